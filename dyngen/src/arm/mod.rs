@@ -1,0 +1,143 @@
+//! The arm as its file describes it: kinematics, declared symmetries, rotors, limits.
+
+pub mod angle;
+pub mod parameter;
+mod read;
+pub mod sum;
+
+use crate::diagnostic::Diagnostics;
+use crate::exact::rational::Rational;
+pub use angle::Angle;
+pub use parameter::{Parameter, ParameterKind};
+use std::path::Path;
+
+/// The most joints an arm may have.
+pub const MAX_JOINTS: usize = 9;
+
+/// Which Denavit–Hartenberg convention the table follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Convention {
+    /// Frame i at the far end of link i: T = Rz(theta) Tz(d) Tx(a) Rx(alpha).
+    Standard,
+    /// Craig's: frame i on joint i: T = Rx(alpha) Tx(a) Rz(theta) Tz(d).
+    Modified,
+}
+
+/// How a joint moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointKind {
+    /// q is added to theta, rad.
+    Revolute,
+    /// q is added to d, m.
+    Prismatic,
+}
+
+/// One row of the DH table with what else is known of the joint and its link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Revolute or prismatic.
+    pub kind: JointKind,
+    /// Link length, m.
+    pub a: Rational,
+    /// Link twist.
+    pub alpha: Angle,
+    /// Link offset, m; the constant added to q of a prismatic joint.
+    pub d: Rational,
+    /// Joint angle; the constant added to q of a revolute joint.
+    pub theta: Angle,
+    /// Inertial parameters of the link that are declared zero.
+    pub zero: Vec<ParameterKind>,
+    /// Gear ratio; without it the joint has no rotor inertia.
+    pub rotor_ratio: Option<Rational>,
+    /// Lower and upper limit, rad or m.
+    pub position: Option<[f64; 2]>,
+    /// Largest speed, rad/s or m/s.
+    pub velocity: Option<f64>,
+    /// Largest acceleration, rad/s² or m/s².
+    pub acceleration: Option<f64>,
+    /// Largest torque, N·m or N.
+    pub torque: Option<f64>,
+    /// Torque at the joint for each ampere, N·m/A.
+    pub torque_constant: Option<f64>,
+}
+
+/// One entry of a published parameter set: a name and the exact sum of parameters it stands for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grouping {
+    /// The name in the publication.
+    pub name: String,
+    /// The sum, in the order of the parameters.
+    pub terms: Vec<(Parameter, Rational)>,
+}
+
+/// A serial arm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Arm {
+    /// The arm's name.
+    pub name: String,
+    /// The convention of the DH table.
+    pub convention: Convention,
+    /// Gravity in the base frame, m/s².
+    pub gravity: [Rational; 3],
+    /// The joints from the base outwards, 1 to [`MAX_JOINTS`].
+    pub joints: Vec<Joint>,
+    /// A published parameter set, empty where the file has none.
+    pub groupings: Vec<Grouping>,
+}
+
+impl Arm {
+    /// Reads an arm file.
+    ///
+    /// # Errors
+    /// Every error of the file at once, each with its place.
+    pub fn read(path: &Path) -> Result<Arm, Diagnostics> {
+        let name = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| Diagnostics::whole_file(&name, format!("the arm file cannot be read: {e}")))?;
+        Self::parse(&text, &name)
+    }
+
+    /// Reads an arm from text; `file` names it in errors.
+    ///
+    /// # Errors
+    /// Every error of the text at once, each with its place.
+    pub fn parse(text: &str, file: &str) -> Result<Arm, Diagnostics> {
+        read::parse(text, file)
+    }
+
+    /// The number of joints.
+    pub fn dof(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// The parameters that the declared symmetries and missing rotors leave, in order: the set `full`.
+    pub fn kept_parameters(&self) -> Vec<Parameter> {
+        self.all_parameters().into_iter().filter(|p| self.keeps(*p)).collect()
+    }
+
+    /// All eleven parameters of every link, in order.
+    pub fn all_parameters(&self) -> Vec<Parameter> {
+        (0..self.dof()).flat_map(|link| ParameterKind::ALL.map(|kind| Parameter { link, kind })).collect()
+    }
+
+    /// Whether a parameter is neither declared zero nor a rotor inertia of a joint without rotor.
+    pub fn keeps(&self, parameter: Parameter) -> bool {
+        self.joints.get(parameter.link).is_some_and(|joint| match parameter.kind {
+            ParameterKind::Im => joint.rotor_ratio.is_some(),
+            kind => !joint.zero.contains(&kind),
+        })
+    }
+
+    /// Things about the file that are no errors but that its author may not have meant.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        for (i, joint) in self.joints.iter().enumerate() {
+            for (key, angle) in [("alpha", &joint.alpha), ("theta", &joint.theta)] {
+                if let Some(text) = angle.looks_rounded() {
+                    notes.push(format!("joint {}: {key} = {text}", i + 1));
+                }
+            }
+        }
+        notes
+    }
+}

@@ -1,0 +1,382 @@
+//! From TOML to [`Arm`]: the typed description, or every error with its place.
+
+use super::{Angle, Arm, Convention, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind, sum};
+use crate::diagnostic::{Collector, Diagnostics};
+use crate::exact::rational::{self, Rational};
+use num_traits::{Signed, Zero};
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+type Value<'i> = Spanned<DeValue<'i>>;
+
+const ARM_KEYS: [&str; 5] = ["name", "convention", "gravity", "joint", "grouping"];
+const JOINT_KEYS: [&str; 12] = [
+    "kind",
+    "a",
+    "alpha",
+    "d",
+    "theta",
+    "zero",
+    "rotor_ratio",
+    "position",
+    "velocity",
+    "acceleration",
+    "torque",
+    "torque_constant",
+];
+const GROUPING_KEYS: [&str; 2] = ["name", "sum"];
+/// A larger file is no arm.
+const LARGEST_FILE: usize = 1 << 20;
+
+pub(super) fn parse(text: &str, file: &str) -> Result<Arm, Diagnostics> {
+    if text.len() > LARGEST_FILE {
+        return Err(Diagnostics::whole_file(file, "larger than 1 MiB: this is no arm file"));
+    }
+    let mut reader = Reader { errors: Collector::new(file, text) };
+    let (document, errors) = DeTable::parse_recoverable(text);
+    let broken = !errors.is_empty();
+    for error in errors {
+        reader.errors.error(error.span().unwrap_or(0..0), format!("not valid TOML: {}", error.message()));
+    }
+    // A document that does not parse would only add errors about what the parser skipped.
+    let arm = if broken { None } else { reader.arm(document.get_ref()) };
+    reader.errors.finish(arm)
+}
+
+struct Reader<'t> {
+    errors: Collector<'t>,
+}
+
+/// A table with the words that name it in an error.
+struct Table<'d, 'i> {
+    table: &'d DeTable<'i>,
+    span: Range<usize>,
+    place: String,
+}
+
+impl<'t> Reader<'t> {
+    fn arm(&mut self, document: &DeTable<'_>) -> Option<Arm> {
+        let top = Table { table: document, span: 0..0, place: "arm".to_string() };
+        self.unknown_keys(&top, &ARM_KEYS);
+        let name = self.required(&top, "name").and_then(|v| self.text(v, "name"));
+        let convention = self.required(&top, "convention").and_then(|v| self.convention(v));
+        let gravity = self.required(&top, "gravity").and_then(|v| self.gravity(v));
+        let joint_tables = self.tables(&top, "joint");
+        if document.get("joint").is_none() {
+            self.errors.error(
+                0..0,
+                "the arm has no [[joint]]: give one table for each joint, from the base outwards",
+            );
+        } else if joint_tables.len() > MAX_JOINTS {
+            let span = joint_tables[MAX_JOINTS].span.clone();
+            self.errors
+                .error(span, format!("{} joints: an arm may have 1 to {MAX_JOINTS}", joint_tables.len()));
+            return None;
+        }
+        let dof = joint_tables.len();
+        let joints: Vec<Option<Joint>> = joint_tables.iter().map(|t| self.joint(t)).collect();
+        let grouping_tables = self.tables(&top, "grouping");
+        let mut groupings: Vec<Option<Grouping>> = Vec::new();
+        for table in &grouping_tables {
+            let grouping = self.grouping(table, dof, &joints);
+            let earlier = grouping
+                .as_ref()
+                .and_then(|g| groupings.iter().flatten().position(|other: &Grouping| other.name == g.name));
+            if let (Some(at), Some(g)) = (earlier, &grouping) {
+                self.errors.error(
+                    table.span.clone(),
+                    format!("grouping name '{}' is already that of grouping {}", g.name, at + 1),
+                );
+            }
+            groupings.push(grouping);
+        }
+        Some(Arm {
+            name: name?,
+            convention: convention?,
+            gravity: gravity?,
+            joints: joints.into_iter().collect::<Option<_>>()?,
+            groupings: groupings.into_iter().collect::<Option<_>>()?,
+        })
+    }
+
+    fn joint(&mut self, t: &Table<'_, '_>) -> Option<Joint> {
+        self.unknown_keys(t, &JOINT_KEYS);
+        let place = t.place.clone();
+        let kind = self.required(t, "kind").and_then(|v| match v.get_ref().as_str() {
+            Some("revolute") => Some(JointKind::Revolute),
+            Some("prismatic") => Some(JointKind::Prismatic),
+            _ => {
+                let found = describe(v);
+                self.errors.error(
+                    v.span(),
+                    format!("{place}: kind must be \"revolute\" or \"prismatic\", found {found}"),
+                );
+                None
+            }
+        });
+        let a = self.required(t, "a").and_then(|v| self.number(v, &format!("{place}: a"), "m"));
+        let alpha = self.required(t, "alpha").and_then(|v| self.angle(v, &format!("{place}: alpha")));
+        let d = self.required(t, "d").and_then(|v| self.number(v, &format!("{place}: d"), "m"));
+        let theta = self.required(t, "theta").and_then(|v| self.angle(v, &format!("{place}: theta")));
+        let zero = match t.table.get("zero") {
+            Some(v) => self.symmetries(v, &place),
+            None => Some(Vec::new()),
+        };
+        let rotor_ratio = self.optional(t, "rotor_ratio", |r, v| {
+            let ratio = r.number(v, &format!("{place}: rotor_ratio"), "1")?;
+            if ratio.is_zero() {
+                r.errors.error(
+                    v.span(),
+                    format!("{place}: rotor_ratio is zero: leave the key out where the joint has no rotor"),
+                );
+                return None;
+            }
+            Some(ratio)
+        });
+        let position = self.optional(t, "position", |r, v| r.position(v, &place));
+        let mut limit = |key: &str, unit: &str| {
+            self.optional(t, key, |r, v| {
+                let value = r.number(v, &format!("{place}: {key}"), unit)?;
+                if !value.is_positive() {
+                    r.errors.error(v.span(), format!("{place}: {key} must be greater than zero"));
+                    return None;
+                }
+                Some(rational::to_f64(&value))
+            })
+        };
+        let velocity = limit("velocity", "rad/s or m/s");
+        let acceleration = limit("acceleration", "rad/s² or m/s²");
+        let torque = limit("torque", "N·m or N");
+        let torque_constant = limit("torque_constant", "N·m/A or N/A");
+        Some(Joint {
+            kind: kind?,
+            a: a?,
+            alpha: alpha?,
+            d: d?,
+            theta: theta?,
+            zero: zero?,
+            rotor_ratio: rotor_ratio?,
+            position: position?,
+            velocity: velocity?,
+            acceleration: acceleration?,
+            torque: torque?,
+            torque_constant: torque_constant?,
+        })
+    }
+
+    fn symmetries(&mut self, v: &Value<'_>, place: &str) -> Option<Vec<ParameterKind>> {
+        let Some(list) = v.get_ref().as_array() else {
+            self.errors.error(
+                v.span(),
+                format!("{place}: zero must be a list of parameter names, found {}", describe(v)),
+            );
+            return None;
+        };
+        let mut kinds = Vec::new();
+        let mut sound = true;
+        for item in list.iter() {
+            let name = item.get_ref().as_str().unwrap_or("");
+            match ParameterKind::parse(name) {
+                Some(ParameterKind::Im) => {
+                    sound = false;
+                    self.errors.error(item.span(), format!("{place}: Im is no inertial parameter of the link: leave rotor_ratio out where the joint has no rotor"));
+                }
+                Some(kind) if kinds.contains(&kind) => {
+                    sound = false;
+                    self.errors.error(item.span(), format!("{place}: zero names {name} twice"));
+                }
+                Some(kind) => kinds.push(kind),
+                None => {
+                    sound = false;
+                    self.errors.error(item.span(), format!("{place}: zero names {}, which is no parameter: they are m mx my mz Ixx Ixy Ixz Iyy Iyz Izz, without the link's number", describe(item)));
+                }
+            }
+        }
+        sound.then_some(kinds)
+    }
+
+    fn grouping(&mut self, t: &Table<'_, '_>, dof: usize, joints: &[Option<Joint>]) -> Option<Grouping> {
+        self.unknown_keys(t, &GROUPING_KEYS);
+        let place = t.place.clone();
+        let name = self.required(t, "name").and_then(|v| self.text(v, &format!("{place}: name")));
+        let sum = self.required(t, "sum").and_then(|v| {
+            let text = self.text(v, &format!("{place}: sum"))?;
+            match sum::parse_sum(&text) {
+                Ok(terms) => {
+                    let mut sound = true;
+                    for (parameter, _) in &terms {
+                        if let Some(reason) = unusable(*parameter, dof, joints) {
+                            sound = false;
+                            self.errors.error(v.span(), format!("{place}: {parameter} {reason}"));
+                        }
+                    }
+                    sound.then_some(terms)
+                }
+                Err(reason) => {
+                    self.errors.error(v.span(), format!("{place}: sum: {reason}"));
+                    None
+                }
+            }
+        });
+        Some(Grouping { name: name?, terms: sum? })
+    }
+
+    fn convention(&mut self, v: &Value<'_>) -> Option<Convention> {
+        match v.get_ref().as_str() {
+            Some("standard") => Some(Convention::Standard),
+            Some("modified") => Some(Convention::Modified),
+            _ => {
+                self.errors.error(
+                    v.span(),
+                    format!("convention must be \"standard\" or \"modified\", found {}", describe(v)),
+                );
+                None
+            }
+        }
+    }
+
+    fn gravity(&mut self, v: &Value<'_>) -> Option<[Rational; 3]> {
+        let list = v.get_ref().as_array().map(|a| a.iter().collect::<Vec<_>>()).unwrap_or_default();
+        let [x, y, z] = list[..] else {
+            self.errors.error(
+                v.span(),
+                format!("gravity must be three numbers in m/s² in the base frame, found {}", describe(v)),
+            );
+            return None;
+        };
+        let [x, y, z] = [x, y, z].map(|c| self.number(c, "gravity", "m/s²"));
+        Some([x?, y?, z?])
+    }
+
+    fn position(&mut self, v: &Value<'_>, place: &str) -> Option<[f64; 2]> {
+        let list = v.get_ref().as_array().map(|a| a.iter().collect::<Vec<_>>()).unwrap_or_default();
+        let [low, high] = list[..] else {
+            self.errors.error(
+                v.span(),
+                format!("{place}: position must be [lower, upper] in rad or m, found {}", describe(v)),
+            );
+            return None;
+        };
+        let [low, high] = [low, high].map(|c| self.number(c, &format!("{place}: position"), "rad or m"));
+        let (low, high) = (rational::to_f64(&low?), rational::to_f64(&high?));
+        if low >= high {
+            self.errors.error(
+                v.span(),
+                format!("{place}: position: the lower limit {low} is not below the upper limit {high}"),
+            );
+            return None;
+        }
+        Some([low, high])
+    }
+
+    fn angle(&mut self, v: &Value<'_>, quantity: &str) -> Option<Angle> {
+        if let Some(text) = v.get_ref().as_str() {
+            return Angle::parse(text)
+                .map_err(|e| self.errors.error(v.span(), format!("{quantity}: {e}")))
+                .ok();
+        }
+        self.number(v, quantity, "rad, or text such as \"pi/2\"").map(Angle::from_radians)
+    }
+
+    fn number(&mut self, v: &Value<'_>, quantity: &str, unit: &str) -> Option<Rational> {
+        let parsed = match v.get_ref() {
+            DeValue::Integer(i) if i.radix() == 10 => rational::parse_rational(i.as_str()),
+            DeValue::Float(f) => rational::parse_rational(f.as_str()),
+            _ => Err(format!("found {}", describe(v))),
+        };
+        parsed
+            .map_err(|e| {
+                self.errors.error(v.span(), format!("{quantity} must be a finite number ({unit}): {e}"))
+            })
+            .ok()
+    }
+
+    fn text(&mut self, v: &Value<'_>, quantity: &str) -> Option<String> {
+        match v.get_ref().as_str() {
+            Some(text) if !text.trim().is_empty() => Some(text.to_string()),
+            _ => {
+                self.errors.error(
+                    v.span(),
+                    format!("{quantity} must be text that is not empty, found {}", describe(v)),
+                );
+                None
+            }
+        }
+    }
+
+    fn required<'d, 'i>(&mut self, t: &Table<'d, 'i>, key: &str) -> Option<&'d Value<'i>> {
+        let value = t.table.get(key);
+        if value.is_none() {
+            self.errors.error(t.span.clone(), format!("{}: the key '{key}' is missing", t.place));
+        }
+        value
+    }
+
+    /// `Some(None)` where the key is absent, `None` where its value is wrong.
+    fn optional<T>(
+        &mut self,
+        t: &Table<'_, '_>,
+        key: &str,
+        read: impl FnOnce(&mut Self, &Value<'_>) -> Option<T>,
+    ) -> Option<Option<T>> {
+        match t.table.get(key) {
+            Some(value) => read(self, value).map(Some),
+            None => Some(None),
+        }
+    }
+
+    fn tables<'d, 'i>(&mut self, t: &Table<'d, 'i>, key: &str) -> Vec<Table<'d, 'i>> {
+        let Some(value) = t.table.get(key) else { return Vec::new() };
+        let Some(list) = value.get_ref().as_array() else {
+            self.errors.error(value.span(), format!("{key} must be a list of tables: write [[{key}]]"));
+            return Vec::new();
+        };
+        let mut tables = Vec::new();
+        for (i, item) in list.iter().enumerate() {
+            match item.get_ref().as_table() {
+                Some(table) => {
+                    tables.push(Table { table, span: item.span(), place: format!("{key} {}", i + 1) })
+                }
+                None => self
+                    .errors
+                    .error(item.span(), format!("{key} {} must be a table: write [[{key}]]", i + 1)),
+            }
+        }
+        tables
+    }
+
+    fn unknown_keys(&mut self, t: &Table<'_, '_>, known: &[&str]) {
+        for (key, _) in t.table.iter() {
+            if !known.contains(&key.get_ref().as_ref()) {
+                let message =
+                    format!("{}: unknown key '{}': known are {}", t.place, key.get_ref(), known.join(", "));
+                self.errors.error(key.span(), message);
+            }
+        }
+    }
+}
+
+fn unusable(parameter: Parameter, dof: usize, joints: &[Option<Joint>]) -> Option<String> {
+    if parameter.link >= dof {
+        return Some(format!("names link {} of an arm with {dof}", parameter.link + 1));
+    }
+    let joint = joints[parameter.link].as_ref()?;
+    if parameter.kind == ParameterKind::Im {
+        return joint
+            .rotor_ratio
+            .is_none()
+            .then(|| "is a rotor inertia, but its joint has no rotor_ratio".to_string());
+    }
+    joint.zero.contains(&parameter.kind).then(|| "is declared zero by its joint".to_string())
+}
+
+fn describe(v: &Value<'_>) -> String {
+    match v.get_ref() {
+        DeValue::String(s) => format!("\"{s}\""),
+        DeValue::Integer(i) => i.to_string(),
+        DeValue::Float(f) => f.to_string(),
+        DeValue::Array(a) => format!("a list of {}", a.iter().count()),
+        other => format!("a value of type {}", other.type_str()),
+    }
+}

@@ -1,0 +1,2 @@
+//! The `dyngen` command.
+fn main() {}

@@ -1,0 +1,2 @@
+//! The `powerball` command.
+fn main() {}
