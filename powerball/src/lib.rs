@@ -1,1 +1,4 @@
-//! The runtime crate.
+//! The runtime of an arm: friction, filters, identification and the residual loop.
+#![cfg_attr(not(feature = "std"), no_std)]
+
+pub mod friction;
