@@ -13,6 +13,9 @@ use num_traits::{One, Signed, Zero};
 /// A polynomial in the symbols.
 pub type Numerator = Polynomial<Rational>;
 
+/// A coefficient and the powers of symbols it multiplies: (symbol, its sine?, exponent).
+pub type Factors = (Rational, Vec<(usize, bool, u8)>);
+
 /// A constant of the arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Constant {
@@ -28,6 +31,8 @@ pub struct ConstantField {
     symbols: Vec<(Numerator, Numerator)>,
     /// For each ring variable: its text, value, and whether it is a root (so that −root is its conjugate).
     variables: Vec<(String, f64, bool)>,
+    /// For each ring variable, the symbol whose sine (`true`) or cosine it is.
+    origins: Vec<(usize, bool)>,
     /// For each ring variable, its value modulo the prime.
     modular: Vec<Fp>,
 }
@@ -38,6 +43,7 @@ impl ConstantField {
         let mut squares = Vec::new();
         let mut variables = Vec::new();
         let mut modular = Vec::new();
+        let mut origins = Vec::new();
         for (index, angle) in angles.angles.iter().enumerate() {
             let (sin, cos) = angle.sin_cos();
             let (sin_p, cos_p) = angles.modular(index, draws);
@@ -49,16 +55,19 @@ impl ConstantField {
                     variables.push((format!("sin({angle})"), sin, false));
                     variables.push((format!("cos({angle})"), cos, false));
                     modular.extend([sin_p, cos_p]);
+                    origins.extend([(index, true), (index, false)]);
                 }
                 SymbolKind::Eighth => {
                     squares.push(root(1, 2));
                     variables.push((format!("sin({angle})"), sin, true));
                     modular.push(sin_p);
+                    origins.push((index, true));
                 }
                 SymbolKind::Twelfth => {
                     squares.push(root(3, 4));
                     variables.push((format!("cos({angle})"), cos, true));
                     modular.push(cos_p);
+                    origins.push((index, false));
                 }
             }
         }
@@ -80,7 +89,7 @@ impl ConstantField {
                 }
             })
             .collect();
-        ConstantField { ring, symbols, variables, modular }
+        ConstantField { ring, symbols, variables, origins, modular }
     }
 
     /// The ring of numerators.
@@ -194,6 +203,15 @@ impl ConstantField {
             }
         }
         Constant { numerator, denominator }
+    }
+
+    /// Numerator and denominator as sums of coefficient times powers of (symbol, sine?, exponent).
+    pub fn factors(&self, a: &Constant) -> (Vec<Factors>, Vec<Factors>) {
+        let split = |n: &Numerator| {
+            let powers = |m: &Monomial| m.powers().map(|(v, e)| (self.origins[v].0, self.origins[v].1, e)).collect();
+            n.terms().iter().map(|(m, c)| (c.clone(), powers(m))).collect()
+        };
+        (split(&a.numerator), split(&a.denominator))
     }
 
     /// A row of constants multiplied by a common denominator.
