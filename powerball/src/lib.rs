@@ -2,3 +2,5 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 
 pub mod friction;
+#[cfg(feature = "std")]
+pub mod report;
