@@ -4,3 +4,5 @@
 pub mod friction;
 #[cfg(feature = "std")]
 pub mod report;
+#[cfg(feature = "std")]
+pub mod virtual_arm;

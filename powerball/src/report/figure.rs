@@ -177,7 +177,7 @@ impl Figure {
             let (class, sample) = (ink.class(), y - 4.0);
             let _ = match mark {
                 Mark::Points => {
-                    write!(out, "<path class=\"d {class}\" d=\"M{:.1} {sample:.1}h0\"/>", x + 10.0)
+                    write!(out, "<path class=\"d big {class}\" d=\"M{:.1} {sample:.1}h0\"/>", x + 10.0)
                 }
                 Mark::Line => write!(out, "<path class=\"k {class}\" d=\"M{x:.1} {sample:.1}h20\"/>"),
                 Mark::Dashed => write!(out, "<path class=\"k dash {class}\" d=\"M{x:.1} {sample:.1}h20\"/>"),
