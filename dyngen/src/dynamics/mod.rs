@@ -1,0 +1,4 @@
+//! Kinematics, the Lagrangian (exact), and the recursions that are emitted (graph).
+
+pub mod elements;
+pub mod lagrangian;
