@@ -1,6 +1,8 @@
 //! The virtual arm's numeric dynamics against references that share nothing with them: stored numbers of another
 //! library, Lagrange's equations of an energy written from homogeneous transforms, and conservation of energy.
 
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 use dyngen::Arm;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 use powerball::virtual_arm::{Body, Chain, Dynamics};

@@ -3,6 +3,8 @@
 
 pub mod friction;
 #[cfg(feature = "std")]
+pub mod motion;
+#[cfg(feature = "std")]
 pub mod report;
 #[cfg(feature = "std")]
 pub mod virtual_arm;

@@ -5,7 +5,12 @@
 mod body;
 mod chain;
 mod dynamics;
+mod effect;
+pub mod lwa4p;
+mod plant;
 
 pub use body::{Body, PER_LINK, bodies};
 pub use chain::{Chain, Row};
 pub use dynamics::{Dynamics, solve_positive_definite};
+pub use effect::{Effect, Instant, State};
+pub use plant::{Plant, Recording, Sensors};
