@@ -8,10 +8,15 @@ use super::polynomial::{Monomial, Polynomial, PolynomialRing, Square};
 use super::prime::{Draws, Fp};
 use super::rational::{self, Rational};
 use super::symbols::{AngleSymbols, SymbolKind};
+use super::gcd;
 use num_traits::{One, Signed, Zero};
+use std::collections::BTreeMap;
 
 /// A polynomial in the symbols.
 pub type Numerator = Polynomial<Rational>;
+
+/// A coefficient and the powers of symbols it multiplies: (symbol, its sine?, exponent).
+pub type Factors = (Rational, Vec<(usize, bool, u8)>);
 
 /// A constant of the arm.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,8 +31,11 @@ pub struct ConstantField {
     ring: PolynomialRing<Rational>,
     /// For each symbol, its sine and cosine as elements.
     symbols: Vec<(Numerator, Numerator)>,
-    /// For each ring variable: its text, value, and whether it is a root (so that −root is its conjugate).
+    /// For each ring variable: its text, value, and whether its negative is its conjugate (a sine over its cosine, or a
+    /// root).
     variables: Vec<(String, f64, bool)>,
+    /// For each ring variable, the symbol whose sine (`true`) or cosine it is.
+    origins: Vec<(usize, bool)>,
     /// For each ring variable, its value modulo the prime.
     modular: Vec<Fp>,
 }
@@ -38,6 +46,7 @@ impl ConstantField {
         let mut squares = Vec::new();
         let mut variables = Vec::new();
         let mut modular = Vec::new();
+        let mut origins = Vec::new();
         for (index, angle) in angles.angles.iter().enumerate() {
             let (sin, cos) = angle.sin_cos();
             let (sin_p, cos_p) = angles.modular(index, draws);
@@ -46,19 +55,22 @@ impl ConstantField {
                 SymbolKind::General => {
                     squares.push(Square::OneMinusSquare(squares.len() + 1));
                     squares.push(Square::Free);
-                    variables.push((format!("sin({angle})"), sin, false));
+                    variables.push((format!("sin({angle})"), sin, true));
                     variables.push((format!("cos({angle})"), cos, false));
                     modular.extend([sin_p, cos_p]);
+                    origins.extend([(index, true), (index, false)]);
                 }
                 SymbolKind::Eighth => {
                     squares.push(root(1, 2));
                     variables.push((format!("sin({angle})"), sin, true));
                     modular.push(sin_p);
+                    origins.push((index, true));
                 }
                 SymbolKind::Twelfth => {
                     squares.push(root(3, 4));
                     variables.push((format!("cos({angle})"), cos, true));
                     modular.push(cos_p);
+                    origins.push((index, false));
                 }
             }
         }
@@ -80,7 +92,7 @@ impl ConstantField {
                 }
             })
             .collect();
-        ConstantField { ring, symbols, variables, modular }
+        ConstantField { ring, symbols, variables, origins, modular }
     }
 
     /// The ring of numerators.
@@ -169,31 +181,73 @@ impl ConstantField {
         Some(self.normal(numerator, self.ring.mul(&a.denominator, &b.numerator)))
     }
 
-    /// The denominator becomes 1 wherever it is a rational or built of roots, and where it divides evenly.
+    /// Lowest terms: no root and no sine in the denominator, no common factor, and its leading coefficient 1.
     fn normal(&self, mut numerator: Numerator, mut denominator: Numerator) -> Constant {
         if numerator.terms().is_empty() {
             return self.whole(numerator);
         }
-        for (variable, (_, _, root)) in self.variables.iter().enumerate() {
-            if *root && denominator.terms().iter().any(|(m, _)| m.exponent(variable) > 0) {
+        for (variable, (_, _, conjugates)) in self.variables.iter().enumerate() {
+            if *conjugates && denominator.terms().iter().any(|(m, _)| m.exponent(variable) > 0) {
                 let conjugate = self.conjugate(&denominator, variable);
                 numerator = self.ring.mul(&numerator, &conjugate);
                 denominator = self.ring.mul(&denominator, &conjugate);
             }
         }
-        if let Some((_, lead)) = denominator.terms().first() {
-            // Scale so that the leading coefficient is 1: equal fractions of this kind print alike.
+        if denominator.terms().iter().any(|(m, _)| *m != Monomial::default()) {
+            let parts = self.by_conjugating_part(&numerator);
+            let common = parts.iter().fold(denominator.clone(), |g, part| gcd::gcd(&self.ring, &g, part));
+            // The factor divides every part, so it divides the whole.
+            let reduced = self.divide_parts(&numerator, &common);
+            if let (Some(n), Some(d)) = (reduced, gcd::exact_quotient(&self.ring, &denominator, &common)) {
+                (numerator, denominator) = (n, d);
+            }
+        }
+        if let Some((_, lead)) = denominator.terms().last() {
             let scale = self.ring.constant(lead.recip());
             numerator = self.ring.mul(&numerator, &scale);
             denominator = self.ring.mul(&denominator, &scale);
         }
-        if let Some((_, top)) = numerator.terms().first() {
-            let multiple = self.ring.mul(&denominator, &self.ring.constant(top.clone()));
-            if multiple == numerator {
-                return self.rational(top.clone());
-            }
-        }
         Constant { numerator, denominator }
+    }
+
+    /// The variables of a monomial that have conjugates: sines and roots.
+    fn conjugating_part(&self, monomial: &Monomial) -> Monomial {
+        let powers = monomial.powers().filter(|(v, _)| self.variables[*v].2);
+        powers.fold(Monomial::default(), |m, (v, e)| m.with(v, e))
+    }
+
+    /// The polynomials in the cosines that stand before each product of sines and roots.
+    fn by_conjugating_part(&self, a: &Numerator) -> Vec<Numerator> {
+        self.split(a).into_values().collect()
+    }
+
+    fn split(&self, a: &Numerator) -> BTreeMap<Monomial, Numerator> {
+        let mut parts: BTreeMap<Monomial, Numerator> = BTreeMap::new();
+        for (monomial, coefficient) in a.terms() {
+            let part = self.conjugating_part(monomial);
+            let rest = part.powers().fold(*monomial, |m, (v, _)| m.with(v, 0));
+            let entry = parts.entry(part).or_insert_with(|| self.ring.integer(0));
+            *entry = self.ring.add(entry, &self.ring.term(rest, coefficient.clone()));
+        }
+        parts
+    }
+
+    fn divide_parts(&self, a: &Numerator, divisor: &Numerator) -> Option<Numerator> {
+        let mut sum = self.ring.integer(0);
+        for (part, polynomial) in self.split(a) {
+            let quotient = gcd::exact_quotient(&self.ring, &polynomial, divisor)?;
+            sum = self.ring.add(&sum, &self.ring.mul(&self.ring.term(part, Rational::one()), &quotient));
+        }
+        Some(sum)
+    }
+
+    /// Numerator and denominator as sums of coefficient times powers of (symbol, sine?, exponent).
+    pub fn factors(&self, a: &Constant) -> (Vec<Factors>, Vec<Factors>) {
+        let split = |n: &Numerator| {
+            let powers = |m: &Monomial| m.powers().map(|(v, e)| (self.origins[v].0, self.origins[v].1, e)).collect();
+            n.terms().iter().map(|(m, c)| (c.clone(), powers(m))).collect()
+        };
+        (split(&a.numerator), split(&a.denominator))
     }
 
     /// A row of constants multiplied by a common denominator.
@@ -213,18 +267,11 @@ impl ConstantField {
     }
 
     fn conjugate(&self, a: &Numerator, variable: usize) -> Numerator {
-        let mut sum = self.ring.integer(0);
-        for (monomial, coefficient) in a.terms() {
-            let mut term = self.ring.constant(coefficient.clone());
-            for (v, e) in monomial.powers() {
-                let factor = self.ring.variable(v);
-                for _ in 0..e {
-                    term = self.ring.mul(&term, &if v == variable { self.ring.neg(&factor) } else { factor.clone() });
-                }
-            }
-            sum = self.ring.add(&sum, &term);
-        }
-        sum
+        let term = |(m, c): &(Monomial, Rational)| {
+            let odd = m.exponent(variable) % 2 == 1;
+            self.ring.term(*m, if odd { -c.clone() } else { c.clone() })
+        };
+        a.terms().iter().fold(self.ring.integer(0), |sum, t| self.ring.add(&sum, &term(t)))
     }
 
     /// The text of a constant: `-49/400`, `1/2*cos(0.3)`.

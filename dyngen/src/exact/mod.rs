@@ -4,6 +4,7 @@ pub mod algebra;
 pub mod angle;
 pub mod constant;
 pub mod elimination;
+pub mod gcd;
 pub mod jet;
 pub mod polynomial;
 pub mod prime;

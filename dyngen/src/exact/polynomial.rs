@@ -110,10 +110,15 @@ where
         Polynomial { terms: vec![(Monomial::default().with(index, 1), C::one())] }
     }
 
+    /// A coefficient times a monomial that is in normal form.
+    pub fn term(&self, monomial: Monomial, coefficient: C) -> Polynomial<C> {
+        let terms = if coefficient.is_zero() { vec![] } else { vec![(monomial, coefficient)] };
+        Polynomial { terms }
+    }
+
     /// A constant.
     pub fn constant(&self, value: C) -> Polynomial<C> {
-        let terms = if value.is_zero() { vec![] } else { vec![(Monomial::default(), value)] };
-        Polynomial { terms }
+        self.term(Monomial::default(), value)
     }
 
     /// Puts a monomial into normal form and appends what it becomes.
