@@ -3,3 +3,9 @@
 
 pub mod friction;
 pub mod model;
+#[cfg(feature = "std")]
+pub mod motion;
+#[cfg(feature = "std")]
+pub mod report;
+#[cfg(feature = "std")]
+pub mod virtual_arm;
