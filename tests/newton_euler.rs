@@ -1,5 +1,7 @@
 //! What is evaluated and what is compiled agree with a numeric Newton–Euler that shares no code with the generator.
 
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 use dyngen::arm::{Arm, ParameterKind};
 use dyngen::{Evaluator, Function, Model, SetKind};
 use powerball::virtual_arm::{Chain, Dynamics, bodies};

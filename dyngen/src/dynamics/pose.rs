@@ -13,14 +13,18 @@ pub fn forward_kinematics(b: &Builder, arm: &ArmElements<Expr>) -> Vec<Expr> {
     let mut columns = [unit(0), unit(1), unit(2)];
     let mut point = [Expr::ZERO; 3];
     for joint in arm.joints.iter().rev() {
-        let steps: [fn(&Builder, &JointElements<Expr>, &mut Vector, bool); 2] = match arm.convention {
-            Convention::Standard => [back_x, back_z],
-            Convention::Modified => [back_z, back_x],
+        let back = |v: &mut Vector, is_point: bool| match arm.convention {
+            Convention::Standard => {
+                back_x(b, joint, v, is_point);
+                back_z(b, joint, v, is_point);
+            }
+            Convention::Modified => {
+                back_z(b, joint, v, is_point);
+                back_x(b, joint, v, is_point);
+            }
         };
-        for step in steps {
-            columns.iter_mut().for_each(|c| step(b, joint, c, false));
-            step(b, joint, &mut point, true);
-        }
+        columns.iter_mut().for_each(|c| back(c, false));
+        back(&mut point, true);
     }
     let mut rows = Vec::with_capacity(16);
     for i in 0..3 {
