@@ -65,7 +65,7 @@ fn a_wrong_result_anywhere_is_noticed() {
         assert!(check(&built).is_ok());
         for k in 0..built.outputs.len() {
             let mut wrong = built.clone();
-            wrong.outputs[k] = if built.outputs[k] == Expr::ZERO { Expr::ONE } else { -built.outputs[k] };
+            wrong.outputs[k] = if built.outputs[k] == Expr::ONE { Expr::ZERO } else { Expr::ONE };
             let found = check(&wrong).unwrap_err();
             assert_eq!(found.entry, (k / built.shape.1, k % built.shape.1), "{function}");
         }

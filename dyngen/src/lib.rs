@@ -17,5 +17,5 @@ pub use base::{ParameterSet, SetKind};
 pub use config::{Config, GenerateError};
 pub use diagnostic::{Diagnostic, Diagnostics};
 pub use dynamics::Function;
-pub use evaluator::Evaluator;
+pub use evaluator::{Evaluator, Samples};
 pub use model::{Error, Model};

@@ -3,7 +3,7 @@
 use super::docs;
 use crate::arm::{Arm, JointKind};
 use crate::base::ParameterSet;
-use crate::dynamics::function::trig_offset;
+use crate::dynamics::function::{Argument, trig_offset};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::rational;
 use crate::graph::{Expr, Input, Node};
@@ -25,7 +25,7 @@ pub(super) fn function(model: &Model, set: &ParameterSet, built: &FunctionGraph)
         })
         .collect();
     let name = Ident::new(function.name(), Span::call_site());
-    let doc = docs::lines(&docs::function(arm, set, built));
+    let doc = docs::lines(&docs::function(built));
     let (signature, bindings) = arguments(arm, set, function, &used);
     let trigonometry = trigonometry(arm, &used);
     let statements = needed.iter().filter_map(|n| statement(model, built, *n));
@@ -50,28 +50,26 @@ fn arguments(
     used: &BTreeSet<Input>,
 ) -> (Vec<TokenStream>, Vec<TokenStream>) {
     let n = arm.dof();
-    type Wanted = fn(usize) -> Vec<Input>;
-    let position: Wanted = |i| vec![Input::Sin(i), Input::Cos(i), Input::Position(i)];
-    let mut given: Vec<(&str, usize, Wanted)> = vec![("q", n, position)];
-    if function.takes_speeds() {
-        given.push(("dq", n, |i| vec![Input::Speed(i)]));
-    }
-    if function.takes_accelerations() {
-        given.push(("ddq", n, |i| vec![Input::Acceleration(i)]));
-    }
-    if function.takes_torques() {
-        given.push(("tau", n, |i| vec![Input::Torque(i)]));
-    }
-    if function.takes_parameters() {
-        given.push(("parameters", set.parameters.len(), |i| vec![Input::Parameter(i)]));
-    }
+    let inputs = |argument: Argument, i: usize| match argument {
+        Argument::Positions => vec![Input::Sin(i), Input::Cos(i), Input::Position(i)],
+        Argument::Speeds => vec![Input::Speed(i)],
+        Argument::Accelerations => vec![Input::Acceleration(i)],
+        Argument::ReferenceSpeeds => vec![Input::ReferenceSpeed(i)],
+        Argument::ReferenceAccelerations => vec![Input::ReferenceAcceleration(i)],
+        Argument::Torques => vec![Input::Torque(i)],
+        Argument::Errors => vec![Input::Error(i)],
+        Argument::Parameters => vec![Input::Parameter(i)],
+    };
     let (mut signature, mut bindings) = (Vec::new(), Vec::new());
-    for (name, length, inputs) in given {
+    for argument in function.arguments() {
+        let name = argument.name();
+        let is_parameters = *argument == Argument::Parameters;
+        let length = if is_parameters { set.parameters.len() } else { n };
         let names: Vec<TokenStream> = (0..length)
             .map(|i| {
-                let wanted = inputs(i);
+                let wanted = inputs(*argument, i);
                 if wanted.iter().any(|input| used.contains(input)) {
-                    let element = if name == "parameters" { "p" } else { name };
+                    let element = if is_parameters { "p" } else { name };
                     let ident = format_ident!("{element}{}", i + 1);
                     quote!(#ident)
                 } else {
@@ -79,7 +77,7 @@ fn arguments(
                 }
             })
             .collect();
-        let length = if name == "parameters" { quote!(PARAMETERS) } else { quote!(JOINTS) };
+        let length = if is_parameters { quote!(PARAMETERS) } else { quote!(JOINTS) };
         let any = names.iter().any(|n| n.to_string() != "_");
         let ident = Ident::new(&if any { name.to_string() } else { format!("_{name}") }, Span::call_site());
         signature.push(quote!(#ident: &SVector<T, #length>));
@@ -157,6 +155,9 @@ fn value_name(built: &FunctionGraph, node: usize) -> Ident {
             Input::Speed(i) => format_ident!("dq{}", i + 1),
             Input::Acceleration(i) => format_ident!("ddq{}", i + 1),
             Input::Torque(i) => format_ident!("tau{}", i + 1),
+            Input::ReferenceSpeed(i) => format_ident!("dqr{}", i + 1),
+            Input::ReferenceAcceleration(i) => format_ident!("ddqr{}", i + 1),
+            Input::Error(i) => format_ident!("e{}", i + 1),
             Input::Parameter(i) => format_ident!("p{}", i + 1),
         },
         _ => format_ident!("x{node}"),
@@ -177,11 +178,19 @@ fn result(built: &FunctionGraph) -> (TokenStream, TokenStream) {
             quote!([#(#column),*])
         })
         .collect();
-    let result = match built.function {
-        Function::Regressor => quote!(SMatrix<T, JOINTS, PARAMETERS>),
-        Function::ForwardKinematics => quote!(SMatrix<T, 4, 4>),
-        _ if columns == 1 => quote!(SVector<T, JOINTS>),
-        _ => quote!(SMatrix<T, JOINTS, JOINTS>),
+    if built.shape == (1, 1) {
+        let value = value(0, 0);
+        return (quote!(T), value);
+    }
+    let size = |length: usize| match length {
+        _ if length == built.joints => quote!(JOINTS),
+        _ if length == built.parameters => quote!(PARAMETERS),
+        _ => {
+            let length = Literal::usize_unsuffixed(length);
+            quote!(#length)
+        }
     };
+    let (n, m) = (size(rows), size(columns));
+    let result = if columns == 1 { quote!(SVector<T, #n>) } else { quote!(SMatrix<T, #n, #m>) };
     (result, quote!(SMatrix::from_array_storage(ArrayStorage([#(#columns_of),*]))))
 }
