@@ -6,7 +6,7 @@ use crate::base::ParameterSet;
 use crate::dynamics::function::{Argument, trig_offset};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::rational;
-use crate::graph::{Expr, Input, Node};
+use crate::graph::{Expr, Input, Node, operands};
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
@@ -28,7 +28,7 @@ pub(super) fn function(model: &Model, set: &ParameterSet, built: &FunctionGraph)
     let doc = docs::lines(&docs::function(built));
     let (signature, bindings) = arguments(arm, set, function, &used);
     let trigonometry = trigonometry(arm, &used);
-    let statements = needed.iter().filter_map(|n| statement(model, built, *n));
+    let statements = sections(model, built, &needed);
     let (result, value) = result(built);
     quote! {
         #(#[doc = #doc])*
@@ -114,6 +114,44 @@ fn trigonometry(arm: &Arm, used: &BTreeSet<Input>) -> Vec<TokenStream> {
         }
     }
     lines
+}
+
+/// Nodes in one block of code.
+const SECTION: usize = 256;
+
+/// The body, in blocks that hand on only what later ones need. Every `let` opens a scope within the one before, and a
+/// compiler that writes debug information goes through nested scopes by recursion: thousands of them in a row
+/// exhaust its stack.
+fn sections(model: &Model, built: &FunctionGraph, needed: &[usize]) -> Vec<TokenStream> {
+    let computed: Vec<usize> =
+        needed.iter().copied().filter(|n| !matches!(built.graph.nodes()[*n], Node::Input(_))).collect();
+    let statement = |n: &usize| statement(model, built, *n);
+    if computed.len() <= 2 * SECTION {
+        return computed.iter().filter_map(statement).collect();
+    }
+    let mut last_use = vec![0; built.graph.nodes().len()];
+    for (position, node) in computed.iter().enumerate() {
+        for operand in operands(&built.graph.nodes()[*node]) {
+            last_use[operand.node()] = position;
+        }
+    }
+    for output in &built.outputs {
+        last_use[output.node()] = usize::MAX;
+    }
+    let mut blocks = Vec::new();
+    for (k, section) in computed.chunks(SECTION).enumerate() {
+        let end = (k + 1) * SECTION;
+        let handed_on = section.iter().filter(|n| last_use[**n] >= end).map(|n| value_name(built, *n));
+        let names: Vec<Ident> = handed_on.collect();
+        let statements = section.iter().filter_map(statement);
+        blocks.push(quote! {
+            let (#(#names,)*) = {
+                #(#statements)*
+                (#(#names,)*)
+            };
+        });
+    }
+    blocks
 }
 
 /// The `let` of a node; inputs are bound already.
