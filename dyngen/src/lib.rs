@@ -10,6 +10,7 @@ mod evaluator;
 pub mod exact;
 pub mod graph;
 mod model;
+pub mod optimize;
 pub mod prove;
 
 pub use arm::Arm;

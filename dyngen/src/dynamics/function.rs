@@ -8,9 +8,11 @@ use crate::arm::Arm;
 use crate::base::ParameterSet;
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
+use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::differentiate::{self, Direction};
 use crate::graph::{Builder, Expr, Graph, Input};
+use crate::optimize;
 use std::fmt;
 
 /// A function of the arm's state.
@@ -246,20 +248,35 @@ pub struct FunctionGraph {
     pub joints: usize,
     /// Number of parameters of the set.
     pub parameters: usize,
+    /// Whether the parameters' values are constants of the graph.
+    pub baked: bool,
 }
 
-/// Builds a function of an arm for a parameter set.
+impl FunctionGraph {
+    /// What it takes: the function's arguments, without the parameters where their values are baked in.
+    pub fn arguments(&self) -> impl Iterator<Item = Argument> + '_ {
+        let baked = self.baked;
+        self.function.arguments().iter().copied().filter(move |a| !(baked && *a == Argument::Parameters))
+    }
+}
+
+/// Builds a function of an arm for a parameter set, with its parameters as inputs or their values baked in.
 pub fn build(
     function: Function,
     arm: &Arm,
     symbols: &AngleSymbols,
     set: &ParameterSet,
     field: &ConstantField,
+    baked: Option<&[Rational]>,
 ) -> FunctionGraph {
     let b = Builder::new();
+    let value = |i: usize| match baked {
+        Some(values) => b.constant(&values[i]),
+        None => b.input(Input::Parameter(i)),
+    };
     let n = arm.dof();
     let elements = ArmElements::build(&b, arm, symbols, &mut Inputs { b: &b, arm });
-    let links = links(&b, arm, set, field);
+    let links = links(&b, arm, set, field, value);
     let input = |of: fn(usize) -> Input| -> Vec<Expr> { (0..n).map(|i| b.input(of(i))).collect() };
     let none = vec![Expr::ZERO; n];
     let torque = |accelerations: &[Expr], gravity: bool| {
@@ -313,7 +330,7 @@ pub fn build(
         Function::KineticEnergy => vec![momentum::kinetic_energy(&b, &elements, &links)],
         Function::PotentialEnergy => {
             let row = energy::potential_regressor(&b, arm, &elements, set, field);
-            let term = |(i, column): (usize, &Expr)| b.mul(column, &b.input(Input::Parameter(i)));
+            let term = |(i, column): (usize, &Expr)| b.mul(column, &value(i));
             let terms: Vec<Expr> = row.iter().enumerate().map(term).collect();
             vec![terms.iter().fold(Expr::ZERO, |sum, t| b.add(&sum, t))]
         }
@@ -324,14 +341,9 @@ pub fn build(
         Function::TorqueBySpeed => derivatives(Direction::Speed),
     };
     let parameters = set.parameters.len();
-    FunctionGraph {
-        function,
-        graph: b.finish(),
-        outputs,
-        shape: function.shape(n, parameters),
-        joints: n,
-        parameters,
-    }
+    let (graph, outputs) = optimize::optimize(b.finish(), outputs, field);
+    let shape = function.shape(n, parameters);
+    FunctionGraph { function, graph, outputs, shape, joints: n, parameters, baked: baked.is_some() }
 }
 
 /// The arm's quantities as inputs and constants of a graph.

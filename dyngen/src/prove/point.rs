@@ -6,6 +6,7 @@ use crate::base::sets::{Combination, ParameterSet, Sets};
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;
 use crate::exact::prime::{Draws, Fp};
+use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::{Input, evaluate};
 
@@ -69,6 +70,20 @@ impl<'a> Point<'a> {
             errors: self.errors.clone(),
             values: self.values.clone(),
             ..*self
+        }
+    }
+
+    /// Sets the parameters' values so that a set's sums have given values: each on its carriers.
+    pub(super) fn carry(&mut self, set: &ParameterSet, values: &[Rational]) {
+        self.values.iter_mut().for_each(|(_, value)| *value = Fp::ZERO);
+        for (parameter, sum) in set.parameters.iter().zip(values) {
+            let sum = Fp::from_rational(sum).unwrap_or(Fp::ZERO);
+            for (carrier, factor) in &parameter.carriers {
+                let factor = self.sets.field.modular(factor).unwrap_or(Fp::ZERO);
+                for (_, value) in self.values.iter_mut().filter(|(p, _)| p == carrier) {
+                    *value = *value + factor * sum;
+                }
+            }
         }
     }
 
