@@ -12,6 +12,7 @@ pub mod graph;
 mod model;
 pub mod optimize;
 pub mod prove;
+mod values;
 
 pub use arm::Arm;
 pub use base::{ParameterSet, SetKind};
@@ -20,3 +21,4 @@ pub use diagnostic::{Diagnostic, Diagnostics};
 pub use dynamics::Function;
 pub use evaluator::{Evaluator, Samples};
 pub use model::{Error, Model};
+pub use values::Values;

@@ -1,9 +1,8 @@
 //! `dyngen eval`.
 
-use super::values::Values;
 use super::{Failure, Set, generate, model, print};
 use dyngen::dynamics::function::Argument;
-use dyngen::{Evaluator, Function, Samples};
+use dyngen::{Evaluator, Function, Samples, Values};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -35,7 +34,9 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let set = model.set(args.parameters.into()).map_err(Failure::refused)?;
     let function = args.function;
     let parameters = match (&args.values, function.takes(Argument::Parameters)) {
-        (Some(path), true) => Values::read(path)?.of_set(&model, set)?,
+        (Some(path), true) => {
+            Values::read(path).and_then(|v| v.of_set(&model, set)).map_err(Failure::input)?
+        }
         (None, true) => {
             return Err(Failure::input(format!(
                 "{function} depends on parameter values: give them with --values FILE.json"

@@ -124,6 +124,14 @@ fn words(function: Function) -> (&'static str, &'static str) {
     }
 }
 
+/// The documentation of a function's variant that takes sines and cosines.
+pub(super) fn function_with(built: &FunctionGraph) -> String {
+    format!(
+        "[`{0}`] with the sines and cosines passed in, so that several calls can share them.",
+        built.function
+    )
+}
+
 /// The documentation of a function.
 pub(super) fn function(built: &FunctionGraph) -> String {
     let (what, returns) = words(built.function);
