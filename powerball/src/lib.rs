@@ -1,6 +1,8 @@
 //! The runtime of an arm: friction, filters, identification and the residual loop.
 #![cfg_attr(not(feature = "std"), no_std)]
 
+#[cfg(feature = "std")]
+pub mod excite;
 pub mod friction;
 #[cfg(feature = "std")]
 pub mod motion;
