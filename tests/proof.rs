@@ -2,13 +2,19 @@
 
 use dyngen::base::SetKind;
 use dyngen::{Function, Model};
-use powerball_workspace::{arm, paper_arm_with_ratios, parse, arm_text};
+use powerball_workspace::{arm, arm_text, paper_arm_with_ratios, parse};
 
 fn prove_all(name: &str, model: &Model) {
     for set in &model.sets().sets {
         for function in Function::ALL {
-            let built = model.function(function, set.kind).unwrap_or_else(|e| panic!("{name} {}: {e}", set.kind));
-            println!("{name:10} {:10} {:20} {:?}", set.kind, function, built.graph.operations(&built.outputs));
+            let built =
+                model.function(function, set.kind).unwrap_or_else(|e| panic!("{name} {}: {e}", set.kind));
+            println!(
+                "{name:10} {:10} {:20} {:?}",
+                set.kind,
+                function,
+                built.graph.operations(&built.outputs)
+            );
         }
     }
 }
@@ -22,7 +28,7 @@ fn every_function_of_every_set_is_proven() {
 
 #[test]
 fn no_rotors() {
-        prove_all("norotor", &Model::derive(paper_arm_with_ratios([None; 6])).unwrap());
+    prove_all("norotor", &Model::derive(paper_arm_with_ratios([None; 6])).unwrap());
 }
 
 #[test]
@@ -35,7 +41,11 @@ fn rotors_on_arms_with_prismatic_joints_and_modified_frames_are_proven() {
 
 #[test]
 fn general_angles_are_proven() {
-    let text = arm_text("ur5e").replacen("\"pi/2\"", "\"pi/3\"", 1).replace("theta = \"0\"", "theta = 0.7").replace("\"-pi/2\"", "0.3").replacen("alpha = \"0\"", "alpha = \"3*pi/4\"", 1);
+    let text = arm_text("ur5e")
+        .replacen("\"pi/2\"", "\"pi/3\"", 1)
+        .replace("theta = \"0\"", "theta = 0.7")
+        .replace("\"-pi/2\"", "0.3")
+        .replacen("alpha = \"0\"", "alpha = \"3*pi/4\"", 1);
     let text = text.replace("gravity = [0, 0, -9.81]", "gravity = [1.5, -2, 9.5]");
     prove_all("general", &Model::derive(parse(&text)).unwrap());
     let text = arm_text("stanford").replace("\"-pi/2\"", "\"pi/5\"");

@@ -4,6 +4,7 @@
 #[cfg(feature = "std")]
 pub mod excite;
 pub mod friction;
+pub mod model;
 #[cfg(feature = "std")]
 pub mod motion;
 #[cfg(feature = "std")]
