@@ -2,3 +2,7 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 
 pub mod friction;
+#[cfg(feature = "std")]
+pub mod log;
+#[cfg(feature = "std")]
+pub mod signal;
