@@ -1,8 +1,18 @@
 //! From a DH table, declared symmetries and a rotor model to the arm's dynamics.
 
 pub mod arm;
+pub mod base;
 pub mod diagnostic;
+pub mod dynamics;
+mod evaluator;
 pub mod exact;
+pub mod graph;
+mod model;
+pub mod prove;
 
 pub use arm::Arm;
+pub use base::{ParameterSet, SetKind};
 pub use diagnostic::{Diagnostic, Diagnostics};
+pub use dynamics::Function;
+pub use evaluator::Evaluator;
+pub use model::{Error, Model};

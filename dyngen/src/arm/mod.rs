@@ -1,13 +1,12 @@
 //! The arm as its file describes it: kinematics, declared symmetries, rotors, limits.
 
-pub mod angle;
 pub mod parameter;
 mod read;
 pub mod sum;
 
 use crate::diagnostic::Diagnostics;
 use crate::exact::rational::Rational;
-pub use angle::Angle;
+pub use crate::exact::angle::Angle;
 pub use parameter::{Parameter, ParameterKind};
 use std::path::Path;
 

@@ -1,6 +1,6 @@
 //! Angles that are exact where the file says so.
 
-use crate::exact::rational::{self, Rational};
+use super::rational::{self, Rational};
 use num_traits::{Signed, Zero};
 use std::f64::consts::PI;
 use std::fmt;

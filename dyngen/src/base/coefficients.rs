@@ -1,0 +1,207 @@
+//! The Lagrangian's exact coefficients: one row for each function of the motion, one column for each parameter.
+
+use crate::arm::{Arm, JointKind, Parameter};
+use crate::dynamics::elements::{ArmElements, Source};
+use crate::dynamics::lagrangian::twice_lagrangian;
+use crate::exact::algebra::Algebra;
+use crate::exact::constant::{ConstantField, Numerator};
+use crate::exact::elimination::SparseRow;
+use crate::exact::polynomial::{Monomial, Polynomial, PolynomialRing, Square};
+use crate::exact::rational::Rational;
+use crate::exact::symbols::AngleSymbols;
+use std::collections::BTreeMap;
+
+/// A variable of the Lagrangian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Variable {
+    Sin,
+    Cos,
+    Position,
+    Speed,
+    A(usize),
+    D(usize),
+    Ratio(usize),
+    Gravity(usize),
+    Symbol(usize, bool),
+}
+
+/// Whether the arm's sizes are numbers or variables beside q.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sizes {
+    /// The numbers in the file.
+    Numbers,
+    /// Every a, d and rotor ratio is a variable: a relation must hold for all of them.
+    Variables,
+}
+
+/// The Lagrangian as integer polynomials: L = ½ Σ column·π.
+#[derive(Clone, Debug)]
+pub struct LagrangianPolynomials {
+    variables: Vec<Variable>,
+    columns: Vec<(usize, Polynomial<i64>)>,
+}
+
+/// Gives every quantity of the arm a variable of the ring.
+struct Variables<'r> {
+    ring: &'r PolynomialRing<i64>,
+    variables: &'r [Variable],
+    /// First variable of each joint's q.
+    joints: &'r [usize],
+}
+
+impl Variables<'_> {
+    fn of(&self, wanted: Variable) -> Polynomial<i64> {
+        let index = self.variables.iter().position(|v| *v == wanted).unwrap_or_default();
+        self.ring.variable(index)
+    }
+}
+
+impl Source<Polynomial<i64>> for Variables<'_> {
+    fn joint_trig(&mut self, joint: usize) -> (Polynomial<i64>, Polynomial<i64>) {
+        let first = self.joints[joint];
+        (self.ring.variable(first), self.ring.variable(first + 1))
+    }
+    fn position(&mut self, joint: usize) -> Polynomial<i64> {
+        self.ring.variable(self.joints[joint])
+    }
+    fn speed(&mut self, joint: usize) -> Polynomial<i64> {
+        let first = self.joints[joint];
+        let width = if self.variables[first] == Variable::Position { 1 } else { 2 };
+        self.ring.variable(first + width)
+    }
+    fn a(&mut self, joint: usize) -> Polynomial<i64> {
+        self.of(Variable::A(joint))
+    }
+    fn d(&mut self, joint: usize) -> Polynomial<i64> {
+        self.of(Variable::D(joint))
+    }
+    fn ratio(&mut self, joint: usize) -> Polynomial<i64> {
+        self.of(Variable::Ratio(joint))
+    }
+    fn gravity(&mut self, axis: usize) -> Polynomial<i64> {
+        self.of(Variable::Gravity(axis))
+    }
+    fn symbol(&mut self, index: usize, sine: bool) -> Polynomial<i64> {
+        self.of(Variable::Symbol(index, sine))
+    }
+}
+
+impl LagrangianPolynomials {
+    /// Derives the Lagrangian of an arm, for the parameters that it keeps.
+    ///
+    /// The angle of a revolute joint is q + theta: a constant shift of q changes no relation.
+    pub fn derive(arm: &Arm, symbols: &AngleSymbols) -> Self {
+        let mut variables = Vec::new();
+        let mut squares = Vec::new();
+        let mut joints = Vec::new();
+        for joint in &arm.joints {
+            joints.push(variables.len());
+            match joint.kind {
+                JointKind::Revolute => {
+                    squares.push(Square::OneMinusSquare(variables.len() + 1));
+                    variables.extend([Variable::Sin, Variable::Cos]);
+                }
+                JointKind::Prismatic => variables.push(Variable::Position),
+            }
+            variables.push(Variable::Speed);
+            squares.resize(variables.len(), Square::Free);
+        }
+        for i in 0..arm.dof() {
+            variables.extend([Variable::A(i), Variable::D(i), Variable::Ratio(i)]);
+        }
+        variables.extend([0, 1, 2].map(Variable::Gravity));
+        squares.resize(variables.len(), Square::Free);
+        for index in 0..symbols.angles.len() {
+            squares.push(Square::OneMinusSquare(squares.len() + 1));
+            squares.push(Square::Free);
+            variables.extend([Variable::Symbol(index, true), Variable::Symbol(index, false)]);
+        }
+        let ring = PolynomialRing::new(squares);
+        let mut source = Variables { ring: &ring, variables: &variables, joints: &joints };
+        let elements = ArmElements::build(&ring, arm, symbols, &mut source);
+        let all = arm.all_parameters();
+        let columns = (all.into_iter().zip(twice_lagrangian(&ring, &elements)))
+            .filter(|(p, column)| arm.keeps(*p) && !ring.is_zero(column))
+            .map(|(p, column)| (p.index(), column))
+            .collect();
+        LagrangianPolynomials { variables, columns }
+    }
+
+    /// The rows: for each function of q and q̇ (and of the sizes, where they are variables) its coefficient in
+    /// every parameter's column. Constants, which change no torque, are left out; there are no total time
+    /// derivatives, because every other term is of degree 0 or 2 in the speeds.
+    pub fn rows(&self, arm: &Arm, field: &ConstantField, sizes: Sizes) -> Vec<SparseRow> {
+        let mut rows: BTreeMap<Monomial, BTreeMap<usize, Numerator>> = BTreeMap::new();
+        for (column, polynomial) in &self.columns {
+            for (monomial, coefficient) in polynomial.terms() {
+                let (function, factor) = self.split(arm, field, sizes, monomial, *coefficient);
+                if self.is_constant(&function) {
+                    continue;
+                }
+                let entry = rows.entry(function).or_default().entry(*column);
+                let sum = entry.or_insert_with(|| field.ring().integer(0));
+                *sum = field.ring().add(sum, &factor);
+            }
+        }
+        let nonzero = |row: BTreeMap<usize, Numerator>| -> SparseRow {
+            row.into_iter().filter(|(_, value)| !value.terms().is_empty()).collect()
+        };
+        let mut rows: Vec<SparseRow> = rows.into_values().map(nonzero).filter(|r| !r.is_empty()).collect();
+        // Many functions come with the same coefficients; one row of each says all.
+        rows.sort_by(|a, b| row_key(a).cmp(&row_key(b)));
+        rows.dedup();
+        rows
+    }
+
+    /// Whether a function holds neither q nor q̇.
+    fn is_constant(&self, function: &Monomial) -> bool {
+        !function.powers().any(|(v, _)| {
+            matches!(self.variables[v], Variable::Sin | Variable::Cos | Variable::Position | Variable::Speed)
+        })
+    }
+
+    /// Splits a term into the function it multiplies and its constant coefficient.
+    fn split(
+        &self,
+        arm: &Arm,
+        field: &ConstantField,
+        sizes: Sizes,
+        monomial: &Monomial,
+        coefficient: i64,
+    ) -> (Monomial, Numerator) {
+        let mut function = *monomial;
+        let mut factor = field.ring().integer(coefficient);
+        for (v, exponent) in monomial.powers() {
+            let number = |value: &Rational| field.ring().constant(value.clone());
+            let value = match self.variables[v] {
+                Variable::Gravity(axis) => number(&arm.gravity[axis]),
+                Variable::Symbol(index, sine) => field.symbol(index, sine).clone(),
+                Variable::A(i) if sizes == Sizes::Numbers => number(&arm.joints[i].a),
+                Variable::D(i) if sizes == Sizes::Numbers => number(&arm.joints[i].d),
+                Variable::Ratio(i) if sizes == Sizes::Numbers => match &arm.joints[i].rotor_ratio {
+                    Some(ratio) => number(ratio),
+                    None => continue,
+                },
+                _ => continue,
+            };
+            function = function.with(v, 0);
+            for _ in 0..exponent {
+                factor = field.ring().mul(&factor, &value);
+            }
+        }
+        (function, factor)
+    }
+
+    /// The parameters whose columns are not zero.
+    pub fn parameters(&self) -> impl Iterator<Item = Parameter> + '_ {
+        self.columns.iter().map(|(index, _)| Parameter {
+            link: index / 11,
+            kind: crate::arm::ParameterKind::ALL[index % 11],
+        })
+    }
+}
+
+/// An order on rows that equal rows share.
+fn row_key(row: &SparseRow) -> Vec<(usize, Vec<(Monomial, Rational)>)> {
+    row.iter().map(|(c, n)| (*c, n.terms().to_vec())).collect()
+}

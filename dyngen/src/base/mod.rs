@@ -1,0 +1,8 @@
+//! Parameter sets: exact relations, published groupings, the choice of columns, physical possibility.
+
+pub mod coefficients;
+pub mod preference;
+mod published;
+pub mod sets;
+
+pub use sets::{ParameterSet, SetKind, SetParameter};

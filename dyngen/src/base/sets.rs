@@ -1,0 +1,282 @@
+//! The parameter sets of an arm and the exact relations between them.
+
+use super::coefficients::{LagrangianPolynomials, Sizes};
+use super::preference::preference;
+use super::published;
+use crate::arm::sum::sum_text;
+use crate::arm::{Arm, Parameter};
+use crate::exact::constant::{Constant, ConstantField};
+use crate::exact::elimination::{self, Dependence, Unproven};
+use crate::exact::prime::Draws;
+use crate::exact::symbols::AngleSymbols;
+use std::fmt;
+
+/// Which parameter set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum SetKind {
+    /// Every parameter that the declared symmetries leave.
+    Full,
+    /// Exact for the numbers in the file: as many as the rank.
+    Minimal,
+    /// Exact for every size of the arm: lengths and ratios are variables.
+    Symbolic,
+    /// The file's `[[grouping]]`.
+    Published,
+}
+
+impl SetKind {
+    /// All four.
+    pub const ALL: [SetKind; 4] = [SetKind::Full, SetKind::Minimal, SetKind::Symbolic, SetKind::Published];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            SetKind::Full => "full",
+            SetKind::Minimal => "minimal",
+            SetKind::Symbolic => "symbolic",
+            SetKind::Published => "published",
+        }
+    }
+
+    /// The set of that name.
+    pub fn parse(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+}
+
+impl fmt::Display for SetKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A linear combination of the arm's parameters.
+pub type Combination = Vec<(Parameter, Constant)>;
+
+/// One parameter of a set.
+#[derive(Clone, Debug)]
+pub struct SetParameter {
+    /// The sum it stands for as text, or the name in the publication.
+    pub name: String,
+    /// The sum it stands for.
+    pub terms: Combination,
+    /// How it enters the dynamics: the inertial parameters that carry its value when all others are zero.
+    pub carriers: Combination,
+}
+
+/// A parameter set with what is known exactly of it.
+#[derive(Clone, Debug)]
+pub struct ParameterSet {
+    /// Which one.
+    pub kind: SetKind,
+    /// Its parameters, in order.
+    pub parameters: Vec<SetParameter>,
+    /// The rank of its columns for the numbers in the file.
+    pub rank: usize,
+    /// The linear relations that hold between its columns for the numbers in the file, one text each.
+    pub relations: Vec<String>,
+    /// Whether the torque stays the same when all parameters are replaced by the set's sums.
+    pub exact: bool,
+    /// Where it is not exact: the parameters that the sums lose, and why.
+    pub lost: Vec<(Parameter, String)>,
+}
+
+impl ParameterSet {
+    /// The names, in order.
+    pub fn names(&self) -> Vec<String> {
+        self.parameters.iter().map(|p| p.name.clone()).collect()
+    }
+}
+
+/// How well the torques determine a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// Its column is zero.
+    Unidentifiable,
+    /// Its column depends on no other.
+    Alone,
+    /// Only together with others.
+    InCombination,
+}
+
+impl Class {
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Class::Unidentifiable => "unidentifiable",
+            Class::Alone => "identifiable alone",
+            Class::InCombination => "identifiable in a combination",
+        }
+    }
+}
+
+/// All sets of an arm, in its field of constants.
+#[derive(Clone, Debug)]
+pub struct Sets {
+    /// The field of the coefficients.
+    pub field: ConstantField,
+    /// The sets; `Published` only where the file has groupings.
+    pub sets: Vec<ParameterSet>,
+    /// The dependence of the columns for the numbers in the file.
+    pub minimal: Dependence,
+}
+
+impl Sets {
+    /// Derives the sets of an arm by exact elimination on the coefficients of its Lagrangian.
+    ///
+    /// # Errors
+    /// [`Unproven`] where a number of the arm is a multiple of the proof's prime.
+    pub fn derive(arm: &Arm, symbols: &AngleSymbols) -> Result<Sets, Unproven> {
+        // The values of general angles modulo the prime; any fixed seed keeps the choice reproducible.
+        let field = ConstantField::new(symbols, &mut Draws::new(0x6479_6e67_656e));
+        let lagrangian = LagrangianPolynomials::derive(arm, symbols);
+        let order: Vec<usize> = preference(arm).iter().map(|p| p.index()).collect();
+        let columns = arm.dof() * 11;
+        let eliminate = |sizes| {
+            elimination::dependence(&field, &lagrangian.rows(arm, &field, sizes), columns, &order)
+        };
+        let minimal = eliminate(Sizes::Numbers)?;
+        let symbolic = eliminate(Sizes::Variables)?;
+        let mut sets = vec![
+            full_set(arm, &field),
+            base_set(SetKind::Minimal, arm, &field, &minimal),
+            base_set(SetKind::Symbolic, arm, &field, &symbolic),
+        ];
+        if !arm.groupings.is_empty() {
+            sets.push(published::published_set(arm, &field, &minimal)?);
+        }
+        for set in &mut sets {
+            let (rank, relations) = relations(&field, &minimal, &set.parameters)?;
+            (set.rank, set.relations) = (rank, relations);
+        }
+        Ok(Sets { field, sets, minimal })
+    }
+
+    /// The set of that kind, if the arm has it.
+    pub fn get(&self, kind: SetKind) -> Option<&ParameterSet> {
+        self.sets.iter().find(|set| set.kind == kind)
+    }
+
+    /// How well the torques determine a parameter of the full set.
+    pub fn class(&self, parameter: Parameter) -> Class {
+        let coordinates = &self.minimal.coordinates;
+        let own = &coordinates[parameter.index()];
+        let Some(position) = self.minimal.kept.iter().position(|k| *k == parameter.index()) else {
+            return if own.is_empty() { Class::Unidentifiable } else { Class::InCombination };
+        };
+        let shares = |c: &Vec<(usize, Constant)>| c.iter().any(|(p, _)| *p == position);
+        if coordinates.iter().filter(|c| shares(c)).count() == 1 { Class::Alone } else { Class::InCombination }
+    }
+}
+
+fn full_set(arm: &Arm, field: &ConstantField) -> ParameterSet {
+    let one = field.rational(crate::exact::rational::integer(1));
+    let parameters = arm
+        .kept_parameters()
+        .into_iter()
+        .map(|p| SetParameter {
+            name: p.to_string(),
+            terms: vec![(p, one.clone())],
+            carriers: vec![(p, one.clone())],
+        })
+        .collect();
+    unexamined(SetKind::Full, parameters)
+}
+
+fn base_set(kind: SetKind, arm: &Arm, field: &ConstantField, dependence: &Dependence) -> ParameterSet {
+    let all = arm.all_parameters();
+    let mut parameters: Vec<SetParameter> = Vec::with_capacity(dependence.kept.len());
+    for (position, kept) in dependence.kept.iter().enumerate() {
+        let carrier = all[*kept];
+        let mut terms: Combination = Vec::new();
+        for (column, coordinates) in dependence.coordinates.iter().enumerate() {
+            for (p, coefficient) in coordinates {
+                if *p == position {
+                    terms.push((all[column], coefficient.clone()));
+                }
+            }
+        }
+        // The carrier leads its sum, as in Ixx2 − Iyy2 + 49/400·m3.
+        terms.sort_by_key(|(p, _)| (*p != carrier, *p));
+        let one = field.rational(crate::exact::rational::integer(1));
+        parameters.push(SetParameter { name: combination_text(field, &terms), terms, carriers: vec![(carrier, one)] });
+    }
+    parameters.sort_by_key(|p| p.carriers[0].0);
+    unexamined(kind, parameters)
+}
+
+pub(super) fn unexamined(kind: SetKind, parameters: Vec<SetParameter>) -> ParameterSet {
+    ParameterSet { kind, parameters, rank: 0, relations: Vec::new(), exact: true, lost: Vec::new() }
+}
+
+/// The text of a combination: `Ixx2 - Iyy2 + 49/400*m3`; coefficients with symbols stand in parentheses.
+pub fn combination_text(field: &ConstantField, terms: &[(Parameter, Constant)]) -> String {
+    named_combination_text(field, terms.iter().map(|(p, c)| (p.to_string(), c)))
+}
+
+fn named_combination_text<'a>(
+    field: &ConstantField,
+    terms: impl IntoIterator<Item = (String, &'a Constant)>,
+) -> String {
+    let one = crate::exact::rational::integer(1);
+    let terms: Vec<(String, crate::exact::rational::Rational)> = terms
+        .into_iter()
+        .map(|(name, c)| match c.as_rational() {
+            Some(value) => (name, value),
+            None => (format!("({})*{name}", field.text(c)), one.clone()),
+        })
+        .collect();
+    sum_text(terms.iter().map(|(name, value)| (name, value)))
+}
+
+/// A combination of parameters in coordinates of the minimal columns.
+pub(super) fn minimal_coordinates(
+    field: &ConstantField,
+    minimal: &Dependence,
+    combination: &[(Parameter, Constant)],
+) -> Vec<(usize, Constant)> {
+    let mut sum: std::collections::BTreeMap<usize, Constant> = std::collections::BTreeMap::new();
+    for (parameter, factor) in combination {
+        for (position, coordinate) in &minimal.coordinates[parameter.index()] {
+            let term = field.mul(factor, coordinate);
+            let total = match sum.get(position) {
+                Some(old) => field.add(old, &term),
+                None => term,
+            };
+            sum.insert(*position, total);
+        }
+    }
+    sum.into_iter().filter(|(_, c)| !c.is_zero()).collect()
+}
+
+/// The rank of a set's columns and the relations among them, each as `name = combination of names`.
+fn relations(
+    field: &ConstantField,
+    minimal: &Dependence,
+    parameters: &[SetParameter],
+) -> Result<(usize, Vec<String>), Unproven> {
+    // The rows of this small matrix are the minimal columns, its columns the set's parameters. Denominators would
+    // not survive as polynomials, so the coordinates are cleared of them column by column.
+    let coordinates: Vec<Vec<(usize, Constant)>> =
+        parameters.iter().map(|p| minimal_coordinates(field, minimal, &p.carriers)).collect();
+    let dependence = elimination::dependence_of_columns(field, &coordinates, minimal.kept.len())?;
+    let mut texts = Vec::new();
+    for (column, parameter) in parameters.iter().enumerate() {
+        if dependence.kept.contains(&column) {
+            continue;
+        }
+        let terms = dependence.coordinates[column].iter();
+        let sum = terms.map(|(position, c)| (parameters[dependence.kept[*position]].name.clone(), c));
+        texts.push(format!("{} = {}", quoted(&parameter.name), quoted_sum(field, sum)));
+    }
+    Ok((dependence.kept.len(), texts))
+}
+
+fn quoted_sum<'a>(field: &ConstantField, terms: impl IntoIterator<Item = (String, &'a Constant)>) -> String {
+    named_combination_text(field, terms.into_iter().map(|(name, c)| (quoted(&name), c)))
+}
+
+/// A name that is itself a sum stands in brackets.
+fn quoted(name: &str) -> String {
+    if name.contains(' ') || name.contains('*') { format!("[{name}]") } else { name.to_string() }
+}

@@ -1,0 +1,137 @@
+//! The quantities of an arm's kinematics as elements of an algebra.
+
+use crate::exact::symbols::{AngleSymbols, Trig};
+use crate::arm::{Arm, Convention, JointKind};
+use crate::exact::algebra::Algebra;
+use num_traits::Zero;
+
+/// The arm's angles whose sine and cosine are no rationals: twists, and the fixed angles of prismatic joints.
+pub fn angle_symbols(arm: &Arm) -> AngleSymbols {
+    AngleSymbols::collect(arm.joints.iter().flat_map(|joint| {
+        let fixed = (joint.kind == JointKind::Prismatic).then_some(&joint.theta);
+        std::iter::once(&joint.alpha).chain(fixed)
+    }))
+}
+
+/// One joint's quantities.
+#[derive(Clone, Debug)]
+pub struct JointElements<V> {
+    /// How the joint moves.
+    pub kind: JointKind,
+    /// Sine of the angle about z: q + theta, or theta of a prismatic joint.
+    pub sin: V,
+    /// Its cosine.
+    pub cos: V,
+    /// Shift along z: d, or d + q of a prismatic joint.
+    pub shift: V,
+    /// Joint speed q̇.
+    pub speed: V,
+    /// Link length a.
+    pub a: V,
+    /// Sine of the twist.
+    pub sin_alpha: V,
+    /// Cosine of the twist.
+    pub cos_alpha: V,
+    /// Gear ratio, where the joint has a rotor.
+    pub ratio: Option<V>,
+}
+
+/// An arm's quantities.
+#[derive(Clone, Debug)]
+pub struct ArmElements<V> {
+    /// Which convention orders the two screws of a joint.
+    pub convention: Convention,
+    /// Gravity in the base frame.
+    pub gravity: [V; 3],
+    /// The joints from the base.
+    pub joints: Vec<JointElements<V>>,
+}
+
+/// Where the elements come from: symbols, numbers, inputs of a graph.
+pub trait Source<V> {
+    /// Sine and cosine of q + theta of a revolute joint.
+    fn joint_trig(&mut self, joint: usize) -> (V, V);
+    /// q of a prismatic joint.
+    fn position(&mut self, joint: usize) -> V;
+    /// q̇.
+    fn speed(&mut self, joint: usize) -> V;
+    /// Link length; asked for only where it is not zero.
+    fn a(&mut self, joint: usize) -> V;
+    /// Link offset; asked for only where it is not zero.
+    fn d(&mut self, joint: usize) -> V;
+    /// Gear ratio.
+    fn ratio(&mut self, joint: usize) -> V;
+    /// Component of gravity; asked for only where it is not zero.
+    fn gravity(&mut self, axis: usize) -> V;
+    /// Sine or cosine of an angle symbol.
+    fn symbol(&mut self, index: usize, sine: bool) -> V;
+}
+
+impl<V: Clone> ArmElements<V> {
+    /// Builds the elements of an arm.
+    pub fn build<A: Algebra<Value = V>>(
+        algebra: &A,
+        arm: &Arm,
+        symbols: &AngleSymbols,
+        source: &mut impl Source<V>,
+    ) -> Self {
+        let constant = |trig: Trig, source: &mut dyn FnMut(usize, bool) -> V| match trig {
+            Trig::Zero => algebra.integer(0),
+            Trig::One { negative } => algebra.integer(if negative { -1 } else { 1 }),
+            Trig::Symbol { index, sine, negative } => {
+                let value = source(index, sine);
+                if negative { algebra.neg(&value) } else { value }
+            }
+        };
+        let mut joints = Vec::with_capacity(arm.dof());
+        for (i, joint) in arm.joints.iter().enumerate() {
+            let d = if joint.d.is_zero() { algebra.integer(0) } else { source.d(i) };
+            let (sin, cos, shift) = match joint.kind {
+                JointKind::Revolute => {
+                    let (sin, cos) = source.joint_trig(i);
+                    (sin, cos, d)
+                }
+                JointKind::Prismatic => {
+                    let (sin, cos) = symbols.sin_cos(&joint.theta);
+                    let sin = constant(sin, &mut |m, s| source.symbol(m, s));
+                    let cos = constant(cos, &mut |m, s| source.symbol(m, s));
+                    (sin, cos, algebra.add(&d, &source.position(i)))
+                }
+            };
+            let (sin_alpha, cos_alpha) = symbols.sin_cos(&joint.alpha);
+            joints.push(JointElements {
+                kind: joint.kind,
+                sin,
+                cos,
+                shift,
+                speed: source.speed(i),
+                a: if joint.a.is_zero() { algebra.integer(0) } else { source.a(i) },
+                sin_alpha: constant(sin_alpha, &mut |m, s| source.symbol(m, s)),
+                cos_alpha: constant(cos_alpha, &mut |m, s| source.symbol(m, s)),
+                ratio: joint.rotor_ratio.is_some().then(|| source.ratio(i)),
+            });
+        }
+        let gravity = std::array::from_fn(|axis| {
+            if arm.gravity[axis].is_zero() { algebra.integer(0) } else { source.gravity(axis) }
+        });
+        ArmElements { convention: arm.convention, gravity, joints }
+    }
+}
+
+/// Rx(α)ᵀ·v: a vector's components after the frame turned by α about x.
+pub fn turn_x<A: Algebra>(alg: &A, sin: &A::Value, cos: &A::Value, v: &[A::Value; 3]) -> [A::Value; 3] {
+    let (y, z) = turn(alg, sin, cos, &v[1], &v[2]);
+    [v[0].clone(), y, z]
+}
+
+/// Rz(θ)ᵀ·v: a vector's components after the frame turned by θ about z.
+pub fn turn_z<A: Algebra>(alg: &A, sin: &A::Value, cos: &A::Value, v: &[A::Value; 3]) -> [A::Value; 3] {
+    let (x, y) = turn(alg, sin, cos, &v[0], &v[1]);
+    [x, y, v[2].clone()]
+}
+
+fn turn<A: Algebra>(alg: &A, s: &A::Value, c: &A::Value, u: &A::Value, v: &A::Value) -> (A::Value, A::Value) {
+    let first = alg.add(&alg.mul(c, u), &alg.mul(s, v));
+    let second = alg.sub(&alg.mul(c, v), &alg.mul(s, u));
+    (first, second)
+}

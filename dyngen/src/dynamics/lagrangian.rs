@@ -1,0 +1,103 @@
+//! The Lagrangian of Eq. 5 and 6, linear in the dynamic parameters: the one definition that all else is
+//! derived from or proven against.
+
+use super::elements::{ArmElements, JointElements, turn_x, turn_z};
+use crate::arm::{Convention, ParameterKind};
+use crate::exact::algebra::Algebra;
+
+/// The motion of a link frame relative to the base, in the frame's own axes.
+struct Motion<V> {
+    /// Angular velocity.
+    omega: [V; 3],
+    /// Velocity of the origin.
+    velocity: [V; 3],
+    /// Gravity.
+    gravity: [V; 3],
+    /// Gravity · position of the origin.
+    height: V,
+}
+
+/// Twice the coefficient of every dynamic parameter in the Lagrangian, eleven a link in the order of Eq. 10:
+/// L = ½ Σ columns·π.
+///
+/// Twice, so that integer polynomials stay integer. Positions of frame origins enter the potential
+/// energy U = −gᵀ(m p + m r) of Eq. 6 (p: origin, r: centre of mass).
+pub fn twice_lagrangian<A: Algebra>(alg: &A, arm: &ArmElements<A::Value>) -> Vec<A::Value> {
+    let zero = || alg.integer(0);
+    let mut state = Motion {
+        omega: [zero(), zero(), zero()],
+        velocity: [zero(), zero(), zero()],
+        gravity: arm.gravity.clone(),
+        height: zero(),
+    };
+    let mut columns = Vec::with_capacity(arm.joints.len() * ParameterKind::ALL.len());
+    for joint in &arm.joints {
+        if arm.convention == Convention::Modified {
+            twist(alg, joint, &mut state);
+        }
+        // Before it turns, z is the joint axis in axes that are fixed in the link before.
+        let rotor = rotor_column(alg, joint, &state.omega[2]);
+        advance(alg, joint, &mut state);
+        if arm.convention == Convention::Standard {
+            twist(alg, joint, &mut state);
+        }
+        columns.extend(link_columns(alg, &state));
+        columns.push(rotor);
+    }
+    columns
+}
+
+/// Rx(α) Tx(a).
+fn twist<A: Algebra>(alg: &A, joint: &JointElements<A::Value>, state: &mut Motion<A::Value>) {
+    if !alg.is_zero(&joint.a) {
+        let [_, wy, wz] = &state.omega;
+        state.velocity[1] = alg.add(&state.velocity[1], &alg.mul(&joint.a, wz));
+        state.velocity[2] = alg.sub(&state.velocity[2], &alg.mul(&joint.a, wy));
+        state.height = alg.add(&state.height, &alg.mul(&joint.a, &state.gravity[0]));
+    }
+    for v in [&mut state.omega, &mut state.velocity, &mut state.gravity] {
+        *v = turn_x(alg, &joint.sin_alpha, &joint.cos_alpha, v);
+    }
+}
+
+/// Rz(θ) Tz(d) and the joint's own motion along or about z.
+fn advance<A: Algebra>(alg: &A, joint: &JointElements<A::Value>, state: &mut Motion<A::Value>) {
+    if !alg.is_zero(&joint.shift) {
+        let [wx, wy, _] = &state.omega;
+        state.velocity[0] = alg.add(&state.velocity[0], &alg.mul(&joint.shift, wy));
+        state.velocity[1] = alg.sub(&state.velocity[1], &alg.mul(&joint.shift, wx));
+        state.height = alg.add(&state.height, &alg.mul(&joint.shift, &state.gravity[2]));
+    }
+    for v in [&mut state.omega, &mut state.velocity, &mut state.gravity] {
+        *v = turn_z(alg, &joint.sin, &joint.cos, v);
+    }
+    let moved = match joint.kind {
+        crate::arm::JointKind::Revolute => &mut state.omega[2],
+        crate::arm::JointKind::Prismatic => &mut state.velocity[2],
+    };
+    *moved = alg.add(moved, &joint.speed);
+}
+
+/// 2·(k q̇ (z·ω) + ½ k² q̇²), the rotor's terms of Eq. 5; zero without a rotor.
+fn rotor_column<A: Algebra>(alg: &A, joint: &JointElements<A::Value>, omega_z: &A::Value) -> A::Value {
+    let Some(ratio) = &joint.ratio else { return alg.integer(0) };
+    let spin = alg.mul(ratio, &joint.speed);
+    let coupling = alg.mul(&alg.integer(2), omega_z);
+    alg.mul(&spin, &alg.add(&coupling, &spin))
+}
+
+/// The ten inertial columns of a link: m, first moments, then the inertia tensor with the signs of Eq. 8.
+fn link_columns<A: Algebra>(alg: &A, state: &Motion<A::Value>) -> Vec<A::Value> {
+    let two = alg.integer(2);
+    let Motion { omega: w, velocity: v, gravity: g, height } = state;
+    let mut columns = vec![alg.add(&alg.dot(v, v), &alg.mul(&two, height))];
+    // v·(ω × r) = r·(v × ω)
+    for (moment, gravity) in alg.cross(v, w).iter().zip(g) {
+        columns.push(alg.mul(&two, &alg.add(moment, gravity)));
+    }
+    for (i, j) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
+        let product = alg.mul(&w[i], &w[j]);
+        columns.push(if i == j { product } else { alg.neg(&alg.mul(&two, &product)) });
+    }
+    columns
+}

@@ -1,0 +1,16 @@
+//! Kinematics, the Lagrangian (exact), and the recursions that are emitted (graph), one file a function.
+
+pub mod body;
+pub mod composite;
+pub mod coriolis;
+pub mod elements;
+pub mod forward;
+pub mod function;
+pub mod inverse;
+pub mod lagrangian;
+pub mod motion;
+pub mod pose;
+pub mod regressor;
+pub mod wrench;
+
+pub use function::{Function, FunctionGraph};

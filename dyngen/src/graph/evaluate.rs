@@ -1,0 +1,65 @@
+//! The value of expressions in any field: one sample, modulo the prime, or as a dual number.
+
+use super::{Expr, Graph, Input, Node};
+use crate::exact::prime::Fp;
+use crate::exact::rational::Rational;
+
+/// What the operations of a graph need of a number.
+pub trait Field: Copy {
+    /// a + b
+    fn add(self, other: Self) -> Self;
+    /// −a
+    fn neg(self) -> Self;
+    /// a·b
+    fn mul(self, other: Self) -> Self;
+    /// a/b; `None` where it is not defined.
+    fn div(self, other: Self) -> Option<Self>;
+    /// A constant; `None` where the field has no such number.
+    fn constant(value: &Rational) -> Option<Self>;
+}
+
+impl Field for Fp {
+    fn add(self, other: Self) -> Self {
+        self + other
+    }
+    fn neg(self) -> Self {
+        -self
+    }
+    fn mul(self, other: Self) -> Self {
+        self * other
+    }
+    fn div(self, other: Self) -> Option<Self> {
+        Some(self * other.inverse()?)
+    }
+    fn constant(value: &Rational) -> Option<Self> {
+        Fp::from_rational(value)
+    }
+}
+
+/// The values of some outputs; `None` where an operation is not defined.
+///
+/// `input` gives the inputs, `symbol` the sine (`true`) or cosine of an angle symbol.
+pub fn evaluate<F: Field>(
+    graph: &Graph,
+    outputs: &[Expr],
+    input: impl Fn(Input) -> F,
+    symbol: impl Fn(usize, bool) -> F,
+) -> Option<Vec<F>> {
+    let mut values: Vec<Option<F>> = vec![None; graph.nodes().len()];
+    let of = |values: &[Option<F>], e: Expr| -> Option<F> {
+        let value = values[e.node()]?;
+        Some(if e.is_negative() { value.neg() } else { value })
+    };
+    for node in graph.needed(outputs) {
+        values[node] = match graph.nodes()[node] {
+            Node::Constant(index) => F::constant(graph.constant(index)),
+            Node::Symbol(index, sine) => Some(symbol(index as usize, sine)),
+            Node::Input(i) => Some(input(i)),
+            Node::Add(a, b) => Some(of(&values, a)?.add(of(&values, b)?)),
+            Node::Mul(a, b) => Some(of(&values, a)?.mul(of(&values, b)?)),
+            Node::Div(a, b) => of(&values, a)?.div(of(&values, b)?),
+        };
+        values[node]?;
+    }
+    outputs.iter().map(|e| of(&values, *e)).collect()
+}

@@ -1,0 +1,165 @@
+//! Hash-consed expressions: what is emitted and evaluated.
+//!
+//! Every expression exists once. A sign costs nothing: an [`Expr`] is a node and a sign, so x and −x share their
+//! node, and sums and products are stored with the sign pulled out. Constants are exact.
+
+mod build;
+pub mod evaluate;
+pub mod tape;
+
+pub use build::Builder;
+
+use crate::exact::rational::Rational;
+use std::collections::HashMap;
+
+/// A node with a sign.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Expr(u32);
+
+impl Expr {
+    /// The constant 0, in every graph.
+    pub const ZERO: Expr = Expr(0);
+    /// The constant 1, in every graph.
+    pub const ONE: Expr = Expr(2);
+
+    fn new(node: usize, negative: bool) -> Expr {
+        Expr((node as u32) << 1 | u32::from(negative))
+    }
+
+    /// Index of the node.
+    pub fn node(self) -> usize {
+        (self.0 >> 1) as usize
+    }
+
+    /// Whether the value is minus that of the node.
+    pub fn is_negative(self) -> bool {
+        self.0 & 1 == 1
+    }
+
+    /// The same node without the sign.
+    pub fn positive(self) -> Expr {
+        Expr(self.0 & !1)
+    }
+}
+
+impl std::ops::Neg for Expr {
+    type Output = Expr;
+    fn neg(self) -> Expr {
+        if self == Expr::ZERO { self } else { Expr(self.0 ^ 1) }
+    }
+}
+
+/// What a function is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Input {
+    /// sin q of a revolute joint, or sin(q + theta) where theta is no multiple of pi/2.
+    Sin(usize),
+    /// The cosine of the same angle.
+    Cos(usize),
+    /// q of a prismatic joint.
+    Position(usize),
+    /// q̇
+    Speed(usize),
+    /// q̈
+    Acceleration(usize),
+    /// Joint torque or force, for forward dynamics.
+    Torque(usize),
+    /// A parameter of the set.
+    Parameter(usize),
+}
+
+/// An operation. Operands of `Mul` carry no sign, the first of `Add` and both of `Div` neither.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Node {
+    /// A constant other than zero and without sign: index into [`Graph::constants`].
+    Constant(u32),
+    /// Sine or cosine of an angle symbol.
+    Symbol(u32, bool),
+    /// An input.
+    Input(Input),
+    /// a + b
+    Add(Expr, Expr),
+    /// a·b
+    Mul(Expr, Expr),
+    /// a/b
+    Div(Expr, Expr),
+}
+
+/// Expressions with their nodes in an order in which operands come first.
+#[derive(Clone, Debug)]
+pub struct Graph {
+    nodes: Vec<Node>,
+    constants: Vec<Rational>,
+    index: HashMap<Node, u32>,
+    constant_index: HashMap<Rational, u32>,
+}
+
+/// Operations of a function, trigonometry apart. Changes of sign are free.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Operations {
+    /// Multiplications.
+    pub mul: usize,
+    /// Additions and subtractions.
+    pub add: usize,
+    /// Divisions.
+    pub div: usize,
+    /// Angles whose sine and cosine are needed.
+    pub sin_cos: usize,
+}
+
+impl Graph {
+    /// The nodes, operands first.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// The value of a constant node.
+    pub fn constant(&self, index: u32) -> &Rational {
+        &self.constants[index as usize]
+    }
+
+    /// The nodes that some outputs need, in order.
+    pub fn needed(&self, outputs: &[Expr]) -> Vec<usize> {
+        let mut needed = vec![false; self.nodes.len()];
+        for output in outputs {
+            needed[output.node()] = true;
+        }
+        for node in (0..self.nodes.len()).rev() {
+            if needed[node] {
+                for operand in operands(&self.nodes[node]) {
+                    needed[operand.node()] = true;
+                }
+            }
+        }
+        (0..self.nodes.len()).filter(|n| needed[*n]).collect()
+    }
+
+    /// The operations that some outputs cost.
+    pub fn operations(&self, outputs: &[Expr]) -> Operations {
+        let mut count = Operations::default();
+        let mut angles = std::collections::BTreeSet::new();
+        for node in self.needed(outputs) {
+            match self.nodes[node] {
+                Node::Add(..) => count.add += 1,
+                Node::Mul(..) => count.mul += 1,
+                Node::Div(..) => count.div += 1,
+                Node::Input(Input::Sin(i) | Input::Cos(i)) => {
+                    angles.insert(i);
+                }
+                _ => {}
+            }
+        }
+        count.sin_cos = angles.len();
+        count
+    }
+}
+
+/// The operands of a node.
+pub fn operands(node: &Node) -> impl Iterator<Item = Expr> {
+    match *node {
+        Node::Add(a, b) | Node::Mul(a, b) | Node::Div(a, b) => [Some(a), Some(b)],
+        _ => [None, None],
+    }
+    .into_iter()
+    .flatten()
+}

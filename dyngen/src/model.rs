@@ -1,0 +1,121 @@
+//! An arm with its exact parameter sets: where every function starts.
+
+use crate::arm::{Arm, Parameter};
+use crate::base::sets::{Combination, ParameterSet, SetKind, Sets};
+use crate::dynamics::elements::angle_symbols;
+use crate::dynamics::function;
+use crate::dynamics::{Function, FunctionGraph};
+use crate::exact::elimination::Unproven;
+use crate::exact::symbols::AngleSymbols;
+use crate::prove::{self, Disagreement};
+use std::fmt;
+
+/// An arm with what was derived of it.
+#[derive(Clone, Debug)]
+pub struct Model {
+    arm: Arm,
+    symbols: AngleSymbols,
+    sets: Sets,
+}
+
+/// Why a model or one of its functions is not to be had.
+#[derive(Clone, Debug)]
+pub enum Error {
+    /// The exact elimination was not certified.
+    Unproven(Unproven),
+    /// The arm has no such set: its file has no `[[grouping]]`.
+    NoPublishedSet,
+    /// The published sums change the torque: what they lose, and why.
+    NotExact(Vec<(Parameter, String)>),
+    /// A function does not agree with the Lagrangian.
+    Disagreement(Disagreement),
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::Unproven(e) => e.fmt(f),
+            Error::NoPublishedSet => write!(
+                f,
+                "the arm file has no [[grouping]], so there is no published set: choose full, minimal or symbolic"
+            ),
+            Error::NotExact(lost) => {
+                write!(f, "the published sums do not keep the torque, so no code can be proven for them:")?;
+                lost.iter().try_for_each(|(_, reason)| write!(f, "\n  {reason}"))
+            }
+            Error::Disagreement(e) => e.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+impl From<Unproven> for Error {
+    fn from(e: Unproven) -> Self {
+        Error::Unproven(e)
+    }
+}
+
+impl From<Disagreement> for Error {
+    fn from(e: Disagreement) -> Self {
+        Error::Disagreement(e)
+    }
+}
+
+impl Model {
+    /// Derives the Lagrangian of an arm and its parameter sets.
+    ///
+    /// # Errors
+    /// [`Error::Unproven`] where a number of the arm is a multiple of the proof's prime.
+    pub fn derive(arm: Arm) -> Result<Model, Error> {
+        let symbols = angle_symbols(&arm);
+        let sets = Sets::derive(&arm, &symbols)?;
+        Ok(Model { arm, symbols, sets })
+    }
+
+    /// The arm.
+    pub fn arm(&self) -> &Arm {
+        &self.arm
+    }
+
+    /// All sets with the relations between parameters.
+    pub fn sets(&self) -> &Sets {
+        &self.sets
+    }
+
+    /// The arm's angles whose sine and cosine are kept as symbols.
+    pub fn symbols(&self) -> &AngleSymbols {
+        &self.symbols
+    }
+
+    /// One set.
+    ///
+    /// # Errors
+    /// [`Error::NoPublishedSet`] where the file has no grouping.
+    pub fn set(&self, kind: SetKind) -> Result<&ParameterSet, Error> {
+        self.sets.get(kind).ok_or(Error::NoPublishedSet)
+    }
+
+    /// A function for a set as expressions that are proven equal to the Lagrangian.
+    ///
+    /// # Errors
+    /// [`Error::NotExact`] for published sums that lose parameters, [`Error::Disagreement`] where the proof fails.
+    pub fn function(&self, function: Function, kind: SetKind) -> Result<FunctionGraph, Error> {
+        let set = self.set(kind)?;
+        if !set.exact {
+            return Err(Error::NotExact(set.lost.clone()));
+        }
+        let built = function::build(function, &self.arm, &self.symbols, set, &self.sets.field);
+        prove::prove(&self.arm, &self.symbols, &self.sets, set, &built)?;
+        Ok(built)
+    }
+
+    /// The values of a set's parameters for given values of all parameters, eleven a link in the order of
+    /// [`Arm::all_parameters`].
+    pub fn set_values(&self, set: &ParameterSet, all: &[f64]) -> Vec<f64> {
+        let sum = |terms: &Combination| {
+            terms.iter().map(|(p, c)| self.sets.field.value(c) * all.get(p.index()).copied().unwrap_or(0.0)).sum()
+        };
+        set.parameters.iter().map(|p| sum(&p.terms)).collect()
+    }
+}
