@@ -1,15 +1,27 @@
 //! The runtime of an arm: friction, filters, identification and the residual loop.
 #![cfg_attr(not(feature = "std"), no_std)]
 
+#[cfg(feature = "cli")]
+pub mod cli;
 #[cfg(feature = "std")]
 pub mod demo;
 #[cfg(feature = "std")]
+pub mod estimate;
+#[cfg(feature = "std")]
 pub mod excite;
 pub mod friction;
+#[cfg(feature = "std")]
+pub mod log;
 pub mod model;
 #[cfg(feature = "std")]
 pub mod motion;
 #[cfg(feature = "std")]
+mod parallel;
+#[cfg(feature = "std")]
+pub mod regression;
+#[cfg(feature = "std")]
 pub mod report;
+#[cfg(feature = "std")]
+pub mod signal;
 #[cfg(feature = "std")]
 pub mod virtual_arm;

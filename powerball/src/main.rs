@@ -1,9 +1,7 @@
 //! The `powerball` command.
 
-mod cli;
-
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    cli::main()
+    powerball::cli::main()
 }

@@ -1,20 +1,46 @@
-//! `powerball excite`.
+//! `powerball excite`: from an arm file to a trajectory.
 
-use super::{Failure, Set};
-use powerball::excite::{Error, Excitation, Limits, Settings, optimise};
-use powerball::motion::Motion;
+use super::Failure;
+use super::output::{self, Progress};
+use crate::excite::{Error, Excitation, Figures, Limits, Settings, optimise};
+use crate::motion::Motion;
+use clap::{Args, ValueEnum};
+use dyngen::{Arm, Model, SetKind};
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
-/// Arguments of `powerball excite`.
-#[derive(clap::Args)]
+/// A parameter set on the command line.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Set {
+    /// Exact for the numbers in the file.
+    Minimal,
+    /// Exact for every size of the arm.
+    Symbolic,
+    /// The file's [[grouping]].
+    Published,
+    /// Every parameter that the symmetries leave.
+    Full,
+}
+
+impl From<Set> for SetKind {
+    fn from(set: Set) -> Self {
+        match set {
+            Set::Minimal => SetKind::Minimal,
+            Set::Symbolic => SetKind::Symbolic,
+            Set::Published => SetKind::Published,
+            Set::Full => SetKind::Full,
+        }
+    }
+}
+
+/// Search an exciting trajectory (Eq. 17 to 20) within the arm's limits and write it.
+#[derive(Args, Debug)]
 #[command(
     after_help = "Example: powerball excite --arm arm.toml --out path.csv --period 10 --harmonics 4\n\n\
     The file has the columns t, q1…qn, dq1…dqn, ddq1…ddqn in rad and s, from rest to rest."
 )]
-pub(super) struct Args {
+pub(crate) struct Excite {
     /// The arm file; every joint needs `position`, `velocity` and `acceleration` in it.
     #[arg(long)]
     arm: PathBuf,
@@ -53,35 +79,99 @@ pub(super) struct Args {
     json: bool,
 }
 
-pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
-    if !(args.rate.is_finite() && args.rate > 0.0) {
-        return Err(Failure::input("--rate must be above 0"));
+impl Excite {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        if !(self.rate.is_finite() && self.rate > 0.0) {
+            return Err(Failure::Unusable("--rate must be above 0".to_string()));
+        }
+        let progress = Progress::new();
+        let arm = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+        for note in arm.notes() {
+            eprintln!("powerball: {}: {note}", self.arm.display());
+        }
+        progress.say("deriving and proving the arm's regressor");
+        let refused = |e: Error| match e {
+            Error::Setting(what) => Failure::Unusable(what),
+            other => Failure::Refused(other.to_string()),
+        };
+        let model = Model::derive(arm).map_err(|e| refused(e.into()))?;
+        let settings = Settings {
+            harmonics: self.harmonics,
+            fundamental: std::f64::consts::TAU / self.period,
+            periods: self.periods,
+            margin: self.margin,
+            lambda2: self.weight,
+            evaluations: self.evaluations,
+            seed: self.seed,
+            ..Settings::default()
+        };
+        progress.say("searching");
+        let found = optimise(&model, self.parameters.into(), &settings).map_err(refused)?;
+        let motion = found.path.sample(self.rate);
+        let limits = Limits::of(model.arm(), 0.0).map_err(|e| refused(e.into()))?;
+        let (folder, name) = (self.out.parent(), self.out.file_name().and_then(|name| name.to_str()));
+        let (Some(folder), Some(name)) = (folder, name) else {
+            return Err(Failure::Unusable(format!("--out {} names no file", self.out.display())));
+        };
+        output::write(folder, name, motion.to_csv().as_bytes())?;
+        let peaks = peaks(&motion);
+        if self.json {
+            output::print(&self.in_json(&found, &motion, &peaks));
+        } else {
+            output::print(&self.in_words(&found, &motion, &peaks, &limits));
+        }
+        Ok(())
     }
-    let model = super::model(&args.arm)?;
-    let settings = Settings {
-        harmonics: args.harmonics,
-        fundamental: std::f64::consts::TAU / args.period,
-        periods: args.periods,
-        margin: args.margin,
-        lambda2: args.weight,
-        evaluations: args.evaluations,
-        seed: args.seed,
-        ..Settings::default()
-    };
-    let found = optimise(&model, args.parameters.into(), &settings).map_err(|e| match e {
-        Error::Setting(_) => Failure::input(e),
-        _ => Failure::refused(e),
-    })?;
-    let motion = found.path.sample(args.rate);
-    super::write(&args.out, &motion.to_csv())?;
-    let limits = Limits::of(model.arm(), 0.0).map_err(Failure::refused)?;
-    let peaks = peaks(&motion);
-    super::print(&if args.json {
-        in_json(args, &found, &motion, &peaks)
-    } else {
-        in_words(args, &found, &motion, &peaks, &limits)
-    })?;
-    Ok(ExitCode::SUCCESS)
+
+    fn in_json(&self, found: &Excitation, motion: &Motion, peaks: &[[f64; 4]]) -> String {
+        let joints: Vec<_> = peaks
+            .iter()
+            .zip(&found.path.joints)
+            .map(|([low, high, speed, acceleration], series)| {
+                json!({"position": [low, high], "velocity": speed, "acceleration": acceleration,
+                   "middle": series.middle, "a": series.a, "b": series.b})
+            })
+            .collect();
+        let figures = |f: &Figures| json!({"condition": f.condition, "least_singular_value": f.least});
+        let object = json!({
+            "out": self.out, "samples": motion.len(), "duration": motion.duration(),
+            "fundamental": found.path.fundamental, "figures": figures(&found.figures),
+            "random_start": figures(&found.usual), "joints": joints,
+        });
+        object.to_string()
+    }
+
+    fn in_words(&self, found: &Excitation, motion: &Motion, peaks: &[[f64; 4]], limits: &Limits) -> String {
+        let mut out = String::new();
+        let (good, usual) = (&found.figures, &found.usual);
+        let _ = writeln!(
+            out,
+            "{}: {} samples, {:.2} s from rest to rest\n\
+         condition number of the regressor {:.2} (a random path: {:.1}), smallest singular value {:.3} ({:.3})\n",
+            self.out.display(),
+            motion.len(),
+            motion.duration(),
+            good.condition,
+            usual.condition,
+            good.least,
+            usual.least
+        );
+        let _ = writeln!(
+            out,
+            "joint   position [rad]     of limit        speed  of limit   acceleration  of limit"
+        );
+        for (i, ([low, high, speed, acceleration], limit)) in peaks.iter().zip(&limits.0).enumerate() {
+            let [lowest, highest] = limit.position;
+            let _ = writeln!(
+                out,
+                "{:>5}  {low:>6.2} … {high:<6.2}  {lowest:>6.2} … {highest:<6.2}  {speed:>6.2}    {:>6.2}      {acceleration:>9.2}    {:>6.2}",
+                i + 1,
+                limit.velocity,
+                limit.acceleration
+            );
+        }
+        out
+    }
 }
 
 /// Lowest and highest position, largest speed and acceleration of each joint.
@@ -96,53 +186,4 @@ fn peaks(motion: &Motion) -> Vec<[f64; 4]> {
         }
     }
     peaks
-}
-
-fn in_json(args: &Args, found: &Excitation, motion: &Motion, peaks: &[[f64; 4]]) -> String {
-    let joints: Vec<_> = peaks
-        .iter()
-        .zip(&found.path.joints)
-        .map(|([low, high, speed, acceleration], series)| {
-            json!({"position": [low, high], "velocity": speed, "acceleration": acceleration,
-                   "middle": series.middle, "a": series.a, "b": series.b})
-        })
-        .collect();
-    let figures =
-        |f: &powerball::excite::Figures| json!({"condition": f.condition, "least_singular_value": f.least});
-    let object = json!({
-        "out": args.out, "samples": motion.len(), "duration": motion.duration(),
-        "fundamental": found.path.fundamental, "figures": figures(&found.figures),
-        "random_start": figures(&found.usual), "joints": joints,
-    });
-    format!("{object}\n")
-}
-
-fn in_words(args: &Args, found: &Excitation, motion: &Motion, peaks: &[[f64; 4]], limits: &Limits) -> String {
-    let mut out = String::new();
-    let (good, usual) = (&found.figures, &found.usual);
-    let _ = writeln!(
-        out,
-        "{}: {} samples, {:.2} s from rest to rest\n\
-         condition number of the regressor {:.2} (a random path: {:.1}), smallest singular value {:.3} ({:.3})\n",
-        args.out.display(),
-        motion.len(),
-        motion.duration(),
-        good.condition,
-        usual.condition,
-        good.least,
-        usual.least
-    );
-    let _ =
-        writeln!(out, "joint   position [rad]     of limit        speed  of limit   acceleration  of limit");
-    for (i, ([low, high, speed, acceleration], limit)) in peaks.iter().zip(&limits.0).enumerate() {
-        let [lowest, highest] = limit.position;
-        let _ = writeln!(
-            out,
-            "{:>5}  {low:>6.2} … {high:<6.2}  {lowest:>6.2} … {highest:<6.2}  {speed:>6.2}    {:>6.2}      {acceleration:>9.2}    {:>6.2}",
-            i + 1,
-            limit.velocity,
-            limit.acceleration
-        );
-    }
-    out
 }

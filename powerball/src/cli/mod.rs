@@ -1,107 +1,60 @@
-//! The commands. Exit codes: 0 done, 1 the data or the arm refused it with the reason, 2 wrong use or unreadable
-//! input.
+//! The `powerball` command: one file a subcommand.
 
 mod excite;
+mod explain;
+mod identify;
+mod inputs;
+mod output;
 
-use clap::{Parser, Subcommand, ValueEnum};
-use dyngen::{Arm, Model, SetKind};
-use std::fmt::Display;
-use std::path::Path;
+use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
-/// Identification of robot arms: from exciting trajectories to named effects.
-#[derive(Parser)]
-#[command(version, after_help = "Example: powerball excite --arm arm.toml --out path.csv")]
+/// Identify a robot arm's torque model from logs, and explain what it lacks.
+#[derive(Debug, Parser)]
+#[command(name = "powerball", version, about)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
 }
 
-#[derive(Subcommand)]
+#[derive(Debug, Subcommand)]
 enum Command {
-    /// Searches an exciting trajectory within the arm's limits and writes it.
-    Excite(excite::Args),
+    /// Search an exciting trajectory within the arm's limits and write it.
+    Excite(excite::Excite),
+    /// Fit the minimal inertial set and the friction of every joint to logs.
+    Identify(identify::Identify),
+    /// Find, name and add what the model lacks on logs; judged on another path.
+    Explain(explain::Explain),
 }
 
-/// A parameter set on the command line.
-#[derive(Clone, Copy, ValueEnum)]
-enum Set {
-    /// Exact for the numbers in the file.
-    Minimal,
-    /// Exact for every size of the arm.
-    Symbolic,
-    /// The file's [[grouping]].
-    Published,
-    /// Every parameter that the symmetries leave.
-    Full,
+/// Why a command did not do what it was asked for.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The data or the arm refused it: exit code 1.
+    Refused(String),
+    /// Wrong use or unreadable input: exit code 2.
+    Unusable(String),
 }
 
-impl From<Set> for SetKind {
-    fn from(set: Set) -> Self {
-        match set {
-            Set::Minimal => SetKind::Minimal,
-            Set::Symbolic => SetKind::Symbolic,
-            Set::Published => SetKind::Published,
-            Set::Full => SetKind::Full,
-        }
-    }
-}
-
-/// Why a command ended without its result.
-struct Failure {
-    code: u8,
-    message: String,
-}
-
-impl Failure {
-    /// The input was read, but the answer is no.
-    fn refused(message: impl Display) -> Self {
-        Failure { code: 1, message: message.to_string() }
-    }
-
-    /// Wrong use, or an input that cannot be read.
-    fn input(message: impl Display) -> Self {
-        Failure { code: 2, message: message.to_string() }
-    }
-}
-
-/// Runs the command line.
-pub(crate) fn main() -> ExitCode {
-    let result = match Cli::parse().command {
-        Command::Excite(args) => excite::run(&args),
+/// Runs the command line of this process.
+#[must_use]
+pub fn main() -> ExitCode {
+    // clap itself exits with 2 on wrong use.
+    let cli = Cli::parse();
+    let done = match cli.command {
+        Command::Excite(command) => command.run(),
+        Command::Identify(command) => command.run(),
+        Command::Explain(command) => command.run(),
     };
-    match result {
-        Ok(code) => code,
-        Err(failure) => {
-            eprintln!("{}", failure.message);
-            ExitCode::from(failure.code)
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::Refused(reason)) => {
+            eprintln!("powerball: {reason}");
+            ExitCode::from(1)
         }
-    }
-}
-
-/// Reads an arm and derives its model; what its author may not have meant goes to standard error.
-fn model(path: &Path) -> Result<Model, Failure> {
-    let arm = Arm::read(path).map_err(Failure::input)?;
-    for note in arm.notes() {
-        eprintln!("{}: note: {note}", path.display());
-    }
-    Model::derive(arm).map_err(Failure::refused)
-}
-
-/// Writes a file, or says why not.
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text)
-        .map_err(|e| Failure::input(format!("{} cannot be written: {e}", path.display())))
-}
-
-/// Writes to standard output; a reader that went away is no error.
-fn print(text: &str) -> Result<(), Failure> {
-    use std::io::Write;
-    let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Failure::input(format!("standard output cannot be written: {e}")))
+        Err(Failure::Unusable(reason)) => {
+            eprintln!("powerball: {reason}");
+            ExitCode::from(2)
         }
-        _ => Ok(()),
     }
 }
