@@ -118,7 +118,7 @@ impl Excite {
         if self.json {
             output::print(&self.in_json(&found, &motion, &peaks));
         } else {
-            output::print(&self.in_words(&found, &motion, &peaks, &limits));
+            output::print(self.in_words(&found, &motion, &peaks, &limits).trim_end());
         }
         Ok(())
     }

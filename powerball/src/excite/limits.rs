@@ -18,7 +18,7 @@ pub struct JointLimits {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits(pub Vec<JointLimits>);
 
-/// The arm file misses limits: one text for each.
+/// The arm file misses limits: one text for each joint.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MissingLimits(pub Vec<String>);
 
@@ -27,20 +27,20 @@ impl Limits {
     /// unused.
     ///
     /// # Errors
-    /// Every limit that the arm file misses.
+    /// Every limit that the arm file misses, joint by joint.
     pub fn of(arm: &Arm, margin: f64) -> Result<Limits, MissingLimits> {
         let mut missing = Vec::new();
         let share = 1.0 - margin;
         let mut limits = Vec::new();
         for (i, joint) in arm.joints.iter().enumerate() {
-            for (key, there) in [
-                ("position", joint.position.is_some()),
-                ("velocity", joint.velocity.is_some()),
-                ("acceleration", joint.acceleration.is_some()),
-            ] {
-                if !there {
-                    missing.push(format!("joint {}: `{key}`", i + 1));
-                }
+            let keys = [
+                ("`position`", joint.position.is_some()),
+                ("`velocity`", joint.velocity.is_some()),
+                ("`acceleration`", joint.acceleration.is_some()),
+            ];
+            let absent: Vec<&str> = keys.iter().filter(|(_, there)| !there).map(|(key, _)| *key).collect();
+            if !absent.is_empty() {
+                missing.push(format!("joint {}: {}", i + 1, absent.join(", ")));
             }
             let [low, high] = joint.position.unwrap_or_default();
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
@@ -59,7 +59,7 @@ impl fmt::Display for MissingLimits {
         write!(
             f,
             "an exciting trajectory needs limits that the arm file does not give: {}",
-            self.0.join(", ")
+            self.0.join("; ")
         )
     }
 }
