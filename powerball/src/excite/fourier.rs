@@ -34,13 +34,19 @@ pub struct Fourier {
     pub joints: Vec<Harmonics>,
 }
 
+/// Sine and cosine of all harmonics at one instant, by which all joints are the same.
+fn waves(fundamental: f64, s: f64, count: usize) -> Vec<(f64, f64)> {
+    let (sin, cos) = (fundamental * s).sin_cos();
+    let next = |&(a, b): &(f64, f64)| Some((a * cos + b * sin, b * cos - a * sin));
+    std::iter::successors(Some((sin, cos)), next).take(count).collect()
+}
+
 impl Harmonics {
-    /// Position, first and second derivative of the series at its own time `s`, Eq. 18, 19 and 20.
-    pub fn at(&self, fundamental: f64, s: f64) -> [f64; 3] {
+    /// Position, first and second derivative of the series, Eq. 18, 19 and 20.
+    fn at(&self, fundamental: f64, waves: &[(f64, f64)]) -> [f64; 3] {
         let mut out = [self.middle, 0.0, 0.0];
-        for (l, (a, b)) in self.a.iter().zip(&self.b).enumerate() {
+        for (l, ((a, b), (sin, cos))) in self.a.iter().zip(&self.b).zip(waves).enumerate() {
             let w = fundamental * (l + 1) as f64;
-            let (sin, cos) = (w * s).sin_cos();
             out[0] += (a * sin - b * cos) / w;
             out[1] += a * cos + b * sin;
             out[2] += w * (b * cos - a * sin);
@@ -81,13 +87,20 @@ impl Fourier {
         }
     }
 
+    /// The series of every joint with its first and second derivative at their own time `s`, without start and stop.
+    pub fn series(&self, s: f64) -> impl Iterator<Item = [f64; 3]> + '_ {
+        let waves = waves(self.fundamental, s, self.harmonics());
+        self.joints.iter().map(move |joint| joint.at(self.fundamental, &waves))
+    }
+
+    fn harmonics(&self) -> usize {
+        self.joints.iter().map(|joint| joint.a.len()).max().unwrap_or(0)
+    }
+
     /// Position, speed and acceleration of every joint at time `t` from 0 to [`duration`](Self::duration).
     pub fn at(&self, t: f64) -> impl Iterator<Item = [f64; 3]> + '_ {
         let [s, ds, dds] = self.warp(t);
-        self.joints.iter().map(move |joint| {
-            let [q, first, second] = joint.at(self.fundamental, s);
-            [q, first * ds, second * ds * ds + first * dds]
-        })
+        self.series(s).map(move |[q, first, second]| [q, first * ds, second * ds * ds + first * dds])
     }
 
     /// The motion in samples, `rate` a second.
@@ -107,8 +120,7 @@ impl Fourier {
         // All three quantities but the middle are linear in the coefficients: one measurement of the series as they
         // stand gives the scale. Sampling misses a peak by up to the share (l·ω_f·Δt)²/8, which the rate keeps below
         // 1e-3; twice that is left free.
-        let most = self.joints.iter().map(|j| j.a.len()).max().unwrap_or(1);
-        let rate = (self.fundamental * most as f64 * 12.0).max(8.0 / self.ramp.max(1e-3));
+        let rate = (self.fundamental * self.harmonics() as f64 * 12.0).max(8.0 / self.ramp.max(1e-3));
         for joint in &mut self.joints {
             joint.middle = 0.0;
         }

@@ -93,8 +93,7 @@ impl Objective {
         for k in 0..self.instants {
             // The series without start and stop, which hardly excite.
             let s = path.period() * k as f64 / self.instants as f64;
-            for joint in &path.joints {
-                let [x, v, a] = joint.at(path.fundamental, s);
+            for [x, v, a] in path.series(s) {
                 q.push(x);
                 dq.push(v);
                 ddq.push(a);
