@@ -1,5 +1,6 @@
 //! The `powerball` command: one file a subcommand.
 
+mod demo;
 mod excite;
 mod explain;
 mod identify;
@@ -19,6 +20,8 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// The whole loop on the built-in virtual arm: record, identify, explain, compare with the truth.
+    Demo(demo::DemoCommand),
     /// Search an exciting trajectory within the arm's limits and write it.
     Excite(excite::Excite),
     /// Fit the minimal inertial set and the friction of every joint to logs.
@@ -42,6 +45,7 @@ pub fn main() -> ExitCode {
     // clap itself exits with 2 on wrong use.
     let cli = Cli::parse();
     let done = match cli.command {
+        Command::Demo(command) => command.run(),
         Command::Excite(command) => command.run(),
         Command::Identify(command) => command.run(),
         Command::Explain(command) => command.run(),
