@@ -4,7 +4,11 @@
 #[cfg(feature = "cli")]
 pub mod cli;
 #[cfg(feature = "std")]
+pub mod effects;
+#[cfg(feature = "std")]
 pub mod estimate;
+#[cfg(feature = "std")]
+pub mod explain;
 pub mod friction;
 #[cfg(feature = "std")]
 pub mod log;
