@@ -3,12 +3,14 @@
 
 #[cfg(feature = "cli")]
 pub mod cli;
-#[cfg(feature = "std")]
 pub mod demo;
+pub mod effects;
 #[cfg(feature = "std")]
 pub mod estimate;
 #[cfg(feature = "std")]
 pub mod excite;
+#[cfg(feature = "std")]
+pub mod explain;
 pub mod friction;
 #[cfg(feature = "std")]
 pub mod log;

@@ -37,14 +37,13 @@ impl DemoCommand {
         std::fs::create_dir_all(&self.out)
             .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", self.out.display())))?;
         let started = std::time::Instant::now();
-        let demo = demo::run(&self.out, self.seed, self.effect.as_deref(), &|what| progress.say(what)).map_err(
-            |e| match e {
+        let demo = demo::run(&self.out, self.seed, self.effect.as_deref(), &|what| progress.say(what))
+            .map_err(|e| match e {
                 DemoError::Session(SessionError::UnknownEffect(_) | SessionError::Write(..)) => {
                     Failure::Unusable(e.to_string())
                 }
                 _ => Failure::Refused(e.to_string()),
-            },
-        )?;
+            })?;
         let seconds = started.elapsed().as_secs_f64();
         output::write(&self.out, "explained.json", output::json(&demo.explained)?.as_bytes())?;
         output::write(&self.out, "report.html", demo::page(&demo).to_html().as_bytes())?;

@@ -16,7 +16,12 @@ pub fn page(demo: &Demo) -> Page {
         Judgement::RightAmongOthers => Tone::Plain,
         Judgement::Wrong | Judgement::NotNamed => Tone::Bad,
     };
-    let truth = format!("In the plant: {}. Named: {}. {}", verdict.truth_in_words(), verdict.named_in_words(), verdict.sentence());
+    let truth = format!(
+        "In the plant: {}. Named: {}. {}",
+        verdict.truth_in_words(),
+        verdict.named_in_words(),
+        verdict.sentence()
+    );
     page.note(tone, &truth);
     let paths = session.fit.len() + session.held_out.len();
     page.facts([
@@ -34,7 +39,8 @@ fn errors(page: &mut Page, demo: &Demo) {
     let explained = &demo.explained;
     page.heading("Errors on held-out paths");
     let (before, after) = (&explained.before.validate, &explained.after.validate);
-    let mut bars = BarPairs::new("Torque error on held-out paths", "rms [N·m]", ["base model", "with what was named"]);
+    let mut bars =
+        BarPairs::new("Torque error on held-out paths", "rms [N·m]", ["base model", "with what was named"]);
     let mut table =
         Table::new(["joint", "base model [N·m]", "with what was named [N·m]", "change", "noise floor [N·m]"]);
     for joint in 0..before.rms.len() {

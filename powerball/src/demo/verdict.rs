@@ -42,29 +42,24 @@ impl Verdict {
         let hit = |(name, at): &(String, Vec<usize>)| {
             name == effect.name() && joints.iter().all(|joint| at.contains(joint))
         };
-        let exact = |(name, at): &(String, Vec<usize>)| {
-            name == effect.name() && (joints.is_empty() || *at == joints)
-        };
+        let exact =
+            |(name, at): &(String, Vec<usize>)| name == effect.name() && (joints.is_empty() || *at == joints);
         let judgement = match named.as_slice() {
             [] => Judgement::NotNamed,
             [only] if exact(only) => Judgement::Right,
             several if several.iter().any(hit) => Judgement::RightAmongOthers,
             _ => Judgement::Wrong,
         };
-        Verdict {
-            judgement,
-            truth: effect.name().to_string(),
-            joints,
-            figures: effect.describe(),
-            named,
-        }
+        Verdict { judgement, truth: effect.name().to_string(), joints, figures: effect.describe(), named }
     }
 
     /// The verdict in a sentence.
     pub fn sentence(&self) -> &'static str {
         match self.judgement {
             Judgement::Right => "The name is right.",
-            Judgement::RightAmongOthers => "The true name is among those given; the others are not in the plant.",
+            Judgement::RightAmongOthers => {
+                "The true name is among those given; the others are not in the plant."
+            }
             Judgement::Wrong => "The name is wrong.",
             Judgement::NotNamed => "Nothing was named.",
         }
@@ -80,7 +75,8 @@ impl Verdict {
         if self.named.is_empty() {
             return "nothing".to_string();
         }
-        let words: Vec<String> = self.named.iter().map(|(name, joints)| format!("{name}{}", at(joints))).collect();
+        let words: Vec<String> =
+            self.named.iter().map(|(name, joints)| format!("{name}{}", at(joints))).collect();
         words.join(", ")
     }
 }

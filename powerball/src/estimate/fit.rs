@@ -174,7 +174,9 @@ fn is_tangent(design: &Design, column: usize) -> bool {
         .is_some_and(|f| f < FRICTION * design.dof() && f % FRICTION >= 3)
 }
 
-fn friction_columns(data: &Data<'_>, shapes: &[[f64; 2]]) -> Vec<[Vec<f64>; FRICTION]> {
+/// The friction columns of all joints for given shapes.
+#[must_use]
+pub fn friction_columns(data: &Data<'_>, shapes: &[[f64; 2]]) -> Vec<[Vec<f64>; FRICTION]> {
     let joints: Vec<usize> = (0..shapes.len()).collect();
     parallel::map(&joints, |&j| friction_shape::columns(data, j, shapes[j]))
 }

@@ -8,8 +8,8 @@ mod friction_shape;
 mod identify;
 mod solve;
 
-pub use design::{Design, Gram};
-pub use fit::{Fit, Term, fit};
+pub use design::{Design, Gram, runs};
+pub use fit::{Fit, Term, fit, friction_columns};
 pub use folds::Folds;
 pub use identify::{Identified, JointFriction, ParameterEstimate, Spread, identify, spread};
 pub use solve::Solver;
