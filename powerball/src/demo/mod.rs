@@ -72,7 +72,7 @@ impl From<ExplainError> for DemoError {
 }
 
 /// The names that a demo draws from: effects that the plant has and the residual loop knows.
-pub fn names() -> Vec<&'static str> {
+pub fn names<'a>() -> Vec<&'a str> {
     let known = effects::all();
     Effect::NAMES.into_iter().filter(|name| known.iter().any(|effect| effect.name() == *name)).collect()
 }
@@ -84,7 +84,7 @@ pub fn names() -> Vec<&'static str> {
 /// Only where something broke; a wrong name is a result.
 pub fn run(folder: &Path, seed: u64, name: Option<&str>, progress: &dyn Fn(&str)) -> Result<Demo, DemoError> {
     progress("searching exciting paths and recording them");
-    let names = name.map_or_else(names, |name| vec![name]);
+    let names: Vec<&str> = name.map_or_else(names, |name| vec![name]);
     let session = Session::record(folder, seed, &names)?;
     progress("reading the logs");
     let arm = Arm::read(&session.arm_file).map_err(|e| DemoError::Read(e.to_string()))?;
