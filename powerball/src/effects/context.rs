@@ -3,7 +3,6 @@
 use crate::estimate::Fit;
 use crate::friction::TanhFriction;
 use crate::regression::{Column, Data, Recording};
-use dyngen::arm::ParameterKind;
 use std::sync::OnceLock;
 
 /// Data together with the model fitted so far.
@@ -16,14 +15,13 @@ pub struct Context<'a> {
     /// What the model leaves on the data, by joint.
     pub residual: &'a [Vec<f64>],
     rigid: OnceLock<Vec<Vec<f64>>>,
-    last_link: OnceLock<Vec<Column>>,
 }
 
 impl<'a> Context<'a> {
     /// A model seen on some data.
     #[must_use]
     pub fn new(data: &'a Data<'a>, fit: &'a Fit, residual: &'a [Vec<f64>]) -> Context<'a> {
-        Context { data, fit, residual, rigid: OnceLock::new(), last_link: OnceLock::new() }
+        Context { data, fit, residual, rigid: OnceLock::new() }
     }
 
     /// Joints that move.
@@ -82,29 +80,6 @@ impl<'a> Context<'a> {
     /// A column on one joint that is a function of its position and speed.
     pub fn state_column(&self, joint: usize, f: impl Fn(f64, f64) -> f64) -> Column {
         self.data.column_on(joint, |_, r| r.position(joint).zip(r.speed(joint)).map(|(q, v)| f(q, v)).collect())
-    }
-
-    /// The ten inertial parameters of the last link as columns over all joints.
-    pub fn last_link(&self) -> &[Column] {
-        self.last_link.get_or_init(|| {
-            let body = self.data.body;
-            let chosen: Vec<usize> =
-                ParameterKind::ALL[..10].iter().map(|kind| body.last_link(*kind)).collect();
-            let all: Option<Vec<Vec<f64>>> = self
-                .data
-                .recordings
-                .iter()
-                .map(|r| body.parameter_columns(&chosen, &r.q, &r.v, &r.a))
-                .collect();
-            let Some(all) = all else { return Vec::new() };
-            (0..10)
-                .map(|c| {
-                    let one: Vec<Vec<f64>> =
-                        all.iter().map(|x| x.iter().skip(c).step_by(10).copied().collect()).collect();
-                    self.data.column_over_all(&one)
-                })
-                .collect()
-        })
     }
 
     /// Times of a joint's rows in their log's own t, with the log: by row.

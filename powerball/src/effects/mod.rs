@@ -3,15 +3,26 @@
 //! Adding an effect means adding a file with its [`Effect`] and naming it in [`all`].
 
 mod asymmetry;
+mod backlash;
+mod base_tilt;
+mod broken_symmetry;
 mod candidate;
+mod contact_wrench;
 mod context;
+mod encoder_offset;
 mod hysteresis;
+mod joint_coupling;
+mod joint_elasticity;
 mod load_friction;
 mod payload;
 mod position_ripple;
 mod spring;
 mod stribeck;
+mod temperature;
+mod time_delay;
+mod torque_constant;
 mod velocity_nonlinearity;
+mod window_sums;
 
 pub use candidate::{Candidate, Found, Window};
 pub use context::Context;
@@ -95,5 +106,15 @@ pub fn all() -> Vec<Box<dyn Effect>> {
         Box::new(payload::Payload),
         Box::new(spring::Spring),
         Box::new(position_ripple::PositionRipple),
+        Box::new(temperature::Temperature),
+        Box::new(time_delay::TimeDelay),
+        Box::new(torque_constant::TorqueConstant),
+        Box::new(encoder_offset::EncoderOffset),
+        Box::new(base_tilt::BaseTilt),
+        Box::new(broken_symmetry::BrokenSymmetry),
+        Box::new(contact_wrench::ContactWrench),
+        Box::new(joint_coupling::JointCoupling),
+        Box::new(backlash::Backlash),
+        Box::new(joint_elasticity::JointElasticity),
     ]
 }

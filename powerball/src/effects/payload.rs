@@ -1,9 +1,10 @@
 //! A body held by the last link, from the start of a log or from some time on.
 
 use super::candidate::{Candidate, Found, Window};
+use super::window_sums::Sums;
 use super::{Class, Context, Effect};
 use crate::estimate::Solver;
-use crate::regression::Column;
+use crate::regression::{Block, Column};
 use serde_json::{Value, json};
 
 /// Mass and first moment in the last frame as four columns; the inertia is that of a point mass at the centre of mass
@@ -64,7 +65,7 @@ impl Effect for Payload {
 
 /// Columns for mass and first moments with the inertia of a point mass at `com`.
 fn payload_columns(context: &Context<'_>, com: &[f64]) -> Vec<Column> {
-    let links = context.last_link();
+    let links = context.data.last_link_columns();
     if links.len() < 10 {
         return Vec::new();
     }
@@ -99,51 +100,6 @@ pub(super) fn mask(context: &Context<'_>, joint: usize, windows: &[Window]) -> V
     context.row_times(joint).iter().map(|at| if inside(at) { 1.0 } else { 0.0 }).collect()
 }
 
-/// Sums over the blocks from some block to the end of its log.
-struct Tail {
-    /// A'P: the columns of the base by 4.
-    cross: Vec<[f64; 4]>,
-    square: [[f64; 4]; 4],
-    score: [f64; 4],
-}
-
-impl Tail {
-    fn empty(size: usize) -> Tail {
-        Tail { cross: vec![[0.0; 4]; size], square: [[0.0; 4]; 4], score: [0.0; 4] }
-    }
-
-    fn plus(&self, other: &Tail) -> Tail {
-        let mut sum = Tail::empty(self.cross.len());
-        for (to, (a, b)) in sum.cross.iter_mut().zip(self.cross.iter().zip(&other.cross)) {
-            *to = std::array::from_fn(|k| a[k] + b[k]);
-        }
-        sum.square = std::array::from_fn(|i| std::array::from_fn(|k| self.square[i][k] + other.square[i][k]));
-        sum.score = std::array::from_fn(|k| self.score[k] + other.score[k]);
-        sum
-    }
-
-    /// χ² that the payload explains with the base refitted, where its mass is positive.
-    fn gain(&self, solver: &Solver) -> f64 {
-        let column = |k: usize| self.cross.iter().map(|c| c[k]).collect::<Vec<f64>>();
-        let cross: [Vec<f64>; 4] = std::array::from_fn(column);
-        let base: [Vec<f64>; 4] = std::array::from_fn(|k| solver.solve(&cross[k]));
-        let mut gram = faer::Mat::zeros(4, 4);
-        for i in 0..4 {
-            for k in 0..4 {
-                let shared: f64 = cross[i].iter().zip(&base[k]).map(|(a, b)| a * b).sum();
-                gram[(i, k)] = self.square[i][k] - shared;
-            }
-            // What the base takes over almost wholly says nothing.
-            if gram[(i, i)] < 1e-6 * self.square[i][i] {
-                gram[(i, i)] = 0.0;
-            }
-        }
-        let x = Solver::new(&gram, |_| true).solve(&self.score);
-        let gain = x.iter().zip(&self.score).map(|(a, b)| a * b).sum();
-        if x[0] > 0.0 { gain } else { 0.0 }
-    }
-}
-
 /// The start in each log that explains most, then the logs that share the payload.
 fn search(context: &Context<'_>) -> Option<Candidate> {
     let (data, fit) = (context.data, context.fit);
@@ -153,31 +109,37 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     }
     let (gram, _, _) = fit.gram.sum(&fit.weights, |_| true);
     let solver = Solver::new(&gram, |c| fit.free[c]);
-    let mut starts: Vec<(usize, f64, Tail)> = Vec::new();
-    let mut tail = Tail::empty(fit.design.size);
+    let mut starts: Vec<(usize, f64, Sums)> = Vec::new();
+    let empty = || Sums::zero(fit.design.size, 4);
+    let mut tail = empty();
     for (b, block) in data.blocks.iter().enumerate().rev() {
         if data.blocks.get(b + 1).is_none_or(|next| next.log != block.log) {
-            tail = Tail::empty(fit.design.size);
+            tail = empty();
         }
-        tail = tail.plus(&block_sums(context, &columns, b));
+        tail.add(&Sums::of_block(context, &columns, block), 1.0);
         let recording = &data.recordings[block.recording];
-        let time = block_start(context, b).unwrap_or(recording.start);
+        let time = block_start(context, block).unwrap_or(recording.start);
         let first_of_log = b == 0 || data.blocks[b - 1].log != block.log;
         let time = if first_of_log { recording.start } else { time };
-        starts.push((block.log, time, tail.plus(&Tail::empty(fit.design.size))));
+        starts.push((block.log, time, tail.clone()));
     }
     let searched = starts.len() as f64;
-    let gains: Vec<f64> = starts.iter().map(|(_, _, t)| t.gain(&solver)).collect();
+    let gains: Vec<f64> = starts.iter().map(|(_, _, t)| gain(t, &solver)).collect();
     let best = (0..starts.len()).max_by(|a, b| gains[*a].total_cmp(&gains[*b])).filter(|b| gains[*b] > 0.0)?;
     let mut chosen = vec![best];
-    let mut total = starts[best].2.plus(&Tail::empty(fit.design.size));
+    let mut total = starts[best].2.clone();
     let mut explained = gains[best];
     loop {
+        let with = |s: usize| {
+            let mut sum = total.clone();
+            sum.add(&starts[s].2, 1.0);
+            sum
+        };
         let others = (0..starts.len()).filter(|s| chosen.iter().all(|c| starts[*c].0 != starts[*s].0));
-        let next = others.map(|s| (s, total.plus(&starts[s].2).gain(&solver))).max_by(|a, b| a.1.total_cmp(&b.1));
+        let next = others.map(|s| (s, gain(&with(s), &solver))).max_by(|a, b| a.1.total_cmp(&b.1));
         match next {
             Some((s, gain)) if gain > explained + ANOTHER_LOG => {
-                total = total.plus(&starts[s].2);
+                total = with(s);
                 explained = gain;
                 chosen.push(s);
             }
@@ -192,10 +154,15 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     Some(Candidate { joints: (0..data.dof()).collect(), form: 0, values: Vec::new(), windows, searched })
 }
 
+/// What a payload with positive mass explains over some rows.
+fn gain(sums: &Sums, solver: &Solver) -> f64 {
+    let (gain, x) = sums.gain(solver);
+    if x[0] > 0.0 { gain } else { 0.0 }
+}
+
 /// The time of the first row of a block in its log's own t.
-fn block_start(context: &Context<'_>, block: usize) -> Option<f64> {
+pub(super) fn block_start(context: &Context<'_>, block: &Block) -> Option<f64> {
     let data = context.data;
-    let block = &data.blocks[block];
     let recording = &data.recordings[block.recording];
     let kept = data.band.kept(recording.len());
     (0..data.dof())
@@ -206,34 +173,4 @@ fn block_start(context: &Context<'_>, block: usize) -> Option<f64> {
             recording.start + kept[k] as f64 / recording.rate
         })
         .min_by(f64::total_cmp)
-}
-
-fn block_sums(context: &Context<'_>, columns: &[Column], block: usize) -> Tail {
-    let (data, fit) = (context.data, context.fit);
-    let mut tail = Tail::empty(fit.design.size);
-    for (j, rows) in data.blocks[block].rows.iter().enumerate() {
-        let w = fit.weights[j];
-        if rows.is_empty() || w == 0.0 {
-            continue;
-        }
-        let parts: Vec<&[f64]> = columns.iter().filter_map(|c| c.at(j)).collect();
-        if parts.len() < 4 {
-            continue;
-        }
-        for (g, values) in fit.design.cross(j, rows, &parts) {
-            for k in 0..4 {
-                tail.cross[g][k] += w * values[k];
-            }
-        }
-        let dot = |a: &[f64], b: &[f64]| -> f64 {
-            a[rows.clone()].iter().zip(&b[rows.clone()]).map(|(x, y)| x * y).sum()
-        };
-        for i in 0..4 {
-            for k in 0..4 {
-                tail.square[i][k] += w * dot(parts[i], parts[k]);
-            }
-            tail.score[i] += w * dot(parts[i], &context.residual[j]);
-        }
-    }
-    tail
 }

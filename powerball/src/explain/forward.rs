@@ -305,6 +305,9 @@ impl Session<'_> {
                 && a.candidate.joints == candidate.joints
                 && match (self.effects[effect].name(), a.candidate.values.first(), candidate.values.first()) {
                     ("position_ripple", Some(x), Some(y)) => (x - y).abs() < 0.5,
+                    ("joint_coupling", Some(x), Some(y)) => x == y,
+                    ("broken_symmetry", ..) => a.candidate.form == candidate.form,
+                    ("contact_wrench", ..) => a.candidate.windows == candidate.windows,
                     _ => true,
                 }
         })

@@ -5,7 +5,9 @@ use crate::log::Log;
 use crate::parallel;
 use crate::signal::resample::median_step;
 use crate::signal::{Band, rest};
+use dyngen::arm::{Parameter, ParameterKind};
 use std::fmt;
+use std::sync::OnceLock;
 
 /// How logs are prepared.
 #[derive(Clone, Debug)]
@@ -63,6 +65,9 @@ pub struct Data<'a> {
     pub rest_speed: Vec<f64>,
     /// What was left out or done, in words.
     pub notes: Vec<String>,
+    last_link: OnceLock<Vec<Column>>,
+    force: OnceLock<Vec<Column>>,
+    declared_zero: OnceLock<Vec<Column>>,
 }
 
 impl<'a> Data<'a> {
@@ -114,9 +119,21 @@ impl<'a> Data<'a> {
                 ));
             }
         }
-        let blocks = blocks(&recordings, &joints, &band, options.block);
         let logs = logs.iter().map(|log| log.file.clone()).collect();
-        Ok(Data { body, recordings, band, joints, blocks, logs, rest_speed, notes })
+        let blocks = blocks_of(&recordings, &joints, &band, options.block);
+        Ok(Data {
+            body,
+            recordings,
+            band,
+            joints,
+            blocks,
+            logs,
+            rest_speed,
+            notes,
+            last_link: OnceLock::new(),
+            force: OnceLock::new(),
+            declared_zero: OnceLock::new(),
+        })
     }
 
     /// Joints.
@@ -129,6 +146,57 @@ impl<'a> Data<'a> {
     #[must_use]
     pub fn rate(&self) -> f64 {
         self.recordings.first().map_or(0.0, |r| r.rate)
+    }
+
+    /// Stretches of about `length` seconds, in order.
+    #[must_use]
+    pub fn blocks_of(&self, length: f64) -> Vec<Block> {
+        blocks_of(&self.recordings, &self.joints, &self.band, length)
+    }
+
+    /// The ten inertial parameters of the last link as columns over all joints; empty where they cannot be had.
+    pub fn last_link_columns(&self) -> &[Column] {
+        self.last_link.get_or_init(|| {
+            let chosen: Vec<usize> =
+                ParameterKind::ALL[..10].iter().map(|kind| self.body.last_link(*kind)).collect();
+            self.columns_over_all(10, |r| self.body.parameter_columns(&chosen, &r.q, &r.v, &r.a))
+        })
+    }
+
+    /// Torques for unit forces on the origin of the last frame along the base axes; empty where they cannot be had.
+    pub fn force_columns(&self) -> &[Column] {
+        self.force.get_or_init(|| {
+            // The static torque of a unit mass under unit gravity is that of a unit force.
+            let mass = [self.body.last_link(ParameterKind::M)];
+            (0..3)
+                .flat_map(|axis| self.columns_over_all(1, |r| self.body.gravity_columns(axis, &mass, &r.q)))
+                .collect()
+        })
+    }
+
+    /// The parameters that the arm file declares zero.
+    #[must_use]
+    pub fn declared_zero(&self) -> Vec<Parameter> {
+        let arm = self.body.arm();
+        let declared = |p: &Parameter| p.kind != ParameterKind::Im && !arm.keeps(*p);
+        arm.all_parameters().into_iter().filter(declared).collect()
+    }
+
+    /// Their columns, in the same order.
+    pub fn declared_zero_columns(&self) -> &[Column] {
+        self.declared_zero.get_or_init(|| {
+            let chosen: Vec<usize> = self.declared_zero().iter().map(|p| p.index()).collect();
+            self.columns_over_all(chosen.len(), |r| self.body.parameter_columns(&chosen, &r.q, &r.v, &r.a))
+        })
+    }
+
+    /// Columns from a function that gives n × count values a sample.
+    fn columns_over_all(&self, count: usize, of: impl Fn(&Recording) -> Option<Vec<f64>>) -> Vec<Column> {
+        let Some(all) = self.recordings.iter().map(of).collect::<Option<Vec<Vec<f64>>>>() else { return Vec::new() };
+        let one = |c: usize| -> Vec<Vec<f64>> {
+            all.iter().map(|x| x.iter().skip(c).step_by(count).copied().collect()).collect()
+        };
+        (0..count).map(|c| self.column_over_all(&one(c))).collect()
     }
 
     /// A column from full-rate signals on one joint.
@@ -200,7 +268,7 @@ fn joint_rows(body: &RigidBody, recordings: &[Recording], band: &Band, kept: Vec
     joints
 }
 
-fn blocks(recordings: &[Recording], joints: &[JointRows], band: &Band, length: f64) -> Vec<Block> {
+fn blocks_of(recordings: &[Recording], joints: &[JointRows], band: &Band, length: f64) -> Vec<Block> {
     let mut blocks = Vec::new();
     for (r, recording) in recordings.iter().enumerate() {
         let kept = band.kept(recording.len());
