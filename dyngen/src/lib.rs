@@ -12,12 +12,15 @@ pub mod graph;
 #[cfg(feature = "urdf")]
 pub mod import;
 mod model;
+pub mod optimize;
 pub mod prove;
+mod values;
 
 pub use arm::Arm;
 pub use base::{ParameterSet, SetKind};
 pub use config::{Config, GenerateError};
 pub use diagnostic::{Diagnostic, Diagnostics};
 pub use dynamics::Function;
-pub use evaluator::Evaluator;
+pub use evaluator::{Evaluator, Samples};
 pub use model::{Error, Model};
+pub use values::Values;

@@ -1,2 +1,7 @@
 //! The `powerball` command.
-fn main() {}
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    powerball::cli::main()
+}

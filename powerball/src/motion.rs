@@ -70,7 +70,8 @@ impl Motion {
         for (k, sample) in self.samples().enumerate() {
             let _ = write!(out, "{:.6}", k as f64 * self.period);
             for value in sample.into_iter().flatten() {
-                let _ = write!(out, ",{value:.9}");
+                // Adding zero turns -0 into 0.
+                let _ = write!(out, ",{:.9}", value + 0.0);
             }
             out.push('\n');
         }

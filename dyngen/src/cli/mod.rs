@@ -5,7 +5,6 @@ mod describe;
 mod eval;
 mod generate;
 mod import;
-mod values;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use dyngen::base::SetKind;

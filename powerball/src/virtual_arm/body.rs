@@ -45,6 +45,14 @@ impl Body {
         Body::about_centre(mass, Vector3::from(centre), tensor, rotor)
     }
 
+    /// The same body moved by `by`, m, without turning it.
+    #[must_use]
+    pub fn moved(&self, by: Vector3<f64>) -> Self {
+        let centre = self.moment / self.mass;
+        let shift = Matrix3::identity() * centre.norm_squared() - centre * centre.transpose();
+        Body::about_centre(self.mass, centre + by, self.inertia - self.mass * shift, self.rotor)
+    }
+
     /// The eleven parameters in order.
     pub fn parameters(&self) -> [f64; PER_LINK] {
         let (h, i) = (&self.moment, &self.inertia);
@@ -81,6 +89,13 @@ mod tests {
         // The product of inertia of a point mass is m·x·y, with its own sign.
         let point = Body::even_box(2.0, [0.1, 0.2, 0.0], [0.0; 3], 0.0).parameters();
         approx::assert_relative_eq!(point[5], 0.04, max_relative = 1e-14);
+        let there_and_back = body.moved(Vector3::new(0.1, 0.2, 0.3)).moved(Vector3::new(-0.1, -0.2, -0.3));
+        approx::assert_relative_eq!(
+            there_and_back.inertia,
+            body.inertia,
+            max_relative = 1e-13,
+            epsilon = 1e-15
+        );
         assert!(bodies(&[0.0; 12]).is_none());
     }
 }

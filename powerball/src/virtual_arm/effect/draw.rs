@@ -9,7 +9,7 @@ use std::ops::Range;
 
 impl Effect {
     /// The names that [`draw_named`](Self::draw_named) knows.
-    pub const NAMES: [&'static str; 14] = [
+    pub const NAMES: [&'static str; 16] = [
         "load_friction",
         "stribeck",
         "velocity_nonlinearity",
@@ -24,6 +24,8 @@ impl Effect {
         "encoder_offset",
         "base_tilt",
         "contact_wrench",
+        "broken_symmetry",
+        "joint_coupling",
     ];
 
     /// Draws an effect of that name for the virtual LWA 4P: its joint and its figures. `session` is the time in s
@@ -92,7 +94,7 @@ impl Effect {
             },
             "time_delay" => Effect::TimeDelay { delay: rng.random_range(0.006..0.018) },
             "encoder_offset" => Effect::EncoderOffset {
-                joint: rng.random_range(1..4),
+                joint: rng.random_range(1..3),
                 offset: sign * rng.random_range(0.03..0.08),
             },
             "base_tilt" => Effect::BaseTilt { tilt: [0, 1].map(|_| sign * rng.random_range(0.02..0.06)) },
@@ -101,6 +103,19 @@ impl Effect {
                 start: moment,
                 end: moment + rng.random_range(2.0..5.0),
             },
+            // The elbow and the forearm, whose centres of mass are declared to lie in a plane.
+            "broken_symmetry" => {
+                let link = rng.random_range(2..4);
+                Effect::BrokenSymmetry {
+                    link,
+                    aside: sign * [0.02, 0.06][link - 2] * rng.random_range(0.8..1.5),
+                }
+            }
+            // Both axes of a module share a housing.
+            "joint_coupling" => {
+                let [from, onto] = [[0, 1], [1, 0], [2, 3], [3, 2], [4, 5], [5, 4]][rng.random_range(0..6)];
+                Effect::JointCoupling { from, onto, share: rng.random_range(0.06..0.15) }
+            }
             _ => return None,
         })
     }

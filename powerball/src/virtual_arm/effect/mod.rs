@@ -131,6 +131,22 @@ pub enum Effect {
         /// Up to this time, s.
         end: f64,
     },
+    /// A link's centre of mass lies beside the plane in which it was declared to lie.
+    BrokenSymmetry {
+        /// The link.
+        link: usize,
+        /// By this much along the link's x axis, m.
+        aside: f64,
+    },
+    /// One joint's friction loads the other joint of its module.
+    JointCoupling {
+        /// The joint that moves.
+        from: usize,
+        /// The joint that feels it.
+        onto: usize,
+        /// Share of the friction that is felt.
+        share: f64,
+    },
 }
 
 /// What an effect may depend on at one instant.
@@ -175,6 +191,8 @@ impl Effect {
             Effect::EncoderOffset { .. } => "encoder_offset",
             Effect::BaseTilt { .. } => "base_tilt",
             Effect::ContactWrench { .. } => "contact_wrench",
+            Effect::BrokenSymmetry { .. } => "broken_symmetry",
+            Effect::JointCoupling { .. } => "joint_coupling",
         }
     }
 
@@ -193,7 +211,8 @@ impl Effect {
             | Effect::Spring { joint, .. }
             | Effect::PositionRipple { joint, .. }
             | Effect::TorqueConstant { joint, .. }
-            | Effect::EncoderOffset { joint, .. } => Some(*joint),
+            | Effect::EncoderOffset { joint, .. }
+            | Effect::JointCoupling { onto: joint, .. } => Some(*joint),
             _ => None,
         }
     }
@@ -249,6 +268,12 @@ impl Effect {
                 "a force of ({:.0}, {:.0}, {:.0}) N on the wrist from t = {start:.1} s to {end:.1} s",
                 force[0], force[1], force[2]
             ),
+            Effect::BrokenSymmetry { link, aside } => {
+                format!("the centre of mass of link {} lies {:+.1} mm off its plane", link + 1, 1e3 * aside)
+            }
+            Effect::JointCoupling { from, share, .. } => {
+                format!("{:.0} % of the friction of joint {} is felt here", 100.0 * share, from + 1)
+            }
         }
     }
 
@@ -265,6 +290,12 @@ impl Effect {
                 last.mass += load.mass;
                 last.moment += load.moment;
                 last.inertia += load.inertia;
+                Dynamics::new(arm.chain().clone(), bodies)
+            }
+            Effect::BrokenSymmetry { link, aside } => {
+                let mut bodies = arm.bodies().to_vec();
+                let body = bodies.get_mut(*link)?;
+                *body = body.moved(Vector3::new(*aside, 0.0, 0.0));
                 Dynamics::new(arm.chain().clone(), bodies)
             }
             Effect::BaseTilt { tilt } => {

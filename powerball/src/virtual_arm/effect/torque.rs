@@ -57,6 +57,9 @@ impl Effect {
                     tau[i] += with - without;
                 }
             }
+            Effect::JointCoupling { from, onto, share } => {
+                tau[*onto] += share * now.friction[*from].torque(now.dq[*from]);
+            }
             _ => {}
         }
     }

@@ -1,0 +1,92 @@
+//! `powerball identify`: from logs to identified.json.
+
+use super::Failure;
+use super::inputs::{Inputs, load};
+use super::output::{self, Progress};
+use crate::estimate::{Folds, JointFriction, ParameterEstimate, Spread, fit, identify, spread};
+use crate::regression::{Data, DataOptions};
+use clap::Args;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Fit the minimal inertial set and the friction of every joint (Eq. 16) to logs.
+///
+/// Writes identified.json and report.html.
+#[derive(Args, Debug)]
+#[command(after_help = "Example:\n  powerball identify --arm arm.toml --log a.csv b.csv --validate c.csv --out result")]
+pub(crate) struct Identify {
+    #[command(flatten)]
+    inputs: Inputs,
+    /// Logs on which the fit is judged, on another path.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    validate: Vec<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Result_ {
+    arm: String,
+    set: &'static str,
+    parameters: Vec<ParameterEstimate>,
+    friction: Vec<JointFriction>,
+    fit: Spread,
+    validate: Option<Spread>,
+    physically_consistent: bool,
+    band: [f64; 2],
+    warnings: Vec<String>,
+}
+
+impl Identify {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let progress = Progress::new();
+        let loaded = load(&self.inputs, &self.validate, &progress)?;
+        let options = DataOptions::default();
+        let refused = |e: crate::regression::DataError| Failure::Refused(e.to_string());
+        progress.say("preparing signals");
+        let data = Data::new(&loaded.body, &loaded.fit, &options).map_err(refused)?;
+        progress.say("fitting");
+        let folds = Folds::new(&data);
+        let fitted = fit(&data, &folds, &[], None);
+        let identified = identify(&data, &fitted);
+        let mut warnings = loaded.warnings;
+        warnings.extend(data.notes.iter().cloned());
+        let validate = if loaded.validate.is_empty() {
+            warnings.push("no log was given to --validate: the errors below are those of the fit itself".into());
+            None
+        } else {
+            let data = Data::new(&loaded.body, &loaded.validate, &options).map_err(refused)?;
+            Some(spread(&data, &fitted.residual_on(&data, &[])))
+        };
+        let undetermined: Vec<&str> =
+            identified.parameters.iter().filter(|p| p.std.is_none()).map(|p| p.name.as_str()).collect();
+        if !undetermined.is_empty() {
+            warnings.push(format!(
+                "these logs do not determine {}: they were set to 0; record a motion that excites them",
+                undetermined.join("; ")
+            ));
+        }
+        let result = Result_ {
+            arm: loaded.body.arm().name.clone(),
+            set: "minimal",
+            parameters: identified.parameters,
+            friction: identified.friction,
+            fit: spread(&data, &fitted.residual),
+            validate,
+            physically_consistent: false,
+            band: [0.0, data.band.cutoff],
+            warnings,
+        };
+        let text = output::json(&result)?;
+        output::write(&self.inputs.out, "identified.json", text.as_bytes())?;
+        if self.inputs.json {
+            output::print(&text);
+        } else {
+            for warning in &result.warnings {
+                output::print(&format!("note: {warning}"));
+            }
+            let mut columns = vec![("fit", &result.fit)];
+            columns.extend(result.validate.as_ref().map(|s| ("held out", s)));
+            output::print(&output::table(&columns));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,64 @@
+//! What `identify` and `explain` share: an arm, logs, a folder for results.
+
+use super::Failure;
+use super::output::Progress;
+use crate::log::{Log, common_clock, read_logs};
+use crate::regression::RigidBody;
+use clap::Args;
+use dyngen::Arm;
+use std::path::{Path, PathBuf};
+
+/// Arm and logs.
+#[derive(Args, Debug)]
+pub(crate) struct Inputs {
+    /// The arm file (TOML).
+    #[arg(long, value_name = "ARM.toml")]
+    pub arm: PathBuf,
+    /// Logs to fit (CSV: t, q1…, tau1… or i1…); several, in the order in which they were recorded.
+    #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
+    pub log: Vec<PathBuf>,
+    /// Folder for the results; made if missing.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Print the result as one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The arm and the logs of a command, read.
+pub(crate) struct Loaded {
+    pub body: RigidBody,
+    pub fit: Vec<Log>,
+    pub validate: Vec<Log>,
+    pub warnings: Vec<String>,
+}
+
+/// Reads and checks everything before any work is done.
+pub(crate) fn load(inputs: &Inputs, validate: &[PathBuf], progress: &Progress) -> Result<Loaded, Failure> {
+    let arm = Arm::read(&inputs.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+    let mut warnings = arm.notes();
+    for file in validate {
+        if inputs.log.iter().any(|log| same_file(log, file)) {
+            let name = file.display();
+            return Err(Failure::Unusable(format!("{name} is given to --log and --validate: a log cannot judge its own fit")));
+        }
+    }
+    progress.say("reading logs");
+    let files: Vec<&PathBuf> = inputs.log.iter().chain(validate).collect();
+    let (mut logs, findings) = read_logs(&files, &arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+    warnings.extend(findings.iter().map(ToString::to_string));
+    common_clock(&mut logs);
+    let rest = logs.split_off(inputs.log.len());
+    progress.say("deriving and proving the arm's dynamics");
+    let body = RigidBody::new(&arm).map_err(|e| Failure::Refused(e.to_string()))?;
+    std::fs::create_dir_all(&inputs.out)
+        .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", inputs.out.display())))?;
+    Ok(Loaded { body, fit: logs, validate: rest, warnings })
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => a == b,
+    }
+}

@@ -1,0 +1,64 @@
+//! The `powerball` command: one file a subcommand.
+
+mod demo;
+mod excite;
+mod explain;
+mod identify;
+mod inputs;
+mod output;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Identify a robot arm's torque model from logs, and explain what it lacks.
+#[derive(Debug, Parser)]
+#[command(name = "powerball", version, about)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// The whole loop on the built-in virtual arm: record, identify, explain, compare with the truth.
+    Demo(demo::DemoCommand),
+    /// Search an exciting trajectory within the arm's limits and write it.
+    Excite(excite::Excite),
+    /// Fit the minimal inertial set and the friction of every joint to logs.
+    Identify(identify::Identify),
+    /// Find, name and add what the model lacks on logs; judged on another path.
+    Explain(explain::Explain),
+}
+
+/// Why a command did not do what it was asked for.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The data or the arm refused it: exit code 1.
+    Refused(String),
+    /// Wrong use or unreadable input: exit code 2.
+    Unusable(String),
+}
+
+/// Runs the command line of this process.
+#[must_use]
+pub fn main() -> ExitCode {
+    // clap itself exits with 2 on wrong use.
+    let cli = Cli::parse();
+    let done = match cli.command {
+        Command::Demo(command) => command.run(),
+        Command::Excite(command) => command.run(),
+        Command::Identify(command) => command.run(),
+        Command::Explain(command) => command.run(),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::Refused(reason)) => {
+            eprintln!("powerball: {reason}");
+            ExitCode::from(1)
+        }
+        Err(Failure::Unusable(reason)) => {
+            eprintln!("powerball: {reason}");
+            ExitCode::from(2)
+        }
+    }
+}

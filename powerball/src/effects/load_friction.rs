@@ -1,0 +1,48 @@
+//! Friction that grows with the torque a joint transmits: gears are pressed together harder.
+
+use super::candidate::by_joint;
+use super::{Candidate, Class, Context, Effect, Found};
+use crate::regression::Column;
+use serde_json::{Value, json};
+
+/// τ = c·|τ_rigid|·tanh(γ·q̇), c ≥ 0 in N·m per N·m.
+pub(super) struct LoadFriction;
+
+/// A gear that loses more than this share of its torque would not be used.
+const MOST: f64 = 0.6;
+
+impl Effect for LoadFriction {
+    fn name(&self) -> &'static str {
+        "load_friction"
+    }
+
+    fn class(&self) -> Class {
+        Class::Friction
+    }
+
+    fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
+        context.moving_joints().map(|j| Candidate::on(j, 0, Vec::new(), 1)).collect()
+    }
+
+    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
+        let (j, n) = (candidate.joints[0], context.data.dof());
+        let gamma = context.steepness(j);
+        let rigid = context.rigid();
+        vec![context.data.column_on(j, |r, recording| {
+            let load = rigid[r].iter().skip(j).step_by(n);
+            load.zip(recording.speed(j)).map(|(load, v)| load.abs() * (gamma * v).tanh()).collect()
+        })]
+    }
+
+    fn non_negative(&self) -> bool {
+        true
+    }
+
+    fn admissible(&self, _: &Candidate, coefficients: &[f64]) -> bool {
+        coefficients.iter().all(|c| *c < MOST)
+    }
+
+    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
+        json!({ "coefficient": by_joint(found, |f| f.coefficients[0]) })
+    }
+}

@@ -1,0 +1,64 @@
+//! A wrong factor between current and torque, or one that falls as the motor saturates.
+
+use super::{Candidate, Class, Context, Effect, Found};
+use crate::regression::Column;
+use serde_json::{Value, json};
+
+/// τ_measured = τ·(1 + c) or τ·(1 + c·|τ|/τ_max) or τ·(1 + c·(τ/τ_max)²).
+pub(super) struct TorqueConstant;
+
+const FORMS: usize = 3;
+
+impl Effect for TorqueConstant {
+    fn name(&self) -> &'static str {
+        "torque_constant"
+    }
+
+    fn class(&self) -> Class {
+        Class::Dynamics
+    }
+
+    fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
+        let on = |j: usize| (0..FORMS).map(move |form| Candidate::on(j, form, Vec::new(), FORMS));
+        context.moving_joints().flat_map(on).collect()
+    }
+
+    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
+        let (j, n) = (candidate.joints[0], context.data.dof());
+        let prediction = context.prediction();
+        let of = |torque: &[f64]| torque.iter().skip(j).step_by(n).copied().collect::<Vec<f64>>();
+        let top = scale(context, j);
+        vec![context.data.column_on(j, |r, _| {
+            let bent = |t: f64| match candidate.form {
+                0 => t,
+                1 => t * t.abs() / top,
+                _ => t * (t / top).powi(2),
+            };
+            of(&prediction[r]).into_iter().map(bent).collect()
+        })]
+    }
+
+    fn admissible(&self, _: &Candidate, c: &[f64]) -> bool {
+        c[0].abs() < 0.8
+    }
+
+    fn parameters(&self, context: &Context<'_>, found: &[Found<'_>]) -> Value {
+        let gain: Vec<f64> =
+            found.iter().map(|f| if f.candidate.form == 0 { 1.0 + f.coefficients[0] } else { 1.0 }).collect();
+        let bend: Vec<f64> =
+            found.iter().map(|f| if f.candidate.form == 0 { 0.0 } else { f.coefficients[0] }).collect();
+        let at: Vec<f64> = found.iter().map(|f| scale(context, f.candidate.joints[0])).collect();
+        match gain.as_slice() {
+            [one] => json!({ "gain": one, "change_at_torque": bend[0], "torque": at[0] }),
+            _ => json!({ "gain": gain, "change_at_torque": bend, "torque": at }),
+        }
+    }
+}
+
+/// The joint's own limit, or else a torque of the size that these logs hold.
+fn scale(context: &Context<'_>, joint: usize) -> f64 {
+    context.data.body.arm().joints[joint].torque.unwrap_or_else(|| {
+        let torque = &context.data.joints[joint].torque;
+        (torque.iter().map(|t| t * t).sum::<f64>() / torque.len().max(1) as f64).sqrt().max(1e-6) * 3.0
+    })
+}

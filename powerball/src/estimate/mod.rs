@@ -1,0 +1,15 @@
+//! Weighted least squares in the minimal set, friction shapes included, with honest standard errors.
+
+pub mod distribution;
+mod design;
+mod fit;
+mod folds;
+mod friction_shape;
+mod identify;
+mod solve;
+
+pub use design::{Design, Gram, runs};
+pub use fit::{Fit, Term, fit, friction_columns};
+pub use folds::Folds;
+pub use identify::{Identified, JointFriction, ParameterEstimate, Spread, identify, spread};
+pub use solve::Solver;

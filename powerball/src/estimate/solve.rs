@@ -1,0 +1,197 @@
+//! Normal equations that may be short of rank or bounded from below.
+
+use faer::Mat;
+
+/// The scaled Cholesky factor of a Gram matrix; columns that depend on those before them are left out.
+#[derive(Clone, Debug)]
+pub struct Solver {
+    size: usize,
+    /// Indices of the columns that are in, in order.
+    kept: Vec<usize>,
+    /// 1/norm by kept column.
+    scale: Vec<f64>,
+    /// Lower triangle by rows, kept × kept.
+    lower: Vec<f64>,
+}
+
+/// A column whose part that is new is below this share of its squared length counts as dependent.
+const DEPENDENT: f64 = 1e-9;
+
+impl Solver {
+    /// Factors the Gram matrix over the columns for which `wanted` holds.
+    #[must_use]
+    pub fn new(gram: &Mat<f64>, wanted: impl Fn(usize) -> bool) -> Solver {
+        let size = gram.ncols();
+        let (mut kept, mut scale, mut rows): (Vec<usize>, Vec<f64>, Vec<Vec<f64>>) = (vec![], vec![], vec![]);
+        for c in (0..size).filter(|c| wanted(*c)) {
+            let length = gram[(c, c)];
+            if !(length > 0.0 && length.is_finite()) {
+                continue;
+            }
+            let s = 1.0 / length.sqrt();
+            let mut row = Vec::with_capacity(kept.len() + 1);
+            let mut left = 1.0;
+            for (i, (k, other)) in kept.iter().zip(&rows).enumerate() {
+                let mut value = gram[(c, *k)] * s * scale[i];
+                value -= row.iter().zip(other).map(|(a, b): (&f64, &f64)| a * b).sum::<f64>();
+                value /= other[i];
+                left -= value * value;
+                row.push(value);
+            }
+            if !(left > DEPENDENT) {
+                continue;
+            }
+            row.push(left.sqrt());
+            kept.push(c);
+            scale.push(s);
+            rows.push(row);
+        }
+        let m = kept.len();
+        let mut lower = vec![0.0; m * m];
+        for (i, row) in rows.iter().enumerate() {
+            lower[i * m..i * m + row.len()].copy_from_slice(row);
+        }
+        Solver { size, kept, scale, lower }
+    }
+
+    /// The columns that are in.
+    #[must_use]
+    pub fn kept(&self) -> &[usize] {
+        &self.kept
+    }
+
+    /// Solves for the kept columns; the others get 0.
+    #[must_use]
+    pub fn solve(&self, right: &[f64]) -> Vec<f64> {
+        let m = self.kept.len();
+        let mut x: Vec<f64> = self.kept.iter().zip(&self.scale).map(|(k, s)| right[*k] * s).collect();
+        self.forward(&mut x);
+        for i in (0..m).rev() {
+            let tail: f64 = (i + 1..m).map(|k| self.lower[k * m + i] * x[k]).sum();
+            x[i] = (x[i] - tail) / self.lower[i * m + i];
+        }
+        let mut out = vec![0.0; self.size];
+        for ((k, s), value) in self.kept.iter().zip(&self.scale).zip(x) {
+            out[*k] = value * s;
+        }
+        out
+    }
+
+    fn forward(&self, x: &mut [f64]) {
+        let m = self.kept.len();
+        for i in 0..m {
+            let head: f64 = self.lower[i * m..i * m + i].iter().zip(&*x).map(|(l, v)| l * v).sum();
+            x[i] = (x[i] - head) / self.lower[i * m + i];
+        }
+    }
+
+    /// Diagonal of the inverse for the kept columns, infinity for the others.
+    #[must_use]
+    pub fn inverse_diagonal(&self) -> Vec<f64> {
+        let mut out = vec![f64::INFINITY; self.size];
+        for (i, k) in self.kept.iter().enumerate() {
+            let mut unit = vec![0.0; self.kept.len()];
+            unit[i] = 1.0;
+            self.forward(&mut unit);
+            out[*k] = unit.iter().map(|v| v * v).sum::<f64>() * self.scale[i] * self.scale[i];
+        }
+        out
+    }
+
+    /// Condition estimate of the scaled columns: the ratio of the extreme pivots.
+    #[must_use]
+    pub fn pivot_ratio(&self) -> f64 {
+        let m = self.kept.len();
+        let pivots = (0..m).map(|i| self.lower[i * m + i]);
+        let (low, high) = pivots.fold((f64::MAX, 0.0f64), |(l, h), p| (l.min(p), h.max(p)));
+        if m == 0 { 1.0 } else { high / low }
+    }
+}
+
+/// Least squares from normal equations with some coefficients ≥ 0, by an active set.
+///
+/// Returns the solution and the factor over the columns that are free.
+#[must_use]
+pub fn bounded(gram: &Mat<f64>, right: &[f64], wanted: impl Fn(usize) -> bool, non_negative: &[usize]) -> (Vec<f64>, Solver) {
+    let mut at_bound: Vec<usize> = Vec::new();
+    let mut best = None;
+    // Each round moves one coefficient; a cycle would be endless only through rounding.
+    for _ in 0..4 * non_negative.len() + 2 {
+        let solver = Solver::new(gram, |c| wanted(c) && !at_bound.contains(&c));
+        let x = solver.solve(right);
+        let size = |c: usize| x[c] * gram[(c, c)].sqrt();
+        let worst = non_negative.iter().copied().filter(|c| x[*c] < 0.0).min_by(|a, b| size(*a).total_cmp(&size(*b)));
+        if let Some(c) = worst {
+            at_bound.push(c);
+            best = Some((x, solver));
+            continue;
+        }
+        // A coefficient at its bound that would now rise is let free again.
+        let rising = at_bound.iter().copied().find(|&c| {
+            let gradient = right[c] - (0..x.len()).map(|k| gram[(c, k)] * x[k]).sum::<f64>();
+            gradient > 1e-9 * (gram[(c, c)].sqrt() * right[c].abs().max(1.0))
+                && {
+                    let trial = Solver::new(gram, |k| wanted(k) && (k == c || !at_bound.contains(&k))).solve(right);
+                    trial[c] > 0.0 && non_negative.iter().all(|k| trial[*k] >= 0.0)
+                }
+        });
+        match rising {
+            Some(c) => at_bound.retain(|k| *k != c),
+            None => return (x, solver),
+        }
+    }
+    let (mut x, solver) = best.unwrap_or_else(|| (vec![0.0; gram.ncols()], Solver::new(gram, |_| false)));
+    for c in non_negative {
+        x[*c] = x[*c].max(0.0);
+    }
+    (x, solver)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+
+    #[test]
+    fn dependent_columns_are_left_out_and_the_rest_solved() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let a = Mat::<f64>::from_fn(40, 5, |_, _| rng.random_range(-1.0..1.0));
+        let mut b = a.clone();
+        for i in 0..40 {
+            b[(i, 3)] = 2.0 * a[(i, 0)] - a[(i, 1)];
+        }
+        let truth = [1.0, -2.0, 0.5, 0.0, 3.0];
+        let gram = b.transpose() * &b;
+        let y: Vec<f64> = (0..40).map(|i| (0..5).map(|c| b[(i, c)] * truth[c]).sum()).collect();
+        let right: Vec<f64> = (0..5).map(|c| (0..40).map(|i| b[(i, c)] * y[i]).sum()).collect();
+        let solver = Solver::new(&gram, |_| true);
+        assert_eq!(solver.kept(), [0, 1, 2, 4]);
+        for (x, t) in solver.solve(&right).iter().zip(truth) {
+            approx::assert_abs_diff_eq!(*x, t, epsilon = 1e-10);
+        }
+        assert!(solver.inverse_diagonal()[3].is_infinite());
+    }
+
+    #[test]
+    fn bounds_hold_and_are_optimal() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(6);
+        for _ in 0..50 {
+            let a = Mat::<f64>::from_fn(30, 6, |_, _| rng.random_range(-1.0..1.0));
+            let y: Vec<f64> = (0..30).map(|_| rng.random_range(-1.0..1.0)).collect();
+            let gram = a.transpose() * &a;
+            let right: Vec<f64> = (0..6).map(|c| (0..30).map(|i| a[(i, c)] * y[i]).sum()).collect();
+            let bounds = [1, 2, 4, 5];
+            let (x, _) = bounded(&gram, &right, |_| true, &bounds);
+            for c in 0..6 {
+                let gradient = right[c] - (0..6).map(|k| gram[(c, k)] * x[k]).sum::<f64>();
+                if bounds.contains(&c) {
+                    assert!(x[c] >= 0.0);
+                    assert!(gradient < 1e-8, "a bounded coefficient wants to rise");
+                    assert!(x[c] == 0.0 || gradient.abs() < 1e-8);
+                } else {
+                    assert!(gradient.abs() < 1e-8);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! What speaks for a candidate: blocks that agree, folds that gain, another path that gains.
+
+use super::folds::fold_gains;
+use super::screen::{Screen, Trial, dot};
+use crate::estimate::distribution::f_tail;
+use crate::estimate::{Design, Folds, Solver};
+use crate::regression::{Column, Data};
+use faer::Mat;
+
+/// The evidence for one candidate.
+#[derive(Clone, Debug)]
+pub struct Evidence {
+    /// Penalised gain.
+    pub score: f64,
+    /// Cluster-robust Wald test over blocks, base refitted: the probability of such coefficients by chance.
+    pub p_value: f64,
+    /// Share by which the held-out squared error of the candidate's joints falls, by fold.
+    pub fold_gains: Vec<f64>,
+    /// The same on the other path: the mean over its logs.
+    pub path_gain: f64,
+}
+
+/// The other path, prepared for one base model.
+#[derive(Debug)]
+pub struct Path<'p> {
+    /// Its data.
+    pub data: &'p Data<'p>,
+    /// The base's columns on it.
+    pub design: Design,
+    /// What the base leaves on it.
+    pub residual: Vec<Vec<f64>>,
+}
+
+/// Gathers the evidence for a trial. `path` holds the other path and the candidate's columns there.
+#[must_use]
+pub fn evidence(screen: &Screen<'_>, trial: &Trial, joints: &[usize], folds: &Folds, local: bool, path: Option<(&Path<'_>, &[Column])>) -> Evidence {
+    Evidence {
+        score: trial.score,
+        p_value: wald(screen, trial),
+        fold_gains: fold_gains(screen, trial, joints, folds, local),
+        path_gain: path.map_or(0.0, |(path, columns)| path_gain(screen, trial, joints, path, columns)),
+    }
+}
+
+/// The Wald test of the coefficients with blocks as clusters: within a block residuals may depend on each other.
+pub(super) fn wald(screen: &Screen<'_>, trial: &Trial) -> f64 {
+    let (data, fit) = (screen.context.data, screen.context.fit);
+    let k = trial.columns.len();
+    let columns = screen.residualised(trial);
+    let mut square = Mat::<f64>::zeros(k, k);
+    let mut meat = Mat::<f64>::zeros(k, k);
+    let after: Vec<Vec<f64>> = columns
+        .iter()
+        .zip(screen.context.residual)
+        .map(|(columns, residual)| {
+            let mut e = residual.clone();
+            for (column, theta) in columns.iter().zip(&trial.theta) {
+                e.iter_mut().zip(column).for_each(|(e, c)| *e -= theta * c);
+            }
+            e
+        })
+        .collect();
+    let mut clusters = 0.0;
+    for block in &data.blocks {
+        let mut score = vec![0.0; k];
+        let mut touched = false;
+        for (j, rows) in block.rows.iter().enumerate() {
+            let w = fit.weights[j];
+            if rows.is_empty() || w == 0.0 {
+                continue;
+            }
+            for a in 0..k {
+                let own = &columns[j][a][rows.clone()];
+                score[a] += w * dot(own, &after[j][rows.clone()]);
+                for b in 0..=a {
+                    square[(a, b)] += w * dot(own, &columns[j][b][rows.clone()]);
+                }
+            }
+            touched = true;
+        }
+        if touched {
+            clusters += 1.0;
+        }
+        for a in 0..k {
+            for b in 0..k {
+                meat[(a, b)] += score[a] * score[b];
+            }
+        }
+    }
+    for a in 0..k {
+        for b in 0..a {
+            square[(b, a)] = square[(a, b)];
+        }
+    }
+    // Wald: θ' S M⁻¹ S θ with S the residualised gram and M the sum over clusters.
+    let s: Vec<f64> = (0..k).map(|a| (0..k).map(|b| square[(a, b)] * trial.theta[b]).sum()).collect();
+    let used = trial.theta.iter().filter(|t| **t != 0.0).count() as f64;
+    let solver = Solver::new(&meat, |a| trial.theta[a] != 0.0);
+    let wald = dot(&s, &solver.solve(&s));
+    let freedom = clusters - used;
+    if freedom < 3.0 || used == 0.0 {
+        return 1.0;
+    }
+    f_tail(wald / used * freedom / clusters, used, freedom)
+}
+
+fn path_gain(screen: &Screen<'_>, trial: &Trial, joints: &[usize], path: &Path<'_>, columns: &[Column]) -> f64 {
+    let fit = screen.context.fit;
+    let mut shift = vec![0.0; fit.design.size];
+    for (base, theta) in trial.base.iter().zip(&trial.theta) {
+        shift.iter_mut().zip(base).for_each(|(s, b)| *s -= theta * b);
+    }
+    let mut change = vec![0.0; path.data.logs.len()];
+    let mut scale = vec![0.0; path.data.logs.len()];
+    for j in 0..fit.design.dof() {
+        let mut moved = path.design.predict(j, &shift);
+        for (column, theta) in columns.iter().zip(&trial.theta) {
+            if let Some(values) = column.at(j) {
+                moved.iter_mut().zip(values).for_each(|(m, v)| *m += theta * v);
+            }
+        }
+        for (recording, rows) in path.data.recordings.iter().zip(&path.data.joints[j].rows) {
+            let (r, m) = (&path.residual[j][rows.clone()], &moved[rows.clone()]);
+            change[recording.log] += fit.weights[j] * (2.0 * dot(r, m) - dot(m, m));
+            if joints.contains(&j) {
+                scale[recording.log] += fit.weights[j] * dot(r, r);
+            }
+        }
+    }
+    let gains: Vec<f64> =
+        change.iter().zip(&scale).filter(|(_, s)| **s > 0.0).map(|(c, s)| c / s).collect();
+    // The median keeps one odd log (something held, something touched) from deciding.
+    let mut sorted = gains.clone();
+    sorted.sort_by(f64::total_cmp);
+    match sorted.len() {
+        0 => 0.0,
+        n if n % 2 == 1 => sorted[n / 2],
+        n => 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]),
+    }
+}

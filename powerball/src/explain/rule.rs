@@ -1,0 +1,54 @@
+//! Every threshold of the rule, with its reason.
+
+use super::evidence::Evidence;
+
+/// Least penalised gain, in units of χ² of independent samples: e^(−10/2) is a likelihood ratio of 150 after the
+/// penalties for coefficients and for having searched.
+pub const LEAST_SCORE: f64 = 10.0;
+/// Penalty for each coefficient: what one coefficient gains by chance, twice over (Akaike).
+pub const PER_COEFFICIENT: f64 = 2.0;
+/// Probability of accepting anything at all where nothing is missing, over all joints and candidates.
+pub const FAMILY_WISE: f64 = 0.01;
+/// The held-out squared error must fall by this share: 1 % of the rms, below which no user would notice.
+pub const LEAST_FOLD_GAIN: f64 = 0.02;
+/// … in this share of the folds: four of five.
+pub const FOLDS_THAT_MUST_GAIN: f64 = 0.8;
+/// No fold may lose more than this share of its squared error.
+pub const WORST_FOLD: f64 = -0.05;
+/// Share of the placebos whose score a candidate must exceed.
+pub const PLACEBO_LEVEL: f64 = 0.99;
+/// A term of the class of an accepted one, on the same joint, that gains less than this share of it mends that one's
+/// law and is no effect of its own.
+pub const MENDS_ONLY: f64 = 0.15;
+/// Two names whose gains differ by less than this factor cannot be told apart by these data.
+pub const LEAST_MARGIN: f64 = 1.1;
+/// More of the excess over the noise floor than this may not stay where a name with little margin is given.
+pub const MOST_LEFTOVER: f64 = 0.35;
+/// A name that beats the next best one by this factor is sure even where much is left for others to explain.
+pub const CLEAR_MARGIN: f64 = 1.5;
+/// Effects added at most.
+pub const MOST_STEPS: usize = 12;
+
+/// Why a candidate is refused, `None` where it passes. `tests` counts what was tried over joints and candidates.
+pub fn refusal(evidence: &Evidence, tests: f64, local: bool) -> Option<String> {
+    if evidence.score < LEAST_SCORE {
+        return Some(format!("explains too little (score {:.1} of {LEAST_SCORE})", evidence.score));
+    }
+    let p = evidence.p_value * tests;
+    if p > FAMILY_WISE {
+        return Some(format!("not significant between independent blocks (p = {p:.2} over all that was tried)"));
+    }
+    let folds = &evidence.fold_gains;
+    let good = folds.iter().filter(|g| **g >= LEAST_FOLD_GAIN).count();
+    if (good as f64) < FOLDS_THAT_MUST_GAIN * folds.len() as f64 {
+        return Some(format!("the held-out error falls in {good} of {} folds only", folds.len()));
+    }
+    if let Some(worst) = folds.iter().copied().reduce(f64::min).filter(|w| *w < WORST_FOLD) {
+        return Some(format!("one held-out fold is {:.0} % worse", -100.0 * worst));
+    }
+    // What happens in some logs only need not happen in the logs of the other path.
+    if evidence.path_gain <= 0.0 && !local {
+        return Some(format!("does not lower the error on the other path ({:+.1} %)", -100.0 * evidence.path_gain));
+    }
+    None
+}

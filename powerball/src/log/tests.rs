@@ -1,0 +1,169 @@
+use super::read::parse;
+use super::*;
+use dyngen::Arm;
+use std::fmt::Write as _;
+
+const ARM: &str = r#"
+name = "two"
+convention = "standard"
+gravity = [0, 0, -9.81]
+[[joint]]
+kind = "revolute"
+a = 0.3
+alpha = "pi/2"
+d = 0.1
+theta = 0
+torque = 50
+torque_constant = 2.0
+position = [-3.2, 3.2]
+[[joint]]
+kind = "revolute"
+a = 0.2
+alpha = 0
+d = 0
+theta = 0
+torque = 50
+"#;
+
+fn arm() -> Arm {
+    Arm::parse(ARM, "two.toml").unwrap()
+}
+
+/// A log of 2 s at 100 Hz, each line passed through `line` first.
+fn text(header: &str, mut line: impl FnMut(usize, Vec<String>) -> Option<String>) -> String {
+    let mut text = format!("{header}\n");
+    for k in 0..200 {
+        let t = 0.01 * k as f64;
+        let fields = vec![
+            format!("{t:.4}"),
+            format!("{:.6}", (2.0 * t).sin()),
+            format!("{:.6}", (3.0 * t).cos()),
+            format!("{:.4}", 5.0 + (7.0 * t).sin()),
+            format!("{:.4}", (5.0 * t).cos()),
+        ];
+        if let Some(line) = line(k, fields) {
+            let _ = writeln!(text, "{line}");
+        }
+    }
+    text
+}
+
+const HEADER: &str = "t,q1,q2,tau1,tau2";
+
+fn read(text: &str) -> (Result<Log, LogError>, Vec<Finding>) {
+    let mut findings = Vec::new();
+    let log = parse(text.as_bytes(), "x.csv", &arm(), &mut findings);
+    (log, findings)
+}
+
+#[test]
+fn a_sound_log_is_read_without_findings() {
+    let (log, findings) = read(&text(HEADER, |_, f| Some(f.join(","))));
+    let log = log.unwrap();
+    assert!(findings.is_empty(), "{findings:?}");
+    assert_eq!((log.t.len(), log.pieces.clone()), (200, vec![0..200]));
+    assert_eq!(log.q[1][0], 1.0);
+}
+
+#[test]
+fn faults_are_found_with_their_line_and_taken_out() {
+    let spoilt = text(&format!("{HEADER},mode"), |k, mut f| {
+        f.push("run".into());
+        match k {
+            10 => f[2] = "nan".into(),
+            20 => f[0] = "0.19".into(),
+            100..150 => return None,
+            199 => return Some("1.99,0.1".into()),
+            _ => {}
+        }
+        Some(f.join(","))
+    });
+    let (log, findings) = read(&spoilt);
+    let log = log.unwrap();
+    let said = findings.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+    for part in ["kept out: mode", "x.csv:12: q2", "x.csv:22: t: 1 of", "torn", "x.csv:102: t: a gap of 0.5"] {
+        assert!(said.contains(part), "{part} not in\n{said}");
+    }
+    assert_eq!(log.pieces.len(), 2);
+    assert!(log.q.iter().flatten().all(|v| v.is_finite()));
+}
+
+#[test]
+fn wraps_are_undone() {
+    let wrapped = text(HEADER, |k, mut f| {
+        let q = 2.0 + 0.02 * k as f64;
+        f[1] = format!("{:.6}", if q > std::f64::consts::PI { q - 2.0 * std::f64::consts::PI } else { q });
+        Some(f.join(","))
+    });
+    let (log, findings) = read(&wrapped);
+    let log = log.unwrap();
+    assert!((log.q[0][199] - 5.98).abs() < 1e-3);
+    assert!(findings.iter().any(|f| f.quantity == "q1" && f.message.contains("unwrapped")));
+}
+
+#[test]
+fn what_cannot_be_used_is_refused_with_its_reason() {
+    let plain = |header: &str| text(header, |_, f| Some(f.join(",")));
+    let cases = [
+        (plain("t,q1,q3,tau1,tau2"), "missing: q2"),
+        (plain("time,q1,q2,tau1,tau2"), "no column t"),
+        (plain("t,q1,q2,i1,i2"), "torque_constant (N·m/A at the joint) for joint 2"),
+        (plain("t,q1,q2,tau1,tau1"), "twice"),
+        (text(HEADER, |k, mut f| { f[0] = format!("{}", 10 * k); Some(f.join(",")) }), "milliseconds"),
+        (text(HEADER, |k, mut f| { f[1] = format!("{}", k as f64 * 0.9 - 90.0); Some(f.join(",")) }), "degrees"),
+        (text(HEADER, |k, mut f| { f[3] = format!("{}", 4000 + k); Some(f.join(",")) }), "mN·m"),
+        (text(HEADER, |k, mut f| { if k % 3 == 0 { f[1] = "".into() } Some(f.join(",")) }), "no finite number"),
+        (text(HEADER, |k, mut f| { if k > 100 { f[0] = format!("{}", k - 101) } Some(f.join(",")) }), "clock restarts"),
+        (HEADER.to_string(), "too few"),
+        (String::new(), "no column t"),
+    ];
+    for (text, reason) in cases {
+        let (log, _) = read(&text);
+        let said = log.err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(said.contains(reason), "'{reason}' not in '{said}'");
+    }
+}
+
+#[test]
+fn garbage_is_no_panic() {
+    use rand::{RngExt, SeedableRng};
+    let sound = text(HEADER, |_, f| Some(f.join(","))).into_bytes();
+    for seed in 0..200 {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut bytes = sound.clone();
+        for _ in 0..rng.random_range(1..40) {
+            let at = rng.random_range(0..bytes.len());
+            match rng.random_range(0..3) {
+                0 => bytes[at] = rng.random(),
+                1 => bytes.truncate(at.max(1)),
+                _ => drop(bytes.remove(at)),
+            }
+            if bytes.len() < 2 {
+                break;
+            }
+        }
+        let mut findings = Vec::new();
+        if let Ok(log) = parse(&bytes, "x.csv", &arm(), &mut findings) {
+            assert!(log.q.iter().chain(&log.torque).flatten().all(|v| v.is_finite()));
+        }
+    }
+}
+
+#[test]
+fn a_clock_that_runs_on_is_common_and_others_follow_each_other() {
+    let log = |from: f64, to: f64| Log {
+        file: String::new(),
+        t: vec![from, to],
+        q: vec![],
+        torque: vec![],
+        temperature: None,
+        pieces: vec![],
+        clock: 0.0,
+    };
+    let mut running = [log(10.0, 20.0), log(40.0, 50.0), log(20.5, 30.0)];
+    common_clock(&mut running);
+    assert_eq!(running.map(|l| l.t[0] + l.clock), [0.0, 30.0, 10.5]);
+    let mut restarted = [log(0.0, 20.0), log(0.0, 10.0), log(1.0, 5.0)];
+    common_clock(&mut restarted);
+    assert_eq!(restarted.map(|l| l.t[0] + l.clock), [0.0, 20.0, 30.0]);
+}

@@ -1,0 +1,13 @@
+//! From logs to the rows of a regression: minimal-set regressor, friction columns, one band for all.
+
+#[cfg(test)]
+pub(crate) mod newton_euler;
+mod prepare;
+mod recording;
+mod rigid;
+mod rows;
+
+pub use prepare::{Data, DataError, DataOptions};
+pub use recording::Recording;
+pub use rigid::RigidBody;
+pub use rows::{Block, Column, JointRows};

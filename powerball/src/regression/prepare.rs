@@ -1,0 +1,313 @@
+//! Logs of an arm into rows: even grid, derivatives, band, rest removed, blocks laid out.
+
+use super::{Block, Column, JointRows, Recording, RigidBody};
+use crate::log::Log;
+use crate::parallel;
+use crate::signal::resample::median_step;
+use crate::signal::{Band, rest};
+use dyngen::arm::{Parameter, ParameterKind};
+use std::fmt;
+use std::sync::OnceLock;
+
+/// How logs are prepared.
+#[derive(Clone, Debug)]
+pub struct DataOptions {
+    /// Band of the regression, Hz: torques and columns pass the same zero-phase low-pass.
+    pub cutoff: f64,
+    /// Smoothing of positions before they are differentiated, Hz. The noise of accelerations grows with its power 2.5.
+    pub smoothing: f64,
+    /// Length of a block, s: residuals further apart count as independent.
+    pub block: f64,
+}
+
+impl Default for DataOptions {
+    fn default() -> Self {
+        DataOptions { cutoff: 10.0, smoothing: 8.0, block: 2.0 }
+    }
+}
+
+/// Why logs cannot be analysed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DataError {
+    /// No log has a stretch long enough.
+    TooShort,
+    /// No joint moves.
+    NoMotion,
+}
+
+impl fmt::Display for DataError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            DataError::TooShort => write!(f, "the logs hold no stretch of at least a second without gaps: record longer"),
+            DataError::NoMotion => write!(f, "no joint moves in these logs: friction and inertia cannot be seen at rest; record an exciting motion"),
+        }
+    }
+}
+
+impl std::error::Error for DataError {}
+
+/// Everything that regressions over some logs share.
+#[derive(Debug)]
+pub struct Data<'a> {
+    /// The arm's rigid-body functions.
+    pub body: &'a RigidBody,
+    /// The pieces of all logs.
+    pub recordings: Vec<Recording>,
+    /// The band.
+    pub band: Band,
+    /// The rows by joint.
+    pub joints: Vec<JointRows>,
+    /// The blocks, in order of time and log.
+    pub blocks: Vec<Block>,
+    /// File names by log.
+    pub logs: Vec<String>,
+    /// The speed below which a joint rests, by joint, rad/s.
+    pub rest_speed: Vec<f64>,
+    /// What was left out or done, in words.
+    pub notes: Vec<String>,
+    top_speed: Vec<f64>,
+    last_link: OnceLock<Vec<Column>>,
+    force: OnceLock<Vec<Column>>,
+    declared_zero: OnceLock<Vec<Column>>,
+}
+
+impl<'a> Data<'a> {
+    /// Prepares logs.
+    ///
+    /// # Errors
+    /// [`DataError`] where nothing usable remains.
+    pub fn new(body: &'a RigidBody, logs: &[Log], options: &DataOptions) -> Result<Data<'a>, DataError> {
+        let n = body.dof();
+        let mut steps: Vec<f64> = logs.iter().filter_map(|log| median_step(&log.t)).collect();
+        steps.sort_by(f64::total_cmp);
+        let step = *steps.get(steps.len() / 2).ok_or(DataError::TooShort)?;
+        let rate = 1.0 / step;
+        let band = Band::new(options.cutoff, rate);
+        let mut notes = Vec::new();
+        let mut recordings = Vec::new();
+        for (index, log) in logs.iter().enumerate() {
+            for piece in &log.pieces {
+                let span = log.t[piece.end - 1] - log.t[piece.start];
+                if span < 1.0 {
+                    notes.push(format!("{}: a piece of {span:.2} s is too short and was left out", log.file));
+                    continue;
+                }
+                recordings.extend(Recording::new(log, index, piece.clone(), step, options.smoothing));
+            }
+        }
+        if recordings.is_empty() {
+            return Err(DataError::TooShort);
+        }
+        let rest_speed: Vec<f64> = (0..n)
+            .map(|j| {
+                rest::rest_speed(recordings.iter().flat_map(|r| r.speed(j).map(f64::abs)).collect())
+            })
+            .collect();
+        let top_speed = (0..n).map(|j| top_speed(&recordings, j)).collect();
+        let kept = keep_moving(&recordings, &band, &rest_speed, n);
+        let joints = joint_rows(body, &recordings, &band, kept);
+        if joints.iter().all(|j| j.len() < 20) {
+            return Err(DataError::NoMotion);
+        }
+        let total: usize = recordings.iter().map(|r| band.kept(r.len()).len()).sum();
+        for (j, rows) in joints.iter().enumerate() {
+            let rested = total - rows.len();
+            if rows.len() < 20 {
+                notes.push(format!("joint {} does not move in these logs: nothing can be said of its friction", j + 1));
+            } else if rested * 4 > total {
+                notes.push(format!(
+                    "joint {} rests in {:.0} % of the samples (|speed| below {:.4} for {} s or at an end of a log); they were left out",
+                    j + 1, 100.0 * rested as f64 / total as f64, rest_speed[j], rest::LONGEST_REVERSAL
+                ));
+            }
+        }
+        let logs = logs.iter().map(|log| log.file.clone()).collect();
+        let blocks = blocks_of(&recordings, &joints, &band, options.block);
+        Ok(Data {
+            body,
+            recordings,
+            band,
+            joints,
+            blocks,
+            logs,
+            rest_speed,
+            notes,
+            top_speed,
+            last_link: OnceLock::new(),
+            force: OnceLock::new(),
+            declared_zero: OnceLock::new(),
+        })
+    }
+
+    /// Joints.
+    #[must_use]
+    pub fn dof(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// The speed that a joint exceeds in 5 % of its samples, rad/s, at least 1e-3.
+    #[must_use]
+    pub fn top_speed(&self, joint: usize) -> f64 {
+        self.top_speed[joint]
+    }
+
+    /// Samples a second on the even grid.
+    #[must_use]
+    pub fn rate(&self) -> f64 {
+        self.recordings.first().map_or(0.0, |r| r.rate)
+    }
+
+    /// Stretches of about `length` seconds, in order.
+    #[must_use]
+    pub fn blocks_of(&self, length: f64) -> Vec<Block> {
+        blocks_of(&self.recordings, &self.joints, &self.band, length)
+    }
+
+    /// The ten inertial parameters of the last link as columns over all joints; empty where they cannot be had.
+    pub fn last_link_columns(&self) -> &[Column] {
+        self.last_link.get_or_init(|| {
+            let chosen: Vec<usize> =
+                ParameterKind::ALL[..10].iter().map(|kind| self.body.last_link(*kind)).collect();
+            self.columns_over_all(10, |r| self.body.parameter_columns(&chosen, &r.q, &r.v, &r.a))
+        })
+    }
+
+    /// Torques for unit forces on the origin of the last frame along the base axes; empty where they cannot be had.
+    pub fn force_columns(&self) -> &[Column] {
+        self.force.get_or_init(|| {
+            // The static torque of a unit mass under unit gravity is that of a unit force.
+            let mass = [self.body.last_link(ParameterKind::M)];
+            (0..3)
+                .flat_map(|axis| self.columns_over_all(1, |r| self.body.gravity_columns(axis, &mass, &r.q)))
+                .collect()
+        })
+    }
+
+    /// The parameters that the arm file declares zero.
+    #[must_use]
+    pub fn declared_zero(&self) -> Vec<Parameter> {
+        let arm = self.body.arm();
+        let declared = |p: &Parameter| p.kind != ParameterKind::Im && !arm.keeps(*p);
+        arm.all_parameters().into_iter().filter(declared).collect()
+    }
+
+    /// Their columns, in the same order.
+    pub fn declared_zero_columns(&self) -> &[Column] {
+        self.declared_zero.get_or_init(|| {
+            let chosen: Vec<usize> = self.declared_zero().iter().map(|p| p.index()).collect();
+            self.columns_over_all(chosen.len(), |r| self.body.parameter_columns(&chosen, &r.q, &r.v, &r.a))
+        })
+    }
+
+    /// Columns from a function that gives n × count values a sample.
+    fn columns_over_all(&self, count: usize, of: impl Fn(&Recording) -> Option<Vec<f64>>) -> Vec<Column> {
+        let Some(all) = self.recordings.iter().map(of).collect::<Option<Vec<Vec<f64>>>>() else { return Vec::new() };
+        let one = |c: usize| -> Vec<Vec<f64>> {
+            all.iter().map(|x| x.iter().skip(c).step_by(count).copied().collect()).collect()
+        };
+        (0..count).map(|c| self.column_over_all(&one(c))).collect()
+    }
+
+    /// A column from full-rate signals on one joint.
+    pub fn column_on<'s>(&'s self, joint: usize, signal: impl FnMut(usize, &'s Recording) -> Vec<f64>) -> Column {
+        Column::on(joint, self.joints[joint].column(&self.band, &self.recordings, signal))
+    }
+
+    /// A column from full-rate signals with n values a sample, one for each joint.
+    #[must_use]
+    pub fn column_over_all(&self, signals: &[Vec<f64>]) -> Column {
+        let n = self.dof();
+        let part = |j: usize| {
+            let signal = |r: usize, _: &Recording| -> Vec<f64> {
+                signals[r].iter().skip(j).step_by(n).copied().collect()
+            };
+            (j, self.joints[j].column(&self.band, &self.recordings, signal))
+        };
+        Column { parts: parallel::map(&(0..n).collect::<Vec<_>>(), |j| part(*j)) }
+    }
+}
+
+fn top_speed(recordings: &[Recording], joint: usize) -> f64 {
+    let mut speeds: Vec<f64> = recordings.iter().flat_map(|r| r.speed(joint).map(f64::abs)).collect();
+    if speeds.is_empty() {
+        return 1.0;
+    }
+    let at = (speeds.len() * 95 / 100).min(speeds.len() - 1);
+    let (_, top, _) = speeds.select_nth_unstable_by(at, f64::total_cmp);
+    top.max(1e-3)
+}
+
+fn keep_moving(recordings: &[Recording], band: &Band, limit: &[f64], n: usize) -> Vec<Vec<Vec<usize>>> {
+    let of_joint = |j: usize| {
+        let of_recording = |r: &Recording| {
+            let moving = rest::moving(&r.speed(j).collect::<Vec<_>>(), r.rate, limit[j]);
+            let kept = band.kept(r.len());
+            // A joint that never moves has the limit 0 and is never below it.
+            if limit[j] < 1e-5 { return Vec::new() }
+            (0..kept.len()).filter(|k| moving[kept[*k]]).collect()
+        };
+        recordings.iter().map(of_recording).collect()
+    };
+    (0..n).map(of_joint).collect()
+}
+
+fn joint_rows(body: &RigidBody, recordings: &[Recording], band: &Band, kept: Vec<Vec<Vec<usize>>>) -> Vec<JointRows> {
+    let (n, p) = (body.dof(), body.names().len());
+    let mut joints: Vec<JointRows> = kept
+        .into_iter()
+        .map(|kept| {
+            let mut rows = Vec::new();
+            let mut end = 0;
+            for k in &kept {
+                rows.push(end..end + k.len());
+                end += k.len();
+            }
+            JointRows { torque: Vec::with_capacity(end), inertial: vec![Vec::with_capacity(end); p], kept, rows }
+        })
+        .collect();
+    for (r, recording) in recordings.iter().enumerate() {
+        let y = body.regressor(&recording.q, &recording.v, &recording.a);
+        let per_joint: Vec<Vec<Vec<f64>>> = parallel::map(&(0..n).collect::<Vec<_>>(), |&j| {
+            let pass = |signal: Vec<f64>| {
+                let passed = band.pass(&signal);
+                joints[j].kept[r].iter().map(|k| passed[*k]).collect::<Vec<f64>>()
+            };
+            let mut columns = vec![pass(recording.torque[j].clone())];
+            columns.extend((0..p).map(|c| pass(y.iter().skip(j * p + c).step_by(n * p).copied().collect())));
+            columns
+        });
+        for (joint, columns) in joints.iter_mut().zip(per_joint) {
+            let mut columns = columns.into_iter();
+            joint.torque.extend(columns.next().unwrap_or_default());
+            for (to, from) in joint.inertial.iter_mut().zip(columns) {
+                to.extend(from);
+            }
+        }
+    }
+    joints
+}
+
+fn blocks_of(recordings: &[Recording], joints: &[JointRows], band: &Band, length: f64) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    for (r, recording) in recordings.iter().enumerate() {
+        let kept = band.kept(recording.len());
+        let per_second = recording.rate / band.decimation as f64;
+        // Blocks of equal length, as near to the wanted one as the recording allows.
+        let count = ((kept.len() as f64 / per_second / length).round() as usize).max(1);
+        for b in 0..count {
+            let (from, to) = (kept.len() * b / count, kept.len() * (b + 1) / count);
+            let rows: Vec<_> = joints
+                .iter()
+                .map(|joint| {
+                    let base = joint.rows[r].start;
+                    let below = |limit: usize| joint.kept[r].partition_point(|k| *k < limit);
+                    base + below(from)..base + below(to)
+                })
+                .collect();
+            if rows.iter().any(|r| !r.is_empty()) {
+                blocks.push(Block { recording: r, log: recording.log, rows });
+            }
+        }
+    }
+    blocks
+}

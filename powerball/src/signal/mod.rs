@@ -1,0 +1,10 @@
+//! From samples as they were logged to samples a regression can use: filters, even grids, derivatives, rest.
+
+pub mod butterworth;
+pub mod difference;
+pub mod filter;
+pub mod resample;
+pub mod rest;
+
+pub use butterworth::Butterworth;
+pub use filter::Band;
