@@ -38,9 +38,10 @@ use syn::{ItemMod, parse_macro_input, parse_quote};
 /// - `arm!("arm.toml")`: the minimal set, every function. The path is relative to the crate's `Cargo.toml`.
 /// - `arm! { file = "arm.toml", parameters = full, functions = [regressor, gravity] }`: what is named, only.
 /// - `arm! { toml = r#"…"#, … }`: the arm file's text in place.
+/// - `values = "values.json"` besides either: parameter values to bake in; the functions then take none.
 ///
 /// Everything that is wrong with the arm is reported at once, as errors of the compiler. The crate is built again
-/// when the file changes.
+/// when a file changes.
 #[proc_macro]
 pub fn arm(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
     let request = parse_macro_input!(input as Request);

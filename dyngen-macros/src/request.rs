@@ -1,7 +1,7 @@
 //! What a macro call asks for: an arm and what to generate of it.
 
 use dyngen::emit::{self, Options};
-use dyngen::{Arm, Diagnostics, Function, Model, SetKind};
+use dyngen::{Arm, Diagnostics, Function, Model, SetKind, Values};
 use proc_macro2::{Span, TokenStream, TokenTree};
 use quote::quote;
 use std::path::Path;
@@ -20,6 +20,8 @@ enum Source {
 /// One macro call.
 pub(crate) struct Request {
     source: Source,
+    /// A file of parameter values to bake in.
+    values: Option<LitStr>,
     options: Options,
     /// What is wrong with the call itself, reported together with what is wrong with the arm.
     error: Option<Error>,
@@ -33,7 +35,7 @@ impl Parse for Request {
             if !input.is_empty() {
                 return Err(input.error("nothing may follow the path: write `file = \"…\", parameters = …`"));
             }
-            return Ok(Request { source, options: Options::default(), error: None });
+            return Ok(Request { source, values: None, options: Options::default(), error: None });
         }
         let mut call = Call::default();
         while !input.is_empty() {
@@ -63,6 +65,7 @@ fn value(input: ParseStream<'_>) -> Result<TokenStream> {
 struct Call {
     seen: Vec<Ident>,
     source: Option<Source>,
+    values: Option<LitStr>,
     options: Options,
     error: Option<Error>,
 }
@@ -76,11 +79,12 @@ impl Call {
         let read = match key.to_string().as_str() {
             "file" => syn::parse2(value).map(|text| self.source(key, Source::File(text))),
             "toml" => syn::parse2(value).map(|text| self.source(key, Source::Inline(text))),
+            "values" => syn::parse2(value).map(|path| self.values = Some(path)),
             "parameters" => syn::parse2(value).and_then(|name| self.parameters(&name)),
             "functions" => names.parse2(value).map(|names| self.functions(&names)),
             _ => Err(Error::new(
                 key.span(),
-                format!("there is no key `{key}`: there are file, toml, parameters, functions"),
+                format!("there is no key `{key}`: there are file, toml, values, parameters, functions"),
             )),
         };
         if let Err(e) = read {
@@ -130,7 +134,9 @@ impl Call {
             Error::new(span, "no arm is given: write `file = \"…\"` or `toml = \"…\"`")
         };
         match self.source {
-            Some(source) => Ok(Request { source, options: self.options, error: self.error }),
+            Some(source) => {
+                Ok(Request { source, values: self.values, options: self.options, error: self.error })
+            }
             None => Err(self.error.unwrap_or_else(missing)),
         }
     }
@@ -145,12 +151,16 @@ fn names(input: ParseStream<'_>) -> Result<Punctuated<Ident, Token![,]>> {
 
 impl Request {
     /// The items, or all errors of the call and of the arm.
-    pub(crate) fn generate(self) -> Result<TokenStream> {
-        let (arm, span, tracked) = match &self.source {
-            Source::Inline(text) => (inline(text), text.span(), TokenStream::new()),
+    pub(crate) fn generate(mut self) -> Result<TokenStream> {
+        let mut watched = TokenStream::new();
+        let (arm, span) = match &self.source {
+            Source::Inline(text) => (inline(text), text.span()),
             Source::File(path) => {
-                let (arm, tracked) = file(path);
-                (arm, path.span(), tracked)
+                let text = read(path, &mut watched);
+                (
+                    text.and_then(|text| Arm::parse(&text, &path.value()).map_err(|e| at(path, &e))),
+                    path.span(),
+                )
             }
         };
         let arm = match (arm, self.error) {
@@ -162,8 +172,14 @@ impl Request {
             }
         };
         let model = Model::derive(arm).map_err(|e| Error::new(span, e))?;
+        if let Some(path) = &self.values {
+            let set = model.set(self.options.parameters).map_err(|e| Error::new(span, e))?;
+            let text = read(path, &mut watched)?;
+            let values = Values::parse(&text, &path.value()).and_then(|values| values.of_set(&model, set));
+            self.options.values = Some(values.map_err(|e| at(path, &e))?);
+        }
         let items = emit::tokens(&model, &self.options).map_err(|e| Error::new(span, e))?;
-        Ok(quote!(#items #tracked))
+        Ok(quote!(#items #watched))
     }
 }
 
@@ -176,21 +192,23 @@ fn inline(text: &LitStr) -> Result<Arm> {
         .map_err(|e| all(text.span(), &e, |d| format!("{}{}", place(d.line, d.column), d.message)))
 }
 
-/// The arm of a file, and an item that makes the compiler watch the file.
-fn file(path: &LitStr) -> (Result<Arm>, TokenStream) {
+/// A file's text, with an item that makes the compiler watch the file.
+fn read(path: &LitStr, watched: &mut TokenStream) -> Result<String> {
     // Cargo sets this for the crate that is compiled; without cargo the current folder has to do.
     let folder = std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default();
     let full = Path::new(&folder).join(path.value());
-    let arm = match std::fs::read_to_string(&full) {
-        Ok(text) => Arm::parse(&text, &path.value()).map_err(|e| all(path.span(), &e, ToString::to_string)),
-        Err(e) => Err(Error::new(path.span(), format!("{}: the arm file cannot be read: {e}", path.value()))),
-    };
-    let tracked = full.to_str().map(|full| {
-        quote!(
+    if let Some(full) = full.to_str() {
+        watched.extend(quote!(
             const _: &[u8] = include_bytes!(#full);
-        )
-    });
-    (arm, tracked.unwrap_or_default())
+        ));
+    }
+    std::fs::read_to_string(&full)
+        .map_err(|e| Error::new(path.span(), format!("{}: the file cannot be read: {e}", path.value())))
+}
+
+/// What is wrong with a file, at its path.
+fn at(path: &LitStr, diagnostics: &Diagnostics) -> Error {
+    all(path.span(), diagnostics, ToString::to_string)
 }
 
 /// Every diagnostic as an error of the compiler.

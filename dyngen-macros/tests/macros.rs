@@ -19,6 +19,16 @@ mod slider_model {
     pub const KEPT: &str = "what the module holds stays";
 }
 
+mod baked {
+    //! With the values of its parameters.
+    dyngen_macros::arm! {
+        file = "tests/arms/slider.toml",
+        values = "tests/arms/slider.values.json",
+        functions = [gravity],
+        parameters = full,
+    }
+}
+
 mod inline {
     dyngen_macros::arm! {
         toml = r#"
@@ -65,6 +75,14 @@ fn a_choice_is_kept() {
     let parameters = SVector::<f64, 20>::from_fn(|i, _| (i as f64).sin());
     let gravity = slider_full::gravity(&SVector::from([0.0, 0.1]), &parameters);
     assert!((y * parameters - gravity).norm() < 1e-12);
+}
+
+#[test]
+fn values_of_a_file_are_baked_in() {
+    let parameters = SVector::<f64, { slider_full::PARAMETERS }>::from(baked::PARAMETER_VALUES);
+    assert_eq!(parameters[10], 1.25);
+    let q = SVector::from([0.4, 0.1]);
+    assert!((baked::gravity(&q) - slider_full::gravity(&q, &parameters)).norm() < 1e-13);
 }
 
 #[test]

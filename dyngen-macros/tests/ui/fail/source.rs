@@ -1,4 +1,4 @@
-// No arm, two arms, a file that is not there, a path with more behind it, a value of another type.
+// No arm, two arms, files that are not there, a path with more behind it, a value of another type.
 mod none {
     dyngen_macros::arm! { functions = [gravity] }
 }
@@ -7,6 +7,12 @@ mod two {
 }
 mod gone {
     dyngen_macros::arm!("arms/nowhere.toml");
+}
+mod lost {
+    dyngen_macros::arm! { file = "arms/slider.toml", values = "arms/nowhere.json" }
+}
+mod other {
+    dyngen_macros::arm! { file = "arms/slider.toml", values = "arms/slider.toml" }
 }
 mod more {
     dyngen_macros::arm!("arms/slider.toml", full);
