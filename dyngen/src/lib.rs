@@ -9,6 +9,8 @@ pub mod emit;
 mod evaluator;
 pub mod exact;
 pub mod graph;
+#[cfg(feature = "urdf")]
+pub mod import;
 mod model;
 pub mod optimize;
 pub mod prove;

@@ -4,6 +4,7 @@ mod check;
 mod describe;
 mod eval;
 mod generate;
+mod import;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use dyngen::base::SetKind;
@@ -27,6 +28,8 @@ enum Command {
     Describe(describe::Args),
     /// Writes the arm's functions as one Rust source file.
     Generate(generate::Args),
+    /// Makes an arm file, with inertial values beside it, from a serial chain of a URDF.
+    Import(import::Args),
     /// Evaluates a function at the states of a CSV file.
     Eval(eval::Args),
     /// Says whether a real arm can have given parameter values, and shows the pose where not.
@@ -80,6 +83,7 @@ pub(crate) fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Describe(args) => describe::run(&args),
         Command::Generate(args) => generate::run(&args),
+        Command::Import(args) => import::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Check(args) => check::run(&args),
     };

@@ -13,7 +13,9 @@ use std::path::PathBuf;
 ///
 /// Writes identified.json and report.html.
 #[derive(Args, Debug)]
-#[command(after_help = "Example:\n  powerball identify --arm arm.toml --log a.csv b.csv --validate c.csv --out result")]
+#[command(
+    after_help = "Example:\n  powerball identify --arm arm.toml --log a.csv b.csv --validate c.csv --out result"
+)]
 pub(crate) struct Identify {
     #[command(flatten)]
     inputs: Inputs,
@@ -50,7 +52,8 @@ impl Identify {
         let mut warnings = loaded.warnings;
         warnings.extend(data.notes.iter().cloned());
         let validate = if loaded.validate.is_empty() {
-            warnings.push("no log was given to --validate: the errors below are those of the fit itself".into());
+            warnings
+                .push("no log was given to --validate: the errors below are those of the fit itself".into());
             None
         } else {
             let data = Data::new(&loaded.body, &loaded.validate, &options).map_err(refused)?;

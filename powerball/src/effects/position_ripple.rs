@@ -57,7 +57,9 @@ impl Effect for PositionRipple {
     fn neighbours(&self, candidate: &Candidate) -> Vec<Candidate> {
         let k = candidate.values[0];
         let near = |d: f64| Candidate { values: vec![k + d], ..candidate.clone() };
-        if k < SMALL_ORDERS as f64 { return Vec::new() }
+        if k < SMALL_ORDERS as f64 {
+            return Vec::new();
+        }
         [-0.3, -0.1, -0.03, 0.03, 0.1, 0.3].map(near).to_vec()
     }
 

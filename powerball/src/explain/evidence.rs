@@ -33,7 +33,14 @@ pub struct Path<'p> {
 
 /// Gathers the evidence for a trial. `path` holds the other path and the candidate's columns there.
 #[must_use]
-pub fn evidence(screen: &Screen<'_>, trial: &Trial, joints: &[usize], folds: &Folds, local: bool, path: Option<(&Path<'_>, &[Column])>) -> Evidence {
+pub fn evidence(
+    screen: &Screen<'_>,
+    trial: &Trial,
+    joints: &[usize],
+    folds: &Folds,
+    local: bool,
+    path: Option<(&Path<'_>, &[Column])>,
+) -> Evidence {
     Evidence {
         score: trial.score,
         p_value: wald(screen, trial),
@@ -104,7 +111,13 @@ pub(super) fn wald(screen: &Screen<'_>, trial: &Trial) -> f64 {
     f_tail(wald / used * freedom / clusters, used, freedom)
 }
 
-fn path_gain(screen: &Screen<'_>, trial: &Trial, joints: &[usize], path: &Path<'_>, columns: &[Column]) -> f64 {
+fn path_gain(
+    screen: &Screen<'_>,
+    trial: &Trial,
+    joints: &[usize],
+    path: &Path<'_>,
+    columns: &[Column],
+) -> f64 {
     let fit = screen.context.fit;
     let mut shift = vec![0.0; fit.design.size];
     for (base, theta) in trial.base.iter().zip(&trial.theta) {
@@ -127,8 +140,7 @@ fn path_gain(screen: &Screen<'_>, trial: &Trial, joints: &[usize], path: &Path<'
             }
         }
     }
-    let gains: Vec<f64> =
-        change.iter().zip(&scale).filter(|(_, s)| **s > 0.0).map(|(c, s)| c / s).collect();
+    let gains: Vec<f64> = change.iter().zip(&scale).filter(|(_, s)| **s > 0.0).map(|(c, s)| c / s).collect();
     // The median keeps one odd log (something held, something touched) from deciding.
     let mut sorted = gains.clone();
     sorted.sort_by(f64::total_cmp);

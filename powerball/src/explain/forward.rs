@@ -126,7 +126,13 @@ impl fmt::Debug for Session<'_> {
 ///
 /// # Errors
 /// [`ExplainError`] where logs hold too little.
-pub fn explain(body: &RigidBody, logs: &[Log], validate: &[Log], options: &DataOptions, progress: &dyn Fn(&str)) -> Result<Explained, ExplainError> {
+pub fn explain(
+    body: &RigidBody,
+    logs: &[Log],
+    validate: &[Log],
+    options: &DataOptions,
+    progress: &dyn Fn(&str),
+) -> Result<Explained, ExplainError> {
     progress("preparing signals");
     let data = Data::new(body, logs, options).map_err(ExplainError::Fit)?;
     let other = Data::new(body, validate, options).map_err(ExplainError::Validate)?;
@@ -168,7 +174,11 @@ impl Session<'_> {
             let mut families = self.families(&screen, &mut tests);
             let path = Path {
                 data: &self.other,
-                design: Design::new(&self.other, &friction_columns(&self.other, &self.fit.shapes), &self.other_columns(&self.fit)),
+                design: Design::new(
+                    &self.other,
+                    &friction_columns(&self.other, &self.fit.shapes),
+                    &self.other_columns(&self.fit),
+                ),
                 residual: other_residual.clone(),
             };
             let other_context = Context::new(&self.other, &self.fit, &other_residual);
@@ -196,13 +206,15 @@ impl Session<'_> {
                 })
                 .collect();
             let (chosen, _) = best?;
-            let passing: Vec<&Member> = families[chosen].members.iter().filter(|m| m.refusal.is_none()).collect();
+            let passing: Vec<&Member> =
+                families[chosen].members.iter().filter(|m| m.refusal.is_none()).collect();
             let trials: Vec<(&Trial, &[usize])> =
                 passing.iter().map(|m| (&m.trial, m.candidate.joints.as_slice())).collect();
             let placebos = placebos(&screen, &trials, &self.folds, tests, step as u64);
             let mut scores = placebos.scores;
             scores.sort_by(f64::total_cmp);
-            let level = scores.get((scores.len() as f64 * rule::PLACEBO_LEVEL) as usize).copied().unwrap_or(0.0);
+            let level =
+                scores.get((scores.len() as f64 * rule::PLACEBO_LEVEL) as usize).copied().unwrap_or(0.0);
             self.false_positives.placebos += scores.len();
             self.false_positives.accepted += placebos.accepted;
             let members: Vec<usize> = (0..families[chosen].members.len())
@@ -258,9 +270,8 @@ impl Session<'_> {
 
     /// The best candidate of every effect and joint, and how many were tried in all.
     fn families(&self, screen: &Screen<'_>, tests: &mut f64) -> Vec<Family> {
-        let lists: Vec<(usize, Vec<Candidate>)> = (0..self.effects.len())
-            .map(|e| (e, self.effects[e].candidates(screen.context)))
-            .collect();
+        let lists: Vec<(usize, Vec<Candidate>)> =
+            (0..self.effects.len()).map(|e| (e, self.effects[e].candidates(screen.context))).collect();
         let mut families = Vec::new();
         for (e, candidates) in lists {
             let effect = self.effects[e].as_ref();
@@ -327,7 +338,14 @@ impl Session<'_> {
             .map(|a| self.effects[a.effect].name())
     }
 
-    fn test(&self, screen: &Screen<'_>, family: &mut Family, tests: f64, path: &Path<'_>, other: &Context<'_>) {
+    fn test(
+        &self,
+        screen: &Screen<'_>,
+        family: &mut Family,
+        tests: f64,
+        path: &Path<'_>,
+        other: &Context<'_>,
+    ) {
         let effect = self.effects[family.effect].as_ref();
         let open: Vec<usize> =
             (0..family.members.len()).filter(|m| family.members[*m].refusal.is_none()).collect();
@@ -335,7 +353,14 @@ impl Session<'_> {
             let member = &family.members[*m];
             let columns = effect.columns(other, &member.candidate);
             let local = !member.candidate.windows.is_empty();
-            evidence(screen, &member.trial, &member.candidate.joints, &self.folds, local, Some((path, &columns)))
+            evidence(
+                screen,
+                &member.trial,
+                &member.candidate.joints,
+                &self.folds,
+                local,
+                Some((path, &columns)),
+            )
         });
         for (m, evidence) in open.into_iter().zip(found) {
             let member = &mut family.members[m];
@@ -372,7 +397,8 @@ impl Session<'_> {
             self.fit = fit(&self.data, &self.folds, &terms, Some(&self.fit));
             let mut first = 0;
             for a in &mut self.accepted {
-                let coefficients: Vec<f64> = (first..first + a.columns).map(|c| self.fit.coefficient(c)).collect();
+                let coefficients: Vec<f64> =
+                    (first..first + a.columns).map(|c| self.fit.coefficient(c)).collect();
                 first += a.columns;
                 if let Some(refined) = self.effects[a.effect].refined(&a.candidate, &coefficients) {
                     a.candidate = refined;
@@ -395,7 +421,8 @@ impl Session<'_> {
             for (k, a) in self.accepted.iter().enumerate() {
                 let columns = self.fit.design.extra(first)..self.fit.design.extra(first) + a.columns;
                 first += a.columns;
-                let penalty = rule::PER_COEFFICIENT * a.columns as f64 + 2.0 * a.candidate.searched.max(1.0).ln();
+                let penalty =
+                    rule::PER_COEFFICIENT * a.columns as f64 + 2.0 * a.candidate.searched.max(1.0).ln();
                 let score = error(&|c| columns.contains(&c)) - full - penalty;
                 if score < rule::LEAST_SCORE && weakest.is_none_or(|(_, w)| score < w) {
                     weakest = Some((k, score));
@@ -435,7 +462,8 @@ impl Session<'_> {
             }
         }
         for e in order {
-            let mine: Vec<usize> = (0..self.accepted.len()).filter(|k| self.accepted[*k].effect == e).collect();
+            let mine: Vec<usize> =
+                (0..self.accepted.len()).filter(|k| self.accepted[*k].effect == e).collect();
             let found: Vec<Found<'_>> = mine
                 .iter()
                 .map(|k| Found { candidate: &self.accepted[*k].candidate, coefficients: &coefficients[*k] })

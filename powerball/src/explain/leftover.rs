@@ -110,7 +110,9 @@ pub fn depends_on(context: &Context<'_>, joint: usize) -> Vec<(String, f64)> {
     }
     signals.push((
         "t".into(),
-        pick(&|r| (0..data.recordings[r].len()).map(|k| data.recordings[r].clock + k as f64 / data.rate()).collect()),
+        pick(&|r| {
+            (0..data.recordings[r].len()).map(|k| data.recordings[r].clock + k as f64 / data.rate()).collect()
+        }),
     ));
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(joint as u64);
     let mut found = Vec::new();

@@ -36,7 +36,10 @@ pub fn compare(families: &[Family], chosen: usize, joints: &[usize]) -> Comparis
         .map(|(f, score)| {
             let family = &families[*f];
             let why_not = if own / score < rule::LEAST_MARGIN {
-                format!("fits as well within {:.0} %: these logs do not tell the two apart", 100.0 * (rule::LEAST_MARGIN - 1.0))
+                format!(
+                    "fits as well within {:.0} %: these logs do not tell the two apart",
+                    100.0 * (rule::LEAST_MARGIN - 1.0)
+                )
             } else {
                 let share = 100.0 * score / own;
                 match family.refusal_on(joints) {

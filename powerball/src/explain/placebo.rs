@@ -25,7 +25,13 @@ pub struct Placebos {
 
 /// Shifts the columns of real trials in time within each recording and asks the rule about them.
 #[must_use]
-pub fn placebos(screen: &Screen<'_>, trials: &[(&Trial, &[usize])], folds: &Folds, tests: f64, seed: u64) -> Placebos {
+pub fn placebos(
+    screen: &Screen<'_>,
+    trials: &[(&Trial, &[usize])],
+    folds: &Folds,
+    tests: f64,
+    seed: u64,
+) -> Placebos {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let draws: Vec<(usize, f64)> =
         (0..EACH_STEP).map(|k| (k % trials.len().max(1), rng.random_range(0.15..0.85))).collect();

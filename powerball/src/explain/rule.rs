@@ -36,7 +36,9 @@ pub fn refusal(evidence: &Evidence, tests: f64, local: bool) -> Option<String> {
     }
     let p = evidence.p_value * tests;
     if p > FAMILY_WISE {
-        return Some(format!("not significant between independent blocks (p = {p:.2} over all that was tried)"));
+        return Some(format!(
+            "not significant between independent blocks (p = {p:.2} over all that was tried)"
+        ));
     }
     let folds = &evidence.fold_gains;
     let good = folds.iter().filter(|g| **g >= LEAST_FOLD_GAIN).count();
@@ -48,7 +50,10 @@ pub fn refusal(evidence: &Evidence, tests: f64, local: bool) -> Option<String> {
     }
     // What happens in some logs only need not happen in the logs of the other path.
     if evidence.path_gain <= 0.0 && !local {
-        return Some(format!("does not lower the error on the other path ({:+.1} %)", -100.0 * evidence.path_gain));
+        return Some(format!(
+            "does not lower the error on the other path ({:+.1} %)",
+            -100.0 * evidence.path_gain
+        ));
     }
     None
 }

@@ -51,15 +51,19 @@ pub fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec
         let arm_vector = p_next - p;
         let (w0, dw0) = (w, dw);
         if prismatic {
-            acc += dw0.cross(&arm_vector) + w0.cross(&w0.cross(&arm_vector))
-                + axis * a[i] + w0.cross(&axis) * (2.0 * v[i]);
+            acc += dw0.cross(&arm_vector)
+                + w0.cross(&w0.cross(&arm_vector))
+                + axis * a[i]
+                + w0.cross(&axis) * (2.0 * v[i]);
         } else {
             w = w0 + axis * v[i];
             dw = dw0 + axis * a[i] + w0.cross(&axis) * v[i];
             // To the axis with link i − 1, from there with link i.
             let (to_axis, from_axis) = (point - p, p_next - point);
-            acc += dw0.cross(&to_axis) + w0.cross(&w0.cross(&to_axis))
-                + dw.cross(&from_axis) + w.cross(&w.cross(&from_axis));
+            acc += dw0.cross(&to_axis)
+                + w0.cross(&w0.cross(&to_axis))
+                + dw.cross(&from_axis)
+                + w.cross(&w.cross(&from_axis));
         }
         (r, p) = (r_next, p_next);
 

@@ -142,7 +142,8 @@ impl RigidBody {
 }
 
 fn pick(wide: &Wide, chosen: &[usize], q: &[f64], v: &[f64], a: &[f64], n: usize) -> Option<Vec<f64>> {
-    let columns: Vec<usize> = chosen.iter().map(|c| wide.column.get(*c).copied().flatten()).collect::<Option<_>>()?;
+    let columns: Vec<usize> =
+        chosen.iter().map(|c| wide.column.get(*c).copied().flatten()).collect::<Option<_>>()?;
     let width = wide.evaluator.outputs() / n;
     let (samples, chunk) = (q.len() / n, 1024);
     let mut out = Vec::with_capacity(samples * n * columns.len());
@@ -180,7 +181,13 @@ mod tests {
         let p = values.len();
         for s in 0..3 {
             let at = s * n..(s + 1) * n;
-            let full = newton_euler::regressor(&arm, &q[at.clone()], &v[at.clone()], &a[at.clone()], [0.0, 0.0, -9.81]);
+            let full = newton_euler::regressor(
+                &arm,
+                &q[at.clone()],
+                &v[at.clone()],
+                &a[at.clone()],
+                [0.0, 0.0, -9.81],
+            );
             for j in 0..n {
                 let expected: f64 = (0..11 * n).map(|k| full[j * 11 * n + k] * all[k]).sum();
                 let row: f64 = (0..p).map(|k| y[(s * n + j) * p + k] * values[k]).sum();
@@ -194,7 +201,13 @@ mod tests {
         let sideways = body.gravity_columns(1, &chosen, &q).unwrap();
         for s in 0..3 {
             let at = s * n..(s + 1) * n;
-            let full = newton_euler::regressor(&arm, &q[at.clone()], &v[at.clone()], &a[at.clone()], [0.0, 0.0, -9.81]);
+            let full = newton_euler::regressor(
+                &arm,
+                &q[at.clone()],
+                &v[at.clone()],
+                &a[at.clone()],
+                [0.0, 0.0, -9.81],
+            );
             let still = newton_euler::regressor(&arm, &q[at], &[0.0; 6], &[0.0; 6], [0.0, 1.0, 0.0]);
             for j in 0..n {
                 for (k, c) in chosen.iter().enumerate() {

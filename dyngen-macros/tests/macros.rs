@@ -1,0 +1,96 @@
+//! The macros give the code of every other door: compiled here, called here, compared with the library.
+
+use dyngen::{Arm, Evaluator, Function, Model, SetKind};
+use nalgebra::SVector;
+
+mod slider {
+    #![deny(warnings, missing_docs)]
+    //! From a file, everything.
+    dyngen_macros::arm!("tests/arms/slider.toml");
+}
+
+mod slider_full {
+    //! From a file, a choice.
+    dyngen_macros::arm! { file = "tests/arms/slider.toml", parameters = full, functions = [regressor, gravity] }
+}
+
+#[dyngen_macros::model("tests/arms/slider.toml")]
+mod slider_model {
+    pub const KEPT: &str = "what the module holds stays";
+}
+
+mod baked {
+    //! With the values of its parameters.
+    dyngen_macros::arm! {
+        file = "tests/arms/slider.toml",
+        values = "tests/arms/slider.values.json",
+        functions = [gravity],
+        parameters = full,
+    }
+}
+
+mod inline {
+    dyngen_macros::arm! {
+        toml = r#"
+            name = "pendulum"
+            convention = "standard"
+            gravity = [0, -9.81, 0]
+            [[joint]]
+            kind = "revolute"
+            a = 1
+            alpha = 0
+            d = 0
+            theta = 0
+        "#,
+        parameters = full,
+    }
+}
+
+#[test]
+fn a_file_gives_every_function_of_its_arm() {
+    let text = include_str!("arms/slider.toml");
+    let model = Model::derive(Arm::parse(text, "slider").unwrap()).unwrap();
+    assert_eq!(slider::PARAMETER_NAMES.to_vec(), model.set(SetKind::Minimal).unwrap().names());
+    let (q, dq, ddq) = (SVector::from([0.3, -0.2]), SVector::from([1.1, 0.7]), SVector::from([-0.4, 2.0]));
+    let parameters = SVector::<f64, { slider::PARAMETERS }>::from_fn(|i, _| 0.5 + i as f64);
+    let torque = slider::inverse_dynamics(&q, &dq, &ddq, &parameters);
+    let evaluator = Evaluator::new(&model, Function::InverseDynamics, SetKind::Minimal).unwrap();
+    let mut expected = [0.0; 2];
+    evaluator.evaluate(q.as_slice(), dq.as_slice(), ddq.as_slice(), parameters.as_slice(), &mut expected);
+    for i in 0..2 {
+        assert!((torque[i] - expected[i]).abs() < 1e-13, "{torque} {expected:?}");
+    }
+    assert_eq!(slider_model::inverse_dynamics(&q, &dq, &ddq, &parameters), torque);
+    assert_eq!(slider_model::KEPT.len(), 27);
+}
+
+#[test]
+fn a_choice_is_kept() {
+    assert_eq!(slider_full::PARAMETERS, 20);
+    let y = slider_full::regressor(
+        &SVector::from([0.0, 0.1]),
+        &SVector::from([0.0, 0.0]),
+        &SVector::from([0.0, 0.0]),
+    );
+    let parameters = SVector::<f64, 20>::from_fn(|i, _| (i as f64).sin());
+    let gravity = slider_full::gravity(&SVector::from([0.0, 0.1]), &parameters);
+    assert!((y * parameters - gravity).norm() < 1e-12);
+}
+
+#[test]
+fn values_of_a_file_are_baked_in() {
+    let parameters = SVector::<f64, { slider_full::PARAMETERS }>::from(baked::PARAMETER_VALUES);
+    assert_eq!(parameters[10], 1.25);
+    let q = SVector::from([0.4, 0.1]);
+    assert!((baked::gravity(&q) - slider_full::gravity(&q, &parameters)).norm() < 1e-13);
+}
+
+#[test]
+fn a_table_in_place_is_an_arm() {
+    // A point of 2 kg at the far end of a rod of 1 m that lies level: its frame's origin.
+    let mut parameters = SVector::<f64, { inline::PARAMETERS }>::zeros();
+    parameters[0] = 2.0;
+    assert_eq!(inline::PARAMETER_NAMES[0], "m1");
+    assert!((inline::gravity(&SVector::from([0.0]), &parameters)[0] - 2.0 * 9.81).abs() < 1e-12);
+    assert!(inline::gravity(&SVector::from([std::f64::consts::FRAC_PI_2]), &parameters)[0].abs() < 1e-12);
+}

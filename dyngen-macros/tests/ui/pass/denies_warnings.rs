@@ -1,0 +1,17 @@
+//! What a macro generates is clean under the strictest lints.
+#![deny(warnings, missing_docs)]
+
+pub mod arm {
+    //! A slider on a turntable.
+    dyngen_macros::arm!("arms/slider.toml");
+}
+
+#[dyngen_macros::model(file = "arms/slider.toml", parameters = symbolic)]
+pub mod symbolic {
+    //! The same for any size.
+}
+
+fn main() {
+    assert_eq!(arm::JOINTS, 2);
+    assert!(symbolic::PARAMETERS >= arm::PARAMETERS);
+}

@@ -1,0 +1,82 @@
+//! `dyngen import`.
+
+use super::Failure;
+use dyngen::arm::Convention;
+use dyngen::import::{self, ImportError, Options};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+#[derive(clap::Args)]
+#[command(after_help = "Example: dyngen import robot.urdf --tip tool0 -o arm.toml")]
+pub(super) struct Args {
+    /// The URDF file (xacro has to be run before).
+    urdf: PathBuf,
+    /// The link that ends the chain; needed where the robot is a tree.
+    #[arg(long, value_name = "LINK")]
+    tip: Option<String>,
+    /// The arm file to write; the inertial values go beside it, as FILE.values.json.
+    #[arg(short, long, value_name = "FILE.toml")]
+    output: PathBuf,
+    /// Where frame i sits: on joint i (modified) or at the far end of link i (standard).
+    #[arg(long, value_enum, default_value = "modified")]
+    convention: Frames,
+    /// Angles this close to a multiple of pi/12 are taken for it, rad.
+    #[arg(long, value_name = "RAD", default_value = "1e-9", value_parser = tolerance)]
+    angle_tolerance: f64,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Frames {
+    Modified,
+    Standard,
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|x| (0.0..=0.01).contains(x));
+    value.ok_or_else(|| "must be a number of radians from 0 to 0.01".to_string())
+}
+
+pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
+    let file = args.urdf.display().to_string();
+    let text = std::fs::read_to_string(&args.urdf)
+        .map_err(|e| Failure::input(format!("{file}: the URDF cannot be read: {e}")))?;
+    let convention = match args.convention {
+        Frames::Modified => Convention::Modified,
+        Frames::Standard => Convention::Standard,
+    };
+    let options = Options { tip: args.tip.clone(), convention, angle_tolerance: args.angle_tolerance };
+    let imported = import::urdf(&text, &file, &options).map_err(|e| match e {
+        ImportError::Unreadable(_) => Failure::input(e),
+        ImportError::Refused(_) => Failure::refused(e),
+    })?;
+    for note in imported.notes.iter().chain(&imported.arm.notes()) {
+        eprintln!("{file}: note: {note}");
+    }
+    let values = args.output.with_extension("values.json");
+    write(&[(&args.output, &imported.text), (&values, &imported.values_json())])?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes all files or none: each is complete on the disk before the first takes its name.
+fn write(files: &[(&Path, &str)]) -> Result<(), Failure> {
+    let partial = |path: &Path| {
+        let mut name = path.as_os_str().to_os_string();
+        name.push(".partial");
+        PathBuf::from(name)
+    };
+    let put = |step: &dyn Fn(&Path, &str) -> std::io::Result<()>| {
+        files.iter().try_for_each(|(path, text)| {
+            step(path, text)
+                .map_err(|e| Failure::input(format!("{}: cannot be written: {e}", path.display())))
+        })
+    };
+    let written = put(&|path, text| std::fs::write(partial(path), text))
+        .and_then(|()| put(&|path, _| std::fs::rename(partial(path), path)));
+    if written.is_err() {
+        for (path, _) in files {
+            // Nothing more can be done about a part that cannot be removed either.
+            let _ = std::fs::remove_file(partial(path));
+        }
+    }
+    written
+}

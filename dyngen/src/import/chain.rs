@@ -1,0 +1,362 @@
+//! From a URDF's tree of links to the chain of bodies between its root and a tip.
+
+use super::Options;
+use super::pose::Pose;
+use crate::arm::{JointKind, MAX_JOINTS};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+use urdf_rs::{Joint, JointType, Link, Robot};
+
+/// A serial arm at q = 0, everything in the root link's frame.
+pub(super) struct Chain {
+    pub(super) name: String,
+    pub(super) root: String,
+    pub(super) tip: String,
+    /// The tip link's frame.
+    pub(super) tip_pose: Pose,
+    pub(super) joints: Vec<ChainJoint>,
+    pub(super) notes: Vec<String>,
+}
+
+/// A joint that moves, with the body behind it.
+pub(super) struct ChainJoint {
+    pub(super) name: String,
+    pub(super) kind: JointKind,
+    /// A point on the axis, m.
+    pub(super) point: Vector3<f64>,
+    /// The direction of the axis, of length 1.
+    pub(super) direction: Vector3<f64>,
+    pub(super) position: Option<[f64; 2]>,
+    pub(super) velocity: Option<f64>,
+    pub(super) torque: Option<f64>,
+    /// The links that move as one behind the joint.
+    pub(super) links: Vec<String>,
+    /// Those of them that have mass.
+    pub(super) masses: Vec<Mass>,
+}
+
+/// The inertia of one link.
+pub(super) struct Mass {
+    /// kg
+    pub(super) mass: f64,
+    /// Centre of mass, m.
+    pub(super) centre: Vector3<f64>,
+    /// Inertia tensor about the centre of mass, kg·m².
+    pub(super) inertia: Matrix3<f64>,
+}
+
+/// Reads the chain, or says every reason why there is none.
+pub(super) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<String>> {
+    let tree = Tree::new(robot)?;
+    let tip = match &options.tip {
+        Some(name) => {
+            tree.link(name).ok_or_else(|| vec![format!("there is no link '{name}' to be the tip")])?
+        }
+        None => tree.only_tip().map_err(|reason| vec![reason])?,
+    };
+    let path = tree.path(tip);
+    let mut walk = Walk {
+        tree: &tree,
+        options,
+        path: &path,
+        joints: Vec::new(),
+        refused: Vec::new(),
+        notes: Vec::new(),
+    };
+    let mut pose = Pose::identity();
+    walk.body(tree.root, &pose);
+    for joint in path.iter().map(|j| &robot.joints[*j]) {
+        let (at, moves) = walk.joint(joint, &pose);
+        pose = at;
+        // What is fixed to a body was found with the body.
+        if let (true, Some(child)) = (moves, tree.link(&joint.child.link)) {
+            walk.body(child, &pose);
+        }
+    }
+    let Walk { joints, mut refused, notes, .. } = walk;
+    match joints.len() {
+        1..=MAX_JOINTS => {}
+        0 if refused.is_empty() => refused.push(format!(
+            "no joint moves between the root link '{}' and the tip '{}'",
+            robot.links[tree.root].name, robot.links[tip].name
+        )),
+        count if count > MAX_JOINTS => {
+            refused.push(format!(
+                "{count} joints move, from '{}' to '{}': an arm may have 1 to {MAX_JOINTS}",
+                joints[0].name,
+                joints[count - 1].name
+            ));
+        }
+        _ => {}
+    }
+    if !refused.is_empty() {
+        return Err(refused);
+    }
+    Ok(Chain {
+        name: robot.name.clone(),
+        root: robot.links[tree.root].name.clone(),
+        tip: robot.links[tip].name.clone(),
+        tip_pose: pose,
+        joints,
+        notes,
+    })
+}
+
+/// The links of a URDF by their joints.
+struct Tree<'r> {
+    robot: &'r Robot,
+    by_name: BTreeMap<&'r str, usize>,
+    /// The joint above a link.
+    above: Vec<Option<usize>>,
+    /// The joints below a link.
+    below: Vec<Vec<usize>>,
+    root: usize,
+}
+
+impl<'r> Tree<'r> {
+    fn new(robot: &'r Robot) -> Result<Self, Vec<String>> {
+        let mut reasons = Vec::new();
+        let mut by_name = BTreeMap::new();
+        for (i, link) in robot.links.iter().enumerate() {
+            if by_name.insert(link.name.as_str(), i).is_some() {
+                reasons.push(format!("two links have the name '{}'", link.name));
+            }
+        }
+        let mut above = vec![None; robot.links.len()];
+        let mut below = vec![Vec::new(); robot.links.len()];
+        for (j, joint) in robot.joints.iter().enumerate() {
+            let ends =
+                [&joint.parent.link, &joint.child.link].map(|name| by_name.get(name.as_str()).copied());
+            let [Some(parent), Some(child)] = ends else {
+                let missing = if ends[0].is_none() { &joint.parent.link } else { &joint.child.link };
+                reasons
+                    .push(format!("joint '{}' names the link '{missing}', which is not there", joint.name));
+                continue;
+            };
+            if let Some(first) = above[child].replace(j) {
+                let first: &Joint = &robot.joints[first];
+                reasons.push(format!(
+                    "link '{}' is the child of two joints, '{}' and '{}': a closed loop is no serial chain",
+                    joint.child.link, first.name, joint.name
+                ));
+            }
+            below[parent].push(j);
+        }
+        let roots: Vec<usize> = (0..robot.links.len()).filter(|i| above[*i].is_none()).collect();
+        let names = |links: &[usize]| {
+            links.iter().map(|i| format!("'{}'", robot.links[*i].name)).collect::<Vec<_>>().join(", ")
+        };
+        match roots[..] {
+            [root] if reasons.is_empty() => {
+                let tree = Tree { robot, by_name, above, below, root };
+                let reached = tree.all_below(root);
+                let lost: Vec<usize> = (0..robot.links.len()).filter(|i| !reached.contains(i)).collect();
+                if lost.is_empty() {
+                    return Ok(tree);
+                }
+                reasons.push(format!("the links {} form a loop", names(&lost)));
+            }
+            [] if robot.links.is_empty() => reasons.push("the robot has no links".to_string()),
+            [] => reasons
+                .push("every link is the child of a joint: the links form a loop without a base".to_string()),
+            [_] => {}
+            _ => reasons.push(format!("the links {} hang on no joint: an arm has one base", names(&roots))),
+        }
+        Err(reasons)
+    }
+
+    fn link(&self, name: &str) -> Option<usize> {
+        self.by_name.get(name).copied()
+    }
+
+    fn child(&self, joint: usize) -> usize {
+        self.link(&self.robot.joints[joint].child.link).unwrap_or(self.root)
+    }
+
+    fn moves(&self, joint: usize) -> bool {
+        self.robot.joints[joint].joint_type != JointType::Fixed
+    }
+
+    /// A link and all links below it.
+    fn all_below(&self, link: usize) -> Vec<usize> {
+        let mut found = vec![link];
+        let mut next = 0;
+        while let Some(link) = found.get(next).copied() {
+            found.extend(self.below[link].iter().map(|j| self.child(*j)));
+            next += 1;
+        }
+        found
+    }
+
+    /// The joints from the root to a link.
+    fn path(&self, link: usize) -> Vec<usize> {
+        let mut path = Vec::new();
+        let mut at = link;
+        while let Some(joint) = self.above[at] {
+            path.push(joint);
+            at = self.link(&self.robot.joints[joint].parent.link).unwrap_or(self.root);
+        }
+        path.reverse();
+        path
+    }
+
+    /// The end of the one chain that moves, or where it branches.
+    fn only_tip(&self) -> Result<usize, String> {
+        let mut body = self.root;
+        loop {
+            let (mut rigid, mut moving) = (vec![body], Vec::new());
+            let mut next = 0;
+            while let Some(link) = rigid.get(next).copied() {
+                for joint in &self.below[link] {
+                    if self.moves(*joint) { moving.push(*joint) } else { rigid.push(self.child(*joint)) }
+                }
+                next += 1;
+            }
+            match moving[..] {
+                [joint] => body = self.child(joint),
+                // A tool that is fixed to the last body in one line is the tip, else the body is.
+                [] if rigid.iter().all(|l| self.below[*l].len() <= 1) => return Ok(rigid[rigid.len() - 1]),
+                [] => return Ok(body),
+                _ => {
+                    let joints: Vec<String> =
+                        moving.iter().map(|j| format!("'{}'", self.robot.joints[*j].name)).collect();
+                    // Where the branches hang first: there the arm ends more often than in a finger.
+                    let forks = moving.iter().map(|j| self.robot.joints[*j].parent.link.as_str());
+                    let leaves = self.all_below(body).into_iter().filter(|l| self.below[*l].is_empty());
+                    let mut ends: Vec<&str> = forks.collect();
+                    ends.extend(leaves.map(|l| self.robot.links[l].name.as_str()));
+                    ends.dedup();
+                    return Err(format!(
+                        "the robot is a tree: the joints {} all move on link '{}'; choose the end of the arm with \
+                         --tip, such as {}",
+                        joints.join(", "),
+                        self.robot.links[body].name,
+                        ends.join(", ")
+                    ));
+                }
+            }
+        }
+    }
+}
+
+/// The way along the chain, with what it finds.
+struct Walk<'r> {
+    tree: &'r Tree<'r>,
+    options: &'r Options,
+    path: &'r [usize],
+    joints: Vec<ChainJoint>,
+    refused: Vec<String>,
+    notes: Vec<String>,
+}
+
+impl Walk<'_> {
+    /// Adds a joint of the chain and gives the pose behind it, and whether it moves.
+    fn joint(&mut self, joint: &Joint, parent: &Pose) -> (Pose, bool) {
+        let name = joint.name.clone();
+        let kind = match joint.joint_type {
+            JointType::Fixed => None,
+            JointType::Revolute | JointType::Continuous => Some(JointKind::Revolute),
+            JointType::Prismatic => Some(JointKind::Prismatic),
+            JointType::Floating | JointType::Planar | JointType::Spherical => {
+                let kind = format!("{:?}", joint.joint_type).to_lowercase();
+                self.refused.push(format!(
+                    "joint '{name}' is {kind}: an arm file has revolute and prismatic joints only"
+                ));
+                None
+            }
+        };
+        let pose = self.origin(&joint.origin, parent, &format!("joint '{name}'"));
+        let Some(kind) = kind else { return (pose, false) };
+        if let Some(mimic) = &joint.mimic {
+            self.refused.push(format!(
+                "joint '{name}' mimics joint '{}': joints of an arm file move on their own",
+                mimic.joint
+            ));
+        }
+        let axis = Vector3::from(joint.axis.xyz.0);
+        let length = axis.norm();
+        if !length.is_finite() || length < 1e-9 {
+            self.refused.push(format!("joint '{name}': its axis {:?} has no direction", joint.axis.xyz.0));
+        }
+        let limit = &joint.limit;
+        let (lower, upper) = (limit.lower, limit.upper);
+        let bounded = joint.joint_type != JointType::Continuous && usable(lower) && usable(upper);
+        if lower.is_nan() || upper.is_nan() || bounded && lower > upper {
+            self.refused.push(format!("joint '{name}': its limits {lower} … {upper} are no range"));
+        }
+        if joint.joint_type != JointType::Continuous && lower == upper {
+            self.notes.push(format!("joint '{name}' has no position limits"));
+        }
+        self.joints.push(ChainJoint {
+            name,
+            kind,
+            point: pose.origin,
+            direction: pose.rotation * (axis / length),
+            position: (bounded && lower < upper).then_some([lower, upper]),
+            velocity: (limit.velocity > 0.0 && usable(limit.velocity)).then_some(limit.velocity),
+            torque: (limit.effort > 0.0 && usable(limit.effort)).then_some(limit.effort),
+            links: Vec::new(),
+            masses: Vec::new(),
+        });
+        (pose, true)
+    }
+
+    /// Adds a link and all that is fixed to it to the body of the last joint.
+    fn body(&mut self, link: usize, pose: &Pose) {
+        let mut rigid = vec![(link, *pose)];
+        let mut next = 0;
+        while let Some((at, pose)) = rigid.get(next).copied() {
+            self.link(&self.tree.robot.links[at], &pose);
+            for j in &self.tree.below[at] {
+                let joint = &self.tree.robot.joints[*j];
+                if !self.tree.moves(*j) {
+                    let pose = self.origin(&joint.origin, &pose, &format!("joint '{}'", joint.name));
+                    rigid.push((self.tree.child(*j), pose));
+                } else if !self.path.contains(j) {
+                    self.notes.push(format!(
+                        "left out: joint '{}' on link '{}', with all that it carries",
+                        joint.name, self.tree.robot.links[at].name
+                    ));
+                }
+            }
+            next += 1;
+        }
+    }
+
+    fn link(&mut self, link: &Link, pose: &Pose) {
+        // What stands still has no part in the dynamics.
+        if self.joints.is_empty() {
+            return;
+        }
+        let inertial = &link.inertial;
+        let i = &inertial.inertia;
+        let place = format!("link '{}'", link.name);
+        let mass = inertial.mass.value;
+        let tensor = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
+        if !usable(mass) || !tensor.iter().all(|x| usable(*x)) {
+            self.refused.push(format!("{place}: its inertia has a number that is not finite"));
+        } else if mass < 0.0 {
+            self.refused.push(format!("{place}: its mass {mass} kg is negative"));
+        }
+        let frame = self.origin(&inertial.origin, pose, &format!("{place}: inertial"));
+        if let Some(joint) = self.joints.last_mut() {
+            joint.links.push(link.name.clone());
+            if mass != 0.0 || tensor.iter().any(|x| *x != 0.0) {
+                let inertia = frame.rotation * tensor * frame.rotation.transpose();
+                joint.masses.push(Mass { mass, centre: frame.origin, inertia });
+            }
+        }
+    }
+
+    fn origin(&mut self, origin: &urdf_rs::Pose, parent: &Pose, place: &str) -> Pose {
+        if !origin.xyz.0.iter().chain(&origin.rpy.0).all(|x| usable(*x)) {
+            self.refused.push(format!("{place}: its origin has a number that is not finite"));
+        }
+        parent.then(&Pose::of(origin, self.options.angle_tolerance))
+    }
+}
+
+/// Finite, and not so large that it stands for infinity.
+fn usable(value: f64) -> bool {
+    value.abs() < 1e30
+}

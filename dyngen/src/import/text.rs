@@ -1,0 +1,159 @@
+//! The arm file of an imported chain, and the inertial values in its frames.
+
+use super::Options;
+use super::chain::{Chain, ChainJoint};
+use super::frames::Frames;
+use super::pose::{Pose, twelfths};
+use crate::arm::{Convention, JointKind, Parameter, ParameterKind};
+use crate::exact::angle::Angle;
+use crate::exact::rational;
+use nalgebra::{Matrix3, Vector3};
+use std::fmt::Write;
+
+/// Downwards in a URDF's root link, m/s².
+const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+
+/// The arm file, with comments that say where everything comes from and what an arm file cannot hold.
+pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Options) -> String {
+    let mut text = String::new();
+    let mut comment = |line: String| {
+        // A String takes every write.
+        let _ = writeln!(text, "# {}", plain(&line));
+    };
+    comment(format!("Imported by dyngen from {file}: link '{}' to link '{}'.", chain.root, chain.tip));
+    comment(format!("Frame 0 in link '{}': {}.", chain.root, pose_text(&frames.base)));
+    comment(format!(
+        "Link '{}' in frame {}: {}.",
+        chain.tip,
+        frames.links.len(),
+        pose_text(&tip(chain, frames))
+    ));
+    comment(
+        "An arm file holds neither pose; gravity is turned into frame 0, friction and meshes are left out."
+            .to_string(),
+    );
+    chain.notes.iter().for_each(|note| comment(format!("Note: {note}.")));
+    let convention = match options.convention {
+        Convention::Standard => "standard",
+        Convention::Modified => "modified",
+    };
+    let name = if chain.name.trim().is_empty() { "robot" } else { &chain.name };
+    let gravity = frames.base.rotation.transpose() * GRAVITY;
+    let gravity: Vec<String> = gravity.iter().map(|g| length(*g)).collect();
+    let _ = write!(
+        text,
+        "name = \"{}\"\nconvention = \"{convention}\"\ngravity = [{}]\n",
+        plain(name).replace('\\', "\\\\").replace('"', "\\\""),
+        gravity.join(", ")
+    );
+    for (joint, row) in chain.joints.iter().zip(&frames.rows) {
+        let angle = |value: f64| angle(value, options.angle_tolerance);
+        let kind = match joint.kind {
+            JointKind::Revolute => "revolute",
+            JointKind::Prismatic => "prismatic",
+        };
+        let _ = write!(
+            text,
+            "\n# joint '{}', links {}\n[[joint]]\nkind = \"{kind}\"\na = {}\nalpha = {}\nd = {}\ntheta = {}\n",
+            plain(&joint.name),
+            plain(&joint.links.iter().map(|l| format!("'{l}'")).collect::<Vec<_>>().join(", ")),
+            length(row.a),
+            angle(row.alpha),
+            length(row.d),
+            angle(row.theta),
+        );
+        if let Some([lower, upper]) = joint.position {
+            let _ = writeln!(text, "position = [{lower:?}, {upper:?}]");
+        }
+        for (key, limit) in [("velocity", joint.velocity), ("torque", joint.torque)] {
+            if let Some(limit) = limit {
+                let _ = writeln!(text, "{key} = {limit:?}");
+            }
+        }
+    }
+    text
+}
+
+/// The tip link's frame in the last frame.
+pub(super) fn tip(chain: &Chain, frames: &Frames) -> Pose {
+    frames.links.last().unwrap_or(&frames.base).see(&chain.tip_pose)
+}
+
+/// The ten inertial parameters of every link in its new frame.
+pub(super) fn values(chain: &Chain, frames: &Frames) -> Vec<(Parameter, f64)> {
+    let links = chain.joints.iter().zip(&frames.links).enumerate();
+    links
+        .flat_map(|(link, (joint, frame))| {
+            let values = link_values(joint, frame).map(|x| if x == 0.0 { 0.0 } else { x });
+            ParameterKind::ALL
+                .into_iter()
+                .zip(values)
+                .map(move |(kind, value)| (Parameter { link, kind }, value))
+        })
+        .collect()
+}
+
+fn link_values(joint: &ChainJoint, frame: &Pose) -> [f64; 10] {
+    let (mut mass, mut moment, mut tensor) = (0.0, Vector3::zeros(), Matrix3::zeros());
+    let back = frame.rotation.transpose();
+    for body in &joint.masses {
+        let r = back * (body.centre - frame.origin);
+        mass += body.mass;
+        moment += r * body.mass;
+        // Huygens–Steiner: from the centre of mass to the frame's origin.
+        tensor += back * body.inertia * frame.rotation
+            + (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * body.mass;
+    }
+    let t = &tensor;
+    // Products of inertia are the negative elements off the diagonal (Eq. 8).
+    [
+        mass,
+        moment[0],
+        moment[1],
+        moment[2],
+        t[(0, 0)],
+        -t[(0, 1)],
+        -t[(0, 2)],
+        t[(1, 1)],
+        -t[(1, 2)],
+        t[(2, 2)],
+    ]
+}
+
+/// A length to 1e-12 m, as a decimal.
+fn length(value: f64) -> String {
+    decimal(value, 12)
+}
+
+fn decimal(value: f64, digits: usize) -> String {
+    let text = format!("{value:.digits$}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_string() } else { text.to_string() }
+}
+
+/// An angle in the arm file's notation: exact where it is a multiple of pi/12.
+fn angle(value: f64, tolerance: f64) -> String {
+    match twelfths(value, tolerance) {
+        Some(0) => "0".to_string(),
+        Some(count) => {
+            let multiple = rational::integer(count) / rational::integer(12);
+            format!("\"{}\"", Angle::PiMultiple(multiple))
+        }
+        None => decimal(value, 15),
+    }
+}
+
+/// A pose as a URDF would say it.
+fn pose_text(pose: &Pose) -> String {
+    let list = |values: &[f64]| values.iter().map(|x| length(*x)).collect::<Vec<_>>().join(", ");
+    let (origin, rpy) = (list(pose.origin.as_slice()), list(&pose.rpy()));
+    if origin == "0, 0, 0" && rpy == "0, 0, 0" {
+        return "the same".to_string();
+    }
+    format!("xyz = [{origin}] m, rpy = [{rpy}] rad")
+}
+
+/// Names as they may stand in a comment or a text.
+fn plain(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
