@@ -17,3 +17,6 @@ mod screen;
 
 pub use forward::{ExplainError, Session, explain};
 pub use result::{Explained, NamedEffect, Rival, Unattributed};
+
+#[cfg(test)]
+mod tests;
