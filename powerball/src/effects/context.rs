@@ -15,13 +15,15 @@ pub struct Context<'a> {
     /// What the model leaves on the data, by joint.
     pub residual: &'a [Vec<f64>],
     rigid: OnceLock<Vec<Vec<f64>>>,
+    prediction: OnceLock<Vec<Vec<f64>>>,
+    top_speed: OnceLock<Vec<f64>>,
 }
 
 impl<'a> Context<'a> {
     /// A model seen on some data.
     #[must_use]
     pub fn new(data: &'a Data<'a>, fit: &'a Fit, residual: &'a [Vec<f64>]) -> Context<'a> {
-        Context { data, fit, residual, rigid: OnceLock::new() }
+        Context { data, fit, residual, rigid: OnceLock::new(), prediction: OnceLock::new(), top_speed: OnceLock::new() }
     }
 
     /// Joints that move.
@@ -38,18 +40,19 @@ impl<'a> Context<'a> {
     }
 
     /// Rigid torque and friction by recording, n a sample, N·m.
-    #[must_use]
-    pub fn prediction(&self) -> Vec<Vec<f64>> {
-        let n = self.data.dof();
-        let friction: Vec<TanhFriction<f64>> =
-            (0..n).map(|j| TanhFriction::new(self.fit.friction(j))).collect();
-        let mut torque = self.rigid().to_vec();
-        for (torque, recording) in torque.iter_mut().zip(&self.data.recordings) {
-            for (k, value) in torque.iter_mut().enumerate() {
-                *value += friction[k % n].torque(recording.v[k]);
+    pub fn prediction(&self) -> &[Vec<f64>] {
+        self.prediction.get_or_init(|| {
+            let n = self.data.dof();
+            let friction: Vec<TanhFriction<f64>> =
+                (0..n).map(|j| TanhFriction::new(self.fit.friction(j))).collect();
+            let mut torque = self.rigid().to_vec();
+            for (torque, recording) in torque.iter_mut().zip(&self.data.recordings) {
+                for (k, value) in torque.iter_mut().enumerate() {
+                    *value += friction[k % n].torque(recording.v[k]);
+                }
             }
-        }
-        torque
+            torque
+        })
     }
 
     /// The steepest level of a joint's friction, s/rad: how fast its sign changes.
@@ -67,14 +70,7 @@ impl<'a> Context<'a> {
     /// The speed that a joint exceeds in 5 % of its samples, rad/s.
     #[must_use]
     pub fn top_speed(&self, joint: usize) -> f64 {
-        let mut speeds: Vec<f64> =
-            self.data.recordings.iter().flat_map(|r| r.speed(joint).map(f64::abs)).collect();
-        if speeds.is_empty() {
-            return 1.0;
-        }
-        let at = (speeds.len() * 95 / 100).min(speeds.len() - 1);
-        let (_, top, _) = speeds.select_nth_unstable_by(at, f64::total_cmp);
-        top.max(1e-3)
+        self.top_speed.get_or_init(|| (0..self.data.dof()).map(|j| self.data.top_speed(j)).collect())[joint]
     }
 
     /// A column on one joint that is a function of its position and speed.

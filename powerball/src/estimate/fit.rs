@@ -92,7 +92,9 @@ pub fn fit(data: &Data<'_>, folds: &Folds, terms: &[Term], start: Option<&Fit>) 
     };
     let mut weights = start.map_or_else(|| initial_weights(data), |fit| fit.weights.clone());
     let mut state = State::new(data, folds, &extra, terms, shapes.clone(), &weights);
-    for round in 0..WEIGHT_ROUNDS {
+    // A start is near already.
+    let rounds = if start.is_some() { 1 } else { WEIGHT_ROUNDS };
+    for round in 0..rounds {
         if start.is_none() && round < 2 {
             for j in (0..n).filter(|j| !data.joints[*j].is_empty()) {
                 let (gram, right, _) = state.gram.sum(&weights, |_| true);

@@ -35,13 +35,7 @@ pub fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f64>; FRI
 /// The steepnesses that make sense for a joint, s/rad: from nearly straight over its speeds to a step.
 #[must_use]
 pub fn range(data: &Data<'_>, joint: usize) -> (f64, f64) {
-    let mut speeds: Vec<f64> = data.recordings.iter().flat_map(|r| r.speed(joint).map(f64::abs)).collect();
-    if speeds.is_empty() {
-        return (1.0, 1000.0);
-    }
-    let at = (speeds.len() * 95 / 100).min(speeds.len() - 1);
-    let (_, top, _) = speeds.select_nth_unstable_by(at, f64::total_cmp);
-    let top = top.max(1e-3);
+    let top = data.top_speed(joint);
     (1.0 / top, 1000.0 / top)
 }
 

@@ -1,8 +1,9 @@
 //! What speaks for a candidate: blocks that agree, folds that gain, another path that gains.
 
-use super::screen::{CellCross, Screen, Trial, augmented, dot};
+use super::folds::fold_gains;
+use super::screen::{Screen, Trial, dot};
 use crate::estimate::distribution::f_tail;
-use crate::estimate::{Design, Folds, Solver, runs};
+use crate::estimate::{Design, Folds, Solver};
 use crate::regression::{Column, Data};
 use faer::Mat;
 
@@ -101,55 +102,6 @@ pub(super) fn wald(screen: &Screen<'_>, trial: &Trial) -> f64 {
         return 1.0;
     }
     f_tail(wald / used * freedom / clusters, used, freedom)
-}
-
-fn fold_gains(screen: &Screen<'_>, trial: &Trial, joints: &[usize], folds: &Folds, local: bool) -> Vec<f64> {
-    let (context, fit) = (screen.context, screen.context.fit);
-    let k = trial.columns.len();
-    let mut cells: Vec<CellCross> = Vec::new();
-    let mut joint_of: Vec<usize> = Vec::new();
-    for j in 0..fit.design.dof() {
-        let parts: Vec<&[f64]> = trial.columns.iter().filter_map(|c| c.at(j)).collect();
-        let w = fit.weights[j];
-        if parts.len() < k || w == 0.0 {
-            continue;
-        }
-        for (cell, rows) in runs(context.data, folds, j) {
-            let y = &context.data.joints[j].torque[rows.clone()];
-            let mut cross = fit.design.cross(j, &rows, &parts);
-            cross.iter_mut().flat_map(|(_, v)| v).for_each(|v| *v *= w);
-            let cut: Vec<&[f64]> = parts.iter().map(|p| &p[rows.clone()]).collect();
-            let square = cut.iter().flat_map(|a| cut.iter().map(|b| w * dot(a, b))).collect();
-            let right = cut.iter().map(|a| w * dot(a, y)).collect();
-            cells.push(CellCross { cell, cross, square, right });
-            joint_of.push(j);
-        }
-    }
-    let p = fit.design.size;
-    let free = |c: usize| c >= p || fit.free[c];
-    // What a fold's squared error is measured by: that of the candidate's own joints.
-    let own_weights: Vec<f64> =
-        (0..fit.design.dof()).map(|j| if joints.contains(&j) { fit.weights[j] } else { 0.0 }).collect();
-    let (held, left_out) = folds.folds(local);
-    held.iter()
-        .zip(left_out)
-        .filter_map(|(held, left_out)| {
-            let (gram, right, _) = augmented(context, &fit.gram, &trial.columns, |c| !left_out.contains(&c), &cells);
-            let with = Solver::new(&gram, free).solve(&right);
-            let without = Solver::new(&gram, |c| c < p && fit.free[c]).solve(&right);
-            let (gram, right, square) = augmented(context, &fit.gram, &trial.columns, |c| held.contains(&c), &cells);
-            let error = |theta: &[f64], gram: &Mat<f64>, right: &[f64], square: f64| {
-                let quadratic: f64 = (0..theta.len())
-                    .map(|i| theta[i] * (0..theta.len()).map(|c| gram[(c, i)] * theta[c]).sum::<f64>())
-                    .sum();
-                square - 2.0 * dot(theta, right) + quadratic
-            };
-            let change = error(&without, &gram, &right, square) - error(&with, &gram, &right, square);
-            let (gram, right, square) = fit.gram.sum(&own_weights, |c| held.contains(&c));
-            let scale = error(&without[..p], &gram, &right, square);
-            (scale > 0.0).then_some(change / scale)
-        })
-        .collect()
 }
 
 fn path_gain(screen: &Screen<'_>, trial: &Trial, joints: &[usize], path: &Path<'_>, columns: &[Column]) -> f64 {

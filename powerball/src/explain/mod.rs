@@ -6,6 +6,7 @@
 //! rivals, [`leftover`] says what stays.
 
 mod evidence;
+mod folds;
 mod forward;
 mod leftover;
 mod naming;

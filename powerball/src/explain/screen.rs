@@ -1,10 +1,12 @@
 //! What a candidate would explain with the base refitted: a small solve a candidate.
 
+use super::folds::FoldBase;
 use super::rule;
 use crate::effects::{Candidate, Context, Effect};
-use crate::estimate::{Gram, Solver};
+use crate::estimate::{Folds, Solver};
 use crate::regression::Column;
 use faer::Mat;
+use std::sync::OnceLock;
 
 /// The base model prepared for many candidates.
 #[derive(Debug)]
@@ -15,6 +17,8 @@ pub struct Screen<'c> {
     pub solver: Solver,
     /// A'r: zero but for bounds and unfinished shapes.
     slope: Vec<f64>,
+    /// The base fitted without each fold: whole logs, stretches.
+    folds: [OnceLock<Vec<FoldBase>>; 2],
 }
 
 /// A candidate tried on the base.
@@ -45,7 +49,12 @@ impl<'c> Screen<'c> {
                 slope[g] += fit.weights[j] * value[0];
             }
         }
-        Screen { context, solver, slope }
+        Screen { context, solver, slope, folds: [OnceLock::new(), OnceLock::new()] }
+    }
+
+    /// The base fitted without each fold (see [`Folds::folds`]).
+    pub fn folds(&self, folds: &Folds, local: bool) -> &[FoldBase] {
+        self.folds[usize::from(local)].get_or_init(|| FoldBase::all(self.context.fit, folds, local))
     }
 
     /// Tries a candidate; `None` where it has no usable column or is physically impossible.
@@ -123,43 +132,6 @@ impl<'c> Screen<'c> {
         };
         (0..design.dof()).map(of).collect()
     }
-}
-
-/// Cross products of a fit and a candidate's columns by cell, for folds.
-pub(super) fn augmented(context: &Context<'_>, gram: &Gram, columns: &[Column], wanted: impl Fn(usize) -> bool + Copy, cells: &[CellCross]) -> (Mat<f64>, Vec<f64>, f64) {
-    let (base, mut right, square) = gram.sum(&context.fit.weights, wanted);
-    let (p, k) = (base.ncols(), columns.len());
-    let mut all = Mat::zeros(p + k, p + k);
-    for i in 0..p {
-        for c in 0..p {
-            all[(i, c)] = base[(i, c)];
-        }
-    }
-    right.resize(p + k, 0.0);
-    for cell in cells.iter().filter(|c| wanted(c.cell)) {
-        for (g, values) in &cell.cross {
-            for c in 0..k {
-                all[(*g, p + c)] += values[c];
-                all[(p + c, *g)] += values[c];
-            }
-        }
-        for a in 0..k {
-            for b in 0..k {
-                all[(p + a, p + b)] += cell.square[a * k + b];
-            }
-            right[p + a] += cell.right[a];
-        }
-    }
-    (all, right, square)
-}
-
-/// A candidate's weighted cross products on one joint and cell.
-#[derive(Debug)]
-pub(super) struct CellCross {
-    pub cell: usize,
-    pub cross: Vec<(usize, Vec<f64>)>,
-    pub square: Vec<f64>,
-    pub right: Vec<f64>,
 }
 
 /// The scalar product.

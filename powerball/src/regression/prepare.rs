@@ -65,6 +65,7 @@ pub struct Data<'a> {
     pub rest_speed: Vec<f64>,
     /// What was left out or done, in words.
     pub notes: Vec<String>,
+    top_speed: Vec<f64>,
     last_link: OnceLock<Vec<Column>>,
     force: OnceLock<Vec<Column>>,
     declared_zero: OnceLock<Vec<Column>>,
@@ -102,6 +103,7 @@ impl<'a> Data<'a> {
                 rest::rest_speed(recordings.iter().flat_map(|r| r.speed(j).map(f64::abs)).collect())
             })
             .collect();
+        let top_speed = (0..n).map(|j| top_speed(&recordings, j)).collect();
         let kept = keep_moving(&recordings, &band, &rest_speed, n);
         let joints = joint_rows(body, &recordings, &band, kept);
         if joints.iter().all(|j| j.len() < 20) {
@@ -130,6 +132,7 @@ impl<'a> Data<'a> {
             logs,
             rest_speed,
             notes,
+            top_speed,
             last_link: OnceLock::new(),
             force: OnceLock::new(),
             declared_zero: OnceLock::new(),
@@ -140,6 +143,12 @@ impl<'a> Data<'a> {
     #[must_use]
     pub fn dof(&self) -> usize {
         self.joints.len()
+    }
+
+    /// The speed that a joint exceeds in 5 % of its samples, rad/s, at least 1e-3.
+    #[must_use]
+    pub fn top_speed(&self, joint: usize) -> f64 {
+        self.top_speed[joint]
     }
 
     /// Samples a second on the even grid.
@@ -216,6 +225,16 @@ impl<'a> Data<'a> {
         };
         Column { parts: parallel::map(&(0..n).collect::<Vec<_>>(), |j| part(*j)) }
     }
+}
+
+fn top_speed(recordings: &[Recording], joint: usize) -> f64 {
+    let mut speeds: Vec<f64> = recordings.iter().flat_map(|r| r.speed(joint).map(f64::abs)).collect();
+    if speeds.is_empty() {
+        return 1.0;
+    }
+    let at = (speeds.len() * 95 / 100).min(speeds.len() - 1);
+    let (_, top, _) = speeds.select_nth_unstable_by(at, f64::total_cmp);
+    top.max(1e-3)
 }
 
 fn keep_moving(recordings: &[Recording], band: &Band, limit: &[f64], n: usize) -> Vec<Vec<Vec<usize>>> {
