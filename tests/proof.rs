@@ -1,14 +1,16 @@
 //! Every function of every arm and set is proven against the Lagrangian, and a wrong one is not.
 
 use dyngen::base::SetKind;
+use dyngen::dynamics::function;
+use dyngen::graph::Expr;
+use dyngen::prove::prove;
 use dyngen::{Function, Model};
-use powerball_workspace::{arm, paper_arm_with_ratios, parse, arm_text};
+use powerball_workspace::{arm, arm_text, paper_arm_with_ratios, parse};
 
 fn prove_all(name: &str, model: &Model) {
     for set in &model.sets().sets {
         for function in Function::ALL {
-            let built = model.function(function, set.kind).unwrap_or_else(|e| panic!("{name} {}: {e}", set.kind));
-            println!("{name:10} {:10} {:20} {:?}", set.kind, function, built.graph.operations(&built.outputs));
+            model.function(function, set.kind).unwrap_or_else(|e| panic!("{name} {}: {e}", set.kind));
         }
     }
 }
@@ -18,15 +20,11 @@ fn every_function_of_every_set_is_proven() {
     for name in ["arm", "puma560", "ur5e", "panda", "stanford", "scara"] {
         prove_all(name, &Model::derive(arm(name)).unwrap());
     }
+    prove_all("no rotors", &Model::derive(paper_arm_with_ratios([None; 6])).unwrap());
 }
 
 #[test]
-fn no_rotors() {
-        prove_all("norotor", &Model::derive(paper_arm_with_ratios([None; 6])).unwrap());
-}
-
-#[test]
-fn rotors_on_arms_with_prismatic_joints_and_modified_frames_are_proven() {
+fn rotors_on_prismatic_joints_and_in_modified_frames_are_proven() {
     for name in ["stanford", "panda", "scara"] {
         let text = arm_text(name).replace("[[joint]]", "[[joint]]\nrotor_ratio = 50");
         prove_all(name, &Model::derive(parse(&text)).unwrap());
@@ -34,12 +32,16 @@ fn rotors_on_arms_with_prismatic_joints_and_modified_frames_are_proven() {
 }
 
 #[test]
-fn general_angles_are_proven() {
-    let text = arm_text("ur5e").replacen("\"pi/2\"", "\"pi/3\"", 1).replace("theta = \"0\"", "theta = 0.7").replace("\"-pi/2\"", "0.3").replacen("alpha = \"0\"", "alpha = \"3*pi/4\"", 1);
-    let text = text.replace("gravity = [0, 0, -9.81]", "gravity = [1.5, -2, 9.5]");
-    prove_all("general", &Model::derive(parse(&text)).unwrap());
+fn general_angles_and_any_gravity_are_proven() {
+    let text = arm_text("ur5e")
+        .replacen("\"pi/2\"", "\"pi/3\"", 1)
+        .replace("theta = \"0\"", "theta = 0.7")
+        .replace("\"-pi/2\"", "0.3")
+        .replacen("alpha = \"0\"", "alpha = \"3*pi/4\"", 1)
+        .replace("gravity = [0, 0, -9.81]", "gravity = [1.5, -2, 9.5]");
+    prove_all("general angles", &Model::derive(parse(&text)).unwrap());
     let text = arm_text("stanford").replace("\"-pi/2\"", "\"pi/5\"");
-    prove_all("general", &Model::derive(parse(&text)).unwrap());
+    prove_all("general angles, prismatic", &Model::derive(parse(&text)).unwrap());
 }
 
 #[test]
@@ -47,4 +49,34 @@ fn published_sums_that_lose_a_parameter_are_refused() {
     let model = Model::derive(paper_arm_with_ratios([1, 1, 1, 1, 1, 100].map(Some))).unwrap();
     let error = model.function(Function::Gravity, SetKind::Published).unwrap_err();
     assert!(error.to_string().contains("Im6"), "{error}");
+}
+
+/// Every single result that is altered in any way is noticed: the proof is no formality.
+#[test]
+fn a_wrong_result_anywhere_is_noticed() {
+    let model = Model::derive(arm("arm")).unwrap();
+    let set = model.set(SetKind::Minimal).unwrap();
+    for function in Function::ALL {
+        let built = function::build(function, model.arm(), model.symbols(), set, &model.sets().field);
+        let check =
+            |f: &dyngen::dynamics::FunctionGraph| prove(model.arm(), model.symbols(), model.sets(), set, f);
+        assert!(check(&built).is_ok());
+        for k in 0..built.outputs.len() {
+            let mut wrong = built.clone();
+            wrong.outputs[k] = if built.outputs[k] == Expr::ZERO { Expr::ONE } else { -built.outputs[k] };
+            let found = check(&wrong).unwrap_err();
+            assert_eq!(found.entry, (k / built.shape.1, k % built.shape.1), "{function}");
+        }
+    }
+}
+
+/// Zero where a small term belongs is noticed as well: exact arithmetic has no tolerance.
+#[test]
+fn a_constant_that_is_slightly_off_is_noticed() {
+    let model = Model::derive(arm("arm")).unwrap();
+    let mut other = model.arm().clone();
+    other.joints[3].d += dyngen::exact::rational::parse_rational("1e-30").unwrap();
+    let set = model.set(SetKind::Full).unwrap();
+    let built = function::build(Function::Gravity, &other, model.symbols(), set, &model.sets().field);
+    assert!(prove(model.arm(), model.symbols(), model.sets(), set, &built).is_err());
 }

@@ -69,7 +69,10 @@ impl Evaluator {
         let samples = out.len() / width.max(1);
         assert_eq!(q.len(), samples * n, "q must hold {n} numbers for each sample of out");
         let needs = |needed: bool, slice: &[f64], name: &str| {
-            assert!(!needed || slice.len() == samples * n, "{name} must hold {n} numbers for each sample of out");
+            assert!(
+                !needed || slice.len() == samples * n,
+                "{name} must hold {n} numbers for each sample of out"
+            );
         };
         needs(self.function.takes_speeds(), dq, "dq");
         needs(self.function.takes_accelerations() || self.function.takes_torques(), drive, "ddq or tau");

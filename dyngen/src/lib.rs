@@ -2,8 +2,10 @@
 
 pub mod arm;
 pub mod base;
+mod config;
 pub mod diagnostic;
 pub mod dynamics;
+pub mod emit;
 mod evaluator;
 pub mod exact;
 pub mod graph;
@@ -12,6 +14,7 @@ pub mod prove;
 
 pub use arm::Arm;
 pub use base::{ParameterSet, SetKind};
+pub use config::{Config, GenerateError};
 pub use diagnostic::{Diagnostic, Diagnostics};
 pub use dynamics::Function;
 pub use evaluator::Evaluator;

@@ -1,2 +1,9 @@
-//! The `dyngen` command.
-fn main() {}
+//! The `dyngen` command: describe, generate, eval, check.
+
+mod cli;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    cli::main()
+}

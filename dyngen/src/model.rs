@@ -114,7 +114,10 @@ impl Model {
     /// [`Arm::all_parameters`].
     pub fn set_values(&self, set: &ParameterSet, all: &[f64]) -> Vec<f64> {
         let sum = |terms: &Combination| {
-            terms.iter().map(|(p, c)| self.sets.field.value(c) * all.get(p.index()).copied().unwrap_or(0.0)).sum()
+            terms
+                .iter()
+                .map(|(p, c)| self.sets.field.value(c) * all.get(p.index()).copied().unwrap_or(0.0))
+                .sum()
         };
         set.parameters.iter().map(|p| sum(&p.terms)).collect()
     }

@@ -3,18 +3,27 @@
 
 #[cfg(feature = "cli")]
 pub mod cli;
-#[cfg(feature = "std")]
+pub mod demo;
 pub mod effects;
 #[cfg(feature = "std")]
 pub mod estimate;
+#[cfg(feature = "std")]
+pub mod excite;
 #[cfg(feature = "std")]
 pub mod explain;
 pub mod friction;
 #[cfg(feature = "std")]
 pub mod log;
+pub mod model;
+#[cfg(feature = "std")]
+pub mod motion;
 #[cfg(feature = "std")]
 mod parallel;
 #[cfg(feature = "std")]
 pub mod regression;
 #[cfg(feature = "std")]
+pub mod report;
+#[cfg(feature = "std")]
 pub mod signal;
+#[cfg(feature = "std")]
+pub mod virtual_arm;

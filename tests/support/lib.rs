@@ -1,6 +1,8 @@
 #![allow(clippy::panic)]
 //! What the tests and benches across crates share: the arms, and variants of them.
 
+pub mod generated;
+
 use dyngen::Arm;
 use std::path::{Path, PathBuf};
 

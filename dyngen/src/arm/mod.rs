@@ -5,8 +5,8 @@ mod read;
 pub mod sum;
 
 use crate::diagnostic::Diagnostics;
-use crate::exact::rational::Rational;
 pub use crate::exact::angle::Angle;
+use crate::exact::rational::Rational;
 pub use parameter::{Parameter, ParameterKind};
 use std::path::Path;
 

@@ -1,6 +1,7 @@
 //! Parameter sets: exact relations, published groupings, the choice of columns, physical possibility.
 
 pub mod coefficients;
+pub mod possible;
 pub mod preference;
 mod published;
 pub mod sets;

@@ -18,9 +18,8 @@ pub(super) fn published_set(
 ) -> Result<ParameterSet, Unproven> {
     let kept = arm.kept_parameters();
     // Parameters that occur in one sum only carry it best, so that most carriers are single parameters.
-    let occurrences = |p: Parameter| {
-        arm.groupings.iter().filter(|g| g.terms.iter().any(|(q, _)| *q == p)).count()
-    };
+    let occurrences =
+        |p: Parameter| arm.groupings.iter().filter(|g| g.terms.iter().any(|(q, _)| *q == p)).count();
     let mut order: Vec<Parameter> = kept.iter().copied().filter(|p| occurrences(*p) > 0).collect();
     order.sort_by_key(|p| (occurrences(*p), *p));
     let place: BTreeMap<Parameter, usize> = order.iter().enumerate().map(|(i, p)| (*p, i)).collect();
@@ -93,7 +92,9 @@ fn lost(
         }
         // What the sums put in the parameter's place; nothing where no sum names it.
         let replacement: Vec<(Parameter, Constant)> = at
-            .map(|at| grouping.coordinates[at].iter().map(|(p, c)| (order[grouping.kept[*p]], c.clone())).collect())
+            .map(|at| {
+                grouping.coordinates[at].iter().map(|(p, c)| (order[grouping.kept[*p]], c.clone())).collect()
+            })
             .unwrap_or_default();
         let mut difference = vec![(parameter, one.clone())];
         difference.extend(replacement.iter().map(|(p, c)| (*p, field.neg(c))));

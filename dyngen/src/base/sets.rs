@@ -132,9 +132,8 @@ impl Sets {
         let lagrangian = LagrangianPolynomials::derive(arm, symbols);
         let order: Vec<usize> = preference(arm).iter().map(|p| p.index()).collect();
         let columns = arm.dof() * 11;
-        let eliminate = |sizes| {
-            elimination::dependence(&field, &lagrangian.rows(arm, &field, sizes), columns, &order)
-        };
+        let eliminate =
+            |sizes| elimination::dependence(&field, &lagrangian.rows(arm, &field, sizes), columns, &order);
         let minimal = eliminate(Sizes::Numbers)?;
         let symbolic = eliminate(Sizes::Variables)?;
         let mut sets = vec![
@@ -165,7 +164,11 @@ impl Sets {
             return if own.is_empty() { Class::Unidentifiable } else { Class::InCombination };
         };
         let shares = |c: &Vec<(usize, Constant)>| c.iter().any(|(p, _)| *p == position);
-        if coordinates.iter().filter(|c| shares(c)).count() == 1 { Class::Alone } else { Class::InCombination }
+        if coordinates.iter().filter(|c| shares(c)).count() == 1 {
+            Class::Alone
+        } else {
+            Class::InCombination
+        }
     }
 }
 
@@ -199,7 +202,11 @@ fn base_set(kind: SetKind, arm: &Arm, field: &ConstantField, dependence: &Depend
         // The carrier leads its sum, as in Ixx2 − Iyy2 + 49/400·m3.
         terms.sort_by_key(|(p, _)| (*p != carrier, *p));
         let one = field.rational(crate::exact::rational::integer(1));
-        parameters.push(SetParameter { name: combination_text(field, &terms), terms, carriers: vec![(carrier, one)] });
+        parameters.push(SetParameter {
+            name: combination_text(field, &terms),
+            terms,
+            carriers: vec![(carrier, one)],
+        });
     }
     parameters.sort_by_key(|p| p.carriers[0].0);
     unexamined(kind, parameters)

@@ -33,11 +33,7 @@ impl Body {
     pub fn inertia_times(&self, b: &Builder, v: &Vector) -> Vector {
         let [xx, yy, zz] = self.inertia;
         let [yz, xz, xy] = self.products;
-        [
-            b.dot(&[xx, -xy, -xz], v),
-            b.dot(&[-xy, yy, -yz], v),
-            b.dot(&[-xz, -yz, zz], v),
-        ]
+        [b.dot(&[xx, -xy, -xz], v), b.dot(&[-xy, yy, -yz], v), b.dot(&[-xz, -yz, zz], v)]
     }
 
     /// The sum of two bodies in one frame.

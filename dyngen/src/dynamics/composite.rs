@@ -74,7 +74,12 @@ pub fn body_to_joint(b: &Builder, convention: Convention, joint: &JointElements<
 }
 
 /// A composite at its joint seen from the link before.
-pub fn body_to_link_before(b: &Builder, convention: Convention, joint: &JointElements<Expr>, body: &Body) -> Body {
+pub fn body_to_link_before(
+    b: &Builder,
+    convention: Convention,
+    joint: &JointElements<Expr>,
+    body: &Body,
+) -> Body {
     let before_z = body_back_z(b, joint, body);
     match convention {
         Convention::Standard => before_z,

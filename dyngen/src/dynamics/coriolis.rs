@@ -142,7 +142,8 @@ impl Moving {
         let [xx, yy, zz] = body.inertia;
         let second = |p: Expr, q: Expr, r: Expr| b.mul(&half, &b.sub(&b.add(&p, &q), &r));
         let [yz, xz, xy] = body.products;
-        let columns = [[second(yy, zz, xx), xy, xz], [xy, second(zz, xx, yy), yz], [xz, yz, second(xx, yy, zz)]];
+        let columns =
+            [[second(yy, zz, xx), xy, xz], [xy, second(zz, xx, yy), yz], [xz, yz, second(xx, yy, zz)]];
         Moving {
             body: *body,
             momentum: b.cross(&motion.omega, &body.moment),
@@ -179,10 +180,9 @@ impl Moving {
                     moment: std::array::from_fn(|i| b.add(&inertia[i], &spread[i])),
                 }
             }
-            JointKind::Prismatic => Wrench {
-                force: rate.map(|r| b.mul(&self.body.mass, &r)),
-                moment: b.cross(s, &rate),
-            },
+            JointKind::Prismatic => {
+                Wrench { force: rate.map(|r| b.mul(&self.body.mass, &r)), moment: b.cross(s, &rate) }
+            }
         }
     }
 

@@ -1,8 +1,8 @@
 //! The quantities of an arm's kinematics as elements of an algebra.
 
-use crate::exact::symbols::{AngleSymbols, Trig};
 use crate::arm::{Arm, Convention, JointKind};
 use crate::exact::algebra::Algebra;
+use crate::exact::symbols::{AngleSymbols, Trig};
 use num_traits::Zero;
 
 /// The arm's angles whose sine and cosine are no rationals: twists, and the fixed angles of prismatic joints.

@@ -93,7 +93,8 @@ fn about_z(b: &Builder, joint: &JointElements<Expr>, ddq: Expr, from: &Motion) -
         acceleration = plus_scaled(b, &acceleration, joint.shift, &spin_column(b, from, 2));
     }
     let turn = |v: &Vector| turn_z(b, &joint.sin, &joint.cos, v);
-    let (mut omega, mut alpha, mut acceleration) = (turn(&from.omega), turn(&from.alpha), turn(&acceleration));
+    let (mut omega, mut alpha, mut acceleration) =
+        (turn(&from.omega), turn(&from.alpha), turn(&acceleration));
     let dq = joint.speed;
     match joint.kind {
         JointKind::Revolute => {

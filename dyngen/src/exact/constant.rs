@@ -4,11 +4,11 @@
 //! is a rational number.
 
 use super::algebra::Algebra;
+use super::gcd;
 use super::polynomial::{Monomial, Polynomial, PolynomialRing, Square};
 use super::prime::{Draws, Fp};
 use super::rational::{self, Rational};
 use super::symbols::{AngleSymbols, SymbolKind};
-use super::gcd;
 use num_traits::{One, Signed, Zero};
 use std::collections::BTreeMap;
 
@@ -244,7 +244,8 @@ impl ConstantField {
     /// Numerator and denominator as sums of coefficient times powers of (symbol, sine?, exponent).
     pub fn factors(&self, a: &Constant) -> (Vec<Factors>, Vec<Factors>) {
         let split = |n: &Numerator| {
-            let powers = |m: &Monomial| m.powers().map(|(v, e)| (self.origins[v].0, self.origins[v].1, e)).collect();
+            let powers =
+                |m: &Monomial| m.powers().map(|(v, e)| (self.origins[v].0, self.origins[v].1, e)).collect();
             n.terms().iter().map(|(m, c)| (c.clone(), powers(m))).collect()
         };
         (split(&a.numerator), split(&a.denominator))
@@ -327,8 +328,8 @@ impl Constant {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use super::super::angle::Angle;
+    use super::*;
 
     fn field(angles: &[&str]) -> ConstantField {
         let symbols = AngleSymbols { angles: angles.iter().map(|a| Angle::parse(a).unwrap()).collect() };

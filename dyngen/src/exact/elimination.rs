@@ -27,7 +27,11 @@ pub struct Unproven;
 
 impl fmt::Display for Unproven {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the exact elimination could not be certified: a number of the arm is a multiple of the prime {}", super::prime::P)
+        write!(
+            f,
+            "the exact elimination could not be certified: a number of the arm is a multiple of the prime {}",
+            super::prime::P
+        )
     }
 }
 
@@ -203,8 +207,8 @@ fn holds(field: &ConstantField, row: &SparseRow, dependence: &Dependence) -> boo
 mod tests {
     use super::super::prime::Draws;
     use super::super::rational::integer;
-    use super::*;
     use super::super::symbols::AngleSymbols;
+    use super::*;
 
     fn matrix(field: &ConstantField, rows: &[&[i64]]) -> Vec<SparseRow> {
         let sparse = |r: &&[i64]| {

@@ -3,8 +3,8 @@
 //! Only for polynomials in variables whose squares have no rule: there the ring is a unique factorisation domain.
 
 use super::algebra::Algebra;
-use super::polynomial::{Monomial, PolynomialRing};
 use super::constant::Numerator;
+use super::polynomial::{Monomial, PolynomialRing};
 use super::rational::Rational;
 use num_traits::One;
 
@@ -18,7 +18,8 @@ pub fn gcd(ring: &Ring, a: &Numerator, b: &Numerator) -> Numerator {
     if ring.is_zero(b) {
         return monic(ring, a);
     }
-    let Some(variable) = a.terms().iter().chain(b.terms()).flat_map(|(m, _)| m.powers()).map(|(v, _)| v).max()
+    let Some(variable) =
+        a.terms().iter().chain(b.terms()).flat_map(|(m, _)| m.powers()).map(|(v, _)| v).max()
     else {
         return ring.integer(1);
     };

@@ -151,7 +151,13 @@ mod tests {
             let (sin, cos) = symbols.sin_cos(angle);
             let value = |t: Trig| match t {
                 Trig::Zero => 0.0,
-                Trig::One { negative } => if negative { -1.0 } else { 1.0 },
+                Trig::One { negative } => {
+                    if negative {
+                        -1.0
+                    } else {
+                        1.0
+                    }
+                }
                 Trig::Symbol { index, sine, negative } => {
                     let (s, c) = symbols.angles[index].sin_cos();
                     let v = if sine { s } else { c };

@@ -74,7 +74,9 @@ impl Tape {
         let mut free: Vec<u32> = Vec::new();
         let mut instructions = Vec::new();
         for node in &needed {
-            let (Node::Add(a, b) | Node::Mul(a, b) | Node::Div(a, b)) = graph.nodes()[*node] else { continue };
+            let (Node::Add(a, b) | Node::Mul(a, b) | Node::Div(a, b)) = graph.nodes()[*node] else {
+                continue;
+            };
             let (from_a, from_b) = (slot_of[a.node()], slot_of[b.node()]);
             for operand in [a.node(), b.node()] {
                 let slot = slot_of[operand];
@@ -95,10 +97,8 @@ impl Tape {
                 _ => Instruction::Add { to, a, b },
             });
         }
-        let outputs = outputs
-            .iter()
-            .map(|e| Output { slot: slot_of[e.node()], negative: e.is_negative() })
-            .collect();
+        let outputs =
+            outputs.iter().map(|e| Output { slot: slot_of[e.node()], negative: e.is_negative() }).collect();
         Tape { constants, inputs, instructions, outputs, slots }
     }
 

@@ -61,7 +61,10 @@ pub fn prove(
         let same = |(i, value): (usize, &Fp)| actual.as_ref().is_some_and(|a| a[i] == *value);
         if let Some(wrong) = expected.iter().enumerate().position(|pair| !same(pair)) {
             let columns = function.shape.1;
-            return Err(Disagreement { function: function.function, entry: (wrong / columns, wrong % columns) });
+            return Err(Disagreement {
+                function: function.function,
+                entry: (wrong / columns, wrong % columns),
+            });
         }
     }
     Ok(())

@@ -89,16 +89,35 @@ impl<'a> Point<'a> {
 
     /// The homogeneous transform of the last frame as a product of elementary ones, row-major.
     pub(super) fn pose(&self) -> Vec<Fp> {
-        let mut source =
-            JetSource { point: self, speeds: &self.speeds, accelerations: &self.accelerations, with_gravity: true };
+        let mut source = JetSource {
+            point: self,
+            speeds: &self.speeds,
+            accelerations: &self.accelerations,
+            with_gravity: true,
+        };
         let elements = ArmElements::build(&Jets, self.arm, self.symbols, &mut source);
         let (zero, one) = (Fp::ZERO, Fp::ONE);
-        let mut pose = [[one, zero, zero, zero], [zero, one, zero, zero], [zero, zero, one, zero], [zero, zero, zero, one]];
+        let mut pose = [
+            [one, zero, zero, zero],
+            [zero, one, zero, zero],
+            [zero, zero, one, zero],
+            [zero, zero, zero, one],
+        ];
         for joint in &elements.joints {
             let v = |jet: &Jet| jet.value();
             let (s, c, sa, ca) = (v(&joint.sin), v(&joint.cos), v(&joint.sin_alpha), v(&joint.cos_alpha));
-            let about_z = [[c, -s, zero, zero], [s, c, zero, zero], [zero, zero, one, v(&joint.shift)], [zero, zero, zero, one]];
-            let about_x = [[one, zero, zero, v(&joint.a)], [zero, ca, -sa, zero], [zero, sa, ca, zero], [zero, zero, zero, one]];
+            let about_z = [
+                [c, -s, zero, zero],
+                [s, c, zero, zero],
+                [zero, zero, one, v(&joint.shift)],
+                [zero, zero, zero, one],
+            ];
+            let about_x = [
+                [one, zero, zero, v(&joint.a)],
+                [zero, ca, -sa, zero],
+                [zero, sa, ca, zero],
+                [zero, zero, zero, one],
+            ];
             pose = match self.arm.convention {
                 Convention::Standard => product(&product(&pose, &about_z), &about_x),
                 Convention::Modified => product(&product(&pose, &about_x), &about_z),
@@ -136,9 +155,7 @@ impl<'a> Point<'a> {
 }
 
 fn product(a: &[[Fp; 4]; 4], b: &[[Fp; 4]; 4]) -> [[Fp; 4]; 4] {
-    std::array::from_fn(|i| {
-        std::array::from_fn(|j| (0..4).fold(Fp::ZERO, |sum, k| sum + a[i][k] * b[k][j]))
-    })
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..4).fold(Fp::ZERO, |sum, k| sum + a[i][k] * b[k][j])))
 }
 
 /// The arm's quantities as jets along the point's motion.

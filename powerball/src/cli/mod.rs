@@ -1,5 +1,7 @@
 //! The `powerball` command: one file a subcommand.
 
+mod demo;
+mod excite;
 mod explain;
 mod identify;
 mod inputs;
@@ -18,6 +20,10 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// The whole loop on the built-in virtual arm: record, identify, explain, compare with the truth.
+    Demo(demo::DemoCommand),
+    /// Search an exciting trajectory within the arm's limits and write it.
+    Excite(excite::Excite),
     /// Fit the minimal inertial set and the friction of every joint to logs.
     Identify(identify::Identify),
     /// Find, name and add what the model lacks on logs; judged on another path.
@@ -39,6 +45,8 @@ pub fn main() -> ExitCode {
     // clap itself exits with 2 on wrong use.
     let cli = Cli::parse();
     let done = match cli.command {
+        Command::Demo(command) => command.run(),
+        Command::Excite(command) => command.run(),
         Command::Identify(command) => command.run(),
         Command::Explain(command) => command.run(),
     };

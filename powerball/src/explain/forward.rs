@@ -1,5 +1,6 @@
 //! One effect at a time: screen, test, accept, refit everything, until nothing passes.
 
+use super::curves::curves;
 use super::evidence::{Evidence, Extent, Path, evidence};
 use super::leftover::{depends_on, effective_samples, leftover, noise_floor};
 use super::naming::{Comparison, compare};
@@ -151,10 +152,8 @@ pub fn explain(body: &RigidBody, logs: &[Log], validate: &[Log], options: &DataO
     progress("fitting the base model");
     let folds = Folds::new(&data);
     let base = fit(&data, &folds, &[], None);
-    let before = Errors {
-        fit: spread(&data, &base.residual),
-        validate: spread(&other, &base.residual_on(&other, &[])),
-    };
+    let held_out = base.residual_on(&other, &[]);
+    let before = Errors { fit: spread(&data, &base.residual), validate: spread(&other, &held_out) };
     let mut session = Session {
         data,
         other,
@@ -175,7 +174,7 @@ pub fn explain(body: &RigidBody, logs: &[Log], validate: &[Log], options: &DataO
     progress("asking placebos");
     session.count_false_positives();
     progress("looking at what is left");
-    Ok(session.result(before))
+    Ok(session.result(before, &held_out))
 }
 
 impl Session<'_> {
@@ -487,11 +486,13 @@ impl Session<'_> {
             .collect()
     }
 
-    fn result(mut self, before: Errors) -> Explained {
+    fn result(mut self, before: Errors, base_residual: &[Vec<f64>]) -> Explained {
+        let residual = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
         let after = Errors {
             fit: spread(&self.data, &self.fit.residual),
-            validate: spread(&self.other, &self.fit.residual_on(&self.other, &self.other_columns(&self.fit))),
+            validate: spread(&self.other, &residual),
         };
+        let curves = curves(&self.other, base_residual, &residual);
         let floor = noise_floor(&self.data);
         let context = Context::new(&self.data, &self.fit, &self.fit.residual);
         let coefficients = self.coefficients();
@@ -556,6 +557,7 @@ impl Session<'_> {
             next_experiment,
             false_positives: self.false_positives.clone(),
             warnings: self.data.notes.iter().chain(&self.other.notes).cloned().collect(),
+            curves,
         }
     }
 

@@ -65,7 +65,12 @@ mod tests {
                 let h = 1e-7;
                 let difference = (friction.torque(dq + h) - friction.torque(dq - h)) / (2.0 * h);
                 // Central differences lose h²·f‴/6, and f‴ grows with the cube of the steepness.
-                approx::assert_relative_eq!(friction.slope(dq), difference, max_relative = 1e-4, epsilon = 1e-4);
+                approx::assert_relative_eq!(
+                    friction.slope(dq),
+                    difference,
+                    max_relative = 1e-4,
+                    epsilon = 1e-4
+                );
             }
         }
     }

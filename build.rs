@@ -1,0 +1,15 @@
+//! Generates the code that the tests compile: the arms of `tests/arms` and the paper's arm, for each parameter set.
+
+use dyngen::{Config, SetKind};
+
+fn main() {
+    println!("cargo::rerun-if-changed=tests/arms");
+    for name in ["puma560", "ur5e", "panda", "stanford"] {
+        for set in [SetKind::Full, SetKind::Minimal, SetKind::Symbolic] {
+            let config = Config::new(format!("tests/arms/{name}.toml")).parameters(set);
+            config.build(&format!("{name}_{set}.rs")).unwrap_or_else(|e| e.exit());
+        }
+    }
+    let full = Config::new("powerball/arm.toml").parameters(SetKind::Full);
+    full.build("lwa4p_full.rs").unwrap_or_else(|e| e.exit());
+}

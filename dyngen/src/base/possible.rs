@@ -1,0 +1,184 @@
+//! Whether a real arm can have given parameter values.
+//!
+//! Two things are asked: is the mass matrix B(q) positive definite at every pose, and, where a link's ten
+//! parameters are all given, is its pseudo-inertia matrix positive semi-definite, which is exactly the condition for
+//! a distribution of mass to have them (Wensing, Kim and Slotine 2018).
+
+use super::sets::{ParameterSet, SetKind};
+use crate::arm::{Arm, JointKind, Parameter, ParameterKind};
+use crate::dynamics::Function;
+use crate::evaluator::Evaluator;
+use crate::exact::prime::Draws;
+use crate::model::{Error, Model};
+use nalgebra::{Matrix4, SMatrix};
+
+/// Poses that are drawn before the worst of them are refined.
+const POSES: usize = 512;
+/// Rounding error that an eigenvalue is allowed, relative to the largest.
+const ROUNDING: f64 = 1e-10;
+
+/// The verdict on a set of values.
+#[derive(Clone, Debug)]
+pub struct Possibility {
+    /// Whether nothing speaks against the values.
+    pub possible: bool,
+    /// What speaks against them.
+    pub reasons: Vec<String>,
+    /// The pose where B(q) is worst, rad or m.
+    pub pose: Vec<f64>,
+    /// The smallest eigenvalue of B(q) there, kg·m² (where all joints are revolute).
+    pub min_eigenvalue: f64,
+}
+
+/// Judges the values of a set's parameters, in the set's order.
+///
+/// # Errors
+/// As [`Model::function`].
+pub fn check(model: &Model, kind: SetKind, values: &[f64]) -> Result<Possibility, Error> {
+    let arm = model.arm();
+    let set = model.set(kind)?;
+    let mass = Evaluator::new(model, Function::MassMatrix, kind)?;
+    let mut reasons = impossible_links(arm, set, values);
+    let search = Search { mass: &mass, values, n: arm.dof() };
+    let ((smallest, largest), pose, indefinite) = search.worst(arm);
+    if smallest < -ROUNDING * largest.abs() {
+        reasons.push(format!(
+            "B(q) is not positive definite: its smallest eigenvalue is {smallest:.6} at the pose shown, and it is \
+             negative at {indefinite} of {POSES} poses drawn at random"
+        ));
+    } else if smallest <= ROUNDING * largest.abs() {
+        reasons
+            .push(format!("B(q) is singular at the pose shown: its smallest eigenvalue is {smallest:.3e}"));
+    }
+    Ok(Possibility { possible: reasons.is_empty(), reasons, pose, min_eigenvalue: smallest })
+}
+
+struct Search<'a> {
+    mass: &'a Evaluator,
+    values: &'a [f64],
+    n: usize,
+}
+
+impl Search<'_> {
+    /// Smallest and largest eigenvalue of B at a pose.
+    fn extremes(&self, q: &[f64]) -> (f64, f64) {
+        let n = self.n;
+        let mut flat = vec![0.0; n * n];
+        self.mass.evaluate(q, &[], &[], self.values, &mut flat);
+        if flat.iter().any(|x| !x.is_finite()) {
+            return (f64::NEG_INFINITY, f64::INFINITY);
+        }
+        // The largest arm's matrix, padded; its extra rows are zero and are skipped below.
+        let matrix = SMatrix::<f64, 9, 9>::from_fn(|i, j| {
+            if i < n && j < n { 0.5 * (flat[i * n + j] + flat[j * n + i]) } else { 0.0 }
+        });
+        let eigen = matrix.symmetric_eigen();
+        let mut values: Vec<f64> = (0..9)
+            .filter(|k| (0..n).any(|i| eigen.eigenvectors[(i, *k)].abs() > 0.5 / 9f64.sqrt()))
+            .map(|k| eigen.eigenvalues[k])
+            .collect();
+        values.sort_by(f64::total_cmp);
+        (values.first().copied().unwrap_or(0.0), values.last().copied().unwrap_or(0.0))
+    }
+
+    /// The pose of the smallest eigenvalue: random poses within the limits, the best of them refined joint by joint.
+    fn worst(&self, arm: &Arm) -> ((f64, f64), Vec<f64>, usize) {
+        let limits: Vec<[f64; 2]> = arm
+            .joints
+            .iter()
+            .map(|joint| {
+                joint.position.unwrap_or(match joint.kind {
+                    JointKind::Revolute => [-std::f64::consts::PI, std::f64::consts::PI],
+                    JointKind::Prismatic => [-1.0, 1.0],
+                })
+            })
+            .collect();
+        let mut draws = Draws::new(0x706f_7365);
+        let mut uniform = || draws.element().residue() as f64 / crate::exact::prime::P as f64;
+        let mut poses: Vec<(f64, Vec<f64>)> = (0..POSES)
+            .map(|_| {
+                let q: Vec<f64> = limits.iter().map(|[low, high]| low + (high - low) * uniform()).collect();
+                (self.extremes(&q).0, q)
+            })
+            .collect();
+        let indefinite = poses.iter().filter(|(e, _)| *e < 0.0).count();
+        poses.sort_by(|a, b| a.0.total_cmp(&b.0));
+        poses.truncate(4);
+        for (value, q) in &mut poses {
+            self.refine(value, q, &limits);
+        }
+        poses.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let q = poses.swap_remove(0).1;
+        (self.extremes(&q), q, indefinite)
+    }
+
+    fn refine(&self, value: &mut f64, q: &mut [f64], limits: &[[f64; 2]]) {
+        for round in 0..12 {
+            let step = 0.5f64.powi(round);
+            for i in 0..self.n {
+                for direction in [step, -step] {
+                    let old = q[i];
+                    q[i] = (old + direction).clamp(limits[i][0], limits[i][1]);
+                    let trial = self.extremes(q).0;
+                    if trial < *value {
+                        *value = trial;
+                    } else {
+                        q[i] = old;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Links whose parameters are all given and are those of no body, and rotors of negative inertia.
+fn impossible_links(arm: &Arm, set: &ParameterSet, values: &[f64]) -> Vec<String> {
+    let given = |p: Parameter| {
+        let single = |s: &super::sets::SetParameter| matches!(&s.terms[..], [(q, c)] if *q == p && c.as_rational() == Some(crate::exact::rational::integer(1)));
+        set.parameters.iter().position(single).map(|i| values[i])
+    };
+    let mut reasons = Vec::new();
+    for link in 0..arm.dof() {
+        let of = |kind| {
+            let p = Parameter { link, kind };
+            if arm.keeps(p) { given(p) } else { Some(0.0) }
+        };
+        if let Some(rotor) = of(ParameterKind::Im).filter(|im| *im < 0.0) {
+            reasons.push(format!("rotor {}: its inertia {rotor} is negative", link + 1));
+        }
+        let Some(v) = ParameterKind::ALL[..10].iter().map(|kind| of(*kind)).collect::<Option<Vec<f64>>>()
+        else {
+            continue;
+        };
+        let smallest = pseudo_inertia(&v).symmetric_eigenvalues().min();
+        let scale = v.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        if smallest < -ROUNDING * scale {
+            reasons.push(format!("link {}: {}", link + 1, why_no_body(&v, smallest)));
+        }
+    }
+    reasons
+}
+
+/// [Σ s; sᵀ m] with the second moments Σ = ½ tr(I) − I.
+fn pseudo_inertia(v: &[f64]) -> Matrix4<f64> {
+    let [m, mx, my, mz, xx, xy, xz, yy, yz, zz] = std::array::from_fn(|i| v[i]);
+    let half = 0.5 * (xx + yy + zz);
+    Matrix4::new(half - xx, xy, xz, mx, xy, half - yy, yz, my, xz, yz, half - zz, mz, mx, my, mz, m)
+}
+
+fn why_no_body(v: &[f64], smallest: f64) -> String {
+    let (xx, yy, zz) = (v[4], v[7], v[9]);
+    let triangle = [("Ixx", xx, yy + zz), ("Iyy", yy, xx + zz), ("Izz", zz, xx + yy)];
+    if v[0] < 0.0 {
+        return format!("its mass {} is negative", v[0]);
+    }
+    if let Some((name, value, others)) = triangle.iter().find(|(_, value, others)| value > others) {
+        return format!(
+            "{name} = {value} exceeds the sum {others} of the other two moments of inertia, which no body's does"
+        );
+    }
+    if v[0] == 0.0 {
+        return "it has moments but no mass".to_string();
+    }
+    format!("no distribution of mass has its parameters: the pseudo-inertia has the eigenvalue {smallest:.6}")
+}

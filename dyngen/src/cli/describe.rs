@@ -1,0 +1,192 @@
+//! `dyngen describe`.
+
+use super::{Failure, model, print};
+use dyngen::arm::{Convention, JointKind};
+use dyngen::base::sets::Class;
+use dyngen::base::{ParameterSet, SetKind};
+use dyngen::exact::rational;
+use dyngen::graph::Operations;
+use dyngen::{Function, Model};
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+#[derive(clap::Args)]
+#[command(after_help = "Example: dyngen describe powerball/arm.toml")]
+pub(super) struct Args {
+    /// The arm file.
+    arm: PathBuf,
+    /// One JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
+    let model = model(&args.arm)?;
+    let operations: Vec<(Function, Operations)> = Function::ALL
+        .into_iter()
+        .map(|function| {
+            let built = model.function(function, SetKind::Minimal).map_err(Failure::refused)?;
+            Ok((function, built.graph.operations(&built.outputs)))
+        })
+        .collect::<Result<_, Failure>>()?;
+    let text =
+        if args.json { format!("{}\n", json_text(&model, &operations)) } else { table(&model, &operations) };
+    print(&text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn json_text(model: &Model, operations: &[(Function, Operations)]) -> Value {
+    let arm = model.arm();
+    let kept = arm.kept_parameters();
+    let names: Vec<String> = kept.iter().map(ToString::to_string).collect();
+    let of_class = |class: Class| -> Vec<String> {
+        kept.iter().filter(|p| model.sets().class(**p) == class).map(ToString::to_string).collect()
+    };
+    let mut sets = Map::new();
+    for set in &model.sets().sets {
+        sets.insert(set.kind.name().to_string(), set_json(model, set));
+    }
+    let operations: Map<String, Value> = operations
+        .iter()
+        .map(|(f, o)| {
+            (f.name().to_string(), json!({"mul": o.mul, "add": o.add, "div": o.div, "sin_cos": o.sin_cos}))
+        })
+        .collect();
+    json!({
+        "arm": arm.name,
+        "joints": arm.dof(),
+        "parameters": names,
+        "sets": sets,
+        "unidentifiable": of_class(Class::Unidentifiable),
+        "identifiable_alone": of_class(Class::Alone),
+        "identifiable_in_combination": of_class(Class::InCombination),
+        "operations": operations,
+        "notes": arm.notes(),
+    })
+}
+
+fn set_json(model: &Model, set: &ParameterSet) -> Value {
+    let field = &model.sets().field;
+    let parameters: Vec<Value> = set
+        .parameters
+        .iter()
+        .map(|p| {
+            let terms: Vec<Value> = p
+                .terms
+                .iter()
+                .map(|(q, c)| json!({"parameter": q.to_string(), "coefficient": field.text(c), "value": field.value(c)}))
+                .collect();
+            json!({"name": p.name, "terms": terms})
+        })
+        .collect();
+    let mut object = json!({
+        "count": set.parameters.len(),
+        "rank": set.rank,
+        "exact": set.exact,
+        "relations": set.relations,
+        "parameters": parameters,
+    });
+    if !set.exact {
+        object["lost"] =
+            set.lost.iter().map(|(p, why)| json!({"parameter": p.to_string(), "why": why})).collect();
+    }
+    object
+}
+
+fn table(model: &Model, operations: &[(Function, Operations)]) -> String {
+    let arm = model.arm();
+    let mut t = String::new();
+    let gravity: Vec<String> = arm.gravity.iter().map(|g| rational::to_f64(g).to_string()).collect();
+    let convention = match arm.convention {
+        Convention::Standard => "standard",
+        Convention::Modified => "modified",
+    };
+    // A String takes every write.
+    let _ = writeln!(
+        t,
+        "{}: {} joints, {convention} DH, gravity [{}] m/s²\n",
+        arm.name,
+        arm.dof(),
+        gravity.join(", ")
+    );
+    let _ = writeln!(
+        t,
+        "  {:>2}  {:<9}  {:>8}  {:>8}  {:>8}  {:>8}  {:>6}  declared zero",
+        "i", "kind", "a [m]", "alpha", "d [m]", "theta", "rotor"
+    );
+    for (i, joint) in arm.joints.iter().enumerate() {
+        let kind = match joint.kind {
+            JointKind::Revolute => "revolute",
+            JointKind::Prismatic => "prismatic",
+        };
+        let number = |r: &rational::Rational| rational::to_f64(r).to_string();
+        let rotor = joint.rotor_ratio.as_ref().map_or("-".to_string(), number);
+        let zero: Vec<&str> = joint.zero.iter().map(|k| k.name()).collect();
+        let (alpha, theta) = (joint.alpha.to_string(), joint.theta.to_string());
+        let _ = writeln!(
+            t,
+            "  {:>2}  {kind:<9}  {:>8}  {alpha:>8}  {:>8}  {theta:>8}  {rotor:>6}  {}",
+            i + 1,
+            number(&joint.a),
+            number(&joint.d),
+            zero.join(" ")
+        );
+    }
+    let kept = arm.kept_parameters();
+    let _ = writeln!(t, "\n{} of {} parameters are kept:", kept.len(), arm.all_parameters().len());
+    for class in [Class::Unidentifiable, Class::Alone, Class::InCombination] {
+        let names: Vec<String> =
+            kept.iter().filter(|p| model.sets().class(**p) == class).map(ToString::to_string).collect();
+        let _ = writeln!(t, "  {:<30} {:>2}: {}", class.name(), names.len(), names.join(" "));
+    }
+    for set in model.sets().sets.iter().filter(|s| s.kind != SetKind::Full) {
+        set_table(&mut t, set);
+    }
+    let _ = writeln!(t, "\noperations with the minimal set as arguments:");
+    let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", "function", "mul", "add", "div", "sin_cos");
+    for (function, o) in operations {
+        let _ =
+            writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", function.name(), o.mul, o.add, o.div, o.sin_cos);
+    }
+    t
+}
+
+fn set_table(t: &mut String, set: &ParameterSet) {
+    let meaning = match set.kind {
+        SetKind::Minimal => "exact for the numbers in the file",
+        SetKind::Symbolic => "exact for every length and ratio",
+        _ => "the file's grouping",
+    };
+    let _ =
+        writeln!(t, "\n{}: {} parameters of rank {}, {meaning}", set.kind, set.parameters.len(), set.rank);
+    for (i, p) in set.parameters.iter().enumerate() {
+        let sum = dyngen::arm::sum::sum_text(
+            p.terms
+                .iter()
+                .filter_map(|(q, c)| c.as_rational().map(|r| (q, r)))
+                .collect::<Vec<_>>()
+                .iter()
+                .map(|(q, r)| (*q, r)),
+        );
+        let text = if set.kind == SetKind::Published && p.name != sum {
+            format!("{} = {sum}", p.name)
+        } else {
+            p.name.clone()
+        };
+        let _ = writeln!(t, "  {:>2}  {text}", i + 1);
+    }
+    if !set.exact {
+        let _ = writeln!(t, "  NOT exact: replacing the parameters by these sums changes the torque.");
+        set.lost.iter().for_each(|(_, why)| {
+            let _ = writeln!(t, "    {why}");
+        });
+    }
+    if !set.relations.is_empty() {
+        let _ = writeln!(t, "  relations that hold between its columns for the numbers in the file:");
+        set.relations.iter().for_each(|r| {
+            let _ = writeln!(t, "    {r}");
+        });
+    }
+}

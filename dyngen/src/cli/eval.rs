@@ -1,0 +1,138 @@
+//! `dyngen eval`.
+
+use super::values::Values;
+use super::{Failure, Set, generate, model, print};
+use dyngen::{Evaluator, Function};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example: dyngen eval arm.toml --function inverse_dynamics --states states.csv --values values.json"
+)]
+pub(super) struct Args {
+    /// The arm file.
+    arm: PathBuf,
+    /// The function to evaluate.
+    #[arg(long, value_parser = generate::function)]
+    function: Function,
+    /// States: a CSV file with a header line and the columns q1…, dq1…, ddq1… (tau1… for forward dynamics).
+    #[arg(long, value_name = "FILE.csv")]
+    states: PathBuf,
+    /// The parameter set.
+    #[arg(long, value_enum, default_value = "minimal")]
+    parameters: Set,
+    /// Parameter values: a JSON file {"parameter": number, …}, by the set's names or the arm's.
+    #[arg(long, value_name = "FILE.json")]
+    values: Option<PathBuf>,
+}
+
+pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
+    let model = model(&args.arm)?;
+    let set = model.set(args.parameters.into()).map_err(Failure::refused)?;
+    let function = args.function;
+    let parameters = match (&args.values, function.takes_parameters()) {
+        (Some(path), true) => Values::read(path)?.of_set(&model, set)?,
+        (None, true) => {
+            return Err(Failure::input(format!(
+                "{function} depends on parameter values: give them with --values FILE.json"
+            )));
+        }
+        _ => Vec::new(),
+    };
+    let n = model.arm().dof();
+    let states = States::read(&args.states)?;
+    let q = states.columns("q", n)?;
+    let dq = if function.takes_speeds() { states.columns("dq", n)? } else { Vec::new() };
+    let drive = match (function.takes_torques(), function.takes_accelerations()) {
+        (true, _) => states.columns("tau", n)?,
+        (_, true) => states.columns("ddq", n)?,
+        _ => Vec::new(),
+    };
+    let evaluator = Evaluator::new(&model, function, set.kind).map_err(Failure::refused)?;
+    let mut out = vec![0.0; states.rows.len() * evaluator.outputs()];
+    evaluator.evaluate(&q, &dq, &drive, &parameters, &mut out);
+    let mut text = header(function, evaluator.shape()).join(",");
+    text.push('\n');
+    for row in out.chunks(evaluator.outputs().max(1)) {
+        for (i, value) in row.iter().enumerate() {
+            let separator = if i == 0 { "" } else { "," };
+            // The shortest text that reads back as the same number. A String takes every write.
+            let _ = write!(text, "{separator}{value:?}");
+        }
+        text.push('\n');
+    }
+    print(&text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Names of the result's columns: tau1 …, and for a matrix Y1_1 (row, column).
+fn header(function: Function, (rows, columns): (usize, usize)) -> Vec<String> {
+    let letter = match function {
+        Function::InverseDynamics => "tau",
+        Function::Gravity => "g",
+        Function::ForwardDynamics => "ddq",
+        Function::Regressor => "Y",
+        Function::MassMatrix => "B",
+        Function::CoriolisMatrix => "C",
+        Function::ForwardKinematics => "T",
+    };
+    let name = |k: usize| {
+        if columns == 1 {
+            format!("{letter}{}", k + 1)
+        } else {
+            format!("{letter}{}_{}", k / columns + 1, k % columns + 1)
+        }
+    };
+    (0..rows * columns).map(name).collect()
+}
+
+/// A table of states.
+struct States {
+    file: String,
+    header: Vec<String>,
+    rows: Vec<(u64, Vec<f64>)>,
+}
+
+impl States {
+    fn read(path: &Path) -> Result<States, Failure> {
+        let file = path.display().to_string();
+        let unreadable = |e: csv::Error| Failure::input(format!("{file}: the states cannot be read: {e}"));
+        let mut reader =
+            csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(unreadable)?;
+        let header: Vec<String> = reader.headers().map_err(unreadable)?.iter().map(str::to_string).collect();
+        let mut rows = Vec::new();
+        for record in reader.records() {
+            let record = record.map_err(unreadable)?;
+            let line = record.position().map_or(0, csv::Position::line);
+            let mut row = Vec::with_capacity(record.len());
+            for (column, field) in record.iter().enumerate() {
+                let value = field.parse::<f64>().ok().filter(|x| x.is_finite());
+                row.push(value.ok_or_else(|| {
+                    let name = header.get(column).map_or("?", String::as_str);
+                    Failure::input(format!("{file}:{line}: {name} must be a finite number, found '{field}'"))
+                })?);
+            }
+            rows.push((line, row));
+        }
+        Ok(States { file, header, rows })
+    }
+
+    /// The columns name1 … of every row, one row after another.
+    fn columns(&self, name: &str, n: usize) -> Result<Vec<f64>, Failure> {
+        let places: Vec<Option<usize>> =
+            (1..=n).map(|i| self.header.iter().position(|h| *h == format!("{name}{i}"))).collect();
+        let missing: Vec<String> =
+            (1..=n).filter(|i| places[i - 1].is_none()).map(|i| format!("{name}{i}")).collect();
+        if !missing.is_empty() {
+            return Err(Failure::input(format!(
+                "{}:1: the states have no column {}; the arm has {n} joints",
+                self.file,
+                missing.join(", ")
+            )));
+        }
+        let places: Vec<usize> = places.into_iter().flatten().collect();
+        Ok(self.rows.iter().flat_map(|(_, row)| places.iter().map(|p| row[*p])).collect())
+    }
+}

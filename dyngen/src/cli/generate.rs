@@ -1,0 +1,59 @@
+//! `dyngen generate`.
+
+use super::{Failure, Set};
+use dyngen::{Config, Function, GenerateError};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example: dyngen generate arm.toml -o arm.rs --parameters minimal --functions regressor,mass_matrix"
+)]
+pub(super) struct Args {
+    /// The arm file.
+    arm: PathBuf,
+    /// The file to write.
+    #[arg(short, long, value_name = "FILE.rs")]
+    output: PathBuf,
+    /// The parameter set of every function.
+    #[arg(long, value_enum, default_value = "minimal")]
+    parameters: Set,
+    /// The functions, separated by commas; all of them where this is left out.
+    #[arg(long, value_delimiter = ',', value_parser = function)]
+    functions: Option<Vec<Function>>,
+    /// Write nothing; fail where the file on disk is not what would be written.
+    #[arg(long)]
+    check: bool,
+}
+
+/// A function by its name.
+pub(super) fn function(name: &str) -> Result<Function, String> {
+    let names = Function::ALL.map(Function::name).join(", ");
+    Function::parse(name.trim()).ok_or_else(|| format!("there is no function '{name}': there are {names}"))
+}
+
+pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
+    let mut config = Config::new(&args.arm).parameters(args.parameters.into());
+    if let Some(functions) = &args.functions {
+        config = config.functions(functions.clone());
+    }
+    let failure = |e: GenerateError| match e {
+        GenerateError::Model(_) => Failure::refused(e),
+        _ => Failure::input(e),
+    };
+    if !args.check {
+        config.write(&args.output).map_err(failure)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let expected = config.source().map_err(failure)?;
+    let file = args.output.display();
+    let actual = std::fs::read_to_string(&args.output)
+        .map_err(|e| Failure::input(format!("{file}: cannot be read: {e}")))?;
+    if actual == expected {
+        return Ok(ExitCode::SUCCESS);
+    }
+    Err(Failure::refused(format!(
+        "{file} is stale: it is not what dyngen writes for {}; run the same command without --check",
+        args.arm.display()
+    )))
+}

@@ -1,0 +1,115 @@
+//! The commands. Exit codes: 0 done, 1 refused with the reason, 2 wrong use or unreadable input.
+
+mod check;
+mod describe;
+mod eval;
+mod generate;
+mod values;
+
+use clap::{Parser, Subcommand, ValueEnum};
+use dyngen::base::SetKind;
+use dyngen::{Arm, Model};
+use std::fmt::Display;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// From a DH table to the dynamics of a robot arm: exact base parameters and allocation-free Rust, proven equal to
+/// the Lagrangian.
+#[derive(Parser)]
+#[command(version, after_help = "Example: dyngen describe arm.toml && dyngen generate arm.toml -o arm.rs")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Kinematics, parameters with their class, the sets with their relations, operation counts.
+    Describe(describe::Args),
+    /// Writes the arm's functions as one Rust source file.
+    Generate(generate::Args),
+    /// Evaluates a function at the states of a CSV file.
+    Eval(eval::Args),
+    /// Says whether a real arm can have given parameter values, and shows the pose where not.
+    Check(check::Args),
+}
+
+/// A parameter set on the command line.
+#[derive(Clone, Copy, ValueEnum)]
+enum Set {
+    /// Exact for the numbers in the file.
+    Minimal,
+    /// Exact for every size of the arm.
+    Symbolic,
+    /// The file's [[grouping]].
+    Published,
+    /// Every parameter that the symmetries leave.
+    Full,
+}
+
+impl From<Set> for SetKind {
+    fn from(set: Set) -> Self {
+        match set {
+            Set::Minimal => SetKind::Minimal,
+            Set::Symbolic => SetKind::Symbolic,
+            Set::Published => SetKind::Published,
+            Set::Full => SetKind::Full,
+        }
+    }
+}
+
+/// Why a command ended without its result.
+struct Failure {
+    code: u8,
+    message: String,
+}
+
+impl Failure {
+    /// The input was read, but the answer is no.
+    fn refused(message: impl Display) -> Self {
+        Failure { code: 1, message: message.to_string() }
+    }
+
+    /// Wrong use, or an input that cannot be read.
+    fn input(message: impl Display) -> Self {
+        Failure { code: 2, message: message.to_string() }
+    }
+}
+
+/// Runs the command line.
+pub(crate) fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Describe(args) => describe::run(&args),
+        Command::Generate(args) => generate::run(&args),
+        Command::Eval(args) => eval::run(&args),
+        Command::Check(args) => check::run(&args),
+    };
+    match result {
+        Ok(code) => code,
+        Err(failure) => {
+            eprintln!("{}", failure.message);
+            ExitCode::from(failure.code)
+        }
+    }
+}
+
+/// Reads an arm and derives its model; what its author may not have meant goes to standard error.
+fn model(path: &Path) -> Result<Model, Failure> {
+    let arm = Arm::read(path).map_err(Failure::input)?;
+    for note in arm.notes() {
+        eprintln!("{}: note: {note}", path.display());
+    }
+    Model::derive(arm).map_err(Failure::refused)
+}
+
+/// Writes to standard output; a reader that went away is no error.
+fn print(text: &str) -> Result<(), Failure> {
+    use std::io::Write;
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Failure::input(format!("standard output cannot be written: {e}")))
+        }
+        _ => Ok(()),
+    }
+}

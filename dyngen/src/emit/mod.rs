@@ -1,0 +1,72 @@
+//! From graphs to a Rust source file: tokens, docs, formatting.
+
+mod code;
+mod docs;
+
+use crate::base::SetKind;
+use crate::dynamics::Function;
+use crate::model::{Error, Model};
+use proc_macro2::{Literal, TokenStream};
+use quote::quote;
+
+/// What a generated file holds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// The parameter set of every function.
+    pub parameters: SetKind,
+    /// The functions, in any order.
+    pub functions: Vec<Function>,
+}
+
+impl Default for Options {
+    /// The minimal set and every function.
+    fn default() -> Self {
+        Options { parameters: SetKind::Minimal, functions: Function::ALL.to_vec() }
+    }
+}
+
+/// A generated file as formatted source text: every function in it is proven equal to the Lagrangian.
+///
+/// The same arm and options give the same bytes.
+///
+/// # Errors
+/// As [`Model::function`]: what cannot be proven is not emitted.
+pub fn source(model: &Model, options: &Options) -> Result<String, Error> {
+    let tokens = tokens(model, options)?;
+    // Tokens that quote made of whole items always parse.
+    let body = match syn::parse2::<syn::File>(tokens.clone()) {
+        Ok(file) => prettyplease::unparse(&file),
+        Err(_) => tokens.to_string(),
+    };
+    Ok(format!("{}\n{body}", docs::head(model, options)))
+}
+
+/// The items of a generated file.
+///
+/// # Errors
+/// As [`source`].
+pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
+    let set = model.set(options.parameters)?;
+    let functions = Function::ALL.into_iter().filter(|f| options.functions.contains(f));
+    let functions: Vec<TokenStream> = functions
+        .map(|function| Ok(code::function(model, set, &model.function(function, options.parameters)?)))
+        .collect::<Result<_, Error>>()?;
+    let (n, p) =
+        (Literal::usize_unsuffixed(model.arm().dof()), Literal::usize_unsuffixed(set.parameters.len()));
+    let names = set.names();
+    let names_doc = docs::lines(&docs::parameters(set));
+    Ok(quote! {
+        use nalgebra::{ArrayStorage, SMatrix, SVector, SimdRealField};
+
+        /// Number of joints.
+        pub const JOINTS: usize = #n;
+
+        /// Number of parameters.
+        pub const PARAMETERS: usize = #p;
+
+        #(#[doc = #names_doc])*
+        pub const PARAMETER_NAMES: [&str; PARAMETERS] = [#(#names),*];
+
+        #(#functions)*
+    })
+}

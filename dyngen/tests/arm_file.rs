@@ -1,0 +1,117 @@
+//! Every error of an arm file at once, each with its place and the joint; never a panic.
+
+use dyngen::Arm;
+
+const GOOD: &str = r#"name = "two"
+convention = "standard"
+gravity = [0, 0, -9.81]
+
+[[joint]]
+kind = "revolute"
+a = 0.5
+alpha = "pi/2"
+d = 0
+theta = "-pi/2"
+zero = ["my", "Ixy"]
+rotor_ratio = 100
+position = [-1.5, 1.5]
+torque_constant = 2.5
+
+[[joint]]
+kind = "prismatic"
+a = 0
+alpha = 0
+d = 0.1
+theta = "0"
+
+[[grouping]]
+name = "R1"
+sum = "Izz1 + 7/20*m2"
+"#;
+
+fn errors(text: &str) -> Vec<String> {
+    match Arm::parse(text, "arm.toml") {
+        Ok(_) => Vec::new(),
+        Err(e) => e.0.iter().map(ToString::to_string).collect(),
+    }
+}
+
+fn assert_error(from: &str, to: &str, place: &str, words: &[&str]) {
+    assert!(GOOD.contains(from), "the test itself is wrong: {from}");
+    let found = errors(&GOOD.replacen(from, to, 1));
+    let hit = found
+        .iter()
+        .any(|e| e.starts_with(&format!("arm.toml:{place}: ")) && words.iter().all(|w| e.contains(w)));
+    assert!(hit, "no error at {place} with {words:?} among {found:#?}");
+}
+
+#[test]
+fn a_good_file_is_read() {
+    let arm = Arm::parse(GOOD, "arm.toml").unwrap();
+    assert_eq!(arm.dof(), 2);
+    assert_eq!(arm.kept_parameters().len(), 22 - 2 - 1);
+    assert_eq!(arm.joints[0].position, Some([-1.5, 1.5]));
+}
+
+#[test]
+fn each_error_names_its_place_and_quantity() {
+    assert_error("kind = \"revolute\"", "kind = \"rotary\"", "6:8", &["joint 1", "kind", "rotary"]);
+    assert_error("a = 0.5", "a = \"50cm\"", "7:5", &["joint 1", "a ", "50cm"]);
+    assert_error("a = 0.5", "a = nan", "7:5", &["joint 1", "a ", "nan"]);
+    assert_error("a = 0.5", "a = 1e400", "7:5", &["joint 1", "exponent"]);
+    assert_error("alpha = \"pi/2\"", "alpha = \"90deg\"", "8:9", &["joint 1", "alpha", "90deg", "pi/2"]);
+    assert_error("alpha = \"pi/2\"", "alfa = \"pi/2\"", "8:1", &["joint 1", "unknown key 'alfa'"]);
+    assert_error("alpha = \"pi/2\"\n", "", "5:1", &["joint 1", "'alpha' is missing"]);
+    assert_error("[\"my\", \"Ixy\"]", "[\"my\", \"Iwy\"]", "11:15", &["joint 1", "Iwy"]);
+    assert_error("[\"my\", \"Ixy\"]", "[\"my\", \"my\"]", "11:15", &["joint 1", "twice"]);
+    assert_error("rotor_ratio = 100", "rotor_ratio = 0", "12:15", &["joint 1", "rotor_ratio"]);
+    assert_error("[-1.5, 1.5]", "[1.5, -1.5]", "13:12", &["joint 1", "lower limit"]);
+    assert_error("torque_constant = 2.5", "torque_constant = -1", "14:19", &["joint 1", "greater than zero"]);
+    assert_error("convention = \"standard\"", "convention = \"khalil\"", "2:14", &["convention", "khalil"]);
+    assert_error("gravity = [0, 0, -9.81]", "gravity = [0, -9.81]", "3:11", &["gravity", "three numbers"]);
+    assert_error("sum = \"Izz1 + 7/20*m2\"", "sum = \"Izz1 + m3\"", "25:7", &["grouping 1", "m3", "link 3"]);
+    assert_error("sum = \"Izz1 + 7/20*m2\"", "sum = \"my1\"", "25:7", &["grouping 1", "declared zero"]);
+    assert_error("sum = \"Izz1 + 7/20*m2\"", "sum = \"Im2\"", "25:7", &["grouping 1", "no rotor_ratio"]);
+    assert_error("name = \"two\"", "name = \"\"", "1:8", &["name"]);
+    assert_error("d = 0.1", "d = ", "20:5", &["not valid TOML"]);
+}
+
+#[test]
+fn all_errors_of_a_file_come_at_once_in_order() {
+    let text = GOOD
+        .replace("a = 0.5", "a = \"x\"")
+        .replace("\"prismatic\"", "\"sliding\"")
+        .replace("gravity", "gravty");
+    let found = errors(&text);
+    assert!(found.len() >= 4, "{found:#?}");
+    let lines: Vec<usize> = found.iter().map(|e| e.split(':').nth(1).unwrap().parse().unwrap()).collect();
+    assert!(lines.is_sorted(), "{lines:?}");
+}
+
+#[test]
+fn no_text_makes_it_panic() {
+    for text in [
+        "",
+        "\u{feff}",
+        "[[joint]]",
+        "joint = 3",
+        "joint = [1, 2]",
+        "[joint]\na = 1",
+        "name = 1\nname = 2",
+        "\0",
+        "[[grouping]]\n",
+    ] {
+        assert!(!errors(text).is_empty(), "{text:?}");
+    }
+    // Every prefix and every single byte knocked out of a good file.
+    for cut in 0..GOOD.len() {
+        if GOOD.is_char_boundary(cut) {
+            let _ = errors(&GOOD[..cut]);
+            let _ = errors(&format!("{}{}", &GOOD[..cut], GOOD[cut..].get(1..).unwrap_or("")));
+        }
+    }
+    let ten =
+        GOOD.to_string() + &"[[joint]]\nkind = \"revolute\"\na = 0\nalpha = 0\nd = 0\ntheta = 0\n".repeat(9);
+    assert!(errors(&ten).iter().any(|e| e.contains("1 to 9")), "{:?}", errors(&ten));
+    assert!(!errors(&"a".repeat(2 << 20)).is_empty());
+}

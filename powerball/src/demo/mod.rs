@@ -1,0 +1,99 @@
+//! The whole loop on the virtual arm: an effect that the model is not told of, found again from the logs alone.
+
+mod page;
+mod session;
+mod verdict;
+
+pub use page::page;
+pub use session::{Session, SessionError};
+pub use verdict::{Judgement, Verdict};
+
+use crate::effects;
+use crate::explain::{ExplainError, Explained, explain};
+use crate::log::{LogError, common_clock, read_logs};
+use crate::regression::{DataOptions, RigidBody};
+use crate::virtual_arm::Effect;
+use dyngen::Arm;
+use std::fmt;
+use std::path::Path;
+
+/// What was in the plant, what was found, and whether that is right.
+#[derive(Debug)]
+pub struct Demo {
+    /// The recording session with the truth.
+    pub session: Session,
+    /// What the residual loop says of the logs, which is all it was given.
+    pub explained: Explained,
+    /// Both compared.
+    pub verdict: Verdict,
+}
+
+/// Why the demo broke.
+#[derive(Debug)]
+pub enum DemoError {
+    /// No session could be recorded.
+    Session(SessionError),
+    /// The recorded files could not be read.
+    Read(String),
+    /// The arm's model is not to be had.
+    Model(String),
+    /// The logs hold too little.
+    Explain(ExplainError),
+}
+
+impl fmt::Display for DemoError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            DemoError::Session(e) => e.fmt(f),
+            DemoError::Read(what) | DemoError::Model(what) => f.write_str(what),
+            DemoError::Explain(e) => e.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for DemoError {}
+
+impl From<SessionError> for DemoError {
+    fn from(e: SessionError) -> Self {
+        DemoError::Session(e)
+    }
+}
+
+impl From<LogError> for DemoError {
+    fn from(e: LogError) -> Self {
+        DemoError::Read(e.to_string())
+    }
+}
+
+impl From<ExplainError> for DemoError {
+    fn from(e: ExplainError) -> Self {
+        DemoError::Explain(e)
+    }
+}
+
+/// The names that a demo draws from: effects that the plant has and the residual loop knows.
+pub fn names<'a>() -> Vec<&'a str> {
+    let known = effects::all();
+    Effect::NAMES.into_iter().filter(|name| known.iter().any(|effect| effect.name() == *name)).collect()
+}
+
+/// Records a session with an effect drawn by `seed`, or with the one of the given name, into `folder`, and explains
+/// it from the files alone, as a user would.
+///
+/// # Errors
+/// Only where something broke; a wrong name is a result.
+pub fn run(folder: &Path, seed: u64, name: Option<&str>, progress: &dyn Fn(&str)) -> Result<Demo, DemoError> {
+    progress("searching exciting paths and recording them");
+    let names: Vec<&str> = name.map_or_else(names, |name| vec![name]);
+    let session = Session::record(folder, seed, &names)?;
+    progress("reading the logs");
+    let arm = Arm::read(&session.arm_file).map_err(|e| DemoError::Read(e.to_string()))?;
+    let files: Vec<_> = session.fit.iter().chain(&session.held_out).collect();
+    let (mut logs, _) = read_logs(&files, &arm)?;
+    common_clock(&mut logs);
+    let held_out = logs.split_off(session.fit.len());
+    let body = RigidBody::new(&arm).map_err(|e| DemoError::Model(e.to_string()))?;
+    let explained = explain(&body, &logs, &held_out, &DataOptions::default(), progress)?;
+    let verdict = Verdict::new(&session.effect, &explained);
+    Ok(Demo { session, explained, verdict })
+}

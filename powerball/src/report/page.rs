@@ -1,0 +1,125 @@
+//! The page: a sequence of headings, paragraphs, notes, tables and figures.
+
+use super::{BarPairs, Figure, Table, escape};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// How a note is meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tone {
+    /// Something to know.
+    Plain,
+    /// A good result.
+    Good,
+    /// A result to be careful with, or a bad one.
+    Bad,
+}
+
+/// A page under construction. All text is escaped.
+#[derive(Clone, Debug)]
+pub struct Page {
+    title: String,
+    body: String,
+}
+
+impl Page {
+    /// An empty page with a title.
+    pub fn new(title: impl Into<String>) -> Self {
+        Page { title: title.into(), body: String::new() }
+    }
+
+    /// The sentence below the title.
+    pub fn lead(&mut self, text: &str) {
+        let _ = writeln!(self.body, "<p class=\"lead\">{}</p>", escape(text));
+    }
+
+    /// A heading of a section.
+    pub fn heading(&mut self, text: &str) {
+        let _ = writeln!(self.body, "<h2>{}</h2>", escape(text));
+    }
+
+    /// A heading within a section.
+    pub fn subheading(&mut self, text: &str) {
+        let _ = writeln!(self.body, "<h3>{}</h3>", escape(text));
+    }
+
+    /// A paragraph of text.
+    pub fn paragraph(&mut self, text: &str) {
+        let _ = writeln!(self.body, "<p>{}</p>", escape(text));
+    }
+
+    /// A paragraph that stands out.
+    pub fn note(&mut self, tone: Tone, text: &str) {
+        let class = match tone {
+            Tone::Plain => "note",
+            Tone::Good => "note good",
+            Tone::Bad => "note bad",
+        };
+        let _ = writeln!(self.body, "<p class=\"{class}\">{}</p>", escape(text));
+    }
+
+    /// A few figures that matter, each a label and a value.
+    pub fn facts<L: AsRef<str>, V: AsRef<str>>(&mut self, facts: impl IntoIterator<Item = (L, V)>) {
+        self.body.push_str("<dl class=\"facts\">");
+        for (label, value) in facts {
+            let (label, value) = (escape(label.as_ref()), escape(value.as_ref()));
+            let _ = write!(self.body, "<div><dt>{label}</dt><dd>{value}</dd></div>");
+        }
+        self.body.push_str("</dl>\n");
+    }
+
+    /// A table.
+    pub fn table(&mut self, table: &Table) {
+        self.body.push_str(&table.to_html());
+    }
+
+    /// A table behind a line of text that opens it; printed pages show it.
+    pub fn folded(&mut self, summary: &str, table: &Table) {
+        let _ = writeln!(
+            self.body,
+            "<details><summary>{}</summary>{}</details>",
+            escape(summary),
+            table.to_html()
+        );
+    }
+
+    /// A line or scatter figure with its caption.
+    pub fn figure(&mut self, figure: &Figure, caption: &str) {
+        self.captioned(&figure.to_svg(), caption);
+    }
+
+    /// A bar figure with its caption.
+    pub fn bars(&mut self, bars: &BarPairs, caption: &str) {
+        self.captioned(&bars.to_svg(), caption);
+    }
+
+    fn captioned(&mut self, svg: &str, caption: &str) {
+        self.body.push_str("<figure>");
+        self.body.push_str(svg);
+        if !caption.is_empty() {
+            let _ = write!(self.body, "<figcaption>{}</figcaption>", escape(caption));
+        }
+        self.body.push_str("</figure>\n");
+    }
+
+    /// The whole page.
+    pub fn to_html(&self) -> String {
+        let title = escape(&self.title);
+        format!(
+            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+             <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
+             <meta name=\"color-scheme\" content=\"light dark\"><title>{title}</title>\n\
+             <style>\n{}</style></head>\n<body><main>\n<h1>{title}</h1>\n{}</main></body></html>\n",
+            include_str!("page.css"),
+            self.body
+        )
+    }
+
+    /// Writes the page to a file.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn write(&self, path: &Path) -> std::io::Result<()> {
+        std::fs::write(path, self.to_html())
+    }
+}

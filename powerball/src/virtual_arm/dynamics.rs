@@ -1,0 +1,271 @@
+//! Recursive Newton–Euler in numbers, and what follows from it by superposition.
+//!
+//! This is the virtual arm's own physics. It shares no code with the generator, so that each can test the other.
+//! Everything is in SI units; forces and moments of link i are expressed in frame i, about its origin.
+
+use super::body::{Body, PER_LINK};
+use super::chain::Chain;
+use nalgebra::{Matrix3, Vector3};
+
+/// The largest number of joints that the recursion has room for.
+const ROOM: usize = dyngen::arm::MAX_JOINTS;
+
+/// A chain with the bodies that it carries: the rigid-body dynamics of Eq. 14 without friction.
+#[derive(Clone, Debug)]
+pub struct Dynamics {
+    chain: Chain,
+    bodies: Vec<Body>,
+}
+
+/// What moves and what pushes: the arguments of one pass of the recursion.
+#[derive(Clone, Copy)]
+struct Pass<'a> {
+    q: &'a [f64],
+    dq: &'a [f64],
+    ddq: &'a [f64],
+    gravity: Vector3<f64>,
+    /// Force in N at the last frame's origin and moment in N·m, from outside, in the base frame.
+    outside: [Vector3<f64>; 2],
+}
+
+impl Dynamics {
+    /// The dynamics of a chain with one body a joint; `None` where their numbers differ.
+    pub fn new(chain: Chain, bodies: Vec<Body>) -> Option<Self> {
+        (chain.dof() == bodies.len()).then_some(Dynamics { chain, bodies })
+    }
+
+    /// The chain.
+    pub fn chain(&self) -> &Chain {
+        &self.chain
+    }
+
+    /// The bodies from the first link on.
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    /// The number of joints n.
+    pub fn dof(&self) -> usize {
+        self.bodies.len()
+    }
+
+    /// Joint torques τ = B(q)q̈ + C(q, q̇)q̇ + g(q); N·m, or N at prismatic joints.
+    pub fn inverse(&self, q: &[f64], dq: &[f64], ddq: &[f64]) -> Vec<f64> {
+        let gravity = self.chain.gravity;
+        self.run(&self.bodies, Pass { q, dq, ddq, gravity, outside: [Vector3::zeros(); 2] })
+    }
+
+    /// As [`inverse`](Self::inverse), with a force (N) at the last frame's origin and a moment (N·m) that come from
+    /// outside, both in the base frame.
+    pub fn inverse_in_contact(
+        &self,
+        q: &[f64],
+        dq: &[f64],
+        ddq: &[f64],
+        force: [f64; 3],
+        moment: [f64; 3],
+    ) -> Vec<f64> {
+        let outside = [Vector3::from(force), Vector3::from(moment)];
+        self.run(&self.bodies, Pass { q, dq, ddq, gravity: self.chain.gravity, outside })
+    }
+
+    /// The regressor of all parameters, n × 11n, row-major: column c is the torque of unit parameter c alone.
+    pub fn regressor(&self, q: &[f64], dq: &[f64], ddq: &[f64]) -> Vec<f64> {
+        let n = self.dof();
+        let mut out = vec![0.0; n * n * PER_LINK];
+        let mut unit = vec![Body::from_parameters(&[0.0; PER_LINK]); n];
+        for link in 0..n {
+            for k in 0..PER_LINK {
+                let mut one = [0.0; PER_LINK];
+                one[k] = 1.0;
+                unit[link] = Body::from_parameters(&one);
+                let pass = Pass { q, dq, ddq, gravity: self.chain.gravity, outside: [Vector3::zeros(); 2] };
+                for (joint, torque) in self.run(&unit, pass).into_iter().enumerate() {
+                    out[joint * n * PER_LINK + link * PER_LINK + k] = torque;
+                }
+            }
+            unit[link] = Body::from_parameters(&[0.0; PER_LINK]);
+        }
+        out
+    }
+
+    /// Gravity torques g(q).
+    pub fn gravity(&self, q: &[f64]) -> Vec<f64> {
+        let zero = vec![0.0; self.dof()];
+        self.inverse(q, &zero, &zero)
+    }
+
+    /// The mass matrix B(q), n × n, row-major: column j is the torque of q̈ = e_j at rest without gravity.
+    pub fn mass_matrix(&self, q: &[f64]) -> Vec<f64> {
+        let n = self.dof();
+        let zero = vec![0.0; n];
+        columns(n, |unit| self.without_gravity(q, &zero, unit))
+    }
+
+    /// The Coriolis matrix of the Christoffel symbols, n × n, row-major.
+    ///
+    /// The velocity terms h(q, q̇) = C(q, q̇)q̇ are a quadratic form in q̇, and the Christoffel symbols are its
+    /// symmetric bilinear form: C(q, q̇)v = ½(h(q̇ + v) − h(q̇) − h(v)). With v = e_j that is exact, no derivative of
+    /// B is needed.
+    pub fn coriolis_matrix(&self, q: &[f64], dq: &[f64]) -> Vec<f64> {
+        let n = self.dof();
+        let zero = vec![0.0; n];
+        let h = |speed: &[f64]| self.without_gravity(q, speed, &zero);
+        let at_dq = h(dq);
+        columns(n, |unit| {
+            let sum: Vec<f64> = dq.iter().zip(unit).map(|(a, b)| a + b).collect();
+            let (both, alone) = (h(&sum), h(unit));
+            (0..n).map(|i| 0.5 * (both[i] - at_dq[i] - alone[i])).collect()
+        })
+    }
+
+    /// Joint accelerations under joint torques `tau`; `None` where the mass matrix is not positive definite, which
+    /// no physically possible arm's is.
+    pub fn forward(&self, q: &[f64], dq: &[f64], tau: &[f64]) -> Option<Vec<f64>> {
+        let bias = self.inverse(q, dq, &vec![0.0; self.dof()]);
+        let rest: Vec<f64> = tau.iter().zip(&bias).map(|(t, b)| t - b).collect();
+        solve_positive_definite(self.mass_matrix(q), rest)
+    }
+
+    /// Kinetic energy ½ q̇ᵀBq̇ in J.
+    pub fn kinetic_energy(&self, q: &[f64], dq: &[f64]) -> f64 {
+        let zero = vec![0.0; self.dof()];
+        let momentum = self.without_gravity(q, &zero, dq);
+        0.5 * momentum.iter().zip(dq).map(|(p, v)| p * v).sum::<f64>()
+    }
+
+    /// Potential energy −Σ gᵀ(m p + R h) in J, zero where all mass sits at the base's origin.
+    pub fn potential_energy(&self, q: &[f64]) -> f64 {
+        let g = self.chain.gravity;
+        let poses = self.chain.poses(q);
+        -poses.iter().zip(&self.bodies).map(|((r, p), b)| g.dot(&(p * b.mass + r * b.moment))).sum::<f64>()
+    }
+
+    fn without_gravity(&self, q: &[f64], dq: &[f64], ddq: &[f64]) -> Vec<f64> {
+        self.run(&self.bodies, Pass { q, dq, ddq, gravity: Vector3::zeros(), outside: [Vector3::zeros(); 2] })
+    }
+
+    /// One pass outwards for motion and one inwards for forces.
+    fn run(&self, bodies: &[Body], pass: Pass<'_>) -> Vec<f64> {
+        let n = bodies.len();
+        let rows = self.chain.rows();
+        let mut tau = vec![0.0; n];
+        let mut rotation = [Matrix3::zeros(); ROOM];
+        let mut origin = [Vector3::zeros(); ROOM];
+        let mut force = [Vector3::zeros(); ROOM];
+        let mut moment = [Vector3::zeros(); ROOM];
+
+        // Outwards. Gravity is an acceleration of the base against it. `to_base` turns frame i into the base frame.
+        let (mut w, mut dw, mut acc) = (Vector3::zeros(), Vector3::zeros(), -pass.gravity);
+        let mut to_base = Matrix3::identity();
+        for i in 0..n {
+            let (row, body) = (&rows[i], &bodies[i]);
+            let (r, p) = row.pose(pass.q[i]);
+            let (z, dq, ddq) = (row.axis(), pass.dq[i], pass.ddq[i]);
+
+            // Rotor i sits on link i−1 and spins about the joint's axis with the angular momentum k·Im·q̇·z more than
+            // link i−1 gives it. Its rate of change is a moment on link i−1 (frame i−1 here), and its share in the
+            // rotor's own equation of motion, times k, comes onto the joint.
+            let spin = row.ratio() * body.rotor;
+            if i > 0 {
+                moment[i - 1] += spin * (ddq * z + dq * w.cross(&z));
+            }
+            tau[i] += row.ratio() * spin * ddq + spin * z.dot(&dw);
+
+            // Link i, still expressed in frame i−1.
+            let turning = if row.is_revolute() { z * dq } else { Vector3::zeros() };
+            let mut w_new = w + turning;
+            let mut dw_new = dw + w.cross(&turning);
+            if row.is_revolute() {
+                dw_new += z * ddq;
+            }
+            // The offset between the origins is carried by link i or by link i−1.
+            let (cw, cdw) = if row.offset_turns() { (w_new, dw_new) } else { (w, dw) };
+            acc += cdw.cross(&p) + cw.cross(&cw.cross(&p));
+            if !row.is_revolute() {
+                acc += 2.0 * w.cross(&(z * dq)) + z * ddq;
+            }
+
+            // And now in frame i.
+            let inwards = r.transpose();
+            w_new = inwards * w_new;
+            dw_new = inwards * dw_new;
+            acc = inwards * acc;
+            (w, dw) = (w_new, dw_new);
+            to_base *= r;
+            (rotation[i], origin[i]) = (r, p);
+            let h = body.moment;
+            force[i] = body.mass * acc + dw.cross(&h) + w.cross(&w.cross(&h));
+            moment[i] = body.inertia * dw + w.cross(&(body.inertia * w)) + h.cross(&acc);
+        }
+
+        // Inwards. What comes from outside need not come from the joints.
+        if n > 0 {
+            force[n - 1] -= to_base.transpose() * pass.outside[0];
+            moment[n - 1] -= to_base.transpose() * pass.outside[1];
+        }
+        for i in (0..n).rev() {
+            let row = &rows[i];
+            let (r, p, z) = (rotation[i], origin[i], row.axis());
+            let (f, m) = (r * force[i], r * moment[i]);
+            tau[i] += if row.is_revolute() {
+                let arm = p - row.point_on_axis(p);
+                z.dot(&(m + arm.cross(&f)))
+            } else {
+                z.dot(&f)
+            };
+            if i > 0 {
+                force[i - 1] += f;
+                moment[i - 1] += m + p.cross(&f);
+            }
+        }
+        tau
+    }
+}
+
+/// A row-major n × n matrix from its columns, each a function of the unit vector.
+fn columns(n: usize, mut column: impl FnMut(&[f64]) -> Vec<f64>) -> Vec<f64> {
+    let mut out = vec![0.0; n * n];
+    let mut unit = vec![0.0; n];
+    for j in 0..n {
+        unit[j] = 1.0;
+        for (i, value) in column(&unit).into_iter().enumerate() {
+            out[i * n + j] = value;
+        }
+        unit[j] = 0.0;
+    }
+    out
+}
+
+/// Solves A x = b by Cholesky, A symmetric, n × n, row-major; `None` where A is not positive definite.
+pub fn solve_positive_definite(mut a: Vec<f64>, mut b: Vec<f64>) -> Option<Vec<f64>> {
+    let n = b.len();
+    for j in 0..n {
+        for k in 0..j {
+            for i in j..n {
+                a[i * n + j] -= a[i * n + k] * a[j * n + k];
+            }
+        }
+        let pivot = a[j * n + j];
+        if !(pivot > 0.0 && pivot.is_finite()) {
+            return None;
+        }
+        let root = pivot.sqrt();
+        for i in j..n {
+            a[i * n + j] /= root;
+        }
+    }
+    for i in 0..n {
+        for k in 0..i {
+            b[i] -= a[i * n + k] * b[k];
+        }
+        b[i] /= a[i * n + i];
+    }
+    for i in (0..n).rev() {
+        for k in i + 1..n {
+            b[i] -= a[k * n + i] * b[k];
+        }
+        b[i] /= a[i * n + i];
+    }
+    Some(b)
+}

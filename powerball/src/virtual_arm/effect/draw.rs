@@ -1,0 +1,145 @@
+//! Effects drawn by lot, of sizes that matter and that happen.
+
+use super::Effect;
+use crate::virtual_arm::plant::Plant;
+use rand::seq::IndexedRandom;
+use rand::{Rng, RngExt};
+use std::f64::consts::PI;
+use std::ops::Range;
+
+impl Effect {
+    /// The names that [`draw_named`](Self::draw_named) knows.
+    pub const NAMES: [&'static str; 16] = [
+        "load_friction",
+        "stribeck",
+        "velocity_nonlinearity",
+        "asymmetry",
+        "hysteresis",
+        "payload",
+        "spring",
+        "position_ripple",
+        "temperature",
+        "torque_constant",
+        "time_delay",
+        "encoder_offset",
+        "base_tilt",
+        "contact_wrench",
+        "broken_symmetry",
+        "joint_coupling",
+    ];
+
+    /// Draws an effect of that name for the virtual LWA 4P: its joint and its figures. `session` is the time in s
+    /// within which the logs are recorded: what starts at some time starts within its middle half.
+    ///
+    /// Sizes are chosen against the joint's friction and noise, such that the effect can be seen in a log but does
+    /// not outgrow what it disturbs. `None` for a name that is not known.
+    pub fn draw_named(name: &str, plant: &Plant, session: Range<f64>, rng: &mut impl Rng) -> Option<Effect> {
+        let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
+        let any = rng.random_range(0..plant.friction().len());
+        let large = rng.random_range(0..4);
+        let friction = plant.friction()[any];
+        let coulomb = friction.gamma1 + friction.gamma3;
+        let noise = plant.sensors().white[any];
+        let quarter = 0.25 * (session.end - session.start);
+        let moment = session.start + quarter * rng.random_range(1.0..3.0);
+        Some(match name {
+            // The joints that gravity loads.
+            "load_friction" => Effect::LoadFriction {
+                joint: rng.random_range(1..3),
+                coefficient: rng.random_range(0.05..0.11),
+            },
+            "stribeck" => Effect::Stribeck {
+                joint: large,
+                level: plant.friction()[large].gamma1 * rng.random_range(0.3..0.6),
+                speed: rng.random_range(0.03..0.07),
+            },
+            "velocity_nonlinearity" => Effect::VelocityNonlinearity {
+                joint: large,
+                torque: plant.friction()[large].gamma5 * rng.random_range(0.35..0.7),
+                exponent: rng.random_range(2.2..3.0),
+            },
+            "asymmetry" => Effect::Asymmetry {
+                joint: any,
+                share: rng.random_range(0.1..0.3),
+                constant: coulomb * rng.random_range(0.0..0.15),
+            },
+            "hysteresis" => Effect::Hysteresis {
+                joint: any,
+                level: coulomb * rng.random_range(0.3..0.6),
+                way: rng.random_range(0.010..0.030),
+            },
+            "payload" => {
+                let aside = [0, 1].map(|_| rng.random_range(-0.04..0.04));
+                Effect::payload(rng.random_range(0.8..2.5), aside, rng.random_range(0.03..0.10), moment)
+            }
+            "spring" => Effect::Spring {
+                joint: any,
+                stiffness: 6.0 * noise * rng.random_range(0.5..1.2),
+                rest: rng.random_range(-0.5..0.5),
+            },
+            "position_ripple" => Effect::PositionRipple {
+                joint: any,
+                // Teeth and wave generator turn with the motor, bearings and cables with the joint.
+                order: *[5.0, 9.0, 14.0, 100.0, 160.0].choose(rng)?,
+                amplitude: noise * rng.random_range(1.2..2.5),
+                phase: rng.random_range(-PI..PI),
+            },
+            "temperature" => Effect::Temperature {
+                change: -rng.random_range(0.15..0.30),
+                time_constant: (session.end - session.start) * rng.random_range(0.3..0.6),
+            },
+            "torque_constant" => Effect::TorqueConstant {
+                joint: rng.random_range(1..3),
+                gain: 1.0 + sign * rng.random_range(0.04..0.1),
+            },
+            "time_delay" => Effect::TimeDelay { delay: rng.random_range(0.006..0.018) },
+            "encoder_offset" => Effect::EncoderOffset {
+                joint: rng.random_range(1..3),
+                offset: sign * rng.random_range(0.03..0.08),
+            },
+            "base_tilt" => Effect::BaseTilt { tilt: [0, 1].map(|_| sign * rng.random_range(0.02..0.06)) },
+            "contact_wrench" => Effect::ContactWrench {
+                force: [0, 1, 2].map(|_| sign * rng.random_range(5.0..15.0)),
+                start: session.start + 0.5 * quarter * rng.random_range(0.0..1.0),
+                length: rng.random_range(2.0..5.0),
+                every: rng.random_range(17.0..29.0),
+            },
+            // The elbow and the forearm, whose centres of mass are declared to lie in a plane.
+            "broken_symmetry" => {
+                let link = rng.random_range(2..4);
+                Effect::BrokenSymmetry {
+                    link,
+                    aside: sign * [0.02, 0.06][link - 2] * rng.random_range(0.8..1.5),
+                }
+            }
+            // Both axes of a module share a housing.
+            "joint_coupling" => {
+                let [from, onto] = [[0, 1], [1, 0], [2, 3], [3, 2], [4, 5], [5, 4]][rng.random_range(0..6)];
+                Effect::JointCoupling { from, onto, share: rng.random_range(0.06..0.15) }
+            }
+            _ => return None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::virtual_arm::lwa4p;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn every_name_is_drawn_as_itself_and_the_same_seed_draws_the_same() {
+        let plant = lwa4p::plant().unwrap();
+        for name in Effect::NAMES {
+            let draw = |seed| {
+                Effect::draw_named(name, &plant, 0.0..100.0, &mut ChaCha8Rng::seed_from_u64(seed)).unwrap()
+            };
+            assert_eq!(draw(5).name(), name);
+            assert_eq!(draw(5), draw(5));
+            assert!((0..20).any(|seed| draw(seed) != draw(5)), "{name}");
+        }
+        assert!(Effect::draw_named("ghosts", &plant, 0.0..1.0, &mut ChaCha8Rng::seed_from_u64(1)).is_none());
+    }
+}

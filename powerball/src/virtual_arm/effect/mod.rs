@@ -1,0 +1,343 @@
+//! What a real arm does and its model may not know, as physical laws of the plant.
+//!
+//! These laws are written for the plant alone. Where an estimator has a term for the same phenomenon, its formula is
+//! another one: the gear's load friction is smooth here, presliding is a set of elastic sliders, and so on. A name is
+//! then found for its physics and not for its formula.
+
+mod draw;
+mod torque;
+
+use super::body::Body;
+use super::dynamics::Dynamics;
+use super::lwa4p::FLANGE;
+use crate::friction::TanhFriction;
+use nalgebra::{Matrix3, Vector3};
+
+/// Elastic sliders that make up presliding.
+const SLIDERS: usize = 4;
+
+/// One undeclared effect. Joints count from 0 here and from 1 in [`joints`](Effect::joints).
+#[derive(Clone, Debug, PartialEq)]
+pub enum Effect {
+    /// The gear's teeth rub in proportion to the torque that they carry, N·m of friction for each N·m.
+    LoadFriction {
+        /// The joint.
+        joint: usize,
+        /// Share of the carried torque.
+        coefficient: f64,
+    },
+    /// Friction that is higher while the lubricant's film is not yet built up.
+    Stribeck {
+        /// The joint.
+        joint: usize,
+        /// Additional friction at the smallest speeds, N·m.
+        level: f64,
+        /// Speed at which the film is built up, rad/s.
+        speed: f64,
+    },
+    /// Losses that grow faster than the speed: churned grease.
+    VelocityNonlinearity {
+        /// The joint.
+        joint: usize,
+        /// Torque at 1 rad/s, N·m.
+        torque: f64,
+        /// Exponent of the speed.
+        exponent: f64,
+    },
+    /// Friction that is higher in one direction, and a torque that pulls to one side.
+    Asymmetry {
+        /// The joint.
+        joint: usize,
+        /// Share by which Coulomb friction is higher in the positive direction.
+        share: f64,
+        /// Constant torque, N·m.
+        constant: f64,
+    },
+    /// Part of the friction builds up over a small way and not at once.
+    Hysteresis {
+        /// The joint.
+        joint: usize,
+        /// Friction of all sliders together, N·m.
+        level: f64,
+        /// The way after which the last slider slips, rad.
+        way: f64,
+    },
+    /// Somebody bolts something to the flange.
+    Payload {
+        /// Mass, kg.
+        mass: f64,
+        /// Its centre in the last frame, m.
+        centre: [f64; 3],
+        /// From this time on, s.
+        start: f64,
+    },
+    /// A hose or cable pulls the joint back.
+    Spring {
+        /// The joint.
+        joint: usize,
+        /// Stiffness around rest, N·m/rad.
+        stiffness: f64,
+        /// Where it is slack, rad.
+        rest: f64,
+    },
+    /// Torque that is periodic in the joint's position: teeth, wave generator, cogging.
+    PositionRipple {
+        /// The joint.
+        joint: usize,
+        /// Cycles for each turn of the joint.
+        order: f64,
+        /// Amplitude, N·m.
+        amplitude: f64,
+        /// Where in a cycle the joint's zero lies, rad.
+        phase: f64,
+    },
+    /// Lubricant that thins as the joints warm.
+    Temperature {
+        /// Relative change of viscous friction once warm, negative.
+        change: f64,
+        /// Time constant of warming, s.
+        time_constant: f64,
+    },
+    /// The drive's current-to-torque factor is not what its file says.
+    TorqueConstant {
+        /// The joint.
+        joint: usize,
+        /// Logged torque over true torque.
+        gain: f64,
+    },
+    /// Torques are logged late.
+    TimeDelay {
+        /// By this much, s.
+        delay: f64,
+    },
+    /// A joint's zero is off.
+    EncoderOffset {
+        /// The joint.
+        joint: usize,
+        /// Logged minus true position, rad.
+        offset: f64,
+    },
+    /// The base is not level.
+    BaseTilt {
+        /// Rotation of the base about its x and y axes, rad.
+        tilt: [f64; 2],
+    },
+    /// Something leans against the last link, again and again.
+    ContactWrench {
+        /// Force at the last frame's origin in the base frame, N.
+        force: [f64; 3],
+        /// The first time, s.
+        start: f64,
+        /// How long each time, s.
+        length: f64,
+        /// From one time to the next, s.
+        every: f64,
+    },
+    /// A link's centre of mass lies beside the plane in which it was declared to lie.
+    BrokenSymmetry {
+        /// The link.
+        link: usize,
+        /// By this much along the link's x axis, m.
+        aside: f64,
+    },
+    /// One joint's friction loads the other joint of its module.
+    JointCoupling {
+        /// The joint that moves.
+        from: usize,
+        /// The joint that feels it.
+        onto: usize,
+        /// Share of the friction that is felt.
+        share: f64,
+    },
+}
+
+/// What an effect may depend on at one instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Instant<'a> {
+    /// Time, s.
+    pub t: f64,
+    /// True joint positions.
+    pub q: &'a [f64],
+    /// True joint speeds.
+    pub dq: &'a [f64],
+    /// Torques of the rigid bodies, rotors included.
+    pub rigid: &'a [f64],
+    /// Friction of each joint without effects.
+    pub friction: &'a [TanhFriction<f64>],
+    /// The arm without effects.
+    pub dynamics: &'a Dynamics,
+}
+
+/// What an effect remembers along a motion.
+#[derive(Clone, Debug, Default)]
+pub struct State {
+    /// The joint's last position, and how far each slider is wound up.
+    sliders: Option<(f64, [f64; SLIDERS])>,
+}
+
+impl Effect {
+    /// The name under which the effect is known to users.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Effect::LoadFriction { .. } => "load_friction",
+            Effect::Stribeck { .. } => "stribeck",
+            Effect::VelocityNonlinearity { .. } => "velocity_nonlinearity",
+            Effect::Asymmetry { .. } => "asymmetry",
+            Effect::Hysteresis { .. } => "hysteresis",
+            Effect::Payload { .. } => "payload",
+            Effect::Spring { .. } => "spring",
+            Effect::PositionRipple { .. } => "position_ripple",
+            Effect::Temperature { .. } => "temperature",
+            Effect::TorqueConstant { .. } => "torque_constant",
+            Effect::TimeDelay { .. } => "time_delay",
+            Effect::EncoderOffset { .. } => "encoder_offset",
+            Effect::BaseTilt { .. } => "base_tilt",
+            Effect::ContactWrench { .. } => "contact_wrench",
+            Effect::BrokenSymmetry { .. } => "broken_symmetry",
+            Effect::JointCoupling { .. } => "joint_coupling",
+        }
+    }
+
+    /// The joints that the effect sits at, from 1; empty where it is the whole arm's.
+    pub fn joints(&self) -> Vec<usize> {
+        self.joint().map(|joint| joint + 1).into_iter().collect()
+    }
+
+    fn joint(&self) -> Option<usize> {
+        match self {
+            Effect::LoadFriction { joint, .. }
+            | Effect::Stribeck { joint, .. }
+            | Effect::VelocityNonlinearity { joint, .. }
+            | Effect::Asymmetry { joint, .. }
+            | Effect::Hysteresis { joint, .. }
+            | Effect::Spring { joint, .. }
+            | Effect::PositionRipple { joint, .. }
+            | Effect::TorqueConstant { joint, .. }
+            | Effect::EncoderOffset { joint, .. }
+            | Effect::JointCoupling { onto: joint, .. } => Some(*joint),
+            _ => None,
+        }
+    }
+
+    /// The effect's figures in words.
+    pub fn describe(&self) -> String {
+        match self {
+            Effect::LoadFriction { coefficient, .. } => {
+                format!("gear friction of {coefficient:.3} N·m for each N·m that the gear carries")
+            }
+            Effect::Stribeck { level, speed, .. } => {
+                format!(
+                    "{level:.2} N·m more friction at the smallest speeds, gone beyond about {speed:.3} rad/s"
+                )
+            }
+            Effect::VelocityNonlinearity { torque, exponent, .. } => {
+                format!("{torque:.2} N·m·|q̇|^{exponent:.1} of churning losses")
+            }
+            Effect::Asymmetry { share, constant, .. } => {
+                format!(
+                    "Coulomb friction {:+.0} % in the positive direction, {constant:+.2} N·m always",
+                    100.0 * share
+                )
+            }
+            Effect::Hysteresis { level, way, .. } => {
+                format!("{level:.2} N·m of friction that builds up over {:.1} mrad", 1e3 * way)
+            }
+            Effect::Payload { mass, centre, start } => format!(
+                "{mass:.2} kg at ({:.3}, {:.3}, {:.3}) m of the last frame from t = {start:.1} s on",
+                centre[0], centre[1], centre[2]
+            ),
+            Effect::Spring { stiffness, rest, .. } => {
+                format!("a hose of {stiffness:.2} N·m/rad that is slack at {rest:+.2} rad")
+            }
+            Effect::PositionRipple { order, amplitude, .. } => {
+                format!("{amplitude:.2} N·m of ripple, {order:.0} cycles a turn")
+            }
+            Effect::Temperature { change, time_constant } => {
+                format!(
+                    "viscous friction changes by {:+.0} % with a time constant of {time_constant:.0} s",
+                    100.0 * change
+                )
+            }
+            Effect::TorqueConstant { gain, .. } => format!("logged torque is {gain:.3} of the true one"),
+            Effect::TimeDelay { delay } => format!("torques are logged {:.1} ms late", 1e3 * delay),
+            Effect::EncoderOffset { offset, .. } => {
+                format!("the encoder's zero is off by {:+.1} mrad", 1e3 * offset)
+            }
+            Effect::BaseTilt { tilt } => {
+                format!("the base is tilted by ({:+.1}, {:+.1}) mrad", 1e3 * tilt[0], 1e3 * tilt[1])
+            }
+            Effect::ContactWrench { force, start, length, every } => format!(
+                "a force of ({:.0}, {:.0}, {:.0}) N on the wrist for {length:.1} s at t = {start:.1} s and every {every:.0} s after",
+                force[0], force[1], force[2]
+            ),
+            Effect::BrokenSymmetry { link, aside } => {
+                format!("the centre of mass of link {} lies {:+.1} mm off its plane", link + 1, 1e3 * aside)
+            }
+            Effect::JointCoupling { from, share, .. } => {
+                format!("{:.0} % of the friction of joint {} is felt here", 100.0 * share, from + 1)
+            }
+        }
+    }
+
+    /// The arm at time `t` where the effect changes its bodies or the direction of gravity.
+    pub(super) fn changed_dynamics(&self, arm: &Dynamics, t: f64) -> Option<Dynamics> {
+        match self {
+            Effect::Payload { mass, centre, start } if t >= *start => {
+                let mut bodies = arm.bodies().to_vec();
+                let last = bodies.last_mut()?;
+                // An even ball of the density of aluminium.
+                let radius = (3.0 * mass / (4.0 * std::f64::consts::PI * 2700.0)).cbrt();
+                let tensor = Matrix3::identity() * (0.4 * mass * radius * radius);
+                let load = Body::about_centre(*mass, Vector3::from(*centre), tensor, 0.0);
+                last.mass += load.mass;
+                last.moment += load.moment;
+                last.inertia += load.inertia;
+                Dynamics::new(arm.chain().clone(), bodies)
+            }
+            Effect::BrokenSymmetry { link, aside } => {
+                let mut bodies = arm.bodies().to_vec();
+                let body = bodies.get_mut(*link)?;
+                *body = body.moved(Vector3::new(*aside, 0.0, 0.0));
+                Dynamics::new(arm.chain().clone(), bodies)
+            }
+            Effect::BaseTilt { tilt } => {
+                let mut chain = arm.chain().clone();
+                let turn = nalgebra::Rotation3::from_euler_angles(tilt[0], tilt[1], 0.0);
+                chain.gravity = turn.inverse() * chain.gravity;
+                Dynamics::new(chain, arm.bodies().to_vec())
+            }
+            _ => None,
+        }
+    }
+
+    /// What the effect does to the logged positions and torques, n values a sample.
+    pub(super) fn distort(&self, q: &mut [f64], tau: &mut [f64], n: usize, period: f64) {
+        match self {
+            Effect::EncoderOffset { joint, offset } => {
+                q.chunks_exact_mut(n).for_each(|q| q[*joint] += offset)
+            }
+            Effect::TorqueConstant { joint, gain } => {
+                tau.chunks_exact_mut(n).for_each(|tau| tau[*joint] *= gain)
+            }
+            Effect::TimeDelay { delay } => {
+                let shift = delay / period;
+                let (whole, part) = (shift.floor() as usize, shift.fract());
+                let at =
+                    |k: usize, back: usize, i: usize, source: &[f64]| source[k.saturating_sub(back) * n + i];
+                let source = tau.to_vec();
+                for k in 0..tau.len() / n {
+                    for i in 0..n {
+                        let (near, far) = (at(k, whole, i, &source), at(k, whole + 1, i, &source));
+                        tau[k * n + i] = (1.0 - part) * near + part * far;
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// The payload's place: `mass` kg, its centre `beyond` m beyond the flange and `aside` m beside the axis.
+    fn payload(mass: f64, aside: [f64; 2], beyond: f64, start: f64) -> Effect {
+        Effect::Payload { mass, centre: [aside[0], aside[1], FLANGE + beyond], start }
+    }
+}
