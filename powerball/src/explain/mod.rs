@@ -5,15 +5,22 @@
 //! data, [`rule`] holds every threshold with its reason, [`forward`] adds one effect at a time, [`naming`] compares
 //! rivals, [`leftover`] says what stays.
 
+mod curves;
 mod evidence;
 mod folds;
 mod forward;
 mod leftover;
 mod naming;
+mod page;
 mod placebo;
 mod result;
 mod rule;
 mod screen;
 
+pub use curves::TorqueCurve;
 pub use forward::{ExplainError, Session, explain};
+pub use page::add_to_page;
 pub use result::{Explained, NamedEffect, Rival, Unattributed};
+
+#[cfg(test)]
+mod tests;
