@@ -21,3 +21,6 @@ pub use curves::TorqueCurve;
 pub use forward::{ExplainError, Session, explain};
 pub use page::add_to_page;
 pub use result::{Explained, NamedEffect, Rival, Unattributed};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,2 @@
+mod plant;
+mod study;
