@@ -1,9 +1,11 @@
 //! What is evaluated and what is compiled agree with a numeric Newton–Euler that shares no code with the generator.
 
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 use dyngen::arm::{Arm, ParameterKind};
-use dyngen::{Evaluator, Function, Model, SetKind};
+use dyngen::{Evaluator, Function, Model, Samples, SetKind};
 use powerball::virtual_arm::{Chain, Dynamics, bodies};
-use powerball_workspace::generated::{self, Call};
+use powerball_workspace::generated;
 use powerball_workspace::{arm, paper_arm_with_ratios};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -64,30 +66,63 @@ fn add_point(link: &mut [f64; 11], m: f64, [x, y, z]: [f64; 3]) {
     link.iter_mut().zip(point).for_each(|(sum, p)| *sum += p);
 }
 
-/// A random state: q, q̇, q̈.
-fn state(n: usize, rng: &mut ChaCha8Rng) -> [Vec<f64>; 3] {
-    std::array::from_fn(|_| (0..n).map(|_| rng.random_range(-3.0..3.0)).collect())
+/// A random state: q, q̇, q̈, and reference motion and errors for those who take them.
+struct State {
+    q: Vec<f64>,
+    dq: Vec<f64>,
+    ddq: Vec<f64>,
+    dqr: Vec<f64>,
+    ddqr: Vec<f64>,
+    e: Vec<f64>,
 }
 
-/// Every function by the numeric Newton–Euler, in the order of `Function::ALL`.
-fn reference(arm: &Arm, all: &[f64], [q, dq, ddq]: &[Vec<f64>; 3]) -> Vec<Vec<f64>> {
-    let chain = Chain::new(arm);
-    let (rotation, origin) = chain.poses(q).pop().unwrap();
-    let numeric = Dynamics::new(chain, bodies(all).unwrap()).unwrap();
-    let mut pose = Vec::new();
-    for i in 0..3 {
-        pose.extend([rotation[(i, 0)], rotation[(i, 1)], rotation[(i, 2)], origin[i]]);
+impl State {
+    fn random(n: usize, rng: &mut ChaCha8Rng) -> State {
+        let mut vector = || (0..n).map(|_| rng.random_range(-3.0..3.0)).collect::<Vec<f64>>();
+        State { q: vector(), dq: vector(), ddq: vector(), dqr: vector(), ddqr: vector(), e: vector() }
     }
-    pose.extend([0.0, 0.0, 0.0, 1.0]);
-    vec![
-        numeric.inverse(q, dq, ddq),
-        numeric.regressor(q, dq, ddq),
-        numeric.mass_matrix(q),
-        numeric.coriolis_matrix(q, dq),
-        numeric.gravity(q),
-        ddq.clone(),
-        pose,
-    ]
+
+    fn samples<'a>(&'a self, tau: &'a [f64], parameters: &'a [f64]) -> Samples<'a> {
+        let State { q, dq, ddq, dqr, ddqr, e } = self;
+        Samples { q, dq, ddq, dqr, ddqr, tau, e, parameters }
+    }
+}
+
+/// What the numeric Newton–Euler knows of a function; nothing where it has no such function.
+fn reference(arm: &Arm, all: &[f64], state: &State, function: Function) -> Option<Vec<f64>> {
+    let State { q, dq, ddq, dqr, ddqr, .. } = state;
+    let chain = Chain::new(arm);
+    let numeric = Dynamics::new(chain.clone(), bodies(all).unwrap()).unwrap();
+    let (n, zeros) = (arm.dof(), vec![0.0; arm.dof()]);
+    let minus = |a: Vec<f64>, b: Vec<f64>| -> Vec<f64> { a.iter().zip(b).map(|(x, y)| x - y).collect() };
+    let times = |m: &[f64], v: &[f64]| -> Vec<f64> {
+        m.chunks(n).map(|row| row.iter().zip(v).map(|(a, b)| a * b).sum()).collect()
+    };
+    let transposed = |m: Vec<f64>| -> Vec<f64> { (0..n * n).map(|k| m[k % n * n + k / n]).collect() };
+    Some(match function {
+        Function::InverseDynamics => numeric.inverse(q, dq, ddq),
+        Function::InverseDynamicsWithoutGravity => minus(numeric.inverse(q, dq, ddq), numeric.gravity(q)),
+        // The products with the values: the reference's regressor has a column for every parameter.
+        Function::Regressor => numeric.inverse(q, dq, ddq),
+        Function::SlotineLiRegressor => {
+            let (b, c) = (times(&numeric.mass_matrix(q), ddqr), times(&numeric.coriolis_matrix(q, dq), dqr));
+            (0..n).map(|i| b[i] + c[i] + numeric.gravity(q)[i]).collect()
+        }
+        Function::MassMatrix => numeric.mass_matrix(q),
+        Function::CoriolisMatrix => numeric.coriolis_matrix(q, dq),
+        Function::CoriolisTimesSpeed => minus(numeric.inverse(q, dq, &zeros), numeric.gravity(q)),
+        Function::CoriolisTransposeTimesSpeed => times(&transposed(numeric.coriolis_matrix(q, dq)), dq),
+        Function::Gravity => numeric.gravity(q),
+        Function::ForwardDynamics => ddq.clone(),
+        Function::KineticEnergy | Function::KineticEnergyRegressor => vec![numeric.kinetic_energy(q, dq)],
+        Function::Momentum => times(&numeric.mass_matrix(q), dq),
+        Function::ForwardKinematics => {
+            let (rotation, origin) = chain.poses(q).pop().unwrap();
+            let row = |i: usize| [rotation[(i, 0)], rotation[(i, 1)], rotation[(i, 2)], origin[i]];
+            [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]].concat()
+        }
+        _ => return None,
+    })
 }
 
 fn assert_close(what: &str, actual: &[f64], expected: &[f64], tolerance: f64) {
@@ -98,23 +133,34 @@ fn assert_close(what: &str, actual: &[f64], expected: &[f64], tolerance: f64) {
     }
 }
 
-/// Compares the results of all functions with the reference; `regressor · values` stands for the regressor, because the
-/// reference has a column for every parameter.
-fn compare(name: &str, results: &[Vec<f64>], parameters: &[f64], expected: &[Vec<f64>]) {
-    for (f, function) in Function::ALL.into_iter().enumerate() {
-        let what = format!("{name} {function}");
-        match function {
-            Function::Regressor => {
-                let rows = results[f].chunks(parameters.len());
-                let torque: Vec<f64> =
-                    rows.map(|row| row.iter().zip(parameters).map(|(y, p)| y * p).sum()).collect();
-                assert_close(&what, &torque, &expected[0], TOLERANCE);
-            }
-            // The solution is as exact as the mass matrix is well conditioned.
-            Function::ForwardDynamics => assert_close(&what, &results[f], &expected[f], 1e-8),
-            _ => assert_close(&what, &results[f], &expected[f], TOLERANCE),
-        }
+/// Compares a function's result with the reference; a regressor by its product with the values.
+fn compare(
+    name: &str,
+    arm: &Arm,
+    all: &[f64],
+    state: &State,
+    function: Function,
+    result: &[f64],
+    values: &[f64],
+) {
+    let Some(expected) = reference(arm, all, state, function) else { return };
+    let what = format!("{name} {function}");
+    let regressors = [Function::Regressor, Function::SlotineLiRegressor, Function::KineticEnergyRegressor];
+    if regressors.contains(&function) {
+        let rows = result.chunks(values.len());
+        let product: Vec<f64> = rows.map(|row| row.iter().zip(values).map(|(y, p)| y * p).sum()).collect();
+        assert_close(&what, &product, &expected, TOLERANCE);
+    } else {
+        // A solution is as exact as the mass matrix is well conditioned.
+        let tolerance = if function == Function::ForwardDynamics { 1e-8 } else { TOLERANCE };
+        assert_close(&what, result, &expected, tolerance);
     }
+}
+
+fn evaluate(evaluator: &Evaluator, samples: &Samples<'_>) -> Vec<f64> {
+    let mut out = vec![0.0; evaluator.outputs()];
+    evaluator.run(samples, &mut out);
+    out
 }
 
 fn check_evaluator(name: &str, arm: Arm) {
@@ -125,21 +171,14 @@ fn check_evaluator(name: &str, arm: Arm) {
             Function::ALL.iter().map(|f| Evaluator::new(&model, *f, set.kind).unwrap()).collect();
         for _ in 0..STATES {
             let all = values(model.arm(), &mut rng);
-            let state = state(model.arm().dof(), &mut rng);
-            let expected = reference(model.arm(), &all, &state);
+            let state = State::random(model.arm().dof(), &mut rng);
+            let tau = reference(model.arm(), &all, &state, Function::InverseDynamics).unwrap();
             let parameters = model.set_values(set, &all);
-            let [q, dq, ddq] = &state;
-            let results: Vec<Vec<f64>> = evaluators
-                .iter()
-                .map(|evaluator| {
-                    let mut out = vec![0.0; evaluator.outputs()];
-                    let forward = evaluator.function() == Function::ForwardDynamics;
-                    let drive = if forward { &expected[0] } else { ddq };
-                    evaluator.evaluate(q, dq, drive, &parameters, &mut out);
-                    out
-                })
-                .collect();
-            compare(&format!("{name} {}", set.kind), &results, &parameters, &expected);
+            for evaluator in &evaluators {
+                let result = evaluate(evaluator, &state.samples(&tau, &parameters));
+                let name = format!("{name} {}", set.kind);
+                compare(&name, model.arm(), &all, &state, evaluator.function(), &result, &parameters);
+            }
         }
     }
 }
@@ -161,20 +200,28 @@ fn evaluated_functions_agree_with_high_gear_ratios() {
     check_evaluator("stanford k = 50", stanford);
 }
 
+/// Compiled code agrees with the numeric Newton–Euler, and where that has no such function with the evaluator.
 #[test]
 fn compiled_functions_agree_for_every_arm_and_set() {
     let mut rng = ChaCha8Rng::seed_from_u64(43);
     for file in generated::ALL {
         let model = Model::derive(arm(file.arm)).unwrap();
         let set = model.set(file.set).unwrap();
+        let evaluators: Vec<Evaluator> =
+            Function::ALL.iter().map(|f| Evaluator::new(&model, *f, set.kind).unwrap()).collect();
+        let name = format!("{} {}", file.arm, file.set);
         for _ in 0..STATES {
             let all = values(model.arm(), &mut rng);
-            let state = state(model.arm().dof(), &mut rng);
-            let expected = reference(model.arm(), &all, &state);
+            let state = State::random(model.arm().dof(), &mut rng);
+            let tau = reference(model.arm(), &all, &state, Function::InverseDynamics).unwrap();
             let parameters = model.set_values(set, &all);
-            let [q, dq, ddq] = &state;
-            let results = (file.call)(&Call { q, dq, ddq, tau: &expected[0], parameters: &parameters });
-            compare(&format!("{} {}", file.arm, file.set), &results, &parameters, &expected);
+            let samples = state.samples(&tau, &parameters);
+            for (evaluator, result) in evaluators.iter().zip((file.call)(&samples)) {
+                let function = evaluator.function();
+                compare(&name, model.arm(), &all, &state, function, &result, &parameters);
+                // The same operations in the same order: only the sines may differ in the last place.
+                assert_close(&format!("{name} {function}"), &result, &evaluate(evaluator, &samples), 1e-9);
+            }
         }
     }
 }
@@ -186,11 +233,11 @@ fn the_full_regressor_agrees_column_by_column() {
         let set = model.set(SetKind::Full).unwrap();
         let evaluator = Evaluator::new(&model, Function::Regressor, SetKind::Full).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(44);
-        let [q, dq, ddq] = state(model.arm().dof(), &mut rng);
-        let mut out = vec![0.0; evaluator.outputs()];
-        evaluator.evaluate(&q, &dq, &ddq, &[], &mut out);
+        let state = State::random(model.arm().dof(), &mut rng);
+        let out = evaluate(&evaluator, &state.samples(&[], &[]));
         let all = vec![0.0; model.arm().all_parameters().len()];
-        let reference = reference(model.arm(), &all, &[q, dq, ddq]).swap_remove(1);
+        let numeric = Dynamics::new(Chain::new(model.arm()), bodies(&all).unwrap()).unwrap();
+        let reference = numeric.regressor(&state.q, &state.dq, &state.ddq);
         let (n, p, width) = (model.arm().dof(), set.parameters.len(), all.len());
         for i in 0..n {
             for (j, parameter) in set.parameters.iter().enumerate() {
@@ -206,28 +253,77 @@ fn the_full_regressor_agrees_column_by_column() {
     }
 }
 
+/// Central differences of step h err by about h² times a third derivative, and by rounding over h.
+const STEP: f64 = 1e-5;
+const DIFFERENCE: f64 = 1e-6;
+
 #[test]
-fn coriolis_matrices_are_skew_against_the_rate_of_the_mass_matrix() {
-    let h = 1e-6;
+fn rates_and_derivatives_agree_with_differences() {
     let mut rng = ChaCha8Rng::seed_from_u64(45);
+    let index = |f: Function| Function::ALL.iter().position(|g| *g == f).unwrap();
     for file in generated::ALL {
         let model = Model::derive(arm(file.arm)).unwrap();
-        let n = model.arm().dof();
-        let all = values(model.arm(), &mut rng);
-        let parameters = model.set_values(model.set(file.set).unwrap(), &all);
-        let [q, dq, ddq] = state(n, &mut rng);
-        let results = |step: f64| {
-            let q: Vec<f64> = q.iter().zip(&dq).map(|(q, v)| q + step * v).collect();
-            (file.call)(&Call { q: &q, dq: &dq, ddq: &ddq, tau: &ddq, parameters: &parameters })
+        let (n, name) = (model.arm().dof(), format!("{} {}", file.arm, file.set));
+        let parameters = model.set_values(model.set(file.set).unwrap(), &values(model.arm(), &mut rng));
+        let state = State::random(n, &mut rng);
+        let at = |q: Vec<f64>, dq: Vec<f64>| {
+            (file.call)(&Samples { q: &q, dq: &dq, ..state.samples(&state.ddq, &parameters) })
         };
-        let (before, now, after) = (results(-h), results(0.0), results(h));
-        for i in 0..n {
-            for j in 0..n {
-                let rate = |k: usize| (after[2][k] - before[2][k]) / (2.0 * h);
-                let sum = rate(i * n + j) - now[3][i * n + j] - now[3][j * n + i];
-                // Central differences of step h err by about h² and by rounding over h.
-                assert!(sum.abs() < 1e-7, "{} {}: Ḃ − 2C is not skew at {i}, {j}: {sum}", file.arm, file.set);
-            }
+        let shifted = |x: &[f64], by: &[f64], h: f64| -> Vec<f64> {
+            x.iter().zip(by).map(|(a, b)| a + h * b).collect()
+        };
+        let difference = |plus: &[Vec<f64>], minus: &[Vec<f64>], f: Function| -> Vec<f64> {
+            plus[index(f)].iter().zip(&minus[index(f)]).map(|(a, b)| (a - b) / (2.0 * STEP)).collect()
+        };
+        let now = at(state.q.clone(), state.dq.clone());
+        let value = |f: Function| now[index(f)].clone();
+        let [after, before] = [STEP, -STEP].map(|h| at(shifted(&state.q, &state.dq, h), state.dq.clone()));
+
+        // Ḃ − 2C is skew-symmetric.
+        let (rate, c) = (difference(&after, &before, Function::MassMatrix), value(Function::CoriolisMatrix));
+        let sum: Vec<f64> = (0..n * n).map(|k| c[k] + c[k % n * n + k / n]).collect();
+        assert_close(&format!("{name}: C + Cᵀ against Ḃ"), &sum, &rate, DIFFERENCE);
+        // J̇·q̇
+        let jdot = difference(&after, &before, Function::Jacobian);
+        let product: Vec<f64> =
+            jdot.chunks(n).map(|row| row.iter().zip(&state.dq).map(|(a, b)| a * b).sum()).collect();
+        assert_close(&format!("{name}: J̇·q̇"), &value(Function::JacobianRateTimesSpeed), &product, DIFFERENCE);
+        // B·B⁻¹ = 1
+        let (b, inverse) = (value(Function::MassMatrix), value(Function::MassMatrixInverse));
+        let unit: Vec<f64> = (0..n * n).map(|k| f64::from(u8::from(k / n == k % n))).collect();
+        let product: Vec<f64> =
+            (0..n * n).map(|k| (0..n).map(|m| b[k / n * n + m] * inverse[m * n + k % n]).sum()).collect();
+        assert_close(&format!("{name}: B·B⁻¹"), &product, &unit, 1e-7);
+
+        for j in 0..n {
+            let e: Vec<f64> = (0..n).map(|i| f64::from(u8::from(i == j))).collect();
+            let column = |f: Function| -> Vec<f64> { value(f).chunks(n).map(|row| row[j]).collect() };
+            let [plus, minus] = [STEP, -STEP].map(|h| at(shifted(&state.q, &e, h), state.dq.clone()));
+            let what = format!("{name}: ∂/∂q{}", j + 1);
+            assert_close(
+                &what,
+                &column(Function::TorqueByPosition),
+                &difference(&plus, &minus, Function::InverseDynamics),
+                DIFFERENCE,
+            );
+            let gravity = difference(&plus, &minus, Function::PotentialEnergy);
+            assert_close(&what, &[value(Function::Gravity)[j]], &gravity, DIFFERENCE);
+            let pose = difference(&plus, &minus, Function::ForwardKinematics);
+            assert_close(&what, &column(Function::Jacobian)[..3], &[pose[3], pose[7], pose[11]], DIFFERENCE);
+            let [plus, minus] = [STEP, -STEP].map(|h| at(state.q.clone(), shifted(&state.dq, &e, h)));
+            let what = format!("{name}: ∂/∂q̇{}", j + 1);
+            assert_close(
+                &what,
+                &column(Function::TorqueBySpeed),
+                &difference(&plus, &minus, Function::InverseDynamics),
+                DIFFERENCE,
+            );
+            assert_close(
+                &what,
+                &[value(Function::Momentum)[j]],
+                &difference(&plus, &minus, Function::KineticEnergy),
+                DIFFERENCE,
+            );
         }
     }
 }

@@ -1,5 +1,7 @@
 //! The parameter sets have the sizes, ranks and relations that an independent numeric regressor gave.
 
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 use dyngen::Arm;
 use dyngen::base::SetKind;
 use dyngen::base::sets::Sets;

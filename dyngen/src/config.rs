@@ -6,6 +6,7 @@ use crate::diagnostic::Diagnostics;
 use crate::dynamics::Function;
 use crate::emit::{self, Options};
 use crate::model::{Error, Model};
+use crate::values::Values;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -20,13 +21,14 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug)]
 pub struct Config {
     arm: PathBuf,
+    values: Option<PathBuf>,
     options: Options,
 }
 
 /// Why nothing was generated.
 #[derive(Debug)]
 pub enum GenerateError {
-    /// The arm file is wrong.
+    /// The arm file or the file of values is wrong.
     Arm(Diagnostics),
     /// The arm's model is not to be had.
     Model(Error),
@@ -59,7 +61,7 @@ impl GenerateError {
 impl Config {
     /// Generation of the minimal set and every function from an arm file.
     pub fn new(arm: impl Into<PathBuf>) -> Self {
-        Config { arm: arm.into(), options: Options::default() }
+        Config { arm: arm.into(), values: None, options: Options::default() }
     }
 
     /// Chooses the parameter set.
@@ -76,6 +78,13 @@ impl Config {
         self
     }
 
+    /// Bakes parameter values in: a JSON file `{"parameter": number, …}` by the set's names or the arm's.
+    #[must_use]
+    pub fn values(mut self, file: impl Into<PathBuf>) -> Self {
+        self.values = Some(file.into());
+        self
+    }
+
     /// The generated source text.
     ///
     /// # Errors
@@ -83,7 +92,13 @@ impl Config {
     pub fn source(&self) -> Result<String, GenerateError> {
         let arm = Arm::read(&self.arm).map_err(GenerateError::Arm)?;
         let model = Model::derive(arm).map_err(GenerateError::Model)?;
-        emit::source(&model, &self.options).map_err(GenerateError::Model)
+        let mut options = self.options.clone();
+        if let Some(file) = &self.values {
+            let set = model.set(options.parameters).map_err(GenerateError::Model)?;
+            let values = Values::read(file).and_then(|v| v.of_set(&model, set));
+            options.values = Some(values.map_err(GenerateError::Arm)?);
+        }
+        emit::source(&model, &options).map_err(GenerateError::Model)
     }
 
     /// Writes the generated file; a file that is there already is replaced as a whole or not at all.
@@ -102,7 +117,9 @@ impl Config {
     /// # Errors
     /// As [`Config::write`].
     pub fn build(&self, name: &str) -> Result<(), GenerateError> {
-        println!("cargo::rerun-if-changed={}", self.arm.display());
+        for file in std::iter::once(&self.arm).chain(&self.values) {
+            println!("cargo::rerun-if-changed={}", file.display());
+        }
         let missing = || std::io::Error::other("OUT_DIR is not set: call this from a build script");
         let folder =
             std::env::var_os("OUT_DIR").ok_or_else(|| GenerateError::Write(name.into(), missing()))?;

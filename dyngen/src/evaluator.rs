@@ -2,10 +2,47 @@
 
 use crate::base::SetKind;
 use crate::dynamics::Function;
-use crate::dynamics::function::trig_offset;
+use crate::dynamics::function::{Argument, trig_offset};
 use crate::graph::Input;
 use crate::graph::tape::{LANES, Lane, Tape};
 use crate::model::{Error, Model};
+
+/// Samples for an [`Evaluator`]: slices of n numbers a sample, one sample after another, and the values of the
+/// parameters. What a function does not take may stay empty.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Samples<'a> {
+    /// Joint positions, rad or m.
+    pub q: &'a [f64],
+    /// Joint speeds.
+    pub dq: &'a [f64],
+    /// Joint accelerations.
+    pub ddq: &'a [f64],
+    /// Reference speeds q̇ᵣ of Slotine and Li.
+    pub dqr: &'a [f64],
+    /// Reference accelerations q̈ᵣ.
+    pub ddqr: &'a [f64],
+    /// Joint torques.
+    pub tau: &'a [f64],
+    /// What a transposed regressor is multiplied with.
+    pub e: &'a [f64],
+    /// Parameter values, the same for all samples.
+    pub parameters: &'a [f64],
+}
+
+impl<'a> Samples<'a> {
+    fn of(&self, argument: Argument) -> &'a [f64] {
+        match argument {
+            Argument::Positions => self.q,
+            Argument::Speeds => self.dq,
+            Argument::Accelerations => self.ddq,
+            Argument::ReferenceSpeeds => self.dqr,
+            Argument::ReferenceAccelerations => self.ddqr,
+            Argument::Torques => self.tau,
+            Argument::Errors => self.e,
+            Argument::Parameters => self.parameters,
+        }
+    }
+}
 
 /// A function of an arm, ready to run over any number of samples.
 #[derive(Clone, Debug)]
@@ -57,37 +94,35 @@ impl Evaluator {
     }
 
     /// Runs over samples that lie one after another: `q`, `dq` and `drive` hold n numbers a sample, `out` takes
-    /// [`Evaluator::outputs`] numbers a sample.
-    ///
-    /// `drive` is q̈, or τ for forward dynamics. Slices that the function does not need may be empty, others must all
-    /// hold the same number of samples.
+    /// [`Evaluator::outputs`] numbers a sample. `drive` is q̈, or τ for forward dynamics.
     ///
     /// # Panics
-    /// Where a slice that is needed has another length than `out` asks for.
+    /// As [`Evaluator::run`].
     pub fn evaluate(&self, q: &[f64], dq: &[f64], drive: &[f64], parameters: &[f64], out: &mut [f64]) {
+        self.run(&Samples { q, dq, ddq: drive, tau: drive, parameters, ..Samples::default() }, out);
+    }
+
+    /// Runs over samples that lie one after another; `out` takes [`Evaluator::outputs`] numbers a sample.
+    ///
+    /// # Panics
+    /// Where a slice that the function takes has another length than `out` asks for.
+    pub fn run(&self, samples: &Samples<'_>, out: &mut [f64]) {
         let (n, width) = (self.dof, self.outputs());
-        let samples = out.len() / width.max(1);
-        assert_eq!(q.len(), samples * n, "q must hold {n} numbers for each sample of out");
-        let needs = |needed: bool, slice: &[f64], name: &str| {
-            assert!(
-                !needed || slice.len() == samples * n,
-                "{name} must hold {n} numbers for each sample of out"
-            );
-        };
-        needs(self.function.takes_speeds(), dq, "dq");
-        needs(self.function.takes_accelerations() || self.function.takes_torques(), drive, "ddq or tau");
-        assert!(
-            !self.function.takes_parameters() || parameters.len() == self.parameters,
-            "{} parameters are needed, {} were given",
-            self.parameters,
-            parameters.len()
-        );
+        let count = out.len() / width.max(1);
+        for argument in self.function.arguments() {
+            let (given, expected) = match argument {
+                Argument::Parameters => (samples.parameters.len(), self.parameters),
+                other => (samples.of(*other).len(), count * n),
+            };
+            assert_eq!(given, expected, "{}: {expected} numbers are needed", argument.name());
+        }
         let mut workspace = self.tape.workspace();
-        for first in (0..samples).step_by(LANES) {
-            let count = LANES.min(samples - first);
+        for first in (0..count).step_by(LANES) {
+            let filled = LANES.min(count - first);
             // The lanes past the end repeat the last sample, so that no arithmetic meets stale values.
-            let at = |lane: usize| (first + lane.min(count - 1)) * n;
-            let gather = |from: &[f64], i: usize, to: &mut Lane| {
+            let at = |lane: usize| (first + lane.min(filled - 1)) * n;
+            let gather = |argument: Argument, i: usize, to: &mut Lane| {
+                let from = samples.of(argument);
                 for (lane, x) in to.iter_mut().enumerate() {
                     *x = from[at(lane) + i];
                 }
@@ -96,20 +131,24 @@ impl Evaluator {
                 &mut workspace,
                 |input, lane| match input {
                     Input::Sin(i) => {
-                        gather(q, i, lane);
+                        gather(Argument::Positions, i, lane);
                         lane.iter_mut().for_each(|x| *x = (*x + self.offsets[i]).sin());
                     }
                     Input::Cos(i) => {
-                        gather(q, i, lane);
+                        gather(Argument::Positions, i, lane);
                         lane.iter_mut().for_each(|x| *x = (*x + self.offsets[i]).cos());
                     }
-                    Input::Position(i) => gather(q, i, lane),
-                    Input::Speed(i) => gather(dq, i, lane),
-                    Input::Acceleration(i) | Input::Torque(i) => gather(drive, i, lane),
-                    Input::Parameter(i) => *lane = [parameters[i]; LANES],
+                    Input::Position(i) => gather(Argument::Positions, i, lane),
+                    Input::Speed(i) => gather(Argument::Speeds, i, lane),
+                    Input::Acceleration(i) => gather(Argument::Accelerations, i, lane),
+                    Input::ReferenceSpeed(i) => gather(Argument::ReferenceSpeeds, i, lane),
+                    Input::ReferenceAcceleration(i) => gather(Argument::ReferenceAccelerations, i, lane),
+                    Input::Torque(i) => gather(Argument::Torques, i, lane),
+                    Input::Error(i) => gather(Argument::Errors, i, lane),
+                    Input::Parameter(i) => *lane = [samples.parameters[i]; LANES],
                 },
                 |index, lane, negative| {
-                    for (k, value) in lane.iter().take(count).enumerate() {
+                    for (k, value) in lane.iter().take(filled).enumerate() {
                         out[(first + k) * width + index] = if negative { -value } else { *value };
                     }
                 },

@@ -10,12 +10,15 @@ mod evaluator;
 pub mod exact;
 pub mod graph;
 mod model;
+pub mod optimize;
 pub mod prove;
+mod values;
 
 pub use arm::Arm;
 pub use base::{ParameterSet, SetKind};
 pub use config::{Config, GenerateError};
 pub use diagnostic::{Diagnostic, Diagnostics};
 pub use dynamics::Function;
-pub use evaluator::Evaluator;
+pub use evaluator::{Evaluator, Samples};
 pub use model::{Error, Model};
+pub use values::Values;

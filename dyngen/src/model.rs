@@ -6,6 +6,7 @@ use crate::dynamics::elements::angle_symbols;
 use crate::dynamics::function;
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::elimination::Unproven;
+use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::prove::{self, Disagreement};
 use std::fmt;
@@ -27,6 +28,8 @@ pub enum Error {
     NoPublishedSet,
     /// The published sums change the torque: what they lose, and why.
     NotExact(Vec<(Parameter, String)>),
+    /// Values that do not fit a set.
+    Values(String),
     /// A function does not agree with the Lagrangian.
     Disagreement(Disagreement),
 }
@@ -43,6 +46,7 @@ impl fmt::Display for Error {
                 write!(f, "the published sums do not keep the torque, so no code can be proven for them:")?;
                 lost.iter().try_for_each(|(_, reason)| write!(f, "\n  {reason}"))
             }
+            Error::Values(reason) => f.write_str(reason),
             Error::Disagreement(e) => e.fmt(f),
         }
     }
@@ -101,12 +105,45 @@ impl Model {
     /// # Errors
     /// [`Error::NotExact`] for published sums that lose parameters, [`Error::Disagreement`] where the proof fails.
     pub fn function(&self, function: Function, kind: SetKind) -> Result<FunctionGraph, Error> {
+        self.proven(function, kind, None)
+    }
+
+    /// A function with the values of a set's parameters baked in, proven like any other.
+    ///
+    /// # Errors
+    /// As [`Model::function`], and [`Error::Values`] where the values do not fit the set.
+    pub fn baked_function(
+        &self,
+        function: Function,
+        kind: SetKind,
+        values: &[f64],
+    ) -> Result<FunctionGraph, Error> {
+        let set = self.set(kind)?;
+        if values.len() != set.parameters.len() {
+            let count = set.parameters.len();
+            return Err(Error::Values(format!(
+                "the {kind} set has {count} parameters, {} values were given",
+                values.len()
+            )));
+        }
+        // Every finite f64 is a rational number.
+        let exact: Option<Vec<Rational>> = values.iter().map(|x| Rational::from_float(*x)).collect();
+        let exact = exact.ok_or_else(|| Error::Values("a parameter value is not finite".to_string()))?;
+        self.proven(function, kind, Some(&exact))
+    }
+
+    fn proven(
+        &self,
+        function: Function,
+        kind: SetKind,
+        baked: Option<&[Rational]>,
+    ) -> Result<FunctionGraph, Error> {
         let set = self.set(kind)?;
         if !set.exact {
             return Err(Error::NotExact(set.lost.clone()));
         }
-        let built = function::build(function, &self.arm, &self.symbols, set, &self.sets.field);
-        prove::prove(&self.arm, &self.symbols, &self.sets, set, &built)?;
+        let built = function::build(function, &self.arm, &self.symbols, set, &self.sets.field, baked);
+        prove::prove(&self.arm, &self.symbols, &self.sets, set, &built, baked)?;
         Ok(built)
     }
 

@@ -2,20 +2,8 @@
 
 use nalgebra::SVector;
 
-/// A state with parameter values; slices of one number a joint, and one a parameter.
-#[derive(Clone, Copy, Debug)]
-pub struct Call<'a> {
-    /// Joint positions, rad or m.
-    pub q: &'a [f64],
-    /// Joint speeds.
-    pub dq: &'a [f64],
-    /// Joint accelerations.
-    pub ddq: &'a [f64],
-    /// Joint torques.
-    pub tau: &'a [f64],
-    /// Parameter values of the set.
-    pub parameters: &'a [f64],
-}
+/// A state with parameter values: one sample.
+pub type Call<'a> = dyngen::Samples<'a>;
 
 /// The results of every function, row-major, in the order of `dyngen::Function::ALL`.
 pub type Results = Vec<Vec<f64>>;
@@ -41,15 +29,32 @@ macro_rules! generated {
                 use $path as arm;
                 let joint = |x: &[f64]| SVector::<f64, { arm::JOINTS }>::from_column_slice(x);
                 let (q, dq, ddq, tau) = (joint(call.q), joint(call.dq), joint(call.ddq), joint(call.tau));
+                let (dqr, ddqr, e) = (joint(call.dqr), joint(call.ddqr), joint(call.e));
                 let p = SVector::<f64, { arm::PARAMETERS }>::from_column_slice(call.parameters);
                 vec![
                     arm::inverse_dynamics(&q, &dq, &ddq, &p).as_slice().to_vec(),
+                    arm::inverse_dynamics_without_gravity(&q, &dq, &ddq, &p).as_slice().to_vec(),
                     arm::regressor(&q, &dq, &ddq).transpose().as_slice().to_vec(),
+                    arm::regressor_transpose_times(&q, &dq, &ddq, &e).as_slice().to_vec(),
+                    arm::slotine_li_regressor(&q, &dq, &dqr, &ddqr).transpose().as_slice().to_vec(),
+                    arm::slotine_li_transpose_times(&q, &dq, &dqr, &ddqr, &e).as_slice().to_vec(),
                     arm::mass_matrix(&q, &p).transpose().as_slice().to_vec(),
+                    arm::mass_matrix_inverse(&q, &p).transpose().as_slice().to_vec(),
                     arm::coriolis_matrix(&q, &dq, &p).transpose().as_slice().to_vec(),
+                    arm::coriolis_times_speed(&q, &dq, &p).as_slice().to_vec(),
+                    arm::coriolis_transpose_times_speed(&q, &dq, &p).as_slice().to_vec(),
                     arm::gravity(&q, &p).as_slice().to_vec(),
                     arm::forward_dynamics(&q, &dq, &tau, &p).as_slice().to_vec(),
                     arm::forward_kinematics(&q).transpose().as_slice().to_vec(),
+                    arm::jacobian(&q).transpose().as_slice().to_vec(),
+                    arm::jacobian_rate_times_speed(&q, &dq).as_slice().to_vec(),
+                    vec![arm::kinetic_energy(&q, &dq, &p)],
+                    vec![arm::potential_energy(&q, &p)],
+                    arm::kinetic_energy_regressor(&q, &dq).as_slice().to_vec(),
+                    arm::potential_energy_regressor(&q).as_slice().to_vec(),
+                    arm::momentum(&q, &dq, &p).as_slice().to_vec(),
+                    arm::torque_by_position(&q, &dq, &ddq, &p).transpose().as_slice().to_vec(),
+                    arm::torque_by_speed(&q, &dq, &ddq, &p).transpose().as_slice().to_vec(),
                 ]
             },
         }),*];

@@ -148,7 +148,7 @@ impl LagrangianPolynomials {
         };
         let mut rows: Vec<SparseRow> = rows.into_values().map(nonzero).filter(|r| !r.is_empty()).collect();
         // Many functions come with the same coefficients; one row of each says all.
-        rows.sort_by(|a, b| row_key(a).cmp(&row_key(b)));
+        rows.sort_by_cached_key(row_key);
         rows.dedup();
         rows
     }

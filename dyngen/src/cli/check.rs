@@ -1,7 +1,7 @@
 //! `dyngen check`.
 
-use super::values::Values;
 use super::{Failure, model, print};
+use dyngen::Values;
 use dyngen::base::possible;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -21,7 +21,8 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let model = model(&args.arm)?;
-    let (kind, values) = Values::read(&args.values)?.recognise(&model)?;
+    let (kind, values) =
+        Values::read(&args.values).and_then(|v| v.recognise(&model)).map_err(Failure::input)?;
     let verdict = possible::check(&model, kind, &values).map_err(Failure::refused)?;
     if args.json {
         let object = serde_json::json!({

@@ -1,8 +1,8 @@
 //! `dyngen eval`.
 
-use super::values::Values;
 use super::{Failure, Set, generate, model, print};
-use dyngen::{Evaluator, Function};
+use dyngen::dynamics::function::Argument;
+use dyngen::{Evaluator, Function, Samples, Values};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -17,7 +17,8 @@ pub(super) struct Args {
     /// The function to evaluate.
     #[arg(long, value_parser = generate::function)]
     function: Function,
-    /// States: a CSV file with a header line and the columns q1…, dq1…, ddq1… (tau1… for forward dynamics).
+    /// States: a CSV file with a header line and the columns q1…, dq1…, ddq1… (tau1… for forward dynamics,
+    /// dqr1… and ddqr1… for reference motions, e1… for transposed products).
     #[arg(long, value_name = "FILE.csv")]
     states: PathBuf,
     /// The parameter set.
@@ -32,8 +33,10 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let model = model(&args.arm)?;
     let set = model.set(args.parameters.into()).map_err(Failure::refused)?;
     let function = args.function;
-    let parameters = match (&args.values, function.takes_parameters()) {
-        (Some(path), true) => Values::read(path)?.of_set(&model, set)?,
+    let parameters = match (&args.values, function.takes(Argument::Parameters)) {
+        (Some(path), true) => {
+            Values::read(path).and_then(|v| v.of_set(&model, set)).map_err(Failure::input)?
+        }
         (None, true) => {
             return Err(Failure::input(format!(
                 "{function} depends on parameter values: give them with --values FILE.json"
@@ -43,16 +46,27 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     };
     let n = model.arm().dof();
     let states = States::read(&args.states)?;
-    let q = states.columns("q", n)?;
-    let dq = if function.takes_speeds() { states.columns("dq", n)? } else { Vec::new() };
-    let drive = match (function.takes_torques(), function.takes_accelerations()) {
-        (true, _) => states.columns("tau", n)?,
-        (_, true) => states.columns("ddq", n)?,
-        _ => Vec::new(),
+    let columns = |argument: Argument| match function.takes(argument) {
+        true => states.columns(argument.name(), n),
+        false => Ok(Vec::new()),
+    };
+    let (q, dq, ddq) =
+        (columns(Argument::Positions)?, columns(Argument::Speeds)?, columns(Argument::Accelerations)?);
+    let (dqr, ddqr) = (columns(Argument::ReferenceSpeeds)?, columns(Argument::ReferenceAccelerations)?);
+    let (tau, e) = (columns(Argument::Torques)?, columns(Argument::Errors)?);
+    let samples = Samples {
+        q: &q,
+        dq: &dq,
+        ddq: &ddq,
+        dqr: &dqr,
+        ddqr: &ddqr,
+        tau: &tau,
+        e: &e,
+        parameters: &parameters,
     };
     let evaluator = Evaluator::new(&model, function, set.kind).map_err(Failure::refused)?;
     let mut out = vec![0.0; states.rows.len() * evaluator.outputs()];
-    evaluator.evaluate(&q, &dq, &drive, &parameters, &mut out);
+    evaluator.run(&samples, &mut out);
     let mut text = header(function, evaluator.shape()).join(",");
     text.push('\n');
     for row in out.chunks(evaluator.outputs().max(1)) {
@@ -69,14 +83,27 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
 
 /// Names of the result's columns: tau1 …, and for a matrix Y1_1 (row, column).
 fn header(function: Function, (rows, columns): (usize, usize)) -> Vec<String> {
+    use Function::*;
     let letter = match function {
-        Function::InverseDynamics => "tau",
-        Function::Gravity => "g",
-        Function::ForwardDynamics => "ddq",
-        Function::Regressor => "Y",
-        Function::MassMatrix => "B",
-        Function::CoriolisMatrix => "C",
-        Function::ForwardKinematics => "T",
+        InverseDynamics
+        | InverseDynamicsWithoutGravity
+        | CoriolisTimesSpeed
+        | CoriolisTransposeTimesSpeed => "tau",
+        Gravity => "g",
+        ForwardDynamics => "ddq",
+        Regressor | SlotineLiRegressor => "Y",
+        RegressorTransposeTimes | SlotineLiTransposeTimes => "Yte",
+        MassMatrix => "B",
+        MassMatrixInverse => "Binv",
+        CoriolisMatrix => "C",
+        ForwardKinematics => "T",
+        Jacobian => "J",
+        JacobianRateTimesSpeed => "a",
+        KineticEnergy | KineticEnergyRegressor => "T",
+        PotentialEnergy | PotentialEnergyRegressor => "U",
+        Momentum => "p",
+        TorqueByPosition => "dtau_dq",
+        TorqueBySpeed => "dtau_ddq",
     };
     let name = |k: usize| {
         if columns == 1 {

@@ -21,6 +21,9 @@ pub(super) struct Args {
     /// The functions, separated by commas; all of them where this is left out.
     #[arg(long, value_delimiter = ',', value_parser = function)]
     functions: Option<Vec<Function>>,
+    /// Bake parameter values in: a JSON file {"parameter": number, …}, by the set's names or the arm's.
+    #[arg(long, value_name = "FILE.json")]
+    values: Option<PathBuf>,
     /// Write nothing; fail where the file on disk is not what would be written.
     #[arg(long)]
     check: bool,
@@ -36,6 +39,9 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let mut config = Config::new(&args.arm).parameters(args.parameters.into());
     if let Some(functions) = &args.functions {
         config = config.functions(functions.clone());
+    }
+    if let Some(values) = &args.values {
+        config = config.values(values);
     }
     let failure = |e: GenerateError| match e {
         GenerateError::Model(_) => Failure::refused(e),

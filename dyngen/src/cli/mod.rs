@@ -4,7 +4,6 @@ mod check;
 mod describe;
 mod eval;
 mod generate;
-mod values;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use dyngen::base::SetKind;

@@ -4,7 +4,7 @@ use crate::arm::{Arm, ParameterKind};
 use crate::base::ParameterSet;
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::{Constant, ConstantField, Factors};
-use crate::graph::{Builder, Expr, Input};
+use crate::graph::{Builder, Expr};
 
 /// A vector's components.
 pub type Vector = [Expr; 3];
@@ -57,14 +57,20 @@ pub struct Link {
     pub rotor: Expr,
 }
 
-/// The links of an arm with the parameters of a set: every parameter of the set is an input, and what carries none is zero.
-pub fn links(b: &Builder, arm: &Arm, set: &ParameterSet, field: &ConstantField) -> Vec<Link> {
+/// The links of an arm with the values of a set's parameters; what carries none is zero.
+pub fn links(
+    b: &Builder,
+    arm: &Arm,
+    set: &ParameterSet,
+    field: &ConstantField,
+    value_of: impl Fn(usize) -> Expr,
+) -> Vec<Link> {
     let mut values = vec![[Expr::ZERO; 11]; arm.dof()];
     for (index, parameter) in set.parameters.iter().enumerate() {
-        let input = b.input(Input::Parameter(index));
+        let given = value_of(index);
         for (carrier, factor) in &parameter.carriers {
             let value = &mut values[carrier.link][carrier.kind as usize];
-            *value = b.add(value, &b.mul(&constant(b, field, factor), &input));
+            *value = b.add(value, &b.mul(&constant(b, field, factor), &given));
         }
     }
     values.iter().map(link_of).collect()

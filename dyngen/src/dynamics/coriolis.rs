@@ -8,7 +8,7 @@
 use super::body::{Body, Link, Vector, ZERO};
 use super::composite::{body_back_x, body_back_z};
 use super::elements::{ArmElements, JointElements, turn_x, turn_z};
-use super::motion::{JointMotion, Motion, motions};
+use super::motion::{Drive, JointMotion, Motion, motions};
 use super::wrench::{Wrench, to_joint, to_link_before};
 use crate::arm::{Convention, JointKind};
 use crate::exact::algebra::Algebra;
@@ -34,7 +34,8 @@ struct Row {
 /// C(q, q̇), row-major n × n.
 pub fn coriolis_matrix(b: &Builder, arm: &ArmElements<Expr>, links: &[Link]) -> Vec<Expr> {
     let n = links.len();
-    let motions = motions(b, arm, &vec![Expr::ZERO; n], false);
+    let still = Drive { reference: None, accelerations: vec![Expr::ZERO; n], gravity: false };
+    let motions = motions(b, arm, &still);
     let mut matrix = vec![Expr::ZERO; n * n];
     let mut outer = Moving::NONE;
     for i in (0..n).rev() {

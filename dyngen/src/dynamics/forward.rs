@@ -3,40 +3,76 @@
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
 
-/// Solves B·x = r for a symmetric matrix by B = L·D·Lᵀ; B positive definite keeps every division defined.
+/// Solves B·x = r for a symmetric matrix; B positive definite keeps every division defined.
 pub fn solve_symmetric(b: &Builder, matrix: &[Expr], right: &[Expr]) -> Vec<Expr> {
-    let n = right.len();
-    let mut lower = vec![Expr::ZERO; n * n];
-    let mut diagonal = vec![Expr::ZERO; n];
-    // From the last joint inwards, as a composite recursion would: the outer joints couple to fewer others.
-    for i in (0..n).rev() {
-        let mut d = matrix[i * n + i];
-        for k in i + 1..n {
-            d = b.sub(&d, &b.mul(&b.mul(&lower[k * n + i], &lower[k * n + i]), &diagonal[k]));
+    Factors::of(b, matrix, right.len()).solve(b, right)
+}
+
+/// B⁻¹, row-major n × n.
+pub fn inverse_symmetric(b: &Builder, matrix: &[Expr], n: usize) -> Vec<Expr> {
+    let factors = Factors::of(b, matrix, n);
+    let mut inverse = vec![Expr::ZERO; n * n];
+    for j in 0..n {
+        let unit: Vec<Expr> = (0..n).map(|i| if i == j { Expr::ONE } else { Expr::ZERO }).collect();
+        let column = factors.solve(b, &unit);
+        // One triangle is computed, the other is its mirror.
+        for i in 0..=j {
+            inverse[i * n + j] = column[i];
+            inverse[j * n + i] = column[i];
         }
-        diagonal[i] = d;
-        for j in (0..i).rev() {
-            let mut sum = matrix[i * n + j];
+    }
+    inverse
+}
+
+/// B = Lᵀ·D·L with unit lower triangular L, from the last joint inwards as a composite recursion would go.
+struct Factors {
+    n: usize,
+    lower: Vec<Expr>,
+    /// 1/D
+    inverse: Vec<Expr>,
+}
+
+impl Factors {
+    fn of(b: &Builder, matrix: &[Expr], n: usize) -> Factors {
+        let mut lower = vec![Expr::ZERO; n * n];
+        // What L is before the division by D, so that each term of a sum is one product.
+        let mut scaled = vec![Expr::ZERO; n * n];
+        let mut inverse = vec![Expr::ZERO; n];
+        for i in (0..n).rev() {
+            let mut d = matrix[i * n + i];
             for k in i + 1..n {
-                sum = b.sub(&sum, &b.mul(&b.mul(&lower[k * n + i], &lower[k * n + j]), &diagonal[k]));
+                d = b.sub(&d, &b.mul(&lower[k * n + i], &scaled[k * n + i]));
             }
-            lower[i * n + j] = b.div(sum, d);
+            inverse[i] = b.div(Expr::ONE, d);
+            for j in (0..i).rev() {
+                let mut sum = matrix[i * n + j];
+                for k in i + 1..n {
+                    sum = b.sub(&sum, &b.mul(&lower[k * n + i], &scaled[k * n + j]));
+                }
+                scaled[i * n + j] = sum;
+                lower[i * n + j] = b.mul(&sum, &inverse[i]);
+            }
         }
+        Factors { n, lower, inverse }
     }
-    // B = Lᵀ·D·L with unit lower-triangular L: first Lᵀ y = r from the last, then D, then L x = z from the first.
-    let mut x = right.to_vec();
-    for i in (0..n).rev() {
-        for k in i + 1..n {
-            x[i] = b.sub(&x[i], &b.mul(&lower[k * n + i], &x[k]));
+
+    /// First Lᵀ y = r from the last joint, then D, then L x = z from the first.
+    fn solve(&self, b: &Builder, right: &[Expr]) -> Vec<Expr> {
+        let n = self.n;
+        let mut x = right.to_vec();
+        for i in (0..n).rev() {
+            for k in i + 1..n {
+                x[i] = b.sub(&x[i], &b.mul(&self.lower[k * n + i], &x[k]));
+            }
         }
-    }
-    for i in 0..n {
-        x[i] = b.div(x[i], diagonal[i]);
-    }
-    for i in 0..n {
-        for k in 0..i {
-            x[i] = b.sub(&x[i], &b.mul(&lower[i * n + k], &x[k]));
+        for i in 0..n {
+            x[i] = b.mul(&x[i], &self.inverse[i]);
         }
+        for i in 0..n {
+            for k in 0..i {
+                x[i] = b.sub(&x[i], &b.mul(&self.lower[i * n + k], &x[k]));
+            }
+        }
+        x
     }
-    x
 }

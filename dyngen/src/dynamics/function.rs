@@ -2,13 +2,17 @@
 
 use super::body::links;
 use super::elements::{ArmElements, Source};
-use super::{composite, coriolis, forward, inverse, pose, regressor};
+use super::motion::Drive;
+use super::{composite, coriolis, energy, forward, inverse, momentum, pose, regressor};
 use crate::arm::Arm;
 use crate::base::ParameterSet;
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
+use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
+use crate::graph::differentiate::{self, Direction};
 use crate::graph::{Builder, Expr, Graph, Input};
+use crate::optimize;
 use std::fmt;
 
 /// A function of the arm's state.
@@ -16,37 +20,161 @@ use std::fmt;
 pub enum Function {
     /// τ(q, q̇, q̈) = B·q̈ + C·q̇ + g
     InverseDynamics,
+    /// B·q̈ + C·q̇
+    InverseDynamicsWithoutGravity,
     /// Y(q, q̇, q̈), n × p
     Regressor,
+    /// Yᵀ·e, p × 1
+    RegressorTransposeTimes,
+    /// Y(q, q̇, q̇ᵣ, q̈ᵣ) of Slotine and Li, n × p
+    SlotineLiRegressor,
+    /// Its transpose times e, p × 1
+    SlotineLiTransposeTimes,
     /// B(q), n × n
     MassMatrix,
+    /// B⁻¹(q), n × n
+    MassMatrixInverse,
     /// C(q, q̇), n × n, of Christoffel symbols
     CoriolisMatrix,
+    /// C·q̇
+    CoriolisTimesSpeed,
+    /// Cᵀ·q̇
+    CoriolisTransposeTimesSpeed,
     /// g(q)
     Gravity,
     /// q̈(q, q̇, τ)
     ForwardDynamics,
     /// Homogeneous transform of the last frame to the base, 4 × 4
     ForwardKinematics,
+    /// Geometric Jacobian of the last frame, 6 × n
+    Jacobian,
+    /// J̇·q̇, 6 × 1
+    JacobianRateTimesSpeed,
+    /// T(q, q̇)
+    KineticEnergy,
+    /// U(q)
+    PotentialEnergy,
+    /// T = row·π, 1 × p
+    KineticEnergyRegressor,
+    /// U = row·π, 1 × p
+    PotentialEnergyRegressor,
+    /// B·q̇
+    Momentum,
+    /// ∂τ/∂q, n × n
+    TorqueByPosition,
+    /// ∂τ/∂q̇, n × n
+    TorqueBySpeed,
+}
+
+/// The arguments of a function, in the order in which it takes them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Argument {
+    /// q
+    Positions,
+    /// q̇
+    Speeds,
+    /// q̈
+    Accelerations,
+    /// q̇ᵣ
+    ReferenceSpeeds,
+    /// q̈ᵣ
+    ReferenceAccelerations,
+    /// τ
+    Torques,
+    /// e
+    Errors,
+    /// π
+    Parameters,
+}
+
+impl Argument {
+    /// The name in the emitted code; with the joint's number the column in a table of states.
+    pub fn name(self) -> &'static str {
+        match self {
+            Argument::Positions => "q",
+            Argument::Speeds => "dq",
+            Argument::Accelerations => "ddq",
+            Argument::ReferenceSpeeds => "dqr",
+            Argument::ReferenceAccelerations => "ddqr",
+            Argument::Torques => "tau",
+            Argument::Errors => "e",
+            Argument::Parameters => "parameters",
+        }
+    }
+
+    /// What it is, with its unit.
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Argument::Positions => "joint positions, rad (m where prismatic)",
+            Argument::Speeds => "joint speeds, rad/s",
+            Argument::Accelerations => "joint accelerations, rad/s²",
+            Argument::ReferenceSpeeds => "reference speeds q̇ᵣ, rad/s",
+            Argument::ReferenceAccelerations => "reference accelerations q̈ᵣ, rad/s²",
+            Argument::Torques => "joint torques, N·m (N where prismatic)",
+            Argument::Errors => "one number for each joint",
+            Argument::Parameters => "the values of [`PARAMETER_NAMES`]",
+        }
+    }
 }
 
 impl Function {
     /// All of them, in the order in which they are emitted.
-    pub const ALL: [Function; 7] = {
+    pub const ALL: [Function; 23] = {
         use Function::*;
-        [InverseDynamics, Regressor, MassMatrix, CoriolisMatrix, Gravity, ForwardDynamics, ForwardKinematics]
+        [
+            InverseDynamics,
+            InverseDynamicsWithoutGravity,
+            Regressor,
+            RegressorTransposeTimes,
+            SlotineLiRegressor,
+            SlotineLiTransposeTimes,
+            MassMatrix,
+            MassMatrixInverse,
+            CoriolisMatrix,
+            CoriolisTimesSpeed,
+            CoriolisTransposeTimesSpeed,
+            Gravity,
+            ForwardDynamics,
+            ForwardKinematics,
+            Jacobian,
+            JacobianRateTimesSpeed,
+            KineticEnergy,
+            PotentialEnergy,
+            KineticEnergyRegressor,
+            PotentialEnergyRegressor,
+            Momentum,
+            TorqueByPosition,
+            TorqueBySpeed,
+        ]
     };
 
     /// The name on the command line and in the emitted code.
     pub fn name(self) -> &'static str {
+        use Function::*;
         match self {
-            Function::InverseDynamics => "inverse_dynamics",
-            Function::Regressor => "regressor",
-            Function::MassMatrix => "mass_matrix",
-            Function::CoriolisMatrix => "coriolis_matrix",
-            Function::Gravity => "gravity",
-            Function::ForwardDynamics => "forward_dynamics",
-            Function::ForwardKinematics => "forward_kinematics",
+            InverseDynamics => "inverse_dynamics",
+            InverseDynamicsWithoutGravity => "inverse_dynamics_without_gravity",
+            Regressor => "regressor",
+            RegressorTransposeTimes => "regressor_transpose_times",
+            SlotineLiRegressor => "slotine_li_regressor",
+            SlotineLiTransposeTimes => "slotine_li_transpose_times",
+            MassMatrix => "mass_matrix",
+            MassMatrixInverse => "mass_matrix_inverse",
+            CoriolisMatrix => "coriolis_matrix",
+            CoriolisTimesSpeed => "coriolis_times_speed",
+            CoriolisTransposeTimesSpeed => "coriolis_transpose_times_speed",
+            Gravity => "gravity",
+            ForwardDynamics => "forward_dynamics",
+            ForwardKinematics => "forward_kinematics",
+            Jacobian => "jacobian",
+            JacobianRateTimesSpeed => "jacobian_rate_times_speed",
+            KineticEnergy => "kinetic_energy",
+            PotentialEnergy => "potential_energy",
+            KineticEnergyRegressor => "kinetic_energy_regressor",
+            PotentialEnergyRegressor => "potential_energy_regressor",
+            Momentum => "momentum",
+            TorqueByPosition => "torque_by_position",
+            TorqueBySpeed => "torque_by_speed",
         }
     }
 
@@ -57,32 +185,45 @@ impl Function {
 
     /// Rows and columns of the result for n joints and p parameters.
     pub fn shape(self, n: usize, p: usize) -> (usize, usize) {
+        use Function::*;
         match self {
-            Function::Regressor => (n, p),
-            Function::MassMatrix | Function::CoriolisMatrix => (n, n),
-            Function::ForwardKinematics => (4, 4),
+            Regressor | SlotineLiRegressor => (n, p),
+            RegressorTransposeTimes | SlotineLiTransposeTimes => (p, 1),
+            MassMatrix | MassMatrixInverse | CoriolisMatrix | TorqueByPosition | TorqueBySpeed => (n, n),
+            ForwardKinematics => (4, 4),
+            Jacobian => (6, n),
+            JacobianRateTimesSpeed => (6, 1),
+            KineticEnergy | PotentialEnergy => (1, 1),
+            KineticEnergyRegressor | PotentialEnergyRegressor => (1, p),
             _ => (n, 1),
         }
     }
 
-    /// Whether the result depends on parameter values.
-    pub fn takes_parameters(self) -> bool {
-        !matches!(self, Function::Regressor | Function::ForwardKinematics)
+    /// What it takes.
+    pub fn arguments(self) -> &'static [Argument] {
+        use Argument::*;
+        use Function::*;
+        match self {
+            InverseDynamics | InverseDynamicsWithoutGravity | TorqueByPosition | TorqueBySpeed => {
+                &[Positions, Speeds, Accelerations, Parameters]
+            }
+            Regressor => &[Positions, Speeds, Accelerations],
+            RegressorTransposeTimes => &[Positions, Speeds, Accelerations, Errors],
+            SlotineLiRegressor => &[Positions, Speeds, ReferenceSpeeds, ReferenceAccelerations],
+            SlotineLiTransposeTimes => &[Positions, Speeds, ReferenceSpeeds, ReferenceAccelerations, Errors],
+            MassMatrix | MassMatrixInverse | Gravity | PotentialEnergy => &[Positions, Parameters],
+            CoriolisMatrix | CoriolisTimesSpeed | CoriolisTransposeTimesSpeed | KineticEnergy | Momentum => {
+                &[Positions, Speeds, Parameters]
+            }
+            ForwardDynamics => &[Positions, Speeds, Torques, Parameters],
+            ForwardKinematics | Jacobian | PotentialEnergyRegressor => &[Positions],
+            JacobianRateTimesSpeed | KineticEnergyRegressor => &[Positions, Speeds],
+        }
     }
 
-    /// Whether it depends on q̇.
-    pub fn takes_speeds(self) -> bool {
-        !matches!(self, Function::MassMatrix | Function::Gravity | Function::ForwardKinematics)
-    }
-
-    /// Whether it depends on q̈.
-    pub fn takes_accelerations(self) -> bool {
-        matches!(self, Function::InverseDynamics | Function::Regressor)
-    }
-
-    /// Whether it depends on τ.
-    pub fn takes_torques(self) -> bool {
-        self == Function::ForwardDynamics
+    /// Whether it takes an argument.
+    pub fn takes(self, argument: Argument) -> bool {
+        self.arguments().contains(&argument)
     }
 }
 
@@ -103,41 +244,106 @@ pub struct FunctionGraph {
     pub outputs: Vec<Expr>,
     /// Its rows and columns.
     pub shape: (usize, usize),
+    /// Number of joints.
+    pub joints: usize,
+    /// Number of parameters of the set.
+    pub parameters: usize,
+    /// Whether the parameters' values are constants of the graph.
+    pub baked: bool,
 }
 
-/// Builds a function of an arm for a parameter set.
+impl FunctionGraph {
+    /// What it takes: the function's arguments, without the parameters where their values are baked in.
+    pub fn arguments(&self) -> impl Iterator<Item = Argument> + '_ {
+        let baked = self.baked;
+        self.function.arguments().iter().copied().filter(move |a| !(baked && *a == Argument::Parameters))
+    }
+}
+
+/// Builds a function of an arm for a parameter set, with its parameters as inputs or their values baked in.
 pub fn build(
     function: Function,
     arm: &Arm,
     symbols: &AngleSymbols,
     set: &ParameterSet,
     field: &ConstantField,
+    baked: Option<&[Rational]>,
 ) -> FunctionGraph {
     let b = Builder::new();
+    let value = |i: usize| match baked {
+        Some(values) => b.constant(&values[i]),
+        None => b.input(Input::Parameter(i)),
+    };
     let n = arm.dof();
     let elements = ArmElements::build(&b, arm, symbols, &mut Inputs { b: &b, arm });
-    let links = links(&b, arm, set, field);
+    let links = links(&b, arm, set, field, value);
     let input = |of: fn(usize) -> Input| -> Vec<Expr> { (0..n).map(|i| b.input(of(i))).collect() };
     let none = vec![Expr::ZERO; n];
+    let torque = |accelerations: &[Expr], gravity: bool| {
+        inverse::inverse_dynamics(&b, &elements, &links, accelerations, gravity)
+    };
+    let regressor = |drive: &Drive| regressor::regressor(&b, arm, &elements, set, field, drive);
+    let motion = || Drive { reference: None, accelerations: input(Input::Acceleration), gravity: true };
+    let reference = || Drive {
+        reference: Some(input(Input::ReferenceSpeed)),
+        accelerations: input(Input::ReferenceAcceleration),
+        gravity: true,
+    };
+    let transposed = |rows: Vec<Expr>| -> Vec<Expr> {
+        let p = set.parameters.len();
+        let product = |c: usize| {
+            (0..n).fold(Expr::ZERO, |sum, i| b.add(&sum, &b.mul(&rows[i * p + c], &b.input(Input::Error(i)))))
+        };
+        (0..p).map(product).collect()
+    };
+    let derivatives = |direction: fn(usize) -> Direction| -> Vec<Expr> {
+        let torques = torque(&input(Input::Acceleration), true);
+        let columns: Vec<Vec<Expr>> =
+            (0..n).map(|j| differentiate::derivative(&b, &torques, direction(j))).collect();
+        (0..n * n).map(|k| columns[k % n][k / n]).collect()
+    };
     let outputs = match function {
-        Function::InverseDynamics => {
-            inverse::inverse_dynamics(&b, &elements, &links, &input(Input::Acceleration), true)
-        }
-        Function::Regressor => {
-            regressor::regressor(&b, arm, &elements, set, field, &input(Input::Acceleration))
-        }
+        Function::InverseDynamics => torque(&input(Input::Acceleration), true),
+        Function::InverseDynamicsWithoutGravity => torque(&input(Input::Acceleration), false),
+        Function::Regressor => regressor(&motion()),
+        Function::RegressorTransposeTimes => transposed(regressor(&motion())),
+        Function::SlotineLiRegressor => regressor(&reference()),
+        Function::SlotineLiTransposeTimes => transposed(regressor(&reference())),
         Function::MassMatrix => composite::mass_matrix(&b, &elements, &links),
+        Function::MassMatrixInverse => {
+            forward::inverse_symmetric(&b, &composite::mass_matrix(&b, &elements, &links), n)
+        }
         Function::CoriolisMatrix => coriolis::coriolis_matrix(&b, &elements, &links),
+        Function::CoriolisTimesSpeed => torque(&none, false),
+        Function::CoriolisTransposeTimesSpeed => {
+            momentum::coriolis_transpose_times_speed(&b, &elements, &links)
+        }
         Function::Gravity => inverse::gravity(&b, &elements, &links),
         Function::ForwardDynamics => {
-            let bias = inverse::inverse_dynamics(&b, &elements, &links, &none, true);
+            let bias = torque(&none, true);
             let right: Vec<Expr> = input(Input::Torque).iter().zip(&bias).map(|(t, c)| b.sub(t, c)).collect();
             forward::solve_symmetric(&b, &composite::mass_matrix(&b, &elements, &links), &right)
         }
         Function::ForwardKinematics => pose::forward_kinematics(&b, &elements),
+        Function::Jacobian => pose::jacobian(&b, &elements),
+        Function::JacobianRateTimesSpeed => pose::jacobian_rate_times_speed(&b, &elements),
+        Function::KineticEnergy => vec![momentum::kinetic_energy(&b, &elements, &links)],
+        Function::PotentialEnergy => {
+            let row = energy::potential_regressor(&b, arm, &elements, set, field);
+            let term = |(i, column): (usize, &Expr)| b.mul(column, &value(i));
+            let terms: Vec<Expr> = row.iter().enumerate().map(term).collect();
+            vec![terms.iter().fold(Expr::ZERO, |sum, t| b.add(&sum, t))]
+        }
+        Function::KineticEnergyRegressor => energy::kinetic_regressor(&b, arm, &elements, set, field),
+        Function::PotentialEnergyRegressor => energy::potential_regressor(&b, arm, &elements, set, field),
+        Function::Momentum => momentum::momentum(&b, &elements, &links),
+        Function::TorqueByPosition => derivatives(Direction::Position),
+        Function::TorqueBySpeed => derivatives(Direction::Speed),
     };
-    let shape = function.shape(n, set.parameters.len());
-    FunctionGraph { function, graph: b.finish(), outputs, shape }
+    let parameters = set.parameters.len();
+    let (graph, outputs) = optimize::optimize(b.finish(), outputs, field);
+    let shape = function.shape(n, parameters);
+    FunctionGraph { function, graph, outputs, shape, joints: n, parameters, baked: baked.is_some() }
 }
 
 /// The arm's quantities as inputs and constants of a graph.

@@ -2,7 +2,7 @@
 
 use super::body::{Body, Link, Vector, ZERO};
 use super::elements::ArmElements;
-use super::motion::{JointMotion, Motion, motions, spin_column};
+use super::motion::{Drive, JointMotion, Motion, motions};
 use super::wrench::{Wrench, to_joint, to_link_before};
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
@@ -13,9 +13,10 @@ pub fn inverse_dynamics(
     arm: &ArmElements<Expr>,
     links: &[Link],
     accelerations: &[Expr],
-    with_gravity: bool,
+    gravity: bool,
 ) -> Vec<Expr> {
-    let motions = motions(b, arm, accelerations, with_gravity);
+    let drive = Drive { reference: None, accelerations: accelerations.to_vec(), gravity };
+    let motions = motions(b, arm, &drive);
     let mut torques = vec![Expr::ZERO; links.len()];
     let mut outer = Wrench::NONE;
     for i in (0..links.len()).rev() {
@@ -27,7 +28,8 @@ pub fn inverse_dynamics(
         if let Some(ratio) = joint.ratio {
             let rotor = b.mul(&ratio, &link.rotor);
             torques[i] = b.add(&torques[i], &rotor_torque(b, rotor, ratio, accelerations[i], motion));
-            let moment = rotor_moment(b, rotor, joint.speed, accelerations[i], &motion.before_z);
+            let speeds = (joint.speed, joint.speed);
+            let moment = rotor_moment(b, rotor, speeds, accelerations[i], &motion.before_z);
             before = before.plus(b, &Wrench { force: ZERO, moment });
         }
         outer = to_link_before(b, arm.convention, joint, &before);
@@ -47,7 +49,7 @@ fn body_wrench(b: &Builder, body: &Body, motion: &Motion) -> Wrench {
     let mut force: Vector = std::array::from_fn(|i| b.mul(&body.mass, &motion.acceleration[i]));
     for (axis, moment) in body.moment.iter().enumerate() {
         if *moment != Expr::ZERO {
-            force = super::motion::plus_scaled(b, &force, *moment, &spin_column(b, motion, axis));
+            force = super::motion::plus_scaled(b, &force, *moment, &motion.spin_column(b, axis));
         }
     }
     let euler = body.inertia_times(b, &motion.alpha);
@@ -58,12 +60,12 @@ fn body_wrench(b: &Builder, body: &Body, motion: &Motion) -> Wrench {
 }
 
 /// On the joint's own torque: k·Im·(k q̈ + z·α of the link before).
-fn rotor_torque(b: &Builder, rotor: Expr, ratio: Expr, ddq: Expr, motion: &JointMotion) -> Expr {
+pub fn rotor_torque(b: &Builder, rotor: Expr, ratio: Expr, ddq: Expr, motion: &JointMotion) -> Expr {
     b.mul(&rotor, &b.add(&b.mul(&ratio, &ddq), &motion.before_z.alpha[2]))
 }
 
-/// On the link before: the rate of the rotor's own angular momentum, k·Im·(q̈ z + q̇ ω×z).
-fn rotor_moment(b: &Builder, rotor: Expr, dq: Expr, ddq: Expr, before: &Motion) -> Vector {
-    let spin = b.mul(&rotor, &dq);
-    [b.mul(&spin, &before.omega[1]), -b.mul(&spin, &before.omega[0]), b.mul(&rotor, &ddq)]
+/// On the link before: the rate of the rotor's own angular momentum, k·Im·(q̈ z + q̇ ω×z); `speeds` are q̇ and q̇ᵣ.
+pub fn rotor_moment(b: &Builder, rotor: Expr, speeds: (Expr, Expr), ddq: Expr, before: &Motion) -> Vector {
+    let turned = before.axis_turn(b, speeds.0, speeds.1);
+    [b.mul(&rotor, &turned[0]), b.mul(&rotor, &turned[1]), b.mul(&rotor, &ddq)]
 }

@@ -7,10 +7,15 @@ use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
 
 /// The motion of a frame relative to the base, in the frame's own axes.
+///
+/// Accelerations are J·q̈ᵣ + J̇(q, q̇)·q̇ᵣ, symmetric in the speeds q̇ and the reference speeds q̇ᵣ; with q̇ᵣ = q̇ they are the
+/// accelerations of the motion itself.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion {
-    /// Angular velocity ω.
+    /// Angular velocity ω at the speeds q̇.
     pub omega: Vector,
+    /// Angular velocity ωᵣ at the reference speeds.
+    pub reference: Vector,
     /// Angular acceleration.
     pub alpha: Vector,
     /// Acceleration of the origin, less gravity.
@@ -30,27 +35,38 @@ pub struct JointMotion {
     pub link: Motion,
 }
 
-/// Runs from the base to the last link. `accelerations` may be zeros, and gravity may be left out.
-pub fn motions(
-    b: &Builder,
-    arm: &ArmElements<Expr>,
-    accelerations: &[Expr],
-    with_gravity: bool,
-) -> Vec<JointMotion> {
-    let gravity = if with_gravity { arm.gravity.map(|g| -g) } else { ZERO };
-    let mut state = Motion { omega: ZERO, alpha: ZERO, acceleration: gravity };
+/// What drives the recursion beside the joints' positions and speeds.
+#[derive(Clone, Debug)]
+pub struct Drive {
+    /// Reference speeds q̇ᵣ; `None` where they are the speeds themselves.
+    pub reference: Option<Vec<Expr>>,
+    /// Accelerations q̈, or reference accelerations q̈ᵣ.
+    pub accelerations: Vec<Expr>,
+    /// Whether gravity acts.
+    pub gravity: bool,
+}
+
+/// Runs from the base to the last link.
+pub fn motions(b: &Builder, arm: &ArmElements<Expr>, drive: &Drive) -> Vec<JointMotion> {
+    let gravity = if drive.gravity { arm.gravity.map(|g| -g) } else { ZERO };
+    let mut state = Motion { omega: ZERO, reference: ZERO, alpha: ZERO, acceleration: gravity };
     let mut all = Vec::with_capacity(arm.joints.len());
-    for (joint, acceleration) in arm.joints.iter().zip(accelerations) {
+    for (i, joint) in arm.joints.iter().enumerate() {
         let start = state;
+        let rates = Rates {
+            speed: joint.speed,
+            reference: drive.reference.as_ref().map_or(joint.speed, |r| r[i]),
+            acceleration: drive.accelerations[i],
+        };
         let motion = match arm.convention {
             Convention::Standard => {
-                let after_z = about_z(b, joint, *acceleration, &start);
+                let after_z = about_z(b, joint, &rates, &start);
                 let link = about_x(b, joint, &after_z);
                 JointMotion { before_x: after_z, before_z: start, after_z, link }
             }
             Convention::Modified => {
                 let before_z = about_x(b, joint, &start);
-                let link = about_z(b, joint, *acceleration, &before_z);
+                let link = about_z(b, joint, &rates, &before_z);
                 JointMotion { before_x: start, before_z, after_z: link, link }
             }
         };
@@ -60,15 +76,53 @@ pub fn motions(
     all
 }
 
-/// One column of U = [α×] + [ω×][ω×]: the acceleration of a point at unit distance along an axis, relative to the origin.
-pub fn spin_column(b: &Builder, motion: &Motion, axis: usize) -> Vector {
-    let [w, a] = [&motion.omega, &motion.alpha];
-    let (i, j, k) = (axis, (axis + 1) % 3, (axis + 2) % 3);
-    let mut column = ZERO;
-    column[i] = -b.add(&b.mul(&w[j], &w[j]), &b.mul(&w[k], &w[k]));
-    column[j] = b.add(&b.mul(&w[i], &w[j]), &a[k]);
-    column[k] = b.sub(&b.mul(&w[i], &w[k]), &a[j]);
-    column
+/// Rates of one joint.
+#[derive(Clone, Copy)]
+struct Rates {
+    speed: Expr,
+    reference: Expr,
+    acceleration: Expr,
+}
+
+/// ½(uᵢ·rⱼ + rᵢ·uⱼ), which is uᵢ·uⱼ where r is u.
+fn symmetric_product(b: &Builder, u: &Vector, r: &Vector, i: usize, j: usize) -> Expr {
+    if u == r {
+        return b.mul(&u[i], &u[j]);
+    }
+    if i == j {
+        return b.mul(&u[i], &r[i]);
+    }
+    let half = b.constant(&crate::exact::rational::Rational::new(1.into(), 2.into()));
+    b.mul(&half, &b.add(&b.mul(&u[i], &r[j]), &b.mul(&r[i], &u[j])))
+}
+
+impl Motion {
+    /// The product ωᵢ·ωⱼ, symmetric in ω and ωᵣ.
+    pub fn product(&self, b: &Builder, i: usize, j: usize) -> Expr {
+        symmetric_product(b, &self.omega, &self.reference, i, j)
+    }
+
+    /// One column of U = [α×] + [ω×][ω×]: the acceleration of a point at unit distance along an axis, relative to the
+    /// origin.
+    pub fn spin_column(&self, b: &Builder, axis: usize) -> Vector {
+        let a = &self.alpha;
+        let (i, j, k) = (axis, (axis + 1) % 3, (axis + 2) % 3);
+        let mut column = ZERO;
+        column[i] = -b.add(&self.product(b, j, j), &self.product(b, k, k));
+        column[j] = b.add(&self.product(b, i, j), &a[k]);
+        column[k] = b.sub(&self.product(b, i, k), &a[j]);
+        column
+    }
+
+    /// q̇·ω×z for a joint axis z that is fixed in the frame, symmetric in speeds and reference speeds.
+    pub fn axis_turn(&self, b: &Builder, speed: Expr, reference: Expr) -> Vector {
+        let across = |i: usize| {
+            let u = [self.omega[i], speed, Expr::ZERO];
+            let r = [self.reference[i], reference, Expr::ZERO];
+            symmetric_product(b, &u, &r, 0, 1)
+        };
+        [across(1), -across(0), Expr::ZERO]
+    }
 }
 
 /// v + length·u
@@ -80,37 +134,44 @@ pub fn plus_scaled(b: &Builder, v: &Vector, length: Expr, u: &Vector) -> Vector 
 fn about_x(b: &Builder, joint: &JointElements<Expr>, from: &Motion) -> Motion {
     let mut acceleration = from.acceleration;
     if joint.a != Expr::ZERO {
-        acceleration = plus_scaled(b, &acceleration, joint.a, &spin_column(b, from, 0));
+        acceleration = plus_scaled(b, &acceleration, joint.a, &from.spin_column(b, 0));
     }
     let turn = |v: &Vector| turn_x(b, &joint.sin_alpha, &joint.cos_alpha, v);
-    Motion { omega: turn(&from.omega), alpha: turn(&from.alpha), acceleration: turn(&acceleration) }
+    Motion {
+        omega: turn(&from.omega),
+        reference: turn(&from.reference),
+        alpha: turn(&from.alpha),
+        acceleration: turn(&acceleration),
+    }
 }
 
 /// Rz(θ) Tz(d) with the joint's own motion.
-fn about_z(b: &Builder, joint: &JointElements<Expr>, ddq: Expr, from: &Motion) -> Motion {
+fn about_z(b: &Builder, joint: &JointElements<Expr>, rates: &Rates, from: &Motion) -> Motion {
     let mut acceleration = from.acceleration;
     if joint.shift != Expr::ZERO {
-        acceleration = plus_scaled(b, &acceleration, joint.shift, &spin_column(b, from, 2));
+        acceleration = plus_scaled(b, &acceleration, joint.shift, &from.spin_column(b, 2));
     }
     let turn = |v: &Vector| turn_z(b, &joint.sin, &joint.cos, v);
-    let (mut omega, mut alpha, mut acceleration) =
-        (turn(&from.omega), turn(&from.alpha), turn(&acceleration));
-    let dq = joint.speed;
+    let mut to = Motion {
+        omega: turn(&from.omega),
+        reference: turn(&from.reference),
+        alpha: turn(&from.alpha),
+        acceleration: turn(&acceleration),
+    };
+    let crossed = to.axis_turn(b, rates.speed, rates.reference);
     match joint.kind {
         JointKind::Revolute => {
-            // ω×(q̇ z) of the frame that turns.
-            alpha[0] = b.add(&alpha[0], &b.mul(&omega[1], &dq));
-            alpha[1] = b.sub(&alpha[1], &b.mul(&omega[0], &dq));
-            alpha[2] = b.add(&alpha[2], &ddq);
-            omega[2] = b.add(&omega[2], &dq);
+            to.alpha = std::array::from_fn(|i| b.add(&to.alpha[i], &crossed[i]));
+            to.alpha[2] = b.add(&to.alpha[2], &rates.acceleration);
+            to.omega[2] = b.add(&to.omega[2], &rates.speed);
+            to.reference[2] = b.add(&to.reference[2], &rates.reference);
         }
         JointKind::Prismatic => {
             // Coriolis acceleration 2 ω×(q̇ z).
-            let twice = b.mul(&b.integer(2), &dq);
-            acceleration[0] = b.add(&acceleration[0], &b.mul(&omega[1], &twice));
-            acceleration[1] = b.sub(&acceleration[1], &b.mul(&omega[0], &twice));
-            acceleration[2] = b.add(&acceleration[2], &ddq);
+            let twice = b.integer(2);
+            to.acceleration = plus_scaled(b, &to.acceleration, twice, &crossed);
+            to.acceleration[2] = b.add(&to.acceleration[2], &rates.acceleration);
         }
     }
-    Motion { omega, alpha, acceleration }
+    to
 }

@@ -1,45 +1,109 @@
-//! Forward kinematics: where the last link is.
+//! Kinematics of the last link: pose, Jacobian, and the acceleration that speeds alone make.
 
 use super::body::Vector;
-use super::elements::{ArmElements, JointElements, turn_x, turn_z};
-use crate::arm::Convention;
+use super::elements::{ArmElements, JointElements};
+use super::motion::{Drive, motions};
+use crate::arm::{Convention, JointKind};
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
 
-/// The homogeneous transform of the last link's frame to the base, row-major 4 × 4.
-pub fn forward_kinematics(b: &Builder, arm: &ArmElements<Expr>) -> Vec<Expr> {
-    // Turning back the unit vectors and the point from the last frame to the base.
-    let unit = |i: usize| -> Vector { std::array::from_fn(|j| if i == j { Expr::ONE } else { Expr::ZERO }) };
-    let mut columns = [unit(0), unit(1), unit(2)];
-    let mut point = [Expr::ZERO; 3];
-    for joint in arm.joints.iter().rev() {
-        let steps: [fn(&Builder, &JointElements<Expr>, &mut Vector, bool); 2] = match arm.convention {
-            Convention::Standard => [back_x, back_z],
-            Convention::Modified => [back_z, back_x],
-        };
-        for step in steps {
-            columns.iter_mut().for_each(|c| step(b, joint, c, false));
-            step(b, joint, &mut point, true);
+/// A frame in the base: its axes as columns, and its origin.
+#[derive(Clone, Copy, Debug)]
+struct Pose {
+    axes: [Vector; 3],
+    origin: Vector,
+}
+
+impl Pose {
+    const BASE: Pose = {
+        const O: Expr = Expr::ZERO;
+        const I: Expr = Expr::ONE;
+        Pose { axes: [[I, O, O], [O, I, O], [O, O, I]], origin: [O, O, O] }
+    };
+
+    /// After Rx(α) Tx(a).
+    fn about_x(&self, b: &Builder, joint: &JointElements<Expr>) -> Pose {
+        let [x, y, z] = self.axes;
+        let (y, z) = turned(b, &joint.sin_alpha, &joint.cos_alpha, &y, &z);
+        Pose { axes: [x, y, z], origin: moved(b, &self.origin, joint.a, &x) }
+    }
+
+    /// After Rz(θ) Tz(d).
+    fn about_z(&self, b: &Builder, joint: &JointElements<Expr>) -> Pose {
+        let [x, y, z] = self.axes;
+        let (x, y) = turned(b, &joint.sin, &joint.cos, &x, &y);
+        Pose { axes: [x, y, z], origin: moved(b, &self.origin, joint.shift, &z) }
+    }
+}
+
+/// u' = c u + s v, v' = c v − s u
+fn turned(b: &Builder, s: &Expr, c: &Expr, u: &Vector, v: &Vector) -> (Vector, Vector) {
+    let first = std::array::from_fn(|i| b.add(&b.mul(c, &u[i]), &b.mul(s, &v[i])));
+    let second = std::array::from_fn(|i| b.sub(&b.mul(c, &v[i]), &b.mul(s, &u[i])));
+    (first, second)
+}
+
+fn moved(b: &Builder, origin: &Vector, length: Expr, axis: &Vector) -> Vector {
+    super::motion::plus_scaled(b, origin, length, axis)
+}
+
+/// The frame of every joint before its screw about z, and of the last link.
+fn poses(b: &Builder, arm: &ArmElements<Expr>) -> (Vec<Pose>, Pose) {
+    let mut state = Pose::BASE;
+    let mut joints = Vec::with_capacity(arm.joints.len());
+    for joint in &arm.joints {
+        if arm.convention == Convention::Modified {
+            state = state.about_x(b, joint);
+        }
+        joints.push(state);
+        state = state.about_z(b, joint);
+        if arm.convention == Convention::Standard {
+            state = state.about_x(b, joint);
         }
     }
+    (joints, state)
+}
+
+/// The homogeneous transform of the last link's frame to the base, row-major 4 × 4.
+pub fn forward_kinematics(b: &Builder, arm: &ArmElements<Expr>) -> Vec<Expr> {
+    let (_, last) = poses(b, arm);
     let mut rows = Vec::with_capacity(16);
     for i in 0..3 {
-        rows.extend([columns[0][i], columns[1][i], columns[2][i], point[i]]);
+        rows.extend([last.axes[0][i], last.axes[1][i], last.axes[2][i], last.origin[i]]);
     }
     rows.extend([Expr::ZERO, Expr::ZERO, Expr::ZERO, Expr::ONE]);
     rows
 }
 
-fn back_x(b: &Builder, joint: &JointElements<Expr>, v: &mut Vector, is_point: bool) {
-    *v = turn_x(b, &-joint.sin_alpha, &joint.cos_alpha, v);
-    if is_point {
-        v[0] = b.add(&v[0], &joint.a);
+/// The geometric Jacobian, row-major 6 × n: velocity of the last frame's origin above its angular velocity, in base axes.
+pub fn jacobian(b: &Builder, arm: &ArmElements<Expr>) -> Vec<Expr> {
+    let (joints, last) = poses(b, arm);
+    let n = joints.len();
+    let mut rows = vec![Expr::ZERO; 6 * n];
+    for (j, (pose, joint)) in joints.iter().zip(&arm.joints).enumerate() {
+        let z = pose.axes[2];
+        let (linear, angular) = match joint.kind {
+            JointKind::Revolute => {
+                let arm: Vector = std::array::from_fn(|i| b.sub(&last.origin[i], &pose.origin[i]));
+                (b.cross(&z, &arm), z)
+            }
+            JointKind::Prismatic => (z, super::body::ZERO),
+        };
+        for i in 0..3 {
+            rows[i * n + j] = linear[i];
+            rows[(i + 3) * n + j] = angular[i];
+        }
     }
+    rows
 }
 
-fn back_z(b: &Builder, joint: &JointElements<Expr>, v: &mut Vector, is_point: bool) {
-    *v = turn_z(b, &-joint.sin, &joint.cos, v);
-    if is_point {
-        v[2] = b.add(&v[2], &joint.shift);
-    }
+/// J̇·q̇: acceleration of the last frame's origin above its angular acceleration where q̈ = 0, in base axes.
+pub fn jacobian_rate_times_speed(b: &Builder, arm: &ArmElements<Expr>) -> Vec<Expr> {
+    let still = Drive { reference: None, accelerations: vec![Expr::ZERO; arm.joints.len()], gravity: false };
+    let (_, last) = poses(b, arm);
+    let Some(motion) = motions(b, arm, &still).pop() else { return vec![Expr::ZERO; 6] };
+    let to_base = |v: &Vector| -> [Expr; 3] {
+        std::array::from_fn(|i| b.dot(&[last.axes[0][i], last.axes[1][i], last.axes[2][i]], v))
+    };
+    [to_base(&motion.link.acceleration), to_base(&motion.link.alpha)].concat()
 }

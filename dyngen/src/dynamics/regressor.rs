@@ -2,7 +2,8 @@
 
 use super::body::{Vector, ZERO};
 use super::elements::{ArmElements, JointElements, turn_x, turn_z};
-use super::motion::{JointMotion, Motion, motions, spin_column};
+use super::inverse::{rotor_moment, rotor_torque};
+use super::motion::{Drive, JointMotion, Motion, motions};
 use super::wrench::Wrench;
 use crate::arm::{Arm, Convention, JointKind, Parameter, ParameterKind};
 use crate::base::ParameterSet;
@@ -19,23 +20,24 @@ pub struct Axis {
     linear: Vector,
 }
 
-/// Y(q, q̇, q̈), row-major n × p: τ = Y·π for the parameters of a set.
+/// Y(q, q̇, q̈), row-major n × p: τ = Y·π for the parameters of a set; with reference speeds the regressor of Slotine and
+/// Li, Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g.
 pub fn regressor(
     b: &Builder,
     arm: &Arm,
     elements: &ArmElements<Expr>,
     set: &ParameterSet,
     field: &ConstantField,
-    accelerations: &[Expr],
+    drive: &Drive,
 ) -> Vec<Expr> {
     let (n, p) = (arm.dof(), set.parameters.len());
-    let motions = motions(b, elements, accelerations, true);
+    let motions = motions(b, elements, drive);
     let axes = axes(b, elements);
     let mut rows = vec![Expr::ZERO; n * p];
     for (column, parameter) in set.parameters.iter().enumerate() {
         for (carrier, factor) in &parameter.carriers {
             let factor = super::body::constant(b, field, factor);
-            let torques = column_of(b, elements, &motions, &axes, accelerations, *carrier);
+            let torques = column_of(b, elements, &motions, &axes, drive, *carrier);
             for (row, torque) in torques.into_iter().enumerate() {
                 let entry = &mut rows[row * p + column];
                 *entry = b.add(entry, &b.mul(&factor, &torque));
@@ -51,22 +53,17 @@ fn column_of(
     arm: &ArmElements<Expr>,
     motions: &[JointMotion],
     axes: &[JointAxes],
-    accelerations: &[Expr],
+    drive: &Drive,
     parameter: Parameter,
 ) -> Vec<Expr> {
     let i = parameter.link;
     let mut column = vec![Expr::ZERO; arm.joints.len()];
     let (wrench, seen) = if parameter.kind == ParameterKind::Im {
         let Some(ratio) = arm.joints[i].ratio else { return column };
-        let before = &motions[i].before_z;
-        let own = b.add(&b.mul(&ratio, &accelerations[i]), &before.alpha[2]);
-        column[i] = b.mul(&ratio, &own);
-        let spin = b.mul(&ratio, &arm.joints[i].speed);
-        let moment = [
-            b.mul(&spin, &before.omega[1]),
-            -b.mul(&spin, &before.omega[0]),
-            b.mul(&ratio, &accelerations[i]),
-        ];
+        let (speed, ddq) = (arm.joints[i].speed, drive.accelerations[i]);
+        let reference = drive.reference.as_ref().map_or(speed, |r| r[i]);
+        column[i] = rotor_torque(b, ratio, ratio, ddq, &motions[i]);
+        let moment = rotor_moment(b, ratio, (speed, reference), ddq, &motions[i].before_z);
         (Wrench { force: ZERO, moment }, &axes[i].before_z)
     } else {
         (unit_wrench(b, parameter.kind, &motions[i].link), &axes[i].link)
@@ -81,7 +78,7 @@ fn column_of(
 /// The wrench of a unit of one inertial parameter about the origin of its link's frame.
 fn unit_wrench(b: &Builder, kind: ParameterKind, motion: &Motion) -> Wrench {
     let [ax, ay, az] = motion.acceleration;
-    let first = |axis: usize, moment: Vector| Wrench { force: spin_column(b, motion, axis), moment };
+    let first = |axis: usize, moment: Vector| Wrench { force: motion.spin_column(b, axis), moment };
     match kind {
         ParameterKind::M => Wrench { force: motion.acceleration, moment: ZERO },
         ParameterKind::Mx => first(0, [Expr::ZERO, -az, ay]),
@@ -94,8 +91,8 @@ fn unit_wrench(b: &Builder, kind: ParameterKind, motion: &Motion) -> Wrench {
 
 /// I α + ω×(I ω) for a tensor with one unit entry.
 fn inertia_moment(b: &Builder, kind: ParameterKind, motion: &Motion) -> Vector {
-    let (w, a) = (&motion.omega, &motion.alpha);
-    let product = |i: usize, j: usize| b.mul(&w[i], &w[j]);
+    let a = &motion.alpha;
+    let product = |i: usize, j: usize| motion.product(b, i, j);
     let square_difference = |i: usize, j: usize| b.sub(&product(i, i), &product(j, j));
     let plus = |i: usize, x: Expr| b.add(&a[i], &x);
     let minus = |i: usize, x: Expr| b.sub(&a[i], &x);

@@ -2,20 +2,18 @@
 
 use super::docs;
 use crate::arm::{Arm, JointKind};
-use crate::base::ParameterSet;
-use crate::dynamics::function::trig_offset;
-use crate::dynamics::{Function, FunctionGraph};
+use crate::dynamics::FunctionGraph;
+use crate::dynamics::function::{Argument, trig_offset};
 use crate::exact::rational;
-use crate::graph::{Expr, Input, Node};
+use crate::graph::{Expr, Input, Node, operands};
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
 use std::collections::BTreeSet;
 
-/// A function's item.
-pub(super) fn function(model: &Model, set: &ParameterSet, built: &FunctionGraph) -> TokenStream {
+/// A function's items: one that takes q, and one that takes [`Trig`] in its place.
+pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
     let arm = model.arm();
-    let function = built.function;
     let needed = built.graph.needed(&built.outputs);
     let used: BTreeSet<Input> = needed
         .iter()
@@ -24,83 +22,99 @@ pub(super) fn function(model: &Model, set: &ParameterSet, built: &FunctionGraph)
             _ => None,
         })
         .collect();
-    let name = Ident::new(function.name(), Span::call_site());
-    let doc = docs::lines(&docs::function(arm, set, built));
-    let (signature, bindings) = arguments(arm, set, function, &used);
-    let trigonometry = trigonometry(arm, &used);
-    let statements = needed.iter().filter_map(|n| statement(model, built, *n));
+    let name = Ident::new(built.function.name(), Span::call_site());
+    let name_with = format_ident!("{name}_with");
+    let doc = docs::lines(&docs::function(built));
+    let doc_with = docs::lines(&docs::function_with(built));
+    let others: Vec<Argument> = built.arguments().filter(|a| *a != Argument::Positions).collect();
+    let (signature, bindings): (Vec<_>, Vec<_>) = others.iter().map(|a| argument(built, *a, &used)).unzip();
+    let passed = others.iter().map(|a| Ident::new(a.name(), Span::call_site()));
+    let plain = others.iter().map(|a| parameter(*a, a.name()));
+    let positions = positions(built, &used);
+    let trig = trig_of(arm, &used);
+    let (q, trig_name) = match uses_positions(&used) {
+        true => (quote!(q), quote!(trig)),
+        false => (quote!(_q), quote!(_trig)),
+    };
+    let statements = sections(model, built, &needed);
     let (result, value) = result(built);
     quote! {
         #(#[doc = #doc])*
         #[must_use]
-        pub fn #name<T: SimdRealField + Copy>(#(#signature),*) -> #result {
+        pub fn #name<T: SimdRealField + Copy>(#q: &SVector<T, JOINTS>, #(#plain),*) -> #result {
+            #trig
+            #name_with(&trig, #(#passed),*)
+        }
+
+        #(#[doc = #doc_with])*
+        #[must_use]
+        pub fn #name_with<T: SimdRealField + Copy>(#trig_name: &Trig<T>, #(#signature),*) -> #result {
+            #positions
             #(#bindings)*
-            #(#trigonometry)*
             #(#statements)*
             #value
         }
     }
 }
 
-/// The arguments, and how those that are used get names.
-fn arguments(
-    arm: &Arm,
-    set: &ParameterSet,
-    function: Function,
-    used: &BTreeSet<Input>,
-) -> (Vec<TokenStream>, Vec<TokenStream>) {
-    let n = arm.dof();
-    type Wanted = fn(usize) -> Vec<Input>;
-    let position: Wanted = |i| vec![Input::Sin(i), Input::Cos(i), Input::Position(i)];
-    let mut given: Vec<(&str, usize, Wanted)> = vec![("q", n, position)];
-    if function.takes_speeds() {
-        given.push(("dq", n, |i| vec![Input::Speed(i)]));
-    }
-    if function.takes_accelerations() {
-        given.push(("ddq", n, |i| vec![Input::Acceleration(i)]));
-    }
-    if function.takes_torques() {
-        given.push(("tau", n, |i| vec![Input::Torque(i)]));
-    }
-    if function.takes_parameters() {
-        given.push(("parameters", set.parameters.len(), |i| vec![Input::Parameter(i)]));
-    }
-    let (mut signature, mut bindings) = (Vec::new(), Vec::new());
-    for (name, length, inputs) in given {
-        let names: Vec<TokenStream> = (0..length)
-            .map(|i| {
-                let wanted = inputs(i);
-                if wanted.iter().any(|input| used.contains(input)) {
-                    let element = if name == "parameters" { "p" } else { name };
-                    let ident = format_ident!("{element}{}", i + 1);
-                    quote!(#ident)
-                } else {
-                    quote!(_)
-                }
-            })
-            .collect();
-        let length = if name == "parameters" { quote!(PARAMETERS) } else { quote!(JOINTS) };
-        let any = names.iter().any(|n| n.to_string() != "_");
-        let ident = Ident::new(&if any { name.to_string() } else { format!("_{name}") }, Span::call_site());
-        signature.push(quote!(#ident: &SVector<T, #length>));
-        if any {
-            // Taking the storage apart needs no bounds check and cannot panic.
-            bindings.push(quote!(let [[#(#names),*]] = #ident.data.0;));
+/// The struct of sines and cosines that functions share.
+pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
+    let all: BTreeSet<Input> =
+        (0..arm.dof()).flat_map(|i| [Input::Sin(i), Input::Cos(i), Input::Position(i)]).collect();
+    let (bindings, fields) = trig_fields(arm, &all);
+    let shifted: Vec<String> = (0..arm.dof())
+        .filter(|i| trig_offset(arm, *i) != 0.0)
+        .map(|i| format!(" Joint {}: of q + {} rad.", i + 1, trig_offset(arm, i)))
+        .collect();
+    quote! {
+        /// Joint positions with their sines and cosines: computed once and shared between calls, or taken from
+        /// wherever the caller has them.
+        #(#[doc = #shifted])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct Trig<T> {
+            /// Sine of each revolute joint's angle; not read for prismatic joints.
+            pub sin: [T; JOINTS],
+            /// Cosine of each revolute joint's angle; not read for prismatic joints.
+            pub cos: [T; JOINTS],
+            /// Position of each prismatic joint, m; not read for revolute joints.
+            pub position: [T; JOINTS],
+        }
+
+        impl<T: SimdRealField + Copy> Trig<T> {
+            /// From joint positions, rad (m where prismatic).
+            #[must_use]
+            pub fn new(q: &SVector<T, JOINTS>) -> Self {
+                #bindings
+                #fields
+            }
         }
     }
-    (signature, bindings)
 }
 
-/// Sines and cosines of the angles that are used.
-fn trigonometry(arm: &Arm, used: &BTreeSet<Input>) -> Vec<TokenStream> {
-    let mut lines = Vec::new();
+fn uses_positions(used: &BTreeSet<Input>) -> bool {
+    used.iter().any(|i| matches!(i, Input::Sin(_) | Input::Cos(_) | Input::Position(_)))
+}
+
+/// `let trig = …` with what a function uses; the rest is zero, because nobody reads it.
+fn trig_of(arm: &Arm, used: &BTreeSet<Input>) -> TokenStream {
+    let (bindings, fields) = trig_fields(arm, used);
+    if uses_positions(used) { quote!(#bindings let trig = #fields;) } else { quote!(let trig = #fields;) }
+}
+
+/// Takes q apart, and builds a `Trig` of the inputs that are used. A pattern over the storage needs no bounds check and
+/// cannot panic.
+fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
+    let (mut names, mut lets) = (Vec::new(), Vec::new());
+    let (mut sines, mut cosines, mut places) = (Vec::new(), Vec::new(), Vec::new());
+    let zero = quote!(T::zero());
     for (i, joint) in arm.joints.iter().enumerate() {
-        if joint.kind == JointKind::Prismatic {
-            continue;
-        }
-        let (sin, cos) = (used.contains(&Input::Sin(i)), used.contains(&Input::Cos(i)));
         let (q, s, c) =
             (format_ident!("q{}", i + 1), format_ident!("s{}", i + 1), format_ident!("c{}", i + 1));
+        let revolute = joint.kind == JointKind::Revolute;
+        let (sin, cos) =
+            (revolute && used.contains(&Input::Sin(i)), revolute && used.contains(&Input::Cos(i)));
+        let place = !revolute && used.contains(&Input::Position(i));
+        names.push(if sin || cos || place { quote!(#q) } else { quote!(_) });
         let offset = trig_offset(arm, i);
         let angle = if offset == 0.0 {
             quote!(#q)
@@ -109,13 +123,114 @@ fn trigonometry(arm: &Arm, used: &BTreeSet<Input>) -> Vec<TokenStream> {
             quote!((#q + nalgebra::convert::<f64, T>(#offset)))
         };
         match (sin, cos) {
-            (true, true) => lines.push(quote!(let (#s, #c) = #angle.simd_sin_cos();)),
-            (true, false) => lines.push(quote!(let #s = #angle.simd_sin();)),
-            (false, true) => lines.push(quote!(let #c = #angle.simd_cos();)),
+            (true, true) => lets.push(quote!(let (#s, #c) = #angle.simd_sin_cos();)),
+            (true, false) => lets.push(quote!(let #s = #angle.simd_sin();)),
+            (false, true) => lets.push(quote!(let #c = #angle.simd_cos();)),
             (false, false) => {}
         }
+        sines.push(if sin { quote!(#s) } else { zero.clone() });
+        cosines.push(if cos { quote!(#c) } else { zero.clone() });
+        places.push(if place { quote!(#q) } else { zero.clone() });
     }
-    lines
+    let bindings = quote! {
+        let [[#(#names),*]] = q.data.0;
+        #(#lets)*
+    };
+    let fields = quote!(Trig { sin: [#(#sines),*], cos: [#(#cosines),*], position: [#(#places),*] });
+    (bindings, fields)
+}
+
+/// Names for what is read of a `Trig`.
+fn positions(built: &FunctionGraph, used: &BTreeSet<Input>) -> TokenStream {
+    let take = |field: &str, letter: &str, input: fn(usize) -> Input| {
+        let field = Ident::new(field, Span::call_site());
+        let any = (0..built.joints).any(|i| used.contains(&input(i)));
+        let names = (0..built.joints).map(|i| {
+            let name = format_ident!("{letter}{}", i + 1);
+            if used.contains(&input(i)) { quote!(#name) } else { quote!(_) }
+        });
+        any.then(|| quote!(let [#(#names),*] = trig.#field;))
+    };
+    let lines =
+        [take("sin", "s", Input::Sin), take("cos", "c", Input::Cos), take("position", "q", Input::Position)];
+    let lines = lines.iter().flatten();
+    quote!(#(#lines)*)
+}
+
+/// The inputs that an argument other than q brings.
+fn input_of(argument: Argument, i: usize) -> Input {
+    match argument {
+        Argument::Positions => Input::Position(i),
+        Argument::Speeds => Input::Speed(i),
+        Argument::Accelerations => Input::Acceleration(i),
+        Argument::ReferenceSpeeds => Input::ReferenceSpeed(i),
+        Argument::ReferenceAccelerations => Input::ReferenceAcceleration(i),
+        Argument::Torques => Input::Torque(i),
+        Argument::Errors => Input::Error(i),
+        Argument::Parameters => Input::Parameter(i),
+    }
+}
+
+/// `name: &SVector<T, …>`
+fn parameter(argument: Argument, name: &str) -> TokenStream {
+    let length = if argument == Argument::Parameters { quote!(PARAMETERS) } else { quote!(JOINTS) };
+    let ident = Ident::new(name, Span::call_site());
+    quote!(#ident: &SVector<T, #length>)
+}
+
+/// An argument in the signature, and the line that names what is used of it.
+fn argument(built: &FunctionGraph, argument: Argument, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
+    let is_parameters = argument == Argument::Parameters;
+    let length = if is_parameters { built.parameters } else { built.joints };
+    let letter = if is_parameters { "p" } else { argument.name() };
+    let is_used = |i: usize| used.contains(&input_of(argument, i));
+    if !(0..length).any(is_used) {
+        return (parameter(argument, &format!("_{}", argument.name())), quote!());
+    }
+    let names = (0..length).map(|i| {
+        let name = format_ident!("{letter}{}", i + 1);
+        if is_used(i) { quote!(#name) } else { quote!(_) }
+    });
+    let ident = Ident::new(argument.name(), Span::call_site());
+    (parameter(argument, argument.name()), quote!(let [[#(#names),*]] = #ident.data.0;))
+}
+
+/// Nodes in one block of code.
+const SECTION: usize = 256;
+
+/// The body, in blocks that hand on only what later ones need. Every `let` opens a scope within the one before, and a
+/// compiler that writes debug information goes through nested scopes by recursion: thousands of them in a row
+/// exhaust its stack.
+fn sections(model: &Model, built: &FunctionGraph, needed: &[usize]) -> Vec<TokenStream> {
+    let computed: Vec<usize> =
+        needed.iter().copied().filter(|n| !matches!(built.graph.nodes()[*n], Node::Input(_))).collect();
+    let statement = |n: &usize| statement(model, built, *n);
+    if computed.len() <= 2 * SECTION {
+        return computed.iter().filter_map(statement).collect();
+    }
+    let mut last_use = vec![0; built.graph.nodes().len()];
+    for (position, node) in computed.iter().enumerate() {
+        for operand in operands(&built.graph.nodes()[*node]) {
+            last_use[operand.node()] = position;
+        }
+    }
+    for output in &built.outputs {
+        last_use[output.node()] = usize::MAX;
+    }
+    let mut blocks = Vec::new();
+    for (k, section) in computed.chunks(SECTION).enumerate() {
+        let end = (k + 1) * SECTION;
+        let handed_on = section.iter().filter(|n| last_use[**n] >= end).map(|n| value_name(built, *n));
+        let names: Vec<Ident> = handed_on.collect();
+        let statements = section.iter().filter_map(statement);
+        blocks.push(quote! {
+            let (#(#names,)*) = {
+                #(#statements)*
+                (#(#names,)*)
+            };
+        });
+    }
+    blocks
 }
 
 /// The `let` of a node; inputs are bound already.
@@ -157,6 +272,9 @@ fn value_name(built: &FunctionGraph, node: usize) -> Ident {
             Input::Speed(i) => format_ident!("dq{}", i + 1),
             Input::Acceleration(i) => format_ident!("ddq{}", i + 1),
             Input::Torque(i) => format_ident!("tau{}", i + 1),
+            Input::ReferenceSpeed(i) => format_ident!("dqr{}", i + 1),
+            Input::ReferenceAcceleration(i) => format_ident!("ddqr{}", i + 1),
+            Input::Error(i) => format_ident!("e{}", i + 1),
             Input::Parameter(i) => format_ident!("p{}", i + 1),
         },
         _ => format_ident!("x{node}"),
@@ -177,11 +295,19 @@ fn result(built: &FunctionGraph) -> (TokenStream, TokenStream) {
             quote!([#(#column),*])
         })
         .collect();
-    let result = match built.function {
-        Function::Regressor => quote!(SMatrix<T, JOINTS, PARAMETERS>),
-        Function::ForwardKinematics => quote!(SMatrix<T, 4, 4>),
-        _ if columns == 1 => quote!(SVector<T, JOINTS>),
-        _ => quote!(SMatrix<T, JOINTS, JOINTS>),
+    if built.shape == (1, 1) {
+        let value = value(0, 0);
+        return (quote!(T), value);
+    }
+    let size = |length: usize| match length {
+        _ if length == built.joints => quote!(JOINTS),
+        _ if length == built.parameters => quote!(PARAMETERS),
+        _ => {
+            let length = Literal::usize_unsuffixed(length);
+            quote!(#length)
+        }
     };
+    let (n, m) = (size(rows), size(columns));
+    let result = if columns == 1 { quote!(SVector<T, #n>) } else { quote!(SMatrix<T, #n, #m>) };
     (result, quote!(SMatrix::from_array_storage(ArrayStorage([#(#columns_of),*]))))
 }

@@ -10,18 +10,20 @@ use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
 /// What a generated file holds.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// The parameter set of every function.
     pub parameters: SetKind,
     /// The functions, in any order.
     pub functions: Vec<Function>,
+    /// Values of the set's parameters, in its order, to bake in; the functions then take none.
+    pub values: Option<Vec<f64>>,
 }
 
 impl Default for Options {
     /// The minimal set and every function.
     fn default() -> Self {
-        Options { parameters: SetKind::Minimal, functions: Function::ALL.to_vec() }
+        Options { parameters: SetKind::Minimal, functions: Function::ALL.to_vec(), values: None }
     }
 }
 
@@ -49,11 +51,25 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     let set = model.set(options.parameters)?;
     let functions = Function::ALL.into_iter().filter(|f| options.functions.contains(f));
     let functions: Vec<TokenStream> = functions
-        .map(|function| Ok(code::function(model, set, &model.function(function, options.parameters)?)))
+        .map(|function| {
+            let built = match &options.values {
+                Some(values) => model.baked_function(function, options.parameters, values)?,
+                None => model.function(function, options.parameters)?,
+            };
+            Ok(code::function(model, &built))
+        })
         .collect::<Result<_, Error>>()?;
     let (n, p) =
         (Literal::usize_unsuffixed(model.arm().dof()), Literal::usize_unsuffixed(set.parameters.len()));
     let names = set.names();
+    let trig = code::trig_struct(model.arm());
+    let values = options.values.as_ref().map(|values| {
+        let values = values.iter().map(|x| Literal::f64_suffixed(*x));
+        quote! {
+            /// The parameters' values that are baked into the functions, SI units.
+            pub const PARAMETER_VALUES: [f64; PARAMETERS] = [#(#values),*];
+        }
+    });
     let names_doc = docs::lines(&docs::parameters(set));
     Ok(quote! {
         use nalgebra::{ArrayStorage, SMatrix, SVector, SimdRealField};
@@ -66,6 +82,10 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
 
         #(#[doc = #names_doc])*
         pub const PARAMETER_NAMES: [&str; PARAMETERS] = [#(#names),*];
+
+        #values
+
+        #trig
 
         #(#functions)*
     })

@@ -40,6 +40,16 @@ impl Jet {
         self.value
     }
 
+    /// A function that is zero at this state but has this rate along the motion.
+    pub fn of_rate(rate: Fp) -> Jet {
+        Jet { value: Fp::ZERO, rate, joints: Vec::new() }
+    }
+
+    /// ∂/∂q̇ᵢ of this function.
+    pub fn by_speed(&self, joint: usize) -> Fp {
+        self.joints.get(joint).map_or(Fp::ZERO, |j| j[0])
+    }
+
     /// d/dt ∂/∂q̇ᵢ − ∂/∂qᵢ of this function.
     pub fn euler_lagrange(&self, joint: usize) -> Fp {
         self.joints.get(joint).map_or(Fp::ZERO, |j| j[1] - j[2])

@@ -3,6 +3,7 @@
 pub mod algebra;
 pub mod angle;
 pub mod constant;
+pub mod dual;
 pub mod elimination;
 pub mod gcd;
 pub mod jet;

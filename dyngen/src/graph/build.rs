@@ -39,6 +39,11 @@ impl Builder {
         self.graph.into_inner()
     }
 
+    /// A copy of the graph as built so far.
+    pub fn snapshot(&self) -> Graph {
+        self.graph.borrow().clone()
+    }
+
     /// An input.
     pub fn input(&self, input: Input) -> Expr {
         self.graph.borrow_mut().intern(Node::Input(input))

@@ -4,6 +4,7 @@
 //! node, and sums and products are stored with the sign pulled out. Constants are exact.
 
 mod build;
+pub mod differentiate;
 pub mod evaluate;
 pub mod tape;
 
@@ -64,6 +65,12 @@ pub enum Input {
     Acceleration(usize),
     /// Joint torque or force, for forward dynamics.
     Torque(usize),
+    /// Reference speed q̇ᵣ of Slotine and Li.
+    ReferenceSpeed(usize),
+    /// Reference acceleration q̈ᵣ.
+    ReferenceAcceleration(usize),
+    /// A vector of one number a joint that the regressor's transpose is multiplied with.
+    Error(usize),
     /// A parameter of the set.
     Parameter(usize),
 }

@@ -5,13 +5,18 @@
 //! probability below 2⁻⁵⁴, and at both points with probability below 2⁻¹⁰⁸.
 
 mod point;
+mod series;
+mod state;
 
 use crate::arm::Arm;
 use crate::base::sets::{ParameterSet, Sets};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::prime::{Draws, Fp};
+use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
+use crate::graph::differentiate::Direction;
 use point::Point;
+use series::PoseSeries;
 use std::fmt;
 
 /// Random points for each function.
@@ -51,13 +56,23 @@ pub fn prove(
     sets: &Sets,
     set: &ParameterSet,
     function: &FunctionGraph,
+    baked: Option<&[Rational]>,
 ) -> Result<(), Disagreement> {
     // The seed is fixed: a proof that passed passes again, on every machine.
-    let mut draws = Draws::new(0x7072_6f6f_66);
+    let mut draws = Draws::new(0x0070_726f_6f66);
     for _ in 0..POINTS {
-        let point = Point::draw(arm, symbols, sets, &mut draws);
-        let expected = expected(&point, set, function.function);
-        let actual = point.evaluate(set, function);
+        let mut point = Point::draw(arm, symbols, sets, &mut draws);
+        if let Some(values) = baked {
+            point.carry(set, values);
+        }
+        let mut expected = expected(&point, set, function.function);
+        let mut actual = point.evaluate(set, function);
+        if function.function == Function::PotentialEnergy {
+            // A potential energy is known up to a constant, which regrouped parameters leave out.
+            let zero = point.at_zero();
+            expected[0] = expected[0] - self::expected(&zero, set, function.function)[0];
+            actual = actual.zip(zero.evaluate(set, function)).map(|(a, b)| vec![a[0] - b[0]]);
+        }
         let same = |(i, value): (usize, &Fp)| actual.as_ref().is_some_and(|a| a[i] == *value);
         if let Some(wrong) = expected.iter().enumerate().position(|pair| !same(pair)) {
             let columns = function.shape.1;
@@ -74,33 +89,90 @@ pub fn prove(
 fn expected(point: &Point<'_>, set: &ParameterSet, function: Function) -> Vec<Fp> {
     let n = point.dof();
     let zeros = vec![Fp::ZERO; n];
+    let motion = |gravity| point.state(&point.speeds, &point.accelerations, gravity);
+    let of_set = |columns: &[Vec<Fp>]| point.of_set(set, columns);
     match function {
-        Function::InverseDynamics => point.torques(&point.speeds, &point.accelerations, true),
-        Function::Regressor => point.regressor_of_set(set),
-        Function::MassMatrix => {
-            let columns: Vec<Vec<Fp>> = (0..n).map(|j| point.torques(&zeros, &unit(n, j), false)).collect();
-            transpose(&columns)
+        Function::InverseDynamics => motion(true).torques(),
+        Function::InverseDynamicsWithoutGravity => motion(false).torques(),
+        Function::Regressor => of_set(&motion(true).columns()),
+        Function::RegressorTransposeTimes => transpose_times(&of_set(&motion(true).columns()), &point.errors),
+        Function::SlotineLiRegressor => of_set(&slotine_li_columns(point)),
+        Function::SlotineLiTransposeTimes => {
+            transpose_times(&of_set(&slotine_li_columns(point)), &point.errors)
         }
-        Function::CoriolisMatrix => {
-            // The velocity terms are h(v) = Σ c_ijk vⱼ vₖ with Christoffel symbols that are symmetric in j and
-            // k, so polarisation gives the matrix: C·eⱼ = ½(h(q̇ + eⱼ) − h(q̇) − h(eⱼ)).
-            let half = Fp::from_integer(2).inverse().unwrap_or(Fp::ONE);
-            let h = |v: &[Fp]| point.torques(v, &zeros, false);
-            let own = h(&point.speeds);
-            let columns: Vec<Vec<Fp>> = (0..n)
-                .map(|j| {
-                    let e = unit(n, j);
-                    let sum: Vec<Fp> = point.speeds.iter().zip(&e).map(|(a, b)| *a + *b).collect();
-                    let (both, alone) = (h(&sum), h(&e));
-                    (0..n).map(|i| half * (both[i] - own[i] - alone[i])).collect()
-                })
-                .collect();
-            transpose(&columns)
-        }
-        Function::Gravity => point.torques(&zeros, &zeros, true),
+        Function::MassMatrix => mass_matrix(point),
+        Function::MassMatrixInverse => inverse(mass_matrix(point), n),
+        Function::CoriolisMatrix => coriolis_matrix(point),
+        Function::CoriolisTimesSpeed => point.state(&point.speeds, &zeros, false).torques(),
+        Function::CoriolisTransposeTimesSpeed => transpose_times(&coriolis_matrix(point), &point.speeds),
+        Function::Gravity => point.state(&zeros, &zeros, true).torques(),
         Function::ForwardDynamics => point.accelerations.clone(),
-        Function::ForwardKinematics => point.pose(),
+        Function::ForwardKinematics => PoseSeries::along(point, &zeros).pose(),
+        Function::Jacobian => {
+            let columns: Vec<Vec<Fp>> =
+                (0..n).map(|j| PoseSeries::along(point, &unit(n, j)).velocity()).collect();
+            transpose(&columns)
+        }
+        Function::JacobianRateTimesSpeed => PoseSeries::along(point, &point.speeds).acceleration(),
+        Function::KineticEnergy => point.weigh(&singles(motion(false).values())),
+        Function::PotentialEnergy => point.weigh(&singles(potential(point))),
+        Function::KineticEnergyRegressor => of_set(&singles(motion(false).values())),
+        Function::PotentialEnergyRegressor => of_set(&singles(potential(point))),
+        Function::Momentum => motion(false).momentum(),
+        Function::TorqueByPosition => torque_derivatives(point, Direction::Position),
+        Function::TorqueBySpeed => torque_derivatives(point, Direction::Speed),
     }
+}
+
+/// −L of an arm that stands still.
+fn potential(point: &Point<'_>) -> Vec<Fp> {
+    let zeros = vec![Fp::ZERO; point.dof()];
+    point.state(&zeros, &zeros, true).values().into_iter().map(|x| -x).collect()
+}
+
+fn singles(values: Vec<Fp>) -> Vec<Vec<Fp>> {
+    values.into_iter().map(|x| vec![x]).collect()
+}
+
+fn torque_derivatives(point: &Point<'_>, direction: fn(usize) -> Direction) -> Vec<Fp> {
+    let motion = point.state(&point.speeds, &point.accelerations, true);
+    let columns: Vec<Vec<Fp>> = (0..point.dof()).map(|j| motion.torque_derivative(direction(j))).collect();
+    transpose(&columns)
+}
+
+fn mass_matrix(point: &Point<'_>) -> Vec<Fp> {
+    let n = point.dof();
+    let zeros = vec![Fp::ZERO; n];
+    let columns: Vec<Vec<Fp>> = (0..n).map(|j| point.state(&zeros, &unit(n, j), false).torques()).collect();
+    transpose(&columns)
+}
+
+/// The velocity terms h(v) = Σ c_ijk vⱼ vₖ with Christoffel symbols, which are symmetric in j and k, polarised:
+/// ½(h(u + v) − h(u) − h(v)) = Σ c_ijk uⱼ vₖ; for each parameter.
+fn polarised(point: &Point<'_>, u: &[Fp], v: &[Fp]) -> Vec<Vec<Fp>> {
+    let half = Fp::from_integer(2).inverse().unwrap_or(Fp::ONE);
+    let zeros = vec![Fp::ZERO; point.dof()];
+    let h = |v: &[Fp]| point.state(v, &zeros, false).columns();
+    let sum: Vec<Fp> = u.iter().zip(v).map(|(a, b)| *a + *b).collect();
+    let (both, one, other) = (h(&sum), h(u), h(v));
+    (0..both.len())
+        .map(|c| (0..point.dof()).map(|i| half * (both[c][i] - one[c][i] - other[c][i])).collect())
+        .collect()
+}
+
+fn coriolis_matrix(point: &Point<'_>) -> Vec<Fp> {
+    let n = point.dof();
+    let column = |j: usize| point.weigh(&polarised(point, &point.speeds, &unit(n, j)));
+    transpose(&(0..n).map(column).collect::<Vec<_>>())
+}
+
+/// B·q̈ᵣ + C·q̇ᵣ + g for each parameter.
+fn slotine_li_columns(point: &Point<'_>) -> Vec<Vec<Fp>> {
+    let zeros = vec![Fp::ZERO; point.dof()];
+    let still = point.state(&zeros, &point.reference_accelerations, true).columns();
+    let moving = polarised(point, &point.speeds, &point.reference_speeds);
+    let sum = |(a, b): (Vec<Fp>, Vec<Fp>)| a.into_iter().zip(b).map(|(x, y)| x + y).collect();
+    still.into_iter().zip(moving).map(sum).collect()
 }
 
 fn unit(n: usize, j: usize) -> Vec<Fp> {
@@ -110,4 +182,37 @@ fn unit(n: usize, j: usize) -> Vec<Fp> {
 fn transpose(columns: &[Vec<Fp>]) -> Vec<Fp> {
     let rows = columns.first().map_or(0, Vec::len);
     (0..rows).flat_map(|i| columns.iter().map(move |c| c[i])).collect()
+}
+
+/// Mᵀ·v of a row-major matrix.
+fn transpose_times(matrix: &[Fp], v: &[Fp]) -> Vec<Fp> {
+    let columns = matrix.len() / v.len().max(1);
+    (0..columns)
+        .map(|c| v.iter().enumerate().fold(Fp::ZERO, |sum, (i, x)| sum + matrix[i * columns + c] * *x))
+        .collect()
+}
+
+/// The inverse of a row-major matrix by Gauss and Jordan; zeros where it is singular, which no result equals.
+fn inverse(mut a: Vec<Fp>, n: usize) -> Vec<Fp> {
+    let mut inverse: Vec<Fp> = (0..n).flat_map(|i| unit(n, i)).collect();
+    for k in 0..n {
+        let Some(pivot) = (k..n).find(|r| a[r * n + k] != Fp::ZERO) else { return vec![Fp::ZERO; n * n] };
+        for c in 0..n {
+            a.swap(k * n + c, pivot * n + c);
+            inverse.swap(k * n + c, pivot * n + c);
+        }
+        let scale = a[k * n + k].inverse().unwrap_or(Fp::ONE);
+        for c in 0..n {
+            a[k * n + c] = a[k * n + c] * scale;
+            inverse[k * n + c] = inverse[k * n + c] * scale;
+        }
+        for r in (0..n).filter(|r| *r != k) {
+            let factor = a[r * n + k];
+            for c in 0..n {
+                a[r * n + c] = a[r * n + c] - factor * a[k * n + c];
+                inverse[r * n + c] = inverse[r * n + c] - factor * inverse[k * n + c];
+            }
+        }
+    }
+    inverse
 }

@@ -1,25 +1,27 @@
-//! A random point: a state of the arm and values of its parameters, modulo the prime.
+//! A random point: a pose of the arm, rates, and values of its parameters, modulo the prime.
 
-use crate::arm::{Arm, Convention, JointKind, Parameter};
+use super::state::State;
+use crate::arm::{Arm, JointKind, Parameter};
 use crate::base::sets::{Combination, ParameterSet, Sets};
 use crate::dynamics::FunctionGraph;
-use crate::dynamics::elements::{ArmElements, Source};
-use crate::dynamics::lagrangian::twice_lagrangian;
-use crate::exact::jet::{Jet, Jets};
+use crate::dynamics::function::Argument;
 use crate::exact::prime::{Draws, Fp};
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::{Input, evaluate};
 
-/// A state and parameter values.
+/// A pose, rates and parameter values.
 pub(super) struct Point<'a> {
-    arm: &'a Arm,
-    symbols: &'a AngleSymbols,
-    sets: &'a Sets,
+    pub(super) arm: &'a Arm,
+    pub(super) symbols: &'a AngleSymbols,
+    pub(super) sets: &'a Sets,
     /// For a revolute joint sine and cosine of its trigonometric input, for a prismatic one q twice.
-    positions: Vec<(Fp, Fp)>,
+    pub(super) positions: Vec<(Fp, Fp)>,
     pub(super) speeds: Vec<Fp>,
     pub(super) accelerations: Vec<Fp>,
+    pub(super) reference_speeds: Vec<Fp>,
+    pub(super) reference_accelerations: Vec<Fp>,
+    pub(super) errors: Vec<Fp>,
     /// Values of the arm's kept parameters.
     values: Vec<(Parameter, Fp)>,
 }
@@ -37,101 +39,115 @@ impl<'a> Point<'a> {
                 }
             })
             .collect();
-        let mut vector = || (0..arm.dof()).map(|_| draws.element()).collect::<Vec<_>>();
-        let (speeds, accelerations) = (vector(), vector());
         let values = arm.kept_parameters().into_iter().map(|p| (p, draws.element())).collect();
-        Point { arm, symbols, sets, positions, speeds, accelerations, values }
+        let mut vector = || (0..arm.dof()).map(|_| draws.element()).collect::<Vec<_>>();
+        Point {
+            arm,
+            symbols,
+            sets,
+            positions,
+            speeds: vector(),
+            accelerations: vector(),
+            reference_speeds: vector(),
+            reference_accelerations: vector(),
+            errors: vector(),
+            values,
+        }
+    }
+
+    /// The same values at the pose where every input angle is zero.
+    pub(super) fn at_zero(&self) -> Point<'a> {
+        let zero = |joint: &crate::arm::Joint| match joint.kind {
+            JointKind::Revolute => (Fp::ZERO, Fp::ONE),
+            JointKind::Prismatic => (Fp::ZERO, Fp::ZERO),
+        };
+        Point {
+            positions: self.arm.joints.iter().map(zero).collect(),
+            speeds: self.speeds.clone(),
+            accelerations: self.accelerations.clone(),
+            reference_speeds: self.reference_speeds.clone(),
+            reference_accelerations: self.reference_accelerations.clone(),
+            errors: self.errors.clone(),
+            values: self.values.clone(),
+            ..*self
+        }
+    }
+
+    /// Sets the parameters' values so that a set's sums have given values: each on its carriers.
+    pub(super) fn carry(&mut self, set: &ParameterSet, values: &[Rational]) {
+        self.values.iter_mut().for_each(|(_, value)| *value = Fp::ZERO);
+        for (parameter, sum) in set.parameters.iter().zip(values) {
+            let sum = Fp::from_rational(sum).unwrap_or(Fp::ZERO);
+            for (carrier, factor) in &parameter.carriers {
+                let factor = self.sets.field.modular(factor).unwrap_or(Fp::ZERO);
+                for (_, value) in self.values.iter_mut().filter(|(p, _)| p == carrier) {
+                    *value = *value + factor * sum;
+                }
+            }
+        }
     }
 
     pub(super) fn dof(&self) -> usize {
         self.arm.dof()
     }
 
-    /// The regressor of all parameters, by the Euler–Lagrange equations: for each parameter its torques.
-    fn columns(&self, speeds: &[Fp], accelerations: &[Fp], with_gravity: bool) -> Vec<Vec<Fp>> {
-        let mut source = JetSource { point: self, speeds, accelerations, with_gravity };
-        let elements = ArmElements::build(&Jets, self.arm, self.symbols, &mut source);
-        let half = Fp::from_integer(2).inverse().unwrap_or(Fp::ONE);
-        twice_lagrangian(&Jets, &elements)
-            .iter()
-            .map(|jet| (0..self.dof()).map(|i| half * jet.euler_lagrange(i)).collect())
-            .collect()
+    /// A motion at this pose.
+    pub(super) fn state<'p>(
+        &'p self,
+        speeds: &'p [Fp],
+        accelerations: &'p [Fp],
+        gravity: bool,
+    ) -> State<'p, 'a> {
+        State { point: self, speeds, accelerations, gravity }
     }
 
-    /// The torques of a motion at this pose with the point's parameter values.
-    pub(super) fn torques(&self, speeds: &[Fp], accelerations: &[Fp], with_gravity: bool) -> Vec<Fp> {
-        let columns = self.columns(speeds, accelerations, with_gravity);
-        let mut torques = vec![Fp::ZERO; self.dof()];
+    /// Sine and cosine of q + theta: by the addition theorem where theta is a multiple of pi/2; the input holds any
+    /// other theta.
+    pub(super) fn joint_trig(&self, joint: usize) -> (Fp, Fp) {
+        let (sin, cos) = self.positions[joint];
+        let (st, ct) = match self.arm.joints[joint].theta.quarter_turns() {
+            None => (Fp::ZERO, Fp::ONE),
+            Some(turns) => {
+                let cycle = [0, 1, 0, -1].map(Fp::from_integer);
+                (cycle[usize::from(turns % 4)], cycle[usize::from((turns + 1) % 4)])
+            }
+        };
+        (sin * ct + cos * st, cos * ct - sin * st)
+    }
+
+    /// The sum of the parameters' columns with their values.
+    pub(super) fn weigh(&self, columns: &[Vec<Fp>]) -> Vec<Fp> {
+        let mut sum = vec![Fp::ZERO; columns.first().map_or(0, Vec::len)];
         for (parameter, value) in &self.values {
-            for (torque, entry) in torques.iter_mut().zip(&columns[parameter.index()]) {
-                *torque = *torque + *value * *entry;
+            for (total, entry) in sum.iter_mut().zip(&columns[parameter.index()]) {
+                *total = *total + *value * *entry;
             }
         }
-        torques
+        sum
     }
 
-    /// Y of a set from the Lagrangian: its columns are those of the carriers.
-    pub(super) fn regressor_of_set(&self, set: &ParameterSet) -> Vec<Fp> {
-        let columns = self.columns(&self.speeds, &self.accelerations, true);
-        let n = self.dof();
-        let mut rows = vec![Fp::ZERO; n * set.parameters.len()];
+    /// The columns of a set are those of its carriers; row-major.
+    pub(super) fn of_set(&self, set: &ParameterSet, columns: &[Vec<Fp>]) -> Vec<Fp> {
+        let rows = columns.first().map_or(0, Vec::len);
+        let p = set.parameters.len();
+        let mut matrix = vec![Fp::ZERO; rows * p];
         for (c, parameter) in set.parameters.iter().enumerate() {
             for (carrier, factor) in &parameter.carriers {
                 let factor = self.sets.field.modular(factor).unwrap_or(Fp::ZERO);
-                for i in 0..n {
-                    let entry = &mut rows[i * set.parameters.len() + c];
-                    *entry = *entry + factor * columns[carrier.index()][i];
+                for i in 0..rows {
+                    matrix[i * p + c] = matrix[i * p + c] + factor * columns[carrier.index()][i];
                 }
             }
         }
-        rows
-    }
-
-    /// The homogeneous transform of the last frame as a product of elementary ones, row-major.
-    pub(super) fn pose(&self) -> Vec<Fp> {
-        let mut source = JetSource {
-            point: self,
-            speeds: &self.speeds,
-            accelerations: &self.accelerations,
-            with_gravity: true,
-        };
-        let elements = ArmElements::build(&Jets, self.arm, self.symbols, &mut source);
-        let (zero, one) = (Fp::ZERO, Fp::ONE);
-        let mut pose = [
-            [one, zero, zero, zero],
-            [zero, one, zero, zero],
-            [zero, zero, one, zero],
-            [zero, zero, zero, one],
-        ];
-        for joint in &elements.joints {
-            let v = |jet: &Jet| jet.value();
-            let (s, c, sa, ca) = (v(&joint.sin), v(&joint.cos), v(&joint.sin_alpha), v(&joint.cos_alpha));
-            let about_z = [
-                [c, -s, zero, zero],
-                [s, c, zero, zero],
-                [zero, zero, one, v(&joint.shift)],
-                [zero, zero, zero, one],
-            ];
-            let about_x = [
-                [one, zero, zero, v(&joint.a)],
-                [zero, ca, -sa, zero],
-                [zero, sa, ca, zero],
-                [zero, zero, zero, one],
-            ];
-            pose = match self.arm.convention {
-                Convention::Standard => product(&product(&pose, &about_z), &about_x),
-                Convention::Modified => product(&product(&pose, &about_x), &about_z),
-            };
-        }
-        pose.concat()
+        matrix
     }
 
     /// The function's graph at this point, with the set's sums of the parameter values.
     pub(super) fn evaluate(&self, set: &ParameterSet, function: &FunctionGraph) -> Option<Vec<Fp>> {
         let sums: Vec<Fp> = set.parameters.iter().map(|p| self.sum(&p.terms)).collect();
         // Forward dynamics gets the torques of the point's motion and must give its accelerations back.
-        let torques = match function.function.takes_torques() {
-            true => self.torques(&self.speeds, &self.accelerations, true),
+        let torques = match function.function.takes(Argument::Torques) {
+            true => self.state(&self.speeds, &self.accelerations, true).torques(),
             false => Vec::new(),
         };
         let input = |input: Input| match input {
@@ -139,6 +155,9 @@ impl<'a> Point<'a> {
             Input::Cos(i) => self.positions[i].1,
             Input::Speed(i) => self.speeds[i],
             Input::Acceleration(i) => self.accelerations[i],
+            Input::ReferenceSpeed(i) => self.reference_speeds[i],
+            Input::ReferenceAcceleration(i) => self.reference_accelerations[i],
+            Input::Error(i) => self.errors[i],
             Input::Torque(i) => torques[i],
             Input::Parameter(i) => sums[i],
         };
@@ -151,63 +170,5 @@ impl<'a> Point<'a> {
             let value = self.values.iter().find(|(p, _)| p == parameter).map_or(Fp::ZERO, |(_, v)| *v);
             sum + self.sets.field.modular(factor).unwrap_or(Fp::ZERO) * value
         })
-    }
-}
-
-fn product(a: &[[Fp; 4]; 4], b: &[[Fp; 4]; 4]) -> [[Fp; 4]; 4] {
-    std::array::from_fn(|i| std::array::from_fn(|j| (0..4).fold(Fp::ZERO, |sum, k| sum + a[i][k] * b[k][j])))
-}
-
-/// The arm's quantities as jets along the point's motion.
-struct JetSource<'p, 'a> {
-    point: &'p Point<'a>,
-    speeds: &'p [Fp],
-    accelerations: &'p [Fp],
-    with_gravity: bool,
-}
-
-impl JetSource<'_, '_> {
-    fn number(&self, value: &Rational) -> Jet {
-        // Numbers with the prime in a denominator were refused when the sets were derived.
-        Jet::constant(Fp::from_rational(value).unwrap_or(Fp::ZERO))
-    }
-}
-
-impl Source<Jet> for JetSource<'_, '_> {
-    fn joint_trig(&mut self, joint: usize) -> (Jet, Jet) {
-        let (sin, cos) = self.point.positions[joint];
-        // sin(q + theta) by the addition theorem where theta is a multiple of pi/2; the input holds any other theta.
-        let (st, ct) = match self.point.arm.joints[joint].theta.quarter_turns() {
-            None => (Fp::ZERO, Fp::ONE),
-            Some(turns) => {
-                let cycle = [0, 1, 0, -1].map(Fp::from_integer);
-                (cycle[usize::from(turns % 4)], cycle[usize::from((turns + 1) % 4)])
-            }
-        };
-        let (s, c) = (sin * ct + cos * st, cos * ct - sin * st);
-        let (n, dq) = (self.point.dof(), self.speeds[joint]);
-        (Jet::of_position(n, joint, s, c, dq), Jet::of_position(n, joint, c, -s, dq))
-    }
-    fn position(&mut self, joint: usize) -> Jet {
-        Jet::of_position(self.point.dof(), joint, self.point.positions[joint].0, Fp::ONE, self.speeds[joint])
-    }
-    fn speed(&mut self, joint: usize) -> Jet {
-        Jet::speed(self.point.dof(), joint, self.speeds[joint], self.accelerations[joint])
-    }
-    fn a(&mut self, joint: usize) -> Jet {
-        self.number(&self.point.arm.joints[joint].a)
-    }
-    fn d(&mut self, joint: usize) -> Jet {
-        self.number(&self.point.arm.joints[joint].d)
-    }
-    fn ratio(&mut self, joint: usize) -> Jet {
-        let ratio = self.point.arm.joints[joint].rotor_ratio.clone();
-        ratio.map_or(Jet::constant(Fp::ZERO), |k| self.number(&k))
-    }
-    fn gravity(&mut self, axis: usize) -> Jet {
-        if self.with_gravity { self.number(&self.point.arm.gravity[axis]) } else { Jet::constant(Fp::ZERO) }
-    }
-    fn symbol(&mut self, index: usize, sine: bool) -> Jet {
-        Jet::constant(self.point.sets.field.modular_symbol(index, sine))
     }
 }

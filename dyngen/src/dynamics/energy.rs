@@ -1,0 +1,57 @@
+//! The columns of the energies: Eq. 5 and 6 themselves.
+
+use super::body::constant;
+use super::elements::ArmElements;
+use super::lagrangian::twice_lagrangian;
+use crate::arm::Arm;
+use crate::base::ParameterSet;
+use crate::exact::algebra::Algebra;
+use crate::exact::constant::ConstantField;
+use crate::exact::rational::Rational;
+use crate::graph::{Builder, Expr};
+
+/// One row, 1 × p: T = row·π.
+pub fn kinetic_regressor(
+    b: &Builder,
+    arm: &Arm,
+    elements: &ArmElements<Expr>,
+    set: &ParameterSet,
+    field: &ConstantField,
+) -> Vec<Expr> {
+    let mut weightless = elements.clone();
+    weightless.gravity = [Expr::ZERO; 3];
+    of_set(b, arm, &weightless, set, field, false)
+}
+
+/// One row, 1 × p: U = row·π, zero where every mass is at the base's origin.
+pub fn potential_regressor(
+    b: &Builder,
+    arm: &Arm,
+    elements: &ArmElements<Expr>,
+    set: &ParameterSet,
+    field: &ConstantField,
+) -> Vec<Expr> {
+    let mut still = elements.clone();
+    still.joints.iter_mut().for_each(|joint| joint.speed = Expr::ZERO);
+    of_set(b, arm, &still, set, field, true)
+}
+
+fn of_set(
+    b: &Builder,
+    arm: &Arm,
+    elements: &ArmElements<Expr>,
+    set: &ParameterSet,
+    field: &ConstantField,
+    negate: bool,
+) -> Vec<Expr> {
+    debug_assert_eq!(arm.dof(), elements.joints.len());
+    let half = b.constant(&Rational::new(1.into(), 2.into()));
+    let half = if negate { -half } else { half };
+    let columns = twice_lagrangian(b, elements);
+    let column = |carriers: &crate::base::sets::Combination| {
+        carriers.iter().fold(Expr::ZERO, |sum, (p, factor)| {
+            b.add(&sum, &b.mul(&constant(b, field, factor), &columns[p.index()]))
+        })
+    };
+    set.parameters.iter().map(|p| b.mul(&half, &column(&p.carriers))).collect()
+}

@@ -1,0 +1,28 @@
+//! First derivatives in one direction over any algebra.
+
+use super::algebra::Algebra;
+
+/// Pairs of a value and its derivative over an algebra.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Duals<A>(pub A);
+
+impl<A: Algebra> Algebra for Duals<A> {
+    type Value = (A::Value, A::Value);
+
+    fn integer(&self, value: i64) -> Self::Value {
+        (self.0.integer(value), self.0.integer(0))
+    }
+    fn is_zero(&self, a: &Self::Value) -> bool {
+        self.0.is_zero(&a.0) && self.0.is_zero(&a.1)
+    }
+    fn add(&self, a: &Self::Value, b: &Self::Value) -> Self::Value {
+        (self.0.add(&a.0, &b.0), self.0.add(&a.1, &b.1))
+    }
+    fn neg(&self, a: &Self::Value) -> Self::Value {
+        (self.0.neg(&a.0), self.0.neg(&a.1))
+    }
+    fn mul(&self, a: &Self::Value, b: &Self::Value) -> Self::Value {
+        let cross = self.0.add(&self.0.mul(&a.0, &b.1), &self.0.mul(&a.1, &b.0));
+        (self.0.mul(&a.0, &b.0), cross)
+    }
+}

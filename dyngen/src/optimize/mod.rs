@@ -1,0 +1,20 @@
+//! Passes over a graph, in order, each with what holds after it.
+
+mod merge;
+
+use crate::exact::constant::ConstantField;
+use crate::graph::{Expr, Graph};
+
+/// A pass by name: what it turns a graph and its outputs into.
+pub type Pass = fn(&Graph, &[Expr], &ConstantField) -> (Graph, Vec<Expr>);
+
+/// The passes in order.
+pub const PASSES: &[(&str, Pass)] = &[
+    // AFTER THIS POINT: no two nodes are equal as functions of the inputs, up to sign, and none is zero.
+    ("merge", merge::merge),
+];
+
+/// Runs all passes.
+pub fn optimize(graph: Graph, outputs: Vec<Expr>, field: &ConstantField) -> (Graph, Vec<Expr>) {
+    PASSES.iter().fold((graph, outputs), |(graph, outputs), (_, pass)| pass(&graph, &outputs, field))
+}

@@ -1,0 +1,143 @@
+//! The pose as a power series in time, modulo the prime: what kinematics is proven against.
+
+use super::point::Point;
+use crate::arm::Convention;
+use crate::dynamics::elements::{ArmElements, Source};
+use crate::exact::algebra::Algebra;
+use crate::exact::prime::Fp;
+use crate::exact::rational::Rational;
+
+/// x₀ + x₁ t + x₂ t²
+type Series = [Fp; 3];
+
+/// Power series to second order.
+struct SeriesAlgebra;
+
+impl Algebra for SeriesAlgebra {
+    type Value = Series;
+    fn integer(&self, value: i64) -> Series {
+        [Fp::from_integer(value), Fp::ZERO, Fp::ZERO]
+    }
+    fn is_zero(&self, a: &Series) -> bool {
+        *a == [Fp::ZERO; 3]
+    }
+    fn add(&self, a: &Series, b: &Series) -> Series {
+        [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+    }
+    fn neg(&self, a: &Series) -> Series {
+        a.map(|x| -x)
+    }
+    fn mul(&self, a: &Series, b: &Series) -> Series {
+        [a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[0] * b[2] + a[1] * b[1] + a[2] * b[0]]
+    }
+}
+
+type Matrix = [[Series; 4]; 4];
+
+/// The last frame's transform along a motion of constant joint speeds.
+pub(super) struct PoseSeries(Matrix);
+
+impl PoseSeries {
+    pub(super) fn along(point: &Point<'_>, speeds: &[Fp]) -> PoseSeries {
+        let alg = SeriesAlgebra;
+        let elements =
+            ArmElements::build(&alg, point.arm, point.symbols, &mut SeriesSource { point, speeds });
+        let (zero, one) = (alg.integer(0), alg.integer(1));
+        let mut pose: Matrix =
+            std::array::from_fn(|i| std::array::from_fn(|j| if i == j { one } else { zero }));
+        for joint in &elements.joints {
+            let (s, c, sa, ca) = (joint.sin, joint.cos, joint.sin_alpha, joint.cos_alpha);
+            let about_z = [
+                [c, alg.neg(&s), zero, zero],
+                [s, c, zero, zero],
+                [zero, zero, one, joint.shift],
+                [zero, zero, zero, one],
+            ];
+            let about_x = [
+                [one, zero, zero, joint.a],
+                [zero, ca, alg.neg(&sa), zero],
+                [zero, sa, ca, zero],
+                [zero, zero, zero, one],
+            ];
+            let steps = match point.arm.convention {
+                Convention::Standard => [about_z, about_x],
+                Convention::Modified => [about_x, about_z],
+            };
+            for step in steps {
+                pose = std::array::from_fn(|i| {
+                    std::array::from_fn(|j| {
+                        (0..4).fold(zero, |sum, k| alg.add(&sum, &alg.mul(&pose[i][k], &step[k][j])))
+                    })
+                });
+            }
+        }
+        PoseSeries(pose)
+    }
+
+    /// The transform itself, row-major.
+    pub(super) fn pose(&self) -> Vec<Fp> {
+        self.0.iter().flatten().map(|x| x[0]).collect()
+    }
+
+    /// Velocity of the origin and angular velocity: ṗ, and ω from Ṙ·Rᵀ.
+    pub(super) fn velocity(&self) -> Vec<Fp> {
+        let spin = |i: usize, j: usize| (0..3).fold(Fp::ZERO, |s, k| s + self.0[i][k][1] * self.0[j][k][0]);
+        [self.origin(1).to_vec(), vec![spin(2, 1), spin(0, 2), spin(1, 0)]].concat()
+    }
+
+    /// Acceleration of the origin and angular acceleration: p̈, and from d/dt(Ṙ·Rᵀ).
+    pub(super) fn acceleration(&self) -> Vec<Fp> {
+        let two = Fp::from_integer(2);
+        let spin = |i: usize, j: usize| {
+            (0..3).fold(Fp::ZERO, |s, k| {
+                let (a, b) = (self.0[i][k], self.0[j][k]);
+                s + two * a[2] * b[0] + a[1] * b[1]
+            })
+        };
+        [self.origin(2).map(|x| two * x).to_vec(), vec![spin(2, 1), spin(0, 2), spin(1, 0)]].concat()
+    }
+
+    fn origin(&self, order: usize) -> [Fp; 3] {
+        std::array::from_fn(|i| self.0[i][3][order])
+    }
+}
+
+struct SeriesSource<'p, 'a> {
+    point: &'p Point<'a>,
+    speeds: &'p [Fp],
+}
+
+impl SeriesSource<'_, '_> {
+    fn number(&self, value: &Rational) -> Series {
+        [Fp::from_rational(value).unwrap_or(Fp::ZERO), Fp::ZERO, Fp::ZERO]
+    }
+}
+
+impl Source<Series> for SeriesSource<'_, '_> {
+    fn joint_trig(&mut self, joint: usize) -> (Series, Series) {
+        let ((s, c), v) = (self.point.joint_trig(joint), self.speeds[joint]);
+        let half = v * v * Fp::from_integer(2).inverse().unwrap_or(Fp::ONE);
+        ([s, c * v, -(s * half)], [c, -(s * v), -(c * half)])
+    }
+    fn position(&mut self, joint: usize) -> Series {
+        [self.point.positions[joint].0, self.speeds[joint], Fp::ZERO]
+    }
+    fn speed(&mut self, joint: usize) -> Series {
+        [self.speeds[joint], Fp::ZERO, Fp::ZERO]
+    }
+    fn a(&mut self, joint: usize) -> Series {
+        self.number(&self.point.arm.joints[joint].a)
+    }
+    fn d(&mut self, joint: usize) -> Series {
+        self.number(&self.point.arm.joints[joint].d)
+    }
+    fn ratio(&mut self, _: usize) -> Series {
+        [Fp::ZERO; 3]
+    }
+    fn gravity(&mut self, _: usize) -> Series {
+        [Fp::ZERO; 3]
+    }
+    fn symbol(&mut self, index: usize, sine: bool) -> Series {
+        [self.point.sets.field.modular_symbol(index, sine), Fp::ZERO, Fp::ZERO]
+    }
+}

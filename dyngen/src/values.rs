@@ -1,0 +1,127 @@
+//! Parameter values from a JSON file: `{"parameter": number, …}`.
+
+use crate::arm::Parameter;
+use crate::base::{ParameterSet, SetKind};
+use crate::diagnostic::{Diagnostic, Diagnostics};
+use crate::model::Model;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Named values, as a file gives them.
+#[derive(Clone, Debug)]
+pub struct Values {
+    file: String,
+    by_name: BTreeMap<String, f64>,
+}
+
+impl Values {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// Where the file cannot be read, is no JSON object, or holds anything but finite numbers: all of these at once.
+    pub fn read(path: &Path) -> Result<Values, Diagnostics> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| Diagnostics::whole_file(&file, format!("the values cannot be read: {e}")))?;
+        Self::parse(&text, &file)
+    }
+
+    /// Reads values from text; `file` names it in errors.
+    ///
+    /// # Errors
+    /// As [`Values::read`].
+    pub fn parse(text: &str, file: &str) -> Result<Values, Diagnostics> {
+        let json: serde_json::Value = serde_json::from_str(text).map_err(|e| {
+            let message = format!("not valid JSON: {e}");
+            Diagnostics(vec![Diagnostic {
+                file: file.to_string(),
+                line: e.line(),
+                column: e.column(),
+                message,
+            }])
+        })?;
+        let Some(object) = json.as_object() else {
+            return Err(Diagnostics::whole_file(
+                file,
+                "values must be one object {\"parameter\": number, …}",
+            ));
+        };
+        let (mut by_name, mut wrong) = (BTreeMap::new(), Vec::new());
+        for (name, value) in object {
+            match value.as_f64().filter(|x| x.is_finite()) {
+                Some(number) => {
+                    by_name.insert(name.clone(), number);
+                }
+                None => wrong.push(format!("the value of '{name}' must be a finite number, found {value}")),
+            }
+        }
+        if wrong.is_empty() {
+            return Ok(Values { file: file.to_string(), by_name });
+        }
+        let diagnostic = |message| Diagnostic { file: file.to_string(), line: 0, column: 0, message };
+        Err(Diagnostics(wrong.into_iter().map(diagnostic).collect()))
+    }
+
+    /// The values of a set's parameters in order: given by the set's own names, or as values of the arm's parameters, of
+    /// which the set's sums are made.
+    ///
+    /// # Errors
+    /// Every name that is missing or means nothing here.
+    pub fn of_set(&self, model: &Model, set: &ParameterSet) -> Result<Vec<f64>, Diagnostics> {
+        let names = set.names();
+        let given = |name: &String| self.by_name.contains_key(name);
+        let only_of_set = |name: &String| given(name) && Parameter::parse(name).is_none();
+        if names.iter().any(only_of_set) || names.iter().all(given) {
+            return self.in_order(&names, &names);
+        }
+        let kept: Vec<String> = model.arm().kept_parameters().iter().map(ToString::to_string).collect();
+        let needed: Vec<Parameter> =
+            set.parameters.iter().flat_map(|p| p.terms.iter().map(|(q, _)| *q)).collect();
+        let needed_names: Vec<String> = needed.iter().map(ToString::to_string).collect();
+        let values = self.in_order(&needed_names, &kept)?;
+        let mut all = vec![0.0; model.arm().all_parameters().len()];
+        for (parameter, value) in needed.iter().zip(values) {
+            all[parameter.index()] = value;
+        }
+        Ok(model.set_values(set, &all))
+    }
+
+    /// The set whose names the values have, with the values in its order; the minimal set where they are values of the
+    /// arm's parameters.
+    ///
+    /// # Errors
+    /// As [`Values::of_set`].
+    pub fn recognise(&self, model: &Model) -> Result<(SetKind, Vec<f64>), Diagnostics> {
+        let covered = |set: &&ParameterSet| set.names().iter().all(|n| self.by_name.contains_key(n));
+        let order = [SetKind::Full, SetKind::Published, SetKind::Minimal, SetKind::Symbolic];
+        let sets = order.iter().filter_map(|kind| model.sets().get(*kind));
+        let found = sets.clone().find(covered).or_else(|| model.sets().get(SetKind::Minimal));
+        match found {
+            Some(set) => Ok((set.kind, self.of_set(model, set)?)),
+            None => Err(Diagnostics::whole_file(&self.file, "the arm has no parameters")),
+        }
+    }
+
+    fn in_order(&self, names: &[String], allowed: &[String]) -> Result<Vec<f64>, Diagnostics> {
+        let missing: Vec<&str> =
+            names.iter().filter(|n| !self.by_name.contains_key(*n)).map(String::as_str).collect();
+        let unknown: Vec<&str> =
+            self.by_name.keys().filter(|n| !allowed.contains(n)).map(String::as_str).collect();
+        let mut wrong = Vec::new();
+        if !missing.is_empty() {
+            wrong.push(format!("no value for {}", missing.join(", ")));
+        }
+        if !unknown.is_empty() {
+            wrong.push(format!(
+                "{} names no parameter here; expected are {}",
+                unknown.join(", "),
+                allowed.join(", ")
+            ));
+        }
+        if wrong.is_empty() {
+            return Ok(names.iter().filter_map(|n| self.by_name.get(n).copied()).collect());
+        }
+        let diagnostic = |message| Diagnostic { file: self.file.clone(), line: 0, column: 0, message };
+        Err(Diagnostics(wrong.into_iter().map(diagnostic).collect()))
+    }
+}
