@@ -44,12 +44,23 @@ pub struct Path<'p> {
 
 /// Gathers the evidence for a trial. `path` holds the other path and the candidate's columns there.
 #[must_use]
-pub fn evidence(screen: &Screen<'_>, trial: &Trial, joints: &[usize], folds: &Folds, extent: Extent, path: Option<(&Path<'_>, &[Column])>) -> Evidence {
+pub fn evidence(
+    screen: &Screen<'_>,
+    trial: &Trial,
+    joints: &[usize],
+    folds: &Folds,
+    extent: Extent,
+    path: Option<(&Path<'_>, &[Column])>,
+) -> Evidence {
     let (local, short) = (extent != Extent::Everywhere, extent == Extent::Short);
     Evidence {
         score: trial.score,
         p_value: if short { by_chance(trial) } else { wald(screen, trial) },
-        fold_gains: if short { event_gains(screen, trial) } else { fold_gains(screen, trial, joints, folds, local) },
+        fold_gains: if short {
+            event_gains(screen, trial)
+        } else {
+            fold_gains(screen, trial, joints, folds, local)
+        },
         path_gain: path.map_or(0.0, |(path, columns)| path_gain(screen, trial, joints, path, columns)),
     }
 }
@@ -158,13 +169,20 @@ fn event_gains(screen: &Screen<'_>, trial: &Trial) -> Vec<f64> {
             }
             let x = Solver::new(&gram, |_| true).solve(&right);
             let (gram, right, square) = &parts[held];
-            let quadratic: f64 = (0..k).map(|a| x[a] * (0..k).map(|b| gram[(a, b)] * x[b]).sum::<f64>()).sum();
+            let quadratic: f64 =
+                (0..k).map(|a| x[a] * (0..k).map(|b| gram[(a, b)] * x[b]).sum::<f64>()).sum();
             (*square > 0.0).then(|| (2.0 * dot(&x, right) - quadratic) / square)
         })
         .collect()
 }
 
-fn path_gain(screen: &Screen<'_>, trial: &Trial, joints: &[usize], path: &Path<'_>, columns: &[Column]) -> f64 {
+fn path_gain(
+    screen: &Screen<'_>,
+    trial: &Trial,
+    joints: &[usize],
+    path: &Path<'_>,
+    columns: &[Column],
+) -> f64 {
     let fit = screen.context.fit;
     let mut shift = vec![0.0; fit.design.size];
     for (base, theta) in trial.base.iter().zip(&trial.theta) {

@@ -229,7 +229,10 @@ impl Session<'_> {
             // What needs fewer columns and is as good is preferred.
             let least = top - (rule::AS_GOOD * top).max(rule::AS_GOOD_SCORE);
             for f in 0..families.len() {
-                if f == chosen || families[f].potential() < least || families[f].columns() >= families[chosen].columns() {
+                if f == chosen
+                    || families[f].potential() < least
+                    || families[f].columns() >= families[chosen].columns()
+                {
                     continue;
                 }
                 self.test(&screen, &mut families[f], tests, &path, &other_context);
@@ -237,13 +240,15 @@ impl Session<'_> {
                     chosen = f;
                 }
             }
-            let passing: Vec<&Member> = families[chosen].members.iter().filter(|m| m.refusal.is_none()).collect();
+            let passing: Vec<&Member> =
+                families[chosen].members.iter().filter(|m| m.refusal.is_none()).collect();
             let trials: Vec<(&Trial, &[usize])> =
                 passing.iter().map(|m| (&m.trial, m.candidate.joints.as_slice())).collect();
             let placebos = placebos(&screen, &trials, &self.folds, tests, STEP_PLACEBOS, step as u64);
             let mut scores = placebos.scores;
             scores.sort_by(f64::total_cmp);
-            let level = scores.get((scores.len() as f64 * rule::PLACEBO_LEVEL) as usize).copied().unwrap_or(0.0);
+            let level =
+                scores.get((scores.len() as f64 * rule::PLACEBO_LEVEL) as usize).copied().unwrap_or(0.0);
             let members: Vec<usize> = (0..families[chosen].members.len())
                 .filter(|m| {
                     let member = &families[chosen].members[*m];
@@ -268,9 +273,8 @@ impl Session<'_> {
                 .collect();
             (family.effect, comparison, kept, tests)
         };
-        let squares = |fit: &Fit| -> Vec<f64> {
-            fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect()
-        };
+        let squares =
+            |fit: &Fit| -> Vec<f64> { fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect() };
         let square_before = squares(&self.fit);
         let added: Vec<Candidate> = members.iter().map(|m| m.candidate.clone()).collect();
         for member in members {
@@ -333,7 +337,8 @@ impl Session<'_> {
         let mut families = Vec::new();
         for (e, candidates) in lists {
             let effect = self.effects[e].as_ref();
-            let open: Vec<Candidate> = candidates.into_iter().filter(|c| !self.has(e, c) && !self.gave_up(e, c)).collect();
+            let open: Vec<Candidate> =
+                candidates.into_iter().filter(|c| !self.has(e, c) && !self.gave_up(e, c)).collect();
             *tests += open.iter().map(|c| c.searched.max(1.0)).fold(0.0, f64::max).max(open.len() as f64);
             let trials = parallel::map(&open, |c| screen.try_candidate(effect, c));
             let mut members: Vec<Member> = Vec::new();
@@ -410,15 +415,21 @@ impl Session<'_> {
         other: &Context<'_>,
     ) {
         let effect = self.effects[family.effect].as_ref();
-        let open: Vec<usize> =
-            (0..family.members.len())
-                .filter(|m| family.members[*m].refusal.is_none() && family.members[*m].evidence.is_none())
-                .collect();
+        let open: Vec<usize> = (0..family.members.len())
+            .filter(|m| family.members[*m].refusal.is_none() && family.members[*m].evidence.is_none())
+            .collect();
         let found = parallel::map(&open, |m| {
             let member = &family.members[*m];
             let columns = effect.columns(other, &member.candidate);
             let extent = extent(&member.candidate);
-            evidence(screen, &member.trial, &member.candidate.joints, &self.folds, extent, Some((path, &columns)))
+            evidence(
+                screen,
+                &member.trial,
+                &member.candidate.joints,
+                &self.folds,
+                extent,
+                Some((path, &columns)),
+            )
         });
         for (m, evidence) in open.into_iter().zip(found) {
             let member = &mut family.members[m];
@@ -506,10 +517,8 @@ impl Session<'_> {
 
     fn result(mut self, before: Errors, base_residual: &[Vec<f64>]) -> Explained {
         let residual = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
-        let after = Errors {
-            fit: spread(&self.data, &self.fit.residual),
-            validate: spread(&self.other, &residual),
-        };
+        let after =
+            Errors { fit: spread(&self.data, &self.fit.residual), validate: spread(&self.other, &residual) };
         let curves = curves(&self.other, base_residual, &residual);
         let floor = noise_floor(&self.data);
         let context = Context::new(&self.data, &self.fit, &self.fit.residual);

@@ -23,7 +23,14 @@ pub struct Placebos {
 
 /// Shifts the columns of real trials in time within each recording and asks the rule about them.
 #[must_use]
-pub fn placebos(screen: &Screen<'_>, trials: &[(&Trial, &[usize])], folds: &Folds, tests: f64, count: usize, seed: u64) -> Placebos {
+pub fn placebos(
+    screen: &Screen<'_>,
+    trials: &[(&Trial, &[usize])],
+    folds: &Folds,
+    tests: f64,
+    count: usize,
+    seed: u64,
+) -> Placebos {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let draws: Vec<(usize, f64)> =
         (0..count).map(|k| (k % trials.len().max(1), rng.random_range(0.15..0.85))).collect();
