@@ -13,7 +13,9 @@ use std::path::PathBuf;
 ///
 /// Writes explained.json and report.html.
 #[derive(Args, Debug)]
-#[command(after_help = "Example:\n  powerball explain --arm arm.toml --log a.csv b.csv c.csv --validate d.csv --out result")]
+#[command(
+    after_help = "Example:\n  powerball explain --arm arm.toml --log a.csv b.csv c.csv --validate d.csv --out result"
+)]
 pub(crate) struct Explain {
     #[command(flatten)]
     inputs: Inputs,
@@ -27,8 +29,9 @@ impl Explain {
         let progress = Progress::new();
         let loaded = load(&self.inputs, &self.validate, &progress)?;
         let say = |what: &str| progress.say(what);
-        let mut explained = explain(&loaded.body, &loaded.fit, &loaded.validate, &DataOptions::default(), &say)
-            .map_err(|e| Failure::Refused(e.to_string()))?;
+        let mut explained =
+            explain(&loaded.body, &loaded.fit, &loaded.validate, &DataOptions::default(), &say)
+                .map_err(|e| Failure::Refused(e.to_string()))?;
         explained.warnings.splice(0..0, loaded.warnings);
         let text = output::json(&explained)?;
         output::write(&self.inputs.out, "explained.json", text.as_bytes())?;
@@ -57,7 +60,9 @@ fn summary(explained: &Explained) -> String {
     ]));
     text.push('\n');
     if explained.effects.is_empty() {
-        text.push_str("\nNo effect was accepted: these logs do not show that the model lacks anything with a name.\n");
+        text.push_str(
+            "\nNo effect was accepted: these logs do not show that the model lacks anything with a name.\n",
+        );
     }
     for effect in &explained.effects {
         let joints: Vec<String> = effect.joints.iter().map(ToString::to_string).collect();
@@ -71,7 +76,11 @@ fn summary(explained: &Explained) -> String {
     }
     if let Some(unattributed) = &explained.unattributed {
         let joints: Vec<String> = unattributed.joints.iter().map(ToString::to_string).collect();
-        text.push_str(&format!("\nUnattributed on joint {}: depends on {}\n", joints.join(", "), unattributed.depends_on.join(", ")));
+        text.push_str(&format!(
+            "\nUnattributed on joint {}: depends on {}\n",
+            joints.join(", "),
+            unattributed.depends_on.join(", ")
+        ));
     }
     let fp = &explained.false_positives;
     text.push_str(&format!("\n{} of {} placebos were accepted", fp.accepted, fp.placebos));

@@ -40,7 +40,9 @@ pub(crate) fn load(inputs: &Inputs, validate: &[PathBuf], progress: &Progress) -
     for file in validate {
         if inputs.log.iter().any(|log| same_file(log, file)) {
             let name = file.display();
-            return Err(Failure::Unusable(format!("{name} is given to --log and --validate: a log cannot judge its own fit")));
+            return Err(Failure::Unusable(format!(
+                "{name} is given to --log and --validate: a log cannot judge its own fit"
+            )));
         }
     }
     progress.say("reading logs");

@@ -23,7 +23,8 @@ impl Progress {
 /// Writes a file whole or not at all: a reader never sees half of it.
 pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failure> {
     let (target, part) = (folder.join(name), folder.join(format!(".{name}.{}.part", std::process::id())));
-    let failure = |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", target.display()));
+    let failure =
+        |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", target.display()));
     let done = std::fs::File::create(&part).and_then(|mut file| {
         file.write_all(bytes)?;
         file.sync_all()?;

@@ -22,7 +22,9 @@ impl Effect for BaseTilt {
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
         let joints: Vec<usize> = context.moving_joints().collect();
         let weightless = context.data.body.arm().gravity.iter().all(|g| rational::to_f64(g) == 0.0);
-        if joints.is_empty() || weightless { return Vec::new() }
+        if joints.is_empty() || weightless {
+            return Vec::new();
+        }
         vec![Candidate { joints, ..Candidate::on(0, 0, Vec::new(), 1) }]
     }
 

@@ -92,7 +92,8 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     // To the last row before the next step begins.
     let next = steps.get(last + 1).filter(|s| s.log == steps[last].log);
     let to = next.and_then(|s| block_start(context, s)).map_or(f64::MAX, |t| t - 0.5 * step);
-    let window = Window { log, from, to: if to == f64::MAX { end_of_log(context, steps[last].log) } else { to } };
+    let window =
+        Window { log, from, to: if to == f64::MAX { end_of_log(context, steps[last].log) } else { to } };
     let joints = (0..data.dof()).collect();
     Some(Candidate { joints, form: 0, values: Vec::new(), windows: vec![window], searched })
 }

@@ -23,7 +23,14 @@ impl<'a> Context<'a> {
     /// A model seen on some data.
     #[must_use]
     pub fn new(data: &'a Data<'a>, fit: &'a Fit, residual: &'a [Vec<f64>]) -> Context<'a> {
-        Context { data, fit, residual, rigid: OnceLock::new(), prediction: OnceLock::new(), top_speed: OnceLock::new() }
+        Context {
+            data,
+            fit,
+            residual,
+            rigid: OnceLock::new(),
+            prediction: OnceLock::new(),
+            top_speed: OnceLock::new(),
+        }
     }
 
     /// Joints that move.
@@ -75,7 +82,8 @@ impl<'a> Context<'a> {
 
     /// A column on one joint that is a function of its position and speed.
     pub fn state_column(&self, joint: usize, f: impl Fn(f64, f64) -> f64) -> Column {
-        self.data.column_on(joint, |_, r| r.position(joint).zip(r.speed(joint)).map(|(q, v)| f(q, v)).collect())
+        self.data
+            .column_on(joint, |_, r| r.position(joint).zip(r.speed(joint)).map(|(q, v)| f(q, v)).collect())
     }
 
     /// Times of a joint's rows in their log's own t, with the log: by row.
@@ -87,7 +95,9 @@ impl<'a> Context<'a> {
         for (r, recording) in data.recordings.iter().enumerate() {
             let kept = data.band.kept(recording.len());
             times.extend(
-                rows.kept[r].iter().map(|k| (recording.log, recording.start + kept[*k] as f64 / recording.rate)),
+                rows.kept[r]
+                    .iter()
+                    .map(|k| (recording.log, recording.start + kept[*k] as f64 / recording.rate)),
             );
         }
         times

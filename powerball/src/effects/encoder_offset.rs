@@ -54,7 +54,12 @@ impl Effect for EncoderOffset {
 }
 
 /// Rigid torque with one joint's position moved by `shift` of the sample.
-pub(super) fn shifted_torque(context: &Context<'_>, r: &Recording, joint: usize, shift: impl Fn(usize) -> f64) -> Vec<f64> {
+pub(super) fn shifted_torque(
+    context: &Context<'_>,
+    r: &Recording,
+    joint: usize,
+    shift: impl Fn(usize) -> f64,
+) -> Vec<f64> {
     let n = r.dof;
     let mut q = r.q.clone();
     for k in 0..r.len() {

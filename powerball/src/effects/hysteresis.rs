@@ -18,7 +18,8 @@ impl Effect for Hysteresis {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let on = |j: usize| geometric(3e-4, 0.05, 8).into_iter().map(move |d| Candidate::on(j, 0, vec![d], 8));
+        let on =
+            |j: usize| geometric(3e-4, 0.05, 8).into_iter().map(move |d| Candidate::on(j, 0, vec![d], 8));
         context.moving_joints().flat_map(on).collect()
     }
 

@@ -29,7 +29,11 @@ impl Effect for JointElasticity {
 
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
         let (j, n) = (candidate.joints[0], context.data.dof());
-        let top = context.rigid().iter().flat_map(|t| t.iter().skip(j).step_by(n)).fold(1e-9f64, |m, t| m.max(t.abs()));
+        let top = context
+            .rigid()
+            .iter()
+            .flat_map(|t| t.iter().skip(j).step_by(n))
+            .fold(1e-9f64, |m, t| m.max(t.abs()));
         let epsilon = STEP / top;
         let rate = context.data.rate();
         let filter = Butterworth::low_pass(2, SMOOTHING.min(0.3 * rate), rate);

@@ -125,7 +125,8 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     }
     let searched = starts.len() as f64;
     let gains: Vec<f64> = starts.iter().map(|(_, _, t)| gain(t, &solver)).collect();
-    let best = (0..starts.len()).max_by(|a, b| gains[*a].total_cmp(&gains[*b])).filter(|b| gains[*b] > 0.0)?;
+    let best =
+        (0..starts.len()).max_by(|a, b| gains[*a].total_cmp(&gains[*b])).filter(|b| gains[*b] > 0.0)?;
     let mut chosen = vec![best];
     let mut total = starts[best].2.clone();
     let mut explained = gains[best];

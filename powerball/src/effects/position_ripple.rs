@@ -57,7 +57,9 @@ impl Effect for PositionRipple {
     fn neighbours(&self, candidate: &Candidate) -> Vec<Candidate> {
         let k = candidate.values[0];
         let near = |d: f64| Candidate { values: vec![k + d], ..candidate.clone() };
-        if k < SMALL_ORDERS as f64 { return Vec::new() }
+        if k < SMALL_ORDERS as f64 {
+            return Vec::new();
+        }
         [-0.3, -0.1, -0.03, 0.03, 0.1, 0.3].map(near).to_vec()
     }
 
@@ -83,7 +85,7 @@ fn scan(context: &Context<'_>, joint: usize) -> Vec<f64> {
     }
     let (low, high) = positions.iter().fold((f64::MAX, f64::MIN), |(l, h), q| (l.min(*q), h.max(*q)));
     let width = 2.0 * PI / BINS as f64;
-    if !(high - low > 20.0 * width) || high - low > 100.0 {
+    if high - low <= 20.0 * width || high - low > 100.0 {
         return Vec::new();
     }
     let bins = ((high - low) / width) as usize + 1;

@@ -19,7 +19,8 @@ impl Effect for VelocityNonlinearity {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let on = |j: usize| (0..POWERS.len()).map(move |form| Candidate::on(j, form, Vec::new(), POWERS.len()));
+        let on =
+            |j: usize| (0..POWERS.len()).map(move |form| Candidate::on(j, form, Vec::new(), POWERS.len()));
         context.moving_joints().flat_map(on).collect()
     }
 

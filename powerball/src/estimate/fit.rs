@@ -116,7 +116,17 @@ pub fn fit(data: &Data<'_>, folds: &Folds, terms: &[Term], start: Option<&Fit>) 
     state.solve(&weights, terms);
     let residual = residuals(data, &state.design, &state.theta);
     let free = state.free(n);
-    Fit { shapes, theta: state.theta, weights, sigma, inflation, residual, design: state.design, gram: state.gram, free }
+    Fit {
+        shapes,
+        theta: state.theta,
+        weights,
+        sigma,
+        inflation,
+        residual,
+        design: state.design,
+        gram: state.gram,
+        free,
+    }
 }
 
 /// A model at given shapes.
@@ -129,7 +139,14 @@ struct State {
 }
 
 impl State {
-    fn new(data: &Data<'_>, folds: &Folds, extra: &[Column], terms: &[Term], shapes: Vec<[f64; 2]>, weights: &[f64]) -> State {
+    fn new(
+        data: &Data<'_>,
+        folds: &Folds,
+        extra: &[Column],
+        terms: &[Term],
+        shapes: Vec<[f64; 2]>,
+        weights: &[f64],
+    ) -> State {
         let design = Design::new(data, &friction_columns(data, &shapes), extra);
         let gram = Gram::new(data, &design, folds);
         let solver = Solver::new(&faer::Mat::zeros(0, 0), |_| false);
@@ -144,7 +161,8 @@ impl State {
             .flat_map(|j| [0, 1, 2].map(|k| (j, k)))
             .map(|(j, k)| self.design.friction(j, k))
             .collect();
-        non_negative.extend((0..terms.len()).filter(|t| terms[*t].non_negative).map(|t| self.design.extra(t)));
+        non_negative
+            .extend((0..terms.len()).filter(|t| terms[*t].non_negative).map(|t| self.design.extra(t)));
         let wanted = |c: usize| !is_tangent(&self.design, c);
         let (theta, solver) = bounded(&gram, &right, wanted, &non_negative);
         let explained: f64 = theta.iter().zip(&right).map(|(x, r)| x * r).sum::<f64>();
@@ -171,9 +189,7 @@ impl State {
 }
 
 fn is_tangent(design: &Design, column: usize) -> bool {
-    column
-        .checked_sub(design.inertial)
-        .is_some_and(|f| f < FRICTION * design.dof() && f % FRICTION >= 3)
+    column.checked_sub(design.inertial).is_some_and(|f| f < FRICTION * design.dof() && f % FRICTION >= 3)
 }
 
 /// The friction columns of all joints for given shapes.
@@ -252,7 +268,8 @@ fn new_weights(data: &Data<'_>, residual: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>, V
         .iter()
         .map(|r| (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt())
         .collect();
-    let inflation: Vec<f64> = residual.iter().enumerate().map(|(j, r)| variance_inflation(data, j, r)).collect();
+    let inflation: Vec<f64> =
+        residual.iter().enumerate().map(|(j, r)| variance_inflation(data, j, r)).collect();
     let top = sigma.iter().fold(0.0f64, |m, s| m.max(*s));
     let weights = (0..sigma.len())
         .map(|j| {

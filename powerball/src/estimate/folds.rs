@@ -42,7 +42,8 @@ impl Folds {
         let folds = names.len().clamp(1, MOST);
         let mut logs = Parts { held: vec![Vec::new(); folds], left_out: vec![Vec::new(); folds] };
         for (at, log) in names.iter().enumerate() {
-            let members: Vec<usize> = (0..data.blocks.len()).filter(|b| data.blocks[*b].log == *log).collect();
+            let members: Vec<usize> =
+                (0..data.blocks.len()).filter(|b| data.blocks[*b].log == *log).collect();
             let part_of = |k: usize| k * FOLDS / members.len();
             let mut previous = None;
             for (k, block) in members.iter().enumerate() {

@@ -12,7 +12,7 @@ const GRID: usize = 14;
 
 /// Friction columns of a joint in the band: tanh(γ2 q̇), tanh(γ4 q̇), q̇, and ∂/∂ ln γ of the first two.
 #[must_use]
-pub fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f64>; FRICTION] {
+pub(super) fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f64>; FRICTION] {
     let column = |f: &dyn Fn(f64) -> f64| {
         data.joints[joint].column(&data.band, &data.recordings, |_, r| r.speed(joint).map(f).collect())
     };
@@ -34,21 +34,27 @@ pub fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f64>; FRI
 
 /// The steepnesses that make sense for a joint, s/rad: from nearly straight over its speeds to a step.
 #[must_use]
-pub fn range(data: &Data<'_>, joint: usize) -> (f64, f64) {
+pub(super) fn range(data: &Data<'_>, joint: usize) -> (f64, f64) {
     let top = data.top_speed(joint);
     (1.0 / top, 1000.0 / top)
 }
 
 /// The pair of steepnesses that leaves the least on one joint, all else refitted, levels ≥ 0.
 #[must_use]
-pub fn search(data: &Data<'_>, design: &Design, gram: &Mat<f64>, right: &[f64], joint: usize, weight: f64, folds: &Folds) -> [f64; 2] {
+pub(super) fn search(
+    data: &Data<'_>,
+    design: &Design,
+    gram: &Mat<f64>,
+    right: &[f64],
+    joint: usize,
+    weight: f64,
+    folds: &Folds,
+) -> [f64; 2] {
     let (low, high) = range(data, joint);
-    let steep: Vec<f64> =
-        (0..GRID).map(|k| low * (high / low).powf(k as f64 / (GRID - 1) as f64)).collect();
+    let steep: Vec<f64> = (0..GRID).map(|k| low * (high / low).powf(k as f64 / (GRID - 1) as f64)).collect();
     let trial: Vec<Vec<f64>> = parallel::map(&steep, |g| {
-        data.joints[joint].column(&data.band, &data.recordings, |_, r| {
-            r.speed(joint).map(|v| (g * v).tanh()).collect()
-        })
+        data.joints[joint]
+            .column(&data.band, &data.recordings, |_, r| r.speed(joint).map(|v| (g * v).tanh()).collect())
     });
     // Everything but this joint's levels and all tangents stays as nuisance.
     let nuisance = |c: usize| {
@@ -70,7 +76,9 @@ pub fn search(data: &Data<'_>, design: &Design, gram: &Mat<f64>, right: &[f64], 
                 cross[k][g] += weight * value;
             }
         }
-        let dot = |a: &[f64], b: &[f64]| a[rows.clone()].iter().zip(&b[rows.clone()]).map(|(x, y)| x * y).sum::<f64>();
+        let dot = |a: &[f64], b: &[f64]| {
+            a[rows.clone()].iter().zip(&b[rows.clone()]).map(|(x, y)| x * y).sum::<f64>()
+        };
         for a in 0..GRID {
             for b in 0..=a {
                 square[a][b] += weight * dot(&trial[a], &trial[b]);
@@ -86,7 +94,8 @@ pub fn search(data: &Data<'_>, design: &Design, gram: &Mat<f64>, right: &[f64], 
         }
         score[a] -= inner(&cross[a], &base);
     }
-    let single = |a: usize| if score[a] > 0.0 && square[a][a] > 0.0 { score[a].powi(2) / square[a][a] } else { 0.0 };
+    let single =
+        |a: usize| if score[a] > 0.0 && square[a][a] > 0.0 { score[a].powi(2) / square[a][a] } else { 0.0 };
     let (mut best, mut found) = (0.0, [steep[GRID - 3], steep[2]]);
     for a in 0..GRID {
         for b in 0..a {
@@ -96,11 +105,8 @@ pub fn search(data: &Data<'_>, design: &Design, gram: &Mat<f64>, right: &[f64], 
             }
             let x = (score[a] * square[b][b] - score[b] * square[a][b]) / det;
             let z = (score[b] * square[a][a] - score[a] * square[a][b]) / det;
-            let gain = if x >= 0.0 && z >= 0.0 {
-                x * score[a] + z * score[b]
-            } else {
-                single(a).max(single(b))
-            };
+            let gain =
+                if x >= 0.0 && z >= 0.0 { x * score[a] + z * score[b] } else { single(a).max(single(b)) };
             if gain > best {
                 (best, found) = (gain, [steep[a], steep[b]]);
             }

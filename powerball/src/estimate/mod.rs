@@ -1,7 +1,7 @@
 //! Weighted least squares in the minimal set, friction shapes included, with honest standard errors.
 
-pub mod distribution;
 mod design;
+pub mod distribution;
 mod fit;
 mod folds;
 mod friction_shape;

@@ -38,7 +38,7 @@ impl Solver {
                 left -= value * value;
                 row.push(value);
             }
-            if !(left > DEPENDENT) {
+            if left.is_nan() || left <= DEPENDENT {
                 continue;
             }
             row.push(left.sqrt());
@@ -112,7 +112,12 @@ impl Solver {
 ///
 /// Returns the solution and the factor over the columns that are free.
 #[must_use]
-pub fn bounded(gram: &Mat<f64>, right: &[f64], wanted: impl Fn(usize) -> bool, non_negative: &[usize]) -> (Vec<f64>, Solver) {
+pub(super) fn bounded(
+    gram: &Mat<f64>,
+    right: &[f64],
+    wanted: impl Fn(usize) -> bool,
+    non_negative: &[usize],
+) -> (Vec<f64>, Solver) {
     let mut at_bound: Vec<usize> = Vec::new();
     let mut best = None;
     // Each round moves one coefficient; a cycle would be endless only through rounding.
@@ -120,7 +125,8 @@ pub fn bounded(gram: &Mat<f64>, right: &[f64], wanted: impl Fn(usize) -> bool, n
         let solver = Solver::new(gram, |c| wanted(c) && !at_bound.contains(&c));
         let x = solver.solve(right);
         let size = |c: usize| x[c] * gram[(c, c)].sqrt();
-        let worst = non_negative.iter().copied().filter(|c| x[*c] < 0.0).min_by(|a, b| size(*a).total_cmp(&size(*b)));
+        let worst =
+            non_negative.iter().copied().filter(|c| x[*c] < 0.0).min_by(|a, b| size(*a).total_cmp(&size(*b)));
         if let Some(c) = worst {
             at_bound.push(c);
             best = Some((x, solver));
@@ -129,11 +135,11 @@ pub fn bounded(gram: &Mat<f64>, right: &[f64], wanted: impl Fn(usize) -> bool, n
         // A coefficient at its bound that would now rise is let free again.
         let rising = at_bound.iter().copied().find(|&c| {
             let gradient = right[c] - (0..x.len()).map(|k| gram[(c, k)] * x[k]).sum::<f64>();
-            gradient > 1e-9 * (gram[(c, c)].sqrt() * right[c].abs().max(1.0))
-                && {
-                    let trial = Solver::new(gram, |k| wanted(k) && (k == c || !at_bound.contains(&k))).solve(right);
-                    trial[c] > 0.0 && non_negative.iter().all(|k| trial[*k] >= 0.0)
-                }
+            gradient > 1e-9 * (gram[(c, c)].sqrt() * right[c].abs().max(1.0)) && {
+                let trial =
+                    Solver::new(gram, |k| wanted(k) && (k == c || !at_bound.contains(&k))).solve(right);
+                trial[c] > 0.0 && non_negative.iter().all(|k| trial[*k] >= 0.0)
+            }
         });
         match rising {
             Some(c) => at_bound.retain(|k| *k != c),

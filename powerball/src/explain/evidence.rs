@@ -9,20 +9,20 @@ use faer::Mat;
 
 /// The evidence for one candidate.
 #[derive(Clone, Debug)]
-pub struct Evidence {
+pub(super) struct Evidence {
     /// Penalised gain.
-    pub score: f64,
+    pub(super) score: f64,
     /// Cluster-robust Wald test over blocks, base refitted: the probability of such coefficients by chance.
-    pub p_value: f64,
+    pub(super) p_value: f64,
     /// Share by which the held-out squared error of the candidate's joints falls, by fold.
-    pub fold_gains: Vec<f64>,
+    pub(super) fold_gains: Vec<f64>,
     /// The same on the other path: the mean over its logs.
-    pub path_gain: f64,
+    pub(super) path_gain: f64,
 }
 
 /// Where a candidate acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Extent {
+pub(super) enum Extent {
     /// In all logs.
     Everywhere,
     /// In some logs, for most of their time.
@@ -33,23 +33,34 @@ pub enum Extent {
 
 /// The other path, prepared for one base model.
 #[derive(Debug)]
-pub struct Path<'p> {
+pub(super) struct Path<'p> {
     /// Its data.
-    pub data: &'p Data<'p>,
+    pub(super) data: &'p Data<'p>,
     /// The base's columns on it.
-    pub design: Design,
+    pub(super) design: Design,
     /// What the base leaves on it.
-    pub residual: Vec<Vec<f64>>,
+    pub(super) residual: Vec<Vec<f64>>,
 }
 
 /// Gathers the evidence for a trial. `path` holds the other path and the candidate's columns there.
 #[must_use]
-pub fn evidence(screen: &Screen<'_>, trial: &Trial, joints: &[usize], folds: &Folds, extent: Extent, path: Option<(&Path<'_>, &[Column])>) -> Evidence {
+pub(super) fn evidence(
+    screen: &Screen<'_>,
+    trial: &Trial,
+    joints: &[usize],
+    folds: &Folds,
+    extent: Extent,
+    path: Option<(&Path<'_>, &[Column])>,
+) -> Evidence {
     let (local, short) = (extent != Extent::Everywhere, extent == Extent::Short);
     Evidence {
         score: trial.score,
         p_value: if short { by_chance(trial) } else { wald(screen, trial) },
-        fold_gains: if short { event_gains(screen, trial) } else { fold_gains(screen, trial, joints, folds, local) },
+        fold_gains: if short {
+            event_gains(screen, trial)
+        } else {
+            fold_gains(screen, trial, joints, folds, local)
+        },
         path_gain: path.map_or(0.0, |(path, columns)| path_gain(screen, trial, joints, path, columns)),
     }
 }
@@ -158,13 +169,20 @@ fn event_gains(screen: &Screen<'_>, trial: &Trial) -> Vec<f64> {
             }
             let x = Solver::new(&gram, |_| true).solve(&right);
             let (gram, right, square) = &parts[held];
-            let quadratic: f64 = (0..k).map(|a| x[a] * (0..k).map(|b| gram[(a, b)] * x[b]).sum::<f64>()).sum();
+            let quadratic: f64 =
+                (0..k).map(|a| x[a] * (0..k).map(|b| gram[(a, b)] * x[b]).sum::<f64>()).sum();
             (*square > 0.0).then(|| (2.0 * dot(&x, right) - quadratic) / square)
         })
         .collect()
 }
 
-fn path_gain(screen: &Screen<'_>, trial: &Trial, joints: &[usize], path: &Path<'_>, columns: &[Column]) -> f64 {
+fn path_gain(
+    screen: &Screen<'_>,
+    trial: &Trial,
+    joints: &[usize],
+    path: &Path<'_>,
+    columns: &[Column],
+) -> f64 {
     let fit = screen.context.fit;
     let mut shift = vec![0.0; fit.design.size];
     for (base, theta) in trial.base.iter().zip(&trial.theta) {
@@ -187,8 +205,7 @@ fn path_gain(screen: &Screen<'_>, trial: &Trial, joints: &[usize], path: &Path<'
             }
         }
     }
-    let gains: Vec<f64> =
-        change.iter().zip(&scale).filter(|(_, s)| **s > 0.0).map(|(c, s)| c / s).collect();
+    let gains: Vec<f64> = change.iter().zip(&scale).filter(|(_, s)| **s > 0.0).map(|(c, s)| c / s).collect();
     // The median keeps one odd log (something held, something touched) from deciding.
     let mut sorted = gains.clone();
     sorted.sort_by(f64::total_cmp);

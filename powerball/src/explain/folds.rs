@@ -6,7 +6,7 @@ use faer::Mat;
 
 /// The base model fitted without one fold.
 #[derive(Debug)]
-pub struct FoldBase {
+pub(super) struct FoldBase {
     held: Vec<usize>,
     left_out: Vec<usize>,
     /// Over what is fitted.
@@ -23,7 +23,7 @@ pub struct FoldBase {
 impl FoldBase {
     /// Fits the base without each fold.
     #[must_use]
-    pub fn all(fit: &Fit, folds: &Folds, local: bool) -> Vec<FoldBase> {
+    pub(super) fn all(fit: &Fit, folds: &Folds, local: bool) -> Vec<FoldBase> {
         let (held, left_out) = folds.folds(local);
         held.iter()
             .zip(left_out)
@@ -38,7 +38,8 @@ impl FoldBase {
                         let mut own = vec![0.0; fit.design.dof()];
                         own[j] = fit.weights[j];
                         let (gram, right, square) = fit.gram.sum(&own, |c| held.contains(&c));
-                        let quadratic: f64 = (0..theta.len()).map(|i| theta[i] * times(&gram, i, &theta)).sum();
+                        let quadratic: f64 =
+                            (0..theta.len()).map(|i| theta[i] * times(&gram, i, &theta)).sum();
                         square - 2.0 * dot(&theta, &right) + quadratic
                     })
                     .collect();
@@ -79,7 +80,13 @@ impl Cross {
 /// Share by which the held-out squared error of the given joints falls with a candidate, by fold; the base and the
 /// candidate are fitted to the rest.
 #[must_use]
-pub fn fold_gains(screen: &Screen<'_>, trial: &Trial, joints: &[usize], folds: &Folds, local: bool) -> Vec<f64> {
+pub(super) fn fold_gains(
+    screen: &Screen<'_>,
+    trial: &Trial,
+    joints: &[usize],
+    folds: &Folds,
+    local: bool,
+) -> Vec<f64> {
     let (data, fit) = (screen.context.data, screen.context.fit);
     let (size, k) = (fit.design.size, trial.columns.len());
     let mut cells: Vec<Option<Cross>> = vec![None; folds.cells];

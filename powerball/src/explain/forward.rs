@@ -38,11 +38,11 @@ impl std::error::Error for ExplainError {}
 
 /// One effect's best candidates.
 #[derive(Debug)]
-pub struct Family {
+pub(super) struct Family {
     /// Its place among the effects.
     effect: usize,
     /// Its name.
-    pub name: &'static str,
+    pub(super) name: &'static str,
     members: Vec<Member>,
 }
 
@@ -58,7 +58,7 @@ struct Member {
 impl Family {
     /// The summed score of what acts on the given joints.
     #[must_use]
-    pub fn score_on(&self, joints: &[usize]) -> f64 {
+    pub(super) fn score_on(&self, joints: &[usize]) -> f64 {
         self.members
             .iter()
             .filter(|m| m.candidate.joints.iter().any(|j| joints.contains(j)))
@@ -68,7 +68,7 @@ impl Family {
 
     /// Why its best member on the given joints was refused.
     #[must_use]
-    pub fn refusal_on(&self, joints: &[usize]) -> Option<String> {
+    pub(super) fn refusal_on(&self, joints: &[usize]) -> Option<String> {
         self.members
             .iter()
             .filter(|m| m.candidate.joints.iter().any(|j| joints.contains(j)))
@@ -148,7 +148,13 @@ impl fmt::Debug for Session<'_> {
 ///
 /// # Errors
 /// [`ExplainError`] where logs hold too little.
-pub fn explain(body: &RigidBody, logs: &[Log], validate: &[Log], options: &DataOptions, progress: &dyn Fn(&str)) -> Result<Explained, ExplainError> {
+pub fn explain(
+    body: &RigidBody,
+    logs: &[Log],
+    validate: &[Log],
+    options: &DataOptions,
+    progress: &dyn Fn(&str),
+) -> Result<Explained, ExplainError> {
     progress("preparing signals");
     let data = Data::new(body, logs, options).map_err(ExplainError::Fit)?;
     let mut other = Data::new(body, validate, options).map_err(ExplainError::Validate)?;
@@ -157,7 +163,8 @@ pub fn explain(body: &RigidBody, logs: &[Log], validate: &[Log], options: &DataO
     let base = fit(&data, &folds, &[], None);
     let held_out = base.residual_on(&other, &[]);
     let before = Errors { fit: spread(&data, &base.residual), validate: spread(&other, &held_out) };
-    let held = payload_on(body, logs, validate, options, &base, &mut other).map_err(ExplainError::Validate)?;
+    let held =
+        payload_on(body, logs, validate, options, &base, &mut other).map_err(ExplainError::Validate)?;
     let mut session = Session {
         held,
         data,
@@ -193,7 +200,11 @@ impl Session<'_> {
             let mut families = self.families(&screen, &mut tests);
             let path = Path {
                 data: &self.other,
-                design: Design::new(&self.other, &friction_columns(&self.other, &self.fit.shapes), &self.other_columns(&self.fit)),
+                design: Design::new(
+                    &self.other,
+                    &friction_columns(&self.other, &self.fit.shapes),
+                    &self.other_columns(&self.fit),
+                ),
                 residual: other_residual.clone(),
             };
             let other_context = Context::new(&self.other, &self.fit, &other_residual);
@@ -224,7 +235,10 @@ impl Session<'_> {
             // What needs fewer columns and is as good is preferred.
             let least = top - (rule::AS_GOOD * top).max(rule::AS_GOOD_SCORE);
             for f in 0..families.len() {
-                if f == chosen || families[f].potential() < least || families[f].columns() >= families[chosen].columns() {
+                if f == chosen
+                    || families[f].potential() < least
+                    || families[f].columns() >= families[chosen].columns()
+                {
                     continue;
                 }
                 self.test(&screen, &mut families[f], tests, &path, &other_context);
@@ -232,13 +246,15 @@ impl Session<'_> {
                     chosen = f;
                 }
             }
-            let passing: Vec<&Member> = families[chosen].members.iter().filter(|m| m.refusal.is_none()).collect();
+            let passing: Vec<&Member> =
+                families[chosen].members.iter().filter(|m| m.refusal.is_none()).collect();
             let trials: Vec<(&Trial, &[usize])> =
                 passing.iter().map(|m| (&m.trial, m.candidate.joints.as_slice())).collect();
             let placebos = placebos(&screen, &trials, &self.folds, tests, STEP_PLACEBOS, step as u64);
             let mut scores = placebos.scores;
             scores.sort_by(f64::total_cmp);
-            let level = scores.get((scores.len() as f64 * rule::PLACEBO_LEVEL) as usize).copied().unwrap_or(0.0);
+            let level =
+                scores.get((scores.len() as f64 * rule::PLACEBO_LEVEL) as usize).copied().unwrap_or(0.0);
             let members: Vec<usize> = (0..families[chosen].members.len())
                 .filter(|m| {
                     let member = &families[chosen].members[*m];
@@ -263,9 +279,8 @@ impl Session<'_> {
                 .collect();
             (family.effect, comparison, kept, tests)
         };
-        let squares = |fit: &Fit| -> Vec<f64> {
-            fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect()
-        };
+        let squares =
+            |fit: &Fit| -> Vec<f64> { fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect() };
         let square_before = squares(&self.fit);
         let added: Vec<Candidate> = members.iter().map(|m| m.candidate.clone()).collect();
         for member in members {
@@ -323,13 +338,13 @@ impl Session<'_> {
 
     /// The best candidate of every effect and joint, and how many were tried in all.
     fn families(&self, screen: &Screen<'_>, tests: &mut f64) -> Vec<Family> {
-        let lists: Vec<(usize, Vec<Candidate>)> = (0..self.effects.len())
-            .map(|e| (e, self.effects[e].candidates(screen.context)))
-            .collect();
+        let lists: Vec<(usize, Vec<Candidate>)> =
+            (0..self.effects.len()).map(|e| (e, self.effects[e].candidates(screen.context))).collect();
         let mut families = Vec::new();
         for (e, candidates) in lists {
             let effect = self.effects[e].as_ref();
-            let open: Vec<Candidate> = candidates.into_iter().filter(|c| !self.has(e, c) && !self.gave_up(e, c)).collect();
+            let open: Vec<Candidate> =
+                candidates.into_iter().filter(|c| !self.has(e, c) && !self.gave_up(e, c)).collect();
             *tests += open.iter().map(|c| c.searched.max(1.0)).fold(0.0, f64::max).max(open.len() as f64);
             let trials = parallel::map(&open, |c| screen.try_candidate(effect, c));
             let mut members: Vec<Member> = Vec::new();
@@ -397,17 +412,30 @@ impl Session<'_> {
         self.accepted.iter().find(mends).map(|a| self.effects[a.effect].name())
     }
 
-    fn test(&self, screen: &Screen<'_>, family: &mut Family, tests: f64, path: &Path<'_>, other: &Context<'_>) {
+    fn test(
+        &self,
+        screen: &Screen<'_>,
+        family: &mut Family,
+        tests: f64,
+        path: &Path<'_>,
+        other: &Context<'_>,
+    ) {
         let effect = self.effects[family.effect].as_ref();
-        let open: Vec<usize> =
-            (0..family.members.len())
-                .filter(|m| family.members[*m].refusal.is_none() && family.members[*m].evidence.is_none())
-                .collect();
+        let open: Vec<usize> = (0..family.members.len())
+            .filter(|m| family.members[*m].refusal.is_none() && family.members[*m].evidence.is_none())
+            .collect();
         let found = parallel::map(&open, |m| {
             let member = &family.members[*m];
             let columns = effect.columns(other, &member.candidate);
             let extent = extent(&member.candidate);
-            evidence(screen, &member.trial, &member.candidate.joints, &self.folds, extent, Some((path, &columns)))
+            evidence(
+                screen,
+                &member.trial,
+                &member.candidate.joints,
+                &self.folds,
+                extent,
+                Some((path, &columns)),
+            )
         });
         for (m, evidence) in open.into_iter().zip(found) {
             let member = &mut family.members[m];
@@ -444,7 +472,8 @@ impl Session<'_> {
             self.fit = fit(&self.data, &self.folds, &terms, Some(&self.fit));
             let mut first = 0;
             for a in &mut self.accepted {
-                let coefficients: Vec<f64> = (first..first + a.columns).map(|c| self.fit.coefficient(c)).collect();
+                let coefficients: Vec<f64> =
+                    (first..first + a.columns).map(|c| self.fit.coefficient(c)).collect();
                 first += a.columns;
                 if let Some(refined) = self.effects[a.effect].refined(&a.candidate, &coefficients) {
                     a.candidate = refined;
@@ -467,7 +496,8 @@ impl Session<'_> {
             for (k, a) in self.accepted.iter().enumerate() {
                 let columns = self.fit.design.extra(first)..self.fit.design.extra(first) + a.columns;
                 first += a.columns;
-                let penalty = rule::PER_COEFFICIENT * a.columns as f64 + 2.0 * a.candidate.searched.max(1.0).ln();
+                let penalty =
+                    rule::PER_COEFFICIENT * a.columns as f64 + 2.0 * a.candidate.searched.max(1.0).ln();
                 let score = error(&|c| columns.contains(&c)) - full - penalty;
                 if score < rule::LEAST_SCORE && weakest.is_none_or(|(_, w)| score < w) {
                     weakest = Some((k, score));
@@ -493,10 +523,8 @@ impl Session<'_> {
 
     fn result(mut self, before: Errors, base_residual: &[Vec<f64>]) -> Explained {
         let residual = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
-        let after = Errors {
-            fit: spread(&self.data, &self.fit.residual),
-            validate: spread(&self.other, &residual),
-        };
+        let after =
+            Errors { fit: spread(&self.data, &self.fit.residual), validate: spread(&self.other, &residual) };
         let curves = curves(&self.other, base_residual, &residual);
         let floor = noise_floor(&self.data);
         let context = Context::new(&self.data, &self.fit, &self.fit.residual);
@@ -509,7 +537,8 @@ impl Session<'_> {
             }
         }
         for e in order {
-            let mine: Vec<usize> = (0..self.accepted.len()).filter(|k| self.accepted[*k].effect == e).collect();
+            let mine: Vec<usize> =
+                (0..self.accepted.len()).filter(|k| self.accepted[*k].effect == e).collect();
             let found: Vec<Found<'_>> = mine
                 .iter()
                 .map(|k| Found { candidate: &self.accepted[*k].candidate, coefficients: &coefficients[*k] })

@@ -18,7 +18,7 @@ mod result;
 mod rule;
 mod screen;
 
-pub use curves::TorqueCurve;
+pub use curves::{TorqueCurve, curves};
 pub use forward::{ExplainError, Session, explain};
 pub use page::add_to_page;
 pub use result::{Explained, NamedEffect, Rival, Unattributed};

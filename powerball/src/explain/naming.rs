@@ -6,13 +6,13 @@ use super::rule;
 
 /// How a chosen family compares with the others on its joints.
 #[derive(Clone, Debug)]
-pub struct Comparison {
+pub(super) struct Comparison {
     /// Its score over that of the next best name.
-    pub margin: f64,
+    pub(super) margin: f64,
     /// The next best names.
-    pub rivals: Vec<Rival>,
+    pub(super) rivals: Vec<Rival>,
     /// A name that fits as well.
-    pub twin: Option<String>,
+    pub(super) twin: Option<String>,
 }
 
 /// Rivals listed at most.
@@ -20,7 +20,7 @@ const LISTED: usize = 3;
 
 /// Compares the family at `chosen` with the others, each on the chosen joints only.
 #[must_use]
-pub fn compare(families: &[Family], chosen: usize, joints: &[usize]) -> Comparison {
+pub(super) fn compare(families: &[Family], chosen: usize, joints: &[usize]) -> Comparison {
     let own = families[chosen].score_on(joints);
     let mut others: Vec<(usize, f64)> = (0..families.len())
         .filter(|f| *f != chosen)
@@ -36,7 +36,10 @@ pub fn compare(families: &[Family], chosen: usize, joints: &[usize]) -> Comparis
         .map(|(f, score)| {
             let family = &families[*f];
             let why_not = if own / score < rule::LEAST_MARGIN {
-                format!("fits as well within {:.0} %: these logs do not tell the two apart", 100.0 * (rule::LEAST_MARGIN - 1.0))
+                format!(
+                    "fits as well within {:.0} %: these logs do not tell the two apart",
+                    100.0 * (rule::LEAST_MARGIN - 1.0)
+                )
             } else {
                 let share = 100.0 * score / own;
                 match family.refusal_on(joints) {
@@ -56,6 +59,6 @@ pub fn compare(families: &[Family], chosen: usize, joints: &[usize]) -> Comparis
 
 /// The margin of a name without a rival: its score over the least that could have counted.
 #[must_use]
-pub fn surprise(score: f64) -> f64 {
+pub(super) fn surprise(score: f64) -> f64 {
     score / (rule::LEAST_SCORE / 2.0)
 }

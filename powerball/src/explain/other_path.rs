@@ -22,7 +22,14 @@ const ROUNDS: usize = 3;
 ///
 /// # Errors
 /// [`DataError`] as for any data.
-pub(super) fn payload_on(body: &RigidBody, logs: &[Log], validate: &[Log], options: &DataOptions, base: &Fit, other: &mut Data<'_>) -> Result<Option<NamedEffect>, DataError> {
+pub(super) fn payload_on(
+    body: &RigidBody,
+    logs: &[Log],
+    validate: &[Log],
+    options: &DataOptions,
+    base: &Fit,
+    other: &mut Data<'_>,
+) -> Result<Option<NamedEffect>, DataError> {
     let residual = base.residual_on(other, &[]);
     if !odd(base, other, &residual) {
         return Ok(None);
@@ -38,7 +45,8 @@ pub(super) fn payload_on(body: &RigidBody, logs: &[Log], validate: &[Log], optio
         let candidates = effect.candidates(&context);
         let tried: Vec<_> =
             candidates.into_iter().filter_map(|c| Some((screen.try_candidate(&effect, &c)?, c))).collect();
-        let Some((trial, candidate)) = tried.into_iter().max_by(|a, b| a.0.score.total_cmp(&b.0.score)) else {
+        let Some((trial, candidate)) = tried.into_iter().max_by(|a, b| a.0.score.total_cmp(&b.0.score))
+        else {
             return Ok(None);
         };
         let found = evidence(&screen, &trial, &candidate.joints, &folds, Extent::SomeLogs, None);

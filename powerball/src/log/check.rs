@@ -143,7 +143,9 @@ pub(super) fn into_log(
                 findings.push(finding(Some(raw.line[k]), "t".into(), message));
             } else if let Some(j) = jump {
                 let by = raw.q[j][k] - raw.q[j][k - 1];
-                let message = format!("jumps by {by:.4} in {gap:.4} s, faster than the joint can move: the log is split there");
+                let message = format!(
+                    "jumps by {by:.4} in {gap:.4} s, faster than the joint can move: the log is split there"
+                );
                 findings.push(finding(Some(raw.line[k]), format!("q{}", j + 1), message));
             } else {
                 continue;
@@ -210,15 +212,20 @@ fn units(
     let span = largest(q);
     let (low, high) = q.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
     if joint.kind == JointKind::Revolute && span > ABSURD * reach.max(PI) && high - low > 2.0 * PI {
-        let message = format!("reaches {span:.1}, the joint {reach:.2} rad: angles must be in radians (degrees look like this); divide by 57.2958");
+        let message = format!(
+            "reaches {span:.1}, the joint {reach:.2} rad: angles must be in radians (degrees look like this); divide by 57.2958"
+        );
         error(format!("q{}", j + 1), message);
-    } else if joint.position.is_some_and(|[low, high]| raw.q[j].iter().any(|v| *v < low - 0.1 || *v > high + 0.1))
+    } else if joint
+        .position
+        .is_some_and(|[low, high]| raw.q[j].iter().any(|v| *v < low - 0.1 || *v > high + 0.1))
     {
         findings.push(Finding {
             file: file.to_string(),
             line: None,
             quantity: format!("q{}", j + 1),
-            message: "goes beyond the arm file's position limits: check the joint's zero, sign and unit".into(),
+            message: "goes beyond the arm file's position limits: check the joint's zero, sign and unit"
+                .into(),
         });
     }
     let mut magnitudes: Vec<f64> = raw.effort[j].iter().map(|v| v.abs()).collect();
@@ -227,11 +234,16 @@ fn units(
     if let Some(limit) = joint.torque {
         match effort {
             Effort::Torque if typical > ABSURD * limit => {
-                let message = format!("is typically {typical:.0}, the joint's limit is {limit} N·m: torques must be in N·m (mN·m look like this)");
+                let message = format!(
+                    "is typically {typical:.0}, the joint's limit is {limit} N·m: torques must be in N·m (mN·m look like this)"
+                );
                 error(format!("tau{}", j + 1), message);
             }
             Effort::Current(constants) if typical * constants[j].abs() > ABSURD * limit => {
-                let message = format!("is typically {typical:.0}, which is {:.0} N·m where the joint's limit is {limit}: currents must be in A (mA look like this)", typical * constants[j]);
+                let message = format!(
+                    "is typically {typical:.0}, which is {:.0} N·m where the joint's limit is {limit}: currents must be in A (mA look like this)",
+                    typical * constants[j]
+                );
                 error(format!("i{}", j + 1), message);
             }
             _ => {}
@@ -259,9 +271,13 @@ fn units(
             } else {
                 "check units and order of columns"
             };
-            let message = format!("is {ratio:.3} times the slope of q{}: {hint}. Speeds are computed from q; dq is not used", j + 1);
+            let message = format!(
+                "is {ratio:.3} times the slope of q{}: {hint}. Speeds are computed from q; dq is not used",
+                j + 1
+            );
             let degrees = hint == "q looks like degrees";
-            let finding = Finding { file: file.to_string(), line: None, quantity: format!("dq{}", j + 1), message };
+            let finding =
+                Finding { file: file.to_string(), line: None, quantity: format!("dq{}", j + 1), message };
             if degrees { errors.push(finding) } else { findings.push(finding) }
         }
     }
@@ -270,7 +286,12 @@ fn units(
 fn dead_or_saturated(x: &[f64], j: usize, effort: &Effort, file: &str, findings: &mut Vec<Finding>) {
     let name = if matches!(effort, Effort::Torque) { "tau" } else { "i" };
     let mut note = |message: String| {
-        findings.push(Finding { file: file.to_string(), line: None, quantity: format!("{name}{}", j + 1), message });
+        findings.push(Finding {
+            file: file.to_string(),
+            line: None,
+            quantity: format!("{name}{}", j + 1),
+            message,
+        });
     };
     let (low, high) = x.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
     if high - low <= 1e-12 * high.abs().max(low.abs()) {
@@ -280,7 +301,9 @@ fn dead_or_saturated(x: &[f64], j: usize, effort: &Effort, file: &str, findings:
     for edge in [low, high] {
         let at_edge = x.windows(2).filter(|w| w[0] == edge && w[1] == edge).count();
         if at_edge as f64 > 0.02 * x.len() as f64 && edge != 0.0 {
-            note(format!("stays at its extreme {edge} for {at_edge} samples: it looks saturated, and the model cannot explain torque that was not delivered"));
+            note(format!(
+                "stays at its extreme {edge} for {at_edge} samples: it looks saturated, and the model cannot explain torque that was not delivered"
+            ));
         }
     }
 }

@@ -42,7 +42,12 @@ pub fn read_log(path: &Path, arm: &Arm, findings: &mut Vec<Finding>) -> Result<L
 }
 
 /// Reads a log from the bytes of a CSV file.
-pub(super) fn parse(bytes: &[u8], file: &str, arm: &Arm, findings: &mut Vec<Finding>) -> Result<Log, LogError> {
+pub(super) fn parse(
+    bytes: &[u8],
+    file: &str,
+    arm: &Arm,
+    findings: &mut Vec<Finding>,
+) -> Result<Log, LogError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let error = |line: Option<usize>, quantity: &str, message: String| Finding {
         file: file.to_string(),
@@ -85,7 +90,8 @@ pub(super) fn parse(bytes: &[u8], file: &str, arm: &Arm, findings: &mut Vec<Find
         }
     }
     if last_torn && total > 0 {
-        let message = "the last line is torn (fewer or more fields than the header); it was left out".to_string();
+        let message =
+            "the last line is torn (fewer or more fields than the header); it was left out".to_string();
         findings.push(error(None, "last line", message));
         bad -= 1;
     }
@@ -94,7 +100,9 @@ pub(super) fn parse(bytes: &[u8], file: &str, arm: &Arm, findings: &mut Vec<Find
             "{bad} of {total} lines hold no finite number in every needed column (the first is this one) and were left out; short holes are filled by interpolation, long ones split the log"
         );
         if bad as f64 > MOST_BAD_LINES * total as f64 {
-            let message = format!("{bad} of {total} lines hold no finite number in every needed column: record the log again or leave it out");
+            let message = format!(
+                "{bad} of {total} lines hold no finite number in every needed column: record the log again or leave it out"
+            );
             return Err(LogError(vec![error(Some(line), &culprit, message)]));
         }
         findings.push(error(Some(line), &culprit, message));
@@ -121,7 +129,12 @@ struct Columns {
 }
 
 impl Columns {
-    fn find(names: &[String], arm: &Arm, file: &str, findings: &mut Vec<Finding>) -> Result<Columns, LogError> {
+    fn find(
+        names: &[String],
+        arm: &Arm,
+        file: &str,
+        findings: &mut Vec<Finding>,
+    ) -> Result<Columns, LogError> {
         let n = arm.dof();
         let mut errors = Vec::new();
         let finding = |quantity: &str, message: String| Finding {
@@ -169,7 +182,8 @@ impl Columns {
                 errors.push(finding("i", format!("the log holds currents, but the arm file gives no torque_constant (N·m/A at the joint) for joint {}: add it there, or log tau1 … tau{n}", without.join(", "))));
             }
         } else {
-            let missing = if tau_missing.len() <= current_missing.len() { tau_missing } else { current_missing };
+            let missing =
+                if tau_missing.len() <= current_missing.len() { tau_missing } else { current_missing };
             errors.push(finding("tau", format!("a log needs tau1 … tau{n} [N·m] or i1 … i{n} [A] for each of the {n} joints; missing: {}", missing.join(", "))));
         }
         if !errors.is_empty() {

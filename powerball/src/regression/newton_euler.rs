@@ -5,7 +5,7 @@ use dyngen::arm::{Convention, JointKind};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// The regressor of all eleven parameters a link (n × 11n, row-major) at one state, for gravity `g` in the base frame.
-pub fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec<f64> {
+pub(crate) fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec<f64> {
     let n = arm.dof();
     let number = dyngen::exact::rational::to_f64;
     let mut y = vec![0.0; n * 11 * n];
@@ -51,15 +51,19 @@ pub fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec
         let arm_vector = p_next - p;
         let (w0, dw0) = (w, dw);
         if prismatic {
-            acc += dw0.cross(&arm_vector) + w0.cross(&w0.cross(&arm_vector))
-                + axis * a[i] + w0.cross(&axis) * (2.0 * v[i]);
+            acc += dw0.cross(&arm_vector)
+                + w0.cross(&w0.cross(&arm_vector))
+                + axis * a[i]
+                + w0.cross(&axis) * (2.0 * v[i]);
         } else {
             w = w0 + axis * v[i];
             dw = dw0 + axis * a[i] + w0.cross(&axis) * v[i];
             // To the axis with link i − 1, from there with link i.
             let (to_axis, from_axis) = (point - p, p_next - point);
-            acc += dw0.cross(&to_axis) + w0.cross(&w0.cross(&to_axis))
-                + dw.cross(&from_axis) + w.cross(&w.cross(&from_axis));
+            acc += dw0.cross(&to_axis)
+                + w0.cross(&w0.cross(&to_axis))
+                + dw.cross(&from_axis)
+                + w.cross(&w.cross(&from_axis));
         }
         (r, p) = (r_next, p_next);
 

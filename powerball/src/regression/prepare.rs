@@ -38,8 +38,13 @@ pub enum DataError {
 impl fmt::Display for DataError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            DataError::TooShort => write!(f, "the logs hold no stretch of at least a second without gaps: record longer"),
-            DataError::NoMotion => write!(f, "no joint moves in these logs: friction and inertia cannot be seen at rest; record an exciting motion"),
+            DataError::TooShort => {
+                write!(f, "the logs hold no stretch of at least a second without gaps: record longer")
+            }
+            DataError::NoMotion => write!(
+                f,
+                "no joint moves in these logs: friction and inertia cannot be seen at rest; record an exciting motion"
+            ),
         }
     }
 }
@@ -99,9 +104,7 @@ impl<'a> Data<'a> {
             return Err(DataError::TooShort);
         }
         let rest_speed: Vec<f64> = (0..n)
-            .map(|j| {
-                rest::rest_speed(recordings.iter().flat_map(|r| r.speed(j).map(f64::abs)).collect())
-            })
+            .map(|j| rest::rest_speed(recordings.iter().flat_map(|r| r.speed(j).map(f64::abs)).collect()))
             .collect();
         let top_speed = (0..n).map(|j| top_speed(&recordings, j)).collect();
         let kept = keep_moving(&recordings, &band, &rest_speed, n);
@@ -113,7 +116,10 @@ impl<'a> Data<'a> {
         for (j, rows) in joints.iter().enumerate() {
             let rested = total - rows.len();
             if rows.len() < 20 {
-                notes.push(format!("joint {} does not move in these logs: nothing can be said of its friction", j + 1));
+                notes.push(format!(
+                    "joint {} does not move in these logs: nothing can be said of its friction",
+                    j + 1
+                ));
             } else if rested * 4 > total {
                 notes.push(format!(
                     "joint {} rests in {:.0} % of the samples (|speed| below {:.4} for {} s or at an end of a log); they were left out",
@@ -201,7 +207,9 @@ impl<'a> Data<'a> {
 
     /// Columns from a function that gives n × count values a sample.
     fn columns_over_all(&self, count: usize, of: impl Fn(&Recording) -> Option<Vec<f64>>) -> Vec<Column> {
-        let Some(all) = self.recordings.iter().map(of).collect::<Option<Vec<Vec<f64>>>>() else { return Vec::new() };
+        let Some(all) = self.recordings.iter().map(of).collect::<Option<Vec<Vec<f64>>>>() else {
+            return Vec::new();
+        };
         let one = |c: usize| -> Vec<Vec<f64>> {
             all.iter().map(|x| x.iter().skip(c).step_by(count).copied().collect()).collect()
         };
@@ -209,7 +217,11 @@ impl<'a> Data<'a> {
     }
 
     /// A column from full-rate signals on one joint.
-    pub fn column_on<'s>(&'s self, joint: usize, signal: impl FnMut(usize, &'s Recording) -> Vec<f64>) -> Column {
+    pub fn column_on<'s>(
+        &'s self,
+        joint: usize,
+        signal: impl FnMut(usize, &'s Recording) -> Vec<f64>,
+    ) -> Column {
         Column::on(joint, self.joints[joint].column(&self.band, &self.recordings, signal))
     }
 
@@ -243,7 +255,9 @@ fn keep_moving(recordings: &[Recording], band: &Band, limit: &[f64], n: usize) -
             let moving = rest::moving(&r.speed(j).collect::<Vec<_>>(), r.rate, limit[j]);
             let kept = band.kept(r.len());
             // A joint that never moves has the limit 0 and is never below it.
-            if limit[j] < 1e-5 { return Vec::new() }
+            if limit[j] < 1e-5 {
+                return Vec::new();
+            }
             (0..kept.len()).filter(|k| moving[kept[*k]]).collect()
         };
         recordings.iter().map(of_recording).collect()
@@ -251,7 +265,12 @@ fn keep_moving(recordings: &[Recording], band: &Band, limit: &[f64], n: usize) -
     (0..n).map(of_joint).collect()
 }
 
-fn joint_rows(body: &RigidBody, recordings: &[Recording], band: &Band, kept: Vec<Vec<Vec<usize>>>) -> Vec<JointRows> {
+fn joint_rows(
+    body: &RigidBody,
+    recordings: &[Recording],
+    band: &Band,
+    kept: Vec<Vec<Vec<usize>>>,
+) -> Vec<JointRows> {
     let (n, p) = (body.dof(), body.names().len());
     let mut joints: Vec<JointRows> = kept
         .into_iter()
@@ -262,7 +281,12 @@ fn joint_rows(body: &RigidBody, recordings: &[Recording], band: &Band, kept: Vec
                 rows.push(end..end + k.len());
                 end += k.len();
             }
-            JointRows { torque: Vec::with_capacity(end), inertial: vec![Vec::with_capacity(end); p], kept, rows }
+            JointRows {
+                torque: Vec::with_capacity(end),
+                inertial: vec![Vec::with_capacity(end); p],
+                kept,
+                rows,
+            }
         })
         .collect();
     for (r, recording) in recordings.iter().enumerate() {

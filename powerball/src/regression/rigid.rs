@@ -99,6 +99,14 @@ impl RigidBody {
         out
     }
 
+    /// Why no real arm can have these values of the minimal set; empty where nothing speaks against them.
+    ///
+    /// # Errors
+    /// As [`Model::function`].
+    pub fn impossible(&self, values: &[f64]) -> Result<Vec<String>, Error> {
+        Ok(dyngen::base::possible::check(&self.model, SetKind::Minimal, values)?.reasons)
+    }
+
     /// Values of all eleven parameters a link that move like the minimal set's `values`.
     #[must_use]
     pub fn carried(&self, values: &[f64]) -> Vec<f64> {
@@ -142,7 +150,8 @@ impl RigidBody {
 }
 
 fn pick(wide: &Wide, chosen: &[usize], q: &[f64], v: &[f64], a: &[f64], n: usize) -> Option<Vec<f64>> {
-    let columns: Vec<usize> = chosen.iter().map(|c| wide.column.get(*c).copied().flatten()).collect::<Option<_>>()?;
+    let columns: Vec<usize> =
+        chosen.iter().map(|c| wide.column.get(*c).copied().flatten()).collect::<Option<_>>()?;
     let width = wide.evaluator.outputs() / n;
     let (samples, chunk) = (q.len() / n, 1024);
     let mut out = Vec::with_capacity(samples * n * columns.len());
@@ -180,7 +189,13 @@ mod tests {
         let p = values.len();
         for s in 0..3 {
             let at = s * n..(s + 1) * n;
-            let full = newton_euler::regressor(&arm, &q[at.clone()], &v[at.clone()], &a[at.clone()], [0.0, 0.0, -9.81]);
+            let full = newton_euler::regressor(
+                &arm,
+                &q[at.clone()],
+                &v[at.clone()],
+                &a[at.clone()],
+                [0.0, 0.0, -9.81],
+            );
             for j in 0..n {
                 let expected: f64 = (0..11 * n).map(|k| full[j * 11 * n + k] * all[k]).sum();
                 let row: f64 = (0..p).map(|k| y[(s * n + j) * p + k] * values[k]).sum();
@@ -194,7 +209,13 @@ mod tests {
         let sideways = body.gravity_columns(1, &chosen, &q).unwrap();
         for s in 0..3 {
             let at = s * n..(s + 1) * n;
-            let full = newton_euler::regressor(&arm, &q[at.clone()], &v[at.clone()], &a[at.clone()], [0.0, 0.0, -9.81]);
+            let full = newton_euler::regressor(
+                &arm,
+                &q[at.clone()],
+                &v[at.clone()],
+                &a[at.clone()],
+                [0.0, 0.0, -9.81],
+            );
             let still = newton_euler::regressor(&arm, &q[at], &[0.0; 6], &[0.0; 6], [0.0, 1.0, 0.0]);
             for j in 0..n {
                 for (k, c) in chosen.iter().enumerate() {

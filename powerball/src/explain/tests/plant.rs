@@ -42,9 +42,26 @@ impl Truth {
     pub(super) const ALL: [Truth; 20] = {
         use Truth::*;
         [
-            LoadFriction, Stribeck, VelocityNonlinearity, Asymmetry, Hysteresis, Payload, PayloadLater, Spring, Ripple,
-            MotorRipple, Temperature, TimeDelay, TorqueConstant, EncoderOffset, BaseTilt, BrokenSymmetry, Contact,
-            Coupling, Backlash, Elasticity,
+            LoadFriction,
+            Stribeck,
+            VelocityNonlinearity,
+            Asymmetry,
+            Hysteresis,
+            Payload,
+            PayloadLater,
+            Spring,
+            Ripple,
+            MotorRipple,
+            Temperature,
+            TimeDelay,
+            TorqueConstant,
+            EncoderOffset,
+            BaseTilt,
+            BrokenSymmetry,
+            Contact,
+            Coupling,
+            Backlash,
+            Elasticity,
         ]
     };
 
@@ -107,9 +124,17 @@ fn parameters(arm: &Arm, rng: &mut ChaCha8Rng) -> Vec<f64> {
         let [x, y, z] = c;
         let rotor = if joint.rotor_ratio.is_some() { rng.random_range(0.5..1.5) * 1e-5 } else { 0.0 };
         let mut of = vec![
-            mass, mass * x, mass * y, mass * z,
-            own[0] + mass * (y * y + z * z), mass * x * y, mass * x * z,
-            own[1] + mass * (x * x + z * z), mass * y * z, own[2] + mass * (x * x + y * y), rotor,
+            mass,
+            mass * x,
+            mass * y,
+            mass * z,
+            own[0] + mass * (y * y + z * z),
+            mass * x * y,
+            mass * x * z,
+            own[1] + mass * (x * x + z * z),
+            mass * y * z,
+            own[2] + mass * (x * x + y * y),
+            rotor,
         ];
         for kind in &joint.zero {
             of[*kind as usize] = 0.0;
@@ -165,7 +190,15 @@ impl Motion {
 }
 
 /// Logs of the plant with a truth of relative size `size` (1 is easily visible); the first `fit` are to be fitted.
-pub(super) fn record(arm: &Arm, truth: Truth, size: f64, noise: Noise, logs: usize, seconds: f64, seed: u64) -> Vec<Log> {
+pub(super) fn record(
+    arm: &Arm,
+    truth: Truth,
+    size: f64,
+    noise: Noise,
+    logs: usize,
+    seconds: f64,
+    seed: u64,
+) -> Vec<Log> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let n = arm.dof();
     let all = parameters(arm, &mut rng);
@@ -190,7 +223,6 @@ pub(super) fn record(arm: &Arm, truth: Truth, size: f64, noise: Noise, logs: usi
         let mut colour = vec![0.0; n];
         let mut previous = motion.at(0.0)[0][at];
         let mut play = 0.0f64;
-        let mut load_before = vec![[0.0; 3]; 1];
         for k in 0..count {
             let now = k as f64 / RATE;
             let time = if truth == Truth::TimeDelay { now - 0.006 * size } else { now };
@@ -202,10 +234,15 @@ pub(super) fn record(arm: &Arm, truth: Truth, size: f64, noise: Noise, logs: usi
                 Truth::EncoderOffset => q_true[at] -= 0.03 * size,
                 Truth::BaseTilt => {
                     let tilt = 0.02 * size;
-                    g = [gravity[0], -tilt * gravity[2].abs() * -1.0, gravity[2]];
+                    g = [gravity[0], tilt * gravity[2].abs(), gravity[2]];
                 }
                 Truth::BrokenSymmetry => {
-                    let zero = [(2, ParameterKind::Mx), (3, ParameterKind::Mx), (4, ParameterKind::Mx), (1, ParameterKind::My)];
+                    let zero = [
+                        (2, ParameterKind::Mx),
+                        (3, ParameterKind::Mx),
+                        (4, ParameterKind::Mx),
+                        (1, ParameterKind::My),
+                    ];
                     let (link, kind) = zero[at % 4];
                     values[11 * link + kind as usize] += 0.06 * size;
                 }
@@ -213,8 +250,18 @@ pub(super) fn record(arm: &Arm, truth: Truth, size: f64, noise: Noise, logs: usi
                     if (log == 1 || log == 3) && (truth == Truth::Payload || now > 0.4 * seconds) =>
                 {
                     let (m, [x, y, z]) = (0.5 * size, [0.03, -0.02, 0.08]);
-                    let add = [m, m * x, m * y, m * z, m * (y * y + z * z + 0.001), m * x * y, m * x * z,
-                        m * (x * x + z * z + 0.001), m * y * z, m * (x * x + y * y + 0.001)];
+                    let add = [
+                        m,
+                        m * x,
+                        m * y,
+                        m * z,
+                        m * (y * y + z * z + 0.001),
+                        m * x * y,
+                        m * x * z,
+                        m * (x * x + z * z + 0.001),
+                        m * y * z,
+                        m * (x * x + y * y + 0.001),
+                    ];
                     for (k, value) in add.into_iter().enumerate() {
                         values[11 * (n - 1) + k] += value;
                     }
@@ -247,10 +294,18 @@ pub(super) fn record(arm: &Arm, truth: Truth, size: f64, noise: Noise, logs: usi
             let (x, speed) = (q[at], v[at]);
             let sign = speed.signum();
             tau[at] += match truth {
-                Truth::LoadFriction => 0.08 * size * (rigid[at].powi(2) + 0.01).sqrt() * (300.0 * speed).tanh(),
+                Truth::LoadFriction => {
+                    0.08 * size * (rigid[at].powi(2) + 0.01).sqrt() * (300.0 * speed).tanh()
+                }
                 Truth::Stribeck => scale * sign / (1.0 + (speed / 0.06).powi(2)),
                 Truth::VelocityNonlinearity => 3.0 * scale * sign * speed.abs().powf(1.8),
-                Truth::Asymmetry => if speed > 0.0 { 0.6 * scale } else { -0.1 * scale },
+                Truth::Asymmetry => {
+                    if speed > 0.0 {
+                        0.6 * scale
+                    } else {
+                        -0.1 * scale
+                    }
+                }
                 Truth::Hysteresis => {
                     z = f64::clamp(z + (x - previous) / 0.004, -1.0, 1.0);
                     previous = x;
@@ -281,7 +336,6 @@ pub(super) fn record(arm: &Arm, truth: Truth, size: f64, noise: Noise, logs: usi
                     }
                 }
             }
-            load_before[0] = [x, speed, z];
             let at_now = motion.at(now)[0].clone();
             t.push(now);
             for j in 0..n {
@@ -303,7 +357,7 @@ pub(super) fn record(arm: &Arm, truth: Truth, size: f64, noise: Noise, logs: usi
         running += seconds;
         out.push(Log {
             file: format!("log{log}.csv"),
-            pieces: vec![0..t.len()],
+            pieces: std::iter::once(0..t.len()).collect(),
             t,
             q: q_log,
             torque: tau_log,
