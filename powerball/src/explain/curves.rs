@@ -38,7 +38,7 @@ impl TorqueCurve {
 
 /// The curves of every joint from the residuals of both models.
 #[must_use]
-pub(super) fn curves(data: &Data<'_>, before: &[Vec<f64>], after: &[Vec<f64>]) -> Vec<TorqueCurve> {
+pub fn curves(data: &Data<'_>, before: &[Vec<f64>], after: &[Vec<f64>]) -> Vec<TorqueCurve> {
     (0..data.dof())
         .map(|j| {
             let rows = &data.joints[j];

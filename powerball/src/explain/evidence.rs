@@ -9,20 +9,20 @@ use faer::Mat;
 
 /// The evidence for one candidate.
 #[derive(Clone, Debug)]
-pub struct Evidence {
+pub(super) struct Evidence {
     /// Penalised gain.
-    pub score: f64,
+    pub(super) score: f64,
     /// Cluster-robust Wald test over blocks, base refitted: the probability of such coefficients by chance.
-    pub p_value: f64,
+    pub(super) p_value: f64,
     /// Share by which the held-out squared error of the candidate's joints falls, by fold.
-    pub fold_gains: Vec<f64>,
+    pub(super) fold_gains: Vec<f64>,
     /// The same on the other path: the mean over its logs.
-    pub path_gain: f64,
+    pub(super) path_gain: f64,
 }
 
 /// Where a candidate acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Extent {
+pub(super) enum Extent {
     /// In all logs.
     Everywhere,
     /// In some logs, for most of their time.
@@ -33,18 +33,18 @@ pub enum Extent {
 
 /// The other path, prepared for one base model.
 #[derive(Debug)]
-pub struct Path<'p> {
+pub(super) struct Path<'p> {
     /// Its data.
-    pub data: &'p Data<'p>,
+    pub(super) data: &'p Data<'p>,
     /// The base's columns on it.
-    pub design: Design,
+    pub(super) design: Design,
     /// What the base leaves on it.
-    pub residual: Vec<Vec<f64>>,
+    pub(super) residual: Vec<Vec<f64>>,
 }
 
 /// Gathers the evidence for a trial. `path` holds the other path and the candidate's columns there.
 #[must_use]
-pub fn evidence(
+pub(super) fn evidence(
     screen: &Screen<'_>,
     trial: &Trial,
     joints: &[usize],

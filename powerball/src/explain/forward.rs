@@ -4,6 +4,7 @@ use super::curves::curves;
 use super::evidence::{Evidence, Extent, Path, evidence};
 use super::leftover::{depends_on, effective_samples, leftover, noise_floor};
 use super::naming::{Comparison, compare};
+use super::other_path::payload_on;
 use super::placebo::placebos;
 use super::result::{Errors, Explained, FalsePositives, NamedEffect, Rival, Unattributed};
 use super::rule;
@@ -37,11 +38,11 @@ impl std::error::Error for ExplainError {}
 
 /// One effect's best candidates.
 #[derive(Debug)]
-pub struct Family {
+pub(super) struct Family {
     /// Its place among the effects.
     effect: usize,
     /// Its name.
-    pub name: &'static str,
+    pub(super) name: &'static str,
     members: Vec<Member>,
 }
 
@@ -57,7 +58,7 @@ struct Member {
 impl Family {
     /// The summed score of what acts on the given joints.
     #[must_use]
-    pub fn score_on(&self, joints: &[usize]) -> f64 {
+    pub(super) fn score_on(&self, joints: &[usize]) -> f64 {
         self.members
             .iter()
             .filter(|m| m.candidate.joints.iter().any(|j| joints.contains(j)))
@@ -67,7 +68,7 @@ impl Family {
 
     /// Why its best member on the given joints was refused.
     #[must_use]
-    pub fn refusal_on(&self, joints: &[usize]) -> Option<String> {
+    pub(super) fn refusal_on(&self, joints: &[usize]) -> Option<String> {
         self.members
             .iter()
             .filter(|m| m.candidate.joints.iter().any(|j| joints.contains(j)))
@@ -122,6 +123,8 @@ const FINAL_PLACEBOS: usize = 200;
 
 /// An explanation in progress.
 pub struct Session<'a> {
+    /// What is in logs of the other path only; its torque is taken out of them.
+    held: Option<NamedEffect>,
     data: Data<'a>,
     other: Data<'a>,
     folds: Folds,
@@ -154,13 +157,16 @@ pub fn explain(
 ) -> Result<Explained, ExplainError> {
     progress("preparing signals");
     let data = Data::new(body, logs, options).map_err(ExplainError::Fit)?;
-    let other = Data::new(body, validate, options).map_err(ExplainError::Validate)?;
+    let mut other = Data::new(body, validate, options).map_err(ExplainError::Validate)?;
     progress("fitting the base model");
     let folds = Folds::new(&data);
     let base = fit(&data, &folds, &[], None);
     let held_out = base.residual_on(&other, &[]);
     let before = Errors { fit: spread(&data, &base.residual), validate: spread(&other, &held_out) };
+    let held =
+        payload_on(body, logs, validate, options, &base, &mut other).map_err(ExplainError::Validate)?;
     let mut session = Session {
+        held,
         data,
         other,
         folds,
@@ -523,7 +529,7 @@ impl Session<'_> {
         let floor = noise_floor(&self.data);
         let context = Context::new(&self.data, &self.fit, &self.fit.residual);
         let coefficients = self.coefficients();
-        let mut named: Vec<NamedEffect> = Vec::new();
+        let mut named: Vec<NamedEffect> = self.held.take().into_iter().collect();
         let mut order: Vec<usize> = Vec::new();
         for a in &self.accepted {
             if !order.contains(&a.effect) {

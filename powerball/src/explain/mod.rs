@@ -11,13 +11,14 @@ mod folds;
 mod forward;
 mod leftover;
 mod naming;
+mod other_path;
 mod page;
 mod placebo;
 mod result;
 mod rule;
 mod screen;
 
-pub use curves::TorqueCurve;
+pub use curves::{TorqueCurve, curves};
 pub use forward::{ExplainError, Session, explain};
 pub use page::add_to_page;
 pub use result::{Explained, NamedEffect, Rival, Unattributed};

@@ -14,16 +14,16 @@ const MOST_ALIKE: f64 = 0.4;
 
 /// What placebos scored.
 #[derive(Clone, Debug, Default)]
-pub struct Placebos {
+pub(super) struct Placebos {
     /// Their penalised scores.
-    pub scores: Vec<f64>,
+    pub(super) scores: Vec<f64>,
     /// How many the rule accepted.
-    pub accepted: usize,
+    pub(super) accepted: usize,
 }
 
 /// Shifts the columns of real trials in time within each recording and asks the rule about them.
 #[must_use]
-pub fn placebos(
+pub(super) fn placebos(
     screen: &Screen<'_>,
     trials: &[(&Trial, &[usize])],
     folds: &Folds,

@@ -4,37 +4,37 @@ use super::evidence::Evidence;
 
 /// Least penalised gain, in units of χ² of independent samples: e^(−10/2) is a likelihood ratio of 150 after the
 /// penalties for coefficients and for having searched.
-pub const LEAST_SCORE: f64 = 10.0;
+pub(super) const LEAST_SCORE: f64 = 10.0;
 /// Penalty for each coefficient: what one coefficient gains by chance, twice over (Akaike).
-pub const PER_COEFFICIENT: f64 = 2.0;
+pub(super) const PER_COEFFICIENT: f64 = 2.0;
 /// Probability of accepting anything at all where nothing is missing, over all joints and candidates.
-pub const FAMILY_WISE: f64 = 0.01;
+pub(super) const FAMILY_WISE: f64 = 0.01;
 /// The held-out squared error must fall by this share on average over folds: 1 % of the rms, below which no user would
 /// notice.
-pub const LEAST_GAIN: f64 = 0.02;
+pub(super) const LEAST_GAIN: f64 = 0.02;
 /// … and it must fall at all in this share of the folds: four of five.
-pub const FOLDS_THAT_MUST_GAIN: f64 = 0.8;
+pub(super) const FOLDS_THAT_MUST_GAIN: f64 = 0.8;
 /// No fold may lose more than this share of its squared error.
-pub const WORST_FOLD: f64 = -0.05;
+pub(super) const WORST_FOLD: f64 = -0.05;
 /// Share of the placebos whose score a candidate must exceed.
-pub const PLACEBO_LEVEL: f64 = 0.99;
+pub(super) const PLACEBO_LEVEL: f64 = 0.99;
 /// A term of the class of an accepted one, on the same joint, that gains less than this share of it mends that one's
 /// law and is no effect of its own.
-pub const MENDS_ONLY: f64 = 0.15;
+pub(super) const MENDS_ONLY: f64 = 0.15;
 /// The same for a term of another class: laws are wrong by a few percent, and that shows in any guise.
-pub const MENDS_ANY: f64 = 0.05;
+pub(super) const MENDS_ANY: f64 = 0.05;
 /// A family with fewer columns is preferred where the better one's score is larger by less than this share or
 /// [`AS_GOOD_SCORE`]: these data do not tell the two apart.
-pub const AS_GOOD: f64 = 0.02;
+pub(super) const AS_GOOD: f64 = 0.02;
 /// See [`AS_GOOD`]: a likelihood ratio of 4.
-pub const AS_GOOD_SCORE: f64 = 3.0;
+pub(super) const AS_GOOD_SCORE: f64 = 3.0;
 /// Two names whose gains differ by less than this factor cannot be told apart by these data.
-pub const LEAST_MARGIN: f64 = 1.1;
+pub(super) const LEAST_MARGIN: f64 = 1.1;
 /// Effects added at most.
-pub const MOST_STEPS: usize = 12;
+pub(super) const MOST_STEPS: usize = 12;
 
 /// Why a candidate is refused, `None` where it passes. `tests` counts what was tried over joints and candidates.
-pub fn refusal(evidence: &Evidence, tests: f64, local: bool) -> Option<String> {
+pub(super) fn refusal(evidence: &Evidence, tests: f64, local: bool) -> Option<String> {
     if evidence.score < LEAST_SCORE {
         return Some(format!("explains too little (score {:.1} of {LEAST_SCORE})", evidence.score));
     }

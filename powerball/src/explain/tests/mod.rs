@@ -1,2 +1,3 @@
+mod measured;
 mod plant;
 mod study;

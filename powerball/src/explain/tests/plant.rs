@@ -223,7 +223,6 @@ pub(super) fn record(
         let mut colour = vec![0.0; n];
         let mut previous = motion.at(0.0)[0][at];
         let mut play = 0.0f64;
-        let mut load_before = vec![[0.0; 3]; 1];
         for k in 0..count {
             let now = k as f64 / RATE;
             let time = if truth == Truth::TimeDelay { now - 0.006 * size } else { now };
@@ -235,7 +234,7 @@ pub(super) fn record(
                 Truth::EncoderOffset => q_true[at] -= 0.03 * size,
                 Truth::BaseTilt => {
                     let tilt = 0.02 * size;
-                    g = [gravity[0], -tilt * gravity[2].abs() * -1.0, gravity[2]];
+                    g = [gravity[0], tilt * gravity[2].abs(), gravity[2]];
                 }
                 Truth::BrokenSymmetry => {
                     let zero = [
@@ -337,7 +336,6 @@ pub(super) fn record(
                     }
                 }
             }
-            load_before[0] = [x, speed, z];
             let at_now = motion.at(now)[0].clone();
             t.push(now);
             for j in 0..n {
@@ -359,7 +357,7 @@ pub(super) fn record(
         running += seconds;
         out.push(Log {
             file: format!("log{log}.csv"),
-            pieces: vec![0..t.len()],
+            pieces: std::iter::once(0..t.len()).collect(),
             t,
             q: q_log,
             torque: tau_log,

@@ -18,6 +18,40 @@ fn names(explained: &Explained) -> Vec<String> {
         .collect()
 }
 
+#[test]
+fn one_missing_effect_is_named_with_its_figures() {
+    let body = RigidBody::new(&arm()).unwrap();
+    let figure = |explained: &Explained, name: &str| explained.effects[0].parameters[name].as_f64().unwrap();
+    let load = run(&body, Truth::LoadFriction, 1.0, Noise::White, 3);
+    assert_eq!(load.effects[0].effect, "load_friction");
+    approx::assert_abs_diff_eq!(figure(&load, "coefficient"), 0.08, epsilon = 0.008);
+    let payload = run(&body, Truth::PayloadLater, 1.0, Noise::White, 3);
+    assert_eq!(payload.effects[0].effect, "payload");
+    approx::assert_abs_diff_eq!(figure(&payload, "mass"), 0.5, epsilon = 0.05);
+    assert_eq!(payload.effects[0].logs, ["log1.csv", "log3.csv"]);
+    let ripple = run(&body, Truth::MotorRipple, 1.0, Noise::White, 3);
+    assert_eq!(ripple.effects[0].effect, "position_ripple");
+    approx::assert_abs_diff_eq!(
+        ripple.effects[0].parameters["orders"][0].as_f64().unwrap(),
+        200.0,
+        epsilon = 0.5
+    );
+    for explained in [load, payload, ripple] {
+        let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
+        assert!(before.iter().zip(after).any(|(b, a)| *a < 0.95 * b), "{before:?} {after:?}");
+    }
+}
+
+#[test]
+fn nothing_is_found_where_nothing_is_missing() {
+    let body = RigidBody::new(&arm()).unwrap();
+    for (noise, seed) in [(Noise::White, 11), (Noise::White, 12), (Noise::Coloured(0.3), 13)] {
+        let explained = run(&body, Truth::Clean, 0.0, noise, seed);
+        assert_eq!(names(&explained), Vec::<String>::new(), "{noise:?} {seed}");
+        assert!(explained.false_positives.rate <= 0.01);
+    }
+}
+
 /// The table of a study: `STUDY=size,seeds cargo test --release -p powerball study -- --ignored --nocapture`.
 #[test]
 #[ignore = "minutes"]
