@@ -2,8 +2,8 @@
 
 use super::docs;
 use crate::arm::{Arm, JointKind};
-use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::{Argument, trig_offset};
+use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::rational;
 use crate::graph::{Expr, Input, Node, operands};
 use crate::model::Model;
@@ -295,7 +295,8 @@ fn result(built: &FunctionGraph) -> (TokenStream, TokenStream) {
             quote!([#(#column),*])
         })
         .collect();
-    if built.shape == (1, 1) {
+    // A number, and not a vector of one joint: an arm with a single joint keeps the types of every other.
+    if matches!(built.function, Function::KineticEnergy | Function::PotentialEnergy) {
         let value = value(0, 0);
         return (quote!(T), value);
     }
