@@ -2,8 +2,8 @@
 
 use super::docs;
 use crate::arm::{Arm, JointKind};
-use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::{Argument, trig_offset};
+use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::rational;
 use crate::graph::{Expr, Input, Node, operands};
 use crate::model::Model;
@@ -38,6 +38,8 @@ pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
     };
     let statements = sections(model, built, &needed);
     let (result, value) = result(built);
+    // Where the result is a number, the last `let` is the result.
+    let lint = is_number(built).then(|| quote!(#[allow(clippy::let_and_return)]));
     quote! {
         #(#[doc = #doc])*
         #[must_use]
@@ -47,6 +49,7 @@ pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
         }
 
         #(#[doc = #doc_with])*
+        #lint
         #[must_use]
         pub fn #name_with<T: SimdRealField + Copy>(#trig_name: &Trig<T>, #(#signature),*) -> #result {
             #positions
@@ -55,6 +58,11 @@ pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
             #value
         }
     }
+}
+
+/// Whether the result is a number for every arm: where it is a vector, one joint makes it a vector of one.
+fn is_number(built: &FunctionGraph) -> bool {
+    matches!(built.function, Function::KineticEnergy | Function::PotentialEnergy)
 }
 
 /// The struct of sines and cosines that functions share.
@@ -295,7 +303,7 @@ fn result(built: &FunctionGraph) -> (TokenStream, TokenStream) {
             quote!([#(#column),*])
         })
         .collect();
-    if built.shape == (1, 1) {
+    if is_number(built) {
         let value = value(0, 0);
         return (quote!(T), value);
     }

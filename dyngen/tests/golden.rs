@@ -1,0 +1,84 @@
+//! The generated code of four small arms: the committed bytes, and that they compile under the strictest lints.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use dyngen::{Config, Function};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const ARMS: [&str; 4] = ["pendulum", "planar2r", "scara", "twist"];
+/// Enough to review; every function is compiled.
+const FUNCTIONS: [Function; 7] = {
+    use Function::*;
+    [InverseDynamics, Regressor, MassMatrix, CoriolisMatrix, Gravity, ForwardDynamics, ForwardKinematics]
+};
+const BLESS: &str = "DYNGEN_BLESS=1 cargo test -p dyngen --test golden";
+
+fn tests() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests")
+}
+
+fn generated(arm: &str, functions: &[Function]) -> String {
+    let config = Config::new(tests().join(format!("arms/{arm}.toml"))).functions(functions);
+    config.source().unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn generated_code_is_what_was_reviewed() {
+    let bless = std::env::var_os("DYNGEN_BLESS").is_some();
+    let mut stale = Vec::new();
+    for arm in ARMS {
+        let path = tests().join(format!("golden/{arm}.rs"));
+        let source = generated(arm, &FUNCTIONS);
+        let golden = std::fs::read_to_string(&path).unwrap_or_default();
+        if bless {
+            std::fs::write(&path, source).unwrap();
+        } else if golden != source {
+            let same = golden.lines().zip(source.lines()).take_while(|(a, b)| a == b).count();
+            let line = |text: &str| text.lines().nth(same).unwrap_or("(the end)").to_string();
+            stale.push(format!(
+                "tests/golden/{arm}.rs:{}:\n- {}\n+ {}",
+                same + 1,
+                line(&golden),
+                line(&source)
+            ));
+        }
+    }
+    assert!(
+        stale.is_empty(),
+        "{}\nIf the change is meant, run {BLESS} and look at the diff.",
+        stale.join("\n")
+    );
+}
+
+/// A crate of its own without std, in which every warning is an error, clippy's too.
+#[test]
+fn generated_code_compiles_without_std_and_without_a_warning() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("golden");
+    std::fs::create_dir_all(folder.join("src")).unwrap();
+    let manifest = "[package]\nname = \"golden\"\nversion = \"0.0.0\"\nedition = \"2024\"\n[workspace]\n[dependencies]\n\
+                    nalgebra = { version = \"0.35\", default-features = false, features = [\"libm\"] }\n";
+    std::fs::write(folder.join("Cargo.toml"), manifest).unwrap();
+    // The versions of this workspace, so that nothing has to be looked up.
+    std::fs::copy(tests().join("../Cargo.lock"), folder.join("Cargo.lock")).unwrap();
+    let mut library =
+        "//! Generated arms.\n#![no_std]\n#![deny(warnings, missing_docs, clippy::all)]\n".to_string();
+    for arm in ARMS {
+        std::fs::write(folder.join(format!("src/{arm}.inc")), generated(arm, &Function::ALL)).unwrap();
+        library += &format!("pub mod {arm} {{\n    //! An arm.\n    include!(\"{arm}.inc\");\n}}\n");
+    }
+    std::fs::write(folder.join("src/lib.rs"), library).unwrap();
+    let cargo = |command: &str| {
+        Command::new(env!("CARGO"))
+            .args([command, "--quiet", "--offline"])
+            .current_dir(&folder)
+            .env("CARGO_TARGET_DIR", folder.join("target"))
+            .output()
+            .unwrap()
+    };
+    let clippy = cargo("clippy");
+    // Where the toolchain came without clippy, the compiler's own lints have to do.
+    let missing = String::from_utf8_lossy(&clippy.stderr).contains("is not installed");
+    let out = if missing { cargo("check") } else { clippy };
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+}
