@@ -1,0 +1,43 @@
+//! What the pages name is there: files, folders and links.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use powerball_workspace::root;
+
+/// Words in backticks that look like a path of this repository, and targets of links.
+fn paths(page: &str) -> Vec<String> {
+    let code = page.split('`').skip(1).step_by(2);
+    let first_folders = ["dyngen/", "dyngen-macros/", "powerball/", "tests/", "docs/", "examples/", "benches/", ".ci/"];
+    let named = code.filter(|w| first_folders.iter().any(|f| w.starts_with(f)) && !w.contains(' '));
+    let links = page.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+    let local = links.filter(|l| !l.contains("://") && !l.starts_with('#'));
+    named.chain(local).map(|p| p.split('#').next().unwrap().to_string()).collect()
+}
+
+#[test]
+fn every_path_that_a_page_names_exists() {
+    let mut checked = 0;
+    for page in ["README.md", "ARCHITECTURE.md", "docs/dyngen.md", "docs/explain.md"] {
+        let text = std::fs::read_to_string(root().join(page)).unwrap_or_else(|e| panic!("{page}: {e}"));
+        let folder = root().join(page).parent().unwrap().to_path_buf();
+        for path in paths(&text) {
+            assert!(root().join(&path).exists() || folder.join(&path).exists(), "{page} names {path}");
+            checked += 1;
+        }
+    }
+    assert!(checked > 30, "only {checked} paths were found: the test reads nothing");
+}
+
+#[test]
+fn the_architecture_names_every_folder_of_the_sources() {
+    let text = std::fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
+    for krate in ["dyngen/src", "powerball/src"] {
+        for entry in std::fs::read_dir(root().join(krate)).unwrap() {
+            let entry = entry.unwrap();
+            if entry.file_type().unwrap().is_dir() {
+                let name = format!("{krate}/{}/", entry.file_name().to_string_lossy());
+                assert!(text.contains(&name), "ARCHITECTURE.md does not name {name}");
+            }
+        }
+    }
+}
