@@ -3,7 +3,9 @@
 
 #[cfg(feature = "cli")]
 pub mod cli;
+#[cfg(feature = "std")]
 pub mod demo;
+#[cfg(feature = "std")]
 pub mod effects;
 #[cfg(feature = "std")]
 pub mod estimate;

@@ -1,10 +1,11 @@
-//! `powerball explain`: the residual loop, from logs to explained.json.
+//! `powerball explain`: the residual loop, from logs to explained.json and report.html.
 
 use super::Failure;
 use super::inputs::{Inputs, load};
 use super::output::{self, Progress};
-use crate::explain::{Explained, explain};
+use crate::explain::{Explained, add_to_page, explain};
 use crate::regression::DataOptions;
+use crate::report::Page;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -34,6 +35,9 @@ impl Explain {
         explained.warnings.splice(0..0, loaded.warnings);
         let text = output::json(&explained)?;
         output::write(&self.inputs.out, "explained.json", text.as_bytes())?;
+        let mut page = Page::new(format!("What the model of {} lacks", explained.arm));
+        add_to_page(&mut page, &explained);
+        output::write(&self.inputs.out, "report.html", page.to_html().as_bytes())?;
         if self.inputs.json {
             output::print(&text);
         } else {

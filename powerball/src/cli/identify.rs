@@ -1,9 +1,11 @@
 //! `powerball identify`: from logs to identified.json.
 
 use super::Failure;
+use super::identify_page::page;
 use super::inputs::{Inputs, load};
 use super::output::{self, Progress};
 use crate::estimate::{Folds, JointFriction, ParameterEstimate, Spread, fit, identify, spread};
+use crate::explain::curves;
 use crate::regression::{Data, DataOptions};
 use clap::Args;
 use serde::Serialize;
@@ -24,17 +26,18 @@ pub(crate) struct Identify {
     validate: Vec<PathBuf>,
 }
 
+/// identified.json.
 #[derive(Serialize)]
-struct Result_ {
-    arm: String,
-    set: &'static str,
-    parameters: Vec<ParameterEstimate>,
-    friction: Vec<JointFriction>,
-    fit: Spread,
-    validate: Option<Spread>,
-    physically_consistent: bool,
-    band: [f64; 2],
-    warnings: Vec<String>,
+pub(super) struct Identification {
+    pub arm: String,
+    pub set: &'static str,
+    pub parameters: Vec<ParameterEstimate>,
+    pub friction: Vec<JointFriction>,
+    pub fit: Spread,
+    pub validate: Option<Spread>,
+    pub physically_consistent: bool,
+    pub band: [f64; 2],
+    pub warnings: Vec<String>,
 }
 
 impl Identify {
@@ -51,13 +54,16 @@ impl Identify {
         let identified = identify(&data, &fitted);
         let mut warnings = loaded.warnings;
         warnings.extend(data.notes.iter().cloned());
+        let mut shown = curves(&data, &fitted.residual, &fitted.residual);
         let validate = if loaded.validate.is_empty() {
             warnings
                 .push("no log was given to --validate: the errors below are those of the fit itself".into());
             None
         } else {
             let data = Data::new(&loaded.body, &loaded.validate, &options).map_err(refused)?;
-            Some(spread(&data, &fitted.residual_on(&data, &[])))
+            let residual = fitted.residual_on(&data, &[]);
+            shown = curves(&data, &residual, &residual);
+            Some(spread(&data, &residual))
         };
         let undetermined: Vec<&str> =
             identified.parameters.iter().filter(|p| p.std.is_none()).map(|p| p.name.as_str()).collect();
@@ -67,19 +73,24 @@ impl Identify {
                 undetermined.join("; ")
             ));
         }
-        let result = Result_ {
+        let values: Vec<f64> = identified.parameters.iter().map(|p| p.value).collect();
+        let reasons = loaded.body.impossible(&values).map_err(|e| Failure::Refused(e.to_string()))?;
+        warnings.extend(reasons.iter().map(|r| format!("no real arm can have these values: {r}")));
+        let result = Identification {
             arm: loaded.body.arm().name.clone(),
             set: "minimal",
             parameters: identified.parameters,
             friction: identified.friction,
             fit: spread(&data, &fitted.residual),
             validate,
-            physically_consistent: false,
+            physically_consistent: reasons.is_empty(),
             band: [0.0, data.band.cutoff],
             warnings,
         };
         let text = output::json(&result)?;
         output::write(&self.inputs.out, "identified.json", text.as_bytes())?;
+        let page = page(&result, &shown, result.validate.is_some());
+        output::write(&self.inputs.out, "report.html", page.to_html().as_bytes())?;
         if self.inputs.json {
             output::print(&text);
         } else {

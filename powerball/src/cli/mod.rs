@@ -4,6 +4,7 @@ mod demo;
 mod excite;
 mod explain;
 mod identify;
+mod identify_page;
 mod inputs;
 mod output;
 

@@ -85,7 +85,7 @@ fn scan(context: &Context<'_>, joint: usize) -> Vec<f64> {
     }
     let (low, high) = positions.iter().fold((f64::MAX, f64::MIN), |(l, h), q| (l.min(*q), h.max(*q)));
     let width = 2.0 * PI / BINS as f64;
-    if !(high - low > 20.0 * width) || high - low > 100.0 {
+    if high - low <= 20.0 * width || high - low > 100.0 {
         return Vec::new();
     }
     let bins = ((high - low) / width) as usize + 1;

@@ -20,7 +20,7 @@ impl Effect for Stribeck {
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
         let on = |j: usize| {
             let top = context.top_speed(j);
-            let speeds = geometric(0.02 * top, 0.6 * top, 8);
+            let speeds = geometric(0.02 * top, 0.3 * top, 8);
             speeds.into_iter().map(move |v| Candidate::on(j, 0, vec![v], 8))
         };
         context.moving_joints().flat_map(on).collect()

@@ -47,7 +47,7 @@ impl Effect for Temperature {
                 (false, Some(t)) => (t[j][k] - t[j][0]) / 10.0,
                 (false, None) => 0.0,
             };
-            let part = |v: f64| if form % 2 == 0 { friction.torque(v) } else { v };
+            let part = |v: f64| if form.is_multiple_of(2) { friction.torque(v) } else { v };
             r.speed(j).enumerate().map(|(k, v)| part(v) * warmth(k)).collect()
         })]
     }

@@ -8,7 +8,7 @@ use faer::{Accum, Mat, MatRef, Par};
 use std::ops::Range;
 
 /// Friction columns of a joint: two saturating levels, the viscous one, and the two tangents of the shapes.
-pub const FRICTION: usize = 5;
+pub(super) const FRICTION: usize = 5;
 
 /// The regression columns for given friction shapes and terms.
 ///
@@ -131,11 +131,14 @@ fn pack(columns: &[&[f64]], rows: &Range<usize>) -> Vec<f64> {
     packed
 }
 
+/// A'A, A'y, y'y.
+type Products = (Mat<f64>, Vec<f64>, f64);
+
 /// Cross products of a design with itself and the torques, by joint and cell of folds.
 #[derive(Debug)]
 pub struct Gram {
     /// `[joint][cell]`: (A'A, A'y, y'y), local.
-    parts: Vec<Vec<(Mat<f64>, Vec<f64>, f64)>>,
+    parts: Vec<Vec<Products>>,
     globals: Vec<Vec<usize>>,
     size: usize,
 }

@@ -3,7 +3,7 @@
 /// P(F > x) of Fisher's F with `d1` and `d2` degrees of freedom.
 #[must_use]
 pub fn f_tail(x: f64, d1: f64, d2: f64) -> f64 {
-    if !(x > 0.0) || d1 <= 0.0 || d2 <= 0.0 {
+    if x.is_nan() || x <= 0.0 || d1 <= 0.0 || d2 <= 0.0 {
         return 1.0;
     }
     incomplete_beta(d2 / (d2 + d1 * x), d2 / 2.0, d1 / 2.0)

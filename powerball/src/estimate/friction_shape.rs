@@ -12,7 +12,7 @@ const GRID: usize = 14;
 
 /// Friction columns of a joint in the band: tanh(γ2 q̇), tanh(γ4 q̇), q̇, and ∂/∂ ln γ of the first two.
 #[must_use]
-pub fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f64>; FRICTION] {
+pub(super) fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f64>; FRICTION] {
     let column = |f: &dyn Fn(f64) -> f64| {
         data.joints[joint].column(&data.band, &data.recordings, |_, r| r.speed(joint).map(f).collect())
     };
@@ -34,14 +34,14 @@ pub fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f64>; FRI
 
 /// The steepnesses that make sense for a joint, s/rad: from nearly straight over its speeds to a step.
 #[must_use]
-pub fn range(data: &Data<'_>, joint: usize) -> (f64, f64) {
+pub(super) fn range(data: &Data<'_>, joint: usize) -> (f64, f64) {
     let top = data.top_speed(joint);
     (1.0 / top, 1000.0 / top)
 }
 
 /// The pair of steepnesses that leaves the least on one joint, all else refitted, levels ≥ 0.
 #[must_use]
-pub fn search(
+pub(super) fn search(
     data: &Data<'_>,
     design: &Design,
     gram: &Mat<f64>,

@@ -38,7 +38,7 @@ impl Solver {
                 left -= value * value;
                 row.push(value);
             }
-            if !(left > DEPENDENT) {
+            if left.is_nan() || left <= DEPENDENT {
                 continue;
             }
             row.push(left.sqrt());
@@ -112,7 +112,7 @@ impl Solver {
 ///
 /// Returns the solution and the factor over the columns that are free.
 #[must_use]
-pub fn bounded(
+pub(super) fn bounded(
     gram: &Mat<f64>,
     right: &[f64],
     wanted: impl Fn(usize) -> bool,

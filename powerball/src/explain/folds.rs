@@ -6,7 +6,7 @@ use faer::Mat;
 
 /// The base model fitted without one fold.
 #[derive(Debug)]
-pub struct FoldBase {
+pub(super) struct FoldBase {
     held: Vec<usize>,
     left_out: Vec<usize>,
     /// Over what is fitted.
@@ -23,7 +23,7 @@ pub struct FoldBase {
 impl FoldBase {
     /// Fits the base without each fold.
     #[must_use]
-    pub fn all(fit: &Fit, folds: &Folds, local: bool) -> Vec<FoldBase> {
+    pub(super) fn all(fit: &Fit, folds: &Folds, local: bool) -> Vec<FoldBase> {
         let (held, left_out) = folds.folds(local);
         held.iter()
             .zip(left_out)
@@ -80,7 +80,7 @@ impl Cross {
 /// Share by which the held-out squared error of the given joints falls with a candidate, by fold; the base and the
 /// candidate are fitted to the rest.
 #[must_use]
-pub fn fold_gains(
+pub(super) fn fold_gains(
     screen: &Screen<'_>,
     trial: &Trial,
     joints: &[usize],

@@ -1,8 +1,10 @@
 //! One effect at a time: screen, test, accept, refit everything, until nothing passes.
 
-use super::evidence::{Evidence, Path, evidence};
+use super::curves::curves;
+use super::evidence::{Evidence, Extent, Path, evidence};
 use super::leftover::{depends_on, effective_samples, leftover, noise_floor};
 use super::naming::{Comparison, compare};
+use super::other_path::payload_on;
 use super::placebo::placebos;
 use super::result::{Errors, Explained, FalsePositives, NamedEffect, Rival, Unattributed};
 use super::rule;
@@ -36,11 +38,11 @@ impl std::error::Error for ExplainError {}
 
 /// One effect's best candidates.
 #[derive(Debug)]
-pub struct Family {
+pub(super) struct Family {
     /// Its place among the effects.
     effect: usize,
     /// Its name.
-    pub name: &'static str,
+    pub(super) name: &'static str,
     members: Vec<Member>,
 }
 
@@ -56,7 +58,7 @@ struct Member {
 impl Family {
     /// The summed score of what acts on the given joints.
     #[must_use]
-    pub fn score_on(&self, joints: &[usize]) -> f64 {
+    pub(super) fn score_on(&self, joints: &[usize]) -> f64 {
         self.members
             .iter()
             .filter(|m| m.candidate.joints.iter().any(|j| joints.contains(j)))
@@ -66,12 +68,17 @@ impl Family {
 
     /// Why its best member on the given joints was refused.
     #[must_use]
-    pub fn refusal_on(&self, joints: &[usize]) -> Option<String> {
+    pub(super) fn refusal_on(&self, joints: &[usize]) -> Option<String> {
         self.members
             .iter()
             .filter(|m| m.candidate.joints.iter().any(|j| joints.contains(j)))
             .max_by(|a, b| a.trial.score.total_cmp(&b.trial.score))
             .and_then(|m| m.refusal.clone())
+    }
+
+    /// Columns of what was not refused.
+    fn columns(&self) -> usize {
+        self.members.iter().filter(|m| m.refusal.is_none()).map(|m| m.trial.columns.len()).sum()
     }
 
     fn potential(&self) -> f64 {
@@ -86,12 +93,10 @@ struct Accepted {
     candidate: Candidate,
     /// Columns among the terms.
     columns: usize,
-    /// Which step accepted it.
-    step: usize,
     p_value: f64,
     fold_gain: f64,
-    /// Squared error explained when accepted, (N·m)² summed over rows: gain over weight.
-    explained: f64,
+    /// Squared error that fell when it was accepted, by joint, (N·m)² summed over rows.
+    explained: Vec<f64>,
 }
 
 /// What a step decided.
@@ -103,8 +108,23 @@ struct Step {
     after: Vec<f64>,
 }
 
+fn extent(candidate: &Candidate) -> Extent {
+    match candidate.windows.as_slice() {
+        [] => Extent::Everywhere,
+        windows if windows.iter().any(|w| w.to.is_finite()) => Extent::Short,
+        _ => Extent::SomeLogs,
+    }
+}
+
+/// Placebos whose scores a step's choice must exceed.
+const STEP_PLACEBOS: usize = 60;
+/// Placebos that state the false-positive rate.
+const FINAL_PLACEBOS: usize = 200;
+
 /// An explanation in progress.
 pub struct Session<'a> {
+    /// What is in logs of the other path only; its torque is taken out of them.
+    held: Option<NamedEffect>,
     data: Data<'a>,
     other: Data<'a>,
     folds: Folds,
@@ -114,6 +134,8 @@ pub struct Session<'a> {
     fit: Fit,
     false_positives: FalsePositives,
     refused: Vec<Rival>,
+    /// Accepted once and taken out again.
+    given_up: Vec<(usize, Candidate)>,
 }
 
 impl fmt::Debug for Session<'_> {
@@ -135,15 +157,16 @@ pub fn explain(
 ) -> Result<Explained, ExplainError> {
     progress("preparing signals");
     let data = Data::new(body, logs, options).map_err(ExplainError::Fit)?;
-    let other = Data::new(body, validate, options).map_err(ExplainError::Validate)?;
+    let mut other = Data::new(body, validate, options).map_err(ExplainError::Validate)?;
     progress("fitting the base model");
     let folds = Folds::new(&data);
     let base = fit(&data, &folds, &[], None);
-    let before = Errors {
-        fit: spread(&data, &base.residual),
-        validate: spread(&other, &base.residual_on(&other, &[])),
-    };
+    let held_out = base.residual_on(&other, &[]);
+    let before = Errors { fit: spread(&data, &base.residual), validate: spread(&other, &held_out) };
+    let held =
+        payload_on(body, logs, validate, options, &base, &mut other).map_err(ExplainError::Validate)?;
     let mut session = Session {
+        held,
         data,
         other,
         folds,
@@ -153,14 +176,17 @@ pub fn explain(
         fit: base,
         false_positives: FalsePositives { family_wise: rule::FAMILY_WISE, ..FalsePositives::default() },
         refused: Vec::new(),
+        given_up: Vec::new(),
     };
     for step in 0..rule::MOST_STEPS {
         progress(&format!("step {}: screening candidates", step + 1));
         let Some(name) = session.step(step) else { break };
         progress(&format!("step {}: {name} accepted", step + 1));
     }
+    progress("asking placebos");
+    session.count_false_positives();
     progress("looking at what is left");
-    Ok(session.result(before))
+    Ok(session.result(before, &held_out))
 }
 
 impl Session<'_> {
@@ -205,18 +231,30 @@ impl Session<'_> {
                     Some(Rival { effect: f.name.to_string(), why_not })
                 })
                 .collect();
-            let (chosen, _) = best?;
+            let (mut chosen, top) = best?;
+            // What needs fewer columns and is as good is preferred.
+            let least = top - (rule::AS_GOOD * top).max(rule::AS_GOOD_SCORE);
+            for f in 0..families.len() {
+                if f == chosen
+                    || families[f].potential() < least
+                    || families[f].columns() >= families[chosen].columns()
+                {
+                    continue;
+                }
+                self.test(&screen, &mut families[f], tests, &path, &other_context);
+                if families[f].potential() >= least && families[f].columns() < families[chosen].columns() {
+                    chosen = f;
+                }
+            }
             let passing: Vec<&Member> =
                 families[chosen].members.iter().filter(|m| m.refusal.is_none()).collect();
             let trials: Vec<(&Trial, &[usize])> =
                 passing.iter().map(|m| (&m.trial, m.candidate.joints.as_slice())).collect();
-            let placebos = placebos(&screen, &trials, &self.folds, tests, step as u64);
+            let placebos = placebos(&screen, &trials, &self.folds, tests, STEP_PLACEBOS, step as u64);
             let mut scores = placebos.scores;
             scores.sort_by(f64::total_cmp);
             let level =
                 scores.get((scores.len() as f64 * rule::PLACEBO_LEVEL) as usize).copied().unwrap_or(0.0);
-            self.false_positives.placebos += scores.len();
-            self.false_positives.accepted += placebos.accepted;
             let members: Vec<usize> = (0..families[chosen].members.len())
                 .filter(|m| {
                     let member = &families[chosen].members[*m];
@@ -241,23 +279,36 @@ impl Session<'_> {
                 .collect();
             (family.effect, comparison, kept, tests)
         };
+        let squares =
+            |fit: &Fit| -> Vec<f64> { fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect() };
+        let square_before = squares(&self.fit);
+        let added: Vec<Candidate> = members.iter().map(|m| m.candidate.clone()).collect();
         for member in members {
             let Some(evidence) = member.evidence else { continue };
-            let weight = member.candidate.joints.iter().map(|j| self.fit.weights[*j]).fold(0.0, f64::max);
             let mut gains = evidence.fold_gains.clone();
             gains.sort_by(f64::total_cmp);
             self.accepted.push(Accepted {
                 effect: chosen,
                 columns: member.trial.columns.len(),
                 candidate: member.candidate,
-                step,
                 p_value: (evidence.p_value * tested).min(1.0),
                 fold_gain: gains.get(gains.len() / 2).copied().unwrap_or(0.0),
-                explained: if weight > 0.0 { member.trial.gain / weight } else { 0.0 },
+                explained: Vec::new(),
             });
         }
         self.refit();
+        let fell: Vec<f64> =
+            square_before.iter().zip(squares(&self.fit)).map(|(b, a)| (b - a).max(0.0)).collect();
+        for a in self.accepted.iter_mut().filter(|a| a.explained.is_empty()) {
+            a.explained.clone_from(&fell);
+        }
         self.prune();
+        // What does not last is not tried again: it would be accepted and taken out for ever.
+        for candidate in added {
+            if !self.has(chosen, &candidate) {
+                self.given_up.push((chosen, candidate));
+            }
+        }
         let after = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
         self.steps.push(Step {
             effect: chosen,
@@ -268,6 +319,23 @@ impl Session<'_> {
         Some(self.effects[chosen].name())
     }
 
+    /// Asks placebos of every kind on the final residual: where nothing is missing any more, what passes is chance.
+    fn count_false_positives(&mut self) {
+        let context = Context::new(&self.data, &self.fit, &self.fit.residual);
+        let screen = Screen::new(&context);
+        let mut tests = 0.0;
+        let families = self.families(&screen, &mut tests);
+        let trials: Vec<(&Trial, &[usize])> = families
+            .iter()
+            .flat_map(|f| &f.members)
+            .filter(|m| m.candidate.windows.is_empty())
+            .map(|m| (&m.trial, m.candidate.joints.as_slice()))
+            .collect();
+        let found = placebos(&screen, &trials, &self.folds, tests, FINAL_PLACEBOS, 99);
+        self.false_positives.placebos = found.scores.len();
+        self.false_positives.accepted = found.accepted;
+    }
+
     /// The best candidate of every effect and joint, and how many were tried in all.
     fn families(&self, screen: &Screen<'_>, tests: &mut f64) -> Vec<Family> {
         let lists: Vec<(usize, Vec<Candidate>)> =
@@ -275,7 +343,8 @@ impl Session<'_> {
         let mut families = Vec::new();
         for (e, candidates) in lists {
             let effect = self.effects[e].as_ref();
-            let open: Vec<Candidate> = candidates.into_iter().filter(|c| !self.has(e, c)).collect();
+            let open: Vec<Candidate> =
+                candidates.into_iter().filter(|c| !self.has(e, c) && !self.gave_up(e, c)).collect();
             *tests += open.iter().map(|c| c.searched.max(1.0)).fold(0.0, f64::max).max(open.len() as f64);
             let trials = parallel::map(&open, |c| screen.try_candidate(effect, c));
             let mut members: Vec<Member> = Vec::new();
@@ -311,31 +380,36 @@ impl Session<'_> {
     }
 
     fn has(&self, effect: usize, candidate: &Candidate) -> bool {
-        self.accepted.iter().any(|a| {
-            a.effect == effect
-                && a.candidate.joints == candidate.joints
-                && match (self.effects[effect].name(), a.candidate.values.first(), candidate.values.first()) {
-                    ("position_ripple", Some(x), Some(y)) => (x - y).abs() < 0.5,
-                    ("joint_coupling", Some(x), Some(y)) => x == y,
-                    ("broken_symmetry", ..) => a.candidate.form == candidate.form,
-                    ("contact_wrench", ..) => a.candidate.windows == candidate.windows,
-                    _ => true,
-                }
-        })
+        self.accepted.iter().any(|a| a.effect == effect && self.same(effect, &a.candidate, candidate))
+    }
+
+    fn gave_up(&self, effect: usize, candidate: &Candidate) -> bool {
+        self.given_up.iter().any(|(e, c)| *e == effect && self.same(effect, c, candidate))
+    }
+
+    /// Whether two candidates of an effect are the same thing twice; several ripples, contacts and the like are not.
+    fn same(&self, effect: usize, a: &Candidate, b: &Candidate) -> bool {
+        a.joints == b.joints
+            && match (self.effects[effect].name(), a.values.first(), b.values.first()) {
+                ("position_ripple", Some(x), Some(y)) => (x - y).abs() < 0.5,
+                ("joint_coupling", Some(x), Some(y)) => x == y,
+                ("broken_symmetry", ..) => a.form == b.form,
+                ("contact_wrench", ..) => a.windows == b.windows,
+                _ => true,
+            }
     }
 
     /// The accepted effect of which a member would only mend the law.
     fn mends(&self, effect: usize, member: &Member) -> Option<&'static str> {
         let class = self.effects[effect].class();
         let own = |j: usize| member.trial.gain / self.fit.weights[j].max(f64::MIN_POSITIVE);
-        self.accepted
-            .iter()
-            .filter(|a| self.effects[a.effect].class() == class)
-            .find(|a| {
-                let shared = a.candidate.joints.iter().find(|j| member.candidate.joints.contains(j));
-                shared.is_some_and(|j| own(*j) < rule::MENDS_ONLY * a.explained)
-            })
-            .map(|a| self.effects[a.effect].name())
+        let mends = |a: &&Accepted| {
+            let alike = self.effects[a.effect].class() == class && a.effect != effect;
+            let share = if alike { rule::MENDS_ONLY } else { rule::MENDS_ANY };
+            let most = |j: &usize| a.explained.get(*j).is_some_and(|e| own(*j) < share * e);
+            a.candidate.windows.is_empty() && member.candidate.joints.iter().all(most)
+        };
+        self.accepted.iter().find(mends).map(|a| self.effects[a.effect].name())
     }
 
     fn test(
@@ -347,18 +421,19 @@ impl Session<'_> {
         other: &Context<'_>,
     ) {
         let effect = self.effects[family.effect].as_ref();
-        let open: Vec<usize> =
-            (0..family.members.len()).filter(|m| family.members[*m].refusal.is_none()).collect();
+        let open: Vec<usize> = (0..family.members.len())
+            .filter(|m| family.members[*m].refusal.is_none() && family.members[*m].evidence.is_none())
+            .collect();
         let found = parallel::map(&open, |m| {
             let member = &family.members[*m];
             let columns = effect.columns(other, &member.candidate);
-            let local = !member.candidate.windows.is_empty();
+            let extent = extent(&member.candidate);
             evidence(
                 screen,
                 &member.trial,
                 &member.candidate.joints,
                 &self.folds,
-                local,
+                extent,
                 Some((path, &columns)),
             )
         });
@@ -446,15 +521,15 @@ impl Session<'_> {
             .collect()
     }
 
-    fn result(mut self, before: Errors) -> Explained {
-        let after = Errors {
-            fit: spread(&self.data, &self.fit.residual),
-            validate: spread(&self.other, &self.fit.residual_on(&self.other, &self.other_columns(&self.fit))),
-        };
+    fn result(mut self, before: Errors, base_residual: &[Vec<f64>]) -> Explained {
+        let residual = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
+        let after =
+            Errors { fit: spread(&self.data, &self.fit.residual), validate: spread(&self.other, &residual) };
+        let curves = curves(&self.other, base_residual, &residual);
         let floor = noise_floor(&self.data);
         let context = Context::new(&self.data, &self.fit, &self.fit.residual);
         let coefficients = self.coefficients();
-        let mut named: Vec<NamedEffect> = Vec::new();
+        let mut named: Vec<NamedEffect> = self.held.take().into_iter().collect();
         let mut order: Vec<usize> = Vec::new();
         for a in &self.accepted {
             if !order.contains(&a.effect) {
@@ -516,6 +591,7 @@ impl Session<'_> {
             next_experiment,
             false_positives: self.false_positives.clone(),
             warnings: self.data.notes.iter().chain(&self.other.notes).cloned().collect(),
+            curves,
         }
     }
 

@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 /// From second differences of the torque as sampled: what varies from one sample to the next is noise. Coloured noise
 /// is not seen this way, so the floor is the lowest one that can be hoped for.
 #[must_use]
-pub fn noise_floor(data: &Data<'_>) -> Vec<f64> {
+pub(super) fn noise_floor(data: &Data<'_>) -> Vec<f64> {
     let share = data.band.white_share(data.rate());
     (0..data.dof())
         .map(|j| {
@@ -31,7 +31,7 @@ pub fn noise_floor(data: &Data<'_>) -> Vec<f64> {
 
 /// The number of independent samples with the same information: Σ over joints of N over its autocorrelation time.
 #[must_use]
-pub fn effective_samples(data: &Data<'_>, residual: &[Vec<f64>]) -> usize {
+pub(super) fn effective_samples(data: &Data<'_>, residual: &[Vec<f64>]) -> usize {
     let mut total = 0.0;
     for (joint, r) in data.joints.iter().zip(residual) {
         let variance: f64 = r.iter().map(|v| v * v).sum();
@@ -61,7 +61,7 @@ pub fn effective_samples(data: &Data<'_>, residual: &[Vec<f64>]) -> usize {
 
 /// Share of the excess over the floor that stays: (after² − floor²)/(before² − floor²) over some joints.
 #[must_use]
-pub fn leftover(before: &[f64], after: &[f64], floor: &[f64], joints: &[usize]) -> f64 {
+pub(super) fn leftover(before: &[f64], after: &[f64], floor: &[f64], joints: &[usize]) -> f64 {
     let mean = joints
         .iter()
         .map(|j| {
@@ -83,7 +83,7 @@ const LEAST_SHARE: f64 = 0.02;
 /// The signals that a joint's residual depends on, with the share of its variance: those that beat every time-shifted
 /// copy of themselves, the strongest first.
 #[must_use]
-pub fn depends_on(context: &Context<'_>, joint: usize) -> Vec<(String, f64)> {
+pub(super) fn depends_on(context: &Context<'_>, joint: usize) -> Vec<(String, f64)> {
     let data = context.data;
     let rows = &data.joints[joint];
     let residual = &context.residual[joint];

@@ -5,15 +5,23 @@
 //! data, [`rule`] holds every threshold with its reason, [`forward`] adds one effect at a time, [`naming`] compares
 //! rivals, [`leftover`] says what stays.
 
+mod curves;
 mod evidence;
 mod folds;
 mod forward;
 mod leftover;
 mod naming;
+mod other_path;
+mod page;
 mod placebo;
 mod result;
 mod rule;
 mod screen;
 
+pub use curves::{TorqueCurve, curves};
 pub use forward::{ExplainError, Session, explain};
+pub use page::add_to_page;
 pub use result::{Explained, NamedEffect, Rival, Unattributed};
+
+#[cfg(test)]
+mod tests;

@@ -6,13 +6,13 @@ use super::rule;
 
 /// How a chosen family compares with the others on its joints.
 #[derive(Clone, Debug)]
-pub struct Comparison {
+pub(super) struct Comparison {
     /// Its score over that of the next best name.
-    pub margin: f64,
+    pub(super) margin: f64,
     /// The next best names.
-    pub rivals: Vec<Rival>,
+    pub(super) rivals: Vec<Rival>,
     /// A name that fits as well.
-    pub twin: Option<String>,
+    pub(super) twin: Option<String>,
 }
 
 /// Rivals listed at most.
@@ -20,7 +20,7 @@ const LISTED: usize = 3;
 
 /// Compares the family at `chosen` with the others, each on the chosen joints only.
 #[must_use]
-pub fn compare(families: &[Family], chosen: usize, joints: &[usize]) -> Comparison {
+pub(super) fn compare(families: &[Family], chosen: usize, joints: &[usize]) -> Comparison {
     let own = families[chosen].score_on(joints);
     let mut others: Vec<(usize, f64)> = (0..families.len())
         .filter(|f| *f != chosen)
@@ -28,8 +28,8 @@ pub fn compare(families: &[Family], chosen: usize, joints: &[usize]) -> Comparis
         .filter(|(_, score)| *score > 0.0)
         .collect();
     others.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let next = others.first().map_or(rule::LEAST_SCORE / 2.0, |(_, score)| *score);
-    let margin = own / next.max(rule::LEAST_SCORE / 2.0);
+    let next = others.first().map_or(0.0, |(_, score)| *score);
+    let margin = if next > rule::LEAST_SCORE / 2.0 { own / next } else { surprise(own) };
     let rivals = others
         .iter()
         .take(LISTED)
@@ -55,4 +55,10 @@ pub fn compare(families: &[Family], chosen: usize, joints: &[usize]) -> Comparis
         .filter(|(_, score)| own / score < rule::LEAST_MARGIN)
         .map(|(f, _)| families[*f].name.to_string());
     Comparison { margin, rivals, twin }
+}
+
+/// The margin of a name without a rival: its score over the least that could have counted.
+#[must_use]
+pub(super) fn surprise(score: f64) -> f64 {
+    score / (rule::LEAST_SCORE / 2.0)
 }

@@ -1,6 +1,6 @@
 //! Candidates that cannot be true, asked the same questions: how often these very data say yes by chance.
 
-use super::evidence::evidence;
+use super::evidence::{Extent, evidence};
 use super::rule;
 use super::screen::{Screen, Trial, dot};
 use crate::estimate::Folds;
@@ -9,32 +9,31 @@ use crate::regression::{Column, Data};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Placebos of one step.
-pub const EACH_STEP: usize = 60;
 /// A shifted column that still looks like the unshifted one (a periodic motion) is no placebo.
 const MOST_ALIKE: f64 = 0.4;
 
-/// What the placebos of one step scored.
+/// What placebos scored.
 #[derive(Clone, Debug, Default)]
-pub struct Placebos {
+pub(super) struct Placebos {
     /// Their penalised scores.
-    pub scores: Vec<f64>,
+    pub(super) scores: Vec<f64>,
     /// How many the rule accepted.
-    pub accepted: usize,
+    pub(super) accepted: usize,
 }
 
 /// Shifts the columns of real trials in time within each recording and asks the rule about them.
 #[must_use]
-pub fn placebos(
+pub(super) fn placebos(
     screen: &Screen<'_>,
     trials: &[(&Trial, &[usize])],
     folds: &Folds,
     tests: f64,
+    count: usize,
     seed: u64,
 ) -> Placebos {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let draws: Vec<(usize, f64)> =
-        (0..EACH_STEP).map(|k| (k % trials.len().max(1), rng.random_range(0.15..0.85))).collect();
+        (0..count).map(|k| (k % trials.len().max(1), rng.random_range(0.15..0.85))).collect();
     let outcomes = parallel::map(&draws, |(which, fraction)| {
         let (trial, joints) = trials.get(*which)?;
         let columns: Vec<Column> =
@@ -44,7 +43,7 @@ pub fn placebos(
         }
         let placebo = screen.try_columns(columns, 1.0)?;
         // The other path is not asked: a shifted column has no meaning there, so this is the stricter count.
-        let mut found = evidence(screen, &placebo, joints, folds, false, None);
+        let mut found = evidence(screen, &placebo, joints, folds, Extent::Everywhere, None);
         found.path_gain = 1.0;
         Some((placebo.score, rule::refusal(&found, tests, false).is_none()))
     });

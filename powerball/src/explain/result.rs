@@ -1,5 +1,6 @@
 //! What an explanation says, in the form of explained.json.
 
+use super::curves::TorqueCurve;
 use crate::estimate::Spread;
 use serde::Serialize;
 use serde_json::Value;
@@ -29,6 +30,9 @@ pub struct Explained {
     pub false_positives: FalsePositives,
     /// What was found in logs and arm file, and what was done about it.
     pub warnings: Vec<String>,
+    /// Torques over time on the other path, by joint; not part of the JSON.
+    #[serde(skip)]
+    pub curves: Vec<TorqueCurve>,
 }
 
 /// Errors on the fitted logs and on the other path.

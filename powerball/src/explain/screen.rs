@@ -10,11 +10,11 @@ use std::sync::OnceLock;
 
 /// The base model prepared for many candidates.
 #[derive(Debug)]
-pub struct Screen<'c> {
+pub(super) struct Screen<'c> {
     /// The model and its residual.
-    pub context: &'c Context<'c>,
+    pub(super) context: &'c Context<'c>,
     /// The base's normal equations over its free columns, shape tangents among them.
-    pub solver: Solver,
+    pub(super) solver: Solver,
     /// A'r: zero but for bounds and unfinished shapes.
     slope: Vec<f64>,
     /// The base fitted without each fold: whole logs, stretches.
@@ -23,23 +23,23 @@ pub struct Screen<'c> {
 
 /// A candidate tried on the base.
 #[derive(Clone, Debug)]
-pub struct Trial {
+pub(super) struct Trial {
     /// Its columns.
-    pub columns: Vec<Column>,
+    pub(super) columns: Vec<Column>,
     /// Its coefficients.
-    pub theta: Vec<f64>,
+    pub(super) theta: Vec<f64>,
     /// For each of its columns: the base columns' shares in it.
-    pub base: Vec<Vec<f64>>,
+    pub(super) base: Vec<Vec<f64>>,
     /// χ² explained, over variance inflation.
-    pub gain: f64,
+    pub(super) gain: f64,
     /// Gain after penalties for coefficients and search.
-    pub score: f64,
+    pub(super) score: f64,
 }
 
 impl<'c> Screen<'c> {
     /// Prepares the base model of a context.
     #[must_use]
-    pub fn new(context: &'c Context<'c>) -> Screen<'c> {
+    pub(super) fn new(context: &'c Context<'c>) -> Screen<'c> {
         let fit = context.fit;
         let (gram, _, _) = fit.gram.sum(&fit.weights, |_| true);
         let solver = Solver::new(&gram, |c| fit.free[c]);
@@ -53,13 +53,13 @@ impl<'c> Screen<'c> {
     }
 
     /// The base fitted without each fold (see [`Folds::folds`]).
-    pub fn folds(&self, folds: &Folds, local: bool) -> &[FoldBase] {
+    pub(super) fn folds(&self, folds: &Folds, local: bool) -> &[FoldBase] {
         self.folds[usize::from(local)].get_or_init(|| FoldBase::all(self.context.fit, folds, local))
     }
 
     /// Tries a candidate; `None` where it has no usable column or is physically impossible.
     #[must_use]
-    pub fn try_candidate(&self, effect: &dyn Effect, candidate: &Candidate) -> Option<Trial> {
+    pub(super) fn try_candidate(&self, effect: &dyn Effect, candidate: &Candidate) -> Option<Trial> {
         let columns = effect.columns(self.context, candidate);
         let trial = self.try_columns(columns, candidate.searched)?;
         let sound = !(effect.non_negative() && trial.theta.iter().any(|t| *t <= 0.0));
@@ -68,7 +68,7 @@ impl<'c> Screen<'c> {
 
     /// Tries columns, whatever they mean.
     #[must_use]
-    pub fn try_columns(&self, columns: Vec<Column>, searched: f64) -> Option<Trial> {
+    pub(super) fn try_columns(&self, columns: Vec<Column>, searched: f64) -> Option<Trial> {
         if columns.is_empty() || !columns.iter().all(Column::is_usable) {
             return None;
         }
@@ -118,7 +118,7 @@ impl<'c> Screen<'c> {
 
     /// The columns with the base's shares taken out, by joint and column.
     #[must_use]
-    pub fn residualised(&self, trial: &Trial) -> Vec<Vec<Vec<f64>>> {
+    pub(super) fn residualised(&self, trial: &Trial) -> Vec<Vec<Vec<f64>>> {
         let design = &self.context.fit.design;
         let of = |j: usize| {
             let one = |(column, base): (&Column, &Vec<f64>)| {

@@ -5,7 +5,7 @@ use dyngen::arm::{Convention, JointKind};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// The regressor of all eleven parameters a link (n × 11n, row-major) at one state, for gravity `g` in the base frame.
-pub fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec<f64> {
+pub(crate) fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec<f64> {
     let n = arm.dof();
     let number = dyngen::exact::rational::to_f64;
     let mut y = vec![0.0; n * 11 * n];

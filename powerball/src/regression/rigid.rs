@@ -99,6 +99,14 @@ impl RigidBody {
         out
     }
 
+    /// Why no real arm can have these values of the minimal set; empty where nothing speaks against them.
+    ///
+    /// # Errors
+    /// As [`Model::function`].
+    pub fn impossible(&self, values: &[f64]) -> Result<Vec<String>, Error> {
+        Ok(dyngen::base::possible::check(&self.model, SetKind::Minimal, values)?.reasons)
+    }
+
     /// Values of all eleven parameters a link that move like the minimal set's `values`.
     #[must_use]
     pub fn carried(&self, values: &[f64]) -> Vec<f64> {

@@ -47,6 +47,8 @@ impl Ink {
 pub enum Mark {
     /// A line through the points in their order.
     Line,
+    /// A broad pale line, to be seen under another one.
+    Broad,
     /// A thin dashed line, for limits and references.
     Dashed,
     /// A dot at each point.
@@ -66,6 +68,11 @@ impl Series {
     /// A curve; points that are not finite break it.
     pub fn line(name: impl Into<String>, ink: Ink, points: Vec<(f64, f64)>) -> Self {
         Series { name: name.into(), ink, mark: Mark::Line, points }
+    }
+
+    /// A broad pale curve, to be seen under another one.
+    pub fn broad(name: impl Into<String>, ink: Ink, points: Vec<(f64, f64)>) -> Self {
+        Series { name: name.into(), ink, mark: Mark::Broad, points }
     }
 
     /// A dashed curve.
@@ -180,6 +187,7 @@ impl Figure {
                     write!(out, "<path class=\"d big {class}\" d=\"M{:.1} {sample:.1}h0\"/>", x + 10.0)
                 }
                 Mark::Line => write!(out, "<path class=\"k {class}\" d=\"M{x:.1} {sample:.1}h20\"/>"),
+                Mark::Broad => write!(out, "<path class=\"k broad {class}\" d=\"M{x:.1} {sample:.1}h20\"/>"),
                 Mark::Dashed => write!(out, "<path class=\"k dash {class}\" d=\"M{x:.1} {sample:.1}h20\"/>"),
             };
             let _ = write!(out, "<text x=\"{:.1}\" y=\"{y:.1}\">{}</text>", x + 26.0, escape(name));
@@ -276,8 +284,12 @@ fn draw_series(out: &mut String, series: &Series, place: impl Fn((f64, f64)) -> 
         let _ = write!(d, "{}{x:.1} {y:.1}", if pen_down { 'L' } else { 'M' });
         pen_down = true;
     }
-    let dash = if series.mark == Mark::Dashed { " dash" } else { "" };
-    let _ = write!(out, "<path class=\"s{dash} {class}\" d=\"{d}\"/>");
+    let style = match series.mark {
+        Mark::Dashed => " dash",
+        Mark::Broad => " broad",
+        Mark::Line | Mark::Points => "",
+    };
+    let _ = write!(out, "<path class=\"s{style} {class}\" d=\"{d}\"/>");
 }
 
 #[cfg(test)]

@@ -100,8 +100,9 @@ impl Effect {
             "base_tilt" => Effect::BaseTilt { tilt: [0, 1].map(|_| sign * rng.random_range(0.02..0.06)) },
             "contact_wrench" => Effect::ContactWrench {
                 force: [0, 1, 2].map(|_| sign * rng.random_range(5.0..15.0)),
-                start: moment,
-                end: moment + rng.random_range(2.0..5.0),
+                start: session.start + 0.5 * quarter * rng.random_range(0.0..1.0),
+                length: rng.random_range(2.0..5.0),
+                every: rng.random_range(17.0..29.0),
             },
             // The elbow and the forearm, whose centres of mass are declared to lie in a plane.
             "broken_symmetry" => {

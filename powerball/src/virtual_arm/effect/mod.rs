@@ -122,14 +122,16 @@ pub enum Effect {
         /// Rotation of the base about its x and y axes, rad.
         tilt: [f64; 2],
     },
-    /// Something leans against the last link.
+    /// Something leans against the last link, again and again.
     ContactWrench {
         /// Force at the last frame's origin in the base frame, N.
         force: [f64; 3],
-        /// From this time on, s.
+        /// The first time, s.
         start: f64,
-        /// Up to this time, s.
-        end: f64,
+        /// How long each time, s.
+        length: f64,
+        /// From one time to the next, s.
+        every: f64,
     },
     /// A link's centre of mass lies beside the plane in which it was declared to lie.
     BrokenSymmetry {
@@ -264,8 +266,8 @@ impl Effect {
             Effect::BaseTilt { tilt } => {
                 format!("the base is tilted by ({:+.1}, {:+.1}) mrad", 1e3 * tilt[0], 1e3 * tilt[1])
             }
-            Effect::ContactWrench { force, start, end } => format!(
-                "a force of ({:.0}, {:.0}, {:.0}) N on the wrist from t = {start:.1} s to {end:.1} s",
+            Effect::ContactWrench { force, start, length, every } => format!(
+                "a force of ({:.0}, {:.0}, {:.0}) N on the wrist for {length:.1} s at t = {start:.1} s and every {every:.0} s after",
                 force[0], force[1], force[2]
             ),
             Effect::BrokenSymmetry { link, aside } => {

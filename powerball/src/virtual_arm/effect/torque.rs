@@ -49,7 +49,9 @@ impl Effect {
                     tau[i] += change * warm * now.friction[i].gamma5 * now.dq[i];
                 }
             }
-            Effect::ContactWrench { force, start, end } if (*start..*end).contains(&now.t) => {
+            Effect::ContactWrench { force, start, length, every }
+                if now.t >= *start && (now.t - start).rem_euclid(*every) < *length =>
+            {
                 // The force's share alone: the arm at rest with it and without it.
                 let zero = vec![0.0; tau.len()];
                 let with = now.dynamics.inverse_in_contact(now.q, &zero, &zero, *force, [0.0; 3]);

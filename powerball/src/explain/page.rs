@@ -1,0 +1,186 @@
+//! An explanation as sections of a page.
+
+use super::curves::TorqueCurve;
+use super::result::{Explained, NamedEffect};
+use crate::report::{BarPairs, Figure, Ink, Page, Panel, Series, Table, Tone, number};
+use serde_json::Value;
+
+/// Adds everything that an explanation says to a page: errors, effects with their evidence, torques over time, what
+/// stays, and what was found in the logs.
+pub fn add_to_page(page: &mut Page, explained: &Explained) {
+    errors(page, explained);
+    effects(page, explained);
+    torques(page, explained);
+    rest(page, explained);
+}
+
+fn errors(page: &mut Page, explained: &Explained) {
+    page.heading("Errors on the held-out path");
+    let [low, high] = explained.band;
+    let (before, after) = (&explained.before.validate, &explained.after.validate);
+    let title = format!("Torque error on logs that were not fitted, {low} to {high} Hz");
+    let mut bars = BarPairs::new(title, "rms [N·m]", ["base model", "with the effects below"]);
+    let mut table = Table::new([
+        "joint",
+        "base model [N·m]",
+        "of the torque",
+        "with effects [N·m]",
+        "of the torque",
+        "change",
+        "noise floor [N·m]",
+    ]);
+    for joint in 0..before.rms.len() {
+        let (b, a) = (before.rms[joint], after.rms[joint]);
+        let floor = explained.noise_floor.get(joint).copied().unwrap_or(f64::NAN);
+        bars = bars.pair_with_floor(format!("joint {}", joint + 1), b, a, floor);
+        table.push([
+            (joint + 1).to_string(),
+            number(b),
+            percent(before.relative[joint]),
+            number(a),
+            percent(after.relative[joint]),
+            if b > 0.0 { change(a / b - 1.0) } else { String::new() },
+            number(floor),
+        ]);
+    }
+    page.bars(&bars, "The dashed lines are what white measurement noise alone would leave in the band.");
+    page.table(&table);
+}
+
+fn effects(page: &mut Page, explained: &Explained) {
+    page.heading("What the model lacked");
+    if explained.effects.is_empty() {
+        page.paragraph(
+            "No effect was accepted: these logs do not show that the model lacks anything with a name.",
+        );
+    } else {
+        let mut table = Table::new([
+            "effect",
+            "joints",
+            "figures (SI units)",
+            "held-out gain",
+            "p",
+            "margin",
+            "left over",
+        ]);
+        for effect in &explained.effects {
+            let gain = effect.held_out_gain.iter().copied().fold(f64::INFINITY, f64::min);
+            table.push([
+                effect.effect.clone(),
+                list(&effect.joints),
+                figures(&effect.parameters),
+                percent(gain),
+                number(effect.p_value),
+                format!("{:.2}", effect.margin),
+                percent(effect.leftover),
+            ]);
+        }
+        page.table(&table);
+        page.paragraph(
+            "Gain: by how much the squared error of folds that were left out falls, on the joint where it falls least. \
+             Margin: evidence over that of the next best name. Left over: share of the residual's excess over noise \
+             that stays on these joints.",
+        );
+    }
+    for effect in explained.effects.iter().filter(|e| !e.rivals.is_empty()) {
+        page.folded(
+            &format!("Rivals of {} on joint {}", effect.effect, list(&effect.joints)),
+            &rivals(effect),
+        );
+    }
+}
+
+fn rivals(effect: &NamedEffect) -> Table {
+    let mut table = Table::new(["name", "why it was not given"]);
+    for rival in &effect.rivals {
+        table.push([rival.effect.clone(), rival.why_not.clone()]);
+    }
+    table
+}
+
+fn torques(page: &mut Page, explained: &Explained) {
+    page.heading("Torques on the held-out path");
+    let moving = explained.curves.iter().enumerate().filter(|(_, curve)| !curve.t.is_empty());
+    for (joint, curve) in moving {
+        page.figure(&figure(joint, curve), "");
+    }
+    page.paragraph("The logs follow each other without their pauses. Phases of rest are left out.");
+}
+
+fn figure(joint: usize, curve: &TorqueCurve) -> Figure {
+    let measured = curve.points(|row| curve.measured[row]);
+    let predicted = curve.points(|row| curve.measured[row] - curve.after[row]);
+    let torque = Panel::new("torque [N·m]").line("measured", Ink::Blue, measured).series(Series::line(
+        "predicted with the effects",
+        Ink::Orange,
+        predicted,
+    ));
+    let residual = Panel::new("error [N·m]")
+        .height(0.75)
+        .line("error of the base model", Ink::Grey, curve.points(|row| curve.before[row]))
+        .line("error with the effects", Ink::Green, curve.points(|row| curve.after[row]));
+    Figure::new(format!("Joint {}", joint + 1), "time along the logs [s]").panel(torque).panel(residual)
+}
+
+fn rest(page: &mut Page, explained: &Explained) {
+    page.heading("What stays open");
+    match &explained.unattributed {
+        Some(rest) => {
+            let signals = rest.depends_on.join(", ");
+            let text = format!(
+                "The residual of joint {} still depends on {signals}, and nothing in the library explains it well enough to be named.",
+                list(&rest.joints)
+            );
+            page.note(Tone::Bad, &text);
+            let mut table = Table::new(["considered", "why it was not given"]);
+            rest.considered.iter().for_each(|r| table.push([r.effect.clone(), r.why_not.clone()]));
+            if !table.is_empty() {
+                page.folded("Names that were considered", &table);
+            }
+        }
+        None => page.paragraph("Nothing that these logs could show."),
+    }
+    if let Some(advice) =
+        explained.next_experiment.as_ref().and_then(|next| next.get("advice")).and_then(Value::as_str)
+    {
+        page.note(Tone::Plain, &format!("Next experiment: {advice}"));
+    }
+    let placebos = &explained.false_positives;
+    page.paragraph(&format!(
+        "How often the rule is wrong on these data: {} of {} effects that cannot be there were accepted. The residuals \
+         are worth {} independent samples.",
+        placebos.accepted, placebos.placebos, explained.effective_samples
+    ));
+    if !explained.warnings.is_empty() {
+        let mut table = Table::new(["found in the logs and the arm file"]);
+        explained.warnings.iter().for_each(|w| table.push([w.clone()]));
+        page.table(&table);
+    }
+}
+
+/// `{"mass": 1.5, "com": [0, 0, 0.1]}` as `mass 1.50, com (0, 0, 0.100)`.
+fn figures(parameters: &Value) -> String {
+    match parameters {
+        Value::Object(map) => map
+            .iter()
+            .map(|(name, value)| format!("{name} {}", figures(value)))
+            .collect::<Vec<_>>()
+            .join(", "),
+        Value::Array(values) => format!("({})", values.iter().map(figures).collect::<Vec<_>>().join(", ")),
+        Value::Number(value) => value.as_f64().map_or_else(|| value.to_string(), number),
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    }
+}
+
+fn list(joints: &[usize]) -> String {
+    joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.1} %", 100.0 * share)
+}
+
+fn change(share: f64) -> String {
+    format!("{:+.0} %", 100.0 * share).replace('-', "\u{2212}")
+}

@@ -1,0 +1,3 @@
+mod measured;
+mod plant;
+mod study;

@@ -1,0 +1,95 @@
+//! What the rule does on logs whose truth is known.
+
+use super::plant::{Noise, Truth, arm, record};
+use crate::explain::{Explained, explain};
+use crate::regression::{DataOptions, RigidBody};
+
+fn run(body: &RigidBody, truth: Truth, size: f64, noise: Noise, seed: u64) -> Explained {
+    let logs = record(body.arm(), truth, size, noise, 7, 22.0, seed);
+    let (fit, validate) = logs.split_at(5);
+    explain(body, fit, validate, &DataOptions::default(), &|_| ()).unwrap()
+}
+
+fn names(explained: &Explained) -> Vec<String> {
+    explained
+        .effects
+        .iter()
+        .map(|e| format!("{}@{:?} m{:.1} l{:.2}", e.effect, e.joints, e.margin, e.leftover))
+        .collect()
+}
+
+#[test]
+fn one_missing_effect_is_named_with_its_figures() {
+    let body = RigidBody::new(&arm()).unwrap();
+    let figure = |explained: &Explained, name: &str| explained.effects[0].parameters[name].as_f64().unwrap();
+    let load = run(&body, Truth::LoadFriction, 1.0, Noise::White, 3);
+    assert_eq!(load.effects[0].effect, "load_friction");
+    approx::assert_abs_diff_eq!(figure(&load, "coefficient"), 0.08, epsilon = 0.008);
+    let payload = run(&body, Truth::PayloadLater, 1.0, Noise::White, 3);
+    assert_eq!(payload.effects[0].effect, "payload");
+    approx::assert_abs_diff_eq!(figure(&payload, "mass"), 0.5, epsilon = 0.05);
+    assert_eq!(payload.effects[0].logs, ["log1.csv", "log3.csv"]);
+    let ripple = run(&body, Truth::MotorRipple, 1.0, Noise::White, 3);
+    assert_eq!(ripple.effects[0].effect, "position_ripple");
+    approx::assert_abs_diff_eq!(
+        ripple.effects[0].parameters["orders"][0].as_f64().unwrap(),
+        200.0,
+        epsilon = 0.5
+    );
+    for explained in [load, payload, ripple] {
+        let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
+        assert!(before.iter().zip(after).any(|(b, a)| *a < 0.95 * b), "{before:?} {after:?}");
+    }
+}
+
+#[test]
+fn nothing_is_found_where_nothing_is_missing() {
+    let body = RigidBody::new(&arm()).unwrap();
+    for (noise, seed) in [(Noise::White, 11), (Noise::White, 12), (Noise::Coloured(0.3), 13)] {
+        let explained = run(&body, Truth::Clean, 0.0, noise, seed);
+        assert_eq!(names(&explained), Vec::<String>::new(), "{noise:?} {seed}");
+        assert!(explained.false_positives.rate <= 0.01);
+    }
+}
+
+/// The table of a study: `STUDY=size,seeds cargo test --release -p powerball study -- --ignored --nocapture`.
+#[test]
+#[ignore = "minutes"]
+fn study() {
+    let body = RigidBody::new(&arm()).unwrap();
+    let text = std::env::var("STUDY").unwrap_or_else(|_| "1.0,2".into());
+    let mut parts = text.split(',');
+    let size: f64 = parts.next().and_then(|s| s.parse().ok()).unwrap_or(1.0);
+    let seeds: u64 = parts.next().and_then(|s| s.parse().ok()).unwrap_or(2);
+    let only: Vec<&str> = parts.collect();
+    let (mut right, mut total) = (0, 0);
+    for truth in Truth::ALL {
+        if !only.is_empty() && !only.contains(&truth.name()) {
+            continue;
+        }
+        for seed in 0..seeds {
+            let start = std::time::Instant::now();
+            let explained = run(&body, truth, size, Noise::White, seed);
+            let ok = explained.effects.first().is_some_and(|e| e.effect == truth.name());
+            right += usize::from(ok);
+            total += 1;
+            println!(
+                "{} {:22} seed {seed} {:4.1} s fp {} {:?} {}",
+                if ok { "ok " } else { "BAD" },
+                truth.name(),
+                start.elapsed().as_secs_f64(),
+                explained.false_positives.accepted,
+                names(&explained),
+                explained.effects.first().map(|e| e.parameters.to_string()).unwrap_or_default(),
+            );
+        }
+    }
+    println!("{right} of {total}");
+    for (noise, seeds) in [(Noise::White, seeds), (Noise::Coloured(0.3), seeds)] {
+        if only.is_empty() {
+            for seed in 100..100 + 2 * seeds {
+                println!("clean {noise:?} {seed} {:?}", names(&run(&body, Truth::Clean, 0.0, noise, seed)));
+            }
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! `powerball demo` and `powerball excite` as a user runs them.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use powerball::demo::{self, Session};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn powerball(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_powerball")).args(arguments).output().unwrap()
+}
+
+fn json(output: &Output) -> Value {
+    let complaint = String::from_utf8_lossy(&output.stderr);
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {complaint}"))
+}
+
+fn complaint(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A place of this test run.
+fn scratch(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)
+}
+
+fn arm(name: &str) -> String {
+    format!("{}/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn the_demo_finds_what_it_hid_and_writes_what_it_promises() {
+    for (effect, seed) in [("load_friction", "3"), ("hysteresis", "1")] {
+        let folder = scratch(&format!("demo_{effect}"));
+        let out = folder.to_str().unwrap();
+        let run = powerball(&["demo", "--effect", effect, "--seed", seed, "--out", out, "--json"]);
+        assert!(run.status.success(), "{}", complaint(&run));
+        let result = json(&run);
+        assert_eq!(result["verdict"]["truth"], effect);
+        assert_eq!(result["verdict"]["judgement"], "right", "{}", result["verdict"]);
+        let rms = |when: &str| -> Vec<f64> {
+            let list = result["explained"][when]["validate"]["rms"].as_array().unwrap();
+            list.iter().map(|x| x.as_f64().unwrap()).collect()
+        };
+        let joint = result["verdict"]["joints"][0].as_u64().unwrap() as usize - 1;
+        assert!(rms("after")[joint] < 0.5 * rms("before")[joint]);
+
+        let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
+        // One figure a joint, and the bars.
+        assert_eq!(page.matches("<svg").count(), 7);
+        assert!(page.len() < 2_000_000 && page.contains("The name is right."));
+        for file in ["arm.toml", "explained.json", "fit_5.csv", "held_out_3.csv"] {
+            assert!(folder.join(file).is_file(), "{file}");
+        }
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_logs_and_another_one_others() {
+    let log = |seed: u64, name: &str| {
+        let folder = scratch(name);
+        std::fs::create_dir_all(&folder).unwrap();
+        let session = Session::record(&folder, seed, &demo::names()).unwrap();
+        (session.effect, std::fs::read(&session.held_out[1]).unwrap())
+    };
+    let first = log(5, "session_a");
+    assert!(first == log(5, "session_b"));
+    assert!(first.1 != log(6, "session_c").1);
+}
+
+#[test]
+fn an_effect_that_does_not_exist_is_wrong_use() {
+    let run = powerball(&["demo", "--effect", "ghosts", "--out", scratch("ghosts").to_str().unwrap()]);
+    assert_eq!(run.status.code(), Some(2));
+    assert!(complaint(&run).contains("load_friction"), "{}", complaint(&run));
+}
+
+#[test]
+fn an_exciting_path_keeps_the_limits_from_rest_to_rest() {
+    let file = scratch("path.csv");
+    let hardware = arm("lwa4p.toml");
+    let run = powerball(&[
+        "excite",
+        "--arm",
+        &hardware,
+        "--out",
+        file.to_str().unwrap(),
+        "--evaluations",
+        "200",
+        "--json",
+    ]);
+    let result = json(&run);
+    let condition = result["figures"]["condition"].as_f64().unwrap();
+    assert!(condition < 0.7 * result["random_start"]["condition"].as_f64().unwrap());
+
+    let mut csv = csv::Reader::from_path(&file).unwrap();
+    let header: Vec<String> = csv.headers().unwrap().iter().map(String::from).collect();
+    assert_eq!(header.len(), 19);
+    assert_eq!((header[0].as_str(), header[1].as_str(), header[18].as_str()), ("t", "q1", "ddq6"));
+    let rows: Vec<Vec<f64>> =
+        csv.records().map(|row| row.unwrap().iter().map(|x| x.parse().unwrap()).collect()).collect();
+    assert_eq!(rows.len(), result["samples"].as_u64().unwrap() as usize);
+    for row in [&rows[0], rows.last().unwrap()] {
+        assert!(row[7..].iter().all(|x| x.abs() < 1e-9), "{row:?}");
+    }
+    for row in &rows {
+        assert!(row[7..13].iter().all(|v| v.abs() < 1.257) && row[2].abs() < 1.92 && row[5].abs() < 2.443);
+    }
+}
+
+#[test]
+fn excite_says_what_is_missing() {
+    let file = scratch("none.csv");
+    let out = file.to_str().unwrap();
+    let paper = powerball(&["excite", "--arm", &arm("arm.toml"), "--out", out]);
+    assert_eq!(paper.status.code(), Some(1));
+    assert!(
+        complaint(&paper).contains("joint 1: `position`, `velocity`, `acceleration`"),
+        "{}",
+        complaint(&paper)
+    );
+    let nothing = powerball(&["excite", "--arm", &arm("lwa4p.toml"), "--out", out, "--harmonics", "0"]);
+    assert_eq!(nothing.status.code(), Some(2));
+    let nowhere = powerball(&["excite", "--arm", "no/such/arm.toml", "--out", out]);
+    assert_eq!(nowhere.status.code(), Some(2));
+    assert!(!file.exists());
+}
