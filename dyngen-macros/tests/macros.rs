@@ -16,7 +16,7 @@ mod slider_full {
 
 #[dyngen_macros::model("tests/arms/slider.toml")]
 mod slider_model {
-    pub const KEPT: &str = "what the module holds stays";
+    pub(super) const KEPT: &str = "what the module holds stays";
 }
 
 mod baked {
