@@ -14,7 +14,7 @@ mod hysteresis;
 mod joint_coupling;
 mod joint_elasticity;
 mod load_friction;
-mod payload;
+pub(crate) mod payload;
 mod position_ripple;
 mod spring;
 mod stribeck;

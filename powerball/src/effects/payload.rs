@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 /// Mass and first moment in the last frame as four columns; the inertia is that of a point mass at the centre of mass
 /// last estimated (`values`), so a few rounds make it consistent.
-pub(super) struct Payload;
+pub(crate) struct Payload;
 
 /// A centre of mass farther than this from the flange, m, is no payload.
 const REACH: f64 = 1.0;

@@ -4,6 +4,7 @@ use super::curves::curves;
 use super::evidence::{Evidence, Extent, Path, evidence};
 use super::leftover::{depends_on, effective_samples, leftover, noise_floor};
 use super::naming::{Comparison, compare};
+use super::other_path::payload_on;
 use super::placebo::placebos;
 use super::result::{Errors, Explained, FalsePositives, NamedEffect, Rival, Unattributed};
 use super::rule;
@@ -122,6 +123,8 @@ const FINAL_PLACEBOS: usize = 200;
 
 /// An explanation in progress.
 pub struct Session<'a> {
+    /// What is in logs of the other path only; its torque is taken out of them.
+    held: Option<NamedEffect>,
     data: Data<'a>,
     other: Data<'a>,
     folds: Folds,
@@ -148,13 +151,15 @@ impl fmt::Debug for Session<'_> {
 pub fn explain(body: &RigidBody, logs: &[Log], validate: &[Log], options: &DataOptions, progress: &dyn Fn(&str)) -> Result<Explained, ExplainError> {
     progress("preparing signals");
     let data = Data::new(body, logs, options).map_err(ExplainError::Fit)?;
-    let other = Data::new(body, validate, options).map_err(ExplainError::Validate)?;
+    let mut other = Data::new(body, validate, options).map_err(ExplainError::Validate)?;
     progress("fitting the base model");
     let folds = Folds::new(&data);
     let base = fit(&data, &folds, &[], None);
     let held_out = base.residual_on(&other, &[]);
     let before = Errors { fit: spread(&data, &base.residual), validate: spread(&other, &held_out) };
+    let held = payload_on(body, logs, validate, options, &base, &mut other).map_err(ExplainError::Validate)?;
     let mut session = Session {
+        held,
         data,
         other,
         folds,
@@ -496,7 +501,7 @@ impl Session<'_> {
         let floor = noise_floor(&self.data);
         let context = Context::new(&self.data, &self.fit, &self.fit.residual);
         let coefficients = self.coefficients();
-        let mut named: Vec<NamedEffect> = Vec::new();
+        let mut named: Vec<NamedEffect> = self.held.take().into_iter().collect();
         let mut order: Vec<usize> = Vec::new();
         for a in &self.accepted {
             if !order.contains(&a.effect) {

@@ -11,6 +11,7 @@ mod folds;
 mod forward;
 mod leftover;
 mod naming;
+mod other_path;
 mod page;
 mod placebo;
 mod result;

@@ -28,8 +28,8 @@ pub fn compare(families: &[Family], chosen: usize, joints: &[usize]) -> Comparis
         .filter(|(_, score)| *score > 0.0)
         .collect();
     others.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let next = others.first().map_or(rule::LEAST_SCORE / 2.0, |(_, score)| *score);
-    let margin = own / next.max(rule::LEAST_SCORE / 2.0);
+    let next = others.first().map_or(0.0, |(_, score)| *score);
+    let margin = if next > rule::LEAST_SCORE / 2.0 { own / next } else { surprise(own) };
     let rivals = others
         .iter()
         .take(LISTED)
@@ -52,4 +52,10 @@ pub fn compare(families: &[Family], chosen: usize, joints: &[usize]) -> Comparis
         .filter(|(_, score)| own / score < rule::LEAST_MARGIN)
         .map(|(f, _)| families[*f].name.to_string());
     Comparison { margin, rivals, twin }
+}
+
+/// The margin of a name without a rival: its score over the least that could have counted.
+#[must_use]
+pub fn surprise(score: f64) -> f64 {
+    score / (rule::LEAST_SCORE / 2.0)
 }
