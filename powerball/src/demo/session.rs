@@ -23,6 +23,8 @@ const PATHS: [(bool, f64); 8] = [
     (false, 10.5),
     (true, 11.5),
 ];
+/// The path, one to fit, during which something may begin.
+const BEGINS_IN: usize = 3;
 /// Between two logs, s.
 const PAUSE: f64 = 3.0;
 /// Paths tried for each log: enough for a condition number near the best, in a fraction of a second.
@@ -114,21 +116,27 @@ impl Session {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let session: f64 = found.iter().map(|f| f.path.duration() + PAUSE).sum();
         let name = named.choose(&mut rng).copied().unwrap_or_default();
-        let effect = Effect::draw_named(name, &plant, 0.0..session, &mut rng)
+        let starts = found.iter().scan(0.0, |end, f| {
+            let start = *end;
+            *end += f.path.duration() + PAUSE;
+            Some(start)
+        });
+        let starts: Vec<f64> = starts.collect();
+        // What begins at some time begins while a log is recorded that will be fitted, with logs before and after.
+        let begins = starts[BEGINS_IN] + PAUSE..starts[BEGINS_IN + 1] - 2.0 * PAUSE;
+        let effect = Effect::draw_named(name, &plant, session, begins, &mut rng)
             .ok_or_else(|| SessionError::UnknownEffect(name.to_string()))?;
         let plant = plant.with(effect.clone());
 
         let (mut fit, mut held_out) = (Vec::new(), Vec::new());
-        let (mut start, mut recorded) = (0.0, 0.0);
-        for ((is_held_out, _), found) in PATHS.iter().zip(&found) {
+        for (((is_held_out, _), found), start) in PATHS.iter().zip(&found).zip(&starts) {
             let (list, word) = if *is_held_out { (&mut held_out, "held_out") } else { (&mut fit, "fit") };
-            let log = plant.record(&found.path.sample(plant.sensors().rate), start, rng.random());
+            let log = plant.record(&found.path.sample(plant.sensors().rate), *start, rng.random());
             let path = folder.join(format!("{word}_{}.csv", list.len() + 1));
             save(&path, &log.to_csv())?;
             list.push(path);
-            start += found.path.duration() + PAUSE;
-            recorded += found.path.duration();
         }
+        let recorded = found.iter().map(|f| f.path.duration()).sum();
         let conditions = found.iter().map(|f| f.figures.condition).collect();
         Ok(Session { plant, effect, arm_file, fit, held_out, conditions, recorded })
     }

@@ -1,5 +1,7 @@
 //! One way in which an effect could show.
 
+use crate::regression::Data;
+
 /// A time span of one log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Window {
@@ -9,6 +11,17 @@ pub struct Window {
     pub from: f64,
     /// End in the log's own t, s; infinite for "to the end".
     pub to: f64,
+    /// Seconds to add to the log's own t for the clock of all logs.
+    pub offset: f64,
+}
+
+impl Window {
+    /// A span of one of the logs of some data.
+    #[must_use]
+    pub(super) fn new(data: &Data<'_>, log: usize, from: f64, to: f64) -> Window {
+        let offset = data.recordings.iter().find(|r| r.log == log).map_or(0.0, |r| r.clock - r.start);
+        Window { log: data.logs[log].clone(), from, to, offset }
+    }
 }
 
 /// An effect on some joints with the settings of its search.

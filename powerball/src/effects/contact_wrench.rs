@@ -86,14 +86,17 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
         }
     }
     let (first, last) = found?;
-    let log = data.logs[steps[first].log].clone();
     let from = block_start(context, &steps[first])?;
     let step = 1.0 / data.rate();
     // To the last row before the next step begins.
     let next = steps.get(last + 1).filter(|s| s.log == steps[last].log);
     let to = next.and_then(|s| block_start(context, s)).map_or(f64::MAX, |t| t - 0.5 * step);
-    let window =
-        Window { log, from, to: if to == f64::MAX { end_of_log(context, steps[last].log) } else { to } };
+    let window = Window::new(
+        data,
+        steps[first].log,
+        from,
+        if to == f64::MAX { end_of_log(context, steps[last].log) } else { to },
+    );
     let joints = (0..data.dof()).collect();
     Some(Candidate { joints, form: 0, values: Vec::new(), windows: vec![window], searched })
 }

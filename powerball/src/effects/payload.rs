@@ -32,7 +32,8 @@ impl Effect for Payload {
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
         let columns = payload_columns(context, &candidate.values);
         let n = context.data.dof();
-        let masks: Vec<Vec<f64>> = (0..n).map(|j| mask(context, j, &candidate.windows)).collect();
+        let windows = followed(context, candidate);
+        let masks: Vec<Vec<f64>> = (0..n).map(|j| mask(context, j, &windows)).collect();
         let cut = |column: &Column| Column {
             parts: column
                 .parts
@@ -92,6 +93,27 @@ fn payload_columns(context: &Context<'_>, com: &[f64]) -> Vec<Column> {
         .collect()
 }
 
+/// A candidate's form where the payload is in every log that was recorded after its start.
+const STAYS: usize = 1;
+
+/// The windows on the context's logs. A payload that stays is also in logs that were not fitted, where their `t` and
+/// that of the logs with the payload are one clock.
+fn followed(context: &Context<'_>, candidate: &Candidate) -> Vec<Window> {
+    let (data, windows) = (context.data, &candidate.windows);
+    let here = windows.iter().any(|w| data.logs.contains(&w.log));
+    let Some(first) = windows.iter().min_by(|a, b| (a.from + a.offset).total_cmp(&(b.from + b.offset))) else {
+        return Vec::new();
+    };
+    if here || candidate.form != STAYS {
+        return windows.clone();
+    }
+    data.recordings
+        .iter()
+        .filter(|r| (r.clock - r.start - first.offset).abs() < 1e-6)
+        .map(|r| Window::new(data, r.log, first.from, f64::INFINITY))
+        .collect()
+}
+
 /// 1 in the windows, 0 elsewhere, by row; without windows 1 everywhere.
 pub(super) fn mask(context: &Context<'_>, joint: usize, windows: &[Window]) -> Vec<f64> {
     let inside = |(log, t): &(usize, f64)| {
@@ -148,11 +170,13 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
         }
     }
     chosen.sort_by_key(|s| starts[*s].0);
-    let windows = chosen
-        .iter()
-        .map(|s| Window { log: data.logs[starts[*s].0].clone(), from: starts[*s].1, to: f64::INFINITY })
-        .collect();
-    Some(Candidate { joints: (0..data.dof()).collect(), form: 0, values: Vec::new(), windows, searched })
+    let windows: Vec<Window> =
+        chosen.iter().map(|s| Window::new(data, starts[*s].0, starts[*s].1, f64::INFINITY)).collect();
+    let first = windows.iter().map(|w| w.from + w.offset).fold(f64::INFINITY, f64::min);
+    let has = |log: usize| windows.iter().any(|w| w.log == data.logs[log]);
+    let stays = data.recordings.iter().filter(|r| r.clock >= first).all(|r| has(r.log));
+    let form = if stays { STAYS } else { 0 };
+    Some(Candidate { joints: (0..data.dof()).collect(), form, values: Vec::new(), windows, searched })
 }
 
 /// What a payload with positive mass explains over some rows.

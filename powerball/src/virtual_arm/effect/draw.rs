@@ -29,19 +29,24 @@ impl Effect {
     ];
 
     /// Draws an effect of that name for the virtual LWA 4P: its joint and its figures. `session` is the time in s
-    /// within which the logs are recorded: what starts at some time starts within its middle half.
+    /// within which the logs are recorded, and what starts at some time starts within `begins`.
     ///
     /// Sizes are chosen against the joint's friction and noise, such that the effect can be seen in a log but does
     /// not outgrow what it disturbs. `None` for a name that is not known.
-    pub fn draw_named(name: &str, plant: &Plant, session: Range<f64>, rng: &mut impl Rng) -> Option<Effect> {
+    pub fn draw_named(
+        name: &str,
+        plant: &Plant,
+        session: f64,
+        begins: Range<f64>,
+        rng: &mut impl Rng,
+    ) -> Option<Effect> {
         let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
         let any = rng.random_range(0..plant.friction().len());
         let large = rng.random_range(0..4);
         let friction = plant.friction()[any];
         let coulomb = friction.gamma1 + friction.gamma3;
         let noise = plant.sensors().white[any];
-        let quarter = 0.25 * (session.end - session.start);
-        let moment = session.start + quarter * rng.random_range(1.0..3.0);
+        let moment = rng.random_range(begins);
         Some(match name {
             // The joints that gravity loads.
             "load_friction" => Effect::LoadFriction {
@@ -86,7 +91,7 @@ impl Effect {
             },
             "temperature" => Effect::Temperature {
                 change: -rng.random_range(0.15..0.30),
-                time_constant: (session.end - session.start) * rng.random_range(0.3..0.6),
+                time_constant: session * rng.random_range(0.3..0.6),
             },
             "torque_constant" => Effect::TorqueConstant {
                 joint: rng.random_range(1..3),
@@ -100,7 +105,7 @@ impl Effect {
             "base_tilt" => Effect::BaseTilt { tilt: [0, 1].map(|_| sign * rng.random_range(0.02..0.06)) },
             "contact_wrench" => Effect::ContactWrench {
                 force: [0, 1, 2].map(|_| sign * rng.random_range(5.0..15.0)),
-                start: session.start + 0.5 * quarter * rng.random_range(0.0..1.0),
+                start: session * rng.random_range(0.0..0.1),
                 length: rng.random_range(2.0..5.0),
                 every: rng.random_range(17.0..29.0),
             },
@@ -134,12 +139,15 @@ mod tests {
         let plant = lwa4p::plant().unwrap();
         for name in Effect::NAMES {
             let draw = |seed| {
-                Effect::draw_named(name, &plant, 0.0..100.0, &mut ChaCha8Rng::seed_from_u64(seed)).unwrap()
+                Effect::draw_named(name, &plant, 100.0, 30.0..60.0, &mut ChaCha8Rng::seed_from_u64(seed))
+                    .unwrap()
             };
             assert_eq!(draw(5).name(), name);
             assert_eq!(draw(5), draw(5));
             assert!((0..20).any(|seed| draw(seed) != draw(5)), "{name}");
         }
-        assert!(Effect::draw_named("ghosts", &plant, 0.0..1.0, &mut ChaCha8Rng::seed_from_u64(1)).is_none());
+        assert!(
+            Effect::draw_named("ghosts", &plant, 1.0, 0.0..1.0, &mut ChaCha8Rng::seed_from_u64(1)).is_none()
+        );
     }
 }
