@@ -67,7 +67,8 @@ pub fn dependence(
         }
     }
     let dependence = Dependence { kept, coordinates };
-    if rows.iter().all(|row| holds(field, row, &dependence)) { Ok(dependence) } else { Err(Unproven) }
+    let relations = relations(field, &dependence);
+    if rows.iter().all(|row| holds(field, row, &relations)) { Ok(dependence) } else { Err(Unproven) }
 }
 
 /// The dependence of columns that are given as sparse columns of constants, in their own order of preference.
@@ -184,22 +185,36 @@ fn subtract(field: &ConstantField, row: &mut ReducedRow, factor: &Constant, pivo
     }
 }
 
-/// Whether the row agrees with the relations: every entry off the kept columns is what the relation makes of the kept ones.
-fn holds(field: &ConstantField, row: &SparseRow, dependence: &Dependence) -> bool {
-    // In coordinates, row = Σ over columns of entry·column must be reproduced by the kept entries alone, which
-    // means: for every column j, entry_j = Σ_k entry_kept(k)·coordinate_k(j).
+/// A column's relation over a common denominator: denominator·column = Σ numerator·kept.
+struct Relation {
+    column: usize,
+    denominator: Numerator,
+    terms: Vec<(usize, Numerator)>,
+}
+
+/// The relations of all columns without fractions, so that checking them takes products and sums alone.
+fn relations(field: &ConstantField, dependence: &Dependence) -> Vec<Relation> {
+    let one = field.whole(field.ring().integer(1));
+    let relation = |(column, coordinates): (usize, &Vec<(usize, Constant)>)| {
+        let mut row: Vec<(usize, &Constant)> =
+            coordinates.iter().map(|(position, c)| (dependence.kept[*position], c)).collect();
+        row.push((column, &one));
+        let mut terms = field.clear_denominators(&row);
+        let denominator = terms.pop().map_or(field.ring().integer(1), |(_, d)| d);
+        Relation { column, denominator, terms }
+    };
+    dependence.coordinates.iter().enumerate().map(relation).collect()
+}
+
+/// Whether a row's entries obey the relations.
+fn holds(field: &ConstantField, row: &SparseRow, relations: &[Relation]) -> bool {
+    let ring = field.ring();
     let entry: BTreeMap<usize, &Numerator> = row.iter().map(|(c, e)| (*c, e)).collect();
-    dependence.coordinates.iter().enumerate().all(|(column, coordinates)| {
-        let mut expected = field.whole(field.ring().integer(0));
-        for (position, coefficient) in coordinates {
-            if let Some(value) = entry.get(&dependence.kept[*position]) {
-                expected = field.add(&expected, &field.mul(&field.whole((*value).clone()), coefficient));
-            }
-        }
-        match entry.get(&column) {
-            Some(actual) => field.add(&expected, &field.neg(&field.whole((*actual).clone()))).is_zero(),
-            None => expected.is_zero(),
-        }
+    relations.iter().all(|relation| {
+        let of = |column: &usize, factor: &Numerator| entry.get(column).map(|value| ring.mul(value, factor));
+        let terms = relation.terms.iter().filter_map(|(kept, numerator)| of(kept, numerator));
+        let sum = terms.fold(ring.integer(0), |sum, term| ring.add(&sum, &term));
+        sum == of(&relation.column, &relation.denominator).unwrap_or_else(|| ring.integer(0))
     })
 }
 
@@ -240,8 +255,9 @@ mod tests {
         let field = ConstantField::new(&AngleSymbols::default(), &mut Draws::new(1));
         let rows = matrix(&field, &[&[1, 2], &[2, 4]]);
         let mut found = dependence(&field, &rows, 2, &[0, 1]).unwrap();
-        assert!(rows.iter().all(|r| holds(&field, r, &found)));
+        let all_hold = |d: &Dependence| rows.iter().all(|r| holds(&field, r, &relations(&field, d)));
+        assert!(all_hold(&found));
         found.coordinates[1][0].1 = field.rational(integer(3));
-        assert!(!rows.iter().all(|r| holds(&field, r, &found)));
+        assert!(!all_hold(&found));
     }
 }

@@ -101,7 +101,8 @@ const STAYS: usize = 1;
 fn followed(context: &Context<'_>, candidate: &Candidate) -> Vec<Window> {
     let (data, windows) = (context.data, &candidate.windows);
     let here = windows.iter().any(|w| data.logs.contains(&w.log));
-    let Some(first) = windows.iter().min_by(|a, b| (a.from + a.offset).total_cmp(&(b.from + b.offset))) else {
+    let Some(first) = windows.iter().min_by(|a, b| (a.from + a.offset).total_cmp(&(b.from + b.offset)))
+    else {
         return Vec::new();
     };
     if here || candidate.form != STAYS {
