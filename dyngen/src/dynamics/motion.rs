@@ -102,7 +102,7 @@ impl Motion {
         symmetric_product(b, &self.omega, &self.reference, i, j)
     }
 
-    /// One column of U = [α×] + [ω×][ω×]: the acceleration of a point at unit distance along an axis, relative to the
+    /// One column of U = α× + ω×ω×, with v× the matrix of the cross product: the acceleration of a point at unit distance along an axis, relative to the
     /// origin.
     pub fn spin_column(&self, b: &Builder, axis: usize) -> Vector {
         let a = &self.alpha;

@@ -78,7 +78,7 @@ pub enum Input {
 /// An operation. Operands of `Mul` carry no sign, the first of `Add` and both of `Div` neither.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Node {
-    /// A constant other than zero and without sign: index into [`Graph::constants`].
+    /// A constant other than zero and without sign: index for [`Graph::constant`].
     Constant(u32),
     /// Sine or cosine of an angle symbol.
     Symbol(u32, bool),

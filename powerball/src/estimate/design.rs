@@ -12,7 +12,7 @@ pub(super) const FRICTION: usize = 5;
 
 /// The regression columns for given friction shapes and terms.
 ///
-/// Global order: the minimal set, [`FRICTION`] columns a joint, the terms' columns.
+/// Global order: the minimal set, `FRICTION` columns a joint, the terms' columns.
 #[derive(Debug)]
 pub struct Design {
     /// Joint by joint: columns, column-major.
@@ -32,7 +32,7 @@ struct Local {
 }
 
 impl Design {
-    /// Lays out the columns; `friction[j]` are joint j's [`FRICTION`] columns.
+    /// Lays out the columns; `friction[j]` are joint j's `FRICTION` columns.
     #[must_use]
     pub fn new(data: &Data<'_>, friction: &[[Vec<f64>; FRICTION]], extra: &[Column]) -> Design {
         let (n, p) = (data.dof(), data.body.names().len());

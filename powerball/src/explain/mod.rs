@@ -1,9 +1,9 @@
 //! From what a model leaves to named effects: the rule that accepts, names or refuses them.
 //!
-//! The rule, in the order of the files: [`screen`] refits the base with each candidate, [`evidence`] asks clusters,
-//! folds and another path, [`placebo`] measures how often the same questions are answered by chance on these very
-//! data, [`rule`] holds every threshold with its reason, [`forward`] adds one effect at a time, [`naming`] compares
-//! rivals, [`leftover`] says what stays.
+//! The rule, in the order of the files: `screen` refits the base with each candidate, `evidence` asks clusters,
+//! folds and another path, `placebo` measures how often the same questions are answered by chance on these very
+//! data, `rule` holds every threshold with its reason, `forward` adds one effect at a time, `naming` compares
+//! rivals, `leftover` says what stays.
 
 mod curves;
 mod evidence;
