@@ -61,7 +61,8 @@ pub struct Spread {
 /// The spread of residuals on their data.
 #[must_use]
 pub fn spread(data: &Data<'_>, residual: &[Vec<f64>]) -> Spread {
-    let rms = |x: &[f64]| (x.iter().map(|v| v * v).sum::<f64>() / x.len().max(1) as f64).sqrt();
+    // A sum over nothing is -0 and would print so.
+    let rms = |x: &[f64]| (x.iter().fold(0.0, |sum, v| sum + v * v) / x.len().max(1) as f64).sqrt();
     let errors: Vec<f64> = residual.iter().map(|r| rms(r)).collect();
     let relative = errors
         .iter()
