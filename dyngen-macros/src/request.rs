@@ -7,7 +7,7 @@ use quote::quote;
 use std::path::Path;
 use syn::parse::{Parse, ParseStream, Parser};
 use syn::punctuated::Punctuated;
-use syn::{Error, Ident, LitStr, Result, Token, bracketed};
+use syn::{Error, Ident, LitBool, LitStr, Result, Token, bracketed};
 
 /// Where the arm comes from.
 enum Source {
@@ -82,9 +82,13 @@ impl Call {
             "values" => syn::parse2(value).map(|path| self.values = Some(path)),
             "parameters" => syn::parse2(value).and_then(|name| self.parameters(&name)),
             "functions" => names.parse2(value).map(|names| self.functions(&names)),
+            "friction" => texts.parse2(value).map(|terms| self.friction(&terms)),
+            "tests" => syn::parse2(value).map(|tests: LitBool| self.options.tests = tests.value),
             _ => Err(Error::new(
                 key.span(),
-                format!("there is no key `{key}`: there are file, toml, values, parameters, functions"),
+                format!(
+                    "there is no key `{key}`: there are file, toml, values, parameters, functions, friction, tests"
+                ),
             )),
         };
         if let Err(e) = read {
@@ -121,6 +125,15 @@ impl Call {
         }
     }
 
+    fn friction(&mut self, terms: &Punctuated<LitStr, Token![,]>) {
+        for term in terms {
+            match term.value().parse() {
+                Ok(parsed) => self.options.friction.push(parsed),
+                Err(reason) => self.wrong(Error::new(term.span(), reason)),
+            }
+        }
+    }
+
     fn wrong(&mut self, e: Error) {
         match &mut self.error {
             Some(first) => first.combine(e),
@@ -144,6 +157,13 @@ impl Call {
 
 /// `[regressor, gravity]`
 fn names(input: ParseStream<'_>) -> Result<Punctuated<Ident, Token![,]>> {
+    let content;
+    bracketed!(content in input);
+    Punctuated::parse_terminated(&content)
+}
+
+/// `["viscous", "tanh:216"]`
+fn texts(input: ParseStream<'_>) -> Result<Punctuated<LitStr, Token![,]>> {
     let content;
     bracketed!(content in input);
     Punctuated::parse_terminated(&content)

@@ -4,7 +4,7 @@ use crate::arm::Arm;
 use crate::base::SetKind;
 use crate::diagnostic::Diagnostics;
 use crate::dynamics::Function;
-use crate::emit::{self, Options};
+use crate::emit::{self, FrictionTerm, Options};
 use crate::model::{Error, Model};
 use crate::values::Values;
 use std::fmt;
@@ -82,6 +82,20 @@ impl Config {
     #[must_use]
     pub fn values(mut self, file: impl Into<PathBuf>) -> Self {
         self.values = Some(file.into());
+        self
+    }
+
+    /// Adds columns for friction: `friction_columns(dq)` and `friction(dq, coefficients)`.
+    #[must_use]
+    pub fn friction(mut self, terms: impl Into<Vec<FrictionTerm>>) -> Self {
+        self.options.friction = terms.into();
+        self
+    }
+
+    /// Emits the arm's own consistency tests, in a `#[cfg(test)]` module.
+    #[must_use]
+    pub fn tests(mut self, tests: bool) -> Self {
+        self.options.tests = tests;
         self
     }
 

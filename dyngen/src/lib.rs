@@ -21,6 +21,7 @@ pub use base::{ParameterSet, SetKind};
 pub use config::{Config, GenerateError};
 pub use diagnostic::{Diagnostic, Diagnostics};
 pub use dynamics::Function;
+pub use emit::FrictionTerm;
 pub use evaluator::{Evaluator, Samples};
 pub use model::{Error, Model};
 pub use values::Values;

@@ -8,6 +8,7 @@ use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::elimination::Unproven;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
+use crate::optimize::{PASSES, Pass};
 use crate::prove::{self, Disagreement};
 use std::fmt;
 
@@ -28,6 +29,8 @@ pub enum Error {
     NoPublishedSet,
     /// The published sums change the torque: what they lose, and why.
     NotExact(Vec<(Parameter, String)>),
+    /// A friction term that does not fit the arm.
+    Friction(String),
     /// Values that do not fit a set.
     Values(String),
     /// A function does not agree with the Lagrangian.
@@ -46,7 +49,7 @@ impl fmt::Display for Error {
                 write!(f, "the published sums do not keep the torque, so no code can be proven for them:")?;
                 lost.iter().try_for_each(|(_, reason)| write!(f, "\n  {reason}"))
             }
-            Error::Values(reason) => f.write_str(reason),
+            Error::Values(reason) | Error::Friction(reason) => f.write_str(reason),
             Error::Disagreement(e) => e.fmt(f),
         }
     }
@@ -105,7 +108,20 @@ impl Model {
     /// # Errors
     /// [`Error::NotExact`] for published sums that lose parameters, [`Error::Disagreement`] where the proof fails.
     pub fn function(&self, function: Function, kind: SetKind) -> Result<FunctionGraph, Error> {
-        self.proven(function, kind, None)
+        self.proven(function, kind, None, PASSES)
+    }
+
+    /// A function after the given passes alone, proven like any other: to look into the optimiser, or to try a pass.
+    ///
+    /// # Errors
+    /// As [`Model::function`].
+    pub fn function_after(
+        &self,
+        function: Function,
+        kind: SetKind,
+        passes: &[(&str, Pass)],
+    ) -> Result<FunctionGraph, Error> {
+        self.proven(function, kind, None, passes)
     }
 
     /// A function with the values of a set's parameters baked in, proven like any other.
@@ -129,7 +145,7 @@ impl Model {
         // Every finite f64 is a rational number.
         let exact: Option<Vec<Rational>> = values.iter().map(|x| Rational::from_float(*x)).collect();
         let exact = exact.ok_or_else(|| Error::Values("a parameter value is not finite".to_string()))?;
-        self.proven(function, kind, Some(&exact))
+        self.proven(function, kind, Some(&exact), PASSES)
     }
 
     fn proven(
@@ -137,12 +153,13 @@ impl Model {
         function: Function,
         kind: SetKind,
         baked: Option<&[Rational]>,
+        passes: &[(&str, Pass)],
     ) -> Result<FunctionGraph, Error> {
         let set = self.set(kind)?;
         if !set.exact {
             return Err(Error::NotExact(set.lost.clone()));
         }
-        let built = function::build(function, &self.arm, &self.symbols, set, &self.sets.field, baked);
+        let built = function::build(function, &self.arm, &self.symbols, set, &self.sets.field, baked, passes);
         prove::prove(&self.arm, &self.symbols, &self.sets, set, &built, baked)?;
         Ok(built)
     }

@@ -69,6 +69,15 @@ pub struct Grouping {
     pub terms: Vec<(Parameter, Rational)>,
 }
 
+/// A tool's frame in the last link's frame: where forward kinematics and the Jacobian look.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tool {
+    /// Its origin, m.
+    pub xyz: [Rational; 3],
+    /// Roll, pitch and yaw: R = Rz(yaw)·Ry(pitch)·Rx(roll).
+    pub rpy: [Angle; 3],
+}
+
 /// A serial arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arm {
@@ -80,6 +89,8 @@ pub struct Arm {
     pub gravity: [Rational; 3],
     /// The joints from the base outwards, 1 to [`MAX_JOINTS`].
     pub joints: Vec<Joint>,
+    /// The tool's frame, where it is another than the last link's. It has no inertia of its own.
+    pub tool: Option<Tool>,
     /// A published parameter set, empty where the file has none.
     pub groupings: Vec<Grouping>,
 }

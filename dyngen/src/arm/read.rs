@@ -1,6 +1,8 @@
 //! From TOML to [`Arm`]: the typed description, or every error with its place.
 
-use super::{Angle, Arm, Convention, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind, sum};
+use super::{
+    Angle, Arm, Convention, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind, Tool, sum,
+};
 use crate::diagnostic::{Collector, Diagnostics};
 use crate::exact::rational::{self, Rational};
 use num_traits::{Signed, Zero};
@@ -10,7 +12,8 @@ use toml::de::{DeTable, DeValue};
 
 type Value<'i> = Spanned<DeValue<'i>>;
 
-const ARM_KEYS: [&str; 5] = ["name", "convention", "gravity", "joint", "grouping"];
+const ARM_KEYS: [&str; 6] = ["name", "convention", "gravity", "joint", "tool", "grouping"];
+const TOOL_KEYS: [&str; 2] = ["xyz", "rpy"];
 const JOINT_KEYS: [&str; 12] = [
     "kind",
     "a",
@@ -76,6 +79,7 @@ impl<'t> Reader<'t> {
         }
         let dof = joint_tables.len();
         let joints: Vec<Option<Joint>> = joint_tables.iter().map(|t| self.joint(t)).collect();
+        let tool = self.optional(&top, "tool", Self::tool);
         let grouping_tables = self.tables(&top, "grouping");
         let mut groupings: Vec<Option<Grouping>> = Vec::new();
         for table in &grouping_tables {
@@ -96,6 +100,7 @@ impl<'t> Reader<'t> {
             convention: convention?,
             gravity: gravity?,
             joints: joints.into_iter().collect::<Option<_>>()?,
+            tool: tool?,
             groupings: groupings.into_iter().collect::<Option<_>>()?,
         })
     }
@@ -237,16 +242,43 @@ impl<'t> Reader<'t> {
     }
 
     fn gravity(&mut self, v: &Value<'_>) -> Option<[Rational; 3]> {
-        let list = v.get_ref().as_array().map(|a| a.iter().collect::<Vec<_>>()).unwrap_or_default();
-        let [x, y, z] = list[..] else {
-            self.errors.error(
-                v.span(),
-                format!("gravity must be three numbers in m/s² in the base frame, found {}", describe(v)),
-            );
-            return None;
-        };
+        let [x, y, z] = self.three(v, "gravity must be three numbers in m/s² in the base frame")?;
         let [x, y, z] = [x, y, z].map(|c| self.number(c, "gravity", "m/s²"));
         Some([x?, y?, z?])
+    }
+
+    fn tool(&mut self, v: &Value<'_>) -> Option<Tool> {
+        let Some(table) = v.get_ref().as_table() else {
+            self.errors.error(v.span(), format!("tool must be a table: write [tool], found {}", describe(v)));
+            return None;
+        };
+        let t = Table { table, span: v.span(), place: "tool".to_string() };
+        self.unknown_keys(&t, &TOOL_KEYS);
+        let xyz = self.optional(&t, "xyz", |r, v| {
+            let [x, y, z] = r.three(v, "tool: xyz must be three numbers in m in the last frame")?;
+            let [x, y, z] = [x, y, z].map(|c| r.number(c, "tool: xyz", "m"));
+            Some([x?, y?, z?])
+        });
+        let rpy = self.optional(&t, "rpy", |r, v| {
+            let [x, y, z] = r.three(v, "tool: rpy must be three angles, roll, pitch and yaw")?;
+            let [x, y, z] = [x, y, z].map(|c| r.angle(c, "tool: rpy"));
+            Some([x?, y?, z?])
+        });
+        let straight = || Angle::PiMultiple(Rational::zero());
+        Some(Tool {
+            xyz: xyz?.unwrap_or_else(|| std::array::from_fn(|_| Rational::zero())),
+            rpy: rpy?.unwrap_or_else(|| std::array::from_fn(|_| straight())),
+        })
+    }
+
+    /// The three items of a list, or an error that starts with `what`.
+    fn three<'d, 'i>(&mut self, v: &'d Value<'i>, what: &str) -> Option<[&'d Value<'i>; 3]> {
+        let list = v.get_ref().as_array().map(|a| a.iter().collect::<Vec<_>>()).unwrap_or_default();
+        if let [x, y, z] = list[..] {
+            return Some([x, y, z]);
+        }
+        self.errors.error(v.span(), format!("{what}, found {}", describe(v)));
+        None
     }
 
     fn position(&mut self, v: &Value<'_>, place: &str) -> Option<[f64; 2]> {

@@ -1,7 +1,7 @@
 //! `dyngen generate`.
 
 use super::{Failure, Set};
-use dyngen::{Config, Function, GenerateError};
+use dyngen::{Config, FrictionTerm, Function, GenerateError};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -24,6 +24,13 @@ pub(super) struct Args {
     /// Bake parameter values in: a JSON file {"parameter": number, …}, by the set's names or the arm's.
     #[arg(long, value_name = "FILE.json")]
     values: Option<PathBuf>,
+    /// Friction columns for every joint, separated by commas: viscous, coulomb, tanh:SHAPE (s/rad; or one for each joint,
+    /// tanh:216:180:…).
+    #[arg(long, value_delimiter = ',', value_name = "TERMS")]
+    friction: Vec<FrictionTerm>,
+    /// Emit the arm's own consistency tests too.
+    #[arg(long)]
+    tests: bool,
     /// Write nothing; fail where the file on disk is not what would be written.
     #[arg(long)]
     check: bool,
@@ -36,7 +43,10 @@ pub(super) fn function(name: &str) -> Result<Function, String> {
 }
 
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
-    let mut config = Config::new(&args.arm).parameters(args.parameters.into());
+    let mut config = Config::new(&args.arm)
+        .parameters(args.parameters.into())
+        .friction(args.friction.clone())
+        .tests(args.tests);
     if let Some(functions) = &args.functions {
         config = config.functions(functions.clone());
     }

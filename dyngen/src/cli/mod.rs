@@ -5,6 +5,7 @@ mod describe;
 mod eval;
 mod generate;
 mod import;
+mod inspect;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use dyngen::base::SetKind;
@@ -30,6 +31,8 @@ enum Command {
     Generate(generate::Args),
     /// Makes an arm file, with inertial values beside it, from a serial chain of a URDF.
     Import(import::Args),
+    /// Shows a function's expressions after a pass of the optimiser, with what each pass costs.
+    Inspect(inspect::Args),
     /// Evaluates a function at the states of a CSV file.
     Eval(eval::Args),
     /// Says whether a real arm can have given parameter values, and shows the pose where not.
@@ -84,6 +87,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Describe(args) => describe::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Import(args) => import::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Check(args) => check::run(&args),
     };

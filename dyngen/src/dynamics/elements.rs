@@ -1,16 +1,19 @@
 //! The quantities of an arm's kinematics as elements of an algebra.
 
-use crate::arm::{Arm, Convention, JointKind};
+use crate::arm::{Angle, Arm, Convention, JointKind};
 use crate::exact::algebra::Algebra;
+use crate::exact::rational::Rational;
 use crate::exact::symbols::{AngleSymbols, Trig};
 use num_traits::Zero;
 
-/// The arm's angles whose sine and cosine are no rationals: twists, and the fixed angles of prismatic joints.
+/// The arm's angles whose sine and cosine are no rationals: twists, the fixed angles of prismatic joints, and the
+/// tool's.
 pub fn angle_symbols(arm: &Arm) -> AngleSymbols {
-    AngleSymbols::collect(arm.joints.iter().flat_map(|joint| {
+    let of_joints = arm.joints.iter().flat_map(|joint| {
         let fixed = (joint.kind == JointKind::Prismatic).then_some(&joint.theta);
         std::iter::once(&joint.alpha).chain(fixed)
-    }))
+    });
+    AngleSymbols::collect(of_joints.chain(arm.tool.iter().flat_map(|tool| &tool.rpy)))
 }
 
 /// One joint's quantities.
@@ -47,6 +50,59 @@ pub struct ArmElements<V> {
     pub joints: Vec<JointElements<V>>,
 }
 
+/// The tool's frame in the last link's.
+#[derive(Clone, Debug)]
+pub struct ToolElements<V> {
+    /// Its origin.
+    pub origin: [V; 3],
+    /// Sine and cosine of roll, pitch and yaw.
+    pub rpy: [(V, V); 3],
+}
+
+impl<V: Clone> ToolElements<V> {
+    /// Builds the elements of an arm's tool; without a tool those of the last link's own frame.
+    pub fn build<A: Algebra<Value = V>>(
+        algebra: &A,
+        arm: &Arm,
+        symbols: &AngleSymbols,
+        length: impl Fn(&Rational) -> V,
+        symbol: impl Fn(usize, bool) -> V,
+    ) -> Self {
+        let Some(tool) = &arm.tool else {
+            let (zero, one) = (algebra.integer(0), algebra.integer(1));
+            return ToolElements {
+                origin: std::array::from_fn(|_| zero.clone()),
+                rpy: std::array::from_fn(|_| (zero.clone(), one.clone())),
+            };
+        };
+        let length = |x: &Rational| if x.is_zero() { algebra.integer(0) } else { length(x) };
+        let turn = |angle: &Angle| {
+            let (sin, cos) = symbols.sin_cos(angle);
+            (
+                constant(algebra, sin, &mut |i, s| symbol(i, s)),
+                constant(algebra, cos, &mut |i, s| symbol(i, s)),
+            )
+        };
+        ToolElements { origin: tool.xyz.each_ref().map(length), rpy: tool.rpy.each_ref().map(turn) }
+    }
+}
+
+/// A constant sine or cosine in an algebra; `symbol` gives those that are symbols.
+fn constant<A: Algebra>(
+    algebra: &A,
+    trig: Trig,
+    symbol: &mut dyn FnMut(usize, bool) -> A::Value,
+) -> A::Value {
+    match trig {
+        Trig::Zero => algebra.integer(0),
+        Trig::One { negative } => algebra.integer(if negative { -1 } else { 1 }),
+        Trig::Symbol { index, sine, negative } => {
+            let value = symbol(index, sine);
+            if negative { algebra.neg(&value) } else { value }
+        }
+    }
+}
+
 /// Where the elements come from: symbols, numbers, inputs of a graph.
 pub trait Source<V> {
     /// Sine and cosine of q + theta of a revolute joint.
@@ -75,14 +131,6 @@ impl<V: Clone> ArmElements<V> {
         symbols: &AngleSymbols,
         source: &mut impl Source<V>,
     ) -> Self {
-        let constant = |trig: Trig, source: &mut dyn FnMut(usize, bool) -> V| match trig {
-            Trig::Zero => algebra.integer(0),
-            Trig::One { negative } => algebra.integer(if negative { -1 } else { 1 }),
-            Trig::Symbol { index, sine, negative } => {
-                let value = source(index, sine);
-                if negative { algebra.neg(&value) } else { value }
-            }
-        };
         let mut joints = Vec::with_capacity(arm.dof());
         for (i, joint) in arm.joints.iter().enumerate() {
             let d = if joint.d.is_zero() { algebra.integer(0) } else { source.d(i) };
@@ -93,8 +141,8 @@ impl<V: Clone> ArmElements<V> {
                 }
                 JointKind::Prismatic => {
                     let (sin, cos) = symbols.sin_cos(&joint.theta);
-                    let sin = constant(sin, &mut |m, s| source.symbol(m, s));
-                    let cos = constant(cos, &mut |m, s| source.symbol(m, s));
+                    let sin = constant(algebra, sin, &mut |m, s| source.symbol(m, s));
+                    let cos = constant(algebra, cos, &mut |m, s| source.symbol(m, s));
                     (sin, cos, algebra.add(&d, &source.position(i)))
                 }
             };
@@ -106,8 +154,8 @@ impl<V: Clone> ArmElements<V> {
                 shift,
                 speed: source.speed(i),
                 a: if joint.a.is_zero() { algebra.integer(0) } else { source.a(i) },
-                sin_alpha: constant(sin_alpha, &mut |m, s| source.symbol(m, s)),
-                cos_alpha: constant(cos_alpha, &mut |m, s| source.symbol(m, s)),
+                sin_alpha: constant(algebra, sin_alpha, &mut |m, s| source.symbol(m, s)),
+                cos_alpha: constant(algebra, cos_alpha, &mut |m, s| source.symbol(m, s)),
                 ratio: joint.rotor_ratio.is_some().then(|| source.ratio(i)),
             });
         }

@@ -1,7 +1,7 @@
 //! The functions of an arm, each built as a graph.
 
 use super::body::links;
-use super::elements::{ArmElements, Source};
+use super::elements::{ArmElements, Source, ToolElements};
 use super::motion::Drive;
 use super::{composite, coriolis, energy, forward, inverse, momentum, pose, regressor};
 use crate::arm::Arm;
@@ -12,7 +12,7 @@ use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::differentiate::{self, Direction};
 use crate::graph::{Builder, Expr, Graph, Input};
-use crate::optimize;
+use crate::optimize::{self, Pass};
 use std::fmt;
 
 /// A function of the arm's state.
@@ -44,9 +44,9 @@ pub enum Function {
     Gravity,
     /// q̈(q, q̇, τ)
     ForwardDynamics,
-    /// Homogeneous transform of the last frame to the base, 4 × 4
+    /// Homogeneous transform of the tool's frame (the last frame where no tool is declared) to the base, 4 × 4
     ForwardKinematics,
-    /// Geometric Jacobian of the last frame, 6 × n
+    /// Geometric Jacobian of the tool's frame, 6 × n
     Jacobian,
     /// J̇·q̇, 6 × 1
     JacobianRateTimesSpeed,
@@ -64,6 +64,17 @@ pub enum Function {
     TorqueByPosition,
     /// ∂τ/∂q̇, n × n
     TorqueBySpeed,
+}
+
+/// A length of a result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Size {
+    /// One for each joint.
+    Joints,
+    /// One for each parameter.
+    Parameters,
+    /// The same for every arm.
+    Fixed(usize),
 }
 
 /// The arguments of a function, in the order in which it takes them.
@@ -183,20 +194,34 @@ impl Function {
         Self::ALL.into_iter().find(|f| f.name() == name)
     }
 
+    /// Rows and columns of the result.
+    pub fn size(self) -> (Size, Size) {
+        use Function::*;
+        use Size::{Fixed, Joints, Parameters};
+        match self {
+            Regressor | SlotineLiRegressor => (Joints, Parameters),
+            RegressorTransposeTimes | SlotineLiTransposeTimes => (Parameters, Fixed(1)),
+            MassMatrix | MassMatrixInverse | CoriolisMatrix | TorqueByPosition | TorqueBySpeed => {
+                (Joints, Joints)
+            }
+            ForwardKinematics => (Fixed(4), Fixed(4)),
+            Jacobian => (Fixed(6), Joints),
+            JacobianRateTimesSpeed => (Fixed(6), Fixed(1)),
+            KineticEnergy | PotentialEnergy => (Fixed(1), Fixed(1)),
+            KineticEnergyRegressor | PotentialEnergyRegressor => (Fixed(1), Parameters),
+            _ => (Joints, Fixed(1)),
+        }
+    }
+
     /// Rows and columns of the result for n joints and p parameters.
     pub fn shape(self, n: usize, p: usize) -> (usize, usize) {
-        use Function::*;
-        match self {
-            Regressor | SlotineLiRegressor => (n, p),
-            RegressorTransposeTimes | SlotineLiTransposeTimes => (p, 1),
-            MassMatrix | MassMatrixInverse | CoriolisMatrix | TorqueByPosition | TorqueBySpeed => (n, n),
-            ForwardKinematics => (4, 4),
-            Jacobian => (6, n),
-            JacobianRateTimesSpeed => (6, 1),
-            KineticEnergy | PotentialEnergy => (1, 1),
-            KineticEnergyRegressor | PotentialEnergyRegressor => (1, p),
-            _ => (n, 1),
-        }
+        let length = |size: Size| match size {
+            Size::Joints => n,
+            Size::Parameters => p,
+            Size::Fixed(length) => length,
+        };
+        let (rows, columns) = self.size();
+        (length(rows), length(columns))
     }
 
     /// What it takes.
@@ -260,7 +285,8 @@ impl FunctionGraph {
     }
 }
 
-/// Builds a function of an arm for a parameter set, with its parameters as inputs or their values baked in.
+/// Builds a function of an arm for a parameter set, with its parameters as inputs or their values baked in, and runs
+/// passes over its graph.
 pub fn build(
     function: Function,
     arm: &Arm,
@@ -268,6 +294,7 @@ pub fn build(
     set: &ParameterSet,
     field: &ConstantField,
     baked: Option<&[Rational]>,
+    passes: &[(&str, Pass)],
 ) -> FunctionGraph {
     let b = Builder::new();
     let value = |i: usize| match baked {
@@ -302,6 +329,8 @@ pub fn build(
             (0..n).map(|j| differentiate::derivative(&b, &torques, direction(j))).collect();
         (0..n * n).map(|k| columns[k % n][k / n]).collect()
     };
+    let tool =
+        || ToolElements::build(&b, arm, symbols, |x| b.constant(x), |index, sine| b.symbol(index, sine));
     let outputs = match function {
         Function::InverseDynamics => torque(&input(Input::Acceleration), true),
         Function::InverseDynamicsWithoutGravity => torque(&input(Input::Acceleration), false),
@@ -324,9 +353,9 @@ pub fn build(
             let right: Vec<Expr> = input(Input::Torque).iter().zip(&bias).map(|(t, c)| b.sub(t, c)).collect();
             forward::solve_symmetric(&b, &composite::mass_matrix(&b, &elements, &links), &right)
         }
-        Function::ForwardKinematics => pose::forward_kinematics(&b, &elements),
-        Function::Jacobian => pose::jacobian(&b, &elements),
-        Function::JacobianRateTimesSpeed => pose::jacobian_rate_times_speed(&b, &elements),
+        Function::ForwardKinematics => pose::forward_kinematics(&b, &elements, &tool()),
+        Function::Jacobian => pose::jacobian(&b, &elements, &tool()),
+        Function::JacobianRateTimesSpeed => pose::jacobian_rate_times_speed(&b, &elements, &tool()),
         Function::KineticEnergy => vec![momentum::kinetic_energy(&b, &elements, &links)],
         Function::PotentialEnergy => {
             let row = energy::potential_regressor(&b, arm, &elements, set, field);
@@ -341,7 +370,7 @@ pub fn build(
         Function::TorqueBySpeed => derivatives(Direction::Speed),
     };
     let parameters = set.parameters.len();
-    let (graph, outputs) = optimize::optimize(b.finish(), outputs, field);
+    let (graph, outputs) = optimize::optimize(b.finish(), outputs, field, passes);
     let shape = function.shape(n, parameters);
     FunctionGraph { function, graph, outputs, shape, joints: n, parameters, baked: baked.is_some() }
 }

@@ -1,7 +1,8 @@
-//! Kinematics of the last link: pose, Jacobian, and the acceleration that speeds alone make.
+//! Kinematics of the tool, or of the last link where no tool is declared: pose, Jacobian, and the acceleration that speeds
+//! alone make.
 
 use super::body::Vector;
-use super::elements::{ArmElements, JointElements};
+use super::elements::{ArmElements, JointElements, ToolElements};
 use super::motion::{Drive, motions};
 use crate::arm::{Convention, JointKind};
 use crate::exact::algebra::Algebra;
@@ -34,6 +35,18 @@ impl Pose {
         let (x, y) = turned(b, &joint.sin, &joint.cos, &x, &y);
         Pose { axes: [x, y, z], origin: moved(b, &self.origin, joint.shift, &z) }
     }
+
+    /// The tool's frame, from the last link's: a shift, then Rz(yaw)·Ry(pitch)·Rx(roll).
+    fn tool(&self, b: &Builder, tool: &ToolElements<Expr>) -> Pose {
+        let shifted = |origin: Vector, (axis, length): (&Vector, &Expr)| moved(b, &origin, *length, axis);
+        let origin = self.axes.iter().zip(&tool.origin).fold(self.origin, shifted);
+        let [x, y, z] = self.axes;
+        let [(sr, cr), (sp, cp), (sy, cy)] = &tool.rpy;
+        let (x, y) = turned(b, sy, cy, &x, &y);
+        let (z, x) = turned(b, sp, cp, &z, &x);
+        let (y, z) = turned(b, sr, cr, &y, &z);
+        Pose { axes: [x, y, z], origin }
+    }
 }
 
 /// u' = c u + s v, v' = c v − s u
@@ -64,9 +77,9 @@ fn poses(b: &Builder, arm: &ArmElements<Expr>) -> (Vec<Pose>, Pose) {
     (joints, state)
 }
 
-/// The homogeneous transform of the last link's frame to the base, row-major 4 × 4.
-pub fn forward_kinematics(b: &Builder, arm: &ArmElements<Expr>) -> Vec<Expr> {
-    let (_, last) = poses(b, arm);
+/// The homogeneous transform of the tool's frame to the base, row-major 4 × 4.
+pub fn forward_kinematics(b: &Builder, arm: &ArmElements<Expr>, tool: &ToolElements<Expr>) -> Vec<Expr> {
+    let last = poses(b, arm).1.tool(b, tool);
     let mut rows = Vec::with_capacity(16);
     for i in 0..3 {
         rows.extend([last.axes[0][i], last.axes[1][i], last.axes[2][i], last.origin[i]]);
@@ -75,9 +88,10 @@ pub fn forward_kinematics(b: &Builder, arm: &ArmElements<Expr>) -> Vec<Expr> {
     rows
 }
 
-/// The geometric Jacobian, row-major 6 × n: velocity of the last frame's origin above its angular velocity, in base axes.
-pub fn jacobian(b: &Builder, arm: &ArmElements<Expr>) -> Vec<Expr> {
+/// The geometric Jacobian, row-major 6 × n: velocity of the tool's origin above its angular velocity, in base axes.
+pub fn jacobian(b: &Builder, arm: &ArmElements<Expr>, tool: &ToolElements<Expr>) -> Vec<Expr> {
     let (joints, last) = poses(b, arm);
+    let last = last.tool(b, tool);
     let n = joints.len();
     let mut rows = vec![Expr::ZERO; 6 * n];
     for (j, (pose, joint)) in joints.iter().zip(&arm.joints).enumerate() {
@@ -97,13 +111,22 @@ pub fn jacobian(b: &Builder, arm: &ArmElements<Expr>) -> Vec<Expr> {
     rows
 }
 
-/// J̇·q̇: acceleration of the last frame's origin above its angular acceleration where q̈ = 0, in base axes.
-pub fn jacobian_rate_times_speed(b: &Builder, arm: &ArmElements<Expr>) -> Vec<Expr> {
+/// J̇·q̇: acceleration of the tool's origin above its angular acceleration where q̈ = 0, in base axes.
+pub fn jacobian_rate_times_speed(
+    b: &Builder,
+    arm: &ArmElements<Expr>,
+    tool: &ToolElements<Expr>,
+) -> Vec<Expr> {
     let still = Drive { reference: None, accelerations: vec![Expr::ZERO; arm.joints.len()], gravity: false };
     let (_, last) = poses(b, arm);
     let Some(motion) = motions(b, arm, &still).pop() else { return vec![Expr::ZERO; 6] };
     let to_base = |v: &Vector| -> [Expr; 3] {
         std::array::from_fn(|i| b.dot(&[last.axes[0][i], last.axes[1][i], last.axes[2][i]], v))
     };
-    [to_base(&motion.link.acceleration), to_base(&motion.link.alpha)].concat()
+    // The link's own spin carries the tool's origin along.
+    let carried = |v: Vector, i: usize| {
+        super::motion::plus_scaled(b, &v, tool.origin[i], &motion.link.spin_column(b, i))
+    };
+    let acceleration = (0..3).fold(motion.link.acceleration, carried);
+    [to_base(&acceleration), to_base(&motion.link.alpha)].concat()
 }

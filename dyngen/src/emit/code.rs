@@ -2,7 +2,7 @@
 
 use super::docs;
 use crate::arm::{Arm, JointKind};
-use crate::dynamics::function::{Argument, trig_offset};
+use crate::dynamics::function::{Argument, Size, trig_offset};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::rational;
 use crate::graph::{Expr, Input, Node, operands};
@@ -273,18 +273,7 @@ fn statement(model: &Model, built: &FunctionGraph, node: usize) -> Option<TokenS
 
 fn value_name(built: &FunctionGraph, node: usize) -> Ident {
     match built.graph.nodes()[node] {
-        Node::Input(input) => match input {
-            Input::Sin(i) => format_ident!("s{}", i + 1),
-            Input::Cos(i) => format_ident!("c{}", i + 1),
-            Input::Position(i) => format_ident!("q{}", i + 1),
-            Input::Speed(i) => format_ident!("dq{}", i + 1),
-            Input::Acceleration(i) => format_ident!("ddq{}", i + 1),
-            Input::Torque(i) => format_ident!("tau{}", i + 1),
-            Input::ReferenceSpeed(i) => format_ident!("dqr{}", i + 1),
-            Input::ReferenceAcceleration(i) => format_ident!("ddqr{}", i + 1),
-            Input::Error(i) => format_ident!("e{}", i + 1),
-            Input::Parameter(i) => format_ident!("p{}", i + 1),
-        },
+        Node::Input(input) => format_ident!("{}", input.to_string()),
         _ => format_ident!("x{node}"),
     }
 }
@@ -307,15 +296,16 @@ fn result(built: &FunctionGraph) -> (TokenStream, TokenStream) {
         let value = value(0, 0);
         return (quote!(T), value);
     }
-    let size = |length: usize| match length {
-        _ if length == built.joints => quote!(JOINTS),
-        _ if length == built.parameters => quote!(PARAMETERS),
-        _ => {
+    let size = |size: Size| match size {
+        Size::Joints => quote!(JOINTS),
+        Size::Parameters => quote!(PARAMETERS),
+        Size::Fixed(length) => {
             let length = Literal::usize_unsuffixed(length);
             quote!(#length)
         }
     };
-    let (n, m) = (size(rows), size(columns));
+    let (n, m) = built.function.size();
+    let (n, m) = (size(n), size(m));
     let result = if columns == 1 { quote!(SVector<T, #n>) } else { quote!(SMatrix<T, #n, #m>) };
     (result, quote!(SMatrix::from_array_storage(ArrayStorage([#(#columns_of),*]))))
 }

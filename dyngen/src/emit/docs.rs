@@ -95,15 +95,15 @@ fn words(function: Function) -> (&'static str, &'static str) {
             "Returns q̈; not finite where the parameters make B singular.",
         ),
         ForwardKinematics => (
-            "Pose of the last link's frame in the base frame.",
+            "Pose of the tool's frame (the last link's where the arm declares no tool) in the base frame.",
             "Returns the homogeneous transform, 4 × 4, lengths in m.",
         ),
         Jacobian => (
-            "Geometric Jacobian of the last link's frame, in base axes.",
+            "Geometric Jacobian of the tool's frame (the last link's where the arm declares no tool), in base axes.",
             "Returns 6 × n: velocity of the origin, m/s, above the angular velocity, rad/s.",
         ),
         JacobianRateTimesSpeed => (
-            "J̇(q, q̇)·q̇ of the geometric Jacobian: acceleration of the last link's frame where q̈ = 0.",
+            "J̇(q, q̇)·q̇ of the geometric Jacobian: acceleration of the tool's frame where q̈ = 0.",
             "Returns six numbers: acceleration of the origin, m/s², above the angular acceleration, rad/s².",
         ),
         KineticEnergy => ("Kinetic energy T = ½ q̇ᵀ·B·q̇.", "Returns T, J."),

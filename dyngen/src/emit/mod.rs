@@ -2,6 +2,10 @@
 
 mod code;
 mod docs;
+mod friction;
+mod tests;
+
+pub use friction::FrictionTerm;
 
 use crate::base::SetKind;
 use crate::dynamics::Function;
@@ -18,12 +22,22 @@ pub struct Options {
     pub functions: Vec<Function>,
     /// Values of the set's parameters, in its order, to bake in; the functions then take none.
     pub values: Option<Vec<f64>>,
+    /// Friction terms of every joint; none where empty.
+    pub friction: Vec<FrictionTerm>,
+    /// Whether the arm's own consistency tests are emitted too.
+    pub tests: bool,
 }
 
 impl Default for Options {
     /// The minimal set and every function.
     fn default() -> Self {
-        Options { parameters: SetKind::Minimal, functions: Function::ALL.to_vec(), values: None }
+        Options {
+            parameters: SetKind::Minimal,
+            functions: Function::ALL.to_vec(),
+            values: None,
+            friction: Vec::new(),
+            tests: false,
+        }
     }
 }
 
@@ -32,7 +46,7 @@ impl Default for Options {
 /// The same arm and options give the same bytes.
 ///
 /// # Errors
-/// As [`Model::function`]: what cannot be proven is not emitted.
+/// As [`Model::function`]: what cannot be proven is not emitted; friction terms that do not fit the arm.
 pub fn source(model: &Model, options: &Options) -> Result<String, Error> {
     let tokens = tokens(model, options)?;
     // Tokens that quote made of whole items always parse.
@@ -46,7 +60,7 @@ pub fn source(model: &Model, options: &Options) -> Result<String, Error> {
 /// The items of a generated file.
 ///
 /// # Errors
-/// As [`source`].
+/// As [`Model::function`], and friction terms that do not fit the arm.
 pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     let set = model.set(options.parameters)?;
     let functions = Function::ALL.into_iter().filter(|f| options.functions.contains(f));
@@ -70,6 +84,11 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
             pub const PARAMETER_VALUES: [f64; PARAMETERS] = [#(#values),*];
         }
     });
+    for term in &options.friction {
+        term.check(model.arm().dof()).map_err(Error::Friction)?;
+    }
+    let friction = friction::items(&options.friction, model.arm().dof());
+    let tests = if options.tests { tests::module(model, options)? } else { quote!() };
     let names_doc = docs::lines(&docs::parameters(set));
     Ok(quote! {
         use nalgebra::{ArrayStorage, SMatrix, SVector, SimdRealField};
@@ -88,5 +107,9 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
         #trig
 
         #(#functions)*
+
+        #friction
+
+        #tests
     })
 }

@@ -12,6 +12,7 @@ pub use build::Builder;
 
 use crate::exact::rational::Rational;
 use std::collections::HashMap;
+use std::fmt;
 
 /// A node with a sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -73,6 +74,25 @@ pub enum Input {
     Error(usize),
     /// A parameter of the set.
     Parameter(usize),
+}
+
+impl fmt::Display for Input {
+    /// The name in emitted code and listings.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (letters, index) = match self {
+            Input::Sin(i) => ("s", i),
+            Input::Cos(i) => ("c", i),
+            Input::Position(i) => ("q", i),
+            Input::Speed(i) => ("dq", i),
+            Input::Acceleration(i) => ("ddq", i),
+            Input::Torque(i) => ("tau", i),
+            Input::ReferenceSpeed(i) => ("dqr", i),
+            Input::ReferenceAcceleration(i) => ("ddqr", i),
+            Input::Error(i) => ("e", i),
+            Input::Parameter(i) => ("p", i),
+        };
+        write!(f, "{letters}{}", index + 1)
+    }
 }
 
 /// An operation. Operands of `Mul` carry no sign, the first of `Add` and both of `Div` neither.

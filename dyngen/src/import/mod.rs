@@ -43,8 +43,6 @@ pub struct Imported {
     pub values: Vec<(Parameter, f64)>,
     /// Frame 0 in the root link's frame: a homogeneous transform, row by row, m.
     pub base: [[f64; 4]; 4],
-    /// The tip link's frame in the last frame.
-    pub tip: [[f64; 4]; 4],
     /// What was left out or may surprise.
     pub notes: Vec<String>,
 }
@@ -92,8 +90,8 @@ pub fn urdf(text: &str, file: &str, options: &Options) -> Result<Imported, Impor
     let text = text::arm_file(&chain, &frames, file, options);
     let arm = Arm::parse(&text, file)
         .map_err(|e| refused(e.0.into_iter().map(|d| format!("as an arm file: {}", d.message)).collect()))?;
-    let (base, tip) = (frames.base.rows(), text::tip(&chain, &frames).rows());
-    Ok(Imported { arm, text, values: text::values(&chain, &frames), base, tip, notes: chain.notes })
+    let base = frames.base.rows();
+    Ok(Imported { arm, text, values: text::values(&chain, &frames), base, notes: chain.notes })
 }
 
 /// A larger file is no robot.

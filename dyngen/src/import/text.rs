@@ -29,7 +29,7 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
         pose_text(&tip(chain, frames))
     ));
     comment(
-        "An arm file holds neither pose; gravity is turned into frame 0, friction and meshes are left out."
+        "An arm file has no place for frame 0's pose: gravity is turned into it. Friction and meshes are left out."
             .to_string(),
     );
     chain.notes.iter().for_each(|note| comment(format!("Note: {note}.")));
@@ -71,11 +71,23 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
             }
         }
     }
+    let tip = tip(chain, frames);
+    if pose_text(&tip) != SAME {
+        let xyz: Vec<String> = tip.origin.iter().map(|x| length(*x)).collect();
+        let rpy = tip.rpy().map(|turn| angle(turn, options.angle_tolerance));
+        let _ = write!(
+            text,
+            "\n# link '{}'\n[tool]\nxyz = [{}]\nrpy = [{}]\n",
+            plain(&chain.tip),
+            xyz.join(", "),
+            rpy.join(", ")
+        );
+    }
     text
 }
 
 /// The tip link's frame in the last frame.
-pub(super) fn tip(chain: &Chain, frames: &Frames) -> Pose {
+fn tip(chain: &Chain, frames: &Frames) -> Pose {
     frames.links.last().unwrap_or(&frames.base).see(&chain.tip_pose)
 }
 
@@ -143,12 +155,15 @@ fn angle(value: f64, tolerance: f64) -> String {
     }
 }
 
+/// What is said of a pose that is none.
+const SAME: &str = "the same";
+
 /// A pose as a URDF would say it.
 fn pose_text(pose: &Pose) -> String {
     let list = |values: &[f64]| values.iter().map(|x| length(*x)).collect::<Vec<_>>().join(", ");
     let (origin, rpy) = (list(pose.origin.as_slice()), list(&pose.rpy()));
     if origin == "0, 0, 0" && rpy == "0, 0, 0" {
-        return "the same".to_string();
+        return SAME.to_string();
     }
     format!("xyz = [{origin}] m, rpy = [{rpy}] rad")
 }

@@ -14,7 +14,12 @@ pub const PASSES: &[(&str, Pass)] = &[
     ("merge", merge::merge),
 ];
 
-/// Runs all passes.
-pub fn optimize(graph: Graph, outputs: Vec<Expr>, field: &ConstantField) -> (Graph, Vec<Expr>) {
-    PASSES.iter().fold((graph, outputs), |(graph, outputs), (_, pass)| pass(&graph, &outputs, field))
+/// Runs passes one after another.
+pub fn optimize(
+    graph: Graph,
+    outputs: Vec<Expr>,
+    field: &ConstantField,
+    passes: &[(&str, Pass)],
+) -> (Graph, Vec<Expr>) {
+    passes.iter().fold((graph, outputs), |(graph, outputs), (_, pass)| pass(&graph, &outputs, field))
 }

@@ -2,7 +2,7 @@
 
 use super::point::Point;
 use crate::arm::Convention;
-use crate::dynamics::elements::{ArmElements, Source};
+use crate::dynamics::elements::{ArmElements, Source, ToolElements};
 use crate::exact::algebra::Algebra;
 use crate::exact::prime::Fp;
 use crate::exact::rational::Rational;
@@ -34,7 +34,15 @@ impl Algebra for SeriesAlgebra {
 
 type Matrix = [[Series; 4]; 4];
 
-/// The last frame's transform along a motion of constant joint speeds.
+fn times(a: Matrix, b: &Matrix) -> Matrix {
+    let alg = SeriesAlgebra;
+    let entry = |i: usize, j: usize| {
+        (0..4).fold(alg.integer(0), |sum, k| alg.add(&sum, &alg.mul(&a[i][k], &b[k][j])))
+    };
+    std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
+}
+
+/// The tool frame's transform along a motion of constant joint speeds.
 pub(super) struct PoseSeries(Matrix);
 
 impl PoseSeries {
@@ -64,14 +72,37 @@ impl PoseSeries {
                 Convention::Modified => [about_x, about_z],
             };
             for step in steps {
-                pose = std::array::from_fn(|i| {
-                    std::array::from_fn(|j| {
-                        (0..4).fold(zero, |sum, k| alg.add(&sum, &alg.mul(&pose[i][k], &step[k][j])))
-                    })
-                });
+                pose = times(pose, &step);
             }
         }
-        PoseSeries(pose)
+        let source = SeriesSource { point, speeds };
+        let length = |x: &Rational| source.number(x);
+        let tool = ToolElements::build(&alg, point.arm, point.symbols, length, |index, sine| {
+            [point.sets.field.modular_symbol(index, sine), Fp::ZERO, Fp::ZERO]
+        });
+        let [x, y, z] = tool.origin;
+        let [(sr, cr), (sp, cp), (sy, cy)] = tool.rpy;
+        let shift =
+            [[one, zero, zero, x], [zero, one, zero, y], [zero, zero, one, z], [zero, zero, zero, one]];
+        let yaw = [
+            [cy, alg.neg(&sy), zero, zero],
+            [sy, cy, zero, zero],
+            [zero, zero, one, zero],
+            [zero, zero, zero, one],
+        ];
+        let pitch = [
+            [cp, zero, sp, zero],
+            [zero, one, zero, zero],
+            [alg.neg(&sp), zero, cp, zero],
+            [zero, zero, zero, one],
+        ];
+        let roll = [
+            [one, zero, zero, zero],
+            [zero, cr, alg.neg(&sr), zero],
+            [zero, sr, cr, zero],
+            [zero, zero, zero, one],
+        ];
+        PoseSeries([shift, yaw, pitch, roll].iter().fold(pose, times))
     }
 
     /// The transform itself, row-major.

@@ -1,0 +1,135 @@
+//! Columns for friction beside the regressor: each joint's own terms, functions of its speed alone.
+
+use super::docs;
+use proc_macro2::{Literal, TokenStream};
+use quote::quote;
+use std::fmt;
+use std::str::FromStr;
+
+/// One friction term of every joint: its column, a function of the joint's speed v.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FrictionTerm {
+    /// v
+    Viscous,
+    /// sign v, zero at standstill
+    Coulomb,
+    /// tanh(a·v) with the shape a, s/rad: one for all joints, or one for each.
+    Tanh(Vec<f64>),
+}
+
+impl FrictionTerm {
+    /// Whether the term fits an arm of n joints; the reason where it does not.
+    ///
+    /// # Errors
+    /// Shapes that are no positive numbers, or as many as neither one nor the joints.
+    pub fn check(&self, n: usize) -> Result<(), String> {
+        let FrictionTerm::Tanh(shapes) = self else { return Ok(()) };
+        if shapes.len() != 1 && shapes.len() != n {
+            return Err(format!("{self}: {} shapes for {n} joints: give one, or one for each", shapes.len()));
+        }
+        match shapes.iter().find(|a| !(a.is_finite() && **a > 0.0)) {
+            Some(wrong) => Err(format!("{self}: the shape {wrong} is not greater than zero")),
+            None => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for FrictionTerm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            FrictionTerm::Viscous => f.write_str("viscous"),
+            FrictionTerm::Coulomb => f.write_str("coulomb"),
+            FrictionTerm::Tanh(shapes) => {
+                f.write_str("tanh")?;
+                shapes.iter().try_for_each(|a| write!(f, ":{a}"))
+            }
+        }
+    }
+}
+
+impl FromStr for FrictionTerm {
+    type Err = String;
+
+    /// `viscous`, `coulomb`, or `tanh:` and its shapes, as in `tanh:216` or `tanh:216:180`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once(':') {
+            None if text == "viscous" => Ok(FrictionTerm::Viscous),
+            None if text == "coulomb" => Ok(FrictionTerm::Coulomb),
+            Some(("tanh", shapes)) => {
+                let shape =
+                    |a: &str| a.trim().parse().map_err(|_| format!("{text}: the shape '{a}' is no number"));
+                shapes.split(':').map(shape).collect::<Result<_, String>>().map(FrictionTerm::Tanh)
+            }
+            _ => {
+                Err(format!("there is no friction term '{text}': there are viscous, coulomb and tanh:SHAPE"))
+            }
+        }
+    }
+}
+
+/// The items for some terms; none where there are no terms.
+pub(super) fn items(terms: &[FrictionTerm], n: usize) -> TokenStream {
+    if terms.is_empty() {
+        return quote!();
+    }
+    let count = Literal::usize_unsuffixed(terms.len());
+    let list: String = terms.iter().enumerate().map(|(k, term)| format!("\n{}. `{term}`", k + 1)).collect();
+    let shapes = |what: &str| format!("{what}, one for each column:\n{list}");
+    let columns_doc = docs::lines(&format!(
+        "{}\n\n* `dq`: joint speeds, rad/s\n\nReturns n × terms: row i holds joint i's columns, so joint i's friction is \
+         this row times its coefficients.\nIn a regression they stand beside the regressor, each in its own joint's rows.",
+        shapes("Friction columns of every joint")
+    ));
+    let speeds: Vec<_> = (0..n).map(|i| quote::format_ident!("dq{}", i + 1)).collect();
+    let column = |term: &FrictionTerm| -> TokenStream {
+        let entries = speeds.iter().enumerate().map(|(i, v)| match term {
+            FrictionTerm::Viscous => quote!(#v),
+            FrictionTerm::Coulomb => quote!(sign(#v)),
+            FrictionTerm::Tanh(shapes) => {
+                let shape = shapes.get(i).or(shapes.first()).copied().unwrap_or_default();
+                let shape = Literal::f64_suffixed(shape);
+                quote!((#v * nalgebra::convert::<f64, T>(#shape)).simd_tanh())
+            }
+        });
+        quote!([#(#entries),*])
+    };
+    let columns = terms.iter().map(column);
+    let sign = terms.contains(&FrictionTerm::Coulomb).then(|| {
+        quote! {
+            /// −1, 0 or 1.
+            fn sign<T: SimdRealField + Copy>(x: T) -> T {
+                let (zero, one) = (T::zero(), T::one());
+                one.select(x.simd_gt(zero), (-one).select(x.simd_lt(zero), zero))
+            }
+        }
+    });
+    quote! {
+        /// Number of friction terms of a joint.
+        pub const FRICTION_TERMS: usize = #count;
+
+        #sign
+
+        #(#[doc = #columns_doc])*
+        #[must_use]
+        pub fn friction_columns<T: SimdRealField + Copy>(
+            dq: &SVector<T, JOINTS>,
+        ) -> SMatrix<T, JOINTS, FRICTION_TERMS> {
+            let [[#(#speeds),*]] = dq.data.0;
+            SMatrix::from_array_storage(ArrayStorage([#(#columns),*]))
+        }
+
+        /// Friction torques of all joints: each row of [`friction_columns`] times the same row of coefficients.
+        ///
+        /// * `dq`: joint speeds, rad/s
+        /// * `coefficients`: n × terms, N·m (N·m·s/rad where viscous)
+        ///
+        /// Returns the torques, N·m, that the drives spend on friction.
+        #[must_use]
+        pub fn friction<T: SimdRealField + Copy>(
+            dq: &SVector<T, JOINTS>,
+            coefficients: &SMatrix<T, JOINTS, FRICTION_TERMS>,
+        ) -> SVector<T, JOINTS> {
+            friction_columns(dq).component_mul(coefficients).column_sum()
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! The arm's own consistency tests, emitted beside its functions: identities that hold between them, in floating point.
+
+use super::Options;
+use crate::arm::{Arm, ParameterKind};
+use crate::base::possible;
+use crate::dynamics::Function;
+use crate::model::{Error, Model};
+use proc_macro2::{Literal, TokenStream};
+use quote::quote;
+
+/// The test module for the functions of a file; each test needs those that it compares.
+///
+/// # Errors
+/// As [`Model::function`].
+pub(super) fn module(model: &Model, options: &Options) -> Result<TokenStream, Error> {
+    use Function::*;
+    let set = model.set(options.parameters)?;
+    let values = match &options.values {
+        Some(values) => values.clone(),
+        None => model.set_values(set, &sample_bodies(model.arm())),
+    };
+    // Forward dynamics and definiteness are for values that a real arm can have.
+    let possible = possible::check(model, options.parameters, &values)?.possible;
+    let has = |needed: &[Function]| needed.iter().all(|f| options.functions.contains(f));
+    let baked = options.values.is_some();
+    let p = if baked { quote!() } else { quote!(, &parameters()) };
+    let mut tests = Vec::new();
+    let mut test = |needed: &[Function], body: TokenStream| {
+        if has(needed) {
+            tests.push(quote!(#[test] #body));
+        }
+    };
+    test(
+        &[InverseDynamics, MassMatrix, CoriolisMatrix, Gravity],
+        quote! {
+            fn the_torque_is_the_sum_of_its_parts() {
+                for [q, dq, ddq] in states() {
+                    let parts = mass_matrix(&q #p) * ddq + coriolis_matrix(&q, &dq #p) * dq + gravity(&q #p);
+                    assert_close(&inverse_dynamics(&q, &dq, &ddq #p), &parts, 1e-9);
+                }
+            }
+        },
+    );
+    if has(&[InverseDynamics, Regressor]) {
+        let values = if baked { quote!(SVector::from(PARAMETER_VALUES)) } else { quote!(parameters()) };
+        test(
+            &[],
+            quote! {
+                fn the_torque_is_the_regressor_times_the_parameters() {
+                    for [q, dq, ddq] in states() {
+                        let product = regressor(&q, &dq, &ddq) * #values;
+                        assert_close(&inverse_dynamics(&q, &dq, &ddq #p), &product, 1e-9);
+                    }
+                }
+            },
+        );
+    }
+    test(
+        &[MassMatrix, CoriolisMatrix],
+        quote! {
+            fn the_rate_of_the_mass_matrix_less_twice_the_coriolis_matrix_is_skew() {
+                let step = 1e-5;
+                for [q, dq, _] in states() {
+                    let ahead = mass_matrix(&(q + dq * step) #p);
+                    let behind = mass_matrix(&(q - dq * step) #p);
+                    let rate = (ahead - behind) / (2.0 * step);
+                    let coriolis = coriolis_matrix(&q, &dq #p);
+                    assert_close(&(coriolis + coriolis.transpose()), &rate, 1e-6);
+                }
+            }
+        },
+    );
+    test(
+        &[InverseDynamics, KineticEnergy, PotentialEnergy],
+        quote! {
+            fn the_power_of_the_torques_is_the_change_of_energy() {
+                let step = 1e-5;
+                for [q, dq, ddq] in states() {
+                    let energy = |t: f64| {
+                        let (place, speed) = (q + dq * t + ddq * (0.5 * t * t), dq + ddq * t);
+                        kinetic_energy(&place, &speed #p) + potential_energy(&place #p)
+                    };
+                    let rate = SVector::<f64, 1>::new((energy(step) - energy(-step)) / (2.0 * step));
+                    let power = SVector::<f64, 1>::new(dq.dot(&inverse_dynamics(&q, &dq, &ddq #p)));
+                    assert_close(&power, &rate, 1e-6);
+                }
+            }
+        },
+    );
+    if possible {
+        test(
+            &[MassMatrix],
+            quote! {
+                fn the_mass_matrix_is_symmetric_and_positive_definite() {
+                    for [q, ..] in states() {
+                        let mass = mass_matrix(&q #p);
+                        assert_close(&mass, &mass.transpose(), 1e-12);
+                        assert!(mass.cholesky().is_some(), "not positive definite at {q}");
+                    }
+                }
+            },
+        );
+        test(
+            &[InverseDynamics, ForwardDynamics],
+            quote! {
+                fn inverse_after_forward_dynamics_gives_the_torque_back() {
+                    for [q, dq, tau] in states() {
+                        let ddq = forward_dynamics(&q, &dq, &tau #p);
+                        assert_close(&inverse_dynamics(&q, &dq, &ddq #p), &tau, 1e-7);
+                    }
+                }
+            },
+        );
+    }
+    if tests.is_empty() {
+        return Ok(quote!());
+    }
+    let parameters = (!baked).then(|| {
+        let values = values.iter().map(|x| Literal::f64_suffixed(*x));
+        quote! {
+            /// Values that a body of each link can have.
+            fn parameters() -> SVector<f64, PARAMETERS> {
+                SVector::from([#(#values),*])
+            }
+        }
+    });
+    Ok(quote! {
+        #[cfg(test)]
+        mod tests {
+            use super::*;
+
+            #parameters
+
+            /// Positions, speeds, and accelerations or torques.
+            fn states() -> impl Iterator<Item = [SVector<f64, JOINTS>; 3]> {
+                (0..5_u8).map(|k| {
+                    [0.3, 1.7, 2.9].map(|phase| {
+                        let mut angle = f64::from(k) * 2.1 + phase;
+                        SVector::from_fn(|_, _| {
+                            angle += 1.3;
+                            1.5 * nalgebra::ComplexField::sin(angle)
+                        })
+                    })
+                })
+            }
+
+            fn assert_close<const R: usize, const C: usize>(
+                a: &SMatrix<f64, R, C>,
+                b: &SMatrix<f64, R, C>,
+                tolerance: f64,
+            ) {
+                let scale = a.abs().max().max(b.abs().max()).max(1.0);
+                let error = (a - b).abs().max();
+                assert!(error <= tolerance * scale, "{a} and {b} differ by {error}");
+            }
+
+            #(#tests)*
+        }
+    })
+}
+
+/// Eleven parameters a link of bodies that keep the declared symmetries: a compact body whose mass shrinks outwards.
+fn sample_bodies(arm: &Arm) -> Vec<f64> {
+    let mut all = Vec::with_capacity(11 * arm.dof());
+    for link in 0..arm.dof() {
+        let mass = 4.0 / (1.0 + link as f64);
+        let keeps = |kind| arm.keeps(crate::arm::Parameter { link, kind });
+        let place = |kind, x: f64| if keeps(kind) { x } else { 0.0 };
+        use ParameterKind::*;
+        let r = [place(Mx, 0.04), place(My, -0.03), place(Mz, 0.05)];
+        for kind in ParameterKind::ALL {
+            // About the frame's origin: a ball of radius of gyration 0.2 m, moved by r (Huygens and Steiner).
+            let across = |i: usize, j: usize| mass * (0.04 + r[i] * r[i] + r[j] * r[j]);
+            let value = match kind {
+                M => mass,
+                Mx => mass * r[0],
+                My => mass * r[1],
+                Mz => mass * r[2],
+                Ixx => across(1, 2),
+                Iyy => across(0, 2),
+                Izz => across(0, 1),
+                Ixy => mass * r[0] * r[1],
+                Ixz => mass * r[0] * r[2],
+                Iyz => mass * r[1] * r[2],
+                Im => 0.01,
+            };
+            all.push(place(kind, value));
+        }
+    }
+    all
+}
