@@ -4,9 +4,12 @@
 
 use dyngen::base::SetKind;
 use dyngen::dynamics::function;
-use dyngen::graph::Expr;
+use dyngen::exact::algebra::Algebra;
+use dyngen::exact::constant::ConstantField;
+use dyngen::graph::{Builder, Expr, Graph, Node};
+use dyngen::optimize::{PASSES, Pass};
 use dyngen::prove::prove;
-use dyngen::{Function, Model};
+use dyngen::{Error, Function, Model};
 use powerball_workspace::{arm, arm_text, paper_arm_with_ratios, parse};
 
 fn prove_all(name: &str, model: &Model) {
@@ -59,7 +62,7 @@ fn a_wrong_result_anywhere_is_noticed() {
     let model = Model::derive(arm("arm")).unwrap();
     let set = model.set(SetKind::Minimal).unwrap();
     for function in Function::ALL {
-        let built = function::build(function, model.arm(), model.symbols(), set, &model.sets().field, None);
+        let built = function::build(function, model.arm(), model.symbols(), set, &model.sets().field, None, PASSES);
         let check = |f: &dyngen::dynamics::FunctionGraph| {
             prove(model.arm(), model.symbols(), model.sets(), set, f, None)
         };
@@ -73,6 +76,50 @@ fn a_wrong_result_anywhere_is_noticed() {
     }
 }
 
+/// A pass that goes wrong in one place: it turns one sum among many into a difference.
+fn slip(graph: &Graph, outputs: &[Expr], _: &ConstantField) -> (Graph, Vec<Expr>) {
+    let b = Builder::new();
+    let needed = graph.needed(outputs);
+    let sums: Vec<usize> =
+        needed.iter().copied().filter(|n| matches!(graph.nodes()[*n], Node::Add(..))).collect();
+    let slipped = sums[sums.len() / 2];
+    let mut new = vec![Expr::ZERO; graph.nodes().len()];
+    let signed = |new: &[Expr], e: Expr| if e.is_negative() { -new[e.node()] } else { new[e.node()] };
+    for node in needed {
+        new[node] = match graph.nodes()[node] {
+            Node::Constant(index) => b.constant(graph.constant(index)),
+            Node::Symbol(index, sine) => b.symbol(index as usize, sine),
+            Node::Input(input) => b.input(input),
+            Node::Add(x, y) if node == slipped => b.sub(&signed(&new, x), &signed(&new, y)),
+            Node::Add(x, y) => b.add(&signed(&new, x), &signed(&new, y)),
+            Node::Mul(x, y) => b.mul(&signed(&new, x), &signed(&new, y)),
+            Node::Div(x, y) => b.div(signed(&new, x), signed(&new, y)),
+        };
+    }
+    let outputs = outputs.iter().map(|e| signed(&new, *e)).collect();
+    (b.finish(), outputs)
+}
+
+/// Whichever pass goes wrong, the generator refuses the function.
+#[test]
+fn a_pass_that_goes_wrong_is_refused() {
+    let model = Model::derive(arm("arm")).unwrap();
+    let with_sums: Vec<Function> = Function::ALL
+        .into_iter()
+        .filter(|f| model.function_after(*f, SetKind::Minimal, &[]).unwrap().operations().add > 0)
+        .collect();
+    assert!(with_sums.len() > 20);
+    for broken in 0..PASSES.len() {
+        let mut passes: Vec<(&str, Pass)> = PASSES.to_vec();
+        passes.insert(broken + 1, ("slip", slip));
+        for function in &with_sums {
+            let refused = model.function_after(*function, SetKind::Minimal, &passes);
+            let name = PASSES[broken].0;
+            assert!(matches!(refused, Err(Error::Disagreement(_))), "{function} after a broken {name}");
+        }
+    }
+}
+
 /// Zero where a small term belongs is noticed as well: exact arithmetic has no tolerance.
 #[test]
 fn a_constant_that_is_slightly_off_is_noticed() {
@@ -80,6 +127,6 @@ fn a_constant_that_is_slightly_off_is_noticed() {
     let mut other = model.arm().clone();
     other.joints[3].d += dyngen::exact::rational::parse_rational("1e-30").unwrap();
     let set = model.set(SetKind::Full).unwrap();
-    let built = function::build(Function::Gravity, &other, model.symbols(), set, &model.sets().field, None);
+    let built = function::build(Function::Gravity, &other, model.symbols(), set, &model.sets().field, None, PASSES);
     assert!(prove(model.arm(), model.symbols(), model.sets(), set, &built, None).is_err());
 }

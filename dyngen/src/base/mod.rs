@@ -5,5 +5,6 @@ pub mod possible;
 pub mod preference;
 mod published;
 pub mod sets;
+pub mod symmetry;
 
 pub use sets::{ParameterSet, SetKind, SetParameter};

@@ -2,7 +2,8 @@
 
 use super::{Failure, model, print};
 use dyngen::arm::{Convention, JointKind};
-use dyngen::base::sets::Class;
+use dyngen::base::sets::{Class, combination_text};
+use dyngen::base::symmetry::{self, Removed, Symmetry};
 use dyngen::base::{ParameterSet, SetKind};
 use dyngen::exact::rational;
 use dyngen::graph::Operations;
@@ -28,16 +29,19 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         .into_iter()
         .map(|function| {
             let built = model.function(function, SetKind::Minimal).map_err(Failure::refused)?;
-            Ok((function, built.graph.operations(&built.outputs)))
+            Ok((function, built.operations()))
         })
         .collect::<Result<_, Failure>>()?;
-    let text =
-        if args.json { format!("{}\n", json_text(&model, &operations)) } else { table(&model, &operations) };
+    let symmetries = symmetry::symmetries(&model).map_err(Failure::refused)?;
+    let text = match args.json {
+        true => format!("{}\n", json_text(&model, &operations, &symmetries)),
+        false => table(&model, &operations, &symmetries),
+    };
     print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn json_text(model: &Model, operations: &[(Function, Operations)]) -> Value {
+fn json_text(model: &Model, operations: &[(Function, Operations)], symmetries: &[Symmetry]) -> Value {
     let arm = model.arm();
     let kept = arm.kept_parameters();
     let names: Vec<String> = kept.iter().map(ToString::to_string).collect();
@@ -63,8 +67,18 @@ fn json_text(model: &Model, operations: &[(Function, Operations)]) -> Value {
         "identifiable_alone": of_class(Class::Alone),
         "identifiable_in_combination": of_class(Class::InCombination),
         "operations": operations,
+        "symmetries": symmetries.iter().map(|s| symmetry_json(model, s)).collect::<Vec<_>>(),
         "notes": arm.notes(),
     })
+}
+
+fn symmetry_json(model: &Model, symmetry: &Symmetry) -> Value {
+    let (removed, equals) = match &symmetry.removed {
+        Removed::Nothing => ("nothing", None),
+        Removed::BaseParameter => ("base parameter", None),
+        Removed::Term(terms) => ("term", Some(combination_text(&model.sets().field, terms))),
+    };
+    json!({"parameter": symmetry.parameter.to_string(), "removed": removed, "equals": equals})
 }
 
 fn set_json(model: &Model, set: &ParameterSet) -> Value {
@@ -95,7 +109,7 @@ fn set_json(model: &Model, set: &ParameterSet) -> Value {
     object
 }
 
-fn table(model: &Model, operations: &[(Function, Operations)]) -> String {
+fn table(model: &Model, operations: &[(Function, Operations)], symmetries: &[Symmetry]) -> String {
     let arm = model.arm();
     let mut t = String::new();
     let gravity: Vec<String> = arm.gravity.iter().map(|g| rational::to_f64(g).to_string()).collect();
@@ -141,6 +155,10 @@ fn table(model: &Model, operations: &[(Function, Operations)]) -> String {
             kept.iter().filter(|p| model.sets().class(**p) == class).map(ToString::to_string).collect();
         let _ = writeln!(t, "  {:<30} {:>2}: {}", class.name(), names.len(), names.join(" "));
     }
+    if !symmetries.is_empty() {
+        let _ = writeln!(t, "\nwhat each declared symmetry removed:");
+        symmetry_table(&mut t, model, symmetries);
+    }
     for set in model.sets().sets.iter().filter(|s| s.kind != SetKind::Full) {
         set_table(&mut t, set);
     }
@@ -151,6 +169,26 @@ fn table(model: &Model, operations: &[(Function, Operations)]) -> String {
             writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", function.name(), o.mul, o.add, o.div, o.sin_cos);
     }
     t
+}
+
+fn symmetry_table(t: &mut String, model: &Model, symmetries: &[Symmetry]) {
+    let names = |wanted: fn(&Removed) -> bool| -> Vec<String> {
+        let some = symmetries.iter().filter(|s| wanted(&s.removed));
+        some.map(|s| s.parameter.to_string()).collect()
+    };
+    let nothing = names(|r| matches!(r, Removed::Nothing));
+    let own = names(|r| matches!(r, Removed::BaseParameter));
+    for (what, names) in [("nothing that torques show", nothing), ("a base parameter of its own", own)] {
+        if !names.is_empty() {
+            let _ = writeln!(t, "  {what:<30} {:>2}: {}", names.len(), names.join(" "));
+        }
+    }
+    for symmetry in symmetries {
+        if let Removed::Term(terms) = &symmetry.removed {
+            let sum = combination_text(&model.sets().field, terms);
+            let _ = writeln!(t, "  {:<30}  a term that acts as {sum}", symmetry.parameter.to_string());
+        }
+    }
 }
 
 fn set_table(t: &mut String, set: &ParameterSet) {

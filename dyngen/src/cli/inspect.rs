@@ -50,7 +50,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     for earlier in 0..=count {
         let name = if earlier == 0 { "build" } else { PASSES[earlier - 1].0 };
         let graph = if earlier == count { built.clone() } else { after(earlier)? };
-        let Operations { mul, add, div, sin_cos } = graph.graph.operations(&graph.outputs);
+        let Operations { mul, add, div, sin_cos } = graph.operations();
         // A String takes every write.
         let _ = writeln!(text, "# after {name}: {mul} mul, {add} add, {div} div, {sin_cos} sin_cos");
     }

@@ -11,7 +11,7 @@ use crate::exact::constant::ConstantField;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::differentiate::{self, Direction};
-use crate::graph::{Builder, Expr, Graph, Input};
+use crate::graph::{Builder, Expr, Graph, Input, Operations};
 use crate::optimize::{self, Pass};
 use std::fmt;
 
@@ -278,6 +278,11 @@ pub struct FunctionGraph {
 }
 
 impl FunctionGraph {
+    /// What it costs.
+    pub fn operations(&self) -> Operations {
+        self.graph.operations(&self.outputs)
+    }
+
     /// What it takes: the function's arguments, without the parameters where their values are baked in.
     pub fn arguments(&self) -> impl Iterator<Item = Argument> + '_ {
         let baked = self.baked;

@@ -137,7 +137,7 @@ pub(super) fn function(built: &FunctionGraph) -> String {
     let (what, returns) = words(built.function);
     let arguments: String =
         built.function.arguments().iter().map(|a| format!("\n* `{}`: {}", a.name(), a.meaning())).collect();
-    let operations = built.graph.operations(&built.outputs);
+    let operations = built.operations();
     let divisions =
         if operations.div > 0 { format!(", {} divisions", operations.div) } else { String::new() };
     format!(

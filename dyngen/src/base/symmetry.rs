@@ -1,0 +1,67 @@
+//! What each declared symmetry removed: the arm's file says that a parameter is zero, and this says what that saves.
+
+use super::coefficients::{LagrangianPolynomials, Sizes};
+use super::preference::preference;
+use super::sets::Combination;
+use crate::arm::{Arm, Parameter};
+use crate::exact::elimination::{self, SparseRow, Unproven};
+use crate::model::Model;
+
+/// What the torques would show of a parameter that is declared zero, beside those that are kept.
+#[derive(Clone, Debug)]
+pub enum Removed {
+    /// Nothing: its column is zero, with or without the symmetry.
+    Nothing,
+    /// A base parameter of its own: without this symmetry the rank is greater by one.
+    BaseParameter,
+    /// A term of other base parameters: the rank stays, and the parameter acts as this combination of kept ones.
+    Term(Combination),
+}
+
+/// A declared symmetry with what it removed.
+#[derive(Clone, Debug)]
+pub struct Symmetry {
+    /// The parameter that is declared zero.
+    pub parameter: Parameter,
+    /// What that removed.
+    pub removed: Removed,
+}
+
+/// Each declared symmetry of an arm, by itself, for the numbers in its file.
+///
+/// # Errors
+/// As [`Model::derive`].
+pub fn symmetries(model: &Model) -> Result<Vec<Symmetry>, Unproven> {
+    let arm = model.arm();
+    let field = &model.sets().field;
+    let mut without: Arm = arm.clone();
+    without.joints.iter_mut().for_each(|joint| joint.zero.clear());
+    let lagrangian = LagrangianPolynomials::derive(&without, model.symbols());
+    let rows = lagrangian.rows(arm, field, Sizes::Numbers);
+    let kept: Vec<usize> = preference(arm).iter().map(|p| p.index()).collect();
+    let all = arm.all_parameters();
+    let declared = all.iter().filter(|p| without.keeps(**p) && !arm.keeps(**p));
+    declared
+        .map(|parameter| {
+            let own = parameter.index();
+            let takes_part = |column: &usize| *column == own || kept.contains(column);
+            let mut some: Vec<SparseRow> = rows
+                .iter()
+                .map(|row| row.iter().filter(|(c, _)| takes_part(c)).cloned().collect())
+                .collect();
+            some.retain(|row| !row.is_empty());
+            // Last in the order: it is kept exactly where it depends on none of the others.
+            let order: Vec<usize> = kept.iter().copied().chain([own]).collect();
+            let found = elimination::dependence(field, &some, all.len(), &order)?;
+            let removed = if found.kept.contains(&own) {
+                Removed::BaseParameter
+            } else if found.coordinates[own].is_empty() {
+                Removed::Nothing
+            } else {
+                let terms = found.coordinates[own].iter();
+                Removed::Term(terms.map(|(position, c)| (all[found.kept[*position]], c.clone())).collect())
+            };
+            Ok(Symmetry { parameter: *parameter, removed })
+        })
+        .collect()
+}

@@ -1,0 +1,78 @@
+//! One emission for every scalar: f32, several samples at once, dual numbers.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use nalgebra::{SVector, SimdValue};
+use num_dual::Dual64;
+use powerball_workspace::generated::{panda_minimal, stanford_minimal};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use simba::simd::AutoF64x4;
+
+fn random<const N: usize>(rng: &mut ChaCha8Rng) -> SVector<f64, N> {
+    SVector::from_fn(|_, _| rng.random_range(-1.5..1.5))
+}
+
+/// Four samples at once are four samples, to the bit: the lanes run the same operations.
+#[test]
+fn lanes_are_the_samples() {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let samples: [[SVector<f64, 7>; 3]; 4] = std::array::from_fn(|_| std::array::from_fn(|_| random(&mut rng)));
+    let parameters: SVector<f64, { panda_minimal::PARAMETERS }> = random(&mut rng);
+    let lanes = |k: usize| SVector::<AutoF64x4, 7>::from_fn(|i, _| AutoF64x4::from(samples.map(|s| s[k][i])));
+    let (q, dq, ddq) = (lanes(0), lanes(1), lanes(2));
+    let torques = panda_minimal::inverse_dynamics(&q, &dq, &ddq, &parameters.map(AutoF64x4::splat));
+    let regressor = panda_minimal::regressor(&q, &dq, &ddq);
+    for (lane, [q, dq, ddq]) in samples.iter().enumerate() {
+        assert_eq!(torques.map(|x| x.extract(lane)), panda_minimal::inverse_dynamics(q, dq, ddq, &parameters));
+        assert_eq!(regressor.map(|x| x.extract(lane)), panda_minimal::regressor(q, dq, ddq));
+    }
+}
+
+/// Derivatives by dual numbers are the emitted derivatives.
+#[test]
+fn dual_numbers_carry_the_derivatives() {
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let (q, dq, ddq): (SVector<f64, 6>, _, _) = (random(&mut rng), random(&mut rng), random(&mut rng));
+    let parameters: SVector<f64, { stanford_minimal::PARAMETERS }> = random(&mut rng);
+    let constant = |v: &SVector<f64, 6>| v.map(Dual64::from_re);
+    let by_position = stanford_minimal::torque_by_position(&q, &dq, &ddq, &parameters);
+    let by_speed = stanford_minimal::torque_by_speed(&q, &dq, &ddq, &parameters);
+    for j in 0..6 {
+        let seeded = |v: &SVector<f64, 6>| {
+            let mut v = constant(v);
+            v[j] = v[j].derivative();
+            v
+        };
+        let torque = |q: &_, dq: &_| {
+            stanford_minimal::inverse_dynamics(q, dq, &constant(&ddq), &parameters.map(Dual64::from_re))
+        };
+        let (a, b) = (torque(&seeded(&q), &constant(&dq)), torque(&constant(&q), &seeded(&dq)));
+        for i in 0..6 {
+            assert!((a[i].eps - by_position[(i, j)]).abs() < 1e-11, "{i} {j}");
+            assert!((b[i].eps - by_speed[(i, j)]).abs() < 1e-11, "{i} {j}");
+        }
+    }
+}
+
+/// Single precision differs from double by its rounding alone.
+#[test]
+fn single_precision_is_close() {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    for _ in 0..100 {
+        let (q, dq, ddq): (SVector<f64, 7>, _, _) = (random(&mut rng), random(&mut rng), random(&mut rng));
+        let parameters: SVector<f64, { panda_minimal::PARAMETERS }> = random(&mut rng);
+        let single = |v: &SVector<f64, 7>| v.map(|x| x as f32);
+        let torques = panda_minimal::inverse_dynamics(&q, &dq, &ddq, &parameters);
+        let close = panda_minimal::inverse_dynamics(
+            &single(&q),
+            &single(&dq),
+            &single(&ddq),
+            &parameters.map(|x| x as f32),
+        );
+        let error = (torques - close.map(f64::from)).abs().max();
+        // Some hundred operations, each rounded to 2⁻²⁴ of its result.
+        assert!(error < 200.0 * 2f64.powi(-24) * torques.abs().max().max(1.0), "{error}");
+        assert!(error > 0.0);
+    }
+}
