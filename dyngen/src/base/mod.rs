@@ -1,5 +1,6 @@
 //! Parameter sets: exact relations, published groupings, the choice of columns, physical possibility.
 
+pub mod choice;
 pub mod coefficients;
 pub mod possible;
 pub mod preference;

@@ -1,30 +1,60 @@
 //! Which parameters a base set keeps where there is a choice.
 
 use crate::arm::{Arm, Convention, Joint, JointKind, Parameter, ParameterKind};
+use std::fmt;
 
-/// All parameters that an arm keeps, those to be kept in a base set first.
-///
-/// As in Khalil and Dombre's regrouping for a revolute joint, what can be carried to the link before goes last: the mass, the
-/// first moment along the joint axis and one of the two inertias across it. Of two links the inner one keeps.
-pub fn preference(arm: &Arm) -> Vec<Parameter> {
-    let mut order = arm.kept_parameters();
-    order.sort_by_key(|p| (rank(arm, *p), p.link, p.kind));
-    order
+/// A rule for what a base set keeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Preference {
+    /// Of the two inertias across the joint axis the second stays, not the first.
+    pub second_across: bool,
+    /// Of two links the outer one keeps, not the inner one.
+    pub outer: bool,
 }
 
-fn rank(arm: &Arm, parameter: Parameter) -> u8 {
-    use ParameterKind::*;
-    let joint = &arm.joints[parameter.link];
-    let along_y = axis_is_y(arm.convention, joint);
-    let (along, second_across) = if along_y { (My, Izz) } else { (Mz, Iyy) };
-    let revolute = joint.kind == JointKind::Revolute;
-    match parameter.kind {
-        M => 5,
-        Im => 4,
-        kind if revolute && kind == along => 3,
-        kind if revolute && kind == second_across => 2,
-        Ixx | Iyy | Izz => 1,
-        _ => 0,
+impl Preference {
+    /// The rule of Khalil and Dombre's regrouping, and its variants.
+    pub const ALL: [Preference; 4] = [
+        Preference { second_across: false, outer: false },
+        Preference { second_across: true, outer: false },
+        Preference { second_across: false, outer: true },
+        Preference { second_across: true, outer: true },
+    ];
+
+    /// All parameters that an arm keeps, those to be kept in a base set first.
+    ///
+    /// For a revolute joint, what can be carried to the link before goes last: the mass, the first moment along the joint
+    /// axis and one of the two inertias across it.
+    pub fn order(self, arm: &Arm) -> Vec<Parameter> {
+        let mut order = arm.kept_parameters();
+        let link = |p: &Parameter| if self.outer { arm.dof() - p.link } else { p.link };
+        order.sort_by_key(|p| (self.rank(arm, *p), link(p), p.kind));
+        order
+    }
+
+    fn rank(self, arm: &Arm, parameter: Parameter) -> u8 {
+        use ParameterKind::*;
+        let joint = &arm.joints[parameter.link];
+        let (along, across) =
+            if axis_is_y(arm.convention, joint) { (My, [Ixx, Izz]) } else { (Mz, [Ixx, Iyy]) };
+        let last_across = across[usize::from(!self.second_across)];
+        let revolute = joint.kind == JointKind::Revolute;
+        match parameter.kind {
+            M => 5,
+            Im => 4,
+            kind if revolute && kind == along => 3,
+            kind if revolute && kind == last_across => 2,
+            Ixx | Iyy | Izz => 1,
+            _ => 0,
+        }
+    }
+}
+
+impl fmt::Display for Preference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let across = if self.second_across { "second" } else { "first" };
+        let link = if self.outer { "outer" } else { "inner" };
+        write!(f, "{link} links, {across} inertia across the joint axis")
     }
 }
 

@@ -1,12 +1,13 @@
 //! The parameter sets of an arm and the exact relations between them.
 
 use super::coefficients::{LagrangianPolynomials, Sizes};
-use super::preference::preference;
+use super::choice::{self, Candidate};
+use super::preference::Preference;
 use super::published;
 use crate::arm::sum::sum_text;
 use crate::arm::{Arm, Parameter};
 use crate::exact::constant::{Constant, ConstantField};
-use crate::exact::elimination::{self, Dependence, Unproven};
+use crate::exact::elimination::{self, Dependence, SparseRow, Unproven};
 use crate::exact::prime::Draws;
 use crate::exact::symbols::AngleSymbols;
 use std::fmt;
@@ -119,6 +120,8 @@ pub struct Sets {
     pub sets: Vec<ParameterSet>,
     /// The dependence of the columns for the numbers in the file.
     pub minimal: Dependence,
+    /// The rules that were tried for the choice of the minimal set's columns.
+    pub candidates: Vec<Candidate>,
 }
 
 impl Sets {
@@ -130,12 +133,14 @@ impl Sets {
         // The values of general angles modulo the prime; any fixed seed keeps the choice reproducible.
         let field = ConstantField::new(symbols, &mut Draws::new(0x6479_6e67_656e));
         let lagrangian = LagrangianPolynomials::derive(arm, symbols);
-        let order: Vec<usize> = preference(arm).iter().map(|p| p.index()).collect();
         let columns = arm.dof() * 11;
-        let eliminate =
-            |sizes| elimination::dependence(&field, &lagrangian.rows(arm, &field, sizes), columns, &order);
-        let minimal = eliminate(Sizes::Numbers)?;
-        let symbolic = eliminate(Sizes::Variables)?;
+        let eliminate = |rows: &[SparseRow], preference: Preference| {
+            let order: Vec<usize> = preference.order(arm).iter().map(|p| p.index()).collect();
+            elimination::dependence(&field, rows, columns, &order)
+        };
+        let rows = lagrangian.rows(arm, &field, Sizes::Numbers);
+        let (minimal, candidates) = choice::cheapest(arm, symbols, &field, |p| eliminate(&rows, p))?;
+        let symbolic = eliminate(&lagrangian.rows(arm, &field, Sizes::Variables), Preference::ALL[0])?;
         let mut sets = vec![
             full_set(arm, &field),
             base_set(SetKind::Minimal, arm, &field, &minimal),
@@ -148,7 +153,7 @@ impl Sets {
             let (rank, relations) = relations(&field, &minimal, &set.parameters)?;
             (set.rank, set.relations) = (rank, relations);
         }
-        Ok(Sets { field, sets, minimal })
+        Ok(Sets { field, sets, minimal, candidates })
     }
 
     /// The set of that kind, if the arm has it.
@@ -186,7 +191,7 @@ fn full_set(arm: &Arm, field: &ConstantField) -> ParameterSet {
     unexamined(SetKind::Full, parameters)
 }
 
-fn base_set(kind: SetKind, arm: &Arm, field: &ConstantField, dependence: &Dependence) -> ParameterSet {
+pub(super) fn base_set(kind: SetKind, arm: &Arm, field: &ConstantField, dependence: &Dependence) -> ParameterSet {
     let all = arm.all_parameters();
     let mut parameters: Vec<SetParameter> = Vec::with_capacity(dependence.kept.len());
     for (position, kept) in dependence.kept.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! What each declared symmetry removed: the arm's file says that a parameter is zero, and this says what that saves.
 
 use super::coefficients::{LagrangianPolynomials, Sizes};
-use super::preference::preference;
+use super::preference::Preference;
 use super::sets::Combination;
 use crate::arm::{Arm, Parameter};
 use crate::exact::elimination::{self, SparseRow, Unproven};
@@ -38,7 +38,7 @@ pub fn symmetries(model: &Model) -> Result<Vec<Symmetry>, Unproven> {
     without.joints.iter_mut().for_each(|joint| joint.zero.clear());
     let lagrangian = LagrangianPolynomials::derive(&without, model.symbols());
     let rows = lagrangian.rows(arm, field, Sizes::Numbers);
-    let kept: Vec<usize> = preference(arm).iter().map(|p| p.index()).collect();
+    let kept: Vec<usize> = Preference::ALL[0].order(arm).iter().map(|p| p.index()).collect();
     let all = arm.all_parameters();
     let declared = all.iter().filter(|p| without.keeps(**p) && !arm.keeps(**p));
     declared

@@ -2,6 +2,7 @@
 
 use super::{Failure, model, print};
 use dyngen::arm::{Convention, JointKind};
+use dyngen::base::choice;
 use dyngen::base::sets::{Class, combination_text};
 use dyngen::base::symmetry::{self, Removed, Symmetry};
 use dyngen::base::{ParameterSet, SetKind};
@@ -58,6 +59,9 @@ fn json_text(model: &Model, operations: &[(Function, Operations)], symmetries: &
             (f.name().to_string(), json!({"mul": o.mul, "add": o.add, "div": o.div, "sin_cos": o.sin_cos}))
         })
         .collect();
+    let choice: Vec<Value> = (model.sets().candidates.iter())
+        .map(|c| json!({"rule": c.preference.to_string(), "operations": c.operations}))
+        .collect();
     json!({
         "arm": arm.name,
         "joints": arm.dof(),
@@ -67,6 +71,7 @@ fn json_text(model: &Model, operations: &[(Function, Operations)], symmetries: &
         "identifiable_alone": of_class(Class::Alone),
         "identifiable_in_combination": of_class(Class::InCombination),
         "operations": operations,
+        "choice": choice,
         "symmetries": symmetries.iter().map(|s| symmetry_json(model, s)).collect::<Vec<_>>(),
         "notes": arm.notes(),
     })
@@ -161,6 +166,17 @@ fn table(model: &Model, operations: &[(Function, Operations)], symmetries: &[Sym
     }
     for set in model.sets().sets.iter().filter(|s| s.kind != SetKind::Full) {
         set_table(&mut t, set);
+    }
+    let candidates = &model.sets().candidates;
+    if let Some(chosen) = choice::chosen(candidates) {
+        let counts: Vec<String> = candidates.iter().map(|c| c.operations.to_string()).collect();
+        let _ = writeln!(
+            t,
+            "\nminimal set's columns chosen by code: {} ({} rules cost {} operations in τ, Y, B, C and g)",
+            chosen.preference,
+            counts.len(),
+            counts.join(", ")
+        );
     }
     let _ = writeln!(t, "\noperations with the minimal set as arguments:");
     let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", "function", "mul", "add", "div", "sin_cos");
