@@ -62,7 +62,8 @@ fn a_wrong_result_anywhere_is_noticed() {
     let model = Model::derive(arm("arm")).unwrap();
     let set = model.set(SetKind::Minimal).unwrap();
     for function in Function::ALL {
-        let built = function::build(function, model.arm(), model.symbols(), set, &model.sets().field, None, PASSES);
+        let built =
+            function::build(function, model.arm(), model.symbols(), set, &model.sets().field, None, PASSES);
         let check = |f: &dyngen::dynamics::FunctionGraph| {
             prove(model.arm(), model.symbols(), model.sets(), set, f, None)
         };
@@ -127,6 +128,7 @@ fn a_constant_that_is_slightly_off_is_noticed() {
     let mut other = model.arm().clone();
     other.joints[3].d += dyngen::exact::rational::parse_rational("1e-30").unwrap();
     let set = model.set(SetKind::Full).unwrap();
-    let built = function::build(Function::Gravity, &other, model.symbols(), set, &model.sets().field, None, PASSES);
+    let built =
+        function::build(Function::Gravity, &other, model.symbols(), set, &model.sets().field, None, PASSES);
     assert!(prove(model.arm(), model.symbols(), model.sets(), set, &built, None).is_err());
 }

@@ -17,14 +17,18 @@ fn random<const N: usize>(rng: &mut ChaCha8Rng) -> SVector<f64, N> {
 #[test]
 fn lanes_are_the_samples() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let samples: [[SVector<f64, 7>; 3]; 4] = std::array::from_fn(|_| std::array::from_fn(|_| random(&mut rng)));
+    let samples: [[SVector<f64, 7>; 3]; 4] =
+        std::array::from_fn(|_| std::array::from_fn(|_| random(&mut rng)));
     let parameters: SVector<f64, { panda_minimal::PARAMETERS }> = random(&mut rng);
     let lanes = |k: usize| SVector::<AutoF64x4, 7>::from_fn(|i, _| AutoF64x4::from(samples.map(|s| s[k][i])));
     let (q, dq, ddq) = (lanes(0), lanes(1), lanes(2));
     let torques = panda_minimal::inverse_dynamics(&q, &dq, &ddq, &parameters.map(AutoF64x4::splat));
     let regressor = panda_minimal::regressor(&q, &dq, &ddq);
     for (lane, [q, dq, ddq]) in samples.iter().enumerate() {
-        assert_eq!(torques.map(|x| x.extract(lane)), panda_minimal::inverse_dynamics(q, dq, ddq, &parameters));
+        assert_eq!(
+            torques.map(|x| x.extract(lane)),
+            panda_minimal::inverse_dynamics(q, dq, ddq, &parameters)
+        );
         assert_eq!(regressor.map(|x| x.extract(lane)), panda_minimal::regressor(q, dq, ddq));
     }
 }

@@ -1,7 +1,7 @@
 //! The macros give the code of every other door: compiled here, called here, compared with the library.
 
 use dyngen::{Arm, Evaluator, Function, Model, SetKind};
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 mod slider {
     #![deny(warnings, missing_docs)]
@@ -93,4 +93,32 @@ fn a_table_in_place_is_an_arm() {
     assert_eq!(inline::PARAMETER_NAMES[0], "m1");
     assert!((inline::gravity(&SVector::from([0.0]), &parameters)[0] - 2.0 * 9.81).abs() < 1e-12);
     assert!(inline::gravity(&SVector::from([std::f64::consts::FRAC_PI_2]), &parameters)[0].abs() < 1e-12);
+}
+
+mod rubbing {
+    dyngen_macros::arm! {
+        file = "tests/arms/slider.toml",
+        functions = [gravity],
+        friction = ["viscous", "coulomb", "tanh:30:2"],
+    }
+}
+
+#[test]
+fn friction_is_the_sum_of_its_columns() {
+    let dq = SVector::from([-0.2, 0.0]);
+    let columns = rubbing::friction_columns(&dq);
+    let tanh = |x: f64| (x.exp() - (-x).exp()) / (x.exp() + (-x).exp());
+    let expected = [[-0.2, -1.0, tanh(-0.2 * 30.0)], [0.0; 3]];
+    for (i, row) in expected.iter().enumerate() {
+        for (k, value) in row.iter().enumerate() {
+            assert!((columns[(i, k)] - value).abs() < 1e-15, "{i} {k}: {}", columns[(i, k)]);
+        }
+    }
+    let coefficients = SMatrix::<f64, 2, 3>::from_row_slice(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    let torque = rubbing::friction(&dq, &coefficients);
+    assert!((torque[0] - (-0.2 - 2.0 + 3.0 * expected[0][2])).abs() < 1e-15);
+    assert_eq!(torque[1], 0.0);
+    // The second joint's own shape.
+    let moving = rubbing::friction_columns(&SVector::from([0.0, 0.5]));
+    assert!((moving[(1, 2)] - tanh(1.0)).abs() < 1e-15);
 }

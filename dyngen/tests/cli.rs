@@ -236,3 +236,68 @@ fn wrong_use_and_wrong_input_end_with_2_and_say_where() {
         }
     }
 }
+
+#[test]
+fn inspect_shows_what_each_pass_leaves() {
+    let out = dyngen(&["inspect", &arm(), "--function", "gravity", "--pass", "merge"]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    let listing = text(&out.stdout);
+    let cost = |pass: &str| -> Vec<usize> {
+        let line = listing.lines().find(|l| l.starts_with(&format!("# after {pass}: "))).unwrap();
+        line.split(|c: char| !c.is_ascii_digit()).filter_map(|n| n.parse().ok()).collect()
+    };
+    let (built, merged) = (cost("build"), cost("merge"));
+    assert!(merged[0] <= built[0] && merged[1] <= built[1], "{listing}");
+    // One line for each operation of the last graph, and one for each joint's torque that is not zero.
+    assert_eq!(listing.lines().filter(|l| l.starts_with('x')).count(), merged[0] + merged[1]);
+    assert_eq!(listing.lines().filter(|l| l.starts_with("result[")).count(), 4);
+    let wrong = dyngen(&["inspect", &arm(), "--function", "gravity", "--pass", "magic"]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(text(&wrong.stderr).contains("there are build, merge"), "{}", text(&wrong.stderr));
+}
+
+#[test]
+fn friction_terms_that_do_not_fit_are_refused() {
+    let target = file("friction.rs", "untouched");
+    let generate = |terms: &str| {
+        dyngen(&["generate", &arm(), "-o", &target, "--functions", "gravity", "--friction", terms])
+    };
+    for (terms, code, reason) in [
+        ("sticky", 2, "there are viscous, coulomb and tanh:SHAPE"),
+        ("tanh:fast", 2, "'fast' is no number"),
+        ("tanh:1:2", 1, "2 shapes for 6 joints"),
+        ("viscous,tanh:-3", 1, "the shape -3 is not greater than zero"),
+    ] {
+        let out = generate(terms);
+        assert_eq!(out.status.code(), Some(code), "{terms}: {}", text(&out.stderr));
+        assert!(text(&out.stderr).contains(reason), "{terms}: {}", text(&out.stderr));
+        assert_eq!(std::fs::read_to_string(&target).unwrap(), "untouched");
+    }
+    assert!(generate("viscous,coulomb,tanh:216").status.success());
+    let source = std::fs::read_to_string(&target).unwrap();
+    assert!(source.contains("pub fn friction_columns<") && source.contains("FRICTION_TERMS: usize = 3"));
+}
+
+/// Against the definition: a parameter that is declared zero is let in again, and the rank says what it was worth.
+#[test]
+fn describe_says_what_each_symmetry_removed() {
+    let rank = |path: &str| {
+        json(&dyngen(&["describe", path, "--json"]))["sets"]["minimal"]["rank"].as_u64().unwrap()
+    };
+    let toml = std::fs::read_to_string(arm()).unwrap();
+    let described = json(&dyngen(&["describe", &arm(), "--json"]));
+    let symmetries = described["symmetries"].as_array().unwrap();
+    assert_eq!(symmetries.len(), 22);
+    let grouping = toml.find("[[grouping]]").unwrap();
+    for (symmetry, zero, left) in [
+        ("mx1", "[\"mx\", \"mz\", \"Ixy\", \"Ixz\", \"Iyz\"]", "[\"mz\", \"Ixy\", \"Ixz\", \"Iyz\"]"),
+        ("my2", "[\"my\", \"Ixy\", \"Iyz\"]", "[\"Ixy\", \"Iyz\"]"),
+    ] {
+        assert!(toml.contains(zero));
+        let path = file(&format!("without_{symmetry}.toml"), &toml[..grouping].replacen(zero, left, 1));
+        let removed =
+            symmetries.iter().find(|s| s["parameter"] == symmetry).unwrap()["removed"].as_str().unwrap();
+        let expected = if removed == "base parameter" { 20 } else { 19 };
+        assert_eq!(rank(&path), expected, "{symmetry}: {removed}");
+    }
+}

@@ -1,7 +1,7 @@
 //! The parameter sets of an arm and the exact relations between them.
 
-use super::coefficients::{LagrangianPolynomials, Sizes};
 use super::choice::{self, Candidate};
+use super::coefficients::{LagrangianPolynomials, Sizes};
 use super::preference::Preference;
 use super::published;
 use crate::arm::sum::sum_text;
@@ -191,7 +191,12 @@ fn full_set(arm: &Arm, field: &ConstantField) -> ParameterSet {
     unexamined(SetKind::Full, parameters)
 }
 
-pub(super) fn base_set(kind: SetKind, arm: &Arm, field: &ConstantField, dependence: &Dependence) -> ParameterSet {
+pub(super) fn base_set(
+    kind: SetKind,
+    arm: &Arm,
+    field: &ConstantField,
+    dependence: &Dependence,
+) -> ParameterSet {
     let all = arm.all_parameters();
     let mut parameters: Vec<SetParameter> = Vec::with_capacity(dependence.kept.len());
     for (position, kept) in dependence.kept.iter().enumerate() {

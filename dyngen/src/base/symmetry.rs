@@ -45,10 +45,8 @@ pub fn symmetries(model: &Model) -> Result<Vec<Symmetry>, Unproven> {
         .map(|parameter| {
             let own = parameter.index();
             let takes_part = |column: &usize| *column == own || kept.contains(column);
-            let mut some: Vec<SparseRow> = rows
-                .iter()
-                .map(|row| row.iter().filter(|(c, _)| takes_part(c)).cloned().collect())
-                .collect();
+            let mut some: Vec<SparseRow> =
+                rows.iter().map(|row| row.iter().filter(|(c, _)| takes_part(c)).cloned().collect()).collect();
             some.retain(|row| !row.is_empty());
             // Last in the order: it is kept exactly where it depends on none of the others.
             let order: Vec<usize> = kept.iter().copied().chain([own]).collect();
