@@ -27,7 +27,7 @@ macro_rules! compare {
         let (q, dq, ddq, parameters) = (draw(SAMPLES * N), draw(SAMPLES * N), draw(SAMPLES * N), draw(P));
         let p = SVector::<f64, P>::from_column_slice(&parameters);
         let at = |x: &[f64], k: usize| SVector::<f64, N>::from_column_slice(&x[k * N..][..N]);
-        let mut row = |function: Function, compiled: &mut dyn FnMut(usize)| {
+        let row = |function: Function, compiled: &mut dyn FnMut(usize)| {
             let evaluator = Evaluator::new(&model, function, SetKind::Minimal).unwrap();
             let parameters: &[f64] = if function.takes(dyngen::dynamics::function::Argument::Parameters) {
                 &parameters

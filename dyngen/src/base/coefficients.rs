@@ -1,6 +1,6 @@
 //! The Lagrangian's exact coefficients: one row for each function of the motion, one column for each parameter.
 
-use crate::arm::{Arm, JointKind, Parameter};
+use crate::arm::{Arm, JointKind};
 use crate::dynamics::elements::{ArmElements, Source};
 use crate::dynamics::lagrangian::twice_lagrangian;
 use crate::exact::algebra::Algebra;
@@ -87,7 +87,7 @@ impl Source<Polynomial<i64>> for Variables<'_> {
 }
 
 impl LagrangianPolynomials {
-    /// Derives the Lagrangian of an arm, for the parameters that it keeps.
+    /// Derives the Lagrangian of an arm, for all its parameters whether declared zero or not.
     ///
     /// The angle of a revolute joint is q + theta: a constant shift of q changes no relation.
     pub fn derive(arm: &Arm, symbols: &AngleSymbols) -> Self {
@@ -121,26 +121,33 @@ impl LagrangianPolynomials {
         let elements = ArmElements::build(&ring, arm, symbols, &mut source);
         let all = arm.all_parameters();
         let columns = (all.into_iter().zip(twice_lagrangian(&ring, &elements)))
-            .filter(|(p, column)| arm.keeps(*p) && !ring.is_zero(column))
+            .filter(|(_, column)| !ring.is_zero(column))
             .map(|(p, column)| (p.index(), column))
             .collect();
         LagrangianPolynomials { variables, columns }
     }
 
     /// The rows: for each function of q and q̇ (and of the sizes, where they are variables) its coefficient in
-    /// every parameter's column. Constants, which change no torque, are left out; there are no total time
+    /// the columns of the parameters that the arm keeps. Constants, which change no torque, are left out; there are no total time
     /// derivatives, because every other term is of degree 0 or 2 in the speeds.
     pub fn rows(&self, arm: &Arm, field: &ConstantField, sizes: Sizes) -> Vec<SparseRow> {
         let mut rows: BTreeMap<Monomial, BTreeMap<usize, Numerator>> = BTreeMap::new();
-        for (column, polynomial) in &self.columns {
+        // The same products of constants stand before many functions.
+        let mut products: BTreeMap<Monomial, Numerator> = BTreeMap::new();
+        let ring = field.ring();
+        let all = arm.all_parameters();
+        for (column, polynomial) in self.columns.iter().filter(|(c, _)| arm.keeps(all[*c])) {
             for (monomial, coefficient) in polynomial.terms() {
-                let (function, factor) = self.split(arm, field, sizes, monomial, *coefficient);
+                let (function, constants) = self.split(sizes, monomial);
                 if self.is_constant(&function) {
                     continue;
                 }
+                let product =
+                    products.entry(constants).or_insert_with(|| self.product(arm, field, &constants));
+                let term = ring.mul(&ring.integer(*coefficient), product);
                 let entry = rows.entry(function).or_default().entry(*column);
-                let sum = entry.or_insert_with(|| field.ring().integer(0));
-                *sum = field.ring().add(sum, &factor);
+                let sum = entry.or_insert_with(|| ring.integer(0));
+                *sum = ring.add(sum, &term);
             }
         }
         let nonzero = |row: BTreeMap<usize, Numerator>| -> SparseRow {
@@ -160,44 +167,42 @@ impl LagrangianPolynomials {
         })
     }
 
-    /// Splits a term into the function it multiplies and its constant coefficient.
-    fn split(
-        &self,
-        arm: &Arm,
-        field: &ConstantField,
-        sizes: Sizes,
-        monomial: &Monomial,
-        coefficient: i64,
-    ) -> (Monomial, Numerator) {
-        let mut function = *monomial;
-        let mut factor = field.ring().integer(coefficient);
+    /// Splits a monomial into the function it is and the constants that it multiplies.
+    fn split(&self, sizes: Sizes, monomial: &Monomial) -> (Monomial, Monomial) {
+        let (mut function, mut constants) = (*monomial, Monomial::default());
         for (v, exponent) in monomial.powers() {
-            let number = |value: &Rational| field.ring().constant(value.clone());
+            let constant = match self.variables[v] {
+                Variable::Gravity(_) | Variable::Symbol(..) => true,
+                Variable::A(_) | Variable::D(_) | Variable::Ratio(_) => sizes == Sizes::Numbers,
+                _ => false,
+            };
+            if constant {
+                function = function.with(v, 0);
+                constants = constants.with(v, exponent);
+            }
+        }
+        (function, constants)
+    }
+
+    /// The value of a product of constants. A column with a ratio exists only where its joint has a rotor.
+    fn product(&self, arm: &Arm, field: &ConstantField, constants: &Monomial) -> Numerator {
+        let ring = field.ring();
+        let mut product = ring.integer(1);
+        for (v, exponent) in constants.powers() {
+            let number = |value: &Rational| ring.constant(value.clone());
             let value = match self.variables[v] {
                 Variable::Gravity(axis) => number(&arm.gravity[axis]),
                 Variable::Symbol(index, sine) => field.symbol(index, sine).clone(),
-                Variable::A(i) if sizes == Sizes::Numbers => number(&arm.joints[i].a),
-                Variable::D(i) if sizes == Sizes::Numbers => number(&arm.joints[i].d),
-                Variable::Ratio(i) if sizes == Sizes::Numbers => match &arm.joints[i].rotor_ratio {
-                    Some(ratio) => number(ratio),
-                    None => continue,
-                },
+                Variable::A(i) => number(&arm.joints[i].a),
+                Variable::D(i) => number(&arm.joints[i].d),
+                Variable::Ratio(i) => arm.joints[i].rotor_ratio.as_ref().map_or(ring.integer(1), number),
                 _ => continue,
             };
-            function = function.with(v, 0);
             for _ in 0..exponent {
-                factor = field.ring().mul(&factor, &value);
+                product = ring.mul(&product, &value);
             }
         }
-        (function, factor)
-    }
-
-    /// The parameters whose columns are not zero.
-    pub fn parameters(&self) -> impl Iterator<Item = Parameter> + '_ {
-        self.columns.iter().map(|(index, _)| Parameter {
-            link: index / 11,
-            kind: crate::arm::ParameterKind::ALL[index % 11],
-        })
+        product
     }
 }
 

@@ -120,6 +120,8 @@ pub struct Sets {
     pub sets: Vec<ParameterSet>,
     /// The dependence of the columns for the numbers in the file.
     pub minimal: Dependence,
+    /// The Lagrangian of all the arm's parameters, those declared zero too.
+    pub(super) lagrangian: LagrangianPolynomials,
     /// The rules that were tried for the choice of the minimal set's columns.
     pub candidates: Vec<Candidate>,
 }
@@ -153,7 +155,7 @@ impl Sets {
             let (rank, relations) = relations(&field, &minimal, &set.parameters)?;
             (set.rank, set.relations) = (rank, relations);
         }
-        Ok(Sets { field, sets, minimal, candidates })
+        Ok(Sets { field, sets, minimal, lagrangian, candidates })
     }
 
     /// The set of that kind, if the arm has it.

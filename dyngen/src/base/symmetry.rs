@@ -1,6 +1,6 @@
 //! What each declared symmetry removed: the arm's file says that a parameter is zero, and this says what that saves.
 
-use super::coefficients::{LagrangianPolynomials, Sizes};
+use super::coefficients::Sizes;
 use super::preference::Preference;
 use super::sets::Combination;
 use crate::arm::{Arm, Parameter};
@@ -36,8 +36,7 @@ pub fn symmetries(model: &Model) -> Result<Vec<Symmetry>, Unproven> {
     let field = &model.sets().field;
     let mut without: Arm = arm.clone();
     without.joints.iter_mut().for_each(|joint| joint.zero.clear());
-    let lagrangian = LagrangianPolynomials::derive(&without, model.symbols());
-    let rows = lagrangian.rows(arm, field, Sizes::Numbers);
+    let rows = model.sets().lagrangian.rows(&without, field, Sizes::Numbers);
     let kept: Vec<usize> = Preference::ALL[0].order(arm).iter().map(|p| p.index()).collect();
     let all = arm.all_parameters();
     let declared = all.iter().filter(|p| without.keeps(**p) && !arm.keeps(**p));
