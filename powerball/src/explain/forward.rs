@@ -368,7 +368,7 @@ impl Session<'_> {
             for member in &mut members {
                 if member.trial.score < rule::LEAST_SCORE {
                     member.refusal = Some(format!("explains too little (score {:.1})", member.trial.score));
-                } else if let Some(name) = self.mends(e, member) {
+                } else if let Some(name) = self.mends(screen, e, member) {
                     member.refusal = Some(format!("only mends the law of {name}"));
                 }
             }
@@ -399,17 +399,28 @@ impl Session<'_> {
             }
     }
 
-    /// The accepted effect of which a member would only mend the law.
-    fn mends(&self, effect: usize, member: &Member) -> Option<&'static str> {
+    /// The accepted effect of which a member would only mend the law: on the joints where no accepted effect is large
+    /// beside it, it would not count.
+    fn mends(&self, screen: &Screen<'_>, effect: usize, member: &Member) -> Option<&'static str> {
         let class = self.effects[effect].class();
-        let own = |j: usize| member.trial.gain / self.fit.weights[j].max(f64::MIN_POSITIVE);
-        let mends = |a: &&Accepted| {
-            let alike = self.effects[a.effect].class() == class && a.effect != effect;
-            let share = if alike { rule::MENDS_ONLY } else { rule::MENDS_ANY };
-            let most = |j: &usize| a.explained.get(*j).is_some_and(|e| own(*j) < share * e);
-            a.candidate.windows.is_empty() && member.candidate.joints.iter().all(most)
-        };
-        self.accepted.iter().find(mends).map(|a| self.effects[a.effect].name())
+        // An event mends nothing that lasts.
+        let lasting: Vec<&Accepted> =
+            self.accepted.iter().filter(|a| a.candidate.windows.is_empty()).collect();
+        let mut mended = None;
+        let mut rest = 0.0;
+        for (j, gain) in screen.gains(&member.trial, &member.candidate.joints) {
+            let small = lasting.iter().find(|a| {
+                let alike = self.effects[a.effect].class() == class && a.effect != effect;
+                let share = if alike { rule::MENDS_ONLY } else { rule::MENDS_ANY };
+                let explained = a.explained.get(j).copied().unwrap_or(0.0);
+                gain < share * explained * self.fit.weights[j]
+            });
+            match small {
+                Some(a) => mended = Some(self.effects[a.effect].name()),
+                None => rest += gain.max(0.0),
+            }
+        }
+        mended.filter(|_| rest < rule::LEAST_SCORE)
     }
 
     fn test(

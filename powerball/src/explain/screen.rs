@@ -116,6 +116,24 @@ impl<'c> Screen<'c> {
         gain.is_finite().then_some(Trial { columns, theta, base, gain, score })
     }
 
+    /// The gain by joint: on the only joint all of it, else where the squared error falls.
+    #[must_use]
+    pub(super) fn gains(&self, trial: &Trial, joints: &[usize]) -> Vec<(usize, f64)> {
+        if let [joint] = joints {
+            return vec![(*joint, trial.gain)];
+        }
+        let columns = self.residualised(trial);
+        let fall = |j: usize| {
+            let mut moved = vec![0.0; self.context.residual[j].len()];
+            for (column, theta) in columns[j].iter().zip(&trial.theta) {
+                moved.iter_mut().zip(column).for_each(|(m, c)| *m += theta * c);
+            }
+            let change = 2.0 * dot(&self.context.residual[j], &moved) - dot(&moved, &moved);
+            self.context.fit.weights[j] * change
+        };
+        joints.iter().map(|j| (*j, fall(*j))).collect()
+    }
+
     /// The columns with the base's shares taken out, by joint and column.
     #[must_use]
     pub(super) fn residualised(&self, trial: &Trial) -> Vec<Vec<Vec<f64>>> {
