@@ -9,6 +9,18 @@ pub fn f_tail(x: f64, d1: f64, d2: f64) -> f64 {
     incomplete_beta(d2 / (d2 + d1 * x), d2 / 2.0, d1 / 2.0)
 }
 
+/// The 97.5 % quantile of Student's t with `d` degrees of freedom: half the width of a 95 % interval in standard errors.
+#[must_use]
+pub fn t_quantile_975(d: f64) -> f64 {
+    // t² is distributed as F with 1 and d degrees of freedom.
+    let (mut low, mut high) = (1.9, 1000.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if f_tail(middle * middle, 1.0, d) > 0.05 { low = middle } else { high = middle }
+    }
+    high
+}
+
 /// The regularised incomplete beta function I_x(a, b), by its continued fraction (modified Lentz).
 fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
     if x <= 0.0 {
@@ -75,6 +87,11 @@ mod tests {
             (250.0, 1.0, 200.0, 4.55578454531192e-37),
         ] {
             approx::assert_relative_eq!(f_tail(x, d1, d2), p, max_relative = 1e-8);
+        }
+        // scipy.stats.t.ppf(0.975, d)
+        for (d, t) in [(1.0, 12.7062047364), (4.0, 2.7764451052), (30.0, 2.0422724563), (200.0, 1.9718962236)]
+        {
+            approx::assert_relative_eq!(t_quantile_975(d), t, max_relative = 1e-8);
         }
         assert_eq!(f_tail(-1.0, 1.0, 5.0), 1.0);
         assert_eq!(f_tail(f64::NAN, 1.0, 5.0), 1.0);

@@ -12,4 +12,4 @@ pub use design::{Design, Gram, runs};
 pub use fit::{Fit, Term, fit, friction_columns};
 pub use folds::Folds;
 pub use identify::{Identified, JointFriction, ParameterEstimate, Spread, identify, spread};
-pub use solve::Solver;
+pub use solve::{Solver, bounded};

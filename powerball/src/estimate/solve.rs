@@ -112,7 +112,7 @@ impl Solver {
 ///
 /// Returns the solution and the factor over the columns that are free.
 #[must_use]
-pub(super) fn bounded(
+pub fn bounded(
     gram: &Mat<f64>,
     right: &[f64],
     wanted: impl Fn(usize) -> bool,
