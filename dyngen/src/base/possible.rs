@@ -146,10 +146,8 @@ fn impossible_links(arm: &Arm, set: &ParameterSet, values: &[f64]) -> Vec<String
         if let Some(rotor) = of(ParameterKind::Im).filter(|im| *im < 0.0) {
             reasons.push(format!("rotor {}: its inertia {rotor} is negative", link + 1));
         }
-        let Some(v) = ParameterKind::ALL[..10].iter().map(|kind| of(*kind)).collect::<Option<Vec<f64>>>()
-        else {
-            continue;
-        };
+        let given: Option<Vec<f64>> = ParameterKind::ALL[..10].iter().map(|kind| of(*kind)).collect();
+        let Some(v) = given.and_then(|v| <[f64; 10]>::try_from(v).ok()) else { continue };
         let smallest = pseudo_inertia(&v).symmetric_eigenvalues().min();
         let scale = v.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         if smallest < -ROUNDING * scale {
@@ -159,14 +157,16 @@ fn impossible_links(arm: &Arm, set: &ParameterSet, values: &[f64]) -> Vec<String
     reasons
 }
 
-/// [Σ s; sᵀ m] with the second moments Σ = ½ tr(I) − I.
-fn pseudo_inertia(v: &[f64]) -> Matrix4<f64> {
-    let [m, mx, my, mz, xx, xy, xz, yy, yz, zz] = std::array::from_fn(|i| v[i]);
+/// The pseudo-inertia of a link from its ten inertial parameters, in order: [Σ s; sᵀ m] with the second moments Σ = ½ tr(I) − I.
+/// A body can have them exactly where it is positive semi-definite.
+#[must_use]
+pub fn pseudo_inertia(v: &[f64; 10]) -> Matrix4<f64> {
+    let [m, mx, my, mz, xx, xy, xz, yy, yz, zz] = *v;
     let half = 0.5 * (xx + yy + zz);
     Matrix4::new(half - xx, xy, xz, mx, xy, half - yy, yz, my, xz, yz, half - zz, mz, mx, my, mz, m)
 }
 
-fn why_no_body(v: &[f64], smallest: f64) -> String {
+fn why_no_body(v: &[f64; 10], smallest: f64) -> String {
     let (xx, yy, zz) = (v[4], v[7], v[9]);
     let triangle = [("Ixx", xx, yy + zz), ("Iyy", yy, xx + zz), ("Izz", zz, xx + yy)];
     if v[0] < 0.0 {

@@ -4,7 +4,9 @@ use super::Failure;
 use super::identify_page::page;
 use super::inputs::{Inputs, load};
 use super::output::{self, Progress};
-use crate::estimate::{Folds, JointFriction, ParameterEstimate, Spread, fit, identify, spread};
+use crate::estimate::{
+    ConsistentReport, Folds, JointFriction, ParameterEstimate, Spread, consistent_fit, fit, identify, spread,
+};
 use crate::explain::curves;
 use crate::regression::{Data, DataOptions};
 use clap::Args;
@@ -13,7 +15,8 @@ use std::path::PathBuf;
 
 /// Fit the minimal inertial set and the friction of every joint (Eq. 16) to logs.
 ///
-/// Writes identified.json and report.html.
+/// Writes identified.json and report.html, and consistent.json: the nearest parameters that a real arm can have, as values
+/// for `dyngen generate --values`.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Example:\n  powerball identify --arm arm.toml --log a.csv b.csv --validate c.csv --out result"
@@ -36,6 +39,7 @@ pub(super) struct Identification {
     pub fit: Spread,
     pub validate: Option<Spread>,
     pub physically_consistent: bool,
+    pub consistent: ConsistentReport,
     pub band: [f64; 2],
     pub warnings: Vec<String>,
 }
@@ -76,6 +80,10 @@ impl Identify {
         let values: Vec<f64> = identified.parameters.iter().map(|p| p.value).collect();
         let reasons = loaded.body.impossible(&values).map_err(|e| Failure::Refused(e.to_string()))?;
         warnings.extend(reasons.iter().map(|r| format!("no real arm can have these values: {r}")));
+        progress.say("looking for the nearest real arm");
+        let consistent = consistent_fit(&data, &fitted)
+            .map_err(|e| Failure::Refused(e.to_string()))?
+            .report(&data, &fitted);
         let result = Identification {
             arm: loaded.body.arm().name.clone(),
             set: "minimal",
@@ -84,11 +92,15 @@ impl Identify {
             fit: spread(&data, &fitted.residual),
             validate,
             physically_consistent: reasons.is_empty(),
+            consistent,
             band: [0.0, data.band.cutoff],
             warnings,
         };
         let text = output::json(&result)?;
         output::write(&self.inputs.out, "identified.json", text.as_bytes())?;
+        let values: serde_json::Map<String, serde_json::Value> =
+            result.consistent.parameters.iter().map(|(name, value)| (name.clone(), (*value).into())).collect();
+        output::write(&self.inputs.out, "consistent.json", output::json(&values)?.as_bytes())?;
         let page = page(&result, &shown, result.validate.is_some());
         output::write(&self.inputs.out, "report.html", page.to_html().as_bytes())?;
         if self.inputs.json {

@@ -1,5 +1,7 @@
 //! Weighted least squares in the minimal set, friction shapes included, with honest standard errors.
 
+mod consistent;
+mod consistent_fit;
 mod design;
 pub mod distribution;
 mod fit;
@@ -8,6 +10,8 @@ mod friction_shape;
 mod identify;
 mod solve;
 
+pub use consistent::{Consistent, nearest};
+pub use consistent_fit::{ConsistentFit, ConsistentReport, consistent_fit};
 pub use design::{Design, Gram, runs};
 pub use fit::{Fit, Term, fit, friction_columns};
 pub use folds::Folds;

@@ -71,6 +71,12 @@ impl RigidBody {
         self.model.arm()
     }
 
+    /// The arm with its parameter sets.
+    #[must_use]
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
     /// Joints.
     #[must_use]
     pub fn dof(&self) -> usize {
