@@ -55,12 +55,7 @@ struct Link {
 ///
 /// # Errors
 /// As [`Model::set`].
-pub fn nearest(
-    model: &Model,
-    kind: SetKind,
-    values: &[f64],
-    metric: &Mat<f64>,
-) -> Result<Consistent, Error> {
+pub fn nearest(model: &Model, kind: SetKind, values: &[f64], metric: &Mat<f64>) -> Result<Consistent, Error> {
     let arm = model.arm();
     let set = model.set(kind)?;
     let kept: Vec<Parameter> = arm.kept_parameters();
@@ -73,12 +68,8 @@ pub fn nearest(
             }
         }
     }
-    let mut problem = Problem {
-        curvature: sums.transpose() * metric * &sums,
-        sums,
-        links: Vec::new(),
-        rotors: Vec::new(),
-    };
+    let mut problem =
+        Problem { curvature: sums.transpose() * metric * &sums, sums, links: Vec::new(), rotors: Vec::new() };
     let mut x = vec![0.0; kept.len()];
     let mut without_body = Vec::new();
     for link in 0..arm.dof() {

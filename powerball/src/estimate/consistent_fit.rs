@@ -62,11 +62,9 @@ pub fn consistent_fit(data: &Data<'_>, fit: &Fit) -> Result<ConsistentFit, Error
     let rest: Vec<f64> = (0..design.size)
         .map(|c| right[c] - (0..p).map(|k| gram[(c, k)] * consistent.set[k]).sum::<f64>())
         .collect();
-    let levels: Vec<usize> =
-        (0..data.dof()).flat_map(|j| [0, 1, 2].map(|k| design.friction(j, k))).collect();
-    let tangent = |c: usize| {
-        (0..data.dof()).any(|j| c == design.friction(j, 3) || c == design.friction(j, 4))
-    };
+    let levels: Vec<usize> = (0..data.dof()).flat_map(|j| [0, 1, 2].map(|k| design.friction(j, k))).collect();
+    let tangent =
+        |c: usize| (0..data.dof()).any(|j| c == design.friction(j, 3) || c == design.friction(j, 4));
     let (mut theta, _) = bounded(&gram, &rest, |c| c >= p && !tangent(c), &levels);
     theta[..p].copy_from_slice(&consistent.set);
     Ok(ConsistentFit { consistent, theta })
@@ -99,7 +97,12 @@ impl ConsistentFit {
                     [level(0), g2, level(1), g4, level(2)]
                 })
                 .collect(),
-            cost: error.rms.iter().zip(&free.rms).map(|(a, b)| if *b > 0.0 { a / b - 1.0 } else { 0.0 }).collect(),
+            cost: error
+                .rms
+                .iter()
+                .zip(&free.rms)
+                .map(|(a, b)| if *b > 0.0 { a / b - 1.0 } else { 0.0 })
+                .collect(),
             fit: error,
             distance: self.consistent.distance,
             gap: self.consistent.gap,

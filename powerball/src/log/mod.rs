@@ -2,6 +2,7 @@
 
 mod check;
 mod clock;
+mod columnar;
 mod read;
 
 pub use clock::common_clock;

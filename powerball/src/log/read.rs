@@ -1,4 +1,4 @@
-//! CSV with a header line, found by its column names.
+//! Logs found by their column names, from CSV with a header line or from Parquet.
 
 use super::check::{self, Raw};
 use super::{Finding, Log, LogError};
@@ -41,13 +41,16 @@ pub fn read_log(path: &Path, arm: &Arm, findings: &mut Vec<Finding>) -> Result<L
     parse(&bytes, &file, arm, findings)
 }
 
-/// Reads a log from the bytes of a CSV file.
+/// Reads a log from the bytes of a file: Parquet by its mark, CSV else.
 pub(super) fn parse(
     bytes: &[u8],
     file: &str,
     arm: &Arm,
     findings: &mut Vec<Finding>,
 ) -> Result<Log, LogError> {
+    if bytes.starts_with(b"PAR1") {
+        return super::columnar::parse(bytes, file, arm, findings);
+    }
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let error = |line: Option<usize>, quantity: &str, message: String| Finding {
         file: file.to_string(),
@@ -61,10 +64,7 @@ pub(super) fn parse(
         .map_err(|e| LogError(vec![error(Some(1), "header", format!("cannot be read: {e}"))]))?
         .clone();
     let names: Vec<String> = header.iter().map(|h| String::from_utf8_lossy(h).into_owned()).collect();
-    let columns = Columns::find(&names, arm, file, findings)?;
-
-    let mut raw = Raw::new(arm.dof(), columns.temperature.is_some());
-    let (mut bad, mut first_bad, mut total) = (0usize, None, 0usize);
+    let mut samples = Samples::new(Columns::find(&names, arm, file, findings)?, arm);
     let mut record = csv::ByteRecord::new();
     let mut last_torn = false;
     loop {
@@ -78,36 +78,71 @@ pub(super) fn parse(
             }
         }
         let line = record.position().map_or(line, |p| p.line() as usize);
-        total += 1;
         last_torn = record.len() != names.len();
-        let sample = if last_torn { None } else { columns.sample(&record) };
-        match sample {
-            Some(values) => raw.push(line, &values),
-            None => {
-                bad += 1;
-                first_bad.get_or_insert((line, columns.culprit(&record, &names)));
-            }
-        }
+        samples.take(line, &names, |k| {
+            // A torn line's last number may be cut off too.
+            let field = record.get(k).filter(|_| !last_torn)?;
+            std::str::from_utf8(field).ok()?.parse().ok()
+        });
     }
-    if last_torn && total > 0 {
+    if last_torn && samples.total > 0 {
         let message =
             "the last line is torn (fewer or more fields than the header); it was left out".to_string();
         findings.push(error(None, "last line", message));
-        bad -= 1;
+        samples.bad -= 1;
     }
-    if let Some((line, culprit)) = first_bad.filter(|_| bad > 0) {
-        let message = format!(
-            "{bad} of {total} lines hold no finite number in every needed column (the first is this one) and were left out; short holes are filled by interpolation, long ones split the log"
-        );
-        if bad as f64 > MOST_BAD_LINES * total as f64 {
-            let message = format!(
-                "{bad} of {total} lines hold no finite number in every needed column: record the log again or leave it out"
-            );
-            return Err(LogError(vec![error(Some(line), &culprit, message)]));
+    samples.finish(file, arm, findings)
+}
+
+/// The samples of a log while it is read, and how many of its lines are none.
+pub(super) struct Samples {
+    columns: Columns,
+    raw: Raw,
+    total: usize,
+    bad: usize,
+    first_bad: Option<(usize, String)>,
+}
+
+impl Samples {
+    pub(super) fn new(columns: Columns, arm: &Arm) -> Samples {
+        let raw = Raw::new(arm.dof(), columns.temperature.is_some());
+        Samples { columns, raw, total: 0, bad: 0, first_bad: None }
+    }
+
+    /// Takes a line; `field` gives the number in a column, where there is one.
+    pub(super) fn take(&mut self, line: usize, names: &[String], field: impl Fn(usize) -> Option<f64>) {
+        let field = |k: usize| field(k).filter(|v: &f64| v.is_finite());
+        self.total += 1;
+        match self.columns.sample(&field) {
+            Some(values) => self.raw.push(line, &values),
+            None => {
+                self.bad += 1;
+                self.first_bad.get_or_insert_with(|| (line, self.columns.culprit(&field, names)));
+            }
         }
-        findings.push(error(Some(line), &culprit, message));
     }
-    check::into_log(raw, &columns.effort, file, arm, findings)
+
+    /// The log of what was taken.
+    pub(super) fn finish(self, file: &str, arm: &Arm, findings: &mut Vec<Finding>) -> Result<Log, LogError> {
+        let (bad, total) = (self.bad, self.total);
+        if let Some((line, culprit)) = self.first_bad.filter(|_| bad > 0) {
+            let finding = |message: String| Finding {
+                file: file.to_string(),
+                line: Some(line),
+                quantity: culprit.clone(),
+                message,
+            };
+            if bad as f64 > MOST_BAD_LINES * total as f64 {
+                return Err(LogError(vec![finding(format!(
+                    "{bad} of {total} lines hold no finite number in every needed column: record the log again or leave it out"
+                ))]));
+            }
+            findings.push(finding(format!(
+                "{bad} of {total} lines hold no finite number in every needed column (the first is this one) and were left out; short holes are filled by interpolation, long ones split the log"
+            )));
+        }
+        check::into_log(self.raw, &self.columns.effort, file, arm, findings)
+    }
 }
 
 /// What the effort columns hold.
@@ -118,7 +153,7 @@ pub(super) enum Effort {
     Current(Vec<f64>),
 }
 
-struct Columns {
+pub(super) struct Columns {
     t: usize,
     q: Vec<usize>,
     effort_at: Vec<usize>,
@@ -129,7 +164,7 @@ struct Columns {
 }
 
 impl Columns {
-    fn find(
+    pub(super) fn find(
         names: &[String],
         arm: &Arm,
         file: &str,
@@ -214,10 +249,7 @@ impl Columns {
     }
 
     /// t, q, effort, temperature, dq in a row; a temperature or dq that is no number does not spoil the sample.
-    fn sample(&self, record: &csv::ByteRecord) -> Option<Vec<f64>> {
-        let number = |k: usize| -> Option<f64> {
-            std::str::from_utf8(record.get(k)?).ok()?.parse::<f64>().ok().filter(|v| v.is_finite())
-        };
+    fn sample(&self, number: &impl Fn(usize) -> Option<f64>) -> Option<Vec<f64>> {
         let mut values = vec![number(self.t)?];
         for &k in self.q.iter().chain(&self.effort_at) {
             values.push(number(k)?);
@@ -230,15 +262,12 @@ impl Columns {
         Some(values)
     }
 
-    /// The first needed column of a record that holds no number.
-    fn culprit(&self, record: &csv::ByteRecord, names: &[String]) -> String {
+    /// The first needed column that holds no number.
+    fn culprit(&self, number: &impl Fn(usize) -> Option<f64>, names: &[String]) -> String {
         std::iter::once(&self.t)
             .chain(&self.q)
             .chain(&self.effort_at)
-            .find(|k| {
-                let text = record.get(**k).and_then(|f| std::str::from_utf8(f).ok());
-                !text.and_then(|f| f.parse::<f64>().ok()).is_some_and(f64::is_finite)
-            })
+            .find(|k| number(**k).is_none())
             .and_then(|k| names.get(*k).cloned())
             .unwrap_or_else(|| "line".into())
     }
