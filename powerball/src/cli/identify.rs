@@ -98,13 +98,8 @@ impl Identify {
         };
         let text = output::json(&result)?;
         output::write(&self.inputs.out, "identified.json", text.as_bytes())?;
-        let values: serde_json::Map<String, serde_json::Value> = result
-            .consistent
-            .parameters
-            .iter()
-            .map(|(name, value)| (name.clone(), (*value).into()))
-            .collect();
-        output::write(&self.inputs.out, "consistent.json", output::json(&values)?.as_bytes())?;
+        let values = output::json(&result.consistent.parameters)?;
+        output::write(&self.inputs.out, "consistent.json", values.as_bytes())?;
         let page = page(&result, &shown, result.validate.is_some());
         output::write(&self.inputs.out, "report.html", page.to_html().as_bytes())?;
         if self.inputs.json {

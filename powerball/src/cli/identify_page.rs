@@ -30,24 +30,7 @@ pub(super) fn page(result: &Identification, curves: &[TorqueCurve], held_out: bo
     page.table(&table);
     page.heading(if held_out { "Torques on the held-out logs" } else { "Torques on the fitted logs" });
     for (joint, curve) in curves.iter().enumerate().filter(|(_, c)| !c.t.is_empty()) {
-        let torque = Panel::new("torque [N·m]")
-            .line("measured", Ink::Blue, curve.points(|k| curve.measured[k]))
-            .series(Series::line(
-                "predicted",
-                Ink::Orange,
-                curve.points(|k| curve.measured[k] - curve.after[k]),
-            ));
-        let error = Panel::new("error [N·m]").height(0.75).line(
-            "measured − predicted",
-            Ink::Grey,
-            curve.points(|k| curve.after[k]),
-        );
-        page.figure(
-            &Figure::new(format!("Joint {}", joint + 1), "time along the logs [s]")
-                .panel(torque)
-                .panel(error),
-            "",
-        );
+        page.figure(&torque_figure(joint, curve), "");
     }
     page.heading("Inertial parameters");
     let mut table = Table::new(["parameter", "value (SI units)", "standard error", "relative"]);
@@ -79,4 +62,17 @@ pub(super) fn page(result: &Identification, curves: &[TorqueCurve], held_out: bo
         page.table(&table);
     }
     page
+}
+
+/// Measured against predicted torque of a joint, and the error below.
+pub(super) fn torque_figure(joint: usize, curve: &TorqueCurve) -> Figure {
+    let torque = Panel::new("torque [N·m]")
+        .line("measured", Ink::Blue, curve.points(|k| curve.measured[k]))
+        .series(Series::line("predicted", Ink::Orange, curve.points(|k| curve.measured[k] - curve.after[k])));
+    let error = Panel::new("error [N·m]").height(0.75).line(
+        "measured − predicted",
+        Ink::Grey,
+        curve.points(|k| curve.after[k]),
+    );
+    Figure::new(format!("Joint {}", joint + 1), "time along the logs [s]").panel(torque).panel(error)
 }

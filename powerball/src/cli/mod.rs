@@ -7,6 +7,7 @@ mod identify;
 mod identify_page;
 mod inputs;
 mod output;
+mod verify;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -27,6 +28,8 @@ enum Command {
     Excite(excite::Excite),
     /// Fit the minimal inertial set and the friction of every joint to logs.
     Identify(identify::Identify),
+    /// Judge an identified model on logs that it has not seen.
+    Verify(verify::Verify),
     /// Find, name and add what the model lacks on logs; judged on another path.
     Explain(explain::Explain),
 }
@@ -49,6 +52,7 @@ pub fn main() -> ExitCode {
         Command::Demo(command) => command.run(),
         Command::Excite(command) => command.run(),
         Command::Identify(command) => command.run(),
+        Command::Verify(command) => command.run(),
         Command::Explain(command) => command.run(),
     };
     match done {

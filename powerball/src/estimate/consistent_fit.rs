@@ -8,6 +8,7 @@ use crate::regression::Data;
 use dyngen::{Error, SetKind};
 use faer::Mat;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// A physically consistent fit.
 #[derive(Debug)]
@@ -22,7 +23,7 @@ pub struct ConsistentFit {
 #[derive(Clone, Debug, Serialize)]
 pub struct ConsistentReport {
     /// Every parameter of the arm: a body for each link.
-    pub parameters: Vec<(String, f64)>,
+    pub parameters: BTreeMap<String, f64>,
     /// γ1 … γ5 by joint.
     pub friction: Vec<[f64; 5]>,
     /// Error of the fit.

@@ -8,7 +8,9 @@ mod fit;
 mod folds;
 mod friction_shape;
 mod identify;
+mod noise;
 mod solve;
+mod verify;
 
 pub use consistent::{Consistent, nearest};
 pub use consistent_fit::{ConsistentFit, ConsistentReport, consistent_fit};
@@ -16,4 +18,6 @@ pub use design::{Design, Gram, runs};
 pub use fit::{Fit, Term, fit, friction_columns};
 pub use folds::Folds;
 pub use identify::{Identified, JointFriction, ParameterEstimate, Spread, identify, spread};
+pub use noise::noise_floor;
 pub use solve::{Solver, bounded};
+pub use verify::{JointVerdict, TorqueModel};

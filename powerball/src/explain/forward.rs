@@ -2,7 +2,7 @@
 
 use super::curves::curves;
 use super::evidence::{Evidence, Extent, Path, evidence};
-use super::leftover::{depends_on, effective_samples, leftover, noise_floor};
+use super::leftover::{depends_on, effective_samples, leftover};
 use super::naming::{Comparison, compare};
 use super::other_path::payload_on;
 use super::placebo::placebos;
@@ -10,7 +10,7 @@ use super::result::{Errors, Explained, FalsePositives, NamedEffect, Rival, Unatt
 use super::rule;
 use super::screen::{Screen, Trial};
 use crate::effects::{self, Candidate, Context, Effect, Found};
-use crate::estimate::{Design, Fit, Folds, Solver, Term, fit, friction_columns, spread};
+use crate::estimate::{Design, Fit, Folds, Solver, Term, fit, friction_columns, noise_floor, spread};
 use crate::log::Log;
 use crate::parallel;
 use crate::regression::{Column, Data, DataError, DataOptions, RigidBody};

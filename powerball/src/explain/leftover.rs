@@ -1,33 +1,8 @@
-//! What stays: the noise floor, the samples that residuals are worth, and the signals a residual depends on.
+//! What stays: the samples that residuals are worth, and the signals a residual depends on.
 
 use crate::effects::Context;
 use crate::regression::Data;
 use rand::{RngExt, SeedableRng};
-
-/// What white measurement noise would leave in the band, by joint, N·m.
-///
-/// From second differences of the torque as sampled: what varies from one sample to the next is noise. Coloured noise
-/// is not seen this way, so the floor is the lowest one that can be hoped for.
-#[must_use]
-pub(super) fn noise_floor(data: &Data<'_>) -> Vec<f64> {
-    let share = data.band.white_share(data.rate());
-    (0..data.dof())
-        .map(|j| {
-            let mut squares: Vec<f64> = data
-                .recordings
-                .iter()
-                .flat_map(|r| r.torque[j].windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2)))
-                .collect();
-            if squares.is_empty() {
-                return 0.0;
-            }
-            let middle = squares.len() / 2;
-            let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
-            // The median of χ² with one degree of freedom is 0.4549; second differences have 6 times the variance.
-            (*median / 0.4549 / 6.0).sqrt() * share
-        })
-        .collect()
-}
 
 /// The number of independent samples with the same information: Σ over joints of N over its autocorrelation time.
 #[must_use]

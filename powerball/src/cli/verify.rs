@@ -1,0 +1,160 @@
+//! `powerball verify`: an identified model on another trajectory.
+
+use super::Failure;
+use super::identify_page::torque_figure;
+use super::inputs::{Inputs, load};
+use super::output::{self, Progress};
+use crate::estimate::{JointVerdict, TorqueModel};
+use crate::explain::{TorqueCurve, curves};
+use crate::regression::{Data, DataOptions};
+use crate::report::{Page, Table, Tone, number};
+use clap::Args;
+use serde::Serialize;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Judge an identified model on logs that it has not seen (Fig. 8): errors with intervals, against the noise floor.
+///
+/// Writes verified.json and report.html. Exit code 1 where a joint's error is beyond the tolerance.
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Example:\n  powerball verify --arm arm.toml --model result/identified.json --log other.csv --out verified"
+)]
+pub(crate) struct Verify {
+    #[command(flatten)]
+    inputs: Inputs,
+    /// The model: identified.json of `powerball identify` for the same arm file.
+    #[arg(long, value_name = "FILE.json")]
+    model: PathBuf,
+    /// Largest error of a joint, as a share of the rms of its torque.
+    #[arg(long, default_value_t = 0.1)]
+    tolerance: f64,
+}
+
+/// verified.json.
+#[derive(Serialize)]
+struct Verified {
+    arm: String,
+    joints: Vec<JointVerdict>,
+    tolerance: f64,
+    within_tolerance: bool,
+    band: [f64; 2],
+    warnings: Vec<String>,
+}
+
+impl Verify {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        if !(self.tolerance.is_finite() && self.tolerance > 0.0) {
+            return Err(Failure::Unusable("--tolerance must be above 0".into()));
+        }
+        let progress = Progress::new();
+        let loaded = load(&self.inputs, &[], &progress)?;
+        let model = read_model(&self.model, loaded.body.names(), loaded.body.dof())?;
+        progress.say("preparing signals");
+        let data = Data::new(&loaded.body, &loaded.fit, &DataOptions::default())
+            .map_err(|e| Failure::Refused(e.to_string()))?;
+        let joints = model.verify(&data, self.tolerance);
+        let residual = model.residual(&data);
+        let verified = Verified {
+            arm: loaded.body.arm().name.clone(),
+            within_tolerance: joints.iter().all(|j| j.within != Some(false)),
+            joints,
+            tolerance: self.tolerance,
+            band: [0.0, data.band.cutoff],
+            warnings: loaded.warnings.into_iter().chain(data.notes.iter().cloned()).collect(),
+        };
+        let text = output::json(&verified)?;
+        output::write(&self.inputs.out, "verified.json", text.as_bytes())?;
+        let shown = page(&verified, &curves(&data, &residual, &residual));
+        output::write(&self.inputs.out, "report.html", shown.to_html().as_bytes())?;
+        if self.inputs.json {
+            output::print(&text);
+        } else {
+            for j in &verified.joints {
+                output::print(&format!(
+                    "joint {}: {:.4} N·m ({:.4} to {:.4}), {:.1} % of the torque, noise alone {:.4} N·m",
+                    j.joint,
+                    j.rms,
+                    j.interval[0],
+                    j.interval[1],
+                    100.0 * j.relative,
+                    j.noise_floor
+                ));
+            }
+        }
+        let beyond: Vec<String> =
+            verified.joints.iter().filter(|j| j.within == Some(false)).map(|j| j.joint.to_string()).collect();
+        if beyond.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::Refused(format!(
+            "the error of joint {} may exceed {} % of its torque: see {}",
+            beyond.join(", "),
+            100.0 * self.tolerance,
+            self.inputs.out.join("report.html").display()
+        )))
+    }
+}
+
+/// The model of an identified.json; its parameters must be those of the arm's minimal set.
+fn read_model(path: &Path, names: &[String], dof: usize) -> Result<TorqueModel, Failure> {
+    let wrong = |what: String| Failure::Unusable(format!("{}: {what}", path.display()));
+    let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    let json: Value = serde_json::from_str(&text).map_err(|e| wrong(format!("is no JSON: {e}")))?;
+    let list = |key: &str| {
+        json[key].as_array().ok_or_else(|| wrong(format!("has no list '{key}': it is no identified.json")))
+    };
+    let parameters = list("parameters")?;
+    let inertial = names
+        .iter()
+        .map(|name| {
+            let found = parameters.iter().find(|p| p["name"] == name.as_str());
+            found.and_then(|p| p["value"].as_f64()).ok_or_else(|| {
+                wrong(format!(
+                    "has no value for the parameter {name}: it was identified for another arm file"
+                ))
+            })
+        })
+        .collect::<Result<_, Failure>>()?;
+    let joints = list("friction")?;
+    let friction = (1..=dof)
+        .map(|j| {
+            let found = joints.iter().find(|f| f["joint"] == j);
+            let gamma = |k: usize| found.and_then(|f| f[format!("gamma{k}")].as_f64());
+            let all = [gamma(1), gamma(2), gamma(3), gamma(4), gamma(5)];
+            let [Some(a), Some(b), Some(c), Some(d), Some(e)] = all else {
+                return Err(wrong(format!("has no friction for joint {j}")));
+            };
+            Ok([a, b, c, d, e])
+        })
+        .collect::<Result<_, Failure>>()?;
+    Ok(TorqueModel { inertial, friction })
+}
+
+fn page(verified: &Verified, curves: &[TorqueCurve]) -> Page {
+    let mut page = Page::new(format!("Torque model of {}, verified", verified.arm));
+    page.lead("A model on logs that it has not seen: measured against predicted torque, 95 % intervals of the error from blocks that count as independent.");
+    let percent = 100.0 * verified.tolerance;
+    match verified.within_tolerance {
+        true => {
+            page.note(Tone::Good, &format!("Every joint that moves is within {percent} % of its torque."))
+        }
+        false => page.note(Tone::Bad, &format!("Not every joint is within {percent} % of its torque.")),
+    };
+    let mut table =
+        Table::new(["joint", "error [N·m]", "interval [N·m]", "of the torque", "noise alone [N·m]"]);
+    for j in &verified.joints {
+        table.push([
+            j.joint.to_string(),
+            number(j.rms),
+            format!("{} to {}", number(j.interval[0]), number(j.interval[1])),
+            format!("{:.1} %", 100.0 * j.relative),
+            number(j.noise_floor),
+        ]);
+    }
+    page.table(&table);
+    for (joint, curve) in curves.iter().enumerate().filter(|(_, c)| !c.t.is_empty()) {
+        page.figure(&torque_figure(joint, curve), "");
+    }
+    page
+}

@@ -1,0 +1,112 @@
+//! `powerball identify` and `powerball verify` as a user runs them, on logs of the virtual arm.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use powerball::demo::Session;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn powerball(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_powerball")).args(arguments).output().unwrap()
+}
+
+fn json(output: &Output) -> Value {
+    let complaint = String::from_utf8_lossy(&output.stderr);
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {complaint}"))
+}
+
+fn scratch(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// Logs of an arm whose friction grows with the load: fitted ones, and those of another path.
+fn session(name: &str) -> (PathBuf, Vec<String>, Vec<String>) {
+    let folder = scratch(name);
+    let session = Session::record(&folder, 3, &["load_friction"]).unwrap();
+    let text = |files: &[PathBuf]| files.iter().map(|f| f.display().to_string()).collect();
+    let logs = (text(&session.fit), text(&session.held_out));
+    (folder, logs.0, logs.1)
+}
+
+fn run(command: &[&str], logs: &[String], rest: &[&str]) -> Output {
+    let logs: Vec<&str> = logs.iter().map(String::as_str).collect();
+    powerball(&[command, &["--log"], &logs, rest].concat())
+}
+
+#[test]
+fn a_fit_comes_with_a_real_arm_that_costs_next_to_nothing() {
+    let (folder, fit, other) = session("identify");
+    let (arm, out) = (folder.join("arm.toml"), folder.join("result"));
+    let (arm, out) = (arm.to_str().unwrap(), out.to_str().unwrap());
+    let done = run(&["identify", "--arm", arm], &fit, &["--out", out, "--json"]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let result = json(&done);
+    let consistent = &result["consistent"];
+    for (cost, eigenvalue) in
+        consistent["cost"].as_array().unwrap().iter().zip(consistent["eigenvalues"].as_array().unwrap())
+    {
+        assert!(cost.as_f64().unwrap() < 0.005 && eigenvalue.as_f64().unwrap() > 0.0);
+    }
+    // The values are those of a real arm by the generator's own judgement, and every parameter is there.
+    let values = dyngen::Values::read(&Path::new(out).join("consistent.json")).unwrap();
+    let model = dyngen::Model::derive(dyngen::Arm::read(Path::new(arm)).unwrap()).unwrap();
+    let set = model.set(dyngen::SetKind::Full).unwrap();
+    let values = values.of_set(&model, set).unwrap();
+    assert!(dyngen::base::possible::check(&model, dyngen::SetKind::Full, &values).unwrap().possible);
+
+    // On the other path the model does as the fit says, and the undeclared effect keeps it from the noise floor.
+    let identified = format!("{out}/identified.json");
+    let verify = |tolerance: &str| {
+        run(
+            &["verify", "--arm", arm, "--model", &identified, "--tolerance", tolerance],
+            &other,
+            &["--out", out, "--json"],
+        )
+    };
+    let judged = verify("0.5");
+    assert!(judged.status.success(), "{}", String::from_utf8_lossy(&judged.stderr));
+    let verdict = json(&judged);
+    let direct = json(&run(
+        &["identify", "--arm", arm],
+        &fit,
+        &[
+            &["--validate"],
+            &other.iter().map(String::as_str).collect::<Vec<_>>()[..],
+            &["--out", out, "--json"],
+        ]
+        .concat(),
+    ));
+    for (j, joint) in verdict["joints"].as_array().unwrap().iter().enumerate() {
+        let number = |v: &Value| v.as_f64().unwrap();
+        let rms = number(&joint["rms"]);
+        assert!((rms - number(&direct["validate"]["rms"][j])).abs() < 1e-9 * rms);
+        assert!(number(&joint["interval"][0]) < rms && rms < number(&joint["interval"][1]));
+        assert!(rms > 0.9 * number(&joint["noise_floor"]));
+    }
+    let strict = verify("0.001");
+    assert_eq!(strict.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&strict.stderr).contains("may exceed 0.1 % of its torque"));
+}
+
+#[test]
+fn a_model_of_another_arm_is_not_judged() {
+    let (folder, fit, _) = session("verify_wrong");
+    let arm = folder.join("arm.toml").display().to_string();
+    let out = folder.display().to_string();
+    for (content, reason) in [
+        ("{", "is no JSON"),
+        ("{}", "has no list 'parameters'"),
+        (r#"{"parameters": [], "friction": []}"#, "it was identified for another arm file"),
+    ] {
+        let model = folder.join("model.json");
+        std::fs::write(&model, content).unwrap();
+        let model = model.display().to_string();
+        let done = run(&["verify", "--arm", &arm, "--model", &model], &fit, &["--out", &out]);
+        assert_eq!(done.status.code(), Some(2));
+        let complaint = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert!(complaint.contains(reason) && complaint.contains("model.json"), "{complaint}");
+    }
+}
