@@ -10,6 +10,7 @@ pub mod lwa4p;
 mod plant;
 mod servo;
 mod simulation;
+pub mod slave;
 
 pub use body::{Body, PER_LINK, bodies};
 pub use chain::{Chain, Row};
@@ -18,3 +19,4 @@ pub use effect::{Effect, Gear, Instant, State};
 pub use plant::{Plant, Recording, Sensors};
 pub use servo::{Gains, Servo};
 pub use simulation::Simulation;
+pub use slave::VirtualArm;
