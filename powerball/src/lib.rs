@@ -9,6 +9,7 @@ pub mod cia402;
 pub mod cli;
 #[cfg(feature = "std")]
 pub mod demo;
+pub mod driver;
 #[cfg(feature = "std")]
 pub mod effects;
 #[cfg(feature = "std")]

@@ -92,6 +92,15 @@ impl Mapping {
         if mapping.len() > 8 { Err(MappingError::TooLong) } else { Ok(mapping) }
     }
 
+    /// For constant tables: a mapping of `entries`, or none where they do not fit (the driver refuses a profile whose
+    /// mapping lacks what it needs).
+    pub const fn of(entries: &[Entry]) -> Mapping {
+        match Mapping::new(entries) {
+            Ok(mapping) => mapping,
+            Err(_) => Mapping::EMPTY,
+        }
+    }
+
     /// The mapped objects.
     pub fn entries(&self) -> &[Entry] {
         self.entries.get(..usize::from(self.count)).unwrap_or(&[])
