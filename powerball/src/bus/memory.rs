@@ -1,10 +1,11 @@
 //! A bus in memory, on a clock of its own.
 //!
-//! Frames take the time that they take on a wire, the lowest identifier goes first, and time passes only while somebody
+//! Frames take the time that they take on a wire with the most stuffing, the lowest identifier goes first, and time passes only while somebody
 //! waits for it. The same calls give the same events at the same times, always.
 
 use super::{Bus, BusError, Event};
 use crate::canopen::{Frame, Micros};
+use crate::driver::budget::worst_bits;
 use std::collections::VecDeque;
 use std::fmt;
 
@@ -90,7 +91,7 @@ impl<P: Peer> Memory<P> {
             let next = (0..self.waiting.len()).min_by_key(|k| self.waiting[*k].frame.raw_id());
             self.on_wire = next.map(|k| {
                 let waiting = self.waiting.remove(k);
-                let bits = super::wire_bits(waiting.frame.bytes().len());
+                let bits = worst_bits(waiting.frame.bytes().len());
                 (self.now + (f64::from(bits) * self.bit_time).round() as Micros, waiting)
             });
         }
@@ -192,7 +193,7 @@ mod tests {
         assert_eq!(bus.peer().heard.iter().map(|h| h.1).collect::<Vec<_>>(), [0x100, 0x200, 0x300]);
         // An answer waits for the frame that is on the wire, and wins over what waits with it.
         assert_eq!(got.iter().map(|g| g.1).collect::<Vec<_>>(), [0x101, 0x201, 0x301]);
-        let one = super::super::wire_bits(8) as Micros * 2;
+        let one = worst_bits(8) as Micros * 2;
         assert_eq!(bus.peer().heard[0].0, one);
         assert_eq!(got[2].0, 6 * one);
         assert_eq!(bus.now(), 10_000);

@@ -3,6 +3,7 @@
 //! All of them are a [`Bus`]: frames out, frames in, and a clock that goes with them. The clock belongs to the bus, so
 //! that a bus in memory can run faster than real time.
 
+pub mod blocking;
 mod memory;
 mod msgpack;
 #[cfg(unix)]
@@ -158,11 +159,4 @@ fn readable(file: &impl std::os::fd::AsFd, left: Duration) -> Result<bool, BusEr
         Err(rustix::io::Errno::INTR) => Ok(false),
         Err(e) => Err(BusError::io("waiting for the bus", e)),
     }
-}
-
-/// Bits of a frame with `len` bytes on the wire with the interframe space and half of the worst case's stuff bits, which
-/// random bytes come near.
-fn wire_bits(len: usize) -> u32 {
-    let data = 8 * len as u32;
-    47 + data + (33 + data) / 8
 }

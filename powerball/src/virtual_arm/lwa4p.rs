@@ -5,7 +5,7 @@ use super::chain::Chain;
 use super::dynamics::Dynamics;
 use super::plant::{Plant, Sensors};
 use super::slave::{Identity, Module, Setup};
-use crate::canopen::NodeId;
+use crate::driver::lwa4p::LWA4P;
 use crate::friction::{TABLE_2, TanhFriction};
 use dyngen::{Arm, Diagnostics};
 
@@ -67,14 +67,11 @@ pub fn plant() -> Result<Plant, Diagnostics> {
     Ok(Plant::new(dynamics, TABLE_2.map(TanhFriction::new).to_vec(), sensors))
 }
 
-/// Node of the first joint; the others follow.
-const FIRST_NODE: u8 = 3;
-/// Rated current, mA, and torque at that current, N·m, of the modules: the factors that a driver of this arm was seen to
-/// use with 0x6077. The wrist's motors turn against their joints.
-const RATED_145: (u32, f64) = (3000, 7.0);
-const RATED_115: (u32, f64) = (1500, -1.409);
+/// Rated current of the modules, mA, such that a few amperes give the torques that their maker names.
+const RATED_145: u32 = 500;
+const RATED_115: u32 = 150;
 
-/// The drives of the arm, nodes 3 to 8, with the limits of the arm file.
+/// The drives of the arm: nodes and the scale of 0x6077 as the driver knows them, limits of the arm file.
 ///
 /// # Errors
 /// As [`arm`].
@@ -82,26 +79,23 @@ pub fn modules() -> Result<Vec<Module>, Diagnostics> {
     let joints = arm()?.joints;
     Ok(joints
         .iter()
-        .zip(FIRST_NODE..)
-        .map(|(joint, node)| {
-            let (rated_current, rated_torque) = if node < FIRST_NODE + 4 { RATED_145 } else { RATED_115 };
-            Module {
-                node: NodeId::clamped(node),
-                identity: Identity {
-                    vendor: VENDOR,
-                    product: 1,
-                    revision: 0x0003_0001,
-                    serial: 1000 + u32::from(node),
-                },
-                limits: joint.position.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
-                speed: joint.velocity.unwrap_or(f64::INFINITY),
-                acceleration: joint.acceleration.unwrap_or(f64::INFINITY),
-                torque: joint.torque.unwrap_or(f64::INFINITY),
-                rated_current,
-                rated_torque,
-                commutated: false,
-                current_mode: None,
-            }
+        .zip(&LWA4P.joints)
+        .map(|(joint, known)| Module {
+            node: known.node,
+            identity: Identity {
+                vendor: VENDOR,
+                product: 1,
+                revision: 0x0003_0001,
+                serial: 1000 + u32::from(known.node.raw()),
+            },
+            limits: joint.position.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+            speed: joint.velocity.unwrap_or(f64::INFINITY),
+            acceleration: joint.acceleration.unwrap_or(f64::INFINITY),
+            torque: joint.torque.unwrap_or(f64::INFINITY),
+            rated_current: if known.units.rated_torque > 2.0 { RATED_145 } else { RATED_115 },
+            rated_torque: known.units.rated_torque,
+            commutated: false,
+            current_mode: None,
         })
         .collect())
 }

@@ -21,7 +21,7 @@ mod server;
 mod tests;
 
 pub use arm::{Setup, VirtualArm, serve};
-pub use dictionary::{Access, Dictionary, Entry, Identity, Type, Value};
+pub use dictionary::{Dictionary, Entry, Identity, Value};
 pub use module::{CurrentMode, Module};
 pub use node::Node;
 

@@ -1,6 +1,6 @@
 //! One node: network management, heartbeats, emergencies, and the drive's dictionary brought to life.
 
-use super::dictionary::{Access, Dictionary, Type, Value};
+use super::dictionary::{Dictionary, Value};
 use super::drive::{Drive, Inputs, Trip};
 use super::module::Module;
 use super::process::{self, Pdos};
@@ -458,7 +458,7 @@ fn fresh_dictionary(module: &Module) -> Dictionary {
     }
     dictionary.set_real(schunk::BOARD_TEMPERATURE, 31.5);
     if let Some(current) = module.current_mode {
-        dictionary.add(current.target, Type::Signed(2), Access::Rww, true, 0);
+        dictionary.add_setpoint(current.target);
         let supported = dictionary.get(drive_objects::SUPPORTED_MODES);
         let bit = if (1..=16).contains(&current.mode) { 1 << (current.mode - 1) } else { 0 };
         dictionary.set(drive_objects::SUPPORTED_MODES, supported | bit);

@@ -3,7 +3,7 @@
 //! As on the real drive a PDO is changed in pre-operational only, after its COB-ID was made invalid; its mapping only
 //! while it maps nothing.
 
-use super::dictionary::{Access, Dictionary};
+use super::dictionary::Dictionary;
 use crate::canopen::pdo::{Entry, INVALID, Mapping};
 use crate::canopen::sdo::AbortCode;
 use crate::canopen::{Frame, Object};
@@ -55,11 +55,7 @@ pub(super) fn check(
 
 fn mappable(dictionary: &Dictionary, entry: Entry, receive: bool) -> Result<(), AbortCode> {
     let target = dictionary.entry(entry.object)?;
-    let direction = match target.access {
-        Access::Rw => true,
-        Access::Rww | Access::Wo => receive,
-        Access::Ro | Access::Rwr => !receive,
-    };
+    let direction = if receive { target.writable } else { target.readable };
     let size = target.kind.size().is_some_and(|size| 8 * size == usize::from(entry.bits));
     if target.mappable && direction && size { Ok(()) } else { Err(AbortCode::NOT_MAPPABLE) }
 }
