@@ -1,6 +1,8 @@
 //! The runtime of an arm: friction, filters, identification and the residual loop.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
+#[cfg(feature = "std")]
+pub mod bus;
 pub mod canopen;
 pub mod cia402;
 #[cfg(feature = "cli")]
