@@ -12,6 +12,7 @@
 //! | [`client`] | the master's end of an SDO transfer, driven by polling |
 //! | [`pdo`] | process data: mapping entries, packing and unpacking |
 //! | [`emcy`] | emergency messages, with SCHUNK's own codes in words |
+//! | [`sync`] | SYNC and heartbeats in time: due, late, lost |
 //! | [`objects`] | the communication objects (0x1000 … 0x1FFF) that a master needs |
 
 pub mod client;
@@ -22,6 +23,7 @@ pub mod nmt;
 pub mod objects;
 pub mod pdo;
 pub mod sdo;
+pub mod sync;
 
 pub use cob::{Cob, NodeId};
 pub use frame::Frame;

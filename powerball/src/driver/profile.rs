@@ -229,9 +229,9 @@ impl<const N: usize> Profile<N> {
     /// Value and power of ten of the interpolation period 0x60C2, or `None` where it cannot be written.
     pub const fn interpolation_period(&self) -> Option<(u8, i8)> {
         let (ms, tenths) = (self.sync_period / 1000, self.sync_period / 100);
-        if self.sync_period % 1000 == 0 && ms >= 1 && ms <= 255 {
+        if self.sync_period.is_multiple_of(1000) && ms >= 1 && ms <= 255 {
             Some((ms as u8, -3))
-        } else if self.sync_period % 100 == 0 && tenths >= 1 && tenths <= 255 {
+        } else if self.sync_period.is_multiple_of(100) && tenths >= 1 && tenths <= 255 {
             Some((tenths as u8, -4))
         } else {
             None
