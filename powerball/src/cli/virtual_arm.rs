@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::output;
-use crate::bus::{self, Bus, BusUrl};
+use crate::bus::{self, BusUrl};
 use crate::virtual_arm::{Effect, VirtualArm, lwa4p, slave};
 use clap::Args;
 use rand::SeedableRng;
