@@ -4,4 +4,4 @@ mod approach;
 pub mod record;
 
 pub use approach::approach;
-pub use record::{Record, RecordError, Recorder, record};
+pub use record::{Record, RecordError, Recorder, record, way};

@@ -92,6 +92,11 @@ impl Simulation {
         &self.plant
     }
 
+    /// Sets the time: what warms or begins does so as if it were `time` s.
+    pub fn set_time(&mut self, time: f64) {
+        (self.time, self.stale) = (time, 0);
+    }
+
     /// Time, s.
     pub fn time(&self) -> f64 {
         self.time

@@ -81,6 +81,11 @@ impl VirtualArm {
         &self.simulation
     }
 
+    /// Sets the plant's age, s: what warms has been warming for so long.
+    pub fn set_age(&mut self, age: f64) {
+        self.simulation.set_time(age);
+    }
+
     /// Torques that the drives give, N·m.
     pub fn torques(&self) -> &[f64] {
         &self.torque
