@@ -11,8 +11,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::collections::VecDeque;
 
-/// The drives' tick, µs: servo and physics.
+/// The drives' tick, µs.
 const TICK: Micros = 1000;
+/// Steps of the physics in a tick.
+const STEPS: u32 = 2;
 
 /// What a virtual arm is made of.
 #[derive(Clone, Debug)]
@@ -103,20 +105,23 @@ impl VirtualArm {
     fn tick(&mut self) {
         self.ticks += 1;
         let (now, h) = (self.ticks * TICK, TICK as f64 * 1e-6);
+        let before = self.torque.clone();
         for joint in 0..self.nodes.len() {
             let speed = self.simulation.speed(joint);
             let position = self.simulation.position(joint) + self.offsets[joint];
             self.torque[joint] = self.nodes[joint].tick(h, now, [position, speed]);
         }
-        self.measure(h);
+        self.measure(h, &before);
         for (joint, node) in self.nodes.iter().enumerate() {
             self.simulation.set_brake(joint, node.brake_closed());
         }
-        self.simulation.step(h, &self.torque);
+        for _ in 0..STEPS {
+            self.simulation.step(h / f64::from(STEPS), &self.torque);
+        }
     }
 
-    /// What the sensors say, at the instant for which the drives have decided.
-    fn measure(&mut self, h: f64) {
+    /// What the sensors say at this instant, between two ticks: the current is the mean of `before` and after.
+    fn measure(&mut self, h: f64, before: &[f64]) {
         let sensors = self.simulation.plant().sensors();
         let (mut delay, mut gains) = (0.0, vec![1.0; self.nodes.len()]);
         for effect in self.simulation.plant().effects() {
@@ -127,7 +132,7 @@ impl VirtualArm {
             }
         }
         let back = (delay / h).round() as usize;
-        self.history.push_back(self.torque.clone());
+        self.history.push_back(before.iter().zip(&self.torque).map(|(a, b)| 0.5 * (a + b)).collect());
         while self.history.len() > back + 1 {
             self.history.pop_front();
         }
