@@ -14,10 +14,10 @@ pub struct Gains {
 }
 
 impl Gains {
-    /// Gains for an inertia in kg·m² at the joint: a velocity loop of 80 Hz, an integrator and a position loop that are
+    /// Gains for an inertia in kg·m² at the joint: a velocity loop of 160 Hz, an integrator and a position loop that are
     /// slower by four.
     pub fn for_inertia(inertia: f64, limit: f64) -> Self {
-        let bandwidth = std::f64::consts::TAU * 80.0;
+        let bandwidth = std::f64::consts::TAU * 160.0;
         let velocity = inertia * bandwidth;
         Gains { position: bandwidth / 4.0, velocity, integral: velocity * bandwidth / 4.0, limit }
     }

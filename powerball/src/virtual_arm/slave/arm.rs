@@ -11,10 +11,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::collections::VecDeque;
 
-/// The drives' tick, µs.
-const TICK: Micros = 1000;
-/// Steps of the physics in a tick.
-const STEPS: u32 = 2;
+/// The drives' tick, µs: servo and physics.
+const TICK: Micros = 500;
 
 /// What a virtual arm is made of.
 #[derive(Clone, Debug)]
@@ -115,9 +113,7 @@ impl VirtualArm {
         for (joint, node) in self.nodes.iter().enumerate() {
             self.simulation.set_brake(joint, node.brake_closed());
         }
-        for _ in 0..STEPS {
-            self.simulation.step(h / f64::from(STEPS), &self.torque);
-        }
+        self.simulation.step(h, &self.torque);
     }
 
     /// What the sensors say at this instant, between two ticks: the current is the mean of `before` and after.
