@@ -187,7 +187,12 @@ impl Client {
         if self.is_idle() || Cob::of(frame) != Some(Cob::SdoResponse(self.node)) {
             return Step::NOTHING;
         }
-        let Ok(response) = Response::decode(frame.bytes()) else { return self.violated(AbortCode::COMMAND) };
+        let response = match Response::decode(frame.bytes()) {
+            Ok(response) => response,
+            // Cut short on its way: as good as lost. The deadline still runs.
+            Err(_) if frame.bytes().len() != 8 => return Step::NOTHING,
+            Err(_) => return self.violated(AbortCode::COMMAND),
+        };
         match (response, self.phase) {
             // An abort for another object is late news of a transfer that we gave up.
             (Response::Abort { object, code }, _) if object == self.object => {

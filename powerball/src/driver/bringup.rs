@@ -248,7 +248,7 @@ impl<const N: usize> Driver<N> {
         for joint in &mut self.joints {
             joint.heartbeat.beat(now);
             (joint.arrived, joint.missing_run, joint.overspeed_run) = (0, 0, 0);
-            (joint.status, joint.mode) = (None, None);
+            (joint.status, joint.mode, joint.nmt) = (None, None, None);
         }
         (self.late_run, self.good_run) = (0, 0);
         self.send(nmt::Command::Start.frame(None), tx);
@@ -261,10 +261,10 @@ impl<const N: usize> Driver<N> {
         let off =
             |state| matches!(state, State::SwitchOnDisabled | State::ReadyToSwitchOn | State::SwitchedOn);
         let ready = |joint: &super::Joint| joint.state().is_some_and(off) && joint.mode == Some(expected);
-        let Some(j) = self.joints.iter().position(|joint| !ready(joint)) else {
-            if self.cycle_complete() {
-                self.enter(Phase::Ready);
-            }
+        let all = self.all_tpdos();
+        let hindered = self.joints.iter().position(|joint| !ready(joint) || joint.arrived != all);
+        let Some(j) = hindered else {
+            self.enter(Phase::Ready);
             return;
         };
         if self.elapsed() < self.profile.reactions.transition_timeout {
@@ -276,7 +276,8 @@ impl<const N: usize> Driver<N> {
             (Some(state), _) if !off(state) => {
                 Cause::Transition(node, state, State::SwitchOnDisabled, Hindrance::of(joint.status, true))
             }
-            (_, Some(mode)) => Cause::WrongMode(node, mode),
+            (_, Some(mode)) if mode != expected => Cause::WrongMode(node, mode),
+            _ => Cause::DataMissing(node),
         };
         self.trip(cause, tx);
     }

@@ -128,7 +128,7 @@ impl<const N: usize> Driver<N> {
     fn heartbeat(&mut self, j: usize, state: nmt::State, tx: &mut impl Transmit) {
         let (now, node) = (self.now, self.node(j));
         let Some(joint) = self.joints.get_mut(j) else { return };
-        joint.nmt = Some(state);
+        let before = joint.nmt.replace(state);
         if joint.heartbeat.is_watching() {
             joint.heartbeat.beat(now);
         }
@@ -139,6 +139,8 @@ impl<const N: usize> Driver<N> {
                 _ => self.trip(Cause::Rebooted(node), tx),
             }
         } else if state != nmt::State::Operational
+            // A heartbeat from before the start may have waited behind everything else: its priority is the lowest.
+            && before == Some(nmt::State::Operational)
             && matches!(self.phase, Phase::Ready | Phase::Enabling | Phase::Running)
         {
             self.trip(Cause::NotOperational(node), tx);
