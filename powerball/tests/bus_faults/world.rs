@@ -10,7 +10,7 @@ use powerball::virtual_arm::{VirtualArm, lwa4p};
 use std::collections::VecDeque;
 
 pub(crate) const CYCLE: Micros = 5_000;
-pub(crate) const START: [f64; 6] = [0.2, 0.4, -0.6, 0.3, 0.5, -0.2];
+pub(crate) const START: [f64; 6] = [0.05, 0.02, -0.04, 0.03, 0.05, -0.02];
 /// The node that things happen to: joint 3.
 pub(crate) const VICTIM: NodeId = NodeId::clamped(5);
 
@@ -49,7 +49,7 @@ pub(crate) struct Faulty {
     now: Micros,
     late: Vec<(Micros, Frame)>,
     out: VecDeque<Frame>,
-    swapped: Option<Frame>,
+    swapped: Option<(Micros, Frame)>,
     /// Frames of the master, as they arrive.
     pub(crate) heard: Vec<(Micros, Frame)>,
     /// Emergencies that the victim still sends, one a tick.
@@ -81,8 +81,8 @@ impl Faulty {
                 self.out.extend([frame, frame]);
             }
             Wire::Swap { frames } if *frames > 0 => match self.swapped.take() {
-                None => self.swapped = Some(frame),
-                Some(first) => {
+                None => self.swapped = Some((self.now, frame)),
+                Some((_, first)) => {
                     *frames -= 1;
                     self.out.extend([frame, first]);
                 }
@@ -111,7 +111,10 @@ impl Peer for Faulty {
     fn advance(&mut self, now: Micros) {
         self.now = now;
         self.arm.advance(now);
-        // A frame that is held back to change places with the next one is not held for ever.
+        // A frame that waits to change places with the next one does not wait for ever.
+        if let Some((_, frame)) = self.swapped.take_if(|(at, _)| now > *at + 10_000) {
+            self.out.push_back(frame);
+        }
         if self.storm > 0 {
             self.storm -= 1;
             let emcy =
@@ -176,16 +179,14 @@ pub(crate) struct World {
     pub(crate) full_until: Micros,
     /// Set-points that the driver took, with the time.
     pub(crate) accepted: Vec<(Micros, [f64; 6])>,
+    /// What came while nobody looked.
+    backlog: VecDeque<(Micros, Event)>,
     cycle: u64,
     phase: f64,
 }
 
 impl World {
-    pub(crate) fn new(commutated: bool) -> World {
-        World::with(commutated, LWA4P)
-    }
-
-    pub(crate) fn with(commutated: bool, profile: Profile<6>) -> World {
+    pub(crate) fn new(commutated: bool, profile: Profile<6>) -> World {
         let mut setup = lwa4p::setup(START, 7).unwrap();
         for module in &mut setup.modules {
             module.commutated = commutated;
@@ -200,6 +201,7 @@ impl World {
             pilot,
             full_until: 0,
             accepted: Vec::new(),
+            backlog: VecDeque::new(),
             cycle: 0,
             phase: 0.0,
         }
@@ -228,7 +230,8 @@ impl World {
         self.driver.poll(now, &mut door);
         self.fly();
         let until = self.driver.deadline().max(now + 1);
-        if let Some((at, event)) = self.bus.receive(until).unwrap() {
+        let waited = self.backlog.pop_front().map(|(_, event)| (now, event));
+        if let Some((at, event)) = waited.or_else(|| self.bus.receive(until).unwrap()) {
             let mut door = Door { full: at < self.full_until, bus: &mut self.bus };
             match event {
                 Event::Frame(frame) => self.driver.receive(&frame, at, &mut door),
@@ -288,7 +291,9 @@ impl World {
     /// The bus goes on without the driver: nobody polls it.
     pub(crate) fn run_without_driver(&mut self, time: Micros) {
         let until = self.now() + time;
-        while self.bus.receive(until).unwrap().is_some() {}
+        while let Some(event) = self.bus.receive(until).unwrap() {
+            self.backlog.push_back(event);
+        }
     }
 
     /// Controlwords that reached the drives since `from`.
