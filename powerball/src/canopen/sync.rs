@@ -11,7 +11,9 @@ pub struct Tick {
     pub skipped: u64,
 }
 
-/// The producer's schedule: a fixed raster that lateness does not shift.
+/// The producer's schedule: a raster that a little lateness, up to 2 % of the period, does not shift. What is later
+/// shifts it: a SYNC that followed too soon would make the drives go through their set-points too fast, and leave too
+/// little time for their data.
 #[derive(Clone, Copy, Debug)]
 pub struct SyncProducer {
     period: Micros,
@@ -55,7 +57,7 @@ impl SyncProducer {
         let due = self.next.filter(|&due| now >= due)?;
         let behind = now - due;
         let tick = Tick { late: behind % self.period, skipped: behind / self.period };
-        self.scheduled = now - tick.late;
+        self.scheduled = if tick.late > self.period / 50 { now } else { now - tick.late };
         self.next = Some(self.scheduled + self.period);
         Some(tick)
     }
@@ -128,15 +130,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lateness_does_not_shift_the_raster() {
+    fn a_little_lateness_does_not_shift_the_raster_and_more_does() {
         let mut sync = SyncProducer::new(5000);
         assert_eq!(sync.poll(0), None);
         sync.start(1000);
         assert_eq!(sync.poll(999), None);
         assert_eq!(sync.poll(1000), Some(Tick { late: 0, skipped: 0 }));
         assert_eq!(sync.poll(1000), None);
-        assert_eq!(sync.poll(7200), Some(Tick { late: 1200, skipped: 0 }));
+        assert_eq!(sync.poll(6100), Some(Tick { late: 100, skipped: 0 }));
         assert_eq!(sync.next(), Some(11_000));
+        assert_eq!(sync.poll(13_000), Some(Tick { late: 2000, skipped: 0 }));
+        assert_eq!(sync.next(), Some(18_000));
     }
 
     #[test]
@@ -145,8 +149,8 @@ mod tests {
         sync.start(0);
         sync.poll(0);
         assert_eq!(sync.poll(21_000), Some(Tick { late: 1000, skipped: 3 }));
-        assert_eq!(sync.poll(21_000), None);
-        assert_eq!(sync.poll(25_000), Some(Tick { late: 0, skipped: 0 }));
+        assert_eq!(sync.poll(25_999), None);
+        assert_eq!(sync.poll(26_000), Some(Tick { late: 0, skipped: 0 }));
     }
 
     #[test]

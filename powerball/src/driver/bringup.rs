@@ -1,5 +1,6 @@
 //! From silence to following set-points: boot, scripts, first data, enabling, commutation.
 
+use super::budget::worst_bits;
 use super::cause::Hindrance;
 use super::joint::Progress;
 use super::script::{Write, configuration, questions};
@@ -62,6 +63,13 @@ impl<const N: usize> Driver<N> {
         self.poll_scripts(tx);
     }
 
+    /// Between two steps of one joint: as long as a round of all joints takes, and half of that again. Transfers without a
+    /// pause would fill the bus, and the master's heartbeat, lowest in priority, would be missed by the drives.
+    fn sdo_pause(&self) -> Micros {
+        let round_trip = self.budget.duration(2 * worst_bits(8));
+        round_trip * N as u64 * 3 / 2
+    }
+
     /// The write that joint `j` is at, while configuring and verifying.
     fn write_of(&self, j: usize, step: usize) -> Option<Write> {
         let verifying = self.phase == Phase::Verify;
@@ -72,9 +80,9 @@ impl<const N: usize> Driver<N> {
 
     /// Begins joint `j`'s next step; `None` where its script is done.
     fn begin_step(&mut self, j: usize) -> Option<Frame> {
+        let (now, pause) = (self.now, self.sdo_pause());
         let step = self.joints.get(j)?.step;
-        let now = self.now;
-        match self.phase {
+        let frame = match self.phase {
             Phase::Identify => {
                 let object = questions(self.mode_profile(), self.control).nth(step)?;
                 Some(self.joints.get_mut(j)?.client.read(object, now))
@@ -88,7 +96,9 @@ impl<const N: usize> Driver<N> {
                 Some(self.joints.get_mut(j)?.client.read(write.object, now))
             }
             _ => None,
-        }
+        };
+        self.joints.get_mut(j)?.next_step = now + pause;
+        frame
     }
 
     pub(super) fn poll_scripts(&mut self, tx: &mut impl Transmit) {
@@ -98,6 +108,10 @@ impl<const N: usize> Driver<N> {
             let now = self.now;
             let Some(joint) = self.joints.get_mut(j) else { continue };
             if joint.client.is_idle() {
+                if now < joint.next_step {
+                    done = false;
+                    continue;
+                }
                 let Some(frame) = self.begin_step(j) else { continue };
                 self.send(frame, tx);
             } else {
@@ -150,13 +164,6 @@ impl<const N: usize> Driver<N> {
                 joint.step += 1;
                 joint.retries = 0;
             }
-        }
-        match self.begin_step(j) {
-            Some(frame) => {
-                self.send(frame, tx);
-            }
-            None if self.joints.iter().all(|joint| joint.client.is_idle()) => self.poll_scripts(tx),
-            None => {}
         }
     }
 
@@ -261,12 +268,13 @@ impl<const N: usize> Driver<N> {
         let off =
             |state| matches!(state, State::SwitchOnDisabled | State::ReadyToSwitchOn | State::SwitchedOn);
         let ready = |joint: &super::Joint| joint.state().is_some_and(off) && joint.mode == Some(expected);
-        let all = self.all_tpdos();
-        let hindered = self.joints.iter().position(|joint| !ready(joint) || joint.arrived != all);
-        let Some(j) = hindered else {
+        let unready = self.joints.iter().position(|joint| !ready(joint));
+        if unready.is_none() && self.cycle_complete() {
             self.enter(Phase::Ready);
             return;
-        };
+        }
+        let hindered = unready.or_else(|| self.joints.iter().position(|joint| joint.missing_run > 0));
+        let Some(j) = hindered else { return };
         if self.elapsed() < self.profile.reactions.transition_timeout {
             return;
         }

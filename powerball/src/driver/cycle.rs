@@ -92,9 +92,7 @@ impl<const N: usize> Driver<N> {
         if self.phase == Phase::Running {
             self.judge_setpoints(tx);
         }
-        if self.counters.cycles == 0 || self.phase == Phase::Starting {
-            return;
-        }
+        let judged = self.phase != Phase::Starting;
         let (all, limit) = (self.all_tpdos(), self.profile.reactions.missing_cycles);
         for j in 0..N {
             let Some(joint) = self.joints.get_mut(j) else { continue };
@@ -102,9 +100,9 @@ impl<const N: usize> Driver<N> {
                 joint.missing_run = 0;
                 continue;
             }
-            joint.counters.missing += 1;
+            joint.counters.missing += u64::from(judged);
             joint.missing_run = joint.missing_run.saturating_add(1);
-            if joint.missing_run == limit {
+            if judged && joint.missing_run == limit {
                 self.trip(Cause::DataMissing(self.node(j)), tx);
             }
         }

@@ -69,6 +69,8 @@ pub struct Joint {
     pub(super) client: Client,
     pub(super) step: usize,
     pub(super) retries: u8,
+    /// Not before then.
+    pub(super) next_step: Micros,
     pub(super) booted: Option<Micros>,
     pub(super) heartbeat: HeartbeatConsumer,
     /// Transmit PDOs that came since the last SYNC, by bit.
@@ -105,6 +107,7 @@ impl Joint {
             client: Client::new(profile.node, sdo_timeout),
             step: 0,
             retries: 0,
+            next_step: 0,
             booted: None,
             heartbeat: HeartbeatConsumer::new(heartbeat_timeout),
             arrived: 0,

@@ -199,6 +199,8 @@ pub struct Driver<const N: usize> {
     since: Micros,
     now: Micros,
     cause: Option<Cause>,
+    /// The nodes' configuration can no longer be trusted.
+    restart: bool,
     details: Details,
     silent: bool,
     joints: [Joint; N],
@@ -240,6 +242,7 @@ impl<const N: usize> Driver<N> {
             since: 0,
             now: 0,
             cause: None,
+            restart: false,
             details: Details::default(),
             silent: false,
             joints: profile.joints.map(|joint| Joint::new(&joint, lost, reactions.sdo_timeout)),
@@ -290,6 +293,8 @@ impl<const N: usize> Driver<N> {
         self.control = control;
         self.budget = budget;
         self.bring_up = BringUp::default();
+        self.sync.stop();
+        self.joints.iter_mut().for_each(|joint| joint.heartbeat.stop());
         self.enter(Phase::Boot);
         Ok(verdict)
     }
@@ -317,14 +322,15 @@ impl<const N: usize> Driver<N> {
     /// # Errors
     /// Where nothing is latched, or the arm is still being stopped.
     pub fn acknowledge(&mut self) -> Result<(), Refusal> {
-        let (Phase::Faulted, Some(cause)) = (self.phase, self.cause) else {
+        if self.phase != Phase::Faulted {
             return Err(Refusal::Phase(self.phase.text()));
-        };
+        }
         self.cause = None;
         self.diagnosis = None;
         self.joints.iter_mut().for_each(|joint| joint.client.cancel());
-        if cause.needs_restart() || !self.sync.is_running() {
+        if self.restart || !self.sync.is_running() {
             self.silent = false;
+            self.restart = false;
             self.sync.stop();
             self.enter(Phase::Idle);
         } else {
@@ -357,6 +363,11 @@ impl<const N: usize> Driver<N> {
     /// Why the arm was stopped, until it is acknowledged.
     pub fn cause(&self) -> Option<&Cause> {
         self.cause.as_ref()
+    }
+
+    /// Whether [`Driver::acknowledge`] leads to [`Phase::Idle`], to be started anew.
+    pub fn needs_restart(&self) -> bool {
+        self.restart
     }
 
     /// What the drive that the cause is about told of its error, as far as it was read.
@@ -398,6 +409,13 @@ impl<const N: usize> Driver<N> {
             return soon;
         }
         let slot = self.slot_open.then(|| self.slot());
+        let scripted = matches!(self.phase, Phase::Identify | Phase::Configure | Phase::Verify);
+        let steps = self
+            .joints
+            .iter()
+            .filter(|joint| scripted && joint.client.is_idle())
+            .map(|joint| joint.next_step);
+        let soon = steps.filter(|step| *step > self.now).fold(soon, Micros::min);
         [self.sync.next(), slot, Some(self.heartbeat.next())].into_iter().flatten().fold(soon, Micros::min)
     }
 

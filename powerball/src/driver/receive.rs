@@ -141,7 +141,8 @@ impl<const N: usize> Driver<N> {
         } else if state != nmt::State::Operational
             // A heartbeat from before the start may have waited behind everything else: its priority is the lowest.
             && before == Some(nmt::State::Operational)
-            && matches!(self.phase, Phase::Ready | Phase::Enabling | Phase::Running)
+            && self.sync.is_running()
+            && self.phase != Phase::Starting
         {
             self.trip(Cause::NotOperational(node), tx);
         }

@@ -62,10 +62,7 @@ impl<const N: usize> Driver<N> {
             BusEvent::BusOff if self.phase != Phase::Idle => {
                 // Nothing more can be said to the arm; its drives miss the heartbeat and stop themselves.
                 tx.discard_queued();
-                self.note(Cause::BusOff);
-                if !self.needs_restart() {
-                    self.cause = Some(Cause::BusOff);
-                }
+                self.latch(Cause::BusOff);
                 self.silent = true;
                 self.sync.stop();
                 self.enter(Phase::Faulted);
@@ -74,8 +71,20 @@ impl<const N: usize> Driver<N> {
         }
     }
 
-    fn needs_restart(&self) -> bool {
-        self.cause.is_some_and(|cause| cause.needs_restart())
+    /// The first cause stays. Only missing data gives way to what explains it: a node that restarts is missed before it
+    /// says so. What asks for a restart is not forgotten in any case.
+    fn latch(&mut self, cause: Cause) {
+        self.note(cause);
+        let tells_more = |first| match first {
+            Cause::DataMissing(node) => cause.needs_restart() && cause.node() == Some(node),
+            _ => false,
+        };
+        if self.cause.is_none_or(tells_more) {
+            self.cause = Some(cause);
+        }
+        // Where first data does not come in any way that a fault reset could mend, the nodes must be configured anew.
+        let mendable = matches!(cause, Cause::DriveFault(..) | Cause::Emergency(..));
+        self.restart |= cause.needs_restart() || self.phase == Phase::Starting && !mendable;
     }
 
     /// Something is wrong: latches `cause` where it is the first, and stops what may move.
@@ -83,12 +92,7 @@ impl<const N: usize> Driver<N> {
         if self.phase == Phase::Idle {
             return;
         }
-        self.note(cause);
-        // The first cause stays, but for one that asks for more: what needs a restart must not be forgotten.
-        let graver = cause.needs_restart() && !self.needs_restart();
-        if self.cause.is_none() || graver {
-            self.cause = Some(cause);
-        }
+        self.latch(cause);
         match self.phase {
             Phase::Enabling | Phase::Running => self.begin_stop(tx),
             Phase::Boot | Phase::Identify | Phase::Configure | Phase::Verify => {
