@@ -14,6 +14,9 @@ use std::collections::VecDeque;
 /// The drives' tick, µs: servo and physics.
 const TICK: Micros = 500;
 
+/// Share of the friction's steep part that the drives feed forward.
+const TUNED: f64 = 0.9;
+
 /// What a virtual arm is made of.
 #[derive(Clone, Debug)]
 pub struct Setup {
@@ -59,7 +62,10 @@ impl VirtualArm {
             return None;
         }
         let simulation = Simulation::new(plant, &start, age);
-        let nodes = modules.into_iter().zip(simulation.inertias()).map(|(m, i)| Node::new(m, i)).collect();
+        // Drives are tuned where they are built in, to what they have to move and to most of its friction.
+        let friction = simulation.plant().friction().iter().map(|f| TUNED * f.gamma1.max(f.gamma3));
+        let tuned = simulation.inertias().into_iter().zip(friction);
+        let nodes = modules.into_iter().zip(tuned).map(|(m, (i, f))| Node::new(m, [i, f])).collect();
         let mut offsets = vec![0.0; n];
         for effect in simulation.plant().effects() {
             if let Effect::EncoderOffset { joint, offset } = effect {

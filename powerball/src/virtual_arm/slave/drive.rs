@@ -86,8 +86,8 @@ pub(super) struct Drive {
 }
 
 impl Drive {
-    pub(super) fn new(module: Module, inertia: f64) -> Self {
-        let servo = Servo::new(Gains::for_inertia(inertia, module.torque));
+    pub(super) fn new(module: Module, [inertia, friction]: [f64; 2]) -> Self {
+        let servo = Servo::new(Gains::for_inertia(inertia, module.torque, friction));
         let search = if module.commutated { 0.0 } else { SEARCH.0 };
         Drive {
             module,

@@ -35,7 +35,8 @@ struct Watched {
 #[derive(Clone, Debug)]
 pub struct Node {
     module: Module,
-    inertia: f64,
+    /// What its servo is tuned to: inertia, kg·m², and Coulomb friction, N·m.
+    tuned: [f64; 2],
     nmt: nmt::State,
     dictionary: Dictionary,
     server: Server,
@@ -60,16 +61,16 @@ pub struct Node {
 }
 
 impl Node {
-    pub(super) fn new(module: Module, inertia: f64) -> Self {
+    pub(super) fn new(module: Module, tuned: [f64; 2]) -> Self {
         let dictionary = fresh_dictionary(&module);
         let mut node = Node {
             module,
-            inertia,
+            tuned,
             nmt: nmt::State::PreOperational,
             pdos: Pdos::read(&dictionary),
             dictionary,
             server: Server::default(),
-            drive: Drive::new(module, inertia),
+            drive: Drive::new(module, tuned),
             watched: [Watched::default(); 3],
             waiting: Vec::new(),
             fresh: false,
@@ -159,7 +160,7 @@ impl Node {
         let module = Module { commutated: self.drive.is_commutated(), ..self.module };
         let supply = self.drive.supply;
         *self =
-            Node { silent: self.silent, boots_at: Some(now + BOOT_TIME), ..Node::new(module, self.inertia) };
+            Node { silent: self.silent, boots_at: Some(now + BOOT_TIME), ..Node::new(module, self.tuned) };
         self.drive.supply = supply;
     }
 
