@@ -8,6 +8,7 @@ mod identify;
 mod identify_page;
 mod inputs;
 mod output;
+mod record;
 mod virtual_arm;
 
 use clap::{Parser, Subcommand};
@@ -29,6 +30,8 @@ enum Command {
     Bus(bus::BusCommand),
     /// Put the virtual arm on a bus for others.
     VirtualArm(virtual_arm::VirtualArmCommand),
+    /// Follow a trajectory on a bus and log it.
+    Record(record::RecordCommand),
     /// Search an exciting trajectory within the arm's limits and write it.
     Excite(excite::Excite),
     /// Fit the minimal inertial set and the friction of every joint to logs.
@@ -55,6 +58,7 @@ pub fn main() -> ExitCode {
         Command::Demo(command) => command.run(),
         Command::Bus(command) => command.run(),
         Command::VirtualArm(command) => command.run(),
+        Command::Record(command) => command.run(),
         Command::Excite(command) => command.run(),
         Command::Identify(command) => command.run(),
         Command::Explain(command) => command.run(),

@@ -1,5 +1,6 @@
 //! `powerball bus`: look at a CAN bus, and move what is on it.
 
+mod drive;
 mod scan;
 mod sdo;
 mod state;
@@ -35,6 +36,12 @@ enum What {
     Watch(state::Watch),
     /// Read or write an object of a node.
     Sdo(sdo::Sdo),
+    /// Configure and enable all drives, hold the arm, let go again.
+    Enable(drive::Enable),
+    /// Stop all drives, close their brakes, take their torque away.
+    Stop(drive::Stop),
+    /// Move one joint slowly.
+    Move(drive::Move),
 }
 
 impl BusCommand {
@@ -44,6 +51,9 @@ impl BusCommand {
             What::State(command) => command.run(),
             What::Watch(command) => command.run(),
             What::Sdo(command) => command.run(),
+            What::Enable(command) => command.run(),
+            What::Stop(command) => command.run(),
+            What::Move(command) => command.run(),
         }
     }
 }
