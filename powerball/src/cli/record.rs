@@ -1,10 +1,8 @@
 //! `powerball record`: a trajectory in interpolated position mode, and its log.
 
 use super::Failure;
-use super::bus::Where;
+use super::bus::{Where, master};
 use super::output;
-use crate::bus::Master;
-use crate::driver::Driver;
 use crate::driver::lwa4p::LWA4P;
 use crate::motion::Motion;
 use crate::procedure::{RecordError, record};
@@ -38,8 +36,7 @@ impl RecordCommand {
             .map_err(|e| Failure::Unusable(format!("{name}: cannot be read: {e}")))?;
         let motion = Motion::from_csv(&text, LWA4P.joints.len())
             .map_err(|why| Failure::Unusable(format!("{name}: {why}")))?;
-        let driver = Driver::new(LWA4P).map_err(|e| Failure::Refused(e.to_string()))?;
-        let master = Master::new(driver, self.place.open()?);
+        let master = master(&self.place)?;
         let mut log = File::create(&self.out)
             .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", self.out.display())))?;
         let done = record(master, &motion, &mut log).map_err(|e| match e {

@@ -1,12 +1,12 @@
 //! `powerball bus enable`, `stop` and `move`.
 
 use super::super::output;
-use super::{Failure, Where, refused};
+use super::{Failure, Where, master, refused};
 use crate::bus::{ArmError, Bus, BusUrl, Master, Moment};
 use crate::canopen::nmt;
 use crate::cia402::{Command, Controlword};
 use crate::driver::lwa4p::LWA4P;
-use crate::driver::{ControlMode, Driver, Phase};
+use crate::driver::{ControlMode, Phase};
 use crate::procedure::{RecordError, Recorder};
 use clap::Args;
 use serde_json::json;
@@ -65,11 +65,6 @@ pub(crate) struct Move {
     /// Share of the joint's greatest speed and acceleration, 0.01 to 0.5.
     #[arg(long, default_value_t = 0.1)]
     speed: f64,
-}
-
-fn master(place: &Where) -> Result<Master<Box<dyn Bus>, 6>, Failure> {
-    let driver = Driver::new(LWA4P).map_err(refused)?;
-    Ok(Master::new(driver, place.open()?))
 }
 
 impl Enable {

@@ -4,12 +4,14 @@ mod drive;
 mod scan;
 mod sdo;
 mod state;
+mod timing;
 
 use super::Failure;
 use super::virtual_arm::virtual_arm;
 use crate::bus::blocking::TransferError;
-use crate::bus::{self, Bus, BusUrl, Event, Memory};
+use crate::bus::{self, Bus, BusUrl, Event, Master, Memory};
 use crate::canopen::{Micros, NodeId};
+use crate::driver::Driver;
 use crate::driver::lwa4p::LWA4P;
 use clap::{Args, Subcommand};
 
@@ -36,6 +38,8 @@ enum What {
     Watch(state::Watch),
     /// Read or write an object of a node.
     Sdo(sdo::Sdo),
+    /// Measure how even the cycle is and how soon the drives answer.
+    Timing(timing::Timing),
     /// Configure and enable all drives, hold the arm, let go again.
     Enable(drive::Enable),
     /// Stop all drives, close their brakes, take their torque away.
@@ -51,6 +55,7 @@ impl BusCommand {
             What::State(command) => command.run(),
             What::Watch(command) => command.run(),
             What::Sdo(command) => command.run(),
+            What::Timing(command) => command.run(),
             What::Enable(command) => command.run(),
             What::Stop(command) => command.run(),
             What::Move(command) => command.run(),
@@ -79,6 +84,20 @@ impl Where {
         wait(&mut memory, BOOT)?;
         Ok(Box::new(memory))
     }
+}
+
+/// A driver of the arm on the bus.
+///
+/// UDP multicast is a bench: nobody promises a program its time slices there, and no arm is hurt by a late SYNC. The driver
+/// then bears what it would not on a real bus; it counts all the same.
+pub(crate) fn master(place: &Where) -> Result<Master<Box<dyn Bus>, 6>, Failure> {
+    let mut profile = LWA4P;
+    if matches!(place.bus, BusUrl::Udp(_)) {
+        let reactions = &mut profile.reactions;
+        (reactions.late_limit, reactions.skipped_limit, reactions.missing_cycles) = (u8::MAX, 20, 20);
+    }
+    let driver = Driver::new(profile).map_err(refused)?;
+    Ok(Master::new(driver, place.open()?))
 }
 
 /// Lets time pass on the bus.
