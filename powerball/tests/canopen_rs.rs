@@ -1,8 +1,8 @@
 //! The codecs and the SDO client against `canopen-rs`, written by others: what one end writes the other must read.
 
-use canopen_rs::{Address, DataType, Entry, ObjectDictionary, Value as Theirs};
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test's helpers may stop the test")]
 
+use canopen_rs::{Address, DataType, Entry, ObjectDictionary, Value as Theirs};
 use canopen_rs::{emcy, nmt as theirs, pdo as their_pdo, sdo as their_sdo};
 use powerball::canopen::client::{Client, SdoError, Value};
 use powerball::canopen::emcy::Emcy;
