@@ -1,5 +1,7 @@
 //! The codecs and the SDO client against `canopen-rs`, written by others: what one end writes the other must read.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test's helpers may stop the test")]
+
 use canopen_rs::{Address, DataType, Entry, ObjectDictionary, Value as Theirs};
 use canopen_rs::{emcy, nmt as theirs, pdo as their_pdo, sdo as their_sdo};
 use powerball::canopen::client::{Client, SdoError, Value};

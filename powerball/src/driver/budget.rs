@@ -165,7 +165,8 @@ mod tests {
     /// of 1 Mbit/s, worst and nominal; ms of a 5 ms cycle at 500 kbit/s.
     #[test]
     fn the_table_of_mappings() {
-        let rows: [(&[usize], [u32; 2], [f64; 4], f64); 6] = [
+        type Row = (&'static [usize], [u32; 2], [f64; 4], f64);
+        let rows: [Row; 6] = [
             (&[8, 8, 8], [2485, 2045], [99.4, 81.8, 49.7, 40.9], 4.97),
             (&[6, 8, 4], [2125, 1757], [85.0, 70.3, 42.5, 35.1], 4.25),
             (&[8, 8, 4], [2245, 1853], [89.8, 74.1, 44.9, 37.1], 4.49),

@@ -547,6 +547,3 @@ fn check<const N: usize>(profile: &Profile<N>) -> Result<(), Refusal> {
     }
     Ok(())
 }
-
-#[cfg(test)]
-mod tests;

@@ -2,7 +2,10 @@
 //! is latched, and only an explicit act enables again. Prints the matrix that `docs/bus.md` holds:
 //! `cargo test --release -p powerball --test bus_faults -- --nocapture`.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test's helpers may stop the test")]
+
 mod faults;
+mod rules;
 mod world;
 
 use faults::{Expected, Fault, Stage};
@@ -71,6 +74,9 @@ fn cell(fault: Fault, stage: Stage, control: ControlMode) -> Result<String, Stri
             let took = (last - injected).saturating_sub(2_500).div_ceil(CYCLE);
             if took > cycles {
                 return fail(format!("stopped after {took} cycles, {cycles} are allowed"));
+            }
+            if let Some((at, node, word)) = world.motion_after_stop(injected, last) {
+                return fail(format!("node {node} is told to move ({word:?}) after its stop, at {at}"));
             }
             after_stop(&mut world, fault, last)?;
             latched(&mut world, fault)?;

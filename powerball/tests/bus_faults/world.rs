@@ -1,7 +1,8 @@
 //! The driver, the virtual arm and a bus that can be made to fail, on one virtual clock.
 
 use powerball::bus::{Bus, BusError, Event, Memory, Peer};
-use powerball::canopen::{Cob, Frame, Micros, NodeId};
+use powerball::canopen::sdo::{AbortCode, Chunk, Request, Response, Transfer};
+use powerball::canopen::{Cob, Frame, Micros, NodeId, Object};
 use powerball::cia402::{Command, Controlword};
 use powerball::driver::lwa4p::LWA4P;
 use powerball::driver::{BusEvent, ControlMode, Driver, Phase, Profile, QueueFull, Transmit};
@@ -39,6 +40,10 @@ pub(crate) enum Wire {
     },
     /// The mode display, fifth byte of its second transmit PDO, says this.
     Mode(u8),
+    /// Its server refuses this object.
+    Refuse(Object),
+    /// Its server reads this value for this object, whatever was written.
+    Misread(Object, u32),
 }
 
 /// The arm behind a faulty wire, with a record of what reaches it.
@@ -60,6 +65,25 @@ impl Faulty {
     fn new(arm: VirtualArm) -> Faulty {
         let (late, out, heard) = (Vec::new(), VecDeque::new(), Vec::new());
         Faulty { arm, wire: Wire::Good, now: 0, late, out, swapped: None, heard, storm: 0 }
+    }
+
+    /// What the victim's server is made to answer, where it is.
+    fn served(&self, frame: &Frame) -> Option<Response> {
+        if Cob::of(frame) != Some(Cob::SdoRequest(VICTIM)) {
+            return None;
+        }
+        match (Request::decode(frame.bytes()).ok()?, self.wire) {
+            (Request::Download { object, .. } | Request::Upload { object }, Wire::Refuse(refused))
+                if object == refused =>
+            {
+                Some(Response::Abort { object, code: AbortCode::NO_OBJECT })
+            }
+            (Request::Upload { object }, Wire::Misread(misread, value)) if object == misread => {
+                let transfer = Transfer::Expedited(Chunk::first(&value.to_le_bytes(), 4));
+                Some(Response::Upload { object, transfer })
+            }
+            _ => None,
+        }
     }
 
     /// One frame of the arm through the wire.
@@ -105,7 +129,13 @@ impl Peer for Faulty {
     fn receive(&mut self, frame: &Frame, now: Micros) {
         self.now = now;
         self.heard.push((now, *frame));
-        self.arm.receive(frame, now);
+        match self.served(frame) {
+            Some(answer) => {
+                let id = Cob::SdoResponse(VICTIM).id();
+                self.out.extend(Frame::from_raw(id, &answer.encode()));
+            }
+            None => self.arm.receive(frame, now),
+        }
     }
 
     fn advance(&mut self, now: Micros) {
@@ -183,15 +213,22 @@ pub(crate) struct World {
     backlog: VecDeque<(Micros, Event)>,
     cycle: u64,
     phase: f64,
+    holding: bool,
 }
 
 impl World {
     pub(crate) fn new(commutated: bool, profile: Profile<6>) -> World {
+        World::with(commutated, profile, true)
+    }
+
+    /// With or without a current mode.
+    pub(crate) fn with(commutated: bool, profile: Profile<6>, current: bool) -> World {
         let mut setup = lwa4p::setup(START, 7).unwrap();
         for module in &mut setup.modules {
             module.commutated = commutated;
             let target = LWA4P.current.unwrap();
-            module.current_mode = Some(CurrentMode { mode: target.mode.code(), target: target.setpoint });
+            let mode = CurrentMode { mode: target.mode.code(), target: target.setpoint };
+            module.current_mode = current.then_some(mode);
         }
         let arm = VirtualArm::new(setup).unwrap();
         let pilot = Pilot { enable: true, bad: 0, bad_value: 0.0 };
@@ -204,6 +241,7 @@ impl World {
             backlog: VecDeque::new(),
             cycle: 0,
             phase: 0.0,
+            holding: false,
         }
     }
 
@@ -228,7 +266,9 @@ impl World {
         let now = self.now();
         let mut door = Door { full: now < self.full_until, bus: &mut self.bus };
         self.driver.poll(now, &mut door);
-        self.fly();
+        if !self.holding {
+            self.fly();
+        }
         let until = self.driver.deadline().max(now + 1);
         let waited = self.backlog.pop_front().map(|(_, event)| (now, event));
         if let Some((at, event)) = waited.or_else(|| self.bus.receive(until).unwrap()) {
@@ -288,6 +328,16 @@ impl World {
         done(self)
     }
 
+    /// Runs while the caller gives no set-points.
+    pub(crate) fn hold_pilot(&mut self, time: Micros) {
+        let until = self.now() + time;
+        while self.now() < until {
+            self.holding = true;
+            self.turn();
+            self.holding = false;
+        }
+    }
+
     /// The bus goes on without the driver: nobody polls it.
     pub(crate) fn run_without_driver(&mut self, time: Micros) {
         let until = self.now() + time;
@@ -318,6 +368,22 @@ impl World {
                     .map(|(at, ..)| at)
             })
             .collect()
+    }
+
+    /// A word that would move a joint, after `from`, or after that joint's own quick stop where one came since `since`.
+    pub(crate) fn motion_after_stop(
+        &self,
+        since: Micros,
+        from: Micros,
+    ) -> Option<(Micros, NodeId, Controlword)> {
+        let stops = self.quick_stops(since);
+        let stop = |node| {
+            LWA4P.joints.iter().zip(&stops).find(|(joint, _)| joint.node == node).and_then(|(_, at)| *at)
+        };
+        self.words(since).find(|(at, node, word)| {
+            *at > stop(*node).unwrap_or(from).min(from)
+                && word.decode(Controlword::default()) == Command::EnableOperation
+        })
     }
 
     /// Words that would move a joint, after `from`.

@@ -118,11 +118,10 @@ fn joint_source(joint: &JointTable) -> String {
         1000.0 => "MILLIDEGREES_PER_RADIAN".to_string(),
         other => format!("{:?} * MILLIDEGREES_PER_RADIAN", other / 1000.0),
     };
-    let identity = match (joint.vendor, joint.product, joint.revision, joint.serial) {
-        (vendor, product, revision, serial) => format!(
-            "Identity {{ vendor: {vendor:?}, product: {product:?}, revision: {revision:?}, serial: {serial:?} }}"
-        ),
-    };
+    let JointTable { vendor, product, revision, serial, .. } = joint;
+    let identity = format!(
+        "Identity {{ vendor: {vendor:?}, product: {product:?}, revision: {revision:?}, serial: {serial:?} }}"
+    );
     format!(
         "JointProfile {{\n            node: NodeId::clamped({}),\n            identity: {identity},\n            \
          units: JointUnits {{ counts_per_radian: {counts}, rated_current: {:?}, rated_torque: {:?}, torque_verified: {} }},\n            \
