@@ -1,10 +1,15 @@
 //! The runtime of an arm: friction, filters, identification and the residual loop.
-#![cfg_attr(not(feature = "std"), no_std)]
+#![cfg_attr(not(any(feature = "std", test)), no_std)]
 
+#[cfg(feature = "std")]
+pub mod bus;
+pub mod canopen;
+pub mod cia402;
 #[cfg(feature = "cli")]
 pub mod cli;
 #[cfg(feature = "std")]
 pub mod demo;
+pub mod driver;
 #[cfg(feature = "std")]
 pub mod effects;
 #[cfg(feature = "std")]

@@ -1,6 +1,11 @@
 //! The paper's procedure (§II.C, §III): what is done with an arm, and what its records say.
 
+mod approach;
 pub mod constant_speed;
 pub mod gravity_free;
 pub mod laws;
+pub mod record;
 pub mod settling;
+
+pub use approach::approach;
+pub use record::{Record, RecordError, Recorder, record, way};

@@ -4,6 +4,8 @@ use super::body::Body;
 use super::chain::Chain;
 use super::dynamics::Dynamics;
 use super::plant::{Plant, Sensors};
+use super::slave::{Identity, Module, Setup};
+use crate::driver::lwa4p::LWA4P;
 use crate::friction::{TABLE_2, TanhFriction};
 use dyngen::{Arm, Diagnostics};
 
@@ -63,4 +65,48 @@ pub fn plant() -> Result<Plant, Diagnostics> {
         colour_time: 0.15,
     };
     Ok(Plant::new(dynamics, TABLE_2.map(TanhFriction::new).to_vec(), sensors))
+}
+
+/// Rated current of the modules, mA, such that a few amperes give the torques that their maker names.
+const RATED_145: u32 = 500;
+const RATED_115: u32 = 150;
+
+/// The drives of the arm: nodes and the scale of 0x6077 as the driver knows them, limits of the arm file.
+///
+/// # Errors
+/// As [`arm`].
+pub fn modules() -> Result<Vec<Module>, Diagnostics> {
+    let joints = arm()?.joints;
+    Ok(joints
+        .iter()
+        .zip(&LWA4P.joints)
+        .map(|(joint, known)| Module {
+            node: known.node,
+            identity: Identity {
+                vendor: VENDOR,
+                product: 1,
+                revision: 0x0003_0001,
+                serial: 1000 + u32::from(known.node.raw()),
+            },
+            limits: joint.position.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+            speed: joint.velocity.unwrap_or(f64::INFINITY),
+            acceleration: joint.acceleration.unwrap_or(f64::INFINITY),
+            torque: joint.torque.unwrap_or(f64::INFINITY),
+            rated_current: if known.units.rated_torque > 2.0 { RATED_145 } else { RATED_115 },
+            rated_torque: known.units.rated_torque,
+            commutated: false,
+            current_mode: None,
+        })
+        .collect())
+}
+
+/// A number for the vendor object: SCHUNK's own is in none of its public files.
+const VENDOR: u32 = 0x0000_0200;
+
+/// The virtual LWA 4P for a bus: [`plant`] with its six drives at `start`, rad.
+///
+/// # Errors
+/// As [`arm`].
+pub fn setup(start: [f64; 6], seed: u64) -> Result<Setup, Diagnostics> {
+    Ok(Setup { plant: plant()?, modules: modules()?, start: start.to_vec(), age: 0.0, seed })
 }

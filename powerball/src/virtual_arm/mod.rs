@@ -8,9 +8,15 @@ mod dynamics;
 mod effect;
 pub mod lwa4p;
 mod plant;
+mod servo;
+mod simulation;
+pub mod slave;
 
 pub use body::{Body, PER_LINK, bodies};
 pub use chain::{Chain, Row};
 pub use dynamics::{Dynamics, solve_positive_definite};
-pub use effect::{Effect, Instant, State};
+pub use effect::{Effect, Gear, Instant, State};
 pub use plant::{Plant, Recording, Sensors};
+pub use servo::{Gains, Servo};
+pub use simulation::Simulation;
+pub use slave::VirtualArm;

@@ -80,6 +80,7 @@ impl Plant {
     pub fn record(&self, motion: &Motion, start: f64, seed: u64) -> Recording {
         let n = motion.dof();
         let mut torques = Vec::with_capacity(motion.q.len());
+        let mut positions = motion.q.clone();
         let mut states = vec![State::default(); self.effects.len()];
         for (k, [q, dq, ddq]) in motion.samples().enumerate() {
             let t = start + k as f64 * motion.period;
@@ -89,13 +90,14 @@ impl Plant {
             let mut tau: Vec<f64> = (0..n).map(|i| rigid[i] + self.friction[i].torque(dq[i])).collect();
             for (effect, state) in self.effects.iter().zip(&mut states) {
                 effect.add_torque(&instant, state, &mut tau);
+                effect.add_windup(&instant, &mut positions[k * n..(k + 1) * n]);
             }
             torques.extend(tau);
         }
         let mut recording = Recording {
             dof: n,
             t: (0..motion.len()).map(|k| start + k as f64 * motion.period).collect(),
-            q: motion.q.clone(),
+            q: positions,
             tau: torques,
         };
         for effect in &self.effects {
@@ -107,8 +109,19 @@ impl Plant {
 
     /// The torques of the bodies alone, as the effects make them at that time.
     fn rigid_torques(&self, t: f64, q: &[f64], dq: &[f64], ddq: &[f64]) -> Vec<f64> {
-        let changed = self.effects.iter().find_map(|effect| effect.changed_dynamics(&self.dynamics, t));
-        changed.as_ref().unwrap_or(&self.dynamics).inverse(q, dq, ddq)
+        self.changed_dynamics(t).as_ref().unwrap_or(&self.dynamics).inverse(q, dq, ddq)
+    }
+
+    /// The rigid bodies at time `t` with all effects that change them; `None` where none does.
+    pub(super) fn changed_dynamics(&self, t: f64) -> Option<Dynamics> {
+        self.effects.iter().fold(None, |changed: Option<Dynamics>, effect| {
+            effect.changed_dynamics(changed.as_ref().unwrap_or(&self.dynamics), t).or(changed)
+        })
+    }
+
+    /// The effects, in the order in which they were added.
+    pub fn effects(&self) -> &[Effect] {
+        &self.effects
     }
 
     /// Encoder steps and torque noise.

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 impl Effect {
     /// The names that [`draw_named`](Self::draw_named) knows.
-    pub const NAMES: [&'static str; 16] = [
+    pub const NAMES: [&'static str; 18] = [
         "load_friction",
         "stribeck",
         "velocity_nonlinearity",
@@ -26,6 +26,8 @@ impl Effect {
         "contact_wrench",
         "broken_symmetry",
         "joint_coupling",
+        "joint_elasticity",
+        "backlash",
     ];
 
     /// Draws an effect of that name for the virtual LWA 4P: its joint and its figures. `session` is the time in s
@@ -116,6 +118,13 @@ impl Effect {
                     link,
                     aside: sign * [0.02, 0.06][link - 2] * rng.random_range(0.8..1.5),
                 }
+            }
+            "joint_elasticity" => Effect::JointElasticity {
+                joint: rng.random_range(1..3),
+                stiffness: rng.random_range(1500.0..3500.0),
+            },
+            "backlash" => {
+                Effect::Backlash { joint: rng.random_range(1..3), gap: rng.random_range(0.01..0.03) }
             }
             // Both axes of a module share a housing.
             "joint_coupling" => {

@@ -16,6 +16,32 @@ use nalgebra::{Matrix3, Vector3};
 /// Elastic sliders that make up presliding.
 const SLIDERS: usize = 4;
 
+/// Stiffness of a gear's teeth once they touch, N·m/rad.
+const TEETH: f64 = 2.0e4;
+
+/// A gear that gives way: a spring between motor and link, with play.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gear {
+    /// Stiffness once the teeth touch, N·m/rad.
+    pub stiffness: f64,
+    /// The whole play, rad.
+    pub gap: f64,
+}
+
+impl Gear {
+    /// The torque onto the link, N·m, where the motor is `ahead` of it, rad at the joint, and whether teeth touch.
+    pub fn torque(&self, ahead: f64) -> (f64, bool) {
+        let free = 0.5 * self.gap;
+        (self.stiffness * (ahead - ahead.clamp(-free, free)), ahead.abs() >= free)
+    }
+
+    /// How far ahead the motor must be for a torque, rad; within the play the teeth lean to the loaded side.
+    pub fn windup(&self, torque: f64) -> f64 {
+        // Half a newton metre is enough to press the teeth onto one flank.
+        torque / self.stiffness + 0.5 * self.gap * torque / torque.hypot(0.5)
+    }
+}
+
 /// One undeclared effect. Joints count from 0 here and from 1 in [`joints`](Effect::joints).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
@@ -140,6 +166,20 @@ pub enum Effect {
         /// By this much along the link's x axis, m.
         aside: f64,
     },
+    /// A gear that winds up under its load; the encoder sits on the motor.
+    JointElasticity {
+        /// The joint.
+        joint: usize,
+        /// Stiffness, N·m/rad.
+        stiffness: f64,
+    },
+    /// Play in a gear.
+    Backlash {
+        /// The joint.
+        joint: usize,
+        /// The whole gap, rad at the joint.
+        gap: f64,
+    },
     /// One joint's friction loads the other joint of its module.
     JointCoupling {
         /// The joint that moves.
@@ -194,6 +234,8 @@ impl Effect {
             Effect::BaseTilt { .. } => "base_tilt",
             Effect::ContactWrench { .. } => "contact_wrench",
             Effect::BrokenSymmetry { .. } => "broken_symmetry",
+            Effect::JointElasticity { .. } => "joint_elasticity",
+            Effect::Backlash { .. } => "backlash",
             Effect::JointCoupling { .. } => "joint_coupling",
         }
     }
@@ -214,6 +256,8 @@ impl Effect {
             | Effect::PositionRipple { joint, .. }
             | Effect::TorqueConstant { joint, .. }
             | Effect::EncoderOffset { joint, .. }
+            | Effect::JointElasticity { joint, .. }
+            | Effect::Backlash { joint, .. }
             | Effect::JointCoupling { onto: joint, .. } => Some(*joint),
             _ => None,
         }
@@ -273,6 +317,10 @@ impl Effect {
             Effect::BrokenSymmetry { link, aside } => {
                 format!("the centre of mass of link {} lies {:+.1} mm off its plane", link + 1, 1e3 * aside)
             }
+            Effect::JointElasticity { stiffness, .. } => {
+                format!("the gear winds up by a radian for {stiffness:.0} N·m")
+            }
+            Effect::Backlash { gap, .. } => format!("the gear has {:.1} mrad of play", 1e3 * gap),
             Effect::JointCoupling { from, share, .. } => {
                 format!("{:.0} % of the friction of joint {} is felt here", 100.0 * share, from + 1)
             }
@@ -307,6 +355,35 @@ impl Effect {
                 Dynamics::new(chain, arm.bodies().to_vec())
             }
             _ => None,
+        }
+    }
+
+    /// The joint whose friction the effect changes, where its torque may turn round within a small change of speed.
+    pub(super) fn rubs_at(&self) -> Option<usize> {
+        match self {
+            Effect::LoadFriction { joint, .. }
+            | Effect::Stribeck { joint, .. }
+            | Effect::VelocityNonlinearity { joint, .. }
+            | Effect::Asymmetry { joint, .. } => Some(*joint),
+            _ => None,
+        }
+    }
+
+    /// The gear that the effect makes of a joint's stiff one.
+    pub(super) fn gear(&self) -> Option<(usize, Gear)> {
+        match self {
+            Effect::JointElasticity { joint, stiffness } => {
+                Some((*joint, Gear { stiffness: *stiffness, gap: 0.0 }))
+            }
+            Effect::Backlash { joint, gap } => Some((*joint, Gear { stiffness: TEETH, gap: *gap })),
+            _ => None,
+        }
+    }
+
+    /// How far the motor is ahead of the link in an arm that follows its motion exactly, added to the positions.
+    pub(super) fn add_windup(&self, now: &Instant<'_>, q: &mut [f64]) {
+        if let Some((joint, gear)) = self.gear() {
+            q[joint] += gear.windup(now.rigid[joint]);
         }
     }
 

@@ -1,0 +1,194 @@
+//! All nodes over one plant: the other end of a bus.
+
+use super::module::Module;
+use super::node::Node;
+use super::{Fault, Sample};
+use crate::bus::{Bus, BusError, Event, Peer};
+use crate::canopen::{Frame, Micros, NodeId};
+use crate::virtual_arm::{Effect, Plant, Simulation};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::collections::VecDeque;
+
+/// The drives' tick, µs: servo and physics.
+const TICK: Micros = 500;
+
+/// Share of the friction's steep part that the drives feed forward.
+const TUNED: f64 = 0.9;
+
+/// What a virtual arm is made of.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// The plant with its effects.
+    pub plant: Plant,
+    /// The module of each joint.
+    pub modules: Vec<Module>,
+    /// Joint positions at the start, rad.
+    pub start: Vec<f64>,
+    /// Age of the plant at the start, s: what warms has been warming for so long.
+    pub age: f64,
+    /// Seed of the sensors' noise.
+    pub seed: u64,
+}
+
+/// An arm of CiA 402 drives.
+#[derive(Debug)]
+pub struct VirtualArm {
+    simulation: Simulation,
+    nodes: Vec<Node>,
+    noise: Noise,
+    /// Torques of the last ticks, newest last, for drives that log late.
+    history: VecDeque<Vec<f64>>,
+    offsets: Vec<f64>,
+    torque: Vec<f64>,
+    ticks: u64,
+}
+
+/// Noise of the current sensors.
+#[derive(Debug)]
+struct Noise {
+    rng: ChaCha8Rng,
+    slow: Vec<f64>,
+}
+
+impl VirtualArm {
+    /// An arm at rest with closed brakes, its nodes about to boot. `None` where plant, modules and start do not have
+    /// the same number of joints.
+    pub fn new(setup: Setup) -> Option<Self> {
+        let Setup { plant, modules, start, age, seed } = setup;
+        let n = plant.dynamics().dof();
+        if modules.len() != n || start.len() != n || plant.friction().len() != n {
+            return None;
+        }
+        let simulation = Simulation::new(plant, &start, age);
+        // Drives are tuned where they are built in, to what they have to move and to most of its friction.
+        let friction = simulation.plant().friction().iter().map(|f| TUNED * f.gamma1.max(f.gamma3));
+        let tuned = simulation.inertias().into_iter().zip(friction);
+        let nodes = modules.into_iter().zip(tuned).map(|(m, (i, f))| Node::new(m, [i, f])).collect();
+        let mut offsets = vec![0.0; n];
+        for effect in simulation.plant().effects() {
+            if let Effect::EncoderOffset { joint, offset } = effect {
+                offsets[*joint] += offset;
+            }
+        }
+        let noise = Noise { rng: ChaCha8Rng::seed_from_u64(seed), slow: vec![0.0; n] };
+        let torque = vec![0.0; n];
+        Some(VirtualArm { simulation, nodes, noise, history: VecDeque::new(), offsets, torque, ticks: 0 })
+    }
+
+    /// The nodes, one a joint.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// The plant as it truly moves.
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    /// Sets the plant's age, s: what warms has been warming for so long.
+    pub fn set_age(&mut self, age: f64) {
+        self.simulation.set_time(age);
+    }
+
+    /// Torques that the drives give, N·m.
+    pub fn torques(&self) -> &[f64] {
+        &self.torque
+    }
+
+    /// Makes something go wrong at a node; nothing happens where no node has this number.
+    pub fn fault(&mut self, node: NodeId, fault: Fault) {
+        let now = self.ticks * TICK;
+        if let Some(node) = self.nodes.iter_mut().find(|n| n.id() == node) {
+            node.fault(fault, now);
+        }
+    }
+
+    /// One tick: the drives decide, the plant moves.
+    fn tick(&mut self) {
+        self.ticks += 1;
+        let (now, h) = (self.ticks * TICK, TICK as f64 * 1e-6);
+        let before = self.torque.clone();
+        for joint in 0..self.nodes.len() {
+            let speed = self.simulation.speed(joint);
+            let position = self.simulation.position(joint) + self.offsets[joint];
+            self.torque[joint] = self.nodes[joint].tick(h, now, [position, speed]);
+        }
+        self.measure(h, &before);
+        for (joint, node) in self.nodes.iter().enumerate() {
+            self.simulation.set_brake(joint, node.brake_closed());
+        }
+        self.simulation.step(h, &self.torque);
+    }
+
+    /// What the sensors say at this instant, between two ticks: the current is the mean of `before` and after.
+    fn measure(&mut self, h: f64, before: &[f64]) {
+        let sensors = self.simulation.plant().sensors();
+        let (mut delay, mut gains) = (0.0, vec![1.0; self.nodes.len()]);
+        for effect in self.simulation.plant().effects() {
+            match effect {
+                Effect::TimeDelay { delay: late } => delay += late,
+                Effect::TorqueConstant { joint, gain } => gains[*joint] *= gain,
+                _ => {}
+            }
+        }
+        let back = (delay / h).round() as usize;
+        self.history.push_back(before.iter().zip(&self.torque).map(|(a, b)| 0.5 * (a + b)).collect());
+        while self.history.len() > back + 1 {
+            self.history.pop_front();
+        }
+        let keep = (-h / sensors.colour_time).exp();
+        for (joint, node) in self.nodes.iter_mut().enumerate() {
+            let mut normal = || -> f64 { StandardNormal.sample(&mut self.noise.rng) };
+            let slow = &mut self.noise.slow[joint];
+            *slow = keep * *slow + (1.0 - keep * keep).sqrt() * sensors.coloured[joint] * normal();
+            let torque = self.history.front().map_or(0.0, |torque| torque[joint]);
+            node.measure(Sample {
+                position: self.simulation.position(joint) + self.offsets[joint],
+                speed: self.simulation.speed(joint),
+                torque: torque * gains[joint] + *slow + sensors.white[joint] * normal(),
+            });
+        }
+    }
+}
+
+impl Peer for VirtualArm {
+    fn receive(&mut self, frame: &Frame, now: Micros) {
+        self.nodes.iter_mut().for_each(|node| node.receive(frame, now));
+    }
+
+    fn advance(&mut self, now: Micros) {
+        while (self.ticks + 1) * TICK <= now {
+            self.tick();
+        }
+    }
+
+    fn wake(&self) -> Micros {
+        (self.ticks + 1) * TICK
+    }
+
+    fn transmit(&mut self) -> Option<Frame> {
+        self.nodes.iter_mut().find_map(Node::transmit)
+    }
+}
+
+/// Puts an arm on a bus with others, in the bus's time, until `stop` says so or the bus is gone.
+///
+/// # Errors
+/// What the bus says; a full queue loses the frame, as a drive does.
+pub fn serve(arm: &mut impl Peer, bus: &mut impl Bus, stop: impl Fn() -> bool) -> Result<(), BusError> {
+    while !stop() {
+        if let Some((at, Event::Frame(frame))) = bus.receive(arm.wake())? {
+            arm.receive(&frame, at);
+        }
+        arm.advance(bus.now());
+        while let Some(frame) = arm.transmit() {
+            match bus.send(&frame) {
+                Ok(()) | Err(BusError::Full | BusError::Off) => {}
+                Err(gone) => return Err(gone),
+            }
+        }
+    }
+    Ok(())
+}
