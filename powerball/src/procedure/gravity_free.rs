@@ -55,7 +55,7 @@ pub struct GravityFree {
 }
 
 /// Leftover below which a pose counts as free of gravity.
-const FREE: f64 = 1e-3;
+pub const FREE: f64 = 1e-3;
 /// Places of a joint that are tried in a sweep, and sweeps over all joints.
 const PLACES: usize = 49;
 const SWEEPS: i32 = 4;

@@ -2,6 +2,7 @@
 
 mod approach;
 pub mod constant_speed;
+pub mod friction;
 pub mod gravity_free;
 pub mod laws;
 pub mod record;

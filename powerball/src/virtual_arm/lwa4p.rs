@@ -54,8 +54,21 @@ pub fn arm() -> Result<Arm, Diagnostics> {
 /// # Errors
 /// As [`arm`].
 pub fn plant() -> Result<Plant, Diagnostics> {
-    let arm = arm()?;
-    let dynamics = Dynamics::new(Chain::new(&arm), links())
+    build(Chain::new(&arm()?))
+}
+
+/// The same arm with its base mounted otherwise: gravity in the base frame, m/s².
+///
+/// # Errors
+/// As [`arm`].
+pub fn mounted(gravity: [f64; 3]) -> Result<Plant, Diagnostics> {
+    let mut chain = Chain::new(&arm()?);
+    chain.gravity = gravity.into();
+    build(chain)
+}
+
+fn build(chain: Chain) -> Result<Plant, Diagnostics> {
+    let dynamics = Dynamics::new(chain, links())
         .ok_or_else(|| Diagnostics::whole_file("lwa4p.toml", "the virtual arm has six joints"))?;
     let sensors = Sensors {
         rate: 200.0,
