@@ -4,6 +4,7 @@ mod bus;
 mod demo;
 mod excite;
 mod explain;
+mod friction;
 mod identify;
 mod identify_page;
 mod inputs;
@@ -11,6 +12,7 @@ mod output;
 mod record;
 mod verify;
 mod virtual_arm;
+mod warm_up;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -33,6 +35,10 @@ enum Command {
     VirtualArm(virtual_arm::VirtualArmCommand),
     /// Follow a trajectory on a bus and log it.
     Record(record::RecordCommand),
+    /// Swing the arm until its friction has settled.
+    WarmUp(warm_up::WarmUp),
+    /// Measure every joint's friction at constant speeds and fit its law.
+    Friction(friction::Friction),
     /// Search an exciting trajectory within the arm's limits and write it.
     Excite(excite::Excite),
     /// Fit the minimal inertial set and the friction of every joint to logs.
@@ -62,6 +68,8 @@ pub fn main() -> ExitCode {
         Command::Bus(command) => command.run(),
         Command::VirtualArm(command) => command.run(),
         Command::Record(command) => command.run(),
+        Command::WarmUp(command) => command.run(),
+        Command::Friction(command) => command.run(),
         Command::Excite(command) => command.run(),
         Command::Identify(command) => command.run(),
         Command::Verify(command) => command.run(),

@@ -82,9 +82,15 @@ const SHARE: f64 = 0.5;
 ///
 /// # Errors
 /// [`FrictionError::Arm`] where the arm file gives the joint no limits.
-pub fn plan(model: &Model, joint: usize, mounting: Mounting, period: f64) -> Result<Option<Experiment>, FrictionError> {
+pub fn plan(
+    model: &Model,
+    joint: usize,
+    mounting: Mounting,
+    period: f64,
+) -> Result<Option<Experiment>, FrictionError> {
     let row = &model.arm().joints[joint];
-    let missing = |key: &str| FrictionError::Arm(format!("joint {} needs `{key}` in the arm file", joint + 1));
+    let missing =
+        |key: &str| FrictionError::Arm(format!("joint {} needs `{key}` in the arm file", joint + 1));
     let position = row.position.ok_or_else(|| missing("position"))?;
     let velocity = row.velocity.ok_or_else(|| missing("velocity"))?;
     let acceleration = SHARE * row.acceleration.ok_or_else(|| missing("acceleration"))?;

@@ -7,6 +7,7 @@ pub mod gravity_free;
 pub mod laws;
 pub mod record;
 pub mod settling;
+pub mod warm_up;
 
 pub use approach::approach;
 pub use record::{Record, RecordError, Recorder, record, way};

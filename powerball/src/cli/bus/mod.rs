@@ -13,6 +13,7 @@ use crate::bus::{self, Bus, BusUrl, Event, Master, Memory};
 use crate::canopen::{Micros, NodeId};
 use crate::driver::Driver;
 use crate::driver::lwa4p::LWA4P;
+use crate::virtual_arm::VirtualArm;
 use clap::{Args, Subcommand};
 
 /// For the built-in arm's drives to boot, µs.
@@ -80,24 +81,33 @@ impl Where {
         if self.bus != BusUrl::Virtual {
             return bus::open(&self.bus).map_err(|e| Failure::Unusable(e.to_string()));
         }
-        let mut memory = Memory::new(virtual_arm([0.0; 6], 1, None, false)?, LWA4P.bitrate);
-        wait(&mut memory, BOOT)?;
-        Ok(Box::new(memory))
+        virtual_bus(virtual_arm([0.0; 6], 1, None, false)?)
+    }
+
+    /// A driver of the arm on an open bus.
+    ///
+    /// UDP multicast is a bench: nobody promises a program its time slices there, and no arm is hurt by a late SYNC. The driver
+    /// then bears what it would not on a real bus; it counts all the same.
+    pub(crate) fn driver(&self, bus: Box<dyn Bus>) -> Result<Master<Box<dyn Bus>, 6>, Failure> {
+        let mut profile = LWA4P;
+        if matches!(self.bus, BusUrl::Udp(_)) {
+            let reactions = &mut profile.reactions;
+            (reactions.late_limit, reactions.skipped_limit, reactions.missing_cycles) = (u8::MAX, 20, 20);
+        }
+        Ok(Master::new(Driver::new(profile).map_err(refused)?, bus))
     }
 }
 
+/// A virtual arm on a bus in memory; its drives have booted.
+pub(crate) fn virtual_bus(arm: VirtualArm) -> Result<Box<dyn Bus>, Failure> {
+    let mut memory = Memory::new(arm, LWA4P.bitrate);
+    wait(&mut memory, BOOT)?;
+    Ok(Box::new(memory))
+}
+
 /// A driver of the arm on the bus.
-///
-/// UDP multicast is a bench: nobody promises a program its time slices there, and no arm is hurt by a late SYNC. The driver
-/// then bears what it would not on a real bus; it counts all the same.
 pub(crate) fn master(place: &Where) -> Result<Master<Box<dyn Bus>, 6>, Failure> {
-    let mut profile = LWA4P;
-    if matches!(place.bus, BusUrl::Udp(_)) {
-        let reactions = &mut profile.reactions;
-        (reactions.late_limit, reactions.skipped_limit, reactions.missing_cycles) = (u8::MAX, 20, 20);
-    }
-    let driver = Driver::new(profile).map_err(refused)?;
-    Ok(Master::new(driver, place.open()?))
+    place.driver(place.open()?)
 }
 
 /// Lets time pass on the bus.
