@@ -24,6 +24,7 @@ pub mod log;
 pub mod model;
 #[cfg(feature = "std")]
 pub mod motion;
+pub mod online;
 #[cfg(feature = "std")]
 mod parallel;
 #[cfg(feature = "std")]
