@@ -99,6 +99,14 @@ struct Accepted {
     explained: Vec<f64>,
 }
 
+/// How a step ended.
+enum Stepped {
+    /// An effect was accepted.
+    Accepted(&'static str),
+    /// What fitted best could not be told from its rivals and left much.
+    Withdrawn,
+}
+
 /// What a step decided.
 #[derive(Debug)]
 struct Step {
@@ -114,6 +122,18 @@ fn extent(candidate: &Candidate) -> Extent {
         windows if windows.iter().any(|w| w.to.is_finite()) => Extent::Short,
         _ => Extent::SomeLogs,
     }
+}
+
+/// Two events this close count as one whose time is a little off, s.
+const BESIDE: f64 = 2.0;
+
+/// Whether one of `event`'s windows begins or ends beside the beginning of one of `earlier`'s.
+fn begins_beside(earlier: &Candidate, event: &Candidate) -> bool {
+    let near = |a: f64, b: f64| (a - b).abs() < BESIDE;
+    earlier.windows.iter().any(|e| {
+        let mut same_log = event.windows.iter().filter(|w| w.log == e.log);
+        same_log.any(|w| near(w.from, e.from) || near(w.to, e.from))
+    })
 }
 
 /// Placebos whose scores a step's choice must exceed.
@@ -180,8 +200,13 @@ pub fn explain(
     };
     for step in 0..rule::MOST_STEPS {
         progress(&format!("step {}: screening candidates", step + 1));
-        let Some(name) = session.step(step) else { break };
-        progress(&format!("step {}: {name} accepted", step + 1));
+        match session.step(step) {
+            None => break,
+            Some(Stepped::Accepted(name)) => progress(&format!("step {}: {name} accepted", step + 1)),
+            Some(Stepped::Withdrawn) => {
+                progress(&format!("step {}: what fits best cannot be named", step + 1))
+            }
+        }
     }
     progress("asking placebos");
     session.count_false_positives();
@@ -190,8 +215,8 @@ pub fn explain(
 }
 
 impl Session<'_> {
-    /// One step of the loop: the name of what was accepted, `None` where nothing passes.
-    fn step(&mut self, step: usize) -> Option<&'static str> {
+    /// One step of the loop; `None` where nothing passes.
+    fn step(&mut self, step: usize) -> Option<Stepped> {
         let other_residual = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
         let (chosen, comparison, members, tested) = {
             let context = Context::new(&self.data, &self.fit, &self.fit.residual);
@@ -282,6 +307,7 @@ impl Session<'_> {
         let squares =
             |fit: &Fit| -> Vec<f64> { fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect() };
         let square_before = squares(&self.fit);
+        let earlier = self.accepted.len();
         let added: Vec<Candidate> = members.iter().map(|m| m.candidate.clone()).collect();
         for member in members {
             let Some(evidence) = member.evidence else { continue };
@@ -297,6 +323,15 @@ impl Session<'_> {
             });
         }
         self.refit();
+        if comparison.margin < rule::LEAST_MARGIN
+            && self.share_left(&square_before, &comparison.joints) > rule::MUCH_LEFT
+        {
+            // Not named; it stays as a rival of what comes.
+            self.accepted.truncate(earlier);
+            self.given_up.extend(added.into_iter().map(|c| (chosen, c)));
+            self.refit();
+            return Some(Stepped::Withdrawn);
+        }
         let fell: Vec<f64> =
             square_before.iter().zip(squares(&self.fit)).map(|(b, a)| (b - a).max(0.0)).collect();
         for a in self.accepted.iter_mut().filter(|a| a.explained.is_empty()) {
@@ -316,7 +351,15 @@ impl Session<'_> {
             before: spread(&self.other, &other_residual).rms,
             after: spread(&self.other, &after).rms,
         });
-        Some(self.effects[chosen].name())
+        Some(Stepped::Accepted(self.effects[chosen].name()))
+    }
+
+    /// The share of the excess over the noise floor that stayed on some joints, given the squared errors before.
+    fn share_left(&self, before: &[f64], joints: &[usize]) -> f64 {
+        let rms = |j: usize, square: f64| (square / self.data.joints[j].len().max(1) as f64).sqrt();
+        let before: Vec<f64> = before.iter().enumerate().map(|(j, s)| rms(j, *s)).collect();
+        let after = spread(&self.data, &self.fit.residual).rms;
+        leftover(&before, &after, &noise_floor(&self.data), joints)
     }
 
     /// Asks placebos of every kind on the final residual: where nothing is missing any more, what passes is chance.
@@ -343,8 +386,7 @@ impl Session<'_> {
         let mut families = Vec::new();
         for (e, candidates) in lists {
             let effect = self.effects[e].as_ref();
-            let open: Vec<Candidate> =
-                candidates.into_iter().filter(|c| !self.has(e, c) && !self.gave_up(e, c)).collect();
+            let open: Vec<Candidate> = candidates.into_iter().filter(|c| !self.has(e, c)).collect();
             *tests += open.iter().map(|c| c.searched.max(1.0)).fold(0.0, f64::max).max(open.len() as f64);
             let trials = parallel::map(&open, |c| screen.try_candidate(effect, c));
             let mut members: Vec<Member> = Vec::new();
@@ -365,9 +407,12 @@ impl Session<'_> {
                     }
                 }
             }
+            let mut members = self.compatible(e, members);
             for member in &mut members {
                 if member.trial.score < rule::LEAST_SCORE {
                     member.refusal = Some(format!("explains too little (score {:.1})", member.trial.score));
+                } else if self.gave_up(e, &member.candidate) {
+                    member.refusal = Some("did not last, or could not be told from its rivals".to_string());
                 } else if let Some(name) = self.mends(screen, e, member) {
                     member.refusal = Some(format!("only mends the law of {name}"));
                 }
@@ -379,33 +424,61 @@ impl Session<'_> {
         families
     }
 
+    /// Members that do not exclude each other: the best one that acts on several joints with what goes beside it, or those of
+    /// single joints, whichever explain more.
+    fn compatible(&self, effect: usize, mut members: Vec<Member>) -> Vec<Member> {
+        members.sort_by(|a, b| b.trial.score.total_cmp(&a.trial.score));
+        let choose = |first: &dyn Fn(&Member) -> bool| -> (f64, Vec<usize>) {
+            let mut kept: Vec<usize> = Vec::new();
+            let order = (0..members.len()).filter(|m| first(&members[*m]));
+            for m in order {
+                let excluded = |k: &usize| self.same(effect, &members[*k].candidate, &members[m].candidate);
+                if !kept.iter().any(excluded) {
+                    kept.push(m);
+                }
+            }
+            (kept.iter().map(|m| members[*m].trial.score).sum(), kept)
+        };
+        let (single, wide) = (choose(&|m| m.candidate.joints.len() == 1), choose(&|_| true));
+        let kept = if single.0 > wide.0 { single.1 } else { wide.1 };
+        let mut at = 0;
+        members.retain(|_| {
+            at += 1;
+            kept.contains(&(at - 1))
+        });
+        members
+    }
+
     fn has(&self, effect: usize, candidate: &Candidate) -> bool {
         self.accepted.iter().any(|a| a.effect == effect && self.same(effect, &a.candidate, candidate))
     }
 
     fn gave_up(&self, effect: usize, candidate: &Candidate) -> bool {
-        self.given_up.iter().any(|(e, c)| *e == effect && self.same(effect, c, candidate))
+        let again = |c: &Candidate| c.joints == candidate.joints && self.same(effect, c, candidate);
+        self.given_up.iter().any(|(e, c)| *e == effect && again(c))
     }
 
-    /// Whether two candidates of an effect are the same thing twice; several ripples, contacts and the like are not.
+    /// Whether two candidates of an effect are the same thing twice, so that one excludes the other. Several ripples, contacts
+    /// and the like are not; a delay of all joints and one of a single joint are.
     fn same(&self, effect: usize, a: &Candidate, b: &Candidate) -> bool {
-        a.joints == b.joints
-            && match (self.effects[effect].name(), a.values.first(), b.values.first()) {
-                ("position_ripple", Some(x), Some(y)) => (x - y).abs() < 0.5,
-                ("joint_coupling", Some(x), Some(y)) => x == y,
-                ("broken_symmetry", ..) => a.form == b.form,
-                ("contact_wrench", ..) => a.windows == b.windows,
-                _ => true,
-            }
+        let joints = a.joints == b.joints;
+        match (self.effects[effect].name(), a.values.first(), b.values.first()) {
+            ("position_ripple", Some(x), Some(y)) => joints && (x - y).abs() < 0.5,
+            ("joint_coupling", Some(x), Some(y)) => joints && x == y,
+            ("broken_symmetry", ..) => joints && a.form == b.form,
+            ("contact_wrench", ..) => a.windows == b.windows,
+            _ => a.joints.iter().any(|j| b.joints.contains(j)),
+        }
     }
 
     /// The accepted effect of which a member would only mend the law: on the joints where no accepted effect is large
     /// beside it, it would not count.
     fn mends(&self, screen: &Screen<'_>, effect: usize, member: &Member) -> Option<&'static str> {
         let class = self.effects[effect].class();
-        // An event mends nothing that lasts.
-        let lasting: Vec<&Accepted> =
-            self.accepted.iter().filter(|a| a.candidate.windows.is_empty()).collect();
+        // An event mends nothing that lasts; but an event beside the beginning of another one mends its time.
+        let lasting: Vec<&Accepted> = (self.accepted.iter())
+            .filter(|a| a.candidate.windows.is_empty() || begins_beside(&a.candidate, &member.candidate))
+            .collect();
         let mut mended = None;
         let mut rest = 0.0;
         for (j, gain) in screen.gains(&member.trial, &member.candidate.joints) {

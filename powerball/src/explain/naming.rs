@@ -13,6 +13,8 @@ pub(super) struct Comparison {
     pub(super) rivals: Vec<Rival>,
     /// A name that fits as well.
     pub(super) twin: Option<String>,
+    /// The joints on which they were compared.
+    pub(super) joints: Vec<usize>,
 }
 
 /// Rivals listed at most.
@@ -54,7 +56,7 @@ pub(super) fn compare(families: &[Family], chosen: usize, joints: &[usize]) -> C
         .first()
         .filter(|(_, score)| own / score < rule::LEAST_MARGIN)
         .map(|(f, _)| families[*f].name.to_string());
-    Comparison { margin, rivals, twin }
+    Comparison { margin, rivals, twin, joints: joints.to_vec() }
 }
 
 /// The margin of a name without a rival: its score over the least that could have counted.

@@ -30,6 +30,10 @@ pub(super) const AS_GOOD: f64 = 0.02;
 pub(super) const AS_GOOD_SCORE: f64 = 3.0;
 /// Two names whose gains differ by less than this factor cannot be told apart by these data.
 pub(super) const LEAST_MARGIN: f64 = 1.1;
+/// A name that is not told apart from the next best one ([`LEAST_MARGIN`]) is not given where it leaves more than this share of
+/// the excess over the noise floor: then something else is there, and what fits best only resembles it. The share is that of an
+/// earlier trial on other data.
+pub(super) const MUCH_LEFT: f64 = 0.35;
 /// Effects added at most.
 pub(super) const MOST_STEPS: usize = 12;
 

@@ -52,7 +52,7 @@ fn nothing_is_found_where_nothing_is_missing() {
     }
 }
 
-/// The table of a study: `STUDY=size,seeds cargo test --release -p powerball study -- --ignored --nocapture`.
+/// The table of a study: `STUDY=size,seeds,first cargo test --release -p powerball study -- --ignored --nocapture`.
 #[test]
 #[ignore = "minutes"]
 fn study() {
@@ -61,13 +61,14 @@ fn study() {
     let mut parts = text.split(',');
     let size: f64 = parts.next().and_then(|s| s.parse().ok()).unwrap_or(1.0);
     let seeds: u64 = parts.next().and_then(|s| s.parse().ok()).unwrap_or(2);
+    let first: u64 = parts.next().and_then(|s| s.parse().ok()).unwrap_or(0);
     let only: Vec<&str> = parts.collect();
     let (mut right, mut total) = (0, 0);
     for truth in Truth::ALL {
         if !only.is_empty() && !only.contains(&truth.name()) {
             continue;
         }
-        for seed in 0..seeds {
+        for seed in first..first + seeds {
             let start = std::time::Instant::now();
             let explained = run(&body, truth, size, Noise::White, seed);
             let ok = explained.effects.first().is_some_and(|e| e.effect == truth.name());
@@ -87,7 +88,7 @@ fn study() {
     println!("{right} of {total}");
     for (noise, seeds) in [(Noise::White, seeds), (Noise::Coloured(0.3), seeds)] {
         if only.is_empty() {
-            for seed in 100..100 + 2 * seeds {
+            for seed in 100 + 2 * first..100 + 2 * (first + seeds) {
                 println!("clean {noise:?} {seed} {:?}", names(&run(&body, Truth::Clean, 0.0, noise, seed)));
             }
         }
