@@ -263,13 +263,17 @@ impl World {
 
     /// One turn of the caller's loop: at most to the driver's deadline.
     pub(crate) fn turn(&mut self) {
+        self.turn_until(Micros::MAX);
+    }
+
+    fn turn_until(&mut self, limit: Micros) {
         let now = self.now();
         let mut door = Door { full: now < self.full_until, bus: &mut self.bus };
         self.driver.poll(now, &mut door);
         if !self.holding {
             self.fly();
         }
-        let until = self.driver.deadline().max(now + 1);
+        let until = self.driver.deadline().max(now + 1).min(limit);
         let waited = self.backlog.pop_front().map(|(_, event)| (now, event));
         if let Some((at, event)) = waited.or_else(|| self.bus.receive(until).unwrap()) {
             let mut door = Door { full: at < self.full_until, bus: &mut self.bus };
@@ -312,7 +316,7 @@ impl World {
     pub(crate) fn run(&mut self, time: Micros) {
         let until = self.now() + time;
         while self.now() < until {
-            self.turn();
+            self.turn_until(until);
         }
     }
 
