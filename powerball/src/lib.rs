@@ -27,6 +27,8 @@ pub mod motion;
 #[cfg(feature = "std")]
 mod parallel;
 #[cfg(feature = "std")]
+pub mod procedure;
+#[cfg(feature = "std")]
 pub mod regression;
 #[cfg(feature = "std")]
 pub mod report;

@@ -4,6 +4,7 @@
 //! that a bus in memory can run faster than real time.
 
 pub mod blocking;
+mod master;
 mod memory;
 mod msgpack;
 #[cfg(unix)]
@@ -14,6 +15,7 @@ mod socketcan;
 mod udp;
 mod url;
 
+pub use master::{ArmError, Master, Moment};
 pub use memory::{Memory, Peer};
 #[cfg(unix)]
 pub use slcan::Slcan;

@@ -1,5 +1,6 @@
 //! The `powerball` command: one file a subcommand.
 
+mod bus;
 mod demo;
 mod excite;
 mod explain;
@@ -7,6 +8,8 @@ mod identify;
 mod identify_page;
 mod inputs;
 mod output;
+mod record;
+mod virtual_arm;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -23,6 +26,12 @@ struct Cli {
 enum Command {
     /// The whole loop on the built-in virtual arm: record, identify, explain, compare with the truth.
     Demo(demo::DemoCommand),
+    /// Look at the drives on a CAN bus, read and write their objects, enable, stop and move them.
+    Bus(bus::BusCommand),
+    /// Put the virtual arm on a bus for others.
+    VirtualArm(virtual_arm::VirtualArmCommand),
+    /// Follow a trajectory on a bus and log it.
+    Record(record::RecordCommand),
     /// Search an exciting trajectory within the arm's limits and write it.
     Excite(excite::Excite),
     /// Fit the minimal inertial set and the friction of every joint to logs.
@@ -47,6 +56,9 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let done = match cli.command {
         Command::Demo(command) => command.run(),
+        Command::Bus(command) => command.run(),
+        Command::VirtualArm(command) => command.run(),
+        Command::Record(command) => command.run(),
         Command::Excite(command) => command.run(),
         Command::Identify(command) => command.run(),
         Command::Explain(command) => command.run(),

@@ -1,8 +1,14 @@
 //! A recording session on the virtual arm: several exciting paths, some to fit and some to hold out, with an effect
-//! that nobody tells the model.
+//! that nobody tells the model. The arm is on a CAN bus in memory and is driven and recorded as the real one is.
 
+use crate::bus::{Master, Memory};
+use crate::driver::lwa4p::LWA4P;
+use crate::driver::{Driver, Refusal};
 use crate::excite::{self, Settings};
-use crate::virtual_arm::{Effect, Plant, lwa4p};
+use crate::motion::Motion;
+use crate::procedure::{RecordError, Recorder, way};
+use crate::virtual_arm::slave::Setup;
+use crate::virtual_arm::{Effect, Plant, VirtualArm, lwa4p};
 use dyngen::{Model, SetKind};
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
@@ -25,8 +31,9 @@ const PATHS: [(bool, f64); 8] = [
 ];
 /// The path, one to fit, during which something may begin.
 const BEGINS_IN: usize = 3;
-/// Between two logs, s.
+/// Between two logs the arm goes to where the next one begins: in so many seconds at least, and at this share of its speed.
 const PAUSE: f64 = 3.0;
+const SHARE: f64 = 0.5;
 /// Paths tried for each log: enough for a condition number near the best, in a fraction of a second.
 const EVALUATIONS: usize = 300;
 
@@ -60,6 +67,10 @@ pub enum SessionError {
     UnknownEffect(String),
     /// A file could not be written.
     Write(PathBuf, io::Error),
+    /// The driver refuses its own profile.
+    Driver(Refusal),
+    /// A recording failed.
+    Record(RecordError),
 }
 
 impl std::fmt::Display for SessionError {
@@ -70,6 +81,8 @@ impl std::fmt::Display for SessionError {
             SessionError::UnknownEffect(name) => {
                 write!(f, "no effect is called {name}; there are {}", Effect::NAMES.join(", "))
             }
+            SessionError::Driver(e) => e.fmt(f),
+            SessionError::Record(e) => e.fmt(f),
             SessionError::Write(path, e) => write!(f, "{} cannot be written: {e}", path.display()),
         }
     }
@@ -86,6 +99,12 @@ impl From<excite::Error> for SessionError {
 impl From<dyngen::Diagnostics> for SessionError {
     fn from(e: dyngen::Diagnostics) -> Self {
         SessionError::Arm(e)
+    }
+}
+
+impl From<RecordError> for SessionError {
+    fn from(e: RecordError) -> Self {
+        SessionError::Record(e)
     }
 }
 
@@ -113,33 +132,67 @@ impl Session {
         }
 
         let plant = lwa4p::plant()?;
+        let motions: Vec<Motion> = found.iter().map(|f| f.path.sample(plant.sensors().rate)).collect();
+        let ends: Vec<[[f64; 6]; 2]> = motions.iter().map(ends).collect();
+        let starts = starts(&motions, &ends);
+        let session = starts.last().map_or(0.0, |last| last + motions.last().map_or(0.0, Motion::duration));
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let session: f64 = found.iter().map(|f| f.path.duration() + PAUSE).sum();
         let name = named.choose(&mut rng).copied().unwrap_or_default();
-        let starts = found.iter().scan(0.0, |end, f| {
-            let start = *end;
-            *end += f.path.duration() + PAUSE;
-            Some(start)
-        });
-        let starts: Vec<f64> = starts.collect();
         // What begins at some time begins while a log is recorded that will be fitted, with logs before and after.
-        let begins = starts[BEGINS_IN] + PAUSE..starts[BEGINS_IN + 1] - 2.0 * PAUSE;
+        let begins = starts[BEGINS_IN] + PAUSE..starts[BEGINS_IN] + motions[BEGINS_IN].duration() - PAUSE;
         let effect = Effect::draw_named(name, &plant, session, begins, &mut rng)
             .ok_or_else(|| SessionError::UnknownEffect(name.to_string()))?;
         let plant = plant.with(effect.clone());
 
+        let setup = Setup { plant: plant.clone(), ..lwa4p::setup(ends[0][0], rng.random())? };
+        let arm = VirtualArm::new(setup).ok_or_else(|| {
+            SessionError::Arm(dyngen::Diagnostics::whole_file("lwa4p.toml", "six joints are needed"))
+        })?;
+        let driver = Driver::new(LWA4P).map_err(SessionError::Driver)?;
+        let mut recorder = Recorder::enable(Master::new(driver, Memory::new(arm, LWA4P.bitrate)))?;
+        recorder.go(&ends[0][0], SHARE, PAUSE)?;
+        recorder.master_mut().bus_mut().peer_mut().set_age(0.0);
+
         let (mut fit, mut held_out) = (Vec::new(), Vec::new());
-        for (((is_held_out, _), found), start) in PATHS.iter().zip(&found).zip(&starts) {
+        for (k, (is_held_out, _)) in PATHS.iter().enumerate() {
             let (list, word) = if *is_held_out { (&mut held_out, "held_out") } else { (&mut fit, "fit") };
-            let log = plant.record(&found.path.sample(plant.sensors().rate), *start, rng.random());
             let path = folder.join(format!("{word}_{}.csv", list.len() + 1));
-            save(&path, &log.to_csv())?;
+            if k > 0 {
+                recorder.go(&ends[k][0], SHARE, PAUSE)?;
+            }
+            let unwritten = |e| SessionError::Write(path.clone(), e);
+            let mut file = std::fs::File::create(&path).map_err(unwritten)?;
+            match recorder.record(&motions[k], starts[k], false, &mut file) {
+                Err(RecordError::Write(e)) => return Err(unwritten(e)),
+                done => done?,
+            };
             list.push(path);
         }
+        recorder.finish()?;
         let recorded = found.iter().map(|f| f.path.duration()).sum();
         let conditions = found.iter().map(|f| f.figures.condition).collect();
         Ok(Session { plant, effect, arm_file, fit, held_out, conditions, recorded })
     }
+}
+
+/// Where a motion begins and ends.
+fn ends(motion: &Motion) -> [[f64; 6]; 2] {
+    let at = |place: usize| std::array::from_fn(|i| motion.q.get(place + i).copied().unwrap_or(0.0));
+    [at(0), at(motion.q.len().saturating_sub(6))]
+}
+
+/// When each motion begins, s after the first, with the ways between them. A motion of n samples takes n + 1 cycles.
+fn starts(motions: &[Motion], ends: &[[[f64; 6]; 2]]) -> Vec<f64> {
+    let mut cycles = 0;
+    let mut starts = Vec::new();
+    for (k, motion) in motions.iter().enumerate() {
+        if k > 0 {
+            cycles += way(&LWA4P, &ends[k - 1][1], &ends[k][0], SHARE, PAUSE).len() + 1;
+        }
+        starts.push(cycles as f64 * LWA4P.period_seconds());
+        cycles += motion.len() + 1;
+    }
+    starts
 }
 
 fn save(path: &Path, text: &str) -> Result<(), SessionError> {

@@ -11,15 +11,21 @@ pub struct Gains {
     pub integral: f64,
     /// Torque at the current limit, N·m.
     pub limit: f64,
+    /// Coulomb friction that is fed forward with the sign of the wanted speed, N·m: without it a joint dwells at each
+    /// reversal until the integrator has turned round.
+    pub friction: f64,
 }
 
+/// Below this speed the friction is not yet fed forward whole, rad/s.
+const TURN: f64 = 5e-3;
+
 impl Gains {
-    /// Gains for an inertia in kg·m² at the joint: a velocity loop of 25 Hz, an integrator and a position loop that are
+    /// Gains for an inertia in kg·m² at the joint: a velocity loop of 120 Hz, an integrator and a position loop that are
     /// slower by four.
-    pub fn for_inertia(inertia: f64, limit: f64) -> Self {
-        let bandwidth = std::f64::consts::TAU * 25.0;
+    pub fn for_inertia(inertia: f64, limit: f64, friction: f64) -> Self {
+        let bandwidth = std::f64::consts::TAU * 120.0;
         let velocity = inertia * bandwidth;
-        Gains { position: bandwidth / 4.0, velocity, integral: velocity * bandwidth / 4.0, limit }
+        Gains { position: bandwidth / 4.0, velocity, integral: velocity * bandwidth / 4.0, limit, friction }
     }
 }
 
@@ -48,10 +54,11 @@ impl Servo {
     ///
     /// At the current limit the integrator waits, unless it leads away from the limit.
     pub fn torque(&mut self, h: f64, wanted: [f64; 2], actual: [f64; 2], forward: f64) -> f64 {
-        let Gains { position, velocity, integral, limit } = self.gains;
+        let Gains { position, velocity, integral, limit, friction } = self.gains;
         let error = wanted[1] + position * (wanted[0] - actual[0]) - actual[1];
         let more = self.held + h * integral * error;
-        let asked = forward + velocity * error + more;
+        let turning = friction * wanted[1] / wanted[1].hypot(TURN);
+        let asked = forward + turning + velocity * error + more;
         if asked.abs() <= limit || asked * error < 0.0 {
             self.held = more.clamp(-limit, limit);
         }

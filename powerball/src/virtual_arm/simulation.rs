@@ -1,15 +1,16 @@
 //! The plant in time: what the arm does under the torques of its drives.
 //!
-//! Each step is linearly implicit in what is stiff. Friction is a torque s·q̇' against the new speed q̇' with the secant
-//! s = f(q̇)/q̇ of the old one: Eq. 16's tanh(216 q̇) then dissipates at any step and comes to rest without chatter. A gear
-//! that gives way is a spring and a damper between two masses, taken at the end of the step. Everything else is taken
-//! at its start.
+//! Each step is linearly implicit in what is stiff. Friction is first a torque s·q̇' against the new speed q̇' with the secant
+//! s = f(q̇)/q̇ of the old one: Eq. 16's tanh(216 q̇) then dissipates at any step and comes to rest without chatter. With
+//! the speed so found, the chord of f from the old speed to the new one takes the secant's place: where friction has
+//! saturated, it no longer follows the speed. A gear that gives way is a spring and a damper between two masses, taken at
+//! the end of the step. Everything else is taken at its start.
 
 use super::dynamics::{Dynamics, solve_positive_definite};
 use super::effect::{Gear, Instant, State};
 use super::plant::Plant;
 
-/// Below this speed the secant of a friction law is its slope, rad/s.
+/// Speeds nearer than this have no chord, rad/s.
 const REST: f64 = 1e-9;
 /// A closed brake holds this much more than the joint can ask for, N·m, and turns a millionth of a radian a second.
 const BRAKE: f64 = 120.0;
@@ -92,6 +93,11 @@ impl Simulation {
         &self.plant
     }
 
+    /// Sets the time: what warms or begins does so as if it were `time` s.
+    pub fn set_time(&mut self, time: f64) {
+        (self.time, self.stale) = (time, 0);
+    }
+
     /// Time, s.
     pub fn time(&self) -> f64 {
         self.time
@@ -140,51 +146,82 @@ impl Simulation {
         self.stale -= 1;
         let bias = self.dynamics.inverse(&self.q, &self.dq, &vec![0.0; n]);
         let inertia = self.dynamics.mass_matrix(&self.q);
-        let (load, rubbing) = self.effects();
+        let load = self.load();
+        let free: Vec<f64> = (0..n).map(|i| bias[i] + load[i]).collect();
+        self.time += h;
 
-        // (B + h·S) q̇' = B q̇ + h (τ − bias − effects): row by row.
-        let mut matrix = inertia.clone();
+        // A first step tells the new speeds to within what friction changes on the way to them.
+        let [old, rest] = [self.speeds(), vec![[0.0; 2]; n]].map(|speeds| (self.friction(&speeds), speeds));
+        let secants = chords(&rest, &old, |i| self.slope(i));
+        let Some((first, _)) = self.solve(h, tau, &inertia, &free, &rest.0, &secants) else { return };
+        let new = (self.friction(&first), first);
+        let chords = chords(&old, &new, |i| self.slope(i));
+        let offsets: Vec<[f64; 2]> =
+            (0..n).map(|i| [0, 1].map(|side| old.0[i][side] - chords[i][side] * old.1[i][side])).collect();
+        let Some((speeds, change)) = self.solve(h, tau, &inertia, &free, &offsets, &chords) else { return };
+        for i in 0..n {
+            self.rigid[i] = bias[i] + (0..n).map(|j| inertia[i * n + j] * change[j]).sum::<f64>();
+            let [link, motor] = speeds[i];
+            self.q[i] += h * link;
+            self.dq[i] = link;
+            if let Some(behind) = &mut self.motors[i] {
+                behind.speed = motor;
+                behind.position += h * motor;
+            }
+        }
+    }
+
+    /// Speeds of links and motors, rad/s.
+    fn speeds(&self) -> Vec<[f64; 2]> {
+        (0..self.dof()).map(|i| [self.dq[i], self.speed(i)]).collect()
+    }
+
+    /// The new speeds of links and motors, and the links' accelerations, where friction on either side is an offset plus a
+    /// slope times the new speed. `None` stops the arm.
+    fn solve(
+        &mut self,
+        h: f64,
+        tau: &[f64],
+        inertia: &[f64],
+        free: &[f64],
+        offsets: &[[f64; 2]],
+        slopes: &[[f64; 2]],
+    ) -> Option<(Vec<[f64; 2]>, Vec<f64>)> {
+        let n = self.dof();
+        let mut matrix = inertia.to_vec();
         let mut right = vec![0.0; n];
         let mut windings = vec![None; n];
         for i in 0..n {
-            right[i] = (0..n).map(|j| inertia[i * n + j] * self.dq[j]).sum::<f64>()
-                - h * (bias[i] + load[i] - rubbing[i] * self.dq[i]);
-            matrix[i * n + i] += h * rubbing[i];
-            let drag = self.drag(i);
+            right[i] =
+                (0..n).map(|j| inertia[i * n + j] * self.dq[j]).sum::<f64>() - h * (free[i] + offsets[i][0]);
+            matrix[i * n + i] += h * slopes[i][0];
+            let brake = self.brake(i);
             match &self.motors[i] {
                 None => {
-                    right[i] += h * tau[i];
-                    matrix[i * n + i] += h * drag;
+                    right[i] += h * (tau[i] - offsets[i][1]);
+                    matrix[i * n + i] += h * (slopes[i][1] + brake);
                 }
                 Some(motor) => {
                     // Motor: m w = a + h c v, link: … + h (spring + c (w − v)); w is eliminated.
-                    let ahead = motor.position - self.q[i];
-                    let (spring, touching) = motor.gear.torque(ahead);
+                    let (spring, touching) = motor.gear.torque(motor.position - self.q[i]);
                     let c = if touching { h * motor.gear.stiffness + motor.damping } else { 0.0 };
-                    let m = motor.inertia + h * (drag + c);
-                    let a = motor.inertia * motor.speed + h * (tau[i] - spring);
+                    let m = motor.inertia + h * (slopes[i][1] + brake + c);
+                    let a = motor.inertia * motor.speed + h * (tau[i] - offsets[i][1] - spring);
                     matrix[i * n + i] += h * c - (h * c).powi(2) / m;
                     right[i] += h * (spring + c * a / m);
                     windings[i] = Some((a, h * c, m));
                 }
             }
         }
-        self.time += h;
-        let Some(speeds) = solve_positive_definite(matrix, right).filter(|v| v.iter().all(|v| v.is_finite()))
+        let Some(links) = solve_positive_definite(matrix, right).filter(|v| v.iter().all(|v| v.is_finite()))
         else {
             self.dq.fill(0.0);
-            return;
+            return None;
         };
-        let change: Vec<f64> = speeds.iter().zip(&self.dq).map(|(new, old)| (new - old) / h).collect();
-        for i in 0..n {
-            self.rigid[i] = bias[i] + (0..n).map(|j| inertia[i * n + j] * change[j]).sum::<f64>();
-            self.q[i] += h * speeds[i];
-            if let (Some(motor), Some((a, hc, m))) = (&mut self.motors[i], windings[i]) {
-                motor.speed = (a + hc * speeds[i]) / m;
-                motor.position += h * motor.speed;
-            }
-        }
-        self.dq = speeds;
+        let motor = |i: usize| windings[i].map_or(links[i], |(a, hc, m)| (a + hc * links[i]) / m);
+        let speeds = (0..n).map(|i| [links[i], motor(i)]).collect();
+        let change = links.iter().zip(&self.dq).map(|(new, old)| (new - old) / h).collect();
+        Some((speeds, change))
     }
 
     /// The bodies as the effects make them now, without the motors that move on their own.
@@ -204,36 +241,61 @@ impl Simulation {
         }
     }
 
-    /// Friction and brake of a joint as a secant, N·m·s/rad: their torque over the speed.
-    fn drag(&self, joint: usize) -> f64 {
-        let speed = self.speed(joint);
-        let friction = &self.plant.friction()[joint];
-        let secant = if speed.abs() > REST { friction.torque(speed) / speed } else { friction.slope(speed) };
-        secant + if self.brakes[joint] { BRAKE / speed.abs().max(BRAKE_CREEP) } else { 0.0 }
+    /// A closed brake as a torque over the motor's speed, N·m·s/rad.
+    fn brake(&self, joint: usize) -> f64 {
+        if self.brakes[joint] { BRAKE / self.speed(joint).abs().max(BRAKE_CREEP) } else { 0.0 }
     }
 
-    /// Torques of the effects against the motion, N·m, and the part of them that is a secant against the joint's own
-    /// speed, N·m·s/rad.
-    fn effects(&mut self) -> (Vec<f64>, Vec<f64>) {
-        let n = self.dof();
-        let (mut load, mut rubbing) = (vec![0.0; n], vec![0.0; n]);
-        let (q, dq) = (&self.q, &self.dq);
-        let (friction, dynamics) = (self.plant.friction(), &self.dynamics);
-        let now = Instant { t: self.time, q, dq, rigid: &self.rigid, friction, dynamics };
-        for (effect, state) in self.plant.effects().iter().zip(&mut self.states) {
-            let before = effect.rubs_at().map(|joint| (joint, load[joint]));
-            effect.add_torque(&now, state, &mut load);
-            if let Some((joint, before)) = before.filter(|(joint, _)| dq[*joint].abs() > REST) {
-                // What the effect would be at rest is no drag.
-                let mut still = dq.clone();
-                still[joint] = 0.0;
-                let mut rest = vec![0.0; n];
-                effect.add_torque(&Instant { dq: &still, ..now }, state, &mut rest);
-                rubbing[joint] += ((load[joint] - before - rest[joint]) / dq[joint]).max(0.0);
+    /// Torques against the motion, N·m, at given speeds: of the effects that rub, on the links' side, and of Eq. 16, on
+    /// the motors'.
+    fn friction(&self, speeds: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        let mut rubbing = vec![0.0; self.dof()];
+        if self.plant.effects().iter().any(|effect| effect.rubs_at().is_some()) {
+            let dq: Vec<f64> = speeds.iter().map(|speed| speed[0]).collect();
+            let now = self.now(&dq);
+            for effect in self.plant.effects().iter().filter(|effect| effect.rubs_at().is_some()) {
+                effect.add_torque(&now, &mut State::default(), &mut rubbing);
             }
         }
-        (load, rubbing)
+        let laws = self.plant.friction().iter().zip(speeds);
+        rubbing.into_iter().zip(laws).map(|(rub, (law, speed))| [rub, law.torque(speed[1])]).collect()
     }
+
+    /// The slope of Eq. 16 at a motor's speed, N·m·s/rad.
+    fn slope(&self, joint: usize) -> [f64; 2] {
+        [0.0, self.plant.friction()[joint].slope(self.speed(joint))]
+    }
+
+    /// Torques against the motion of all effects that do not rub, N·m.
+    fn load(&mut self) -> Vec<f64> {
+        let mut load = vec![0.0; self.dof()];
+        let mut states = std::mem::take(&mut self.states);
+        let now = self.now(&self.dq);
+        for (effect, state) in self.plant.effects().iter().zip(&mut states) {
+            if effect.rubs_at().is_none() {
+                effect.add_torque(&now, state, &mut load);
+            }
+        }
+        self.states = states;
+        load
+    }
+
+    fn now<'a>(&'a self, dq: &'a [f64]) -> Instant<'a> {
+        let (friction, dynamics) = (self.plant.friction(), &self.dynamics);
+        Instant { t: self.time, q: &self.q, dq, rigid: &self.rigid, friction, dynamics }
+    }
+}
+
+/// Friction at two sets of speeds, and those speeds.
+type AtSpeeds = (Vec<[f64; 2]>, Vec<[f64; 2]>);
+
+/// The chord of the friction between two speeds, never negative; the slope where they are one.
+fn chords(a: &AtSpeeds, b: &AtSpeeds, slope: impl Fn(usize) -> [f64; 2]) -> Vec<[f64; 2]> {
+    let chord = |i: usize, side: usize| {
+        let way = b.1[i][side] - a.1[i][side];
+        if way.abs() > REST { (b.0[i][side] - a.0[i][side]) / way } else { slope(i)[side] }
+    };
+    (0..a.0.len()).map(|i| [0, 1].map(|side| chord(i, side).max(0.0))).collect()
 }
 
 #[cfg(test)]

@@ -12,7 +12,10 @@ use rand_distr::{Distribution, StandardNormal};
 use std::collections::VecDeque;
 
 /// The drives' tick, µs: servo and physics.
-const TICK: Micros = 1000;
+const TICK: Micros = 500;
+
+/// Share of the friction's steep part that the drives feed forward.
+const TUNED: f64 = 0.9;
 
 /// What a virtual arm is made of.
 #[derive(Clone, Debug)]
@@ -59,7 +62,10 @@ impl VirtualArm {
             return None;
         }
         let simulation = Simulation::new(plant, &start, age);
-        let nodes = modules.into_iter().zip(simulation.inertias()).map(|(m, i)| Node::new(m, i)).collect();
+        // Drives are tuned where they are built in, to what they have to move and to most of its friction.
+        let friction = simulation.plant().friction().iter().map(|f| TUNED * f.gamma1.max(f.gamma3));
+        let tuned = simulation.inertias().into_iter().zip(friction);
+        let nodes = modules.into_iter().zip(tuned).map(|(m, (i, f))| Node::new(m, [i, f])).collect();
         let mut offsets = vec![0.0; n];
         for effect in simulation.plant().effects() {
             if let Effect::EncoderOffset { joint, offset } = effect {
@@ -81,6 +87,11 @@ impl VirtualArm {
         &self.simulation
     }
 
+    /// Sets the plant's age, s: what warms has been warming for so long.
+    pub fn set_age(&mut self, age: f64) {
+        self.simulation.set_time(age);
+    }
+
     /// Torques that the drives give, N·m.
     pub fn torques(&self) -> &[f64] {
         &self.torque
@@ -98,20 +109,21 @@ impl VirtualArm {
     fn tick(&mut self) {
         self.ticks += 1;
         let (now, h) = (self.ticks * TICK, TICK as f64 * 1e-6);
+        let before = self.torque.clone();
         for joint in 0..self.nodes.len() {
             let speed = self.simulation.speed(joint);
             let position = self.simulation.position(joint) + self.offsets[joint];
             self.torque[joint] = self.nodes[joint].tick(h, now, [position, speed]);
         }
-        self.measure(h);
+        self.measure(h, &before);
         for (joint, node) in self.nodes.iter().enumerate() {
             self.simulation.set_brake(joint, node.brake_closed());
         }
         self.simulation.step(h, &self.torque);
     }
 
-    /// What the sensors say, at the instant for which the drives have decided.
-    fn measure(&mut self, h: f64) {
+    /// What the sensors say at this instant, between two ticks: the current is the mean of `before` and after.
+    fn measure(&mut self, h: f64, before: &[f64]) {
         let sensors = self.simulation.plant().sensors();
         let (mut delay, mut gains) = (0.0, vec![1.0; self.nodes.len()]);
         for effect in self.simulation.plant().effects() {
@@ -122,7 +134,7 @@ impl VirtualArm {
             }
         }
         let back = (delay / h).round() as usize;
-        self.history.push_back(self.torque.clone());
+        self.history.push_back(before.iter().zip(&self.torque).map(|(a, b)| 0.5 * (a + b)).collect());
         while self.history.len() > back + 1 {
             self.history.pop_front();
         }

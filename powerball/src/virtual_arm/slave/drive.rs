@@ -60,8 +60,8 @@ pub(super) struct Drive {
     mode: Mode,
     servo: Servo,
     pub(super) reference: Reference,
-    /// The last three interpolation points, and the time since the last of them began to count, s.
-    points: [f64; 3],
+    /// The last four interpolation points, and the time since the last of them began to count, s.
+    points: [f64; 4],
     phase: f64,
     starving: f64,
     interpolating: bool,
@@ -86,8 +86,8 @@ pub(super) struct Drive {
 }
 
 impl Drive {
-    pub(super) fn new(module: Module, inertia: f64) -> Self {
-        let servo = Servo::new(Gains::for_inertia(inertia, module.torque));
+    pub(super) fn new(module: Module, [inertia, friction]: [f64; 2]) -> Self {
+        let servo = Servo::new(Gains::for_inertia(inertia, module.torque, friction));
         let search = if module.commutated { 0.0 } else { SEARCH.0 };
         Drive {
             module,
@@ -96,7 +96,7 @@ impl Drive {
             mode: Mode::None,
             servo,
             reference: Reference::default(),
-            points: [0.0; 3],
+            points: [0.0; 4],
             phase: 0.0,
             starving: 0.0,
             interpolating: false,
@@ -192,15 +192,15 @@ impl Drive {
         }
         if !self.interpolating {
             self.interpolating = true;
-            self.points = [self.reference.position; 3];
+            self.points = [self.reference.position; 4];
             self.starving = 0.0;
         }
         if fresh {
             self.starving = 0.0;
         }
         if self.is_commutated() {
-            let point = if fresh { self.within(inputs.point, inputs.limits) } else { self.points[2] };
-            self.points = [self.points[1], self.points[2], point];
+            let point = if fresh { self.within(inputs.point, inputs.limits) } else { self.points[3] };
+            self.points = [self.points[1], self.points[2], self.points[3], point];
         }
         self.phase = 0.0;
     }
@@ -256,7 +256,7 @@ impl Drive {
                 self.reference = Reference { position: from + SEARCH.1 * wave.sin(), speed: 0.0 };
                 if self.search <= 0.0 {
                     self.reference.position = from;
-                    self.points = [from; 3];
+                    self.points = [from; 4];
                 }
                 self.starving = 0.0;
             }

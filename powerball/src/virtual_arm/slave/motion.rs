@@ -49,16 +49,18 @@ impl Reference {
     }
 }
 
-/// Between set-points the drive follows the quadratic B-spline of the last three: linear interpolation averaged over one
-/// period, as a drive's jerk filter does. Speed is continuous, and a constant speed is followed exactly, one and a half
+/// Between set-points the drive follows the cubic B-spline of the last four: linear interpolation averaged twice over one
+/// period, as a drive's jerk filter does. Acceleration is continuous, and a constant speed is followed exactly, two
 /// periods late. `phase` is the share of the period that has passed.
-pub(super) fn spline(points: [f64; 3], phase: f64, period: f64) -> Reference {
-    let [a, b, c] = points;
+pub(super) fn spline(points: [f64; 4], phase: f64, period: f64) -> Reference {
     let x = phase.clamp(0.0, 1.0);
-    let position = 0.5 * (1.0 - x) * (1.0 - x) * a + (0.5 + x - x * x) * b + 0.5 * x * x * c;
+    let (y, x2, x3) = (1.0 - x, x * x, x * x * x);
+    let place = [y * y * y, 3.0 * x3 - 6.0 * x2 + 4.0, -3.0 * x3 + 3.0 * x2 + 3.0 * x + 1.0, x3];
+    let slope = [-y * y, 3.0 * x2 - 4.0 * x, -3.0 * x2 + 2.0 * x + 1.0, x2];
+    let sum = |weights: [f64; 4]| weights.iter().zip(points).map(|(w, p)| w * p).sum::<f64>();
     // A SYNC that is late by up to a period lets the speed stand; then the joint stops.
-    let speed = if phase > 2.0 { 0.0 } else { ((x - 1.0) * a + (1.0 - 2.0 * x) * b + x * c) / period };
-    Reference { position, speed }
+    let speed = if phase > 2.0 { 0.0 } else { sum(slope) / (2.0 * period) };
+    Reference { position: sum(place) / 6.0, speed }
 }
 
 #[cfg(test)]
@@ -96,15 +98,15 @@ mod tests {
     #[test]
     fn the_spline_is_smooth_and_follows_a_line() {
         let period = 5e-3;
-        let points = [0.2, 0.21, 0.23];
+        let points = [0.2, 0.21, 0.23, 0.2];
         let end = spline(points, 1.0, period);
-        let start = spline([0.21, 0.23, 0.2], 0.0, period);
+        let start = spline([0.21, 0.23, 0.2, 0.4], 0.0, period);
         approx::assert_relative_eq!(end.position, start.position, max_relative = 1e-12);
         approx::assert_relative_eq!(end.speed, start.speed, max_relative = 1e-9);
-        let line = |phase| spline([0.0, 0.01, 0.02], phase, period);
+        let line = |phase| spline([0.0, 0.01, 0.02, 0.03], phase, period);
         for phase in [0.0, 0.3, 1.0] {
             approx::assert_relative_eq!(line(phase).speed, 2.0, max_relative = 1e-12);
-            approx::assert_relative_eq!(line(phase).position, 0.01 * (0.5 + phase), max_relative = 1e-12);
+            approx::assert_relative_eq!(line(phase).position, 0.01 * (1.0 + phase), max_relative = 1e-12);
         }
     }
 }

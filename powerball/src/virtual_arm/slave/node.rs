@@ -35,7 +35,8 @@ struct Watched {
 #[derive(Clone, Debug)]
 pub struct Node {
     module: Module,
-    inertia: f64,
+    /// What its servo is tuned to: inertia, kg·m², and Coulomb friction, N·m.
+    tuned: [f64; 2],
     nmt: nmt::State,
     dictionary: Dictionary,
     server: Server,
@@ -49,6 +50,8 @@ pub struct Node {
     next_heartbeat: Micros,
     boots_at: Option<Micros>,
     sample: Sample,
+    /// What the drive is told, as the dictionary had it when it was last written.
+    inputs: Inputs,
     /// What is made to go wrong.
     silent: bool,
     mute_heartbeat: bool,
@@ -58,16 +61,16 @@ pub struct Node {
 }
 
 impl Node {
-    pub(super) fn new(module: Module, inertia: f64) -> Self {
+    pub(super) fn new(module: Module, tuned: [f64; 2]) -> Self {
         let dictionary = fresh_dictionary(&module);
-        Node {
+        let mut node = Node {
             module,
-            inertia,
+            tuned,
             nmt: nmt::State::PreOperational,
             pdos: Pdos::read(&dictionary),
             dictionary,
             server: Server::default(),
-            drive: Drive::new(module, inertia),
+            drive: Drive::new(module, tuned),
             watched: [Watched::default(); 3],
             waiting: Vec::new(),
             fresh: false,
@@ -80,7 +83,10 @@ impl Node {
             refused: None,
             garbage: None,
             out: VecDeque::new(),
-        }
+            inputs: Inputs::default(),
+        };
+        node.inputs = node.read_inputs();
+        node
     }
 
     /// The node's number.
@@ -154,7 +160,7 @@ impl Node {
         let module = Module { commutated: self.drive.is_commutated(), ..self.module };
         let supply = self.drive.supply;
         *self =
-            Node { silent: self.silent, boots_at: Some(now + BOOT_TIME), ..Node::new(module, self.inertia) };
+            Node { silent: self.silent, boots_at: Some(now + BOOT_TIME), ..Node::new(module, self.tuned) };
         self.drive.supply = supply;
     }
 
@@ -229,8 +235,7 @@ impl Node {
         for frame in std::mem::take(&mut self.waiting) {
             self.process(&frame);
         }
-        let inputs = self.inputs();
-        self.drive.sync(&inputs, std::mem::take(&mut self.fresh));
+        self.drive.sync(&self.inputs, std::mem::take(&mut self.fresh));
         self.publish();
         for pdo in &self.pdos.transmit {
             if pdo.due(self.syncs) {
@@ -278,6 +283,7 @@ impl Node {
             drive_objects::INTERPOLATION_SETPOINT => self.fresh = true,
             _ => {}
         }
+        self.inputs = self.read_inputs();
     }
 
     fn offers(&self, mode: Mode) -> bool {
@@ -328,8 +334,7 @@ impl Node {
             self.beat(now);
             self.watch(now);
         }
-        let inputs = self.inputs();
-        let torque = self.drive.tick(h, &inputs, actual);
+        let torque = self.drive.tick(h, &self.inputs, actual);
         match self.drive.trip.take() {
             Some(Trip::Following) => self.emergency(EMCY_FOLLOWING, 0x20, false),
             Some(Trip::Starved) => self.emergency(EMCY_STARVED, 0x10, false),
@@ -367,8 +372,8 @@ impl Node {
         }
     }
 
-    /// What the drive is told by its dictionary.
-    fn inputs(&self) -> Inputs {
+    /// What the dictionary tells the drive.
+    fn read_inputs(&self) -> Inputs {
         let number = |object| self.dictionary.get(object) as f64;
         let angle = |object| number(object) * DEGREE;
         let per_mille = self.module.rated_torque / 1000.0;
@@ -408,7 +413,7 @@ impl Node {
 
     /// Brings the objects that live up to date.
     fn publish(&mut self) {
-        let inputs = self.inputs();
+        let inputs = self.inputs;
         let Sample { position, speed, torque } = self.sample;
         let actual = [position, speed];
         let remote = self.nmt == nmt::State::Operational;

@@ -1,0 +1,385 @@
+//! A motion in interpolated position mode, and the log of it.
+//!
+//! Every line of a log is written whole, by one call, when its cycle is over: whatever moment the program dies at, the
+//! file can be read up to there.
+
+use super::approach;
+use crate::bus::{ArmError, Bus, Master, Moment};
+use crate::driver::{ControlMode, Phase, Profile, Rejection};
+use crate::motion::Motion;
+use serde::Serialize;
+use std::fmt::{self, Write as _};
+use std::io::{self, Write};
+
+/// Time that bringing up and enabling may take, µs: joints commutate one after the other.
+const PATIENCE: u64 = 60_000_000;
+
+/// What came of a recording.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Record {
+    /// Lines of the log.
+    pub samples: usize,
+    /// Cycles of the motion without a line: process data was missing.
+    pub missing: usize,
+    /// SYNCs that were late, and those that were left out.
+    pub late: u64,
+    /// SYNCs that were left out because their time had passed.
+    pub skipped: u64,
+    /// Cycles in which the drives held their last set-points because new ones came too late.
+    pub dropped: u64,
+    /// Greatest distance of each joint from the set-point of the cycle, rad; with the drives' interpolation delay in it.
+    pub following_max: Vec<f64>,
+    /// Root mean square of the same, rad.
+    pub following_rms: Vec<f64>,
+}
+
+/// Why a recording ended early, or did not begin.
+#[derive(Debug)]
+pub enum RecordError {
+    /// The arm.
+    Arm(ArmError),
+    /// A set-point was rejected.
+    Rejected(Rejection),
+    /// The motion does not fit the arm or its rate.
+    Motion(String),
+    /// The log could not be written.
+    Write(io::Error),
+}
+
+impl fmt::Display for RecordError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            RecordError::Arm(e) => e.fmt(f),
+            RecordError::Rejected(rejection) => write!(f, "the motion cannot be followed: {rejection}"),
+            RecordError::Motion(what) => f.write_str(what),
+            RecordError::Write(e) => write!(f, "the log cannot be written: {e}"),
+        }
+    }
+}
+
+impl std::error::Error for RecordError {}
+
+impl<E: Into<ArmError>> From<E> for RecordError {
+    fn from(e: E) -> Self {
+        RecordError::Arm(e.into())
+    }
+}
+
+/// An arm that is enabled in interpolated position mode and holds its position between motions.
+#[derive(Debug)]
+pub struct Recorder<B, const N: usize> {
+    master: Master<B, N>,
+    /// The set-point that is held.
+    target: [f64; N],
+}
+
+impl<B: Bus, const N: usize> Recorder<B, N> {
+    /// Brings an arm up, enables it, and holds it where it is.
+    ///
+    /// # Errors
+    /// Where driver, arm or bus refuse.
+    pub fn enable(mut master: Master<B, N>) -> Result<Self, RecordError> {
+        master.driver_mut().start(ControlMode::InterpolatedPosition, false).map_err(ArmError::from)?;
+        master.wait_for(Phase::Ready, PATIENCE)?;
+        master.driver_mut().enable().map_err(ArmError::from)?;
+        master.wait_for(Phase::Running, PATIENCE)?;
+        let target = master.driver().positions();
+        Ok(Recorder { master, target })
+    }
+
+    /// The arm.
+    pub fn master(&self) -> &Master<B, N> {
+        &self.master
+    }
+
+    /// The arm, to do something to its bus.
+    pub fn master_mut(&mut self) -> &mut Master<B, N> {
+        &mut self.master
+    }
+
+    /// Follows a motion, with `each` called for every cycle: the index of the sample that the joints were sent before this
+    /// cycle, and the master, `None` where process data is missing.
+    fn follow(
+        &mut self,
+        motion: &Motion,
+        mut each: impl FnMut(usize, Option<&Master<B, N>>) -> Result<(), RecordError>,
+    ) -> Result<(), RecordError> {
+        let mut samples = motion.samples();
+        let (mut sent, mut seen) = (0usize, 0usize);
+        loop {
+            let until = self.master.bus().now() + 100_000;
+            let moment = self.master.step(until)?;
+            if self.master.driver().phase() != Phase::Running {
+                self.master.wait_for(Phase::Faulted, 10_000_000)?;
+                self.master.check()?;
+            }
+            match moment {
+                Moment::Cycle => {
+                    // The cycle before is over; what it did not bring is missing.
+                    if sent > seen {
+                        each(seen, None)?;
+                        seen += 1;
+                    }
+                    let Some([q, ..]) = samples.next() else {
+                        let target = self.target;
+                        return self.master.driver_mut().set(&target).map_err(RecordError::Rejected);
+                    };
+                    for (target, q) in self.target.iter_mut().zip(q) {
+                        *target = *q;
+                    }
+                    let target = self.target;
+                    self.master.driver_mut().set(&target).map_err(RecordError::Rejected)?;
+                    sent += 1;
+                }
+                Moment::Data if sent > seen => {
+                    each(seen, Some(&self.master))?;
+                    seen += 1;
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Goes to a position and holds it: at a share of each joint's speed and acceleration, in `least` s at least.
+    ///
+    /// # Errors
+    /// As [`record`](Self::record).
+    pub fn go(&mut self, to: &[f64; N], share: f64, least: f64) -> Result<(), RecordError> {
+        let motion = way(self.master.driver().profile(), &self.target, to, share, least);
+        self.follow(&motion, |_, _| Ok(()))
+    }
+
+    /// Follows a motion that begins where the arm is, and writes the log: `t` in s from `start` on, `q1…qn` in rad,
+    /// `tau1…taun` in N·m, and `ref1…refn`, the set-points, where `with_references`.
+    ///
+    /// # Errors
+    /// Where the motion does not fit the arm, the arm is stopped, or the log cannot be written. The log ends there.
+    pub fn record(
+        &mut self,
+        motion: &Motion,
+        start: f64,
+        with_references: bool,
+        log: &mut impl Write,
+    ) -> Result<Record, RecordError> {
+        self.check(motion)?;
+        let counters = *self.master.driver().counters();
+        let mut record =
+            Record { following_max: vec![0.0; N], following_rms: vec![0.0; N], ..Record::default() };
+        log.write_all(header::<N>(with_references).as_bytes()).map_err(RecordError::Write)?;
+        let rows: Vec<&[f64]> = motion.samples().map(|[q, ..]| q).collect();
+        let mut line = String::new();
+        self.follow(motion, |k, master| {
+            let Some(master) = master else {
+                record.missing += 1;
+                return Ok(());
+            };
+            let joints = master.driver().joints();
+            line.clear();
+            // A SYNC that was left out took its time all the same.
+            let skipped = master.driver().counters().skipped - counters.skipped;
+            let _ = write!(line, "{:.4}", start + (k as u64 + skipped) as f64 * motion.period);
+            // A digit finer than the encoders' step.
+            for joint in joints {
+                let _ = write!(line, ",{:.7}", joint.position);
+            }
+            for joint in joints {
+                let _ = write!(line, ",{:.4}", joint.torque);
+            }
+            for q in rows[k].iter().filter(|_| with_references) {
+                let _ = write!(line, ",{q:.7}");
+            }
+            line.push('\n');
+            log.write_all(line.as_bytes()).map_err(RecordError::Write)?;
+            record.samples += 1;
+            for (i, joint) in joints.iter().enumerate() {
+                let error = rows[k][i] - joint.position;
+                record.following_max[i] = record.following_max[i].max(error.abs());
+                record.following_rms[i] += error * error;
+            }
+            Ok(())
+        })?;
+        log.flush().map_err(RecordError::Write)?;
+        let count = record.samples.max(1) as f64;
+        record.following_rms.iter_mut().for_each(|sum| *sum = (*sum / count).sqrt());
+        let now = self.master.driver().counters();
+        record.late = now.late - counters.late;
+        record.skipped = now.skipped - counters.skipped;
+        record.dropped = now.dropped - counters.dropped;
+        Ok(record)
+    }
+
+    fn check(&self, motion: &Motion) -> Result<(), RecordError> {
+        let period = self.master.driver().profile().period_seconds();
+        let wrong = |what| Err(RecordError::Motion(what));
+        if motion.dof() != N || motion.is_empty() {
+            return wrong(format!(
+                "the motion has {} joints and {} samples; the arm has {N} joints",
+                motion.dof(),
+                motion.len()
+            ));
+        }
+        if (motion.period - period).abs() > 1e-6 {
+            return wrong(format!(
+                "the motion has a sample every {:.3} ms, the arm's SYNC comes every {:.3} ms: sample it at {} Hz",
+                1e3 * motion.period,
+                1e3 * period,
+                (1.0 / period).round()
+            ));
+        }
+        let far = motion.q.iter().zip(&self.target).fold(0.0f64, |far, (a, b)| far.max((a - b).abs()));
+        if far > 1e-3 {
+            return wrong(format!("the motion begins {far:.4} rad from where the arm is; go there first"));
+        }
+        Ok(())
+    }
+
+    /// Stops the arm: brakes closed, torque off.
+    ///
+    /// # Errors
+    /// Where the arm or the bus fails.
+    pub fn finish(mut self) -> Result<Master<B, N>, RecordError> {
+        self.master.stop()?;
+        Ok(self.master)
+    }
+}
+
+/// The motion that [`Recorder::go`] makes from `from` to `to`.
+pub fn way<const N: usize>(
+    profile: &Profile<N>,
+    from: &[f64; N],
+    to: &[f64; N],
+    share: f64,
+    least: f64,
+) -> Motion {
+    let speed = profile.joints.map(|joint| share * joint.velocity);
+    let acceleration = profile.joints.map(|joint| share * joint.acceleration);
+    approach(from, to, &speed, &acceleration, profile.period_seconds(), least)
+}
+
+fn header<const N: usize>(with_references: bool) -> String {
+    let mut out = String::from("t");
+    let names: &[&str] = if with_references { &["q", "tau", "ref"] } else { &["q", "tau"] };
+    for name in names {
+        for joint in 1..=N {
+            let _ = write!(out, ",{name}{joint}");
+        }
+    }
+    out.push('\n');
+    out
+}
+
+/// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its speed, follows the motion,
+/// writes the log, and stops.
+///
+/// # Errors
+/// As [`Recorder::enable`] and [`Recorder::record`].
+pub fn record<B: Bus, const N: usize>(
+    master: Master<B, N>,
+    motion: &Motion,
+    log: &mut impl Write,
+) -> Result<Record, RecordError> {
+    let mut recorder = Recorder::enable(master)?;
+    let begin: Option<[f64; N]> = motion.samples().next().and_then(|[q, ..]| q.try_into().ok());
+    if let Some(begin) = begin {
+        recorder.go(&begin, 0.25, 1.0)?;
+    }
+    let done = recorder.record(motion, 0.0, true, log);
+    // Also where the recording failed, the arm is stopped; why it failed is what is told.
+    let stopped = recorder.finish();
+    let done = done?;
+    stopped?;
+    Ok(done)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bus::Memory;
+    use crate::canopen::NodeId;
+    use crate::driver::lwa4p::LWA4P;
+    use crate::driver::{Cause, Driver};
+    use crate::virtual_arm::slave::Fault;
+    use crate::virtual_arm::{VirtualArm, lwa4p};
+
+    const START: [f64; 6] = [0.1, 0.2, -0.3, 0.2, 0.4, 0.0];
+
+    fn arm() -> Master<Memory<VirtualArm>, 6> {
+        let arm = VirtualArm::new(lwa4p::setup(START, 1).unwrap()).unwrap();
+        Master::new(Driver::new(LWA4P).unwrap(), Memory::new(arm, LWA4P.bitrate))
+    }
+
+    /// Every joint swings, from rest to rest.
+    fn swing(seconds: f64) -> Motion {
+        let mut motion = Motion::new(6, 0.005);
+        for k in 0..=(seconds / 0.005) as usize {
+            let t = k as f64 * 0.005;
+            motion.push((0..6).map(|i| {
+                let w = std::f64::consts::TAU * (1 + i % 3) as f64 / seconds;
+                let (s, c) = (w * t).sin_cos();
+                [START[i] + 0.3 * (1.0 - c), 0.3 * w * s, 0.3 * w * w * c]
+            }));
+        }
+        motion
+    }
+
+    #[test]
+    fn a_motion_is_followed_and_logged_without_a_gap() {
+        let (motion, mut log) = (swing(6.0), Vec::new());
+        let mut recorder = Recorder::enable(arm()).unwrap();
+        recorder.go(&START, 0.25, 1.0).unwrap();
+        let record = recorder.record(&motion, 10.0, true, &mut log).unwrap();
+        assert_eq!((record.samples, record.missing, record.late, record.dropped), (motion.len(), 0, 0, 0));
+        // Two and a half cycles of delay at 1 rad/s, and the servo.
+        assert!(record.following_max.iter().all(|e| *e < 0.03), "{record:?}");
+        let text = String::from_utf8(log).unwrap();
+        let rows: Vec<Vec<f64>> =
+            text.lines().skip(1).map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
+        assert_eq!(rows.len(), motion.len());
+        assert!(
+            rows.iter()
+                .enumerate()
+                .all(|(k, row)| { row.len() == 19 && (row[0] - 10.0 - 0.005 * k as f64).abs() < 1e-9 })
+        );
+        let master = recorder.finish().unwrap();
+        let arm = master.bus().peer();
+        assert!(arm.nodes().iter().all(|node| node.brake_closed()));
+        assert_eq!(master.driver().phase(), Phase::Ready);
+    }
+
+    #[test]
+    fn a_log_ends_with_a_whole_line_where_the_arm_is_stopped() {
+        let (motion, mut log) = (swing(6.0), Vec::new());
+        let mut recorder = Recorder::enable(arm()).unwrap();
+        recorder.go(&START, 0.25, 1.0).unwrap();
+        let mut lines = 0;
+        let failed = recorder.follow(&motion, |_, master| {
+            lines += usize::from(master.is_some());
+            Ok(())
+        });
+        assert!(failed.is_ok() && lines == motion.len());
+        recorder.go(&START, 0.25, 1.0).unwrap();
+        recorder.master_mut().bus_mut().peer_mut().fault(NodeId::clamped(5), Fault::Silent(true));
+        let failed = recorder.record(&motion, 0.0, false, &mut log).unwrap_err();
+        let RecordError::Arm(ArmError::Stopped(cause, _)) = &failed else { panic!("{failed}") };
+        // The first cause, or the graver one that follows from the same silence.
+        assert!(matches!(cause, Cause::DataMissing(_) | Cause::HeartbeatLost(_)), "{cause:?}");
+        assert_eq!(cause.node(), NodeId::new(5));
+        assert!(log.ends_with(b"\n"));
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused_before_anything_moves() {
+        let mut recorder = Recorder::enable(arm()).unwrap();
+        let mut refused = |motion: Motion| match recorder.record(&motion, 0.0, false, &mut Vec::new()) {
+            Err(RecordError::Motion(what)) => what,
+            other => panic!("{other:?}"),
+        };
+        let mut slow = swing(1.0);
+        slow.period = 0.01;
+        assert!(refused(slow).contains("sample it at 200 Hz"));
+        let mut far = swing(1.0);
+        far.q.iter_mut().for_each(|q| *q += 0.1);
+        assert!(refused(far).contains("go there first"));
+        assert!(refused(Motion::new(6, 0.005)).contains("0 samples"));
+    }
+}
