@@ -39,7 +39,8 @@ impl ProfileCommand {
         let overlays = self.overlay.iter().map(|path| read(path)).collect::<Result<Vec<_>, _>>()?;
         let toml = String::from_utf8(read(&self.arm)?)
             .map_err(|_| Failure::Unusable(format!("{}: not UTF-8", self.arm.display())))?;
-        let name = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let name =
+            |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let files = || {
             let all = [&self.dcf].into_iter().chain(&self.overlay).chain([&self.arm]);
             all.map(|path| name(path)).collect::<Vec<_>>().join(", ")

@@ -57,7 +57,7 @@ pub(crate) struct Faulty {
     swapped: Option<(Micros, Frame)>,
     /// Frames of the master, as they arrive.
     pub(crate) heard: Vec<(Micros, Frame)>,
-    /// Emergencies that the victim still sends, one a tick.
+    /// Emergencies that the victim still sends, one a millisecond: a quarter of the bus.
     pub(crate) storm: u32,
 }
 
@@ -145,7 +145,7 @@ impl Peer for Faulty {
         if let Some((_, frame)) = self.swapped.take_if(|(at, _)| now > *at + 10_000) {
             self.out.push_back(frame);
         }
-        if self.storm > 0 {
+        if self.storm > 0 && now.is_multiple_of(1000) {
             self.storm -= 1;
             let emcy =
                 powerball::canopen::emcy::Emcy { code: 0x3222, register: 5, vendor: [0x74, 0, 0, 0, 0] };
