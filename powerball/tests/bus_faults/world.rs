@@ -301,7 +301,7 @@ impl World {
         let mut targets = match self.driver.control() {
             ControlMode::ProfilePosition => START.map(|q| q + 0.05 * (self.phase / 0.2).floor().sin()),
             ControlMode::InterpolatedPosition => START.map(|q| q + 0.05 * (2.0 * self.phase).sin()),
-            ControlMode::Velocity => [0.1 * wave; 6],
+            ControlMode::Velocity => [0.15 * wave; 6],
             ControlMode::Current => [0.05 * wave; 6],
         };
         if self.pilot.bad > 0 {
