@@ -4,11 +4,10 @@
 //! stands in a [`Profile`]. Set-points and measurements are in SI.
 //!
 //! ```text
-//! Idle ─start→ Boot → Identify → Configure → Verify → Starting → Ready ─enable→ Enabling → Running
-//!   ↑                                                    ↑         ↑                │         │ set each cycle
-//!   │                                                    │         └──── stop ──────┴─────────┤
-//!   └──── acknowledge (cause asks for a restart) ──── Faulted ←──── Stopping ←──── any cause ─┘
-//!                                                        └─ acknowledge → Resetting → Starting
+//! Idle ─start→ Boot → Identify → Configure → Verify → Starting → Ready ─enable→ Enabling → Running (set each cycle)
+//!
+//! Enabling, Running ─stop→ Stopping → Starting         any phase ─cause→ Stopping (where joints may move) → Faulted
+//! Faulted ─acknowledge→ Resetting → Starting           or Idle, where the cause asks for a restart
 //! ```
 //!
 //! # A cycle
