@@ -8,6 +8,7 @@ mod identify;
 mod identify_page;
 mod inputs;
 mod output;
+mod profile;
 mod record;
 mod virtual_arm;
 
@@ -32,6 +33,8 @@ enum Command {
     VirtualArm(virtual_arm::VirtualArmCommand),
     /// Follow a trajectory on a bus and log it.
     Record(record::RecordCommand),
+    /// Make an arm's constant tables for the bus driver from its drives' DCF and one TOML.
+    Profile(profile::ProfileCommand),
     /// Search an exciting trajectory within the arm's limits and write it.
     Excite(excite::Excite),
     /// Fit the minimal inertial set and the friction of every joint to logs.
@@ -59,6 +62,7 @@ pub fn main() -> ExitCode {
         Command::Bus(command) => command.run(),
         Command::VirtualArm(command) => command.run(),
         Command::Record(command) => command.run(),
+        Command::Profile(command) => command.run(),
         Command::Excite(command) => command.run(),
         Command::Identify(command) => command.run(),
         Command::Explain(command) => command.run(),

@@ -308,7 +308,10 @@ impl<const N: usize> Driver<N> {
         }
         if self.joints.iter().all(|joint| joint.progress == Progress::Done) {
             let control = self.control;
-            self.joints.iter_mut().for_each(|joint| joint.preset(control));
+            for joint in &mut self.joints {
+                joint.preset(control);
+                (joint.swept, joint.swept_from) = (0.0, joint.position);
+            }
             (self.fresh, self.rejection, self.streaming) = (false, None, false);
             (self.rejected_run, self.starved_run) = (0, 0);
             self.enter(Phase::Running);

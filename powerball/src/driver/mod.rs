@@ -39,6 +39,7 @@
 //! | transmit queue full | transport | queue discarded, stop, repeated until it could be queued | at once |
 //! | set-point NaN, jumping, outside the limits | before it leaves | rejected, the last one held, counted; 3 cycles in a row: stop, [`Cause::Setpoints`] | 3 cycles |
 //! | no new set-point | in the slot | the last one held; 3 cycles in a row: stop, [`Cause::Starved`] (not in profile position) | 3 cycles |
+//! | velocities mean something else | way asked for and way gone, while the scale is not verified on hardware | stop, [`Cause::WrongVelocityScale`] | 0.1 rad |
 //! | joint too fast | measured velocity | 3 cycles in a row: stop, [`Cause::Overspeed`] | 3 cycles |
 //! | refused transition | state and time | stop, [`Cause::Transition`] with the reason that the statusword gives | its time limit |
 //!

@@ -118,6 +118,8 @@ pub struct Reactions {
     pub current_step: f64,
     /// A joint measured faster than this times its greatest speed, for [`Reactions::missing_cycles`] cycles, stops the arm.
     pub overspeed_factor: f64,
+    /// So much way, rad, is asked for in velocity mode before it is compared with the way that was gone.
+    pub scale_way: f64,
     /// For a node to boot.
     pub boot_timeout: Micros,
     /// For an SDO answer.
@@ -158,6 +160,7 @@ impl Reactions {
         step_factor: 1.05,
         current_step: 0.25,
         overspeed_factor: 1.5,
+        scale_way: 0.1,
         boot_timeout: 5_000_000,
         sdo_timeout: 100_000,
         sdo_retries: 2,

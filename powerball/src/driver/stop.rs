@@ -163,16 +163,16 @@ impl<const N: usize> Driver<N> {
                     self.stop = StopStage::Brake { since: now };
                 }
             }
-            StopStage::Brake { since } if now - since >= reactions.brake_time => {
+            StopStage::Brake { since } if now.saturating_sub(since) >= reactions.brake_time => {
                 self.stop = StopStage::Off { since: now };
             }
             StopStage::Off { since } => {
                 let off = |joint: &super::Joint| joint.state().is_some_and(|state| !state.has_torque());
-                let settled = now - since >= 3 * self.profile.sync_period;
+                let settled = now.saturating_sub(since) >= 3 * self.profile.sync_period;
                 let stuck = self.joints.iter().position(|joint| !off(joint));
                 match stuck {
                     None if settled => self.end_stop(),
-                    Some(j) if now - since >= reactions.transition_timeout => {
+                    Some(j) if now.saturating_sub(since) >= reactions.transition_timeout => {
                         if let Some(status) = self.joints.get(j).and_then(|joint| joint.status) {
                             self.trip(Cause::StateLost(self.node(j), status), tx);
                         }

@@ -312,20 +312,21 @@ fn profile_position_shakes_hands() {
 fn velocities_that_the_wire_cannot_hold_are_rejected_not_cut() {
     let mut world = running(ControlMode::Velocity);
     let step = LWA4P.joints[0].acceleration * 0.005;
-    let mut speed = 0.0;
-    world.pilot.bad = 0;
+    let mut speeds = world.accepted.last().unwrap().1;
+    world.hold_pilot(CYCLE);
     let mut rejected = None;
     for _ in 0..60 {
         world.run_until(CYCLE, |w| w.driver.cycle_complete());
-        speed += step;
-        if let Err(rejection) = world.driver.set(&[speed, 0.0, 0.0, 0.0, 0.0, 0.0]) {
+        speeds[0] += step;
+        if let Err(rejection) = world.driver.set(&speeds) {
             rejected = Some(rejection);
             break;
         }
         world.hold_pilot(CYCLE);
     }
-    assert_eq!(rejected, Some(Rejection::Saturated(0)), "at {speed} rad/s");
-    assert!((speed.to_degrees() - 32.767).abs() < 1.3, "{}", speed.to_degrees());
+    let degrees = speeds[0].to_degrees();
+    assert_eq!(rejected, Some(Rejection::Saturated(0)), "at {degrees}°/s");
+    assert!((degrees - 32.767).abs() < step.to_degrees(), "{degrees}°/s");
 }
 
 /// All three ramp bits: without them drives hold the ramp.
@@ -457,4 +458,20 @@ fn profiles_that_contradict_themselves_are_refused() {
     assert!(refused(|p| p.tpdos[1] = Mapping::EMPTY));
     assert!(refused(|p| p.velocity.setpoint = objects::TARGET_POSITION));
     assert!(!refused(|_| {}));
+}
+
+/// The dimension factor 0x604C can be read in two ways that are inverse to each other. A tenth of a radian tells.
+#[test]
+fn a_wrong_velocity_scale_stops_the_first_move() {
+    let mut profile = LWA4P;
+    profile.velocity_scale.millidegrees = 4.0;
+    let mut world = started(ControlMode::Velocity, profile, true, Wire::Good);
+    assert!(world.run_until(20_000_000, |w| w.driver.phase() == Phase::Running));
+    assert!(world.run_until(5_000_000, |w| w.driver.cause().is_some()));
+    let cause = *world.driver.cause().unwrap();
+    assert!(matches!(cause, Cause::WrongVelocityScale(_, part) if (part - 0.25).abs() < 0.1), "{cause}");
+    // The right one runs on, to and fro.
+    let mut world = running(ControlMode::Velocity);
+    world.run(5_000_000);
+    assert_eq!(world.driver.cause(), None);
 }
