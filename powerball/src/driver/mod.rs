@@ -6,7 +6,7 @@
 //! ```text
 //! Idle ─start→ Boot → Identify → Configure → Verify → Starting → Ready ─enable→ Enabling → Running (set each cycle)
 //!
-//! Enabling, Running ─stop→ Stopping → Starting         any phase ─cause→ Stopping (where joints may move) → Faulted
+//! Enabling, Running ─stop→ Stopping → Ready            any phase ─cause→ Stopping (where joints may move) → Faulted
 //! Faulted ─acknowledge→ Resetting → Starting           or Idle, where the cause asks for a restart
 //! ```
 //!

@@ -188,8 +188,12 @@ impl<const N: usize> Driver<N> {
 
     fn end_stop(&mut self) {
         match self.cause {
-            // On request only. Whether all is as it should be for another start is looked at again.
-            None => self.enter(Phase::Starting),
+            // On request only: ready again where all is as it should be, and waited for where it is not.
+            None => {
+                let whole =
+                    self.joints.iter().all(|joint| joint.missing_run == 0) && self.unready().is_none();
+                self.enter(if whole { Phase::Ready } else { Phase::Starting });
+            }
             Some(_) => self.fault(),
         }
     }
