@@ -103,7 +103,9 @@ impl<const N: usize> Driver<N> {
             }
             joint.counters.missing += u64::from(judged);
             joint.missing_run = joint.missing_run.saturating_add(1);
-            if judged && joint.missing_run == limit {
+            // What is stopped already is told once.
+            let stopped = matches!(self.phase, Phase::Stopping | Phase::Faulted | Phase::Resetting);
+            if judged && (joint.missing_run == limit || joint.missing_run > limit && !stopped) {
                 self.trip(Cause::DataMissing(self.node(j)), tx);
             }
         }

@@ -106,6 +106,7 @@ impl<const N: usize> Driver<N> {
     /// No process data flows yet: the nodes are kept from taking any.
     fn give_up(&mut self, phase: Phase, tx: &mut impl Transmit) {
         self.joints.iter_mut().for_each(|joint| joint.client.cancel());
+        (self.details, self.diagnosis) = (Details::default(), None);
         self.sync.stop();
         self.send(nmt::Command::EnterPreOperational.frame(None), tx);
         self.enter(phase);
@@ -187,7 +188,8 @@ impl<const N: usize> Driver<N> {
 
     fn end_stop(&mut self) {
         match self.cause {
-            None => self.enter(Phase::Ready),
+            // On request only. Whether all is as it should be for another start is looked at again.
+            None => self.enter(Phase::Starting),
             Some(_) => self.fault(),
         }
     }

@@ -263,14 +263,53 @@ fn a_transition_that_does_not_happen_has_its_reason() {
     }
 }
 
+/// One peer tried for ever, and took any bit of the extended status for the one that counts.
 #[test]
 fn a_commutation_that_never_ends_ends() {
     let mut profile = LWA4P;
     profile.reactions.commutation_tries = 4;
-    let mut world =
-        started(ControlMode::InterpolatedPosition, profile, true, Wire::Misread(schunk::EXTENDED_STATUS, 0));
+    for status in [0, u32::from(schunk::POSITION_VERIFIED)] {
+        let wire = Wire::Misread(schunk::EXTENDED_STATUS, status);
+        let mut world = started(ControlMode::InterpolatedPosition, profile, true, wire);
+        assert!(world.run_until(20_000_000, |w| w.driver.phase() == Phase::Faulted));
+        assert_eq!(world.driver.cause(), Some(&Cause::NoCommutation(VICTIM)));
+    }
+}
+
+/// Supplies come late: a node that did not boot is reset once more, and then refused.
+#[test]
+fn a_node_that_boots_late_is_waited_for() {
+    for comes in [true, false] {
+        let mut world = started(ControlMode::Velocity, LWA4P, true, Wire::Good);
+        world.bus.peer_mut().arm.fault(VICTIM, Fault::Silent(true));
+        world.run(4_000_000);
+        assert_eq!(world.driver.phase(), Phase::Boot);
+        world.bus.peer_mut().arm.fault(VICTIM, Fault::Silent(!comes));
+        let done = |w: &World| w.driver.phase() == Phase::Running || w.driver.cause().is_some();
+        assert!(world.run_until(20_000_000, done));
+        assert_eq!(world.driver.cause(), if comes { None } else { Some(&Cause::NoBoot(VICTIM)) });
+    }
+}
+
+/// With others an emergency stop that is pressed at boot kills the start-up.
+#[test]
+fn a_motor_supply_that_is_off_at_boot_costs_no_restart() {
+    let mut world = World::new(true, LWA4P);
+    world.bus.peer_mut().arm.fault(VICTIM, Fault::Supply(false));
+    world.run(100_000);
+    world.driver.start(ControlMode::Velocity, false).unwrap();
     assert!(world.run_until(20_000_000, |w| w.driver.phase() == Phase::Faulted));
-    assert_eq!(world.driver.cause(), Some(&Cause::NoCommutation(VICTIM)));
+    let cause = *world.driver.cause().unwrap();
+    let told =
+        matches!(cause, Cause::Transition(VICTIM, _, _, Hindrance::NoVoltage) | Cause::DriveFault(VICTIM, _));
+    assert!(told, "{cause}");
+    world.bus.peer_mut().arm.fault(VICTIM, Fault::Supply(true));
+    world.driver.acknowledge().unwrap();
+    assert!(
+        world.run_until(20_000_000, |w| w.driver.phase() == Phase::Running),
+        "{:?}",
+        world.driver.cause()
+    );
 }
 
 #[test]
