@@ -128,11 +128,13 @@ impl Simulation {
         self.brakes[joint] = closed;
     }
 
-    /// The diagonal of the mass matrix at the present pose, rotors included, kg·m²: what each drive has to move.
+    /// What each drive has to move at once, kg·m²: the diagonal of the mass matrix at the present pose, rotors included, or
+    /// the motor alone where its gear gives way.
     pub fn inertias(&self) -> Vec<f64> {
         let n = self.dof();
         let matrix = self.plant.dynamics().mass_matrix(&self.q);
-        (0..n).map(|i| matrix[i * n + i]).collect()
+        let motors = self.motors.iter().enumerate();
+        motors.map(|(i, motor)| motor.map_or(matrix[i * n + i], |motor| motor.inertia)).collect()
     }
 
     /// One step of `h` s under the drives' torques `tau` at the joints, N·m, which hold their value within it.
