@@ -18,7 +18,14 @@ fn paths(page: &str) -> Vec<String> {
 #[test]
 fn every_path_that_a_page_names_exists() {
     let mut checked = 0;
-    for page in ["README.md", "ARCHITECTURE.md", "docs/dyngen.md", "docs/explain.md"] {
+    for page in [
+        "README.md",
+        "ARCHITECTURE.md",
+        "docs/bus.md",
+        "docs/transports.md",
+        "docs/dyngen.md",
+        "docs/explain.md",
+    ] {
         let text = std::fs::read_to_string(root().join(page)).unwrap_or_else(|e| panic!("{page}: {e}"));
         let folder = root().join(page).parent().unwrap().to_path_buf();
         for path in paths(&text) {

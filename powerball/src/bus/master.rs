@@ -193,7 +193,7 @@ impl<B: Bus, const N: usize> Master<B, N> {
         let mut out = Out { bus: &mut self.bus, wrong: None };
         self.driver.stop(now, &mut out);
         let until = now + 5_000_000;
-        while self.driver.phase() == Phase::Stopping {
+        while !matches!(self.driver.phase(), Phase::Ready | Phase::Idle | Phase::Faulted) {
             if self.step(until)? == Moment::Over {
                 return Err(ArmError::Slow(Phase::Ready, self.driver.phase()));
             }

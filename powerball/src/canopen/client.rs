@@ -1,6 +1,6 @@
 //! The master's end of an SDO transfer, driven by polling: no clock, no bus, no allocation.
 //!
-//! One transfer at a time and node. [`Client::start`] gives the first frame; every received frame goes to
+//! One transfer at a time and node. [`Client::read`] and [`Client::write`] give the first frame; every received frame goes to
 //! [`Client::receive`], and time to [`Client::poll`]. Both say what to send, and when the transfer has ended.
 
 use super::sdo::{AbortCode, Chunk, Request, Response, Transfer};

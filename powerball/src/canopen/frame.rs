@@ -24,6 +24,19 @@ impl Frame {
         Some(Frame { id, len: data.len() as u8, data: bytes })
     }
 
+    /// Another crate's frame as this one; `None` where it is extended or remote.
+    pub fn from_can(frame: &impl embedded_can::Frame) -> Option<Frame> {
+        match frame.id() {
+            Id::Standard(id) if frame.is_data_frame() => Frame::from_raw(id.as_raw(), frame.data()),
+            _ => None,
+        }
+    }
+
+    /// This frame as another crate's; `None` where that crate refuses it.
+    pub fn to_can<F: embedded_can::Frame>(&self) -> Option<F> {
+        F::new(StandardId::new(self.id)?, self.bytes())
+    }
+
     /// A frame of a length known when compiling; the identifier comes from [`super::cob`] and is masked to 11 bits.
     pub(crate) const fn fixed<const L: usize>(id: u16, data: [u8; L]) -> Frame {
         const { assert!(L <= 8, "a CAN frame holds 8 bytes") };
@@ -124,6 +137,8 @@ mod tests {
         assert_eq!(frame.to_string(), "185#4002");
         assert_eq!(frame.id(), Id::Standard(StandardId::new(0x185).unwrap()));
         assert_eq!((frame.dlc(), frame.data()), (2, &[0x40, 0x02][..]));
+        assert_eq!(Frame::from_can(&frame), Some(frame));
+        assert_eq!(frame.to_can(), Some(frame));
     }
 
     #[test]

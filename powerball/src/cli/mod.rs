@@ -9,6 +9,7 @@ mod identify;
 mod identify_page;
 mod inputs;
 mod output;
+mod profile;
 mod record;
 mod verify;
 mod virtual_arm;
@@ -39,6 +40,8 @@ enum Command {
     WarmUp(warm_up::WarmUp),
     /// Measure every joint's friction at constant speeds and fit its law.
     Friction(friction::Friction),
+    /// Make an arm's constant tables for the bus driver from its drives' DCF and one TOML.
+    Profile(profile::ProfileCommand),
     /// Search an exciting trajectory within the arm's limits and write it.
     Excite(excite::Excite),
     /// Fit the minimal inertial set and the friction of every joint to logs.
@@ -70,6 +73,7 @@ pub fn main() -> ExitCode {
         Command::Record(command) => command.run(),
         Command::WarmUp(command) => command.run(),
         Command::Friction(command) => command.run(),
+        Command::Profile(command) => command.run(),
         Command::Excite(command) => command.run(),
         Command::Identify(command) => command.run(),
         Command::Verify(command) => command.run(),

@@ -59,7 +59,11 @@ impl VirtualArmCommand {
         let started = Instant::now();
         let length = self.seconds.map(Duration::from_secs_f64);
         let stop = || length.is_some_and(|length| started.elapsed() >= length);
-        slave::serve(&mut arm, &mut bus, stop).map_err(|e| Failure::Refused(e.to_string()))?;
+        let behind = slave::serve(&mut arm, &mut bus, stop).map_err(|e| Failure::Refused(e.to_string()))?;
+        if behind > 0 {
+            let seconds = behind as f64 * 1e-6;
+            eprintln!("powerball: this machine was too slow at times: the arm is {seconds:.3} s behind");
+        }
         if self.json {
             let result = json!({
                 "bus": self.bus.to_string(), "nodes": nodes, "seconds": started.elapsed().as_secs_f64(),

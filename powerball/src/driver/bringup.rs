@@ -263,12 +263,16 @@ impl<const N: usize> Driver<N> {
         self.enter(Phase::Starting);
     }
 
+    /// The first joint whose drive is not in the right mode, without torque.
+    pub(super) fn unready(&self) -> Option<usize> {
+        let expected = self.mode_profile().mode;
+        let ready = |joint: &super::Joint| joint.state().is_some_and(is_off) && joint.mode == Some(expected);
+        self.joints.iter().position(|joint| !ready(joint))
+    }
+
     pub(super) fn poll_starting(&mut self, tx: &mut impl Transmit) {
         let expected = self.mode_profile().mode;
-        let off =
-            |state| matches!(state, State::SwitchOnDisabled | State::ReadyToSwitchOn | State::SwitchedOn);
-        let ready = |joint: &super::Joint| joint.state().is_some_and(off) && joint.mode == Some(expected);
-        let unready = self.joints.iter().position(|joint| !ready(joint));
+        let unready = self.unready();
         if unready.is_none() && self.cycle_complete() {
             self.enter(Phase::Ready);
             return;
@@ -281,7 +285,7 @@ impl<const N: usize> Driver<N> {
         let (node, Some(joint)) = (self.node(j), self.joints.get(j)) else { return };
         let cause = match (joint.state(), joint.mode) {
             (None, _) | (_, None) => Cause::DataMissing(node),
-            (Some(state), _) if !off(state) => {
+            (Some(state), _) if !is_off(state) => {
                 Cause::Transition(node, state, State::SwitchOnDisabled, Hindrance::of(joint.status, true))
             }
             (_, Some(mode)) if mode != expected => Cause::WrongMode(node, mode),
@@ -308,7 +312,10 @@ impl<const N: usize> Driver<N> {
         }
         if self.joints.iter().all(|joint| joint.progress == Progress::Done) {
             let control = self.control;
-            self.joints.iter_mut().for_each(|joint| joint.preset(control));
+            for joint in &mut self.joints {
+                joint.preset(control);
+                (joint.swept, joint.swept_from) = (0.0, joint.position);
+            }
             (self.fresh, self.rejection, self.streaming) = (false, None, false);
             (self.rejected_run, self.starved_run) = (0, 0);
             self.enter(Phase::Running);
@@ -395,6 +402,11 @@ impl<const N: usize> Driver<N> {
             }
         }
     }
+}
+
+/// Whether a drive may be left as it is until it is enabled.
+fn is_off(state: State) -> bool {
+    matches!(state, State::SwitchOnDisabled | State::ReadyToSwitchOn | State::SwitchedOn)
 }
 
 /// Steps on the way to "operation enabled"; states that are not on it have none.

@@ -89,6 +89,9 @@ pub enum Cause {
     Starved,
     /// Set-points were rejected again and again.
     Setpoints(Rejection),
+    /// In velocity mode a joint went this part of the way that was asked for, less than half or more than twice: the
+    /// dimension factor 0x604C means something else than the profile says, or the joint is blocked.
+    WrongVelocityScale(NodeId, f64),
     /// A joint (from 0) moves faster than it may.
     Overspeed(usize),
     /// The CAN controller is off the bus.
@@ -128,6 +131,7 @@ impl Cause {
             | Cause::UnknownState(node, _)
             | Cause::WrongMode(node, _)
             | Cause::NotOperational(node)
+            | Cause::WrongVelocityScale(node, _)
             | Cause::NoBoot(node)
             | Cause::WrongIdentity(node, ..)
             | Cause::ModeNotOffered(node, ..)
@@ -179,6 +183,12 @@ impl fmt::Display for Cause {
             Cause::Late => f.write_str("too many SYNCs late or left out: the driver is polled too seldom"),
             Cause::Starved => f.write_str("no new set-points"),
             Cause::Setpoints(rejection) => write!(f, "set-points rejected again and again: {rejection}"),
+            Cause::WrongVelocityScale(_, part) => {
+                write!(
+                    f,
+                    "went {part:.2} of the way that the velocities asked for: check the scale of 0x604C, or free the joint"
+                )
+            }
             Cause::Overspeed(joint) => write!(f, "joint {} moves faster than it may", joint + 1),
             Cause::BusOff => f.write_str("CAN controller off the bus"),
             Cause::TransmitQueueFull => f.write_str("transmit queue full"),

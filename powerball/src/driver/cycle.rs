@@ -91,6 +91,7 @@ impl<const N: usize> Driver<N> {
         self.judge_lateness(tick, tx);
         if self.phase == Phase::Running {
             self.judge_setpoints(tx);
+            self.judge_velocity_scale(tx);
         }
         let judged = self.phase != Phase::Starting;
         let (all, limit) = (self.all_tpdos(), self.profile.reactions.missing_cycles);
@@ -102,7 +103,9 @@ impl<const N: usize> Driver<N> {
             }
             joint.counters.missing += u64::from(judged);
             joint.missing_run = joint.missing_run.saturating_add(1);
-            if judged && joint.missing_run == limit {
+            // What is stopped already is told once.
+            let stopped = matches!(self.phase, Phase::Stopping | Phase::Faulted | Phase::Resetting);
+            if judged && (joint.missing_run == limit || joint.missing_run > limit && !stopped) {
                 self.trip(Cause::DataMissing(self.node(j)), tx);
             }
         }
@@ -147,6 +150,21 @@ impl<const N: usize> Driver<N> {
             self.starved_run = self.starved_run.saturating_add(1);
             if self.starved_run >= reactions.starved_cycles {
                 self.trip(Cause::Starved, tx);
+            }
+        }
+    }
+
+    /// As long as the scale of velocities was not verified on hardware, each move verifies it: two readings of 0x604C are the
+    /// inverse of each other.
+    fn judge_velocity_scale(&mut self, tx: &mut impl Transmit) {
+        if self.control != ControlMode::Velocity || self.profile.velocity_scale.verified_on_hardware {
+            return;
+        }
+        let (period, reactions) = (self.profile.period_seconds(), self.profile.reactions);
+        for j in 0..N {
+            let part = self.joints.get_mut(j).and_then(|joint| joint.sweep(period, reactions.scale_way));
+            if let Some(part) = part.filter(|part| !(0.5..=2.0).contains(part)) {
+                self.trip(Cause::WrongVelocityScale(self.node(j), part), tx);
             }
         }
     }

@@ -84,6 +84,9 @@ pub struct Joint {
     /// Profile position: the target announced last, and whether its announcing bit is up.
     pub(super) announced: Option<i32>,
     pub(super) raised: bool,
+    /// Way that velocity set-points asked for since `swept_from`, rad, and the position then.
+    pub(super) swept: f64,
+    pub(super) swept_from: f64,
     /// A stop that could not be queued yet.
     pub(super) unsent: bool,
 }
@@ -118,6 +121,8 @@ impl Joint {
             sent: 0.0,
             announced: None,
             raised: false,
+            swept: 0.0,
+            swept_from: 0.0,
             unsent: false,
         }
     }
@@ -175,6 +180,18 @@ impl Joint {
         self.sent = self.target;
         self.announced = None;
         self.raised = false;
+    }
+
+    /// A cycle of `period` s with the velocity that was sent. Once enough way was asked for: the part of it that the joint
+    /// has gone, and a new beginning.
+    pub(super) fn sweep(&mut self, period: f64, enough: f64) -> Option<f64> {
+        self.swept += self.sent * period;
+        if self.swept.abs() < enough {
+            return None;
+        }
+        let part = (self.position - self.swept_from) / self.swept;
+        (self.swept, self.swept_from) = (0.0, self.position);
+        Some(part)
     }
 
     /// The controlword that leads to "operation enabled" from where the drive is, with the brake closed.

@@ -4,11 +4,10 @@
 //! stands in a [`Profile`]. Set-points and measurements are in SI.
 //!
 //! ```text
-//! Idle ─start→ Boot → Identify → Configure → Verify → Starting → Ready ─enable→ Enabling → Running
-//!   ↑                                                    ↑         ↑                │         │ set each cycle
-//!   │                                                    │         └──── stop ──────┴─────────┤
-//!   └──── acknowledge (cause asks for a restart) ──── Faulted ←──── Stopping ←──── any cause ─┘
-//!                                                        └─ acknowledge → Resetting → Starting
+//! Idle ─start→ Boot → Identify → Configure → Verify → Starting → Ready ─enable→ Enabling → Running (set each cycle)
+//!
+//! Enabling, Running ─stop→ Stopping → Ready            any phase ─cause→ Stopping (where joints may move) → Faulted
+//! Faulted ─acknowledge→ Resetting → Starting           or Idle, where the cause asks for a restart
 //! ```
 //!
 //! # A cycle
@@ -39,6 +38,7 @@
 //! | transmit queue full | transport | queue discarded, stop, repeated until it could be queued | at once |
 //! | set-point NaN, jumping, outside the limits | before it leaves | rejected, the last one held, counted; 3 cycles in a row: stop, [`Cause::Setpoints`] | 3 cycles |
 //! | no new set-point | in the slot | the last one held; 3 cycles in a row: stop, [`Cause::Starved`] (not in profile position) | 3 cycles |
+//! | velocities mean something else | way asked for and way gone, while the scale is not verified on hardware | stop, [`Cause::WrongVelocityScale`] | 0.1 rad |
 //! | joint too fast | measured velocity | 3 cycles in a row: stop, [`Cause::Overspeed`] | 3 cycles |
 //! | refused transition | state and time | stop, [`Cause::Transition`] with the reason that the statusword gives | its time limit |
 //!
@@ -70,7 +70,6 @@ pub use profile::{ControlMode, JointProfile, Profile};
 
 use crate::canopen::sync::{HeartbeatProducer, SyncProducer};
 use crate::canopen::{Frame, Micros, NodeId};
-use crate::cia402::objects;
 use bringup::BringUp;
 use core::fmt;
 use stop::{ResetStage, StopStage};
@@ -232,7 +231,7 @@ impl<const N: usize> Driver<N> {
     /// # Errors
     /// Where the profile contradicts itself: a node twice, no watching of the master, a PDO without what the driver needs.
     pub fn new(profile: Profile<N>) -> Result<Driver<N>, Refusal> {
-        check(&profile)?;
+        profile.check()?;
         let reactions = &profile.reactions;
         let lost = Micros::from(profile.node_heartbeat_ms) * 3000;
         Ok(Driver {
@@ -497,53 +496,4 @@ impl<const N: usize> Driver<N> {
             self.noted = (self.noted + 1) % NOTES;
         }
     }
-}
-
-/// Whether the driver can work with a profile at all.
-fn check<const N: usize>(profile: &Profile<N>) -> Result<(), Refusal> {
-    let wrong = |what| Err(Refusal::Profile(what));
-    for (j, joint) in profile.joints.iter().enumerate() {
-        let others = profile.joints.iter().skip(j + 1).map(|other| other.node);
-        if others.chain([profile.master]).any(|node| node == joint.node) {
-            return wrong("a node id is used twice");
-        }
-        let [low, high] = joint.position;
-        let positive =
-            [joint.velocity, joint.acceleration, joint.current, joint.units.counts_per_radian.abs()];
-        if low.partial_cmp(&high) != Some(core::cmp::Ordering::Less)
-            || positive.iter().any(|value| !(value.is_finite() && *value > 0.0))
-        {
-            return wrong(
-                "a joint's limits are no range, or its speed, acceleration, current or scale is not positive",
-            );
-        }
-    }
-    if profile.interpolation_period().is_none() {
-        return wrong(
-            "the SYNC period cannot be written to 0x60C2: whole ms to 255, or tenths to 25.5 are expected",
-        );
-    }
-    if profile.sync_timeout_factor == 0 || profile.master_watch_ms == 0 || profile.node_heartbeat_ms == 0 {
-        return wrong("the drives must watch the master and be watched: no such time may be 0");
-    }
-    if profile.master_heartbeat == 0
-        || profile.master_heartbeat * 2 > Micros::from(profile.master_watch_ms) * 1000
-    {
-        return wrong(
-            "the master's heartbeat must come at least twice in the time that the drives wait for it",
-        );
-    }
-    let sent = |object| profile.tpdos.iter().any(|mapping| mapping.contains(object));
-    if ![objects::STATUSWORD, objects::POSITION, objects::VELOCITY, objects::MODE_DISPLAY]
-        .into_iter()
-        .all(sent)
-    {
-        return wrong("the transmit PDOs must hold statusword, position, velocity and mode display");
-    }
-    for mode in ControlMode::ALL.into_iter().filter_map(|mode| profile.mode(mode)) {
-        if !(mode.rpdo.contains(objects::CONTROLWORD) && mode.rpdo.contains(mode.setpoint)) {
-            return wrong("a receive PDO must hold controlword and set-point");
-        }
-    }
-    Ok(())
 }

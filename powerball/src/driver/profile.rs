@@ -1,10 +1,11 @@
 //! What the driver must know of an arm before it speaks to it: constant tables, made offline from the drive's DCF and one
 //! TOML ([`super::import`] with `std`; [`super::lwa4p`] is the result for the SCHUNK Powerball LWA 4P).
 
+use super::cause::Refusal;
 use super::units::{JointUnits, VelocityScale};
 use crate::canopen::pdo::Mapping;
 use crate::canopen::{Micros, NodeId, Object};
-use crate::cia402::{Controlword, Mode};
+use crate::cia402::{Controlword, Mode, objects};
 use core::fmt;
 
 /// How the joints are commanded.
@@ -118,6 +119,8 @@ pub struct Reactions {
     pub current_step: f64,
     /// A joint measured faster than this times its greatest speed, for [`Reactions::missing_cycles`] cycles, stops the arm.
     pub overspeed_factor: f64,
+    /// So much way, rad, is asked for in velocity mode before it is compared with the way that was gone.
+    pub scale_way: f64,
     /// For a node to boot.
     pub boot_timeout: Micros,
     /// For an SDO answer.
@@ -158,6 +161,7 @@ impl Reactions {
         step_factor: 1.05,
         current_step: 0.25,
         overspeed_factor: 1.5,
+        scale_way: 0.1,
         boot_timeout: 5_000_000,
         sdo_timeout: 100_000,
         sdo_retries: 2,
@@ -236,6 +240,53 @@ impl<const N: usize> Profile<N> {
         } else {
             None
         }
+    }
+
+    /// Whether the driver can work with this profile at all.
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        let wrong = |what| Err(Refusal::Profile(what));
+        for (j, joint) in self.joints.iter().enumerate() {
+            let others = self.joints.iter().skip(j + 1).map(|other| other.node);
+            if others.chain([self.master]).any(|node| node == joint.node) {
+                return wrong("a node id is used twice");
+            }
+            let [low, high] = joint.position;
+            let positive =
+                [joint.velocity, joint.acceleration, joint.current, joint.units.counts_per_radian.abs()];
+            if low.partial_cmp(&high) != Some(core::cmp::Ordering::Less)
+                || positive.iter().any(|value| !(value.is_finite() && *value > 0.0))
+            {
+                return wrong(
+                    "a joint's limits are no range, or its speed, acceleration, current or scale is not positive",
+                );
+            }
+        }
+        if self.interpolation_period().is_none() {
+            return wrong(
+                "the SYNC period cannot be written to 0x60C2: whole ms to 255, or tenths to 25.5 are expected",
+            );
+        }
+        if self.sync_timeout_factor == 0 || self.master_watch_ms == 0 || self.node_heartbeat_ms == 0 {
+            return wrong("the drives must watch the master and be watched: no such time may be 0");
+        }
+        if self.master_heartbeat == 0 || self.master_heartbeat > Micros::from(self.master_watch_ms) * 500 {
+            return wrong(
+                "the master's heartbeat must come at least twice in the time that the drives wait for it",
+            );
+        }
+        let sent = |object| self.tpdos.iter().any(|mapping| mapping.contains(object));
+        if ![objects::STATUSWORD, objects::POSITION, objects::VELOCITY, objects::MODE_DISPLAY]
+            .into_iter()
+            .all(sent)
+        {
+            return wrong("the transmit PDOs must hold statusword, position, velocity and mode display");
+        }
+        for mode in ControlMode::ALL.into_iter().filter_map(|mode| self.mode(mode)) {
+            if !(mode.rpdo.contains(objects::CONTROLWORD) && mode.rpdo.contains(mode.setpoint)) {
+                return wrong("a receive PDO must hold controlword and set-point");
+            }
+        }
+        Ok(())
     }
 }
 

@@ -106,6 +106,7 @@ impl<const N: usize> Driver<N> {
     /// No process data flows yet: the nodes are kept from taking any.
     fn give_up(&mut self, phase: Phase, tx: &mut impl Transmit) {
         self.joints.iter_mut().for_each(|joint| joint.client.cancel());
+        (self.details, self.diagnosis) = (Details::default(), None);
         self.sync.stop();
         self.send(nmt::Command::EnterPreOperational.frame(None), tx);
         self.enter(phase);
@@ -163,16 +164,16 @@ impl<const N: usize> Driver<N> {
                     self.stop = StopStage::Brake { since: now };
                 }
             }
-            StopStage::Brake { since } if now - since >= reactions.brake_time => {
+            StopStage::Brake { since } if now.saturating_sub(since) >= reactions.brake_time => {
                 self.stop = StopStage::Off { since: now };
             }
             StopStage::Off { since } => {
                 let off = |joint: &super::Joint| joint.state().is_some_and(|state| !state.has_torque());
-                let settled = now - since >= 3 * self.profile.sync_period;
+                let settled = now.saturating_sub(since) >= 3 * self.profile.sync_period;
                 let stuck = self.joints.iter().position(|joint| !off(joint));
                 match stuck {
                     None if settled => self.end_stop(),
-                    Some(j) if now - since >= reactions.transition_timeout => {
+                    Some(j) if now.saturating_sub(since) >= reactions.transition_timeout => {
                         if let Some(status) = self.joints.get(j).and_then(|joint| joint.status) {
                             self.trip(Cause::StateLost(self.node(j), status), tx);
                         }
@@ -187,7 +188,12 @@ impl<const N: usize> Driver<N> {
 
     fn end_stop(&mut self) {
         match self.cause {
-            None => self.enter(Phase::Ready),
+            // On request only: ready again where all is as it should be, and waited for where it is not.
+            None => {
+                let whole =
+                    self.joints.iter().all(|joint| joint.missing_run == 0) && self.unready().is_none();
+                self.enter(if whole { Phase::Ready } else { Phase::Starting });
+            }
             Some(_) => self.fault(),
         }
     }

@@ -97,15 +97,19 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         &mut self.master
     }
 
-    /// Follows a motion, with `each` called for every cycle: the index of the sample that the joints were sent before this
-    /// cycle, and the master, `None` where process data is missing.
+    /// Follows a motion, with `each` called for every cycle: the cycle's number and that of the sample that was given in it,
+    /// and the master, `None` where process data is missing.
+    ///
+    /// Where set-points came too late for their slot, the sample is given again and the motion is a cycle longer: a joint
+    /// is never asked to catch up.
     fn follow(
         &mut self,
         motion: &Motion,
-        mut each: impl FnMut(usize, Option<&Master<B, N>>) -> Result<(), RecordError>,
+        mut each: impl FnMut([usize; 2], Option<&Master<B, N>>) -> Result<(), RecordError>,
     ) -> Result<(), RecordError> {
-        let mut samples = motion.samples();
-        let (mut sent, mut seen) = (0usize, 0usize);
+        let (mut next, mut cycle) = (0usize, 0usize);
+        let mut waiting: Option<[usize; 2]> = None;
+        let mut dropped = self.master.driver().counters().dropped;
         loop {
             let until = self.master.bus().now() + 100_000;
             let moment = self.master.step(until)?;
@@ -116,24 +120,28 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
             match moment {
                 Moment::Cycle => {
                     // The cycle before is over; what it did not bring is missing.
-                    if sent > seen {
-                        each(seen, None)?;
-                        seen += 1;
+                    if let Some(missed) = waiting.take() {
+                        each(missed, None)?;
                     }
-                    let Some([q, ..]) = samples.next() else {
-                        let target = self.target;
-                        return self.master.driver_mut().set(&target).map_err(RecordError::Rejected);
-                    };
-                    for (target, q) in self.target.iter_mut().zip(q) {
-                        *target = *q;
+                    let again =
+                        std::mem::replace(&mut dropped, self.master.driver().counters().dropped) != dropped;
+                    let sample = if again && next > 0 { next - 1 } else { next };
+                    let q = motion.q.get(sample * N..(sample + 1) * N);
+                    if let Some(q) = q {
+                        self.target.copy_from_slice(q);
+                        waiting = Some([cycle, sample]);
                     }
                     let target = self.target;
                     self.master.driver_mut().set(&target).map_err(RecordError::Rejected)?;
-                    sent += 1;
+                    if q.is_none() {
+                        return Ok(());
+                    }
+                    (next, cycle) = (sample + 1, cycle + 1);
                 }
-                Moment::Data if sent > seen => {
-                    each(seen, Some(&self.master))?;
-                    seen += 1;
+                Moment::Data => {
+                    if let Some(numbers) = waiting.take() {
+                        each(numbers, Some(&self.master))?;
+                    }
                 }
                 _ => {}
             }
@@ -168,7 +176,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         log.write_all(header::<N>(with_references).as_bytes()).map_err(RecordError::Write)?;
         let rows: Vec<&[f64]> = motion.samples().map(|[q, ..]| q).collect();
         let mut line = String::new();
-        self.follow(motion, |k, master| {
+        self.follow(motion, |[cycle, k], master| {
             let Some(master) = master else {
                 record.missing += 1;
                 return Ok(());
@@ -177,7 +185,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
             line.clear();
             // A SYNC that was left out took its time all the same.
             let skipped = master.driver().counters().skipped - counters.skipped;
-            let _ = write!(line, "{:.4}", start + (k as u64 + skipped) as f64 * motion.period);
+            let _ = write!(line, "{:.4}", start + (cycle as u64 + skipped) as f64 * motion.period);
             // A digit finer than the encoders' step.
             for joint in joints {
                 let _ = write!(line, ",{:.7}", joint.position);

@@ -128,11 +128,13 @@ impl Simulation {
         self.brakes[joint] = closed;
     }
 
-    /// The diagonal of the mass matrix at the present pose, rotors included, kg·m²: what each drive has to move.
+    /// What each drive has to move at once, kg·m²: the diagonal of the mass matrix at the present pose, rotors included, or
+    /// the motor alone where its gear gives way.
     pub fn inertias(&self) -> Vec<f64> {
         let n = self.dof();
         let matrix = self.plant.dynamics().mass_matrix(&self.q);
-        (0..n).map(|i| matrix[i * n + i]).collect()
+        let motors = self.motors.iter().enumerate();
+        motors.map(|(i, motor)| motor.map_or(matrix[i * n + i], |motor| motor.inertia)).collect()
     }
 
     /// One step of `h` s under the drives' torques `tau` at the joints, N·m, which hold their value within it.
@@ -432,7 +434,8 @@ mod tests {
             let hold = simulation.plant().dynamics().gravity(&POSE);
             (0..1000).for_each(|_| simulation.step(1e-3, &hold));
             assert!(simulation.q.iter().chain(&simulation.dq).all(|x| x.is_finite()), "{name}");
-            assert!(simulation.dq.iter().all(|v| v.abs() < 2.0), "{name}: {:?}", simulation.dq);
+            // Nothing carries what an effect adds: joints may fall, for a second.
+            assert!(simulation.dq.iter().all(|v| v.abs() < 5.0), "{name}: {:?}", simulation.dq);
         }
     }
 

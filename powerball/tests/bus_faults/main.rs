@@ -205,8 +205,10 @@ fn every_fault_in_every_mode_and_phase() {
     let only = std::env::var("CELL").ok();
     let mut wrong = Vec::new();
     let modes = ["PP", "VL", "IP", "current"];
-    println!("| fault \\ phase | {} |", Stage::ALL.map(|(_, name)| name).join(" | "));
-    println!("|---|{}", "---|".repeat(Stage::ALL.len()));
+    let mut table = vec![
+        format!("| fault \\ phase | {} |", Stage::ALL.map(|(_, name)| name).join(" | ")),
+        format!("|---|{}", "---|".repeat(Stage::ALL.len())),
+    ];
     for (fault, name) in Fault::ALL {
         let mut row = Vec::new();
         for (stage, stage_name) in Stage::ALL {
@@ -226,7 +228,25 @@ fn every_fault_in_every_mode_and_phase() {
             results.dedup();
             row.push(results.join(", "));
         }
-        println!("| {name} | {} |", row.join(" | "));
+        table.push(format!("| {name} | {} |", row.join(" | ")));
     }
+    println!("{}", table.join("\n"));
     assert!(wrong.is_empty(), "{} cells:\n{}", wrong.len(), wrong.join("\n"));
+    if only.is_none() {
+        the_page_holds(&table.join("\n"));
+    }
+}
+
+/// `docs/bus.md` shows this matrix. With `POWERBALL_BLESS` set, it is written there.
+fn the_page_holds(matrix: &str) {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/bus.md");
+    let page = std::fs::read_to_string(&path).unwrap();
+    let (begin, end) = ("<!-- matrix -->\n", "\n<!-- end of matrix -->");
+    let (head, rest) = page.split_once(begin).unwrap();
+    let (shown, tail) = rest.split_once(end).unwrap();
+    if std::env::var_os("POWERBALL_BLESS").is_some() {
+        std::fs::write(&path, format!("{head}{begin}{matrix}{end}{tail}")).unwrap();
+    } else {
+        assert!(shown == matrix, "docs/bus.md shows another matrix; run this test with POWERBALL_BLESS=1");
+    }
 }

@@ -263,14 +263,53 @@ fn a_transition_that_does_not_happen_has_its_reason() {
     }
 }
 
+/// One peer tried for ever, and took any bit of the extended status for the one that counts.
 #[test]
 fn a_commutation_that_never_ends_ends() {
     let mut profile = LWA4P;
     profile.reactions.commutation_tries = 4;
-    let mut world =
-        started(ControlMode::InterpolatedPosition, profile, true, Wire::Misread(schunk::EXTENDED_STATUS, 0));
+    for status in [0, u32::from(schunk::POSITION_VERIFIED)] {
+        let wire = Wire::Misread(schunk::EXTENDED_STATUS, status);
+        let mut world = started(ControlMode::InterpolatedPosition, profile, true, wire);
+        assert!(world.run_until(20_000_000, |w| w.driver.phase() == Phase::Faulted));
+        assert_eq!(world.driver.cause(), Some(&Cause::NoCommutation(VICTIM)));
+    }
+}
+
+/// Supplies come late: a node that did not boot is reset once more, and then refused.
+#[test]
+fn a_node_that_boots_late_is_waited_for() {
+    for comes in [true, false] {
+        let mut world = started(ControlMode::Velocity, LWA4P, true, Wire::Good);
+        world.bus.peer_mut().arm.fault(VICTIM, Fault::Silent(true));
+        world.run(4_000_000);
+        assert_eq!(world.driver.phase(), Phase::Boot);
+        world.bus.peer_mut().arm.fault(VICTIM, Fault::Silent(!comes));
+        let done = |w: &World| w.driver.phase() == Phase::Running || w.driver.cause().is_some();
+        assert!(world.run_until(20_000_000, done));
+        assert_eq!(world.driver.cause(), if comes { None } else { Some(&Cause::NoBoot(VICTIM)) });
+    }
+}
+
+/// With others an emergency stop that is pressed at boot kills the start-up.
+#[test]
+fn a_motor_supply_that_is_off_at_boot_costs_no_restart() {
+    let mut world = World::new(true, LWA4P);
+    world.bus.peer_mut().arm.fault(VICTIM, Fault::Supply(false));
+    world.run(100_000);
+    world.driver.start(ControlMode::Velocity, false).unwrap();
     assert!(world.run_until(20_000_000, |w| w.driver.phase() == Phase::Faulted));
-    assert_eq!(world.driver.cause(), Some(&Cause::NoCommutation(VICTIM)));
+    let cause = *world.driver.cause().unwrap();
+    let told =
+        matches!(cause, Cause::Transition(VICTIM, _, _, Hindrance::NoVoltage) | Cause::DriveFault(VICTIM, _));
+    assert!(told, "{cause}");
+    world.bus.peer_mut().arm.fault(VICTIM, Fault::Supply(true));
+    world.driver.acknowledge().unwrap();
+    assert!(
+        world.run_until(20_000_000, |w| w.driver.phase() == Phase::Running),
+        "{:?}",
+        world.driver.cause()
+    );
 }
 
 #[test]
@@ -312,20 +351,21 @@ fn profile_position_shakes_hands() {
 fn velocities_that_the_wire_cannot_hold_are_rejected_not_cut() {
     let mut world = running(ControlMode::Velocity);
     let step = LWA4P.joints[0].acceleration * 0.005;
-    let mut speed = 0.0;
-    world.pilot.bad = 0;
+    let mut speeds = world.accepted.last().unwrap().1;
+    world.hold_pilot(CYCLE);
     let mut rejected = None;
     for _ in 0..60 {
         world.run_until(CYCLE, |w| w.driver.cycle_complete());
-        speed += step;
-        if let Err(rejection) = world.driver.set(&[speed, 0.0, 0.0, 0.0, 0.0, 0.0]) {
+        speeds[0] += step;
+        if let Err(rejection) = world.driver.set(&speeds) {
             rejected = Some(rejection);
             break;
         }
         world.hold_pilot(CYCLE);
     }
-    assert_eq!(rejected, Some(Rejection::Saturated(0)), "at {speed} rad/s");
-    assert!((speed.to_degrees() - 32.767).abs() < 1.3, "{}", speed.to_degrees());
+    let degrees = speeds[0].to_degrees();
+    assert_eq!(rejected, Some(Rejection::Saturated(0)), "at {degrees}°/s");
+    assert!((degrees - 32.767).abs() < step.to_degrees(), "{degrees}°/s");
 }
 
 /// All three ramp bits: without them drives hold the ramp.
@@ -457,4 +497,20 @@ fn profiles_that_contradict_themselves_are_refused() {
     assert!(refused(|p| p.tpdos[1] = Mapping::EMPTY));
     assert!(refused(|p| p.velocity.setpoint = objects::TARGET_POSITION));
     assert!(!refused(|_| {}));
+}
+
+/// The dimension factor 0x604C can be read in two ways that are inverse to each other. A tenth of a radian tells.
+#[test]
+fn a_wrong_velocity_scale_stops_the_first_move() {
+    let mut profile = LWA4P;
+    profile.velocity_scale.millidegrees = 4.0;
+    let mut world = started(ControlMode::Velocity, profile, true, Wire::Good);
+    assert!(world.run_until(20_000_000, |w| w.driver.phase() == Phase::Running));
+    assert!(world.run_until(5_000_000, |w| w.driver.cause().is_some()));
+    let cause = *world.driver.cause().unwrap();
+    assert!(matches!(cause, Cause::WrongVelocityScale(_, part) if (part - 0.25).abs() < 0.1), "{cause}");
+    // The right one runs on, to and fro.
+    let mut world = running(ControlMode::Velocity);
+    world.run(5_000_000);
+    assert_eq!(world.driver.cause(), None);
 }

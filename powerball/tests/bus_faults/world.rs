@@ -57,7 +57,7 @@ pub(crate) struct Faulty {
     swapped: Option<(Micros, Frame)>,
     /// Frames of the master, as they arrive.
     pub(crate) heard: Vec<(Micros, Frame)>,
-    /// Emergencies that the victim still sends, one a tick.
+    /// Emergencies that the victim still sends, one a millisecond: a quarter of the bus.
     pub(crate) storm: u32,
 }
 
@@ -145,7 +145,7 @@ impl Peer for Faulty {
         if let Some((_, frame)) = self.swapped.take_if(|(at, _)| now > *at + 10_000) {
             self.out.push_back(frame);
         }
-        if self.storm > 0 {
+        if self.storm > 0 && now.is_multiple_of(1000) {
             self.storm -= 1;
             let emcy =
                 powerball::canopen::emcy::Emcy { code: 0x3222, register: 5, vendor: [0x74, 0, 0, 0, 0] };
@@ -263,13 +263,17 @@ impl World {
 
     /// One turn of the caller's loop: at most to the driver's deadline.
     pub(crate) fn turn(&mut self) {
+        self.turn_until(Micros::MAX);
+    }
+
+    fn turn_until(&mut self, limit: Micros) {
         let now = self.now();
         let mut door = Door { full: now < self.full_until, bus: &mut self.bus };
         self.driver.poll(now, &mut door);
         if !self.holding {
             self.fly();
         }
-        let until = self.driver.deadline().max(now + 1);
+        let until = self.driver.deadline().max(now + 1).min(limit);
         let waited = self.backlog.pop_front().map(|(_, event)| (now, event));
         if let Some((at, event)) = waited.or_else(|| self.bus.receive(until).unwrap()) {
             let mut door = Door { full: at < self.full_until, bus: &mut self.bus };
@@ -297,7 +301,7 @@ impl World {
         let mut targets = match self.driver.control() {
             ControlMode::ProfilePosition => START.map(|q| q + 0.05 * (self.phase / 0.2).floor().sin()),
             ControlMode::InterpolatedPosition => START.map(|q| q + 0.05 * (2.0 * self.phase).sin()),
-            ControlMode::Velocity => [0.1 * wave; 6],
+            ControlMode::Velocity => [0.15 * wave; 6],
             ControlMode::Current => [0.05 * wave; 6],
         };
         if self.pilot.bad > 0 {
@@ -312,7 +316,7 @@ impl World {
     pub(crate) fn run(&mut self, time: Micros) {
         let until = self.now() + time;
         while self.now() < until {
-            self.turn();
+            self.turn_until(until);
         }
     }
 

@@ -75,9 +75,10 @@ impl Effect {
                 level: coulomb * rng.random_range(0.3..0.6),
                 way: rng.random_range(0.010..0.030),
             },
+            // What joint 2 can still carry on an exciting path.
             "payload" => {
                 let aside = [0, 1].map(|_| rng.random_range(-0.04..0.04));
-                Effect::payload(rng.random_range(0.8..2.5), aside, rng.random_range(0.03..0.10), moment)
+                Effect::payload(rng.random_range(0.6..1.2), aside, rng.random_range(0.03..0.10), moment)
             }
             "spring" => Effect::Spring {
                 joint: any,

@@ -173,21 +173,42 @@ impl Peer for VirtualArm {
     }
 }
 
-/// Puts an arm on a bus with others, in the bus's time, until `stop` says so or the bus is gone.
+/// Puts an arm on a bus with others, in the bus's time, until `stop` says so or the bus is gone. Gives the time, µs, by which
+/// the arm is behind the bus: a machine that is too slow for the physics slows the arm down, and not its answers.
 ///
 /// # Errors
 /// What the bus says; a full queue loses the frame, as a drive does.
-pub fn serve(arm: &mut impl Peer, bus: &mut impl Bus, stop: impl Fn() -> bool) -> Result<(), BusError> {
+pub fn serve(arm: &mut impl Peer, bus: &mut impl Bus, stop: impl Fn() -> bool) -> Result<Micros, BusError> {
+    let mut slipped = 0;
     while !stop() {
-        if let Some((at, Event::Frame(frame))) = bus.receive(arm.wake())? {
-            arm.receive(&frame, at);
-        }
-        arm.advance(bus.now());
-        while let Some(frame) = arm.transmit() {
-            match bus.send(&frame) {
-                Ok(()) | Err(BusError::Full | BusError::Off) => {}
-                Err(gone) => return Err(gone),
+        let mut event = bus.receive(arm.wake() + slipped)?;
+        while let Some((at, what)) = event {
+            if let Event::Frame(frame) = what {
+                arm.receive(&frame, at.saturating_sub(slipped));
+                speak(arm, bus)?;
             }
+            event = bus.receive(0)?;
+        }
+        let now = bus.now().saturating_sub(slipped);
+        let behind = now.saturating_sub(arm.wake());
+        if behind > CATCH_UP {
+            slipped += behind;
+        }
+        arm.advance(bus.now().saturating_sub(slipped));
+        speak(arm, bus)?;
+    }
+    Ok(slipped)
+}
+
+/// What a hiccup of the machine may cost and is made up for, µs.
+const CATCH_UP: Micros = 20_000;
+
+/// Sends what the arm has to say.
+fn speak(arm: &mut impl Peer, bus: &mut impl Bus) -> Result<(), BusError> {
+    while let Some(frame) = arm.transmit() {
+        match bus.send(&frame) {
+            Ok(()) | Err(BusError::Full | BusError::Off) => {}
+            Err(gone) => return Err(gone),
         }
     }
     Ok(())
