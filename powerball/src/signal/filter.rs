@@ -55,14 +55,25 @@ impl Band {
     /// Standard deviation that white noise of deviation 1 at `rate` Hz keeps in the band.
     #[must_use]
     pub fn white_share(&self, rate: f64) -> f64 {
-        let Some(filter) = &self.filter else { return 1.0 };
-        let steps = 400;
-        let mean = (0..steps)
-            .map(|k| filter.zero_phase_gain(rate / 2.0 * (k as f64 + 0.5) / steps as f64, rate))
-            .sum::<f64>()
-            / steps as f64;
-        mean.sqrt()
+        mean_over_frequencies(rate, |f| self.amplitude(f, rate).powi(2)).sqrt()
     }
+
+    /// The same for what passes `wider`, a band with a higher cutoff, and not this one.
+    #[must_use]
+    pub fn white_share_between(&self, wider: &Band, rate: f64) -> f64 {
+        mean_over_frequencies(rate, |f| (wider.amplitude(f, rate) - self.amplitude(f, rate)).powi(2)).sqrt()
+    }
+
+    /// Amplitude that is kept at a frequency, Hz.
+    fn amplitude(&self, frequency: f64, rate: f64) -> f64 {
+        self.filter.as_ref().map_or(1.0, |f| f.zero_phase_gain(frequency, rate).sqrt())
+    }
+}
+
+fn mean_over_frequencies(rate: f64, value: impl Fn(f64) -> f64) -> f64 {
+    let steps = 400;
+    let at = |k: i32| value(rate / 2.0 * (f64::from(k) + 0.5) / f64::from(steps));
+    (0..steps).map(at).sum::<f64>() / f64::from(steps)
 }
 
 #[cfg(test)]
