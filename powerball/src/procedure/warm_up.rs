@@ -99,11 +99,8 @@ pub fn warm_up<B: Bus, const N: usize>(
         recorder.record(&motion, seconds, false, &mut text)?;
         let text = String::from_utf8_lossy(&text);
         // The header is written once.
-        let lines = text.split_inclusive('\n').skip(usize::from(seconds > 0.0));
-        lines
-            .map(|line| log.write_all(line.as_bytes()))
-            .collect::<Result<(), _>>()
-            .map_err(RecordError::Write)?;
+        let mut lines = text.split_inclusive('\n').skip(usize::from(seconds > 0.0));
+        lines.try_for_each(|line| log.write_all(line.as_bytes())).map_err(RecordError::Write)?;
         let rows: Vec<Vec<f64>> = text
             .lines()
             .skip(1)
