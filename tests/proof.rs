@@ -132,3 +132,44 @@ fn a_constant_that_is_slightly_off_is_noticed() {
         function::build(Function::Gravity, &other, model.symbols(), set, &model.sets().field, None, PASSES);
     assert!(prove(model.arm(), model.symbols(), model.sets(), set, &built, None).is_err());
 }
+
+/// Y·π = B·q̈ + C·q̇ + g as polynomials: the graphs themselves, whatever the Lagrangian says, at a random point of the field.
+#[test]
+fn the_graphs_obey_the_equation_of_motion_in_the_ring() {
+    use dyngen::exact::prime::{Draws, Fp};
+    use dyngen::graph::{Input, evaluate};
+    use std::collections::BTreeMap;
+    for name in ["arm", "puma560", "panda", "stanford"] {
+        let model = Model::derive(arm(name)).unwrap();
+        for kind in [SetKind::Full, SetKind::Minimal, SetKind::Symbolic] {
+            let mut draws = Draws::new(7);
+            let mut drawn: BTreeMap<Input, Fp> = BTreeMap::new();
+            for i in 0..model.arm().dof() {
+                let (s, c) = draws.element().circle_point();
+                drawn.extend([(Input::Sin(i), s), (Input::Cos(i), c), (Input::Position(i), draws.element())]);
+                drawn.extend([Input::Speed(i), Input::Acceleration(i)].map(|x| (x, draws.element())));
+            }
+            let p = model.set(kind).unwrap().parameters.len();
+            drawn.extend((0..p).map(|k| (Input::Parameter(k), draws.element())));
+            let value = |function: Function| -> Vec<Fp> {
+                let f = model.function(function, kind).unwrap();
+                let symbol = |index, sine| model.sets().field.modular_symbol(index, sine);
+                evaluate::evaluate(&f.graph, &f.outputs, |input| drawn[&input], symbol).unwrap()
+            };
+            let product = |matrix: &[Fp], of: fn(usize) -> Input, i: usize, width: usize| {
+                (0..width).fold(Fp::ZERO, |sum, k| sum + matrix[i * width + k] * drawn[&of(k)])
+            };
+            let n = model.arm().dof();
+            let (y, mass, coriolis) =
+                (value(Function::Regressor), value(Function::MassMatrix), value(Function::CoriolisMatrix));
+            let (gravity, torque) = (value(Function::Gravity), value(Function::InverseDynamics));
+            for i in 0..n {
+                let sum = product(&mass, Input::Acceleration, i, n)
+                    + product(&coriolis, Input::Speed, i, n)
+                    + gravity[i];
+                assert_eq!(product(&y, Input::Parameter, i, p), sum, "{name} {kind}");
+                assert_eq!(torque[i], sum, "{name} {kind}");
+            }
+        }
+    }
+}
