@@ -1,6 +1,6 @@
 //! Which name a residual gets, and why the others do not.
 
-use super::forward::Family;
+use super::family::Family;
 use super::result::Rival;
 use super::rule;
 
