@@ -8,6 +8,10 @@ use crate::effects::{Context, Found};
 use crate::estimate::{noise_floor, spread};
 use crate::parallel;
 
+/// Said where the logs to judge on are repeats.
+const ONE_PATH: &str = "the logs of --validate run the same path as those of --log: what depends on positions (springs, zeros, \
+                        gravity, broken symmetries, slow ripple) was not considered; record another path";
+
 impl Session<'_> {
     fn coefficients(&self) -> Vec<Vec<f64>> {
         let mut first = 0;
@@ -90,7 +94,9 @@ impl Session<'_> {
             unattributed,
             next_experiment,
             false_positives: self.false_positives.clone(),
-            warnings: self.data.notes.iter().chain(&self.other.notes).cloned().collect(),
+            warnings: (self.data.notes.iter().chain(&self.other.notes).cloned())
+                .chain(self.one_path.then(|| ONE_PATH.to_string()))
+                .collect(),
             curves,
         }
     }

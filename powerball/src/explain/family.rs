@@ -2,6 +2,7 @@
 
 use super::evidence::{Evidence, Extent, Path, evidence};
 use super::forward::{Accepted, Session};
+use super::one_path::cannot_be_judged;
 use super::rule;
 use super::screen::{Screen, Trial};
 use crate::effects::{Candidate, Context};
@@ -112,6 +113,10 @@ impl Session<'_> {
             for member in &mut members {
                 if member.trial.score < rule::LEAST_SCORE {
                     member.refusal = Some(format!("explains too little (score {:.1})", member.trial.score));
+                } else if let Some(reason) =
+                    self.one_path.then(|| cannot_be_judged(effect, &member.candidate, &self.data)).flatten()
+                {
+                    member.refusal = Some(reason);
                 } else if self.gave_up(e, &member.candidate) {
                     member.refusal = Some("did not last, or could not be told from its rivals".to_string());
                 } else if let Some(name) = self.mends(screen, e, member) {

@@ -4,6 +4,7 @@ use super::evidence::Path;
 use super::family::Member;
 use super::leftover::leftover;
 use super::naming::{Comparison, compare};
+use super::one_path::repeats;
 use super::other_path::payload_on;
 use super::placebo::placebos;
 use super::result::{Errors, Explained, FalsePositives, NamedEffect, Rival};
@@ -76,6 +77,8 @@ pub struct Session<'a> {
     pub(super) held: Option<NamedEffect>,
     pub(super) data: Data<'a>,
     pub(super) other: Data<'a>,
+    /// Whether the other logs run the path of the fitted ones.
+    pub(super) one_path: bool,
     pub(super) folds: Folds,
     pub(super) effects: Vec<Box<dyn Effect>>,
     pub(super) accepted: Vec<Accepted>,
@@ -114,8 +117,10 @@ pub fn explain(
     let before = Errors { fit: spread(&data, &base.residual), validate: spread(&other, &held_out) };
     let held =
         payload_on(body, logs, validate, options, &base, &mut other).map_err(ExplainError::Validate)?;
+    let one_path = repeats(&data, &other);
     let mut session = Session {
         held,
+        one_path,
         data,
         other,
         folds,

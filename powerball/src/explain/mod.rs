@@ -13,6 +13,7 @@ mod folds;
 mod forward;
 mod leftover;
 mod naming;
+mod one_path;
 mod other_path;
 mod page;
 mod placebo;

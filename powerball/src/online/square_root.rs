@@ -9,15 +9,15 @@ use nalgebra::{RealField, SMatrix, SVector};
 /// definiteness to rounding, as a recursive covariance does. Without forgetting the estimate is that of a batch fit.
 ///
 /// ```
-/// use nalgebra::vector;
+/// use nalgebra::Vector2;
 /// use powerball::online::SquareRoot;
 ///
 /// let mut line = SquareRoot::<f64, 2>::new(1e-9);
 /// for x in [0.0, 1.0, 2.0, 3.0] {
-///     line.update(&vector![1.0, x], 5.0 - 2.0 * x, 1.0);
+///     line.update(&Vector2::new(1.0, x), 5.0 - 2.0 * x, 1.0);
 /// }
 /// let found = line.estimate().unwrap();
-/// assert!((found - vector![5.0, -2.0]).norm() < 1e-6);
+/// assert!((found - Vector2::new(5.0, -2.0)).norm() < 1e-6);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SquareRoot<T, const P: usize> {

@@ -1,8 +1,9 @@
 //! What the rule does on logs whose truth is known.
 
 use super::plant::{Noise, Truth, arm, record};
+use crate::explain::one_path::repeats;
 use crate::explain::{Explained, explain};
-use crate::regression::{DataOptions, RigidBody};
+use crate::regression::{Data, DataOptions, RigidBody};
 
 fn run(body: &RigidBody, truth: Truth, size: f64, noise: Noise, seed: u64) -> Explained {
     let logs = record(body.arm(), truth, size, noise, 7, 22.0, seed);
@@ -50,6 +51,21 @@ fn nothing_is_found_where_nothing_is_missing() {
         assert_eq!(names(&explained), Vec::<String>::new(), "{noise:?} {seed}");
         assert!(explained.false_positives.rate <= 0.01);
     }
+}
+
+/// A repeat, even one that drifts, is known from another path; and there a spring is not named, whatever it would gain.
+#[test]
+fn nothing_of_the_position_is_named_on_a_repeated_path() {
+    let body = RigidBody::new(&arm()).unwrap();
+    let logs = record(body.arm(), Truth::Spring, 1.0, Noise::White, 7, 22.0, 3);
+    let data = |logs: &[crate::log::Log]| Data::new(&body, logs, &DataOptions::default()).unwrap();
+    let mut drifted = logs[0].clone();
+    drifted.q.iter_mut().flatten().for_each(|q| *q = 0.03 + 1.2 * *q);
+    assert!(repeats(&data(&logs[..3]), &data(&[drifted])));
+    assert!(!repeats(&data(&logs[..3]), &data(&logs[4..])));
+    let repeated = explain(&body, &logs[..5], &logs[..2], &DataOptions::default(), &|_| ()).unwrap();
+    assert!(!names(&repeated).iter().any(|n| n.starts_with("spring")), "{:?}", names(&repeated));
+    assert!(repeated.warnings.iter().any(|w| w.contains("run the same path")));
 }
 
 /// The table of a study: `STUDY=size,seeds,first cargo test --release -p powerball study -- --ignored --nocapture`.
