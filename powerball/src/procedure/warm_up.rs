@@ -91,7 +91,6 @@ pub fn warm_up<B: Bus, const N: usize>(
         recorder.go(&start, 0.25, 1.0)?;
     }
     let speeds: Vec<Vec<f64>> = (0..N).map(|j| motion.samples().map(|[_, dq, _]| dq[j]).collect()).collect();
-    let times: Vec<f64> = (0..motion.len()).map(|k| k as f64 * motion.period).collect();
     let mut seen: Vec<Vec<Cycle>> = vec![Vec::new(); N];
     let mut seconds = 0.0;
     loop {
@@ -107,12 +106,17 @@ pub fn warm_up<B: Bus, const N: usize>(
             .map(|line| line.split(',').filter_map(|x| x.parse().ok()).collect())
             .filter(|row: &Vec<f64>| row.len() == 1 + 2 * N)
             .collect();
-        if rows.len() == times.len() {
-            for (j, cycle) in seen.iter_mut().enumerate() {
-                let torque: Vec<f64> = rows.iter().map(|row| row[1 + N + j]).collect();
-                let found = cycles(&times, &speeds[j], &torque, motion.duration());
-                cycle.extend(found.iter().map(|c| Cycle { time: c.time + seconds, ..*c }));
-            }
+        // Lines may be missing; each knows by its time which sample it is.
+        let sample = |row: &Vec<f64>| ((row[0] - seconds) / motion.period).round() as usize;
+        let known: Vec<(usize, &Vec<f64>)> =
+            rows.iter().map(|row| (sample(row), row)).filter(|(k, _)| *k < motion.len()).collect();
+        let times: Vec<f64> = known.iter().map(|(k, _)| *k as f64 * motion.period).collect();
+        let whole = times.first() == Some(&0.0) && times.last().is_some_and(|t| *t >= motion.duration());
+        for (j, cycle) in seen.iter_mut().enumerate().filter(|_| whole) {
+            let speed: Vec<f64> = known.iter().map(|(k, _)| speeds[j][*k]).collect();
+            let torque: Vec<f64> = known.iter().map(|(_, row)| row[1 + N + j]).collect();
+            let found = cycles(&times, &speed, &torque, motion.duration());
+            cycle.extend(found.iter().map(|c| Cycle { time: c.time + seconds, ..*c }));
         }
         seconds += motion.len() as f64 * motion.period;
         let trends: Vec<Option<Trend>> = seen.iter().map(|c| trend(c)).collect();
