@@ -68,13 +68,15 @@ fn shifted(column: &Column, data: &Data<'_>, fraction: f64) -> Column {
 }
 
 fn alike(a: &Column, b: &Column) -> f64 {
-    let (mut cross, mut left, mut right) = (0.0, 0.0, 0.0);
+    let (mut cross, mut left, mut right, mut whole) = (0.0, 0.0, 0.0, 0.0);
     for ((_, x), (_, y)) in a.parts.iter().zip(&b.parts) {
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len().max(1) as f64;
         let (mx, my) = (mean(x), mean(y));
         cross += dot(x, y) - mx * my * x.len() as f64;
+        whole += dot(x, x);
         left += dot(x, x) - mx * mx * x.len() as f64;
         right += dot(y, y) - my * my * y.len() as f64;
     }
-    if left * right > 0.0 { cross / (left * right).sqrt() } else { 0.0 }
+    // What hardly varies is the same wherever it is shifted to.
+    if left * right > 1e-12 * (whole * whole) { cross / (left * right).sqrt() } else { 1.0 }
 }
