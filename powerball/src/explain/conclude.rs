@@ -1,12 +1,14 @@
 //! From the accepted effects to the result.
 
 use super::curves::curves;
-use super::forward::{Session, Step};
+use super::forward::{RuledOut, Session, Step};
 use super::leftover::{depends_on, effective_samples, leftover};
-use super::result::{Errors, Explained, NamedEffect, Unattributed};
+use super::naming::Comparison;
+use super::result::{Errors, Explained, NamedEffect, Rival, Unattributed};
 use crate::effects::{Context, Found};
 use crate::estimate::{noise_floor, spread};
 use crate::parallel;
+use std::sync::Arc;
 
 /// Said where the logs to judge on are repeats.
 const ONE_PATH: &str = "the logs of --validate run the same path as those of --log: what depends on positions (springs, zeros, \
@@ -67,18 +69,21 @@ impl Session<'_> {
                 margin: first.comparison.margin,
                 leftover: leftover(&before.fit.rms, &after.fit.rms, &floor, &joints),
                 class: effect.class().name().to_string(),
-                rivals: first.comparison.rivals.clone(),
+                rivals: self.rivals(&first.comparison, effect.name()),
                 joints: joints.iter().map(|j| j + 1).collect(),
             });
         }
         let unattributed = self.unattributed(&context, &floor, &after);
-        let next_experiment = self.steps.iter().find_map(|s| {
-            let twin = s.comparison.twin.as_ref()?;
-            let name = self.effects[s.effect].name();
-            Some(serde_json::json!({
-                "to_tell_apart": [name, twin],
-                "advice": format!("record the joints concerned on a path with other positions, speeds and loads than these logs: {name} and {twin} explain them equally well"),
-            }))
+        let open = self.open(unattributed.is_some());
+        let next_experiment = open.as_ref().map(|open| {
+            let names = open.names();
+            serde_json::json!({
+                "to_tell_apart": names,
+                "advice": format!(
+                    "record the joints concerned on a path with other positions, speeds and loads than these logs, \
+                     where {} predict different torques", names.join(" and ")
+                ),
+            })
         });
         let effective_samples = effective_samples(&self.data, &self.fit.residual);
         self.false_positives.rate =
@@ -93,12 +98,21 @@ impl Session<'_> {
             effective_samples,
             unattributed,
             next_experiment,
+            experiment: None,
+            open: open.map(Arc::new),
             false_positives: self.false_positives.clone(),
             warnings: (self.data.notes.iter().chain(&self.other.notes).cloned())
                 .chain(self.one_path.then(|| ONE_PATH.to_string()))
                 .collect(),
             curves,
         }
+    }
+
+    /// The next best names, and what an experiment has ruled out on the same joints.
+    fn rivals(&self, comparison: &Comparison, name: &str) -> Vec<Rival> {
+        let here = |r: &&RuledOut| r.effect != name && r.joints.iter().any(|j| comparison.joints.contains(j));
+        let out = |r: &RuledOut| Rival { effect: r.effect.clone(), why_not: r.why_not.clone() };
+        comparison.rivals.iter().cloned().chain(self.ruled_out.iter().filter(here).map(out)).collect()
     }
 
     /// The joints whose residual still depends on something.

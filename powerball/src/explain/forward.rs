@@ -5,13 +5,14 @@ use super::family::Member;
 use super::leftover::leftover;
 use super::naming::{Comparison, compare};
 use super::one_path::repeats;
+use super::open::{Question, refitted};
 use super::other_path::payload_on;
 use super::placebo::placebos;
 use super::result::{Errors, Explained, FalsePositives, NamedEffect, Rival};
 use super::rule;
 use super::screen::{Screen, Trial};
 use crate::effects::{self, Candidate, Context, Effect};
-use crate::estimate::{Design, Fit, Folds, Solver, Term, fit, friction_columns, noise_floor, spread};
+use crate::estimate::{Design, Fit, Folds, Solver, fit, friction_columns, noise_floor, spread};
 use crate::log::Log;
 use crate::regression::{Column, Data, DataError, DataOptions, RigidBody};
 use std::fmt;
@@ -88,6 +89,21 @@ pub struct Session<'a> {
     pub(super) refused: Vec<Rival>,
     /// Accepted once and taken out again.
     pub(super) given_up: Vec<(usize, Candidate)>,
+    /// What an experiment showed not to be there.
+    pub(super) ruled_out: Vec<RuledOut>,
+    /// Names that steps left open.
+    pub(super) questions: Vec<Question>,
+}
+
+/// A name that an experiment has ruled out on some joints.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RuledOut {
+    /// The name.
+    pub effect: String,
+    /// The joints, from 0.
+    pub joints: Vec<usize>,
+    /// What showed it.
+    pub why_not: String,
 }
 
 impl fmt::Debug for Session<'_> {
@@ -105,6 +121,21 @@ pub fn explain(
     logs: &[Log],
     validate: &[Log],
     options: &DataOptions,
+    progress: &dyn Fn(&str),
+) -> Result<Explained, ExplainError> {
+    explain_without(body, logs, validate, options, &[], progress)
+}
+
+/// As [`explain`], with names that an experiment has ruled out.
+///
+/// # Errors
+/// As [`explain`].
+pub fn explain_without(
+    body: &RigidBody,
+    logs: &[Log],
+    validate: &[Log],
+    options: &DataOptions,
+    ruled_out: &[RuledOut],
     progress: &dyn Fn(&str),
 ) -> Result<Explained, ExplainError> {
     progress("preparing signals");
@@ -131,6 +162,8 @@ pub fn explain(
         false_positives: FalsePositives { family_wise: rule::FAMILY_WISE, ..FalsePositives::default() },
         refused: Vec::new(),
         given_up: Vec::new(),
+        ruled_out: ruled_out.to_vec(),
+        questions: Vec::new(),
     };
     for step in 0..rule::MOST_STEPS {
         progress(&format!("step {}: screening candidates", step + 1));
@@ -152,7 +185,7 @@ impl Session<'_> {
     /// One step of the loop; `None` where nothing passes.
     fn step(&mut self, step: usize) -> Option<Stepped> {
         let other_residual = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
-        let (chosen, comparison, members, tested) = {
+        let (chosen, comparison, question, members, tested) = {
             let context = Context::new(&self.data, &self.fit, &self.fit.residual);
             let screen = Screen::new(&context);
             let mut tests = 0.0;
@@ -190,7 +223,10 @@ impl Session<'_> {
                     Some(Rival { effect: f.name.to_string(), why_not })
                 })
                 .collect();
-            let (mut chosen, top) = best?;
+            let Some((mut chosen, top)) = best else {
+                self.questions.extend(Question::refused(&families));
+                return None;
+            };
             // What needs fewer columns and is as good is preferred.
             let least = top - (rule::AS_GOOD * top).max(rule::AS_GOOD_SCORE);
             for f in 0..families.len() {
@@ -228,6 +264,7 @@ impl Session<'_> {
             joints.sort_unstable();
             joints.dedup();
             let comparison = compare(&families, chosen, &joints);
+            let question = Question::twins(&families, chosen, comparison.twin.as_deref(), &joints);
             let family = families.swap_remove(chosen);
             let kept: Vec<Member> = family
                 .members
@@ -236,7 +273,7 @@ impl Session<'_> {
                 .filter(|(m, _)| members.contains(m))
                 .map(|(_, member)| member)
                 .collect();
-            (family.effect, comparison, kept, tests)
+            (family.effect, comparison, question, kept, tests)
         };
         let squares =
             |fit: &Fit| -> Vec<f64> { fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect() };
@@ -261,6 +298,7 @@ impl Session<'_> {
             && self.share_left(&square_before, &comparison.joints) > rule::MUCH_LEFT
         {
             // Not named; it stays as a rival of what comes.
+            self.questions.extend(question.map(Question::withheld));
             self.accepted.truncate(earlier);
             self.given_up.extend(added.into_iter().map(|c| (chosen, c)));
             self.refit();
@@ -278,6 +316,7 @@ impl Session<'_> {
                 self.given_up.push((chosen, candidate));
             }
         }
+        self.questions.extend(question);
         let after = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
         self.steps.push(Step {
             effect: chosen,
@@ -325,29 +364,11 @@ impl Session<'_> {
 
     /// Refits everything; columns that depend on estimates are taken anew, twice.
     fn refit(&mut self) {
-        for _ in 0..2 {
-            let terms: Vec<Term> = {
-                let context = Context::new(&self.data, &self.fit, &self.fit.residual);
-                self.accepted
-                    .iter()
-                    .flat_map(|a| {
-                        let effect = self.effects[a.effect].as_ref();
-                        let non_negative = effect.non_negative();
-                        let columns = effect.columns(&context, &a.candidate);
-                        columns.into_iter().map(move |column| Term { column, non_negative })
-                    })
-                    .collect()
-            };
-            self.fit = fit(&self.data, &self.folds, &terms, Some(&self.fit));
-            let mut first = 0;
-            for a in &mut self.accepted {
-                let coefficients: Vec<f64> =
-                    (first..first + a.columns).map(|c| self.fit.coefficient(c)).collect();
-                first += a.columns;
-                if let Some(refined) = self.effects[a.effect].refined(&a.candidate, &coefficients) {
-                    a.candidate = refined;
-                }
-            }
+        let mut found: Vec<(usize, Candidate)> =
+            self.accepted.iter().map(|a| (a.effect, a.candidate.clone())).collect();
+        self.fit = refitted(&self.data, &self.folds, &self.effects, &mut found, &self.fit);
+        for (a, (_, candidate)) in self.accepted.iter_mut().zip(found) {
+            a.candidate = candidate;
         }
     }
 

@@ -3,7 +3,8 @@
 //! The rule, in the order of the files: `screen` refits the base with each candidate, `evidence` asks clusters,
 //! folds and another path, `placebo` measures how often the same questions are answered by chance on these very
 //! data, `rule` holds every threshold with its reason, `family` keeps what may stand together, `forward` adds one effect
-//! at a time, `naming` compares rivals, `leftover` says what stays, `conclude` writes the result.
+//! at a time, `naming` compares rivals, `open` keeps those that are not told apart, `leftover` says what stays,
+//! `conclude` writes the result.
 
 mod conclude;
 mod curves;
@@ -14,6 +15,7 @@ mod forward;
 mod leftover;
 mod naming;
 mod one_path;
+mod open;
 mod other_path;
 mod page;
 mod placebo;
@@ -22,7 +24,8 @@ mod rule;
 mod screen;
 
 pub use curves::{TorqueCurve, curves};
-pub use forward::{ExplainError, Session, explain};
+pub use forward::{ExplainError, RuledOut, Session, explain, explain_without};
+pub use open::{Hypothesis, Open};
 pub use page::add_to_page;
 pub use result::{Explained, NamedEffect, Rival, Unattributed};
 

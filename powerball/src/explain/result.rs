@@ -1,9 +1,11 @@
 //! What an explanation says, in the form of explained.json.
 
 use super::curves::TorqueCurve;
+use super::open::Open;
 use crate::estimate::Spread;
 use serde::Serialize;
 use serde_json::Value;
+use std::sync::Arc;
 
 /// The result of the residual loop.
 #[derive(Clone, Debug, Serialize)]
@@ -26,6 +28,12 @@ pub struct Explained {
     pub unattributed: Option<Unattributed>,
     /// What to record to tell the names apart that these logs leave open.
     pub next_experiment: Option<Value>,
+    /// What an experiment that was made for open names has decided.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub experiment: Option<Value>,
+    /// The open names, fitted; not part of the JSON.
+    #[serde(skip)]
+    pub open: Option<Arc<Open>>,
     /// How often the rule accepts effects that are not there, on these data.
     pub false_positives: FalsePositives,
     /// What was found in logs and arm file, and what was done about it.
