@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 /// A positive delay means that the logged torque is late.
 pub(super) struct TimeDelay;
 
-const DELAYS: [f64; 5] = [0.003, 0.008, 0.02, -0.003, -0.01];
+/// Starting values, s; the coefficient makes each a third to three times as long.
+const DELAYS: [f64; 7] = [0.000_8, 0.003, 0.008, 0.02, -0.000_8, -0.003, -0.01];
 
 impl Effect for TimeDelay {
     fn name(&self) -> &'static str {

@@ -25,7 +25,7 @@ const PAUSE: f64 = 5.0;
 /// The search for a path: enough for a condition number near the best.
 const EVALUATIONS: usize = 60;
 /// Rounds in which a truth is scaled to its size.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 4;
 /// The band in which a size is measured, without noise: wide enough for the ripple of gears.
 const WIDE: DataOptions = DataOptions { cutoff: 60.0, smoothing: 60.0, block: 2.0 };
 
@@ -158,16 +158,10 @@ impl Bench {
     /// A misfit that is as large on every joint as the noise allows: 0.3 of it, after the base was refitted.
     fn misfit(&self, session: &Session, rng: &mut ChaCha8Rng) -> Result<Misfit, String> {
         let mut misfit = Misfit::draw(session.plant.friction().len(), rng);
+        let plain = self.base(&session.logs(&[], false))?;
         for _ in 0..2 {
-            let with = Session {
-                plant: session.plant.clone(),
-                friction: None,
-                misfit: Some(misfit.clone()),
-                motions: session.motions.clone(),
-                starts: session.starts.clone(),
-                seed: 0,
-            };
-            let left = self.visible(&with, &[])?;
+            let with = Session { misfit: Some(misfit.clone()), ..session.alone() };
+            let left = self.visible(session, &with.logs(&[], false), &plain)?;
             misfit.amplitude.iter_mut().zip(left).for_each(|(a, left)| *a *= 0.3 / left);
         }
         Ok(misfit)
@@ -191,17 +185,12 @@ impl Bench {
                     .ok_or_else(|| format!("no effect is called {kind}"))?,
             ),
         };
-        let quiet = Session {
-            plant: session.plant.clone(),
-            friction: None,
-            misfit: None,
-            motions: session.motions.clone(),
-            starts: session.starts.clone(),
-            seed: 0,
-        };
+        let quiet = session.alone();
+        let plain = self.base(&quiet.logs(&[], false))?;
         let mut reached = 0.0;
         for _ in 0..ROUNDS {
-            reached = self.visible(&quiet, std::slice::from_ref(&truth))?.into_iter().fold(0.0, f64::max);
+            let logs = quiet.logs(std::slice::from_ref(&truth), false);
+            reached = self.visible(&quiet, &logs, &plain)?.into_iter().fold(0.0, f64::max);
             if (reached / size - 1.0).abs() < 0.03 {
                 break;
             }
@@ -211,14 +200,22 @@ impl Bench {
     }
 
     /// What of a truth is left on the fitted logs when the base model was refitted, without noise and in a wide band,
-    /// over the noise of a sample, by joint.
-    fn visible(&self, session: &Session, truths: &[Truth]) -> Result<Vec<f64>, String> {
-        let logs = session.logs(truths, false);
-        let data = Data::new(&self.body, &logs[..FIT.len()], &WIDE).map_err(|e| e.to_string())?;
-        let base = fit(&data, &Folds::new(&data), &[], None);
+    /// over the noise of a sample, by joint; `plain` is what the model leaves without it.
+    fn visible(&self, session: &Session, logs: &[Log], plain: &[Vec<f64>]) -> Result<Vec<f64>, String> {
+        let with = self.base(logs)?;
         let sensors = session.plant.sensors();
         let noise = sensors.white.iter().zip(&sensors.coloured).map(|(w, c)| w.hypot(*c));
-        Ok(spread(&data, &base.residual).rms.iter().zip(noise).map(|(left, noise)| left / noise).collect())
+        let change = with.iter().zip(plain).map(|(with, without)| {
+            let squares = with.iter().zip(without).map(|(a, b)| (a - b).powi(2));
+            (squares.sum::<f64>() / without.len().max(1) as f64).sqrt()
+        });
+        Ok(change.zip(noise).map(|(change, noise)| change / noise).collect())
+    }
+
+    /// The residual of the base model on the fitted logs, in a wide band.
+    fn base(&self, logs: &[Log]) -> Result<Vec<Vec<f64>>, String> {
+        let data = Data::new(&self.body, &logs[..FIT.len()], &WIDE).map_err(|e| e.to_string())?;
+        Ok(fit(&data, &Folds::new(&data), &[], None).residual)
     }
 
     /// Errors of the base model held out.
@@ -231,6 +228,18 @@ impl Bench {
 }
 
 impl Session {
+    /// The same with nothing beside the plant that the model knows.
+    fn alone(&self) -> Session {
+        Session {
+            plant: self.plant.clone(),
+            friction: None,
+            misfit: None,
+            motions: self.motions.clone(),
+            starts: self.starts.clone(),
+            seed: self.seed,
+        }
+    }
+
     /// The logs, with noise or without.
     fn logs(&self, truths: &[Truth], noisy: bool) -> Vec<Log> {
         let mut sensors = self.plant.sensors().clone();
