@@ -10,10 +10,6 @@ use crate::estimate::{noise_floor, spread};
 use crate::parallel;
 use std::sync::Arc;
 
-/// Said where the logs to judge on are repeats.
-const ONE_PATH: &str = "the logs of --validate run the same path as those of --log: what depends on positions (springs, zeros, \
-                        gravity, broken symmetries, slow ripple) was not considered; record another path";
-
 impl Session<'_> {
     fn coefficients(&self) -> Vec<Vec<f64>> {
         let mut first = 0;
@@ -101,9 +97,7 @@ impl Session<'_> {
             experiment: None,
             open: open.map(Arc::new),
             false_positives: self.false_positives.clone(),
-            warnings: (self.data.notes.iter().chain(&self.other.notes).cloned())
-                .chain(self.one_path.then(|| ONE_PATH.to_string()))
-                .collect(),
+            warnings: self.doubts(),
             curves,
         }
     }

@@ -8,6 +8,7 @@
 
 mod conclude;
 mod curves;
+mod doubts;
 mod evidence;
 mod family;
 mod folds;
