@@ -7,7 +7,7 @@ use super::output::{self, Progress};
 use crate::bus::{Bus, BusUrl};
 use crate::driver::lwa4p::LWA4P;
 use crate::experiment::{self, TRAJECTORY};
-use crate::explain::{ExplainError, Explained, add_to_page, explain};
+use crate::explain::{ExplainError, Explained, Options, add_to_page, explain_with};
 use crate::log::read_logs;
 use crate::motion::Motion;
 use crate::procedure::{RecordError, record};
@@ -38,6 +38,10 @@ pub(crate) struct Explain {
     /// Where two names fit equally well, record the experiment that tells them apart, and explain again with its log.
     #[arg(long)]
     experiment: bool,
+    /// Where something stays without a name, fit a bounded curve of the one or two signals that it depends on most; kept where
+    /// errors fall that it was not fitted to.
+    #[arg(long)]
+    correct_unattributed: bool,
     /// The bus that the arm of the experiment is on.
     #[arg(long, value_name = "URL", default_value = "virtual", requires = "experiment")]
     bus: BusUrl,
@@ -53,9 +57,10 @@ impl Explain {
         let arm = if self.experiment { Some(self.arm()?) } else { None };
         let mut loaded = load(&self.inputs, &self.validate, &progress)?;
         let (say, options) = (|what: &str| progress.say(what), DataOptions::default());
+        let told = Options { correct_unattributed: self.correct_unattributed, ..Options::default() };
         let refused = |e: ExplainError| Failure::Refused(e.to_string());
-        let mut explained =
-            explain(&loaded.body, &loaded.fit, &loaded.validate, &options, &say).map_err(refused)?;
+        let mut explained = explain_with(&loaded.body, &loaded.fit, &loaded.validate, &options, &told, &say)
+            .map_err(refused)?;
         if let Some(motion) = experiment::propose(&loaded.body, &mut explained, &options, &say) {
             output::write(&self.inputs.out, TRAJECTORY, motion.to_csv().as_bytes())?;
             if let Some((arm, note)) = arm {
@@ -67,7 +72,7 @@ impl Explain {
                 loaded.warnings.extend(findings.iter().map(ToString::to_string).chain(note));
                 if let Some(new) = new.pop() {
                     let old = (loaded.fit.as_slice(), loaded.validate.as_slice());
-                    explained = experiment::learn(&loaded.body, old, new, &explained, &options, &say)
+                    explained = experiment::learn(&loaded.body, old, new, &explained, &options, &told, &say)
                         .map_err(refused)?;
                     // What is still open may ask for another experiment, beside the one that was run.
                     if let Some(motion) = experiment::propose(&loaded.body, &mut explained, &options, &say) {
@@ -187,6 +192,16 @@ fn summary(explained: &Explained) -> String {
             joints.join(", "),
             unattributed.depends_on.join(", ")
         ));
+        for c in unattributed.correction.iter().flatten() {
+            let signals: Vec<&str> = c.curves.iter().map(|curve| curve.signal.as_str()).collect();
+            text.push_str(&format!(
+                "  a curve of {} within ±{:.2} N·m lowers the held-out error of joint {} from {:.4} to {:.4} N·m\n",
+                signals.join(" and "), c.limit, c.joint, c.rms_before, c.rms_after
+            ));
+        }
+        if unattributed.correction.as_ref().is_some_and(Vec::is_empty) {
+            text.push_str("  no curve of these signals lowers held-out errors: none is kept\n");
+        }
     }
     text.push_str(&open_in_words(explained));
     let fp = &explained.false_positives;

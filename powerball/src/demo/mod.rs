@@ -13,7 +13,7 @@ use crate::driver::Driver;
 use crate::driver::lwa4p::LWA4P;
 use crate::effects;
 use crate::experiment::{self, TRAJECTORY};
-use crate::explain::{ExplainError, Explained, explain};
+use crate::explain::{ExplainError, Explained, Options, explain};
 use crate::log::{LogError, common_clock, read_logs};
 use crate::motion::Motion;
 use crate::procedure::record;
@@ -118,7 +118,15 @@ pub fn run(
             let Some(new) = new.pop() else {
                 return Err(DemoError::Read("experiment.csv is missing".into()));
             };
-            explained = experiment::learn(&body, (&logs, &held_out), new, &explained, &options, progress)?;
+            explained = experiment::learn(
+                &body,
+                (&logs, &held_out),
+                new,
+                &explained,
+                &options,
+                &Options::default(),
+                progress,
+            )?;
             experiment::propose(&body, &mut explained, &options, progress);
         }
     }

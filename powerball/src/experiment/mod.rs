@@ -12,7 +12,7 @@ pub use design::{Design, design};
 pub use new_log::{HELD_OUT, split_off};
 
 use crate::excite;
-use crate::explain::{ExplainError, Explained, RuledOut, explain_without};
+use crate::explain::{ExplainError, Explained, Options, RuledOut, explain_with};
 use crate::log::Log;
 use crate::motion::Motion;
 use crate::regression::{DataOptions, RigidBody};
@@ -93,6 +93,7 @@ pub fn learn(
     new: Log,
     before: &Explained,
     options: &DataOptions,
+    told: &Options,
     progress: &dyn Fn(&str),
 ) -> Result<Explained, ExplainError> {
     let file = new.file.clone();
@@ -100,19 +101,19 @@ pub fn learn(
     let fit: Vec<Log> = fit.iter().cloned().chain([to_fit]).collect();
     let held_out: Vec<Log> = held_out.iter().cloned().chain([to_judge]).collect();
     let Some(open) = before.open.as_ref() else {
-        return explain_without(body, &fit, &held_out, options, &[], progress);
+        return explain_with(body, &fit, &held_out, options, told, progress);
     };
     progress("asking the new log which of the open names is right");
     let decision = decide(body, open, &fit, &held_out, options)?;
-    let losers: Vec<RuledOut> = (open.hypotheses.iter())
+    let losers = (open.hypotheses.iter())
         .filter(|h| decision.winner.is_some_and(|winner| winner != h.name))
         .map(|h| RuledOut {
             effect: h.name.to_string(),
             joints: h.joints.clone(),
             why_not: format!("ruled out by the experiment: {}", decision.why),
-        })
-        .collect();
-    let mut explained = explain_without(body, &fit, &held_out, options, &losers, progress)?;
+        });
+    let told = Options { ruled_out: told.ruled_out.iter().cloned().chain(losers).collect(), ..told.clone() };
+    let mut explained = explain_with(body, &fit, &held_out, options, &told, progress)?;
     explained.experiment = Some(json!({
         "to_tell_apart": open.names(),
         "log": file,

@@ -1,5 +1,6 @@
 //! From the accepted effects to the result.
 
+use super::correction::correct;
 use super::curves::curves;
 use super::forward::{RuledOut, Session, Step};
 use super::leftover::{depends_on, effective_samples, leftover};
@@ -69,7 +70,7 @@ impl Session<'_> {
                 joints: joints.iter().map(|j| j + 1).collect(),
             });
         }
-        let unattributed = self.unattributed(&context, &floor, &after);
+        let unattributed = self.unattributed(&context, &residual, &floor, &after);
         let open = self.open(unattributed.is_some());
         let next_experiment = open.as_ref().map(|open| {
             let names = open.names();
@@ -106,16 +107,28 @@ impl Session<'_> {
     fn rivals(&self, comparison: &Comparison, name: &str) -> Vec<Rival> {
         let here = |r: &&RuledOut| r.effect != name && r.joints.iter().any(|j| comparison.joints.contains(j));
         let out = |r: &RuledOut| Rival { effect: r.effect.clone(), why_not: r.why_not.clone() };
-        comparison.rivals.iter().cloned().chain(self.ruled_out.iter().filter(here).map(out)).collect()
+        comparison.rivals.iter().cloned().chain(self.told.ruled_out.iter().filter(here).map(out)).collect()
     }
 
     /// The joints whose residual still depends on something.
-    fn unattributed(&self, context: &Context<'_>, floor: &[f64], after: &Errors) -> Option<Unattributed> {
+    fn unattributed(
+        &self,
+        context: &Context<'_>,
+        other_residual: &[Vec<f64>],
+        floor: &[f64],
+        after: &Errors,
+    ) -> Option<Unattributed> {
         let candidates: Vec<usize> = context
             .moving_joints()
             .filter(|j| after.fit.rms[*j] > 1.2 * floor[*j] && self.fit.inflation[*j] > 2.0)
             .collect();
         let found = parallel::map(&candidates, |j| depends_on(context, *j));
+        let other = Context::new(&self.other, &self.fit, other_residual);
+        let correction = self.told.correct_unattributed.then(|| {
+            (candidates.iter().zip(&found))
+                .filter_map(|(j, list)| correct(context, &other, &self.folds, *j, list))
+                .collect()
+        });
         let mut signals: Vec<(String, f64)> = Vec::new();
         let mut joints = Vec::new();
         for (j, list) in candidates.iter().zip(found) {
@@ -136,6 +149,7 @@ impl Session<'_> {
             joints: joints.iter().map(|j| j + 1).collect(),
             depends_on: signals.into_iter().map(|(name, _)| name).collect(),
             considered: self.refused.clone(),
+            correction,
         })
     }
 }

@@ -163,7 +163,7 @@ impl Session<'_> {
 
     fn is_ruled_out(&self, name: &str, candidate: &Candidate) -> bool {
         let here = |joints: &[usize]| candidate.joints.iter().any(|j| joints.contains(j));
-        self.ruled_out.iter().any(|r| r.effect == name && here(&r.joints))
+        self.told.ruled_out.iter().any(|r| r.effect == name && here(&r.joints))
     }
 
     fn gave_up(&self, effect: usize, candidate: &Candidate) -> bool {

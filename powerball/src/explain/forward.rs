@@ -89,8 +89,8 @@ pub struct Session<'a> {
     pub(super) refused: Vec<Rival>,
     /// Accepted once and taken out again.
     pub(super) given_up: Vec<(usize, Candidate)>,
-    /// What an experiment showed not to be there.
-    pub(super) ruled_out: Vec<RuledOut>,
+    /// What it was told beside the logs.
+    pub(super) told: Options,
     /// Names that steps left open.
     pub(super) questions: Vec<Question>,
 }
@@ -123,19 +123,28 @@ pub fn explain(
     options: &DataOptions,
     progress: &dyn Fn(&str),
 ) -> Result<Explained, ExplainError> {
-    explain_without(body, logs, validate, options, &[], progress)
+    explain_with(body, logs, validate, options, &Options::default(), progress)
 }
 
-/// As [`explain`], with names that an experiment has ruled out.
+/// What an explanation is told beside the logs.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Names that an experiment has ruled out.
+    pub ruled_out: Vec<RuledOut>,
+    /// Whether what stays without a name is corrected where that helps.
+    pub correct_unattributed: bool,
+}
+
+/// As [`explain`], with more to be told.
 ///
 /// # Errors
 /// As [`explain`].
-pub fn explain_without(
+pub fn explain_with(
     body: &RigidBody,
     logs: &[Log],
     validate: &[Log],
     options: &DataOptions,
-    ruled_out: &[RuledOut],
+    told: &Options,
     progress: &dyn Fn(&str),
 ) -> Result<Explained, ExplainError> {
     progress("preparing signals");
@@ -162,7 +171,7 @@ pub fn explain_without(
         false_positives: FalsePositives { family_wise: rule::FAMILY_WISE, ..FalsePositives::default() },
         refused: Vec::new(),
         given_up: Vec::new(),
-        ruled_out: ruled_out.to_vec(),
+        told: told.clone(),
         questions: Vec::new(),
     };
     for step in 0..rule::MOST_STEPS {

@@ -4,9 +4,10 @@
 //! folds and another path, `placebo` measures how often the same questions are answered by chance on these very
 //! data, `rule` holds every threshold with its reason, `family` keeps what may stand together, `forward` adds one effect
 //! at a time, `naming` compares rivals, `open` keeps those that are not told apart, `leftover` says what stays,
-//! `conclude` writes the result.
+//! `correction` takes off of it what it can, `conclude` writes the result.
 
 mod conclude;
+mod correction;
 mod curves;
 mod doubts;
 mod evidence;
@@ -24,8 +25,9 @@ mod result;
 mod rule;
 mod screen;
 
+pub use correction::{Correction, Curve};
 pub use curves::{TorqueCurve, curves};
-pub use forward::{ExplainError, RuledOut, Session, explain, explain_without};
+pub use forward::{ExplainError, Options, RuledOut, Session, explain, explain_with};
 pub use open::{Hypothesis, Open};
 pub use page::add_to_page;
 pub use result::{Explained, NamedEffect, Rival, Unattributed};

@@ -1,5 +1,6 @@
 //! What an explanation says, in the form of explained.json.
 
+use super::correction::Correction;
 use super::curves::TorqueCurve;
 use super::open::Open;
 use crate::estimate::Spread;
@@ -102,6 +103,9 @@ pub struct Unattributed {
     pub rms: Vec<f64>,
     /// Effects that fit a part of it but not well enough to be named.
     pub considered: Vec<Rival>,
+    /// Curves that take a part of it off, where they were asked for: those of the joints whose held-out errors fall by them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correction: Option<Vec<Correction>>,
 }
 
 /// The rule applied to candidates that cannot be true: shifted in time within each recording.

@@ -2,7 +2,7 @@
 
 use super::judge::{Named, Outcome, named};
 use powerball::experiment::{learn, propose};
-use powerball::explain::Explained;
+use powerball::explain::{Explained, Options};
 use powerball::log::Log;
 use powerball::motion::Motion;
 use powerball::regression::{DataOptions, RigidBody};
@@ -52,8 +52,8 @@ pub(super) fn settle(
     settled.expected = number(&explained.next_experiment, "expected_evidence");
     settled.open = explained.open.iter().flat_map(|o| o.names()).map(ToString::to_string).collect();
     let new = record(&motion);
-    let explained =
-        learn(body, (to_fit, held_out), new, &explained, &options, &|_| ()).map_err(|e| e.to_string())?;
+    let explained = learn(body, (to_fit, held_out), new, &explained, &options, &Options::default(), &|_| ())
+        .map_err(|e| e.to_string())?;
     settled.evidence = number(&explained.experiment, "evidence");
     settled.decided = (explained.experiment.as_ref())
         .and_then(|e| e.get("decided"))
