@@ -272,7 +272,7 @@ impl Session<'_> {
                 members.iter().flat_map(|m| families[chosen].members[*m].candidate.joints.clone()).collect();
             joints.sort_unstable();
             joints.dedup();
-            let comparison = compare(&families, chosen, &joints);
+            let comparison = compare(&screen, &families, chosen, &joints);
             let question = Question::twins(&families, chosen, comparison.twin.as_deref(), &joints);
             let family = families.swap_remove(chosen);
             let kept: Vec<Member> = family
@@ -303,7 +303,7 @@ impl Session<'_> {
             });
         }
         self.refit();
-        if comparison.margin < rule::LEAST_MARGIN
+        if comparison.apart < rule::LEAST_MARGIN
             && self.share_left(&square_before, &comparison.joints) > rule::MUCH_LEFT
         {
             // Not named; it stays as a rival of what comes.
