@@ -70,6 +70,7 @@ impl Session<'_> {
                 joints: joints.iter().map(|j| j + 1).collect(),
             });
         }
+        let shown = self.shown(&context);
         let unattributed = self.unattributed(&context, &residual, &floor, &after);
         let open = self.open(unattributed.is_some());
         let next_experiment = open.as_ref().map(|open| {
@@ -100,6 +101,7 @@ impl Session<'_> {
             false_positives: self.false_positives.clone(),
             warnings: self.doubts(),
             curves,
+            shown,
         }
     }
 

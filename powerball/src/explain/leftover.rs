@@ -100,7 +100,7 @@ pub(super) fn depends_on(context: &Context<'_>, joint: usize) -> Vec<(String, f6
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(joint as u64);
     let mut found = Vec::new();
     for (name, signal) in signals(context, joint) {
-        let bins = quantile_bins(&signal);
+        let bins = quantile_bins(&signal, BINS);
         let share = explained_share(&bins, residual);
         if share < LEAST_SHARE {
             continue;
@@ -123,12 +123,14 @@ pub(super) fn depends_on(context: &Context<'_>, joint: usize) -> Vec<(String, f6
     found
 }
 
-fn quantile_bins(signal: &[f64]) -> Vec<usize> {
+/// For each value the share of the values that it lies in, in the order of size, as one of `count`.
+#[must_use]
+pub(super) fn quantile_bins(signal: &[f64], count: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..signal.len()).collect();
     order.sort_by(|a, b| signal[*a].total_cmp(&signal[*b]));
     let mut bins = vec![0; signal.len()];
     for (rank, k) in order.iter().enumerate() {
-        bins[*k] = rank * BINS / signal.len();
+        bins[*k] = rank * count / signal.len();
     }
     bins
 }

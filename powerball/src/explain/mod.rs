@@ -4,7 +4,7 @@
 //! folds and another path, `placebo` measures how often the same questions are answered by chance on these very
 //! data, `rule` holds every threshold with its reason, `family` keeps what may stand together, `forward` adds one effect
 //! at a time, `naming` compares rivals, `open` keeps those that are not told apart, `leftover` says what stays,
-//! `correction` takes off of it what it can, `conclude` writes the result.
+//! `correction` takes off of it what it can, `shown` draws what each name is seen by, `conclude` writes the result.
 
 mod conclude;
 mod correction;
@@ -24,6 +24,7 @@ mod placebo;
 mod result;
 mod rule;
 mod screen;
+mod shown;
 
 pub use correction::{Correction, Curve};
 pub use curves::{TorqueCurve, curves};
@@ -31,6 +32,7 @@ pub use forward::{ExplainError, Options, RuledOut, Session, explain, explain_wit
 pub use open::{Hypothesis, Open};
 pub use page::add_to_page;
 pub use result::{Explained, NamedEffect, Rival, Unattributed};
+pub use shown::Shown;
 
 #[cfg(test)]
 mod tests;

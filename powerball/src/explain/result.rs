@@ -3,6 +3,7 @@
 use super::correction::Correction;
 use super::curves::TorqueCurve;
 use super::open::Open;
+use super::shown::Shown;
 use crate::estimate::Spread;
 use serde::Serialize;
 use serde_json::Value;
@@ -42,6 +43,9 @@ pub struct Explained {
     /// Torques over time on the other path, by joint; not part of the JSON.
     #[serde(skip)]
     pub curves: Vec<TorqueCurve>,
+    /// The plots that show the effects; not part of the JSON.
+    #[serde(skip)]
+    pub shown: Vec<Shown>,
 }
 
 /// Errors on the fitted logs and on the other path.
