@@ -1,7 +1,7 @@
 //! Torque and position that were not sampled at the same time.
 
 use super::candidate::by_joint;
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use serde_json::{Value, json};
 
@@ -20,6 +20,10 @@ impl Effect for TimeDelay {
 
     fn class(&self) -> Class {
         Class::Dynamics
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::TorqueRate
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -1,11 +1,12 @@
 //! Logs of an arm into rows: even grid, derivatives, band, rest removed, blocks laid out.
 
+use super::silent::{Silent, dead};
 use super::{Block, Column, JointRows, Recording, RigidBody};
 use crate::log::Log;
 use crate::parallel;
 use crate::signal::resample::median_step;
 use crate::signal::{Band, rest};
-use dyngen::arm::{Parameter, ParameterKind};
+use dyngen::arm::{JointKind, Parameter, ParameterKind};
 use std::fmt;
 use std::sync::OnceLock;
 
@@ -31,8 +32,8 @@ impl Default for DataOptions {
 pub enum DataError {
     /// No log has a stretch long enough.
     TooShort,
-    /// No joint moves.
-    NoMotion,
+    /// No joint says anything: why, joint by joint.
+    NoMotion(Vec<String>),
 }
 
 impl fmt::Display for DataError {
@@ -41,9 +42,11 @@ impl fmt::Display for DataError {
             DataError::TooShort => {
                 write!(f, "the logs hold no stretch of at least a second without gaps: record longer")
             }
-            DataError::NoMotion => write!(
+            DataError::NoMotion(why) => write!(
                 f,
-                "no joint moves in these logs: friction and inertia cannot be seen at rest; record an exciting motion"
+                "no joint moves enough in these logs, with torques that change: friction and inertia cannot be seen; record an \
+                 exciting motion\n  {}",
+                why.join("\n  ")
             ),
         }
     }
@@ -107,17 +110,40 @@ impl<'a> Data<'a> {
             .map(|j| rest::rest_speed(recordings.iter().flat_map(|r| r.speed(j).map(f64::abs)).collect()))
             .collect();
         let top_speed = (0..n).map(|j| top_speed(&recordings, j)).collect();
-        let kept = keep_moving(&recordings, &band, &rest_speed, n);
+        let kinds: Vec<JointKind> = body.arm().joints.iter().map(|joint| joint.kind).collect();
+        let silent: Vec<Option<Silent>> =
+            kinds.iter().enumerate().map(|(j, kind)| Silent::of(&recordings, j, *kind)).collect();
+        let mut kept = keep_moving(&recordings, &band, &rest_speed, n);
+        for (j, kept) in kept.iter_mut().enumerate() {
+            for (kept, recording) in kept.iter_mut().zip(&recordings) {
+                let is_dead = dead(recording, j);
+                if is_dead || silent[j].is_some() {
+                    kept.clear();
+                }
+                if is_dead && silent[j].is_none() {
+                    notes.push(format!(
+                        "{}: the torque of joint {} never changes: the joint was left out of this log",
+                        logs[recording.log].file,
+                        j + 1
+                    ));
+                }
+            }
+        }
         let joints = joint_rows(body, &recordings, &band, kept);
+        let unit = |j: usize| if kinds[j] == JointKind::Prismatic { "m" } else { "rad" };
+        let silent: Vec<Option<String>> =
+            silent.iter().enumerate().map(|(j, s)| Some(s.as_ref()?.note(j + 1, unit(j)))).collect();
         if joints.iter().all(|j| j.len() < 20) {
-            return Err(DataError::NoMotion);
+            return Err(DataError::NoMotion(silent.into_iter().flatten().collect()));
         }
         let total: usize = recordings.iter().map(|r| band.kept(r.len()).len()).sum();
         for (j, rows) in joints.iter().enumerate() {
             let rested = total - rows.len();
-            if rows.len() < 20 {
+            if let Some(why) = &silent[j] {
+                notes.push(why.clone());
+            } else if rows.len() < 20 {
                 notes.push(format!(
-                    "joint {} does not move in these logs: nothing can be said of its friction",
+                    "joint {} rests in these logs: neither its friction nor any effect on it can be judged; record paths on which it swings",
                     j + 1
                 ));
             } else if rested * 4 > total {

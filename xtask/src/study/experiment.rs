@@ -1,5 +1,6 @@
 //! Logs of the virtual arm along exciting paths, with a truth scaled to a wanted size.
 
+use super::alike;
 use super::case::{Case, Table};
 use super::judge::Outcome;
 use super::law::{FrictionLaw, Law, Misfit, OtherFriction, Outside, OutsideLaw};
@@ -24,6 +25,8 @@ const HELD_OUT: [f64; 2] = [12.0, 11.5];
 const PAUSE: f64 = 5.0;
 /// The search for a path: enough for a condition number near the best.
 const EVALUATIONS: usize = 60;
+/// Logs that leave names open: on paths that leave this share of range, speed and acceleration unused.
+const NARROW: f64 = 0.7;
 /// Rounds in which a truth is scaled to its size.
 const ROUNDS: usize = 4;
 /// The band in which a size is measured, without noise: wide enough for the ripple of gears.
@@ -101,12 +104,20 @@ impl Bench {
         let options = DataOptions::default();
         let explained =
             explain(&self.body, to_fit, held_out, &options, &|_| ()).map_err(|e| e.to_string())?;
+        let (explained, settled) = if case.table == Table::Alike {
+            let record = |motion: &Motion| session.new_log(motion, &truths);
+            let (again, settled) = alike::settle(&self.body, (to_fit, held_out), explained, record)?;
+            (again, Some(settled))
+        } else {
+            (explained, None)
+        };
         let seconds = start.elapsed().as_secs_f64();
         let clean = session.logs(&[], true);
         let clean = self.errors(&clean[..FIT.len()], &clean[FIT.len()..], &options)?;
         let over = explained.after.validate.rms.iter().zip(&clean).map(|(a, c)| a / c).fold(0.0, f64::max);
         let words = truths.iter().map(Truth::words).collect();
-        Ok(Some(Outcome::new(case, words, sizes, &explained, &[], over, seconds)))
+        let outcome = Outcome::new(case, words, sizes, &explained, &[], over, seconds);
+        Ok(Some(Outcome { settled, ..outcome }))
     }
 
     fn session(&self, case: &Case, rng: &mut ChaCha8Rng) -> Result<Session, String> {
@@ -140,6 +151,7 @@ impl Bench {
                 fundamental: TAU / period,
                 evaluations: EVALUATIONS,
                 seed: rng.random(),
+                margin: if case.table == Table::Alike { NARROW } else { Settings::default().margin },
                 ..Settings::default()
             };
             let found = optimise(&self.model, SetKind::Minimal, &settings).map_err(|e| e.to_string())?;
@@ -238,6 +250,20 @@ impl Session {
             starts: self.starts.clone(),
             seed: self.seed,
         }
+    }
+
+    /// The log of one more motion after all others.
+    fn new_log(&self, motion: &Motion, truths: &[Truth]) -> Log {
+        let end = self.starts.iter().zip(&self.motions).map(|(s, m)| s + m.duration()).fold(0.0, f64::max);
+        let next = Session {
+            motions: vec![motion.clone()],
+            starts: vec![end + PAUSE],
+            seed: self.seed.wrapping_add(1000),
+            ..self.alone()
+        };
+        let mut log = next.logs(truths, true).swap_remove(0);
+        log.file = "experiment.csv".into();
+        log
     }
 
     /// The logs, with noise or without.

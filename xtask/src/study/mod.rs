@@ -3,6 +3,7 @@
 //! Each case is one line of a file of results, so that a study can be stopped and taken up again, and tables are made of
 //! the lines.
 
+mod alike;
 mod case;
 mod experiment;
 mod judge;
