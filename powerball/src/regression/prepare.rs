@@ -93,7 +93,7 @@ impl<'a> Data<'a> {
         let step = *steps.get(steps.len() / 2).ok_or(DataError::TooShort)?;
         let rate = 1.0 / step;
         let band = Band::new(options.cutoff, rate);
-        let mut left_out = Vec::new();
+        let mut left_out: Vec<String> = Vec::new();
         let mut recordings = Vec::new();
         for (index, log) in logs.iter().enumerate() {
             for piece in &log.pieces {
@@ -118,6 +118,7 @@ impl<'a> Data<'a> {
         let kinds: Vec<JointKind> = body.arm().joints.iter().map(|joint| joint.kind).collect();
         let silent: Vec<Option<Silent>> =
             kinds.iter().enumerate().map(|(j, kind)| Silent::of(&recordings, j, *kind)).collect();
+        let mut notes = left_out.clone();
         let mut kept = keep_moving(&recordings, &band, &rest_speed, n);
         for (j, kept) in kept.iter_mut().enumerate() {
             for (kept, recording) in kept.iter_mut().zip(&recordings) {
@@ -141,7 +142,6 @@ impl<'a> Data<'a> {
         if joints.iter().all(|j| j.len() < 20) {
             return Err(DataError::NoMotion(silent.into_iter().flatten().collect()));
         }
-        let mut notes = left_out.clone();
         let total: usize = recordings.iter().map(|r| band.kept(r.len()).len()).sum();
         for (j, rows) in joints.iter().enumerate() {
             let rested = total - rows.len();
