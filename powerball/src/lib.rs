@@ -7,6 +7,7 @@ pub mod canopen;
 pub mod cia402;
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod correction;
 #[cfg(feature = "std")]
 pub mod demo;
 pub mod driver;
@@ -35,5 +36,7 @@ pub mod regression;
 pub mod report;
 #[cfg(feature = "std")]
 pub mod signal;
+#[cfg(feature = "std")]
+pub mod torque_model;
 #[cfg(feature = "std")]
 pub mod virtual_arm;

@@ -11,7 +11,8 @@ use std::path::PathBuf;
 
 /// Find, name and add what the model lacks on logs; every addition is judged on another path.
 ///
-/// Writes explained.json and report.html.
+/// Writes explained.json, report.html, and model.json: the model with what was named, for `powerball generate`, `verify` and the
+/// next `identify` or `explain`.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Example:\n  powerball explain --arm arm.toml --log a.csv b.csv c.csv --validate d.csv --out result"
@@ -22,12 +23,17 @@ pub(crate) struct Explain {
     /// Logs of another path, on which additions must hold.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     validate: Vec<PathBuf>,
+    /// What is known already: model.json of an earlier `powerball explain` for the same arm file. It is taken out of the logs as it
+    /// stands; what is found comes to it.
+    #[arg(long, value_name = "FILE.json")]
+    model: Option<PathBuf>,
 }
 
 impl Explain {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let progress = Progress::new();
-        let loaded = load(&self.inputs, &self.validate, &progress)?;
+        let mut loaded = load(&self.inputs, &self.validate, self.model.as_deref(), &progress)?;
+        loaded.take_out();
         let say = |what: &str| progress.say(what);
         let mut explained =
             explain(&loaded.body, &loaded.fit, &loaded.validate, &DataOptions::default(), &say)
@@ -35,6 +41,11 @@ impl Explain {
         explained.warnings.splice(0..0, loaded.warnings);
         let text = output::json(&explained)?;
         output::write(&self.inputs.out, "explained.json", text.as_bytes())?;
+        if let Some(known) = &loaded.known {
+            explained.model.additions = known.additions.and(&explained.model.additions);
+        }
+        let model = output::json(&explained.model)?;
+        output::write(&self.inputs.out, "model.json", model.as_bytes())?;
         let mut page = Page::new(format!("What the model of {} lacks", explained.arm));
         add_to_page(&mut page, &explained);
         output::write(&self.inputs.out, "report.html", page.to_html().as_bytes())?;

@@ -9,6 +9,7 @@ use crate::estimate::{
 };
 use crate::explain::curves;
 use crate::regression::{Data, DataOptions};
+use crate::torque_model::Additions;
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -27,6 +28,10 @@ pub(crate) struct Identify {
     /// Logs on which the fit is judged, on another path.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     validate: Vec<PathBuf>,
+    /// What is known already: model.json of `powerball explain` for the same arm file. Inertial set and friction are fitted beside its
+    /// effects, which stay as they are.
+    #[arg(long, value_name = "FILE.json")]
+    model: Option<PathBuf>,
 }
 
 /// identified.json.
@@ -36,6 +41,9 @@ pub(super) struct Identification {
     pub set: &'static str,
     pub parameters: Vec<ParameterEstimate>,
     pub friction: Vec<JointFriction>,
+    /// As in model.json, where a model was given.
+    #[serde(flatten)]
+    pub additions: Option<Additions>,
     pub fit: Spread,
     pub validate: Option<Spread>,
     pub physically_consistent: bool,
@@ -47,7 +55,8 @@ pub(super) struct Identification {
 impl Identify {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let progress = Progress::new();
-        let loaded = load(&self.inputs, &self.validate, &progress)?;
+        let mut loaded = load(&self.inputs, &self.validate, self.model.as_deref(), &progress)?;
+        loaded.take_out();
         let options = DataOptions::default();
         let refused = |e: crate::regression::DataError| Failure::Refused(e.to_string());
         progress.say("preparing signals");
@@ -89,6 +98,7 @@ impl Identify {
             set: "minimal",
             parameters: identified.parameters,
             friction: identified.friction,
+            additions: loaded.known.map(|known| known.additions),
             fit: spread(&data, &fitted.residual),
             validate,
             physically_consistent: reasons.is_empty(),

@@ -29,6 +29,8 @@ pub struct Fit {
     pub sigma: Vec<f64>,
     /// How many times the variance of slow means exceeds that of independent samples, by joint, at least 1.
     pub inflation: Vec<f64>,
+    /// The speed that each joint exceeds in 5 % of the samples, rad/s.
+    pub top_speed: Vec<f64>,
     /// Residual by joint.
     pub residual: Vec<Vec<f64>>,
     /// The columns at these shapes.
@@ -122,6 +124,7 @@ pub fn fit(data: &Data<'_>, folds: &Folds, terms: &[Term], start: Option<&Fit>) 
         weights,
         sigma,
         inflation,
+        top_speed: (0..n).map(|j| data.top_speed(j)).collect(),
         residual,
         design: state.design,
         gram: state.gram,

@@ -4,10 +4,10 @@ use super::design::FRICTION;
 use super::fit::Fit;
 use super::solve::Solver;
 use crate::regression::Data;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A parameter with its standard error.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ParameterEstimate {
     /// Its name: the sum it stands for.
     pub name: String,
@@ -20,7 +20,7 @@ pub struct ParameterEstimate {
 }
 
 /// Eq. 16 of a joint with standard errors of γ1 … γ5.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointFriction {
     /// Joint, from 1.
     pub joint: usize,
@@ -35,6 +35,7 @@ pub struct JointFriction {
     /// γ5, N·m·s/rad.
     pub gamma5: f64,
     /// Standard errors of γ1 … γ5; null where not determined or at a bound.
+    #[serde(default)]
     pub std: [Option<f64>; 5],
 }
 

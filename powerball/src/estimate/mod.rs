@@ -20,4 +20,4 @@ pub use folds::Folds;
 pub use identify::{Identified, JointFriction, ParameterEstimate, Spread, identify, spread};
 pub use noise::noise_floor;
 pub use solve::{Solver, bounded};
-pub use verify::{JointVerdict, TorqueModel};
+pub use verify::{JointVerdict, verify};

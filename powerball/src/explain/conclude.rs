@@ -1,7 +1,8 @@
 //! From the accepted effects to the result.
 
+use super::compose::Composed;
 use super::curves::curves;
-use super::forward::{Session, Step};
+use super::forward::{ExplainError, Session, Step};
 use super::leftover::{depends_on, effective_samples, leftover};
 use super::result::{Errors, Explained, NamedEffect, Unattributed};
 use crate::effects::{Context, Found};
@@ -13,7 +14,7 @@ const ONE_PATH: &str = "the logs of --validate run the same path as those of --l
                         gravity, broken symmetries, slow ripple) was not considered; record another path";
 
 impl Session<'_> {
-    fn coefficients(&self) -> Vec<Vec<f64>> {
+    pub(super) fn coefficients(&self) -> Vec<Vec<f64>> {
         let mut first = 0;
         self.accepted
             .iter()
@@ -25,10 +26,13 @@ impl Session<'_> {
             .collect()
     }
 
-    pub(super) fn result(mut self, before: Errors, base_residual: &[Vec<f64>]) -> Explained {
-        let residual = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
-        let after =
-            Errors { fit: spread(&self.data, &self.fit.residual), validate: spread(&self.other, &residual) };
+    pub(super) fn result(
+        mut self,
+        before: Errors,
+        base_residual: &[Vec<f64>],
+    ) -> Result<Explained, ExplainError> {
+        let Composed { model, fitted, held_out: residual } = self.composed()?;
+        let after = Errors { fit: spread(&self.data, &fitted), validate: spread(&self.other, &residual) };
         let curves = curves(&self.other, base_residual, &residual);
         let floor = noise_floor(&self.data);
         let context = Context::new(&self.data, &self.fit, &self.fit.residual);
@@ -83,7 +87,7 @@ impl Session<'_> {
         let effective_samples = effective_samples(&self.data, &self.fit.residual);
         self.false_positives.rate =
             self.false_positives.accepted as f64 / (self.false_positives.placebos.max(1)) as f64;
-        Explained {
+        Ok(Explained {
             arm: self.data.body.arm().name.clone(),
             before,
             after,
@@ -98,7 +102,8 @@ impl Session<'_> {
                 .chain(self.one_path.then(|| ONE_PATH.to_string()))
                 .collect(),
             curves,
-        }
+            model,
+        })
     }
 
     /// The joints whose residual still depends on something.

@@ -23,6 +23,8 @@ pub enum ExplainError {
     Fit(DataError),
     /// The logs of the other path.
     Validate(DataError),
+    /// The arm that was found has no model.
+    Arm(String),
 }
 
 impl fmt::Display for ExplainError {
@@ -30,6 +32,7 @@ impl fmt::Display for ExplainError {
         match self {
             ExplainError::Fit(e) => write!(f, "--log: {e}"),
             ExplainError::Validate(e) => write!(f, "--validate: {e}"),
+            ExplainError::Arm(e) => f.write_str(e),
         }
     }
 }
@@ -145,7 +148,7 @@ pub fn explain(
     progress("asking placebos");
     session.count_false_positives();
     progress("looking at what is left");
-    Ok(session.result(before, &held_out))
+    session.result(before, &held_out)
 }
 
 impl Session<'_> {

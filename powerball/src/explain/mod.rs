@@ -3,8 +3,9 @@
 //! The rule, in the order of the files: `screen` refits the base with each candidate, `evidence` asks clusters,
 //! folds and another path, `placebo` measures how often the same questions are answered by chance on these very
 //! data, `rule` holds every threshold with its reason, `family` keeps what may stand together, `forward` adds one effect
-//! at a time, `naming` compares rivals, `leftover` says what stays, `conclude` writes the result.
+//! at a time, `naming` compares rivals, `leftover` says what stays, `compose` makes the model of what was accepted, `conclude` writes the result.
 
+mod compose;
 mod conclude;
 mod curves;
 mod evidence;

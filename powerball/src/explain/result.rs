@@ -2,6 +2,7 @@
 
 use super::curves::TorqueCurve;
 use crate::estimate::Spread;
+use crate::torque_model::TorqueModel;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -33,6 +34,9 @@ pub struct Explained {
     /// Torques over time on the other path, by joint; not part of the JSON.
     #[serde(skip)]
     pub curves: Vec<TorqueCurve>,
+    /// The model with everything that was named: model.json. Its errors are `after`.
+    #[serde(skip)]
+    pub model: TorqueModel,
 }
 
 /// Errors on the fitted logs and on the other path.
