@@ -18,6 +18,8 @@ pub mod estimate;
 #[cfg(feature = "std")]
 pub mod excite;
 #[cfg(feature = "std")]
+pub mod experiment;
+#[cfg(feature = "std")]
 pub mod explain;
 pub mod friction;
 #[cfg(feature = "std")]
@@ -36,6 +38,8 @@ pub mod regression;
 pub mod report;
 #[cfg(feature = "std")]
 pub mod signal;
+#[cfg(feature = "std")]
+pub mod summary;
 #[cfg(feature = "std")]
 pub mod torque_model;
 #[cfg(feature = "std")]

@@ -103,7 +103,7 @@ pub(crate) fn load(
     Ok(Loaded { body, fit: logs, validate: rest, warnings, known })
 }
 
-fn same_file(a: &Path, b: &Path) -> bool {
+pub(super) fn same_file(a: &Path, b: &Path) -> bool {
     match (a.canonicalize(), b.canonicalize()) {
         (Ok(a), Ok(b)) => a == b,
         _ => a == b,

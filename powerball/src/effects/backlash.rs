@@ -1,7 +1,7 @@
 //! Play in a gear: after a reversal the motor turns through a gap before it drives the link again.
 
 use super::candidate::{by_joint, geometric};
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::correction::Law;
 use serde_json::{Value, json};
 
@@ -16,6 +16,10 @@ impl Effect for Backlash {
 
     fn class(&self) -> Class {
         Class::Friction
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Torque
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -3,7 +3,7 @@
 use super::forward::{ExplainError, Session};
 use crate::correction::Term;
 use crate::effects::{Context, Part, Window, payload};
-use crate::estimate::{ParameterEstimate, identify};
+use crate::estimate::{JointFriction, ParameterEstimate};
 use crate::regression::{Data, RigidBody};
 use crate::torque_model::{Additions, ArmChanges, LogChanges, NamedTerm, Payload, TorqueModel};
 use dyngen::SetKind;
@@ -37,12 +37,11 @@ impl Session<'_> {
         let body = self.data.body;
         let mut not_zero: Vec<(Parameter, f64)> = Vec::new();
         let (additions, in_logs) = self.parts(&mut not_zero);
-        let identified = identify(&self.data, &self.fit);
         let mut model = TorqueModel {
             arm: body.arm().name.clone(),
             set: SetKind::Minimal.to_string(),
-            parameters: identified.parameters,
-            friction: identified.friction,
+            parameters: plain(body, self.fit.inertial()),
+            friction: (0..body.dof()).map(|j| JointFriction::plain(j, self.fit.friction(j))).collect(),
             additions,
         };
         let changed = match model.additions.arm_changes == ArmChanges::default() {
@@ -140,8 +139,10 @@ fn moved(
         all[parameter.index()] += value;
     }
     let Ok(set) = changed.model().set(SetKind::Minimal) else { return Vec::new() };
-    let values = changed.model().set_values(set, &all);
-    (changed.names().iter().zip(values))
-        .map(|(name, value)| ParameterEstimate { name: name.clone(), value, std: None, relative_std: None })
-        .collect()
+    plain(changed, &changed.model().set_values(set, &all))
+}
+
+/// Values of an arm's minimal set by name.
+fn plain(body: &RigidBody, values: &[f64]) -> Vec<ParameterEstimate> {
+    body.names().iter().zip(values).map(|(name, value)| ParameterEstimate::plain(name, *value)).collect()
 }

@@ -38,7 +38,7 @@ impl TorqueModel {
         let recording = &true_places;
         let mut motion = [recording.q.clone(), recording.v.clone(), recording.a.clone()];
         let mut rigid = self.rigid(body, &motion, recording, held);
-        let terms: Vec<Term<f64>> = self.additions.terms.iter().map(|t| t.term).collect();
+        let terms: Vec<Term<f64>> = self.terms().iter().map(|t| t.term).collect();
         if terms.iter().any(|t| t.law.moves_link()) {
             for term in terms.iter().filter(|t| t.law.moves_link()) {
                 move_link(&mut motion, recording, &rigid, term.joint, term.law, term.coefficient);

@@ -16,7 +16,7 @@ pub use changes::Unchanged;
 pub use file::FileError;
 pub use source::{Scalar, SourceError};
 
-use crate::correction::Term;
+use crate::correction::{Law, Term};
 use crate::estimate::{JointFriction, ParameterEstimate};
 use serde::{Deserialize, Serialize};
 
@@ -132,6 +132,16 @@ impl LogChanges {
 }
 
 impl TorqueModel {
+    /// Everything beyond rigid torque and Eq. 16: constant torques of the friction law, and the terms.
+    #[must_use]
+    pub fn terms(&self) -> Vec<NamedTerm> {
+        let constant = |f: &JointFriction| {
+            let term = Term { joint: f.joint.saturating_sub(1), coefficient: f.offset?, law: Law::Constant };
+            Some(NamedTerm { effect: "constant torque".to_string(), term })
+        };
+        self.friction.iter().filter_map(constant).chain(self.additions.terms.iter().cloned()).collect()
+    }
+
     /// The minimal set's values in order.
     #[must_use]
     pub fn inertial(&self) -> Vec<f64> {

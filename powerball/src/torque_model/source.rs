@@ -59,7 +59,7 @@ impl TorqueModel {
                 1e3 * delay
             ));
         }
-        for t in self.additions.terms.iter().filter(|t| t.term.law == correction::Law::Compliance) {
+        for t in self.terms().iter().filter(|t| t.term.law == correction::Law::Compliance) {
             notes.push(format!(
                 "joint {}: gives way by {:e} rad for 1 N·m; the torque below has the deflection's part of the position, not that of \
                  its speed and acceleration: give the motor a reference ahead of the link's by as much",
@@ -93,7 +93,7 @@ impl TorqueModel {
         let mut text = self.head(&arm);
         // Writing to a String cannot fail.
         let _ = self.tables(&mut text, scalar);
-        text.push_str(&door(payload.is_some(), self.additions.terms.iter().any(|t| t.term.law.moves_link())));
+        text.push_str(&door(payload.is_some(), self.terms().iter().any(|t| t.term.law.moves_link())));
         let module = |doc: &str, name: &str, body: &str| format!("\n{doc}pub mod {name} {{\n{body}}}\n");
         text.push_str(&module("/// The rigid arm.\n", "rigid", &rigid));
         if let Some(payload) = payload {
@@ -139,7 +139,7 @@ pub const TERMS: usize = {};
 /// Friction of every joint (Eq. 16).
 #[allow(clippy::excessive_precision)]
 pub const FRICTION: [TanhFriction<Real>; JOINTS] = [",
-            self.additions.terms.len()
+            self.terms().len()
         )?;
         for [g1, g2, g3, g4, g5] in self.gammas() {
             writeln!(
@@ -161,7 +161,7 @@ pub const ENCODER_OFFSET: [Real; JOINTS] = {offsets:?};
 #[allow(clippy::excessive_precision)]
 pub const CORRECTIONS: [Term<Real>; TERMS] = ["
         )?;
-        for t in &self.additions.terms {
+        for t in &self.terms() {
             let term = &t.term;
             writeln!(
                 text,

@@ -41,20 +41,7 @@ fn body() -> RigidBody {
 /// A model with the given laws at the second joint and values without meaning.
 fn model(body: &RigidBody, laws: &[Law<f64>]) -> TorqueModel {
     let value = |k: usize| 0.3 + 0.1 * (k as f64 * 1.7).sin();
-    let estimate = |(k, name): (usize, &String)| ParameterEstimate {
-        value: value(k),
-        ..serde_json::from_value(
-            serde_json::json!({ "name": name, "value": 0.0, "std": null, "relative_std": null }),
-        )
-        .unwrap()
-    };
-    let friction = (1..=body.dof()).map(|joint| {
-        serde_json::from_value(serde_json::json!({
-            "joint": joint, "gamma1": 4.5, "gamma2": 216.0, "gamma3": 2.0, "gamma4": 4.7, "gamma5": 15.0,
-            "std": [null, null, null, null, null],
-        }))
-        .unwrap()
-    });
+    let friction = (0..body.dof()).map(|joint| JointFriction::plain(joint, [4.5, 216.0, 2.0, 4.7, 15.0]));
     let term = |(k, law): (usize, &Law<f64>)| NamedTerm {
         effect: format!("effect_{k}"),
         term: Term { joint: 1, coefficient: 0.01 * (k + 1) as f64, law: *law },
@@ -62,7 +49,12 @@ fn model(body: &RigidBody, laws: &[Law<f64>]) -> TorqueModel {
     TorqueModel {
         arm: body.arm().name.clone(),
         set: "minimal".into(),
-        parameters: body.names().iter().enumerate().map(estimate).collect(),
+        parameters: body
+            .names()
+            .iter()
+            .enumerate()
+            .map(|(k, name)| ParameterEstimate::plain(name, value(k)))
+            .collect(),
         friction: friction.collect(),
         additions: Additions { terms: laws.iter().enumerate().map(term).collect(), ..Additions::default() },
     }

@@ -1,5 +1,6 @@
 //! The cases of a study: what is in the plant, how large, under what noise.
 
+use super::alike::PAIRS;
 use super::law::Outside;
 use clap::ValueEnum;
 use powerball::virtual_arm::Effect;
@@ -29,6 +30,8 @@ pub(super) enum Table {
     ColouredEffect,
     /// Something that no effect of the library is
     Outside,
+    /// One effect of a pair that is easily confused, and the experiment that tells it from the other
+    Alike,
     /// An effect put into the measured logs of a UR10e, size 1
     Measured,
     /// The same, size 0.6
@@ -62,6 +65,9 @@ impl Table {
             Table::Coloured => "no effect, coloured noise",
             Table::ColouredEffect => "one effect of size 0.3 to 1.5, coloured noise",
             Table::Outside => "something outside the library, size 0.3 to 1.5",
+            Table::Alike => {
+                "one effect of size 0.3 to 1.5 that is easily taken for another, logged on paths that use 30 % of the ranges"
+            }
             Table::Measured => "one effect of size 1 put into the measured UR10e logs",
             Table::MeasuredSmall => "one effect of size 0.6 put into the measured UR10e logs",
         }
@@ -75,7 +81,7 @@ impl Table {
             Table::Pairs => 60,
             Table::Outside => 20,
             Table::Single | Table::Small => 10,
-            Table::Friction | Table::Misfit | Table::ColouredEffect => 5,
+            Table::Friction | Table::Misfit | Table::ColouredEffect | Table::Alike => 5,
             Table::Measured | Table::MeasuredSmall => 3,
         }
     }
@@ -118,6 +124,11 @@ impl Case {
                 Table::Outside => {
                     for law in Outside::ALL {
                         add(vec![law.name().to_string()], vec![size()]);
+                    }
+                }
+                Table::Alike => {
+                    for name in PAIRS.into_iter().flatten() {
+                        add(vec![name.to_string()], vec![size()]);
                     }
                 }
                 Table::Pairs => {

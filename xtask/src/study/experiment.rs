@@ -1,5 +1,6 @@
 //! Logs of the virtual arm along exciting paths, with a truth scaled to a wanted size.
 
+use super::alike;
 use super::case::{Case, Table};
 use super::judge::Outcome;
 use super::law::{FrictionLaw, Law, Misfit, OtherFriction, Outside, OutsideLaw};
@@ -24,8 +25,10 @@ const HELD_OUT: [f64; 2] = [12.0, 11.5];
 const PAUSE: f64 = 5.0;
 /// The search for a path: enough for a condition number near the best.
 const EVALUATIONS: usize = 60;
+/// Logs that leave names open: on paths that leave this share of range, speed and acceleration unused.
+const NARROW: f64 = 0.7;
 /// Rounds in which a truth is scaled to its size.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 4;
 /// The band in which a size is measured, without noise: wide enough for the ripple of gears.
 const WIDE: DataOptions = DataOptions { cutoff: 60.0, smoothing: 60.0, block: 2.0 };
 
@@ -101,12 +104,20 @@ impl Bench {
         let options = DataOptions::default();
         let explained =
             explain(&self.body, to_fit, held_out, &options, &|_| ()).map_err(|e| e.to_string())?;
+        let (explained, settled) = if case.table == Table::Alike {
+            let record = |motion: &Motion| session.new_log(motion, &truths);
+            let (again, settled) = alike::settle(&self.body, (to_fit, held_out), explained, record)?;
+            (again, Some(settled))
+        } else {
+            (explained, None)
+        };
         let seconds = start.elapsed().as_secs_f64();
         let clean = session.logs(&[], true);
         let clean = self.errors(&clean[..FIT.len()], &clean[FIT.len()..], &options)?;
         let over = explained.after.validate.rms.iter().zip(&clean).map(|(a, c)| a / c).fold(0.0, f64::max);
         let words = truths.iter().map(Truth::words).collect();
-        Ok(Some(Outcome::new(case, words, sizes, &explained, &[], over, seconds)))
+        let outcome = Outcome::new(case, words, sizes, &explained, &[], over, seconds);
+        Ok(Some(Outcome { settled, ..outcome }))
     }
 
     fn session(&self, case: &Case, rng: &mut ChaCha8Rng) -> Result<Session, String> {
@@ -140,6 +151,7 @@ impl Bench {
                 fundamental: TAU / period,
                 evaluations: EVALUATIONS,
                 seed: rng.random(),
+                margin: if case.table == Table::Alike { NARROW } else { Settings::default().margin },
                 ..Settings::default()
             };
             let found = optimise(&self.model, SetKind::Minimal, &settings).map_err(|e| e.to_string())?;
@@ -158,16 +170,10 @@ impl Bench {
     /// A misfit that is as large on every joint as the noise allows: 0.3 of it, after the base was refitted.
     fn misfit(&self, session: &Session, rng: &mut ChaCha8Rng) -> Result<Misfit, String> {
         let mut misfit = Misfit::draw(session.plant.friction().len(), rng);
+        let plain = self.base(&session.logs(&[], false))?;
         for _ in 0..2 {
-            let with = Session {
-                plant: session.plant.clone(),
-                friction: None,
-                misfit: Some(misfit.clone()),
-                motions: session.motions.clone(),
-                starts: session.starts.clone(),
-                seed: 0,
-            };
-            let left = self.visible(&with, &[])?;
+            let with = Session { misfit: Some(misfit.clone()), ..session.alone() };
+            let left = self.visible(session, &with.logs(&[], false), &plain)?;
             misfit.amplitude.iter_mut().zip(left).for_each(|(a, left)| *a *= 0.3 / left);
         }
         Ok(misfit)
@@ -191,17 +197,12 @@ impl Bench {
                     .ok_or_else(|| format!("no effect is called {kind}"))?,
             ),
         };
-        let quiet = Session {
-            plant: session.plant.clone(),
-            friction: None,
-            misfit: None,
-            motions: session.motions.clone(),
-            starts: session.starts.clone(),
-            seed: 0,
-        };
+        let quiet = session.alone();
+        let plain = self.base(&quiet.logs(&[], false))?;
         let mut reached = 0.0;
         for _ in 0..ROUNDS {
-            reached = self.visible(&quiet, std::slice::from_ref(&truth))?.into_iter().fold(0.0, f64::max);
+            let logs = quiet.logs(std::slice::from_ref(&truth), false);
+            reached = self.visible(&quiet, &logs, &plain)?.into_iter().fold(0.0, f64::max);
             if (reached / size - 1.0).abs() < 0.03 {
                 break;
             }
@@ -211,14 +212,22 @@ impl Bench {
     }
 
     /// What of a truth is left on the fitted logs when the base model was refitted, without noise and in a wide band,
-    /// over the noise of a sample, by joint.
-    fn visible(&self, session: &Session, truths: &[Truth]) -> Result<Vec<f64>, String> {
-        let logs = session.logs(truths, false);
-        let data = Data::new(&self.body, &logs[..FIT.len()], &WIDE).map_err(|e| e.to_string())?;
-        let base = fit(&data, &Folds::new(&data), &[], None);
+    /// over the noise of a sample, by joint; `plain` is what the model leaves without it.
+    fn visible(&self, session: &Session, logs: &[Log], plain: &[Vec<f64>]) -> Result<Vec<f64>, String> {
+        let with = self.base(logs)?;
         let sensors = session.plant.sensors();
         let noise = sensors.white.iter().zip(&sensors.coloured).map(|(w, c)| w.hypot(*c));
-        Ok(spread(&data, &base.residual).rms.iter().zip(noise).map(|(left, noise)| left / noise).collect())
+        let change = with.iter().zip(plain).map(|(with, without)| {
+            let squares = with.iter().zip(without).map(|(a, b)| (a - b).powi(2));
+            (squares.sum::<f64>() / without.len().max(1) as f64).sqrt()
+        });
+        Ok(change.zip(noise).map(|(change, noise)| change / noise).collect())
+    }
+
+    /// The residual of the base model on the fitted logs, in a wide band.
+    fn base(&self, logs: &[Log]) -> Result<Vec<Vec<f64>>, String> {
+        let data = Data::new(&self.body, &logs[..FIT.len()], &WIDE).map_err(|e| e.to_string())?;
+        Ok(fit(&data, &Folds::new(&data), &[], None).residual)
     }
 
     /// Errors of the base model held out.
@@ -231,6 +240,32 @@ impl Bench {
 }
 
 impl Session {
+    /// The same with nothing beside the plant that the model knows.
+    fn alone(&self) -> Session {
+        Session {
+            plant: self.plant.clone(),
+            friction: None,
+            misfit: None,
+            motions: self.motions.clone(),
+            starts: self.starts.clone(),
+            seed: self.seed,
+        }
+    }
+
+    /// The log of one more motion after all others.
+    fn new_log(&self, motion: &Motion, truths: &[Truth]) -> Log {
+        let end = self.starts.iter().zip(&self.motions).map(|(s, m)| s + m.duration()).fold(0.0, f64::max);
+        let next = Session {
+            motions: vec![motion.clone()],
+            starts: vec![end + PAUSE],
+            seed: self.seed.wrapping_add(1000),
+            ..self.alone()
+        };
+        let mut log = next.logs(truths, true).swap_remove(0);
+        log.file = "experiment.csv".into();
+        log
+    }
+
     /// The logs, with noise or without.
     fn logs(&self, truths: &[Truth], noisy: bool) -> Vec<Log> {
         let mut sensors = self.plant.sensors().clone();

@@ -1,5 +1,6 @@
 //! What was named against what was there.
 
+use super::alike::Settled;
 use super::case::Case;
 use powerball::explain::Explained;
 use serde::{Deserialize, Serialize};
@@ -30,6 +31,9 @@ pub(super) struct Outcome {
     /// Held-out error after the additions over that of the model without the effect, worst joint.
     pub(super) over_clean: f64,
     pub(super) seconds: f64,
+    /// What an experiment did, in the table of names that are alike.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) settled: Option<Settled>,
 }
 
 impl Outcome {
@@ -55,6 +59,7 @@ impl Outcome {
             unattributed: explained.unattributed.is_some(),
             over_clean,
             seconds,
+            settled: None,
         }
     }
 

@@ -3,6 +3,7 @@
 //! Each case is one line of a file of results, so that a study can be stopped and taken up again, and tables are made of
 //! the lines.
 
+mod alike;
 mod case;
 mod experiment;
 mod judge;
@@ -65,17 +66,21 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
             .map_err(|e| format!("{}: {e}", arguments.results.display()))?;
         let tables = if arguments.table.is_empty() { Table::all() } else { arguments.table.clone() };
         let bench = experiment::Bench::new()?;
+        let mut measured = None;
         for table in tables {
+            if table.measured() && measured.is_none() {
+                measured = measured::Measured::read(&arguments.measured)?;
+            }
             for case in Case::all(table, arguments.seeds.clone()) {
                 let wanted =
                     arguments.kind.is_empty() || arguments.kind.iter().any(|k| case.kinds.contains(k));
                 if !wanted || done.contains(&case.name()) {
                     continue;
                 }
-                let outcome = if table.measured() {
-                    measured::run(&case, &arguments.measured)?
-                } else {
-                    bench.run(&case)?
+                let outcome = match (&measured, table.measured()) {
+                    (Some(measured), true) => measured.run(&case)?,
+                    (None, true) => None,
+                    (_, false) => bench.run(&case)?,
                 };
                 let Some(outcome) = outcome else { continue };
                 println!("{}", outcome.line());

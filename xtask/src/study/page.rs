@@ -24,7 +24,11 @@ pub(super) fn tables(outcomes: &[Outcome]) -> String {
             let _ = writeln!(out, "| {} | {} |", table.words(), counts(&mine));
         }
     }
-    for table in Table::all() {
+    let alike: Vec<&Outcome> = outcomes.iter().filter(|o| o.settled.is_some()).collect();
+    if !alike.is_empty() {
+        let _ = writeln!(out, "\n### {}\n\n{}", capital(Table::Alike.words()), super::alike::table(&alike));
+    }
+    for table in Table::all().into_iter().filter(|table| *table != Table::Alike) {
         let mut kinds: BTreeMap<String, Vec<&Outcome>> = BTreeMap::new();
         for outcome in outcomes.iter().filter(|o| o.table == table.name() && o.truth.len() == 1) {
             kinds.entry(outcome.truth.join(" + ")).or_default().push(outcome);
