@@ -99,6 +99,29 @@ pub(crate) fn reduce(
     Ok(Reduced { body, summary, shown, warnings })
 }
 
+/// Reduces logs that were read already.
+pub(crate) fn in_memory(
+    body: RigidBody,
+    logs: Vec<Log>,
+    mut warnings: Vec<String>,
+    options: &DataOptions,
+) -> Result<Reduced, Failure> {
+    let mut summary = Summary::new(&body, options);
+    let mut refused = Vec::new();
+    for log in &logs {
+        match summary.push(&body, log, options, None) {
+            Ok(notes) => warnings.extend(notes),
+            Err(error) => refused.push(format!("{}: {error}", log.file)),
+        }
+    }
+    if summary.logs.is_empty() {
+        return Err(Failure::Refused(refused.join("\n")));
+    }
+    warnings.extend(refused.into_iter().map(|r| format!("{r}; the log was left out")));
+    warnings.extend(rests(&summary));
+    Ok(Reduced { body, summary, shown: logs, warnings })
+}
+
 /// A file's summary; `None` where the file is something else.
 fn read_summary(file: &Path) -> Result<Option<Summary>, String> {
     let read = |mut f: std::fs::File| {

@@ -25,6 +25,8 @@ pub enum ExplainError {
     Fit(DataError),
     /// The logs of the other path.
     Validate(DataError),
+    /// The arm that was found has no model.
+    Arm(String),
 }
 
 impl fmt::Display for ExplainError {
@@ -32,6 +34,7 @@ impl fmt::Display for ExplainError {
         match self {
             ExplainError::Fit(e) => write!(f, "--log: {e}"),
             ExplainError::Validate(e) => write!(f, "--validate: {e}"),
+            ExplainError::Arm(e) => f.write_str(e),
         }
     }
 }
@@ -204,7 +207,7 @@ pub fn explain_with(
     progress("asking placebos");
     session.count_false_positives();
     progress("looking at what is left");
-    Ok(session.result(before, &held_out))
+    session.result(before, &held_out)
 }
 
 impl Session<'_> {
