@@ -38,4 +38,6 @@ pub mod report;
 #[cfg(feature = "std")]
 pub mod signal;
 #[cfg(feature = "std")]
+pub mod summary;
+#[cfg(feature = "std")]
 pub mod virtual_arm;

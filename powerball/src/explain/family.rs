@@ -148,7 +148,9 @@ impl Session<'_> {
             (kept.iter().map(|m| members[*m].trial.score).sum(), kept)
         };
         let (single, wide) = (choose(&|m| m.candidate.joints.len() == 1), choose(&|_| true));
-        let kept = if single.0 > wide.0 { single.1 } else { wide.1 };
+        // One cause for all joints is preferred to one for each.
+        let as_good = single.0 - (rule::AS_GOOD * single.0).max(rule::AS_GOOD_SCORE);
+        let kept = if as_good > wide.0 { single.1 } else { wide.1 };
         let mut at = 0;
         members.retain(|_| {
             at += 1;

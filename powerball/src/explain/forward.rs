@@ -48,21 +48,28 @@ pub(super) struct Accepted {
     pub(super) fold_gain: f64,
     /// Squared error that fell when it was accepted, by joint, (N·m)² summed over rows.
     pub(super) explained: Vec<f64>,
+    /// The step that accepted it.
+    pub(super) step: usize,
 }
 
 /// How a step ended.
 enum Stepped {
     /// An effect was accepted.
     Accepted(&'static str),
-    /// What fitted best could not be told from its rivals and left much.
-    Withdrawn,
+    /// What fitted best scored no more than placebos do.
+    Chance,
 }
 
 /// What a step decided.
 #[derive(Debug)]
 pub(super) struct Step {
+    pub(super) number: usize,
     pub(super) effect: usize,
+    /// Squared errors before it, by joint, (N·m)² summed over rows.
+    square_before: Vec<f64>,
     pub(super) comparison: Comparison,
+    /// What an experiment would have to decide.
+    pub(super) question: Option<Question>,
     pub(super) before: Vec<f64>,
     pub(super) after: Vec<f64>,
 }
@@ -177,13 +184,18 @@ pub fn explain_with(
     for step in 0..rule::MOST_STEPS {
         progress(&format!("step {}: screening candidates", step + 1));
         match session.step(step) {
-            None => break,
             Some(Stepped::Accepted(name)) => progress(&format!("step {}: {name} accepted", step + 1)),
-            Some(Stepped::Withdrawn) => {
-                progress(&format!("step {}: what fits best cannot be named", step + 1))
+            Some(Stepped::Chance) => {
+                progress(&format!("step {}: what fits best fits no better than placebos", step + 1));
             }
+            // Only now is it known what is left beside all that fits.
+            None => match session.withhold() {
+                Some(name) => progress(&format!("{name} is not named: others fit as well and much is left")),
+                None => break,
+            },
         }
     }
+    while session.withhold().is_some() {}
     progress("asking placebos");
     session.count_false_positives();
     progress("looking at what is left");
@@ -266,7 +278,12 @@ impl Session<'_> {
                 })
                 .collect();
             if members.is_empty() {
-                return None;
+                let chance = passing
+                    .iter()
+                    .map(|m| (families[chosen].effect, m.candidate.clone()))
+                    .collect::<Vec<_>>();
+                self.given_up.extend(chance);
+                return Some(Stepped::Chance);
             }
             let mut joints: Vec<usize> =
                 members.iter().flat_map(|m| families[chosen].members[*m].candidate.joints.clone()).collect();
@@ -287,7 +304,6 @@ impl Session<'_> {
         let squares =
             |fit: &Fit| -> Vec<f64> { fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect() };
         let square_before = squares(&self.fit);
-        let earlier = self.accepted.len();
         let added: Vec<Candidate> = members.iter().map(|m| m.candidate.clone()).collect();
         for member in members {
             let Some(evidence) = member.evidence else { continue };
@@ -300,19 +316,10 @@ impl Session<'_> {
                 p_value: (evidence.p_value * tested).min(1.0),
                 fold_gain: gains.get(gains.len() / 2).copied().unwrap_or(0.0),
                 explained: Vec::new(),
+                step,
             });
         }
         self.refit();
-        if comparison.apart < rule::LEAST_MARGIN
-            && self.share_left(&square_before, &comparison.joints) > rule::MUCH_LEFT
-        {
-            // Not named; it stays as a rival of what comes.
-            self.questions.extend(question.map(Question::withheld));
-            self.accepted.truncate(earlier);
-            self.given_up.extend(added.into_iter().map(|c| (chosen, c)));
-            self.refit();
-            return Some(Stepped::Withdrawn);
-        }
         let fell: Vec<f64> =
             square_before.iter().zip(squares(&self.fit)).map(|(b, a)| (b - a).max(0.0)).collect();
         for a in self.accepted.iter_mut().filter(|a| a.explained.is_empty()) {
@@ -325,15 +332,34 @@ impl Session<'_> {
                 self.given_up.push((chosen, candidate));
             }
         }
-        self.questions.extend(question);
         let after = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
         self.steps.push(Step {
+            number: step,
             effect: chosen,
+            square_before,
             comparison,
+            question,
             before: spread(&self.other, &other_residual).rms,
             after: spread(&self.other, &after).rms,
         });
         Some(Stepped::Accepted(self.effects[chosen].name()))
+    }
+
+    /// Takes back the last effect that is not told apart from its rivals and beside which much is left now that everything
+    /// that fits is in the model: then something else is there. It stays as a rival of what comes. Returns its name.
+    fn withhold(&mut self) -> Option<&'static str> {
+        let weak = self.steps.iter().rposition(|s| {
+            s.comparison.apart < rule::LEAST_MARGIN
+                && self.accepted.iter().any(|a| a.step == s.number)
+                && self.share_left(&s.square_before, &s.comparison.joints) > rule::MUCH_LEFT
+        })?;
+        let step = self.steps.remove(weak);
+        self.questions.extend(step.question.map(Question::withheld));
+        for a in self.accepted.extract_if(.., |a| a.step == step.number) {
+            self.given_up.push((a.effect, a.candidate));
+        }
+        self.refit();
+        Some(self.effects[step.effect].name())
     }
 
     /// The share of the excess over the noise floor that stayed on some joints, given the squared errors before.

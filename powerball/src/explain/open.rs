@@ -206,7 +206,8 @@ impl Session<'_> {
             }
             Why::Withheld | Why::Refused => something_left,
         };
-        let question = self.questions.iter().filter(standing).min_by_key(|q| q.why)?;
+        let of_names = self.steps.iter().filter_map(|s| s.question.as_ref());
+        let question = of_names.chain(&self.questions).filter(standing).min_by_key(|q| q.why)?;
         let asked = |a: &super::forward::Accepted| {
             question.proposals.iter().any(|(e, _)| *e == a.effect)
                 && a.candidate.joints.iter().any(|j| question.joints.contains(j))

@@ -71,6 +71,8 @@ pub struct Data<'a> {
     pub logs: Vec<String>,
     /// The speed below which a joint rests, by joint, rad/s.
     pub rest_speed: Vec<f64>,
+    /// Pieces of logs that were left out, in words.
+    pub left_out: Vec<String>,
     /// What was left out or done, in words.
     pub notes: Vec<String>,
     top_speed: Vec<f64>,
@@ -91,13 +93,13 @@ impl<'a> Data<'a> {
         let step = *steps.get(steps.len() / 2).ok_or(DataError::TooShort)?;
         let rate = 1.0 / step;
         let band = Band::new(options.cutoff, rate);
-        let mut notes = Vec::new();
+        let mut left_out: Vec<String> = Vec::new();
         let mut recordings = Vec::new();
         for (index, log) in logs.iter().enumerate() {
             for piece in &log.pieces {
                 let span = log.t[piece.end - 1] - log.t[piece.start];
                 if span < 1.0 {
-                    notes.push(format!("{}: a piece of {span:.2} s is too short and was left out", log.file));
+                    left_out.push(format!("{}: a piece of {span:.2} s is too short and was left out", log.file));
                     continue;
                 }
                 recordings.extend(Recording::new(log, index, piece.clone(), step, options.smoothing));
@@ -107,12 +109,16 @@ impl<'a> Data<'a> {
             return Err(DataError::TooShort);
         }
         let rest_speed: Vec<f64> = (0..n)
-            .map(|j| rest::rest_speed(recordings.iter().flat_map(|r| r.speed(j).map(f64::abs)).collect()))
+            .map(|j| {
+                let speeds = recordings.iter().flat_map(|r| r.speed(j).map(f64::abs)).collect();
+                rest::rest_speed(speeds, body.arm().joints[j].velocity)
+            })
             .collect();
         let top_speed = (0..n).map(|j| top_speed(&recordings, j)).collect();
         let kinds: Vec<JointKind> = body.arm().joints.iter().map(|joint| joint.kind).collect();
         let silent: Vec<Option<Silent>> =
             kinds.iter().enumerate().map(|(j, kind)| Silent::of(&recordings, j, *kind)).collect();
+        let mut notes = left_out.clone();
         let mut kept = keep_moving(&recordings, &band, &rest_speed, n);
         for (j, kept) in kept.iter_mut().enumerate() {
             for (kept, recording) in kept.iter_mut().zip(&recordings) {
@@ -163,6 +169,7 @@ impl<'a> Data<'a> {
             blocks,
             logs,
             rest_speed,
+            left_out,
             notes,
             top_speed,
             last_link: OnceLock::new(),

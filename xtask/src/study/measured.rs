@@ -3,7 +3,7 @@
 use super::case::Case;
 use super::judge::{Named, Outcome, named};
 use dyngen::Arm;
-use powerball::estimate::{Folds, consistent_fit, fit, spread};
+use powerball::estimate::{Folds, consistent_fit, fit};
 use powerball::explain::{Explained, explain};
 use powerball::friction::TanhFriction;
 use powerball::log::{Log, common_clock, read_logs};
@@ -96,6 +96,10 @@ impl Measured {
             }
             effect = effect.scaled(size / reached);
         }
+        // Some effects cannot be made that large on this arm.
+        if !(0.7..1.4).contains(&(reached / size)) {
+            return Ok(None);
+        }
         let logs = self.with(&effect)?;
         let start = Instant::now();
         let (to_fit, held_out) = logs.split_at(FIT.len());
@@ -151,17 +155,15 @@ impl Measured {
             Ok(fit(&data, &Folds::new(&data), &[], None).residual)
         };
         let (with, without) = (residual(logs)?, residual(&self.logs)?);
-        let data = Data::new(&self.body, &self.logs[..FIT.len()], &DataOptions::default())
-            .map_err(|e| e.to_string())?;
-        // Rows of both are alike but for a few at rest; the shorter one counts.
-        let change: Vec<Vec<f64>> = (with.iter().zip(&without))
-            .map(|(a, b)| {
-                let mut change: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
-                change.resize(b.len(), 0.0);
-                change
-            })
-            .collect();
-        let left = spread(&data, &change).rms;
-        Ok(left.iter().zip(&self.explained.after.fit.rms).map(|(l, r)| l / r).fold(0.0, f64::max))
+        let rms = |r: &[f64]| (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
+        let left = with.iter().zip(&without).map(|(a, b)| {
+            if a.len() == b.len() {
+                rms(&a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<f64>>())
+            } else {
+                // Positions changed, and with them what counts as rest.
+                (rms(a).powi(2) - rms(b).powi(2)).max(0.0).sqrt()
+            }
+        });
+        Ok(left.zip(&self.explained.after.fit.rms).map(|(l, r)| l / r).fold(0.0, f64::max))
     }
 }
