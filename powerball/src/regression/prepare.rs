@@ -1,12 +1,12 @@
 //! Logs of an arm into rows: even grid, derivatives, band, rest removed, blocks laid out.
 
-use super::silent::{Silent, dead};
+use super::silent::{dead, silent_joints};
 use super::{Block, Column, JointRows, Recording, RigidBody};
 use crate::log::Log;
 use crate::parallel;
 use crate::signal::resample::median_step;
 use crate::signal::{Band, rest};
-use dyngen::arm::{JointKind, Parameter, ParameterKind};
+use dyngen::arm::{Parameter, ParameterKind};
 use std::fmt;
 use std::sync::OnceLock;
 
@@ -99,7 +99,8 @@ impl<'a> Data<'a> {
             for piece in &log.pieces {
                 let span = log.t[piece.end - 1] - log.t[piece.start];
                 if span < 1.0 {
-                    left_out.push(format!("{}: a piece of {span:.2} s is too short and was left out", log.file));
+                    left_out
+                        .push(format!("{}: a piece of {span:.2} s is too short and was left out", log.file));
                     continue;
                 }
                 recordings.extend(Recording::new(log, index, piece.clone(), step, options.smoothing));
@@ -115,9 +116,7 @@ impl<'a> Data<'a> {
             })
             .collect();
         let top_speed = (0..n).map(|j| top_speed(&recordings, j)).collect();
-        let kinds: Vec<JointKind> = body.arm().joints.iter().map(|joint| joint.kind).collect();
-        let silent: Vec<Option<Silent>> =
-            kinds.iter().enumerate().map(|(j, kind)| Silent::of(&recordings, j, *kind)).collect();
+        let silent = silent_joints(body.arm(), logs);
         let mut notes = left_out.clone();
         let mut kept = keep_moving(&recordings, &band, &rest_speed, n);
         for (j, kept) in kept.iter_mut().enumerate() {
@@ -136,9 +135,6 @@ impl<'a> Data<'a> {
             }
         }
         let joints = joint_rows(body, &recordings, &band, kept);
-        let unit = |j: usize| if kinds[j] == JointKind::Prismatic { "m" } else { "rad" };
-        let silent: Vec<Option<String>> =
-            silent.iter().enumerate().map(|(j, s)| Some(s.as_ref()?.note(j + 1, unit(j)))).collect();
         if joints.iter().all(|j| j.len() < 20) {
             return Err(DataError::NoMotion(silent.into_iter().flatten().collect()));
         }
