@@ -118,7 +118,7 @@ pub(crate) fn in_memory(
         return Err(Failure::Refused(refused.join("\n")));
     }
     warnings.extend(refused.into_iter().map(|r| format!("{r}; the log was left out")));
-    warnings.extend(rests(&summary));
+    warnings.extend(rests(&body, &summary, &logs));
     Ok(Reduced { body, summary, shown: logs, warnings })
 }
 
