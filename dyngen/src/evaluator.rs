@@ -3,7 +3,7 @@
 use crate::base::SetKind;
 use crate::dynamics::Function;
 use crate::dynamics::function::{Argument, trig_offset};
-use crate::graph::Input;
+use crate::graph::{Input, JointSum};
 use crate::graph::tape::{LANES, Lane, Tape};
 use crate::model::{Error, Model};
 
@@ -127,16 +127,21 @@ impl Evaluator {
                     *x = from[at(lane) + i];
                 }
             };
+            let gather_angle = |sum: JointSum, to: &mut Lane| {
+                for (lane, x) in to.iter_mut().enumerate() {
+                    *x = sum.value(|i| samples.q[at(lane) + i] + self.offsets[i]);
+                }
+            };
             self.tape.run(
                 &mut workspace,
                 |input, lane| match input {
-                    Input::Sin(i) => {
-                        gather(Argument::Positions, i, lane);
-                        lane.iter_mut().for_each(|x| *x = (*x + self.offsets[i]).sin());
+                    Input::Sin(sum) => {
+                        gather_angle(sum, lane);
+                        lane.iter_mut().for_each(|x| *x = x.sin());
                     }
-                    Input::Cos(i) => {
-                        gather(Argument::Positions, i, lane);
-                        lane.iter_mut().for_each(|x| *x = (*x + self.offsets[i]).cos());
+                    Input::Cos(sum) => {
+                        gather_angle(sum, lane);
+                        lane.iter_mut().for_each(|x| *x = x.cos());
                     }
                     Input::Position(i) => gather(Argument::Positions, i, lane),
                     Input::Speed(i) => gather(Argument::Speeds, i, lane),

@@ -3,7 +3,7 @@
 use crate::arm::{Arm, Parameter};
 use crate::base::sets::{Combination, ParameterSet, SetKind, Sets};
 use crate::dynamics::elements::angle_symbols;
-use crate::dynamics::function;
+use crate::dynamics::function::{self, Subject};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::elimination::Unproven;
 use crate::exact::rational::Rational;
@@ -159,7 +159,13 @@ impl Model {
         if !set.exact {
             return Err(Error::NotExact(set.lost.clone()));
         }
-        let built = function::build(function, &self.arm, &self.symbols, set, &self.sets.field, baked, passes);
+        let subject = Subject {
+            arm: &self.arm,
+            symbols: &self.symbols,
+            field: &self.sets.field,
+            minimal: &self.sets.minimal,
+        };
+        let built = function::build(function, &subject, set, baked, passes);
         prove::prove(&self.arm, &self.symbols, &self.sets, set, &built, baked)?;
         Ok(built)
     }

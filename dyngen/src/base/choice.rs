@@ -3,6 +3,7 @@
 use super::preference::Preference;
 use super::sets::{SetKind, base_set};
 use crate::arm::Arm;
+use crate::dynamics::function::Subject;
 use crate::dynamics::{Function, function};
 use crate::exact::constant::ConstantField;
 use crate::exact::elimination::{Dependence, Unproven};
@@ -10,12 +11,8 @@ use crate::exact::symbols::AngleSymbols;
 use crate::optimize::PASSES;
 
 /// The functions whose cost is counted: those that run in a control loop or over a log.
-pub const COUNTED: [Function; 5] = [
-    Function::InverseDynamics,
+pub const COUNTED: [Function; 1] = [
     Function::Regressor,
-    Function::MassMatrix,
-    Function::CoriolisMatrix,
-    Function::Gravity,
 ];
 
 /// A rule that was tried, with the multiplications and additions of [`COUNTED`] under it.
@@ -42,7 +39,8 @@ pub fn cheapest(
     let [first, others @ ..] = Preference::ALL;
     let cost = |dependence: &Dependence| -> usize {
         let set = base_set(SetKind::Minimal, arm, field, dependence);
-        let built = |f: Function| function::build(f, arm, symbols, &set, field, None, PASSES).operations();
+        let subject = Subject { arm, symbols, field, minimal: dependence };
+        let built = |f: Function| function::build(f, &subject, &set, None, PASSES).operations();
         COUNTED.iter().map(|f| built(*f)).map(|o| o.mul + o.add).sum()
     };
     let mut best = eliminate(first)?;

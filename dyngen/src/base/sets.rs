@@ -249,7 +249,7 @@ fn named_combination_text<'a>(
 }
 
 /// A combination of parameters in coordinates of the minimal columns.
-pub(super) fn minimal_coordinates(
+pub fn minimal_coordinates(
     field: &ConstantField,
     minimal: &Dependence,
     combination: &[(Parameter, Constant)],

@@ -6,10 +6,10 @@
 //! Q = Σ m ṙ and K = Σ m ṙ rᵀ are needed. One pass inwards carries them; nothing is differentiated.
 
 use super::body::{Body, Link, Vector, ZERO};
-use super::composite::{body_back_x, body_back_z};
+use super::old_composite::{body_back_x, body_back_z};
 use super::elements::{ArmElements, JointElements, turn_x, turn_z};
-use super::motion::{Drive, JointMotion, Motion, motions};
-use super::wrench::{Wrench, to_joint, to_link_before};
+use super::old_motion::{Drive, JointMotion, Motion, motions};
+use super::old_wrench::{Wrench, to_joint, to_link_before};
 use crate::arm::{Convention, JointKind};
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
@@ -189,7 +189,7 @@ impl Moving {
 
     /// What row i of C makes of the axes of the joints before it.
     fn row(&self, b: &Builder, kind: JointKind) -> Row {
-        let wrench = super::composite::unit_acceleration(&self.body, kind);
+        let wrench = super::old_composite::unit_acceleration(&self.body, kind);
         let drift = match kind {
             JointKind::Revolute => self.spread_times_z(b, true),
             JointKind::Prismatic => b.cross(&self.momentum, &Z),

@@ -2,7 +2,11 @@
 
 use super::body::links;
 use super::elements::{ArmElements, Source, ToolElements};
-use super::motion::Drive;
+use super::motion;
+use super::old_motion::Drive;
+use super::regroup::{Order, Regrouping};
+use super::stage::{Chain, Form};
+use crate::exact::elimination::Dependence;
 use super::{composite, coriolis, energy, forward, inverse, momentum, pose, regressor};
 use crate::arm::Arm;
 use crate::base::ParameterSet;
@@ -11,7 +15,7 @@ use crate::exact::constant::ConstantField;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::differentiate::{self, Direction};
-use crate::graph::{Builder, Expr, Graph, Input, Operations};
+use crate::graph::{Builder, Expr, Graph, Input, JointSum, Operations};
 use crate::optimize::{self, Pass};
 use std::fmt;
 
@@ -278,9 +282,14 @@ pub struct FunctionGraph {
 }
 
 impl FunctionGraph {
-    /// What it costs.
+    /// What it costs, without what is prepared once.
     pub fn operations(&self) -> Operations {
-        self.graph.operations(&self.outputs)
+        self.graph.operations(&self.outputs).0
+    }
+
+    /// What it costs to prepare its parameters.
+    pub fn preparation(&self) -> Operations {
+        self.graph.operations(&self.outputs).1
     }
 
     /// What it takes: the function's arguments, without the parameters where their values are baked in.
@@ -290,17 +299,57 @@ impl FunctionGraph {
     }
 }
 
-/// Builds a function of an arm for a parameter set, with its parameters as inputs or their values baked in, and runs
-/// passes over its graph.
+/// What functions are built from: an arm with what is known exactly of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject<'a> {
+    /// The arm.
+    pub arm: &'a Arm,
+    /// Its angles that are kept as symbols.
+    pub symbols: &'a AngleSymbols,
+    /// The field of its constants.
+    pub field: &'a ConstantField,
+    /// How all its parameters depend on those of the minimal set.
+    pub minimal: &'a Dependence,
+}
+
+/// Builds a function of an arm for a parameter set, with its parameters as inputs or their values baked in, in the form
+/// that costs least, and runs passes over its graph.
 pub fn build(
     function: Function,
-    arm: &Arm,
-    symbols: &AngleSymbols,
+    subject: &Subject<'_>,
     set: &ParameterSet,
-    field: &ConstantField,
     baked: Option<&[Rational]>,
     passes: &[(&str, Pass)],
 ) -> FunctionGraph {
+    let mut best: Option<(usize, FunctionGraph)> = None;
+    for order in Order::all() {
+        let Subject { arm, symbols, field, minimal } = subject;
+        let regrouping = Regrouping::new(arm, symbols, field, minimal, set, order);
+        for form in Form::ALL {
+            let built = build_in_form(function, subject, set, baked, passes, form, &regrouping);
+            let operations = built.operations();
+            let cost = operations.mul + operations.add;
+            if std::env::var("TRACE").is_ok() {
+                println!("{function} {order:?} {form:?} {} {}", operations.mul, operations.add);
+            }
+            if best.as_ref().is_none_or(|(lowest, _)| cost < *lowest) {
+                best = Some((cost, built));
+            }
+        }
+    }
+    best.unwrap().1
+}
+
+fn build_in_form(
+    function: Function,
+    subject: &Subject<'_>,
+    set: &ParameterSet,
+    baked: Option<&[Rational]>,
+    passes: &[(&str, Pass)],
+    form: Form,
+    regrouping: &Regrouping,
+) -> FunctionGraph {
+    let Subject { arm, symbols, field, .. } = *subject;
     let b = Builder::new();
     let value = |i: usize| match baked {
         Some(values) => b.constant(&values[i]),
@@ -309,10 +358,22 @@ pub fn build(
     let n = arm.dof();
     let elements = ArmElements::build(&b, arm, symbols, &mut Inputs { b: &b, arm });
     let links = links(&b, arm, set, field, value);
+    let chain = Chain::build(&b, arm, &elements, form);
+    let mut bodies = regrouping.bodies(&b, arm, symbols, field, set, value);
+    if let Some(last) = bodies.last_mut() {
+        last.moments = last.moments.turned_back_z(&b, &chain.last_turn.0, &chain.last_turn.1);
+    }
+    let speeds: Vec<Expr> = (0..n).map(|i| b.input(Input::Speed(i))).collect();
     let input = |of: fn(usize) -> Input| -> Vec<Expr> { (0..n).map(|i| b.input(of(i))).collect() };
     let none = vec![Expr::ZERO; n];
     let torque = |accelerations: &[Expr], gravity: bool| {
-        inverse::inverse_dynamics(&b, &elements, &links, accelerations, gravity)
+        let drive = motion::Drive {
+            speeds: speeds.clone(),
+            reference: speeds.clone(),
+            accelerations: accelerations.to_vec(),
+            gravity,
+        };
+        inverse::inverse_dynamics(&b, &chain, &bodies, &drive)
     };
     let regressor = |drive: &Drive| regressor::regressor(&b, arm, &elements, set, field, drive);
     let motion = || Drive { reference: None, accelerations: input(Input::Acceleration), gravity: true };
@@ -343,20 +404,20 @@ pub fn build(
         Function::RegressorTransposeTimes => transposed(regressor(&motion())),
         Function::SlotineLiRegressor => regressor(&reference()),
         Function::SlotineLiTransposeTimes => transposed(regressor(&reference())),
-        Function::MassMatrix => composite::mass_matrix(&b, &elements, &links),
+        Function::MassMatrix => composite::mass_matrix(&b, &chain, &bodies),
         Function::MassMatrixInverse => {
-            forward::inverse_symmetric(&b, &composite::mass_matrix(&b, &elements, &links), n)
+            forward::inverse_symmetric(&b, &composite::mass_matrix(&b, &chain, &bodies), n)
         }
         Function::CoriolisMatrix => coriolis::coriolis_matrix(&b, &elements, &links),
         Function::CoriolisTimesSpeed => torque(&none, false),
         Function::CoriolisTransposeTimesSpeed => {
             momentum::coriolis_transpose_times_speed(&b, &elements, &links)
         }
-        Function::Gravity => inverse::gravity(&b, &elements, &links),
+        Function::Gravity => composite::gravity(&b, &chain, &bodies),
         Function::ForwardDynamics => {
             let bias = torque(&none, true);
             let right: Vec<Expr> = input(Input::Torque).iter().zip(&bias).map(|(t, c)| b.sub(t, c)).collect();
-            forward::solve_symmetric(&b, &composite::mass_matrix(&b, &elements, &links), &right)
+            forward::solve_symmetric(&b, &composite::mass_matrix(&b, &chain, &bodies), &right)
         }
         Function::ForwardKinematics => pose::forward_kinematics(&b, &elements, &tool()),
         Function::Jacobian => pose::jacobian(&b, &elements, &tool()),
@@ -388,7 +449,8 @@ struct Inputs<'a> {
 
 impl Source<Expr> for Inputs<'_> {
     fn joint_trig(&mut self, joint: usize) -> (Expr, Expr) {
-        let (s, c) = (self.b.input(Input::Sin(joint)), self.b.input(Input::Cos(joint)));
+        let sum = JointSum::joint(joint);
+        let (s, c) = (self.b.input(Input::Sin(sum)), self.b.input(Input::Cos(sum)));
         // A constant of quarter turns only swaps and signs; any other is added to the angle itself.
         match self.arm.joints[joint].theta.quarter_turns() {
             Some(1) => (c, -s),

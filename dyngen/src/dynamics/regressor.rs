@@ -2,9 +2,9 @@
 
 use super::body::{Vector, ZERO};
 use super::elements::{ArmElements, JointElements, turn_x, turn_z};
-use super::inverse::{rotor_moment, rotor_torque};
-use super::motion::{Drive, JointMotion, Motion, motions};
-use super::wrench::Wrench;
+use super::old_inverse::{rotor_moment, rotor_torque};
+use super::old_motion::{Drive, JointMotion, Motion, motions};
+use super::old_wrench::Wrench;
 use crate::arm::{Arm, Convention, JointKind, Parameter, ParameterKind};
 use crate::base::ParameterSet;
 use crate::exact::algebra::Algebra;

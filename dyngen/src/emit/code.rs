@@ -5,7 +5,8 @@ use crate::arm::{Arm, JointKind};
 use crate::dynamics::function::{Argument, Size, trig_offset};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::rational;
-use crate::graph::{Expr, Input, Node, operands};
+use crate::graph::{Expr, Input, JointSum, Node, operands};
+use crate::dynamics::chain;
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
@@ -30,7 +31,7 @@ pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
     let (signature, bindings): (Vec<_>, Vec<_>) = others.iter().map(|a| argument(built, *a, &used)).unzip();
     let passed = others.iter().map(|a| Ident::new(a.name(), Span::call_site()));
     let plain = others.iter().map(|a| parameter(*a, a.name()));
-    let positions = positions(built, &used);
+    let positions = positions(arm, &used);
     let trig = trig_of(arm, &used);
     let (q, trig_name) = match uses_positions(&used) {
         true => (quote!(q), quote!(trig)),
@@ -68,22 +69,42 @@ fn is_number(built: &FunctionGraph) -> bool {
 /// The struct of sines and cosines that functions share.
 pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
     let all: BTreeSet<Input> =
-        (0..arm.dof()).flat_map(|i| [Input::Sin(i), Input::Cos(i), Input::Position(i)]).collect();
+        angles(arm).into_iter().flat_map(|sum| [Input::Sin(sum), Input::Cos(sum)]).chain((0..arm.dof()).map(Input::Position)).collect();
     let (bindings, fields) = trig_fields(arm, &all);
+    let sums: Vec<String> = chain::sums(arm)
+        .iter()
+        .enumerate()
+        .map(|(k, sum)| {
+            let text: String = sum
+                .joints()
+                .enumerate()
+                .map(|(k, (i, negative))| {
+                    let sign = if k == 0 { "" } else if negative { " − " } else { " + " };
+                    format!("{sign}q{}", i + 1)
+                })
+                .collect();
+            format!(" Angle {}: {text}, across parallel axes.", arm.dof() + k + 1)
+        })
+        .collect();
+    let count = Literal::usize_unsuffixed(angles(arm).len());
     let shifted: Vec<String> = (0..arm.dof())
         .filter(|i| trig_offset(arm, *i) != 0.0)
         .map(|i| format!(" Joint {}: of q + {} rad.", i + 1, trig_offset(arm, i)))
         .collect();
     quote! {
+        /// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
+        pub const ANGLES: usize = #count;
+
         /// Joint positions with their sines and cosines: computed once and shared between calls, or taken from
         /// wherever the caller has them.
         #(#[doc = #shifted])*
+        #(#[doc = #sums])*
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct Trig<T> {
-            /// Sine of each revolute joint's angle; not read for prismatic joints.
-            pub sin: [T; JOINTS],
-            /// Cosine of each revolute joint's angle; not read for prismatic joints.
-            pub cos: [T; JOINTS],
+            /// Sine of each angle; not read for prismatic joints.
+            pub sin: [T; ANGLES],
+            /// Cosine of each angle; not read for prismatic joints.
+            pub cos: [T; ANGLES],
             /// Position of each prismatic joint, m; not read for revolute joints.
             pub position: [T; JOINTS],
         }
@@ -115,20 +136,28 @@ fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) 
     let (mut names, mut lets) = (Vec::new(), Vec::new());
     let (mut sines, mut cosines, mut places) = (Vec::new(), Vec::new(), Vec::new());
     let zero = quote!(T::zero());
-    for (i, joint) in arm.joints.iter().enumerate() {
-        let (q, s, c) =
-            (format_ident!("q{}", i + 1), format_ident!("s{}", i + 1), format_ident!("c{}", i + 1));
-        let revolute = joint.kind == JointKind::Revolute;
+    for sum in angles(arm) {
+        let revolute = sum.joints().all(|(i, _)| arm.joints[i].kind == JointKind::Revolute);
+        let (s, c) = (format_ident!("s{sum}"), format_ident!("c{sum}"));
         let (sin, cos) =
-            (revolute && used.contains(&Input::Sin(i)), revolute && used.contains(&Input::Cos(i)));
-        let place = !revolute && used.contains(&Input::Position(i));
-        names.push(if sin || cos || place { quote!(#q) } else { quote!(_) });
-        let offset = trig_offset(arm, i);
-        let angle = if offset == 0.0 {
-            quote!(#q)
-        } else {
+            (revolute && used.contains(&Input::Sin(sum)), revolute && used.contains(&Input::Cos(sum)));
+        let terms = sum.joints().enumerate().map(|(k, (i, negative))| {
+            let q = format_ident!("q{}", i + 1);
+            match (k, negative) {
+                (0, _) => quote!(#q),
+                (_, false) => quote!(+ #q),
+                (_, true) => quote!(- #q),
+            }
+        });
+        let offset = sum.value(|i| trig_offset(arm, i));
+        let offset = (offset != 0.0).then(|| {
             let offset = Literal::f64_suffixed(offset);
-            quote!((#q + nalgebra::convert::<f64, T>(#offset)))
+            quote!(+ nalgebra::convert::<f64, T>(#offset))
+        });
+        let angle = if sum.is_joint() && offset.is_none() {
+            quote!(#(#terms)*)
+        } else {
+            quote!((#(#terms)* #offset))
         };
         match (sin, cos) {
             (true, true) => lets.push(quote!(let (#s, #c) = #angle.simd_sin_cos();)),
@@ -138,6 +167,17 @@ fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) 
         }
         sines.push(if sin { quote!(#s) } else { zero.clone() });
         cosines.push(if cos { quote!(#c) } else { zero.clone() });
+    }
+    for i in 0..arm.dof() {
+        let q = format_ident!("q{}", i + 1);
+        let revolute = arm.joints[i].kind == JointKind::Revolute;
+        let place = !revolute && used.contains(&Input::Position(i));
+        let in_angle = |input: &Input| match input {
+            Input::Sin(sum) | Input::Cos(sum) => sum.sign(i).is_some(),
+            _ => false,
+        };
+        let read = place || (revolute && used.iter().any(in_angle));
+        names.push(if read { quote!(#q) } else { quote!(_) });
         places.push(if place { quote!(#q) } else { zero.clone() });
     }
     let bindings = quote! {
@@ -148,19 +188,27 @@ fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) 
     (bindings, fields)
 }
 
+/// The angles of a `Trig`: those of the joints, then sums of parallel joints' angles.
+fn angles(arm: &Arm) -> Vec<JointSum> {
+    (0..arm.dof()).map(JointSum::joint).chain(chain::sums(arm)).collect()
+}
+
 /// Names for what is read of a `Trig`.
-fn positions(built: &FunctionGraph, used: &BTreeSet<Input>) -> TokenStream {
-    let take = |field: &str, letter: &str, input: fn(usize) -> Input| {
+fn positions(arm: &Arm, used: &BTreeSet<Input>) -> TokenStream {
+    let take = |field: &str, inputs: Vec<Input>| {
         let field = Ident::new(field, Span::call_site());
-        let any = (0..built.joints).any(|i| used.contains(&input(i)));
-        let names = (0..built.joints).map(|i| {
-            let name = format_ident!("{letter}{}", i + 1);
-            if used.contains(&input(i)) { quote!(#name) } else { quote!(_) }
+        let any = inputs.iter().any(|input| used.contains(input));
+        let names = inputs.into_iter().map(|input| {
+            let name = format_ident!("{}", input.to_string());
+            if used.contains(&input) { quote!(#name) } else { quote!(_) }
         });
         any.then(|| quote!(let [#(#names),*] = trig.#field;))
     };
-    let lines =
-        [take("sin", "s", Input::Sin), take("cos", "c", Input::Cos), take("position", "q", Input::Position)];
+    let lines = [
+        take("sin", angles(arm).into_iter().map(Input::Sin).collect()),
+        take("cos", angles(arm).into_iter().map(Input::Cos).collect()),
+        take("position", (0..arm.dof()).map(Input::Position).collect()),
+    ];
     let lines = lines.iter().flatten();
     quote!(#(#lines)*)
 }

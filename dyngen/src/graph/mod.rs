@@ -6,9 +6,11 @@
 mod build;
 pub mod differentiate;
 pub mod evaluate;
+mod joint_sum;
 pub mod tape;
 
 pub use build::Builder;
+pub use joint_sum::JointSum;
 
 use crate::exact::rational::Rational;
 use std::collections::HashMap;
@@ -54,10 +56,10 @@ impl std::ops::Neg for Expr {
 /// What a function is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Input {
-    /// sin q of a revolute joint, or sin(q + theta) where theta is no multiple of pi/2.
-    Sin(usize),
+    /// sin q of a revolute joint, or sin(q + theta) where theta is no multiple of pi/2; or of a sum of such angles.
+    Sin(JointSum),
     /// The cosine of the same angle.
-    Cos(usize),
+    Cos(JointSum),
     /// q of a prismatic joint.
     Position(usize),
     /// q̇
@@ -80,8 +82,8 @@ impl fmt::Display for Input {
     /// The name in emitted code and listings.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (letters, index) = match self {
-            Input::Sin(i) => ("s", i),
-            Input::Cos(i) => ("c", i),
+            Input::Sin(sum) => return write!(f, "s{sum}"),
+            Input::Cos(sum) => return write!(f, "c{sum}"),
             Input::Position(i) => ("q", i),
             Input::Speed(i) => ("dq", i),
             Input::Acceleration(i) => ("ddq", i),
@@ -161,23 +163,44 @@ impl Graph {
         (0..self.nodes.len()).filter(|n| needed[*n]).collect()
     }
 
-    /// The operations that some outputs cost.
-    pub fn operations(&self, outputs: &[Expr]) -> Operations {
-        let mut count = Operations::default();
+    /// For each node whether it depends on parameters and on no other input: it can be prepared once.
+    pub fn prepared(&self) -> Vec<bool> {
+        // Whether a node holds parameters, and whether it holds anything else that varies.
+        let mut holds: Vec<(bool, bool)> = Vec::with_capacity(self.nodes.len());
+        for node in &self.nodes {
+            holds.push(match node {
+                Node::Constant(_) | Node::Symbol(..) => (false, false),
+                Node::Input(Input::Parameter(_)) => (true, false),
+                Node::Input(_) => (false, true),
+                _ => operands(node)
+                    .map(|e| holds[e.node()])
+                    .fold((false, false), |sum, x| (sum.0 || x.0, sum.1 || x.1)),
+            });
+        }
+        holds.into_iter().map(|(parameters, state)| parameters && !state).collect()
+    }
+
+    /// The operations that some outputs cost, without those on parameters alone, and those.
+    pub fn operations(&self, outputs: &[Expr]) -> (Operations, Operations) {
+        let (mut count, mut preparation) = (Operations::default(), Operations::default());
         let mut angles = std::collections::BTreeSet::new();
+        let prepared = self.prepared();
         for node in self.needed(outputs) {
+            let count = if prepared[node] { &mut preparation } else { &mut count };
             match self.nodes[node] {
                 Node::Add(..) => count.add += 1,
                 Node::Mul(..) => count.mul += 1,
                 Node::Div(..) => count.div += 1,
-                Node::Input(Input::Sin(i) | Input::Cos(i)) => {
-                    angles.insert(i);
+                Node::Input(Input::Sin(sum) | Input::Cos(sum)) => {
+                    angles.insert(sum);
                 }
                 _ => {}
             }
         }
+        // A sum of angles is formed before its sine and cosine are taken.
+        count.add += angles.iter().map(|sum| sum.len() - 1).sum::<usize>();
         count.sin_cos = angles.len();
-        count
+        (count, preparation)
     }
 }
 

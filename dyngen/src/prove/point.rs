@@ -9,6 +9,7 @@ use crate::exact::prime::{Draws, Fp};
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::{Input, evaluate};
+use crate::graph::evaluate::sine_and_cosine;
 
 /// A pose, rates and parameter values.
 pub(super) struct Point<'a> {
@@ -151,8 +152,9 @@ impl<'a> Point<'a> {
             false => Vec::new(),
         };
         let input = |input: Input| match input {
-            Input::Sin(i) | Input::Position(i) => self.positions[i].0,
-            Input::Cos(i) => self.positions[i].1,
+            Input::Sin(sum) => sine_and_cosine(sum, &|i| self.positions[i]).0,
+            Input::Cos(sum) => sine_and_cosine(sum, &|i| self.positions[i]).1,
+            Input::Position(i) => self.positions[i].0,
             Input::Speed(i) => self.speeds[i],
             Input::Acceleration(i) => self.accelerations[i],
             Input::ReferenceSpeed(i) => self.reference_speeds[i],
