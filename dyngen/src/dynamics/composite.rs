@@ -47,7 +47,7 @@ pub fn pieces(b: &Builder, chain: &Chain, stage: &Stage, bodies: &[LinkBody]) ->
 }
 
 /// A body with a mass added at its origin.
-fn with_mass(b: &Builder, body: &Moments<Expr>, mass: Expr) -> Moments<Expr> {
+pub fn with_mass(b: &Builder, body: &Moments<Expr>, mass: Expr) -> Moments<Expr> {
     Moments { mass: b.add(&body.mass, &mass), ..body.clone() }
 }
 

@@ -408,7 +408,7 @@ fn build_in_form(
         Function::MassMatrixInverse => {
             forward::inverse_symmetric(&b, &composite::mass_matrix(&b, &chain, &bodies), n)
         }
-        Function::CoriolisMatrix => coriolis::coriolis_matrix(&b, &elements, &links),
+        Function::CoriolisMatrix => coriolis::coriolis_matrix(&b, &chain, &bodies, &speeds),
         Function::CoriolisTimesSpeed => torque(&none, false),
         Function::CoriolisTransposeTimesSpeed => {
             momentum::coriolis_transpose_times_speed(&b, &elements, &links)

@@ -1,7 +1,7 @@
 //! Inverse dynamics by the Newton–Euler recursion along the chain.
 
 use super::body::Vector;
-use super::motion::{Drive, LinkMotion, StageMotion, axis_rate, motions};
+use super::motion::{Drive, LinkMotion, StageMotion, axis_rate, motions, own_rate};
 use super::regroup::LinkBody;
 use super::stage::{Chain, Stage, back_z, plus, scaled};
 use super::wrench::{Wrench, lever};
@@ -57,12 +57,6 @@ pub fn inverse_dynamics(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: 
         outer = before.turned_back_x(b, stage.twist);
     }
     torques
-}
-
-/// A joint's own rate from the rates of its stage's coordinates.
-pub fn own_rate(b: &Builder, coordinates: &[Expr], k: usize) -> Expr {
-    let inner = k.checked_sub(1).map_or(Expr::ZERO, |inner| coordinates[inner]);
-    b.sub(&coordinates[k], &inner)
 }
 
 /// What each coordinate of the stage feels, and the wrench before the stage about its first origin.

@@ -133,3 +133,9 @@ pub fn axis_rate(b: &Builder, before: &Spin, speed: Expr, reference: Expr) -> Ve
     let half = b.constant(&crate::exact::rational::Rational::new(1.into(), 2.into()));
     axis_rate_sum(b, before, speed, reference).map(|x| b.mul(&half, &x))
 }
+
+/// A joint's own rate from the rates of its stage's coordinates.
+pub fn own_rate(b: &Builder, coordinates: &[Expr], k: usize) -> Expr {
+    let inner = k.checked_sub(1).map_or(Expr::ZERO, |inner| coordinates[inner]);
+    b.sub(&coordinates[k], &inner)
+}
