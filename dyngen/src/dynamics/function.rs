@@ -3,7 +3,7 @@
 use super::body::links;
 use super::elements::{ArmElements, Source, ToolElements};
 use super::motion;
-use super::old_motion::Drive;
+use super::chain;
 use super::regroup::{Order, Regrouping};
 use super::stage::{Chain, Form};
 use crate::exact::elimination::Dependence;
@@ -375,10 +375,20 @@ fn build_in_form(
         };
         inverse::inverse_dynamics(&b, &chain, &bodies, &drive)
     };
-    let regressor = |drive: &Drive| regressor::regressor(&b, arm, &elements, set, field, drive);
-    let motion = || Drive { reference: None, accelerations: input(Input::Acceleration), gravity: true };
-    let reference = || Drive {
-        reference: Some(input(Input::ReferenceSpeed)),
+    let geometry = chain::geometry(&b, arm, &elements);
+    let regressor = |drive: &motion::Drive| {
+        let columns = regressor::Columns { set, field, links: &geometry, forces_home: form.forces_home };
+        regressor::regressor(&b, &chain, &columns, drive)
+    };
+    let motion = || motion::Drive {
+        speeds: speeds.clone(),
+        reference: speeds.clone(),
+        accelerations: input(Input::Acceleration),
+        gravity: true,
+    };
+    let reference = || motion::Drive {
+        speeds: speeds.clone(),
+        reference: input(Input::ReferenceSpeed),
         accelerations: input(Input::ReferenceAcceleration),
         gravity: true,
     };

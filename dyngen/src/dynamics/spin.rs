@@ -37,7 +37,7 @@ impl Spin {
     }
 
     /// ω_i ω_j, symmetric in ω and ωᵣ.
-    fn product(&self, b: &Builder, i: usize, j: usize) -> Expr {
+    pub fn product(&self, b: &Builder, i: usize, j: usize) -> Expr {
         let twice = self.twice_product(b, i, j);
         let half = b.constant(&crate::exact::rational::Rational::new(1.into(), 2.into()));
         if self.omega == self.reference || i == j {
@@ -55,6 +55,12 @@ impl Spin {
         }
         let [u, r] = [&self.omega, &self.reference];
         b.add(&b.mul(&u[i], &r[j]), &b.mul(&r[i], &u[j]))
+    }
+
+    /// Angular acceleration about an axis.
+    pub fn alpha(&self, b: &Builder, axis: usize) -> Expr {
+        let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+        b.sub(&self.rows[k][j], &self.product(b, j, k))
     }
 
     /// Angular acceleration about z.

@@ -20,15 +20,26 @@ pub struct Form {
     pub link_to_link: bool,
     /// The last link keeps the axes of the frame before it, and its moments are turned instead.
     pub last_in_frame_before: bool,
+    /// The regressor's forces are turned back to where their origin is at rest, not the axes' speeds outwards.
+    pub forces_home: bool,
 }
 
 impl Form {
     /// Every form.
-    pub const ALL: [Form; 4] = {
-        const fn form(link_to_link: bool, last_in_frame_before: bool) -> Form {
-            Form { link_to_link, last_in_frame_before }
+    pub const ALL: [Form; 8] = {
+        const fn form(link_to_link: bool, last_in_frame_before: bool, forces_home: bool) -> Form {
+            Form { link_to_link, last_in_frame_before, forces_home }
         }
-        [form(true, true), form(false, true), form(true, false), form(false, false)]
+        [
+            form(true, true, true),
+            form(false, true, true),
+            form(true, false, true),
+            form(false, false, true),
+            form(true, true, false),
+            form(false, true, false),
+            form(true, false, false),
+            form(false, false, false),
+        ]
     };
 }
 
