@@ -179,7 +179,7 @@ impl Sets {
     }
 }
 
-fn full_set(arm: &Arm, field: &ConstantField) -> ParameterSet {
+pub(super) fn full_set(arm: &Arm, field: &ConstantField) -> ParameterSet {
     let one = field.rational(crate::exact::rational::integer(1));
     let parameters = arm
         .kept_parameters()

@@ -4,7 +4,7 @@ use super::body::links;
 use super::elements::{ArmElements, Source, ToolElements};
 use super::motion;
 use super::chain;
-use super::regroup::{Order, Regrouping};
+use super::regroup::Regrouping;
 use super::stage::{Chain, Form};
 use crate::exact::elimination::Dependence;
 use super::{composite, coriolis, energy, forward, inverse, momentum, pose, regressor};
@@ -250,6 +250,27 @@ impl Function {
         }
     }
 
+    /// The forms of its recursion that may differ in cost.
+    fn forms(self) -> &'static [Form] {
+        use Function::*;
+        match self {
+            Regressor | RegressorTransposeTimes | SlotineLiRegressor | SlotineLiTransposeTimes => &Form::ALL,
+            _ if self.is_recursion_of_parameters() => &Form::ALL[..4],
+            _ => &Form::ALL[..1],
+        }
+    }
+
+    /// Whether it runs along the chain with the links' bodies, so that the parameters may be summed up for it.
+    fn is_recursion_of_parameters(self) -> bool {
+        use Function::*;
+        match self {
+            ForwardKinematics | Jacobian | JacobianRateTimesSpeed => false,
+            PotentialEnergy | KineticEnergyRegressor | PotentialEnergyRegressor => false,
+            Regressor | RegressorTransposeTimes | SlotineLiRegressor | SlotineLiTransposeTimes => false,
+            _ => true,
+        }
+    }
+
     /// Whether it takes an argument.
     pub fn takes(self, argument: Argument) -> bool {
         self.arguments().contains(&argument)
@@ -318,36 +339,45 @@ pub fn build(
     function: Function,
     subject: &Subject<'_>,
     set: &ParameterSet,
+    regroupings: &[Regrouping],
     baked: Option<&[Rational]>,
     passes: &[(&str, Pass)],
 ) -> FunctionGraph {
     let mut best: Option<(usize, FunctionGraph)> = None;
-    for order in Order::all() {
-        let Subject { arm, symbols, field, minimal } = subject;
-        let regrouping = Regrouping::new(arm, symbols, field, minimal, set, order);
-        for form in Form::ALL {
-            let built = build_in_form(function, subject, set, baked, passes, form, &regrouping);
-            let operations = built.operations();
-            let cost = operations.mul + operations.add;
-            if std::env::var("TRACE").is_ok() {
-                println!("{function} {order:?} {form:?} {} {}", operations.mul, operations.add);
-            }
-            if best.as_ref().is_none_or(|(lowest, _)| cost < *lowest) {
-                best = Some((cost, built));
+    let mut keep_cheapest = |built: FunctionGraph| {
+        let operations = built.operations();
+        let cost = operations.mul + operations.add;
+        if best.as_ref().is_none_or(|(lowest, _)| cost < *lowest) {
+            best = Some((cost, built));
+        }
+    };
+    let forms = function.forms();
+    if function.is_recursion_of_parameters() {
+        for regrouping in regroupings {
+            for form in forms {
+                keep_cheapest(build_in(*form, Some(regrouping), function, subject, set, baked, passes));
             }
         }
+    } else {
+        for form in forms {
+            keep_cheapest(build_in(*form, None, function, subject, set, baked, passes));
+        }
     }
-    best.unwrap().1
+    match best {
+        Some((_, built)) => built,
+        None => build_in(Form::ALL[0], None, function, subject, set, baked, passes),
+    }
 }
 
-fn build_in_form(
+/// Builds a function in one form, with its parameters summed up in one way.
+pub fn build_in(
+    form: Form,
+    regrouping: Option<&Regrouping>,
     function: Function,
     subject: &Subject<'_>,
     set: &ParameterSet,
     baked: Option<&[Rational]>,
     passes: &[(&str, Pass)],
-    form: Form,
-    regrouping: &Regrouping,
 ) -> FunctionGraph {
     let Subject { arm, symbols, field, .. } = *subject;
     let b = Builder::new();
@@ -359,7 +389,7 @@ fn build_in_form(
     let elements = ArmElements::build(&b, arm, symbols, &mut Inputs { b: &b, arm });
     let links = links(&b, arm, set, field, value);
     let chain = Chain::build(&b, arm, &elements, form);
-    let mut bodies = regrouping.bodies(&b, arm, symbols, field, set, value);
+    let mut bodies = regrouping.map_or(Vec::new(), |r| r.bodies(&b, arm, symbols, field, set, value));
     if let Some(last) = bodies.last_mut() {
         last.moments = last.moments.turned_back_z(&b, &chain.last_turn.0, &chain.last_turn.1);
     }
