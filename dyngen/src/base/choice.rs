@@ -8,6 +8,7 @@ use super::preference::Preference;
 use super::sets::full_set;
 use crate::arm::Arm;
 use crate::dynamics::function::{self, Subject};
+use crate::dynamics::chain::Origins;
 use crate::dynamics::stage::Form;
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::constant::{Constant, ConstantField};
@@ -77,7 +78,7 @@ impl AllColumns {
             place[parameter.carriers[0].0.index()] = Some(column);
         }
         let build = |form| function::build_in(form, None, Function::Regressor, subject, &full, None, PASSES);
-        AllColumns { forms: Form::ALL.into_iter().map(build).collect(), place }
+        AllColumns { forms: [Origins::Inner, Origins::Outer].into_iter().flat_map(Form::all).map(build).collect(), place }
     }
 
     /// What some columns cost in a form.

@@ -85,14 +85,19 @@ pub fn reversed(arm: &Arm) -> Vec<bool> {
 
 /// For each joint, whether the origin of the chain's frame has moved along the axis by the joint's d, so that as many
 /// origins as possible coincide.
-fn slid(arm: &Arm) -> Vec<bool> {
+fn slid(arm: &Arm, origins: Origins) -> Vec<bool> {
     let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
     // What it costs to reach the next origin: along the common normal, along this axis, along the next one.
     let cost = |i: usize, here: bool, next: bool| -> usize {
         let normal = !length(arm, i).is_zero();
         let along = revolute(i) && !arm.joints[i].d.is_zero() && !here;
         let along_next = i + 1 < arm.dof() && revolute(i + 1) && !arm.joints[i + 1].d.is_zero() && next;
-        [0, 6, 10, 13][[normal, along, along_next].iter().filter(|x| **x).count()]
+        let lengths = [normal, along, along_next].iter().filter(|x| **x).count();
+        let unwanted = match origins {
+            Origins::Inner => along_next,
+            Origins::Outer => along,
+        };
+        [0, 6, 10, 13][lengths] + usize::from(unwanted)
     };
     let n = arm.dof();
     let choices = |i: usize| if revolute(i) && !arm.joints[i].d.is_zero() { 0..2 } else { 0..1 };
@@ -124,14 +129,24 @@ fn length(arm: &Arm, joint: usize) -> &crate::exact::rational::Rational {
     }
 }
 
+/// Where an origin lies on its axis if two places cost the same: nearer to the link before or to the next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Origins {
+    /// At the common normal with the axis before.
+    Inner,
+    /// At the common normal with the next axis.
+    Outer,
+}
+
 /// The frames of an arm's links in any algebra.
 pub fn geometry<A: Algebra>(
     alg: &A,
     arm: &Arm,
+    origins: Origins,
     elements: &ArmElements<A::Value>,
 ) -> Vec<LinkGeometry<A::Value>> {
     let (zero, one) = (alg.integer(0), alg.integer(1));
-    let (reversed, slid) = (reversed(arm), slid(arm));
+    let (reversed, slid) = (reversed(arm), slid(arm, origins));
     let n = arm.dof();
     let joint = |i: usize| &elements.joints[i];
     let turned = |negative: bool, (s, c): (A::Value, A::Value)| {

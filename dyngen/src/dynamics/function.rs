@@ -3,7 +3,7 @@
 use super::body::links;
 use super::elements::{ArmElements, Source, ToolElements};
 use super::motion;
-use super::chain;
+use super::chain::{self, Origins};
 use super::regroup::Regrouping;
 use super::stage::{Chain, Form};
 use crate::exact::elimination::Dependence;
@@ -250,24 +250,13 @@ impl Function {
         }
     }
 
-    /// The forms of its recursion that may differ in cost.
-    fn forms(self) -> &'static [Form] {
+    fn kind(self) -> Kind {
         use Function::*;
         match self {
-            Regressor | RegressorTransposeTimes | SlotineLiRegressor | SlotineLiTransposeTimes => &Form::ALL,
-            _ if self.is_recursion_of_parameters() => &Form::ALL[..4],
-            _ => &Form::ALL[..1],
-        }
-    }
-
-    /// Whether it runs along the chain with the links' bodies, so that the parameters may be summed up for it.
-    fn is_recursion_of_parameters(self) -> bool {
-        use Function::*;
-        match self {
-            ForwardKinematics | Jacobian | JacobianRateTimesSpeed => false,
-            PotentialEnergy | KineticEnergyRegressor | PotentialEnergyRegressor => false,
-            Regressor | RegressorTransposeTimes | SlotineLiRegressor | SlotineLiTransposeTimes => false,
-            _ => true,
+            ForwardKinematics | Jacobian | JacobianRateTimesSpeed => Kind::Other,
+            PotentialEnergy | KineticEnergyRegressor | PotentialEnergyRegressor => Kind::Other,
+            Regressor | RegressorTransposeTimes | SlotineLiRegressor | SlotineLiTransposeTimes => Kind::Regressor,
+            _ => Kind::Dynamics,
         }
     }
 
@@ -275,6 +264,17 @@ impl Function {
     pub fn takes(self, argument: Argument) -> bool {
         self.arguments().contains(&argument)
     }
+}
+
+/// What the cost of a function depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// On the form of the recursion and on how it sums the parameters up.
+    Dynamics,
+    /// On the form of the recursion.
+    Regressor,
+    /// On neither.
+    Other,
 }
 
 impl fmt::Display for Function {
@@ -351,21 +351,25 @@ pub fn build(
             best = Some((cost, built));
         }
     };
-    let forms = function.forms();
-    if function.is_recursion_of_parameters() {
-        for regrouping in regroupings {
-            for form in forms {
-                keep_cheapest(build_in(*form, Some(regrouping), function, subject, set, baked, passes));
+    let both = [Origins::Inner, Origins::Outer];
+    match function.kind() {
+        Kind::Dynamics => {
+            for regrouping in regroupings {
+                for form in Form::all(regrouping.order.origins).take(4) {
+                    keep_cheapest(build_in(form, Some(regrouping), function, subject, set, baked, passes));
+                }
             }
         }
-    } else {
-        for form in forms {
-            keep_cheapest(build_in(*form, None, function, subject, set, baked, passes));
+        Kind::Regressor => {
+            for form in both.into_iter().flat_map(Form::all) {
+                keep_cheapest(build_in(form, None, function, subject, set, baked, passes));
+            }
         }
+        Kind::Other => {}
     }
     match best {
         Some((_, built)) => built,
-        None => build_in(Form::ALL[0], None, function, subject, set, baked, passes),
+        None => build_in(Form::FIRST, None, function, subject, set, baked, passes),
     }
 }
 
@@ -405,7 +409,7 @@ pub fn build_in(
         };
         inverse::inverse_dynamics(&b, &chain, &bodies, &drive)
     };
-    let geometry = chain::geometry(&b, arm, &elements);
+    let geometry = chain::geometry(&b, arm, form.origins, &elements);
     let regressor = |drive: &motion::Drive| {
         let columns = regressor::Columns { set, field, links: &geometry, forces_home: form.forces_home };
         regressor::regressor(&b, &chain, &columns, drive)

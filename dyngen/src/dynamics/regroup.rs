@@ -5,7 +5,7 @@
 //! arm's file. The sums are linear in the set's parameters and depend on no state, so they are prepared once.
 
 use super::body::constant;
-use super::chain::{self, LinkGeometry};
+use super::chain::{self, LinkGeometry, Origins};
 use super::elements::{ArmElements, Source};
 use super::moments::{ENTRIES, Moments};
 use crate::arm::{Arm, JointKind, Parameter, ParameterKind};
@@ -44,6 +44,8 @@ enum Column {
 /// A rule for which columns carry the sums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Order {
+    /// Where the origins lie on their axes.
+    pub origins: Origins,
     /// Outer links keep, not inner ones.
     pub outer: bool,
     /// Masses at the ends of links, not first moments along the axes.
@@ -55,8 +57,10 @@ pub struct Order {
 impl Order {
     /// Every rule that is tried.
     pub fn all() -> impl Iterator<Item = Order> {
-        let of = |(flywheels, masses): (usize, bool)| Order { outer: false, masses, flywheels };
-        [(2, true), (2, false), (1, true), (1, false), (0, true), (0, false)].into_iter().map(of)
+        [Origins::Inner, Origins::Outer].into_iter().flat_map(|origins| {
+            let of = move |(flywheels, masses): (usize, bool)| Order { origins, outer: false, masses, flywheels };
+            [(2, true), (2, false), (1, true), (1, false), (0, true), (0, false)].into_iter().map(of)
+        })
     }
 
     fn rank(self, arm: &Arm, stage_of: &[usize], column: Column) -> (usize, usize) {
@@ -88,6 +92,8 @@ impl Order {
 /// The sums and the columns that carry them.
 #[derive(Clone, Debug)]
 pub struct Regrouping {
+    /// The rule.
+    pub order: Order,
     columns: Vec<(Column, Vec<(usize, Constant)>)>,
 }
 
@@ -137,9 +143,9 @@ struct Map<'a> {
 }
 
 impl<'a> Map<'a> {
-    fn new(arm: &Arm, symbols: &AngleSymbols, field: &'a ConstantField) -> Self {
+    fn new(arm: &Arm, symbols: &AngleSymbols, field: &'a ConstantField, origins: Origins) -> Self {
         let elements = ArmElements::build(field, arm, symbols, &mut Constants { field, arm });
-        Map { field, links: chain::geometry(field, arm, &elements) }
+        Map { field, links: chain::geometry(field, arm, origins, &elements) }
     }
 
     /// What a unit of a parameter of the file is in the link's frame.
@@ -232,7 +238,7 @@ impl Regrouping {
         set: &ParameterSet,
         order: Order,
     ) -> Regrouping {
-        let map = Map::new(arm, symbols, field);
+        let map = Map::new(arm, symbols, field, order.origins);
         let n = arm.dof();
         let mut before_stage = vec![None; n];
         let mut stage_of = vec![0; n];
@@ -263,7 +269,7 @@ impl Regrouping {
         let dependence = elimination::dependence_of_columns(field, &coordinates, minimal.kept.len());
         let Ok(dependence) = dependence else {
             let one = |p: usize| vec![(p, field.integer(1))];
-            return Regrouping { columns: given.enumerate().map(|(p, c)| (c, one(p))).collect() };
+            return Regrouping { order, columns: given.enumerate().map(|(p, c)| (c, one(p))).collect() };
         };
         let mut sums: Vec<(Column, Vec<(usize, Constant)>)> =
             dependence.kept.iter().map(|k| (columns[*k], Vec::new())).collect();
@@ -274,7 +280,7 @@ impl Regrouping {
                 }
             }
         }
-        Regrouping { columns: sums }
+        Regrouping { order, columns: sums }
     }
 
     /// The links with the sums in place, for values of the set's parameters.
@@ -294,7 +300,7 @@ impl Regrouping {
             flywheel: Expr::ZERO,
         };
         let mut bodies = vec![none; arm.dof()];
-        let map = Map::new(arm, symbols, field);
+        let map = Map::new(arm, symbols, field, self.order.origins);
         let term = |factor: &Constant, x: Expr| b.mul(&constant(b, field, factor), &x);
         for (column, sum) in &self.columns {
             let sum = sum.iter().fold(Expr::ZERO, |total, (p, factor)| b.add(&total, &term(factor, value(*p))));

@@ -1,7 +1,7 @@
 //! The chain in expressions: stages of parallel axes with their angles, ready for a recursion.
 
 use super::body::{Vector, ZERO};
-use super::chain::{self, LinkGeometry};
+use super::chain::{self, LinkGeometry, Origins};
 use super::elements::ArmElements;
 use crate::arm::{Arm, JointKind};
 use crate::exact::algebra::Algebra;
@@ -16,6 +16,8 @@ pub const STRAIGHT: SinCos = (Expr::ZERO, Expr::ONE);
 /// The form of a recursion: all forms give the same function, which is cheaper depends on the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Form {
+    /// Where origins lie on their axes.
+    pub origins: Origins,
     /// Within a stage vectors are turned from link to link, not through the frame before the stage.
     pub link_to_link: bool,
     /// The last link keeps the axes of the frame before it, and its moments are turned instead.
@@ -25,22 +27,19 @@ pub struct Form {
 }
 
 impl Form {
-    /// Every form.
-    pub const ALL: [Form; 8] = {
-        const fn form(link_to_link: bool, last_in_frame_before: bool, forces_home: bool) -> Form {
-            Form { link_to_link, last_in_frame_before, forces_home }
-        }
-        [
-            form(true, true, true),
-            form(false, true, true),
-            form(true, false, true),
-            form(false, false, true),
-            form(true, true, false),
-            form(false, true, false),
-            form(true, false, false),
-            form(false, false, false),
-        ]
-    };
+    /// One of them.
+    pub const FIRST: Form =
+        Form { origins: Origins::Inner, link_to_link: true, last_in_frame_before: true, forces_home: true };
+
+    /// Every form with some origins.
+    pub fn all(origins: Origins) -> impl Iterator<Item = Form> {
+        (0..8).map(move |k| Form {
+            origins,
+            link_to_link: k & 1 == 0,
+            last_in_frame_before: k & 2 == 0,
+            forces_home: k & 4 == 0,
+        })
+    }
 }
 
 /// A link in its stage.
@@ -89,7 +88,7 @@ pub struct Chain {
 impl Chain {
     /// The chain of an arm.
     pub fn build(b: &Builder, arm: &Arm, elements: &ArmElements<Expr>, form: Form) -> Chain {
-        let links = chain::geometry(b, arm, elements);
+        let links = chain::geometry(b, arm, form.origins, elements);
         let stages = chain::stages(arm);
         let mut stages: Vec<Stage> =
             stages.into_iter().map(|joints| stage(b, arm, elements, &links, joints)).collect();
