@@ -4,8 +4,8 @@ use super::body::{Vector, ZERO};
 use super::chain::LinkGeometry;
 use super::inverse::entry_wrench;
 use super::motion::{Drive, LinkMotion, StageMotion, axis_rate, motions, own_rate};
-use super::spin::turned_tensor;
-use super::stage::{Chain, Stage, back_x, back_z, plus, scaled};
+use super::spin::{Spin, turned_tensor};
+use super::stage::{Chain, STRAIGHT, SinCos, Stage, back_x, back_z, plus, scaled};
 use super::wrench::Wrench;
 use crate::arm::{JointKind, Parameter, ParameterKind};
 use crate::base::ParameterSet;
@@ -35,8 +35,8 @@ struct LinkView {
 /// A turn back by a sine and cosine about x or z.
 #[derive(Clone, Copy, Debug)]
 enum Turn {
-    X(super::stage::SinCos),
-    Z(super::stage::SinCos),
+    X(SinCos),
+    Z(SinCos),
 }
 
 impl Turn {
@@ -92,7 +92,7 @@ fn views(b: &Builder, chain: &Chain, motions: &[StageMotion]) -> (Vec<LinkView>,
     let mut seen: Vec<Axis> = Vec::new();
     let (mut views, mut before_stages) = (Vec::with_capacity(chain.dof()), Vec::new());
     let mut home: Option<(Vec<Turn>, Vec<Vector>)> = None;
-    let turn_z = |(s, c): super::stage::SinCos, v: &Vector| super::elements::turn_z(b, &s, &c, v);
+    let turn_z = |(s, c): SinCos, v: &Vector| super::elements::turn_z(b, &s, &c, v);
     for (stage, motion) in chain.stages.iter().zip(motions) {
         let (s, c) = stage.twist;
         for axis in &mut seen {
@@ -233,6 +233,11 @@ fn unit_wrench(
         Wrench { force: motion.spin.times(b, &arm), moment: b.cross(&arm, &acceleration) }
     };
     let tensor = |i: usize, j: usize, sign: Expr| {
+        let axis = back_x(b, geometry.file_turn, &unit(i));
+        if i == j && last && chain.last_turn != STRAIGHT && axis[2] == Expr::ZERO {
+            let across = axis[0] == Expr::ZERO;
+            return Wrench { force: ZERO, moment: turned_moment(b, chain.last_turn, across, motion) };
+        }
         let mut rows = [ZERO; 3];
         (rows[i][j], rows[j][i]) = (sign, sign);
         Wrench { force: ZERO, moment: tensor_moment(b, &turned_tensor(&rows, turn), motion) }
@@ -251,6 +256,21 @@ fn unit_wrench(
         Ixy => tensor(0, 1, -Expr::ONE),
         Im => Wrench::NONE,
     }
+}
+
+/// I α + ω×(I ω) of a unit moment of inertia about an axis that is turned about z from x, or from y across it.
+///
+/// With the second moment across the axis: with e that direction it is e×(U e), less the moment of the inertia about z.
+fn turned_moment(b: &Builder, trig: SinCos, across: bool, motion: &LinkMotion) -> Vector {
+    let spin = &motion.spin;
+    let turn = |v: &Vector| super::elements::turn_z(b, &trig.0, &trig.1, v);
+    let own = Spin { omega: turn(&spin.omega), reference: turn(&spin.reference), ..*spin };
+    let [along, beside, _] = turn(&spin.rows[2]);
+    let (height, about_z) = if across { (along, own.product(b, 0, 1)) } else { (beside, -own.product(b, 0, 1)) };
+    let lever = if across { [Expr::ZERO, -height, about_z] } else { [height, Expr::ZERO, about_z] };
+    let turned = back_z(b, trig, &lever);
+    let zz = [spin.product(b, 1, 2), -spin.product(b, 2, 0), Expr::ZERO];
+    std::array::from_fn(|i| b.sub(&turned[i], &zz[i]))
 }
 
 /// I α + ω×(I ω) of a tensor by rows.
