@@ -3,7 +3,7 @@
 use crate::base::SetKind;
 use crate::dynamics::Function;
 use crate::dynamics::function::{Argument, trig_offset};
-use crate::graph::{Input, JointSum};
+use crate::graph::{Input, JointSum, Preparation};
 use crate::graph::tape::{LANES, Lane, Tape};
 use crate::model::{Error, Model};
 
@@ -52,6 +52,8 @@ pub struct Evaluator {
     dof: usize,
     parameters: usize,
     offsets: Vec<f64>,
+    /// What depends on the parameters alone, run once for all samples.
+    preparation: Tape,
     tape: Tape,
 }
 
@@ -68,12 +70,15 @@ impl Evaluator {
             if sine { s } else { c }
         };
         let dof = model.arm().dof();
+        let mut preparation = Preparation::default();
+        let built = built.without_preparation(&mut preparation);
         Ok(Evaluator {
             function,
             shape: built.shape,
             dof,
             parameters: model.set(kind)?.parameters.len(),
             offsets: (0..dof).map(|i| trig_offset(model.arm(), i)).collect(),
+            preparation: Tape::compile(&preparation.graph(), preparation.values(), symbol),
             tape: Tape::compile(&built.graph, &built.outputs, symbol),
         })
     }
@@ -116,6 +121,7 @@ impl Evaluator {
             };
             assert_eq!(given, expected, "{}: {expected} numbers are needed", argument.name());
         }
+        let prepared = self.prepared(samples.parameters);
         let mut workspace = self.tape.workspace();
         for first in (0..count).step_by(LANES) {
             let filled = LANES.min(count - first);
@@ -151,6 +157,7 @@ impl Evaluator {
                     Input::Torque(i) => gather(Argument::Torques, i, lane),
                     Input::Error(i) => gather(Argument::Errors, i, lane),
                     Input::Parameter(i) => *lane = [samples.parameters[i]; LANES],
+                    Input::Prepared(i) => *lane = [prepared[i]; LANES],
                 },
                 |index, lane, negative| {
                     for (k, value) in lane.iter().take(filled).enumerate() {
@@ -159,5 +166,20 @@ impl Evaluator {
                 },
             );
         }
+    }
+
+    /// What the function needs of the parameters alone.
+    fn prepared(&self, parameters: &[f64]) -> Vec<f64> {
+        let mut values = vec![0.0; self.preparation.outputs()];
+        let input = |input: Input, lane: &mut Lane| {
+            if let Input::Parameter(i) = input {
+                *lane = [parameters[i]; LANES];
+            }
+        };
+        let output = |index: usize, lane: &Lane, negative: bool| {
+            values[index] = if negative { -lane[0] } else { lane[0] };
+        };
+        self.preparation.run(&mut self.preparation.workspace(), input, output);
+        values
     }
 }

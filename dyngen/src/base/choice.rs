@@ -88,7 +88,7 @@ impl AllColumns {
             .flat_map(|c| (0..rows).map(move |r| r * columns + c))
             .map(|k| form.outputs[k])
             .collect();
-        let operations = form.graph.operations(&outputs).0;
+        let operations = form.graph.operations(&outputs);
         operations.mul + operations.add
     }
 

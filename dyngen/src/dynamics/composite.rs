@@ -263,8 +263,14 @@ pub fn project_inwards(
 /// The torques that hold the arm still, g(q) = ∂U/∂q: first moments carried inwards, gravity outwards.
 pub fn gravity(b: &Builder, chain: &Chain, bodies: &[LinkBody]) -> Vec<Expr> {
     let mut torques = vec![Expr::ZERO; chain.dof()];
+    // Along an axis of the base its size goes into the moments, which do not depend on the pose.
+    let along: Vec<usize> = (0..3).filter(|i| chain.gravity[*i] != Expr::ZERO).collect();
+    let (size, mut g) = match along[..] {
+        [axis] => (chain.gravity[axis], std::array::from_fn(|i| if i == axis { Expr::ONE } else { Expr::ZERO })),
+        _ => (Expr::ONE, chain.gravity),
+    };
+    let weight = |mass: Expr| b.mul(&size, &mass);
     // Gravity in the axes before each stage, and in each link's.
-    let mut g = chain.gravity;
     let mut before = Vec::with_capacity(chain.stages.len());
     for stage in &chain.stages {
         g = super::elements::turn_x(b, &stage.twist.0, &stage.twist.1, &g);
@@ -279,12 +285,13 @@ pub fn gravity(b: &Builder, chain: &Chain, bodies: &[LinkBody]) -> Vec<Expr> {
         let mut sum = Expr::ZERO;
         for (k, member) in stage.members.iter().enumerate().rev() {
             let body = &bodies[member.joint];
-            mass = b.add(&mass, &body.end_mass);
-            let mut own = plus(b, &body.moments.first, &super::stage::scaled(b, mass, &member.reach));
+            mass = b.add(&mass, &weight(body.end_mass));
+            let first_moment = body.moments.first.map(weight);
+            let mut own = plus(b, &first_moment, &super::stage::scaled(b, mass, &member.reach));
             if k + 1 == stage.members.len() {
                 own = plus(b, &own, &first);
             }
-            mass = b.add(&mass, &body.moments.mass);
+            mass = b.add(&mass, &weight(body.moments.mass));
             let own = back_z(b, member.angle, &own);
             at_first = plus(b, &at_first, &own);
             let torque = match stage.kind {

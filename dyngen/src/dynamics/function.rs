@@ -15,8 +15,8 @@ use crate::exact::constant::ConstantField;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::differentiate::{self, Direction};
-use crate::graph::{Builder, Expr, Graph, Input, JointSum, Operations};
-use crate::optimize::{self, Pass};
+use crate::graph::{Builder, Expr, Graph, Input, JointSum, Operations, Preparation};
+use crate::optimize::{self, COMPARED, Pass};
 use std::fmt;
 
 /// A function of the arm's state.
@@ -303,14 +303,16 @@ pub struct FunctionGraph {
 }
 
 impl FunctionGraph {
-    /// What it costs, without what is prepared once.
+    /// What it costs, without what is prepared of the parameters alone.
     pub fn operations(&self) -> Operations {
-        self.graph.operations(&self.outputs).0
+        self.graph.operations_when_prepared(&self.outputs)
     }
 
-    /// What it costs to prepare its parameters.
-    pub fn preparation(&self) -> Operations {
-        self.graph.operations(&self.outputs).1
+    /// The function without what depends on the parameters alone, which `preparation` takes.
+    #[must_use]
+    pub fn without_preparation(&self, preparation: &mut Preparation) -> FunctionGraph {
+        let (graph, outputs) = preparation.take_out(&self.graph, &self.outputs);
+        FunctionGraph { graph, outputs, ..self.clone() }
     }
 
     /// What it takes: the function's arguments, without the parameters where their values are baked in.
@@ -343,6 +345,8 @@ pub fn build(
     baked: Option<&[Rational]>,
     passes: &[(&str, Pass)],
 ) -> FunctionGraph {
+    // The forms are compared after the first passes; the others go over the cheapest.
+    let (passes, rest) = passes.split_at(passes.len().min(COMPARED));
     let mut best: Option<(usize, FunctionGraph)> = None;
     let mut keep_cheapest = |built: FunctionGraph| {
         let operations = built.operations();
@@ -367,10 +371,12 @@ pub fn build(
         }
         Kind::Other => {}
     }
-    match best {
+    let cheapest = match best {
         Some((_, built)) => built,
         None => build_in(Form::FIRST, None, function, subject, set, baked, passes),
-    }
+    };
+    let (graph, outputs) = optimize::optimize(cheapest.graph, cheapest.outputs, subject.field, rest);
+    FunctionGraph { graph, outputs, ..cheapest }
 }
 
 /// Builds a function in one form, with its parameters summed up in one way.

@@ -5,7 +5,7 @@ use crate::arm::{Arm, JointKind};
 use crate::dynamics::function::{Argument, Size, trig_offset};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::rational;
-use crate::graph::{Expr, Input, JointSum, Node, operands};
+use crate::graph::{Expr, Graph, Input, JointSum, Node, Preparation, operands};
 use crate::dynamics::chain;
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
@@ -13,7 +13,7 @@ use quote::{format_ident, quote};
 use std::collections::BTreeSet;
 
 /// A function's items: one that takes q, and one that takes [`Trig`] in its place.
-pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
+pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) -> TokenStream {
     let arm = model.arm();
     let needed = built.graph.needed(&built.outputs);
     let used: BTreeSet<Input> = needed
@@ -28,7 +28,7 @@ pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
     let doc = docs::lines(&docs::function(built));
     let doc_with = docs::lines(&docs::function_with(built));
     let others: Vec<Argument> = built.arguments().filter(|a| *a != Argument::Positions).collect();
-    let (signature, bindings): (Vec<_>, Vec<_>) = others.iter().map(|a| argument(built, *a, &used)).unzip();
+    let (signature, bindings): (Vec<_>, Vec<_>) = others.iter().map(|a| argument(built, prepared, *a, &used)).unzip();
     let passed = others.iter().map(|a| Ident::new(a.name(), Span::call_site()));
     let plain = others.iter().map(|a| parameter(*a, a.name()));
     let positions = positions(arm, &used);
@@ -37,7 +37,7 @@ pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
         true => (quote!(q), quote!(trig)),
         false => (quote!(_q), quote!(_trig)),
     };
-    let statements = sections(model, built, &needed);
+    let statements = sections(model, &built.graph, &built.outputs, &needed);
     let (result, value) = result(built);
     // Where the result is a number, the last `let` is the result.
     let lint = is_number(built).then(|| quote!(#[allow(clippy::let_and_return)]));
@@ -223,7 +223,7 @@ fn input_of(argument: Argument, i: usize) -> Input {
         Argument::ReferenceAccelerations => Input::ReferenceAcceleration(i),
         Argument::Torques => Input::Torque(i),
         Argument::Errors => Input::Error(i),
-        Argument::Parameters => Input::Parameter(i),
+        Argument::Parameters => Input::Prepared(i),
     }
 }
 
@@ -234,21 +234,100 @@ fn parameter(argument: Argument, name: &str) -> TokenStream {
     quote!(#ident: &SVector<T, #length>)
 }
 
+/// `name: &impl Parameters<T>` for parameters, which may be prepared.
+fn shared_parameter(argument: Argument, name: &str) -> TokenStream {
+    if argument != Argument::Parameters {
+        return parameter(argument, name);
+    }
+    let ident = Ident::new(name, Span::call_site());
+    quote!(#ident: &impl Parameters<T>)
+}
+
 /// An argument in the signature, and the line that names what is used of it.
-fn argument(built: &FunctionGraph, argument: Argument, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
+fn argument(
+    built: &FunctionGraph,
+    prepared: usize,
+    argument: Argument,
+    used: &BTreeSet<Input>,
+) -> (TokenStream, TokenStream) {
     let is_parameters = argument == Argument::Parameters;
-    let length = if is_parameters { built.parameters } else { built.joints };
-    let letter = if is_parameters { "p" } else { argument.name() };
+    let length = if is_parameters { prepared } else { built.joints };
     let is_used = |i: usize| used.contains(&input_of(argument, i));
     if !(0..length).any(is_used) {
-        return (parameter(argument, &format!("_{}", argument.name())), quote!());
+        return (shared_parameter(argument, &format!("_{}", argument.name())), quote!());
     }
     let names = (0..length).map(|i| {
-        let name = format_ident!("{letter}{}", i + 1);
+        let name = format_ident!("{}", input_of(argument, i).to_string());
         if is_used(i) { quote!(#name) } else { quote!(_) }
     });
     let ident = Ident::new(argument.name(), Span::call_site());
-    (parameter(argument, argument.name()), quote!(let [[#(#names),*]] = #ident.data.0;))
+    let parameter = shared_parameter(argument, argument.name());
+    match is_parameters {
+        true => (parameter, quote!(let Prepared([#(#names),*]) = #ident.prepared();)),
+        false => (parameter, quote!(let [[#(#names),*]] = #ident.data.0;)),
+    }
+}
+
+/// What functions need of the parameters alone: the function that prepares it, and the trait by which they take it.
+pub(super) fn preparation(model: &Model, preparation: &Preparation) -> TokenStream {
+    let count = Literal::usize_unsuffixed(preparation.values().len());
+    let graph = preparation.graph();
+    let needed = graph.needed(preparation.values());
+    let names: Vec<TokenStream> = needed
+        .iter()
+        .filter_map(|n| match graph.nodes()[*n] {
+            Node::Input(Input::Parameter(i)) => Some(i),
+            _ => None,
+        })
+        .map(|i| {
+            let (name, i) = (format_ident!("p{}", i + 1), Literal::usize_unsuffixed(i));
+            quote!(let #name = parameters[#i];)
+        })
+        .collect();
+    let statements = sections(model, &graph, preparation.values(), &needed);
+    let values = preparation.values().iter().map(|e| value_name(&graph, e.node()));
+    let operations = preparation.operations();
+    let doc = format!(
+        " Operations: {} multiplications, {} additions.",
+        operations.mul, operations.add
+    );
+    quote! {
+        /// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of calls.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct Prepared<T>([T; #count]);
+
+        /// What the functions need of the parameters alone: pass it to those that end in `_with`, in place of the parameters.
+        ///
+        #[doc = #doc]
+        #[inline]
+        #[must_use]
+        pub fn prepare<T: SimdRealField + Copy>(parameters: &SVector<T, PARAMETERS>) -> Prepared<T> {
+            let [parameters] = parameters.data.0;
+            #(#names)*
+            #(#statements)*
+            Prepared([#(#values),*])
+        }
+
+        /// Parameters, or what was prepared of them.
+        pub trait Parameters<T> {
+            /// What the functions need of them.
+            fn prepared(&self) -> Prepared<T>;
+        }
+
+        impl<T: SimdRealField + Copy> Parameters<T> for SVector<T, PARAMETERS> {
+            #[inline]
+            fn prepared(&self) -> Prepared<T> {
+                prepare(self)
+            }
+        }
+
+        impl<T: Copy> Parameters<T> for Prepared<T> {
+            #[inline]
+            fn prepared(&self) -> Prepared<T> {
+                *self
+            }
+        }
+    }
 }
 
 /// Nodes in one block of code.
@@ -257,26 +336,26 @@ const SECTION: usize = 256;
 /// The body, in blocks that hand on only what later ones need. Every `let` opens a scope within the one before, and a
 /// compiler that writes debug information goes through nested scopes by recursion: thousands of them in a row
 /// exhaust its stack.
-fn sections(model: &Model, built: &FunctionGraph, needed: &[usize]) -> Vec<TokenStream> {
+fn sections(model: &Model, graph: &Graph, outputs: &[Expr], needed: &[usize]) -> Vec<TokenStream> {
     let computed: Vec<usize> =
-        needed.iter().copied().filter(|n| !matches!(built.graph.nodes()[*n], Node::Input(_))).collect();
-    let statement = |n: &usize| statement(model, built, *n);
+        needed.iter().copied().filter(|n| !matches!(graph.nodes()[*n], Node::Input(_))).collect();
+    let statement = |n: &usize| statement(model, graph, *n);
     if computed.len() <= 2 * SECTION {
         return computed.iter().filter_map(statement).collect();
     }
-    let mut last_use = vec![0; built.graph.nodes().len()];
+    let mut last_use = vec![0; graph.nodes().len()];
     for (position, node) in computed.iter().enumerate() {
-        for operand in operands(&built.graph.nodes()[*node]) {
+        for operand in operands(&graph.nodes()[*node]) {
             last_use[operand.node()] = position;
         }
     }
-    for output in &built.outputs {
+    for output in outputs {
         last_use[output.node()] = usize::MAX;
     }
     let mut blocks = Vec::new();
     for (k, section) in computed.chunks(SECTION).enumerate() {
         let end = (k + 1) * SECTION;
-        let handed_on = section.iter().filter(|n| last_use[**n] >= end).map(|n| value_name(built, *n));
+        let handed_on = section.iter().filter(|n| last_use[**n] >= end).map(|n| value_name(graph, *n));
         let names: Vec<Ident> = handed_on.collect();
         let statements = section.iter().filter_map(statement);
         blocks.push(quote! {
@@ -290,13 +369,13 @@ fn sections(model: &Model, built: &FunctionGraph, needed: &[usize]) -> Vec<Token
 }
 
 /// The `let` of a node; inputs are bound already.
-fn statement(model: &Model, built: &FunctionGraph, node: usize) -> Option<TokenStream> {
+fn statement(model: &Model, graph: &Graph, node: usize) -> Option<TokenStream> {
     let name = format_ident!("x{node}");
-    let operand = |e: Expr| value_name(built, e.node());
-    Some(match built.graph.nodes()[node] {
+    let operand = |e: Expr| value_name(graph, e.node());
+    Some(match graph.nodes()[node] {
         Node::Input(_) => return None,
         Node::Constant(index) => {
-            let value = Literal::f64_suffixed(rational::to_f64(built.graph.constant(index)));
+            let value = Literal::f64_suffixed(rational::to_f64(graph.constant(index)));
             quote!(let #name: T = nalgebra::convert(#value);)
         }
         Node::Symbol(index, sine) => {
@@ -319,8 +398,8 @@ fn statement(model: &Model, built: &FunctionGraph, node: usize) -> Option<TokenS
     })
 }
 
-fn value_name(built: &FunctionGraph, node: usize) -> Ident {
-    match built.graph.nodes()[node] {
+fn value_name(graph: &Graph, node: usize) -> Ident {
+    match graph.nodes()[node] {
         Node::Input(input) => format_ident!("{}", input.to_string()),
         _ => format_ident!("x{node}"),
     }
@@ -331,7 +410,7 @@ fn result(built: &FunctionGraph) -> (TokenStream, TokenStream) {
     let (rows, columns) = built.shape;
     let value = |i: usize, j: usize| {
         let e = built.outputs[i * columns + j];
-        let name = value_name(built, e.node());
+        let name = value_name(&built.graph, e.node());
         if e.is_negative() { quote!(-#name) } else { quote!(#name) }
     };
     let columns_of: Vec<TokenStream> = (0..columns)

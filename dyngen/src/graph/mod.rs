@@ -7,10 +7,12 @@ mod build;
 pub mod differentiate;
 pub mod evaluate;
 mod joint_sum;
+mod preparation;
 pub mod tape;
 
 pub use build::Builder;
 pub use joint_sum::JointSum;
+pub use preparation::Preparation;
 
 use crate::exact::rational::Rational;
 use std::collections::HashMap;
@@ -76,6 +78,8 @@ pub enum Input {
     Error(usize),
     /// A parameter of the set.
     Parameter(usize),
+    /// A value that was prepared of the parameters alone.
+    Prepared(usize),
 }
 
 impl fmt::Display for Input {
@@ -92,6 +96,7 @@ impl fmt::Display for Input {
             Input::ReferenceAcceleration(i) => ("ddqr", i),
             Input::Error(i) => ("e", i),
             Input::Parameter(i) => ("p", i),
+            Input::Prepared(i) => ("z", i),
         };
         write!(f, "{letters}{}", index + 1)
     }
@@ -163,30 +168,37 @@ impl Graph {
         (0..self.nodes.len()).filter(|n| needed[*n]).collect()
     }
 
-    /// For each node whether it depends on parameters and on no other input: it can be prepared once.
-    pub fn prepared(&self) -> Vec<bool> {
-        // Whether a node holds parameters, and whether it holds anything else that varies.
-        let mut holds: Vec<(bool, bool)> = Vec::with_capacity(self.nodes.len());
+    /// For each node on what it depends.
+    pub fn holds(&self) -> Vec<Holds> {
+        let mut holds: Vec<Holds> = Vec::with_capacity(self.nodes.len());
         for node in &self.nodes {
             holds.push(match node {
-                Node::Constant(_) | Node::Symbol(..) => (false, false),
-                Node::Input(Input::Parameter(_)) => (true, false),
-                Node::Input(_) => (false, true),
-                _ => operands(node)
-                    .map(|e| holds[e.node()])
-                    .fold((false, false), |sum, x| (sum.0 || x.0, sum.1 || x.1)),
+                Node::Input(Input::Parameter(_)) => Holds { parameters: true, state: false },
+                Node::Input(_) => Holds { parameters: false, state: true },
+                _ => operands(node).map(|e| holds[e.node()]).fold(Holds::default(), |sum, x| Holds {
+                    parameters: sum.parameters || x.parameters,
+                    state: sum.state || x.state,
+                }),
             });
         }
-        holds.into_iter().map(|(parameters, state)| parameters && !state).collect()
+        holds
     }
 
-    /// The operations that some outputs cost, without those on parameters alone, and those.
-    pub fn operations(&self, outputs: &[Expr]) -> (Operations, Operations) {
-        let (mut count, mut preparation) = (Operations::default(), Operations::default());
+    /// The operations that some outputs cost.
+    pub fn operations(&self, outputs: &[Expr]) -> Operations {
+        self.count(outputs, |_| true)
+    }
+
+    /// The operations that some outputs cost beside those that depend on parameters alone and can be prepared.
+    pub fn operations_when_prepared(&self, outputs: &[Expr]) -> Operations {
+        let holds = self.holds();
+        self.count(outputs, |node| holds[node].state || !holds[node].parameters)
+    }
+
+    fn count(&self, outputs: &[Expr], counts: impl Fn(usize) -> bool) -> Operations {
+        let mut count = Operations::default();
         let mut angles = std::collections::BTreeSet::new();
-        let prepared = self.prepared();
-        for node in self.needed(outputs) {
-            let count = if prepared[node] { &mut preparation } else { &mut count };
+        for node in self.needed(outputs).into_iter().filter(|n| counts(*n)) {
             match self.nodes[node] {
                 Node::Add(..) => count.add += 1,
                 Node::Mul(..) => count.mul += 1,
@@ -200,8 +212,17 @@ impl Graph {
         // A sum of angles is formed before its sine and cosine are taken.
         count.add += angles.iter().map(|sum| sum.len() - 1).sum::<usize>();
         count.sin_cos = angles.len();
-        (count, preparation)
+        count
     }
+}
+
+/// On what a value depends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Holds {
+    /// On parameters.
+    pub parameters: bool,
+    /// On any other input.
+    pub state: bool,
 }
 
 /// The operands of a node.

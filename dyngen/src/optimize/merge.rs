@@ -4,7 +4,7 @@
 //! are the same function but for a chance below 2⁻¹⁰⁰, and what is emitted is proven afterwards in any case: a false
 //! merge would stop the generator, not reach the code.
 
-use crate::exact::algebra::Algebra;
+
 use crate::exact::constant::ConstantField;
 use crate::exact::prime::{Draws, Fp};
 use crate::arm::MAX_JOINTS;
@@ -32,7 +32,7 @@ pub(super) fn merge(graph: &Graph, outputs: &[Expr], field: &ConstantField) -> (
             }
             known.get(&p).copied().or_else(|| known.get(&p.map(|x| -x)).map(|e| -*e))
         });
-        let built = replacement.unwrap_or_else(|| rebuild(&builder, graph, node, &new));
+        let built = replacement.unwrap_or_else(|| builder.copy_node(graph, node, &new));
         new[node] = built;
         if let (None, Some(p)) = (replacement, print) {
             known.insert(p, built);
@@ -44,17 +44,6 @@ pub(super) fn merge(graph: &Graph, outputs: &[Expr], field: &ConstantField) -> (
 
 fn signed(new: &[Expr], e: Expr) -> Expr {
     if e.is_negative() { -new[e.node()] } else { new[e.node()] }
-}
-
-fn rebuild(b: &Builder, graph: &Graph, node: usize, new: &[Expr]) -> Expr {
-    match graph.nodes()[node] {
-        Node::Constant(index) => b.constant(graph.constant(index)),
-        Node::Symbol(index, sine) => b.symbol(index as usize, sine),
-        Node::Input(input) => b.input(input),
-        Node::Add(x, y) => b.add(&signed(new, x), &signed(new, y)),
-        Node::Mul(x, y) => b.mul(&signed(new, x), &signed(new, y)),
-        Node::Div(x, y) => b.div(signed(new, x), signed(new, y)),
-    }
 }
 
 fn fingerprint(
@@ -119,6 +108,7 @@ impl Inputs {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::exact::algebra::Algebra;
     use crate::exact::symbols::AngleSymbols;
     use crate::graph::JointSum;
 

@@ -162,6 +162,8 @@ impl<'a> Point<'a> {
             Input::Error(i) => self.errors[i],
             Input::Torque(i) => torques[i],
             Input::Parameter(i) => sums[i],
+            // Proven is the function with its preparation; a value of its own has none here.
+            Input::Prepared(_) => Fp::ZERO,
         };
         let symbol = |index, sine| self.sets.field.modular_symbol(index, sine);
         evaluate::evaluate(&function.graph, &function.outputs, input, symbol)
