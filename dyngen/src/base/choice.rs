@@ -81,15 +81,15 @@ impl AllColumns {
         AllColumns { forms: [Origins::Inner, Origins::Outer].into_iter().flat_map(Form::all).map(build).collect(), place }
     }
 
-    /// What some columns cost in a form.
-    fn cost(&self, form: &FunctionGraph, kept: &[usize]) -> usize {
+    /// What some columns cost in a form: operations, and the additions among them.
+    fn cost(&self, form: &FunctionGraph, kept: &[usize]) -> (usize, usize) {
         let (rows, columns) = form.shape;
         let outputs: Vec<Expr> = (kept.iter().filter_map(|k| self.place[*k]))
             .flat_map(|c| (0..rows).map(move |r| r * columns + c))
             .map(|k| form.outputs[k])
             .collect();
         let operations = form.graph.operations(&outputs);
-        operations.mul + operations.add
+        (operations.mul + operations.add, operations.add)
     }
 
     /// Exchanges columns as long as that makes the code cheaper.
@@ -102,10 +102,10 @@ impl AllColumns {
     ) -> (Dependence, Candidate) {
         let costs = self.forms.iter().map(|form| (self.cost(form, &dependence.kept), form));
         // There is a form.
-        let (mut operations, form) = costs.min_by_key(|(cost, _)| *cost).unwrap_or((usize::MAX, &self.forms[0]));
+        let (mut operations, form) = costs.min_by_key(|(cost, _)| *cost).unwrap_or(((usize::MAX, 0), &self.forms[0]));
         let mut exchanged = 0;
         while search {
-            let mut best: Option<(usize, usize, usize)> = None;
+            let mut best: Option<((usize, usize), usize, usize)> = None;
             for (column, coordinates) in dependence.coordinates.iter().enumerate() {
                 if dependence.kept.contains(&column) {
                     continue;
@@ -123,7 +123,7 @@ impl AllColumns {
             let Some(next) = exchange(field, &dependence, position, column) else { break };
             (dependence, operations, exchanged) = (next, cost, exchanged + 1);
         }
-        (dependence, Candidate { preference, exchanged, operations })
+        (dependence, Candidate { preference, exchanged, operations: operations.0 })
     }
 }
 

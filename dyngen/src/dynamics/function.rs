@@ -347,10 +347,10 @@ pub fn build(
 ) -> FunctionGraph {
     // The forms are compared after the first passes; the others go over the cheapest.
     let (passes, rest) = passes.split_at(passes.len().min(COMPARED));
-    let mut best: Option<(usize, FunctionGraph)> = None;
+    let mut best: Option<((usize, usize), FunctionGraph)> = None;
     let mut keep_cheapest = |built: FunctionGraph| {
         let operations = built.operations();
-        let cost = operations.mul + operations.add;
+        let cost = (operations.mul + operations.add, operations.add);
         if best.as_ref().is_none_or(|(lowest, _)| cost < *lowest) {
             best = Some((cost, built));
         }

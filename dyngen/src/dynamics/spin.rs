@@ -95,7 +95,7 @@ impl Spin {
         let xy = to.product(b, 0, 1);
         let [x2, z2] = [to.product(b, 0, 0), to.product(b, 2, 2)];
         // −(ω_y² + ω_z²) with ω_y² = −U_zz − ω_x²
-        let xx = b.sub(&b.add(&zz, &x2), &z2);
+        let xx = b.add(&zz, &b.sub(&x2, &z2));
         let yy = -b.add(&x2, &z2);
         to.rows = [
             [xx, b.sub(&xy, &alpha), xz],
