@@ -171,7 +171,9 @@ impl Model {
         };
         let regroupings = self.regroupings[kind as usize].get_or_init(|| {
             let of = |order| Regrouping::new(&self.arm, &self.symbols, &self.sets.field, &self.sets.minimal, set, order);
-            Order::all().map(of).collect()
+            // With symbols eliminations are slow, and two rules must do.
+            let orders = Order::all().step_by(if self.symbols.angles.is_empty() { 1 } else { Order::RULES });
+            orders.map(of).collect()
         });
         let built = function::build(function, &subject, set, regroupings, baked, passes);
         prove::prove(&self.arm, &self.symbols, &self.sets, set, &built, baked)?;

@@ -1,6 +1,5 @@
 //! The functions of an arm, each built as a graph.
 
-use super::body::links;
 use super::elements::{ArmElements, Source, ToolElements};
 use super::motion;
 use super::chain::{self, Origins};
@@ -397,7 +396,6 @@ pub fn build_in(
     };
     let n = arm.dof();
     let elements = ArmElements::build(&b, arm, symbols, &mut Inputs { b: &b, arm });
-    let links = links(&b, arm, set, field, value);
     let chain = Chain::build(&b, arm, &elements, form);
     let mut bodies = regrouping.map_or(Vec::new(), |r| r.bodies(&b, arm, symbols, field, set, value));
     if let Some(last) = bodies.last_mut() {
@@ -461,7 +459,7 @@ pub fn build_in(
         Function::CoriolisMatrix => coriolis::coriolis_matrix(&b, &chain, &bodies, &speeds),
         Function::CoriolisTimesSpeed => torque(&none, false),
         Function::CoriolisTransposeTimesSpeed => {
-            momentum::coriolis_transpose_times_speed(&b, &elements, &links)
+            momentum::coriolis_transpose_times_speed(&b, &chain, &bodies, &speeds)
         }
         Function::Gravity => composite::gravity(&b, &chain, &bodies),
         Function::ForwardDynamics => {
@@ -471,8 +469,17 @@ pub fn build_in(
         }
         Function::ForwardKinematics => pose::forward_kinematics(&b, &elements, &tool()),
         Function::Jacobian => pose::jacobian(&b, &elements, &tool()),
-        Function::JacobianRateTimesSpeed => pose::jacobian_rate_times_speed(&b, &elements, &tool()),
-        Function::KineticEnergy => vec![momentum::kinetic_energy(&b, &elements, &links)],
+        Function::JacobianRateTimesSpeed => {
+            let drive = motion::Drive {
+                speeds: speeds.clone(),
+                reference: speeds.clone(),
+                accelerations: none,
+                gravity: false,
+            };
+            let straight = Chain::build(&b, arm, &elements, Form { last_in_frame_before: false, ..form });
+            pose::jacobian_rate_times_speed(&b, &elements, &straight, &geometry[n - 1], &tool(), &drive)
+        }
+        Function::KineticEnergy => vec![momentum::kinetic_energy(&b, &chain, &bodies, &speeds)],
         Function::PotentialEnergy => {
             let row = energy::potential_regressor(&b, arm, &elements, set, field);
             let term = |(i, column): (usize, &Expr)| b.mul(column, &value(i));
@@ -481,7 +488,7 @@ pub fn build_in(
         }
         Function::KineticEnergyRegressor => energy::kinetic_regressor(&b, arm, &elements, set, field),
         Function::PotentialEnergyRegressor => energy::potential_regressor(&b, arm, &elements, set, field),
-        Function::Momentum => momentum::momentum(&b, &elements, &links),
+        Function::Momentum => momentum::momentum(&b, &chain, &bodies, &speeds),
         Function::TorqueByPosition => derivatives(Direction::Position),
         Function::TorqueBySpeed => derivatives(Direction::Speed),
     };

@@ -9,9 +9,39 @@ use crate::arm::JointKind;
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
 
+/// What a coordinate of a stage feels.
+#[derive(Clone, Copy, Debug)]
+pub struct Felt {
+    /// Its torque or force.
+    pub torque: Expr,
+    /// The wrench of its link about the link's origin, in the link's axes; of the last link of a stage with all beyond. Of a prismatic
+    /// joint that before its turn.
+    pub wrench: Wrench,
+    /// The force on all beyond a link that is not the last of its stage: in its axes, or in those before the stage if the form
+    /// turns vectors there.
+    pub later: Vector,
+}
+
+/// Both passes of the recursion.
+#[derive(Clone, Debug)]
+pub struct Passes {
+    /// Torques of the joints.
+    pub torques: Vec<Expr>,
+    /// How the frames of each stage move.
+    pub motions: Vec<StageMotion>,
+    /// What the coordinates of each stage feel.
+    pub felt: Vec<Vec<Felt>>,
+}
+
 /// The torques that a motion needs: τ = B(q)·q̈ + C(q, q̇)·q̇ + g(q).
 pub fn inverse_dynamics(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: &Drive) -> Vec<Expr> {
+    newton_euler(b, chain, bodies, drive).torques
+}
+
+/// The motion outwards, forces and moments inwards.
+pub fn newton_euler(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: &Drive) -> Passes {
     let motions = motions(b, chain, drive);
+    let mut felt = Vec::with_capacity(chain.stages.len());
     let mut torques = vec![Expr::ZERO; chain.dof()];
     let mut outer = Wrench::NONE;
     for (stage, motion) in chain.stages.iter().zip(&motions).rev() {
@@ -24,7 +54,7 @@ pub fn inverse_dynamics(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: 
         let alpha = motion.before.alpha_z(b);
         for (k, member) in stage.members.iter().enumerate().rev() {
             let body = &bodies[member.joint];
-            sum = b.add(&sum, &own[k]);
+            sum = b.add(&sum, &own[k].torque);
             let mut torque = b.add(&sum, &wheels);
             if let Some(ratio) = member.ratio {
                 let rotor = b.mul(&ratio, &body.rotor);
@@ -55,8 +85,10 @@ pub fn inverse_dynamics(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: 
         }
         before.moment[2] = b.add(&before.moment[2], &spin);
         outer = before.turned_back_x(b, stage.twist);
+        felt.push(own);
     }
-    torques
+    felt.reverse();
+    Passes { torques, motions, felt }
 }
 
 /// What each coordinate of the stage feels, and the wrench before the stage about its first origin.
@@ -67,8 +99,9 @@ fn revolute(
     motion: &StageMotion,
     bodies: &[LinkBody],
     outer: &Wrench,
-) -> (Vec<Expr>, Wrench) {
-    let mut own = vec![Expr::ZERO; stage.members.len()];
+) -> (Vec<Felt>, Wrench) {
+    let nothing = Felt { torque: Expr::ZERO, wrench: Wrench::NONE, later: super::body::ZERO };
+    let mut own = vec![nothing; stage.members.len()];
     // The force on all links from one on: in that link's axes, or in those before the stage.
     let (mut force, mut before) = (super::body::ZERO, Wrench::NONE);
     for (k, member) in stage.members.iter().enumerate().rev() {
@@ -79,15 +112,17 @@ fn revolute(
         if last {
             let carried = Wrench { force: plus(b, &outer.force, &end), ..*outer };
             here = here.plus(b, &carried.shifted(b, &member.reach));
-            own[k] = here.moment[2];
+            own[k] = Felt { torque: here.moment[2], wrench: here, ..nothing };
         } else if chain.form.link_to_link {
             let later = plus(b, &back_z(b, stage.members[k + 1].step, &force), &end);
-            own[k] = b.add(&here.moment[2], &lever(b, &member.reach, &later));
+            let torque = b.add(&here.moment[2], &lever(b, &member.reach, &later));
+            own[k] = Felt { torque, wrench: here, later };
             here = here.plus(b, &Wrench { force: later, moment: super::body::ZERO }.shifted(b, &member.reach));
         } else {
             let later = plus(b, &before.force, &back_z(b, member.angle, &end));
             let reach = stage.reach_before(b, k);
-            own[k] = b.add(&here.moment[2], &lever(b, &reach, &later));
+            let torque = b.add(&here.moment[2], &lever(b, &reach, &later));
+            own[k] = Felt { torque, wrench: here, later };
             let carried = Wrench { force: later, moment: before.moment };
             before = Wrench { moment: carried.shifted(b, &reach).moment, force: later };
         }
@@ -109,7 +144,7 @@ fn prismatic(
     motion: &StageMotion,
     bodies: &[LinkBody],
     outer: &Wrench,
-) -> (Vec<Expr>, Wrench) {
+) -> (Vec<Felt>, Wrench) {
     let (member, link) = (&stage.members[0], &motion.links[0]);
     let body = &bodies[member.joint];
     let end = scaled(b, body.end_mass, &link.next);
@@ -120,7 +155,7 @@ fn prismatic(
         moment: back_z(b, member.angle, &here.moment),
     };
     let before = turned.shifted(b, &[Expr::ZERO, Expr::ZERO, stage.shift]);
-    (vec![before.force[2]], before)
+    (vec![Felt { torque: before.force[2], wrench: turned, later: super::body::ZERO }], before)
 }
 
 /// What a body's motion needs: f = m a + U s, n = Σ J_ij e_i×(U e_j) + s×a.

@@ -46,8 +46,6 @@ enum Column {
 pub struct Order {
     /// Where the origins lie on their axes.
     pub origins: Origins,
-    /// Outer links keep, not inner ones.
-    pub outer: bool,
     /// Masses at the ends of links, not first moments along the axes.
     pub masses: bool,
     /// Stages from the base whose links keep a flywheel, not one of the second moments across the axis.
@@ -55,17 +53,18 @@ pub struct Order {
 }
 
 impl Order {
+    /// Rules for each place of the origins.
+    pub const RULES: usize = 6;
+
     /// Every rule that is tried.
     pub fn all() -> impl Iterator<Item = Order> {
         [Origins::Inner, Origins::Outer].into_iter().flat_map(|origins| {
-            let of = move |(flywheels, masses): (usize, bool)| Order { origins, outer: false, masses, flywheels };
+            let of = move |(flywheels, masses): (usize, bool)| Order { origins, masses, flywheels };
             [(2, true), (2, false), (1, true), (1, false), (0, true), (0, false)].into_iter().map(of)
         })
     }
 
     fn rank(self, arm: &Arm, stage_of: &[usize], column: Column) -> (usize, usize) {
-        let n = arm.dof();
-        let place = |link: usize| if self.outer { n - link } else { link };
         let revolute = |link: usize| arm.joints[link].kind == JointKind::Revolute;
         let wheels = |link: usize| revolute(link) && stage_of[link] < self.flywheels;
         let (rank, link) = match column {
@@ -85,7 +84,7 @@ impl Order {
             Column::Rotor(link) => (8, link),
             Column::Given(parameter) => return (10, parameter),
         };
-        (rank, place(link))
+        (rank, link)
     }
 }
 
