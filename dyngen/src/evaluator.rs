@@ -3,8 +3,8 @@
 use crate::base::SetKind;
 use crate::dynamics::Function;
 use crate::dynamics::function::{Argument, trig_offset};
-use crate::graph::{Input, JointSum, Preparation};
 use crate::graph::tape::{LANES, Lane, Tape};
+use crate::graph::{Input, JointSum, Preparation};
 use crate::model::{Error, Model};
 
 /// Samples for an [`Evaluator`]: slices of n numbers a sample, one sample after another, and the values of the

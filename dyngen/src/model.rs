@@ -170,7 +170,9 @@ impl Model {
             minimal: &self.sets.minimal,
         };
         let regroupings = self.regroupings[kind as usize].get_or_init(|| {
-            let of = |order| Regrouping::new(&self.arm, &self.symbols, &self.sets.field, &self.sets.minimal, set, order);
+            let of = |order| {
+                Regrouping::new(&self.arm, &self.symbols, &self.sets.field, &self.sets.minimal, set, order)
+            };
             // With symbols eliminations are slow, and two rules must do.
             let orders = Order::all().step_by(if self.symbols.angles.is_empty() { 1 } else { Order::RULES });
             orders.map(of).collect()

@@ -55,12 +55,15 @@ fn counts(model: &Model) -> Vec<Operations> {
 }
 
 fn table() -> String {
-    let mut table = String::from("| arm | parameters | τ | Y | B | C | g | prepare |\n|---|---|---|---|---|---|---|---|\n");
+    let mut table = String::from(
+        "| arm | parameters | τ | Y | B | C | g | prepare |\n|---|---|---|---|---|---|---|---|\n",
+    );
     for (name, text) in arms() {
         let model = model(&text);
         let mut preparation = Preparation::default();
         for function in COUNTED {
-            model.function(function, SetKind::Minimal).unwrap().without_preparation(&mut preparation);
+            let built = model.function(function, SetKind::Minimal).unwrap();
+            let _ = built.without_preparation(&mut preparation);
         }
         write!(table, "| {name} | {} |", model.set(SetKind::Minimal).unwrap().parameters.len()).unwrap();
         for o in counts(&model) {

@@ -7,8 +7,8 @@
 use super::preference::Preference;
 use super::sets::full_set;
 use crate::arm::Arm;
-use crate::dynamics::function::{self, Subject};
 use crate::dynamics::chain::Origins;
+use crate::dynamics::function::{self, Subject};
 use crate::dynamics::stage::Form;
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::constant::{Constant, ConstantField};
@@ -78,7 +78,10 @@ impl AllColumns {
             place[parameter.carriers[0].0.index()] = Some(column);
         }
         let build = |form| function::build_in(form, None, Function::Regressor, subject, &full, None, PASSES);
-        AllColumns { forms: [Origins::Inner, Origins::Outer].into_iter().flat_map(Form::all).map(build).collect(), place }
+        AllColumns {
+            forms: [Origins::Inner, Origins::Outer].into_iter().flat_map(Form::all).map(build).collect(),
+            place,
+        }
     }
 
     /// What some columns cost in a form: operations, and the additions among them.
@@ -102,7 +105,8 @@ impl AllColumns {
     ) -> (Dependence, Candidate) {
         let costs = self.forms.iter().map(|form| (self.cost(form, &dependence.kept), form));
         // There is a form.
-        let (mut operations, form) = costs.min_by_key(|(cost, _)| *cost).unwrap_or(((usize::MAX, 0), &self.forms[0]));
+        let (mut operations, form) =
+            costs.min_by_key(|(cost, _)| *cost).unwrap_or(((usize::MAX, 0), &self.forms[0]));
         let mut exchanged = 0;
         while search {
             let mut best: Option<((usize, usize), usize, usize)> = None;

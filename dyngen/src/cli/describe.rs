@@ -185,8 +185,7 @@ fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetr
     let _ = writeln!(t, "\noperations with the minimal set as arguments:");
     let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", "function", "mul", "add", "div", "sin_cos");
     for (function, o) in operations {
-        let _ =
-            writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", function, o.mul, o.add, o.div, o.sin_cos);
+        let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", function, o.mul, o.add, o.div, o.sin_cos);
     }
     t
 }

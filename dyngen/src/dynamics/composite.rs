@@ -3,7 +3,7 @@
 use super::body::Vector;
 use super::moments::Moments;
 use super::regroup::LinkBody;
-use super::stage::{Chain, SinCos, STRAIGHT, Stage, back_z, plus};
+use super::stage::{Chain, STRAIGHT, SinCos, Stage, back_z, plus};
 use super::wrench::{Wrench, lever};
 use crate::arm::JointKind;
 use crate::exact::algebra::Algebra;
@@ -108,7 +108,8 @@ pub fn mass_matrix(b: &Builder, chain: &Chain, bodies: &[LinkBody]) -> Vec<Expr>
 /// The lower triangle from the upper one, with the signs of the axes in the arm's file.
 fn mirrored(chain: &Chain, mut matrix: Vec<Expr>) -> Vec<Expr> {
     let n = chain.dof();
-    let reversed: Vec<bool> = chain.stages.iter().flat_map(|s| s.members.iter().map(|m| m.reversed)).collect();
+    let reversed: Vec<bool> =
+        chain.stages.iter().flat_map(|s| s.members.iter().map(|m| m.reversed)).collect();
     for i in 0..n {
         for j in i..n {
             if reversed[i] != reversed[j] {
@@ -247,10 +248,8 @@ pub fn project_inwards(
                 (false, true) => member.step,
                 (false, false) => member.angle,
             };
-            wrench = Wrench {
-                force: back_z(b, turn, &carried.force),
-                moment: back_z(b, turn, &carried.moment),
-            };
+            wrench =
+                Wrench { force: back_z(b, turn, &carried.force), moment: back_z(b, turn, &carried.moment) };
         }
         match stage.kind {
             JointKind::Revolute => wrench.moment[2] = sum,
@@ -266,7 +265,9 @@ pub fn gravity(b: &Builder, chain: &Chain, bodies: &[LinkBody]) -> Vec<Expr> {
     // Along an axis of the base its size goes into the moments, which do not depend on the pose.
     let along: Vec<usize> = (0..3).filter(|i| chain.gravity[*i] != Expr::ZERO).collect();
     let (size, mut g) = match along[..] {
-        [axis] => (chain.gravity[axis], std::array::from_fn(|i| if i == axis { Expr::ONE } else { Expr::ZERO })),
+        [axis] => {
+            (chain.gravity[axis], std::array::from_fn(|i| if i == axis { Expr::ONE } else { Expr::ZERO }))
+        }
         _ => (Expr::ONE, chain.gravity),
     };
     let weight = |mass: Expr| b.mul(&size, &mass);

@@ -77,11 +77,14 @@ pub fn coriolis_matrix(b: &Builder, chain: &Chain, bodies: &[LinkBody], speeds: 
                 matrix[member.joint * n + j] = lower;
             });
         }
-        outer = before.turned(b, |v| back_x(b, stage.twist, v), |m| {
-            m.turned_back_x(b, &stage.twist.0, &stage.twist.1)
-        });
+        outer = before.turned(
+            b,
+            |v| back_x(b, stage.twist, v),
+            |m| m.turned_back_x(b, &stage.twist.0, &stage.twist.1),
+        );
     }
-    let reversed: Vec<bool> = chain.stages.iter().flat_map(|s| s.members.iter().map(|m| m.reversed)).collect();
+    let reversed: Vec<bool> =
+        chain.stages.iter().flat_map(|s| s.members.iter().map(|m| m.reversed)).collect();
     let signed = |k: usize| if reversed[k / n] == reversed[k % n] { matrix[k] } else { -matrix[k] };
     (0..n * n).map(signed).collect()
 }
@@ -317,10 +320,8 @@ impl Moving {
         match kind {
             JointKind::Revolute => {
                 let (turned, carried) = (b.cross(z_rate, s), z_cross(&self.momentum));
-                let (inertia, spread) =
-                    (self.body.inertia_times(b, z_rate), self.spread_times_z(b, false));
-                let column =
-                    Wrench { force: plus(b, &turned, &carried), moment: plus(b, &inertia, &spread) };
+                let (inertia, spread) = (self.body.inertia_times(b, z_rate), self.spread_times_z(b, false));
+                let column = Wrench { force: plus(b, &turned, &carried), moment: plus(b, &inertia, &spread) };
                 Share { column, row, drift: self.spread_times_z(b, true) }
             }
             JointKind::Prismatic => {

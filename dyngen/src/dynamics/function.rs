@@ -1,16 +1,16 @@
 //! The functions of an arm, each built as a graph.
 
+use super::chain::{self, Origins};
 use super::elements::{ArmElements, Source, ToolElements};
 use super::motion;
-use super::chain::{self, Origins};
 use super::regroup::Regrouping;
 use super::stage::{Chain, Form};
-use crate::exact::elimination::Dependence;
 use super::{composite, coriolis, energy, forward, inverse, momentum, pose, regressor};
 use crate::arm::Arm;
 use crate::base::ParameterSet;
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
+use crate::exact::elimination::Dependence;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::differentiate::{self, Direction};
@@ -254,7 +254,9 @@ impl Function {
         match self {
             ForwardKinematics | Jacobian | JacobianRateTimesSpeed => Kind::Other,
             PotentialEnergy | KineticEnergyRegressor | PotentialEnergyRegressor => Kind::Other,
-            Regressor | RegressorTransposeTimes | SlotineLiRegressor | SlotineLiTransposeTimes => Kind::Regressor,
+            Regressor | RegressorTransposeTimes | SlotineLiRegressor | SlotineLiTransposeTimes => {
+                Kind::Regressor
+            }
             _ => Kind::Dynamics,
         }
     }

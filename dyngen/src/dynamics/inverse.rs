@@ -117,7 +117,8 @@ fn revolute(
             let later = plus(b, &back_z(b, stage.members[k + 1].step, &force), &end);
             let torque = b.add(&here.moment[2], &lever(b, &member.reach, &later));
             own[k] = Felt { torque, wrench: here, later };
-            here = here.plus(b, &Wrench { force: later, moment: super::body::ZERO }.shifted(b, &member.reach));
+            here =
+                here.plus(b, &Wrench { force: later, moment: super::body::ZERO }.shifted(b, &member.reach));
         } else {
             let later = plus(b, &before.force, &back_z(b, member.angle, &end));
             let reach = stage.reach_before(b, k);
@@ -150,10 +151,8 @@ fn prismatic(
     let end = scaled(b, body.end_mass, &link.next);
     let carried = Wrench { force: plus(b, &outer.force, &end), ..*outer }.shifted(b, &member.reach);
     let here = body_wrench(b, body, link).plus(b, &carried);
-    let turned = Wrench {
-        force: back_z(b, member.angle, &here.force),
-        moment: back_z(b, member.angle, &here.moment),
-    };
+    let turned =
+        Wrench { force: back_z(b, member.angle, &here.force), moment: back_z(b, member.angle, &here.moment) };
     let before = turned.shifted(b, &[Expr::ZERO, Expr::ZERO, stage.shift]);
     (vec![Felt { torque: before.force[2], wrench: turned, later: super::body::ZERO }], before)
 }
@@ -165,7 +164,8 @@ fn body_wrench(b: &Builder, body: &LinkBody, link: &LinkMotion) -> Wrench {
     for (entry, value) in moments.entries().into_iter().enumerate() {
         if value != Expr::ZERO {
             let unit = entry_wrench(b, entry, link);
-            let part = Wrench { force: scaled(b, value, &unit.force), moment: scaled(b, value, &unit.moment) };
+            let part =
+                Wrench { force: scaled(b, value, &unit.force), moment: scaled(b, value, &unit.moment) };
             wrench = wrench.plus(b, &part);
         }
     }

@@ -4,12 +4,12 @@
 //! its wrenches momenta p and h.
 
 use super::body::Vector;
+use super::composite::z_cross;
 use super::inverse::{Felt, newton_euler};
 use super::motion::Drive;
 use super::regroup::LinkBody;
 use super::spin::Spin;
 use super::stage::{Chain, plus};
-use super::composite::z_cross;
 use crate::arm::JointKind;
 use crate::exact::algebra::Algebra;
 use crate::exact::rational::Rational;

@@ -2,8 +2,8 @@
 //! alone make.
 
 use super::body::Vector;
-use super::elements::{ArmElements, JointElements, ToolElements, turn_x};
 use super::chain::LinkGeometry;
+use super::elements::{ArmElements, JointElements, ToolElements, turn_x};
 use super::motion::{Drive, motions};
 use super::stage::{Chain, back_x, plus, scaled};
 use crate::arm::{Convention, JointKind};
@@ -124,7 +124,9 @@ pub fn jacobian_rate_times_speed(
 ) -> Vec<Expr> {
     let (_, last) = poses(b, arm);
     let motions = motions(b, chain, drive);
-    let Some(motion) = motions.last().and_then(|stage| stage.links.last()) else { return vec![Expr::ZERO; 6] };
+    let Some(motion) = motions.last().and_then(|stage| stage.links.last()) else {
+        return vec![Expr::ZERO; 6];
+    };
     let (sin, cos) = link.file_turn;
     let to_base = |v: &Vector| -> [Expr; 3] {
         let v = turn_x(b, &sin, &cos, v);

@@ -222,7 +222,8 @@ fn unit_wrench(
         let v = back_x(b, geometry.file_turn, v);
         if last { back_z(b, chain.last_turn, &v) } else { v }
     };
-    let unit = |axis: usize| -> Vector { std::array::from_fn(|i| if i == axis { Expr::ONE } else { Expr::ZERO }) };
+    let unit =
+        |axis: usize| -> Vector { std::array::from_fn(|i| if i == axis { Expr::ONE } else { Expr::ZERO }) };
     let mut origin = geometry.file_origin;
     if last {
         origin = back_z(b, chain.last_turn, &origin);
@@ -266,7 +267,8 @@ fn turned_moment(b: &Builder, trig: SinCos, across: bool, motion: &LinkMotion) -
     let turn = |v: &Vector| super::elements::turn_z(b, &trig.0, &trig.1, v);
     let own = Spin { omega: turn(&spin.omega), reference: turn(&spin.reference), ..*spin };
     let [along, beside, _] = turn(&spin.rows[2]);
-    let (height, about_z) = if across { (along, own.product(b, 0, 1)) } else { (beside, -own.product(b, 0, 1)) };
+    let (height, about_z) =
+        if across { (along, own.product(b, 0, 1)) } else { (beside, -own.product(b, 0, 1)) };
     let lever = if across { [Expr::ZERO, -height, about_z] } else { [height, Expr::ZERO, about_z] };
     let turned = back_z(b, trig, &lever);
     let zz = [spin.product(b, 1, 2), -spin.product(b, 2, 0), Expr::ZERO];
@@ -328,7 +330,8 @@ fn rotor_column(
 
 /// Stage and member of a joint.
 fn place(stages: &[Stage], joint: usize) -> Option<(usize, usize)> {
-    stages.iter().enumerate().find_map(|(s, stage)| {
-        stage.members.iter().position(|m| m.joint == joint).map(|k| (s, k))
-    })
+    stages
+        .iter()
+        .enumerate()
+        .find_map(|(s, stage)| stage.members.iter().position(|m| m.joint == joint).map(|k| (s, k)))
 }

@@ -70,12 +70,30 @@ impl Order {
         let (rank, link) = match column {
             Column::Entry(link, entry) => {
                 let rank = match entry {
-                    0 => if revolute(link) { 6 } else { 2 },
-                    3 if revolute(link) => if self.masses { 5 } else { 4 },
+                    0 => {
+                        if revolute(link) {
+                            6
+                        } else {
+                            2
+                        }
+                    }
+                    3 if revolute(link) => {
+                        if self.masses {
+                            5
+                        } else {
+                            4
+                        }
+                    }
                     6 if revolute(link) => 7,
                     5 if wheels(link) => 3,
                     1..=3 => 0,
-                    _ => if revolute(link) { 0 } else { 7 },
+                    _ => {
+                        if revolute(link) {
+                            0
+                        } else {
+                            7
+                        }
+                    }
                 };
                 (rank, link)
             }
@@ -302,7 +320,8 @@ impl Regrouping {
         let map = Map::new(arm, symbols, field, self.order.origins);
         let term = |factor: &Constant, x: Expr| b.mul(&constant(b, field, factor), &x);
         for (column, sum) in &self.columns {
-            let sum = sum.iter().fold(Expr::ZERO, |total, (p, factor)| b.add(&total, &term(factor, value(*p))));
+            let sum =
+                sum.iter().fold(Expr::ZERO, |total, (p, factor)| b.add(&total, &term(factor, value(*p))));
             let add = |to: &mut Expr, x: Expr| *to = b.add(to, &x);
             match *column {
                 Column::Entry(link, entry) => {
@@ -323,8 +342,9 @@ impl Regrouping {
                         }
                         let unit = map.of_parameter(*carrier).entries();
                         let entries = body.moments.entries();
-                        body.moments =
-                            Moments::from_entries(&std::array::from_fn(|e| b.add(&entries[e], &term(&unit[e], x))));
+                        body.moments = Moments::from_entries(&std::array::from_fn(|e| {
+                            b.add(&entries[e], &term(&unit[e], x))
+                        }));
                     }
                 }
             }

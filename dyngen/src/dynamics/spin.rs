@@ -83,7 +83,14 @@ impl Spin {
     ///
     /// Points of the axis move alike in both frames, so U's column along z is the same vector. What else U holds follows from
     /// it, from ω, and from the angular acceleration about z.
-    pub fn joined(&self, b: &Builder, trig: (Expr, Expr), speed: Expr, reference: Expr, acceleration: Expr) -> Spin {
+    pub fn joined(
+        &self,
+        b: &Builder,
+        trig: (Expr, Expr),
+        speed: Expr,
+        reference: Expr,
+        acceleration: Expr,
+    ) -> Spin {
         let (sin, cos) = trig;
         let mut omega = turn_z(b, &sin, &cos, &self.omega);
         let mut omega_r = turn_z(b, &sin, &cos, &self.reference);

@@ -93,7 +93,8 @@ impl Chain {
         let mut stages: Vec<Stage> =
             stages.into_iter().map(|joints| stage(b, arm, elements, &links, joints)).collect();
         let mut last_turn = STRAIGHT;
-        if let Some(last) = stages.last_mut().filter(|s| form.last_in_frame_before && s.kind == JointKind::Revolute)
+        if let Some(last) =
+            stages.last_mut().filter(|s| form.last_in_frame_before && s.kind == JointKind::Revolute)
             && let Some(member) = last.members.last_mut()
         {
             // What is turned back to the frame before the stage has to come from there to the others.
@@ -126,7 +127,9 @@ fn stage(
         .map(|i| {
             let angle = match kind {
                 JointKind::Revolute => sum_of_angles(b, arm, links, first..i + 1),
-                JointKind::Prismatic => signed(links[i].reversed, (elements.joints[i].sin, elements.joints[i].cos)),
+                JointKind::Prismatic => {
+                    signed(links[i].reversed, (elements.joints[i].sin, elements.joints[i].cos))
+                }
             };
             let step = if i == first { angle } else { sum_of_angles(b, arm, links, i..i + 1) };
             let LinkGeometry { reversed, reach, .. } = links[i];

@@ -2,11 +2,11 @@
 
 use super::docs;
 use crate::arm::{Arm, JointKind};
+use crate::dynamics::chain;
 use crate::dynamics::function::{Argument, Size, trig_offset};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::rational;
 use crate::graph::{Expr, Graph, Input, JointSum, Node, Preparation, operands};
-use crate::dynamics::chain;
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
@@ -28,7 +28,8 @@ pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) ->
     let doc = docs::lines(&docs::function(built));
     let doc_with = docs::lines(&docs::function_with(built));
     let others: Vec<Argument> = built.arguments().filter(|a| *a != Argument::Positions).collect();
-    let (signature, bindings): (Vec<_>, Vec<_>) = others.iter().map(|a| argument(built, prepared, *a, &used)).unzip();
+    let (signature, bindings): (Vec<_>, Vec<_>) =
+        others.iter().map(|a| argument(built, prepared, *a, &used)).unzip();
     let passed = others.iter().map(|a| Ident::new(a.name(), Span::call_site()));
     let plain = others.iter().map(|a| parameter(*a, a.name()));
     let positions = positions(arm, &used);
@@ -68,8 +69,11 @@ fn is_number(built: &FunctionGraph) -> bool {
 
 /// The struct of sines and cosines that functions share.
 pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
-    let all: BTreeSet<Input> =
-        angles(arm).into_iter().flat_map(|sum| [Input::Sin(sum), Input::Cos(sum)]).chain((0..arm.dof()).map(Input::Position)).collect();
+    let all: BTreeSet<Input> = angles(arm)
+        .into_iter()
+        .flat_map(|sum| [Input::Sin(sum), Input::Cos(sum)])
+        .chain((0..arm.dof()).map(Input::Position))
+        .collect();
     let (bindings, fields) = trig_fields(arm, &all);
     let sums: Vec<String> = chain::sums(arm)
         .iter()
@@ -79,7 +83,13 @@ pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
                 .joints()
                 .enumerate()
                 .map(|(k, (i, negative))| {
-                    let sign = if k == 0 { "" } else if negative { " − " } else { " + " };
+                    let sign = if k == 0 {
+                        ""
+                    } else if negative {
+                        " − "
+                    } else {
+                        " + "
+                    };
                     format!("{sign}q{}", i + 1)
                 })
                 .collect();
@@ -287,10 +297,7 @@ pub(super) fn preparation(model: &Model, preparation: &Preparation) -> TokenStre
     let statements = sections(model, &graph, preparation.values(), &needed);
     let values = preparation.values().iter().map(|e| value_name(&graph, e.node()));
     let operations = preparation.operations();
-    let doc = format!(
-        " Operations: {} multiplications, {} additions.",
-        operations.mul, operations.add
-    );
+    let doc = format!(" Operations: {} multiplications, {} additions.", operations.mul, operations.add);
     quote! {
         /// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of calls.
         #[derive(Clone, Copy, Debug, PartialEq)]

@@ -57,6 +57,12 @@ fn rate(b: &Builder, graph: &Graph, rates: &HashMap<usize, Expr>, node: usize, d
 fn times_sign(derivative: Expr, sign: Option<bool>) -> Expr {
     match sign {
         None => Expr::ZERO,
-        Some(negative) => if negative { -derivative } else { derivative },
+        Some(negative) => {
+            if negative {
+                -derivative
+            } else {
+                derivative
+            }
+        }
     }
 }

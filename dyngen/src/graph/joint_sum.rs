@@ -52,7 +52,8 @@ impl JointSum {
 
     /// The sum in numbers.
     pub fn value(self, of_joint: impl Fn(usize) -> f64) -> f64 {
-        self.joints().fold(0.0, |sum, (i, negative)| if negative { sum - of_joint(i) } else { sum + of_joint(i) })
+        self.joints()
+            .fold(0.0, |sum, (i, negative)| if negative { sum - of_joint(i) } else { sum + of_joint(i) })
     }
 }
 
@@ -60,7 +61,13 @@ impl fmt::Display for JointSum {
     /// As part of a name: `2`, `2m3` for q2 − q3, `2p3` for q2 + q3.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (k, (joint, negative)) in self.joints().enumerate() {
-            let sign = if k == 0 { "" } else if negative { "m" } else { "p" };
+            let sign = if k == 0 {
+                ""
+            } else if negative {
+                "m"
+            } else {
+                "p"
+            };
             write!(f, "{sign}{}", joint + 1)?;
         }
         Ok(())

@@ -21,15 +21,22 @@ type Leaf = (usize, bool);
 
 /// The pass.
 pub(super) fn associate(graph: &Graph, outputs: &[Expr], _: &ConstantField) -> (Graph, Vec<Expr>) {
-    [Kind::Product, Kind::Sum].into_iter().fold((graph.clone(), outputs.to_vec()), |(graph, outputs), kind| {
-        let regrouped = regroup(&graph, &outputs, kind);
-        // Where nothing is shared the order of evaluation stays as it was.
-        let cost = |graph: &Graph, outputs: &[Expr]| {
-            let operations = graph.operations_when_prepared(outputs);
-            operations.mul + operations.add
-        };
-        if cost(&regrouped.0, &regrouped.1) < cost(&graph, &outputs) { regrouped } else { (graph, outputs) }
-    })
+    [Kind::Product, Kind::Sum].into_iter().fold(
+        (graph.clone(), outputs.to_vec()),
+        |(graph, outputs), kind| {
+            let regrouped = regroup(&graph, &outputs, kind);
+            // Where nothing is shared the order of evaluation stays as it was.
+            let cost = |graph: &Graph, outputs: &[Expr]| {
+                let operations = graph.operations_when_prepared(outputs);
+                operations.mul + operations.add
+            };
+            if cost(&regrouped.0, &regrouped.1) < cost(&graph, &outputs) {
+                regrouped
+            } else {
+                (graph, outputs)
+            }
+        },
+    )
 }
 
 fn regroup(graph: &Graph, outputs: &[Expr], kind: Kind) -> (Graph, Vec<Expr>) {
@@ -94,7 +101,16 @@ fn regroup(graph: &Graph, outputs: &[Expr], kind: Kind) -> (Graph, Vec<Expr>) {
         }
     }
     // Leaves come before what they are part of, and pairs before what uses them: build on demand.
-    let mut build = Rebuild { b: &b, graph, kind, leaves: &leaves, fixed: &fixed, pairs: &pairs, first_pair, extra: BTreeMap::new() };
+    let mut build = Rebuild {
+        b: &b,
+        graph,
+        kind,
+        leaves: &leaves,
+        fixed: &fixed,
+        pairs: &pairs,
+        first_pair,
+        extra: BTreeMap::new(),
+    };
     for node in needed {
         if leaves.contains_key(&node) {
             copied[node] = build.combine(&leaves[&node], &copied);
@@ -102,7 +118,8 @@ fn regroup(graph: &Graph, outputs: &[Expr], kind: Kind) -> (Graph, Vec<Expr>) {
             copied[node] = b.copy_node(graph, node, &copied);
         }
     }
-    let outputs = outputs.iter().map(|e| if e.is_negative() { -copied[e.node()] } else { copied[e.node()] }).collect();
+    let outputs =
+        outputs.iter().map(|e| if e.is_negative() { -copied[e.node()] } else { copied[e.node()] }).collect();
     (b.finish(), outputs)
 }
 

@@ -4,10 +4,9 @@
 //! are the same function but for a chance below 2⁻¹⁰⁰, and what is emitted is proven afterwards in any case: a false
 //! merge would stop the generator, not reach the code.
 
-
+use crate::arm::MAX_JOINTS;
 use crate::exact::constant::ConstantField;
 use crate::exact::prime::{Draws, Fp};
-use crate::arm::MAX_JOINTS;
 use crate::graph::evaluate::{Field, sine_and_cosine};
 use crate::graph::{Builder, Expr, Graph, Input, Node};
 use std::collections::{BTreeMap, HashMap};

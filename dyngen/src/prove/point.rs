@@ -8,8 +8,8 @@ use crate::dynamics::function::Argument;
 use crate::exact::prime::{Draws, Fp};
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
-use crate::graph::{Input, evaluate};
 use crate::graph::evaluate::sine_and_cosine;
+use crate::graph::{Input, evaluate};
 
 /// A pose, rates and parameter values.
 pub(super) struct Point<'a> {
