@@ -132,7 +132,7 @@ impl Session {
         }
 
         let plant = lwa4p::plant()?;
-        let motions: Vec<Motion> = found.iter().map(|f| f.path.sample(plant.sensors().rate)).collect();
+        let motions: Vec<Motion> = found.iter().flat_map(|f| &f.paths).map(|path| path.sample(plant.sensors().rate)).collect();
         let ends: Vec<[[f64; 6]; 2]> = motions.iter().map(ends).collect();
         let starts = starts(&motions, &ends);
         let session = starts.last().map_or(0.0, |last| last + motions.last().map_or(0.0, Motion::duration));
@@ -169,7 +169,7 @@ impl Session {
             list.push(path);
         }
         recorder.finish()?;
-        let recorded = found.iter().map(|f| f.path.duration()).sum();
+        let recorded = found.iter().flat_map(|f| &f.paths).map(|path| path.duration()).sum();
         let conditions = found.iter().map(|f| f.figures.condition).collect();
         Ok(Session { plant, effect, arm_file, fit, held_out, conditions, recorded })
     }

@@ -1,14 +1,19 @@
 //! The search for a good path: many starts, then small changes to the best ones. The same seed finds the same path.
 
 use super::Error;
+use super::constraints::Constraints;
 use super::fourier::{Fourier, Harmonics};
 use super::limits::Limits;
-use super::objective::{Figures, Objective};
+use super::objective::{Criterion, Figures, Objective};
+use super::shape::poses;
 use dyngen::{Model, SetKind};
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+
+/// Poses that are tried for the middle of a random path.
+const PLACES: usize = 50;
 
 /// What path to look for, and how long.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,8 +28,8 @@ pub struct Settings {
     pub ramp: f64,
     /// Share of range, speed and acceleration that stays unused.
     pub margin: f64,
-    /// λ₂ of Eq. 17 against λ₁ = 1.
-    pub lambda2: f64,
+    /// What makes a path a good one.
+    pub criterion: Criterion,
     /// How many paths are judged in all.
     pub evaluations: usize,
     /// Seed of the search.
@@ -40,22 +45,31 @@ impl Default for Settings {
             periods: 2,
             ramp: 1.0,
             margin: 0.05,
-            lambda2: 1.0,
+            criterion: Criterion::Condition { lambda2: 1.0 },
             evaluations: 2000,
             seed: 0,
         }
     }
 }
 
-/// A path that was found.
+/// The paths that were found, one for each mounting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Excitation {
-    /// The path.
-    pub path: Fourier,
-    /// Its figures.
+    /// The paths.
+    pub paths: Vec<Fourier>,
+    /// Their figures, together.
     pub figures: Figures,
     /// The figures of the middle one of the random starts, for comparison.
     pub usual: Figures,
+}
+
+/// An arm as it is mounted for a path, and what the path must keep.
+#[derive(Clone, Debug)]
+pub struct Task<'a> {
+    /// The arm in this mounting.
+    pub model: &'a Model,
+    /// Limits and surroundings.
+    pub constraints: Constraints,
 }
 
 /// A path in the coordinates of the search, where every point keeps the limits.
@@ -68,55 +82,131 @@ struct Candidate {
     place: Vec<f64>,
 }
 
-/// Finds a path for a parameter set of an arm within the limits of its file.
+/// Candidates for all mountings, with what they are worth.
+struct Judged {
+    paths: Vec<Candidate>,
+    violation: f64,
+    value: f64,
+    figures: Figures,
+}
+
+impl Judged {
+    /// What keeps the constraints is better than what does not; then the smaller violation, then the objective counts.
+    fn rank(&self) -> (f64, f64) {
+        (self.violation, self.value)
+    }
+}
+
+/// Finds a path for a parameter set of an arm within the limits of its file, and no other constraint.
 ///
 /// # Errors
-/// Limits that the file misses, a set that has no regressor, settings that make no sense.
+/// As [`optimise_all`].
 pub fn optimise(model: &Model, kind: SetKind, settings: &Settings) -> Result<Excitation, Error> {
     check(settings)?;
-    let limits = Limits::of(model.arm(), settings.margin)?;
+    let constraints = Constraints::of(Limits::of(model.arm(), settings.margin)?);
+    optimise_all(&[Task { model, constraints }], kind, settings)
+}
+
+/// Finds a path for each mounting such that they determine a parameter set together.
+///
+/// # Errors
+/// A set that has no regressor, settings that make no sense, and [`Error::NoPath`] where no path that keeps the constraints
+/// was found.
+pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> Result<Excitation, Error> {
+    check(settings)?;
+    let models: Vec<&Model> = tasks.iter().map(|task| task.model).collect();
     // Eight instants for each period of the highest harmonic resolve its regressor.
-    let mut objective = Objective::new(model, kind, (8 * settings.harmonics).max(48))?;
+    let mut objective = Objective::new(&models, kind, (8 * settings.harmonics).max(48))?;
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
-    let place = |candidate: &Candidate| candidate.path(settings, &limits);
+    let place = |candidates: &[Candidate]| -> Vec<Fourier> {
+        let limits = tasks.iter().map(|task| &task.constraints.limits);
+        candidates.iter().zip(limits).map(|(candidate, limits)| candidate.path(settings, limits)).collect()
+    };
+    let random = |rng: &mut ChaCha8Rng| -> Vec<Candidate> {
+        tasks.iter().map(|task| Candidate::random(task, settings, rng)).collect()
+    };
+    let violation = |paths: &[Fourier]| -> f64 {
+        tasks.iter().zip(paths).map(|(task, path)| task.constraints.violation(path)).sum()
+    };
+    let value = |figures: &Figures| figures.objective(settings.criterion);
+    for task in tasks {
+        let constraints = &task.constraints;
+        if poses(&constraints.limits.0).all(|q| constraints.lacks(&q) > 0.0) {
+            return Err(Error::NoPose);
+        }
+    }
 
     // Columns are scaled by paths of a seed of their own: figures of different searches can then be compared.
     let mut fixed = ChaCha8Rng::seed_from_u64(0);
-    let typical: Vec<Fourier> =
-        (0..16).map(|_| place(&Candidate::random(model, settings, &mut fixed))).collect();
+    let typical: Vec<Vec<Fourier>> = (0..16).map(|_| place(&random(&mut fixed))).collect();
     objective.scale_columns(&typical);
 
     let starts = (settings.evaluations / 8).max(1);
-    let mut found: Vec<(f64, Figures, Candidate)> = (0..starts)
+    let mut found: Vec<Judged> = (0..starts)
         .map(|_| {
-            let candidate = Candidate::random(model, settings, &mut rng);
-            let figures = objective.judge(&place(&candidate));
-            (figures.objective(settings.lambda2), figures, candidate)
+            let candidates = random(&mut rng);
+            let paths = place(&candidates);
+            let figures = objective.judge(&paths);
+            Judged { paths: candidates, violation: violation(&paths), value: value(&figures), figures }
         })
         .collect();
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let usual = found[found.len() / 2].1;
+    found.sort_by(|a, b| a.value.total_cmp(&b.value));
+    let usual = found[found.len() / 2].figures;
+    found.sort_by(|a, b| a.violation.total_cmp(&b.violation).then(a.value.total_cmp(&b.value)));
     found.truncate(3);
 
     let each = settings.evaluations.saturating_sub(starts) / found.len();
+    let constrained = tasks.iter().any(|task| task.constraints.any());
     for best in &mut found {
         // Steps grow after a success and shrink after a failure such that one in five succeeds.
         let mut step: f64 = 0.3;
         for _ in 0..each {
-            let next = best.2.changed(step, &mut rng);
-            let figures = objective.judge(&place(&next));
-            let value = figures.objective(settings.lambda2);
-            if value < best.0 {
-                *best = (value, figures, next);
-                step = (step * 1.5).min(1.0);
-            } else {
-                step = (step * 0.9).max(0.01);
+            let mut next = best.paths.clone();
+            let changed = if next.len() > 1 { rng.random_range(0..next.len()) } else { 0 };
+            next[changed] = next[changed].changed(step, constrained, &mut rng);
+            match improved(best, next, &place, &violation, &objective, &value) {
+                Some(better) => {
+                    *best = better;
+                    step = (step * 1.5).min(1.0);
+                }
+                None => step = (step * 0.9).max(0.01),
             }
         }
     }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (_, figures, candidate) = found.swap_remove(0);
-    Ok(Excitation { path: place(&candidate), figures, usual })
+    found.sort_by(|a, b| a.violation.total_cmp(&b.violation).then(a.value.total_cmp(&b.value)));
+    let best = found.swap_remove(0);
+    let paths = place(&best.paths);
+    if best.violation > 0.0 {
+        let reasons = tasks.iter().zip(&paths).filter_map(|(task, path)| task.constraints.broken(&path.sample(200.0)));
+        return Err(Error::NoPath(reasons.collect::<Vec<_>>().join("; ")));
+    }
+    Ok(Excitation { paths, figures: best.figures, usual })
+}
+
+/// The candidates judged, where they are better than the best so far; what is dear is looked at last.
+fn improved(
+    best: &Judged,
+    candidates: Vec<Candidate>,
+    place: &impl Fn(&[Candidate]) -> Vec<Fourier>,
+    violation: &impl Fn(&[Fourier]) -> f64,
+    objective: &Objective,
+    value: &impl Fn(&Figures) -> f64,
+) -> Option<Judged> {
+    let paths = place(&candidates);
+    let judged = if best.violation > 0.0 {
+        let violation = violation(&paths);
+        let free = violation == 0.0;
+        let figures = if free { objective.judge(&paths) } else { Figures::NOTHING };
+        Judged { paths: candidates, violation, value: value(&figures), figures }
+    } else {
+        let figures = objective.judge(&paths);
+        let value = value(&figures);
+        if value >= best.value {
+            return None;
+        }
+        Judged { paths: candidates, violation: violation(&paths), value, figures }
+    };
+    (judged.rank() < best.rank()).then_some(judged)
 }
 
 fn check(settings: &Settings) -> Result<(), Error> {
@@ -131,24 +221,39 @@ fn check(settings: &Settings) -> Result<(), Error> {
     if !(settings.ramp > 0.0 && settings.ramp <= 0.5 * period * settings.periods as f64) {
         return wrong("the start and the stop must last longer than 0 s and less than half of the path");
     }
-    if !(0.0..0.9).contains(&settings.margin) || settings.lambda2.is_nan() || settings.lambda2 < 0.0 {
-        return wrong("the margin must lie between 0 and 0.9, and the second weight must not be negative");
+    if !(0.0..0.9).contains(&settings.margin) {
+        return wrong("the margin must lie between 0 and 0.9");
+    }
+    if matches!(settings.criterion, Criterion::Condition { lambda2 } if !(lambda2.is_finite() && lambda2 >= 0.0)) {
+        return wrong("the second weight must be a number and not negative");
     }
     Ok(())
 }
 
 impl Candidate {
-    fn random(model: &Model, settings: &Settings, rng: &mut ChaCha8Rng) -> Candidate {
-        let n = model.arm().dof();
+    /// A random path; where there are surroundings, about a pose that is free if one of many is.
+    fn random(task: &Task<'_>, settings: &Settings, rng: &mut ChaCha8Rng) -> Candidate {
+        let n = task.model.arm().dof();
         let mut coefficients =
             || -> Vec<f64> { (0..settings.harmonics).map(|_| StandardNormal.sample(rng)).collect() };
         let shape = (0..n).map(|_| Harmonics { middle: 0.0, a: coefficients(), b: coefficients() }).collect();
         let range = (0..n).map(|_| rng.random_range(0.6..1.0)).collect();
-        Candidate { shape, range, place: (0..n).map(|_| rng.random_range(0.0..1.0)).collect() }
+        let mut candidate = Candidate { shape, range, place: Vec::new() };
+        for _ in 0..PLACES {
+            candidate.place = (0..n).map(|_| rng.random_range(0.0..1.0)).collect();
+            let path = candidate.path(settings, &task.constraints.limits);
+            let middle: Vec<f64> = path.joints.iter().map(|joint| joint.middle).collect();
+            if task.constraints.lacks(&middle) == 0.0 {
+                break;
+            }
+        }
+        candidate
     }
 
     /// Changes one or two joints.
-    fn changed(&self, step: f64, rng: &mut ChaCha8Rng) -> Candidate {
+    fn changed(&self, step: f64, constrained: bool, rng: &mut ChaCha8Rng) -> Candidate {
+        // What is narrow can be too narrow for a joint's usual range.
+        let least = if constrained { 0.02 } else { 0.2 };
         let mut next = self.clone();
         let joints: Vec<usize> = (0..self.shape.len()).collect();
         for _ in 0..rng.random_range(1..=2) {
@@ -156,7 +261,7 @@ impl Candidate {
             let mut by = || -> f64 { step * Distribution::<f64>::sample(&StandardNormal, rng) };
             let shape = &mut next.shape[joint];
             shape.a.iter_mut().chain(&mut shape.b).for_each(|c| *c += by());
-            next.range[joint] = (next.range[joint] + 0.5 * by()).clamp(0.2, 1.0);
+            next.range[joint] = (next.range[joint] + 0.5 * by()).clamp(least, 1.0);
             next.place[joint] = (next.place[joint] + by()).clamp(0.0, 1.0);
         }
         next
@@ -185,9 +290,9 @@ mod tests {
         let settings = Settings { evaluations: 400, seed: 3, ..Settings::default() };
         let found = optimise(&model, SetKind::Minimal, &settings).unwrap();
         assert_eq!(found, optimise(&model, SetKind::Minimal, &settings).unwrap());
-        assert!(found.figures.objective(1.0) < 0.5 * found.usual.objective(1.0), "{found:?}");
+        assert!(found.figures.objective(settings.criterion) < 0.5 * found.usual.objective(settings.criterion), "{found:?}");
         let limits = Limits::of(model.arm(), 0.0).unwrap();
-        for [q, dq, ddq] in found.path.sample(200.0).samples() {
+        for [q, dq, ddq] in found.paths[0].sample(200.0).samples() {
             for (i, limit) in limits.0.iter().enumerate() {
                 assert!((limit.position[0]..limit.position[1]).contains(&q[i]));
                 assert!(dq[i].abs() < limit.velocity && ddq[i].abs() < limit.acceleration);
