@@ -4,8 +4,8 @@ use super::Failure;
 use super::excite_page::page;
 use super::output::{self, Progress};
 use crate::excite::{
-    Conditions, Constraints, Criterion, Error, Excitation, Figures, Limits, Load, Masses, Mounting, Objective,
-    Settings, Shape, Space, Task, Tightest, optimise_all,
+    Conditions, Constraints, Criterion, Error, Excitation, Figures, Limits, Load, Masses, Mounting,
+    Objective, Settings, Shape, Space, Task, Tightest, optimise_all,
 };
 use crate::motion::Motion;
 use clap::{Args, ValueEnum};
@@ -132,7 +132,7 @@ pub(crate) struct Excite {
     #[arg(long, value_name = "Q1,…", value_delimiter = ',', allow_hyphen_values = true)]
     from: Option<Vec<f64>>,
     /// How many paths are tried.
-    #[arg(long, default_value_t = 4000)]
+    #[arg(long, default_value_t = 12000)]
     evaluations: usize,
     /// Samples a second.
     #[arg(long, default_value_t = 200.0)]
@@ -220,14 +220,15 @@ impl Excite {
         let references: Vec<&Model> = models.iter().collect();
         let objective = Objective::new(&references, kind, 1).map_err(refused)?;
         let limits = Limits::of(&arm, 0.0).map_err(|e| refused(e.into()))?;
-        let trajectory = |(((task, motion), mounting), file): (((Task<'_>, Motion), Mounting), PathBuf)| Trajectory {
-            mounting,
-            file,
-            tightest: task.constraints.tightest(&motion),
-            motion,
-            limits: limits.clone(),
-            constraints: task.constraints,
-        };
+        let trajectory =
+            |(((task, motion), mounting), file): (((Task<'_>, Motion), Mounting), PathBuf)| Trajectory {
+                mounting,
+                file,
+                tightest: task.constraints.tightest(&motion),
+                motion,
+                limits: limits.clone(),
+                constraints: task.constraints,
+            };
         let told = Told {
             arm: arm.name.clone(),
             parameters: objective.size(),
@@ -292,7 +293,9 @@ impl Excite {
                 2.0 * ((1.0 + 0.5 * self.clearance / self.radius) / 3.0).min(1.0).asin().to_degrees()
             ));
             for (a, b) in shape.always_touching() {
-                assumed.push(format!("links {a} and {b} touch in every pose with this radius: nothing is said of them"));
+                assumed.push(format!(
+                    "links {a} and {b} touch in every pose with this radius: nothing is said of them"
+                ));
             }
         }
         let mut tasks = Vec::new();
@@ -325,7 +328,9 @@ impl Excite {
                 pose.push(from.iter().map(|q| [*q, 0.0, 0.0]));
                 let free = Constraints { load: None, ..constraints };
                 let why = free.broken(&pose).unwrap_or_else(|| "it is at the clearance".to_string());
-                return Err(Failure::Refused(format!("the arm cannot stand at --from, base {mounting}: {why}")));
+                return Err(Failure::Refused(format!(
+                    "the arm cannot stand at --from, base {mounting}: {why}"
+                )));
             }
             tasks.push(Task { model, constraints });
         }
@@ -378,9 +383,7 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 }
 
 fn in_json(told: &Told) -> Value {
-    let figures = |f: &Figures| {
-        json!({"condition": f.condition, "least_singular_value": f.least, "mean_singular_value": f.mean})
-    };
+    let figures = |f: &Figures| json!({"condition": f.condition, "least_singular_value": f.least, "mean_singular_value": f.mean});
     let trajectory = |(trajectory, path): (&Trajectory, &crate::excite::Fourier)| {
         let torque = trajectory.tightest.torque.as_ref();
         let joints: Vec<Value> = peaks(&trajectory.motion)

@@ -8,7 +8,9 @@ const INKS: [Ink; 6] = [Ink::Blue, Ink::Orange, Ink::Green, Ink::Purple, Ink::Sk
 pub(super) fn page(told: &Told) -> Page {
     let mut page = Page::new(format!("Exciting trajectory of {}", told.arm));
     let (good, usual) = (&told.found.figures, &told.found.usual);
-    page.lead("Finite Fourier series (Eq. 18 to 20) from rest to rest, searched for a well conditioned regressor.");
+    page.lead(
+        "Finite Fourier series (Eq. 18 to 20) from rest to rest, searched for a well conditioned regressor.",
+    );
     page.facts([
         ("parameters", told.parameters.0.to_string()),
         ("condition number, raw", number(told.conditions.raw)),
@@ -19,7 +21,10 @@ pub(super) fn page(told: &Told) -> Page {
         page.heading(&format!("Base {}", trajectory.mounting));
         page.figure(&motion(trajectory), "Positions, speeds and accelerations of all joints.");
         if let Some(figure) = torques(trajectory) {
-            page.figure(&figure, "Torque expected by the model or guess below, as a share of what may be used of each limit.");
+            page.figure(
+                &figure,
+                "Torque expected by the model or guess below, as a share of what may be used of each limit.",
+            );
         }
         if let Some(figure) = distances(trajectory) {
             page.figure(&figure, "Distance of the nearest capsules, or of a capsule and the floor.");
@@ -52,10 +57,11 @@ fn torques(trajectory: &Trajectory) -> Option<Figure> {
     let torques = load.torques(&motion.q, &motion.dq, &motion.ddq);
     let n = motion.dof();
     let share = |k: usize, i: usize| torques[k * n + i] / load.limits()[i];
-    let panel = (0..n).filter(|i| load.limits()[*i].is_finite()).fold(Panel::new("share of limit"), |panel, i| {
-        let points = (0..motion.len()).map(|k| (k as f64 * motion.period, share(k, i)));
-        panel.line(format!("joint {}", i + 1), INKS[i % INKS.len()], points.collect())
-    });
+    let panel =
+        (0..n).filter(|i| load.limits()[*i].is_finite()).fold(Panel::new("share of limit"), |panel, i| {
+            let points = (0..motion.len()).map(|k| (k as f64 * motion.period, share(k, i)));
+            panel.line(format!("joint {}", i + 1), INKS[i % INKS.len()], points.collect())
+        });
     Some(Figure::new("Torque", "time [s]").panel(panel))
 }
 
@@ -67,8 +73,10 @@ fn distances(trajectory: &Trajectory) -> Option<Figure> {
     };
     let points: Vec<(f64, f64)> = motion.samples().enumerate().filter_map(near).collect();
     let end = motion.duration();
-    let panel = Panel::new("distance [m]")
-        .line("nearest", Ink::Blue, points)
-        .series(Series::dashed("clearance", Ink::Grey, vec![(0.0, space.clearance), (end, space.clearance)]));
+    let panel = Panel::new("distance [m]").line("nearest", Ink::Blue, points).series(Series::dashed(
+        "clearance",
+        Ink::Grey,
+        vec![(0.0, space.clearance), (end, space.clearance)],
+    ));
     Some(Figure::new("Room", "time [s]").panel(panel))
 }

@@ -132,7 +132,8 @@ impl Session {
         }
 
         let plant = lwa4p::plant()?;
-        let motions: Vec<Motion> = found.iter().flat_map(|f| &f.paths).map(|path| path.sample(plant.sensors().rate)).collect();
+        let motions: Vec<Motion> =
+            found.iter().flat_map(|f| &f.paths).map(|path| path.sample(plant.sensors().rate)).collect();
         let ends: Vec<[[f64; 6]; 2]> = motions.iter().map(ends).collect();
         let starts = starts(&motions, &ends);
         let session = starts.last().map_or(0.0, |last| last + motions.last().map_or(0.0, Motion::duration));

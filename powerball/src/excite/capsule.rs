@@ -43,9 +43,8 @@ impl Segment {
         let (u, v, w) = (self.to - self.from, other.to - other.from, self.from - other.from);
         let (a, b, c, d, e) = (u.dot(&u), u.dot(&v), v.dot(&v), u.dot(&w), v.dot(&w));
         let determinant = a * c - b * b;
-        let inside = (determinant > 1e-12 * a * c).then(|| {
-            ((b * e - c * d) / determinant, (a * e - b * d) / determinant)
-        });
+        let inside = (determinant > 1e-12 * a * c)
+            .then(|| ((b * e - c * d) / determinant, (a * e - b * d) / determinant));
         if let Some((s, t)) = inside.filter(|(s, t)| (0.0..=1.0).contains(s) && (0.0..=1.0).contains(t)) {
             return (w + u * s - v * t).norm();
         }
@@ -63,7 +62,8 @@ impl Segment {
     pub fn distance_to(&self, point: &Vector3<f64>) -> f64 {
         let along = self.to - self.from;
         let square = along.norm_squared();
-        let share = if square > 0.0 { ((point - self.from).dot(&along) / square).clamp(0.0, 1.0) } else { 0.0 };
+        let share =
+            if square > 0.0 { ((point - self.from).dot(&along) / square).clamp(0.0, 1.0) } else { 0.0 };
         (point - self.at(share)).norm()
     }
 }

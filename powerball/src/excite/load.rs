@@ -1,8 +1,8 @@
 //! The torque that a path takes, against the joints' limits.
 
+use super::Error;
 use super::limits::JointLimits;
 use super::shape::{Shape, poses};
-use super::Error;
 use crate::friction::TanhFriction;
 use dyngen::arm::{Arm, ParameterKind};
 use dyngen::exact::rational::to_f64;
@@ -38,8 +38,10 @@ impl Masses {
     /// What the file lacks, or names that the arm does not have.
     pub fn parse(text: &str, file: &str, model: &Model) -> Result<Masses, Error> {
         let wrong = |what: String| Error::Setting(format!("{file}: {what}"));
-        let json: serde_json::Value = serde_json::from_str(text).map_err(|e| wrong(format!("is no JSON: {e}")))?;
-        let identified = json.get("consistent").and_then(|c| Some((c.get("parameters")?, c.get("friction")?)));
+        let json: serde_json::Value =
+            serde_json::from_str(text).map_err(|e| wrong(format!("is no JSON: {e}")))?;
+        let identified =
+            json.get("consistent").and_then(|c| Some((c.get("parameters")?, c.get("friction")?)));
         let (parameters, friction) = match identified {
             Some((parameters, friction)) => {
                 let friction = serde_json::from_value::<Vec<[f64; 5]>>(friction.clone())
@@ -74,19 +76,22 @@ impl Masses {
     /// As [`Load::new`].
     pub fn guess(model: &Model, shape: &Shape, limits: &[JointLimits]) -> Result<Masses, Error> {
         let arm = model.arm();
-        let mut masses =
-            Masses { parameters: bodies(arm, shape, limits), friction: None, reserve: 0.0, origin: String::new() };
+        let mut masses = Masses {
+            parameters: bodies(arm, shape, limits),
+            friction: None,
+            reserve: 0.0,
+            origin: String::new(),
+        };
         let load = Load::new(model, &masses, limits)?;
         let still = vec![0.0; arm.dof()];
-        let heaviest = poses(limits)
-            .flat_map(|q| load.shares(&q, &still, &still))
-            .fold(0.0f64, f64::max);
+        let heaviest = poses(limits).flat_map(|q| load.shares(&q, &still, &still)).fold(0.0f64, f64::max);
         let lighter = (OWN_WEIGHT / heaviest).min(1.0);
         masses.parameters.iter_mut().for_each(|x| *x *= lighter);
         for (i, joint) in arm.joints.iter().enumerate() {
             let ratio = joint.rotor_ratio.as_ref().map(to_f64);
             if let (Some(k), Some(torque), Some(acceleration)) = (ratio, joint.torque, joint.acceleration) {
-                masses.parameters[11 * i + ParameterKind::Im as usize] = ROTOR * torque / (acceleration * k * k);
+                masses.parameters[11 * i + ParameterKind::Im as usize] =
+                    ROTOR * torque / (acceleration * k * k);
             }
         }
         let total: f64 = masses.parameters.iter().step_by(11).sum();

@@ -110,7 +110,11 @@ mod tests {
         ];
         for (text, gravity) in cases {
             let mounting: Mounting = text.parse().unwrap();
-            assert_eq!(mounting.of(&arm).unwrap().gravity.each_ref().map(rational::to_f64), gravity, "{text}");
+            assert_eq!(
+                mounting.of(&arm).unwrap().gravity.each_ref().map(rational::to_f64),
+                gravity,
+                "{text}"
+            );
         }
         for wrong in ["upright", "1", "1,2,3,4", "nan,0", "0,0,9810"] {
             assert!(wrong.parse::<Mounting>().is_err(), "{wrong}");

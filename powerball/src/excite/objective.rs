@@ -180,7 +180,8 @@ impl Objective {
     #[must_use]
     pub fn conditions(&self, motions: &[Motion]) -> Conditions {
         let gram = self.gram_of(motions, &vec![1.0; self.dof], &self.reflected);
-        let lengths: Vec<f64> = (0..self.columns).map(|k| gram[(k, k)].sqrt().max(f64::MIN_POSITIVE)).collect();
+        let lengths: Vec<f64> =
+            (0..self.columns).map(|k| gram[(k, k)].sqrt().max(f64::MIN_POSITIVE)).collect();
         let unit = Mat::from_fn(self.columns, self.columns, |i, k| gram[(i, k)] / lengths[i] / lengths[k]);
         Conditions { raw: self.figures(&gram).condition, normalised: self.figures(&unit).condition }
     }
@@ -244,4 +245,60 @@ fn general_model(models: &[&Model]) -> Result<Model, Error> {
     let [x, y, z] = sum.map(decimal);
     arm.gravity = [x?, y?, z?];
     Ok(Model::derive(arm)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Mounting;
+    use super::*;
+    use crate::regression::newton_euler;
+    use rand::{RngExt, SeedableRng};
+
+    /// Two mountings determine what their stacked regressors do, by another formulation of the torque and all parameters apart; and
+    /// the condition number is that of the stacked columns.
+    #[test]
+    fn mountings_count_together() {
+        let arm = crate::virtual_arm::lwa4p::arm().unwrap();
+        let mountings = ["filed", "90,0"].map(|text| text.parse::<Mounting>().unwrap());
+        let models = mountings.map(|m| Model::derive(m.of(&arm).unwrap()).unwrap());
+        let objective = Objective::new(&[&models[0], &models[1]], SetKind::Minimal, 8).unwrap();
+        let alone = Objective::new(&[&models[0]], SetKind::Minimal, 8).unwrap();
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);
+        let motions = [(); 2].map(|()| {
+            let mut motion = Motion::new(6, 0.01);
+            (0..60).for_each(|_| motion.push((0..6).map(|_| [(); 3].map(|()| rng.random_range(-1.5..1.5)))));
+            motion
+        });
+        let kept = arm.kept_parameters();
+        let mut rows = Vec::new();
+        for (mounting, motion) in mountings.iter().zip(&motions) {
+            for [q, dq, ddq] in motion.samples() {
+                let full = newton_euler::regressor(&arm, q, dq, ddq, mounting.gravity(&arm));
+                rows.extend(
+                    (0..6).map(|j| kept.iter().map(|p| full[j * 66 + p.index()]).collect::<Vec<f64>>()),
+                );
+            }
+        }
+        let singular = |columns: usize, at: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
+            let y = Mat::from_fn(rows.len(), columns, at);
+            y.singular_values().unwrap()
+        };
+        let all = singular(kept.len(), &|r, c| rows[r][c]);
+        let rank = all.iter().filter(|s| **s > 1e-9 * all[0]).count();
+        assert_eq!(objective.size(), (rank, rank));
+        assert!(rank > alone.size().1);
+        let general = general_model(&[&models[0], &models[1]]).unwrap();
+        let set = general.set(SetKind::Minimal).unwrap();
+        let column = |r: usize, c: usize| -> f64 {
+            let value = |(p, x): &(Parameter, _)| {
+                let at = kept.iter().position(|k| k == p).unwrap();
+                general.sets().field.value(x) * rows[r][at]
+            };
+            set.parameters[c].carriers.iter().map(value).sum::<f64>() / reflected(&arm, &set.parameters[c])
+        };
+        let own = singular(rank, &column);
+        let conditions = objective.conditions(&motions);
+        approx::assert_relative_eq!(conditions.raw, own[0] / own[rank - 1], max_relative = 1e-6);
+        assert!(conditions.normalised < conditions.raw);
+    }
 }

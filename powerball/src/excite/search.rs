@@ -177,7 +177,8 @@ pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> R
     let best = found.swap_remove(0);
     let paths = place(&best.paths);
     if best.violation > 0.0 {
-        let reasons = tasks.iter().zip(&paths).filter_map(|(task, path)| task.constraints.broken(&path.sample(200.0)));
+        let reasons =
+            tasks.iter().zip(&paths).filter_map(|(task, path)| task.constraints.broken(&path.sample(200.0)));
         return Err(Error::NoPath(reasons.collect::<Vec<_>>().join("; ")));
     }
     Ok(Excitation { paths, figures: best.figures, usual })
@@ -224,7 +225,8 @@ fn check(settings: &Settings) -> Result<(), Error> {
     if !(0.0..0.9).contains(&settings.margin) {
         return wrong("the margin must lie between 0 and 0.9");
     }
-    if matches!(settings.criterion, Criterion::Condition { lambda2 } if !(lambda2.is_finite() && lambda2 >= 0.0)) {
+    if matches!(settings.criterion, Criterion::Condition { lambda2 } if !(lambda2.is_finite() && lambda2 >= 0.0))
+    {
         return wrong("the second weight must be a number and not negative");
     }
     Ok(())
@@ -290,7 +292,10 @@ mod tests {
         let settings = Settings { evaluations: 400, seed: 3, ..Settings::default() };
         let found = optimise(&model, SetKind::Minimal, &settings).unwrap();
         assert_eq!(found, optimise(&model, SetKind::Minimal, &settings).unwrap());
-        assert!(found.figures.objective(settings.criterion) < 0.5 * found.usual.objective(settings.criterion), "{found:?}");
+        assert!(
+            found.figures.objective(settings.criterion) < 0.5 * found.usual.objective(settings.criterion),
+            "{found:?}"
+        );
         let limits = Limits::of(model.arm(), 0.0).unwrap();
         for [q, dq, ddq] in found.paths[0].sample(200.0).samples() {
             for (i, limit) in limits.0.iter().enumerate() {

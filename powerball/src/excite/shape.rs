@@ -105,8 +105,16 @@ impl Shape {
         }
         let a = arm.joints.iter().map(|joint| to_f64(&joint.a)).collect();
         let all = (0..parts.len()).flat_map(|k| (k + 1..parts.len()).map(move |l| (k, l))).collect();
-        let mut shape =
-            Shape { chain: Chain::new(arm), modified, a, tool, radius, parts, pairs: all, always: Vec::new() };
+        let mut shape = Shape {
+            chain: Chain::new(arm),
+            modified,
+            a,
+            tool,
+            radius,
+            parts,
+            pairs: all,
+            always: Vec::new(),
+        };
         let mut touching = vec![true; shape.pairs.len()];
         for q in poses(limits) {
             let vertices = shape.vertices(&q);
@@ -114,7 +122,8 @@ impl Shape {
                 *touching &= shape.between(*pair, &vertices).is_some_and(|distance| distance <= 0.0);
             }
         }
-        let (always, pairs) = shape.pairs.iter().zip(touching).partition::<Vec<_>, _>(|(_, touching)| *touching);
+        let (always, pairs) =
+            shape.pairs.iter().zip(touching).partition::<Vec<_>, _>(|(_, touching)| *touching);
         let links = |(k, l): (usize, usize)| (shape.parts[k].link, shape.parts[l].link);
         shape.always = always.into_iter().map(|(pair, _)| links(*pair)).collect();
         shape.pairs = pairs.into_iter().map(|(pair, _)| *pair).collect();
@@ -209,6 +218,141 @@ fn segment(part: &Part, vertices: &[Vector3<f64>]) -> Segment {
 pub(super) fn poses(limits: &[JointLimits]) -> impl Iterator<Item = Vec<f64>> + '_ {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     (0..POSES).map(move |_| {
-        limits.iter().map(|l| l.position[0] + rng.random_range(0.0..=1.0) * (l.position[1] - l.position[0])).collect()
+        limits
+            .iter()
+            .map(|l| l.position[0] + rng.random_range(0.0..=1.0) * (l.position[1] - l.position[0]))
+            .collect()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::limits::Limits;
+    use super::*;
+    use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+
+    /// Points along the arm every few millimetres, with the place of each along the chain, by transforms of its own.
+    fn points(arm: &Arm, q: &[f64]) -> Vec<(f64, Vector3<f64>)> {
+        let turn = |axis, angle| {
+            Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&axis, angle))
+        };
+        let (x, z) = (Vector3::x_axis(), Vector3::z_axis());
+        let (mut frame, mut place, mut out) = (Isometry3::identity(), 0.0, Vec::new());
+        let mut slide = |frame: &mut Isometry3<f64>, by: Vector3<f64>| {
+            let steps = (by.norm() / 0.004).ceil() as usize;
+            for k in 0..=steps.max(1) {
+                let share = k as f64 / steps.max(1) as f64;
+                if by.norm() > 0.0 {
+                    out.push((
+                        place + share * by.norm(),
+                        (*frame * Translation3::from(by * share)).translation.vector,
+                    ));
+                }
+            }
+            place += by.norm();
+            *frame *= Translation3::from(by);
+        };
+        for (joint, q) in arm.joints.iter().zip(q) {
+            let (mut theta, mut d) = (joint.theta.radians(), to_f64(&joint.d));
+            *(if joint.kind == JointKind::Prismatic { &mut d } else { &mut theta }) += q;
+            let (along_a, along_d) = (Vector3::x() * to_f64(&joint.a), Vector3::z() * d);
+            if arm.convention == Convention::Modified {
+                frame *= turn(x, joint.alpha.radians());
+                slide(&mut frame, along_a);
+                frame *= turn(z, theta);
+                slide(&mut frame, along_d);
+            } else {
+                frame *= turn(z, theta);
+                slide(&mut frame, along_d);
+                slide(&mut frame, along_a);
+                frame *= turn(x, joint.alpha.radians());
+            }
+        }
+        out
+    }
+
+    const SCARA: &str = r#"
+name = "scara"
+convention = "standard"
+gravity = [0, 0, -9.81]
+[[joint]]
+kind = "revolute"
+a = 0.4
+alpha = 0
+d = 0.5
+theta = 0
+position = [-2.5, 2.5]
+velocity = 2
+acceleration = 5
+[[joint]]
+kind = "revolute"
+a = 0.3
+alpha = "pi"
+d = 0
+theta = 0
+position = [-2.8, 2.8]
+velocity = 2
+acceleration = 5
+[[joint]]
+kind = "prismatic"
+a = 0
+alpha = 0
+d = 0.1
+theta = 0
+position = [0, 0.35]
+velocity = 0.5
+acceleration = 3
+"#;
+
+    /// Against points in their thousands: the floor, and links away from the joints between them, in both conventions and with a
+    /// joint that slides.
+    #[test]
+    fn the_nearest_is_that_of_many_points() {
+        let file = |text: &str| Arm::parse(text, "arm.toml").unwrap();
+        let lwa4p = crate::virtual_arm::lwa4p::ARM_FILE;
+        let modified = lwa4p.replace("\"standard\"", "\"modified\"").replace("d = 0.0\n", "d = 0.11\n");
+        let radius = 0.03;
+        for arm in [file(lwa4p), file(&modified), file(SCARA)] {
+            let limits = Limits::of(&arm, 0.0).unwrap().0;
+            let shape = Shape::new(&arm, &limits, radius);
+            assert!(shape.always_touching().is_empty());
+            let up = Vector3::new(0.1, -0.2, 1.0).normalize();
+            let floor = shape.floor(up, -0.3, &limits);
+            for q in poses(&limits).take(60) {
+                let all = points(&arm, &q);
+                let lowest = all.iter().map(|(_, p)| p.dot(&up)).fold(f64::INFINITY, f64::min);
+                // Further apart along the arm than what counts as joined; cut evenly from both.
+                let links = shape.nearest(&q, None).map_or(f64::INFINITY, |near| near.distance);
+                for (k, (s, a)) in all.iter().enumerate() {
+                    for (t, b) in &all[k..] {
+                        let joint_between = (t - s) > JOINED * radius + 0.6;
+                        if joint_between {
+                            assert!((a - b).norm() - 2.0 * radius >= links - 1e-9, "{q:?}");
+                        }
+                    }
+                }
+                let with_floor = shape.nearest(&q, Some(&floor)).map_or(f64::INFINITY, |near| near.distance);
+                let to_floor = lowest + 0.3 - radius;
+                // What stands still is not asked about.
+                assert!(with_floor <= links + 1e-12);
+                if floor.moving.iter().skip(1).all(|m| *m) && lowest < 0.0 {
+                    approx::assert_abs_diff_eq!(with_floor, links.min(to_floor), epsilon = 1e-9);
+                }
+            }
+        }
+    }
+
+    /// The forearm of an elbow arm against its upper arm: free when stretched, touching when folded, by the triangle's own formula.
+    #[test]
+    fn an_elbow_folds_as_far_as_its_triangle_says() {
+        let arm = crate::virtual_arm::lwa4p::arm().unwrap();
+        let limits = Limits::of(&arm, 0.0).unwrap().0;
+        let shape = Shape::new(&arm, &limits, 0.05);
+        for fold in [-2.6, -1.9, -1.0, 1.0, 2.0, 2.6] {
+            let near = shape.nearest(&[0.3, 0.1, fold, 0.0, 0.0, 0.0], None).unwrap();
+            // Both are cut three radii from the elbow; the shorter one ends 0.305 m from it.
+            let ends = 2.0 * 0.15 * (0.5 * (std::f64::consts::PI - f64::abs(fold))).sin();
+            approx::assert_abs_diff_eq!(near.distance, ends - 0.1, epsilon = 1e-9);
+        }
+    }
 }
