@@ -196,6 +196,6 @@ fn what_cannot_be_kept_is_said() {
     refused(
         &["--arm", weak.to_str().unwrap(), "--values", heavy.to_str().unwrap()],
         1,
-        "no trajectory was found that keeps all constraints; in the best one joint",
+        "no trajectory was found that keeps all constraints; in the best one",
     );
 }

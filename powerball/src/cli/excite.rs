@@ -113,10 +113,10 @@ pub(crate) struct Excite {
     #[arg(long, value_name = "Z", value_parser = floor, allow_hyphen_values = true)]
     floor: Option<FloorAt>,
     /// Radius of the links' capsules, m.
-    #[arg(long, default_value_t = 0.06)]
+    #[arg(long, default_value_t = 0.06, allow_hyphen_values = true)]
     radius: f64,
     /// Distance that capsules keep from each other and from the floor, m.
-    #[arg(long, default_value_t = 0.02)]
+    #[arg(long, default_value_t = 0.02, allow_hyphen_values = true)]
     clearance: f64,
     /// Looks neither at the floor nor at links that touch.
     #[arg(long)]
