@@ -18,7 +18,7 @@ pub use limits::{JointLimits, Limits, MissingLimits};
 pub use load::{Load, Masses};
 pub use mounting::Mounting;
 pub use objective::{Conditions, Criterion, Figures, Objective};
-pub use search::{Excitation, Settings, Task, optimise, optimise_all};
+pub use search::{Excitation, Settings, Task, optimise, optimise_all, search, search_all};
 pub use shape::{Contact, Floor, Nearness, Shape};
 
 use std::fmt;

@@ -83,17 +83,22 @@ struct Candidate {
 }
 
 /// Candidates for all mountings, with what they are worth.
-struct Judged {
+struct Judged<J> {
     paths: Vec<Candidate>,
     violation: f64,
     value: f64,
-    figures: Figures,
+    /// What was said of them; nothing where they break the constraints and were not asked about.
+    said: Option<J>,
 }
 
-impl Judged {
-    /// What keeps the constraints is better than what does not; then the smaller violation, then the objective counts.
+impl<J> Judged<J> {
+    /// What keeps the constraints is better than what does not; then the smaller violation, then the value counts.
     fn rank(&self) -> (f64, f64) {
         (self.violation, self.value)
+    }
+
+    fn order(a: &Self, b: &Self) -> std::cmp::Ordering {
+        a.violation.total_cmp(&b.violation).then(a.value.total_cmp(&b.value))
     }
 }
 
@@ -110,53 +115,82 @@ pub fn optimise(model: &Model, kind: SetKind, settings: &Settings) -> Result<Exc
 /// Finds a path for each mounting such that they determine a parameter set together.
 ///
 /// # Errors
-/// A set that has no regressor, settings that make no sense, and [`Error::NoPath`] where no path that keeps the constraints
-/// was found.
+/// A set that has no regressor, and as [`search_all`].
 pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> Result<Excitation, Error> {
     check(settings)?;
     let models: Vec<&Model> = tasks.iter().map(|task| task.model).collect();
     // Eight instants for each period of the highest harmonic resolve its regressor.
     let mut objective = Objective::new(&models, kind, (8 * settings.harmonics).max(48))?;
-    let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
-    let place = |candidates: &[Candidate]| -> Vec<Fourier> {
-        let limits = tasks.iter().map(|task| &task.constraints.limits);
-        candidates.iter().zip(limits).map(|(candidate, limits)| candidate.path(settings, limits)).collect()
-    };
-    let random = |rng: &mut ChaCha8Rng| -> Vec<Candidate> {
-        tasks.iter().map(|task| Candidate::random(task, settings, rng)).collect()
-    };
-    let violation = |paths: &[Fourier]| -> f64 {
-        tasks.iter().zip(paths).map(|(task, path)| task.constraints.violation(path)).sum()
-    };
-    let value = |figures: &Figures| figures.objective(settings.criterion);
-    for task in tasks {
-        let constraints = &task.constraints;
-        if poses(&constraints.limits.0).all(|q| constraints.lacks(&q) > 0.0) {
-            return Err(Error::NoPose);
-        }
-    }
-
+    let constraints: Vec<&Constraints> = tasks.iter().map(|task| &task.constraints).collect();
     // Columns are scaled by paths of a seed of their own: figures of different searches can then be compared.
     let mut fixed = ChaCha8Rng::seed_from_u64(0);
-    let typical: Vec<Vec<Fourier>> = (0..16).map(|_| place(&random(&mut fixed))).collect();
-    objective.scale_columns(&typical);
-
-    let starts = (settings.evaluations / 8).max(1);
-    let mut found: Vec<Judged> = (0..starts)
+    let typical: Vec<Vec<Fourier>> = (0..16)
         .map(|_| {
-            let candidates = random(&mut rng);
+            let one = |c: &&Constraints| Candidate::random(c, settings, &mut fixed).path(settings, &c.limits);
+            constraints.iter().map(one).collect()
+        })
+        .collect();
+    objective.scale_columns(&typical);
+    let (paths, figures, usual) = search_all(&constraints, settings, |paths| {
+        let figures = objective.judge(paths);
+        (figures.objective(settings.criterion), figures)
+    })?;
+    Ok(Excitation { paths, figures, usual })
+}
+
+/// The path within the limits whose value, the first thing that `judge` says, is smallest; what else it said of that path,
+/// and of the middle one of the random starts.
+///
+/// # Errors
+/// As [`search_all`].
+pub fn search<J: Clone>(
+    settings: &Settings,
+    limits: &Limits,
+    mut judge: impl FnMut(&Fourier) -> (f64, J),
+) -> Result<(Fourier, J, J), Error> {
+    let constraints = Constraints::of(limits.clone());
+    let (mut paths, said, usual) = search_all(&[&constraints], settings, |paths| judge(&paths[0]))?;
+    Ok((paths.swap_remove(0), said, usual))
+}
+
+/// The paths, one for each mounting within its constraints, whose value together is smallest, with what else `judge` said of
+/// them, and of the middle ones of the random starts.
+///
+/// # Errors
+/// Settings that make no sense, [`Error::NoPose`] where there is no room at all, and [`Error::NoPath`] where no path that keeps
+/// the constraints was found.
+pub fn search_all<J: Clone>(
+    constraints: &[&Constraints],
+    settings: &Settings,
+    mut judge: impl FnMut(&[Fourier]) -> (f64, J),
+) -> Result<(Vec<Fourier>, J, J), Error> {
+    check(settings)?;
+    if constraints.iter().any(|c| poses(&c.limits.0).all(|q| c.lacks(&q) > 0.0)) {
+        return Err(Error::NoPose);
+    }
+    let place = |candidates: &[Candidate]| -> Vec<Fourier> {
+        candidates.iter().zip(constraints).map(|(candidate, c)| candidate.path(settings, &c.limits)).collect()
+    };
+    let violation =
+        |paths: &[Fourier]| -> f64 { constraints.iter().zip(paths).map(|(c, path)| c.violation(path)).sum() };
+    let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
+    let starts = (settings.evaluations / 8).max(1);
+    let mut found: Vec<Judged<J>> = (0..starts)
+        .map(|_| {
+            let candidates: Vec<Candidate> =
+                constraints.iter().map(|c| Candidate::random(c, settings, &mut rng)).collect();
             let paths = place(&candidates);
-            let figures = objective.judge(&paths);
-            Judged { paths: candidates, violation: violation(&paths), value: value(&figures), figures }
+            let (value, said) = judge(&paths);
+            Judged { paths: candidates, violation: violation(&paths), value, said: Some(said) }
         })
         .collect();
     found.sort_by(|a, b| a.value.total_cmp(&b.value));
-    let usual = found[found.len() / 2].figures;
-    found.sort_by(|a, b| a.violation.total_cmp(&b.violation).then(a.value.total_cmp(&b.value)));
+    let usual = found[found.len() / 2].said.clone();
+    found.sort_by(Judged::order);
     found.truncate(3);
 
     let each = settings.evaluations.saturating_sub(starts) / found.len();
-    let constrained = tasks.iter().any(|task| task.constraints.any());
+    let constrained = constraints.iter().any(|c| c.any());
     for best in &mut found {
         // Steps grow after a success and shrink after a failure such that one in five succeeds.
         let mut step: f64 = 0.3;
@@ -164,7 +198,7 @@ pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> R
             let mut next = best.paths.clone();
             let changed = if next.len() > 1 { rng.random_range(0..next.len()) } else { 0 };
             next[changed] = next[changed].changed(step, constrained, &mut rng);
-            match improved(best, next, &place, &violation, &objective, &value) {
+            match improved(best, next, &place, &violation, &mut judge) {
                 Some(better) => {
                     *best = better;
                     step = (step * 1.5).min(1.0);
@@ -173,39 +207,43 @@ pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> R
             }
         }
     }
-    found.sort_by(|a, b| a.violation.total_cmp(&b.violation).then(a.value.total_cmp(&b.value)));
+    found.sort_by(Judged::order);
     let best = found.swap_remove(0);
     let paths = place(&best.paths);
-    if best.violation > 0.0 {
-        let reasons =
-            tasks.iter().zip(&paths).filter_map(|(task, path)| task.constraints.broken(&path.sample(200.0)));
-        return Err(Error::NoPath(reasons.collect::<Vec<_>>().join("; ")));
+    match (best.said, usual) {
+        (Some(said), Some(usual)) if best.violation == 0.0 => Ok((paths, said, usual)),
+        _ => {
+            let reasons = constraints.iter().zip(&paths).filter_map(|(c, path)| c.broken(&path.sample(200.0)));
+            Err(Error::NoPath(reasons.collect::<Vec<_>>().join("; ")))
+        }
     }
-    Ok(Excitation { paths, figures: best.figures, usual })
 }
 
 /// The candidates judged, where they are better than the best so far; what is dear is looked at last.
-fn improved(
-    best: &Judged,
+fn improved<J>(
+    best: &Judged<J>,
     candidates: Vec<Candidate>,
     place: &impl Fn(&[Candidate]) -> Vec<Fourier>,
     violation: &impl Fn(&[Fourier]) -> f64,
-    objective: &Objective,
-    value: &impl Fn(&Figures) -> f64,
-) -> Option<Judged> {
+    judge: &mut impl FnMut(&[Fourier]) -> (f64, J),
+) -> Option<Judged<J>> {
     let paths = place(&candidates);
     let judged = if best.violation > 0.0 {
         let violation = violation(&paths);
-        let free = violation == 0.0;
-        let figures = if free { objective.judge(&paths) } else { Figures::NOTHING };
-        Judged { paths: candidates, violation, value: value(&figures), figures }
+        let (value, said) = match violation == 0.0 {
+            true => {
+                let (value, said) = judge(&paths);
+                (value, Some(said))
+            }
+            false => (f64::INFINITY, None),
+        };
+        Judged { paths: candidates, violation, value, said }
     } else {
-        let figures = objective.judge(&paths);
-        let value = value(&figures);
+        let (value, said) = judge(&paths);
         if value >= best.value {
             return None;
         }
-        Judged { paths: candidates, violation: violation(&paths), value, figures }
+        Judged { paths: candidates, violation: violation(&paths), value, said: Some(said) }
     };
     (judged.rank() < best.rank()).then_some(judged)
 }
@@ -234,8 +272,8 @@ fn check(settings: &Settings) -> Result<(), Error> {
 
 impl Candidate {
     /// A random path; where there are surroundings, about a pose that is free if one of many is.
-    fn random(task: &Task<'_>, settings: &Settings, rng: &mut ChaCha8Rng) -> Candidate {
-        let n = task.model.arm().dof();
+    fn random(constraints: &Constraints, settings: &Settings, rng: &mut ChaCha8Rng) -> Candidate {
+        let n = constraints.limits.0.len();
         let mut coefficients =
             || -> Vec<f64> { (0..settings.harmonics).map(|_| StandardNormal.sample(rng)).collect() };
         let shape = (0..n).map(|_| Harmonics { middle: 0.0, a: coefficients(), b: coefficients() }).collect();
@@ -243,9 +281,9 @@ impl Candidate {
         let mut candidate = Candidate { shape, range, place: Vec::new() };
         for _ in 0..PLACES {
             candidate.place = (0..n).map(|_| rng.random_range(0.0..1.0)).collect();
-            let path = candidate.path(settings, &task.constraints.limits);
+            let path = candidate.path(settings, &constraints.limits);
             let middle: Vec<f64> = path.joints.iter().map(|joint| joint.middle).collect();
-            if task.constraints.lacks(&middle) == 0.0 {
+            if constraints.lacks(&middle) == 0.0 {
                 break;
             }
         }
