@@ -1,15 +1,14 @@
 //! `powerball identify`: from logs to identified.json.
 
 use super::Failure;
-use super::identify_page::page;
+use super::identify_page::{Shown, page};
 use super::inputs::same_file;
 use super::output::{self, Progress};
 use super::reduced::{Reduced, reduce};
 use crate::estimate::{
-    ConsistentReport, FrictionLaw, JointFriction, ParameterEstimate, Solution, Spread, TorqueModel, consistent_fit,
-    identify, solve_reduced, spread, spread_of,
+    ConsistentReport, FrictionLaw, JointFriction, ParameterEstimate, Solution, Spread, TorqueModel,
+    consistent_fit, exchanged, identify, solve_reduced, spread, spread_of,
 };
-use crate::explain::{TorqueCurve, curves};
 use crate::log::read_logs;
 use crate::regression::{Data, DataOptions, RigidBody};
 use clap::{Args, ValueEnum};
@@ -82,7 +81,8 @@ impl Identify {
                 )));
             }
         }
-        let Reduced { body, summary, shown, mut warnings } = reduce(&self.arm, &self.log, &options, &progress)?;
+        let Reduced { body, summary, shown, mut warnings } =
+            reduce(&self.arm, &self.log, &options, &progress)?;
         let (held_out, findings) =
             read_logs(&self.validate, body.arm()).map_err(|e| Failure::Unusable(e.to_string()))?;
         warnings.extend(findings.iter().map(ToString::to_string));
@@ -94,6 +94,7 @@ impl Identify {
             Friction::Asymmetric => FrictionLaw::Asymmetric,
         };
         let solution = solve_reduced(&summary, law);
+        warnings.extend(exchanged(&body, &shown, &options, &spread_of(&solution, &solution.theta)));
         let identified = identify(&summary, &solution);
         let model = torque_model(&solution);
         let validate = if held_out.is_empty() {
@@ -105,7 +106,7 @@ impl Identify {
             Some(spread(&data, &model.residual(&data)))
         };
         let figures = if held_out.is_empty() { &shown } else { &held_out };
-        let figures = if figures.is_empty() { Vec::new() } else { curves_of(&body, figures, &options, &model)? };
+        let figures = Shown::new(&body, figures, &options, &model, &identified.friction)?;
         let undetermined: Vec<&str> =
             identified.parameters.iter().filter(|p| p.std.is_none()).map(|p| p.name.as_str()).collect();
         if !undetermined.is_empty() {
@@ -137,7 +138,7 @@ impl Identify {
         output::write(&self.out, "identified.json", text.as_bytes())?;
         let values = output::json(&result.consistent.parameters)?;
         output::write(&self.out, "consistent.json", values.as_bytes())?;
-        let page = page(&result, &figures, result.validate.is_some());
+        let page = page(&result, body.arm(), &figures, result.validate.is_some());
         output::write(&self.out, "report.html", page.to_html().as_bytes())?;
         if self.json {
             output::print(&text);
@@ -162,21 +163,10 @@ fn torque_model(solution: &Solution) -> TorqueModel {
     }
 }
 
-fn prepared<'a>(
+pub(super) fn prepared<'a>(
     body: &'a RigidBody,
     logs: &[crate::log::Log],
     options: &DataOptions,
 ) -> Result<Data<'a>, Failure> {
     Data::new(body, logs, options).map_err(|e| Failure::Refused(e.to_string()))
-}
-
-fn curves_of(
-    body: &RigidBody,
-    logs: &[crate::log::Log],
-    options: &DataOptions,
-    model: &TorqueModel,
-) -> Result<Vec<TorqueCurve>, Failure> {
-    let data = prepared(body, logs, options)?;
-    let residual = model.residual(&data);
-    Ok(curves(&data, &residual, &residual))
 }

@@ -3,8 +3,9 @@
 mod consistent;
 mod consistent_fit;
 mod design;
-mod errors;
 pub mod distribution;
+mod errors;
+mod exchanged;
 mod fit;
 mod folds;
 mod friction_shape;
@@ -19,6 +20,7 @@ pub use consistent::{Consistent, nearest};
 pub use consistent_fit::{ConsistentFit, ConsistentReport, consistent_fit};
 pub use design::{Design, Gram, runs};
 pub use errors::{Errors, errors};
+pub use exchanged::exchanged;
 pub use fit::{Fit, Term, fit, friction_columns};
 pub use folds::Folds;
 pub use identify::{Identified, JointFriction, ParameterEstimate, Spread, identify, spread, spread_of};

@@ -213,7 +213,8 @@ pub fn search_all<J: Clone>(
     match (best.said, usual) {
         (Some(said), Some(usual)) if best.violation == 0.0 => Ok((paths, said, usual)),
         _ => {
-            let reasons = constraints.iter().zip(&paths).filter_map(|(c, path)| c.broken(&path.sample(200.0)));
+            let reasons =
+                constraints.iter().zip(&paths).filter_map(|(c, path)| c.broken(&path.sample(200.0)));
             Err(Error::NoPath(reasons.collect::<Vec<_>>().join("; ")))
         }
     }

@@ -5,6 +5,7 @@ pub mod difference;
 pub mod filter;
 pub mod resample;
 pub mod rest;
+pub mod turns;
 
 pub use butterworth::Butterworth;
 pub use filter::Band;
