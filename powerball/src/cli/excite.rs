@@ -14,6 +14,9 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+/// An hour and more at 1 kHz.
+const MOST_SAMPLES: f64 = 5e6;
+
 /// A parameter set on the command line.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Set {
@@ -171,6 +174,12 @@ impl Excite {
             if !(value.is_finite() && value > 0.0) {
                 return Err(Failure::Unusable(format!("{name} must be above 0")));
             }
+        }
+        let samples = self.rate * self.period * self.periods as f64;
+        if samples > MOST_SAMPLES {
+            return Err(Failure::Unusable(format!(
+                "--rate, --period and --periods make {samples:.0} samples: more than {MOST_SAMPLES} are no trajectory"
+            )));
         }
         if !(self.clearance.is_finite() && self.clearance >= 0.0) {
             return Err(Failure::Unusable("--clearance must not be below 0".to_string()));

@@ -66,6 +66,8 @@ pub(super) struct Identification {
     pub physically_consistent: bool,
     pub consistent: ConsistentReport,
     pub band: [f64; 2],
+    /// What of the motion lies in the band; nothing where there are summaries alone.
+    pub band_reason: Option<String>,
     pub warnings: Vec<String>,
 }
 
@@ -132,6 +134,7 @@ impl Identify {
             physically_consistent: reasons.is_empty(),
             consistent,
             band: [0.0, options.cutoff],
+            band_reason: figures.band.clone(),
             warnings,
         };
         let text = output::json(&result)?;

@@ -8,6 +8,7 @@ use crate::friction::TanhFriction;
 use crate::log::Log;
 use crate::regression::{Data, DataOptions, RigidBody};
 use crate::report::{Figure, Ink, Page, Panel, Series, Table, Tone, number};
+use crate::signal::occupied::occupied;
 use crate::signal::turns::{Turns, turns};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
@@ -30,6 +31,8 @@ pub(super) struct Shown {
     files: Vec<[String; 5]>,
     /// Noise alone, N·m.
     floor: Vec<f64>,
+    /// Why the band is wide enough, or is not.
+    pub(super) band: Option<String>,
 }
 
 /// One joint along the logs.
@@ -76,8 +79,27 @@ impl Shown {
             joints: (0..data.dof()).map(joint).collect(),
             files: logs.iter().map(file).collect(),
             floor: noise_floor(&data),
+            band: band(&data),
         })
     }
+}
+
+/// The band against what the logs hold: the motion must lie well within it, and what friction does at reversals above the motion.
+fn band(data: &Data<'_>) -> Option<String> {
+    let of = |r: &crate::regression::Recording| -> Vec<Vec<f64>> {
+        (0..data.dof()).map(|j| r.speed(j).collect()).collect()
+    };
+    let speeds: Vec<Vec<f64>> = data.recordings.iter().flat_map(of).collect();
+    let motion = occupied(&speeds, data.rate(), 0.99)?;
+    let (cutoff, rate) = (data.band.cutoff, data.rate());
+    let verdict = if motion > 0.5 * cutoff {
+        "that is too near to its end: move slower, or much of the torque is left out"
+    } else {
+        "gravity and inertia are within it, and so is what friction does at reversals, several times faster"
+    };
+    Some(format!(
+        "band 0 to {cutoff} Hz at {rate:.0} samples a second: 99 % of the power of the speeds lies below {motion:.1} Hz; {verdict}"
+    ))
 }
 
 /// Name, duration, samples, rate and pieces of a log.
@@ -118,6 +140,9 @@ pub(super) fn page(result: &Identification, arm: &Arm, shown: &Shown, held_out: 
         "Minimal inertial set and friction of Eq. 16, weighted least squares, {low} to {high} Hz. Standard errors hold for residuals that depend on each other within blocks of two seconds."
     ));
     verdict(&mut page, result);
+    if let Some(band) = &result.band_reason {
+        page.paragraph(&format!("The {band}."));
+    }
     page.heading("Errors");
     let mut table = Table::new([
         "joint",
@@ -271,7 +296,7 @@ fn spectra(page: &mut Page, arm: &Arm, shown: &Shown) {
         let mut count = 0;
         let figure = panels.fold(Figure::new(title, label), |figure, (j, points)| {
             count += 1;
-            figure.panel(Panel::new(format!("{} [N·m]", j + 1)).height(0.45).line(
+            figure.panel(Panel::new(format!("{} [N·m]", j + 1)).height(0.6).line(
                 "",
                 INKS[j % INKS.len()],
                 points,
@@ -312,8 +337,9 @@ fn parameters(page: &mut Page, result: &Identification) {
     let mut table =
         Table::new(["parameter", "value (SI units)", "standard error", "95 % interval", "relative"]);
     for p in &result.parameters {
-        let interval =
-            |std: f64| format!("{} … {}", number(p.value - 1.96 * std), number(p.value + 1.96 * std));
+        let interval = |std: f64| {
+            format!("{}\u{a0}…\u{a0}{}", number(p.value - 1.96 * std), number(p.value + 1.96 * std))
+        };
         table.push([
             p.name.clone(),
             number(p.value),

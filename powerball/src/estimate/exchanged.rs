@@ -51,3 +51,52 @@ pub fn exchanged(body: &RigidBody, logs: &[Log], options: &DataOptions, found: &
         ),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::excite::{Settings, optimise};
+    use crate::virtual_arm::{Recording, lwa4p};
+    use dyngen::SetKind;
+
+    fn log(recording: &Recording) -> Log {
+        let by_joint = |x: &[f64]| (0..6).map(|j| x.iter().skip(j).step_by(6).copied().collect()).collect();
+        Log {
+            file: "made.csv".into(),
+            t: recording.t.clone(),
+            q: by_joint(&recording.q),
+            torque: by_joint(&recording.tau),
+            temperature: None,
+            pieces: vec![0..recording.t.len()],
+            clock: 0.0,
+        }
+    }
+
+    #[test]
+    fn exchanged_torques_and_wrong_signs_are_named_and_sound_ones_are_not() {
+        let body = RigidBody::new(&lwa4p::arm().unwrap()).unwrap();
+        let settings = Settings { evaluations: 60, ..Settings::default() };
+        let path = optimise(body.model(), SetKind::Minimal, &settings).unwrap().paths.swap_remove(0);
+        let sound = log(&lwa4p::plant().unwrap().record(&path.sample(200.0), 0.0, 5));
+        let options = DataOptions::default();
+        let said = |log: &Log| {
+            let mut summary = Summary::new(&body, &options);
+            summary.push(&body, log, &options, None).unwrap();
+            let solution = solve_reduced(&summary, FrictionLaw::Symmetric);
+            exchanged(&body, std::slice::from_ref(log), &options, &spread_of(&solution, &solution.theta))
+        };
+        assert_eq!(said(&sound), None);
+        for (j, k) in [(1, 2), (0, 3), (2, 4)] {
+            let mut wrong = sound.clone();
+            wrong.torque.swap(j, k);
+            let names = format!("the torques of joints {} and {} seem to be exchanged", j + 1, k + 1);
+            assert!(said(&wrong).is_some_and(|said| said.starts_with(&names)), "{names}: {:?}", said(&wrong));
+        }
+        let mut wrong = sound.clone();
+        wrong.torque[1].iter_mut().for_each(|tau| *tau = -*tau);
+        assert!(
+            said(&wrong)
+                .is_some_and(|said| said.starts_with("joint 2: its torque seems to have the wrong sign"))
+        );
+    }
+}

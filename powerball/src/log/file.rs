@@ -5,7 +5,7 @@
 //! that, the lines are still there, a log like any other; the next log of that name puts them into a Parquet file of their own first.
 
 use std::ffi::OsString;
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -15,11 +15,12 @@ pub struct LogFile {
     path: PathBuf,
     lines: PathBuf,
     file: File,
+    begun: bool,
 }
 
 impl LogFile {
-    /// Begins a log at `path`: Parquet where its name ends in `.parquet`, CSV else. Also gives the file that took up what an
-    /// earlier log of this name left when its program died.
+    /// Begins a log at `path`: Parquet where its name ends in `.parquet`, CSV else. What was there before stays until the first line is
+    /// written. Also gives the file that took up what an earlier log of this name left when its program died.
     ///
     /// # Errors
     /// What the file system says, and Parquet in a build without it.
@@ -30,28 +31,36 @@ impl LogFile {
         }
         let lines = if columnar { with_more(path, ".csv") } else { path.to_path_buf() };
         let recovered = if columnar { recover(path, &lines)? } else { None };
-        let file = File::create(&lines)?;
-        Ok((LogFile { path: path.to_path_buf(), lines, file }, recovered))
+        let file = OpenOptions::new().create(true).append(true).open(&lines)?;
+        Ok((LogFile { path: path.to_path_buf(), lines, file, begun: false }, recovered))
     }
 
     /// Ends the log.
     ///
     /// # Errors
-    /// What the file system says; the lines are then still there.
+    /// What the file system says (the lines are then still there), and where nothing was written.
     pub fn close(mut self) -> io::Result<()> {
         self.file.flush()?;
-        if self.lines == self.path {
-            return Ok(());
+        if !self.begun {
+            if self.file.metadata()?.len() == 0 {
+                fs::remove_file(&self.lines)?;
+            }
+            return Err(io::Error::other("nothing was recorded"));
         }
-        if convert(&self.lines, &self.path)? == 0 {
-            return Err(io::Error::other("no line was written: nothing was recorded"));
+        if self.lines != self.path {
+            convert(&self.lines, &self.path)?;
+            fs::remove_file(&self.lines)?;
         }
-        fs::remove_file(&self.lines)
+        Ok(())
     }
 }
 
 impl Write for LogFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if !self.begun {
+            self.file.set_len(0)?;
+            self.begun = true;
+        }
         self.file.write(bytes)
     }
 
@@ -146,8 +155,9 @@ mod tests {
         assert_eq!(read(&recovered).t.len(), 500);
         // Nothing was recorded: that is said, and what was there stays.
         assert!(log.close().unwrap_err().to_string().contains("nothing was recorded"));
-        assert_eq!(read(&parquet).t.len(), 70_000);
-        assert!(begin(&parquet).1.is_none());
+        assert!(begin(&csv).0.close().is_err());
+        assert_eq!((read(&parquet).t.len(), read(&csv).t.len()), (70_000, 70_000));
+        assert!(!lines.exists() && begin(&parquet).1.is_none());
         fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -3,6 +3,7 @@
 pub mod butterworth;
 pub mod difference;
 pub mod filter;
+pub mod occupied;
 pub mod resample;
 pub mod rest;
 pub mod turns;
