@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::identify::{Identification, prepared};
-use crate::estimate::{JointFriction, TorqueModel, noise_floor};
+use crate::estimate::noise_floor;
 use crate::explain::{TorqueCurve, curves};
 use crate::friction::TanhFriction;
 use crate::log::Log;
@@ -10,6 +10,7 @@ use crate::regression::{Data, DataOptions, RigidBody};
 use crate::report::{Figure, Ink, Page, Panel, Series, Table, Tone, number};
 use crate::signal::occupied::occupied;
 use crate::signal::turns::{Turns, turns};
+use crate::torque_model::TorqueModel;
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 use dyngen::exact::rational::to_f64;
@@ -52,15 +53,14 @@ impl Shown {
         logs: &[Log],
         options: &DataOptions,
         model: &TorqueModel,
-        friction: &[JointFriction],
     ) -> Result<Shown, Failure> {
         if logs.is_empty() {
             return Ok(Shown::default());
         }
         let data = prepared(body, logs, options)?;
-        let residual = model.residual(&data);
+        let residual = model.residual(body, &data, &[]);
         let joint = |j: usize| {
-            let f = &friction[j];
+            let f = &model.friction[j];
             let law = TanhFriction::new([f.gamma1, f.gamma2, f.gamma3, f.gamma4, f.gamma5]);
             let (q, v) = rows(&data, j);
             let ratio = body.arm().joints[j].rotor_ratio.as_ref().map(to_f64);
