@@ -1,15 +1,14 @@
 //! `powerball identify`: from logs to identified.json.
 
 use super::Failure;
-use super::identify_page::page;
+use super::identify_page::{Shown, page};
 use super::inputs::{Inputs, load, same_file};
 use super::output::{self, Progress};
 use super::reduced::{Reduced, in_memory, reduce};
 use crate::estimate::{
-    ConsistentReport, FrictionLaw, JointFriction, ParameterEstimate, Spread, consistent_fit, identify,
-    solve_reduced, spread, spread_of,
+    ConsistentReport, FrictionLaw, JointFriction, ParameterEstimate, Spread, consistent_fit, exchanged,
+    identify, solve_reduced, spread, spread_of,
 };
-use crate::explain::{TorqueCurve, curves};
 use crate::log::{Log, read_logs};
 use crate::regression::{Data, DataOptions, RigidBody};
 use crate::torque_model::{Additions, TorqueModel};
@@ -76,6 +75,8 @@ pub(super) struct Identification {
     pub physically_consistent: bool,
     pub consistent: ConsistentReport,
     pub band: [f64; 2],
+    /// What of the motion lies in the band; nothing where there are summaries alone.
+    pub band_reason: Option<String>,
     pub warnings: Vec<String>,
 }
 
@@ -109,6 +110,7 @@ impl Identify {
             Friction::Asymmetric => FrictionLaw::Asymmetric,
         };
         let solution = solve_reduced(&summary, law);
+        warnings.extend(exchanged(&body, &shown, &options, &spread_of(&solution, &solution.theta)));
         let identified = identify(&summary, &solution);
         let model = TorqueModel {
             arm: body.arm().name.clone(),
@@ -127,8 +129,7 @@ impl Identify {
             Some(spread(&data, &model.residual(&body, &data, &[])))
         };
         let figures = if held_out.is_empty() { &shown } else { &held_out };
-        let figures =
-            if figures.is_empty() { Vec::new() } else { curves_of(&body, figures, &options, &model)? };
+        let figures = Shown::new(&body, figures, &options, &model)?;
         let undetermined: Vec<&str> =
             identified.parameters.iter().filter(|p| p.std.is_none()).map(|p| p.name.as_str()).collect();
         if !undetermined.is_empty() {
@@ -155,13 +156,14 @@ impl Identify {
             physically_consistent: reasons.is_empty(),
             consistent,
             band: [0.0, options.cutoff],
+            band_reason: figures.band.clone(),
             warnings,
         };
         let text = output::json(&result)?;
         output::write(&self.out, "identified.json", text.as_bytes())?;
         let values = output::json(&result.consistent.parameters)?;
         output::write(&self.out, "consistent.json", values.as_bytes())?;
-        let page = page(&result, &figures, result.validate.is_some());
+        let page = page(&result, body.arm(), &figures, result.validate.is_some());
         output::write(&self.out, "report.html", page.to_html().as_bytes())?;
         if self.json {
             output::print(&text);
@@ -194,17 +196,10 @@ impl Identify {
     }
 }
 
-fn prepared<'a>(body: &'a RigidBody, logs: &[Log], options: &DataOptions) -> Result<Data<'a>, Failure> {
-    Data::new(body, logs, options).map_err(|e| Failure::Refused(e.to_string()))
-}
-
-fn curves_of(
-    body: &RigidBody,
+pub(super) fn prepared<'a>(
+    body: &'a RigidBody,
     logs: &[Log],
     options: &DataOptions,
-    model: &TorqueModel,
-) -> Result<Vec<TorqueCurve>, Failure> {
-    let data = prepared(body, logs, options)?;
-    let residual = model.residual(body, &data, &[]);
-    Ok(curves(&data, &residual, &residual))
+) -> Result<Data<'a>, Failure> {
+    Data::new(body, logs, options).map_err(|e| Failure::Refused(e.to_string()))
 }

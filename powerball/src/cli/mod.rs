@@ -3,6 +3,7 @@
 mod bus;
 mod demo;
 mod excite;
+mod excite_page;
 mod explain;
 mod friction;
 mod generate;

@@ -4,17 +4,19 @@ use super::Failure;
 use super::bus::{Where, master};
 use super::output;
 use crate::driver::lwa4p::LWA4P;
+use crate::log::LogFile;
 use crate::motion::Motion;
 use crate::procedure::{RecordError, record};
 use clap::Args;
 use serde_json::json;
-use std::fs::File;
 use std::path::PathBuf;
 
 /// Bring the arm up, go to where a trajectory begins, follow it at 200 Hz, and log it.
 ///
 /// The log has t, q1…q6 (rad), tau1…tau6 (N·m, as good as the profile's calibration) and ref1…ref6 (rad, the set-points).
-/// Each line is written whole: whatever happens, the log can be read up to there. THE ARM MOVES.
+/// Each line is written whole: whatever happens, the log can be read up to there. A log whose name ends in .parquet is written as lines
+/// beside it, NAME.parquet.csv, and becomes Parquet when it ends; lines that a program left which died are put into
+/// NAME.interrupted-1.parquet by the next recording of that name. THE ARM MOVES.
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  powerball excite --arm powerball/lwa4p.toml --out path.csv\n  \
     powerball record --trajectory path.csv --out log.csv --bus socketcan:can0")]
@@ -22,7 +24,7 @@ pub(crate) struct RecordCommand {
     /// The trajectory: CSV with t, q1…q6 (rad), as `powerball excite` writes it at the arm's rate.
     #[arg(long, value_name = "FILE")]
     trajectory: PathBuf,
-    /// Where the log is written, CSV.
+    /// Where the log is written: Parquet where the name ends in .parquet, CSV else.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     #[command(flatten)]
@@ -37,12 +39,21 @@ impl RecordCommand {
         let motion = Motion::from_csv(&text, LWA4P.joints.len())
             .map_err(|why| Failure::Unusable(format!("{name}: {why}")))?;
         let master = master(&self.place)?;
-        let mut log = File::create(&self.out)
-            .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", self.out.display())))?;
-        let done = record(master, &motion, &mut log).map_err(|e| match e {
+        let unwritable =
+            |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", self.out.display()));
+        let (mut log, recovered) = LogFile::create(&self.out).map_err(unwritable)?;
+        if let Some(file) = &recovered {
+            let file = file.display();
+            eprintln!("powerball: an earlier recording was broken off: its lines are now in {file}");
+        }
+        let done = record(master, &motion, &mut log);
+        // A recording that failed is closed too: what was recorded counts. Why it failed is what is told.
+        let closed = log.close();
+        let done = done.map_err(|e| match e {
             RecordError::Motion(what) => Failure::Unusable(format!("{name}: {what}")),
             other => Failure::Refused(other.to_string()),
         })?;
+        closed.map_err(unwritable)?;
         if self.place.json {
             output::print(&json!({ "out": self.out, "record": done }).to_string());
         } else {

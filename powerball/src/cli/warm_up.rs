@@ -4,8 +4,9 @@ use super::Failure;
 use super::bus::{Where, virtual_bus};
 use super::output::{self, Progress};
 use crate::bus::{Bus, BusUrl};
-use crate::procedure::warm_up::{Settings, Warmth, warm_up};
-use crate::procedure::{RecordError, Recorder};
+use crate::driver::lwa4p::LWA4P;
+use crate::procedure::warm_up::{Seen, Settings, Warmth, swing, warm_up};
+use crate::procedure::{RecordError, Recorder, resume};
 use crate::report::{Figure, Ink, Page, Panel, Series};
 use crate::virtual_arm::{Effect, VirtualArm, lwa4p};
 use clap::Args;
@@ -15,7 +16,8 @@ use std::path::PathBuf;
 /// Swing every joint until its mean torque over a cycle no longer changes (Fig. 3), and say when the arm is warm.
 ///
 /// Writes warm_up.csv, warm_up.json and report.html. The end is a test of the trend, not a fixed time: the arm is warm when, at
-/// 95 %, no joint's torque can still change by more than the tolerance. Exit code 1 where that is not reached. THE ARM MOVES.
+/// 95 %, no joint's torque can still change by more than the tolerance. Exit code 1 where that is not reached. A warm-up that was broken
+/// off, or that did not get warm, goes on with what its log shows, unless the arm had time to cool since. THE ARM MOVES.
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  powerball warm-up --out warm --bus socketcan:can0")]
 pub(crate) struct WarmUp {
@@ -54,23 +56,37 @@ impl WarmUp {
         }
         std::fs::create_dir_all(&self.out)
             .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", self.out.display())))?;
+        let progress = Progress::new();
         let path = self.out.join("warm_up.csv");
-        let mut log = File::create(&path)
-            .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", path.display())))?;
+        let unwritable =
+            |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", path.display()));
+        let (seen, start) = self.earlier(&settings);
+        let mut log = match start > 0.0 {
+            true => resume::append(&path).map_err(unwritable)?,
+            false => File::create(&path).map_err(unwritable)?,
+        };
+        // From here on the record is one that is not finished.
+        match std::fs::remove_file(self.out.join("warm_up.json")) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(unwritable(e)),
+            _ => {}
+        }
+        if start > 0.0 && !self.place.json {
+            output::print(&format!("going on with {} after {start:.0} s", path.display()));
+        }
         let bus: Box<dyn Bus> = match self.place.bus {
-            // A cold one, or there would be nothing to see.
+            // A cold one, or there would be nothing to see; one that has been swung before is as warm as it was then.
             BusUrl::Virtual => {
                 let broken = |e: String| Failure::Refused(format!("the built-in arm: {e}"));
                 let mut setup = lwa4p::setup([0.0; 6], 1).map_err(|e| broken(e.to_string()))?;
                 setup.plant = setup.plant.with(Effect::Temperature { change: -0.25, time_constant: 120.0 });
+                setup.age = start;
                 virtual_bus(VirtualArm::new(setup).ok_or_else(|| broken("its parts do not fit".into()))?)?
             }
             _ => self.place.open()?,
         };
         let refused = |e: RecordError| Failure::Refused(e.to_string());
-        let progress = Progress::new();
         let mut recorder = Recorder::enable(self.place.driver(bus)?).map_err(refused)?;
-        let done = warm_up(&mut recorder, &settings, &mut log, |seconds, change| {
+        let done = warm_up(&mut recorder, &settings, seen, start, &mut log, |seconds, change| {
             let change = change
                 .map_or("too early to say".to_string(), |c| format!("up to {:.1} % to come", 100.0 * c));
             progress.say(&format!("{seconds:.0} s: {change}"));
@@ -106,6 +122,37 @@ impl WarmUp {
             warmth.seconds,
             100.0 * self.tolerance
         )))
+    }
+}
+
+impl WarmUp {
+    /// What a warm-up in the same folder showed that was not finished, and the time at which this one goes on, s; nothing and 0 where it
+    /// begins anew.
+    ///
+    /// An arm cools about as slowly as it warms: it is taken for as warm as it was if it has stood for less than a fifth of the time
+    /// that it was swung for. What little it cooled shows in the trend.
+    fn earlier(&self, settings: &Settings) -> (Seen, f64) {
+        let path = self.out.join("warm_up.csv");
+        let nothing = || Seen::new(swing(&LWA4P, settings));
+        let json = std::fs::read_to_string(self.out.join("warm_up.json")).unwrap_or_default();
+        let finished =
+            serde_json::from_str::<serde_json::Value>(&json).is_ok_and(|json| json["warm"] == true);
+        let rows = resume::rows(&path);
+        let (Some(last), Some(stood)) = (rows.last().map(|row| row[0]), resume::silence(&path)) else {
+            return (nothing(), 0.0);
+        };
+        // Virtual time does not pass while nobody looks.
+        let stood = if self.place.bus == BusUrl::Virtual { 0.0 } else { stood };
+        if finished || stood > 0.2 * last {
+            return (nothing(), 0.0);
+        }
+        match nothing().earlier(&rows) {
+            Some(seen) => {
+                let start = ((last + stood) / seen.length()).ceil() * seen.length();
+                (seen, start)
+            }
+            None => (nothing(), 0.0),
+        }
     }
 }
 

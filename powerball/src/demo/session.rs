@@ -134,7 +134,8 @@ impl Session {
         }
 
         let plant = lwa4p::plant()?;
-        let motions: Vec<Motion> = found.iter().map(|f| f.path.sample(plant.sensors().rate)).collect();
+        let motions: Vec<Motion> =
+            found.iter().flat_map(|f| &f.paths).map(|path| path.sample(plant.sensors().rate)).collect();
         let ends: Vec<[[f64; 6]; 2]> = motions.iter().map(ends).collect();
         let starts = starts(&motions, &ends);
         let session = starts.last().map_or(0.0, |last| last + motions.last().map_or(0.0, Motion::duration));
@@ -171,7 +172,7 @@ impl Session {
             list.push(path);
         }
         recorder.finish()?;
-        let recorded = found.iter().map(|f| f.path.duration()).sum();
+        let recorded = found.iter().flat_map(|f| &f.paths).map(|path| path.duration()).sum();
         let undeclared = Undeclared { effect: effect.clone(), age: session };
         let text = serde_json::to_string_pretty(&undeclared).unwrap_or_default();
         save(&folder.join(Undeclared::FILE), &text)?;

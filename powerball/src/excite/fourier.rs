@@ -161,11 +161,10 @@ mod tests {
         let mut draw = |n: usize| (0..n).map(|_| rng.random_range(-1.0..1.0)).collect::<Vec<f64>>();
         let joints = (0..3).map(|_| Harmonics { middle: 0.0, a: draw(5), b: draw(5) }).collect();
         let mut fourier = Fourier { fundamental: 0.6, periods: 2, ramp: 1.2, joints };
-        let limits = vec![
-            JointLimits { position: [-2.9, 1.0], velocity: 1.2, acceleration: 4.0 },
-            JointLimits { position: [0.2, 0.4], velocity: 1.2, acceleration: 4.0 },
-            JointLimits { position: [-100.0, 100.0], velocity: 9.0, acceleration: 1.0 },
-        ];
+        let limit =
+            |position, velocity, acceleration| JointLimits { position, velocity, acceleration, torque: None };
+        let limits =
+            vec![limit([-2.9, 1.0], 1.2, 4.0), limit([0.2, 0.4], 1.2, 4.0), limit([-100.0, 100.0], 9.0, 1.0)];
         fourier.fit(&limits, &[1.0, 0.7, 1.0], &[0.3, 1.0, 0.0]);
         (fourier, limits)
     }

@@ -12,6 +12,8 @@ pub struct JointLimits {
     pub velocity: f64,
     /// Highest acceleration.
     pub acceleration: f64,
+    /// Highest torque, N·m (N), where the file gives one.
+    pub torque: Option<f64>,
 }
 
 /// The limits of every joint.
@@ -23,8 +25,8 @@ pub struct Limits(pub Vec<JointLimits>);
 pub struct MissingLimits(pub Vec<String>);
 
 impl Limits {
-    /// The limits of an arm, drawn in by `margin`: 0.05 leaves 5 % of the range, the speed and the acceleration
-    /// unused.
+    /// The limits of an arm, drawn in by `margin`: 0.05 leaves 5 % of the range, the speed, the acceleration and the
+    /// torque unused.
     ///
     /// # Errors
     /// Every limit that the arm file misses, joint by joint.
@@ -48,6 +50,7 @@ impl Limits {
                 position: [middle - share * half, middle + share * half],
                 velocity: share * joint.velocity.unwrap_or_default(),
                 acceleration: share * joint.acceleration.unwrap_or_default(),
+                torque: joint.torque.map(|torque| share * torque),
             });
         }
         if missing.is_empty() { Ok(Limits(limits)) } else { Err(MissingLimits(missing)) }

@@ -1,15 +1,25 @@
-//! Exciting trajectories: finite Fourier series within the arm's limits whose base regressor is well conditioned,
-//! Eq. 17 to 20 of the paper.
+//! Exciting trajectories: finite Fourier series whose base regressor is well conditioned, within the arm's limits, off the floor
+//! and clear of the arm itself, for one mounting of the base or several. Eq. 17 to 20 of the paper.
 
+mod capsule;
+mod constraints;
 mod fourier;
 mod limits;
+mod load;
+mod mounting;
 mod objective;
 mod search;
+mod shape;
 
+pub use capsule::Segment;
+pub use constraints::{Constraints, Space, Tightest};
 pub use fourier::{Fourier, Harmonics};
 pub use limits::{JointLimits, Limits, MissingLimits};
-pub use objective::{Figures, Objective};
-pub use search::{Excitation, Settings, optimise, search};
+pub use load::{Load, Masses};
+pub use mounting::Mounting;
+pub use objective::{Conditions, Criterion, Figures, Objective};
+pub use search::{Excitation, Settings, Task, optimise, optimise_all, search, search_all};
+pub use shape::{Contact, Floor, Nearness, Shape};
 
 use std::fmt;
 
@@ -22,6 +32,10 @@ pub enum Error {
     Model(dyngen::Error),
     /// A setting makes no sense: what is wrong with it.
     Setting(String),
+    /// There is no room for the arm in any pose.
+    NoPose,
+    /// No path was found that keeps all constraints: where the best one breaks them.
+    NoPath(String),
 }
 
 impl fmt::Display for Error {
@@ -30,6 +44,13 @@ impl fmt::Display for Error {
             Error::Limits(e) => e.fmt(f),
             Error::Model(e) => e.fmt(f),
             Error::Setting(what) => f.write_str(what),
+            Error::NoPose => f.write_str(
+                "the arm touches itself or the floor in every pose that was tried: its capsules are too thick for it, or the floor is too high",
+            ),
+            Error::NoPath(why) => write!(
+                f,
+                "no trajectory was found that keeps all constraints; in the best one {why}"
+            ),
         }
     }
 }

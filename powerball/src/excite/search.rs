@@ -1,14 +1,19 @@
 //! The search for a good path: many starts, then small changes to the best ones. The same seed finds the same path.
 
 use super::Error;
+use super::constraints::Constraints;
 use super::fourier::{Fourier, Harmonics};
 use super::limits::Limits;
-use super::objective::{Figures, Objective};
+use super::objective::{Criterion, Figures, Objective};
+use super::shape::poses;
 use dyngen::{Model, SetKind};
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+
+/// Poses that are tried for the middle of a random path.
+const PLACES: usize = 50;
 
 /// What path to look for, and how long.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,8 +28,8 @@ pub struct Settings {
     pub ramp: f64,
     /// Share of range, speed and acceleration that stays unused.
     pub margin: f64,
-    /// λ₂ of Eq. 17 against λ₁ = 1.
-    pub lambda2: f64,
+    /// What makes a path a good one.
+    pub criterion: Criterion,
     /// How many paths are judged in all.
     pub evaluations: usize,
     /// Seed of the search.
@@ -40,22 +45,31 @@ impl Default for Settings {
             periods: 2,
             ramp: 1.0,
             margin: 0.05,
-            lambda2: 1.0,
+            criterion: Criterion::Condition { lambda2: 1.0 },
             evaluations: 2000,
             seed: 0,
         }
     }
 }
 
-/// A path that was found.
+/// The paths that were found, one for each mounting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Excitation {
-    /// The path.
-    pub path: Fourier,
-    /// Its figures.
+    /// The paths.
+    pub paths: Vec<Fourier>,
+    /// Their figures, together.
     pub figures: Figures,
     /// The figures of the middle one of the random starts, for comparison.
     pub usual: Figures,
+}
+
+/// An arm as it is mounted for a path, and what the path must keep.
+#[derive(Clone, Debug)]
+pub struct Task<'a> {
+    /// The arm in this mounting.
+    pub model: &'a Model,
+    /// Limits and surroundings.
+    pub constraints: Constraints,
 }
 
 /// A path in the coordinates of the search, where every point keeps the limits.
@@ -68,72 +82,171 @@ struct Candidate {
     place: Vec<f64>,
 }
 
-/// Finds a path for a parameter set of an arm within the limits of its file.
+/// Candidates for all mountings, with what they are worth.
+struct Judged<J> {
+    paths: Vec<Candidate>,
+    violation: f64,
+    value: f64,
+    /// What was said of them; nothing where they break the constraints and were not asked about.
+    said: Option<J>,
+}
+
+impl<J> Judged<J> {
+    /// What keeps the constraints is better than what does not; then the smaller violation, then the value counts.
+    fn rank(&self) -> (f64, f64) {
+        (self.violation, self.value)
+    }
+
+    fn order(a: &Self, b: &Self) -> std::cmp::Ordering {
+        a.violation.total_cmp(&b.violation).then(a.value.total_cmp(&b.value))
+    }
+}
+
+/// Finds a path for a parameter set of an arm within the limits of its file, and no other constraint.
 ///
 /// # Errors
-/// Limits that the file misses, a set that has no regressor, settings that make no sense.
+/// As [`optimise_all`].
 pub fn optimise(model: &Model, kind: SetKind, settings: &Settings) -> Result<Excitation, Error> {
     check(settings)?;
-    let limits = Limits::of(model.arm(), settings.margin)?;
+    let constraints = Constraints::of(Limits::of(model.arm(), settings.margin)?);
+    optimise_all(&[Task { model, constraints }], kind, settings)
+}
+
+/// Finds a path for each mounting such that they determine a parameter set together.
+///
+/// # Errors
+/// A set that has no regressor, and as [`search_all`].
+pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> Result<Excitation, Error> {
+    check(settings)?;
+    let models: Vec<&Model> = tasks.iter().map(|task| task.model).collect();
     // Eight instants for each period of the highest harmonic resolve its regressor.
-    let mut objective = Objective::new(model, kind, (8 * settings.harmonics).max(48))?;
-    let dof = model.arm().dof();
+    let mut objective = Objective::new(&models, kind, (8 * settings.harmonics).max(48))?;
+    let constraints: Vec<&Constraints> = tasks.iter().map(|task| &task.constraints).collect();
     // Columns are scaled by paths of a seed of their own: figures of different searches can then be compared.
     let mut fixed = ChaCha8Rng::seed_from_u64(0);
-    let typical: Vec<Fourier> =
-        (0..16).map(|_| Candidate::random(dof, settings, &mut fixed).path(settings, &limits)).collect();
+    let typical: Vec<Vec<Fourier>> = (0..16)
+        .map(|_| {
+            let one = |c: &&Constraints| Candidate::random(c, settings, &mut fixed).path(settings, &c.limits);
+            constraints.iter().map(one).collect()
+        })
+        .collect();
     objective.scale_columns(&typical);
-
-    let (path, figures, usual) = search(dof, settings, &limits, |path| {
-        let figures = objective.judge(path);
-        (figures.objective(settings.lambda2), figures)
+    let (paths, figures, usual) = search_all(&constraints, settings, |paths| {
+        let figures = objective.judge(paths);
+        (figures.objective(settings.criterion), figures)
     })?;
-    Ok(Excitation { path, figures, usual })
+    Ok(Excitation { paths, figures, usual })
 }
 
 /// The path within the limits whose value, the first thing that `judge` says, is smallest; what else it said of that path,
 /// and of the middle one of the random starts.
 ///
 /// # Errors
-/// Settings that make no sense.
+/// As [`search_all`].
 pub fn search<J: Clone>(
-    dof: usize,
     settings: &Settings,
     limits: &Limits,
     mut judge: impl FnMut(&Fourier) -> (f64, J),
 ) -> Result<(Fourier, J, J), Error> {
+    let constraints = Constraints::of(limits.clone());
+    let (mut paths, said, usual) = search_all(&[&constraints], settings, |paths| judge(&paths[0]))?;
+    Ok((paths.swap_remove(0), said, usual))
+}
+
+/// The paths, one for each mounting within its constraints, whose value together is smallest, with what else `judge` said of
+/// them, and of the middle ones of the random starts.
+///
+/// # Errors
+/// Settings that make no sense, [`Error::NoPose`] where there is no room at all, and [`Error::NoPath`] where no path that keeps
+/// the constraints was found.
+pub fn search_all<J: Clone>(
+    constraints: &[&Constraints],
+    settings: &Settings,
+    mut judge: impl FnMut(&[Fourier]) -> (f64, J),
+) -> Result<(Vec<Fourier>, J, J), Error> {
     check(settings)?;
+    if constraints.iter().any(|c| poses(&c.limits.0).all(|q| c.lacks(&q) > 0.0)) {
+        return Err(Error::NoPose);
+    }
+    let place = |candidates: &[Candidate]| -> Vec<Fourier> {
+        candidates.iter().zip(constraints).map(|(candidate, c)| candidate.path(settings, &c.limits)).collect()
+    };
+    let violation =
+        |paths: &[Fourier]| -> f64 { constraints.iter().zip(paths).map(|(c, path)| c.violation(path)).sum() };
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
     let starts = (settings.evaluations / 8).max(1);
-    let mut found: Vec<(f64, J, Candidate)> = (0..starts)
+    let mut found: Vec<Judged<J>> = (0..starts)
         .map(|_| {
-            let candidate = Candidate::random(dof, settings, &mut rng);
-            let (value, said) = judge(&candidate.path(settings, limits));
-            (value, said, candidate)
+            let candidates: Vec<Candidate> =
+                constraints.iter().map(|c| Candidate::random(c, settings, &mut rng)).collect();
+            let paths = place(&candidates);
+            let (value, said) = judge(&paths);
+            Judged { paths: candidates, violation: violation(&paths), value, said: Some(said) }
         })
         .collect();
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let usual = found[found.len() / 2].1.clone();
+    found.sort_by(|a, b| a.value.total_cmp(&b.value));
+    let usual = found[found.len() / 2].said.clone();
+    found.sort_by(Judged::order);
     found.truncate(3);
 
     let each = settings.evaluations.saturating_sub(starts) / found.len();
+    let constrained = constraints.iter().any(|c| c.any());
     for best in &mut found {
         // Steps grow after a success and shrink after a failure such that one in five succeeds.
         let mut step: f64 = 0.3;
         for _ in 0..each {
-            let next = best.2.changed(step, &mut rng);
-            let (value, said) = judge(&next.path(settings, limits));
-            if value < best.0 {
-                *best = (value, said, next);
-                step = (step * 1.5).min(1.0);
-            } else {
-                step = (step * 0.9).max(0.01);
+            let mut next = best.paths.clone();
+            let changed = if next.len() > 1 { rng.random_range(0..next.len()) } else { 0 };
+            next[changed] = next[changed].changed(step, constrained, &mut rng);
+            match improved(best, next, &place, &violation, &mut judge) {
+                Some(better) => {
+                    *best = better;
+                    step = (step * 1.5).min(1.0);
+                }
+                None => step = (step * 0.9).max(0.01),
             }
         }
     }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (_, said, candidate) = found.swap_remove(0);
-    Ok((candidate.path(settings, limits), said, usual))
+    found.sort_by(Judged::order);
+    let best = found.swap_remove(0);
+    let paths = place(&best.paths);
+    match (best.said, usual) {
+        (Some(said), Some(usual)) if best.violation == 0.0 => Ok((paths, said, usual)),
+        _ => {
+            let reasons =
+                constraints.iter().zip(&paths).filter_map(|(c, path)| c.broken(&path.sample(200.0)));
+            Err(Error::NoPath(reasons.collect::<Vec<_>>().join("; ")))
+        }
+    }
+}
+
+/// The candidates judged, where they are better than the best so far; what is dear is looked at last.
+fn improved<J>(
+    best: &Judged<J>,
+    candidates: Vec<Candidate>,
+    place: &impl Fn(&[Candidate]) -> Vec<Fourier>,
+    violation: &impl Fn(&[Fourier]) -> f64,
+    judge: &mut impl FnMut(&[Fourier]) -> (f64, J),
+) -> Option<Judged<J>> {
+    let paths = place(&candidates);
+    let judged = if best.violation > 0.0 {
+        let violation = violation(&paths);
+        let (value, said) = match violation == 0.0 {
+            true => {
+                let (value, said) = judge(&paths);
+                (value, Some(said))
+            }
+            false => (f64::INFINITY, None),
+        };
+        Judged { paths: candidates, violation, value, said }
+    } else {
+        let (value, said) = judge(&paths);
+        if value >= best.value {
+            return None;
+        }
+        Judged { paths: candidates, violation: violation(&paths), value, said: Some(said) }
+    };
+    (judged.rank() < best.rank()).then_some(judged)
 }
 
 fn check(settings: &Settings) -> Result<(), Error> {
@@ -148,23 +261,40 @@ fn check(settings: &Settings) -> Result<(), Error> {
     if !(settings.ramp > 0.0 && settings.ramp <= 0.5 * period * settings.periods as f64) {
         return wrong("the start and the stop must last longer than 0 s and less than half of the path");
     }
-    if !(0.0..0.9).contains(&settings.margin) || settings.lambda2.is_nan() || settings.lambda2 < 0.0 {
-        return wrong("the margin must lie between 0 and 0.9, and the second weight must not be negative");
+    if !(0.0..0.9).contains(&settings.margin) {
+        return wrong("the margin must lie between 0 and 0.9");
+    }
+    if matches!(settings.criterion, Criterion::Condition { lambda2 } if !(lambda2.is_finite() && lambda2 >= 0.0))
+    {
+        return wrong("the second weight must be a number and not negative");
     }
     Ok(())
 }
 
 impl Candidate {
-    fn random(n: usize, settings: &Settings, rng: &mut ChaCha8Rng) -> Candidate {
+    /// A random path; where there are surroundings, about a pose that is free if one of many is.
+    fn random(constraints: &Constraints, settings: &Settings, rng: &mut ChaCha8Rng) -> Candidate {
+        let n = constraints.limits.0.len();
         let mut coefficients =
             || -> Vec<f64> { (0..settings.harmonics).map(|_| StandardNormal.sample(rng)).collect() };
         let shape = (0..n).map(|_| Harmonics { middle: 0.0, a: coefficients(), b: coefficients() }).collect();
         let range = (0..n).map(|_| rng.random_range(0.6..1.0)).collect();
-        Candidate { shape, range, place: (0..n).map(|_| rng.random_range(0.0..1.0)).collect() }
+        let mut candidate = Candidate { shape, range, place: Vec::new() };
+        for _ in 0..PLACES {
+            candidate.place = (0..n).map(|_| rng.random_range(0.0..1.0)).collect();
+            let path = candidate.path(settings, &constraints.limits);
+            let middle: Vec<f64> = path.joints.iter().map(|joint| joint.middle).collect();
+            if constraints.lacks(&middle) == 0.0 {
+                break;
+            }
+        }
+        candidate
     }
 
     /// Changes one or two joints.
-    fn changed(&self, step: f64, rng: &mut ChaCha8Rng) -> Candidate {
+    fn changed(&self, step: f64, constrained: bool, rng: &mut ChaCha8Rng) -> Candidate {
+        // What is narrow can be too narrow for a joint's usual range.
+        let least = if constrained { 0.02 } else { 0.2 };
         let mut next = self.clone();
         let joints: Vec<usize> = (0..self.shape.len()).collect();
         for _ in 0..rng.random_range(1..=2) {
@@ -172,7 +302,7 @@ impl Candidate {
             let mut by = || -> f64 { step * Distribution::<f64>::sample(&StandardNormal, rng) };
             let shape = &mut next.shape[joint];
             shape.a.iter_mut().chain(&mut shape.b).for_each(|c| *c += by());
-            next.range[joint] = (next.range[joint] + 0.5 * by()).clamp(0.2, 1.0);
+            next.range[joint] = (next.range[joint] + 0.5 * by()).clamp(least, 1.0);
             next.place[joint] = (next.place[joint] + by()).clamp(0.0, 1.0);
         }
         next
@@ -201,9 +331,12 @@ mod tests {
         let settings = Settings { evaluations: 400, seed: 3, ..Settings::default() };
         let found = optimise(&model, SetKind::Minimal, &settings).unwrap();
         assert_eq!(found, optimise(&model, SetKind::Minimal, &settings).unwrap());
-        assert!(found.figures.objective(1.0) < 0.5 * found.usual.objective(1.0), "{found:?}");
+        assert!(
+            found.figures.objective(settings.criterion) < 0.5 * found.usual.objective(settings.criterion),
+            "{found:?}"
+        );
         let limits = Limits::of(model.arm(), 0.0).unwrap();
-        for [q, dq, ddq] in found.path.sample(200.0).samples() {
+        for [q, dq, ddq] in found.paths[0].sample(200.0).samples() {
             for (i, limit) in limits.0.iter().enumerate() {
                 assert!((limit.position[0]..limit.position[1]).contains(&q[i]));
                 assert!(dq[i].abs() < limit.velocity && ddq[i].abs() < limit.acceleration);

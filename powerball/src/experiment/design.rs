@@ -52,7 +52,7 @@ pub fn design(body: &RigidBody, open: &Open, options: &DataOptions) -> Result<De
     let settings = settings();
     let limits = Limits::of(body.arm(), settings.margin)?;
     let duels = duels(open);
-    let (path, _, usual) = search(body.dof(), &settings, &limits, |path| {
+    let (path, _, usual) = search(&settings, &limits, |path| {
         let shows = judge(body, open, &duels, path, COARSE, options);
         shows.map_or((0.0, 0.0), |s| (-s.evidence - s.narrows, s.evidence))
     })?;

@@ -16,7 +16,7 @@ fn session(plant: &Plant, body: &RigidBody) -> (Vec<Log>, Vec<Log>, Explained) {
         .map(|seed| {
             let settings =
                 Settings { margin: 0.8, harmonics: 5, evaluations: 60, seed, ..Settings::default() };
-            let path = optimise(&model, SetKind::Minimal, &settings).unwrap().path;
+            let path = optimise(&model, SetKind::Minimal, &settings).unwrap().paths.swap_remove(0);
             log(plant, &path.sample(200.0), seed)
         })
         .collect();

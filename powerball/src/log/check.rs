@@ -1,7 +1,7 @@
 //! What can be wrong with numbers that are there: time, wraps, units, dead and saturated signals.
 
 use super::read::Effort;
-use super::{Finding, Log, LogError};
+use super::{Doubts, Finding, Log, LogError, Severity, levels, signs, speeds};
 use crate::signal::resample::median_step;
 use dyngen::Arm;
 use dyngen::arm::JointKind;
@@ -20,11 +20,11 @@ const ABSURD: f64 = 3.0;
 /// Samples as read: joint-major.
 pub(super) struct Raw {
     line: Vec<usize>,
-    t: Vec<f64>,
-    q: Vec<Vec<f64>>,
-    effort: Vec<Vec<f64>>,
+    pub(super) t: Vec<f64>,
+    pub(super) q: Vec<Vec<f64>>,
+    pub(super) effort: Vec<Vec<f64>>,
     temperature: Option<Vec<Vec<f64>>>,
-    dq: Vec<Vec<f64>>,
+    pub(super) dq: Vec<Vec<f64>>,
 }
 
 impl Raw {
@@ -121,10 +121,19 @@ pub(super) fn into_log(
     }
 
     for j in 0..arm.dof() {
-        unwrap(&mut raw.q[j], &raw.line, j, arm, file, findings);
-        units(&raw, j, step, effort, arm, file, findings, &mut errors);
-        dead_or_saturated(&raw.effort[j], j, effort, file, findings);
+        unwrap(&mut raw.q[j], &raw.line, &raw.t, j, arm, file, findings);
+        units(&raw, j, effort, arm, file, findings, &mut errors);
     }
+    let name = if matches!(effort, Effort::Torque) { "tau" } else { "i" };
+    let mut doubts = Doubts { file, line: &raw.line, t: &raw.t, findings, errors: &mut errors };
+    for (j, (q, effort)) in raw.q.iter().zip(&raw.effort).enumerate() {
+        levels::effort(effort, &format!("{name}{}", j + 1), &mut doubts);
+        levels::steps(effort, &format!("{name}{}", j + 1), false, &mut doubts);
+        levels::steps(q, &format!("q{}", j + 1), true, &mut doubts);
+    }
+    speeds::look(&raw, step, &mut doubts);
+    signs::look(&raw, step, name, &mut doubts);
+    rate(&raw.t, &mut doubts);
     if !errors.is_empty() {
         return Err(LogError(errors));
     }
@@ -139,12 +148,14 @@ pub(super) fn into_log(
                 (raw.q[j][k] - raw.q[j][k - 1]).abs() > (limit * gap).max(0.02)
             });
             if gap > GAP.max(GAP_STEPS * step) {
-                let message = format!("a gap of {gap:.3} s: the log is used as two pieces");
+                let message =
+                    format!("at {:.3} s: a gap of {gap:.3} s: the log is used as two pieces", raw.t[k - 1]);
                 findings.push(finding(Some(raw.line[k]), "t".into(), message));
             } else if let Some(j) = jump {
                 let by = raw.q[j][k] - raw.q[j][k - 1];
                 let message = format!(
-                    "jumps by {by:.4} in {gap:.4} s, faster than the joint can move: the log is split there"
+                    "at {:.3} s: jumps by {by:.4} in {gap:.4} s, faster than the joint can move: the log is split there",
+                    raw.t[k]
                 );
                 findings.push(finding(Some(raw.line[k]), format!("q{}", j + 1), message));
             } else {
@@ -165,7 +176,31 @@ pub(super) fn into_log(
     Ok(Log { file: file.to_string(), t: raw.t, q: raw.q, torque, temperature, pieces, clock: 0.0 })
 }
 
-fn unwrap(q: &mut [f64], line: &[usize], j: usize, arm: &Arm, file: &str, findings: &mut Vec<Finding>) {
+/// A clock that changes its pace: the mean step of the last third of the samples against the first.
+fn rate(t: &[f64], doubts: &mut Doubts<'_>) {
+    let third = t.len() / 3;
+    let (first, last) = (t[third] - t[0], t[t.len() - 1] - t[t.len() - 1 - third]);
+    // A gap is no drift.
+    let whole = |w: &[f64]| w.windows(2).all(|w| w[1] - w[0] <= GAP);
+    let change = last / first - 1.0;
+    if change.abs() > 0.01 && whole(&t[..=third]) && whole(&t[t.len() - 1 - third..]) {
+        let message = format!(
+            "the mean step changes by {:.1} % from the first third of the samples to the last: the clock drifts, or samples were lost evenly",
+            100.0 * change
+        );
+        doubts.add(Some(t.len() - 1 - third), "t".into(), message, Severity::Told);
+    }
+}
+
+fn unwrap(
+    q: &mut [f64],
+    line: &[usize],
+    t: &[f64],
+    j: usize,
+    arm: &Arm,
+    file: &str,
+    findings: &mut Vec<Finding>,
+) {
     if arm.joints[j].kind != JointKind::Revolute {
         return;
     }
@@ -177,16 +212,18 @@ fn unwrap(q: &mut [f64], line: &[usize], j: usize, arm: &Arm, file: &str, findin
         if jump.abs() > PI && (jump.abs() - 2.0 * PI).abs() < 0.5 {
             turns -= 2.0 * PI * jump.signum();
             wraps += 1;
-            first.get_or_insert(line[k]);
+            first.get_or_insert((line[k], t[k]));
         }
         *value += turns;
     }
-    if wraps > 0 {
+    if let Some((line, t)) = first {
         findings.push(Finding {
             file: file.to_string(),
-            line: first,
+            line: Some(line),
             quantity: format!("q{}", j + 1),
-            message: format!("the angle wraps by a full turn {wraps} times (first here); it was unwrapped"),
+            message: format!(
+                "at {t:.3} s: the angle wraps by a full turn {wraps} times (first here); it was unwrapped"
+            ),
         });
     }
 }
@@ -195,7 +232,6 @@ fn unwrap(q: &mut [f64], line: &[usize], j: usize, arm: &Arm, file: &str, findin
 fn units(
     raw: &Raw,
     j: usize,
-    step: f64,
     effort: &Effort,
     arm: &Arm,
     file: &str,
@@ -247,63 +283,6 @@ fn units(
                 error(format!("i{}", j + 1), message);
             }
             _ => {}
-        }
-    }
-    // dq is not used (speeds come from q), but where it contradicts q one of the two has another unit.
-    let dq = &raw.dq[j];
-    if dq.len() == q.len() {
-        let (mut cross, mut square) = (0.0, 0.0);
-        let stride = ((0.05 / step) as usize).max(1);
-        for k in (stride..q.len().saturating_sub(stride)).filter(|k| dq[*k].is_finite()) {
-            let span = raw.t[k + stride] - raw.t[k - stride];
-            let v = (q[k + stride] - q[k - stride]) / span;
-            cross += v * dq[k];
-            square += v * v;
-        }
-        let ratio = cross / square.max(f64::MIN_POSITIVE);
-        if square > 1e-4 * q.len() as f64 && !(0.67..1.5).contains(&ratio) {
-            let hint = if (ratio - 57.2958).abs() < 15.0 {
-                "dq looks like degrees a second"
-            } else if (ratio - 1.0 / 57.2958).abs() < 0.01 {
-                "q looks like degrees"
-            } else if ratio < -0.5 {
-                "their signs differ"
-            } else {
-                "check units and order of columns"
-            };
-            let message = format!(
-                "is {ratio:.3} times the slope of q{}: {hint}. Speeds are computed from q; dq is not used",
-                j + 1
-            );
-            let degrees = hint == "q looks like degrees";
-            let finding =
-                Finding { file: file.to_string(), line: None, quantity: format!("dq{}", j + 1), message };
-            if degrees { errors.push(finding) } else { findings.push(finding) }
-        }
-    }
-}
-
-fn dead_or_saturated(x: &[f64], j: usize, effort: &Effort, file: &str, findings: &mut Vec<Finding>) {
-    let name = if matches!(effort, Effort::Torque) { "tau" } else { "i" };
-    let mut note = |message: String| {
-        findings.push(Finding {
-            file: file.to_string(),
-            line: None,
-            quantity: format!("{name}{}", j + 1),
-            message,
-        });
-    };
-    let (low, high) = x.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
-    if high - low <= 1e-12 * high.abs().max(low.abs()) {
-        note("never changes: the joint's sensor or drive is dead, or it was not recorded".into());
-        return;
-    }
-    for edge in [low, high] {
-        let at_edge = x.windows(2).filter(|w| w[0] == edge && w[1] == edge).count();
-        if at_edge as f64 > 0.02 * x.len() as f64 && edge != 0.0 {
-            note(format!(
-                "stays at its extreme {edge} for {at_edge} samples: it looks saturated, and the model cannot explain torque that was not delivered"
-            ));
         }
     }
 }

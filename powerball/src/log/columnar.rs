@@ -64,3 +64,71 @@ fn number(field: &parquet::record::Field) -> Option<f64> {
         _ => None,
     }
 }
+
+/// Rows of a row group.
+#[cfg(feature = "parquet")]
+const GROUP: usize = 65_536;
+
+/// CSV lines of numbers as Parquet columns of doubles, a row group at a time; the number of rows. Lines that are torn or hold
+/// anything else are left out.
+#[cfg(feature = "parquet")]
+pub(super) fn from_csv(csv: impl std::io::Read, out: impl std::io::Write + Send) -> std::io::Result<usize> {
+    use parquet::data_type::DoubleType;
+    use parquet::errors::ParquetError;
+    use parquet::file::properties::WriterProperties;
+    use parquet::file::writer::SerializedFileWriter;
+    use parquet::schema::types::Type;
+    use std::io::Error;
+    use std::sync::Arc;
+
+    let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(csv);
+    let names: Vec<String> = reader.headers()?.iter().map(str::to_string).collect();
+    let column = |name: &String| {
+        let double = Type::primitive_type_builder(name, parquet::basic::Type::DOUBLE);
+        double.with_repetition(parquet::basic::Repetition::REQUIRED).build().map(Arc::new)
+    };
+    let schema = names
+        .iter()
+        .map(column)
+        .collect::<Result<Vec<_>, _>>()
+        .and_then(|fields| Type::group_type_builder("log").with_fields(fields).build());
+    let properties = WriterProperties::builder().set_compression(parquet::basic::Compression::SNAPPY).build();
+    let mut writer = schema
+        .and_then(|schema| SerializedFileWriter::new(out, Arc::new(schema), Arc::new(properties)))
+        .map_err(Error::other)?;
+    let mut write = |columns: &mut [Vec<f64>]| -> Result<(), ParquetError> {
+        let mut group = writer.next_row_group()?;
+        for values in columns {
+            if let Some(mut column) = group.next_column()? {
+                column.typed::<DoubleType>().write_batch(values, None, None)?;
+                column.close()?;
+            }
+            values.clear();
+        }
+        group.close().map(|_| ())
+    };
+    let (mut columns, mut rows) = (vec![Vec::new(); names.len()], 0);
+    for record in reader.records() {
+        let Ok(record) = record else { continue };
+        let values: Vec<f64> = record.iter().filter_map(|cell| cell.parse().ok()).collect();
+        if values.len() != names.len() || record.len() != names.len() {
+            continue;
+        }
+        columns.iter_mut().zip(values).for_each(|(column, value)| column.push(value));
+        rows += 1;
+        if rows % GROUP == 0 {
+            write(&mut columns).map_err(Error::other)?;
+        }
+    }
+    if rows % GROUP != 0 {
+        write(&mut columns).map_err(Error::other)?;
+    }
+    writer.close().map_err(Error::other)?;
+    Ok(rows)
+}
+
+/// CSV lines as Parquet columns.
+#[cfg(not(feature = "parquet"))]
+pub(super) fn from_csv(_: impl std::io::Read, _: impl std::io::Write + Send) -> std::io::Result<usize> {
+    Err(std::io::Error::other("this build writes CSV alone: enable the feature `parquet`"))
+}

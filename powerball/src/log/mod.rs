@@ -3,9 +3,16 @@
 mod check;
 mod clock;
 mod columnar;
+mod doubts;
+mod file;
+mod levels;
 mod read;
+mod signs;
+mod speeds;
 
 pub use clock::common_clock;
+use doubts::{Doubts, Severity};
+pub use file::LogFile;
 pub use read::{read_log, read_logs};
 use std::fmt;
 

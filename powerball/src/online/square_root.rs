@@ -230,7 +230,7 @@ mod tests {
         let body = RigidBody::new(&arm).unwrap();
         let model = Model::derive(arm.clone()).unwrap();
         let settings = Settings { evaluations: 50, ..Settings::default() };
-        let motion = optimise(&model, SetKind::Minimal, &settings).unwrap().path.sample(200.0);
+        let motion = optimise(&model, SetKind::Minimal, &settings).unwrap().paths[0].sample(200.0);
         let known: Vec<f64> = lwa4p::links().iter().flat_map(|link| link.parameters()).collect();
         let chosen: Vec<usize> = [ParameterKind::M, ParameterKind::Mx, ParameterKind::My, ParameterKind::Mz]
             .into_iter()

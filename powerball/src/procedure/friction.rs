@@ -3,7 +3,7 @@
 use super::constant_speed::{self, Bounds, Plan};
 use super::gravity_free::{self, GravityFree, Mounting};
 use super::laws::{Point, Rated, choose};
-use super::{RecordError, Recorder};
+use super::{RecordError, Recorder, resume};
 use crate::bus::Bus;
 use crate::log::{LogError, read_log};
 use dyngen::Model;
@@ -135,10 +135,8 @@ pub fn run<B: Bus, const N: usize>(
 /// Whether a log reaches the end of the motion.
 #[must_use]
 pub fn is_complete(path: &Path, experiment: &Experiment) -> bool {
-    let Ok(text) = std::fs::read_to_string(path) else { return false };
-    let last = text.lines().last().and_then(|line| line.split(',').next()?.parse::<f64>().ok());
     let motion = &experiment.plan.motion;
-    last.is_some_and(|t| t > motion.duration() - 2.0 * motion.period)
+    resume::last_time(path).is_some_and(|t| t > motion.duration() - 2.0 * motion.period)
 }
 
 /// Fits the laws to a joint's log.

@@ -6,6 +6,7 @@ pub mod friction;
 pub mod gravity_free;
 pub mod laws;
 pub mod record;
+pub mod resume;
 pub mod settling;
 pub mod warm_up;
 

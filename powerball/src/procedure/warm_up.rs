@@ -74,25 +74,99 @@ pub fn swing<const N: usize>(profile: &Profile<N>, settings: &Settings) -> Motio
     motion
 }
 
-/// Swings until every joint is warm, or the time is over. The log gets every cycle, t running on; `progress` is told the time and
-/// the greatest change that may still be to come.
+/// Cycle means of a swing, as its log gives them.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    motion: Motion,
+    cycles: Vec<Vec<Cycle>>,
+}
+
+/// A logged position further than this from where the swing should be is another swing's, rad.
+const ANOTHER: f64 = 0.3;
+
+impl Seen {
+    /// Nothing seen yet of a swing.
+    #[must_use]
+    pub fn new(motion: Motion) -> Seen {
+        Seen { cycles: vec![Vec::new(); motion.dof()], motion }
+    }
+
+    /// Length of a cycle in the log, s: the next one begins a sample later than the last ends.
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        self.motion.len() as f64 * self.motion.period
+    }
+
+    /// Takes the rows (`t`, `q1…qn`, `tau1…taun`) of an earlier log of the same swing. `None` where they are of another one.
+    #[must_use]
+    pub fn earlier(mut self, rows: &[Vec<f64>]) -> Option<Seen> {
+        let n = self.motion.dof();
+        let cycle = |row: &Vec<f64>| (row[0] / self.length() + 1e-9).floor();
+        let same = |row: &Vec<f64>| {
+            let sample = ((row[0] - cycle(row) * self.length()) / self.motion.period).round() as usize;
+            row.len() == 1 + 2 * n
+                && self
+                    .motion
+                    .q
+                    .get(sample * n..(sample + 1) * n)
+                    .is_some_and(|q| q.iter().zip(&row[1..]).all(|(a, b)| (a - b).abs() < ANOTHER))
+        };
+        if !rows.iter().all(same) {
+            return None;
+        }
+        let parts: Vec<(f64, &[Vec<f64>])> = rows
+            .chunk_by(|a, b| cycle(a) == cycle(b))
+            .map(|part| (cycle(&part[0]) * self.length(), part))
+            .collect();
+        parts.into_iter().for_each(|(start, part)| self.take(start, part));
+        Some(self)
+    }
+
+    /// Takes the rows of the cycle that began at `start`, s; one that is not whole is left out.
+    fn take(&mut self, start: f64, rows: &[Vec<f64>]) {
+        let (n, motion) = (self.motion.dof(), &self.motion);
+        // Lines may be missing; each knows by its time which sample it is.
+        let sample = |row: &Vec<f64>| ((row[0] - start) / motion.period).round() as usize;
+        let known: Vec<(usize, &Vec<f64>)> =
+            rows.iter().map(|row| (sample(row), row)).filter(|(k, _)| *k < motion.len()).collect();
+        let times: Vec<f64> = known.iter().map(|(k, _)| *k as f64 * motion.period).collect();
+        if times.first() != Some(&0.0) || times.last().is_none_or(|t| *t < motion.duration()) {
+            return;
+        }
+        for (j, seen) in self.cycles.iter_mut().enumerate() {
+            let speed: Vec<f64> = known.iter().map(|(k, _)| motion.dq[k * n + j]).collect();
+            let torque: Vec<f64> = known.iter().map(|(_, row)| row[1 + n + j]).collect();
+            let found = cycles(&times, &speed, &torque, motion.duration());
+            seen.extend(found.iter().map(|c| Cycle { time: c.time + start, ..*c }));
+        }
+    }
+
+    /// Greatest change that may still be to come on a joint, and the trends; `None` while it is too early to say.
+    fn change(&self) -> Option<f64> {
+        let all: Option<Vec<f64>> = self.cycles.iter().map(|c| trend(c).map(|t| t.change)).collect();
+        all.map(|all| all.into_iter().fold(0.0, f64::max))
+    }
+}
+
+/// Swings until every joint is warm, or the time is over. The log gets every cycle, t running on from `start`, which is 0 where a log
+/// begins; `seen` is what an earlier part of it showed. `progress` is told the time and the greatest change that may still be to come.
 ///
 /// # Errors
 /// Where the arm stops, or the log cannot be written.
 pub fn warm_up<B: Bus, const N: usize>(
     recorder: &mut Recorder<B, N>,
     settings: &Settings,
+    mut seen: Seen,
+    start: f64,
     log: &mut impl Write,
     mut progress: impl FnMut(f64, Option<f64>),
 ) -> Result<Warmth, RecordError> {
-    let motion = swing(recorder.master().driver().profile(), settings);
-    let start = motion.samples().next().and_then(|[q, ..]| <[f64; N]>::try_from(q).ok());
-    if let Some(start) = start {
-        recorder.go(&start, 0.25, 1.0)?;
+    let motion = seen.motion.clone();
+    let begin = motion.samples().next().and_then(|[q, ..]| <[f64; N]>::try_from(q).ok());
+    if let Some(begin) = begin {
+        recorder.go(&begin, 0.25, 1.0)?;
     }
-    let speeds: Vec<Vec<f64>> = (0..N).map(|j| motion.samples().map(|[_, dq, _]| dq[j]).collect()).collect();
-    let mut seen: Vec<Vec<Cycle>> = vec![Vec::new(); N];
-    let mut seconds = 0.0;
+    let mut seconds = start;
     loop {
         let mut text = Vec::new();
         recorder.record(&motion, seconds, false, &mut text)?;
@@ -106,31 +180,18 @@ pub fn warm_up<B: Bus, const N: usize>(
             .map(|line| line.split(',').filter_map(|x| x.parse().ok()).collect())
             .filter(|row: &Vec<f64>| row.len() == 1 + 2 * N)
             .collect();
-        // Lines may be missing; each knows by its time which sample it is.
-        let sample = |row: &Vec<f64>| ((row[0] - seconds) / motion.period).round() as usize;
-        let known: Vec<(usize, &Vec<f64>)> =
-            rows.iter().map(|row| (sample(row), row)).filter(|(k, _)| *k < motion.len()).collect();
-        let times: Vec<f64> = known.iter().map(|(k, _)| *k as f64 * motion.period).collect();
-        let whole = times.first() == Some(&0.0) && times.last().is_some_and(|t| *t >= motion.duration());
-        for (j, cycle) in seen.iter_mut().enumerate().filter(|_| whole) {
-            let speed: Vec<f64> = known.iter().map(|(k, _)| speeds[j][*k]).collect();
-            let torque: Vec<f64> = known.iter().map(|(_, row)| row[1 + N + j]).collect();
-            let found = cycles(&times, &speed, &torque, motion.duration());
-            cycle.extend(found.iter().map(|c| Cycle { time: c.time + seconds, ..*c }));
-        }
-        seconds += motion.len() as f64 * motion.period;
-        let trends: Vec<Option<Trend>> = seen.iter().map(|c| trend(c)).collect();
-        let change = trends.iter().map(|t| t.map(|t| t.change)).collect::<Option<Vec<f64>>>();
-        let change = change.map(|all| all.into_iter().fold(0.0, f64::max));
+        seen.take(seconds, &rows);
+        seconds += seen.length();
+        let change = seen.change();
         progress(seconds, change);
         let warm = change.is_some_and(|c| c < settings.tolerance);
         if warm || seconds >= settings.most {
-            let joints = seen
-                .into_iter()
-                .zip(trends)
-                .map(|(cycles, trend)| JointWarmth { curve: exponential(&cycles), cycles, trend })
-                .collect();
-            return Ok(Warmth { joints, warm, seconds });
+            let joint = |cycles: Vec<Cycle>| JointWarmth {
+                curve: exponential(&cycles),
+                trend: trend(&cycles),
+                cycles,
+            };
+            return Ok(Warmth { joints: seen.cycles.into_iter().map(joint).collect(), warm, seconds });
         }
     }
 }
@@ -170,7 +231,8 @@ mod tests {
         let mut recorder = Recorder::enable(Master::new(Driver::new(LWA4P).unwrap(), bus)).unwrap();
         let mut log = Vec::new();
         let settings = Settings { most: 600.0, ..Settings::default() };
-        let warmth = warm_up(&mut recorder, &settings, &mut log, |_, _| ()).unwrap();
+        let seen = || Seen::new(swing(&LWA4P, &settings));
+        let warmth = warm_up(&mut recorder, &settings, seen(), 0.0, &mut log, |_, _| ()).unwrap();
         assert!(warmth.warm && (120.0..500.0).contains(&warmth.seconds), "{}", warmth.seconds);
         let curve = warmth.joints[3].curve.unwrap();
         approx::assert_relative_eq!(curve.time_constant, 60.0, max_relative = 0.2);
@@ -181,7 +243,19 @@ mod tests {
             text.lines().skip(1).map(|l| l.split(',').next().unwrap().parse().unwrap()).collect();
         assert!(times.windows(2).all(|w| w[1] > w[0]) && text.matches("tau1").count() == 1);
         // One that is given no time is not called warm.
-        let settings = Settings { most: 20.0, ..settings };
-        assert!(!warm_up(&mut recorder, &settings, &mut Vec::new(), |_, _| ()).unwrap().warm);
+        let short = Settings { most: 20.0, ..settings };
+        assert!(!warm_up(&mut recorder, &short, seen(), 0.0, &mut Vec::new(), |_, _| ()).unwrap().warm);
+        // What the log says is what was seen, but for a cycle that it holds in part; another swing's log is not taken.
+        let rows: Vec<Vec<f64>> =
+            text.lines().skip(1).map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
+        let whole = seen().earlier(&rows[..rows.len() - 300]).unwrap();
+        for (joint, seen) in warmth.joints.iter().zip(&whole.cycles) {
+            assert_eq!(joint.cycles.len() - 1, seen.len());
+            for (a, b) in joint.cycles.iter().zip(seen) {
+                assert!((a.time - b.time).abs() < 1e-6 && a.torque == b.torque, "{a:?} {b:?}");
+            }
+        }
+        let wider = Settings { share: 0.9, ..settings };
+        assert!(Seen::new(swing(&LWA4P, &wider)).earlier(&rows).is_none());
     }
 }

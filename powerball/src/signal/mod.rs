@@ -3,8 +3,10 @@
 pub mod butterworth;
 pub mod difference;
 pub mod filter;
+pub mod occupied;
 pub mod resample;
 pub mod rest;
+pub mod turns;
 
 pub use butterworth::Butterworth;
 pub use filter::Band;

@@ -155,7 +155,7 @@ impl Bench {
                 ..Settings::default()
             };
             let found = optimise(&self.model, SetKind::Minimal, &settings).map_err(|e| e.to_string())?;
-            motions.push(found.path.sample(plant.sensors().rate));
+            motions.push(found.paths[0].sample(plant.sensors().rate));
         }
         let mut starts = Vec::new();
         let mut now = 0.0;

@@ -1,0 +1,82 @@
+//! The page of an excitation: what the arm will do, and how it keeps its limits.
+
+use super::excite::{Told, Trajectory};
+use crate::report::{Figure, Ink, Page, Panel, Series, Table, number};
+
+const INKS: [Ink; 6] = [Ink::Blue, Ink::Orange, Ink::Green, Ink::Purple, Ink::Sky, Ink::Grey];
+
+pub(super) fn page(told: &Told) -> Page {
+    let mut page = Page::new(format!("Exciting trajectory of {}", told.arm));
+    let (good, usual) = (&told.found.figures, &told.found.usual);
+    page.lead(
+        "Finite Fourier series (Eq. 18 to 20) from rest to rest, searched for a well conditioned regressor.",
+    );
+    page.facts([
+        ("parameters", told.parameters.0.to_string()),
+        ("condition number, raw", number(told.conditions.raw)),
+        ("with normalised columns", number(told.conditions.normalised)),
+        ("as optimised", format!("{} (a random path: {})", number(good.condition), number(usual.condition))),
+    ]);
+    for trajectory in &told.trajectories {
+        page.heading(&format!("Base {}", trajectory.mounting));
+        page.figure(&motion(trajectory), "Positions, speeds and accelerations of all joints.");
+        if let Some(figure) = torques(trajectory) {
+            page.figure(
+                &figure,
+                "Torque expected by the model or guess below, as a share of what may be used of each limit.",
+            );
+        }
+        if let Some(figure) = distances(trajectory) {
+            page.figure(&figure, "Distance of the nearest capsules, or of a capsule and the floor.");
+        }
+    }
+    page.heading("Assumed");
+    let mut table = Table::new(["what the file does not say"]);
+    told.assumed.iter().for_each(|line| table.push([line.clone()]));
+    page.table(&table);
+    page
+}
+
+fn motion(trajectory: &Trajectory) -> Figure {
+    let motion = &trajectory.motion;
+    let panel = |label: &str, pick: usize| {
+        (0..motion.dof()).fold(Panel::new(label), |panel, i| {
+            let name = if pick == 0 { format!("joint {}", i + 1) } else { String::new() };
+            let points = motion.samples().enumerate().map(|(k, s)| (k as f64 * motion.period, s[pick][i]));
+            panel.line(name, INKS[i % INKS.len()], points.collect())
+        })
+    };
+    Figure::new("Motion", "time [s]")
+        .panel(panel("position [rad]", 0))
+        .panel(panel("speed [rad/s]", 1))
+        .panel(panel("acceleration [rad/s²]", 2))
+}
+
+fn torques(trajectory: &Trajectory) -> Option<Figure> {
+    let (motion, load) = (&trajectory.motion, trajectory.constraints.load.as_ref()?);
+    let torques = load.torques(&motion.q, &motion.dq, &motion.ddq);
+    let n = motion.dof();
+    let share = |k: usize, i: usize| torques[k * n + i] / load.limits()[i];
+    let panel =
+        (0..n).filter(|i| load.limits()[*i].is_finite()).fold(Panel::new("share of limit"), |panel, i| {
+            let points = (0..motion.len()).map(|k| (k as f64 * motion.period, share(k, i)));
+            panel.line(format!("joint {}", i + 1), INKS[i % INKS.len()], points.collect())
+        });
+    Some(Figure::new("Torque", "time [s]").panel(panel))
+}
+
+fn distances(trajectory: &Trajectory) -> Option<Figure> {
+    let (motion, space) = (&trajectory.motion, trajectory.constraints.space.as_ref()?);
+    let near = |(k, [q, ..]): (usize, [&[f64]; 3])| {
+        let near = space.shape.nearest(q, space.floor.as_ref())?;
+        Some((k as f64 * motion.period, near.distance))
+    };
+    let points: Vec<(f64, f64)> = motion.samples().enumerate().filter_map(near).collect();
+    let end = motion.duration();
+    let panel = Panel::new("distance [m]").line("nearest", Ink::Blue, points).series(Series::dashed(
+        "clearance",
+        Ink::Grey,
+        vec![(0.0, space.clearance), (end, space.clearance)],
+    ));
+    Some(Figure::new("Room", "time [s]").panel(panel))
+}
