@@ -1,3 +1,4 @@
 mod measured;
+mod model;
 mod plant;
 mod study;
