@@ -67,9 +67,12 @@ impl Explain {
         let refused = |e: ExplainError| Failure::Refused(e.to_string());
         let mut explained = explain_with(&loaded.body, &loaded.fit, &loaded.validate, &options, &told, &say)
             .map_err(refused)?;
-        if let Some(motion) = experiment::propose(&loaded.body, &mut explained, &options, &say) {
+        let motion = experiment::propose(&loaded.body, &mut explained, &options, &say);
+        if let Some(motion) = &motion {
             output::write(&self.inputs.out, TRAJECTORY, motion.to_csv().as_bytes())?;
-            if let Some((arm, note)) = arm {
+        }
+        match (arm, motion) {
+            (Some((arm, note)), Some(motion)) => {
                 progress.say("recording the experiment");
                 let file = self.inputs.out.join("experiment.csv");
                 self.record(&motion, arm, &file)?;
@@ -79,16 +82,22 @@ impl Explain {
                 if let Some(known) = &loaded.known {
                     known.take_out(&loaded.body, &mut new);
                 }
-                if let Some(new) = new.pop() {
-                    let old = (loaded.fit.as_slice(), loaded.validate.as_slice());
+                let old = (loaded.fit.as_slice(), loaded.validate.as_slice());
+                for new in new {
                     explained = experiment::learn(&loaded.body, old, new, &explained, &options, &told, &say)
                         .map_err(refused)?;
-                    // What is still open may ask for another experiment, beside the one that was run.
-                    if let Some(motion) = experiment::propose(&loaded.body, &mut explained, &options, &say) {
-                        output::write(&self.inputs.out, TRAJECTORY, motion.to_csv().as_bytes())?;
-                    }
+                }
+                // What is still open may ask for another experiment.
+                if let Some(next) = experiment::propose(&loaded.body, &mut explained, &options, &say) {
+                    output::write(&self.inputs.out, TRAJECTORY, next.to_csv().as_bytes())?;
                 }
             }
+            (Some(_), None) => loaded.warnings.push(
+                "--experiment: nothing was recorded: these logs leave no names open that a path within the arm file's limits could \
+                 tell apart"
+                    .to_string(),
+            ),
+            (None, _) => {}
         }
         explained.warnings.splice(0..0, loaded.warnings);
         let text = output::json(&explained)?;
@@ -126,7 +135,7 @@ impl Explain {
                         nothing of another arm; name that one's bus by --bus, or the virtual arm's file by --plant";
             return Ok((self.place().open()?, Some(note.to_string())));
         };
-        let arm = Undeclared::read(&file).map_err(Failure::Unusable)?.arm([0.0; 6], 1);
+        let arm = Undeclared::read(&file).map_err(Failure::Unusable)?.arm([0.0; 6], 1, false);
         let note = format!("the experiment was recorded on the virtual arm of {}", file.display());
         Ok((virtual_bus(arm.map_err(|e| Failure::Refused(e.to_string()))?)?, Some(note)))
     }

@@ -17,8 +17,8 @@ impl Effect for Hysteresis {
         Class::Friction
     }
 
-    fn shown_by(&self, _: &Candidate) -> Axis {
-        Axis::Travel
+    fn shown_by(&self, candidate: &Candidate) -> Axis {
+        Axis::Travel(candidate.values[0])
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -10,6 +10,7 @@ use super::other_path::payload_on;
 use super::placebo::placebos;
 use super::result::{Errors, Explained, FalsePositives, NamedEffect, Rival};
 use super::rule;
+use super::running_time;
 use super::screen::{Screen, Trial};
 use crate::effects::{self, Candidate, Context, Effect};
 use crate::estimate::{Design, Fit, Folds, Solver, fit, friction_columns, noise_floor, spread};
@@ -90,6 +91,8 @@ pub struct Session<'a> {
     pub(super) other: Data<'a>,
     /// Whether the other logs run the path of the fitted ones.
     pub(super) one_path: bool,
+    /// Whether the other logs are taken to have been recorded in between the fitted ones.
+    pub(super) beside: bool,
     pub(super) folds: Folds,
     pub(super) effects: Vec<Box<dyn Effect>>,
     pub(super) accepted: Vec<Accepted>,
@@ -168,9 +171,11 @@ pub fn explain_with(
     let held =
         payload_on(body, logs, validate, options, &base, &mut other).map_err(ExplainError::Validate)?;
     let one_path = repeats(&data, &other);
+    let beside = running_time::settle(logs, validate, &data, &base, &mut other);
     let mut session = Session {
         held,
         one_path,
+        beside,
         data,
         other,
         folds,

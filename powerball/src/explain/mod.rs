@@ -25,6 +25,7 @@ mod page;
 mod placebo;
 mod result;
 mod rule;
+mod running_time;
 mod screen;
 mod shown;
 
