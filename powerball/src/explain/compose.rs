@@ -52,7 +52,8 @@ impl Session<'_> {
                 Some(RigidBody::new(&arm).map_err(|e| wrong(&e))?)
             }
         };
-        if let Some(changed) = changed.as_ref().filter(|_| !not_zero.is_empty()) {
+        // Another gravity alone can make the minimal set another.
+        if let Some(changed) = &changed {
             model.parameters = moved(body, changed, self.fit.inertial(), &not_zero);
         }
         let arm = changed.as_ref().unwrap_or(body);
