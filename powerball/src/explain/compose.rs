@@ -1,6 +1,7 @@
 //! From the accepted effects to a model of the arm, and what that model leaves.
 
 use super::forward::{ExplainError, Session};
+use super::result::NamedEffect;
 use crate::correction::Term;
 use crate::effects::{Context, Part, Window, payload};
 use crate::estimate::{JointFriction, ParameterEstimate};
@@ -51,7 +52,8 @@ impl Session<'_> {
                 Some(RigidBody::new(&arm).map_err(|e| wrong(&e))?)
             }
         };
-        if let Some(changed) = changed.as_ref().filter(|_| !not_zero.is_empty()) {
+        // Another gravity alone can make the minimal set another.
+        if let Some(changed) = &changed {
             model.parameters = moved(body, changed, self.fit.inertial(), &not_zero);
         }
         let arm = changed.as_ref().unwrap_or(body);
@@ -73,6 +75,7 @@ impl Session<'_> {
         let n = self.data.dof();
         let (mut offset, mut delay) = (vec![0.0; n], vec![0.0; n]);
         let (mut additions, mut in_logs) = (Additions::default(), InLogs::default());
+        additions.payloads.extend(self.held.as_ref().and_then(held_payload));
         for (k, (a, coefficients)) in self.accepted.iter().zip(self.coefficients()).enumerate() {
             let effect = self.effects[a.effect].as_ref();
             match effect.part(&context, &a.candidate, &coefficients) {
@@ -125,6 +128,19 @@ impl Session<'_> {
             }
         }
     }
+}
+
+/// The payload that only logs of the other path have; it was taken out of them.
+fn held_payload(held: &NamedEffect) -> Option<Payload> {
+    let number = |v: &serde_json::Value| v.as_f64();
+    let list =
+        |key: &str| Some(held.parameters[key].as_array()?.iter().filter_map(number).collect::<Vec<f64>>());
+    Some(Payload {
+        mass: number(&held.parameters["mass"])?,
+        com: list("com")?.try_into().ok()?,
+        logs: held.logs.clone(),
+        start_time: list("start_time")?,
+    })
 }
 
 /// The values of a changed arm's minimal set that move as those of the arm do with what is not zero.

@@ -24,8 +24,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TorqueModel {
     /// The arm's name.
+    #[serde(default)]
     pub arm: String,
     /// The parameter set: "minimal".
+    #[serde(default)]
     pub set: String,
     /// The set's values, SI units.
     pub parameters: Vec<ParameterEstimate>,

@@ -1,4 +1,5 @@
 mod correction;
 mod measured;
+mod model;
 mod plant;
 mod study;
