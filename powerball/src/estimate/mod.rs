@@ -26,4 +26,4 @@ pub use noise::noise_floor;
 pub use reduced::{FrictionLaw, Solution, solve_reduced};
 pub use solve::{Solver, bounded};
 pub use vary::Layout;
-pub use verify::{JointVerdict, TorqueModel};
+pub use verify::{JointVerdict, verify};
