@@ -108,26 +108,38 @@ impl AllColumns {
         let (mut operations, form) =
             costs.min_by_key(|(cost, _)| *cost).unwrap_or(((usize::MAX, 0), &self.forms[0]));
         let mut exchanged = 0;
-        while search {
-            let mut best: Option<((usize, usize), usize, usize)> = None;
-            for (column, coordinates) in dependence.coordinates.iter().enumerate() {
-                if dependence.kept.contains(&column) {
-                    continue;
-                }
-                for (position, _) in coordinates {
-                    let mut kept = dependence.kept.clone();
-                    kept[*position] = column;
-                    let cost = self.cost(form, &kept);
-                    if cost < best.map_or(operations, |b| b.0) {
-                        best = Some((cost, *position, column));
-                    }
-                }
+        if search {
+            while let Some((cost, position, column)) = self.best_exchange(form, &dependence, operations) {
+                let Some(next) = exchange(field, &dependence, position, column) else { break };
+                (dependence, operations, exchanged) = (next, cost, exchanged + 1);
             }
-            let Some((cost, position, column)) = best else { break };
-            let Some(next) = exchange(field, &dependence, position, column) else { break };
-            (dependence, operations, exchanged) = (next, cost, exchanged + 1);
         }
         (dependence, Candidate { preference, exchanged, operations: operations.0 })
+    }
+
+    /// The exchange that costs least, where one costs less than `operations`: its cost, the position and the column that
+    /// comes there.
+    fn best_exchange(
+        &self,
+        form: &FunctionGraph,
+        dependence: &Dependence,
+        operations: (usize, usize),
+    ) -> Option<((usize, usize), usize, usize)> {
+        let mut best: Option<((usize, usize), usize, usize)> = None;
+        for (column, coordinates) in dependence.coordinates.iter().enumerate() {
+            if dependence.kept.contains(&column) {
+                continue;
+            }
+            for (position, _) in coordinates {
+                let mut kept = dependence.kept.clone();
+                kept[*position] = column;
+                let cost = self.cost(form, &kept);
+                if cost < best.map_or(operations, |b| b.0) {
+                    best = Some((cost, *position, column));
+                }
+            }
+        }
+        best
     }
 }
 

@@ -161,9 +161,14 @@ fn prismatic(
 fn body_wrench(b: &Builder, body: &LinkBody, link: &LinkMotion) -> Wrench {
     let moments = &body.moments;
     let mut wrench = Wrench::NONE;
+    // First moments across the axis need U's diagonal as it is.
+    let diagonal_unused = moments.first[0] == Expr::ZERO && moments.first[1] == Expr::ZERO;
     for (entry, value) in moments.entries().into_iter().enumerate() {
         if value != Expr::ZERO {
-            let unit = entry_wrench(b, entry, link);
+            let mut unit = entry_wrench(b, entry, link);
+            if entry == 9 && diagonal_unused {
+                unit.moment[2] = -link.spin.squares_across(b);
+            }
             let part =
                 Wrench { force: scaled(b, value, &unit.force), moment: scaled(b, value, &unit.moment) };
             wrench = wrench.plus(b, &part);

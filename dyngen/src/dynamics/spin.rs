@@ -57,6 +57,12 @@ impl Spin {
         b.add(&b.mul(&u[i], &r[j]), &b.mul(&r[i], &u[j]))
     }
 
+    /// U_xx − U_yy = ω_x² − ω_y², from ω_x² and the inherited U_zz alone.
+    pub fn squares_across(&self, b: &Builder) -> Expr {
+        let x2 = self.product(b, 0, 0);
+        b.add(&b.add(&self.rows[2][2], &x2), &x2)
+    }
+
     /// Angular acceleration about an axis.
     pub fn alpha(&self, b: &Builder, axis: usize) -> Expr {
         let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);

@@ -41,13 +41,13 @@ impl JointSum {
     }
 
     /// How many joints.
-    pub fn len(self) -> usize {
+    pub fn count(self) -> usize {
         (self.plus | self.minus).count_ones() as usize
     }
 
     /// Whether it is one joint's angle.
     pub fn is_joint(self) -> bool {
-        self.len() == 1
+        self.count() == 1
     }
 
     /// The sum in numbers.
@@ -84,7 +84,7 @@ mod tests {
         assert!(negative);
         assert_eq!(sum.to_string(), "2m3");
         assert_eq!(sum.joints().collect::<Vec<_>>(), [(1, false), (2, true)]);
-        assert_eq!((sum.sign(2), sum.sign(3), sum.len()), (Some(true), None, 2));
+        assert_eq!((sum.sign(2), sum.sign(3), sum.count()), (Some(true), None, 2));
         assert_eq!(sum.value(|i| [0.0, 5.0, 3.0][i]), 2.0);
         assert_eq!(JointSum::of([(3, false)]), (JointSum::joint(3), false));
     }

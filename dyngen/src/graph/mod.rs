@@ -210,7 +210,7 @@ impl Graph {
             }
         }
         // A sum of angles is formed before its sine and cosine are taken.
-        count.add += angles.iter().map(|sum| sum.len() - 1).sum::<usize>();
+        count.add += angles.iter().map(|sum| sum.count() - 1).sum::<usize>();
         count.sin_cos = angles.len();
         count
     }

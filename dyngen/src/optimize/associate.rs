@@ -101,16 +101,7 @@ fn regroup(graph: &Graph, outputs: &[Expr], kind: Kind) -> (Graph, Vec<Expr>) {
         }
     }
     // Leaves come before what they are part of, and pairs before what uses them: build on demand.
-    let mut build = Rebuild {
-        b: &b,
-        graph,
-        kind,
-        leaves: &leaves,
-        fixed: &fixed,
-        pairs: &pairs,
-        first_pair,
-        extra: BTreeMap::new(),
-    };
+    let mut build = Rebuild { b: &b, kind, fixed: &fixed, pairs: &pairs, first_pair, extra: BTreeMap::new() };
     for node in needed {
         if leaves.contains_key(&node) {
             copied[node] = build.combine(&leaves[&node], &copied);
@@ -125,9 +116,7 @@ fn regroup(graph: &Graph, outputs: &[Expr], kind: Kind) -> (Graph, Vec<Expr>) {
 
 struct Rebuild<'a> {
     b: &'a Builder,
-    graph: &'a Graph,
     kind: Kind,
-    leaves: &'a BTreeMap<usize, Vec<Leaf>>,
     fixed: &'a BTreeMap<usize, Vec<Leaf>>,
     pairs: &'a [(Leaf, Leaf)],
     first_pair: usize,
@@ -136,8 +125,7 @@ struct Rebuild<'a> {
 
 impl Rebuild<'_> {
     fn combine(&mut self, own: &[Leaf], copied: &[Expr]) -> Expr {
-        debug_assert!(self.leaves.len() <= self.graph.nodes().len());
-        let mut terms = own.iter().map(|leaf| *leaf).collect::<Vec<Leaf>>().into_iter();
+        let mut terms = own.iter().copied();
         // A sum or product has a leaf.
         let Some(first) = terms.next() else { return Expr::ZERO };
         let mut total = self.leaf(first, copied);
