@@ -223,15 +223,16 @@ fn judge(
         .min_by(|a, b| a.evidence.total_cmp(&b.evidence))
 }
 
-/// A motion as a log without torques.
+/// A motion as a log. Its torques are never looked at, but one that never changes would count as dead: positions stand in.
 fn log_of(motion: &Motion) -> Log {
     let n = motion.dof();
     let of = |j: usize| motion.q.iter().skip(j).step_by(n).copied().collect();
+    let q: Vec<Vec<f64>> = (0..n).map(of).collect();
     Log {
         file: "planned".into(),
         t: (0..motion.len()).map(|k| k as f64 * motion.period).collect(),
-        q: (0..n).map(of).collect(),
-        torque: vec![vec![0.0; motion.len()]; n],
+        torque: q.clone(),
+        q,
         temperature: None,
         pieces: std::iter::once(0..motion.len()).collect(),
         clock: 0.0,

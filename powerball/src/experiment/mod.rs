@@ -97,7 +97,8 @@ pub fn learn(
     progress: &dyn Fn(&str),
 ) -> Result<Explained, ExplainError> {
     let file = new.file.clone();
-    let (to_fit, to_judge) = split_off(new, fit.iter().chain(held_out));
+    let others: Vec<&Log> = fit.iter().chain(held_out).collect();
+    let (to_fit, to_judge) = split_off(new, &others);
     let fit: Vec<Log> = fit.iter().cloned().chain([to_fit]).collect();
     let held_out: Vec<Log> = held_out.iter().cloned().chain([to_judge]).collect();
     let Some(open) = before.open.as_ref() else {
