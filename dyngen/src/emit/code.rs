@@ -8,20 +8,14 @@ use crate::exact::rational;
 use crate::graph::{Expr, Input, Node, operands};
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
-use quote::{format_ident, quote};
+use quote::{ToTokens, format_ident, quote};
 use std::collections::BTreeSet;
 
 /// A function's items: one that takes q, and one that takes [`Trig`] in its place.
 pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
     let arm = model.arm();
     let needed = built.graph.needed(&built.outputs);
-    let used: BTreeSet<Input> = needed
-        .iter()
-        .filter_map(|n| match built.graph.nodes()[*n] {
-            Node::Input(input) => Some(input),
-            _ => None,
-        })
-        .collect();
+    let used = used(built, &needed);
     let name = Ident::new(built.function.name(), Span::call_site());
     let name_with = format_ident!("{name}_with");
     let doc = docs::lines(&docs::function(built));
@@ -50,6 +44,7 @@ pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
 
         #(#[doc = #doc_with])*
         #lint
+        #[inline(always)]
         #[must_use]
         pub fn #name_with<T: SimdRealField + Copy>(#trig_name: &Trig<T>, #(#signature),*) -> #result {
             #positions
@@ -61,7 +56,7 @@ pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
 }
 
 /// Whether the result is a number for every arm: where it is a vector, one joint makes it a vector of one.
-fn is_number(built: &FunctionGraph) -> bool {
+pub(super) fn is_number(built: &FunctionGraph) -> bool {
     matches!(built.function, Function::KineticEnergy | Function::PotentialEnergy)
 }
 
@@ -109,43 +104,118 @@ fn trig_of(arm: &Arm, used: &BTreeSet<Input>) -> TokenStream {
     if uses_positions(used) { quote!(#bindings let trig = #fields;) } else { quote!(let trig = #fields;) }
 }
 
-/// Takes q apart, and builds a `Trig` of the inputs that are used. A pattern over the storage needs no bounds check and
-/// cannot panic.
-fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
-    let (mut names, mut lets) = (Vec::new(), Vec::new());
-    let (mut sines, mut cosines, mut places) = (Vec::new(), Vec::new(), Vec::new());
-    let zero = quote!(T::zero());
-    for (i, joint) in arm.joints.iter().enumerate() {
-        let (q, s, c) =
-            (format_ident!("q{}", i + 1), format_ident!("s{}", i + 1), format_ident!("c{}", i + 1));
-        let revolute = joint.kind == JointKind::Revolute;
-        let (sin, cos) =
-            (revolute && used.contains(&Input::Sin(i)), revolute && used.contains(&Input::Cos(i)));
-        let place = !revolute && used.contains(&Input::Position(i));
-        names.push(if sin || cos || place { quote!(#q) } else { quote!(_) });
-        let offset = trig_offset(arm, i);
-        let angle = if offset == 0.0 {
-            quote!(#q)
-        } else {
-            let offset = Literal::f64_suffixed(offset);
-            quote!((#q + nalgebra::convert::<f64, T>(#offset)))
-        };
-        match (sin, cos) {
-            (true, true) => lets.push(quote!(let (#s, #c) = #angle.simd_sin_cos();)),
-            (true, false) => lets.push(quote!(let #s = #angle.simd_sin();)),
-            (false, true) => lets.push(quote!(let #c = #angle.simd_cos();)),
-            (false, false) => {}
+/// The inputs that a function reads.
+fn used(built: &FunctionGraph, needed: &[usize]) -> BTreeSet<Input> {
+    let inputs = needed.iter().filter_map(|n| match built.graph.nodes()[*n] {
+        Node::Input(input) => Some(input),
+        _ => None,
+    });
+    inputs.collect()
+}
+
+/// What a function takes of q: the positions that it reads, and the angles whose sine or cosine it needs.
+struct Positions {
+    /// A position's name, where it is read.
+    names: Vec<Option<Ident>>,
+    /// Each angle's joint, and the names of its sine and cosine where they are read.
+    angles: Vec<(usize, TokenStream, TokenStream)>,
+    /// A `Trig` of them; the rest is zero, because nobody reads it.
+    trig: TokenStream,
+}
+
+impl Positions {
+    /// `position` is how a joint's position is read once it has a name.
+    fn new(arm: &Arm, used: &BTreeSet<Input>, position: impl Fn(&Ident) -> TokenStream) -> Positions {
+        let zero = quote!(T::zero());
+        let (mut names, mut angles) = (Vec::new(), Vec::new());
+        let (mut sines, mut cosines, mut places) = (Vec::new(), Vec::new(), Vec::new());
+        for (i, joint) in arm.joints.iter().enumerate() {
+            let [q, s, c] = ["q", "s", "c"].map(|letter| format_ident!("{letter}{}", i + 1));
+            let revolute = joint.kind == JointKind::Revolute;
+            let sin = (revolute && used.contains(&Input::Sin(i))).then(|| quote!(#s));
+            let cos = (revolute && used.contains(&Input::Cos(i))).then(|| quote!(#c));
+            let place = (!revolute && used.contains(&Input::Position(i))).then(|| position(&q));
+            if sin.is_some() || cos.is_some() {
+                let bound = |name: &Option<TokenStream>| name.clone().unwrap_or(quote!(_));
+                angles.push((i, bound(&sin), bound(&cos)));
+            }
+            let read = sin.is_some() || cos.is_some() || place.is_some();
+            names.push(read.then_some(q));
+            sines.push(sin.unwrap_or(zero.clone()));
+            cosines.push(cos.unwrap_or(zero.clone()));
+            places.push(place.unwrap_or(zero.clone()));
         }
-        sines.push(if sin { quote!(#s) } else { zero.clone() });
-        cosines.push(if cos { quote!(#c) } else { zero.clone() });
-        places.push(if place { quote!(#q) } else { zero.clone() });
+        let trig = quote!(Trig { sin: [#(#sines),*], cos: [#(#cosines),*], position: [#(#places),*] });
+        Positions { names, angles, trig }
     }
+}
+
+/// The angle of a joint at a position.
+fn angle(arm: &Arm, joint: usize, position: &TokenStream) -> TokenStream {
+    match trig_offset(arm, joint) {
+        0.0 => quote!(#position),
+        offset => {
+            let offset = Literal::f64_suffixed(offset);
+            quote!(#position + nalgebra::convert::<f64, T>(#offset))
+        }
+    }
+}
+
+/// Takes q apart, computes all sines and cosines together, and builds a `Trig` of the inputs that are used. A pattern
+/// over the storage needs no bounds check and cannot panic.
+fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
+    let Positions { names, angles, trig } = Positions::new(arm, used, |q| quote!(#q));
+    let patterns = names.iter().map(|name| name.as_ref().map_or(quote!(_), |name| quote!(#name)));
+    let computed = (!angles.is_empty()).then(|| {
+        let (sines, cosines) = (angles.iter().map(|a| &a.1), angles.iter().map(|a| &a.2));
+        let values = angles.iter().map(|(i, ..)| angle(arm, *i, &lane_name(Argument::Positions, *i).into_token_stream()));
+        quote!(let ([#(#sines),*], [#(#cosines),*]) = trigonometry::sin_cos([#(#values),*]);)
+    });
     let bindings = quote! {
-        let [[#(#names),*]] = q.data.0;
-        #(#lets)*
+        let [[#(#patterns),*]] = q.data.0;
+        #computed
     };
-    let fields = quote!(Trig { sin: [#(#sines),*], cos: [#(#cosines),*], position: [#(#places),*] });
-    (bindings, fields)
+    (bindings, trig)
+}
+
+/// Of one sample in a block: the `Trig` that a function reads, whose lines are without a branch, and the joints whose angles
+/// that is right for only where they are near.
+pub(super) fn trig_of_lane(model: &Model, built: &FunctionGraph) -> (TokenStream, Vec<usize>, BTreeSet<usize>) {
+    let arm = model.arm();
+    let used = used(built, &built.graph.needed(&built.outputs));
+    let Positions { names, angles, trig } = Positions::new(arm, &used, |q| quote!(#q[lane]));
+    let lines = angles.iter().map(|(i, sine, cosine)| {
+        let q = lane_name(Argument::Positions, *i);
+        let angle = angle(arm, *i, &quote!(#q[lane]));
+        quote!(let (#sine, #cosine) = trigonometry::near(#angle);)
+    });
+    let tokens = quote! {
+        #(#lines)*
+        let trig = #trig;
+    };
+    let read = (0..names.len()).filter(|i| names[*i].is_some()).collect();
+    (tokens, angles.iter().map(|(i, ..)| *i).collect(), read)
+}
+
+/// The name of an argument's value at a joint.
+pub(super) fn lane_name(argument: Argument, joint: usize) -> Ident {
+    format_ident!("{}{}", argument.name(), joint + 1)
+}
+
+/// The module that computes sines and cosines, for an arm that has any.
+pub(super) fn trigonometry(arm: &Arm) -> TokenStream {
+    if arm.joints.iter().all(|joint| joint.kind != JointKind::Revolute) {
+        return quote!();
+    }
+    // The module that this crate compiles too: it parses.
+    let file = syn::parse_file(include_str!("trigonometry.rs"));
+    let (docs, items) = file.map_or((Vec::new(), Vec::new()), |file| (file.attrs, file.items));
+    quote! {
+        mod trigonometry {
+            #(#docs)*
+            #(#items)*
+        }
+    }
 }
 
 /// Names for what is read of a `Trig`.

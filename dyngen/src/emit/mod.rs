@@ -1,9 +1,14 @@
 //! From graphs to a Rust source file: tokens, docs, formatting.
 
+#[cfg(test)]
+mod accuracy;
+mod batch;
 mod code;
 mod docs;
 mod friction;
 mod tests;
+#[cfg(test)]
+mod trigonometry;
 
 pub use friction::FrictionTerm;
 
@@ -24,6 +29,8 @@ pub struct Options {
     pub values: Option<Vec<f64>>,
     /// Friction terms of every joint; none where empty.
     pub friction: Vec<FrictionTerm>,
+    /// Whether the functions over blocks of samples are emitted too.
+    pub batch: bool,
     /// Whether the arm's own consistency tests are emitted too.
     pub tests: bool,
 }
@@ -36,6 +43,7 @@ impl Default for Options {
             functions: Function::ALL.to_vec(),
             values: None,
             friction: Vec::new(),
+            batch: false,
             tests: false,
         }
     }
@@ -64,19 +72,19 @@ pub fn source(model: &Model, options: &Options) -> Result<String, Error> {
 pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     let set = model.set(options.parameters)?;
     let functions = Function::ALL.into_iter().filter(|f| options.functions.contains(f));
-    let functions: Vec<TokenStream> = functions
-        .map(|function| {
-            let built = match &options.values {
-                Some(values) => model.baked_function(function, options.parameters, values)?,
-                None => model.function(function, options.parameters)?,
-            };
-            Ok(code::function(model, &built))
+    let built = functions
+        .map(|function| match &options.values {
+            Some(values) => model.baked_function(function, options.parameters, values),
+            None => model.function(function, options.parameters),
         })
-        .collect::<Result<_, Error>>()?;
+        .collect::<Result<Vec<_>, Error>>()?;
+    let functions = built.iter().map(|built| code::function(model, built));
+    let batch = options.batch.then(|| batch::module(model, &built));
     let (n, p) =
         (Literal::usize_unsuffixed(model.arm().dof()), Literal::usize_unsuffixed(set.parameters.len()));
     let names = set.names();
     let trig = code::trig_struct(model.arm());
+    let trigonometry = code::trigonometry(model.arm());
     let values = options.values.as_ref().map(|values| {
         let values = values.iter().map(|x| Literal::f64_suffixed(*x));
         quote! {
@@ -109,6 +117,10 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
         #(#functions)*
 
         #friction
+
+        #batch
+
+        #trigonometry
 
         #tests
     })
