@@ -6,7 +6,8 @@ fn main() {
     println!("cargo::rerun-if-changed=tests/arms");
     for name in ["puma560", "ur5e", "panda", "stanford"] {
         for set in [SetKind::Full, SetKind::Minimal, SetKind::Symbolic] {
-            let config = Config::new(format!("tests/arms/{name}.toml")).parameters(set).batch(name == "stanford");
+            let config =
+                Config::new(format!("tests/arms/{name}.toml")).parameters(set).batch(name == "stanford");
             config.build(&format!("{name}_{set}.rs")).unwrap_or_else(|e| e.exit());
         }
     }

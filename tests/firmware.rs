@@ -83,9 +83,14 @@ fn functions(program: &Path) -> BTreeMap<String, u64> {
 
 /// Whether a function computes with doubles in software: what the compiler calls where the core cannot.
 fn is_soft_double(name: &str) -> bool {
-    let runtime = name.strip_prefix("__aeabi_").is_some_and(|rest| rest.starts_with('d') || rest.ends_with("2d"));
+    let runtime =
+        name.strip_prefix("__aeabi_").is_some_and(|rest| rest.starts_with('d') || rest.ends_with("2d"));
     let builtin = name.contains("compiler_builtins") || name.starts_with("__");
-    runtime || builtin && ["df2", "df3", "dfsf", "dfdi", "dfsi", "sfdf", "didf", "sidf"].iter().any(|part| name.contains(part))
+    runtime
+        || builtin
+            && ["df2", "df3", "dfsf", "dfdi", "dfsi", "sfdf", "didf", "sidf"]
+                .iter()
+                .any(|part| name.contains(part))
 }
 
 /// One line of `firmware/costs.txt`: bytes of code, bytes of stack, instructions of a call.
@@ -112,7 +117,9 @@ fn costs(report: &str, of_single: &BTreeMap<String, u64>, of_double: &BTreeMap<S
             let symbols = if scalar == "f32" { of_single } else { of_double };
             let text = symbols
                 .iter()
-                .filter(|(symbol, _)| symbol.contains(&own) || symbol.contains("3arm") && symbol.contains(emitted))
+                .filter(|(symbol, _)| {
+                    symbol.contains(&own) || symbol.contains("3arm") && symbol.contains(emitted)
+                })
                 .map(|(_, size)| size)
                 .sum();
             (format!("{scalar} {name}"), [text, stack.parse().unwrap(), instructions.parse().unwrap()])
@@ -121,7 +128,8 @@ fn costs(report: &str, of_single: &BTreeMap<String, u64>, of_double: &BTreeMap<S
 }
 
 fn written(costs: &Costs) -> String {
-    let mut text = format!("# function: bytes of code, bytes of stack, instructions of a call. Made by {BLESS}\n");
+    let mut text =
+        format!("# function: bytes of code, bytes of stack, instructions of a call. Made by {BLESS}\n");
     for (name, [code, stack, instructions]) in costs {
         let _ = writeln!(text, "{name}: {code} {stack} {instructions}");
     }
@@ -140,9 +148,10 @@ fn read(text: &str) -> Costs {
 
 /// The table for people: single precision beside double.
 fn table(costs: &Costs) -> String {
-    let mut text = "| function | f32: code, B | stack, B | instructions | f64: code, B | stack, B | instructions |\n\
+    let mut text =
+        "| function | f32: code, B | stack, B | instructions | f64: code, B | stack, B | instructions |\n\
                     |---|---|---|---|---|---|---|\n"
-        .to_string();
+            .to_string();
     let meaning = [
         ("trig", "sines and cosines of five joints"),
         ("tau", "τ, trigonometry passed in, as below"),
@@ -182,17 +191,24 @@ fn a_controller_runs_it_without_panic_allocation_or_soft_doubles_and_to_the_same
 
     let (single, double) = (functions(&built("single")), functions(&built("double")));
     for (name, symbols) in [("single", &single), ("double", &double)] {
-        let allocates = symbols.keys().find(|symbol| symbol.contains("__rust_alloc") || symbol.contains("__rg_alloc"));
+        let allocates =
+            symbols.keys().find(|symbol| symbol.contains("__rust_alloc") || symbol.contains("__rg_alloc"));
         assert!(allocates.is_none(), "{name} has an allocator: {allocates:?}");
     }
     let soft: Vec<_> = single.keys().filter(|name| is_soft_double(name)).collect();
     assert!(soft.is_empty(), "single precision computes with doubles: {soft:?}");
-    assert!(double.keys().filter(|name| is_soft_double(name)).count() > 5, "the search for doubles finds none");
+    assert!(
+        double.keys().filter(|name| is_soft_double(name)).count() > 5,
+        "the search for doubles finds none"
+    );
 
     let report = emulate(&built("report"));
     let host = Command::new("rustc").arg("-vV").output().unwrap();
-    let host = String::from_utf8_lossy(&host.stdout).lines().find_map(|l| l.strip_prefix("host: ").map(String::from));
-    let out = cargo(&["run", "--bin", "report", "--target", &host.unwrap(), "--features", "std,deterministic"]);
+    let host = String::from_utf8_lossy(&host.stdout)
+        .lines()
+        .find_map(|l| l.strip_prefix("host: ").map(String::from));
+    let out =
+        cargo(&["run", "--bin", "report", "--target", &host.unwrap(), "--features", "std,deterministic"]);
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     let bits = |text: &str| -> Vec<String> {
         text.lines().filter(|line| line.starts_with("bits ")).map(String::from).collect()

@@ -40,7 +40,12 @@ pub fn driver() -> Result<Driver<6>, Refusal> {
 
 /// One step: what came is taken, set-points are given, what is due leaves.
 #[inline(never)]
-pub fn step(driver: &mut Driver<6>, now: u64, came: &[Frame], positions: &[f64; 6]) -> (Mailbox, Result<(), Rejection>) {
+pub fn step(
+    driver: &mut Driver<6>,
+    now: u64,
+    came: &[Frame],
+    positions: &[f64; 6],
+) -> (Mailbox, Result<(), Rejection>) {
     let mut out = Mailbox::default();
     for frame in came {
         driver.receive(frame, now, &mut out);

@@ -3,14 +3,15 @@
 use std::io::{Error, ErrorKind};
 use std::path::Path;
 
-/// Replaces what stands between `<!-- begin NAME -->` and `<!-- end NAME -->` in a file.
+/// Replaces what stands between `<!-- NAME -->` and `<!-- end of NAME -->` in a file.
 ///
 /// # Errors
 /// Where the file cannot be read or written, or lacks the markers.
 pub fn write_section(path: &Path, name: &str, text: &str) -> Result<(), Error> {
     let page = std::fs::read_to_string(path)?;
-    let (begin, end) = (format!("<!-- begin {name} -->\n"), format!("<!-- end {name} -->"));
-    let missing = || Error::new(ErrorKind::InvalidData, format!("{} has no section '{name}'", path.display()));
+    let (begin, end) = (format!("<!-- {name} -->\n"), format!("<!-- end of {name} -->"));
+    let missing =
+        || Error::new(ErrorKind::InvalidData, format!("{} has no section '{name}'", path.display()));
     let (before, rest) = page.split_once(&begin).ok_or_else(missing)?;
     let (_, after) = rest.split_once(&end).ok_or_else(missing)?;
     std::fs::write(path, format!("{before}{begin}{}\n{end}{after}", text.trim_end()))

@@ -96,7 +96,8 @@ fn worst(angles: impl Iterator<Item = f64>) -> f64 {
 fn a_double_is_within_one_unit_of_the_last_place() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut draw = |limit: f64| rng.random_range(-limit..limit);
-    let random: Vec<f64> = [0.8, 3.2, 10.0, 1e3, 1e5].into_iter().flat_map(|x| [x; 4000]).map(&mut draw).collect();
+    let random: Vec<f64> =
+        [0.8, 3.2, 10.0, 1e3, 1e5].into_iter().flat_map(|x| [x; 4000]).map(&mut draw).collect();
     let error = worst(random.into_iter());
     assert!(error > 0.5, "the reference is no reference: {error}");
 }

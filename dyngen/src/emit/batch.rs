@@ -17,7 +17,8 @@ pub(super) fn module(model: &Model, functions: &[FunctionGraph]) -> TokenStream 
             #[inline(always)]
             fn are_near<T: SimdRealField + Copy>(angles: &[T]) -> bool {
                 let limit = nalgebra::convert(6000.0);
-                angles.iter().all(|angle| nalgebra::SimdBool::all(angle.simd_abs().simd_le(limit)))
+                // No early end: that would be a branch for each angle.
+                angles.iter().fold(true, |near, angle| near & nalgebra::SimdBool::all(angle.simd_abs().simd_le(limit)))
             }
         }
     });
@@ -51,7 +52,8 @@ fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
             _ => quote!(#name: &[[T; LANES]; JOINTS]),
         }
     });
-    let lanes = |argument: &Argument| (0..built.joints).map(|i| code::lane_name(*argument, i)).collect::<Vec<_>>();
+    let lanes =
+        |argument: &Argument| (0..built.joints).map(|i| code::lane_name(*argument, i)).collect::<Vec<_>>();
     let moving: Vec<&Argument> = arguments.iter().filter(|a| **a != Argument::Parameters).collect();
     let (trig, angles, read) = code::trig_of_lane(model, built);
     let angles: Vec<Ident> = angles.iter().map(|i| code::lane_name(Argument::Positions, *i)).collect();
@@ -68,7 +70,8 @@ fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
         let (name, lanes) = (Ident::new(argument.name(), Span::call_site()), lanes(argument));
         quote!(let #name = SVector::from_array_storage(ArrayStorage([[#(#lanes[lane]),*]]));)
     };
-    let vectors = moving.iter().filter(|a| ***a != Argument::Positions).map(|a| vector(a)).collect::<Vec<_>>();
+    let vectors =
+        moving.iter().filter(|a| ***a != Argument::Positions).map(|a| vector(a)).collect::<Vec<_>>();
     let pass = |argument: &Argument| {
         let name = Ident::new(argument.name(), Span::call_site());
         if *argument == Argument::Parameters { quote!(#name) } else { quote!(&#name) }
@@ -83,7 +86,7 @@ fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
             _ => (quote!(out.iter_mut().flatten()), quote!(result.iter())),
         };
         quote! {
-            if [#(#angles),*].iter().any(|angles| !are_near(angles)) {
+            if ![#(#angles),*].into_iter().fold(true, |near, angles| near & are_near(angles)) {
                 for lane in 0..LANES {
                     #q
                     #(#vectors)*

@@ -168,7 +168,9 @@ fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) 
     let patterns = names.iter().map(|name| name.as_ref().map_or(quote!(_), |name| quote!(#name)));
     let computed = (!angles.is_empty()).then(|| {
         let (sines, cosines) = (angles.iter().map(|a| &a.1), angles.iter().map(|a| &a.2));
-        let values = angles.iter().map(|(i, ..)| angle(arm, *i, &lane_name(Argument::Positions, *i).into_token_stream()));
+        let values = angles
+            .iter()
+            .map(|(i, ..)| angle(arm, *i, &lane_name(Argument::Positions, *i).into_token_stream()));
         quote!(let ([#(#sines),*], [#(#cosines),*]) = trigonometry::sin_cos([#(#values),*]);)
     });
     let bindings = quote! {
@@ -180,7 +182,10 @@ fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) 
 
 /// Of one sample in a block: the `Trig` that a function reads, whose lines are without a branch, and the joints whose angles
 /// that is right for only where they are near.
-pub(super) fn trig_of_lane(model: &Model, built: &FunctionGraph) -> (TokenStream, Vec<usize>, BTreeSet<usize>) {
+pub(super) fn trig_of_lane(
+    model: &Model,
+    built: &FunctionGraph,
+) -> (TokenStream, Vec<usize>, BTreeSet<usize>) {
     let arm = model.arm();
     let used = used(built, &built.graph.needed(&built.outputs));
     let Positions { names, angles, trig } = Positions::new(arm, &used, |q| quote!(#q[lane]));

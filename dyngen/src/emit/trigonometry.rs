@@ -65,14 +65,12 @@ const LIMIT: f64 = 1e5;
 /// π/2 = 37 + 37 + 53 bits: products of the first two with 16 bits are exact (Cody and Waite).
 const PARTS: [f64; 3] = [1.5707963267923333, 2.5633441515839558e-12, 1.0562999066987428e-23];
 
-/// Added and taken away again, it leaves a double's nearest whole number.
+/// Added and taken away again, 3·2⁵¹ leaves a double's nearest whole number, and 3·2⁵³ its nearest multiple of four.
 const WHOLE: f64 = 6_755_399_441_055_744.0;
 
-/// Of sin r = r − r³/6 + r⁵·(…), in double precision and in single.
-const CUBIC: f64 = -1.66666666666666324348e-01;
-
-/// Coefficients of sin r = r − r³/6 + r⁵·(…) and cos r = 1 − r²/2 + r⁴·(…) for |r| ≤ π/4 in double precision (Sun's fdlibm).
-const SINE: [f64; 5] = [
+/// Coefficients of sin r = r + r³·(…) and cos r = 1 − r²/2 + r⁴·(…) for |r| ≤ π/4 in double precision (Sun's fdlibm).
+const SINE: [f64; 6] = [
+    -1.66666666666666324348e-01,
     8.33333333332248946124e-03,
     -1.98412698298579493134e-04,
     2.75573137070700676789e-06,
@@ -89,7 +87,8 @@ const COSINE: [f64; 6] = [
 ];
 
 /// The same in single precision, interpolated at Chebyshev points.
-const SINE_SINGLE: [f64; 3] = [0.008333331905305386, -0.00019840082677546889, 2.7249313916399842e-06];
+const SINE_SINGLE: [f64; 4] =
+    [-0.1666666716337204, 0.008333331905305386, -0.00019840082677546889, 2.7249313916399842e-06];
 const COSINE_SINGLE: [f64; 3] = [0.0416666641831398, -0.0013888300163671374, 2.4547436623834074e-05];
 
 /// In double precision, up to [`LIMIT`].
@@ -103,9 +102,9 @@ fn double<T: SimdRealField + Copy>(angle: T) -> (T, T) {
     let part = turns * second;
     let r = near - part;
     let tail = near - r - part - turns * third;
-    // Of four quarter turns one counts: −2 … 2.
-    let four: T = convert(4.0);
-    let turns = turns - (turns * convert(0.25) + whole - whole) * four;
+    // Without whole turns: −2 … 2.
+    let fours: T = convert(4.0 * WHOLE);
+    let turns = turns - (turns + fours - fours);
     turned(turns, sine(r, tail, SINE.map(convert)), cosine(r, tail, COSINE.map(convert)))
 }
 
@@ -127,11 +126,9 @@ fn single<T: SimdRealField + Copy>(angle: T) -> (T, T) {
 /// The sine of r + tail, |r| ≤ π/4.
 #[inline(always)]
 fn sine<T: SimdRealField + Copy, const K: usize>(r: T, tail: T, coefficients: [T; K]) -> T {
-    let half: T = convert(0.5);
     let z = r * r;
-    let cube = z * r;
-    let cubic: T = convert(CUBIC);
-    r - (z * (half * tail - cube * polynomial(z, coefficients)) - tail - cube * cubic)
+    let slope = T::one() - convert::<f64, T>(0.5) * z;
+    r + (tail * slope + z * r * polynomial(z, coefficients))
 }
 
 /// The cosine of r + tail, |r| ≤ π/4.

@@ -23,7 +23,17 @@ macro_rules! bits {
     ($out:expr, $scalar:ident) => {{
         use powerball_firmware::$scalar::*;
         let p = Parameters::from(PARAMETERS);
-        let names = ["trig", "tau", "regressor", "mass_matrix", "coriolis", "gravity", "friction", "control", "estimator"];
+        let names = [
+            "trig",
+            "tau",
+            "regressor",
+            "mass_matrix",
+            "coriolis",
+            "gravity",
+            "friction",
+            "control",
+            "estimator",
+        ];
         let mut hashes = [const { Hash::NEW }; 9];
         let mut online = SquareRoot::<$scalar, { arm::PARAMETERS }>::new(1e-3);
         for state in &STATES {
@@ -31,7 +41,9 @@ macro_rules! bits {
             let trig = trig(&q);
             let y = regressor(&trig, &dq, &ddq);
             let torque = tau(&trig, &dq, &ddq, &p);
-            let mut add = |k: usize, values: &[$scalar]| values.iter().for_each(|x| hashes[k].add(&x.to_bits().to_le_bytes()));
+            let mut add = |k: usize, values: &[$scalar]| {
+                values.iter().for_each(|x| hashes[k].add(&x.to_bits().to_le_bytes()))
+            };
             add(0, &trig.sin);
             add(0, &trig.cos);
             add(1, torque.as_slice());
@@ -95,16 +107,36 @@ macro_rules! costs {
             let instructions = $counter.instructions(call);
             let _ = writeln!($out, "cost {} {name} {stack} {instructions}", stringify!($scalar));
         };
-        cost("trig", &mut || { black_box(trig(black_box(&q))); });
-        cost("tau", &mut || { black_box(tau(black_box(&ready), black_box(&dq), black_box(&ddq), black_box(&p))); });
-        cost("regressor", &mut || { black_box(regressor(black_box(&ready), black_box(&dq), black_box(&ddq))); });
-        cost("mass_matrix", &mut || { black_box(mass_matrix(black_box(&ready), black_box(&p))); });
-        cost("coriolis", &mut || { black_box(coriolis(black_box(&ready), black_box(&dq), black_box(&p))); });
-        cost("gravity", &mut || { black_box(gravity(black_box(&ready), black_box(&p))); });
-        cost("friction", &mut || { black_box(friction(black_box(&dq))); });
-        cost("control", &mut || { black_box(control(black_box([&q, &dq]), black_box([&q, &dq, &ddq]), black_box(&p))); });
-        cost("estimator_row", &mut || { black_box(estimator_row(black_box(&mut online), black_box(&row), black_box(1.0))); });
-        cost("estimate", &mut || { black_box(estimate(black_box(&full))); });
+        cost("trig", &mut || {
+            black_box(trig(black_box(&q)));
+        });
+        cost("tau", &mut || {
+            black_box(tau(black_box(&ready), black_box(&dq), black_box(&ddq), black_box(&p)));
+        });
+        cost("regressor", &mut || {
+            black_box(regressor(black_box(&ready), black_box(&dq), black_box(&ddq)));
+        });
+        cost("mass_matrix", &mut || {
+            black_box(mass_matrix(black_box(&ready), black_box(&p)));
+        });
+        cost("coriolis", &mut || {
+            black_box(coriolis(black_box(&ready), black_box(&dq), black_box(&p)));
+        });
+        cost("gravity", &mut || {
+            black_box(gravity(black_box(&ready), black_box(&p)));
+        });
+        cost("friction", &mut || {
+            black_box(friction(black_box(&dq)));
+        });
+        cost("control", &mut || {
+            black_box(control(black_box([&q, &dq]), black_box([&q, &dq, &ddq]), black_box(&p)));
+        });
+        cost("estimator_row", &mut || {
+            black_box(estimator_row(black_box(&mut online), black_box(&row), black_box(1.0)));
+        });
+        cost("estimate", &mut || {
+            black_box(estimate(black_box(&full)));
+        });
     }};
 }
 
@@ -133,7 +165,9 @@ mod target {
             let mut driver = bus::driver();
             if let Ok(driver) = &mut driver {
                 let _ = driver.start(powerball::driver::ControlMode::InterpolatedPosition, false);
-                let mut step = || { let _ = black_box(bus::step(black_box(driver), 1, &[], black_box(&[0.0; 6]))); };
+                let mut step = || {
+                    let _ = black_box(bus::step(black_box(driver), 1, &[], black_box(&[0.0; 6])));
+                };
                 let stack = powerball_firmware::measure::stack(&mut step);
                 let _ = writeln!(out, "cost bus step {stack} {}", counter.instructions(&mut step));
             }
