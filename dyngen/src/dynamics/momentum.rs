@@ -2,7 +2,7 @@
 
 use super::body::{Body, Link, Vector, ZERO};
 use super::elements::{ArmElements, JointElements, turn_x, turn_z};
-use super::wrench::{Wrench, to_joint, to_link_before};
+use super::old_wrench::{Wrench, to_joint, to_link_before};
 use crate::arm::{Convention, JointKind};
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};

@@ -3,7 +3,7 @@
 
 use super::body::Vector;
 use super::elements::{ArmElements, JointElements, ToolElements};
-use super::motion::{Drive, motions};
+use super::old_motion::{Drive, motions};
 use crate::arm::{Convention, JointKind};
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
@@ -57,7 +57,7 @@ fn turned(b: &Builder, s: &Expr, c: &Expr, u: &Vector, v: &Vector) -> (Vector, V
 }
 
 fn moved(b: &Builder, origin: &Vector, length: Expr, axis: &Vector) -> Vector {
-    super::motion::plus_scaled(b, origin, length, axis)
+    super::old_motion::plus_scaled(b, origin, length, axis)
 }
 
 /// The frame of every joint before its screw about z, and of the last link.
@@ -125,7 +125,7 @@ pub fn jacobian_rate_times_speed(
     };
     // The link's own spin carries the tool's origin along.
     let carried = |v: Vector, i: usize| {
-        super::motion::plus_scaled(b, &v, tool.origin[i], &motion.link.spin_column(b, i))
+        super::old_motion::plus_scaled(b, &v, tool.origin[i], &motion.link.spin_column(b, i))
     };
     let acceleration = (0..3).fold(motion.link.acceleration, carried);
     [to_base(&acceleration), to_base(&motion.link.alpha)].concat()

@@ -1,5 +1,6 @@
 //! Functions over blocks of samples: loops that a compiler turns into vectors of whatever processor it compiles for.
 
+use super::code::TrigOfLane;
 use super::{code, docs};
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;
@@ -10,7 +11,7 @@ use quote::{format_ident, quote};
 /// The module `batch` with every function.
 pub(super) fn module(model: &Model, functions: &[FunctionGraph]) -> TokenStream {
     let items: Vec<TokenStream> = functions.iter().map(|built| function(model, built)).collect();
-    let has_angles = functions.iter().any(|built| !code::trig_of_lane(model, built).1.is_empty());
+    let has_angles = functions.iter().any(|built| !TrigOfLane::new(model, built).turning.is_empty());
     let are_near = has_angles.then(|| {
         quote! {
             /// Whether sums of a few of these angles are right without a branch.
@@ -48,20 +49,22 @@ fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
     let signature = arguments.iter().map(|argument| {
         let name = Ident::new(argument.name(), Span::call_site());
         match argument {
-            Argument::Parameters => quote!(#name: &SVector<T, PARAMETERS>),
+            Argument::Parameters => quote!(#name: &impl Parameters<T>),
             _ => quote!(#name: &[[T; LANES]; JOINTS]),
         }
     });
     let lanes =
         |argument: &Argument| (0..built.joints).map(|i| code::lane_name(*argument, i)).collect::<Vec<_>>();
     let moving: Vec<&Argument> = arguments.iter().filter(|a| **a != Argument::Parameters).collect();
-    let (trig, angles, read) = code::trig_of_lane(model, built);
-    let angles: Vec<Ident> = angles.iter().map(|i| code::lane_name(Argument::Positions, *i)).collect();
+    let TrigOfLane { lines, turning, read } = TrigOfLane::new(model, built);
+    let angles: Vec<Ident> = turning.iter().map(|i| code::lane_name(Argument::Positions, *i)).collect();
+    let prepared =
+        arguments.contains(&Argument::Parameters).then(|| quote!(let parameters = &parameters.prepared();));
     let taken = moving.iter().map(|argument| {
         let name = Ident::new(argument.name(), Span::call_site());
         let lanes = lanes(argument).into_iter().enumerate().map(|(i, lane)| {
             // The way for angles that are not near reads all of q.
-            let is_read = **argument != Argument::Positions || !angles.is_empty() || read.contains(&i);
+            let is_read = **argument != Argument::Positions || !angles.is_empty() || read[i];
             if is_read { quote!(#lane) } else { quote!(_) }
         });
         quote!(let [#(#lanes),*] = #name;)
@@ -76,7 +79,6 @@ fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
         let name = Ident::new(argument.name(), Span::call_site());
         if *argument == Argument::Parameters { quote!(#name) } else { quote!(&#name) }
     };
-    let passed: Vec<_> = arguments.iter().map(pass).collect();
     let passed_with: Vec<_> = arguments.iter().filter(|a| **a != Argument::Positions).map(pass).collect();
     let slow = (!angles.is_empty()).then(|| {
         let q = vector(&Argument::Positions);
@@ -90,7 +92,7 @@ fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
                 for lane in 0..LANES {
                     #q
                     #(#vectors)*
-                    let result = super::#name(#(#passed),*);
+                    let result = super::#name_with(&Trig::new(&q), #(#passed_with),*);
                     for (cells, value) in #flat.zip(#value) {
                         cells[lane] = *value;
                     }
@@ -139,9 +141,10 @@ fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
         #[inline(always)]
         pub fn #name<T: SimdRealField + Copy, const LANES: usize>(#(#signature,)* out: &mut #shape) {
             #(#taken)*
+            #prepared
             #opened
             for lane in 0..LANES {
-                #trig
+                #lines
                 #(#vectors)*
                 #result
                 #(#stores)*

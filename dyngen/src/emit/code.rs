@@ -2,17 +2,18 @@
 
 use super::docs;
 use crate::arm::{Arm, JointKind};
+use crate::dynamics::chain;
 use crate::dynamics::function::{Argument, Size, trig_offset};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::rational;
-use crate::graph::{Expr, Input, Node, operands};
+use crate::graph::{Expr, Graph, Input, JointSum, Node, Preparation, operands};
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{ToTokens, format_ident, quote};
 use std::collections::BTreeSet;
 
 /// A function's items: one that takes q, and one that takes [`Trig`] in its place.
-pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
+pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) -> TokenStream {
     let arm = model.arm();
     let needed = built.graph.needed(&built.outputs);
     let used = used(built, &needed);
@@ -21,16 +22,17 @@ pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
     let doc = docs::lines(&docs::function(built));
     let doc_with = docs::lines(&docs::function_with(built));
     let others: Vec<Argument> = built.arguments().filter(|a| *a != Argument::Positions).collect();
-    let (signature, bindings): (Vec<_>, Vec<_>) = others.iter().map(|a| argument(built, *a, &used)).unzip();
+    let (signature, bindings): (Vec<_>, Vec<_>) =
+        others.iter().map(|a| argument(built, prepared, *a, &used)).unzip();
     let passed = others.iter().map(|a| Ident::new(a.name(), Span::call_site()));
     let plain = others.iter().map(|a| parameter(*a, a.name()));
-    let positions = positions(built, &used);
+    let positions = positions(arm, &used);
     let trig = trig_of(arm, &used);
     let (q, trig_name) = match uses_positions(&used) {
         true => (quote!(q), quote!(trig)),
         false => (quote!(_q), quote!(_trig)),
     };
-    let statements = sections(model, built, &needed);
+    let statements = sections(model, &built.graph, &built.outputs, &needed);
     let (result, value) = result(built);
     // Where the result is a number, the last `let` is the result.
     let lint = is_number(built).then(|| quote!(#[allow(clippy::let_and_return)]));
@@ -62,23 +64,52 @@ pub(super) fn is_number(built: &FunctionGraph) -> bool {
 
 /// The struct of sines and cosines that functions share.
 pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
-    let all: BTreeSet<Input> =
-        (0..arm.dof()).flat_map(|i| [Input::Sin(i), Input::Cos(i), Input::Position(i)]).collect();
+    let all: BTreeSet<Input> = angles(arm)
+        .into_iter()
+        .flat_map(|sum| [Input::Sin(sum), Input::Cos(sum)])
+        .chain((0..arm.dof()).map(Input::Position))
+        .collect();
     let (bindings, fields) = trig_fields(arm, &all);
+    let sums: Vec<String> = chain::sums(arm)
+        .iter()
+        .enumerate()
+        .map(|(k, sum)| {
+            let text: String = sum
+                .joints()
+                .enumerate()
+                .map(|(k, (i, negative))| {
+                    let sign = if k == 0 {
+                        ""
+                    } else if negative {
+                        " − "
+                    } else {
+                        " + "
+                    };
+                    format!("{sign}q{}", i + 1)
+                })
+                .collect();
+            format!(" Angle {}: {text}, across parallel axes.", arm.dof() + k + 1)
+        })
+        .collect();
+    let count = Literal::usize_unsuffixed(angles(arm).len());
     let shifted: Vec<String> = (0..arm.dof())
         .filter(|i| trig_offset(arm, *i) != 0.0)
         .map(|i| format!(" Joint {}: of q + {} rad.", i + 1, trig_offset(arm, i)))
         .collect();
     quote! {
+        /// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
+        pub const ANGLES: usize = #count;
+
         /// Joint positions with their sines and cosines: computed once and shared between calls, or taken from
         /// wherever the caller has them.
         #(#[doc = #shifted])*
+        #(#[doc = #sums])*
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct Trig<T> {
-            /// Sine of each revolute joint's angle; not read for prismatic joints.
-            pub sin: [T; JOINTS],
-            /// Cosine of each revolute joint's angle; not read for prismatic joints.
-            pub cos: [T; JOINTS],
+            /// Sine of each angle; not read for prismatic joints.
+            pub sin: [T; ANGLES],
+            /// Cosine of each angle; not read for prismatic joints.
+            pub cos: [T; ANGLES],
             /// Position of each prismatic joint, m; not read for revolute joints.
             pub position: [T; JOINTS],
         }
@@ -115,62 +146,74 @@ fn used(built: &FunctionGraph, needed: &[usize]) -> BTreeSet<Input> {
 
 /// What a function takes of q: the positions that it reads, and the angles whose sine or cosine it needs.
 struct Positions {
-    /// A position's name, where it is read.
-    names: Vec<Option<Ident>>,
-    /// Each angle's joint, and the names of its sine and cosine where they are read.
-    angles: Vec<(usize, TokenStream, TokenStream)>,
+    /// Whether each joint's position is read.
+    read: Vec<bool>,
+    /// Each angle, and the names of its sine and cosine where they are read.
+    angles: Vec<(JointSum, TokenStream, TokenStream)>,
     /// A `Trig` of them; the rest is zero, because nobody reads it.
     trig: TokenStream,
 }
 
 impl Positions {
-    /// `position` is how a joint's position is read once it has a name.
-    fn new(arm: &Arm, used: &BTreeSet<Input>, position: impl Fn(&Ident) -> TokenStream) -> Positions {
+    /// `position` is how a joint's position is read.
+    fn new(arm: &Arm, used: &BTreeSet<Input>, position: impl Fn(usize) -> TokenStream) -> Positions {
         let zero = quote!(T::zero());
-        let (mut names, mut angles) = (Vec::new(), Vec::new());
-        let (mut sines, mut cosines, mut places) = (Vec::new(), Vec::new(), Vec::new());
-        for (i, joint) in arm.joints.iter().enumerate() {
-            let [q, s, c] = ["q", "s", "c"].map(|letter| format_ident!("{letter}{}", i + 1));
-            let revolute = joint.kind == JointKind::Revolute;
-            let sin = (revolute && used.contains(&Input::Sin(i))).then(|| quote!(#s));
-            let cos = (revolute && used.contains(&Input::Cos(i))).then(|| quote!(#c));
-            let place = (!revolute && used.contains(&Input::Position(i))).then(|| position(&q));
+        let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
+        let mut read = vec![false; arm.dof()];
+        let (mut found, mut sines, mut cosines, mut places) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for sum in angles(arm) {
+            let turns = sum.joints().all(|(i, _)| revolute(i));
+            let name = |input: Input| {
+                (turns && used.contains(&input)).then(|| format_ident!("{}", input.to_string()))
+            };
+            let (sin, cos) = (name(Input::Sin(sum)), name(Input::Cos(sum)));
+            let or =
+                |name: &Option<Ident>, other: TokenStream| name.as_ref().map_or(other, |name| quote!(#name));
             if sin.is_some() || cos.is_some() {
-                let bound = |name: &Option<TokenStream>| name.clone().unwrap_or(quote!(_));
-                angles.push((i, bound(&sin), bound(&cos)));
+                found.push((sum, or(&sin, quote!(_)), or(&cos, quote!(_))));
+                sum.joints().for_each(|(i, _)| read[i] = true);
             }
-            let read = sin.is_some() || cos.is_some() || place.is_some();
-            names.push(read.then_some(q));
-            sines.push(sin.unwrap_or(zero.clone()));
-            cosines.push(cos.unwrap_or(zero.clone()));
-            places.push(place.unwrap_or(zero.clone()));
+            sines.push(or(&sin, zero.clone()));
+            cosines.push(or(&cos, zero.clone()));
+        }
+        for i in 0..arm.dof() {
+            let place = !revolute(i) && used.contains(&Input::Position(i));
+            read[i] |= place;
+            places.push(if place { position(i) } else { zero.clone() });
         }
         let trig = quote!(Trig { sin: [#(#sines),*], cos: [#(#cosines),*], position: [#(#places),*] });
-        Positions { names, angles, trig }
+        Positions { read, angles: found, trig }
     }
 }
 
-/// The angle of a joint at a position.
-fn angle(arm: &Arm, joint: usize, position: &TokenStream) -> TokenStream {
-    match trig_offset(arm, joint) {
-        0.0 => quote!(#position),
-        offset => {
-            let offset = Literal::f64_suffixed(offset);
-            quote!(#position + nalgebra::convert::<f64, T>(#offset))
+/// An angle of the joints at their positions.
+fn angle(arm: &Arm, sum: JointSum, position: impl Fn(usize) -> TokenStream) -> TokenStream {
+    let terms = sum.joints().enumerate().map(|(k, (i, negative))| {
+        let q = position(i);
+        match (k, negative) {
+            (0, _) => q,
+            (_, false) => quote!(+ #q),
+            (_, true) => quote!(- #q),
         }
-    }
+    });
+    let offset = sum.value(|i| trig_offset(arm, i));
+    let offset = (offset != 0.0).then(|| {
+        let offset = Literal::f64_suffixed(offset);
+        quote!(+ nalgebra::convert::<f64, T>(#offset))
+    });
+    quote!(#(#terms)* #offset)
 }
 
 /// Takes q apart, computes all sines and cosines together, and builds a `Trig` of the inputs that are used. A pattern
 /// over the storage needs no bounds check and cannot panic.
 fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
-    let Positions { names, angles, trig } = Positions::new(arm, used, |q| quote!(#q));
-    let patterns = names.iter().map(|name| name.as_ref().map_or(quote!(_), |name| quote!(#name)));
+    let position = |i: usize| lane_name(Argument::Positions, i).into_token_stream();
+    let Positions { read, angles, trig } = Positions::new(arm, used, position);
+    let patterns = (0..arm.dof()).map(|i| if read[i] { position(i) } else { quote!(_) });
     let computed = (!angles.is_empty()).then(|| {
         let (sines, cosines) = (angles.iter().map(|a| &a.1), angles.iter().map(|a| &a.2));
-        let values = angles
-            .iter()
-            .map(|(i, ..)| angle(arm, *i, &lane_name(Argument::Positions, *i).into_token_stream()));
+        let values = angles.iter().map(|(sum, ..)| angle(arm, *sum, position));
         quote!(let ([#(#sines),*], [#(#cosines),*]) = trigonometry::sin_cos([#(#values),*]);)
     });
     let bindings = quote! {
@@ -180,26 +223,36 @@ fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) 
     (bindings, trig)
 }
 
-/// Of one sample in a block: the `Trig` that a function reads, whose lines are without a branch, and the joints whose angles
-/// that is right for only where they are near.
-pub(super) fn trig_of_lane(
-    model: &Model,
-    built: &FunctionGraph,
-) -> (TokenStream, Vec<usize>, BTreeSet<usize>) {
-    let arm = model.arm();
-    let used = used(built, &built.graph.needed(&built.outputs));
-    let Positions { names, angles, trig } = Positions::new(arm, &used, |q| quote!(#q[lane]));
-    let lines = angles.iter().map(|(i, sine, cosine)| {
-        let q = lane_name(Argument::Positions, *i);
-        let angle = angle(arm, *i, &quote!(#q[lane]));
-        quote!(let (#sine, #cosine) = trigonometry::near(#angle);)
-    });
-    let tokens = quote! {
-        #(#lines)*
-        let trig = #trig;
-    };
-    let read = (0..names.len()).filter(|i| names[*i].is_some()).collect();
-    (tokens, angles.iter().map(|(i, ..)| *i).collect(), read)
+/// What a function takes of q at one sample in a block.
+pub(super) struct TrigOfLane {
+    /// Lines without a branch that make its `trig`.
+    pub(super) lines: TokenStream,
+    /// Joints whose angles that is right for only where they are near.
+    pub(super) turning: BTreeSet<usize>,
+    /// Whether each joint's position is read.
+    pub(super) read: Vec<bool>,
+}
+
+impl TrigOfLane {
+    pub(super) fn new(model: &Model, built: &FunctionGraph) -> TrigOfLane {
+        let arm = model.arm();
+        let used = used(built, &built.graph.needed(&built.outputs));
+        let position = |i: usize| {
+            let q = lane_name(Argument::Positions, i);
+            quote!(#q[lane])
+        };
+        let Positions { read, angles, trig } = Positions::new(arm, &used, position);
+        let lines = angles.iter().map(|(sum, sine, cosine)| {
+            let angle = angle(arm, *sum, position);
+            quote!(let (#sine, #cosine) = trigonometry::near(#angle);)
+        });
+        let lines = quote! {
+            #(#lines)*
+            let trig = #trig;
+        };
+        let turning = angles.iter().flat_map(|(sum, ..)| sum.joints().map(|(i, _)| i)).collect();
+        TrigOfLane { lines, turning, read }
+    }
 }
 
 /// The name of an argument's value at a joint.
@@ -223,19 +276,27 @@ pub(super) fn trigonometry(arm: &Arm) -> TokenStream {
     }
 }
 
+/// The angles of a `Trig`: those of the joints, then sums of parallel joints' angles.
+fn angles(arm: &Arm) -> Vec<JointSum> {
+    (0..arm.dof()).map(JointSum::joint).chain(chain::sums(arm)).collect()
+}
+
 /// Names for what is read of a `Trig`.
-fn positions(built: &FunctionGraph, used: &BTreeSet<Input>) -> TokenStream {
-    let take = |field: &str, letter: &str, input: fn(usize) -> Input| {
+fn positions(arm: &Arm, used: &BTreeSet<Input>) -> TokenStream {
+    let take = |field: &str, inputs: Vec<Input>| {
         let field = Ident::new(field, Span::call_site());
-        let any = (0..built.joints).any(|i| used.contains(&input(i)));
-        let names = (0..built.joints).map(|i| {
-            let name = format_ident!("{letter}{}", i + 1);
-            if used.contains(&input(i)) { quote!(#name) } else { quote!(_) }
+        let any = inputs.iter().any(|input| used.contains(input));
+        let names = inputs.into_iter().map(|input| {
+            let name = format_ident!("{}", input.to_string());
+            if used.contains(&input) { quote!(#name) } else { quote!(_) }
         });
         any.then(|| quote!(let [#(#names),*] = trig.#field;))
     };
-    let lines =
-        [take("sin", "s", Input::Sin), take("cos", "c", Input::Cos), take("position", "q", Input::Position)];
+    let lines = [
+        take("sin", angles(arm).into_iter().map(Input::Sin).collect()),
+        take("cos", angles(arm).into_iter().map(Input::Cos).collect()),
+        take("position", (0..arm.dof()).map(Input::Position).collect()),
+    ];
     let lines = lines.iter().flatten();
     quote!(#(#lines)*)
 }
@@ -250,7 +311,7 @@ fn input_of(argument: Argument, i: usize) -> Input {
         Argument::ReferenceAccelerations => Input::ReferenceAcceleration(i),
         Argument::Torques => Input::Torque(i),
         Argument::Errors => Input::Error(i),
-        Argument::Parameters => Input::Parameter(i),
+        Argument::Parameters => Input::Prepared(i),
     }
 }
 
@@ -261,21 +322,97 @@ fn parameter(argument: Argument, name: &str) -> TokenStream {
     quote!(#ident: &SVector<T, #length>)
 }
 
+/// `name: &impl Parameters<T>` for parameters, which may be prepared.
+fn shared_parameter(argument: Argument, name: &str) -> TokenStream {
+    if argument != Argument::Parameters {
+        return parameter(argument, name);
+    }
+    let ident = Ident::new(name, Span::call_site());
+    quote!(#ident: &impl Parameters<T>)
+}
+
 /// An argument in the signature, and the line that names what is used of it.
-fn argument(built: &FunctionGraph, argument: Argument, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
+fn argument(
+    built: &FunctionGraph,
+    prepared: usize,
+    argument: Argument,
+    used: &BTreeSet<Input>,
+) -> (TokenStream, TokenStream) {
     let is_parameters = argument == Argument::Parameters;
-    let length = if is_parameters { built.parameters } else { built.joints };
-    let letter = if is_parameters { "p" } else { argument.name() };
+    let length = if is_parameters { prepared } else { built.joints };
     let is_used = |i: usize| used.contains(&input_of(argument, i));
     if !(0..length).any(is_used) {
-        return (parameter(argument, &format!("_{}", argument.name())), quote!());
+        return (shared_parameter(argument, &format!("_{}", argument.name())), quote!());
     }
     let names = (0..length).map(|i| {
-        let name = format_ident!("{letter}{}", i + 1);
+        let name = format_ident!("{}", input_of(argument, i).to_string());
         if is_used(i) { quote!(#name) } else { quote!(_) }
     });
     let ident = Ident::new(argument.name(), Span::call_site());
-    (parameter(argument, argument.name()), quote!(let [[#(#names),*]] = #ident.data.0;))
+    let parameter = shared_parameter(argument, argument.name());
+    match is_parameters {
+        true => (parameter, quote!(let Prepared([#(#names),*]) = #ident.prepared();)),
+        false => (parameter, quote!(let [[#(#names),*]] = #ident.data.0;)),
+    }
+}
+
+/// What functions need of the parameters alone: the function that prepares it, and the trait by which they take it.
+pub(super) fn preparation(model: &Model, preparation: &Preparation) -> TokenStream {
+    let count = Literal::usize_unsuffixed(preparation.values().len());
+    let graph = preparation.graph();
+    let needed = graph.needed(preparation.values());
+    let names: Vec<TokenStream> = needed
+        .iter()
+        .filter_map(|n| match graph.nodes()[*n] {
+            Node::Input(Input::Parameter(i)) => Some(i),
+            _ => None,
+        })
+        .map(|i| {
+            let (name, i) = (format_ident!("p{}", i + 1), Literal::usize_unsuffixed(i));
+            quote!(let #name = parameters[#i];)
+        })
+        .collect();
+    let statements = sections(model, &graph, preparation.values(), &needed);
+    let values = preparation.values().iter().map(|e| value_name(&graph, e.node()));
+    let operations = preparation.operations();
+    let doc = format!(" Operations: {} multiplications, {} additions.", operations.mul, operations.add);
+    quote! {
+        /// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of calls.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct Prepared<T>([T; #count]);
+
+        /// What the functions need of the parameters alone: pass it to those that end in `_with`, in place of the parameters.
+        ///
+        #[doc = #doc]
+        #[inline]
+        #[must_use]
+        pub fn prepare<T: SimdRealField + Copy>(parameters: &SVector<T, PARAMETERS>) -> Prepared<T> {
+            let [parameters] = parameters.data.0;
+            #(#names)*
+            #(#statements)*
+            Prepared([#(#values),*])
+        }
+
+        /// Parameters, or what was prepared of them.
+        pub trait Parameters<T> {
+            /// What the functions need of them.
+            fn prepared(&self) -> Prepared<T>;
+        }
+
+        impl<T: SimdRealField + Copy> Parameters<T> for SVector<T, PARAMETERS> {
+            #[inline]
+            fn prepared(&self) -> Prepared<T> {
+                prepare(self)
+            }
+        }
+
+        impl<T: Copy> Parameters<T> for Prepared<T> {
+            #[inline]
+            fn prepared(&self) -> Prepared<T> {
+                *self
+            }
+        }
+    }
 }
 
 /// Nodes in one block of code.
@@ -284,26 +421,26 @@ const SECTION: usize = 256;
 /// The body, in blocks that hand on only what later ones need. Every `let` opens a scope within the one before, and a
 /// compiler that writes debug information goes through nested scopes by recursion: thousands of them in a row
 /// exhaust its stack.
-fn sections(model: &Model, built: &FunctionGraph, needed: &[usize]) -> Vec<TokenStream> {
+fn sections(model: &Model, graph: &Graph, outputs: &[Expr], needed: &[usize]) -> Vec<TokenStream> {
     let computed: Vec<usize> =
-        needed.iter().copied().filter(|n| !matches!(built.graph.nodes()[*n], Node::Input(_))).collect();
-    let statement = |n: &usize| statement(model, built, *n);
+        needed.iter().copied().filter(|n| !matches!(graph.nodes()[*n], Node::Input(_))).collect();
+    let statement = |n: &usize| statement(model, graph, *n);
     if computed.len() <= 2 * SECTION {
         return computed.iter().filter_map(statement).collect();
     }
-    let mut last_use = vec![0; built.graph.nodes().len()];
+    let mut last_use = vec![0; graph.nodes().len()];
     for (position, node) in computed.iter().enumerate() {
-        for operand in operands(&built.graph.nodes()[*node]) {
+        for operand in operands(&graph.nodes()[*node]) {
             last_use[operand.node()] = position;
         }
     }
-    for output in &built.outputs {
+    for output in outputs {
         last_use[output.node()] = usize::MAX;
     }
     let mut blocks = Vec::new();
     for (k, section) in computed.chunks(SECTION).enumerate() {
         let end = (k + 1) * SECTION;
-        let handed_on = section.iter().filter(|n| last_use[**n] >= end).map(|n| value_name(built, *n));
+        let handed_on = section.iter().filter(|n| last_use[**n] >= end).map(|n| value_name(graph, *n));
         let names: Vec<Ident> = handed_on.collect();
         let statements = section.iter().filter_map(statement);
         blocks.push(quote! {
@@ -317,13 +454,13 @@ fn sections(model: &Model, built: &FunctionGraph, needed: &[usize]) -> Vec<Token
 }
 
 /// The `let` of a node; inputs are bound already.
-fn statement(model: &Model, built: &FunctionGraph, node: usize) -> Option<TokenStream> {
+fn statement(model: &Model, graph: &Graph, node: usize) -> Option<TokenStream> {
     let name = format_ident!("x{node}");
-    let operand = |e: Expr| value_name(built, e.node());
-    Some(match built.graph.nodes()[node] {
+    let operand = |e: Expr| value_name(graph, e.node());
+    Some(match graph.nodes()[node] {
         Node::Input(_) => return None,
         Node::Constant(index) => {
-            let value = Literal::f64_suffixed(rational::to_f64(built.graph.constant(index)));
+            let value = Literal::f64_suffixed(rational::to_f64(graph.constant(index)));
             quote!(let #name: T = nalgebra::convert(#value);)
         }
         Node::Symbol(index, sine) => {
@@ -346,8 +483,8 @@ fn statement(model: &Model, built: &FunctionGraph, node: usize) -> Option<TokenS
     })
 }
 
-fn value_name(built: &FunctionGraph, node: usize) -> Ident {
-    match built.graph.nodes()[node] {
+fn value_name(graph: &Graph, node: usize) -> Ident {
+    match graph.nodes()[node] {
         Node::Input(input) => format_ident!("{}", input.to_string()),
         _ => format_ident!("x{node}"),
     }
@@ -358,7 +495,7 @@ fn result(built: &FunctionGraph) -> (TokenStream, TokenStream) {
     let (rows, columns) = built.shape;
     let value = |i: usize, j: usize| {
         let e = built.outputs[i * columns + j];
-        let name = value_name(built, e.node());
+        let name = value_name(&built.graph, e.node());
         if e.is_negative() { quote!(-#name) } else { quote!(#name) }
     };
     let columns_of: Vec<TokenStream> = (0..columns)
