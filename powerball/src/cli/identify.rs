@@ -6,8 +6,8 @@ use super::inputs::same_file;
 use super::output::{self, Progress};
 use super::reduced::{Reduced, reduce};
 use crate::estimate::{
-    ConsistentReport, FrictionLaw, JointFriction, ParameterEstimate, Solution, Spread, TorqueModel, consistent_fit,
-    identify, solve_reduced, spread, spread_of,
+    ConsistentReport, FrictionLaw, JointFriction, ParameterEstimate, Solution, Spread, TorqueModel,
+    consistent_fit, identify, solve_reduced, spread, spread_of,
 };
 use crate::explain::{TorqueCurve, curves};
 use crate::log::read_logs;
@@ -82,7 +82,8 @@ impl Identify {
                 )));
             }
         }
-        let Reduced { body, summary, shown, mut warnings } = reduce(&self.arm, &self.log, &options, &progress)?;
+        let Reduced { body, summary, shown, mut warnings } =
+            reduce(&self.arm, &self.log, &options, &progress)?;
         let (held_out, findings) =
             read_logs(&self.validate, body.arm()).map_err(|e| Failure::Unusable(e.to_string()))?;
         warnings.extend(findings.iter().map(ToString::to_string));
@@ -105,7 +106,8 @@ impl Identify {
             Some(spread(&data, &model.residual(&data)))
         };
         let figures = if held_out.is_empty() { &shown } else { &held_out };
-        let figures = if figures.is_empty() { Vec::new() } else { curves_of(&body, figures, &options, &model)? };
+        let figures =
+            if figures.is_empty() { Vec::new() } else { curves_of(&body, figures, &options, &model)? };
         let undetermined: Vec<&str> =
             identified.parameters.iter().filter(|p| p.std.is_none()).map(|p| p.name.as_str()).collect();
         if !undetermined.is_empty() {

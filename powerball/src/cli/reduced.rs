@@ -121,7 +121,10 @@ fn rests(summary: &Summary) -> Vec<String> {
     for (j, octaves) in summary.joints.iter().enumerate() {
         let rested = summary.samples - octaves.rows();
         if octaves.rows() < 20 {
-            notes.push(format!("joint {} does not move in these logs: nothing can be said of its friction", j + 1));
+            notes.push(format!(
+                "joint {} does not move in these logs: nothing can be said of its friction",
+                j + 1
+            ));
         } else if rested * 4 > summary.samples {
             notes.push(format!(
                 "joint {} rests in {:.0} % of the samples ({} s or longer, or at an end of a log); they were left out",

@@ -3,8 +3,8 @@
 mod consistent;
 mod consistent_fit;
 mod design;
-mod errors;
 pub mod distribution;
+mod errors;
 mod fit;
 mod folds;
 mod friction_shape;

@@ -99,7 +99,8 @@ impl<'a> Data<'a> {
             for piece in &log.pieces {
                 let span = log.t[piece.end - 1] - log.t[piece.start];
                 if span < 1.0 {
-                    left_out.push(format!("{}: a piece of {span:.2} s is too short and was left out", log.file));
+                    left_out
+                        .push(format!("{}: a piece of {span:.2} s is too short and was left out", log.file));
                     continue;
                 }
                 recordings.extend(Recording::new(log, index, piece.clone(), step, options.smoothing));

@@ -133,17 +133,18 @@ impl Summary {
         if !Summary::is_summary(bytes) {
             return Err(unreadable("is no summary that `powerball summarize` wrote"));
         }
-        let line = bytes.iter().position(|b| *b == b'\n').ok_or_else(|| unreadable("its first line is torn"))?;
+        let line =
+            bytes.iter().position(|b| *b == b'\n').ok_or_else(|| unreadable("its first line is torn"))?;
         let (head, numbers) = (&bytes[..line], &bytes[line + 1..]);
-        let version: Option<u64> = serde_json::from_slice::<serde_json::Value>(head)
-            .ok()
-            .and_then(|head| head["version"].as_u64());
+        let version: Option<u64> =
+            serde_json::from_slice::<serde_json::Value>(head).ok().and_then(|head| head["version"].as_u64());
         if version != Some(u64::from(VERSION)) {
             return Err(unreadable("another version of powerball wrote it: summarize the log anew"));
         }
         let head: Head = serde_json::from_slice(head)
             .map_err(|e| SummaryError::Unreadable(format!("its first line is damaged: {e}")))?;
-        let hash = u64::from_str_radix(&head.arm_hash, 16).map_err(|_| unreadable("its arm_hash is no number"))?;
+        let hash =
+            u64::from_str_radix(&head.arm_hash, 16).map_err(|_| unreadable("its arm_hash is no number"))?;
         let width = Columns { inertial: head.parameters.len() }.width();
         let each = Triangle::packed_len(width);
         let joints = head.steepness.len();
@@ -155,10 +156,8 @@ impl Summary {
         if !shaped || format!("{:016x}", fnv(numbers)) != head.checksum {
             return Err(unreadable("it is torn or damaged: summarize the log anew"));
         }
-        let doubles: Vec<f64> = numbers
-            .chunks_exact(8)
-            .filter_map(|b| Some(f64::from_le_bytes(b.try_into().ok()?)))
-            .collect();
+        let doubles: Vec<f64> =
+            numbers.chunks_exact(8).filter_map(|b| Some(f64::from_le_bytes(b.try_into().ok()?))).collect();
         let mut parts = doubles.chunks_exact(each.max(1));
         let joints = head
             .rows

@@ -111,7 +111,13 @@ impl Summary {
         }
     }
 
-    fn push_joint(&self, octaves: &mut Octaves, data: &Data<'_>, joint: usize, weights: Option<RowWeights<'_>>) {
+    fn push_joint(
+        &self,
+        octaves: &mut Octaves,
+        data: &Data<'_>,
+        joint: usize,
+        weights: Option<RowWeights<'_>>,
+    ) {
         let rows = &data.joints[joint];
         if rows.is_empty() {
             return;
