@@ -136,7 +136,7 @@ fn times(links: &[Link; 6], parameters: &Parameters, states: &[[Joints; 3]]) {
 trait Kernel {
     type Out: Copy;
     const NOTHING: Self::Out;
-    fn block([q, dq, ddq]: &[Block<f64>; 3], p: &Parameters, out: &mut Self::Out);
+    fn block(motion: &[Block<f64>; 3], parameters: &Parameters, out: &mut Self::Out);
 }
 
 struct Torque;

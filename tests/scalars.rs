@@ -71,7 +71,9 @@ fn blocks_are_the_samples() {
                 let expected = stanford_minimal::inverse_dynamics(q, dq, ddq, &parameters);
                 assert_eq!(torque.map(|x| x[lane]), <[f64; 6]>::from(expected));
                 let expected = stanford_minimal::regressor(q, dq, ddq);
-                let found = SMatrix::from_fn(|i, j| regressor[j][i][lane]);
+                let found = SMatrix::<f64, 6, { stanford_minimal::PARAMETERS }>::from_fn(|i, j| {
+                    regressor[j][i][lane]
+                });
                 assert_eq!(expected, found);
                 assert_eq!(energy[lane], stanford_minimal::kinetic_energy(q, dq, &parameters));
             }

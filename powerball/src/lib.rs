@@ -19,6 +19,8 @@ pub mod estimate;
 #[cfg(feature = "std")]
 pub mod excite;
 #[cfg(feature = "std")]
+pub mod experiment;
+#[cfg(feature = "std")]
 pub mod explain;
 pub mod friction;
 #[cfg(feature = "std")]
@@ -37,5 +39,7 @@ pub mod regression;
 pub mod report;
 #[cfg(feature = "std")]
 pub mod signal;
+#[cfg(feature = "std")]
+pub mod summary;
 #[cfg(feature = "std")]
 pub mod virtual_arm;

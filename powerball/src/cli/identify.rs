@@ -2,14 +2,17 @@
 
 use super::Failure;
 use super::identify_page::page;
-use super::inputs::{Inputs, load};
+use super::inputs::same_file;
 use super::output::{self, Progress};
+use super::reduced::{Reduced, reduce};
 use crate::estimate::{
-    ConsistentReport, Folds, JointFriction, ParameterEstimate, Spread, consistent_fit, fit, identify, spread,
+    ConsistentReport, FrictionLaw, JointFriction, ParameterEstimate, Solution, Spread, TorqueModel,
+    consistent_fit, identify, solve_reduced, spread, spread_of,
 };
-use crate::explain::curves;
-use crate::regression::{Data, DataOptions};
-use clap::Args;
+use crate::explain::{TorqueCurve, curves};
+use crate::log::read_logs;
+use crate::regression::{Data, DataOptions, RigidBody};
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -19,14 +22,37 @@ use std::path::PathBuf;
 /// for `dyngen generate --values`.
 #[derive(Args, Debug)]
 #[command(
-    after_help = "Example:\n  powerball identify --arm arm.toml --log a.csv b.csv --validate c.csv --out result"
+    after_help = "Examples:\n  powerball identify --arm arm.toml --log a.csv b.csv --validate c.csv --out result\n  powerball identify --arm arm.toml --log a.summary b.summary --out result"
 )]
 pub(crate) struct Identify {
-    #[command(flatten)]
-    inputs: Inputs,
+    /// The arm file (TOML).
+    #[arg(long, value_name = "ARM.toml")]
+    arm: PathBuf,
+    /// Logs to fit (CSV or Parquet: t, q1…, tau1… or i1…), or their summaries from `powerball summarize`.
+    #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
+    log: Vec<PathBuf>,
     /// Logs on which the fit is judged, on another path.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     validate: Vec<PathBuf>,
+    /// The friction of every joint.
+    #[arg(long, value_enum, default_value_t)]
+    friction: Friction,
+    /// Folder for the results; made if missing.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Print the result as one JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A friction law by its name on the command line.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Friction {
+    /// Eq. 16: γ1·tanh(γ2·q̇) + γ3·tanh(γ4·q̇) + γ5·q̇.
+    #[default]
+    Symmetric,
+    /// Eq. 16 and a constant torque.
+    Asymmetric,
 }
 
 /// identified.json.
@@ -47,28 +73,41 @@ pub(super) struct Identification {
 impl Identify {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let progress = Progress::new();
-        let loaded = load(&self.inputs, &self.validate, &progress)?;
         let options = DataOptions::default();
-        let refused = |e: crate::regression::DataError| Failure::Refused(e.to_string());
-        progress.say("preparing signals");
-        let data = Data::new(&loaded.body, &loaded.fit, &options).map_err(refused)?;
+        for file in &self.validate {
+            if self.log.iter().any(|log| same_file(log, file)) {
+                let name = file.display();
+                return Err(Failure::Unusable(format!(
+                    "{name} is given to --log and --validate: a log cannot judge its own fit"
+                )));
+            }
+        }
+        let Reduced { body, summary, shown, mut warnings } =
+            reduce(&self.arm, &self.log, &options, &progress)?;
+        let (held_out, findings) =
+            read_logs(&self.validate, body.arm()).map_err(|e| Failure::Unusable(e.to_string()))?;
+        warnings.extend(findings.iter().map(ToString::to_string));
+        std::fs::create_dir_all(&self.out)
+            .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", self.out.display())))?;
         progress.say("fitting");
-        let folds = Folds::new(&data);
-        let fitted = fit(&data, &folds, &[], None);
-        let identified = identify(&data, &fitted);
-        let mut warnings = loaded.warnings;
-        warnings.extend(data.notes.iter().cloned());
-        let mut shown = curves(&data, &fitted.residual, &fitted.residual);
-        let validate = if loaded.validate.is_empty() {
+        let law = match self.friction {
+            Friction::Symmetric => FrictionLaw::Symmetric,
+            Friction::Asymmetric => FrictionLaw::Asymmetric,
+        };
+        let solution = solve_reduced(&summary, law);
+        let identified = identify(&summary, &solution);
+        let model = torque_model(&solution);
+        let validate = if held_out.is_empty() {
             warnings
                 .push("no log was given to --validate: the errors below are those of the fit itself".into());
             None
         } else {
-            let data = Data::new(&loaded.body, &loaded.validate, &options).map_err(refused)?;
-            let residual = fitted.residual_on(&data, &[]);
-            shown = curves(&data, &residual, &residual);
-            Some(spread(&data, &residual))
+            let data = prepared(&body, &held_out, &options)?;
+            Some(spread(&data, &model.residual(&data)))
         };
+        let figures = if held_out.is_empty() { &shown } else { &held_out };
+        let figures =
+            if figures.is_empty() { Vec::new() } else { curves_of(&body, figures, &options, &model)? };
         let undetermined: Vec<&str> =
             identified.parameters.iter().filter(|p| p.std.is_none()).map(|p| p.name.as_str()).collect();
         if !undetermined.is_empty() {
@@ -78,31 +117,31 @@ impl Identify {
             ));
         }
         let values: Vec<f64> = identified.parameters.iter().map(|p| p.value).collect();
-        let reasons = loaded.body.impossible(&values).map_err(|e| Failure::Refused(e.to_string()))?;
+        let reasons = body.impossible(&values).map_err(|e| Failure::Refused(e.to_string()))?;
         warnings.extend(reasons.iter().map(|r| format!("no real arm can have these values: {r}")));
         progress.say("looking for the nearest real arm");
-        let consistent = consistent_fit(&data, &fitted)
+        let consistent = consistent_fit(&body, &solution)
             .map_err(|e| Failure::Refused(e.to_string()))?
-            .report(&data, &fitted);
+            .report(&body, &solution);
         let result = Identification {
-            arm: loaded.body.arm().name.clone(),
+            arm: body.arm().name.clone(),
             set: "minimal",
             parameters: identified.parameters,
             friction: identified.friction,
-            fit: spread(&data, &fitted.residual),
+            fit: spread_of(&solution, &solution.theta),
             validate,
             physically_consistent: reasons.is_empty(),
             consistent,
-            band: [0.0, data.band.cutoff],
+            band: [0.0, options.cutoff],
             warnings,
         };
         let text = output::json(&result)?;
-        output::write(&self.inputs.out, "identified.json", text.as_bytes())?;
+        output::write(&self.out, "identified.json", text.as_bytes())?;
         let values = output::json(&result.consistent.parameters)?;
-        output::write(&self.inputs.out, "consistent.json", values.as_bytes())?;
-        let page = page(&result, &shown, result.validate.is_some());
-        output::write(&self.inputs.out, "report.html", page.to_html().as_bytes())?;
-        if self.inputs.json {
+        output::write(&self.out, "consistent.json", values.as_bytes())?;
+        let page = page(&result, &figures, result.validate.is_some());
+        output::write(&self.out, "report.html", page.to_html().as_bytes())?;
+        if self.json {
             output::print(&text);
         } else {
             for warning in &result.warnings {
@@ -114,4 +153,32 @@ impl Identify {
         }
         Ok(())
     }
+}
+
+fn torque_model(solution: &Solution) -> TorqueModel {
+    let joints = || 0..solution.layout.dof;
+    TorqueModel {
+        inertial: solution.inertial().to_vec(),
+        friction: joints().map(|j| solution.friction(j)).collect(),
+        offset: joints().map(|j| solution.offset(j)).collect(),
+    }
+}
+
+fn prepared<'a>(
+    body: &'a RigidBody,
+    logs: &[crate::log::Log],
+    options: &DataOptions,
+) -> Result<Data<'a>, Failure> {
+    Data::new(body, logs, options).map_err(|e| Failure::Refused(e.to_string()))
+}
+
+fn curves_of(
+    body: &RigidBody,
+    logs: &[crate::log::Log],
+    options: &DataOptions,
+    model: &TorqueModel,
+) -> Result<Vec<TorqueCurve>, Failure> {
+    let data = prepared(body, logs, options)?;
+    let residual = model.residual(&data);
+    Ok(curves(&data, &residual, &residual))
 }

@@ -58,7 +58,7 @@ pub(crate) fn load(inputs: &Inputs, validate: &[PathBuf], progress: &Progress) -
     Ok(Loaded { body, fit: logs, validate: rest, warnings })
 }
 
-fn same_file(a: &Path, b: &Path) -> bool {
+pub(super) fn same_file(a: &Path, b: &Path) -> bool {
     match (a.canonicalize(), b.canonicalize()) {
         (Ok(a), Ok(b)) => a == b,
         _ => a == b,

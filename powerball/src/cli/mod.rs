@@ -11,6 +11,8 @@ mod inputs;
 mod output;
 mod profile;
 mod record;
+mod reduced;
+mod summarize;
 mod verify;
 mod virtual_arm;
 mod warm_up;
@@ -46,6 +48,8 @@ enum Command {
     Excite(excite::Excite),
     /// Fit the minimal inertial set and the friction of every joint to logs.
     Identify(identify::Identify),
+    /// Reduce logs to triangular factors, which `identify` takes in place of the logs.
+    Summarize(summarize::Summarize),
     /// Judge an identified model on logs that it has not seen.
     Verify(verify::Verify),
     /// Find, name and add what the model lacks on logs; judged on another path.
@@ -76,6 +80,7 @@ pub fn main() -> ExitCode {
         Command::Profile(command) => command.run(),
         Command::Excite(command) => command.run(),
         Command::Identify(command) => command.run(),
+        Command::Summarize(command) => command.run(),
         Command::Verify(command) => command.run(),
         Command::Explain(command) => command.run(),
     };

@@ -20,15 +20,21 @@ impl Progress {
     }
 }
 
-/// Writes a file whole or not at all: a reader never sees half of it.
+/// Writes a file of a folder whole or not at all: a reader never sees half of it.
 pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failure> {
-    let (target, part) = (folder.join(name), folder.join(format!(".{name}.{}.part", std::process::id())));
+    write_file(&folder.join(name), bytes)
+}
+
+/// The same for a path.
+pub(crate) fn write_file(target: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let name = target.file_name().unwrap_or_default().to_string_lossy();
+    let part = target.with_file_name(format!(".{name}.{}.part", std::process::id()));
     let failure =
         |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", target.display()));
     let done = std::fs::File::create(&part).and_then(|mut file| {
         file.write_all(bytes)?;
         file.sync_all()?;
-        std::fs::rename(&part, &target)
+        std::fs::rename(&part, target)
     });
     done.map_err(|e| {
         let _ = std::fs::remove_file(&part);

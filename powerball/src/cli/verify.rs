@@ -128,7 +128,10 @@ fn read_model(path: &Path, names: &[String], dof: usize) -> Result<TorqueModel, 
             Ok([a, b, c, d, e])
         })
         .collect::<Result<_, Failure>>()?;
-    Ok(TorqueModel { inertial, friction })
+    let offset = (1..=dof)
+        .map(|j| joints.iter().find(|f| f["joint"] == j).and_then(|f| f["offset"].as_f64()).unwrap_or(0.0))
+        .collect();
+    Ok(TorqueModel { inertial, friction, offset })
 }
 
 fn page(verified: &Verified, curves: &[TorqueCurve]) -> Page {

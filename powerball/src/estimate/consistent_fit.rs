@@ -1,10 +1,10 @@
 //! A fit whose parameters a real arm can have, and what that costs.
 
 use super::consistent::{Consistent, nearest};
-use super::fit::Fit;
-use super::identify::{Spread, spread};
+use super::identify::{Spread, spread_of};
+use super::reduced::Solution;
 use super::solve::{Solver, bounded};
-use crate::regression::Data;
+use crate::regression::RigidBody;
 use dyngen::{Error, SetKind};
 use faer::Mat;
 use serde::Serialize;
@@ -40,70 +40,52 @@ pub struct ConsistentReport {
     pub without_body: Vec<usize>,
 }
 
-/// The consistent parameters nearest to a fit in its own χ², friction refitted with every step: dissipative, as in the fit.
+/// The consistent parameters nearest to a solution in its own χ², friction refitted with every step: dissipative, as in the
+/// fit.
 ///
 /// # Errors
 /// As [`nearest`].
-pub fn consistent_fit(data: &Data<'_>, fit: &Fit) -> Result<ConsistentFit, Error> {
-    let design = &fit.design;
-    let p = design.inertial;
-    let (gram, right, _) = fit.gram.sum(&fit.weights, |_| true);
+pub fn consistent_fit(body: &RigidBody, solution: &Solution) -> Result<ConsistentFit, Error> {
+    let layout = solution.layout;
+    let (p, size) = (layout.inertial, layout.size());
+    let (gram, right, _) = solution.products();
     // χ² as a function of the inertial parameters alone, all other columns refitted: a Schur complement.
-    let others = Solver::new(&gram, |c| c >= p && fit.free[c]);
+    let others = Solver::new(&gram, |c| c >= p && solution.free[c]);
     let mut metric = Mat::<f64>::zeros(p, p);
     for k in 0..p {
-        let column: Vec<f64> = (0..design.size).map(|c| if c >= p { gram[(c, k)] } else { 0.0 }).collect();
+        let column: Vec<f64> = (0..size).map(|c| if c >= p { gram[(c, k)] } else { 0.0 }).collect();
         let moved = others.solve(&column);
         for i in 0..p {
-            metric[(i, k)] = gram[(i, k)] - (p..design.size).map(|c| gram[(c, i)] * moved[c]).sum::<f64>();
+            metric[(i, k)] = gram[(i, k)] - (p..size).map(|c| gram[(c, i)] * moved[c]).sum::<f64>();
         }
     }
     let metric = Mat::from_fn(p, p, |i, k| 0.5 * (metric[(i, k)] + metric[(k, i)]));
-    let consistent = nearest(data.body.model(), SetKind::Minimal, fit.inertial(), &metric)?;
-    let rest: Vec<f64> = (0..design.size)
-        .map(|c| right[c] - (0..p).map(|k| gram[(c, k)] * consistent.set[k]).sum::<f64>())
-        .collect();
-    let levels: Vec<usize> = (0..data.dof()).flat_map(|j| [0, 1, 2].map(|k| design.friction(j, k))).collect();
-    let tangent =
-        |c: usize| (0..data.dof()).any(|j| c == design.friction(j, 3) || c == design.friction(j, 4));
-    let (mut theta, _) = bounded(&gram, &rest, |c| c >= p && !tangent(c), &levels);
+    let consistent = nearest(body.model(), SetKind::Minimal, solution.inertial(), &metric)?;
+    let rest: Vec<f64> =
+        (0..size).map(|c| right[c] - (0..p).map(|k| gram[(c, k)] * consistent.set[k]).sum::<f64>()).collect();
+    let (mut theta, _) = bounded(&gram, &rest, |c| c >= p && !layout.is_tangent(c), &layout.levels());
     theta[..p].copy_from_slice(&consistent.set);
     Ok(ConsistentFit { consistent, theta })
 }
 
 impl ConsistentFit {
-    /// The residual on the data that were fitted.
-    #[must_use]
-    pub fn residual(&self, data: &Data<'_>, fit: &Fit) -> Vec<Vec<f64>> {
-        let joint = |j: usize| -> Vec<f64> {
-            let predicted = fit.design.predict(j, &self.theta);
-            data.joints[j].torque.iter().zip(predicted).map(|(y, p)| y - p).collect()
-        };
-        (0..data.dof()).map(joint).collect()
-    }
-
     /// In the words of a report.
     #[must_use]
-    pub fn report(&self, data: &Data<'_>, fit: &Fit) -> ConsistentReport {
-        let error = spread(data, &self.residual(data, fit));
-        let free = spread(data, &fit.residual);
-        let arm = data.body.arm();
-        let kept = arm.kept_parameters();
+    pub fn report(&self, body: &RigidBody, solution: &Solution) -> ConsistentReport {
+        let error = spread_of(solution, &self.theta);
+        let free = spread_of(solution, &solution.theta);
+        let ratio = |(a, b): (&f64, &f64)| if *b > 0.0 { a / b - 1.0 } else { 0.0 };
         ConsistentReport {
-            parameters: kept.iter().map(|p| (p.to_string(), self.consistent.all[p.index()])).collect(),
-            friction: (0..data.dof())
-                .map(|j| {
-                    let level = |k| self.theta[fit.design.friction(j, k)];
-                    let [g2, g4] = fit.shapes[j];
-                    [level(0), g2, level(1), g4, level(2)]
-                })
-                .collect(),
-            cost: error
-                .rms
+            parameters: body
+                .arm()
+                .kept_parameters()
                 .iter()
-                .zip(&free.rms)
-                .map(|(a, b)| if *b > 0.0 { a / b - 1.0 } else { 0.0 })
+                .map(|p| (p.to_string(), self.consistent.all[p.index()]))
                 .collect(),
+            friction: (0..solution.layout.dof)
+                .map(|j| solution.layout.gamma(&self.theta, j, solution.shapes[j]))
+                .collect(),
+            cost: error.rms.iter().zip(&free.rms).map(ratio).collect(),
             fit: error,
             distance: self.consistent.distance,
             gap: self.consistent.gap,

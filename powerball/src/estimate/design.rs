@@ -1,14 +1,12 @@
 //! The columns of all joints and their cross products, from which every fit is a small solve.
 
 use super::Folds;
+use super::vary::{FRICTION, Layout};
 use crate::parallel;
 use crate::regression::{Column, Data};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use std::ops::Range;
-
-/// Friction columns of a joint: two saturating levels, the viscous one, and the two tangents of the shapes.
-pub(super) const FRICTION: usize = 5;
 
 /// The regression columns for given friction shapes and terms.
 ///
@@ -17,6 +15,8 @@ pub(super) const FRICTION: usize = 5;
 pub struct Design {
     /// Joint by joint: columns, column-major.
     joints: Vec<Local>,
+    /// The global order.
+    pub layout: Layout,
     /// Columns in all.
     pub size: usize,
     /// Inertial columns.
@@ -61,7 +61,8 @@ impl Design {
                 Local { rows, values, global }
             })
             .collect();
-        Design { joints, size: p + FRICTION * n + extra.len(), inertial: p }
+        let layout = Layout { inertial: p, dof: n, extra: extra.len() };
+        Design { joints, layout, size: layout.size(), inertial: p }
     }
 
     /// Joints.
@@ -73,13 +74,13 @@ impl Design {
     /// Global index of a joint's friction column.
     #[must_use]
     pub fn friction(&self, joint: usize, which: usize) -> usize {
-        self.inertial + FRICTION * joint + which
+        self.layout.friction(joint, which)
     }
 
     /// Global index of a term's column.
     #[must_use]
     pub fn extra(&self, which: usize) -> usize {
-        self.inertial + FRICTION * self.dof() + which
+        self.layout.extra(which)
     }
 
     fn matrix(&self, joint: usize, rows: &Range<usize>) -> MatRef<'_, f64> {
@@ -131,14 +132,14 @@ fn pack(columns: &[&[f64]], rows: &Range<usize>) -> Vec<f64> {
     packed
 }
 
-/// A'A, A'y, y'y.
-type Products = (Mat<f64>, Vec<f64>, f64);
+/// A'A, A'y, y'y of one joint and cell.
+type Cell = (Mat<f64>, Vec<f64>, f64);
 
 /// Cross products of a design with itself and the torques, by joint and cell of folds.
 #[derive(Debug)]
 pub struct Gram {
     /// `[joint][cell]`: (A'A, A'y, y'y), local.
-    parts: Vec<Vec<Products>>,
+    parts: Vec<Vec<Cell>>,
     globals: Vec<Vec<usize>>,
     size: usize,
 }

@@ -1,11 +1,12 @@
-//! The whole fit: linear parameters by weighted least squares, friction shapes by variable projection.
+//! The fit of rows in memory, with the columns of further terms.
 
-use super::design::{Design, FRICTION, Gram};
+use super::design::{Design, Gram, runs};
 use super::folds::Folds;
-use super::friction_shape;
-use super::solve::{Solver, bounded};
+use super::friction_shape::{self, Trials};
+use super::vary::{FRICTION, Layout, Products, Rows, Scatter, Start, vary};
 use crate::parallel;
 use crate::regression::{Column, Data};
+use faer::Mat;
 
 /// A column that was added to the base model.
 #[derive(Clone, Debug)]
@@ -43,9 +44,7 @@ impl Fit {
     /// γ1 … γ5 of a joint.
     #[must_use]
     pub fn friction(&self, joint: usize) -> [f64; 5] {
-        let level = |k| self.theta[self.design.friction(joint, k)];
-        let [g2, g4] = self.shapes[joint];
-        [level(0), g2, level(1), g4, level(2)]
+        self.design.layout.gamma(&self.theta, joint, self.shapes[joint])
     }
 
     /// The minimal set's values.
@@ -69,127 +68,113 @@ impl Fit {
     }
 }
 
-/// Rounds of new weights and shapes.
-const WEIGHT_ROUNDS: usize = 3;
-/// Gauss–Newton steps on the shapes in a round.
-const SHAPE_STEPS: usize = 6;
-/// A round that lowers the error by less than this share has arrived.
-const SETTLED: f64 = 1e-5;
-
 /// Fits the base model with the given terms; `start` saves the search for shapes and weights.
 #[must_use]
 pub fn fit(data: &Data<'_>, folds: &Folds, terms: &[Term], start: Option<&Fit>) -> Fit {
-    let n = data.dof();
-    let extra: Vec<Column> = terms.iter().map(|t| t.column.clone()).collect();
-    let mut shapes = match start {
-        Some(fit) => fit.shapes.clone(),
-        None => (0..n)
-            .map(|j| {
-                let (low, high) = friction_shape::range(data, j);
-                [high / 5.0, low * 4.0]
+    let rows = InMemory { data, folds, extra: terms.iter().map(|t| t.column.clone()).collect() };
+    let layout = rows.layout();
+    let non_negative: Vec<usize> =
+        (0..terms.len()).filter(|t| terms[*t].non_negative).map(|t| layout.extra(t)).collect();
+    let start = start.map(|fit| Start { shapes: &fit.shapes, weights: &fit.weights });
+    let done = vary(&rows, &non_negative, start);
+    let (design, gram) = done.at;
+    Fit {
+        residual: residuals(data, &design, &done.theta),
+        shapes: done.shapes,
+        theta: done.theta,
+        weights: done.weights,
+        sigma: done.scatter.sigma,
+        inflation: done.scatter.inflation,
+        design,
+        gram,
+        free: done.free,
+    }
+}
+
+/// Rows of prepared logs with further columns.
+struct InMemory<'a> {
+    data: &'a Data<'a>,
+    folds: &'a Folds,
+    extra: Vec<Column>,
+}
+
+impl Rows for InMemory<'_> {
+    type At = (Design, Gram);
+
+    fn layout(&self) -> Layout {
+        Layout { inertial: self.data.body.names().len(), dof: self.data.dof(), extra: self.extra.len() }
+    }
+
+    fn moves(&self, joint: usize) -> bool {
+        !self.data.joints[joint].is_empty()
+    }
+
+    fn range(&self, joint: usize) -> (f64, f64) {
+        friction_shape::range(self.data.top_speed(joint))
+    }
+
+    fn power(&self, joint: usize) -> f64 {
+        let torque = &self.data.joints[joint].torque;
+        torque.iter().map(|y| y * y).sum::<f64>() / torque.len().max(1) as f64
+    }
+
+    fn at(&self, shapes: &[[f64; 2]]) -> (Design, Gram) {
+        let design = Design::new(self.data, &friction_columns(self.data, shapes), &self.extra);
+        let gram = Gram::new(self.data, &design, self.folds);
+        (design, gram)
+    }
+
+    fn products(&self, (_, gram): &(Design, Gram), weights: &[f64]) -> Products {
+        gram.sum(weights, |_| true)
+    }
+
+    fn trials(&self, (design, _): &(Design, Gram), joint: usize, steep: &[f64]) -> Trials {
+        let rows_of = &self.data.joints[joint];
+        let trial: Vec<Vec<f64>> = parallel::map(steep, |g| {
+            rows_of.column(&self.data.band, &self.data.recordings, |_, r| {
+                r.speed(joint).map(|v| (g * v).tanh()).collect()
             })
-            .collect(),
-    };
-    let mut weights = start.map_or_else(|| initial_weights(data), |fit| fit.weights.clone());
-    let mut state = State::new(data, folds, &extra, terms, shapes.clone(), &weights);
-    // A start is near already.
-    let rounds = if start.is_some() { 1 } else { WEIGHT_ROUNDS };
-    for round in 0..rounds {
-        if start.is_none() && round < 2 {
-            for j in (0..n).filter(|j| !data.joints[*j].is_empty()) {
-                let (gram, right, _) = state.gram.sum(&weights, |_| true);
-                let found = friction_shape::search(data, &state.design, &gram, &right, j, weights[j], folds);
-                let mut trial = shapes.clone();
-                trial[j] = found;
-                let next = State::new(data, folds, &extra, terms, trial.clone(), &weights);
-                if next.error < state.error {
-                    (state, shapes) = (next, trial);
+        });
+        let columns: Vec<&[f64]> = trial.iter().map(Vec::as_slice).collect();
+        let grid = steep.len();
+        let mut trials = Trials {
+            cross: Mat::zeros(design.size, grid),
+            square: Mat::zeros(grid, grid),
+            score: vec![0.0; grid],
+        };
+        for (_, rows) in runs(self.data, self.folds, joint) {
+            for (c, values) in design.cross(joint, &rows, &columns) {
+                for (k, value) in values.iter().enumerate() {
+                    trials.cross[(c, k)] += value;
                 }
             }
-        }
-        state = descend(state, data, folds, &extra, terms, &mut shapes, &weights);
-        weights = new_weights(data, &residuals(data, &state.design, &state.theta)).0;
-        state.solve(&weights, terms);
-    }
-    let residual = residuals(data, &state.design, &state.theta);
-    let (weights, sigma, inflation) = new_weights(data, &residual);
-    state.solve(&weights, terms);
-    let residual = residuals(data, &state.design, &state.theta);
-    let free = state.free(n);
-    Fit {
-        shapes,
-        theta: state.theta,
-        weights,
-        sigma,
-        inflation,
-        residual,
-        design: state.design,
-        gram: state.gram,
-        free,
-    }
-}
-
-/// A model at given shapes.
-struct State {
-    design: Design,
-    gram: Gram,
-    theta: Vec<f64>,
-    solver: Solver,
-    error: f64,
-}
-
-impl State {
-    fn new(
-        data: &Data<'_>,
-        folds: &Folds,
-        extra: &[Column],
-        terms: &[Term],
-        shapes: Vec<[f64; 2]>,
-        weights: &[f64],
-    ) -> State {
-        let design = Design::new(data, &friction_columns(data, &shapes), extra);
-        let gram = Gram::new(data, &design, folds);
-        let solver = Solver::new(&faer::Mat::zeros(0, 0), |_| false);
-        let mut state = State { design, gram, theta: Vec::new(), solver, error: f64::INFINITY };
-        state.solve(weights, terms);
-        state
-    }
-
-    fn solve(&mut self, weights: &[f64], terms: &[Term]) {
-        let (gram, right, square) = self.gram.sum(weights, |_| true);
-        let mut non_negative: Vec<usize> = (0..self.design.dof())
-            .flat_map(|j| [0, 1, 2].map(|k| (j, k)))
-            .map(|(j, k)| self.design.friction(j, k))
-            .collect();
-        non_negative
-            .extend((0..terms.len()).filter(|t| terms[*t].non_negative).map(|t| self.design.extra(t)));
-        let wanted = |c: usize| !is_tangent(&self.design, c);
-        let (theta, solver) = bounded(&gram, &right, wanted, &non_negative);
-        let explained: f64 = theta.iter().zip(&right).map(|(x, r)| x * r).sum::<f64>();
-        let quadratic: f64 = (0..theta.len())
-            .map(|i| theta[i] * (0..theta.len()).map(|k| gram[(k, i)] * theta[k]).sum::<f64>())
-            .sum();
-        self.error = square - 2.0 * explained + quadratic;
-        (self.theta, self.solver) = (theta, solver);
-    }
-
-    /// Free columns, with the tangents of levels that are not zero.
-    fn free(&self, n: usize) -> Vec<bool> {
-        let mut free = vec![false; self.design.size];
-        for k in self.solver.kept() {
-            free[*k] = true;
-        }
-        for j in 0..n {
-            for k in 0..2 {
-                free[self.design.friction(j, 3 + k)] = self.theta[self.design.friction(j, k)] > 0.0;
+            let dot = |a: &[f64], b: &[f64]| {
+                a[rows.clone()].iter().zip(&b[rows.clone()]).map(|(x, y)| x * y).sum::<f64>()
+            };
+            for a in 0..grid {
+                for b in 0..=a {
+                    trials.square[(a, b)] += dot(&trial[a], &trial[b]);
+                }
+                trials.score[a] += dot(&trial[a], &rows_of.torque);
             }
         }
-        free
+        trials
     }
-}
 
-fn is_tangent(design: &Design, column: usize) -> bool {
-    column.checked_sub(design.inertial).is_some_and(|f| f < FRICTION * design.dof() && f % FRICTION >= 3)
+    fn scatter(&self, (design, _): &(Design, Gram), theta: &[f64]) -> Scatter {
+        let residual = residuals(self.data, design, theta);
+        Scatter {
+            sigma: residual
+                .iter()
+                .map(|r| (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt())
+                .collect(),
+            inflation: residual
+                .iter()
+                .enumerate()
+                .map(|(j, r)| variance_inflation(self.data, j, r))
+                .collect(),
+        }
+    }
 }
 
 /// The friction columns of all joints for given shapes.
@@ -199,52 +184,6 @@ pub fn friction_columns(data: &Data<'_>, shapes: &[[f64; 2]]) -> Vec<[Vec<f64>; 
     parallel::map(&joints, |&j| friction_shape::columns(data, j, shapes[j]))
 }
 
-/// Gauss–Newton on ln γ2, ln γ4 of all joints with every linear parameter projected out, steps halved until they help.
-fn descend(
-    mut state: State,
-    data: &Data<'_>,
-    folds: &Folds,
-    extra: &[Column],
-    terms: &[Term],
-    shapes: &mut Vec<[f64; 2]>,
-    weights: &[f64],
-) -> State {
-    let n = data.dof();
-    for _ in 0..SHAPE_STEPS {
-        let free = state.free(n);
-        let (gram, right, _) = state.gram.sum(weights, |_| true);
-        let theta = Solver::new(&gram, |c| free[c]).solve(&right);
-        let mut moved = false;
-        let mut scale = 1.0;
-        for _ in 0..4 {
-            let mut trial = shapes.clone();
-            for (j, shape) in trial.iter_mut().enumerate() {
-                let (low, high) = friction_shape::range(data, j);
-                for k in 0..2 {
-                    let level = state.theta[state.design.friction(j, k)];
-                    if level > 0.0 {
-                        // The tangent's coefficient is the level times the change of ln γ.
-                        let step = theta[state.design.friction(j, 3 + k)] / level;
-                        shape[k] *= (scale * step.clamp(-0.7, 0.7)).exp();
-                        shape[k] = shape[k].clamp(low * 0.2, high * 2.0);
-                    }
-                }
-            }
-            let next = State::new(data, folds, extra, terms, trial.clone(), weights);
-            if next.error < state.error {
-                moved = state.error - next.error > SETTLED * state.error;
-                (state, *shapes) = (next, trial);
-                break;
-            }
-            scale *= 0.4;
-        }
-        if !moved {
-            break;
-        }
-    }
-    state
-}
-
 fn residuals(data: &Data<'_>, design: &Design, theta: &[f64]) -> Vec<Vec<f64>> {
     let joints: Vec<usize> = (0..data.dof()).collect();
     parallel::map(&joints, |&j| {
@@ -252,37 +191,8 @@ fn residuals(data: &Data<'_>, design: &Design, theta: &[f64]) -> Vec<Vec<f64>> {
     })
 }
 
-/// Before anything is fitted a joint's own torque is its scale.
-fn initial_weights(data: &Data<'_>) -> Vec<f64> {
-    data.joints
-        .iter()
-        .map(|joint| {
-            let square = joint.torque.iter().map(|y| y * y).sum::<f64>();
-            if square > 0.0 { joint.len() as f64 / square } else { 0.0 }
-        })
-        .collect()
-}
-
-fn new_weights(data: &Data<'_>, residual: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
-    let sigma: Vec<f64> = residual
-        .iter()
-        .map(|r| (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt())
-        .collect();
-    let inflation: Vec<f64> =
-        residual.iter().enumerate().map(|(j, r)| variance_inflation(data, j, r)).collect();
-    let top = sigma.iter().fold(0.0f64, |m, s| m.max(*s));
-    let weights = (0..sigma.len())
-        .map(|j| {
-            // A residual of exactly zero (a dead sensor) must not outweigh everything.
-            let s = sigma[j].max(1e-9 * top);
-            if data.joints[j].is_empty() || s == 0.0 { 0.0 } else { 1.0 / (s * s * inflation[j]) }
-        })
-        .collect();
-    (weights, sigma, inflation)
-}
-
 /// Seconds over which means are taken for [`variance_inflation`].
-const MEAN_OVER: f64 = 1.0;
+pub(super) const MEAN_OVER: f64 = 1.0;
 
 /// How much more the residual's means over 1 s vary than those of independent samples would.
 ///

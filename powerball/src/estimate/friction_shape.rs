@@ -1,9 +1,7 @@
 //! The steepnesses γ2, γ4 of Eq. 16: columns for given shapes, and a search that needs no start.
 
-use super::design::{Design, FRICTION, runs};
-use super::folds::Folds;
 use super::solve::Solver;
-use crate::parallel;
+use super::vary::{FRICTION, Rows};
 use crate::regression::Data;
 use faer::Mat;
 
@@ -32,67 +30,60 @@ pub(super) fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f6
     ]
 }
 
-/// The steepnesses that make sense for a joint, s/rad: from nearly straight over its speeds to a step.
+/// The steepnesses that make sense for a joint whose fast speed is `top`, s/rad: from straight over its speeds to a step.
 #[must_use]
-pub(super) fn range(data: &Data<'_>, joint: usize) -> (f64, f64) {
-    let top = data.top_speed(joint);
-    (1.0 / top, 1000.0 / top)
+pub(super) fn range(top: f64) -> (f64, f64) {
+    (0.2 / top, 2000.0 / top)
+}
+
+/// Where a search begins that finds nothing: a step and a bend.
+#[must_use]
+pub(super) fn first((low, high): (f64, f64)) -> [f64; 2] {
+    [high / 10.0, low * 20.0]
+}
+
+/// Cross products of trial columns on one joint, by trial.
+#[derive(Debug)]
+pub(super) struct Trials {
+    /// With the columns of all rows, columns × trials.
+    pub cross: Mat<f64>,
+    /// With each other.
+    pub square: Mat<f64>,
+    /// With the torque.
+    pub score: Vec<f64>,
 }
 
 /// The pair of steepnesses that leaves the least on one joint, all else refitted, levels ≥ 0.
 #[must_use]
-pub(super) fn search(
-    data: &Data<'_>,
-    design: &Design,
-    gram: &Mat<f64>,
-    right: &[f64],
-    joint: usize,
-    weight: f64,
-    folds: &Folds,
-) -> [f64; 2] {
-    let (low, high) = range(data, joint);
+pub(super) fn search<R: Rows>(rows: &R, at: &R::At, weights: &[f64], joint: usize) -> [f64; 2] {
+    let layout = rows.layout();
+    let (lowest, highest) = rows.range(joint);
+    // The ends of the range are hardly told from straight lines and steps.
+    let (low, high) = (5.0 * lowest, 0.5 * highest);
     let steep: Vec<f64> = (0..GRID).map(|k| low * (high / low).powf(k as f64 / (GRID - 1) as f64)).collect();
-    let trial: Vec<Vec<f64>> = parallel::map(&steep, |g| {
-        data.joints[joint]
-            .column(&data.band, &data.recordings, |_, r| r.speed(joint).map(|v| (g * v).tanh()).collect())
-    });
     // Everything but this joint's levels and all tangents stays as nuisance.
     let nuisance = |c: usize| {
-        let friction = c.checked_sub(design.inertial).filter(|f| *f < FRICTION * design.dof());
+        let friction = c.checked_sub(layout.inertial).filter(|f| *f < FRICTION * layout.dof);
         friction.is_none_or(|f| {
             let (j, which) = (f / FRICTION, f % FRICTION);
             which == 2 || (which < 2 && j != joint)
         })
     };
-    let solver = Solver::new(gram, nuisance);
-    let base = solver.solve(right);
-    let columns: Vec<&[f64]> = trial.iter().map(Vec::as_slice).collect();
-    let mut cross = vec![vec![0.0; design.size]; GRID];
+    let (gram, right, _) = rows.products(at, weights);
+    let solver = Solver::new(&gram, nuisance);
+    let base = solver.solve(&right);
+    let weight = weights[joint];
+    let trials = rows.trials(at, joint, &steep);
+    let cross: Vec<Vec<f64>> =
+        (0..GRID).map(|g| (0..layout.size()).map(|c| weight * trials.cross[(c, g)]).collect()).collect();
     let (mut square, mut score) = (vec![vec![0.0; GRID]; GRID], vec![0.0; GRID]);
-    let y = &data.joints[joint].torque;
-    for (_, rows) in runs(data, folds, joint) {
-        for (g, values) in design.cross(joint, &rows, &columns) {
-            for (k, value) in values.iter().enumerate() {
-                cross[k][g] += weight * value;
-            }
-        }
-        let dot = |a: &[f64], b: &[f64]| {
-            a[rows.clone()].iter().zip(&b[rows.clone()]).map(|(x, y)| x * y).sum::<f64>()
-        };
-        for a in 0..GRID {
-            for b in 0..=a {
-                square[a][b] += weight * dot(&trial[a], &trial[b]);
-            }
-            score[a] += weight * dot(&trial[a], y);
-        }
-    }
-    let projected: Vec<Vec<f64>> = cross.iter().map(|c| solver.solve(c)).collect();
     let inner = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+    let projected: Vec<Vec<f64>> = cross.iter().map(|c| solver.solve(c)).collect();
     for a in 0..GRID {
         for b in 0..=a {
-            square[a][b] -= inner(&cross[a], &projected[b]);
+            square[a][b] = weight * trials.square[(a, b)] - inner(&cross[a], &projected[b]);
         }
-        score[a] -= inner(&cross[a], &base);
+        score[a] = weight * trials.score[a] - inner(&cross[a], &base);
     }
     let single =
         |a: usize| if score[a] > 0.0 && square[a][a] > 0.0 { score[a].powi(2) / square[a][a] } else { 0.0 };

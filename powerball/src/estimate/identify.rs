@@ -1,9 +1,9 @@
 //! A fit in the words of a model: values with standard errors that hold for coloured residuals.
 
-use super::design::FRICTION;
-use super::fit::Fit;
-use super::solve::Solver;
+use super::errors::errors;
+use super::reduced::Solution;
 use crate::regression::Data;
+use crate::summary::Summary;
 use serde::Serialize;
 
 /// A parameter with its standard error.
@@ -13,10 +13,12 @@ pub struct ParameterEstimate {
     pub name: String,
     /// Its value, SI units.
     pub value: f64,
-    /// Standard error from independent blocks; `None` where the logs do not determine the parameter.
+    /// Standard error; `None` where the logs do not determine the parameter.
     pub std: Option<f64>,
     /// Standard error over |value|.
     pub relative_std: Option<f64>,
+    /// 95 % interval, by Student's t.
+    pub interval: Option<[f64; 2]>,
 }
 
 /// Eq. 16 of a joint with standard errors of γ1 … γ5.
@@ -34,6 +36,9 @@ pub struct JointFriction {
     pub gamma4: f64,
     /// γ5, N·m·s/rad.
     pub gamma5: f64,
+    /// Constant torque, N·m, where the law has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offset: Option<f64>,
     /// Standard errors of γ1 … γ5; null where not determined or at a bound.
     pub std: [Option<f64>; 5],
 }
@@ -75,49 +80,37 @@ pub fn spread(data: &Data<'_>, residual: &[Vec<f64>]) -> Spread {
     Spread { rms: errors, relative, samples: data.joints.iter().map(|j| j.len()).max().unwrap_or(0) }
 }
 
-/// Values and cluster-robust standard errors: the sandwich with blocks of [`crate::regression::Block`] as clusters.
+/// The values of a solution with standard errors that hold for coloured residuals (see [`errors`]).
 #[must_use]
-pub fn identify(data: &Data<'_>, fit: &Fit) -> Identified {
-    let design = &fit.design;
-    let (gram, _, _) = fit.gram.sum(&fit.weights, |_| true);
-    let solver = Solver::new(&gram, |c| fit.free[c]);
-    let mut variance = vec![0.0; design.size];
-    let mut clusters = 0.0;
-    for block in &data.blocks {
-        let mut score = vec![0.0; design.size];
-        for (j, rows) in block.rows.iter().enumerate() {
-            for (g, value) in design.cross(j, rows, &[fit.residual[j].as_slice()]) {
-                score[g] += fit.weights[j] * value[0];
-            }
-        }
-        for (v, x) in variance.iter_mut().zip(solver.solve(&score)) {
-            *v += x * x;
-        }
-        clusters += 1.0;
-    }
-    let small = if clusters > 1.0 { clusters / (clusters - 1.0) } else { 1.0 };
-    let std = |c: usize| solver.kept().contains(&c).then(|| (small * variance[c]).sqrt());
-    let parameters = data
-        .body
-        .names()
+pub fn identify(summary: &Summary, solution: &Solution) -> Identified {
+    let layout = solution.layout;
+    let errors = errors(solution);
+    let parameters = summary
+        .identity
+        .parameters
         .iter()
         .enumerate()
         .map(|(c, name)| {
-            let (value, std) = (fit.theta[c], std(c));
-            let relative_std = std.filter(|_| value != 0.0).map(|s| s / value.abs());
-            ParameterEstimate { name: name.clone(), value, std, relative_std }
+            let (value, std) = (solution.theta[c], errors.std[c]);
+            ParameterEstimate {
+                name: name.clone(),
+                value,
+                std,
+                relative_std: std.filter(|_| value != 0.0).map(|s| s / value.abs()),
+                interval: std.map(|s| [value - errors.quantile[c] * s, value + errors.quantile[c] * s]),
+            }
         })
         .collect();
-    let friction = (0..data.dof())
+    let friction = (0..layout.dof)
         .map(|j| {
-            let [gamma1, gamma2, gamma3, gamma4, gamma5] = fit.friction(j);
-            let at = |k: usize| design.friction(j, k);
+            let [gamma1, gamma2, gamma3, gamma4, gamma5] = solution.friction(j);
+            let at = |k: usize| layout.friction(j, k);
+            let std = |c: usize| errors.std[c];
             // The tangent's coefficient is level · Δ ln γ.
             let shape = |k: usize, gamma: f64| {
-                let level = fit.theta[at(k)];
+                let level = solution.theta[at(k)];
                 std(at(3 + k)).filter(|_| level > 0.0).map(|s| s / level * gamma)
             };
-            debug_assert_eq!(FRICTION, 5);
             JointFriction {
                 joint: j + 1,
                 gamma1,
@@ -125,9 +118,25 @@ pub fn identify(data: &Data<'_>, fit: &Fit) -> Identified {
                 gamma3,
                 gamma4,
                 gamma5,
+                offset: (layout.extra > 0).then(|| solution.offset(j)),
                 std: [std(at(0)), shape(0, gamma2), std(at(1)), shape(1, gamma4), std(at(2))],
             }
         })
         .collect();
     Identified { parameters, friction }
+}
+
+/// The spread of what coefficients leave on the reduced logs.
+#[must_use]
+pub fn spread_of(solution: &Solution, theta: &[f64]) -> Spread {
+    let joints: Vec<(f64, f64, u64)> =
+        (0..solution.layout.dof).map(|j| solution.mean_squares(j, theta)).collect();
+    Spread {
+        rms: joints.iter().map(|(left, _, _)| left.sqrt()).collect(),
+        relative: joints
+            .iter()
+            .map(|(left, torque, _)| if *torque > 0.0 { (left / torque).sqrt() } else { 0.0 })
+            .collect(),
+        samples: joints.iter().map(|(_, _, rows)| *rows as usize).max().unwrap_or(0),
+    }
 }

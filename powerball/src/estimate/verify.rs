@@ -14,6 +14,8 @@ pub struct TorqueModel {
     pub inertial: Vec<f64>,
     /// By joint: N·m, s/rad, N·m, s/rad, N·m·s/rad.
     pub friction: Vec<[f64; 5]>,
+    /// Constant torques by joint, N·m; 0 where the law has none.
+    pub offset: Vec<f64>,
 }
 
 /// How a joint's prediction does.
@@ -48,7 +50,9 @@ impl TorqueModel {
         }
         (0..data.dof())
             .map(|j| {
-                data.joints[j].torque.iter().zip(design.predict(j, &theta)).map(|(y, p)| y - p).collect()
+                let predicted = design.predict(j, &theta);
+                let torque = data.joints[j].torque.iter();
+                torque.zip(predicted).map(|(y, p)| y - p - self.offset[j]).collect()
             })
             .collect()
     }

@@ -6,20 +6,22 @@ use super::Butterworth;
 pub const REST_SPEED: f64 = 0.03;
 /// A slow joint's limit: this share of the speed it stays under in 95 % of its samples.
 pub const REST_SHARE: f64 = 0.03;
+/// Below this share of its speed limit a joint rests whatever else it does: it may only tremble all along.
+pub const REST_OF_LIMIT: f64 = 1e-3;
 /// A reversal that takes longer than this is a stop, s.
 pub const LONGEST_REVERSAL: f64 = 0.5;
 /// Speeds are judged below this frequency, Hz: encoder steps at rest look fast above it.
 const SMOOTHING: f64 = 2.0;
 
-/// The speed below which a joint counts as resting, from samples of |q̇| of all its recordings.
+/// The speed below which a joint counts as resting, from samples of |q̇| of all its recordings and its speed limit if known.
 #[must_use]
-pub fn rest_speed(mut speeds: Vec<f64>) -> f64 {
+pub fn rest_speed(mut speeds: Vec<f64>, limit: Option<f64>) -> f64 {
     if speeds.is_empty() {
         return REST_SPEED;
     }
     let high = (speeds.len() * 95 / 100).min(speeds.len() - 1);
     let (_, p95, _) = speeds.select_nth_unstable_by(high, f64::total_cmp);
-    REST_SPEED.min(REST_SHARE * *p95)
+    REST_SPEED.min((REST_SHARE * *p95).max(REST_OF_LIMIT * limit.unwrap_or(0.0)))
 }
 
 /// Which samples of a joint's speed `v` (rad/s, at `rate` Hz) are motion; heads and tails at rest and stops are not.
@@ -73,8 +75,9 @@ mod tests {
 
     #[test]
     fn slow_joints_have_a_lower_limit() {
-        assert_eq!(rest_speed(vec![1.5; 100]), REST_SPEED);
-        approx::assert_relative_eq!(rest_speed(vec![0.1; 100]), 0.003);
-        assert_eq!(rest_speed(Vec::new()), REST_SPEED);
+        assert_eq!(rest_speed(vec![1.5; 100], Some(2.0)), REST_SPEED);
+        approx::assert_relative_eq!(rest_speed(vec![0.1; 100], None), 0.003);
+        assert_eq!(rest_speed(Vec::new(), None), REST_SPEED);
+        approx::assert_relative_eq!(rest_speed(vec![1e-4; 100], Some(1.2)), 0.0012);
     }
 }

@@ -1,0 +1,138 @@
+//! Logs and summaries of logs, read one after another into one summary.
+
+use super::Failure;
+use super::inputs::same_file;
+use super::output::Progress;
+use crate::log::{Log, LogError, read_log};
+use crate::regression::{DataOptions, RigidBody};
+use crate::signal::rest;
+use crate::summary::Summary;
+use dyngen::Arm;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// What files came to.
+pub(crate) struct Reduced {
+    pub body: RigidBody,
+    pub summary: Summary,
+    /// The first logs as they were read, for figures.
+    pub shown: Vec<Log>,
+    pub warnings: Vec<String>,
+}
+
+/// Samples of logs that are kept for figures.
+const SHOWN: usize = 300_000;
+
+/// The arm of a file, and its functions.
+pub(crate) fn body(arm: &Path, progress: &Progress) -> Result<(RigidBody, Vec<String>), Failure> {
+    let arm = Arm::read(arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+    progress.say("deriving and proving the arm's dynamics");
+    let body = RigidBody::new(&arm).map_err(|e| Failure::Refused(e.to_string()))?;
+    Ok((body, arm.notes()))
+}
+
+/// Reads and reduces files, each a log or a summary; every file that is unusable is named.
+pub(crate) fn reduce(
+    arm: &Path,
+    files: &[PathBuf],
+    options: &DataOptions,
+    progress: &Progress,
+) -> Result<Reduced, Failure> {
+    let (body, mut warnings) = body(arm, progress)?;
+    let mut summary = Summary::new(&body, options);
+    let (mut shown, mut shown_samples): (Vec<Log>, usize) = (Vec::new(), 0);
+    let (mut unusable, mut refused) = (Vec::new(), Vec::new());
+    for (k, file) in files.iter().enumerate() {
+        let name = file.display();
+        if files[..k].iter().any(|other| same_file(other, file)) {
+            unusable.push(format!("{name}: given twice"));
+            continue;
+        }
+        progress.say(&format!("reading {name}"));
+        match read_summary(file) {
+            Ok(None) => {}
+            Ok(Some(read)) => {
+                for (log, _) in &read.logs {
+                    if summary.logs.iter().any(|(other, _)| other == log) {
+                        warnings.push(format!("{name}: holds {log}, which is in already: it counts twice"));
+                    }
+                }
+                if let Err(error) = summary.merge(&read) {
+                    unusable.push(format!("{name}: {error}"));
+                }
+                continue;
+            }
+            Err(reason) => {
+                unusable.push(format!("{name}: {reason}"));
+                continue;
+            }
+        }
+        let mut findings = Vec::new();
+        match read_log(file, body.arm(), &mut findings) {
+            Err(LogError(reasons)) => unusable.extend(reasons.iter().map(ToString::to_string)),
+            Ok(log) => {
+                warnings.extend(findings.iter().map(ToString::to_string));
+                let mut one = Summary::new(&body, options);
+                match one.push(&body, &log, options, None) {
+                    Ok(notes) => warnings.extend(notes),
+                    Err(error) => refused.push(format!("{name}: {error}")),
+                }
+                // A log and its summary must come to the same.
+                if let Err(error) = summary.merge(&one) {
+                    unusable.push(format!("{name}: {error}"));
+                }
+                if shown_samples < SHOWN {
+                    shown_samples += log.t.len();
+                    shown.push(log);
+                }
+            }
+        }
+    }
+    if !unusable.is_empty() {
+        return Err(Failure::Unusable(unusable.join("\n")));
+    }
+    if summary.logs.is_empty() {
+        return Err(Failure::Refused(refused.join("\n")));
+    }
+    warnings.extend(refused.into_iter().map(|r| format!("{r}; the log was left out")));
+    warnings.extend(rests(&summary));
+    Ok(Reduced { body, summary, shown, warnings })
+}
+
+/// A file's summary; `None` where the file is something else.
+fn read_summary(file: &Path) -> Result<Option<Summary>, String> {
+    let read = |mut f: std::fs::File| {
+        let mut head = vec![0; 64];
+        let count = f.read(&mut head)?;
+        head.truncate(count);
+        if Summary::is_summary(&head) {
+            f.read_to_end(&mut head)?;
+            return Ok(Some(head));
+        }
+        Ok(None)
+    };
+    let bytes = std::fs::File::open(file).and_then(read).map_err(|e| format!("cannot be read: {e}"))?;
+    bytes.map(|bytes| Summary::from_bytes(&bytes).map_err(|e| e.to_string())).transpose()
+}
+
+/// What is to be said of joints that rested.
+fn rests(summary: &Summary) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (j, octaves) in summary.joints.iter().enumerate() {
+        let rested = summary.samples - octaves.rows();
+        if octaves.rows() < 20 {
+            notes.push(format!(
+                "joint {} does not move in these logs: nothing can be said of its friction",
+                j + 1
+            ));
+        } else if rested * 4 > summary.samples {
+            notes.push(format!(
+                "joint {} rests in {:.0} % of the samples ({} s or longer, or at an end of a log); they were left out",
+                j + 1,
+                100.0 * rested as f64 / summary.samples as f64,
+                rest::LONGEST_REVERSAL
+            ));
+        }
+    }
+    notes
+}

@@ -1,0 +1,82 @@
+//! `powerball summarize`: a log as triangular factors.
+
+use super::Failure;
+use super::output::{self, Progress};
+use super::reduced::reduce;
+use crate::regression::DataOptions;
+use clap::Args;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Reduce logs to triangular factors, which `powerball identify` takes in place of the logs.
+///
+/// A summary is of one size however long the logs were, and holds all that a fit needs of them: the rows of every joint
+/// for any friction steepness, octave by octave. Summaries made one by one anywhere come to what their logs would
+/// have come to together. They are of one arm file; another one refuses them.
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Example:\n  powerball summarize --arm arm.toml --log a.csv --out a.summary\n  powerball identify --arm arm.toml --log a.summary b.summary c.csv --out result"
+)]
+pub(crate) struct Summarize {
+    /// The arm file (TOML).
+    #[arg(long, value_name = "ARM.toml")]
+    arm: PathBuf,
+    /// Logs (CSV or Parquet), or summaries to join.
+    #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
+    log: Vec<PathBuf>,
+    /// The summary to write.
+    #[arg(long, value_name = "SUMMARY")]
+    out: PathBuf,
+    /// Print what was written as one JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What was written.
+#[derive(Serialize)]
+struct Written {
+    arm: String,
+    set: &'static str,
+    logs: Vec<String>,
+    seconds: f64,
+    /// By joint.
+    rows: Vec<u64>,
+    bytes: usize,
+    band: [f64; 2],
+    warnings: Vec<String>,
+}
+
+impl Summarize {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let reduced = reduce(&self.arm, &self.log, &DataOptions::default(), &Progress::new())?;
+        let summary = &reduced.summary;
+        let bytes = summary.to_bytes();
+        output::write_file(&self.out, &bytes)?;
+        let written = Written {
+            arm: summary.identity.arm.clone(),
+            set: "minimal",
+            logs: summary.logs.iter().map(|(name, _)| name.clone()).collect(),
+            seconds: summary.logs.iter().map(|(_, seconds)| seconds).sum(),
+            rows: summary.joints.iter().map(|j| j.rows()).collect(),
+            bytes: bytes.len(),
+            band: [0.0, summary.identity.cutoff],
+            warnings: reduced.warnings,
+        };
+        if self.json {
+            output::print(&output::json(&written)?);
+            return Ok(());
+        }
+        for warning in &written.warnings {
+            output::print(&format!("note: {warning}"));
+        }
+        output::print(&format!(
+            "{}: {} logs, {:.0} s, up to {} rows a joint, in {} kB",
+            self.out.display(),
+            written.logs.len(),
+            written.seconds,
+            written.rows.iter().max().unwrap_or(&0),
+            written.bytes / 1000
+        ));
+        Ok(())
+    }
+}

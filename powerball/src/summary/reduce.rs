@@ -1,0 +1,178 @@
+//! Logs into factors: one log after another, a long one part by part, so memory does not grow.
+
+use super::{Octaves, Steepness, Summary, steepness};
+use crate::log::Log;
+use crate::parallel;
+use crate::regression::{Data, DataError, DataOptions, RigidBody};
+
+/// A log is worked on in parts of this length, s.
+const PART: f64 = 120.0;
+/// What neighbouring parts share, s: twice what a band leaves out at an end.
+const OVERLAP: f64 = 0.6;
+
+/// The columns of a joint's rows in a reduced log: the minimal set, q̇, 1, tanh(γ·q̇) at the nodes of its [`Steepness`], the
+/// torque. All in the band.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Columns {
+    /// Parameters of the minimal set.
+    pub inertial: usize,
+}
+
+impl Columns {
+    /// Index of the viscous column.
+    #[must_use]
+    pub fn viscous(&self) -> usize {
+        self.inertial
+    }
+
+    /// Index of the constant one.
+    #[must_use]
+    pub fn constant(&self) -> usize {
+        self.inertial + 1
+    }
+
+    /// Index of a node's saturating column.
+    #[must_use]
+    pub fn node(&self, k: usize) -> usize {
+        self.inertial + 2 + k
+    }
+
+    /// Index of the torque.
+    #[must_use]
+    pub fn torque(&self) -> usize {
+        self.inertial + 2 + steepness::NODES
+    }
+
+    /// Columns in all.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.torque() + 1
+    }
+
+    /// The columns on a joint's rows.
+    fn of(&self, data: &Data<'_>, joint: usize, steepness: &Steepness) -> Vec<Vec<f64>> {
+        let rows = &data.joints[joint];
+        let column = |f: &dyn Fn(f64) -> f64| {
+            rows.column(&data.band, &data.recordings, |_, r| r.speed(joint).map(f).collect())
+        };
+        let mut columns = rows.inertial.clone();
+        columns.push(column(&|v| v));
+        columns.push(vec![1.0; rows.len()]);
+        columns.extend(steepness.nodes().iter().map(|g| column(&|v| (g * v).tanh())));
+        columns.push(rows.torque.clone());
+        columns
+    }
+}
+
+/// How rows are counted before they go into a factor: from the columns of a joint, one factor a row.
+pub type RowWeights<'a> = &'a (dyn Fn(usize, &[Vec<f64>]) -> Vec<f64> + Sync);
+
+impl Summary {
+    /// Takes a log in. Returns what was left out of it, in words.
+    ///
+    /// `weights` gives each row's factor √w where rows do not count alike.
+    ///
+    /// # Errors
+    /// [`DataError`] where nothing of the log can be used; nothing has been taken in then.
+    pub fn push(
+        &mut self,
+        body: &RigidBody,
+        log: &Log,
+        options: &DataOptions,
+        weights: Option<RowWeights<'_>>,
+    ) -> Result<Vec<String>, DataError> {
+        let (mut notes, mut seconds, mut refused) = (Vec::new(), 0.0, None);
+        let mut joints = std::mem::take(&mut self.joints);
+        let mut taken = false;
+        for part in parts(log) {
+            match Data::new(body, std::slice::from_ref(&part), options) {
+                Ok(data) => {
+                    joints = parallel::map(&(0..data.dof()).collect::<Vec<_>>(), |&j| {
+                        let mut octaves = joints[j].clone();
+                        self.push_joint(&mut octaves, &data, j, weights);
+                        octaves
+                    });
+                    seconds += data.recordings.iter().map(|r| r.len() as f64 / r.rate).sum::<f64>();
+                    self.samples +=
+                        data.recordings.iter().map(|r| data.band.kept(r.len()).len() as u64).sum::<u64>();
+                    notes.extend(data.left_out);
+                    taken = true;
+                }
+                Err(error) => refused = Some(error),
+            }
+        }
+        self.joints = joints;
+        match refused {
+            Some(error) if !taken => Err(error),
+            _ => {
+                self.logs.push((log.file.clone(), seconds));
+                Ok(notes)
+            }
+        }
+    }
+
+    fn push_joint(
+        &self,
+        octaves: &mut Octaves,
+        data: &Data<'_>,
+        joint: usize,
+        weights: Option<RowWeights<'_>>,
+    ) {
+        let rows = &data.joints[joint];
+        if rows.is_empty() {
+            return;
+        }
+        let mut columns = self.columns().of(data, joint, &self.identity.steepness[joint]);
+        if let Some(weights) = weights {
+            let factors = weights(joint, &columns);
+            for column in &mut columns {
+                column.iter_mut().zip(&factors).for_each(|(c, f)| *c *= f);
+            }
+        }
+        for (kept, range) in rows.kept.iter().zip(&rows.rows) {
+            // Stretches without a gap.
+            let mut first = 0;
+            for k in 1..=kept.len() {
+                if k == kept.len() || kept[k] != kept[k - 1] + 1 {
+                    let run = range.start + first..range.start + k;
+                    octaves.push(&columns.iter().map(|c| &c[run.clone()]).collect::<Vec<_>>());
+                    first = k;
+                }
+            }
+        }
+    }
+}
+
+/// A log in parts that share what a band leaves out at their ends: each piece of it in equal ones of about [`PART`].
+fn parts(log: &Log) -> Vec<Log> {
+    let whole = |log: &Log| log.t.last().unwrap_or(&0.0) - log.t.first().unwrap_or(&0.0);
+    if whole(log) < 1.5 * PART {
+        return vec![log.clone()];
+    }
+    let mut parts = Vec::new();
+    for piece in &log.pieces {
+        let t = &log.t[piece.clone()];
+        let (start, span) = (t[0], t[t.len() - 1] - t[0]);
+        let count = ((span / PART).round() as usize).max(1);
+        for k in 0..count {
+            let at = |k: usize| start + span * k as f64 / count as f64;
+            let from = t.partition_point(|x| *x < at(k) - if k > 0 { OVERLAP / 2.0 } else { 0.0 });
+            let to = t.partition_point(|x| *x <= at(k + 1) + OVERLAP / 2.0);
+            parts.push(part(log, piece.start + from..piece.start + to));
+        }
+    }
+    parts
+}
+
+fn part(log: &Log, range: std::ops::Range<usize>) -> Log {
+    let cut = |x: &Vec<Vec<f64>>| x.iter().map(|c| c[range.clone()].to_vec()).collect();
+    Log {
+        file: log.file.clone(),
+        t: log.t[range.clone()].to_vec(),
+        q: cut(&log.q),
+        torque: cut(&log.torque),
+        temperature: log.temperature.as_ref().map(cut),
+        pieces: vec![0..range.len()],
+        clock: log.clock,
+    }
+}
