@@ -33,7 +33,7 @@ fn main() -> ! {
         if let Ok(driver) = &mut driver {
             now += black_box(1000);
             let came = black_box([powerball::canopen::Frame::from_raw(0x183, &[0; 8])]);
-            black_box(bus::step(
+            let _ = black_box(bus::step(
                 black_box(driver),
                 now,
                 came.as_slice().first().map_or(&[], Option::as_slice),
