@@ -6,10 +6,13 @@ fn main() {
     println!("cargo::rerun-if-changed=tests/arms");
     for name in ["puma560", "ur5e", "panda", "stanford"] {
         for set in [SetKind::Full, SetKind::Minimal, SetKind::Symbolic] {
-            let config = Config::new(format!("tests/arms/{name}.toml")).parameters(set);
+            let config =
+                Config::new(format!("tests/arms/{name}.toml")).parameters(set).batch(name == "stanford");
             config.build(&format!("{name}_{set}.rs")).unwrap_or_else(|e| e.exit());
         }
     }
+    let rotorless = Config::new("tests/arms/lwa4p_rotorless.toml");
+    rotorless.batch(true).build("lwa4p_rotorless_minimal.rs").unwrap_or_else(|e| e.exit());
     let full = Config::new("powerball/arm.toml").parameters(SetKind::Full);
     full.build("lwa4p_full.rs").unwrap_or_else(|e| e.exit());
 }

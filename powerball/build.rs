@@ -4,7 +4,10 @@ use dyngen::{Config, SetKind};
 
 fn main() {
     for set in [SetKind::Minimal, SetKind::Symbolic, SetKind::Published] {
-        let built = Config::new("arm.toml").parameters(set).build(&format!("{set}.rs"));
+        let built = Config::new("arm.toml")
+            .parameters(set)
+            .batch(set == SetKind::Minimal)
+            .build(&format!("{set}.rs"));
         built.unwrap_or_else(|e| e.exit());
     }
 }

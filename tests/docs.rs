@@ -7,8 +7,17 @@ use powerball_workspace::root;
 /// Words in backticks that look like a path of this repository, and targets of links.
 fn paths(page: &str) -> Vec<String> {
     let code = page.split('`').skip(1).step_by(2);
-    let first_folders =
-        ["dyngen/", "dyngen-macros/", "powerball/", "tests/", "docs/", "examples/", "benches/", ".ci/"];
+    let first_folders = [
+        "dyngen/",
+        "dyngen-macros/",
+        "powerball/",
+        "tests/",
+        "docs/",
+        "examples/",
+        "benches/",
+        "firmware/",
+        ".ci/",
+    ];
     let named = code.filter(|w| first_folders.iter().any(|f| w.starts_with(f)) && !w.contains(' '));
     let links = page.split("](").skip(1).filter_map(|rest| rest.split(')').next());
     let local = links.filter(|l| !l.contains("://") && !l.starts_with('#'));
@@ -24,6 +33,7 @@ fn every_path_that_a_page_names_exists() {
         "docs/bus.md",
         "docs/transports.md",
         "docs/dyngen.md",
+        "docs/performance.md",
         "docs/explain.md",
         "docs/model.md",
     ] {

@@ -2,8 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use nalgebra::{SVector, SimdValue};
+use nalgebra::{SMatrix, SVector, SimdValue};
 use num_dual::Dual64;
+use powerball::batch::{self, Work};
 use powerball_workspace::generated::{panda_minimal, stanford_minimal};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -30,6 +31,53 @@ fn lanes_are_the_samples() {
             panda_minimal::inverse_dynamics(q, dq, ddq, &parameters)
         );
         assert_eq!(regressor.map(|x| x.extract(lane)), panda_minimal::regressor(q, dq, ddq));
+    }
+}
+
+/// A block of samples is its samples, to the bit, whatever vectors the processor has: an arm with a prismatic joint, with an
+/// angle beyond what is reduced without a branch in one lane, a vector, a matrix and a number as results.
+#[test]
+fn blocks_are_the_samples() {
+    const LANES: usize = 8;
+    type Block = [[f64; LANES]; 6];
+    struct Everything<'a> {
+        motion: &'a [Block; 3],
+        parameters: &'a SVector<f64, { stanford_minimal::PARAMETERS }>,
+    }
+    impl Work for Everything<'_> {
+        type Output = (Block, [Block; stanford_minimal::PARAMETERS], [f64; LANES]);
+        #[inline(always)]
+        fn run(self) -> Self::Output {
+            let [q, dq, ddq] = self.motion;
+            let (mut torque, mut regressor, mut energy) =
+                ([[0.0; LANES]; 6], [[[0.0; LANES]; 6]; stanford_minimal::PARAMETERS], [0.0; LANES]);
+            stanford_minimal::batch::inverse_dynamics(q, dq, ddq, self.parameters, &mut torque);
+            stanford_minimal::batch::regressor(q, dq, ddq, &mut regressor);
+            stanford_minimal::batch::kinetic_energy(q, dq, self.parameters, &mut energy);
+            (torque, regressor, energy)
+        }
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let parameters: SVector<f64, { stanford_minimal::PARAMETERS }> = random(&mut rng);
+    for far in [0.0, 1e4, 1e7] {
+        let mut samples: [[SVector<f64, 6>; 3]; LANES] =
+            std::array::from_fn(|_| std::array::from_fn(|_| random(&mut rng)));
+        samples[3][0][4] += far;
+        let block = |k: usize| -> Block { std::array::from_fn(|i| samples.map(|sample| sample[k][i])) };
+        let motion = [block(0), block(1), block(2)];
+        let work = || Everything { motion: &motion, parameters: &parameters };
+        for (torque, regressor, energy) in [batch::run(work()), work().run()] {
+            for (lane, [q, dq, ddq]) in samples.iter().enumerate() {
+                let expected = stanford_minimal::inverse_dynamics(q, dq, ddq, &parameters);
+                assert_eq!(torque.map(|x| x[lane]), <[f64; 6]>::from(expected));
+                let expected = stanford_minimal::regressor(q, dq, ddq);
+                let found = SMatrix::<f64, 6, { stanford_minimal::PARAMETERS }>::from_fn(|i, j| {
+                    regressor[j][i][lane]
+                });
+                assert_eq!(expected, found);
+                assert_eq!(energy[lane], stanford_minimal::kinetic_energy(q, dq, &parameters));
+            }
+        }
     }
 }
 

@@ -1,5 +1,11 @@
 //! Paired timings: what is compared runs in turn in one process, so that ratios mean something on any machine.
 
+#![allow(dead_code)]
+
+pub(crate) mod by_hand;
+pub(crate) mod with_nalgebra;
+
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// The shortest of many runs of each of several things, run in turn.
@@ -13,4 +19,14 @@ pub(crate) fn paired<const N: usize>(rounds: usize, mut things: [&mut dyn FnMut(
         }
     }
     best
+}
+
+/// Prints a table, and writes it into its section of the page after `--write` on the command line.
+pub(crate) fn publish(section: &str, table: &str) {
+    println!("{table}");
+    let mut arguments = std::env::args().skip_while(|argument| argument != "--write").skip(1);
+    if let Some(page) = arguments.next() {
+        let page = Path::new(env!("CARGO_MANIFEST_DIR")).join(page);
+        powerball_workspace::document::write_section(&page, section, table).unwrap();
+    }
 }

@@ -39,6 +39,7 @@ use syn::{ItemMod, parse_macro_input, parse_quote};
 /// - `arm! { file = "arm.toml", parameters = full, functions = [regressor, gravity] }`: what is named, only.
 /// - `arm! { toml = r#"…"#, … }`: the arm file's text in place.
 /// - `friction = ["viscous", "tanh:216"]`, `tests = true`: friction columns, and the arm's own consistency tests.
+/// - `batch = true`: the module `batch` with the functions over blocks of samples.
 /// - `values = "values.json"` besides either: parameter values to bake in; the functions then take none.
 ///
 /// Everything that is wrong with the arm is reported at once, as errors of the compiler. The crate is built again

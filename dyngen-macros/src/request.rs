@@ -83,11 +83,12 @@ impl Call {
             "parameters" => syn::parse2(value).and_then(|name| self.parameters(&name)),
             "functions" => names.parse2(value).map(|names| self.functions(&names)),
             "friction" => texts.parse2(value).map(|terms| self.friction(&terms)),
+            "batch" => syn::parse2(value).map(|batch: LitBool| self.options.batch = batch.value),
             "tests" => syn::parse2(value).map(|tests: LitBool| self.options.tests = tests.value),
             _ => Err(Error::new(
                 key.span(),
                 format!(
-                    "there is no key `{key}`: there are file, toml, values, parameters, functions, friction, tests"
+                    "there is no key `{key}`: there are file, toml, values, parameters, functions, friction, batch, tests"
                 ),
             )),
         };

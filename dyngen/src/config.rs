@@ -92,6 +92,13 @@ impl Config {
         self
     }
 
+    /// Emits the module `batch` too: the functions over blocks of samples, for the processor's vectors.
+    #[must_use]
+    pub fn batch(mut self, batch: bool) -> Self {
+        self.options.batch = batch;
+        self
+    }
+
     /// Emits the arm's own consistency tests, in a `#[cfg(test)]` module.
     #[must_use]
     pub fn tests(mut self, tests: bool) -> Self {

@@ -65,8 +65,10 @@ fn generated_code_compiles_without_a_warning_and_passes_its_own_tests() {
         "//! Generated arms.\n#![no_std]\n#![deny(warnings, missing_docs, clippy::all)]\n".to_string();
     let friction = ["viscous", "coulomb", "tanh:200"].map(|term| term.parse::<FrictionTerm>().unwrap());
     for arm in ARMS {
-        let config =
-            Config::new(tests().join(format!("arms/{arm}.toml"))).friction(friction.clone()).tests(true);
+        let config = Config::new(tests().join(format!("arms/{arm}.toml")))
+            .friction(friction.clone())
+            .batch(true)
+            .tests(true);
         config.write(&folder.join(format!("src/{arm}.inc"))).unwrap();
         library += &format!("pub mod {arm} {{\n    //! An arm.\n    include!(\"{arm}.inc\");\n}}\n");
     }

@@ -72,6 +72,7 @@ macro_rules! files {
 
 files! {
     lwa4p_full = "lwa4p_full.rs";
+    lwa4p_rotorless_minimal = "lwa4p_rotorless_minimal.rs";
     puma560_full = "puma560_full.rs";
     puma560_minimal = "puma560_minimal.rs";
     puma560_symbolic = "puma560_symbolic.rs";

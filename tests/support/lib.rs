@@ -1,6 +1,7 @@
 #![allow(clippy::panic)]
 //! What the tests and benches across crates share: the arms, and variants of them.
 
+pub mod document;
 pub mod generated;
 
 use dyngen::Arm;

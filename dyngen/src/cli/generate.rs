@@ -28,6 +28,9 @@ pub(super) struct Args {
     /// tanh:216:180:…).
     #[arg(long, value_delimiter = ',', value_name = "TERMS")]
     friction: Vec<FrictionTerm>,
+    /// Emit the module `batch` too: the functions over blocks of samples, for the processor's vectors.
+    #[arg(long)]
+    batch: bool,
     /// Emit the arm's own consistency tests too.
     #[arg(long)]
     tests: bool,
@@ -46,6 +49,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let mut config = Config::new(&args.arm)
         .parameters(args.parameters.into())
         .friction(args.friction.clone())
+        .batch(args.batch)
         .tests(args.tests);
     if let Some(functions) = &args.functions {
         config = config.functions(functions.clone());

@@ -9,20 +9,14 @@ use crate::exact::rational;
 use crate::graph::{Expr, Graph, Input, JointSum, Node, Preparation, operands};
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
-use quote::{format_ident, quote};
+use quote::{ToTokens, format_ident, quote};
 use std::collections::BTreeSet;
 
 /// A function's items: one that takes q, and one that takes [`Trig`] in its place.
 pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) -> TokenStream {
     let arm = model.arm();
     let needed = built.graph.needed(&built.outputs);
-    let used: BTreeSet<Input> = needed
-        .iter()
-        .filter_map(|n| match built.graph.nodes()[*n] {
-            Node::Input(input) => Some(input),
-            _ => None,
-        })
-        .collect();
+    let used = used(built, &needed);
     let name = Ident::new(built.function.name(), Span::call_site());
     let name_with = format_ident!("{name}_with");
     let doc = docs::lines(&docs::function(built));
@@ -52,6 +46,7 @@ pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) ->
 
         #(#[doc = #doc_with])*
         #lint
+        #[inline(always)]
         #[must_use]
         pub fn #name_with<T: SimdRealField + Copy>(#trig_name: &Trig<T>, #(#signature),*) -> #result {
             #positions
@@ -63,7 +58,7 @@ pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) ->
 }
 
 /// Whether the result is a number for every arm: where it is a vector, one joint makes it a vector of one.
-fn is_number(built: &FunctionGraph) -> bool {
+pub(super) fn is_number(built: &FunctionGraph) -> bool {
     matches!(built.function, Function::KineticEnergy | Function::PotentialEnergy)
 }
 
@@ -140,62 +135,145 @@ fn trig_of(arm: &Arm, used: &BTreeSet<Input>) -> TokenStream {
     if uses_positions(used) { quote!(#bindings let trig = #fields;) } else { quote!(let trig = #fields;) }
 }
 
-/// Takes q apart, and builds a `Trig` of the inputs that are used. A pattern over the storage needs no bounds check and
-/// cannot panic.
-fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
-    let (mut names, mut lets) = (Vec::new(), Vec::new());
-    let (mut sines, mut cosines, mut places) = (Vec::new(), Vec::new(), Vec::new());
-    let zero = quote!(T::zero());
-    for sum in angles(arm) {
-        let revolute = sum.joints().all(|(i, _)| arm.joints[i].kind == JointKind::Revolute);
-        let (s, c) = (format_ident!("s{sum}"), format_ident!("c{sum}"));
-        let (sin, cos) =
-            (revolute && used.contains(&Input::Sin(sum)), revolute && used.contains(&Input::Cos(sum)));
-        let terms = sum.joints().enumerate().map(|(k, (i, negative))| {
-            let q = format_ident!("q{}", i + 1);
-            match (k, negative) {
-                (0, _) => quote!(#q),
-                (_, false) => quote!(+ #q),
-                (_, true) => quote!(- #q),
+/// The inputs that a function reads.
+fn used(built: &FunctionGraph, needed: &[usize]) -> BTreeSet<Input> {
+    let inputs = needed.iter().filter_map(|n| match built.graph.nodes()[*n] {
+        Node::Input(input) => Some(input),
+        _ => None,
+    });
+    inputs.collect()
+}
+
+/// What a function takes of q: the positions that it reads, and the angles whose sine or cosine it needs.
+struct Positions {
+    /// Whether each joint's position is read.
+    read: Vec<bool>,
+    /// Each angle, and the names of its sine and cosine where they are read.
+    angles: Vec<(JointSum, TokenStream, TokenStream)>,
+    /// A `Trig` of them; the rest is zero, because nobody reads it.
+    trig: TokenStream,
+}
+
+impl Positions {
+    /// `position` is how a joint's position is read.
+    fn new(arm: &Arm, used: &BTreeSet<Input>, position: impl Fn(usize) -> TokenStream) -> Positions {
+        let zero = quote!(T::zero());
+        let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
+        let mut read = vec![false; arm.dof()];
+        let (mut found, mut sines, mut cosines, mut places) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for sum in angles(arm) {
+            let turns = sum.joints().all(|(i, _)| revolute(i));
+            let name = |input: Input| {
+                (turns && used.contains(&input)).then(|| format_ident!("{}", input.to_string()))
+            };
+            let (sin, cos) = (name(Input::Sin(sum)), name(Input::Cos(sum)));
+            let or =
+                |name: &Option<Ident>, other: TokenStream| name.as_ref().map_or(other, |name| quote!(#name));
+            if sin.is_some() || cos.is_some() {
+                found.push((sum, or(&sin, quote!(_)), or(&cos, quote!(_))));
+                sum.joints().for_each(|(i, _)| read[i] = true);
             }
-        });
-        let offset = sum.value(|i| trig_offset(arm, i));
-        let offset = (offset != 0.0).then(|| {
-            let offset = Literal::f64_suffixed(offset);
-            quote!(+ nalgebra::convert::<f64, T>(#offset))
-        });
-        let angle = if sum.is_joint() && offset.is_none() {
-            quote!(#(#terms)*)
-        } else {
-            quote!((#(#terms)* #offset))
-        };
-        match (sin, cos) {
-            (true, true) => lets.push(quote!(let (#s, #c) = #angle.simd_sin_cos();)),
-            (true, false) => lets.push(quote!(let #s = #angle.simd_sin();)),
-            (false, true) => lets.push(quote!(let #c = #angle.simd_cos();)),
-            (false, false) => {}
+            sines.push(or(&sin, zero.clone()));
+            cosines.push(or(&cos, zero.clone()));
         }
-        sines.push(if sin { quote!(#s) } else { zero.clone() });
-        cosines.push(if cos { quote!(#c) } else { zero.clone() });
+        for i in 0..arm.dof() {
+            let place = !revolute(i) && used.contains(&Input::Position(i));
+            read[i] |= place;
+            places.push(if place { position(i) } else { zero.clone() });
+        }
+        let trig = quote!(Trig { sin: [#(#sines),*], cos: [#(#cosines),*], position: [#(#places),*] });
+        Positions { read, angles: found, trig }
     }
-    for i in 0..arm.dof() {
-        let q = format_ident!("q{}", i + 1);
-        let revolute = arm.joints[i].kind == JointKind::Revolute;
-        let place = !revolute && used.contains(&Input::Position(i));
-        let in_angle = |input: &Input| match input {
-            Input::Sin(sum) | Input::Cos(sum) => sum.sign(i).is_some(),
-            _ => false,
-        };
-        let read = place || (revolute && used.iter().any(in_angle));
-        names.push(if read { quote!(#q) } else { quote!(_) });
-        places.push(if place { quote!(#q) } else { zero.clone() });
-    }
+}
+
+/// An angle of the joints at their positions.
+fn angle(arm: &Arm, sum: JointSum, position: impl Fn(usize) -> TokenStream) -> TokenStream {
+    let terms = sum.joints().enumerate().map(|(k, (i, negative))| {
+        let q = position(i);
+        match (k, negative) {
+            (0, _) => q,
+            (_, false) => quote!(+ #q),
+            (_, true) => quote!(- #q),
+        }
+    });
+    let offset = sum.value(|i| trig_offset(arm, i));
+    let offset = (offset != 0.0).then(|| {
+        let offset = Literal::f64_suffixed(offset);
+        quote!(+ nalgebra::convert::<f64, T>(#offset))
+    });
+    quote!(#(#terms)* #offset)
+}
+
+/// Takes q apart, computes all sines and cosines together, and builds a `Trig` of the inputs that are used. A pattern
+/// over the storage needs no bounds check and cannot panic.
+fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
+    let position = |i: usize| lane_name(Argument::Positions, i).into_token_stream();
+    let Positions { read, angles, trig } = Positions::new(arm, used, position);
+    let patterns = (0..arm.dof()).map(|i| if read[i] { position(i) } else { quote!(_) });
+    let computed = (!angles.is_empty()).then(|| {
+        let (sines, cosines) = (angles.iter().map(|a| &a.1), angles.iter().map(|a| &a.2));
+        let values = angles.iter().map(|(sum, ..)| angle(arm, *sum, position));
+        quote!(let ([#(#sines),*], [#(#cosines),*]) = trigonometry::sin_cos([#(#values),*]);)
+    });
     let bindings = quote! {
-        let [[#(#names),*]] = q.data.0;
-        #(#lets)*
+        let [[#(#patterns),*]] = q.data.0;
+        #computed
     };
-    let fields = quote!(Trig { sin: [#(#sines),*], cos: [#(#cosines),*], position: [#(#places),*] });
-    (bindings, fields)
+    (bindings, trig)
+}
+
+/// What a function takes of q at one sample in a block.
+pub(super) struct TrigOfLane {
+    /// Lines without a branch that make its `trig`.
+    pub(super) lines: TokenStream,
+    /// Joints whose angles that is right for only where they are near.
+    pub(super) turning: BTreeSet<usize>,
+    /// Whether each joint's position is read.
+    pub(super) read: Vec<bool>,
+}
+
+impl TrigOfLane {
+    pub(super) fn new(model: &Model, built: &FunctionGraph) -> TrigOfLane {
+        let arm = model.arm();
+        let used = used(built, &built.graph.needed(&built.outputs));
+        let position = |i: usize| {
+            let q = lane_name(Argument::Positions, i);
+            quote!(#q[lane])
+        };
+        let Positions { read, angles, trig } = Positions::new(arm, &used, position);
+        let lines = angles.iter().map(|(sum, sine, cosine)| {
+            let angle = angle(arm, *sum, position);
+            quote!(let (#sine, #cosine) = trigonometry::near(#angle);)
+        });
+        let lines = quote! {
+            #(#lines)*
+            let trig = #trig;
+        };
+        let turning = angles.iter().flat_map(|(sum, ..)| sum.joints().map(|(i, _)| i)).collect();
+        TrigOfLane { lines, turning, read }
+    }
+}
+
+/// The name of an argument's value at a joint.
+pub(super) fn lane_name(argument: Argument, joint: usize) -> Ident {
+    format_ident!("{}{}", argument.name(), joint + 1)
+}
+
+/// The module that computes sines and cosines, for an arm that has any.
+pub(super) fn trigonometry(arm: &Arm) -> TokenStream {
+    if arm.joints.iter().all(|joint| joint.kind != JointKind::Revolute) {
+        return quote!();
+    }
+    // The module that this crate compiles too: it parses.
+    let file = syn::parse_file(include_str!("trigonometry.rs"));
+    let (docs, items) = file.map_or((Vec::new(), Vec::new()), |file| (file.attrs, file.items));
+    quote! {
+        mod trigonometry {
+            #(#docs)*
+            #(#items)*
+        }
+    }
 }
 
 /// The angles of a `Trig`: those of the joints, then sums of parallel joints' angles.

@@ -1,9 +1,14 @@
 //! From graphs to a Rust source file: tokens, docs, formatting.
 
+#[cfg(test)]
+mod accuracy;
+mod batch;
 mod code;
 mod docs;
 mod friction;
 mod tests;
+#[cfg(test)]
+mod trigonometry;
 
 pub use friction::FrictionTerm;
 
@@ -26,6 +31,8 @@ pub struct Options {
     pub values: Option<Vec<f64>>,
     /// Friction terms of every joint; none where empty.
     pub friction: Vec<FrictionTerm>,
+    /// Whether the functions over blocks of samples are emitted too.
+    pub batch: bool,
     /// Whether the arm's own consistency tests are emitted too.
     pub tests: bool,
 }
@@ -38,6 +45,7 @@ impl Default for Options {
             functions: Function::ALL.to_vec(),
             values: None,
             friction: Vec::new(),
+            batch: false,
             tests: false,
         }
     }
@@ -67,7 +75,7 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     let set = model.set(options.parameters)?;
     let functions = Function::ALL.into_iter().filter(|f| options.functions.contains(f));
     let mut preparation = Preparation::default();
-    let functions: Vec<FunctionGraph> = functions
+    let built: Vec<FunctionGraph> = functions
         .map(|function| {
             let built = match &options.values {
                 Some(values) => model.baked_function(function, options.parameters, values)?,
@@ -77,14 +85,15 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
         })
         .collect::<Result<_, Error>>()?;
     let prepared = preparation.values().len();
-    let takes_parameters = functions.iter().any(|f| f.arguments().any(|a| a == Argument::Parameters));
-    let functions: Vec<TokenStream> =
-        functions.iter().map(|built| code::function(model, built, prepared)).collect();
+    let takes_parameters = built.iter().any(|f| f.arguments().any(|a| a == Argument::Parameters));
+    let functions = built.iter().map(|built| code::function(model, built, prepared));
+    let batch = options.batch.then(|| batch::module(model, &built));
     let preparation = takes_parameters.then(|| code::preparation(model, &preparation));
     let (n, p) =
         (Literal::usize_unsuffixed(model.arm().dof()), Literal::usize_unsuffixed(set.parameters.len()));
     let names = set.names();
     let trig = code::trig_struct(model.arm());
+    let trigonometry = code::trigonometry(model.arm());
     let values = options.values.as_ref().map(|values| {
         let values = values.iter().map(|x| Literal::f64_suffixed(*x));
         quote! {
@@ -119,6 +128,10 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
         #(#functions)*
 
         #friction
+
+        #batch
+
+        #trigonometry
 
         #tests
     })

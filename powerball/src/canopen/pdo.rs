@@ -109,7 +109,8 @@ impl Mapping {
     /// Bytes of a frame with this mapping.
     pub const fn len(&self) -> usize {
         let (mut sum, mut i) = (0, 0);
-        while i < self.count as usize {
+        // Those that are not used have no bytes.
+        while i < self.entries.len() {
             sum += self.entries[i].bytes();
             i += 1;
         }

@@ -1,6 +1,7 @@
 //! SYNC and heartbeats in time: when to send, what was late, who is silent. Told the time, never asking it.
 
 use super::Micros;
+use core::num::NonZeroU64;
 
 /// A SYNC that is to be sent now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,7 +17,7 @@ pub struct Tick {
 /// little time for their data.
 #[derive(Clone, Copy, Debug)]
 pub struct SyncProducer {
-    period: Micros,
+    period: NonZeroU64,
     next: Option<Micros>,
     scheduled: Micros,
 }
@@ -24,7 +25,11 @@ pub struct SyncProducer {
 impl SyncProducer {
     /// Stopped; `period` in µs, at least 1.
     pub const fn new(period: Micros) -> SyncProducer {
-        SyncProducer { period: if period == 0 { 1 } else { period }, next: None, scheduled: 0 }
+        let period = match NonZeroU64::new(period) {
+            Some(period) => period,
+            None => NonZeroU64::MIN,
+        };
+        SyncProducer { period, next: None, scheduled: 0 }
     }
 
     /// The first SYNC is due at `now`.
@@ -57,8 +62,8 @@ impl SyncProducer {
         let due = self.next.filter(|&due| now >= due)?;
         let behind = now - due;
         let tick = Tick { late: behind % self.period, skipped: behind / self.period };
-        self.scheduled = if tick.late > self.period / 50 { now } else { now - tick.late };
-        self.next = Some(self.scheduled + self.period);
+        self.scheduled = if tick.late > self.period.get() / 50 { now } else { now - tick.late };
+        self.next = Some(self.scheduled + self.period.get());
         Some(tick)
     }
 }

@@ -68,7 +68,7 @@ impl<T: RealField + Copy, const P: usize> SquareRoot<T, P> {
             if b == T::zero() {
                 continue;
             }
-            let length = a.hypot(b);
+            let length = hypotenuse(a, b);
             let (c, s) = (a / length, b / length);
             for j in k..P {
                 let (above, below) = (self.r[(k, j)], row[j]);
@@ -79,7 +79,7 @@ impl<T: RealField + Copy, const P: usize> SquareRoot<T, P> {
             self.z[k] = c * above + s * below;
             value = c * below - s * above;
         }
-        self.rest = self.rest.hypot(value);
+        self.rest = hypotenuse(self.rest, value);
         self.rows += T::one();
         true
     }
@@ -127,6 +127,17 @@ impl<T: RealField + Copy, const P: usize> SquareRoot<T, P> {
         }
         column.norm()
     }
+}
+
+/// √(a² + b²) without overflow, in the scalar's own precision: libm's for `f32` computes in `f64`, which few
+/// controllers have.
+fn hypotenuse<T: RealField + Copy>(a: T, b: T) -> T {
+    let (long, short) = if a.abs() > b.abs() { (a.abs(), b.abs()) } else { (b.abs(), a.abs()) };
+    if long == T::zero() {
+        return long;
+    }
+    let ratio = short / long;
+    long * (T::one() + ratio * ratio).sqrt()
 }
 
 #[cfg(test)]
