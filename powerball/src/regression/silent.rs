@@ -32,10 +32,13 @@ pub fn silent_joints(arm: &Arm, logs: &[Log]) -> Vec<Option<String>> {
 
 impl Silent {
     fn of(logs: &[Log], joint: usize, kind: JointKind) -> Option<Silent> {
-        let positions = logs.iter().flat_map(|log| &log.q[joint]);
-        let [low, high] =
-            positions.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(*q), high.max(*q)]);
-        let travel = (high - low).max(0.0);
+        // Within a log: that a joint was elsewhere in another one is no motion.
+        let within = |log: &Log| {
+            let ends = [f64::INFINITY, f64::NEG_INFINITY];
+            let [low, high] = log.q[joint].iter().fold(ends, |[low, high], q| [low.min(*q), high.max(*q)]);
+            high - low
+        };
+        let travel = logs.iter().map(within).fold(0.0, f64::max);
         let least = LEAST_TRAVEL[usize::from(kind == JointKind::Prismatic)];
         let changes = |log: &Log| log.torque[joint].windows(2).any(|pair| pair[0] != pair[1]);
         if travel < 1e-4 * least {
@@ -58,7 +61,7 @@ impl Silent {
                  move, its encoder is dead and the other joints are judged wrongly too"
             ),
             Silent::HardlyMoves(travel, least) => format!(
-                "joint {joint} moves by {travel:.4} {unit} only: {lost}; record paths on which it moves by {least} {unit} or more and \
+                "joint {joint} moves by {travel:.4} {unit} at most in a log: {lost}; record paths on which it moves by {least} {unit} or more and \
                  turns back several times (powerball excite)"
             ),
             Silent::Dead => format!(
