@@ -17,6 +17,9 @@ use std::path::{Path, PathBuf};
 /// An hour and more at 1 kHz.
 const MOST_SAMPLES: f64 = 5e6;
 
+/// A floor at its base that blocks more than this share of an arm's poses is not what it was built on.
+const HANGS: f64 = 0.95;
+
 /// A parameter set on the command line.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Set {
@@ -112,7 +115,7 @@ pub(crate) struct Excite {
     #[arg(long, value_name = "MOUNTING", allow_hyphen_values = true)]
     mounting: Vec<Mounting>,
     /// Height of the floor above the base frame's origin along the vertical, m, or `none`. Without it the floor is at 0 where the base
-    /// stands upright, and there is none elsewhere.
+    /// stands upright and the arm can be above it, and there is none elsewhere.
     #[arg(long, value_name = "Z", value_parser = floor, allow_hyphen_values = true)]
     floor: Option<FloorAt>,
     /// Radius of the links' capsules, m.
@@ -313,7 +316,10 @@ impl Excite {
                 let up = mounting.up(arm);
                 let height = match self.floor {
                     Some(FloorAt(height)) => height,
-                    None => (up.z > 0.5).then_some(0.0),
+                    // An arm that is below its base wherever it is hangs over something.
+                    None => (up.z > 0.5)
+                        .then_some(0.0)
+                        .filter(|z| shape.blocked(&shape.floor(up, *z, &limits.0), self.clearance, &limits.0) < HANGS),
                 };
                 assumed.push(match (height, self.floor) {
                     (Some(height), Some(_)) => format!("base {mounting}: floor at {height} m"),

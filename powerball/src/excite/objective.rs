@@ -5,10 +5,12 @@ use super::fourier::Fourier;
 use super::mounting::decimal;
 use crate::motion::Motion;
 use dyngen::arm::{Arm, Parameter, ParameterKind};
-use dyngen::base::SetParameter;
+use dyngen::base::preference::Preference;
 use dyngen::exact::rational::to_f64;
 use dyngen::{Evaluator, Function, Model, SetKind};
 use faer::Mat;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// The figures of a path. Both refer to the regressor with its rows divided by the joints' largest torques and its
 /// columns by their usual size, so that they have no units.
@@ -116,23 +118,41 @@ impl Objective {
     pub fn new(models: &[&Model], kind: SetKind, instants: usize) -> Result<Objective, Error> {
         let first = *models.first().ok_or_else(|| Error::Setting("no mounting was given".to_string()))?;
         let general;
-        let (set, regressors) = if models.len() == 1 {
-            let evaluator = Evaluator::new(first, Function::Regressor, kind)?;
-            (first.set(kind)?, vec![Regressor { evaluator, sums: None }])
-        } else {
-            general = general_model(models)?;
-            let set = general.set(kind)?;
-            let wide = |model: &&Model| -> Result<Regressor, Error> {
-                let evaluator = Evaluator::new(model, Function::Regressor, SetKind::Full)?;
-                let kept = model.arm().kept_parameters();
+        let reference = match models {
+            [only] => *only,
+            _ => {
+                general = general_model(models)?;
+                &general
+            }
+        };
+        let set = reference.set(kind)?;
+        let kept = reference.arm().kept_parameters();
+        // The columns that carry each of the set's parameters, among those of all parameters.
+        let sums: Option<Vec<Vec<(usize, f64)>>> = match kind {
+            SetKind::Minimal => Some(customary(reference)?.into_iter().map(|c| vec![(c, 1.0)]).collect()),
+            _ if models.len() > 1 => {
                 let place = |p: &Parameter| kept.iter().position(|k| k == p);
-                let field = &general.sets().field;
-                let sum = |p: &SetParameter| {
-                    p.carriers.iter().filter_map(|(p, c)| Some((place(p)?, field.value(c)))).collect()
-                };
-                Ok(Regressor { evaluator, sums: Some(set.parameters.iter().map(sum).collect()) })
-            };
-            (set, models.iter().map(wide).collect::<Result<_, _>>()?)
+                let value = |c| reference.sets().field.value(c);
+                let mut sums = Vec::new();
+                for parameter in &set.parameters {
+                    let carriers = parameter.carriers.iter();
+                    sums.push(carriers.filter_map(|(p, c)| Some((place(p)?, value(c)))).collect());
+                }
+                Some(sums)
+            }
+            _ => None,
+        };
+        let of = if sums.is_some() { SetKind::Full } else { kind };
+        let regressor = |model: &&Model| -> Result<Regressor, Error> {
+            Ok(Regressor { evaluator: Evaluator::new(model, Function::Regressor, of)?, sums: sums.clone() })
+        };
+        let regressors = models.iter().map(regressor).collect::<Result<Vec<_>, _>>()?;
+        let reflected = match (&sums, kind) {
+            (Some(sums), SetKind::Minimal) => sums
+                .iter()
+                .map(|sum| sum.iter().map(|(c, _)| reflected(first.arm(), &kept[*c])).product())
+                .collect(),
+            _ => vec![1.0; set.parameters.len()],
         };
         let columns = set.parameters.len();
         // Without a torque limit a joint's torques count as they are.
@@ -144,7 +164,7 @@ impl Objective {
             rank: set.rank,
             row_weights,
             column_scales: vec![1.0; columns],
-            reflected: set.parameters.iter().map(|p| reflected(first.arm(), p)).collect(),
+            reflected,
             instants,
         })
     }
@@ -224,13 +244,53 @@ impl Objective {
     }
 }
 
-/// k² where a column is the rotor inertia of a joint alone, so that it counts at the joint; 1 else.
-fn reflected(arm: &Arm, parameter: &SetParameter) -> f64 {
-    match parameter.carriers.as_slice() {
-        [(carrier, _)] if carrier.kind == ParameterKind::Im => {
-            arm.joints[carrier.link].rotor_ratio.as_ref().map_or(1.0, |k| to_f64(k).powi(2))
+/// k² where a column is a joint's rotor inertia, so that it counts at the joint; 1 else.
+fn reflected(arm: &Arm, parameter: &Parameter) -> f64 {
+    let ratio =
+        arm.joints[parameter.link].rotor_ratio.as_ref().filter(|_| parameter.kind == ParameterKind::Im);
+    ratio.map_or(1.0, |k| to_f64(k).powi(2))
+}
+
+/// The columns of the customary base parameters (Khalil and Dombre's regrouping) among those of all parameters an arm keeps.
+///
+/// The minimal set's own choice of columns is the one whose code is cheapest. A condition number depends on the choice, and
+/// published ones are those of the customary one; any choice determines the same torques.
+fn customary(model: &Model) -> Result<Vec<usize>, Error> {
+    let evaluator = Evaluator::new(model, Function::Regressor, SetKind::Full)?;
+    let kept = model.arm().kept_parameters();
+    let (n, p) = (model.arm().dof(), kept.len());
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let mut draw = || -> Vec<f64> { (0..4 * p * n).map(|_| rng.random_range(-1.5..1.5)).collect() };
+    let (q, dq, ddq) = (draw(), draw(), draw());
+    let mut y = vec![0.0; 4 * p * n * p];
+    evaluator.evaluate(&q, &dq, &ddq, &[], &mut y);
+    // In the order of the preference, what is no combination of columns before it.
+    let (mut chosen, mut basis): (Vec<usize>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
+    for parameter in Preference::ALL[0].order(model.arm()) {
+        let Some(c) = kept.iter().position(|k| *k == parameter) else { continue };
+        let mut column: Vec<f64> = y.iter().skip(c).step_by(p).copied().collect();
+        let length = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let whole = length(&column);
+        // Twice: once leaves the rounding of the first time.
+        for _ in 0..2 {
+            for unit in &basis {
+                let along: f64 = unit.iter().zip(&column).map(|(a, b)| a * b).sum();
+                column.iter_mut().zip(unit).for_each(|(x, u)| *x -= along * u);
+            }
         }
-        _ => 1.0,
+        let left = length(&column);
+        if left > 1e-9 * whole && whole > 0.0 {
+            column.iter_mut().for_each(|x| *x /= left);
+            basis.push(column);
+            chosen.push(c);
+        }
+    }
+    let rank = model.set(SetKind::Minimal)?.rank;
+    match chosen.len() == rank {
+        true => Ok(chosen),
+        false => {
+            Err(Error::Setting(format!("{} of {rank} base columns were found by numbers", chosen.len())))
+        }
     }
 }
 
@@ -252,8 +312,6 @@ mod tests {
     use super::super::Mounting;
     use super::*;
     use crate::regression::newton_euler;
-    use rand::{RngExt, SeedableRng};
-
     /// Two mountings determine what their stacked regressors do, by another formulation of the torque and all parameters apart; and
     /// the condition number is that of the stacked columns.
     #[test]
@@ -287,14 +345,9 @@ mod tests {
         let rank = all.iter().filter(|s| **s > 1e-9 * all[0]).count();
         assert_eq!(objective.size(), (rank, rank));
         assert!(rank > alone.size().1);
-        let general = general_model(&[&models[0], &models[1]]).unwrap();
-        let set = general.set(SetKind::Minimal).unwrap();
+        let sums = objective.regressors[0].sums.clone().unwrap();
         let column = |r: usize, c: usize| -> f64 {
-            let value = |(p, x): &(Parameter, _)| {
-                let at = kept.iter().position(|k| k == p).unwrap();
-                general.sets().field.value(x) * rows[r][at]
-            };
-            set.parameters[c].carriers.iter().map(value).sum::<f64>() / reflected(&arm, &set.parameters[c])
+            sums[c].iter().map(|(k, x)| x * rows[r][*k]).sum::<f64>() / objective.reflected[c]
         };
         let own = singular(rank, &column);
         let conditions = objective.conditions(&motions);

@@ -150,6 +150,16 @@ impl Shape {
         Floor { up, height, moving: range.iter().map(|[low, high]| high - low > 1e-6).collect() }
     }
 
+    /// Share of the poses within the limits in which the floor is nearer than the clearance (m), and nearer than anything else.
+    #[must_use]
+    pub fn blocked(&self, floor: &Floor, clearance: f64, limits: &[JointLimits]) -> f64 {
+        let at_floor = |q: &Vec<f64>| {
+            self.nearest(q, Some(floor))
+                .is_some_and(|near| near.distance < clearance && matches!(near.contact, Contact::Floor(_)))
+        };
+        poses(limits).filter(at_floor).count() as f64 / POSES as f64
+    }
+
     /// The polyline in a pose: base origin, then for each joint its corner and its frame's origin, and the tool, m.
     #[must_use]
     pub fn vertices(&self, q: &[f64]) -> Vec<Vector3<f64>> {
