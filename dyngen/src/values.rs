@@ -1,4 +1,4 @@
-//! Parameter values from a JSON file: `{"parameter": number, …}`.
+//! Parameter values from a JSON file: `{"parameter": number, …}`, or what `powerball identify` wrote.
 
 use crate::arm::Parameter;
 use crate::base::{ParameterSet, SetKind};
@@ -47,10 +47,16 @@ impl Values {
             ));
         };
         let (mut by_name, mut wrong) = (BTreeMap::new(), Vec::new());
-        for (name, value) in object {
+        // identified.json has a list of named values beside much else.
+        let listed: Option<Vec<(String, &serde_json::Value)>> = object
+            .get("parameters")
+            .and_then(|list| list.as_array())
+            .map(|list| list.iter().filter_map(|p| Some((p["name"].as_str()?.to_string(), &p["value"]))).collect());
+        let pairs = listed.unwrap_or_else(|| object.iter().map(|(name, value)| (name.clone(), value)).collect());
+        for (name, value) in pairs {
             match value.as_f64().filter(|x| x.is_finite()) {
                 Some(number) => {
-                    by_name.insert(name.clone(), number);
+                    by_name.insert(name, number);
                 }
                 None => wrong.push(format!("the value of '{name}' must be a finite number, found {value}")),
             }

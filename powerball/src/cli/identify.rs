@@ -6,8 +6,8 @@ use super::inputs::same_file;
 use super::output::{self, Progress};
 use super::reduced::{Reduced, reduce};
 use crate::estimate::{
-    ConsistentReport, FrictionLaw, JointFriction, ParameterEstimate, Solution, Spread, TorqueModel, consistent_fit,
-    identify, solve_reduced, spread, spread_of,
+    ConsistentReport, Errors, FrictionLaw, JointFriction, ParameterEstimate, Solution, Spread, TorqueModel,
+    consistent_fit, errors, identify, solve_instrumental, solve_reduced, solve_robust, spread, spread_of,
 };
 use crate::explain::{TorqueCurve, curves};
 use crate::log::read_logs;
@@ -37,6 +37,9 @@ pub(crate) struct Identify {
     /// The friction of every joint.
     #[arg(long, value_enum, default_value_t)]
     friction: Friction,
+    /// How rows are counted.
+    #[arg(long, value_enum, default_value_t)]
+    estimator: Estimator,
     /// Folder for the results; made if missing.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -53,6 +56,19 @@ enum Friction {
     Symmetric,
     /// Eq. 16 and a constant torque.
     Asymmetric,
+}
+
+/// An estimator by its name on the command line.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Estimator {
+    /// Least squares, every joint weighted by its noise.
+    #[default]
+    Weighted,
+    /// The same, and torque samples that the model cannot believe (knocks, spikes, brief collisions) count less or nothing.
+    Robust,
+    /// Instrumental variables: unbiased where positions are noisy. The regressor from every second sample of the positions,
+    /// its instruments from those between.
+    Instrumental,
 }
 
 /// identified.json.
@@ -82,7 +98,9 @@ impl Identify {
                 )));
             }
         }
-        let Reduced { body, summary, shown, mut warnings } = reduce(&self.arm, &self.log, &options, &progress)?;
+        let whole = !matches!(self.estimator, Estimator::Weighted);
+        let Reduced { body, summary, logs, mut warnings } =
+            reduce(&self.arm, &self.log, &options, whole, &progress)?;
         let (held_out, findings) =
             read_logs(&self.validate, body.arm()).map_err(|e| Failure::Unusable(e.to_string()))?;
         warnings.extend(findings.iter().map(ToString::to_string));
@@ -93,9 +111,27 @@ impl Identify {
             Friction::Symmetric => FrictionLaw::Symmetric,
             Friction::Asymmetric => FrictionLaw::Asymmetric,
         };
-        let solution = solve_reduced(&summary, law);
-        let identified = identify(&summary, &solution);
-        let model = torque_model(&solution);
+        let (solution, errors) = match self.estimator {
+            Estimator::Weighted => weighted(solve_reduced(&summary, law)),
+            Estimator::Instrumental => {
+                let start = solve_reduced(&summary, law);
+                solve_instrumental(&body, &logs, &options, &start).map_err(Failure::Refused)?
+            }
+            Estimator::Robust => {
+                let robust = solve_robust(&body, &logs, &options, law)
+                    .map_err(|e| Failure::Refused(e.to_string()))?;
+                for (j, share) in robust.doubted.iter().enumerate().filter(|(_, share)| **share > 0.01) {
+                    warnings.push(format!(
+                        "joint {}: {:.1} % of the torque samples were beyond belief and counted less",
+                        j + 1,
+                        100.0 * share
+                    ));
+                }
+                weighted(robust.solution)
+            }
+        };
+        let identified = identify(body.names(), &solution, &errors);
+        let model = TorqueModel::of(&solution);
         let validate = if held_out.is_empty() {
             warnings
                 .push("no log was given to --validate: the errors below are those of the fit itself".into());
@@ -104,7 +140,7 @@ impl Identify {
             let data = prepared(&body, &held_out, &options)?;
             Some(spread(&data, &model.residual(&data)))
         };
-        let figures = if held_out.is_empty() { &shown } else { &held_out };
+        let figures = if held_out.is_empty() { &logs } else { &held_out };
         let figures = if figures.is_empty() { Vec::new() } else { curves_of(&body, figures, &options, &model)? };
         let undetermined: Vec<&str> =
             identified.parameters.iter().filter(|p| p.std.is_none()).map(|p| p.name.as_str()).collect();
@@ -153,13 +189,9 @@ impl Identify {
     }
 }
 
-fn torque_model(solution: &Solution) -> TorqueModel {
-    let joints = || 0..solution.layout.dof;
-    TorqueModel {
-        inertial: solution.inertial().to_vec(),
-        friction: joints().map(|j| solution.friction(j)).collect(),
-        offset: joints().map(|j| solution.offset(j)).collect(),
-    }
+fn weighted(solution: Solution) -> (Solution, Errors) {
+    let errors = errors(&solution);
+    (solution, errors)
 }
 
 fn prepared<'a>(

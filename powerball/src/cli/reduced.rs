@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Reduced {
     pub body: RigidBody,
     pub summary: Summary,
-    /// The first logs as they were read, for figures.
-    pub shown: Vec<Log>,
+    /// The first logs as they were read, for figures; all where they were asked for.
+    pub logs: Vec<Log>,
     pub warnings: Vec<String>,
 }
 
@@ -31,11 +31,13 @@ pub(crate) fn body(arm: &Path, progress: &Progress) -> Result<(RigidBody, Vec<St
     Ok((body, arm.notes()))
 }
 
-/// Reads and reduces files, each a log or a summary; every file that is unusable is named.
+/// Reads and reduces files, each a log or a summary; every file that is unusable is named. Where logs are needed `whole`,
+/// all are kept and a summary is none.
 pub(crate) fn reduce(
     arm: &Path,
     files: &[PathBuf],
     options: &DataOptions,
+    whole: bool,
     progress: &Progress,
 ) -> Result<Reduced, Failure> {
     let (body, mut warnings) = body(arm, progress)?;
@@ -51,6 +53,12 @@ pub(crate) fn reduce(
         progress.say(&format!("reading {name}"));
         match read_summary(file) {
             Ok(None) => {}
+            Ok(Some(_)) if whole => {
+                unusable.push(format!(
+                    "{name}: is a summary, and this estimator looks at single samples: give the log itself"
+                ));
+                continue;
+            }
             Ok(Some(read)) => {
                 for (log, _) in &read.logs {
                     if summary.logs.iter().any(|(other, _)| other == log) {
@@ -73,7 +81,7 @@ pub(crate) fn reduce(
             Ok(log) => {
                 warnings.extend(findings.iter().map(ToString::to_string));
                 let mut one = Summary::new(&body, options);
-                match one.push(&body, &log, options, None) {
+                match one.push(&body, &log, options) {
                     Ok(notes) => warnings.extend(notes),
                     Err(error) => refused.push(format!("{name}: {error}")),
                 }
@@ -81,7 +89,7 @@ pub(crate) fn reduce(
                 if let Err(error) = summary.merge(&one) {
                     unusable.push(format!("{name}: {error}"));
                 }
-                if shown_samples < SHOWN {
+                if whole || shown_samples < SHOWN {
                     shown_samples += log.t.len();
                     shown.push(log);
                 }
@@ -96,7 +104,7 @@ pub(crate) fn reduce(
     }
     warnings.extend(refused.into_iter().map(|r| format!("{r}; the log was left out")));
     warnings.extend(rests(&summary));
-    Ok(Reduced { body, summary, shown, warnings })
+    Ok(Reduced { body, summary, logs: shown, warnings })
 }
 
 /// A file's summary; `None` where the file is something else.

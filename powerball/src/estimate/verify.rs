@@ -3,7 +3,7 @@
 use super::distribution::t_quantile_975;
 use super::fit::friction_columns;
 use super::noise::noise_floor;
-use super::{Design, spread};
+use super::{Design, Solution, spread};
 use crate::regression::Data;
 use serde::Serialize;
 
@@ -36,6 +36,17 @@ pub struct JointVerdict {
 }
 
 impl TorqueModel {
+    /// The model of a fit.
+    #[must_use]
+    pub fn of(solution: &Solution) -> TorqueModel {
+        let joints = || 0..solution.layout.dof;
+        TorqueModel {
+            inertial: solution.inertial().to_vec(),
+            friction: joints().map(|j| solution.friction(j)).collect(),
+            offset: joints().map(|j| solution.offset(j)).collect(),
+        }
+    }
+
     /// Measured less predicted torque, by joint, N·m.
     #[must_use]
     pub fn residual(&self, data: &Data<'_>) -> Vec<Vec<f64>> {

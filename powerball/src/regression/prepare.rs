@@ -84,6 +84,19 @@ impl<'a> Data<'a> {
     /// # Errors
     /// [`DataError`] where nothing usable remains.
     pub fn new(body: &'a RigidBody, logs: &[Log], options: &DataOptions) -> Result<Data<'a>, DataError> {
+        Data::corrected(body, logs, options, |_| {})
+    }
+
+    /// Prepares logs whose signals are corrected on the even grid before they pass the band.
+    ///
+    /// # Errors
+    /// As [`Data::new`].
+    pub fn corrected(
+        body: &'a RigidBody,
+        logs: &[Log],
+        options: &DataOptions,
+        correct: impl FnMut(&mut Recording),
+    ) -> Result<Data<'a>, DataError> {
         let n = body.dof();
         let mut steps: Vec<f64> = logs.iter().filter_map(|log| median_step(&log.t)).collect();
         steps.sort_by(f64::total_cmp);
@@ -91,7 +104,7 @@ impl<'a> Data<'a> {
         let rate = 1.0 / step;
         let band = Band::new(options.cutoff, rate);
         let mut left_out = Vec::new();
-        let mut recordings = Vec::new();
+        let mut recordings: Vec<Recording> = Vec::new();
         for (index, log) in logs.iter().enumerate() {
             for piece in &log.pieces {
                 let span = log.t[piece.end - 1] - log.t[piece.start];
@@ -105,6 +118,7 @@ impl<'a> Data<'a> {
         if recordings.is_empty() {
             return Err(DataError::TooShort);
         }
+        recordings.iter_mut().for_each(correct);
         let rest_speed: Vec<f64> = (0..n)
             .map(|j| {
                 let speeds = recordings.iter().flat_map(|r| r.speed(j).map(f64::abs)).collect();
@@ -150,6 +164,30 @@ impl<'a> Data<'a> {
             force: OnceLock::new(),
             declared_zero: OnceLock::new(),
         })
+    }
+
+    /// The same rows with other signals: samples, band and blocks stay as they are.
+    #[must_use]
+    pub fn seen_otherwise(&self, correct: impl FnMut(&mut Recording)) -> Data<'a> {
+        let mut recordings = self.recordings.clone();
+        recordings.iter_mut().for_each(correct);
+        let kept = self.joints.iter().map(|j| j.kept.clone()).collect();
+        let joints = joint_rows(self.body, &recordings, &self.band, kept);
+        Data {
+            body: self.body,
+            recordings,
+            band: self.band.clone(),
+            joints,
+            blocks: self.blocks.clone(),
+            logs: self.logs.clone(),
+            rest_speed: self.rest_speed.clone(),
+            left_out: self.left_out.clone(),
+            notes: self.notes.clone(),
+            top_speed: self.top_speed.clone(),
+            last_link: OnceLock::new(),
+            force: OnceLock::new(),
+            declared_zero: OnceLock::new(),
+        }
     }
 
     /// Joints.

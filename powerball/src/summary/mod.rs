@@ -11,7 +11,8 @@ mod triangle;
 
 pub use file::SummaryError;
 pub use octaves::{OCTAVES, Octaves, SLOW};
-pub use reduce::{Columns, RowWeights};
+pub use reduce::Columns;
+pub(crate) use reduce::parts;
 pub use steepness::{NODES, Steepness};
 pub use triangle::Triangle;
 
