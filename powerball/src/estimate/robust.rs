@@ -64,10 +64,15 @@ pub fn solve_robust(
         let gentle = round < GENTLE_ROUNDS;
         let summary = reduce(body, logs, options, |recording| {
             for (j, miss) in model.misses(body, recording).into_iter().enumerate() {
-                let rows: Vec<usize> = in_motion(recording, j).collect();
-                for k in rows {
-                    let unbelieved = miss[k] - believed(miss[k], deviation[j], gentle);
-                    recording.torque[j][k] -= unbelieved;
+                // Near a reversal friction itself may be far from its law: nothing is discarded there, only bounded.
+                let slow: Vec<bool> = recording.speed(j).map(|v| v.abs() <= REST_SPEED).collect();
+                for (k, tau) in recording.torque[j].iter_mut().enumerate() {
+                    let bound = DISCARDED * deviation[j];
+                    let counts = match slow[k] {
+                        true => miss[k].clamp(-bound, bound),
+                        false => believed(miss[k], deviation[j], gentle),
+                    };
+                    *tau -= miss[k] - counts;
                 }
             }
         })?;
