@@ -25,9 +25,8 @@ fn main() {
     let n = body.dof();
     let samples = std::env::var("SAMPLES").map_or(SAMPLES, |s| s.parse().unwrap());
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let mut draw = |scale: f64| -> Vec<f64> {
-        (0..samples * n).map(|_| scale * rng.random_range(-1.0..1.0)).collect()
-    };
+    let mut draw =
+        |scale: f64| -> Vec<f64> { (0..samples * n).map(|_| scale * rng.random_range(-1.0..1.0)).collect() };
     let (q, dq, ddq) = (draw(2.0), draw(1.0), draw(3.0));
     let mut tau = draw(0.1);
     // Cylinders of a few kilograms: all that matters is that both fit the same torques.

@@ -48,11 +48,12 @@ impl Values {
         };
         let (mut by_name, mut wrong) = (BTreeMap::new(), Vec::new());
         // identified.json has a list of named values beside much else.
-        let listed: Option<Vec<(String, &serde_json::Value)>> = object
-            .get("parameters")
-            .and_then(|list| list.as_array())
-            .map(|list| list.iter().filter_map(|p| Some((p["name"].as_str()?.to_string(), &p["value"]))).collect());
-        let pairs = listed.unwrap_or_else(|| object.iter().map(|(name, value)| (name.clone(), value)).collect());
+        let listed: Option<Vec<(String, &serde_json::Value)>> =
+            object.get("parameters").and_then(|list| list.as_array()).map(|list| {
+                list.iter().filter_map(|p| Some((p["name"].as_str()?.to_string(), &p["value"]))).collect()
+            });
+        let pairs =
+            listed.unwrap_or_else(|| object.iter().map(|(name, value)| (name.clone(), value)).collect());
         for (name, value) in pairs {
             match value.as_f64().filter(|x| x.is_finite()) {
                 Some(number) => {

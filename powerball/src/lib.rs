@@ -17,6 +17,8 @@ pub mod estimate;
 #[cfg(feature = "std")]
 pub mod excite;
 #[cfg(feature = "std")]
+pub mod experiment;
+#[cfg(feature = "std")]
 pub mod explain;
 pub mod friction;
 #[cfg(feature = "std")]

@@ -110,7 +110,9 @@ impl ConsistentCommand {
             distance.join(", ")
         ));
         for link in &found.without_body {
-            output::print(&format!("note: no body can have the symmetries that the file declares of link {link}"));
+            output::print(&format!(
+                "note: no body can have the symmetries that the file declares of link {link}"
+            ));
         }
         Ok(())
     }

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 /// result.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  powerball demo\n  powerball demo --seed 7 --out demo7\n  \
-    powerball demo --effect hysteresis\n\nThe logs can then be explained by hand:\n  \
+    powerball demo --effect hysteresis\n  powerball demo --effect asymmetry --seed 3 --experiment\n\nThe logs can then be explained by hand:\n  \
     powerball explain --arm demo/arm.toml --log demo/fit_*.csv --validate demo/held_out_*.csv --out again")]
 pub(crate) struct DemoCommand {
     /// Folder for the results; made if missing.
@@ -26,6 +26,9 @@ pub(crate) struct DemoCommand {
     /// The effect by name instead of one that the seed draws.
     #[arg(long, value_name = "NAME")]
     effect: Option<String>,
+    /// Where two names fit equally well, also record the experiment that tells them apart, and let it decide.
+    #[arg(long)]
+    experiment: bool,
     /// Print the result as one JSON object on standard output.
     #[arg(long)]
     json: bool,
@@ -37,13 +40,15 @@ impl DemoCommand {
         std::fs::create_dir_all(&self.out)
             .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", self.out.display())))?;
         let started = std::time::Instant::now();
-        let demo = demo::run(&self.out, self.seed, self.effect.as_deref(), &|what| progress.say(what))
-            .map_err(|e| match e {
-                DemoError::Session(SessionError::UnknownEffect(_) | SessionError::Write(..)) => {
-                    Failure::Unusable(e.to_string())
-                }
-                _ => Failure::Refused(e.to_string()),
-            })?;
+        let demo = demo::run(&self.out, self.seed, self.effect.as_deref(), self.experiment, &|what| {
+            progress.say(what)
+        })
+        .map_err(|e| match e {
+            DemoError::Session(SessionError::UnknownEffect(_) | SessionError::Write(..)) => {
+                Failure::Unusable(e.to_string())
+            }
+            _ => Failure::Refused(e.to_string()),
+        })?;
         let seconds = started.elapsed().as_secs_f64();
         output::write(&self.out, "explained.json", output::json(&demo.explained)?.as_bytes())?;
         output::write(&self.out, "report.html", demo::page(&demo).to_html().as_bytes())?;
@@ -87,6 +92,7 @@ impl DemoCommand {
                 explained.noise_floor[joint]
             );
         }
+        out.push_str(&super::explain::open_in_words(explained));
         let _ = writeln!(
             out,
             "\nnamed:         {}\nin the plant:  {}\n\n{}\n\n{} and the logs beside it, {seconds:.1} s",

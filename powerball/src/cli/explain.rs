@@ -1,20 +1,33 @@
 //! `powerball explain`: the residual loop, from logs to explained.json and report.html.
 
 use super::Failure;
+use super::bus::{Where, virtual_bus};
 use super::inputs::{Inputs, load};
 use super::output::{self, Progress};
-use crate::explain::{Explained, add_to_page, explain};
+use crate::bus::{Bus, BusUrl};
+use crate::driver::lwa4p::LWA4P;
+use crate::experiment::{self, TRAJECTORY};
+use crate::explain::{ExplainError, Explained, Options, add_to_page, explain_with};
+use crate::log::read_logs;
+use crate::motion::Motion;
+use crate::procedure::{RecordError, record};
 use crate::regression::DataOptions;
 use crate::report::Page;
+use crate::virtual_arm::Undeclared;
 use clap::Args;
-use std::path::PathBuf;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
 
 /// Find, name and add what the model lacks on logs; every addition is judged on another path.
 ///
-/// Writes explained.json and report.html.
+/// Writes explained.json and report.html; where two names fit equally well, also next_experiment.csv: the trajectory on which they
+/// differ most. With --experiment THE ARM MOVES along it.
 #[derive(Args, Debug)]
 #[command(
-    after_help = "Example:\n  powerball explain --arm arm.toml --log a.csv b.csv c.csv --validate d.csv --out result"
+    after_help = "Example:\n  powerball explain --arm arm.toml --log a.csv b.csv c.csv --validate d.csv --out result\n\n\
+    On the virtual arm, from logs to a decision between two names that fit alike:\n  \
+    powerball demo --effect asymmetry --seed 3 --out demo\n  \
+    powerball explain --arm demo/arm.toml --log demo/fit_*.csv --validate demo/held_out_*.csv --out again --experiment"
 )]
 pub(crate) struct Explain {
     #[command(flatten)]
@@ -22,16 +35,52 @@ pub(crate) struct Explain {
     /// Logs of another path, on which additions must hold.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     validate: Vec<PathBuf>,
+    /// Where two names fit equally well, record the experiment that tells them apart, and explain again with its log.
+    #[arg(long)]
+    experiment: bool,
+    /// Where something stays without a name, fit a bounded curve of the one or two signals that it depends on most; kept where
+    /// errors fall that it was not fitted to.
+    #[arg(long)]
+    correct_unattributed: bool,
+    /// The bus that the arm of the experiment is on.
+    #[arg(long, value_name = "URL", default_value = "virtual", requires = "experiment")]
+    bus: BusUrl,
+    /// What is undeclared in the virtual arm, where it is on --bus virtual: as `powerball demo` writes it; without, the file
+    /// virtual_arm.json beside the arm file.
+    #[arg(long, value_name = "FILE", requires = "experiment")]
+    plant: Option<PathBuf>,
 }
 
 impl Explain {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let progress = Progress::new();
-        let loaded = load(&self.inputs, &self.validate, &progress)?;
-        let say = |what: &str| progress.say(what);
-        let mut explained =
-            explain(&loaded.body, &loaded.fit, &loaded.validate, &DataOptions::default(), &say)
-                .map_err(|e| Failure::Refused(e.to_string()))?;
+        let arm = if self.experiment { Some(self.arm()?) } else { None };
+        let mut loaded = load(&self.inputs, &self.validate, &progress)?;
+        let (say, options) = (|what: &str| progress.say(what), DataOptions::default());
+        let told = Options { correct_unattributed: self.correct_unattributed, ..Options::default() };
+        let refused = |e: ExplainError| Failure::Refused(e.to_string());
+        let mut explained = explain_with(&loaded.body, &loaded.fit, &loaded.validate, &options, &told, &say)
+            .map_err(refused)?;
+        if let Some(motion) = experiment::propose(&loaded.body, &mut explained, &options, &say) {
+            output::write(&self.inputs.out, TRAJECTORY, motion.to_csv().as_bytes())?;
+            if let Some((arm, note)) = arm {
+                progress.say("recording the experiment");
+                let file = self.inputs.out.join("experiment.csv");
+                self.record(&motion, arm, &file)?;
+                let (mut new, findings) =
+                    read_logs(&[&file], loaded.body.arm()).map_err(|e| Failure::Refused(e.to_string()))?;
+                loaded.warnings.extend(findings.iter().map(ToString::to_string).chain(note));
+                if let Some(new) = new.pop() {
+                    let old = (loaded.fit.as_slice(), loaded.validate.as_slice());
+                    explained = experiment::learn(&loaded.body, old, new, &explained, &options, &told, &say)
+                        .map_err(refused)?;
+                    // What is still open may ask for another experiment, beside the one that was run.
+                    if let Some(motion) = experiment::propose(&loaded.body, &mut explained, &options, &say) {
+                        output::write(&self.inputs.out, TRAJECTORY, motion.to_csv().as_bytes())?;
+                    }
+                }
+            }
+        }
         explained.warnings.splice(0..0, loaded.warnings);
         let text = output::json(&explained)?;
         output::write(&self.inputs.out, "explained.json", text.as_bytes())?;
@@ -45,6 +94,68 @@ impl Explain {
         }
         Ok(())
     }
+}
+
+impl Explain {
+    /// The bus of the experiment, opened before any work is done, and what there is to say of it.
+    fn arm(&self) -> Result<(Box<dyn Bus>, Option<String>), Failure> {
+        if self.bus != BusUrl::Virtual {
+            if self.plant.is_some() {
+                return Err(Failure::Unusable("--plant is for --bus virtual".to_string()));
+            }
+            return Ok((self.place().open()?, None));
+        }
+        let beside = self.inputs.arm.with_file_name(Undeclared::FILE);
+        let file = self.plant.clone().or_else(|| beside.is_file().then_some(beside));
+        let Some(file) = file else {
+            let note = "the experiment was recorded on the built-in virtual arm, which has no undeclared effect: it says \
+                        nothing of another arm; name that one's bus by --bus, or the virtual arm's file by --plant";
+            return Ok((self.place().open()?, Some(note.to_string())));
+        };
+        let arm = Undeclared::read(&file).map_err(Failure::Unusable)?.arm([0.0; 6], 1);
+        let note = format!("the experiment was recorded on the virtual arm of {}", file.display());
+        Ok((virtual_bus(arm.map_err(|e| Failure::Refused(e.to_string()))?)?, Some(note)))
+    }
+
+    fn place(&self) -> Where {
+        Where { bus: self.bus.clone(), json: self.inputs.json }
+    }
+
+    fn record(&self, motion: &Motion, bus: Box<dyn Bus>, file: &Path) -> Result<(), Failure> {
+        if motion.dof() != LWA4P.joints.len() {
+            return Err(Failure::Unusable(format!(
+                "--experiment: the driver's arm has {} joints, the arm file has {}; {TRAJECTORY} is written, record it with the \
+                 arm's own driver",
+                LWA4P.joints.len(),
+                motion.dof()
+            )));
+        }
+        let master = self.place().driver(bus)?;
+        let mut log = std::fs::File::create(file)
+            .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", file.display())))?;
+        record(master, motion, &mut log).map(|_| ()).map_err(|e| match e {
+            RecordError::Write(_) => Failure::Unusable(e.to_string()),
+            other => Failure::Refused(format!("the experiment was not recorded: {other}")),
+        })
+    }
+}
+
+/// What the logs leave open and what an experiment decided, in words; empty where there is nothing of the kind.
+pub(super) fn open_in_words(explained: &Explained) -> String {
+    let mut text = String::new();
+    let of = |value: &Option<Value>, key: &str| -> Option<String> {
+        value.as_ref()?.get(key)?.as_str().map(str::to_string)
+    };
+    if let Some(why) = of(&explained.experiment, "why") {
+        match of(&explained.experiment, "decided") {
+            Some(name) => text.push_str(&format!("\nThe experiment decides for {name}: {why}\n")),
+            None => text.push_str(&format!("\nThe experiment does not decide: {why}\n")),
+        }
+    }
+    if let Some(advice) = of(&explained.next_experiment, "advice") {
+        text.push_str(&format!("\nNext experiment: {advice}\n"));
+    }
+    text
 }
 
 fn summary(explained: &Explained) -> String {
@@ -81,7 +192,18 @@ fn summary(explained: &Explained) -> String {
             joints.join(", "),
             unattributed.depends_on.join(", ")
         ));
+        for c in unattributed.correction.iter().flatten() {
+            let signals: Vec<&str> = c.curves.iter().map(|curve| curve.signal.as_str()).collect();
+            text.push_str(&format!(
+                "  a curve of {} within ±{:.2} N·m lowers the held-out error of joint {} from {:.4} to {:.4} N·m\n",
+                signals.join(" and "), c.limit, c.joint, c.rms_before, c.rms_after
+            ));
+        }
+        if unattributed.correction.as_ref().is_some_and(Vec::is_empty) {
+            text.push_str("  no curve of these signals lowers held-out errors: none is kept\n");
+        }
     }
+    text.push_str(&open_in_words(explained));
     let fp = &explained.false_positives;
     text.push_str(&format!("\n{} of {} placebos were accepted", fp.accepted, fp.placebos));
     text

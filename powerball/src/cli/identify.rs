@@ -118,8 +118,8 @@ impl Identify {
                 solve_instrumental(&body, &logs, &options, &start).map_err(Failure::Refused)?
             }
             Estimator::Robust => {
-                let robust = solve_robust(&body, &logs, &options, law)
-                    .map_err(|e| Failure::Refused(e.to_string()))?;
+                let robust =
+                    solve_robust(&body, &logs, &options, law).map_err(|e| Failure::Refused(e.to_string()))?;
                 for (j, share) in robust.doubted.iter().enumerate().filter(|(_, share)| **share > 0.01) {
                     warnings.push(format!(
                         "joint {}: {:.1} % of the torque samples were beyond belief and counted less",
@@ -141,7 +141,8 @@ impl Identify {
             Some(spread(&data, &model.residual(&data)))
         };
         let figures = if held_out.is_empty() { &logs } else { &held_out };
-        let figures = if figures.is_empty() { Vec::new() } else { curves_of(&body, figures, &options, &model)? };
+        let figures =
+            if figures.is_empty() { Vec::new() } else { curves_of(&body, figures, &options, &model)? };
         let undetermined: Vec<&str> =
             identified.parameters.iter().filter(|p| p.std.is_none()).map(|p| p.name.as_str()).collect();
         if !undetermined.is_empty() {

@@ -127,9 +127,10 @@ fn read_summary(file: &Path) -> Result<Option<Summary>, String> {
 fn rests(summary: &Summary) -> Vec<String> {
     let mut notes = Vec::new();
     for (j, octaves) in summary.joints.iter().enumerate() {
-        let rested = summary.samples - octaves.rows();
+        let rested = summary.samples.saturating_sub(octaves.rows());
         if octaves.rows() < 20 {
-            notes.push(format!("joint {} does not move in these logs: nothing can be said of its friction", j + 1));
+            let rests = || format!("joint {} rests in these logs: its friction cannot be judged", j + 1);
+            notes.push(summary.silent[j].clone().unwrap_or_else(rests));
         } else if rested * 4 > summary.samples {
             notes.push(format!(
                 "joint {} rests in {:.0} % of the samples ({} s or longer, or at an end of a log); they were left out",

@@ -8,14 +8,20 @@ pub use page::page;
 pub use session::{Session, SessionError};
 pub use verdict::{Judgement, Verdict};
 
+use crate::bus::{Master, Memory};
+use crate::driver::Driver;
+use crate::driver::lwa4p::LWA4P;
 use crate::effects;
-use crate::explain::{ExplainError, Explained, explain};
+use crate::experiment::{self, TRAJECTORY};
+use crate::explain::{ExplainError, Explained, Options, explain};
 use crate::log::{LogError, common_clock, read_logs};
+use crate::motion::Motion;
+use crate::procedure::record;
 use crate::regression::{DataOptions, RigidBody};
 use crate::virtual_arm::Effect;
 use dyngen::Arm;
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What was in the plant, what was found, and whether that is right.
 #[derive(Debug)]
@@ -78,11 +84,18 @@ pub fn names<'a>() -> Vec<&'a str> {
 }
 
 /// Records a session with an effect drawn by `seed`, or with the one of the given name, into `folder`, and explains
-/// it from the files alone, as a user would.
+/// it from the files alone, as a user would. Where names stay open, the trajectory that tells them apart is written there as
+/// well, and `with_experiment` runs it on the same arm and lets it decide.
 ///
 /// # Errors
 /// Only where something broke; a wrong name is a result.
-pub fn run(folder: &Path, seed: u64, name: Option<&str>, progress: &dyn Fn(&str)) -> Result<Demo, DemoError> {
+pub fn run(
+    folder: &Path,
+    seed: u64,
+    name: Option<&str>,
+    with_experiment: bool,
+    progress: &dyn Fn(&str),
+) -> Result<Demo, DemoError> {
     progress("searching exciting paths and recording them");
     let names: Vec<&str> = name.map_or_else(names, |name| vec![name]);
     let session = Session::record(folder, seed, &names)?;
@@ -93,7 +106,41 @@ pub fn run(folder: &Path, seed: u64, name: Option<&str>, progress: &dyn Fn(&str)
     common_clock(&mut logs);
     let held_out = logs.split_off(session.fit.len());
     let body = RigidBody::new(&arm).map_err(|e| DemoError::Model(e.to_string()))?;
-    let explained = explain(&body, &logs, &held_out, &DataOptions::default(), progress)?;
+    let options = DataOptions::default();
+    let mut explained = explain(&body, &logs, &held_out, &options, progress)?;
+    if let Some(motion) = experiment::propose(&body, &mut explained, &options, progress) {
+        let file = folder.join(TRAJECTORY);
+        std::fs::write(&file, motion.to_csv()).map_err(|e| SessionError::Write(file.clone(), e))?;
+        if with_experiment {
+            progress("recording the experiment");
+            let log = carry_out(&session, &motion, &folder.join("experiment.csv"), seed)?;
+            let (mut new, _) = read_logs(&[log], &arm)?;
+            let Some(new) = new.pop() else {
+                return Err(DemoError::Read("experiment.csv is missing".into()));
+            };
+            explained = experiment::learn(
+                &body,
+                (&logs, &held_out),
+                new,
+                &explained,
+                &options,
+                &Options::default(),
+                progress,
+            )?;
+            experiment::propose(&body, &mut explained, &options, progress);
+        }
+    }
     let verdict = Verdict::new(&session.effect, &explained);
     Ok(Demo { session, explained, verdict })
+}
+
+/// Runs a motion on the arm of a session, after it, and logs it.
+fn carry_out(session: &Session, motion: &Motion, file: &Path, seed: u64) -> Result<PathBuf, DemoError> {
+    let unwritten = |e| SessionError::Write(file.to_path_buf(), e);
+    let arm = session.undeclared.arm([0.0; 6], seed.wrapping_add(1)).map_err(SessionError::Arm)?;
+    let driver = Driver::new(LWA4P).map_err(SessionError::Driver)?;
+    let master = Master::new(driver, Memory::new(arm, LWA4P.bitrate));
+    let mut log = std::fs::File::create(file).map_err(unwritten)?;
+    record(master, motion, &mut log).map_err(SessionError::Record)?;
+    Ok(file.to_path_buf())
 }

@@ -8,7 +8,7 @@ use crate::excite::{self, Settings};
 use crate::motion::Motion;
 use crate::procedure::{RecordError, Recorder, way};
 use crate::virtual_arm::slave::Setup;
-use crate::virtual_arm::{Effect, Plant, VirtualArm, lwa4p};
+use crate::virtual_arm::{Effect, Plant, Undeclared, VirtualArm, lwa4p};
 use dyngen::{Model, SetKind};
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
@@ -44,6 +44,8 @@ pub struct Session {
     pub plant: Plant,
     /// What is in the plant and not in the model.
     pub effect: Effect,
+    /// The same as a file, with the arm's age at the end of the session.
+    pub undeclared: Undeclared,
     /// The arm file as the model knows it.
     pub arm_file: PathBuf,
     /// Logs to fit.
@@ -109,8 +111,8 @@ impl From<RecordError> for SessionError {
 }
 
 impl Session {
-    /// Draws an effect by `seed` among those `named`, records all paths, and writes the logs and the arm file into
-    /// `folder`, which must exist.
+    /// Draws an effect by `seed` among those `named`, records all paths, and writes the logs, the arm file and the
+    /// undeclared effect into `folder`, which must exist.
     ///
     /// # Errors
     /// A name that no effect has, a file that cannot be written.
@@ -170,8 +172,11 @@ impl Session {
         }
         recorder.finish()?;
         let recorded = found.iter().map(|f| f.path.duration()).sum();
+        let undeclared = Undeclared { effect: effect.clone(), age: session };
+        let text = serde_json::to_string_pretty(&undeclared).unwrap_or_default();
+        save(&folder.join(Undeclared::FILE), &text)?;
         let conditions = found.iter().map(|f| f.figures.condition).collect();
-        Ok(Session { plant, effect, arm_file, fit, held_out, conditions, recorded })
+        Ok(Session { plant, effect, undeclared, arm_file, fit, held_out, conditions, recorded })
     }
 }
 

@@ -1,6 +1,6 @@
 //! Friction that differs with the direction, or a constant torque: an offset of the current looks the same.
 
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use serde_json::{Value, json};
 
@@ -16,6 +16,10 @@ impl Effect for Asymmetry {
 
     fn class(&self) -> Class {
         Class::Friction
+    }
+
+    fn shown_by(&self, candidate: &Candidate) -> Axis {
+        Axis::Speed(candidate.joints[0])
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -2,7 +2,7 @@
 
 use super::candidate::{by_joint, geometric};
 use super::encoder_offset::shifted_torque;
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use serde_json::{Value, json};
 
@@ -20,6 +20,10 @@ impl Effect for Backlash {
 
     fn class(&self) -> Class {
         Class::Friction
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Torque
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -1,6 +1,6 @@
 //! Gravity that does not point where the arm file says: the base is not level.
 
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use dyngen::exact::rational;
 use serde_json::{Value, json};
@@ -17,6 +17,10 @@ impl Effect for BaseTilt {
 
     fn class(&self) -> Class {
         Class::Position
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Law
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

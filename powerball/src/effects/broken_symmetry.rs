@@ -1,6 +1,6 @@
 //! An inertial parameter that the arm file declares zero and that is not.
 
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use serde_json::{Value, json};
 
@@ -14,6 +14,10 @@ impl Effect for BrokenSymmetry {
 
     fn class(&self) -> Class {
         Class::Position
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Law
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -3,7 +3,7 @@
 use super::candidate::Window;
 use super::payload::{block_start, mask};
 use super::window_sums::Sums;
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::estimate::Solver;
 use crate::regression::Column;
 use serde_json::{Value, json};
@@ -25,6 +25,10 @@ impl Effect for ContactWrench {
 
     fn class(&self) -> Class {
         Class::Event
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Time
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -1,7 +1,7 @@
 //! A joint whose zero is off: the arm is not where the log says.
 
 use super::candidate::by_joint;
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::{Column, Recording};
 use serde_json::{Value, json};
 
@@ -20,6 +20,10 @@ impl Effect for EncoderOffset {
 
     fn class(&self) -> Class {
         Class::Position
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Law
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -1,7 +1,7 @@
 //! Presliding: after a reversal friction does not jump but winds up over a small distance.
 
 use super::candidate::{by_joint, geometric};
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use serde_json::{Value, json};
 
@@ -15,6 +15,10 @@ impl Effect for Hysteresis {
 
     fn class(&self) -> Class {
         Class::Friction
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Travel
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

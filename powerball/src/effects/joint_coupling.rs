@@ -1,6 +1,6 @@
 //! One joint's motion that loads another: shared bearings, cables, belts through a joint.
 
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use serde_json::{Value, json};
 
@@ -16,6 +16,10 @@ impl Effect for JointCoupling {
 
     fn class(&self) -> Class {
         Class::Dynamics
+    }
+
+    fn shown_by(&self, candidate: &Candidate) -> Axis {
+        Axis::Speed(candidate.values[0] as usize)
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -1,7 +1,7 @@
 //! A joint that gives way under its torque: the link is not where the motor's encoder says.
 
 use super::candidate::by_joint;
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use crate::signal::{Butterworth, difference};
 use serde_json::{Value, json};
@@ -21,6 +21,10 @@ impl Effect for JointElasticity {
 
     fn class(&self) -> Class {
         Class::Dynamics
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Law
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -1,7 +1,7 @@
 //! Friction that grows with the torque a joint transmits: gears are pressed together harder.
 
 use super::candidate::by_joint;
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use serde_json::{Value, json};
 
@@ -18,6 +18,10 @@ impl Effect for LoadFriction {
 
     fn class(&self) -> Class {
         Class::Friction
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Load
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

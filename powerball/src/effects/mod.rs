@@ -3,6 +3,7 @@
 //! Adding an effect means adding a file with its [`Effect`] and naming it in [`all`].
 
 mod asymmetry;
+mod axis;
 mod backlash;
 mod base_tilt;
 mod broken_symmetry;
@@ -24,6 +25,7 @@ mod torque_constant;
 mod velocity_nonlinearity;
 mod window_sums;
 
+pub use axis::Axis;
 pub use candidate::{Candidate, Found, Window};
 pub use context::Context;
 
@@ -63,6 +65,9 @@ pub trait Effect: Sync {
 
     /// What it is easily confused with.
     fn class(&self) -> Class;
+
+    /// The signal over which a joint's residual shows it.
+    fn shown_by(&self, candidate: &Candidate) -> Axis;
 
     /// The ways in which it could show in these data, worth a look each.
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate>;

@@ -2,7 +2,7 @@
 
 use super::candidate::{Candidate, Found, Window};
 use super::window_sums::Sums;
-use super::{Class, Context, Effect};
+use super::{Axis, Class, Context, Effect};
 use crate::estimate::Solver;
 use crate::regression::{Block, Column};
 use serde_json::{Value, json};
@@ -23,6 +23,10 @@ impl Effect for Payload {
 
     fn class(&self) -> Class {
         Class::Event
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Time
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -1,6 +1,6 @@
 //! Torque that is periodic in a joint's or its motor's position: gear teeth, wave generators, cogging.
 
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use dyngen::exact::rational;
 use rustfft::FftPlanner;
@@ -27,6 +27,10 @@ impl Effect for PositionRipple {
 
     fn class(&self) -> Class {
         Class::Position
+    }
+
+    fn shown_by(&self, candidate: &Candidate) -> Axis {
+        Axis::Cycle(candidate.values[0])
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

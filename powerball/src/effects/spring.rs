@@ -1,7 +1,7 @@
 //! A torque that grows with position: a hose, a cable, a balancer.
 
 use super::candidate::by_joint;
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use serde_json::{Value, json};
 
@@ -15,6 +15,10 @@ impl Effect for Spring {
 
     fn class(&self) -> Class {
         Class::Position
+    }
+
+    fn shown_by(&self, candidate: &Candidate) -> Axis {
+        Axis::Position(candidate.joints[0])
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

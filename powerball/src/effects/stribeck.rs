@@ -1,7 +1,7 @@
 //! Friction that falls with rising speed where a film of lubricant builds up.
 
 use super::candidate::{by_joint, geometric};
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use serde_json::{Value, json};
 
@@ -15,6 +15,10 @@ impl Effect for Stribeck {
 
     fn class(&self) -> Class {
         Class::Friction
+    }
+
+    fn shown_by(&self, candidate: &Candidate) -> Axis {
+        Axis::Speed(candidate.joints[0])
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -1,7 +1,7 @@
 //! Friction that changes as the joint warms: lubricant thins.
 
 use super::candidate::{by_joint, geometric};
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::friction::TanhFriction;
 use crate::regression::Column;
 use serde_json::{Value, json};
@@ -17,6 +17,10 @@ impl Effect for Temperature {
 
     fn class(&self) -> Class {
         Class::Friction
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Warmth
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

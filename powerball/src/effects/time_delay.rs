@@ -1,7 +1,7 @@
 //! Torque and position that were not sampled at the same time.
 
 use super::candidate::by_joint;
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use serde_json::{Value, json};
 
@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 /// A positive delay means that the logged torque is late.
 pub(super) struct TimeDelay;
 
-const DELAYS: [f64; 5] = [0.003, 0.008, 0.02, -0.003, -0.01];
+/// Starting values, s; the coefficient makes each a third to three times as long.
+const DELAYS: [f64; 7] = [0.000_8, 0.003, 0.008, 0.02, -0.000_8, -0.003, -0.01];
 
 impl Effect for TimeDelay {
     fn name(&self) -> &'static str {
@@ -19,6 +20,10 @@ impl Effect for TimeDelay {
 
     fn class(&self) -> Class {
         Class::Dynamics
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::TorqueRate
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

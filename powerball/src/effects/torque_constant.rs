@@ -1,6 +1,6 @@
 //! A wrong factor between current and torque, or one that falls as the motor saturates.
 
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use serde_json::{Value, json};
 
@@ -16,6 +16,10 @@ impl Effect for TorqueConstant {
 
     fn class(&self) -> Class {
         Class::Dynamics
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Torque
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -1,6 +1,6 @@
 //! Friction at speed that Eq. 16 cannot bend to: growing faster or slower than in proportion.
 
-use super::{Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::regression::Column;
 use serde_json::{Value, json};
 
@@ -16,6 +16,10 @@ impl Effect for VelocityNonlinearity {
 
     fn class(&self) -> Class {
         Class::Friction
+    }
+
+    fn shown_by(&self, candidate: &Candidate) -> Axis {
+        Axis::Speed(candidate.joints[0])
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -61,9 +61,8 @@ pub fn consistent_fit(body: &RigidBody, solution: &Solution) -> Result<Consisten
     }
     let metric = Mat::from_fn(p, p, |i, k| 0.5 * (metric[(i, k)] + metric[(k, i)]));
     let consistent = nearest(body.model(), SetKind::Minimal, solution.inertial(), &metric)?;
-    let rest: Vec<f64> = (0..size)
-        .map(|c| right[c] - (0..p).map(|k| gram[(c, k)] * consistent.set[k]).sum::<f64>())
-        .collect();
+    let rest: Vec<f64> =
+        (0..size).map(|c| right[c] - (0..p).map(|k| gram[(c, k)] * consistent.set[k]).sum::<f64>()).collect();
     let (mut theta, _) = bounded(&gram, &rest, |c| c >= p && !layout.is_tangent(c), &layout.levels());
     theta[..p].copy_from_slice(&consistent.set);
     Ok(ConsistentFit { consistent, theta })

@@ -91,7 +91,8 @@ fn powers(groups: &[Group]) -> Vec<(f64, f64)> {
     };
     let taken: Vec<f64> = groups.iter().map(|g| g.weight * trace(&g.turned)).collect();
     let matrix = Mat::from_fn(count, count, |g, h| {
-        let other = groups[h].weight * groups[h].weight * trace_of_product(&groups[g].turned, &groups[h].turned);
+        let other =
+            groups[h].weight * groups[h].weight * trace_of_product(&groups[g].turned, &groups[h].turned);
         if g == h { groups[g].rows - 2.0 * taken[g] + other } else { other }
     });
     let left = Mat::from_fn(count, 1, |g, _| groups[g].left);

@@ -137,8 +137,11 @@ impl Rows for InMemory<'_> {
         });
         let columns: Vec<&[f64]> = trial.iter().map(Vec::as_slice).collect();
         let grid = steep.len();
-        let mut trials =
-            Trials { cross: Mat::zeros(design.size, grid), square: Mat::zeros(grid, grid), score: vec![0.0; grid] };
+        let mut trials = Trials {
+            cross: Mat::zeros(design.size, grid),
+            square: Mat::zeros(grid, grid),
+            score: vec![0.0; grid],
+        };
         for (_, rows) in runs(self.data, self.folds, joint) {
             for (c, values) in design.cross(joint, &rows, &columns) {
                 for (k, value) in values.iter().enumerate() {

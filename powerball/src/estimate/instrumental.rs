@@ -55,7 +55,9 @@ pub fn solve_instrumental(
     let inverse = Mat::from_fn(size, size, |i, k| unscaled[(i, k)] * scale[i] * scale[k]);
     let found = &inverse * &right;
     if (0..size).any(|i| !found[(i, 0)].is_finite()) {
-        return Err("the instruments do not determine the parameters: record a motion that excites them".into());
+        return Err(
+            "the instruments do not determine the parameters: record a motion that excites them".into()
+        );
     }
     let mut theta = vec![0.0; layout.size()];
     free.iter().enumerate().for_each(|(i, c)| theta[*c] = found[(i, 0)]);
@@ -114,7 +116,8 @@ fn rows(body: &RigidBody, logs: &[Log], options: &DataOptions, start: &Solution)
             for (j, joint) in rows.iter_mut().enumerate().filter(|(j, _)| !data.joints[*j].is_empty()) {
                 let (global, a) = columns(&seen, start, j);
                 let (_, z) = columns(&instrument, start, j);
-                let all: Vec<Vec<f64>> = z.into_iter().chain(a).chain([data.joints[j].torque.clone()]).collect();
+                let all: Vec<Vec<f64>> =
+                    z.into_iter().chain(a).chain([data.joints[j].torque.clone()]).collect();
                 let (_, octaves) = joint.get_or_insert_with(|| (global, Octaves::new(all.len())));
                 octaves.push_rows(&data.joints[j], &all);
             }
@@ -207,10 +210,7 @@ impl Level {
     }
 }
 
-fn weighted<'a>(
-    levels: &'a [Vec<Level>],
-    weights: &'a [f64],
-) -> impl Iterator<Item = (&'a Level, f64)> {
+fn weighted<'a>(levels: &'a [Vec<Level>], weights: &'a [f64]) -> impl Iterator<Item = (&'a Level, f64)> {
     levels.iter().zip(weights).flat_map(|(joint, weight)| joint.iter().map(move |level| (level, *weight)))
 }
 

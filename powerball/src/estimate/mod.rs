@@ -3,8 +3,8 @@
 mod consistent;
 mod consistent_fit;
 mod design;
-mod errors;
 pub mod distribution;
+mod errors;
 mod fit;
 mod folds;
 mod friction_shape;
@@ -29,8 +29,8 @@ pub use identify::{Identified, JointFriction, ParameterEstimate, Spread, identif
 pub use instrumental::solve_instrumental;
 pub use noise::noise_floor;
 pub use reduced::{FrictionLaw, Solution, solve_reduced};
-pub use solve::{Solver, bounded};
 pub use robust::{Robust, solve_robust};
+pub use solve::{Solver, bounded};
 pub use stream::{States, Stream, StreamFit};
 pub use torque_metric::TorqueMetric;
 pub use vary::Layout;

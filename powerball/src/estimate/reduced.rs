@@ -53,7 +53,8 @@ impl Solution {
 
     /// Σ w·A'A, Σ w·A'y, Σ w·y'y.
     pub(super) fn products(&self) -> Products {
-        let mut sum = (Mat::zeros(self.layout.size(), self.layout.size()), vec![0.0; self.layout.size()], 0.0);
+        let mut sum =
+            (Mat::zeros(self.layout.size(), self.layout.size()), vec![0.0; self.layout.size()], 0.0);
         for (parts, weight) in self.parts.iter().zip(&self.weights) {
             parts.iter().for_each(|part| part.add_to(&mut sum, *weight));
         }

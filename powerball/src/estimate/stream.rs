@@ -101,7 +101,12 @@ impl<'a> Stream<'a> {
             let count = BLOCK.min(to - first);
             let at = first * n..(first + count) * n;
             let y = &mut y[..count * n * p];
-            self.body.regressor_into(&states.q[at.clone()], &states.dq[at.clone()], &states.ddq[at.clone()], y);
+            self.body.regressor_into(
+                &states.q[at.clone()],
+                &states.dq[at.clone()],
+                &states.ddq[at.clone()],
+                y,
+            );
             let (dq, tau) = (&states.dq[at.clone()], &states.tau[at]);
             for j in 0..n {
                 rows.clear();

@@ -9,7 +9,7 @@ mod search;
 pub use fourier::{Fourier, Harmonics};
 pub use limits::{JointLimits, Limits, MissingLimits};
 pub use objective::{Figures, Objective};
-pub use search::{Excitation, Settings, optimise};
+pub use search::{Excitation, Settings, optimise, search};
 
 use std::fmt;
 

@@ -77,25 +77,43 @@ pub fn optimise(model: &Model, kind: SetKind, settings: &Settings) -> Result<Exc
     let limits = Limits::of(model.arm(), settings.margin)?;
     // Eight instants for each period of the highest harmonic resolve its regressor.
     let mut objective = Objective::new(model, kind, (8 * settings.harmonics).max(48))?;
-    let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
-    let place = |candidate: &Candidate| candidate.path(settings, &limits);
-
+    let dof = model.arm().dof();
     // Columns are scaled by paths of a seed of their own: figures of different searches can then be compared.
     let mut fixed = ChaCha8Rng::seed_from_u64(0);
     let typical: Vec<Fourier> =
-        (0..16).map(|_| place(&Candidate::random(model, settings, &mut fixed))).collect();
+        (0..16).map(|_| Candidate::random(dof, settings, &mut fixed).path(settings, &limits)).collect();
     objective.scale_columns(&typical);
 
+    let (path, figures, usual) = search(dof, settings, &limits, |path| {
+        let figures = objective.judge(path);
+        (figures.objective(settings.lambda2), figures)
+    })?;
+    Ok(Excitation { path, figures, usual })
+}
+
+/// The path within the limits whose value, the first thing that `judge` says, is smallest; what else it said of that path,
+/// and of the middle one of the random starts.
+///
+/// # Errors
+/// Settings that make no sense.
+pub fn search<J: Clone>(
+    dof: usize,
+    settings: &Settings,
+    limits: &Limits,
+    mut judge: impl FnMut(&Fourier) -> (f64, J),
+) -> Result<(Fourier, J, J), Error> {
+    check(settings)?;
+    let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
     let starts = (settings.evaluations / 8).max(1);
-    let mut found: Vec<(f64, Figures, Candidate)> = (0..starts)
+    let mut found: Vec<(f64, J, Candidate)> = (0..starts)
         .map(|_| {
-            let candidate = Candidate::random(model, settings, &mut rng);
-            let figures = objective.judge(&place(&candidate));
-            (figures.objective(settings.lambda2), figures, candidate)
+            let candidate = Candidate::random(dof, settings, &mut rng);
+            let (value, said) = judge(&candidate.path(settings, limits));
+            (value, said, candidate)
         })
         .collect();
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let usual = found[found.len() / 2].1;
+    let usual = found[found.len() / 2].1.clone();
     found.truncate(3);
 
     let each = settings.evaluations.saturating_sub(starts) / found.len();
@@ -104,10 +122,9 @@ pub fn optimise(model: &Model, kind: SetKind, settings: &Settings) -> Result<Exc
         let mut step: f64 = 0.3;
         for _ in 0..each {
             let next = best.2.changed(step, &mut rng);
-            let figures = objective.judge(&place(&next));
-            let value = figures.objective(settings.lambda2);
+            let (value, said) = judge(&next.path(settings, limits));
             if value < best.0 {
-                *best = (value, figures, next);
+                *best = (value, said, next);
                 step = (step * 1.5).min(1.0);
             } else {
                 step = (step * 0.9).max(0.01);
@@ -115,8 +132,8 @@ pub fn optimise(model: &Model, kind: SetKind, settings: &Settings) -> Result<Exc
         }
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (_, figures, candidate) = found.swap_remove(0);
-    Ok(Excitation { path: place(&candidate), figures, usual })
+    let (_, said, candidate) = found.swap_remove(0);
+    Ok((candidate.path(settings, limits), said, usual))
 }
 
 fn check(settings: &Settings) -> Result<(), Error> {
@@ -138,8 +155,7 @@ fn check(settings: &Settings) -> Result<(), Error> {
 }
 
 impl Candidate {
-    fn random(model: &Model, settings: &Settings, rng: &mut ChaCha8Rng) -> Candidate {
-        let n = model.arm().dof();
+    fn random(n: usize, settings: &Settings, rng: &mut ChaCha8Rng) -> Candidate {
         let mut coefficients =
             || -> Vec<f64> { (0..settings.harmonics).map(|_| StandardNormal.sample(rng)).collect() };
         let shape = (0..n).map(|_| Harmonics { middle: 0.0, a: coefficients(), b: coefficients() }).collect();

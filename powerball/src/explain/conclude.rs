@@ -1,16 +1,15 @@
 //! From the accepted effects to the result.
 
+use super::correction::correct;
 use super::curves::curves;
-use super::forward::{Session, Step};
+use super::forward::{RuledOut, Session, Step};
 use super::leftover::{depends_on, effective_samples, leftover};
-use super::result::{Errors, Explained, NamedEffect, Unattributed};
+use super::naming::Comparison;
+use super::result::{Errors, Explained, NamedEffect, Rival, Unattributed};
 use crate::effects::{Context, Found};
 use crate::estimate::{noise_floor, spread};
 use crate::parallel;
-
-/// Said where the logs to judge on are repeats.
-const ONE_PATH: &str = "the logs of --validate run the same path as those of --log: what depends on positions (springs, zeros, \
-                        gravity, broken symmetries, slow ripple) was not considered; record another path";
+use std::sync::Arc;
 
 impl Session<'_> {
     fn coefficients(&self) -> Vec<Vec<f64>> {
@@ -67,18 +66,22 @@ impl Session<'_> {
                 margin: first.comparison.margin,
                 leftover: leftover(&before.fit.rms, &after.fit.rms, &floor, &joints),
                 class: effect.class().name().to_string(),
-                rivals: first.comparison.rivals.clone(),
+                rivals: self.rivals(&first.comparison, effect.name()),
                 joints: joints.iter().map(|j| j + 1).collect(),
             });
         }
-        let unattributed = self.unattributed(&context, &floor, &after);
-        let next_experiment = self.steps.iter().find_map(|s| {
-            let twin = s.comparison.twin.as_ref()?;
-            let name = self.effects[s.effect].name();
-            Some(serde_json::json!({
-                "to_tell_apart": [name, twin],
-                "advice": format!("record the joints concerned on a path with other positions, speeds and loads than these logs: {name} and {twin} explain them equally well"),
-            }))
+        let shown = self.shown(&context);
+        let unattributed = self.unattributed(&context, &residual, &floor, &after);
+        let open = self.open(unattributed.is_some());
+        let next_experiment = open.as_ref().map(|open| {
+            let names = open.names();
+            serde_json::json!({
+                "to_tell_apart": names,
+                "advice": format!(
+                    "record the joints concerned on a path with other positions, speeds and loads than these logs, \
+                     where {} predict different torques", names.join(" and ")
+                ),
+            })
         });
         let effective_samples = effective_samples(&self.data, &self.fit.residual);
         self.false_positives.rate =
@@ -93,21 +96,41 @@ impl Session<'_> {
             effective_samples,
             unattributed,
             next_experiment,
+            experiment: None,
+            open: open.map(Arc::new),
             false_positives: self.false_positives.clone(),
-            warnings: (self.data.notes.iter().chain(&self.other.notes).cloned())
-                .chain(self.one_path.then(|| ONE_PATH.to_string()))
-                .collect(),
+            warnings: self.doubts(),
             curves,
+            shown,
         }
     }
 
+    /// The next best names, and what an experiment has ruled out on the same joints.
+    fn rivals(&self, comparison: &Comparison, name: &str) -> Vec<Rival> {
+        let here = |r: &&RuledOut| r.effect != name && r.joints.iter().any(|j| comparison.joints.contains(j));
+        let out = |r: &RuledOut| Rival { effect: r.effect.clone(), why_not: r.why_not.clone() };
+        comparison.rivals.iter().cloned().chain(self.told.ruled_out.iter().filter(here).map(out)).collect()
+    }
+
     /// The joints whose residual still depends on something.
-    fn unattributed(&self, context: &Context<'_>, floor: &[f64], after: &Errors) -> Option<Unattributed> {
+    fn unattributed(
+        &self,
+        context: &Context<'_>,
+        other_residual: &[Vec<f64>],
+        floor: &[f64],
+        after: &Errors,
+    ) -> Option<Unattributed> {
         let candidates: Vec<usize> = context
             .moving_joints()
             .filter(|j| after.fit.rms[*j] > 1.2 * floor[*j] && self.fit.inflation[*j] > 2.0)
             .collect();
         let found = parallel::map(&candidates, |j| depends_on(context, *j));
+        let other = Context::new(&self.other, &self.fit, other_residual);
+        let correction = self.told.correct_unattributed.then(|| {
+            (candidates.iter().zip(&found))
+                .filter_map(|(j, list)| correct(context, &other, &self.folds, *j, list))
+                .collect()
+        });
         let mut signals: Vec<(String, f64)> = Vec::new();
         let mut joints = Vec::new();
         for (j, list) in candidates.iter().zip(found) {
@@ -128,6 +151,7 @@ impl Session<'_> {
             joints: joints.iter().map(|j| j + 1).collect(),
             depends_on: signals.into_iter().map(|(name, _)| name).collect(),
             considered: self.refused.clone(),
+            correction,
         })
     }
 }

@@ -88,7 +88,9 @@ impl Session<'_> {
         let mut families = Vec::new();
         for (e, candidates) in lists {
             let effect = self.effects[e].as_ref();
-            let open: Vec<Candidate> = candidates.into_iter().filter(|c| !self.has(e, c)).collect();
+            let open: Vec<Candidate> = (candidates.into_iter())
+                .filter(|c| !self.has(e, c) && !self.is_ruled_out(effect.name(), c))
+                .collect();
             *tests += open.iter().map(|c| c.searched.max(1.0)).fold(0.0, f64::max).max(open.len() as f64);
             let trials = parallel::map(&open, |c| screen.try_candidate(effect, c));
             let mut members: Vec<Member> = Vec::new();
@@ -146,7 +148,9 @@ impl Session<'_> {
             (kept.iter().map(|m| members[*m].trial.score).sum(), kept)
         };
         let (single, wide) = (choose(&|m| m.candidate.joints.len() == 1), choose(&|_| true));
-        let kept = if single.0 > wide.0 { single.1 } else { wide.1 };
+        // One cause for all joints is preferred to one for each.
+        let as_good = single.0 - (rule::AS_GOOD * single.0).max(rule::AS_GOOD_SCORE);
+        let kept = if as_good > wide.0 { single.1 } else { wide.1 };
         let mut at = 0;
         members.retain(|_| {
             at += 1;
@@ -157,6 +161,11 @@ impl Session<'_> {
 
     pub(super) fn has(&self, effect: usize, candidate: &Candidate) -> bool {
         self.accepted.iter().any(|a| a.effect == effect && self.same(effect, &a.candidate, candidate))
+    }
+
+    fn is_ruled_out(&self, name: &str, candidate: &Candidate) -> bool {
+        let here = |joints: &[usize]| candidate.joints.iter().any(|j| joints.contains(j));
+        self.told.ruled_out.iter().any(|r| r.effect == name && here(&r.joints))
     }
 
     fn gave_up(&self, effect: usize, candidate: &Candidate) -> bool {

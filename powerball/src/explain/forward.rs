@@ -5,13 +5,14 @@ use super::family::Member;
 use super::leftover::leftover;
 use super::naming::{Comparison, compare};
 use super::one_path::repeats;
+use super::open::{Question, refitted};
 use super::other_path::payload_on;
 use super::placebo::placebos;
 use super::result::{Errors, Explained, FalsePositives, NamedEffect, Rival};
 use super::rule;
 use super::screen::{Screen, Trial};
 use crate::effects::{self, Candidate, Context, Effect};
-use crate::estimate::{Design, Fit, Folds, Solver, Term, fit, friction_columns, noise_floor, spread};
+use crate::estimate::{Design, Fit, Folds, Solver, fit, friction_columns, noise_floor, spread};
 use crate::log::Log;
 use crate::regression::{Column, Data, DataError, DataOptions, RigidBody};
 use std::fmt;
@@ -47,21 +48,28 @@ pub(super) struct Accepted {
     pub(super) fold_gain: f64,
     /// Squared error that fell when it was accepted, by joint, (N·m)² summed over rows.
     pub(super) explained: Vec<f64>,
+    /// The step that accepted it.
+    pub(super) step: usize,
 }
 
 /// How a step ended.
 enum Stepped {
     /// An effect was accepted.
     Accepted(&'static str),
-    /// What fitted best could not be told from its rivals and left much.
-    Withdrawn,
+    /// What fitted best scored no more than placebos do.
+    Chance,
 }
 
 /// What a step decided.
 #[derive(Debug)]
 pub(super) struct Step {
+    pub(super) number: usize,
     pub(super) effect: usize,
+    /// Squared errors before it, by joint, (N·m)² summed over rows.
+    square_before: Vec<f64>,
     pub(super) comparison: Comparison,
+    /// What an experiment would have to decide.
+    pub(super) question: Option<Question>,
     pub(super) before: Vec<f64>,
     pub(super) after: Vec<f64>,
 }
@@ -88,6 +96,21 @@ pub struct Session<'a> {
     pub(super) refused: Vec<Rival>,
     /// Accepted once and taken out again.
     pub(super) given_up: Vec<(usize, Candidate)>,
+    /// What it was told beside the logs.
+    pub(super) told: Options,
+    /// Names that steps left open.
+    pub(super) questions: Vec<Question>,
+}
+
+/// A name that an experiment has ruled out on some joints.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RuledOut {
+    /// The name.
+    pub effect: String,
+    /// The joints, from 0.
+    pub joints: Vec<usize>,
+    /// What showed it.
+    pub why_not: String,
 }
 
 impl fmt::Debug for Session<'_> {
@@ -105,6 +128,30 @@ pub fn explain(
     logs: &[Log],
     validate: &[Log],
     options: &DataOptions,
+    progress: &dyn Fn(&str),
+) -> Result<Explained, ExplainError> {
+    explain_with(body, logs, validate, options, &Options::default(), progress)
+}
+
+/// What an explanation is told beside the logs.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Names that an experiment has ruled out.
+    pub ruled_out: Vec<RuledOut>,
+    /// Whether what stays without a name is corrected where that helps.
+    pub correct_unattributed: bool,
+}
+
+/// As [`explain`], with more to be told.
+///
+/// # Errors
+/// As [`explain`].
+pub fn explain_with(
+    body: &RigidBody,
+    logs: &[Log],
+    validate: &[Log],
+    options: &DataOptions,
+    told: &Options,
     progress: &dyn Fn(&str),
 ) -> Result<Explained, ExplainError> {
     progress("preparing signals");
@@ -131,17 +178,24 @@ pub fn explain(
         false_positives: FalsePositives { family_wise: rule::FAMILY_WISE, ..FalsePositives::default() },
         refused: Vec::new(),
         given_up: Vec::new(),
+        told: told.clone(),
+        questions: Vec::new(),
     };
     for step in 0..rule::MOST_STEPS {
         progress(&format!("step {}: screening candidates", step + 1));
         match session.step(step) {
-            None => break,
             Some(Stepped::Accepted(name)) => progress(&format!("step {}: {name} accepted", step + 1)),
-            Some(Stepped::Withdrawn) => {
-                progress(&format!("step {}: what fits best cannot be named", step + 1))
+            Some(Stepped::Chance) => {
+                progress(&format!("step {}: what fits best fits no better than placebos", step + 1));
             }
+            // Only now is it known what is left beside all that fits.
+            None => match session.withhold() {
+                Some(name) => progress(&format!("{name} is not named: others fit as well and much is left")),
+                None => break,
+            },
         }
     }
+    while session.withhold().is_some() {}
     progress("asking placebos");
     session.count_false_positives();
     progress("looking at what is left");
@@ -152,7 +206,7 @@ impl Session<'_> {
     /// One step of the loop; `None` where nothing passes.
     fn step(&mut self, step: usize) -> Option<Stepped> {
         let other_residual = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
-        let (chosen, comparison, members, tested) = {
+        let (chosen, comparison, question, members, tested) = {
             let context = Context::new(&self.data, &self.fit, &self.fit.residual);
             let screen = Screen::new(&context);
             let mut tests = 0.0;
@@ -190,7 +244,10 @@ impl Session<'_> {
                     Some(Rival { effect: f.name.to_string(), why_not })
                 })
                 .collect();
-            let (mut chosen, top) = best?;
+            let Some((mut chosen, top)) = best else {
+                self.questions.extend(Question::refused(&families));
+                return None;
+            };
             // What needs fewer columns and is as good is preferred.
             let least = top - (rule::AS_GOOD * top).max(rule::AS_GOOD_SCORE);
             for f in 0..families.len() {
@@ -221,13 +278,19 @@ impl Session<'_> {
                 })
                 .collect();
             if members.is_empty() {
-                return None;
+                let chance = passing
+                    .iter()
+                    .map(|m| (families[chosen].effect, m.candidate.clone()))
+                    .collect::<Vec<_>>();
+                self.given_up.extend(chance);
+                return Some(Stepped::Chance);
             }
             let mut joints: Vec<usize> =
                 members.iter().flat_map(|m| families[chosen].members[*m].candidate.joints.clone()).collect();
             joints.sort_unstable();
             joints.dedup();
-            let comparison = compare(&families, chosen, &joints);
+            let comparison = compare(&screen, &families, chosen, &joints);
+            let question = Question::twins(&families, chosen, comparison.twin.as_deref(), &joints);
             let family = families.swap_remove(chosen);
             let kept: Vec<Member> = family
                 .members
@@ -236,12 +299,11 @@ impl Session<'_> {
                 .filter(|(m, _)| members.contains(m))
                 .map(|(_, member)| member)
                 .collect();
-            (family.effect, comparison, kept, tests)
+            (family.effect, comparison, question, kept, tests)
         };
         let squares =
             |fit: &Fit| -> Vec<f64> { fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect() };
         let square_before = squares(&self.fit);
-        let earlier = self.accepted.len();
         let added: Vec<Candidate> = members.iter().map(|m| m.candidate.clone()).collect();
         for member in members {
             let Some(evidence) = member.evidence else { continue };
@@ -254,18 +316,10 @@ impl Session<'_> {
                 p_value: (evidence.p_value * tested).min(1.0),
                 fold_gain: gains.get(gains.len() / 2).copied().unwrap_or(0.0),
                 explained: Vec::new(),
+                step,
             });
         }
         self.refit();
-        if comparison.margin < rule::LEAST_MARGIN
-            && self.share_left(&square_before, &comparison.joints) > rule::MUCH_LEFT
-        {
-            // Not named; it stays as a rival of what comes.
-            self.accepted.truncate(earlier);
-            self.given_up.extend(added.into_iter().map(|c| (chosen, c)));
-            self.refit();
-            return Some(Stepped::Withdrawn);
-        }
         let fell: Vec<f64> =
             square_before.iter().zip(squares(&self.fit)).map(|(b, a)| (b - a).max(0.0)).collect();
         for a in self.accepted.iter_mut().filter(|a| a.explained.is_empty()) {
@@ -280,12 +334,32 @@ impl Session<'_> {
         }
         let after = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
         self.steps.push(Step {
+            number: step,
             effect: chosen,
+            square_before,
             comparison,
+            question,
             before: spread(&self.other, &other_residual).rms,
             after: spread(&self.other, &after).rms,
         });
         Some(Stepped::Accepted(self.effects[chosen].name()))
+    }
+
+    /// Takes back the last effect that is not told apart from its rivals and beside which much is left now that everything
+    /// that fits is in the model: then something else is there. It stays as a rival of what comes. Returns its name.
+    fn withhold(&mut self) -> Option<&'static str> {
+        let weak = self.steps.iter().rposition(|s| {
+            s.comparison.apart < rule::LEAST_MARGIN
+                && self.accepted.iter().any(|a| a.step == s.number)
+                && self.share_left(&s.square_before, &s.comparison.joints) > rule::MUCH_LEFT
+        })?;
+        let step = self.steps.remove(weak);
+        self.questions.extend(step.question.map(Question::withheld));
+        for a in self.accepted.extract_if(.., |a| a.step == step.number) {
+            self.given_up.push((a.effect, a.candidate));
+        }
+        self.refit();
+        Some(self.effects[step.effect].name())
     }
 
     /// The share of the excess over the noise floor that stayed on some joints, given the squared errors before.
@@ -325,29 +399,11 @@ impl Session<'_> {
 
     /// Refits everything; columns that depend on estimates are taken anew, twice.
     fn refit(&mut self) {
-        for _ in 0..2 {
-            let terms: Vec<Term> = {
-                let context = Context::new(&self.data, &self.fit, &self.fit.residual);
-                self.accepted
-                    .iter()
-                    .flat_map(|a| {
-                        let effect = self.effects[a.effect].as_ref();
-                        let non_negative = effect.non_negative();
-                        let columns = effect.columns(&context, &a.candidate);
-                        columns.into_iter().map(move |column| Term { column, non_negative })
-                    })
-                    .collect()
-            };
-            self.fit = fit(&self.data, &self.folds, &terms, Some(&self.fit));
-            let mut first = 0;
-            for a in &mut self.accepted {
-                let coefficients: Vec<f64> =
-                    (first..first + a.columns).map(|c| self.fit.coefficient(c)).collect();
-                first += a.columns;
-                if let Some(refined) = self.effects[a.effect].refined(&a.candidate, &coefficients) {
-                    a.candidate = refined;
-                }
-            }
+        let mut found: Vec<(usize, Candidate)> =
+            self.accepted.iter().map(|a| (a.effect, a.candidate.clone())).collect();
+        self.fit = refitted(&self.data, &self.folds, &self.effects, &mut found, &self.fit);
+        for (a, (_, candidate)) in self.accepted.iter_mut().zip(found) {
+            a.candidate = candidate;
         }
     }
 

@@ -55,13 +55,12 @@ const SHIFTS: usize = 19;
 /// Least share of a residual's variance that a signal must explain.
 const LEAST_SHARE: f64 = 0.02;
 
-/// The signals that a joint's residual depends on, with the share of its variance: those that beat every time-shifted
-/// copy of themselves, the strongest first.
+/// What a joint's residual may depend on, by its rows: positions, speeds and accelerations of all joints, the rigid arm's torque
+/// on this one, and time.
 #[must_use]
-pub(super) fn depends_on(context: &Context<'_>, joint: usize) -> Vec<(String, f64)> {
+pub(super) fn signals(context: &Context<'_>, joint: usize) -> Vec<(String, Vec<f64>)> {
     let data = context.data;
     let rows = &data.joints[joint];
-    let residual = &context.residual[joint];
     let mut signals: Vec<(String, Vec<f64>)> = Vec::new();
     let pick = |values: &dyn Fn(usize) -> Vec<f64>| {
         let mut out = Vec::with_capacity(rows.len());
@@ -89,10 +88,19 @@ pub(super) fn depends_on(context: &Context<'_>, joint: usize) -> Vec<(String, f6
             (0..data.recordings[r].len()).map(|k| data.recordings[r].clock + k as f64 / data.rate()).collect()
         }),
     ));
+    signals
+}
+
+/// The signals that a joint's residual depends on, with the share of its variance: those that beat every time-shifted
+/// copy of themselves, the strongest first.
+#[must_use]
+pub(super) fn depends_on(context: &Context<'_>, joint: usize) -> Vec<(String, f64)> {
+    let rows = &context.data.joints[joint];
+    let residual = &context.residual[joint];
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(joint as u64);
     let mut found = Vec::new();
-    for (name, signal) in signals {
-        let bins = quantile_bins(&signal);
+    for (name, signal) in signals(context, joint) {
+        let bins = quantile_bins(&signal, BINS);
         let share = explained_share(&bins, residual);
         if share < LEAST_SHARE {
             continue;
@@ -115,12 +123,14 @@ pub(super) fn depends_on(context: &Context<'_>, joint: usize) -> Vec<(String, f6
     found
 }
 
-fn quantile_bins(signal: &[f64]) -> Vec<usize> {
+/// For each value the share of the values that it lies in, in the order of size, as one of `count`.
+#[must_use]
+pub(super) fn quantile_bins(signal: &[f64], count: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..signal.len()).collect();
     order.sort_by(|a, b| signal[*a].total_cmp(&signal[*b]));
     let mut bins = vec![0; signal.len()];
     for (rank, k) in order.iter().enumerate() {
-        bins[*k] = rank * BINS / signal.len();
+        bins[*k] = rank * count / signal.len();
     }
     bins
 }

@@ -3,10 +3,13 @@
 //! The rule, in the order of the files: `screen` refits the base with each candidate, `evidence` asks clusters,
 //! folds and another path, `placebo` measures how often the same questions are answered by chance on these very
 //! data, `rule` holds every threshold with its reason, `family` keeps what may stand together, `forward` adds one effect
-//! at a time, `naming` compares rivals, `leftover` says what stays, `conclude` writes the result.
+//! at a time, `naming` compares rivals, `open` keeps those that are not told apart, `leftover` says what stays,
+//! `correction` takes off of it what it can, `shown` draws what each name is seen by, `conclude` writes the result.
 
 mod conclude;
+mod correction;
 mod curves;
+mod doubts;
 mod evidence;
 mod family;
 mod folds;
@@ -14,17 +17,22 @@ mod forward;
 mod leftover;
 mod naming;
 mod one_path;
+mod open;
 mod other_path;
 mod page;
 mod placebo;
 mod result;
 mod rule;
 mod screen;
+mod shown;
 
+pub use correction::{Correction, Curve};
 pub use curves::{TorqueCurve, curves};
-pub use forward::{ExplainError, Session, explain};
+pub use forward::{ExplainError, Options, RuledOut, Session, explain, explain_with};
+pub use open::{Hypothesis, Open};
 pub use page::add_to_page;
 pub use result::{Explained, NamedEffect, Rival, Unattributed};
+pub use shown::Shown;
 
 #[cfg(test)]
 mod tests;

@@ -2,6 +2,7 @@
 
 use super::curves::TorqueCurve;
 use super::result::{Explained, NamedEffect};
+use super::shown::Shown;
 use crate::report::{BarPairs, Figure, Ink, Page, Panel, Series, Table, Tone, number};
 use serde_json::Value;
 
@@ -82,12 +83,37 @@ fn effects(page: &mut Page, explained: &Explained) {
              that stays on these joints.",
         );
     }
+    for shown in &explained.shown {
+        page.figure(&sight(shown), "");
+    }
+    if !explained.shown.is_empty() {
+        page.paragraph(
+            "Each figure shows the residual of the fitted logs over the signal that the effect depends on: grey dots without this effect but \
+             with all others, green dots with it. Lines are means over equal numbers of samples. Where the law is right the green line is \
+             flat, and the orange one runs through the grey dots.",
+        );
+    }
     for effect in explained.effects.iter().filter(|e| !e.rivals.is_empty()) {
         page.folded(
             &format!("Rivals of {} on joint {}", effect.effect, list(&effect.joints)),
             &rivals(effect),
         );
     }
+}
+
+/// The residual over the signal that shows an effect.
+fn sight(shown: &Shown) -> Figure {
+    let rows = |k: usize| shown.rows.iter().map(|row| (row[0], row[k])).collect();
+    let means = |k: usize| shown.means.iter().map(|mean| (mean[0], mean[k])).collect();
+    let what = if shown.against_motion { "residual against motion [N·m]" } else { "residual [N·m]" };
+    let panel = Panel::new(what)
+        .height(1.3)
+        .series(Series::points("without the effect", Ink::Grey, rows(1)))
+        .series(Series::points("with it", Ink::Green, rows(2)))
+        .series(Series::broad("what the effect adds, mean", Ink::Orange, means(3)))
+        .line("without it, mean", Ink::Purple, means(1))
+        .line("with it, mean", Ink::Blue, means(2));
+    Figure::new(format!("{} on joint {}", shown.effect, shown.joint), shown.signal.as_str()).panel(panel)
 }
 
 fn rivals(effect: &NamedEffect) -> Table {
@@ -140,6 +166,16 @@ fn rest(page: &mut Page, explained: &Explained) {
         }
         None => page.paragraph("Nothing that these logs could show."),
     }
+    corrections(page, explained);
+    if let Some(experiment) = &explained.experiment {
+        let text = |key: &str| experiment.get(key).and_then(Value::as_str).unwrap_or_default();
+        match experiment.get("decided").and_then(Value::as_str) {
+            Some(name) => {
+                page.note(Tone::Good, &format!("The experiment decides for {name}: {}.", text("why")));
+            }
+            None => page.note(Tone::Plain, &format!("The experiment does not decide: {}.", text("why"))),
+        }
+    }
     if let Some(advice) =
         explained.next_experiment.as_ref().and_then(|next| next.get("advice")).and_then(Value::as_str)
     {
@@ -156,6 +192,34 @@ fn rest(page: &mut Page, explained: &Explained) {
         explained.warnings.iter().for_each(|w| table.push([w.clone()]));
         page.table(&table);
     }
+}
+
+fn corrections(page: &mut Page, explained: &Explained) {
+    let Some(kept) = explained.unattributed.as_ref().and_then(|u| u.correction.as_ref()) else { return };
+    if kept.is_empty() {
+        page.paragraph("No curve of these signals lowers held-out errors: none is kept.");
+        return;
+    }
+    let mut table = Table::new([
+        "corrected joint",
+        "by a curve of",
+        "within [N·m]",
+        "held-out error [N·m]",
+        "corrected [N·m]",
+    ]);
+    for c in kept {
+        let signals: Vec<&str> = c.curves.iter().map(|curve| curve.signal.as_str()).collect();
+        let limit = format!("±{}", number(c.limit));
+        table.push([
+            c.joint.to_string(),
+            signals.join(", "),
+            limit,
+            number(c.rms_before),
+            number(c.rms_after),
+        ]);
+    }
+    page.table(&table);
+    page.paragraph("A correction is a number for the controller and no finding: it names nothing, and is no part of the errors above.");
 }
 
 /// `{"mass": 1.5, "com": [0, 0, 0.1]}` as `mass 1.50, com (0, 0, 0.100)`.

@@ -67,14 +67,32 @@ fn shifted(column: &Column, data: &Data<'_>, fraction: f64) -> Column {
     Column { parts: column.parts.iter().map(shift).collect() }
 }
 
+/// Correlation of two columns. One that hardly changes (a constant torque) is the same wherever it is shifted to.
 fn alike(a: &Column, b: &Column) -> f64 {
-    let (mut cross, mut left, mut right) = (0.0, 0.0, 0.0);
+    let (mut cross, mut left, mut right, mut size) = (0.0, 0.0, 0.0, 0.0);
     for ((_, x), (_, y)) in a.parts.iter().zip(&b.parts) {
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len().max(1) as f64;
         let (mx, my) = (mean(x), mean(y));
         cross += dot(x, y) - mx * my * x.len() as f64;
         left += dot(x, x) - mx * mx * x.len() as f64;
         right += dot(y, y) - my * my * y.len() as f64;
+        size += dot(x, x) + dot(y, y);
     }
-    if left * right > 0.0 { cross / (left * right).sqrt() } else { 0.0 }
+    if left.min(right) > 1e-6 * size { cross / (left * right).sqrt() } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shift_changes_no_constant_and_a_wave_is_like_itself() {
+        let column = |f: &dyn Fn(f64) -> f64| Column::on(0, (0..1000).map(|k| f(f64::from(k))).collect());
+        // Filters leave a constant with rounding.
+        let constant = column(&|k| 1.0 + 1e-12 * (k * 0.7).sin());
+        assert_eq!(alike(&constant, &column(&|k| 1.0 - 1e-12 * (k * 0.7).cos())), 1.0);
+        let wave = column(&|k| 3.0 + (k * 0.1).sin());
+        assert!(alike(&wave, &wave) > 0.999);
+        assert!(alike(&wave, &column(&|k| 3.0 + (k * 0.1).cos())).abs() < 0.1);
+    }
 }

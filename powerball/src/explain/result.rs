@@ -1,9 +1,13 @@
 //! What an explanation says, in the form of explained.json.
 
+use super::correction::Correction;
 use super::curves::TorqueCurve;
+use super::open::Open;
+use super::shown::Shown;
 use crate::estimate::Spread;
 use serde::Serialize;
 use serde_json::Value;
+use std::sync::Arc;
 
 /// The result of the residual loop.
 #[derive(Clone, Debug, Serialize)]
@@ -26,6 +30,12 @@ pub struct Explained {
     pub unattributed: Option<Unattributed>,
     /// What to record to tell the names apart that these logs leave open.
     pub next_experiment: Option<Value>,
+    /// What an experiment that was made for open names has decided.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub experiment: Option<Value>,
+    /// The open names, fitted; not part of the JSON.
+    #[serde(skip)]
+    pub open: Option<Arc<Open>>,
     /// How often the rule accepts effects that are not there, on these data.
     pub false_positives: FalsePositives,
     /// What was found in logs and arm file, and what was done about it.
@@ -33,6 +43,9 @@ pub struct Explained {
     /// Torques over time on the other path, by joint; not part of the JSON.
     #[serde(skip)]
     pub curves: Vec<TorqueCurve>,
+    /// The plots that show the effects; not part of the JSON.
+    #[serde(skip)]
+    pub shown: Vec<Shown>,
 }
 
 /// Errors on the fitted logs and on the other path.
@@ -94,6 +107,9 @@ pub struct Unattributed {
     pub rms: Vec<f64>,
     /// Effects that fit a part of it but not well enough to be named.
     pub considered: Vec<Rival>,
+    /// Curves that take a part of it off, where they were asked for: those of the joints whose held-out errors fall by them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correction: Option<Vec<Correction>>,
 }
 
 /// The rule applied to candidates that cannot be true: shifted in time within each recording.

@@ -30,7 +30,10 @@ pub(super) const AS_GOOD: f64 = 0.02;
 pub(super) const AS_GOOD_SCORE: f64 = 3.0;
 /// Two names whose gains differ by less than this factor cannot be told apart by these data.
 pub(super) const LEAST_MARGIN: f64 = 1.1;
-/// A name that is not told apart from the next best one ([`LEAST_MARGIN`]) is not given where it leaves more than this share of
+/// Two names of which one explains this share of what the other does are words for the same part of a residual. Names for the same
+/// thing share 98 % and more of it, names for different things less than 70 % (noise-free trials on other data).
+pub(super) const SAME_PART: f64 = 0.9;
+/// A name that is not told apart ([`LEAST_MARGIN`]) from the next best one for another part ([`SAME_PART`]) is not given where it leaves more than this share of
 /// the excess over the noise floor: then something else is there, and what fits best only resembles it. The share is that of an
 /// earlier trial on other data.
 pub(super) const MUCH_LEFT: f64 = 0.35;

@@ -6,6 +6,7 @@ mod prepare;
 mod recording;
 mod rigid;
 mod rows;
+mod silent;
 
 pub use prepare::{Data, DataError, DataOptions};
 pub use recording::Recording;

@@ -1,11 +1,12 @@
 //! Logs of an arm into rows: even grid, derivatives, band, rest removed, blocks laid out.
 
+use super::silent::{Silent, dead};
 use super::{Block, Column, JointRows, Recording, RigidBody};
 use crate::log::Log;
 use crate::parallel;
 use crate::signal::resample::median_step;
 use crate::signal::{Band, rest};
-use dyngen::arm::{Parameter, ParameterKind};
+use dyngen::arm::{JointKind, Parameter, ParameterKind};
 use std::fmt;
 use std::sync::OnceLock;
 
@@ -31,8 +32,8 @@ impl Default for DataOptions {
 pub enum DataError {
     /// No log has a stretch long enough.
     TooShort,
-    /// No joint moves.
-    NoMotion,
+    /// No joint says anything: why, joint by joint.
+    NoMotion(Vec<String>),
 }
 
 impl fmt::Display for DataError {
@@ -41,9 +42,11 @@ impl fmt::Display for DataError {
             DataError::TooShort => {
                 write!(f, "the logs hold no stretch of at least a second without gaps: record longer")
             }
-            DataError::NoMotion => write!(
+            DataError::NoMotion(why) => write!(
                 f,
-                "no joint moves in these logs: friction and inertia cannot be seen at rest; record an exciting motion"
+                "no joint moves enough in these logs, with torques that change: friction and inertia cannot be seen; record an \
+                 exciting motion\n  {}",
+                why.join("\n  ")
             ),
         }
     }
@@ -68,7 +71,9 @@ pub struct Data<'a> {
     pub logs: Vec<String>,
     /// The speed below which a joint rests, by joint, rad/s.
     pub rest_speed: Vec<f64>,
-    /// Pieces of logs that were left out, in words.
+    /// By joint: why its samples say nothing, in words.
+    pub silent: Vec<Option<String>>,
+    /// Pieces of logs, and joints of some logs, that were left out, in words.
     pub left_out: Vec<String>,
     /// What was left out or done, in words.
     pub notes: Vec<String>,
@@ -103,13 +108,14 @@ impl<'a> Data<'a> {
         let step = *steps.get(steps.len() / 2).ok_or(DataError::TooShort)?;
         let rate = 1.0 / step;
         let band = Band::new(options.cutoff, rate);
-        let mut left_out = Vec::new();
+        let mut left_out: Vec<String> = Vec::new();
         let mut recordings: Vec<Recording> = Vec::new();
         for (index, log) in logs.iter().enumerate() {
             for piece in &log.pieces {
                 let span = log.t[piece.end - 1] - log.t[piece.start];
                 if span < 1.0 {
-                    left_out.push(format!("{}: a piece of {span:.2} s is too short and was left out", log.file));
+                    left_out
+                        .push(format!("{}: a piece of {span:.2} s is too short and was left out", log.file));
                     continue;
                 }
                 recordings.extend(Recording::new(log, index, piece.clone(), step, options.smoothing));
@@ -126,18 +132,41 @@ impl<'a> Data<'a> {
             })
             .collect();
         let top_speed = (0..n).map(|j| top_speed(&recordings, j)).collect();
-        let kept = keep_moving(&recordings, &band, &rest_speed, n);
+        let kinds: Vec<JointKind> = body.arm().joints.iter().map(|joint| joint.kind).collect();
+        let silent: Vec<Option<Silent>> =
+            kinds.iter().enumerate().map(|(j, kind)| Silent::of(&recordings, j, *kind)).collect();
+        let mut kept = keep_moving(&recordings, &band, &rest_speed, n);
+        for (j, kept) in kept.iter_mut().enumerate() {
+            for (kept, recording) in kept.iter_mut().zip(&recordings) {
+                let is_dead = dead(recording, j);
+                if is_dead || silent[j].is_some() {
+                    kept.clear();
+                }
+                if is_dead && silent[j].is_none() {
+                    left_out.push(format!(
+                        "{}: the torque of joint {} never changes: the joint was left out of this log",
+                        logs[recording.log].file,
+                        j + 1
+                    ));
+                }
+            }
+        }
         let joints = joint_rows(body, &recordings, &band, kept);
+        let unit = |j: usize| if kinds[j] == JointKind::Prismatic { "m" } else { "rad" };
+        let silent: Vec<Option<String>> =
+            silent.iter().enumerate().map(|(j, s)| Some(s.as_ref()?.note(j + 1, unit(j)))).collect();
         if joints.iter().all(|j| j.len() < 20) {
-            return Err(DataError::NoMotion);
+            return Err(DataError::NoMotion(silent.into_iter().flatten().collect()));
         }
         let mut notes = left_out.clone();
         let total: usize = recordings.iter().map(|r| band.kept(r.len()).len()).sum();
         for (j, rows) in joints.iter().enumerate() {
             let rested = total - rows.len();
-            if rows.len() < 20 {
+            if let Some(why) = &silent[j] {
+                notes.push(why.clone());
+            } else if rows.len() < 20 {
                 notes.push(format!(
-                    "joint {} does not move in these logs: nothing can be said of its friction",
+                    "joint {} rests in these logs: neither its friction nor any effect on it can be judged; record paths on which it swings",
                     j + 1
                 ));
             } else if rested * 4 > total {
@@ -157,6 +186,7 @@ impl<'a> Data<'a> {
             blocks,
             logs,
             rest_speed,
+            silent,
             left_out,
             notes,
             top_speed,
@@ -181,6 +211,7 @@ impl<'a> Data<'a> {
             blocks: self.blocks.clone(),
             logs: self.logs.clone(),
             rest_speed: self.rest_speed.clone(),
+            silent: self.silent.clone(),
             left_out: self.left_out.clone(),
             notes: self.notes.clone(),
             top_speed: self.top_speed.clone(),

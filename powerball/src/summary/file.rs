@@ -49,6 +49,8 @@ struct Head {
     /// Name and seconds.
     logs: Vec<(String, f64)>,
     samples: u64,
+    /// By joint: why a log said nothing of it.
+    silent: Vec<Option<String>>,
     /// By joint and octave.
     rows: Vec<Vec<u64>>,
     /// Of the doubles.
@@ -108,6 +110,7 @@ impl Summary {
             octaves: OCTAVES,
             logs: self.logs.clone(),
             samples: self.samples,
+            silent: self.silent.clone(),
             rows: self.joints.iter().map(|j| j.levels().iter().map(Triangle::rows).collect()).collect(),
             checksum: format!("{:016x}", fnv(&numbers)),
         };
@@ -133,32 +136,32 @@ impl Summary {
         if !Summary::is_summary(bytes) {
             return Err(unreadable("is no summary that `powerball summarize` wrote"));
         }
-        let line = bytes.iter().position(|b| *b == b'\n').ok_or_else(|| unreadable("its first line is torn"))?;
+        let line =
+            bytes.iter().position(|b| *b == b'\n').ok_or_else(|| unreadable("its first line is torn"))?;
         let (head, numbers) = (&bytes[..line], &bytes[line + 1..]);
-        let version: Option<u64> = serde_json::from_slice::<serde_json::Value>(head)
-            .ok()
-            .and_then(|head| head["version"].as_u64());
+        let version: Option<u64> =
+            serde_json::from_slice::<serde_json::Value>(head).ok().and_then(|head| head["version"].as_u64());
         if version != Some(u64::from(VERSION)) {
             return Err(unreadable("another version of powerball wrote it: summarize the log anew"));
         }
         let head: Head = serde_json::from_slice(head)
             .map_err(|e| SummaryError::Unreadable(format!("its first line is damaged: {e}")))?;
-        let hash = u64::from_str_radix(&head.arm_hash, 16).map_err(|_| unreadable("its arm_hash is no number"))?;
+        let hash =
+            u64::from_str_radix(&head.arm_hash, 16).map_err(|_| unreadable("its arm_hash is no number"))?;
         let width = Columns { inertial: head.parameters.len() }.width();
         let each = Triangle::packed_len(width);
         let joints = head.steepness.len();
         let shaped = head.nodes == NODES
             && head.octaves == OCTAVES
             && head.rows.len() == joints
+            && head.silent.len() == joints
             && head.rows.iter().all(|r| r.len() == OCTAVES)
             && numbers.len() == 8 * each * OCTAVES * joints;
         if !shaped || format!("{:016x}", fnv(numbers)) != head.checksum {
             return Err(unreadable("it is torn or damaged: summarize the log anew"));
         }
-        let doubles: Vec<f64> = numbers
-            .chunks_exact(8)
-            .filter_map(|b| Some(f64::from_le_bytes(b.try_into().ok()?)))
-            .collect();
+        let doubles: Vec<f64> =
+            numbers.chunks_exact(8).filter_map(|b| Some(f64::from_le_bytes(b.try_into().ok()?))).collect();
         let mut parts = doubles.chunks_exact(each.max(1));
         let joints = head
             .rows
@@ -180,6 +183,6 @@ impl Summary {
             smoothing: head.smoothing,
             steepness: head.steepness.iter().map(|[low, high]| Steepness::between(*low, *high)).collect(),
         };
-        Ok(Summary { identity, logs: head.logs, samples: head.samples, joints })
+        Ok(Summary { identity, logs: head.logs, samples: head.samples, silent: head.silent, joints })
     }
 }

@@ -129,7 +129,11 @@ mod tests {
         };
         approx::assert_relative_eq!(product(0, 0), count as f64, max_relative = 1e-12);
         approx::assert_abs_diff_eq!(product(0, 1), x.iter().sum::<f64>(), epsilon = 1e-10);
-        approx::assert_relative_eq!(product(1, 1), x.iter().map(|v| v * v).sum::<f64>(), max_relative = 1e-12);
+        approx::assert_relative_eq!(
+            product(1, 1),
+            x.iter().map(|v| v * v).sum::<f64>(),
+            max_relative = 1e-12
+        );
         // A constant is in the slowest octave, but for rows without a neighbour.
         let slowest = octaves.levels()[OCTAVES - 1].column(0)[0];
         assert!(slowest * slowest > 0.85 * count as f64);

@@ -103,6 +103,9 @@ impl Summary {
                     seconds += data.recordings.iter().map(|r| r.len() as f64 / r.rate).sum::<f64>();
                     self.samples +=
                         data.recordings.iter().map(|r| data.band.kept(r.len()).len() as u64).sum::<u64>();
+                    for (silent, why) in self.silent.iter_mut().zip(data.silent) {
+                        *silent = why.or(silent.take());
+                    }
                     notes.extend(data.left_out);
                     taken = true;
                 }

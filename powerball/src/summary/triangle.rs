@@ -256,7 +256,8 @@ mod tests {
     #[test]
     fn fewer_rows_than_columns_stay_finite() {
         let mut t = Triangle::new(40);
-        let all: Vec<Vec<f64>> = rows(3, 40, 3).into_iter().map(|c| c.iter().map(|x| x * 1e-150).collect()).collect();
+        let all: Vec<Vec<f64>> =
+            rows(3, 40, 3).into_iter().map(|c| c.iter().map(|x| x * 1e-150).collect()).collect();
         for _ in 0..30 {
             t.push(&slices(&all));
         }

@@ -11,6 +11,7 @@ mod plant;
 mod servo;
 mod simulation;
 pub mod slave;
+mod undeclared;
 
 pub use body::{Body, PER_LINK, bodies};
 pub use chain::{Chain, Row};
@@ -20,3 +21,4 @@ pub use plant::{Plant, Recording, Sensors};
 pub use servo::{Gains, Servo};
 pub use simulation::Simulation;
 pub use slave::VirtualArm;
+pub use undeclared::Undeclared;

@@ -12,7 +12,8 @@ use rand_chacha::ChaCha8Rng;
 fn coverage(experiments: u64, logs: usize, periods: usize) -> Vec<(String, [usize; 2], f64)> {
     let (body, truth) = truth();
     let options = DataOptions::default();
-    let mut counts: Vec<(String, [usize; 2], f64)> = body.names().iter().map(|n| (n.clone(), [0; 2], 0.0)).collect();
+    let mut counts: Vec<(String, [usize; 2], f64)> =
+        body.names().iter().map(|n| (n.clone(), [0; 2], 0.0)).collect();
     for seed in 0..experiments {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut sensors = sensors();

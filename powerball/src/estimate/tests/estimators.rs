@@ -22,7 +22,8 @@ fn weighted(body: &RigidBody, logs: &[Log]) -> Solution {
 
 /// Error of the inertial parameters in the standard errors of a fit without faults, rms.
 fn miss(solution: &Solution, truth: &[f64], clean: &Errors) -> f64 {
-    let terms = solution.inertial().iter().zip(truth).zip(&clean.std).filter_map(|((x, t), s)| Some((x - t) / (*s)?));
+    let terms =
+        solution.inertial().iter().zip(truth).zip(&clean.std).filter_map(|((x, t), s)| Some((x - t) / (*s)?));
     (terms.clone().map(|z| z * z).sum::<f64>() / terms.count() as f64).sqrt()
 }
 
@@ -80,7 +81,8 @@ fn instruments_are_not_biased_by_noisy_positions() {
         }
     }
     let start = weighted(&body, &logs);
-    let (unbiased, unbiased_errors) = solve_instrumental(&body, &logs, &DataOptions::default(), &start).unwrap();
+    let (unbiased, unbiased_errors) =
+        solve_instrumental(&body, &logs, &DataOptions::default(), &start).unwrap();
     let [biased, unbiased] =
         [(&start, &errors(&start)), (&unbiased, &unbiased_errors)].map(|(s, e)| miss(s, &truth, e));
     println!("least squares {biased:.2}, instrumental {unbiased:.2} standard errors");

@@ -135,6 +135,36 @@ impl Effect {
             _ => return None,
         })
     }
+
+    /// The same effect about `factor` times as large, where and when it is.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Effect {
+        let mut scaled = self.clone();
+        match &mut scaled {
+            Effect::LoadFriction { coefficient: x, .. }
+            | Effect::Stribeck { level: x, .. }
+            | Effect::VelocityNonlinearity { torque: x, .. }
+            | Effect::Hysteresis { level: x, .. }
+            | Effect::Payload { mass: x, .. }
+            | Effect::Spring { stiffness: x, .. }
+            | Effect::PositionRipple { amplitude: x, .. }
+            | Effect::Temperature { change: x, .. }
+            | Effect::TimeDelay { delay: x }
+            | Effect::EncoderOffset { offset: x, .. }
+            | Effect::BrokenSymmetry { aside: x, .. }
+            | Effect::Backlash { gap: x, .. }
+            | Effect::JointCoupling { share: x, .. } => *x *= factor,
+            Effect::Asymmetry { share, constant, .. } => {
+                *share *= factor;
+                *constant *= factor;
+            }
+            Effect::TorqueConstant { gain, .. } => *gain = 1.0 + factor * (*gain - 1.0),
+            Effect::BaseTilt { tilt } => tilt.iter_mut().for_each(|x| *x *= factor),
+            Effect::ContactWrench { force, .. } => force.iter_mut().for_each(|x| *x *= factor),
+            Effect::JointElasticity { stiffness, .. } => *stiffness /= factor,
+        }
+        scaled
+    }
 }
 
 #[cfg(test)]

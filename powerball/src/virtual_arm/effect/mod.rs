@@ -12,6 +12,7 @@ use super::dynamics::Dynamics;
 use super::lwa4p::FLANGE;
 use crate::friction::TanhFriction;
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// Elastic sliders that make up presliding.
 const SLIDERS: usize = 4;
@@ -43,7 +44,8 @@ impl Gear {
 }
 
 /// One undeclared effect. Joints count from 0 here and from 1 in [`joints`](Effect::joints).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Effect {
     /// The gear's teeth rub in proportion to the torque that they carry, N·m of friction for each N·m.
     LoadFriction {

@@ -1,0 +1,162 @@
+//! The cases of a study: what is in the plant, how large, under what noise.
+
+use super::alike::PAIRS;
+use super::law::Outside;
+use clap::ValueEnum;
+use powerball::virtual_arm::Effect;
+use rand::seq::IndexedRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::ops::Range;
+
+/// The tables of a study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Table {
+    /// One effect of size 0.3 to 1.5
+    Single,
+    /// One effect of size 0.15 to 0.3
+    Small,
+    /// Two effects, each of size 0.3 to 1.5
+    Pairs,
+    /// One effect where friction follows other laws than Eq. 16
+    Friction,
+    /// One effect beside a smooth misfit of 0.3 σ on all joints
+    Misfit,
+    /// No effect, white noise
+    Clean,
+    /// No effect, coloured noise
+    Coloured,
+    /// One effect in coloured noise
+    ColouredEffect,
+    /// Something that no effect of the library is
+    Outside,
+    /// One effect of a pair that is easily confused, and the experiment that tells it from the other
+    Alike,
+    /// An effect put into the measured logs of a UR10e, size 1
+    Measured,
+    /// The same, size 0.6
+    MeasuredSmall,
+}
+
+impl Table {
+    pub(super) fn all() -> Vec<Table> {
+        Table::value_variants().to_vec()
+    }
+
+    /// Whether it needs measured logs.
+    pub(super) fn measured(self) -> bool {
+        matches!(self, Table::Measured | Table::MeasuredSmall)
+    }
+
+    /// The name in results and on the command line.
+    pub(super) fn name(self) -> String {
+        self.to_possible_value().map(|v| v.get_name().to_string()).unwrap_or_default()
+    }
+
+    /// What it holds, in words.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Table::Single => "one effect of size 0.3 to 1.5, white noise",
+            Table::Small => "one effect of size 0.15 to 0.3, white noise",
+            Table::Pairs => "two effects of sizes 0.3 to 1.5, white noise",
+            Table::Friction => "one effect of size 0.3 to 1.5, friction of other laws",
+            Table::Misfit => "one effect of size 0.3 to 1.5 beside a smooth misfit of 0.3 σ on all joints",
+            Table::Clean => "no effect, white noise",
+            Table::Coloured => "no effect, coloured noise",
+            Table::ColouredEffect => "one effect of size 0.3 to 1.5, coloured noise",
+            Table::Outside => "something outside the library, size 0.3 to 1.5",
+            Table::Alike => {
+                "one effect of size 0.3 to 1.5 that is easily taken for another, logged on paths that use 30 % of the ranges"
+            }
+            Table::Measured => "one effect of size 1 put into the measured UR10e logs",
+            Table::MeasuredSmall => "one effect of size 0.6 put into the measured UR10e logs",
+        }
+    }
+
+    /// Seeds of each kind where the caller names none.
+    fn seeds(self) -> u64 {
+        match self {
+            Table::Clean => 300,
+            Table::Coloured => 100,
+            Table::Pairs => 60,
+            Table::Outside => 20,
+            Table::Single | Table::Small => 10,
+            Table::Friction | Table::Misfit | Table::ColouredEffect | Table::Alike => 5,
+            Table::Measured | Table::MeasuredSmall => 3,
+        }
+    }
+
+    fn sizes(self) -> Range<f64> {
+        match self {
+            Table::Small => 0.15..0.3,
+            Table::Measured => 1.0..1.000_001,
+            Table::MeasuredSmall => 0.6..0.600_001,
+            _ => 0.3..1.5,
+        }
+    }
+}
+
+/// One case.
+#[derive(Clone, Debug)]
+pub(super) struct Case {
+    pub(super) table: Table,
+    /// What is in the plant: names of effects or of laws outside the library.
+    pub(super) kinds: Vec<String>,
+    /// How large each is to be: RMS left after the base is refitted over the RMS of the noise, worst joint.
+    pub(super) sizes: Vec<f64>,
+    pub(super) seed: u64,
+}
+
+impl Case {
+    /// All cases of a table, seed after seed, so that a stopped study has seen every kind.
+    pub(super) fn all(table: Table, seeds: Option<Range<u64>>) -> Vec<Case> {
+        let mut cases = Vec::new();
+        for seed in seeds.unwrap_or(0..table.seeds()) {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1000) + table as u64);
+            let mut size = || {
+                let range = table.sizes();
+                (rng.random_range(range.start.ln()..range.end.ln()) as f64).exp()
+            };
+            let mut add =
+                |kinds: Vec<String>, sizes: Vec<f64>| cases.push(Case { table, kinds, sizes, seed });
+            match table {
+                Table::Clean | Table::Coloured => add(Vec::new(), Vec::new()),
+                Table::Outside => {
+                    for law in Outside::ALL {
+                        add(vec![law.name().to_string()], vec![size()]);
+                    }
+                }
+                Table::Alike => {
+                    for name in PAIRS.into_iter().flatten() {
+                        add(vec![name.to_string()], vec![size()]);
+                    }
+                }
+                Table::Pairs => {
+                    let sizes = vec![size(), size()];
+                    let two: Vec<String> =
+                        Effect::NAMES.sample(&mut rng, 2).map(|n| (*n).to_string()).collect();
+                    add(two, sizes);
+                }
+                _ => {
+                    for name in Effect::NAMES {
+                        add(vec![name.to_string()], vec![size()]);
+                    }
+                }
+            }
+        }
+        cases
+    }
+
+    /// What tells it from every other one.
+    pub(super) fn name(&self) -> String {
+        format!("{}/{}/{}", self.table.name(), self.kinds.join("+"), self.seed)
+    }
+
+    /// A generator of its own.
+    pub(super) fn rng(&self) -> ChaCha8Rng {
+        let text = self.name();
+        ChaCha8Rng::seed_from_u64(text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        }))
+    }
+}

@@ -1,0 +1,323 @@
+//! Logs of the virtual arm along exciting paths, with a truth scaled to a wanted size.
+
+use super::alike;
+use super::case::{Case, Table};
+use super::judge::Outcome;
+use super::law::{FrictionLaw, Law, Misfit, OtherFriction, Outside, OutsideLaw};
+use dyngen::{Model, SetKind};
+use powerball::estimate::{Folds, fit, spread};
+use powerball::excite::{Settings, optimise};
+use powerball::explain::explain;
+use powerball::friction::TanhFriction;
+use powerball::log::{Log, common_clock};
+use powerball::motion::Motion;
+use powerball::regression::{Data, DataOptions, RigidBody};
+use powerball::virtual_arm::{Effect, Plant, Recording, lwa4p};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use std::f64::consts::TAU;
+use std::time::Instant;
+
+/// Paths of a session: those to fit, then those held out. Periods, s.
+const FIT: [f64; 5] = [10.0, 11.0, 9.5, 10.5, 9.0];
+const HELD_OUT: [f64; 2] = [12.0, 11.5];
+/// Between two logs, s.
+const PAUSE: f64 = 5.0;
+/// The search for a path: enough for a condition number near the best.
+const EVALUATIONS: usize = 60;
+/// Logs that leave names open: on paths that leave this share of range, speed and acceleration unused.
+const NARROW: f64 = 0.7;
+/// Rounds in which a truth is scaled to its size.
+const ROUNDS: usize = 4;
+/// The band in which a size is measured, without noise: wide enough for the ripple of gears.
+const WIDE: DataOptions = DataOptions { cutoff: 60.0, smoothing: 60.0, block: 2.0 };
+
+/// What every case needs.
+pub(super) struct Bench {
+    model: Model,
+    body: RigidBody,
+}
+
+/// What is in the plant beside what its model knows.
+#[derive(Clone, Debug)]
+enum Truth {
+    Effect(Effect),
+    Law(OutsideLaw),
+}
+
+impl Truth {
+    fn scaled(&self, factor: f64) -> Truth {
+        match self {
+            Truth::Effect(effect) => Truth::Effect(effect.scaled(factor)),
+            Truth::Law(law) => Truth::Law(law.scaled(factor)),
+        }
+    }
+
+    fn words(&self) -> String {
+        match self {
+            Truth::Effect(effect) => {
+                let joints: Vec<String> = effect.joints().iter().map(ToString::to_string).collect();
+                format!("joint {}: {}", joints.join(","), effect.describe())
+            }
+            Truth::Law(law) => {
+                format!("joint {}: {} of {:.2} N·m", law.joint + 1, law.kind.name(), law.amplitude)
+            }
+        }
+    }
+}
+
+/// A session on one arm: its paths, and what of its logs is not the plant's.
+struct Session {
+    plant: Plant,
+    friction: Option<FrictionLaw>,
+    misfit: Option<Misfit>,
+    motions: Vec<Motion>,
+    starts: Vec<f64>,
+    seed: u64,
+}
+
+impl Bench {
+    pub(super) fn new() -> Result<Bench, String> {
+        let arm = lwa4p::arm().map_err(|e| e.to_string())?;
+        let body = RigidBody::new(&arm).map_err(|e| e.to_string())?;
+        let model = Model::derive(arm).map_err(|e| e.to_string())?;
+        Ok(Bench { model, body })
+    }
+
+    /// Runs a case of simulated logs.
+    pub(super) fn run(&self, case: &Case) -> Result<Option<Outcome>, String> {
+        let mut rng = case.rng();
+        let mut session = self.session(case, &mut rng)?;
+        if case.table == Table::Misfit {
+            session.misfit = Some(self.misfit(&session, &mut rng)?);
+        }
+        let mut truths = Vec::new();
+        let mut sizes = Vec::new();
+        for (kind, size) in case.kinds.iter().zip(&case.sizes) {
+            let (truth, reached) = self.truth(&session, kind, *size, &mut rng)?;
+            truths.push(truth);
+            sizes.push(reached);
+        }
+        let logs = session.logs(&truths, true);
+        let (to_fit, held_out) = logs.split_at(FIT.len());
+        let start = Instant::now();
+        let options = DataOptions::default();
+        let explained =
+            explain(&self.body, to_fit, held_out, &options, &|_| ()).map_err(|e| e.to_string())?;
+        let (explained, settled) = if case.table == Table::Alike {
+            let record = |motion: &Motion| session.new_log(motion, &truths);
+            let (again, settled) = alike::settle(&self.body, (to_fit, held_out), explained, record)?;
+            (again, Some(settled))
+        } else {
+            (explained, None)
+        };
+        let seconds = start.elapsed().as_secs_f64();
+        let clean = session.logs(&[], true);
+        let clean = self.errors(&clean[..FIT.len()], &clean[FIT.len()..], &options)?;
+        let over = explained.after.validate.rms.iter().zip(&clean).map(|(a, c)| a / c).fold(0.0, f64::max);
+        let words = truths.iter().map(Truth::words).collect();
+        let outcome = Outcome::new(case, words, sizes, &explained, &[], over, seconds);
+        Ok(Some(Outcome { settled, ..outcome }))
+    }
+
+    fn session(&self, case: &Case, rng: &mut ChaCha8Rng) -> Result<Session, String> {
+        let mut plant = lwa4p::plant().map_err(|e| e.to_string())?;
+        let friction: Vec<TanhFriction<f64>> = (plant.friction().iter())
+            .map(|f| {
+                let mut share = || rng.random_range(0.6..1.5);
+                TanhFriction::new([
+                    f.gamma1 * share(),
+                    f.gamma2 * share(),
+                    f.gamma3 * share(),
+                    f.gamma4 * share(),
+                    f.gamma5 * share(),
+                ])
+            })
+            .collect();
+        let mut sensors = plant.sensors().clone();
+        match case.table {
+            Table::Coloured | Table::ColouredEffect => {
+                let share = rng.random_range(0.3..1.0);
+                sensors.coloured = sensors.white.iter().map(|w| share * w).collect();
+                sensors.colour_time = rng.random_range(0.05..1.0);
+            }
+            _ => sensors.coloured.fill(0.0),
+        }
+        plant = Plant::new(plant.dynamics().clone(), friction, sensors);
+        let mut motions = Vec::new();
+        for period in FIT.iter().chain(&HELD_OUT) {
+            let settings = Settings {
+                harmonics: 5,
+                fundamental: TAU / period,
+                evaluations: EVALUATIONS,
+                seed: rng.random(),
+                margin: if case.table == Table::Alike { NARROW } else { Settings::default().margin },
+                ..Settings::default()
+            };
+            let found = optimise(&self.model, SetKind::Minimal, &settings).map_err(|e| e.to_string())?;
+            motions.push(found.path.sample(plant.sensors().rate));
+        }
+        let mut starts = Vec::new();
+        let mut now = 0.0;
+        for motion in &motions {
+            starts.push(now);
+            now += motion.duration() + PAUSE;
+        }
+        let friction = (case.table == Table::Friction).then(|| FrictionLaw::draw(rng));
+        Ok(Session { plant, friction, misfit: None, motions, starts, seed: rng.random() })
+    }
+
+    /// A misfit that is as large on every joint as the noise allows: 0.3 of it, after the base was refitted.
+    fn misfit(&self, session: &Session, rng: &mut ChaCha8Rng) -> Result<Misfit, String> {
+        let mut misfit = Misfit::draw(session.plant.friction().len(), rng);
+        let plain = self.base(&session.logs(&[], false))?;
+        for _ in 0..2 {
+            let with = Session { misfit: Some(misfit.clone()), ..session.alone() };
+            let left = self.visible(session, &with.logs(&[], false), &plain)?;
+            misfit.amplitude.iter_mut().zip(left).for_each(|(a, left)| *a *= 0.3 / left);
+        }
+        Ok(misfit)
+    }
+
+    /// A truth of that kind whose visible size is `size`, and the size that was reached.
+    fn truth(
+        &self,
+        session: &Session,
+        kind: &str,
+        size: f64,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<(Truth, f64), String> {
+        let end = session.starts.last().copied().unwrap_or(0.0)
+            + session.motions.last().map_or(0.0, Motion::duration);
+        let begins = session.starts[2] + 3.0..session.starts[3] - PAUSE - 3.0;
+        let mut truth = match Outside::ALL.into_iter().find(|law| law.name() == kind) {
+            Some(law) => Truth::Law(OutsideLaw::draw(law, &session.plant, rng)),
+            None => Truth::Effect(
+                Effect::draw_named(kind, &session.plant, end, begins, rng)
+                    .ok_or_else(|| format!("no effect is called {kind}"))?,
+            ),
+        };
+        let quiet = session.alone();
+        let plain = self.base(&quiet.logs(&[], false))?;
+        let mut reached = 0.0;
+        for _ in 0..ROUNDS {
+            let logs = quiet.logs(std::slice::from_ref(&truth), false);
+            reached = self.visible(&quiet, &logs, &plain)?.into_iter().fold(0.0, f64::max);
+            if (reached / size - 1.0).abs() < 0.03 {
+                break;
+            }
+            truth = truth.scaled(size / reached);
+        }
+        Ok((truth, reached))
+    }
+
+    /// What of a truth is left on the fitted logs when the base model was refitted, without noise and in a wide band,
+    /// over the noise of a sample, by joint; `plain` is what the model leaves without it.
+    fn visible(&self, session: &Session, logs: &[Log], plain: &[Vec<f64>]) -> Result<Vec<f64>, String> {
+        let with = self.base(logs)?;
+        let sensors = session.plant.sensors();
+        let noise = sensors.white.iter().zip(&sensors.coloured).map(|(w, c)| w.hypot(*c));
+        let change = with.iter().zip(plain).map(|(with, without)| {
+            let squares = with.iter().zip(without).map(|(a, b)| (a - b).powi(2));
+            (squares.sum::<f64>() / without.len().max(1) as f64).sqrt()
+        });
+        Ok(change.zip(noise).map(|(change, noise)| change / noise).collect())
+    }
+
+    /// The residual of the base model on the fitted logs, in a wide band.
+    fn base(&self, logs: &[Log]) -> Result<Vec<Vec<f64>>, String> {
+        let data = Data::new(&self.body, &logs[..FIT.len()], &WIDE).map_err(|e| e.to_string())?;
+        Ok(fit(&data, &Folds::new(&data), &[], None).residual)
+    }
+
+    /// Errors of the base model held out.
+    fn errors(&self, to_fit: &[Log], held_out: &[Log], options: &DataOptions) -> Result<Vec<f64>, String> {
+        let data = Data::new(&self.body, to_fit, options).map_err(|e| e.to_string())?;
+        let other = Data::new(&self.body, held_out, options).map_err(|e| e.to_string())?;
+        let base = fit(&data, &Folds::new(&data), &[], None);
+        Ok(spread(&other, &base.residual_on(&other, &[])).rms)
+    }
+}
+
+impl Session {
+    /// The same with nothing beside the plant that the model knows.
+    fn alone(&self) -> Session {
+        Session {
+            plant: self.plant.clone(),
+            friction: None,
+            misfit: None,
+            motions: self.motions.clone(),
+            starts: self.starts.clone(),
+            seed: self.seed,
+        }
+    }
+
+    /// The log of one more motion after all others.
+    fn new_log(&self, motion: &Motion, truths: &[Truth]) -> Log {
+        let end = self.starts.iter().zip(&self.motions).map(|(s, m)| s + m.duration()).fold(0.0, f64::max);
+        let next = Session {
+            motions: vec![motion.clone()],
+            starts: vec![end + PAUSE],
+            seed: self.seed.wrapping_add(1000),
+            ..self.alone()
+        };
+        let mut log = next.logs(truths, true).swap_remove(0);
+        log.file = "experiment.csv".into();
+        log
+    }
+
+    /// The logs, with noise or without.
+    fn logs(&self, truths: &[Truth], noisy: bool) -> Vec<Log> {
+        let mut sensors = self.plant.sensors().clone();
+        if !noisy {
+            sensors.encoder_step = 0.0;
+            sensors.white.fill(0.0);
+            sensors.coloured.fill(0.0);
+        }
+        let mut plant = Plant::new(self.plant.dynamics().clone(), self.plant.friction().to_vec(), sensors);
+        for truth in truths {
+            if let Truth::Effect(effect) = truth {
+                plant = plant.with(effect.clone());
+            }
+        }
+        let mut logs: Vec<Log> = Vec::new();
+        for (k, (motion, start)) in self.motions.iter().zip(&self.starts).enumerate() {
+            let mut recording = plant.record(motion, *start, self.seed.wrapping_add(k as u64));
+            let mut add = |law: &dyn Law| {
+                let torques = law.torques(motion, *start);
+                recording.tau.iter_mut().zip(torques).for_each(|(tau, t)| *tau += t);
+            };
+            for truth in truths {
+                if let Truth::Law(law) = truth {
+                    add(law);
+                }
+            }
+            if let Some(misfit) = &self.misfit {
+                add(misfit);
+            }
+            if let Some(law) = self.friction {
+                add(&OtherFriction { law, plant: &self.plant });
+            }
+            logs.push(log(&recording, k));
+        }
+        common_clock(&mut logs);
+        logs
+    }
+}
+
+/// A recording as a log that was read.
+fn log(recording: &Recording, k: usize) -> Log {
+    let n = recording.dof();
+    let by_joint = |values: &[f64]| -> Vec<Vec<f64>> {
+        (0..n).map(|j| values.iter().skip(j).step_by(n).copied().collect()).collect()
+    };
+    Log {
+        file: format!("log{k}.csv"),
+        t: recording.t.clone(),
+        q: by_joint(&recording.q),
+        torque: by_joint(&recording.tau),
+        temperature: None,
+        pieces: std::iter::once(0..recording.t.len()).collect(),
+        clock: 0.0,
+    }
+}

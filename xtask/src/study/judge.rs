@@ -1,0 +1,130 @@
+//! What was named against what was there.
+
+use super::alike::Settled;
+use super::case::Case;
+use powerball::explain::Explained;
+use serde::{Deserialize, Serialize};
+
+/// A name that was given.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Named {
+    pub(super) effect: String,
+    pub(super) joints: Vec<usize>,
+    /// Names that fit as well, so that the answer is their class.
+    pub(super) alike: Vec<String>,
+    pub(super) margin: f64,
+    pub(super) leftover: f64,
+}
+
+/// One case and what came of it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Outcome {
+    pub(super) case: String,
+    pub(super) table: String,
+    pub(super) truth: Vec<String>,
+    /// In words.
+    pub(super) law: Vec<String>,
+    /// Visible sizes.
+    pub(super) sizes: Vec<f64>,
+    pub(super) named: Vec<Named>,
+    pub(super) unattributed: bool,
+    /// Held-out error after the additions over that of the model without the effect, worst joint.
+    pub(super) over_clean: f64,
+    pub(super) seconds: f64,
+    /// What an experiment did, in the table of names that are alike.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) settled: Option<Settled>,
+}
+
+impl Outcome {
+    pub(super) fn new(
+        case: &Case,
+        law: Vec<String>,
+        sizes: Vec<f64>,
+        explained: &Explained,
+        known: &[Named],
+        over_clean: f64,
+        seconds: f64,
+    ) -> Outcome {
+        let new = |n: &Named| {
+            !known.iter().any(|k| k.effect == n.effect && n.joints.iter().all(|j| k.joints.contains(j)))
+        };
+        Outcome {
+            case: case.name(),
+            table: case.table.name(),
+            truth: case.kinds.clone(),
+            law,
+            sizes,
+            named: named(explained).into_iter().filter(new).collect(),
+            unattributed: explained.unattributed.is_some(),
+            over_clean,
+            seconds,
+            settled: None,
+        }
+    }
+
+    /// Whether the first name is what is there, or its class is told.
+    pub(super) fn first_right(&self) -> bool {
+        self.named.first().is_some_and(|n| self.names_truth(n))
+    }
+
+    /// Whether everything that is there was named.
+    pub(super) fn all_right(&self) -> bool {
+        self.truth.iter().all(|t| self.named.iter().any(|n| n.effect == *t || n.alike.contains(t)))
+    }
+
+    /// Names given to what is not there.
+    pub(super) fn false_names(&self) -> usize {
+        self.named.iter().filter(|n| !self.names_truth(n)).count()
+    }
+
+    fn names_truth(&self, named: &Named) -> bool {
+        self.truth.iter().any(|t| named.effect == *t || named.alike.contains(t))
+    }
+
+    /// For the eye.
+    pub(super) fn line(&self) -> String {
+        let named: Vec<String> = (self.named.iter())
+            .map(|n| {
+                let alike =
+                    if n.alike.is_empty() { String::new() } else { format!(" or {}", n.alike.join(", ")) };
+                format!("{}{:?}{alike} m{:.1} l{:.2}", n.effect, n.joints, n.margin, n.leftover)
+            })
+            .collect();
+        let sizes: Vec<String> = self.sizes.iter().map(|s| format!("{s:.2}")).collect();
+        let verdict = match (self.truth.is_empty(), self.all_right(), self.false_names()) {
+            (_, true, 0) => "ok ",
+            (false, true, _) => "ok+",
+            (false, false, 0) => "-- ",
+            _ => "BAD",
+        };
+        format!(
+            "{verdict} {} size {} over clean {:.2}, {:.1} s: [{}]{} | {}",
+            self.case,
+            sizes.join(" "),
+            self.over_clean,
+            self.seconds,
+            named.join("; "),
+            if self.unattributed { " unattributed" } else { "" },
+            self.law.join("; "),
+        )
+    }
+}
+
+/// The names that an explanation gives.
+pub(super) fn named(explained: &Explained) -> Vec<Named> {
+    (explained.effects.iter())
+        .map(|e| Named {
+            effect: e.effect.clone(),
+            joints: e.joints.clone(),
+            alike: e
+                .rivals
+                .iter()
+                .filter(|r| r.why_not.starts_with("fits as well"))
+                .map(|r| r.effect.clone())
+                .collect(),
+            margin: e.margin,
+            leftover: e.leftover,
+        })
+        .collect()
+}
