@@ -24,6 +24,8 @@ fn every_path_that_a_page_names_exists() {
         "docs/bus.md",
         "docs/transports.md",
         "docs/dyngen.md",
+        "docs/estimation.md",
+        "docs/performance.md",
         "docs/explain.md",
     ] {
         let text = std::fs::read_to_string(root().join(page)).unwrap_or_else(|e| panic!("{page}: {e}"));
