@@ -27,6 +27,7 @@ fn every_path_that_a_page_names_exists() {
         "docs/estimation.md",
         "docs/performance.md",
         "docs/explain.md",
+        "docs/model.md",
     ] {
         let text = std::fs::read_to_string(root().join(page)).unwrap_or_else(|e| panic!("{page}: {e}"));
         let folder = root().join(page).parent().unwrap().to_path_buf();

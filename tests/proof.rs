@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use dyngen::base::SetKind;
-use dyngen::dynamics::function;
 use dyngen::exact::algebra::Algebra;
 use dyngen::exact::constant::ConstantField;
 use dyngen::graph::{Builder, Expr, Graph, Node};
@@ -62,8 +61,7 @@ fn a_wrong_result_anywhere_is_noticed() {
     let model = Model::derive(arm("arm")).unwrap();
     let set = model.set(SetKind::Minimal).unwrap();
     for function in Function::ALL {
-        let built =
-            function::build(function, model.arm(), model.symbols(), set, &model.sets().field, None, PASSES);
+        let built = model.function(function, SetKind::Minimal).unwrap();
         let check = |f: &dyngen::dynamics::FunctionGraph| {
             prove(model.arm(), model.symbols(), model.sets(), set, f, None)
         };
@@ -128,8 +126,7 @@ fn a_constant_that_is_slightly_off_is_noticed() {
     let mut other = model.arm().clone();
     other.joints[3].d += dyngen::exact::rational::parse_rational("1e-30").unwrap();
     let set = model.set(SetKind::Full).unwrap();
-    let built =
-        function::build(Function::Gravity, &other, model.symbols(), set, &model.sets().field, None, PASSES);
+    let built = Model::derive(other).unwrap().function(Function::Gravity, SetKind::Full).unwrap();
     assert!(prove(model.arm(), model.symbols(), model.sets(), set, &built, None).is_err());
 }
 
@@ -144,9 +141,11 @@ fn the_graphs_obey_the_equation_of_motion_in_the_ring() {
         for kind in [SetKind::Full, SetKind::Minimal, SetKind::Symbolic] {
             let mut draws = Draws::new(7);
             let mut drawn: BTreeMap<Input, Fp> = BTreeMap::new();
+            let mut angles: Vec<(Fp, Fp)> = Vec::new();
             for i in 0..model.arm().dof() {
                 let (s, c) = draws.element().circle_point();
-                drawn.extend([(Input::Sin(i), s), (Input::Cos(i), c), (Input::Position(i), draws.element())]);
+                angles.push((s, c));
+                drawn.insert(Input::Position(i), draws.element());
                 drawn.extend([Input::Speed(i), Input::Acceleration(i)].map(|x| (x, draws.element())));
             }
             let p = model.set(kind).unwrap().parameters.len();
@@ -154,7 +153,12 @@ fn the_graphs_obey_the_equation_of_motion_in_the_ring() {
             let value = |function: Function| -> Vec<Fp> {
                 let f = model.function(function, kind).unwrap();
                 let symbol = |index, sine| model.sets().field.modular_symbol(index, sine);
-                evaluate::evaluate(&f.graph, &f.outputs, |input| drawn[&input], symbol).unwrap()
+                let input = |input| match input {
+                    Input::Sin(sum) => evaluate::sine_and_cosine(sum, &|i| angles[i]).0,
+                    Input::Cos(sum) => evaluate::sine_and_cosine(sum, &|i| angles[i]).1,
+                    other => drawn[&other],
+                };
+                evaluate::evaluate(&f.graph, &f.outputs, input, symbol).unwrap()
             };
             let product = |matrix: &[Fp], of: fn(usize) -> Input, i: usize, width: usize| {
                 (0..width).fold(Fp::ZERO, |sum, k| sum + matrix[i * width + k] * drawn[&of(k)])

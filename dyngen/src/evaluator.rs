@@ -3,8 +3,8 @@
 use crate::base::SetKind;
 use crate::dynamics::Function;
 use crate::dynamics::function::{Argument, trig_offset};
-use crate::graph::Input;
 use crate::graph::tape::{LANES, Lane, Tape};
+use crate::graph::{Input, JointSum, Preparation};
 use crate::model::{Error, Model};
 
 /// Samples for an [`Evaluator`]: slices of n numbers a sample, one sample after another, and the values of the
@@ -52,6 +52,8 @@ pub struct Evaluator {
     dof: usize,
     parameters: usize,
     offsets: Vec<f64>,
+    /// What depends on the parameters alone, run once for all samples.
+    preparation: Tape,
     tape: Tape,
 }
 
@@ -68,12 +70,15 @@ impl Evaluator {
             if sine { s } else { c }
         };
         let dof = model.arm().dof();
+        let mut preparation = Preparation::default();
+        let built = built.without_preparation(&mut preparation);
         Ok(Evaluator {
             function,
             shape: built.shape,
             dof,
             parameters: model.set(kind)?.parameters.len(),
             offsets: (0..dof).map(|i| trig_offset(model.arm(), i)).collect(),
+            preparation: Tape::compile(&preparation.graph(), preparation.values(), symbol),
             tape: Tape::compile(&built.graph, &built.outputs, symbol),
         })
     }
@@ -116,6 +121,7 @@ impl Evaluator {
             };
             assert_eq!(given, expected, "{}: {expected} numbers are needed", argument.name());
         }
+        let prepared = self.prepared(samples.parameters);
         let mut workspace = self.tape.workspace();
         for first in (0..count).step_by(LANES) {
             let filled = LANES.min(count - first);
@@ -127,16 +133,21 @@ impl Evaluator {
                     *x = from[at(lane) + i];
                 }
             };
+            let gather_angle = |sum: JointSum, to: &mut Lane| {
+                for (lane, x) in to.iter_mut().enumerate() {
+                    *x = sum.value(|i| samples.q[at(lane) + i] + self.offsets[i]);
+                }
+            };
             self.tape.run(
                 &mut workspace,
                 |input, lane| match input {
-                    Input::Sin(i) => {
-                        gather(Argument::Positions, i, lane);
-                        lane.iter_mut().for_each(|x| *x = (*x + self.offsets[i]).sin());
+                    Input::Sin(sum) => {
+                        gather_angle(sum, lane);
+                        lane.iter_mut().for_each(|x| *x = x.sin());
                     }
-                    Input::Cos(i) => {
-                        gather(Argument::Positions, i, lane);
-                        lane.iter_mut().for_each(|x| *x = (*x + self.offsets[i]).cos());
+                    Input::Cos(sum) => {
+                        gather_angle(sum, lane);
+                        lane.iter_mut().for_each(|x| *x = x.cos());
                     }
                     Input::Position(i) => gather(Argument::Positions, i, lane),
                     Input::Speed(i) => gather(Argument::Speeds, i, lane),
@@ -146,6 +157,7 @@ impl Evaluator {
                     Input::Torque(i) => gather(Argument::Torques, i, lane),
                     Input::Error(i) => gather(Argument::Errors, i, lane),
                     Input::Parameter(i) => *lane = [samples.parameters[i]; LANES],
+                    Input::Prepared(i) => *lane = [prepared[i]; LANES],
                 },
                 |index, lane, negative| {
                     for (k, value) in lane.iter().take(filled).enumerate() {
@@ -154,5 +166,20 @@ impl Evaluator {
                 },
             );
         }
+    }
+
+    /// What the function needs of the parameters alone.
+    fn prepared(&self, parameters: &[f64]) -> Vec<f64> {
+        let mut values = vec![0.0; self.preparation.outputs()];
+        let input = |input: Input, lane: &mut Lane| {
+            if let Input::Parameter(i) = input {
+                *lane = [parameters[i]; LANES];
+            }
+        };
+        let output = |index: usize, lane: &Lane, negative: bool| {
+            values[index] = if negative { -lane[0] } else { lane[0] };
+        };
+        self.preparation.run(&mut self.preparation.workspace(), input, output);
+        values
     }
 }

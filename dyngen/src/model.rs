@@ -3,7 +3,8 @@
 use crate::arm::{Arm, Parameter};
 use crate::base::sets::{Combination, ParameterSet, SetKind, Sets};
 use crate::dynamics::elements::angle_symbols;
-use crate::dynamics::function;
+use crate::dynamics::function::{self, Subject};
+use crate::dynamics::regroup::{Order, Regrouping};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::elimination::Unproven;
 use crate::exact::rational::Rational;
@@ -11,6 +12,7 @@ use crate::exact::symbols::AngleSymbols;
 use crate::optimize::{PASSES, Pass};
 use crate::prove::{self, Disagreement};
 use std::fmt;
+use std::sync::OnceLock;
 
 /// An arm with what was derived of it.
 #[derive(Clone, Debug)]
@@ -18,6 +20,8 @@ pub struct Model {
     arm: Arm,
     symbols: AngleSymbols,
     sets: Sets,
+    /// For each kind of set the ways in which functions sum its parameters up, once they are asked for.
+    regroupings: [OnceLock<Vec<Regrouping>>; 4],
 }
 
 /// Why a model or one of its functions is not to be had.
@@ -77,7 +81,7 @@ impl Model {
     pub fn derive(arm: Arm) -> Result<Model, Error> {
         let symbols = angle_symbols(&arm);
         let sets = Sets::derive(&arm, &symbols)?;
-        Ok(Model { arm, symbols, sets })
+        Ok(Model { arm, symbols, sets, regroupings: Default::default() })
     }
 
     /// The arm.
@@ -159,7 +163,21 @@ impl Model {
         if !set.exact {
             return Err(Error::NotExact(set.lost.clone()));
         }
-        let built = function::build(function, &self.arm, &self.symbols, set, &self.sets.field, baked, passes);
+        let subject = Subject {
+            arm: &self.arm,
+            symbols: &self.symbols,
+            field: &self.sets.field,
+            minimal: &self.sets.minimal,
+        };
+        let regroupings = self.regroupings[kind as usize].get_or_init(|| {
+            let of = |order| {
+                Regrouping::new(&self.arm, &self.symbols, &self.sets.field, &self.sets.minimal, set, order)
+            };
+            // With symbols eliminations are slow, and two rules must do.
+            let orders = Order::all().step_by(if self.symbols.angles.is_empty() { 1 } else { Order::RULES });
+            orders.map(of).collect()
+        });
+        let built = function::build(function, &subject, set, regroupings, baked, passes);
         prove::prove(&self.arm, &self.symbols, &self.sets, set, &built, baked)?;
         Ok(built)
     }

@@ -1,9 +1,10 @@
-//! Parameter values from a JSON file: `{"parameter": number, …}`, or what `powerball identify` wrote.
+//! Parameter values from a JSON file: `{"parameter": number, …}`, or a model with `"parameters": [{"name", "value"}, …]`.
 
 use crate::arm::Parameter;
 use crate::base::{ParameterSet, SetKind};
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::model::Model;
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -31,7 +32,7 @@ impl Values {
     /// # Errors
     /// As [`Values::read`].
     pub fn parse(text: &str, file: &str) -> Result<Values, Diagnostics> {
-        let json: serde_json::Value = serde_json::from_str(text).map_err(|e| {
+        let json: Value = serde_json::from_str(text).map_err(|e| {
             let message = format!("not valid JSON: {e}");
             Diagnostics(vec![Diagnostic {
                 file: file.to_string(),
@@ -47,17 +48,23 @@ impl Values {
             ));
         };
         let (mut by_name, mut wrong) = (BTreeMap::new(), Vec::new());
-        // identified.json has a list of named values beside much else.
-        let listed: Option<Vec<(String, &serde_json::Value)>> =
-            object.get("parameters").and_then(|list| list.as_array()).map(|list| {
-                list.iter().filter_map(|p| Some((p["name"].as_str()?.to_string(), &p["value"]))).collect()
-            });
-        let pairs =
-            listed.unwrap_or_else(|| object.iter().map(|(name, value)| (name.clone(), value)).collect());
-        for (name, value) in pairs {
+        let mut given: Vec<(&str, &Value)> = Vec::new();
+        match object.get("parameters").and_then(Value::as_array) {
+            // What `powerball identify` and `explain` write; its other keys are not the rigid arm's.
+            Some(list) => {
+                for entry in list {
+                    match entry["name"].as_str() {
+                        Some(name) => given.push((name, &entry["value"])),
+                        None => wrong.push(format!("'parameters' has an entry without a name: {entry}")),
+                    }
+                }
+            }
+            None => given.extend(object.iter().map(|(name, value)| (name.as_str(), value))),
+        }
+        for (name, value) in given {
             match value.as_f64().filter(|x| x.is_finite()) {
                 Some(number) => {
-                    by_name.insert(name, number);
+                    by_name.insert(name.to_string(), number);
                 }
                 None => wrong.push(format!("the value of '{name}' must be a finite number, found {value}")),
             }

@@ -301,3 +301,17 @@ fn describe_says_what_each_symmetry_removed() {
         assert_eq!(rank(&path), expected, "{symmetry}: {removed}");
     }
 }
+
+/// What `powerball explain` writes beside values is no parameter of the rigid arm; a list without names is refused.
+#[test]
+fn a_model_is_a_file_of_values() {
+    let model = dyngen::Model::derive(dyngen::Arm::read(Path::new(&arm())).unwrap()).unwrap();
+    let set = model.set(dyngen::SetKind::Minimal).unwrap();
+    let list: Vec<Value> =
+        set.names().iter().map(|n| serde_json::json!({ "name": n, "value": 0.125 })).collect();
+    let text = serde_json::json!({ "arm": "x", "parameters": list, "terms": [], "friction": [] }).to_string();
+    let read = dyngen::Values::parse(&text, "model.json").unwrap().of_set(&model, set).unwrap();
+    assert_eq!(read, vec![0.125; set.parameters.len()]);
+    let wrong = dyngen::Values::parse(r#"{"parameters": [{"value": 1.0}]}"#, "model.json").unwrap_err();
+    assert!(wrong.to_string().contains("an entry without a name"), "{wrong}");
+}

@@ -7,6 +7,7 @@ pub mod canopen;
 pub mod cia402;
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod correction;
 #[cfg(feature = "std")]
 pub mod demo;
 pub mod driver;
@@ -39,5 +40,7 @@ pub mod report;
 pub mod signal;
 #[cfg(feature = "std")]
 pub mod summary;
+#[cfg(feature = "std")]
+pub mod torque_model;
 #[cfg(feature = "std")]
 pub mod virtual_arm;

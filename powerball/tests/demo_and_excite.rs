@@ -47,13 +47,65 @@ fn the_demo_finds_what_it_hid_and_writes_what_it_promises() {
         assert!(rms("after")[joint] < 0.5 * rms("before")[joint]);
 
         let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
-        // One figure a joint, and the bars.
-        assert_eq!(page.matches("<svg").count(), 7);
+        // One figure a joint, the bars, and what shows the effect.
+        assert_eq!(page.matches("<svg").count(), 8);
+        assert!(page.contains(&format!("{effect} on joint {}", joint + 1)));
         assert!(page.len() < 2_000_000 && page.contains("The name is right."));
         for file in ["arm.toml", "explained.json", "fit_5.csv", "held_out_3.csv"] {
             assert!(folder.join(file).is_file(), "{file}");
         }
     }
+}
+
+/// From logs that leave two names open to a decision, on the arm that the logs were made on and with nothing but its files.
+#[test]
+fn an_experiment_decides_what_logs_leave_open() {
+    let folder = scratch("demo_experiment");
+    let demo = folder.to_str().unwrap();
+    let run = powerball(&["demo", "--effect", "asymmetry", "--seed", "3", "--out", demo, "--json"]);
+    assert!(run.status.success(), "{}", complaint(&run));
+    let first = json(&run);
+    let next = &first["explained"]["next_experiment"];
+    assert_eq!(next["to_tell_apart"], serde_json::json!(["asymmetry", "spring"]), "{next}");
+    assert!(folder.join("virtual_arm.json").is_file());
+
+    let again = scratch("demo_experiment_again");
+    let file = |name: String| folder.join(name).to_str().unwrap().to_string();
+    let logs: Vec<String> = (1..=5).map(|k| file(format!("fit_{k}.csv"))).collect();
+    let held_out: Vec<String> = (1..=3).map(|k| file(format!("held_out_{k}.csv"))).collect();
+    let arm = file("arm.toml".to_string());
+    let mut arguments =
+        vec!["explain", "--arm", &arm, "--json", "--experiment", "--out", again.to_str().unwrap(), "--log"];
+    arguments.extend(logs.iter().map(String::as_str));
+    arguments.push("--validate");
+    arguments.extend(held_out.iter().map(String::as_str));
+    let run = powerball(&arguments);
+    assert!(run.status.success(), "{}", complaint(&run));
+    let result = json(&run);
+    assert_eq!(result["experiment"]["decided"], "asymmetry", "{}", result["experiment"]);
+    assert_eq!(result["effects"][0]["effect"], "asymmetry");
+    assert!(result["effects"][0]["margin"].as_f64().unwrap() > 1.1);
+    // The trajectory is one that `record` takes, and its log is there.
+    let lines = |name: &str| std::fs::read_to_string(again.join(name)).unwrap().lines().count();
+    assert_eq!(lines("next_experiment.csv"), lines("experiment.csv"));
+    let page = std::fs::read_to_string(again.join("report.html")).unwrap();
+    assert!(page.contains("The experiment decides for asymmetry"));
+
+    let refusal = powerball(&[
+        "explain",
+        "--arm",
+        &arm,
+        "--log",
+        &logs[0],
+        "--validate",
+        &logs[1],
+        "--out",
+        demo,
+        "--bus",
+        "virtual",
+    ]);
+    assert_eq!(refusal.status.code(), Some(2));
+    assert!(complaint(&refusal).contains("--experiment"));
 }
 
 #[test]

@@ -13,15 +13,17 @@ pub const PARAMETERS: usize = 3;
 ///
 /// Each is the sum that its name says, of masses m, first moments mx, my, mz and inertias of the links about the
 /// origins of their frames, and rotor inertias Im.
-pub const PARAMETER_NAMES: [&str; PARAMETERS] = ["mx1 + 1/2*m1", "my1", "Izz1 - 1/4*m1"];
+pub const PARAMETER_NAMES: [&str; PARAMETERS] = ["m1 + 2*mx1", "my1", "Izz1 + 1/2*mx1"];
+/// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
+pub const ANGLES: usize = 1;
 /// Joint positions with their sines and cosines: computed once and shared between calls, or taken from
 /// wherever the caller has them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trig<T> {
-    /// Sine of each revolute joint's angle; not read for prismatic joints.
-    pub sin: [T; JOINTS],
-    /// Cosine of each revolute joint's angle; not read for prismatic joints.
-    pub cos: [T; JOINTS],
+    /// Sine of each angle; not read for prismatic joints.
+    pub sin: [T; ANGLES],
+    /// Cosine of each angle; not read for prismatic joints.
+    pub cos: [T; ANGLES],
     /// Position of each prismatic joint, m; not read for revolute joints.
     pub position: [T; JOINTS],
 }
@@ -38,6 +40,50 @@ impl<T: SimdRealField + Copy> Trig<T> {
         }
     }
 }
+/// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of calls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prepared<T>([T; 6]);
+/// What the functions need of the parameters alone: pass it to those that end in `_with`, in place of the parameters.
+///
+/// Operations: 4 multiplications, 1 additions.
+#[inline]
+#[must_use]
+pub fn prepare<T: SimdRealField + Copy>(
+    parameters: &SVector<T, PARAMETERS>,
+) -> Prepared<T> {
+    let [parameters] = parameters.data.0;
+    let p1 = parameters[0];
+    let p2 = parameters[1];
+    let p3 = parameters[2];
+    let x1: T = nalgebra::convert(1f64);
+    let x2: T = nalgebra::convert(0.5f64);
+    let x3: T = nalgebra::convert(9.81f64);
+    let x5 = x2 * p1;
+    let x7: T = nalgebra::convert(0.25f64);
+    let x8 = p1 * x7;
+    let x10 = x8 + p3;
+    let x11 = x3 * x5;
+    let x12 = x3 * p2;
+    let x13 = x1 / x10;
+    Prepared([x11, x12, x10, x5, p2, x13])
+}
+/// Parameters, or what was prepared of them.
+pub trait Parameters<T> {
+    /// What the functions need of them.
+    fn prepared(&self) -> Prepared<T>;
+}
+impl<T: SimdRealField + Copy> Parameters<T> for SVector<T, PARAMETERS> {
+    #[inline]
+    fn prepared(&self) -> Prepared<T> {
+        prepare(self)
+    }
+}
+impl<T: Copy> Parameters<T> for Prepared<T> {
+    #[inline]
+    fn prepared(&self) -> Prepared<T> {
+        *self
+    }
+}
 /// Joint torques of a motion: τ = B(q)·q̈ + C(q, q̇)·q̇ + g(q), without friction.
 ///
 /// * `q`: joint positions, rad (m where prismatic)
@@ -47,7 +93,7 @@ impl<T: SimdRealField + Copy> Trig<T> {
 ///
 /// Returns τ, N·m (N where prismatic).
 ///
-/// Operations: 11 multiplications, 6 additions, 1 sines with cosines.
+/// Operations: 3 multiplications, 2 additions, 1 sines with cosines.
 #[must_use]
 pub fn inverse_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -68,35 +114,20 @@ pub fn inverse_dynamics<T: SimdRealField + Copy>(
 #[must_use]
 pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
-    dq: &SVector<T, JOINTS>,
+    _dq: &SVector<T, JOINTS>,
     ddq: &SVector<T, JOINTS>,
-    parameters: &SVector<T, PARAMETERS>,
+    parameters: &impl Parameters<T>,
 ) -> SVector<T, JOINTS> {
     let [s1] = trig.sin;
     let [c1] = trig.cos;
-    let [[dq1]] = dq.data.0;
     let [[ddq1]] = ddq.data.0;
-    let [[p1, p2, p3]] = parameters.data.0;
-    let x5: T = nalgebra::convert(0.5f64);
-    let x6: T = nalgebra::convert(9.81f64);
-    let x11 = s1 * x6;
-    let x12 = c1 * x6;
-    let x13 = dq1 * dq1;
-    let x14 = x5 * x13;
-    let x15 = x11 - x14;
-    let x16 = x5 * ddq1;
-    let x17 = x12 + x16;
-    let x18 = p1 * ddq1;
-    let x19 = p2 * x13;
-    let x20 = x18 - x19;
-    let x21 = p3 * ddq1;
-    let x22 = p1 * x17;
-    let x23 = p2 * x15;
-    let x24 = x22 - x23;
-    let x25 = x21 + x24;
-    let x26 = x5 * x20;
-    let x27 = x25 + x26;
-    SMatrix::from_array_storage(ArrayStorage([[x27]]))
+    let Prepared([z1, z2, z3, _, _, _]) = parameters.prepared();
+    let x9 = c1 * z1;
+    let x11 = s1 * z2;
+    let x12 = x9 - x11;
+    let x14 = ddq1 * z3;
+    let x15 = x12 + x14;
+    SMatrix::from_array_storage(ArrayStorage([[x15]]))
 }
 /// Regressor Y(q, q̇, q̈): τ = Y·π for the parameters of [`PARAMETER_NAMES`].
 ///
@@ -106,7 +137,7 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
 ///
 /// Returns Y, n × p.
 ///
-/// Operations: 3 multiplications, 2 additions, 1 sines with cosines.
+/// Operations: 4 multiplications, 1 additions, 1 sines with cosines.
 #[must_use]
 pub fn regressor<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -132,14 +163,14 @@ pub fn regressor_with<T: SimdRealField + Copy>(
     let [s1] = trig.sin;
     let [c1] = trig.cos;
     let [[ddq1]] = ddq.data.0;
-    let x5: T = nalgebra::convert(0.5f64);
-    let x6: T = nalgebra::convert(9.81f64);
-    let x8 = s1 * x6;
-    let x9 = c1 * x6;
-    let x13 = x5 * ddq1;
-    let x14 = x9 + x13;
-    let x15 = x13 + x14;
-    SMatrix::from_array_storage(ArrayStorage([[x15], [-x8], [ddq1]]))
+    let x4: T = nalgebra::convert(0.5f64);
+    let x5: T = nalgebra::convert(9.81f64);
+    let x7 = s1 * x5;
+    let x8 = c1 * x5;
+    let x9 = x4 * ddq1;
+    let x10 = x8 + x9;
+    let x11 = x4 * x10;
+    SMatrix::from_array_storage(ArrayStorage([[x11], [-x7], [ddq1]]))
 }
 /// Mass matrix B(q), symmetric.
 ///
@@ -148,7 +179,7 @@ pub fn regressor_with<T: SimdRealField + Copy>(
 ///
 /// Returns B, n × n, kg·m².
 ///
-/// Operations: 0 multiplications, 1 additions, 0 sines with cosines.
+/// Operations: 0 multiplications, 0 additions, 0 sines with cosines.
 #[must_use]
 pub fn mass_matrix<T: SimdRealField + Copy>(
     _q: &SVector<T, JOINTS>,
@@ -165,11 +196,10 @@ pub fn mass_matrix<T: SimdRealField + Copy>(
 #[must_use]
 pub fn mass_matrix_with<T: SimdRealField + Copy>(
     _trig: &Trig<T>,
-    parameters: &SVector<T, PARAMETERS>,
+    parameters: &impl Parameters<T>,
 ) -> SVector<T, JOINTS> {
-    let [[p1, _, p3]] = parameters.data.0;
-    let x6 = p1 + p3;
-    SMatrix::from_array_storage(ArrayStorage([[x6]]))
+    let Prepared([_, _, z3, _, _, _]) = parameters.prepared();
+    SMatrix::from_array_storage(ArrayStorage([[z3]]))
 }
 /// Coriolis matrix C(q, q̇) of Christoffel symbols: Ḃ − 2C is skew-symmetric.
 ///
@@ -198,7 +228,7 @@ pub fn coriolis_matrix<T: SimdRealField + Copy>(
 pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
     _trig: &Trig<T>,
     _dq: &SVector<T, JOINTS>,
-    _parameters: &SVector<T, PARAMETERS>,
+    _parameters: &impl Parameters<T>,
 ) -> SVector<T, JOINTS> {
     let x0: T = nalgebra::convert(0f64);
     SMatrix::from_array_storage(ArrayStorage([[x0]]))
@@ -210,7 +240,7 @@ pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
 ///
 /// Returns g, N·m.
 ///
-/// Operations: 4 multiplications, 1 additions, 1 sines with cosines.
+/// Operations: 2 multiplications, 1 additions, 1 sines with cosines.
 #[must_use]
 pub fn gravity<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -229,18 +259,15 @@ pub fn gravity<T: SimdRealField + Copy>(
 #[must_use]
 pub fn gravity_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
-    parameters: &SVector<T, PARAMETERS>,
+    parameters: &impl Parameters<T>,
 ) -> SVector<T, JOINTS> {
     let [s1] = trig.sin;
     let [c1] = trig.cos;
-    let [[p1, p2, _]] = parameters.data.0;
-    let x4: T = nalgebra::convert(9.81f64);
-    let x7 = s1 * x4;
-    let x8 = c1 * x4;
-    let x9 = p1 * x8;
-    let x10 = p2 * x7;
-    let x11 = x9 - x10;
-    SMatrix::from_array_storage(ArrayStorage([[x11]]))
+    let Prepared([z1, z2, _, _, _, _]) = parameters.prepared();
+    let x7 = c1 * z1;
+    let x9 = s1 * z2;
+    let x10 = x7 - x9;
+    SMatrix::from_array_storage(ArrayStorage([[x10]]))
 }
 /// Joint accelerations under joint torques: q̈ = B⁻¹·(τ − C·q̇ − g), without friction.
 ///
@@ -251,7 +278,7 @@ pub fn gravity_with<T: SimdRealField + Copy>(
 ///
 /// Returns q̈; not finite where the parameters make B singular.
 ///
-/// Operations: 9 multiplications, 5 additions, 1 divisions, 1 sines with cosines.
+/// Operations: 4 multiplications, 2 additions, 1 sines with cosines.
 #[must_use]
 pub fn forward_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -272,34 +299,22 @@ pub fn forward_dynamics<T: SimdRealField + Copy>(
 #[must_use]
 pub fn forward_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
-    dq: &SVector<T, JOINTS>,
+    _dq: &SVector<T, JOINTS>,
     tau: &SVector<T, JOINTS>,
-    parameters: &SVector<T, PARAMETERS>,
+    parameters: &impl Parameters<T>,
 ) -> SVector<T, JOINTS> {
     let [s1] = trig.sin;
     let [c1] = trig.cos;
-    let [[dq1]] = dq.data.0;
     let [[tau1]] = tau.data.0;
-    let [[p1, p2, p3]] = parameters.data.0;
-    let x1: T = nalgebra::convert(1f64);
-    let x5: T = nalgebra::convert(0.5f64);
-    let x6: T = nalgebra::convert(9.81f64);
-    let x10 = s1 * x6;
-    let x11 = c1 * x6;
-    let x12 = dq1 * dq1;
-    let x13 = x5 * x12;
-    let x14 = x10 - x13;
-    let x15 = p2 * x12;
-    let x16 = p1 * x11;
-    let x17 = p2 * x14;
-    let x18 = x16 - x17;
-    let x19 = x5 * x15;
-    let x20 = x18 - x19;
-    let x22 = x20 - tau1;
-    let x24 = p1 + p3;
-    let x25 = x1 / x24;
-    let x26 = x22 * x25;
-    SMatrix::from_array_storage(ArrayStorage([[-x26]]))
+    let Prepared([_, _, _, z4, z5, z6]) = parameters.prepared();
+    let x5: T = nalgebra::convert(9.81f64);
+    let x8 = c1 * z4;
+    let x10 = s1 * z5;
+    let x11 = x8 - x10;
+    let x12 = x5 * x11;
+    let x14 = x12 - tau1;
+    let x16 = x14 * z6;
+    SMatrix::from_array_storage(ArrayStorage([[-x16]]))
 }
 /// Pose of the tool's frame (the last link's where the arm declares no tool) in the base frame.
 ///

@@ -14,22 +14,25 @@ pub const PARAMETERS: usize = 7;
 /// Each is the sum that its name says, of masses m, first moments mx, my, mz and inertias of the links about the
 /// origins of their frames, and rotor inertias Im.
 pub const PARAMETER_NAMES: [&str; PARAMETERS] = [
-    "mx1 + 2/5*m1 + 2/5*m2",
+    "m1 + 5/2*mx1 + m2",
     "my1",
-    "Izz1 - 4/25*m1 + 2500*Im1 - 4/25*m2",
+    "Izz1 + 2/5*mx1 + 2500*Im1",
     "mx2 + 3/10*m2",
     "my2",
     "Izz2 - 9/100*m2",
     "Im2",
 ];
+/// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
+pub const ANGLES: usize = 3;
 /// Joint positions with their sines and cosines: computed once and shared between calls, or taken from
 /// wherever the caller has them.
+/// Angle 3: q1 + q2, across parallel axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trig<T> {
-    /// Sine of each revolute joint's angle; not read for prismatic joints.
-    pub sin: [T; JOINTS],
-    /// Cosine of each revolute joint's angle; not read for prismatic joints.
-    pub cos: [T; JOINTS],
+    /// Sine of each angle; not read for prismatic joints.
+    pub sin: [T; ANGLES],
+    /// Cosine of each angle; not read for prismatic joints.
+    pub cos: [T; ANGLES],
     /// Position of each prismatic joint, m; not read for revolute joints.
     pub position: [T; JOINTS],
 }
@@ -40,11 +43,69 @@ impl<T: SimdRealField + Copy> Trig<T> {
         let [[q1, q2]] = q.data.0;
         let (s1, c1) = q1.simd_sin_cos();
         let (s2, c2) = q2.simd_sin_cos();
+        let (s1p2, c1p2) = (q1 + q2).simd_sin_cos();
         Trig {
-            sin: [s1, s2],
-            cos: [c1, c2],
+            sin: [s1, s2, s1p2],
+            cos: [c1, c2, c1p2],
             position: [T::zero(), T::zero()],
         }
+    }
+}
+/// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of calls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prepared<T>([T; 13]);
+/// What the functions need of the parameters alone: pass it to those that end in `_with`, in place of the parameters.
+///
+/// Operations: 9 multiplications, 3 additions.
+#[inline]
+#[must_use]
+pub fn prepare<T: SimdRealField + Copy>(
+    parameters: &SVector<T, PARAMETERS>,
+) -> Prepared<T> {
+    let [parameters] = parameters.data.0;
+    let p1 = parameters[0];
+    let p2 = parameters[1];
+    let p3 = parameters[2];
+    let p4 = parameters[3];
+    let p5 = parameters[4];
+    let p6 = parameters[5];
+    let p7 = parameters[6];
+    let x1: T = nalgebra::convert(1f64);
+    let x2: T = nalgebra::convert(0.4f64);
+    let x3: T = nalgebra::convert(30f64);
+    let x4: T = nalgebra::convert(9.81f64);
+    let x6 = x2 * p1;
+    let x8: T = nalgebra::convert(0.16f64);
+    let x9 = p1 * x8;
+    let x11 = x9 + p3;
+    let x14: T = nalgebra::convert(0.6f64);
+    let x15 = p4 * x14;
+    let x17 = x15 + p6;
+    let x19 = x3 * p7;
+    let x21 = x3 * x19;
+    let x22 = x17 + x21;
+    let x23 = x4 * p4;
+    let x24 = x4 * p5;
+    let x25 = x4 * x6;
+    let x26 = x4 * p2;
+    let x27 = x1 / x22;
+    Prepared([p4, p5, x17, x6, p2, x11, x19, x22, x23, x24, x25, x26, x27])
+}
+/// Parameters, or what was prepared of them.
+pub trait Parameters<T> {
+    /// What the functions need of them.
+    fn prepared(&self) -> Prepared<T>;
+}
+impl<T: SimdRealField + Copy> Parameters<T> for SVector<T, PARAMETERS> {
+    #[inline]
+    fn prepared(&self) -> Prepared<T> {
+        prepare(self)
+    }
+}
+impl<T: Copy> Parameters<T> for Prepared<T> {
+    #[inline]
+    fn prepared(&self) -> Prepared<T> {
+        *self
     }
 }
 /// Joint torques of a motion: τ = B(q)·q̈ + C(q, q̇)·q̇ + g(q), without friction.
@@ -56,7 +117,7 @@ impl<T: SimdRealField + Copy> Trig<T> {
 ///
 /// Returns τ, N·m (N where prismatic).
 ///
-/// Operations: 32 multiplications, 23 additions, 2 sines with cosines.
+/// Operations: 26 multiplications, 18 additions, 2 sines with cosines.
 #[must_use]
 pub fn inverse_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -68,8 +129,8 @@ pub fn inverse_dynamics<T: SimdRealField + Copy>(
     let (s1, c1) = q1.simd_sin_cos();
     let (s2, c2) = q2.simd_sin_cos();
     let trig = Trig {
-        sin: [s1, s2],
-        cos: [c1, c2],
+        sin: [s1, s2, T::zero()],
+        cos: [c1, c2, T::zero()],
         position: [T::zero(), T::zero()],
     };
     inverse_dynamics_with(&trig, dq, ddq, parameters)
@@ -80,73 +141,61 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
     ddq: &SVector<T, JOINTS>,
-    parameters: &SVector<T, PARAMETERS>,
+    parameters: &impl Parameters<T>,
 ) -> SVector<T, JOINTS> {
-    let [s1, s2] = trig.sin;
-    let [c1, c2] = trig.cos;
+    let [s1, s2, _] = trig.sin;
+    let [c1, c2, _] = trig.cos;
     let [[dq1, dq2]] = dq.data.0;
     let [[ddq1, ddq2]] = ddq.data.0;
-    let [[p1, p2, p3, p4, p5, p6, p7]] = parameters.data.0;
+    let Prepared([z1, z2, z3, z4, z5, z6, z7, _, _, _, _, _, _]) = parameters.prepared();
     let x5: T = nalgebra::convert(0.4f64);
-    let x9: T = nalgebra::convert(0.3f64);
-    let x10: T = nalgebra::convert(30f64);
-    let x11: T = nalgebra::convert(9.81f64);
-    let x21 = s1 * x11;
-    let x22 = c1 * x11;
-    let x23 = dq1 * dq1;
-    let x24 = x5 * x23;
-    let x25 = x21 - x24;
-    let x26 = x5 * ddq1;
-    let x27 = x22 + x26;
-    let x28 = c2 * x25;
-    let x29 = s2 * x27;
-    let x30 = x28 + x29;
-    let x31 = c2 * x27;
-    let x32 = s2 * x25;
-    let x33 = x31 - x32;
-    let x34 = ddq1 + ddq2;
-    let x35 = dq1 + dq2;
-    let x36 = x35 * x35;
-    let x37 = x9 * x36;
-    let x38 = x30 - x37;
-    let x39 = x9 * x34;
-    let x40 = x33 + x39;
-    let x41 = p4 * x36;
-    let x42 = p4 * x34;
-    let x43 = p5 * x34;
+    let x9: T = nalgebra::convert(30f64);
+    let x10: T = nalgebra::convert(9.81f64);
+    let x15 = dq1 + dq2;
+    let x16 = ddq1 + ddq2;
+    let x17 = dq1 * dq1;
+    let x18 = s1 * x10;
+    let x19 = c1 * x10;
+    let x20 = x5 * x17;
+    let x21 = x5 * ddq1;
+    let x22 = x18 - x20;
+    let x23 = x19 + x21;
+    let x24 = x15 * x15;
+    let x25 = c2 * x22;
+    let x26 = s2 * x23;
+    let x27 = x25 + x26;
+    let x28 = c2 * x23;
+    let x29 = s2 * x22;
+    let x30 = x28 - x29;
+    let x32 = x24 * z1;
+    let x33 = x16 * z1;
+    let x34 = x30 * z1;
+    let x36 = x16 * z2;
+    let x37 = x24 * z2;
+    let x38 = x27 * z2;
+    let x39 = x32 + x36;
+    let x40 = x33 - x37;
+    let x41 = x34 - x38;
+    let x43 = x16 * z3;
     let x44 = x41 + x43;
-    let x45 = p5 * x36;
-    let x46 = x42 - x45;
-    let x47 = p6 * x34;
-    let x48 = p4 * x40;
-    let x49 = p5 * x38;
-    let x50 = x48 - x49;
-    let x51 = x47 + x50;
-    let x52 = x9 * x46;
-    let x53 = x51 + x52;
-    let x54 = c2 * x46;
-    let x55 = s2 * x44;
-    let x56 = x54 - x55;
-    let x57 = x10 * p7;
-    let x58 = x10 * ddq2;
+    let x46 = x19 * z4;
+    let x48 = x18 * z5;
+    let x49 = x46 - x48;
+    let x51 = ddq1 * z6;
+    let x52 = x49 + x51;
+    let x53 = c2 * x40;
+    let x54 = s2 * x39;
+    let x55 = x53 - x54;
+    let x56 = x5 * x55;
+    let x57 = x52 + x56;
+    let x58 = x9 * ddq2;
     let x59 = ddq1 + x58;
-    let x60 = x57 * x59;
-    let x61 = x53 + x60;
-    let x62 = ddq2 * x57;
-    let x63 = x53 + x62;
-    let x64 = p1 * ddq1;
-    let x65 = p2 * x23;
-    let x66 = x64 - x65;
-    let x67 = p3 * ddq1;
-    let x68 = p1 * x27;
-    let x69 = p2 * x25;
-    let x70 = x68 - x69;
-    let x71 = x67 + x70;
-    let x72 = x56 + x66;
-    let x73 = x63 + x71;
-    let x74 = x5 * x72;
-    let x75 = x73 + x74;
-    SMatrix::from_array_storage(ArrayStorage([[x75, x61]]))
+    let x61 = x59 * z7;
+    let x62 = x44 + x61;
+    let x63 = ddq2 * z7;
+    let x64 = x44 + x63;
+    let x65 = x57 + x64;
+    SMatrix::from_array_storage(ArrayStorage([[x65, x62]]))
 }
 /// Regressor Y(q, q̇, q̈): τ = Y·π for the parameters of [`PARAMETER_NAMES`].
 ///
@@ -156,7 +205,7 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
 ///
 /// Returns Y, n × p.
 ///
-/// Operations: 20 multiplications, 16 additions, 2 sines with cosines.
+/// Operations: 20 multiplications, 13 additions, 2 sines with cosines.
 #[must_use]
 pub fn regressor<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -167,8 +216,8 @@ pub fn regressor<T: SimdRealField + Copy>(
     let (s1, c1) = q1.simd_sin_cos();
     let (s2, c2) = q2.simd_sin_cos();
     let trig = Trig {
-        sin: [s1, s2],
-        cos: [c1, c2],
+        sin: [s1, s2, T::zero()],
+        cos: [c1, c2, T::zero()],
         position: [T::zero(), T::zero()],
     };
     regressor_with(&trig, dq, ddq)
@@ -180,8 +229,8 @@ pub fn regressor_with<T: SimdRealField + Copy>(
     dq: &SVector<T, JOINTS>,
     ddq: &SVector<T, JOINTS>,
 ) -> SMatrix<T, JOINTS, PARAMETERS> {
-    let [s1, s2] = trig.sin;
-    let [c1, c2] = trig.cos;
+    let [s1, s2, _] = trig.sin;
+    let [c1, c2, _] = trig.cos;
     let [[dq1, dq2]] = dq.data.0;
     let [[ddq1, ddq2]] = ddq.data.0;
     let x0: T = nalgebra::convert(0f64);
@@ -189,51 +238,48 @@ pub fn regressor_with<T: SimdRealField + Copy>(
     let x9: T = nalgebra::convert(0.3f64);
     let x10: T = nalgebra::convert(30f64);
     let x11: T = nalgebra::convert(9.81f64);
-    let x14 = s1 * x11;
-    let x15 = c1 * x11;
+    let x14 = dq1 + dq2;
+    let x15 = ddq1 + ddq2;
     let x16 = dq1 * dq1;
-    let x17 = x5 * x16;
-    let x18 = x14 - x17;
-    let x19 = x5 * ddq1;
-    let x20 = x15 + x19;
-    let x21 = c2 * x18;
-    let x22 = s2 * x20;
-    let x23 = x21 + x22;
-    let x24 = c2 * x20;
-    let x25 = s2 * x18;
-    let x26 = x24 - x25;
-    let x27 = ddq1 + ddq2;
-    let x28 = dq1 + dq2;
-    let x29 = x28 * x28;
-    let x30 = x9 * x29;
-    let x31 = x23 - x30;
-    let x32 = x9 * x27;
-    let x33 = x26 + x32;
-    let x34 = x5 * s2;
-    let x35 = x5 * c2;
-    let x36 = x9 + x35;
-    let x37 = x19 + x20;
-    let x38 = x29 * x34;
-    let x39 = x27 * x36;
-    let x40 = x38 - x39;
-    let x41 = x33 - x40;
-    let x42 = x32 + x33;
-    let x43 = x27 * x34;
-    let x44 = x29 * x36;
-    let x45 = x43 + x44;
-    let x46 = x31 + x45;
-    let x47 = x10 * ddq2;
-    let x48 = ddq1 + x47;
-    let x49 = x10 * x48;
+    let x17 = s1 * x11;
+    let x18 = c1 * x11;
+    let x19 = x5 * x16;
+    let x20 = x5 * ddq1;
+    let x21 = x17 - x19;
+    let x22 = x18 + x20;
+    let x23 = x14 * x14;
+    let x24 = c2 * x21;
+    let x25 = s2 * x22;
+    let x26 = x24 + x25;
+    let x27 = c2 * x22;
+    let x28 = s2 * x21;
+    let x29 = x27 - x28;
+    let x30 = x9 * x15;
+    let x31 = x29 + x30;
+    let x32 = x5 * s2;
+    let x33 = x5 * c2;
+    let x34 = x5 * x22;
+    let x35 = x23 * x32;
+    let x36 = x15 * x33;
+    let x37 = x35 - x36;
+    let x38 = x30 + x31;
+    let x39 = x37 - x38;
+    let x40 = x15 * x32;
+    let x41 = x23 * x33;
+    let x42 = x40 + x41;
+    let x43 = x26 + x42;
+    let x44 = x10 * ddq2;
+    let x45 = ddq1 + x44;
+    let x46 = x10 * x45;
     SMatrix::from_array_storage(
         ArrayStorage([
-            [x37, x0],
-            [-x14, x0],
+            [x34, x0],
+            [-x17, x0],
             [ddq1, x0],
-            [x41, x42],
-            [-x46, -x23],
-            [x27, x27],
-            [x47, x49],
+            [-x39, x38],
+            [-x43, -x26],
+            [x15, x15],
+            [x44, x46],
         ]),
     )
 }
@@ -244,7 +290,7 @@ pub fn regressor_with<T: SimdRealField + Copy>(
 ///
 /// Returns B, n × n, kg·m².
 ///
-/// Operations: 7 multiplications, 10 additions, 1 sines with cosines.
+/// Operations: 3 multiplications, 5 additions, 1 sines with cosines.
 #[must_use]
 pub fn mass_matrix<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -253,8 +299,8 @@ pub fn mass_matrix<T: SimdRealField + Copy>(
     let [[_, q2]] = q.data.0;
     let (s2, c2) = q2.simd_sin_cos();
     let trig = Trig {
-        sin: [T::zero(), s2],
-        cos: [T::zero(), c2],
+        sin: [T::zero(), s2, T::zero()],
+        cos: [T::zero(), c2, T::zero()],
         position: [T::zero(), T::zero()],
     };
     mass_matrix_with(&trig, parameters)
@@ -263,32 +309,21 @@ pub fn mass_matrix<T: SimdRealField + Copy>(
 #[must_use]
 pub fn mass_matrix_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
-    parameters: &SVector<T, PARAMETERS>,
+    parameters: &impl Parameters<T>,
 ) -> SMatrix<T, JOINTS, JOINTS> {
-    let [_, s2] = trig.sin;
-    let [_, c2] = trig.cos;
-    let [[p1, _, p3, p4, p5, p6, p7]] = parameters.data.0;
+    let [_, s2, _] = trig.sin;
+    let [_, c2, _] = trig.cos;
+    let Prepared([z1, z2, z3, _, _, z6, z7, z8, _, _, _, _, _]) = parameters.prepared();
     let x2: T = nalgebra::convert(0.4f64);
-    let x5: T = nalgebra::convert(0.3f64);
-    let x6: T = nalgebra::convert(30f64);
-    let x13 = p4 + p4;
-    let x14 = x5 * x13;
-    let x15 = p6 + x14;
-    let x16 = c2 * p4;
-    let x17 = s2 * p5;
-    let x18 = x16 - x17;
-    let x19 = x6 * p7;
-    let x20 = x6 * x19;
-    let x21 = x15 + x20;
-    let x22 = x15 + x19;
-    let x23 = x2 * x18;
-    let x24 = x22 + x23;
-    let x25 = p1 + x18;
-    let x26 = p3 + x15;
-    let x27 = x25 + x25;
-    let x28 = x2 * x27;
-    let x29 = x26 + x28;
-    SMatrix::from_array_storage(ArrayStorage([[x29, x24], [x24, x21]]))
+    let x9 = c2 * z1;
+    let x11 = s2 * z2;
+    let x12 = x9 - x11;
+    let x13 = x2 * x12;
+    let x15 = x13 + z3;
+    let x17 = x13 + z6;
+    let x18 = x15 + x17;
+    let x20 = x15 + z7;
+    SMatrix::from_array_storage(ArrayStorage([[x18, x20], [x20, z8]]))
 }
 /// Coriolis matrix C(q, q̇) of Christoffel symbols: Ḃ − 2C is skew-symmetric.
 ///
@@ -298,7 +333,7 @@ pub fn mass_matrix_with<T: SimdRealField + Copy>(
 ///
 /// Returns C, n × n.
 ///
-/// Operations: 22 multiplications, 13 additions, 1 sines with cosines.
+/// Operations: 7 multiplications, 4 additions, 1 sines with cosines.
 #[must_use]
 pub fn coriolis_matrix<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -308,8 +343,8 @@ pub fn coriolis_matrix<T: SimdRealField + Copy>(
     let [[_, q2]] = q.data.0;
     let (s2, c2) = q2.simd_sin_cos();
     let trig = Trig {
-        sin: [T::zero(), s2],
-        cos: [T::zero(), c2],
+        sin: [T::zero(), s2, T::zero()],
+        cos: [T::zero(), c2, T::zero()],
         position: [T::zero(), T::zero()],
     };
     coriolis_matrix_with(&trig, dq, parameters)
@@ -319,52 +354,26 @@ pub fn coriolis_matrix<T: SimdRealField + Copy>(
 pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
-    parameters: &SVector<T, PARAMETERS>,
+    parameters: &impl Parameters<T>,
 ) -> SMatrix<T, JOINTS, JOINTS> {
-    let [_, s2] = trig.sin;
-    let [_, c2] = trig.cos;
+    let [_, s2, _] = trig.sin;
+    let [_, c2, _] = trig.cos;
     let [[dq1, dq2]] = dq.data.0;
-    let [[_, p2, _, p4, p5, p6, _]] = parameters.data.0;
+    let Prepared([z1, z2, _, _, _, _, _, _, _, _, _, _, _]) = parameters.prepared();
     let x0: T = nalgebra::convert(0f64);
     let x3: T = nalgebra::convert(0.4f64);
-    let x7: T = nalgebra::convert(0.3f64);
-    let x12 = dq1 + dq2;
-    let x13: T = nalgebra::convert(0.5f64);
-    let x14 = p6 * x13;
-    let x15 = p5 * x12;
-    let x16 = p4 * x12;
-    let x17 = x12 * x14;
-    let x19 = x7 * x15;
-    let x20 = x7 * x16;
-    let x21 = x17 + x20;
-    let x22 = x20 + x21;
-    let x23 = c2 * x15;
-    let x24 = s2 * x16;
-    let x25 = x23 + x24;
-    let x26 = c2 * p5;
-    let x27 = s2 * p4;
-    let x28 = x26 + x27;
-    let x29 = c2 * x19;
-    let x30 = s2 * x22;
-    let x31 = x29 + x30;
-    let x33 = s2 * x19;
-    let x35 = c2 * x17;
-    let x36 = x33 + x35;
-    let x39 = c2 * x31;
-    let x40 = s2 * x36;
-    let x41 = x39 - x40;
-    let x44 = x3 * x25;
-    let x45 = dq1 * x3;
-    let x46 = x28 * x45;
-    let x47 = dq1 * p2;
-    let x48 = p2 + x28;
-    let x49 = x25 + x47;
-    let x50 = x3 * x49;
-    let x51 = x41 + x50;
-    let x52 = x45 * x48;
-    let x53 = x41 + x52;
-    let x54 = x51 - x53;
-    SMatrix::from_array_storage(ArrayStorage([[-x54, x46], [-x44, x0]]))
+    let x7 = dq1 + dq2;
+    let x9 = c2 * z2;
+    let x11 = s2 * z1;
+    let x12 = x9 + x11;
+    let x13 = x7 * x9;
+    let x14 = x7 * x11;
+    let x15 = x13 + x14;
+    let x16 = x3 * x15;
+    let x17 = x3 * x12;
+    let x18 = dq1 * x17;
+    let x19 = x16 - x18;
+    SMatrix::from_array_storage(ArrayStorage([[-x19, x18], [-x16, x0]]))
 }
 /// Joint torques that hold the arm still: g(q).
 ///
@@ -373,7 +382,7 @@ pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
 ///
 /// Returns g, N·m.
 ///
-/// Operations: 10 multiplications, 5 additions, 2 sines with cosines.
+/// Operations: 4 multiplications, 4 additions, 2 sines with cosines.
 #[must_use]
 pub fn gravity<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -381,10 +390,10 @@ pub fn gravity<T: SimdRealField + Copy>(
 ) -> SVector<T, JOINTS> {
     let [[q1, q2]] = q.data.0;
     let (s1, c1) = q1.simd_sin_cos();
-    let (s2, c2) = q2.simd_sin_cos();
+    let (s1p2, c1p2) = (q1 + q2).simd_sin_cos();
     let trig = Trig {
-        sin: [s1, s2],
-        cos: [c1, c2],
+        sin: [s1, T::zero(), s1p2],
+        cos: [c1, T::zero(), c1p2],
         position: [T::zero(), T::zero()],
     };
     gravity_with(&trig, parameters)
@@ -393,28 +402,19 @@ pub fn gravity<T: SimdRealField + Copy>(
 #[must_use]
 pub fn gravity_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
-    parameters: &SVector<T, PARAMETERS>,
+    parameters: &impl Parameters<T>,
 ) -> SVector<T, JOINTS> {
-    let [s1, s2] = trig.sin;
-    let [c1, c2] = trig.cos;
-    let [[p1, p2, _, p4, p5, _, _]] = parameters.data.0;
-    let x6: T = nalgebra::convert(9.81f64);
-    let x11 = s1 * x6;
-    let x12 = c1 * x6;
-    let x13 = c2 * x11;
-    let x14 = s2 * x12;
-    let x15 = x13 + x14;
-    let x16 = c2 * x12;
-    let x17 = s2 * x11;
-    let x18 = x16 - x17;
-    let x19 = p4 * x18;
-    let x20 = p5 * x15;
-    let x21 = x19 - x20;
-    let x22 = p1 * x12;
-    let x23 = p2 * x11;
-    let x24 = x22 - x23;
-    let x25 = x21 + x24;
-    SMatrix::from_array_storage(ArrayStorage([[x25, x21]]))
+    let [s1, _, s1p2] = trig.sin;
+    let [c1, _, c1p2] = trig.cos;
+    let Prepared([_, _, _, _, _, _, _, _, z9, z10, z11, z12, _]) = parameters.prepared();
+    let x9 = c1p2 * z9;
+    let x11 = s1p2 * z10;
+    let x12 = x9 - x11;
+    let x14 = c1 * z11;
+    let x16 = s1 * z12;
+    let x17 = x14 - x16;
+    let x18 = x12 + x17;
+    SMatrix::from_array_storage(ArrayStorage([[x18, x12]]))
 }
 /// Joint accelerations under joint torques: q̈ = B⁻¹·(τ − C·q̇ − g), without friction.
 ///
@@ -425,7 +425,7 @@ pub fn gravity_with<T: SimdRealField + Copy>(
 ///
 /// Returns q̈; not finite where the parameters make B singular.
 ///
-/// Operations: 34 multiplications, 27 additions, 2 divisions, 2 sines with cosines.
+/// Operations: 27 multiplications, 19 additions, 1 divisions, 2 sines with cosines.
 #[must_use]
 pub fn forward_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -437,8 +437,8 @@ pub fn forward_dynamics<T: SimdRealField + Copy>(
     let (s1, c1) = q1.simd_sin_cos();
     let (s2, c2) = q2.simd_sin_cos();
     let trig = Trig {
-        sin: [s1, s2],
-        cos: [c1, c2],
+        sin: [s1, s2, T::zero()],
+        cos: [c1, c2, T::zero()],
         position: [T::zero(), T::zero()],
     };
     forward_dynamics_with(&trig, dq, tau, parameters)
@@ -449,82 +449,65 @@ pub fn forward_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
     tau: &SVector<T, JOINTS>,
-    parameters: &SVector<T, PARAMETERS>,
+    parameters: &impl Parameters<T>,
 ) -> SVector<T, JOINTS> {
-    let [s1, s2] = trig.sin;
-    let [c1, c2] = trig.cos;
+    let [s1, s2, _] = trig.sin;
+    let [c1, c2, _] = trig.cos;
     let [[dq1, dq2]] = dq.data.0;
     let [[tau1, tau2]] = tau.data.0;
-    let [[p1, p2, p3, p4, p5, p6, p7]] = parameters.data.0;
+    let Prepared([z1, z2, z3, z4, z5, z6, z7, _, _, _, _, _, z13]) = parameters
+        .prepared();
     let x1: T = nalgebra::convert(1f64);
     let x5: T = nalgebra::convert(0.4f64);
-    let x9: T = nalgebra::convert(0.3f64);
-    let x10: T = nalgebra::convert(30f64);
-    let x11: T = nalgebra::convert(9.81f64);
-    let x19 = s1 * x11;
-    let x20 = c1 * x11;
-    let x21 = dq1 * dq1;
-    let x22 = x5 * x21;
-    let x23 = x19 - x22;
-    let x24 = c2 * x23;
-    let x25 = s2 * x20;
-    let x26 = x24 + x25;
-    let x27 = c2 * x20;
-    let x28 = s2 * x23;
-    let x29 = x27 - x28;
-    let x30 = dq1 + dq2;
-    let x31 = x30 * x30;
-    let x32 = x9 * x31;
-    let x33 = x26 - x32;
-    let x34 = p4 * x31;
-    let x35 = p5 * x31;
-    let x36 = p4 * x29;
-    let x37 = p5 * x33;
-    let x38 = x36 - x37;
-    let x39 = x9 * x35;
-    let x40 = x38 - x39;
-    let x41 = c2 * x35;
-    let x42 = s2 * x34;
-    let x43 = x41 + x42;
-    let x44 = x10 * p7;
-    let x45 = p2 * x21;
-    let x46 = p1 * x20;
-    let x47 = p2 * x23;
-    let x48 = x46 - x47;
-    let x49 = x43 + x45;
-    let x50 = x40 + x48;
-    let x51 = x5 * x49;
-    let x52 = x50 - x51;
-    let x55 = x52 - tau1;
-    let x56 = x40 - tau2;
-    let x57 = p4 + p4;
-    let x58 = x9 * x57;
-    let x59 = p6 + x58;
-    let x60 = c2 * p4;
-    let x61 = s2 * p5;
-    let x62 = x60 - x61;
-    let x63 = x10 * x44;
-    let x64 = x59 + x63;
-    let x65 = x44 + x59;
-    let x66 = x5 * x62;
-    let x67 = x65 + x66;
-    let x68 = p1 + x62;
-    let x69 = p3 + x59;
-    let x70 = x68 + x68;
-    let x71 = x5 * x70;
-    let x72 = x69 + x71;
-    let x73 = x1 / x64;
-    let x74 = x67 * x73;
-    let x75 = x67 * x74;
-    let x76 = x72 - x75;
-    let x77 = x1 / x76;
-    let x78 = x56 * x74;
-    let x79 = x55 - x78;
-    let x80 = x77 * x79;
-    let x81 = x56 * x73;
-    let x82 = x74 * x80;
-    let x83 = x81 - x82;
-    SMatrix::from_array_storage(ArrayStorage([[-x80, -x83]]))
+    let x10: T = nalgebra::convert(9.81f64);
+    let x13 = dq1 + dq2;
+    let x14 = dq1 * dq1;
+    let x15 = s1 * x10;
+    let x16 = c1 * x10;
+    let x17 = x5 * x14;
+    let x18 = x15 - x17;
+    let x19 = x13 * x13;
+    let x20 = c2 * x18;
+    let x21 = s2 * x16;
+    let x22 = x20 + x21;
+    let x23 = c2 * x16;
+    let x24 = s2 * x18;
+    let x25 = x23 - x24;
+    let x27 = x19 * z1;
+    let x28 = x25 * z1;
+    let x30 = x19 * z2;
+    let x31 = x22 * z2;
+    let x32 = x28 - x31;
+    let x34 = x16 * z4;
+    let x36 = x15 * z5;
+    let x37 = x34 - x36;
+    let x38 = c2 * x30;
+    let x39 = s2 * x27;
+    let x40 = x38 + x39;
+    let x41 = x5 * x40;
+    let x42 = x37 - x41;
+    let x43 = x32 + x42;
+    let x46 = x43 - tau1;
+    let x47 = x32 - tau2;
+    let x48 = c2 * z1;
+    let x49 = s2 * z2;
+    let x50 = x48 - x49;
+    let x51 = x5 * x50;
+    let x53 = x51 + z3;
+    let x55 = x51 + z6;
+    let x56 = x53 + x55;
+    let x58 = x53 + z7;
+    let x60 = x58 * z13;
+    let x61 = x58 * x60;
+    let x62 = x56 - x61;
+    let x63 = x1 / x62;
+    let x64 = x47 * x60;
+    let x65 = x46 - x64;
+    let x66 = x63 * x65;
+    let x67 = x47 * z13;
+    let x68 = x60 * x66;
+    let x69 = x67 - x68;
+    SMatrix::from_array_storage(ArrayStorage([[-x66, -x69]]))
 }
 /// Pose of the tool's frame (the last link's where the arm declares no tool) in the base frame.
 ///
@@ -541,8 +524,8 @@ pub fn forward_kinematics<T: SimdRealField + Copy>(
     let (s1, c1) = q1.simd_sin_cos();
     let (s2, c2) = q2.simd_sin_cos();
     let trig = Trig {
-        sin: [s1, s2],
-        cos: [c1, c2],
+        sin: [s1, s2, T::zero()],
+        cos: [c1, c2, T::zero()],
         position: [T::zero(), T::zero()],
     };
     forward_kinematics_with(&trig)
@@ -552,8 +535,8 @@ pub fn forward_kinematics<T: SimdRealField + Copy>(
 pub fn forward_kinematics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
 ) -> SMatrix<T, 4, 4> {
-    let [s1, s2] = trig.sin;
-    let [c1, c2] = trig.cos;
+    let [s1, s2, _] = trig.sin;
+    let [c1, c2, _] = trig.cos;
     let x0: T = nalgebra::convert(0f64);
     let x1: T = nalgebra::convert(1f64);
     let x4: T = nalgebra::convert(0.4f64);
@@ -567,15 +550,15 @@ pub fn forward_kinematics_with<T: SimdRealField + Copy>(
     let x14 = c1 * s2;
     let x15 = x13 + x14;
     let x16 = x7 * x12;
-    let x17 = x8 + x16;
-    let x18 = x7 * x15;
-    let x19 = x9 + x18;
+    let x17 = x7 * x15;
+    let x18 = x8 + x16;
+    let x19 = x9 + x17;
     SMatrix::from_array_storage(
         ArrayStorage([
             [x12, x15, x0, x0],
             [-x15, x12, x0, x0],
             [x0, x0, x1, x0],
-            [x17, x19, x0, x1],
+            [x18, x19, x0, x1],
         ]),
     )
 }

@@ -14,23 +14,26 @@ pub const PARAMETERS: usize = 8;
 /// Each is the sum that its name says, of masses m, first moments mx, my, mz and inertias of the links about the
 /// origins of their frames, and rotor inertias Im.
 pub const PARAMETER_NAMES: [&str; PARAMETERS] = [
-    "mx1 + 1/5*m1 + 5/4*Izz1 + 1/5*m2",
-    "mx2 + 3/10*m2 + mx3",
+    "Izz1 + 4/25*m1 + 4/5*mx1 - 8/15*mx2 - 8/15*mx3",
+    "m2 + 10/3*mx2 + 10/3*mx3",
     "my2 + my3",
-    "Izz2 - 9/100*m2 + Izz3",
+    "Izz2 + 3/10*mx2 + 3/10*mx3 + Izz3",
     "m3 + m4",
     "mx4",
     "my4",
     "Izz4",
 ];
+/// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
+pub const ANGLES: usize = 5;
 /// Joint positions with their sines and cosines: computed once and shared between calls, or taken from
 /// wherever the caller has them.
+/// Angle 5: q1 + q2, across parallel axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trig<T> {
-    /// Sine of each revolute joint's angle; not read for prismatic joints.
-    pub sin: [T; JOINTS],
-    /// Cosine of each revolute joint's angle; not read for prismatic joints.
-    pub cos: [T; JOINTS],
+    /// Sine of each angle; not read for prismatic joints.
+    pub sin: [T; ANGLES],
+    /// Cosine of each angle; not read for prismatic joints.
+    pub cos: [T; ANGLES],
     /// Position of each prismatic joint, m; not read for revolute joints.
     pub position: [T; JOINTS],
 }
@@ -42,11 +45,69 @@ impl<T: SimdRealField + Copy> Trig<T> {
         let (s1, c1) = q1.simd_sin_cos();
         let (s2, c2) = q2.simd_sin_cos();
         let (s4, c4) = q4.simd_sin_cos();
+        let (s1p2, c1p2) = (q1 + q2).simd_sin_cos();
         Trig {
-            sin: [s1, s2, T::zero(), s4],
-            cos: [c1, c2, T::zero(), c4],
+            sin: [s1, s2, T::zero(), s4, s1p2],
+            cos: [c1, c2, T::zero(), c4, c1p2],
             position: [T::zero(), T::zero(), q3, T::zero()],
         }
+    }
+}
+/// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of calls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prepared<T>([T; 13]);
+/// What the functions need of the parameters alone: pass it to those that end in `_with`, in place of the parameters.
+///
+/// Operations: 7 multiplications, 3 additions.
+#[inline]
+#[must_use]
+pub fn prepare<T: SimdRealField + Copy>(
+    parameters: &SVector<T, PARAMETERS>,
+) -> Prepared<T> {
+    let [parameters] = parameters.data.0;
+    let p1 = parameters[0];
+    let p2 = parameters[1];
+    let p3 = parameters[2];
+    let p4 = parameters[3];
+    let p6 = parameters[5];
+    let p7 = parameters[6];
+    let p8 = parameters[7];
+    let p5 = parameters[4];
+    let x1: T = nalgebra::convert(1f64);
+    let x2: T = nalgebra::convert(0.3f64);
+    let x3: T = nalgebra::convert(0.4f64);
+    let x4: T = nalgebra::convert(9.81f64);
+    let x7: T = nalgebra::convert(0.16f64);
+    let x8 = p2 * x7;
+    let x9 = p1 + x8;
+    let x10 = x2 * p2;
+    let x12: T = nalgebra::convert(0.09f64);
+    let x13 = p2 * x12;
+    let x15 = x13 + p4;
+    let x20 = x2 * p5;
+    let x21 = x3 * p5;
+    let x22 = x3 * x21;
+    let x23 = x9 + x22;
+    let x24 = x4 * p5;
+    let x25 = x1 / p8;
+    let x26 = x1 / p5;
+    Prepared([p8, p6, p7, p5, x10, p3, x15, x9, x20, x23, x24, x25, x26])
+}
+/// Parameters, or what was prepared of them.
+pub trait Parameters<T> {
+    /// What the functions need of them.
+    fn prepared(&self) -> Prepared<T>;
+}
+impl<T: SimdRealField + Copy> Parameters<T> for SVector<T, PARAMETERS> {
+    #[inline]
+    fn prepared(&self) -> Prepared<T> {
+        prepare(self)
+    }
+}
+impl<T: Copy> Parameters<T> for Prepared<T> {
+    #[inline]
+    fn prepared(&self) -> Prepared<T> {
+        *self
     }
 }
 /// Joint torques of a motion: τ = B(q)·q̈ + C(q, q̇)·q̇ + g(q), without friction.
@@ -58,7 +119,7 @@ impl<T: SimdRealField + Copy> Trig<T> {
 ///
 /// Returns τ, N·m (N where prismatic).
 ///
-/// Operations: 42 multiplications, 31 additions, 2 sines with cosines.
+/// Operations: 40 multiplications, 30 additions, 2 sines with cosines.
 #[must_use]
 pub fn inverse_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -70,8 +131,8 @@ pub fn inverse_dynamics<T: SimdRealField + Copy>(
     let (s2, c2) = q2.simd_sin_cos();
     let (s4, c4) = q4.simd_sin_cos();
     let trig = Trig {
-        sin: [T::zero(), s2, T::zero(), s4],
-        cos: [T::zero(), c2, T::zero(), c4],
+        sin: [T::zero(), s2, T::zero(), s4, T::zero()],
+        cos: [T::zero(), c2, T::zero(), c4, T::zero()],
         position: [T::zero(), T::zero(), T::zero(), T::zero()],
     };
     inverse_dynamics_with(&trig, dq, ddq, parameters)
@@ -82,90 +143,88 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
     ddq: &SVector<T, JOINTS>,
-    parameters: &SVector<T, PARAMETERS>,
+    parameters: &impl Parameters<T>,
 ) -> SVector<T, JOINTS> {
-    let [_, s2, _, s4] = trig.sin;
-    let [_, c2, _, c4] = trig.cos;
+    let [_, s2, _, s4, _] = trig.sin;
+    let [_, c2, _, c4, _] = trig.cos;
     let [[dq1, dq2, _, dq4]] = dq.data.0;
     let [[ddq1, ddq2, ddq3, ddq4]] = ddq.data.0;
-    let [[p1, p2, p3, p4, p5, p6, p7, p8]] = parameters.data.0;
+    let Prepared([z1, z2, z3, z4, z5, z6, z7, z8, _, _, _, _, _]) = parameters
+        .prepared();
     let x2: T = nalgebra::convert(0.3f64);
     let x4: T = nalgebra::convert(0.4f64);
     let x11: T = nalgebra::convert(9.81f64);
-    let x24 = dq1 * dq1;
-    let x25 = x4 * x24;
-    let x26 = x4 * ddq1;
-    let x27 = c2 * x25;
-    let x28 = s2 * x26;
-    let x29 = x27 - x28;
-    let x30 = c2 * x26;
-    let x31 = s2 * x25;
-    let x32 = x30 + x31;
-    let x33 = ddq1 + ddq2;
-    let x34 = dq1 + dq2;
-    let x35 = x34 * x34;
-    let x36 = x2 * x35;
-    let x37 = x29 + x36;
-    let x38 = x2 * x33;
-    let x39 = x32 + x38;
-    let x40 = x11 - ddq3;
-    let x41 = c4 * x37;
-    let x42 = s4 * x39;
-    let x43 = x41 + x42;
-    let x44 = c4 * x39;
-    let x45 = s4 * x37;
-    let x46 = x44 - x45;
-    let x47 = ddq4 - x33;
-    let x48 = dq4 - x34;
-    let x49 = x48 * x48;
-    let x50 = p6 * x49;
-    let x51 = p6 * x47;
-    let x52 = p7 * x47;
-    let x53 = x50 + x52;
-    let x54 = p7 * x49;
-    let x55 = x51 - x54;
-    let x56 = p8 * x47;
-    let x57 = p6 * x46;
-    let x58 = p7 * x43;
-    let x59 = x57 - x58;
-    let x60 = x56 - x59;
-    let x61 = c4 * x53;
-    let x62 = s4 * x55;
-    let x63 = x61 + x62;
-    let x64 = c4 * x55;
-    let x65 = s4 * x53;
-    let x66 = x64 - x65;
-    let x67 = p5 * x37;
-    let x68 = p5 * x39;
-    let x69 = p5 * x40;
-    let x70 = x63 + x67;
-    let x71 = x66 - x68;
-    let x72 = p2 * x35;
-    let x73 = p2 * x33;
-    let x74 = p3 * x33;
-    let x75 = x72 - x74;
-    let x76 = p3 * x35;
-    let x77 = x73 + x76;
-    let x78 = p4 * x33;
-    let x79 = p2 * x39;
-    let x80 = p3 * x37;
-    let x81 = x79 - x80;
-    let x82 = x78 + x81;
-    let x83 = x70 + x75;
-    let x84 = x71 - x77;
-    let x85 = x60 - x82;
-    let x86 = x2 * x84;
-    let x87 = x85 + x86;
-    let x88 = c2 * x84;
-    let x89 = s2 * x83;
-    let x90 = x88 + x89;
-    let x91 = p1 * ddq1;
-    let x92 = p1 * x26;
-    let x93 = x90 - x91;
-    let x94 = x87 - x92;
-    let x95 = x4 * x93;
-    let x96 = x94 + x95;
-    SMatrix::from_array_storage(ArrayStorage([[-x96, -x87, -x69, x60]]))
+    let x15 = s4 * z1;
+    let x16 = s4 * x15;
+    let x17 = z1 - x16;
+    let x19 = c4 * z2;
+    let x21 = s4 * z3;
+    let x22 = x19 - x21;
+    let x23 = c4 * z3;
+    let x24 = s4 * z2;
+    let x25 = x23 + x24;
+    let x30 = dq1 + dq2;
+    let x31 = ddq1 + ddq2;
+    let x32 = dq1 * dq1;
+    let x33 = x4 * x32;
+    let x34 = x4 * ddq1;
+    let x35 = x30 * x30;
+    let x36 = c2 * x33;
+    let x37 = s2 * x34;
+    let x38 = x36 - x37;
+    let x39 = c2 * x34;
+    let x40 = s2 * x33;
+    let x41 = x39 + x40;
+    let x42 = x2 * x35;
+    let x43 = x2 * x31;
+    let x44 = x38 + x42;
+    let x45 = x41 + x43;
+    let x46 = x11 - ddq3;
+    let x47 = dq4 - x30;
+    let x48 = ddq4 - x31;
+    let x49 = x47 * x47;
+    let x50 = x22 * x49;
+    let x51 = x22 * x48;
+    let x52 = x22 * x45;
+    let x53 = x25 * x48;
+    let x54 = x25 * x49;
+    let x55 = x25 * x44;
+    let x56 = x50 + x53;
+    let x57 = x51 - x54;
+    let x58 = x52 - x55;
+    let x59 = x17 * x48;
+    let x60 = x58 - x59;
+    let x61 = x16 * x48;
+    let x62 = x60 - x61;
+    let x64 = x44 * z4;
+    let x65 = x45 * z4;
+    let x66 = x46 * z4;
+    let x67 = x56 + x64;
+    let x68 = x57 - x65;
+    let x70 = x35 * z5;
+    let x71 = x31 * z5;
+    let x72 = x41 * z5;
+    let x74 = x31 * z6;
+    let x75 = x35 * z6;
+    let x76 = x38 * z6;
+    let x77 = x70 - x74;
+    let x78 = x71 + x75;
+    let x79 = x72 - x76;
+    let x81 = x31 * z7;
+    let x82 = x79 + x81;
+    let x83 = x2 * x68;
+    let x84 = x62 - x83;
+    let x85 = x67 + x77;
+    let x86 = x68 - x78;
+    let x87 = x82 + x84;
+    let x89 = ddq1 * z8;
+    let x90 = c2 * x86;
+    let x91 = s2 * x85;
+    let x92 = x90 + x91;
+    let x93 = x4 * x92;
+    let x94 = x89 - x93;
+    let x95 = x87 + x94;
+    SMatrix::from_array_storage(ArrayStorage([[x95, x87, -x66, -x62]]))
 }
 /// Regressor Y(q, q̇, q̈): τ = Y·π for the parameters of [`PARAMETER_NAMES`].
 ///
@@ -175,7 +234,7 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
 ///
 /// Returns Y, n × p.
 ///
-/// Operations: 38 multiplications, 29 additions, 2 sines with cosines.
+/// Operations: 32 multiplications, 23 additions, 2 sines with cosines.
 #[must_use]
 pub fn regressor<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -186,8 +245,8 @@ pub fn regressor<T: SimdRealField + Copy>(
     let (s2, c2) = q2.simd_sin_cos();
     let (s4, c4) = q4.simd_sin_cos();
     let trig = Trig {
-        sin: [T::zero(), s2, T::zero(), s4],
-        cos: [T::zero(), c2, T::zero(), c4],
+        sin: [T::zero(), s2, T::zero(), s4, T::zero()],
+        cos: [T::zero(), c2, T::zero(), c4, T::zero()],
         position: [T::zero(), T::zero(), T::zero(), T::zero()],
     };
     regressor_with(&trig, dq, ddq)
@@ -199,91 +258,79 @@ pub fn regressor_with<T: SimdRealField + Copy>(
     dq: &SVector<T, JOINTS>,
     ddq: &SVector<T, JOINTS>,
 ) -> SMatrix<T, JOINTS, PARAMETERS> {
-    let [_, s2, _, s4] = trig.sin;
-    let [_, c2, _, c4] = trig.cos;
+    let [_, s2, _, s4, _] = trig.sin;
+    let [_, c2, _, c4, _] = trig.cos;
     let [[dq1, dq2, _, dq4]] = dq.data.0;
     let [[ddq1, ddq2, ddq3, ddq4]] = ddq.data.0;
     let x0: T = nalgebra::convert(0f64);
     let x2: T = nalgebra::convert(0.3f64);
     let x4: T = nalgebra::convert(0.4f64);
     let x11: T = nalgebra::convert(9.81f64);
-    let x16 = dq1 * dq1;
-    let x17 = x4 * x16;
-    let x18 = x4 * ddq1;
-    let x19 = c2 * x17;
-    let x20 = s2 * x18;
-    let x21 = x19 - x20;
-    let x22 = c2 * x18;
-    let x23 = s2 * x17;
-    let x24 = x22 + x23;
-    let x25 = ddq1 + ddq2;
-    let x26 = dq1 + dq2;
-    let x27 = x26 * x26;
-    let x28 = x2 * x27;
-    let x29 = x21 + x28;
-    let x30 = x2 * x25;
-    let x31 = x24 + x30;
+    let x16 = dq1 + dq2;
+    let x17 = ddq1 + ddq2;
+    let x18 = dq1 * dq1;
+    let x19 = x4 * x18;
+    let x20 = x4 * ddq1;
+    let x21 = x16 * x16;
+    let x22 = c2 * x19;
+    let x23 = s2 * x20;
+    let x24 = x22 - x23;
+    let x25 = c2 * x20;
+    let x26 = s2 * x19;
+    let x27 = x25 + x26;
+    let x28 = x2 * x21;
+    let x29 = x2 * x17;
+    let x30 = x24 + x28;
+    let x31 = x27 + x29;
     let x32 = x11 - ddq3;
-    let x33 = c4 * x29;
-    let x34 = s4 * x31;
-    let x35 = x33 + x34;
-    let x36 = c4 * x31;
-    let x37 = s4 * x29;
-    let x38 = x36 - x37;
-    let x39 = ddq4 - x25;
-    let x40 = dq4 - x26;
-    let x41 = x4 * s2;
-    let x42 = x4 * c2;
-    let x43 = x2 + x42;
-    let x44 = c4 * x41;
-    let x45 = s4 * x43;
-    let x46 = x44 - x45;
-    let x47 = c4 * x43;
-    let x48 = s4 * x41;
+    let x33 = dq4 - x16;
+    let x34 = ddq4 - x17;
+    let x35 = x33 * x33;
+    let x36 = x4 * s2;
+    let x37 = x4 * c2;
+    let x38 = x30 * x36;
+    let x39 = x31 * x37;
+    let x40 = x38 - x39;
+    let x41 = x2 * x31;
+    let x42 = x40 - x41;
+    let x43 = x17 * x36;
+    let x44 = x21 * x37;
+    let x45 = x43 + x44;
+    let x46 = x24 - x45;
+    let x47 = c4 * x35;
+    let x48 = s4 * x34;
     let x49 = x47 + x48;
-    let x50 = x2 * s4;
-    let x51 = x2 * c4;
-    let x52 = x18 + x18;
-    let x53 = x27 * x41;
-    let x54 = x25 * x43;
+    let x50 = c4 * x34;
+    let x51 = s4 * x35;
+    let x52 = x50 - x51;
+    let x53 = c4 * x31;
+    let x54 = s4 * x30;
     let x55 = x53 - x54;
-    let x56 = x31 - x55;
-    let x57 = x30 + x31;
-    let x58 = x25 * x41;
-    let x59 = x27 * x43;
-    let x60 = x58 + x59;
-    let x61 = x29 - x60;
-    let x62 = x29 * x41;
-    let x63 = x31 * x43;
-    let x64 = x62 - x63;
-    let x65 = x2 * x31;
-    let x66 = x40 * x40;
-    let x67 = x46 * x66;
-    let x68 = x39 * x49;
-    let x69 = x67 + x68;
-    let x70 = x38 - x69;
-    let x71 = x50 * x66;
-    let x72 = x39 * x51;
-    let x73 = x71 - x72;
-    let x74 = x38 + x73;
-    let x75 = x39 * x46;
-    let x76 = x49 * x66;
-    let x77 = x75 - x76;
-    let x78 = x35 + x77;
-    let x79 = x39 * x50;
-    let x80 = x51 * x66;
-    let x81 = x79 + x80;
-    let x82 = x35 - x81;
+    let x56 = x36 * x49;
+    let x57 = x37 * x52;
+    let x58 = x56 + x57;
+    let x59 = x2 * x52;
+    let x60 = x55 - x59;
+    let x61 = x58 - x60;
+    let x62 = s4 * x31;
+    let x63 = c4 * x30;
+    let x64 = x62 + x63;
+    let x65 = x36 * x52;
+    let x66 = x37 * x49;
+    let x67 = x65 - x66;
+    let x68 = x2 * x49;
+    let x69 = x64 - x68;
+    let x70 = x67 + x69;
     SMatrix::from_array_storage(
         ArrayStorage([
-            [x52, x0, x0, x0],
-            [x56, x57, x0, x0],
-            [-x61, -x21, x0, x0],
-            [x25, x25, x0, x0],
-            [-x64, x65, -x32, x0],
-            [x70, x74, x0, -x38],
-            [-x78, -x82, x0, x35],
-            [-x39, -x39, x0, x39],
+            [ddq1, x0, x0, x0],
+            [-x42, x41, x0, x0],
+            [-x46, -x24, x0, x0],
+            [x17, x17, x0, x0],
+            [-x42, x41, -x32, x0],
+            [-x61, x60, x0, -x55],
+            [-x70, -x69, x0, x64],
+            [-x34, -x34, x0, x34],
         ]),
     )
 }
@@ -294,7 +341,7 @@ pub fn regressor_with<T: SimdRealField + Copy>(
 ///
 /// Returns B, n × n, kg·m².
 ///
-/// Operations: 15 multiplications, 17 additions, 2 sines with cosines.
+/// Operations: 14 multiplications, 17 additions, 2 sines with cosines.
 #[must_use]
 pub fn mass_matrix<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -304,8 +351,8 @@ pub fn mass_matrix<T: SimdRealField + Copy>(
     let (s2, c2) = q2.simd_sin_cos();
     let (s4, c4) = q4.simd_sin_cos();
     let trig = Trig {
-        sin: [T::zero(), s2, T::zero(), s4],
-        cos: [T::zero(), c2, T::zero(), c4],
+        sin: [T::zero(), s2, T::zero(), s4, T::zero()],
+        cos: [T::zero(), c2, T::zero(), c4, T::zero()],
         position: [T::zero(), T::zero(), T::zero(), T::zero()],
     };
     mass_matrix_with(&trig, parameters)
@@ -314,52 +361,52 @@ pub fn mass_matrix<T: SimdRealField + Copy>(
 #[must_use]
 pub fn mass_matrix_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
-    parameters: &SVector<T, PARAMETERS>,
+    parameters: &impl Parameters<T>,
 ) -> SMatrix<T, JOINTS, JOINTS> {
-    let [_, s2, _, s4] = trig.sin;
-    let [_, c2, _, c4] = trig.cos;
-    let [[p1, p2, p3, p4, p5, p6, p7, p8]] = parameters.data.0;
+    let [_, s2, _, s4, _] = trig.sin;
+    let [_, c2, _, c4, _] = trig.cos;
+    let Prepared([z1, z2, z3, z4, z5, z6, z7, _, z9, z10, _, _, _]) = parameters
+        .prepared();
     let x0: T = nalgebra::convert(0f64);
     let x2: T = nalgebra::convert(0.3f64);
     let x3: T = nalgebra::convert(0.4f64);
-    let x16 = c4 * p7;
-    let x17 = s4 * p6;
-    let x18 = x16 + x17;
-    let x19 = c4 * p6;
-    let x20 = s4 * p7;
-    let x21 = x19 - x20;
-    let x22 = x2 * x21;
-    let x23 = p8 + x22;
-    let x24 = c2 * x21;
-    let x25 = s2 * x18;
-    let x26 = x24 + x25;
-    let x27 = x3 * x26;
-    let x28 = x23 + x27;
-    let x29 = x2 * p5;
-    let x30 = x3 * p5;
-    let x31 = p2 + x21;
-    let x32 = p3 + x18;
-    let x33 = p4 + p8;
-    let x34 = x29 + x31;
-    let x35 = x31 + x34;
-    let x36 = x2 * x35;
-    let x37 = x33 + x36;
-    let x38 = c2 * x34;
-    let x39 = s2 * x32;
-    let x40 = x38 + x39;
-    let x41 = x3 * x40;
-    let x42 = x37 + x41;
-    let x43 = p1 + x40;
-    let x44 = x30 + x43;
-    let x45 = x43 + x44;
-    let x46 = x3 * x45;
-    let x47 = x37 + x46;
+    let x11 = s4 * z1;
+    let x12 = s4 * x11;
+    let x14 = c4 * z2;
+    let x16 = s4 * z3;
+    let x17 = x14 - x16;
+    let x18 = c4 * z3;
+    let x19 = s4 * z2;
+    let x20 = x18 + x19;
+    let x21 = x2 * x17;
+    let x22 = z1 + x21;
+    let x23 = c2 * x17;
+    let x24 = s2 * x20;
+    let x25 = x23 + x24;
+    let x26 = x3 * x25;
+    let x27 = x22 + x26;
+    let x29 = x17 + z9;
+    let x30 = x17 + x29;
+    let x31 = x2 * x30;
+    let x33 = x29 + z5;
+    let x35 = x20 + z6;
+    let x37 = x12 + z7;
+    let x38 = z1 + x37;
+    let x39 = x12 - x38;
+    let x40 = x31 - x39;
+    let x41 = c2 * x33;
+    let x42 = s2 * x35;
+    let x43 = x41 + x42;
+    let x44 = x3 * x43;
+    let x45 = x40 + x44;
+    let x47 = x45 + z10;
+    let x48 = x44 + x47;
     SMatrix::from_array_storage(
         ArrayStorage([
-            [x47, x42, x0, -x28],
-            [x42, x37, x0, -x23],
-            [x0, x0, p5, x0],
-            [-x28, -x23, x0, p8],
+            [x48, x45, x0, -x27],
+            [x45, x40, x0, -x22],
+            [x0, x0, z4, x0],
+            [-x27, -x22, x0, z1],
         ]),
     )
 }
@@ -371,7 +418,7 @@ pub fn mass_matrix_with<T: SimdRealField + Copy>(
 ///
 /// Returns C, n × n.
 ///
-/// Operations: 50 multiplications, 33 additions, 2 sines with cosines.
+/// Operations: 28 multiplications, 22 additions, 2 sines with cosines.
 #[must_use]
 pub fn coriolis_matrix<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -382,8 +429,8 @@ pub fn coriolis_matrix<T: SimdRealField + Copy>(
     let (s2, c2) = q2.simd_sin_cos();
     let (s4, c4) = q4.simd_sin_cos();
     let trig = Trig {
-        sin: [T::zero(), s2, T::zero(), s4],
-        cos: [T::zero(), c2, T::zero(), c4],
+        sin: [T::zero(), s2, T::zero(), s4, T::zero()],
+        cos: [T::zero(), c2, T::zero(), c4, T::zero()],
         position: [T::zero(), T::zero(), T::zero(), T::zero()],
     };
     coriolis_matrix_with(&trig, dq, parameters)
@@ -393,105 +440,71 @@ pub fn coriolis_matrix<T: SimdRealField + Copy>(
 pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
-    parameters: &SVector<T, PARAMETERS>,
+    parameters: &impl Parameters<T>,
 ) -> SMatrix<T, JOINTS, JOINTS> {
-    let [_, s2, _, s4] = trig.sin;
-    let [_, c2, _, c4] = trig.cos;
+    let [_, s2, _, s4, _] = trig.sin;
+    let [_, c2, _, c4, _] = trig.cos;
     let [[dq1, dq2, _, dq4]] = dq.data.0;
-    let [[_, p2, p3, p4, p5, p6, p7, p8]] = parameters.data.0;
+    let Prepared([z1, z2, z3, z4, z5, z6, _, _, z9, _, _, _, _]) = parameters.prepared();
     let x0: T = nalgebra::convert(0f64);
     let x2: T = nalgebra::convert(0.3f64);
     let x4: T = nalgebra::convert(0.4f64);
-    let x18 = dq1 + dq2;
-    let x19 = dq4 - x18;
-    let x20: T = nalgebra::convert(0.5f64);
-    let x21 = p8 * x20;
-    let x22 = p7 * x19;
-    let x23 = p6 * x19;
-    let x24 = x19 * x21;
-    let x25 = c4 * x23;
-    let x26 = s4 * x22;
-    let x27 = x25 - x26;
-    let x28 = c4 * x22;
-    let x29 = s4 * x23;
-    let x30 = x28 + x29;
-    let x31 = c4 * p7;
-    let x32 = s4 * p6;
-    let x33 = x31 + x32;
-    let x34 = c4 * p6;
-    let x35 = s4 * p7;
-    let x36 = x34 - x35;
-    let x42 = x2 * x30;
-    let x43 = x2 * x18;
-    let x44 = x33 * x43;
-    let x45 = c2 * x30;
-    let x46 = s2 * x27;
-    let x47 = x45 - x46;
-    let x48 = c2 * x33;
-    let x49 = s2 * x36;
-    let x50 = x48 - x49;
-    let x51 = x4 * x47;
-    let x52 = x42 + x51;
-    let x53 = dq1 * x4;
-    let x54 = x50 * x53;
-    let x55 = x44 + x54;
-    let x56 = x2 * p5;
-    let x57 = p5 * x43;
-    let x58 = p4 * x20;
-    let x59 = p3 * x18;
-    let x60 = p2 * x18;
-    let x61 = x18 * x58;
-    let x62 = p2 + x36;
-    let x63 = p3 + x33;
-    let x64 = x30 - x59;
-    let x65 = x27 - x60;
-    let x66 = x24 - x61;
-    let x67 = x56 + x62;
-    let x68 = x2 * x64;
-    let x69 = x2 * x65;
-    let x70 = x66 + x69;
-    let x71 = x43 * x67;
-    let x72 = x70 - x71;
-    let x73 = x43 * x63;
-    let x74 = x57 - x65;
-    let x75 = x68 + x73;
-    let x76 = c2 * x64;
-    let x77 = s2 * x74;
-    let x78 = x76 + x77;
-    let x79 = c2 * x63;
-    let x80 = s2 * x67;
-    let x81 = x79 - x80;
-    let x82 = c2 * x68;
-    let x83 = s2 * x72;
-    let x84 = x82 - x83;
-    let x85 = c2 * x72;
-    let x86 = s2 * x68;
-    let x87 = x85 + x86;
-    let x88 = c2 * x66;
-    let x89 = s2 * x73;
-    let x90 = x88 + x89;
-    let x91 = c2 * x73;
-    let x92 = s2 * x66;
-    let x93 = x91 - x92;
-    let x94 = c2 * x84;
-    let x95 = s2 * x90;
-    let x96 = x94 + x95;
-    let x97 = c2 * x93;
-    let x98 = s2 * x87;
-    let x99 = x97 + x98;
-    let x100 = x4 * x78;
-    let x101 = x75 + x100;
-    let x102 = x53 * x81;
-    let x103 = x75 + x102;
-    let x104 = x96 + x100;
-    let x105 = x99 + x102;
-    let x106 = x104 + x105;
+    let x12 = s4 * z1;
+    let x13 = c4 * x12;
+    let x15 = c4 * z2;
+    let x17 = s4 * z3;
+    let x18 = x15 - x17;
+    let x19 = c4 * z3;
+    let x20 = s4 * z2;
+    let x21 = x19 + x20;
+    let x22 = dq1 + dq2;
+    let x23 = dq4 - x22;
+    let x24 = x13 * x23;
+    let x25 = x21 * x23;
+    let x26 = x18 * x23;
+    let x27 = x2 * x22;
+    let x28 = x2 * x25;
+    let x29 = x21 * x27;
+    let x30 = c2 * x25;
+    let x31 = s2 * x26;
+    let x32 = x30 - x31;
+    let x33 = c2 * x21;
+    let x34 = s2 * x18;
+    let x35 = x33 - x34;
+    let x36 = dq1 * x4;
+    let x37 = x4 * x32;
+    let x38 = x28 + x37;
+    let x39 = x35 * x36;
+    let x40 = x29 + x39;
+    let x42 = x18 + z9;
+    let x44 = x27 * z4;
+    let x45 = x26 - x44;
+    let x47 = x22 * z6;
+    let x49 = x22 * z5;
+    let x50 = x24 + x28;
+    let x51 = x24 - x29;
+    let x52 = x42 + z5;
+    let x53 = x21 + z6;
+    let x54 = x25 - x47;
+    let x55 = x45 - x49;
+    let x56 = x50 - x51;
+    let x57 = c2 * x53;
+    let x58 = s2 * x52;
+    let x59 = x57 - x58;
+    let x60 = c2 * x54;
+    let x61 = s2 * x55;
+    let x62 = x60 - x61;
+    let x63 = x4 * x62;
+    let x64 = x36 * x59;
+    let x65 = x56 + x63;
+    let x66 = x56 + x64;
+    let x67 = x63 + x66;
     SMatrix::from_array_storage(
         ArrayStorage([
-            [-x106, -x103, x0, x55],
-            [-x101, -x75, x0, x44],
+            [-x67, -x66, x0, x40],
+            [-x65, -x56, x0, x29],
             [x0, x0, x0, x0],
-            [x52, x42, x0, x0],
+            [x38, x28, x0, x0],
         ]),
     )
 }
@@ -502,15 +515,15 @@ pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
 ///
 /// Returns g, N·m.
 ///
-/// Operations: 1 multiplications, 0 additions, 0 sines with cosines.
+/// Operations: 0 multiplications, 0 additions, 0 sines with cosines.
 #[must_use]
 pub fn gravity<T: SimdRealField + Copy>(
     _q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
     let trig = Trig {
-        sin: [T::zero(), T::zero(), T::zero(), T::zero()],
-        cos: [T::zero(), T::zero(), T::zero(), T::zero()],
+        sin: [T::zero(), T::zero(), T::zero(), T::zero(), T::zero()],
+        cos: [T::zero(), T::zero(), T::zero(), T::zero(), T::zero()],
         position: [T::zero(), T::zero(), T::zero(), T::zero()],
     };
     gravity_with(&trig, parameters)
@@ -519,13 +532,11 @@ pub fn gravity<T: SimdRealField + Copy>(
 #[must_use]
 pub fn gravity_with<T: SimdRealField + Copy>(
     _trig: &Trig<T>,
-    parameters: &SVector<T, PARAMETERS>,
+    parameters: &impl Parameters<T>,
 ) -> SVector<T, JOINTS> {
-    let [[_, _, _, _, p5, _, _, _]] = parameters.data.0;
+    let Prepared([_, _, _, _, _, _, _, _, _, _, z11, _, _]) = parameters.prepared();
     let x0: T = nalgebra::convert(0f64);
-    let x2: T = nalgebra::convert(9.81f64);
-    let x4 = x2 * p5;
-    SMatrix::from_array_storage(ArrayStorage([[x0, x0, -x4, x0]]))
+    SMatrix::from_array_storage(ArrayStorage([[x0, x0, -z11, x0]]))
 }
 /// Joint accelerations under joint torques: q̈ = B⁻¹·(τ − C·q̇ − g), without friction.
 ///
@@ -536,7 +547,7 @@ pub fn gravity_with<T: SimdRealField + Copy>(
 ///
 /// Returns q̈; not finite where the parameters make B singular.
 ///
-/// Operations: 62 multiplications, 48 additions, 4 divisions, 2 sines with cosines.
+/// Operations: 52 multiplications, 44 additions, 2 divisions, 2 sines with cosines.
 #[must_use]
 pub fn forward_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -548,8 +559,8 @@ pub fn forward_dynamics<T: SimdRealField + Copy>(
     let (s2, c2) = q2.simd_sin_cos();
     let (s4, c4) = q4.simd_sin_cos();
     let trig = Trig {
-        sin: [T::zero(), s2, T::zero(), s4],
-        cos: [T::zero(), c2, T::zero(), c4],
+        sin: [T::zero(), s2, T::zero(), s4, T::zero()],
+        cos: [T::zero(), c2, T::zero(), c4, T::zero()],
         position: [T::zero(), T::zero(), T::zero(), T::zero()],
     };
     forward_dynamics_with(&trig, dq, tau, parameters)
@@ -560,132 +571,116 @@ pub fn forward_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
     tau: &SVector<T, JOINTS>,
-    parameters: &SVector<T, PARAMETERS>,
+    parameters: &impl Parameters<T>,
 ) -> SVector<T, JOINTS> {
-    let [_, s2, _, s4] = trig.sin;
-    let [_, c2, _, c4] = trig.cos;
+    let [_, s2, _, s4, _] = trig.sin;
+    let [_, c2, _, c4, _] = trig.cos;
     let [[dq1, dq2, _, dq4]] = dq.data.0;
     let [[tau1, tau2, tau3, tau4]] = tau.data.0;
-    let [[p1, p2, p3, p4, p5, p6, p7, p8]] = parameters.data.0;
+    let Prepared([z1, z2, z3, z4, z5, z6, z7, _, z9, z10, z11, z12, z13]) = parameters
+        .prepared();
     let x1: T = nalgebra::convert(1f64);
     let x2: T = nalgebra::convert(0.3f64);
     let x4: T = nalgebra::convert(0.4f64);
-    let x11: T = nalgebra::convert(9.81f64);
-    let x20 = dq1 * dq1;
-    let x21 = x4 * x20;
-    let x22 = c2 * x21;
-    let x23 = s2 * x21;
-    let x24 = dq1 + dq2;
-    let x25 = x24 * x24;
-    let x26 = x2 * x25;
-    let x27 = x22 + x26;
-    let x28 = c4 * x27;
-    let x29 = s4 * x23;
-    let x30 = x28 + x29;
-    let x31 = c4 * x23;
-    let x32 = s4 * x27;
-    let x33 = x31 - x32;
-    let x34 = dq4 - x24;
-    let x35 = x34 * x34;
-    let x36 = p6 * x35;
-    let x37 = p7 * x35;
-    let x38 = p6 * x33;
-    let x39 = p7 * x30;
-    let x40 = x38 - x39;
-    let x41 = c4 * x36;
-    let x42 = s4 * x37;
-    let x43 = x41 - x42;
-    let x44 = c4 * x37;
-    let x45 = s4 * x36;
-    let x46 = x44 + x45;
-    let x47 = p5 * x27;
-    let x48 = p5 * x23;
-    let x49 = x11 * p5;
-    let x50 = x43 + x47;
-    let x51 = x46 + x48;
-    let x52 = p2 * x25;
-    let x53 = p3 * x25;
-    let x54 = p2 * x23;
-    let x55 = p3 * x27;
-    let x56 = x54 - x55;
-    let x57 = x50 + x52;
-    let x58 = x51 + x53;
-    let x59 = x40 + x56;
-    let x60 = x2 * x58;
-    let x61 = x59 + x60;
-    let x62 = c2 * x58;
-    let x63 = s2 * x57;
-    let x64 = x62 - x63;
-    let x65 = x4 * x64;
-    let x66 = x61 + x65;
-    let x71 = x66 - tau1;
-    let x72 = x61 - tau2;
-    let x73 = x49 + tau3;
-    let x74 = x40 + tau4;
-    let x75 = c4 * p7;
-    let x76 = s4 * p6;
-    let x77 = x75 + x76;
-    let x78 = c4 * p6;
-    let x79 = s4 * p7;
-    let x80 = x78 - x79;
-    let x81 = x2 * x80;
-    let x82 = p8 + x81;
-    let x83 = c2 * x80;
-    let x84 = s2 * x77;
-    let x85 = x83 + x84;
-    let x86 = x4 * x85;
-    let x87 = x82 + x86;
-    let x88 = x2 * p5;
-    let x89 = x4 * p5;
-    let x90 = p2 + x80;
-    let x91 = p3 + x77;
-    let x92 = p4 + p8;
-    let x93 = x88 + x90;
-    let x94 = x90 + x93;
-    let x95 = x2 * x94;
-    let x96 = x92 + x95;
-    let x97 = c2 * x93;
-    let x98 = s2 * x91;
-    let x99 = x97 + x98;
-    let x100 = x4 * x99;
-    let x101 = x96 + x100;
-    let x102 = p1 + x99;
-    let x103 = x89 + x102;
-    let x104 = x102 + x103;
-    let x105 = x4 * x104;
-    let x106 = x96 + x105;
-    let x107 = x1 / p8;
-    let x108 = x82 * x107;
-    let x109 = x87 * x107;
-    let x110 = x1 / p5;
-    let x111 = x82 * x108;
-    let x112 = x96 - x111;
-    let x113 = x1 / x112;
-    let x114 = x87 * x108;
-    let x115 = x101 - x114;
-    let x116 = x113 * x115;
-    let x117 = x115 * x116;
-    let x118 = x106 - x117;
-    let x119 = x87 * x109;
-    let x120 = x118 - x119;
-    let x121 = x1 / x120;
-    let x122 = x74 * x108;
-    let x123 = x72 - x122;
-    let x124 = x116 * x123;
-    let x125 = x71 - x124;
-    let x126 = x74 * x109;
-    let x127 = x125 - x126;
-    let x128 = x121 * x127;
-    let x129 = x113 * x123;
-    let x130 = x73 * x110;
-    let x131 = x74 * x107;
-    let x132 = x116 * x128;
-    let x133 = x129 - x132;
-    let x134 = x109 * x128;
-    let x135 = x131 - x134;
-    let x136 = x108 * x133;
-    let x137 = x135 - x136;
-    SMatrix::from_array_storage(ArrayStorage([[-x128, -x133, x130, x137]]))
+    let x15 = s4 * z1;
+    let x16 = s4 * x15;
+    let x18 = c4 * z2;
+    let x20 = s4 * z3;
+    let x21 = x18 - x20;
+    let x22 = c4 * z3;
+    let x23 = s4 * z2;
+    let x24 = x22 + x23;
+    let x25 = dq1 + dq2;
+    let x26 = dq1 * dq1;
+    let x27 = x4 * x26;
+    let x28 = x25 * x25;
+    let x29 = c2 * x27;
+    let x30 = s2 * x27;
+    let x31 = x2 * x28;
+    let x32 = x29 + x31;
+    let x33 = dq4 - x25;
+    let x34 = x33 * x33;
+    let x35 = x21 * x34;
+    let x36 = x21 * x30;
+    let x37 = x24 * x34;
+    let x38 = x24 * x32;
+    let x39 = x36 - x38;
+    let x41 = x32 * z4;
+    let x42 = x30 * z4;
+    let x43 = x37 + x42;
+    let x45 = x28 * z5;
+    let x46 = x30 * z5;
+    let x48 = x28 * z6;
+    let x49 = x29 * z6;
+    let x50 = x2 * x43;
+    let x51 = x35 + x41;
+    let x52 = x45 + x51;
+    let x53 = x43 + x48;
+    let x54 = x46 - x49;
+    let x55 = x39 + x54;
+    let x56 = x50 + x55;
+    let x57 = c2 * x53;
+    let x58 = s2 * x52;
+    let x59 = x57 - x58;
+    let x60 = x4 * x59;
+    let x66 = tau3 + z11;
+    let x67 = x39 + tau4;
+    let x68 = x2 * x21;
+    let x69 = z1 + x68;
+    let x70 = c2 * x21;
+    let x71 = s2 * x24;
+    let x72 = x70 + x71;
+    let x73 = x4 * x72;
+    let x74 = x69 + x73;
+    let x76 = x21 + z9;
+    let x77 = x21 + x76;
+    let x78 = x2 * x77;
+    let x79 = z5 + x76;
+    let x80 = x24 + z6;
+    let x82 = x16 + z7;
+    let x83 = z1 + x82;
+    let x84 = x16 - x83;
+    let x85 = x78 - x84;
+    let x86 = c2 * x79;
+    let x87 = s2 * x80;
+    let x88 = x86 + x87;
+    let x89 = x4 * x88;
+    let x90 = x85 + x89;
+    let x92 = x69 * z12;
+    let x93 = x74 * z12;
+    let x94 = x69 * x92;
+    let x95 = x85 - x94;
+    let x96 = x1 / x95;
+    let x97 = x74 * x92;
+    let x98 = x90 - x97;
+    let x99 = x96 * x98;
+    let x100 = x98 * x99;
+    let x101 = x74 * x93;
+    let x103 = x90 + z10;
+    let x104 = x89 + x103;
+    let x105 = x100 - x104;
+    let x106 = x101 + x105;
+    let x107 = x1 / x106;
+    let x108 = x67 * x92;
+    let x109 = x56 - tau2;
+    let x110 = x108 - x109;
+    let x111 = x99 * x110;
+    let x112 = x67 * x93;
+    let x113 = x56 + x60;
+    let x114 = tau1 - x113;
+    let x115 = x111 - x114;
+    let x116 = x112 - x115;
+    let x117 = x107 * x116;
+    let x118 = x96 * x110;
+    let x120 = x66 * z13;
+    let x121 = x67 * z12;
+    let x122 = x99 * x117;
+    let x123 = x118 + x122;
+    let x124 = x93 * x117;
+    let x125 = x92 * x123;
+    let x126 = x121 - x124;
+    let x127 = x125 + x126;
+    SMatrix::from_array_storage(ArrayStorage([[-x117, x123, x120, x127]]))
 }
 /// Pose of the tool's frame (the last link's where the arm declares no tool) in the base frame.
 ///
@@ -693,7 +688,7 @@ pub fn forward_dynamics_with<T: SimdRealField + Copy>(
 ///
 /// Returns the homogeneous transform, 4 × 4, lengths in m.
 ///
-/// Operations: 12 multiplications, 8 additions, 3 sines with cosines.
+/// Operations: 12 multiplications, 7 additions, 3 sines with cosines.
 #[must_use]
 pub fn forward_kinematics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -703,8 +698,8 @@ pub fn forward_kinematics<T: SimdRealField + Copy>(
     let (s2, c2) = q2.simd_sin_cos();
     let (s4, c4) = q4.simd_sin_cos();
     let trig = Trig {
-        sin: [s1, s2, T::zero(), s4],
-        cos: [c1, c2, T::zero(), c4],
+        sin: [s1, s2, T::zero(), s4, T::zero()],
+        cos: [c1, c2, T::zero(), c4, T::zero()],
         position: [T::zero(), T::zero(), q3, T::zero()],
     };
     forward_kinematics_with(&trig)
@@ -714,40 +709,39 @@ pub fn forward_kinematics<T: SimdRealField + Copy>(
 pub fn forward_kinematics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
 ) -> SMatrix<T, 4, 4> {
-    let [s1, s2, _, s4] = trig.sin;
-    let [c1, c2, _, c4] = trig.cos;
+    let [s1, s2, _, s4, _] = trig.sin;
+    let [c1, c2, _, c4, _] = trig.cos;
     let [_, _, q3, _] = trig.position;
     let x0: T = nalgebra::convert(0f64);
     let x1: T = nalgebra::convert(1f64);
     let x2: T = nalgebra::convert(0.3f64);
     let x5: T = nalgebra::convert(0.4f64);
-    let x8: T = nalgebra::convert(0.1f64);
-    let x10 = x8 + q3;
-    let x13 = c1 * x5;
-    let x14 = s1 * x5;
-    let x15 = c1 * c2;
-    let x16 = s1 * s2;
-    let x17 = x15 - x16;
-    let x18 = s1 * c2;
-    let x19 = c1 * s2;
-    let x20 = x18 + x19;
-    let x21 = x2 * x17;
-    let x22 = x13 + x21;
-    let x23 = x2 * x20;
-    let x24 = x14 + x23;
-    let x25 = x2 - x10;
-    let x26 = c4 * x17;
-    let x27 = s4 * x20;
-    let x28 = x26 + x27;
-    let x29 = c4 * x20;
-    let x30 = s4 * x17;
-    let x31 = x29 - x30;
+    let x11 = c1 * x5;
+    let x12 = s1 * x5;
+    let x13 = c1 * c2;
+    let x14 = s1 * s2;
+    let x15 = x13 - x14;
+    let x16 = s1 * c2;
+    let x17 = c1 * s2;
+    let x18 = x16 + x17;
+    let x19 = x2 * x15;
+    let x20 = x2 * x18;
+    let x21 = x11 + x19;
+    let x22 = x12 + x20;
+    let x23: T = nalgebra::convert(0.2f64);
+    let x24 = q3 - x23;
+    let x25 = c4 * x15;
+    let x26 = s4 * x18;
+    let x27 = x25 + x26;
+    let x28 = c4 * x18;
+    let x29 = s4 * x15;
+    let x30 = x28 - x29;
     SMatrix::from_array_storage(
         ArrayStorage([
-            [x28, x31, x0, x0],
-            [x31, -x28, x0, x0],
+            [x27, x30, x0, x0],
+            [x30, -x27, x0, x0],
             [x0, x0, -x1, x0],
-            [x22, x24, x25, x1],
+            [x21, x22, -x24, x1],
         ]),
     )
 }

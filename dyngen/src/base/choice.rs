@@ -1,35 +1,36 @@
-//! Which base columns to keep: those whose code is the cheapest, among a few rules of choice.
+//! Which base columns to keep: those whose regressor is the cheapest.
+//!
+//! A few rules of choice give a start. From each, a kept column is exchanged for one that depends on it as long as that makes the
+//! code cheaper. All columns are built once, as one graph; what a choice costs is counted in it. Functions of parameter values do
+//! not depend on the choice: they sum the parameters up in their own way.
 
 use super::preference::Preference;
-use super::sets::{SetKind, base_set};
+use super::sets::full_set;
 use crate::arm::Arm;
-use crate::dynamics::{Function, function};
-use crate::exact::constant::ConstantField;
+use crate::dynamics::chain::Origins;
+use crate::dynamics::function::{self, Subject};
+use crate::dynamics::stage::Form;
+use crate::dynamics::{Function, FunctionGraph};
+use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{Dependence, Unproven};
 use crate::exact::symbols::AngleSymbols;
+use crate::graph::Expr;
 use crate::optimize::PASSES;
 
-/// The functions whose cost is counted: those that run in a control loop or over a log.
-pub const COUNTED: [Function; 5] = [
-    Function::InverseDynamics,
-    Function::Regressor,
-    Function::MassMatrix,
-    Function::CoriolisMatrix,
-    Function::Gravity,
-];
-
-/// A rule that was tried, with the multiplications and additions of [`COUNTED`] under it.
+/// A rule that was tried, with what the regressor costs for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Candidate {
     /// The rule.
     pub preference: Preference,
-    /// Multiplications and additions in all.
+    /// Columns that were exchanged for cheaper ones.
+    pub exchanged: usize,
+    /// Multiplications and additions of the regressor in all.
     pub operations: usize,
 }
 
-/// The base columns of the cheapest rule, and what every rule costs; of equal costs the first rule wins.
+/// The cheapest base columns, and what the search from every rule found; of equal costs the first rule wins.
 ///
-/// Where angles are kept as symbols their eliminations are slow, and only the first rule is tried.
+/// Where angles are kept as symbols eliminations are slow, and the first rule's columns are taken as they are.
 ///
 /// # Errors
 /// Those of `eliminate`.
@@ -40,22 +41,18 @@ pub fn cheapest(
     eliminate: impl Fn(Preference) -> Result<Dependence, Unproven>,
 ) -> Result<(Dependence, Vec<Candidate>), Unproven> {
     let [first, others @ ..] = Preference::ALL;
-    let cost = |dependence: &Dependence| -> usize {
-        let set = base_set(SetKind::Minimal, arm, field, dependence);
-        let built = |f: Function| function::build(f, arm, symbols, &set, field, None, PASSES).operations();
-        COUNTED.iter().map(|f| built(*f)).map(|o| o.mul + o.add).sum()
-    };
-    let mut best = eliminate(first)?;
-    let mut candidates = vec![Candidate { preference: first, operations: cost(&best) }];
-    let mut lowest = candidates[0].operations;
-    let others = if symbols.angles.is_empty() { &others[..] } else { &[] };
+    let start = eliminate(first)?;
+    let all = AllColumns::build(&Subject { arm, symbols, field, minimal: &start });
+    let search = symbols.angles.is_empty();
+    let (mut best, candidate) = all.improved(field, start, first, search);
+    let mut candidates = vec![candidate];
+    let others = if search { &others[..] } else { &[] };
     for preference in others {
-        let dependence = eliminate(*preference)?;
-        let operations = cost(&dependence);
-        candidates.push(Candidate { preference: *preference, operations });
-        if operations < lowest {
-            (best, lowest) = (dependence, operations);
+        let (found, candidate) = all.improved(field, eliminate(*preference)?, *preference, search);
+        if candidates.iter().all(|c| candidate.operations < c.operations) {
+            best = found;
         }
+        candidates.push(candidate);
     }
     Ok((best, candidates))
 }
@@ -64,4 +61,95 @@ pub fn cheapest(
 pub fn chosen(candidates: &[Candidate]) -> Option<&Candidate> {
     // `min_by_key` takes the first of equals.
     candidates.iter().min_by_key(|c| c.operations)
+}
+
+/// The regressor of every parameter that the arm keeps, in every form.
+struct AllColumns {
+    forms: Vec<FunctionGraph>,
+    /// For each parameter of the arm, its column.
+    place: Vec<Option<usize>>,
+}
+
+impl AllColumns {
+    fn build(subject: &Subject<'_>) -> Self {
+        let full = full_set(subject.arm, subject.field);
+        let mut place = vec![None; subject.arm.dof() * 11];
+        for (column, parameter) in full.parameters.iter().enumerate() {
+            place[parameter.carriers[0].0.index()] = Some(column);
+        }
+        let build = |form| function::build_in(form, None, Function::Regressor, subject, &full, None, PASSES);
+        AllColumns {
+            forms: [Origins::Inner, Origins::Outer].into_iter().flat_map(Form::all).map(build).collect(),
+            place,
+        }
+    }
+
+    /// What some columns cost in a form: operations, and the additions among them.
+    fn cost(&self, form: &FunctionGraph, kept: &[usize]) -> (usize, usize) {
+        let (rows, columns) = form.shape;
+        let outputs: Vec<Expr> = (kept.iter().filter_map(|k| self.place[*k]))
+            .flat_map(|c| (0..rows).map(move |r| r * columns + c))
+            .map(|k| form.outputs[k])
+            .collect();
+        let operations = form.graph.operations(&outputs);
+        (operations.mul + operations.add, operations.add)
+    }
+
+    /// Exchanges columns as long as that makes the code cheaper.
+    fn improved(
+        &self,
+        field: &ConstantField,
+        mut dependence: Dependence,
+        preference: Preference,
+        search: bool,
+    ) -> (Dependence, Candidate) {
+        let costs = self.forms.iter().map(|form| (self.cost(form, &dependence.kept), form));
+        // There is a form.
+        let (mut operations, form) =
+            costs.min_by_key(|(cost, _)| *cost).unwrap_or(((usize::MAX, 0), &self.forms[0]));
+        let mut exchanged = 0;
+        while search {
+            let mut best: Option<((usize, usize), usize, usize)> = None;
+            for (column, coordinates) in dependence.coordinates.iter().enumerate() {
+                if dependence.kept.contains(&column) {
+                    continue;
+                }
+                for (position, _) in coordinates {
+                    let mut kept = dependence.kept.clone();
+                    kept[*position] = column;
+                    let cost = self.cost(form, &kept);
+                    if cost < best.map_or(operations, |b| b.0) {
+                        best = Some((cost, *position, column));
+                    }
+                }
+            }
+            let Some((cost, position, column)) = best else { break };
+            let Some(next) = exchange(field, &dependence, position, column) else { break };
+            (dependence, operations, exchanged) = (next, cost, exchanged + 1);
+        }
+        (dependence, Candidate { preference, exchanged, operations: operations.0 })
+    }
+}
+
+/// The dependence with another column kept at a position; the column must depend on the one that was kept there.
+fn exchange(field: &ConstantField, from: &Dependence, position: usize, column: usize) -> Option<Dependence> {
+    let entering = &from.coordinates[column];
+    let pivot = entering.iter().find(|(p, _)| *p == position).map(|(_, c)| c)?;
+    let mut to = from.clone();
+    to.kept[position] = column;
+    for coordinates in &mut to.coordinates {
+        let Some(index) = coordinates.iter().position(|(p, _)| *p == position) else { continue };
+        let factor = field.div(&coordinates[index].1, pivot)?;
+        coordinates[index].1 = factor.clone();
+        for (p, value) in entering.iter().filter(|(p, _)| *p != position) {
+            let change = field.neg(&field.mul(&factor, value));
+            match coordinates.iter_mut().find(|(q, _)| q == p) {
+                Some((_, old)) => *old = field.add(old, &change),
+                None => coordinates.push((*p, change)),
+            }
+        }
+        coordinates.retain(|(_, c): &(usize, Constant)| !c.is_zero());
+        coordinates.sort_by_key(|(p, _)| *p);
+    }
+    Some(to)
 }

@@ -179,7 +179,7 @@ impl Sets {
     }
 }
 
-fn full_set(arm: &Arm, field: &ConstantField) -> ParameterSet {
+pub(super) fn full_set(arm: &Arm, field: &ConstantField) -> ParameterSet {
     let one = field.rational(crate::exact::rational::integer(1));
     let parameters = arm
         .kept_parameters()
@@ -249,7 +249,7 @@ fn named_combination_text<'a>(
 }
 
 /// A combination of parameters in coordinates of the minimal columns.
-pub(super) fn minimal_coordinates(
+pub fn minimal_coordinates(
     field: &ConstantField,
     minimal: &Dependence,
     combination: &[(Parameter, Constant)],

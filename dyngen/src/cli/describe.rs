@@ -7,7 +7,7 @@ use dyngen::base::sets::{Class, combination_text};
 use dyngen::base::symmetry::{self, Removed, Symmetry};
 use dyngen::base::{ParameterSet, SetKind};
 use dyngen::exact::rational;
-use dyngen::graph::Operations;
+use dyngen::graph::{Operations, Preparation};
 use dyngen::{Function, Model};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -26,13 +26,17 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let model = model(&args.arm)?;
-    let operations: Vec<(Function, Operations)> = Function::ALL
+    let mut preparation = Preparation::default();
+    let mut operations: Vec<(&str, Operations)> = Function::ALL
         .into_iter()
         .map(|function| {
             let built = model.function(function, SetKind::Minimal).map_err(Failure::refused)?;
-            Ok((function, built.operations()))
+            let built = built.without_preparation(&mut preparation);
+            Ok((function.name(), built.operations()))
         })
         .collect::<Result<_, Failure>>()?;
+    // What every function together needs of the parameters alone.
+    operations.push(("prepare", preparation.operations()));
     let symmetries = symmetry::symmetries(&model).map_err(Failure::refused)?;
     let text = match args.json {
         true => format!("{}\n", json_text(&model, &operations, &symmetries)),
@@ -42,7 +46,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn json_text(model: &Model, operations: &[(Function, Operations)], symmetries: &[Symmetry]) -> Value {
+fn json_text(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetry]) -> Value {
     let arm = model.arm();
     let kept = arm.kept_parameters();
     let names: Vec<String> = kept.iter().map(ToString::to_string).collect();
@@ -56,7 +60,7 @@ fn json_text(model: &Model, operations: &[(Function, Operations)], symmetries: &
     let operations: Map<String, Value> = operations
         .iter()
         .map(|(f, o)| {
-            (f.name().to_string(), json!({"mul": o.mul, "add": o.add, "div": o.div, "sin_cos": o.sin_cos}))
+            ((*f).to_string(), json!({"mul": o.mul, "add": o.add, "div": o.div, "sin_cos": o.sin_cos}))
         })
         .collect();
     let choice: Vec<Value> = (model.sets().candidates.iter())
@@ -114,7 +118,7 @@ fn set_json(model: &Model, set: &ParameterSet) -> Value {
     object
 }
 
-fn table(model: &Model, operations: &[(Function, Operations)], symmetries: &[Symmetry]) -> String {
+fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetry]) -> String {
     let arm = model.arm();
     let mut t = String::new();
     let gravity: Vec<String> = arm.gravity.iter().map(|g| rational::to_f64(g).to_string()).collect();
@@ -172,7 +176,7 @@ fn table(model: &Model, operations: &[(Function, Operations)], symmetries: &[Sym
         let counts: Vec<String> = candidates.iter().map(|c| c.operations.to_string()).collect();
         let _ = writeln!(
             t,
-            "\nminimal set's columns chosen by code: {} ({} rules cost {} operations in τ, Y, B, C and g)",
+            "\nminimal set's columns chosen by code: {} ({} rules cost {} operations in Y)",
             chosen.preference,
             counts.len(),
             counts.join(", ")
@@ -181,8 +185,7 @@ fn table(model: &Model, operations: &[(Function, Operations)], symmetries: &[Sym
     let _ = writeln!(t, "\noperations with the minimal set as arguments:");
     let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", "function", "mul", "add", "div", "sin_cos");
     for (function, o) in operations {
-        let _ =
-            writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", function.name(), o.mul, o.add, o.div, o.sin_cos);
+        let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", function, o.mul, o.add, o.div, o.sin_cos);
     }
     t
 }

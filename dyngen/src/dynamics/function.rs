@@ -1,18 +1,21 @@
 //! The functions of an arm, each built as a graph.
 
-use super::body::links;
+use super::chain::{self, Origins};
 use super::elements::{ArmElements, Source, ToolElements};
-use super::motion::Drive;
+use super::motion;
+use super::regroup::Regrouping;
+use super::stage::{Chain, Form};
 use super::{composite, coriolis, energy, forward, inverse, momentum, pose, regressor};
 use crate::arm::Arm;
 use crate::base::ParameterSet;
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
+use crate::exact::elimination::Dependence;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::differentiate::{self, Direction};
-use crate::graph::{Builder, Expr, Graph, Input, Operations};
-use crate::optimize::{self, Pass};
+use crate::graph::{Builder, Expr, Graph, Input, JointSum, Operations, Preparation};
+use crate::optimize::{self, COMPARED, Pass};
 use std::fmt;
 
 /// A function of the arm's state.
@@ -246,10 +249,33 @@ impl Function {
         }
     }
 
+    fn kind(self) -> Kind {
+        use Function::*;
+        match self {
+            ForwardKinematics | Jacobian | JacobianRateTimesSpeed => Kind::Other,
+            PotentialEnergy | KineticEnergyRegressor | PotentialEnergyRegressor => Kind::Other,
+            Regressor | RegressorTransposeTimes | SlotineLiRegressor | SlotineLiTransposeTimes => {
+                Kind::Regressor
+            }
+            _ => Kind::Dynamics,
+        }
+    }
+
     /// Whether it takes an argument.
     pub fn takes(self, argument: Argument) -> bool {
         self.arguments().contains(&argument)
     }
+}
+
+/// What the cost of a function depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// On the form of the recursion and on how it sums the parameters up.
+    Dynamics,
+    /// On the form of the recursion.
+    Regressor,
+    /// On neither.
+    Other,
 }
 
 impl fmt::Display for Function {
@@ -278,9 +304,16 @@ pub struct FunctionGraph {
 }
 
 impl FunctionGraph {
-    /// What it costs.
+    /// What it costs, without what is prepared of the parameters alone.
     pub fn operations(&self) -> Operations {
-        self.graph.operations(&self.outputs)
+        self.graph.operations_when_prepared(&self.outputs)
+    }
+
+    /// The function without what depends on the parameters alone, which `preparation` takes.
+    #[must_use]
+    pub fn without_preparation(&self, preparation: &mut Preparation) -> FunctionGraph {
+        let (graph, outputs) = preparation.take_out(&self.graph, &self.outputs);
+        FunctionGraph { graph, outputs, ..self.clone() }
     }
 
     /// What it takes: the function's arguments, without the parameters where their values are baked in.
@@ -290,17 +323,74 @@ impl FunctionGraph {
     }
 }
 
-/// Builds a function of an arm for a parameter set, with its parameters as inputs or their values baked in, and runs
-/// passes over its graph.
+/// What functions are built from: an arm with what is known exactly of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject<'a> {
+    /// The arm.
+    pub arm: &'a Arm,
+    /// Its angles that are kept as symbols.
+    pub symbols: &'a AngleSymbols,
+    /// The field of its constants.
+    pub field: &'a ConstantField,
+    /// How all its parameters depend on those of the minimal set.
+    pub minimal: &'a Dependence,
+}
+
+/// Builds a function of an arm for a parameter set, with its parameters as inputs or their values baked in, in the form
+/// that costs least, and runs passes over its graph.
 pub fn build(
     function: Function,
-    arm: &Arm,
-    symbols: &AngleSymbols,
+    subject: &Subject<'_>,
     set: &ParameterSet,
-    field: &ConstantField,
+    regroupings: &[Regrouping],
     baked: Option<&[Rational]>,
     passes: &[(&str, Pass)],
 ) -> FunctionGraph {
+    // The forms are compared after the first passes; the others go over the cheapest.
+    let (passes, rest) = passes.split_at(passes.len().min(COMPARED));
+    let mut best: Option<((usize, usize), FunctionGraph)> = None;
+    let mut keep_cheapest = |built: FunctionGraph| {
+        let operations = built.operations();
+        let cost = (operations.mul + operations.add, operations.add);
+        if best.as_ref().is_none_or(|(lowest, _)| cost < *lowest) {
+            best = Some((cost, built));
+        }
+    };
+    let both = [Origins::Inner, Origins::Outer];
+    match function.kind() {
+        Kind::Dynamics => {
+            for regrouping in regroupings {
+                for form in Form::all(regrouping.order.origins).take(4) {
+                    keep_cheapest(build_in(form, Some(regrouping), function, subject, set, baked, passes));
+                }
+            }
+        }
+        Kind::Regressor => {
+            for form in both.into_iter().flat_map(Form::all) {
+                keep_cheapest(build_in(form, None, function, subject, set, baked, passes));
+            }
+        }
+        Kind::Other => {}
+    }
+    let cheapest = match best {
+        Some((_, built)) => built,
+        None => build_in(Form::FIRST, None, function, subject, set, baked, passes),
+    };
+    let (graph, outputs) = optimize::optimize(cheapest.graph, cheapest.outputs, subject.field, rest);
+    FunctionGraph { graph, outputs, ..cheapest }
+}
+
+/// Builds a function in one form, with its parameters summed up in one way.
+pub fn build_in(
+    form: Form,
+    regrouping: Option<&Regrouping>,
+    function: Function,
+    subject: &Subject<'_>,
+    set: &ParameterSet,
+    baked: Option<&[Rational]>,
+    passes: &[(&str, Pass)],
+) -> FunctionGraph {
+    let Subject { arm, symbols, field, .. } = *subject;
     let b = Builder::new();
     let value = |i: usize| match baked {
         Some(values) => b.constant(&values[i]),
@@ -308,16 +398,37 @@ pub fn build(
     };
     let n = arm.dof();
     let elements = ArmElements::build(&b, arm, symbols, &mut Inputs { b: &b, arm });
-    let links = links(&b, arm, set, field, value);
+    let chain = Chain::build(&b, arm, &elements, form);
+    let mut bodies = regrouping.map_or(Vec::new(), |r| r.bodies(&b, arm, symbols, field, set, value));
+    if let Some(last) = bodies.last_mut() {
+        last.moments = last.moments.turned_back_z(&b, &chain.last_turn.0, &chain.last_turn.1);
+    }
+    let speeds: Vec<Expr> = (0..n).map(|i| b.input(Input::Speed(i))).collect();
     let input = |of: fn(usize) -> Input| -> Vec<Expr> { (0..n).map(|i| b.input(of(i))).collect() };
     let none = vec![Expr::ZERO; n];
     let torque = |accelerations: &[Expr], gravity: bool| {
-        inverse::inverse_dynamics(&b, &elements, &links, accelerations, gravity)
+        let drive = motion::Drive {
+            speeds: speeds.clone(),
+            reference: speeds.clone(),
+            accelerations: accelerations.to_vec(),
+            gravity,
+        };
+        inverse::inverse_dynamics(&b, &chain, &bodies, &drive)
     };
-    let regressor = |drive: &Drive| regressor::regressor(&b, arm, &elements, set, field, drive);
-    let motion = || Drive { reference: None, accelerations: input(Input::Acceleration), gravity: true };
-    let reference = || Drive {
-        reference: Some(input(Input::ReferenceSpeed)),
+    let geometry = chain::geometry(&b, arm, form.origins, &elements);
+    let regressor = |drive: &motion::Drive| {
+        let columns = regressor::Columns { set, field, links: &geometry, forces_home: form.forces_home };
+        regressor::regressor(&b, &chain, &columns, drive)
+    };
+    let motion = || motion::Drive {
+        speeds: speeds.clone(),
+        reference: speeds.clone(),
+        accelerations: input(Input::Acceleration),
+        gravity: true,
+    };
+    let reference = || motion::Drive {
+        speeds: speeds.clone(),
+        reference: input(Input::ReferenceSpeed),
         accelerations: input(Input::ReferenceAcceleration),
         gravity: true,
     };
@@ -343,25 +454,34 @@ pub fn build(
         Function::RegressorTransposeTimes => transposed(regressor(&motion())),
         Function::SlotineLiRegressor => regressor(&reference()),
         Function::SlotineLiTransposeTimes => transposed(regressor(&reference())),
-        Function::MassMatrix => composite::mass_matrix(&b, &elements, &links),
+        Function::MassMatrix => composite::mass_matrix(&b, &chain, &bodies),
         Function::MassMatrixInverse => {
-            forward::inverse_symmetric(&b, &composite::mass_matrix(&b, &elements, &links), n)
+            forward::inverse_symmetric(&b, &composite::mass_matrix(&b, &chain, &bodies), n)
         }
-        Function::CoriolisMatrix => coriolis::coriolis_matrix(&b, &elements, &links),
+        Function::CoriolisMatrix => coriolis::coriolis_matrix(&b, &chain, &bodies, &speeds),
         Function::CoriolisTimesSpeed => torque(&none, false),
         Function::CoriolisTransposeTimesSpeed => {
-            momentum::coriolis_transpose_times_speed(&b, &elements, &links)
+            momentum::coriolis_transpose_times_speed(&b, &chain, &bodies, &speeds)
         }
-        Function::Gravity => inverse::gravity(&b, &elements, &links),
+        Function::Gravity => composite::gravity(&b, &chain, &bodies),
         Function::ForwardDynamics => {
             let bias = torque(&none, true);
             let right: Vec<Expr> = input(Input::Torque).iter().zip(&bias).map(|(t, c)| b.sub(t, c)).collect();
-            forward::solve_symmetric(&b, &composite::mass_matrix(&b, &elements, &links), &right)
+            forward::solve_symmetric(&b, &composite::mass_matrix(&b, &chain, &bodies), &right)
         }
         Function::ForwardKinematics => pose::forward_kinematics(&b, &elements, &tool()),
         Function::Jacobian => pose::jacobian(&b, &elements, &tool()),
-        Function::JacobianRateTimesSpeed => pose::jacobian_rate_times_speed(&b, &elements, &tool()),
-        Function::KineticEnergy => vec![momentum::kinetic_energy(&b, &elements, &links)],
+        Function::JacobianRateTimesSpeed => {
+            let drive = motion::Drive {
+                speeds: speeds.clone(),
+                reference: speeds.clone(),
+                accelerations: none,
+                gravity: false,
+            };
+            let straight = Chain::build(&b, arm, &elements, Form { last_in_frame_before: false, ..form });
+            pose::jacobian_rate_times_speed(&b, &elements, &straight, &geometry[n - 1], &tool(), &drive)
+        }
+        Function::KineticEnergy => vec![momentum::kinetic_energy(&b, &chain, &bodies, &speeds)],
         Function::PotentialEnergy => {
             let row = energy::potential_regressor(&b, arm, &elements, set, field);
             let term = |(i, column): (usize, &Expr)| b.mul(column, &value(i));
@@ -370,7 +490,7 @@ pub fn build(
         }
         Function::KineticEnergyRegressor => energy::kinetic_regressor(&b, arm, &elements, set, field),
         Function::PotentialEnergyRegressor => energy::potential_regressor(&b, arm, &elements, set, field),
-        Function::Momentum => momentum::momentum(&b, &elements, &links),
+        Function::Momentum => momentum::momentum(&b, &chain, &bodies, &speeds),
         Function::TorqueByPosition => derivatives(Direction::Position),
         Function::TorqueBySpeed => derivatives(Direction::Speed),
     };
@@ -388,7 +508,8 @@ struct Inputs<'a> {
 
 impl Source<Expr> for Inputs<'_> {
     fn joint_trig(&mut self, joint: usize) -> (Expr, Expr) {
-        let (s, c) = (self.b.input(Input::Sin(joint)), self.b.input(Input::Cos(joint)));
+        let sum = JointSum::joint(joint);
+        let (s, c) = (self.b.input(Input::Sin(sum)), self.b.input(Input::Cos(sum)));
         // A constant of quarter turns only swaps and signs; any other is added to the angle itself.
         match self.arm.joints[joint].theta.quarter_turns() {
             Some(1) => (c, -s),

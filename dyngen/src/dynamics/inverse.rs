@@ -1,71 +1,194 @@
-//! Inverse dynamics by the Newton–Euler recursion, and gravity as its part without motion.
+//! Inverse dynamics by the Newton–Euler recursion along the chain.
 
-use super::body::{Body, Link, Vector, ZERO};
-use super::elements::ArmElements;
-use super::motion::{Drive, JointMotion, Motion, motions};
-use super::wrench::{Wrench, to_joint, to_link_before};
+use super::body::Vector;
+use super::motion::{Drive, LinkMotion, StageMotion, axis_rate, motions, own_rate};
+use super::regroup::LinkBody;
+use super::stage::{Chain, Stage, back_z, plus, scaled};
+use super::wrench::{Wrench, lever};
+use crate::arm::JointKind;
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
 
+/// What a coordinate of a stage feels.
+#[derive(Clone, Copy, Debug)]
+pub struct Felt {
+    /// Its torque or force.
+    pub torque: Expr,
+    /// The wrench of its link about the link's origin, in the link's axes; of the last link of a stage with all beyond. Of a prismatic
+    /// joint that before its turn.
+    pub wrench: Wrench,
+    /// The force on all beyond a link that is not the last of its stage: in its axes, or in those before the stage if the form
+    /// turns vectors there.
+    pub later: Vector,
+}
+
+/// Both passes of the recursion.
+#[derive(Clone, Debug)]
+pub struct Passes {
+    /// Torques of the joints.
+    pub torques: Vec<Expr>,
+    /// How the frames of each stage move.
+    pub motions: Vec<StageMotion>,
+    /// What the coordinates of each stage feel.
+    pub felt: Vec<Vec<Felt>>,
+}
+
 /// The torques that a motion needs: τ = B(q)·q̈ + C(q, q̇)·q̇ + g(q).
-pub fn inverse_dynamics(
-    b: &Builder,
-    arm: &ArmElements<Expr>,
-    links: &[Link],
-    accelerations: &[Expr],
-    gravity: bool,
-) -> Vec<Expr> {
-    let drive = Drive { reference: None, accelerations: accelerations.to_vec(), gravity };
-    let motions = motions(b, arm, &drive);
-    let mut torques = vec![Expr::ZERO; links.len()];
+pub fn inverse_dynamics(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: &Drive) -> Vec<Expr> {
+    newton_euler(b, chain, bodies, drive).torques
+}
+
+/// The motion outwards, forces and moments inwards.
+pub fn newton_euler(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: &Drive) -> Passes {
+    let motions = motions(b, chain, drive);
+    let mut felt = Vec::with_capacity(chain.stages.len());
+    let mut torques = vec![Expr::ZERO; chain.dof()];
     let mut outer = Wrench::NONE;
-    for i in (0..links.len()).rev() {
-        let (joint, motion, link) = (&arm.joints[i], &motions[i], &links[i]);
-        let total = body_wrench(b, &link.body, &motion.link).plus(b, &outer);
-        let at_joint = to_joint(b, arm.convention, joint, &total);
-        torques[i] = at_joint.along_joint(joint.kind);
-        let mut before = at_joint.back_z(b, joint);
-        if let Some(ratio) = joint.ratio {
-            let rotor = b.mul(&ratio, &link.rotor);
-            torques[i] = b.add(&torques[i], &rotor_torque(b, rotor, ratio, accelerations[i], motion));
-            let speeds = (joint.speed, joint.speed);
-            let moment = rotor_moment(b, rotor, speeds, accelerations[i], &motion.before_z);
-            before = before.plus(b, &Wrench { force: ZERO, moment });
+    for (stage, motion) in chain.stages.iter().zip(&motions).rev() {
+        let (own, mut before) = match stage.kind {
+            JointKind::Revolute => revolute(b, chain, stage, motion, bodies, &outer),
+            JointKind::Prismatic => prismatic(b, stage, motion, bodies, &outer),
+        };
+        // A joint's torque moves its own link and all after it.
+        let (mut sum, mut wheels, mut spin) = (Expr::ZERO, Expr::ZERO, Expr::ZERO);
+        let alpha = motion.before.alpha_z(b);
+        for (k, member) in stage.members.iter().enumerate().rev() {
+            let body = &bodies[member.joint];
+            sum = b.add(&sum, &own[k].torque);
+            let mut torque = b.add(&sum, &wheels);
+            if let Some(ratio) = member.ratio {
+                let rotor = b.mul(&ratio, &body.rotor);
+                let ddq = own_rate(b, &motion.accelerations, k);
+                let inner = k.checked_sub(1).map_or(Expr::ZERO, |inner| motion.accelerations[inner]);
+                let turning = b.add(&b.mul(&ratio, &ddq), &b.add(&alpha, &inner));
+                torque = b.add(&torque, &b.mul(&rotor, &turning));
+                // It turns the link before: within the stage that is what the inner coordinates feel.
+                let carrier = if stage.kind == JointKind::Revolute { &mut sum } else { &mut spin };
+                *carrier = b.add(carrier, &b.mul(&rotor, &ddq));
+                let rates = (own_rate(b, &motion.speeds, k), own_rate(b, &motion.reference, k));
+                let turned = axis_rate(b, &motion.before, rates.0, rates.1);
+                before.moment = plus(b, &before.moment, &scaled(b, rotor, &turned));
+            }
+            if body.flywheel != Expr::ZERO {
+                let wheel = body.flywheel;
+                let turning = b.mul(&wheel, &b.add(&alpha, &motion.accelerations[k]));
+                wheels = b.add(&wheels, &turning);
+                torque = b.add(&torque, &turning);
+                spin = b.add(&spin, &b.mul(&wheel, &motion.accelerations[k]));
+                let turned = axis_rate(b, &motion.before, motion.speeds[k], motion.reference[k]);
+                before.moment = plus(b, &before.moment, &scaled(b, wheel, &turned));
+            }
+            torques[member.joint] = if member.reversed { -torque } else { torque };
         }
-        outer = to_link_before(b, arm.convention, joint, &before);
+        if stage.kind == JointKind::Revolute {
+            before.moment[2] = sum;
+        }
+        before.moment[2] = b.add(&before.moment[2], &spin);
+        outer = before.turned_back_x(b, stage.twist);
+        felt.push(own);
     }
-    torques
+    felt.reverse();
+    Passes { torques, motions, felt }
 }
 
-/// The torques that hold the arm still: g(q) = ∂U/∂q.
-pub fn gravity(b: &Builder, arm: &ArmElements<Expr>, links: &[Link]) -> Vec<Expr> {
-    let mut still = arm.clone();
-    still.joints.iter_mut().for_each(|joint| joint.speed = Expr::ZERO);
-    inverse_dynamics(b, &still, links, &vec![Expr::ZERO; links.len()], true)
-}
-
-/// What a body's motion needs: f = m a + U s, n = I α + ω×(I ω) + s×a, with s its first moment.
-fn body_wrench(b: &Builder, body: &Body, motion: &Motion) -> Wrench {
-    let mut force: Vector = std::array::from_fn(|i| b.mul(&body.mass, &motion.acceleration[i]));
-    for (axis, moment) in body.moment.iter().enumerate() {
-        if *moment != Expr::ZERO {
-            force = super::motion::plus_scaled(b, &force, *moment, &motion.spin_column(b, axis));
+/// What each coordinate of the stage feels, and the wrench before the stage about its first origin.
+fn revolute(
+    b: &Builder,
+    chain: &Chain,
+    stage: &Stage,
+    motion: &StageMotion,
+    bodies: &[LinkBody],
+    outer: &Wrench,
+) -> (Vec<Felt>, Wrench) {
+    let nothing = Felt { torque: Expr::ZERO, wrench: Wrench::NONE, later: super::body::ZERO };
+    let mut own = vec![nothing; stage.members.len()];
+    // The force on all links from one on: in that link's axes, or in those before the stage.
+    let (mut force, mut before) = (super::body::ZERO, Wrench::NONE);
+    for (k, member) in stage.members.iter().enumerate().rev() {
+        let (body, link) = (&bodies[member.joint], &motion.links[k]);
+        let mut here = body_wrench(b, body, link);
+        let end = scaled(b, body.end_mass, &link.next);
+        let last = k + 1 == stage.members.len();
+        if last {
+            let carried = Wrench { force: plus(b, &outer.force, &end), ..*outer };
+            here = here.plus(b, &carried.shifted(b, &member.reach));
+            own[k] = Felt { torque: here.moment[2], wrench: here, ..nothing };
+        } else if chain.form.link_to_link {
+            let later = plus(b, &back_z(b, stage.members[k + 1].step, &force), &end);
+            let torque = b.add(&here.moment[2], &lever(b, &member.reach, &later));
+            own[k] = Felt { torque, wrench: here, later };
+            here =
+                here.plus(b, &Wrench { force: later, moment: super::body::ZERO }.shifted(b, &member.reach));
+        } else {
+            let later = plus(b, &before.force, &back_z(b, member.angle, &end));
+            let reach = stage.reach_before(b, k);
+            let torque = b.add(&here.moment[2], &lever(b, &reach, &later));
+            own[k] = Felt { torque, wrench: here, later };
+            let carried = Wrench { force: later, moment: before.moment };
+            before = Wrench { moment: carried.shifted(b, &reach).moment, force: later };
+        }
+        before.moment = plus(b, &before.moment, &back_z(b, member.angle, &here.moment));
+        if chain.form.link_to_link {
+            force = here.force;
+            before.force = back_z(b, member.angle, &force);
+        } else {
+            before.force = plus(b, &before.force, &back_z(b, member.angle, &here.force));
         }
     }
-    let euler = body.inertia_times(b, &motion.alpha);
-    let gyroscopic = b.cross(&motion.omega, &body.inertia_times(b, &motion.omega));
-    let lever = b.cross(&body.moment, &motion.acceleration);
-    let moment = std::array::from_fn(|i| b.add(&b.add(&euler[i], &gyroscopic[i]), &lever[i]));
-    Wrench { force, moment }
+    (own, before)
 }
 
-/// On the joint's own torque: k·Im·(k q̈ + z·α of the link before).
-pub fn rotor_torque(b: &Builder, rotor: Expr, ratio: Expr, ddq: Expr, motion: &JointMotion) -> Expr {
-    b.mul(&rotor, &b.add(&b.mul(&ratio, &ddq), &motion.before_z.alpha[2]))
+/// The force that the joint feels, and the wrench before it about the point of its axis in the link before.
+fn prismatic(
+    b: &Builder,
+    stage: &Stage,
+    motion: &StageMotion,
+    bodies: &[LinkBody],
+    outer: &Wrench,
+) -> (Vec<Felt>, Wrench) {
+    let (member, link) = (&stage.members[0], &motion.links[0]);
+    let body = &bodies[member.joint];
+    let end = scaled(b, body.end_mass, &link.next);
+    let carried = Wrench { force: plus(b, &outer.force, &end), ..*outer }.shifted(b, &member.reach);
+    let here = body_wrench(b, body, link).plus(b, &carried);
+    let turned =
+        Wrench { force: back_z(b, member.angle, &here.force), moment: back_z(b, member.angle, &here.moment) };
+    let before = turned.shifted(b, &[Expr::ZERO, Expr::ZERO, stage.shift]);
+    (vec![Felt { torque: before.force[2], wrench: turned, later: super::body::ZERO }], before)
 }
 
-/// On the link before: the rate of the rotor's own angular momentum, k·Im·(q̈ z + q̇ ω×z); `speeds` are q̇ and q̇ᵣ.
-pub fn rotor_moment(b: &Builder, rotor: Expr, speeds: (Expr, Expr), ddq: Expr, before: &Motion) -> Vector {
-    let turned = before.axis_turn(b, speeds.0, speeds.1);
-    [b.mul(&rotor, &turned[0]), b.mul(&rotor, &turned[1]), b.mul(&rotor, &ddq)]
+/// What a body's motion needs: f = m a + U s, n = Σ J_ij e_i×(U e_j) + s×a.
+fn body_wrench(b: &Builder, body: &LinkBody, link: &LinkMotion) -> Wrench {
+    let moments = &body.moments;
+    let mut wrench = Wrench::NONE;
+    for (entry, value) in moments.entries().into_iter().enumerate() {
+        if value != Expr::ZERO {
+            let unit = entry_wrench(b, entry, link);
+            let part =
+                Wrench { force: scaled(b, value, &unit.force), moment: scaled(b, value, &unit.moment) };
+            wrench = wrench.plus(b, &part);
+        }
+    }
+    wrench
+}
+
+/// The wrench of a unit of one entry of a body's moments about the origin.
+pub fn entry_wrench(b: &Builder, entry: usize, link: &LinkMotion) -> Wrench {
+    let u = &link.spin.rows;
+    let [ax, ay, az] = link.acceleration;
+    let zero = Expr::ZERO;
+    let moment = |moment: Vector| Wrench { force: super::body::ZERO, moment };
+    let first = |axis: usize, moment: Vector| Wrench { force: link.spin.column(axis), moment };
+    match entry {
+        0 => Wrench { force: link.acceleration, moment: super::body::ZERO },
+        1 => first(0, [zero, -az, ay]),
+        2 => first(1, [az, zero, -ax]),
+        3 => first(2, [-ay, ax, zero]),
+        4 => moment([zero, -u[2][0], u[1][0]]),
+        5 => moment([u[2][1], zero, -u[0][1]]),
+        6 => moment([-u[1][2], u[0][2], zero]),
+        7 => moment([b.sub(&u[2][2], &u[1][1]), u[0][1], -u[0][2]]),
+        8 => moment([-u[1][0], b.sub(&u[0][0], &u[2][2]), u[1][2]]),
+        _ => moment([u[2][0], -u[2][1], b.sub(&u[1][1], &u[0][0])]),
+    }
 }

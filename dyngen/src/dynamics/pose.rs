@@ -2,8 +2,10 @@
 //! alone make.
 
 use super::body::Vector;
-use super::elements::{ArmElements, JointElements, ToolElements};
+use super::chain::LinkGeometry;
+use super::elements::{ArmElements, JointElements, ToolElements, turn_x};
 use super::motion::{Drive, motions};
+use super::stage::{Chain, back_x, plus, scaled};
 use crate::arm::{Convention, JointKind};
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
@@ -57,7 +59,7 @@ fn turned(b: &Builder, s: &Expr, c: &Expr, u: &Vector, v: &Vector) -> (Vector, V
 }
 
 fn moved(b: &Builder, origin: &Vector, length: Expr, axis: &Vector) -> Vector {
-    super::motion::plus_scaled(b, origin, length, axis)
+    plus(b, origin, &scaled(b, length, axis))
 }
 
 /// The frame of every joint before its screw about z, and of the last link.
@@ -115,18 +117,24 @@ pub fn jacobian(b: &Builder, arm: &ArmElements<Expr>, tool: &ToolElements<Expr>)
 pub fn jacobian_rate_times_speed(
     b: &Builder,
     arm: &ArmElements<Expr>,
+    chain: &Chain,
+    link: &LinkGeometry<Expr>,
     tool: &ToolElements<Expr>,
+    drive: &Drive,
 ) -> Vec<Expr> {
-    let still = Drive { reference: None, accelerations: vec![Expr::ZERO; arm.joints.len()], gravity: false };
     let (_, last) = poses(b, arm);
-    let Some(motion) = motions(b, arm, &still).pop() else { return vec![Expr::ZERO; 6] };
+    let motions = motions(b, chain, drive);
+    let Some(motion) = motions.last().and_then(|stage| stage.links.last()) else {
+        return vec![Expr::ZERO; 6];
+    };
+    let (sin, cos) = link.file_turn;
     let to_base = |v: &Vector| -> [Expr; 3] {
-        std::array::from_fn(|i| b.dot(&[last.axes[0][i], last.axes[1][i], last.axes[2][i]], v))
+        let v = turn_x(b, &sin, &cos, v);
+        std::array::from_fn(|i| b.dot(&[last.axes[0][i], last.axes[1][i], last.axes[2][i]], &v))
     };
     // The link's own spin carries the tool's origin along.
-    let carried = |v: Vector, i: usize| {
-        super::motion::plus_scaled(b, &v, tool.origin[i], &motion.link.spin_column(b, i))
-    };
-    let acceleration = (0..3).fold(motion.link.acceleration, carried);
-    [to_base(&acceleration), to_base(&motion.link.alpha)].concat()
+    let place = plus(b, &link.file_origin, &back_x(b, link.file_turn, &tool.origin));
+    let acceleration = plus(b, &motion.acceleration, &motion.spin.times(b, &place));
+    let turning = std::array::from_fn(|axis| motion.spin.alpha(b, axis));
+    [to_base(&acceleration), to_base(&turning)].concat()
 }

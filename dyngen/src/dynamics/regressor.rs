@@ -1,166 +1,337 @@
-//! The regressor: each parameter's wrench projected onto the joints before it.
+//! The regressor: each parameter's wrench projected onto what each coordinate moves.
 
 use super::body::{Vector, ZERO};
-use super::elements::{ArmElements, JointElements, turn_x, turn_z};
-use super::inverse::{rotor_moment, rotor_torque};
-use super::motion::{Drive, JointMotion, Motion, motions};
+use super::chain::LinkGeometry;
+use super::inverse::entry_wrench;
+use super::motion::{Drive, LinkMotion, StageMotion, axis_rate, motions, own_rate};
+use super::spin::{Spin, turned_tensor};
+use super::stage::{Chain, STRAIGHT, SinCos, Stage, back_x, back_z, plus, scaled};
 use super::wrench::Wrench;
-use crate::arm::{Arm, Convention, JointKind, Parameter, ParameterKind};
+use crate::arm::{JointKind, Parameter, ParameterKind};
 use crate::base::ParameterSet;
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
 use crate::graph::{Builder, Expr};
 
-/// A joint's axis as seen from a frame further out: what a unit of its speed gives the frame.
+/// What a unit of a coordinate's speed gives a frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Axis {
-    /// Angular velocity of the frame.
+struct Axis {
+    /// Angular velocity.
     angular: Vector,
-    /// Velocity of the frame's origin.
+    /// Velocity of the origin.
     linear: Vector,
+}
+
+/// Where a link's columns are projected.
+#[derive(Clone, Debug)]
+struct LinkView {
+    motion: LinkMotion,
+    /// The coordinates up to the link's own, in its axes.
+    axes: Vec<Axis>,
+    /// The way of a force back to the link whose end is this link's origin, and the speeds of that end there.
+    home: Option<(Vec<Turn>, Vec<Vector>)>,
+}
+
+/// A turn back by a sine and cosine about x or z.
+#[derive(Clone, Copy, Debug)]
+enum Turn {
+    X(SinCos),
+    Z(SinCos),
+}
+
+impl Turn {
+    fn back(self, b: &Builder, v: &Vector) -> Vector {
+        match self {
+            Turn::X(trig) => back_x(b, trig, v),
+            Turn::Z(trig) => back_z(b, trig, v),
+        }
+    }
+}
+
+/// What the columns are made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Columns<'a> {
+    /// The parameter set.
+    pub set: &'a ParameterSet,
+    /// The field of its factors.
+    pub field: &'a ConstantField,
+    /// Where the file's frames lie in the chain's.
+    pub links: &'a [LinkGeometry<Expr>],
+    /// Whether forces are turned back to where their origin is at rest, not the axes' speeds outwards.
+    pub forces_home: bool,
 }
 
 /// Y(q, q̇, q̈), row-major n × p: τ = Y·π for the parameters of a set; with reference speeds the regressor of Slotine and
 /// Li, Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g.
-pub fn regressor(
-    b: &Builder,
-    arm: &Arm,
-    elements: &ArmElements<Expr>,
-    set: &ParameterSet,
-    field: &ConstantField,
-    drive: &Drive,
-) -> Vec<Expr> {
-    let (n, p) = (arm.dof(), set.parameters.len());
-    let motions = motions(b, elements, drive);
-    let axes = axes(b, elements);
+pub fn regressor(b: &Builder, chain: &Chain, columns: &Columns<'_>, drive: &Drive) -> Vec<Expr> {
+    let (n, p) = (chain.dof(), columns.set.parameters.len());
+    let motions = motions(b, chain, drive);
+    let (views, before) = views(b, chain, &motions);
     let mut rows = vec![Expr::ZERO; n * p];
-    for (column, parameter) in set.parameters.iter().enumerate() {
+    for (index, parameter) in columns.set.parameters.iter().enumerate() {
+        let mut column = vec![Expr::ZERO; n];
         for (carrier, factor) in &parameter.carriers {
-            let factor = super::body::constant(b, field, factor);
-            let torques = column_of(b, elements, &motions, &axes, drive, *carrier);
-            for (row, torque) in torques.into_iter().enumerate() {
-                let entry = &mut rows[row * p + column];
-                *entry = b.add(entry, &b.mul(&factor, &torque));
+            let factor = super::body::constant(b, columns.field, factor);
+            let own = match carrier.kind {
+                ParameterKind::Im => rotor_column(b, chain, &motions, &before, carrier.link),
+                _ => body_column(b, chain, columns, &views[carrier.link], *carrier),
+            };
+            for (total, torque) in column.iter_mut().zip(own) {
+                *total = b.add(total, &b.mul(&factor, &torque));
             }
+        }
+        for (row, torque) in column.into_iter().enumerate() {
+            rows[row * p + index] = torque;
         }
     }
     rows
 }
 
-/// The torques of a unit of one parameter.
-fn column_of(
+/// Carries every coordinate's axis outwards: to each link, and to the axes before each stage.
+fn views(b: &Builder, chain: &Chain, motions: &[StageMotion]) -> (Vec<LinkView>, Vec<Vec<Axis>>) {
+    let mut seen: Vec<Axis> = Vec::new();
+    let (mut views, mut before_stages) = (Vec::with_capacity(chain.dof()), Vec::new());
+    let mut home: Option<(Vec<Turn>, Vec<Vector>)> = None;
+    let turn_z = |(s, c): SinCos, v: &Vector| super::elements::turn_z(b, &s, &c, v);
+    for (stage, motion) in chain.stages.iter().zip(motions) {
+        let (s, c) = stage.twist;
+        for axis in &mut seen {
+            axis.angular = super::elements::turn_x(b, &s, &c, &axis.angular);
+            axis.linear = super::elements::turn_x(b, &s, &c, &axis.linear);
+        }
+        if let Some((turns, _)) = &mut home {
+            turns.push(Turn::X(stage.twist));
+        }
+        before_stages.push(seen.clone());
+        let first = seen.len();
+        let before = seen.clone();
+        for (k, member) in stage.members.iter().enumerate() {
+            let unit = [Expr::ZERO, Expr::ZERO, Expr::ONE];
+            let in_axes = |axis: &Axis| Axis {
+                angular: turn_z(member.angle, &axis.angular),
+                linear: turn_z(member.angle, &axis.linear),
+            };
+            // The linear parts of earlier coordinates grow from member to member, their angular parts stay.
+            let mut axes: Vec<Axis> = if k == 0 || !chain.form.link_to_link {
+                let base = if k == 0 { &before } else { &seen };
+                base.iter().map(in_axes).collect()
+            } else {
+                let angular = before.iter().map(|axis| turn_z(member.angle, &axis.angular));
+                let within = std::iter::repeat_n(ZERO, k);
+                let linear = seen.iter().map(|axis| turn_z(member.step, &axis.linear));
+                angular.chain(within).zip(linear).map(|(angular, linear)| Axis { angular, linear }).collect()
+            };
+            let own = match stage.kind {
+                JointKind::Revolute => Axis { angular: unit, linear: ZERO },
+                JointKind::Prismatic => {
+                    let shift = [Expr::ZERO, Expr::ZERO, stage.shift];
+                    for axis in &mut axes {
+                        axis.linear = plus(b, &axis.linear, &b.cross(&axis.angular, &shift));
+                    }
+                    home = None;
+                    Axis { angular: ZERO, linear: unit }
+                }
+            };
+            axes.push(own);
+            if let Some((turns, _)) = &mut home {
+                turns.push(Turn::Z(if k == 0 { member.angle } else { member.step }));
+            }
+            views.push(LinkView { motion: motion.links[k], axes: axes.clone(), home: home.clone() });
+            // To the next origin.
+            let last = k + 1 == stage.members.len();
+            for (j, axis) in axes.iter_mut().enumerate() {
+                axis.linear = plus(b, &axis.linear, &b.cross(&axis.angular, &member.reach));
+                if j == first + k && !last {
+                    axis.angular = ZERO;
+                }
+            }
+            if member.reach != ZERO {
+                home = Some((Vec::new(), axes.iter().map(|axis| axis.linear).collect()));
+            }
+            seen = axes;
+            if !last && !chain.form.link_to_link {
+                for axis in &mut seen {
+                    axis.angular = back_z(b, member.angle, &axis.angular);
+                    axis.linear = back_z(b, member.angle, &axis.linear);
+                }
+            }
+        }
+    }
+    (views, before_stages)
+}
+
+/// The torques of a unit of one inertial parameter.
+fn body_column(
     b: &Builder,
-    arm: &ArmElements<Expr>,
-    motions: &[JointMotion],
-    axes: &[JointAxes],
-    drive: &Drive,
+    chain: &Chain,
+    columns: &Columns<'_>,
+    view: &LinkView,
     parameter: Parameter,
 ) -> Vec<Expr> {
-    let i = parameter.link;
-    let mut column = vec![Expr::ZERO; arm.joints.len()];
-    let (wrench, seen) = if parameter.kind == ParameterKind::Im {
-        let Some(ratio) = arm.joints[i].ratio else { return column };
-        let (speed, ddq) = (arm.joints[i].speed, drive.accelerations[i]);
-        let reference = drive.reference.as_ref().map_or(speed, |r| r[i]);
-        column[i] = rotor_torque(b, ratio, ratio, ddq, &motions[i]);
-        let moment = rotor_moment(b, ratio, (speed, reference), ddq, &motions[i].before_z);
-        (Wrench { force: ZERO, moment }, &axes[i].before_z)
-    } else {
-        (unit_wrench(b, parameter.kind, &motions[i].link), &axes[i].link)
+    let geometry = &columns.links[parameter.link];
+    let wrench = unit_wrench(b, chain, geometry, &view.motion, parameter);
+    let at_file = !is_second(parameter.kind) && geometry.file_origin != ZERO;
+    let forced = |axis: usize| -> Expr {
+        let Axis { angular, linear } = view.axes[axis];
+        match &view.home {
+            Some((turns, speeds)) if columns.forces_home && !at_file && axis < speeds.len() => {
+                let home = turns.iter().rev().fold(wrench.force, |f, turn| turn.back(b, &f));
+                b.dot(&speeds[axis], &home)
+            }
+            _ if at_file => {
+                let speed = plus(b, &linear, &b.cross(&angular, &geometry.file_origin));
+                b.dot(&speed, &wrench.force)
+            }
+            _ => b.dot(&linear, &wrench.force),
+        }
     };
-    for (j, axis) in seen.iter().enumerate() {
-        let torque = b.add(&b.dot(&axis.angular, &wrench.moment), &b.dot(&axis.linear, &wrench.force));
-        column[j] = b.add(&column[j], &torque);
-    }
-    column
+    let coordinates: Vec<Expr> = (0..view.axes.len())
+        .map(|j| b.add(&b.dot(&view.axes[j].angular, &wrench.moment), &forced(j)))
+        .collect();
+    of_joints(b, chain, &coordinates)
 }
 
-/// The wrench of a unit of one inertial parameter about the origin of its link's frame.
-fn unit_wrench(b: &Builder, kind: ParameterKind, motion: &Motion) -> Wrench {
-    let [ax, ay, az] = motion.acceleration;
-    let first = |axis: usize, moment: Vector| Wrench { force: motion.spin_column(b, axis), moment };
-    match kind {
-        ParameterKind::M => Wrench { force: motion.acceleration, moment: ZERO },
-        ParameterKind::Mx => first(0, [Expr::ZERO, -az, ay]),
-        ParameterKind::My => first(1, [az, Expr::ZERO, -ax]),
-        ParameterKind::Mz => first(2, [-ay, ax, Expr::ZERO]),
-        ParameterKind::Im => Wrench::NONE,
-        _ => Wrench { force: ZERO, moment: inertia_moment(b, kind, motion) },
+/// The joints' torques from what the coordinates feel: a joint moves its link and all after it.
+fn of_joints(b: &Builder, chain: &Chain, coordinates: &[Expr]) -> Vec<Expr> {
+    let mut torques = vec![Expr::ZERO; chain.dof()];
+    for stage in &chain.stages {
+        let mut sum = Expr::ZERO;
+        for member in stage.members.iter().rev() {
+            sum = b.add(&sum, coordinates.get(member.joint).unwrap_or(&Expr::ZERO));
+            torques[member.joint] = if member.reversed { -sum } else { sum };
+        }
     }
+    torques
 }
 
-/// I α + ω×(I ω) for a tensor with one unit entry.
-fn inertia_moment(b: &Builder, kind: ParameterKind, motion: &Motion) -> Vector {
-    let a = &motion.alpha;
-    let product = |i: usize, j: usize| motion.product(b, i, j);
-    let square_difference = |i: usize, j: usize| b.sub(&product(i, i), &product(j, j));
-    let plus = |i: usize, x: Expr| b.add(&a[i], &x);
-    let minus = |i: usize, x: Expr| b.sub(&a[i], &x);
-    let negated = |v: Vector| v.map(|x| -x);
-    match kind {
-        ParameterKind::Ixx => [a[0], product(0, 2), -product(0, 1)],
-        ParameterKind::Iyy => [-product(1, 2), a[1], product(0, 1)],
-        ParameterKind::Izz => [product(1, 2), -product(0, 2), a[2]],
+fn is_second(kind: ParameterKind) -> bool {
+    !matches!(kind, ParameterKind::M | ParameterKind::Mx | ParameterKind::My | ParameterKind::Mz)
+}
+
+/// The wrench of a unit of one inertial parameter about the origin of the file's frame, in the chain's axes.
+fn unit_wrench(
+    b: &Builder,
+    chain: &Chain,
+    geometry: &LinkGeometry<Expr>,
+    motion: &LinkMotion,
+    parameter: Parameter,
+) -> Wrench {
+    use ParameterKind::*;
+    let last = parameter.link + 1 == chain.dof();
+    let turn = |v: &Vector| {
+        let v = back_x(b, geometry.file_turn, v);
+        if last { back_z(b, chain.last_turn, &v) } else { v }
+    };
+    let unit =
+        |axis: usize| -> Vector { std::array::from_fn(|i| if i == axis { Expr::ONE } else { Expr::ZERO }) };
+    let mut origin = geometry.file_origin;
+    if last {
+        origin = back_z(b, chain.last_turn, &origin);
+    }
+    let acceleration = plus(b, &motion.acceleration, &motion.spin.times(b, &origin));
+    let first = |axis: usize| {
+        let arm = turn(&unit(axis));
+        Wrench { force: motion.spin.times(b, &arm), moment: b.cross(&arm, &acceleration) }
+    };
+    let tensor = |i: usize, j: usize, sign: Expr| {
+        let axis = back_x(b, geometry.file_turn, &unit(i));
+        if i == j && last && chain.last_turn != STRAIGHT && axis[2] == Expr::ZERO {
+            let across = axis[0] == Expr::ZERO;
+            return Wrench { force: ZERO, moment: turned_moment(b, chain.last_turn, across, motion) };
+        }
+        let mut rows = [ZERO; 3];
+        (rows[i][j], rows[j][i]) = (sign, sign);
+        Wrench { force: ZERO, moment: tensor_moment(b, &turned_tensor(&rows, turn), motion) }
+    };
+    match parameter.kind {
+        M => Wrench { force: acceleration, moment: ZERO },
+        Mx => first(0),
+        My => first(1),
+        Mz => first(2),
+        Ixx => tensor(0, 0, Expr::ONE),
+        Iyy => tensor(1, 1, Expr::ONE),
+        Izz => tensor(2, 2, Expr::ONE),
         // The tensor's element is minus the product of inertia.
-        ParameterKind::Ixy => {
-            negated([minus(1, product(0, 2)), plus(0, product(1, 2)), square_difference(0, 1)])
-        }
-        ParameterKind::Ixz => {
-            negated([plus(2, product(0, 1)), square_difference(2, 0), minus(0, product(1, 2))])
-        }
-        ParameterKind::Iyz => {
-            negated([square_difference(1, 2), minus(2, product(0, 1)), plus(1, product(0, 2))])
-        }
-        _ => ZERO,
+        Iyz => tensor(1, 2, -Expr::ONE),
+        Ixz => tensor(0, 2, -Expr::ONE),
+        Ixy => tensor(0, 1, -Expr::ONE),
+        Im => Wrench::NONE,
     }
 }
 
-/// The axes of the joints up to one, seen from two frames at it.
-#[derive(Clone, Debug)]
-pub struct JointAxes {
-    /// Seen from before its screw about z: the joints before it.
-    pub before_z: Vec<Axis>,
-    /// Seen from its link's frame: the joints up to it.
-    pub link: Vec<Axis>,
+/// I α + ω×(I ω) of a unit moment of inertia about an axis that is turned about z from x, or from y across it.
+///
+/// With the second moment across the axis: with e that direction it is e×(U e), less the moment of the inertia about z.
+fn turned_moment(b: &Builder, trig: SinCos, across: bool, motion: &LinkMotion) -> Vector {
+    let spin = &motion.spin;
+    let turn = |v: &Vector| super::elements::turn_z(b, &trig.0, &trig.1, v);
+    let own = Spin { omega: turn(&spin.omega), reference: turn(&spin.reference), ..*spin };
+    let [along, beside, _] = turn(&spin.rows[2]);
+    let (height, about_z) =
+        if across { (along, own.product(b, 0, 1)) } else { (beside, -own.product(b, 0, 1)) };
+    let lever = if across { [Expr::ZERO, -height, about_z] } else { [height, Expr::ZERO, about_z] };
+    let turned = back_z(b, trig, &lever);
+    let zz = [spin.product(b, 1, 2), -spin.product(b, 2, 0), Expr::ZERO];
+    std::array::from_fn(|i| b.sub(&turned[i], &zz[i]))
 }
 
-/// Carries every joint's axis outwards.
-pub fn axes(b: &Builder, arm: &ArmElements<Expr>) -> Vec<JointAxes> {
-    let mut seen: Vec<Axis> = Vec::new();
-    let mut all = Vec::with_capacity(arm.joints.len());
-    for joint in &arm.joints {
-        if arm.convention == Convention::Modified {
-            seen.iter_mut().for_each(|axis| about_x(b, joint, axis));
+/// I α + ω×(I ω) of a tensor by rows.
+fn tensor_moment(b: &Builder, tensor: &[Vector; 3], motion: &LinkMotion) -> Vector {
+    let mut moment = ZERO;
+    for i in 0..3 {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        if tensor[i][i] != Expr::ZERO {
+            let mut own = ZERO;
+            own[i] = motion.spin.alpha(b, i);
+            own[j] = motion.spin.product(b, k, i);
+            own[k] = -motion.spin.product(b, i, j);
+            moment = plus(b, &moment, &scaled(b, tensor[i][i], &own));
         }
-        let before_z = seen.clone();
-        seen.iter_mut().for_each(|axis| about_z(b, joint, axis));
-        let unit = [Expr::ZERO, Expr::ZERO, Expr::ONE];
-        seen.push(match joint.kind {
-            JointKind::Revolute => Axis { angular: unit, linear: ZERO },
-            JointKind::Prismatic => Axis { angular: ZERO, linear: unit },
-        });
-        if arm.convention == Convention::Standard {
-            seen.iter_mut().for_each(|axis| about_x(b, joint, axis));
+        // Off the diagonal minus the second moments.
+        if tensor[j][k] != Expr::ZERO {
+            let own = entry_wrench(b, 7 + i, motion).moment;
+            moment = plus(b, &moment, &scaled(b, -tensor[j][k], &own));
         }
-        all.push(JointAxes { before_z, link: seen.clone() });
     }
-    all
+    moment
 }
 
-fn about_x(b: &Builder, joint: &JointElements<Expr>, axis: &mut Axis) {
-    let [_, wy, wz] = axis.angular;
-    axis.linear[1] = b.add(&axis.linear[1], &b.mul(&joint.a, &wz));
-    axis.linear[2] = b.sub(&axis.linear[2], &b.mul(&joint.a, &wy));
-    for v in [&mut axis.angular, &mut axis.linear] {
-        *v = turn_x(b, &joint.sin_alpha, &joint.cos_alpha, v);
+/// The torques of a unit of a rotor's inertia: on its own joint k·(k q̈ + z·α of the link before), and on that link the rate
+/// of the rotor's own angular momentum, k·(q̈ z + q̇ ω×z).
+fn rotor_column(
+    b: &Builder,
+    chain: &Chain,
+    motions: &[StageMotion],
+    before: &[Vec<Axis>],
+    joint: usize,
+) -> Vec<Expr> {
+    let mut coordinates = vec![Expr::ZERO; chain.dof()];
+    let Some((s, k)) = place(&chain.stages, joint) else { return coordinates };
+    let (stage, motion) = (&chain.stages[s], &motions[s]);
+    let Some(ratio) = stage.members[k].ratio else { return coordinates };
+    let ddq = own_rate(b, &motion.accelerations, k);
+    let [speed, reference] = [&motion.speeds, &motion.reference].map(|rates| own_rate(b, rates, k));
+    let mut moment = scaled(b, ratio, &axis_rate(b, &motion.before, speed, reference));
+    moment[2] = b.mul(&ratio, &ddq);
+    for (j, axis) in before[s].iter().enumerate() {
+        coordinates[j] = b.dot(&axis.angular, &moment);
     }
+    // Within the stage the link before the rotor is the last that it turns.
+    let mut alpha = motion.before.alpha_z(b);
+    if let Some(inner) = k.checked_sub(1) {
+        coordinates[stage.members[inner].joint] = moment[2];
+        alpha = b.add(&alpha, &motion.accelerations[inner]);
+    }
+    let mut torques = of_joints(b, chain, &coordinates);
+    let own = b.mul(&ratio, &b.add(&b.mul(&ratio, &ddq), &alpha));
+    torques[joint] = if stage.members[k].reversed { -own } else { own };
+    torques
 }
 
-fn about_z(b: &Builder, joint: &JointElements<Expr>, axis: &mut Axis) {
-    let [wx, wy, _] = axis.angular;
-    axis.linear[0] = b.add(&axis.linear[0], &b.mul(&joint.shift, &wy));
-    axis.linear[1] = b.sub(&axis.linear[1], &b.mul(&joint.shift, &wx));
-    for v in [&mut axis.angular, &mut axis.linear] {
-        *v = turn_z(b, &joint.sin, &joint.cos, v);
-    }
+/// Stage and member of a joint.
+fn place(stages: &[Stage], joint: usize) -> Option<(usize, usize)> {
+    stages
+        .iter()
+        .enumerate()
+        .find_map(|(s, stage)| stage.members.iter().position(|m| m.joint == joint).map(|k| (s, k)))
 }

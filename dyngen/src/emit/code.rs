@@ -2,17 +2,18 @@
 
 use super::docs;
 use crate::arm::{Arm, JointKind};
+use crate::dynamics::chain;
 use crate::dynamics::function::{Argument, Size, trig_offset};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::rational;
-use crate::graph::{Expr, Input, Node, operands};
+use crate::graph::{Expr, Graph, Input, JointSum, Node, Preparation, operands};
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
 use std::collections::BTreeSet;
 
 /// A function's items: one that takes q, and one that takes [`Trig`] in its place.
-pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
+pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) -> TokenStream {
     let arm = model.arm();
     let needed = built.graph.needed(&built.outputs);
     let used: BTreeSet<Input> = needed
@@ -27,16 +28,17 @@ pub(super) fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
     let doc = docs::lines(&docs::function(built));
     let doc_with = docs::lines(&docs::function_with(built));
     let others: Vec<Argument> = built.arguments().filter(|a| *a != Argument::Positions).collect();
-    let (signature, bindings): (Vec<_>, Vec<_>) = others.iter().map(|a| argument(built, *a, &used)).unzip();
+    let (signature, bindings): (Vec<_>, Vec<_>) =
+        others.iter().map(|a| argument(built, prepared, *a, &used)).unzip();
     let passed = others.iter().map(|a| Ident::new(a.name(), Span::call_site()));
     let plain = others.iter().map(|a| parameter(*a, a.name()));
-    let positions = positions(built, &used);
+    let positions = positions(arm, &used);
     let trig = trig_of(arm, &used);
     let (q, trig_name) = match uses_positions(&used) {
         true => (quote!(q), quote!(trig)),
         false => (quote!(_q), quote!(_trig)),
     };
-    let statements = sections(model, built, &needed);
+    let statements = sections(model, &built.graph, &built.outputs, &needed);
     let (result, value) = result(built);
     // Where the result is a number, the last `let` is the result.
     let lint = is_number(built).then(|| quote!(#[allow(clippy::let_and_return)]));
@@ -67,23 +69,52 @@ fn is_number(built: &FunctionGraph) -> bool {
 
 /// The struct of sines and cosines that functions share.
 pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
-    let all: BTreeSet<Input> =
-        (0..arm.dof()).flat_map(|i| [Input::Sin(i), Input::Cos(i), Input::Position(i)]).collect();
+    let all: BTreeSet<Input> = angles(arm)
+        .into_iter()
+        .flat_map(|sum| [Input::Sin(sum), Input::Cos(sum)])
+        .chain((0..arm.dof()).map(Input::Position))
+        .collect();
     let (bindings, fields) = trig_fields(arm, &all);
+    let sums: Vec<String> = chain::sums(arm)
+        .iter()
+        .enumerate()
+        .map(|(k, sum)| {
+            let text: String = sum
+                .joints()
+                .enumerate()
+                .map(|(k, (i, negative))| {
+                    let sign = if k == 0 {
+                        ""
+                    } else if negative {
+                        " − "
+                    } else {
+                        " + "
+                    };
+                    format!("{sign}q{}", i + 1)
+                })
+                .collect();
+            format!(" Angle {}: {text}, across parallel axes.", arm.dof() + k + 1)
+        })
+        .collect();
+    let count = Literal::usize_unsuffixed(angles(arm).len());
     let shifted: Vec<String> = (0..arm.dof())
         .filter(|i| trig_offset(arm, *i) != 0.0)
         .map(|i| format!(" Joint {}: of q + {} rad.", i + 1, trig_offset(arm, i)))
         .collect();
     quote! {
+        /// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
+        pub const ANGLES: usize = #count;
+
         /// Joint positions with their sines and cosines: computed once and shared between calls, or taken from
         /// wherever the caller has them.
         #(#[doc = #shifted])*
+        #(#[doc = #sums])*
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct Trig<T> {
-            /// Sine of each revolute joint's angle; not read for prismatic joints.
-            pub sin: [T; JOINTS],
-            /// Cosine of each revolute joint's angle; not read for prismatic joints.
-            pub cos: [T; JOINTS],
+            /// Sine of each angle; not read for prismatic joints.
+            pub sin: [T; ANGLES],
+            /// Cosine of each angle; not read for prismatic joints.
+            pub cos: [T; ANGLES],
             /// Position of each prismatic joint, m; not read for revolute joints.
             pub position: [T; JOINTS],
         }
@@ -115,20 +146,28 @@ fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) 
     let (mut names, mut lets) = (Vec::new(), Vec::new());
     let (mut sines, mut cosines, mut places) = (Vec::new(), Vec::new(), Vec::new());
     let zero = quote!(T::zero());
-    for (i, joint) in arm.joints.iter().enumerate() {
-        let (q, s, c) =
-            (format_ident!("q{}", i + 1), format_ident!("s{}", i + 1), format_ident!("c{}", i + 1));
-        let revolute = joint.kind == JointKind::Revolute;
+    for sum in angles(arm) {
+        let revolute = sum.joints().all(|(i, _)| arm.joints[i].kind == JointKind::Revolute);
+        let (s, c) = (format_ident!("s{sum}"), format_ident!("c{sum}"));
         let (sin, cos) =
-            (revolute && used.contains(&Input::Sin(i)), revolute && used.contains(&Input::Cos(i)));
-        let place = !revolute && used.contains(&Input::Position(i));
-        names.push(if sin || cos || place { quote!(#q) } else { quote!(_) });
-        let offset = trig_offset(arm, i);
-        let angle = if offset == 0.0 {
-            quote!(#q)
-        } else {
+            (revolute && used.contains(&Input::Sin(sum)), revolute && used.contains(&Input::Cos(sum)));
+        let terms = sum.joints().enumerate().map(|(k, (i, negative))| {
+            let q = format_ident!("q{}", i + 1);
+            match (k, negative) {
+                (0, _) => quote!(#q),
+                (_, false) => quote!(+ #q),
+                (_, true) => quote!(- #q),
+            }
+        });
+        let offset = sum.value(|i| trig_offset(arm, i));
+        let offset = (offset != 0.0).then(|| {
             let offset = Literal::f64_suffixed(offset);
-            quote!((#q + nalgebra::convert::<f64, T>(#offset)))
+            quote!(+ nalgebra::convert::<f64, T>(#offset))
+        });
+        let angle = if sum.is_joint() && offset.is_none() {
+            quote!(#(#terms)*)
+        } else {
+            quote!((#(#terms)* #offset))
         };
         match (sin, cos) {
             (true, true) => lets.push(quote!(let (#s, #c) = #angle.simd_sin_cos();)),
@@ -138,6 +177,17 @@ fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) 
         }
         sines.push(if sin { quote!(#s) } else { zero.clone() });
         cosines.push(if cos { quote!(#c) } else { zero.clone() });
+    }
+    for i in 0..arm.dof() {
+        let q = format_ident!("q{}", i + 1);
+        let revolute = arm.joints[i].kind == JointKind::Revolute;
+        let place = !revolute && used.contains(&Input::Position(i));
+        let in_angle = |input: &Input| match input {
+            Input::Sin(sum) | Input::Cos(sum) => sum.sign(i).is_some(),
+            _ => false,
+        };
+        let read = place || (revolute && used.iter().any(in_angle));
+        names.push(if read { quote!(#q) } else { quote!(_) });
         places.push(if place { quote!(#q) } else { zero.clone() });
     }
     let bindings = quote! {
@@ -148,19 +198,27 @@ fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) 
     (bindings, fields)
 }
 
+/// The angles of a `Trig`: those of the joints, then sums of parallel joints' angles.
+fn angles(arm: &Arm) -> Vec<JointSum> {
+    (0..arm.dof()).map(JointSum::joint).chain(chain::sums(arm)).collect()
+}
+
 /// Names for what is read of a `Trig`.
-fn positions(built: &FunctionGraph, used: &BTreeSet<Input>) -> TokenStream {
-    let take = |field: &str, letter: &str, input: fn(usize) -> Input| {
+fn positions(arm: &Arm, used: &BTreeSet<Input>) -> TokenStream {
+    let take = |field: &str, inputs: Vec<Input>| {
         let field = Ident::new(field, Span::call_site());
-        let any = (0..built.joints).any(|i| used.contains(&input(i)));
-        let names = (0..built.joints).map(|i| {
-            let name = format_ident!("{letter}{}", i + 1);
-            if used.contains(&input(i)) { quote!(#name) } else { quote!(_) }
+        let any = inputs.iter().any(|input| used.contains(input));
+        let names = inputs.into_iter().map(|input| {
+            let name = format_ident!("{}", input.to_string());
+            if used.contains(&input) { quote!(#name) } else { quote!(_) }
         });
         any.then(|| quote!(let [#(#names),*] = trig.#field;))
     };
-    let lines =
-        [take("sin", "s", Input::Sin), take("cos", "c", Input::Cos), take("position", "q", Input::Position)];
+    let lines = [
+        take("sin", angles(arm).into_iter().map(Input::Sin).collect()),
+        take("cos", angles(arm).into_iter().map(Input::Cos).collect()),
+        take("position", (0..arm.dof()).map(Input::Position).collect()),
+    ];
     let lines = lines.iter().flatten();
     quote!(#(#lines)*)
 }
@@ -175,7 +233,7 @@ fn input_of(argument: Argument, i: usize) -> Input {
         Argument::ReferenceAccelerations => Input::ReferenceAcceleration(i),
         Argument::Torques => Input::Torque(i),
         Argument::Errors => Input::Error(i),
-        Argument::Parameters => Input::Parameter(i),
+        Argument::Parameters => Input::Prepared(i),
     }
 }
 
@@ -186,21 +244,97 @@ fn parameter(argument: Argument, name: &str) -> TokenStream {
     quote!(#ident: &SVector<T, #length>)
 }
 
+/// `name: &impl Parameters<T>` for parameters, which may be prepared.
+fn shared_parameter(argument: Argument, name: &str) -> TokenStream {
+    if argument != Argument::Parameters {
+        return parameter(argument, name);
+    }
+    let ident = Ident::new(name, Span::call_site());
+    quote!(#ident: &impl Parameters<T>)
+}
+
 /// An argument in the signature, and the line that names what is used of it.
-fn argument(built: &FunctionGraph, argument: Argument, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
+fn argument(
+    built: &FunctionGraph,
+    prepared: usize,
+    argument: Argument,
+    used: &BTreeSet<Input>,
+) -> (TokenStream, TokenStream) {
     let is_parameters = argument == Argument::Parameters;
-    let length = if is_parameters { built.parameters } else { built.joints };
-    let letter = if is_parameters { "p" } else { argument.name() };
+    let length = if is_parameters { prepared } else { built.joints };
     let is_used = |i: usize| used.contains(&input_of(argument, i));
     if !(0..length).any(is_used) {
-        return (parameter(argument, &format!("_{}", argument.name())), quote!());
+        return (shared_parameter(argument, &format!("_{}", argument.name())), quote!());
     }
     let names = (0..length).map(|i| {
-        let name = format_ident!("{letter}{}", i + 1);
+        let name = format_ident!("{}", input_of(argument, i).to_string());
         if is_used(i) { quote!(#name) } else { quote!(_) }
     });
     let ident = Ident::new(argument.name(), Span::call_site());
-    (parameter(argument, argument.name()), quote!(let [[#(#names),*]] = #ident.data.0;))
+    let parameter = shared_parameter(argument, argument.name());
+    match is_parameters {
+        true => (parameter, quote!(let Prepared([#(#names),*]) = #ident.prepared();)),
+        false => (parameter, quote!(let [[#(#names),*]] = #ident.data.0;)),
+    }
+}
+
+/// What functions need of the parameters alone: the function that prepares it, and the trait by which they take it.
+pub(super) fn preparation(model: &Model, preparation: &Preparation) -> TokenStream {
+    let count = Literal::usize_unsuffixed(preparation.values().len());
+    let graph = preparation.graph();
+    let needed = graph.needed(preparation.values());
+    let names: Vec<TokenStream> = needed
+        .iter()
+        .filter_map(|n| match graph.nodes()[*n] {
+            Node::Input(Input::Parameter(i)) => Some(i),
+            _ => None,
+        })
+        .map(|i| {
+            let (name, i) = (format_ident!("p{}", i + 1), Literal::usize_unsuffixed(i));
+            quote!(let #name = parameters[#i];)
+        })
+        .collect();
+    let statements = sections(model, &graph, preparation.values(), &needed);
+    let values = preparation.values().iter().map(|e| value_name(&graph, e.node()));
+    let operations = preparation.operations();
+    let doc = format!(" Operations: {} multiplications, {} additions.", operations.mul, operations.add);
+    quote! {
+        /// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of calls.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct Prepared<T>([T; #count]);
+
+        /// What the functions need of the parameters alone: pass it to those that end in `_with`, in place of the parameters.
+        ///
+        #[doc = #doc]
+        #[inline]
+        #[must_use]
+        pub fn prepare<T: SimdRealField + Copy>(parameters: &SVector<T, PARAMETERS>) -> Prepared<T> {
+            let [parameters] = parameters.data.0;
+            #(#names)*
+            #(#statements)*
+            Prepared([#(#values),*])
+        }
+
+        /// Parameters, or what was prepared of them.
+        pub trait Parameters<T> {
+            /// What the functions need of them.
+            fn prepared(&self) -> Prepared<T>;
+        }
+
+        impl<T: SimdRealField + Copy> Parameters<T> for SVector<T, PARAMETERS> {
+            #[inline]
+            fn prepared(&self) -> Prepared<T> {
+                prepare(self)
+            }
+        }
+
+        impl<T: Copy> Parameters<T> for Prepared<T> {
+            #[inline]
+            fn prepared(&self) -> Prepared<T> {
+                *self
+            }
+        }
+    }
 }
 
 /// Nodes in one block of code.
@@ -209,26 +343,26 @@ const SECTION: usize = 256;
 /// The body, in blocks that hand on only what later ones need. Every `let` opens a scope within the one before, and a
 /// compiler that writes debug information goes through nested scopes by recursion: thousands of them in a row
 /// exhaust its stack.
-fn sections(model: &Model, built: &FunctionGraph, needed: &[usize]) -> Vec<TokenStream> {
+fn sections(model: &Model, graph: &Graph, outputs: &[Expr], needed: &[usize]) -> Vec<TokenStream> {
     let computed: Vec<usize> =
-        needed.iter().copied().filter(|n| !matches!(built.graph.nodes()[*n], Node::Input(_))).collect();
-    let statement = |n: &usize| statement(model, built, *n);
+        needed.iter().copied().filter(|n| !matches!(graph.nodes()[*n], Node::Input(_))).collect();
+    let statement = |n: &usize| statement(model, graph, *n);
     if computed.len() <= 2 * SECTION {
         return computed.iter().filter_map(statement).collect();
     }
-    let mut last_use = vec![0; built.graph.nodes().len()];
+    let mut last_use = vec![0; graph.nodes().len()];
     for (position, node) in computed.iter().enumerate() {
-        for operand in operands(&built.graph.nodes()[*node]) {
+        for operand in operands(&graph.nodes()[*node]) {
             last_use[operand.node()] = position;
         }
     }
-    for output in &built.outputs {
+    for output in outputs {
         last_use[output.node()] = usize::MAX;
     }
     let mut blocks = Vec::new();
     for (k, section) in computed.chunks(SECTION).enumerate() {
         let end = (k + 1) * SECTION;
-        let handed_on = section.iter().filter(|n| last_use[**n] >= end).map(|n| value_name(built, *n));
+        let handed_on = section.iter().filter(|n| last_use[**n] >= end).map(|n| value_name(graph, *n));
         let names: Vec<Ident> = handed_on.collect();
         let statements = section.iter().filter_map(statement);
         blocks.push(quote! {
@@ -242,13 +376,13 @@ fn sections(model: &Model, built: &FunctionGraph, needed: &[usize]) -> Vec<Token
 }
 
 /// The `let` of a node; inputs are bound already.
-fn statement(model: &Model, built: &FunctionGraph, node: usize) -> Option<TokenStream> {
+fn statement(model: &Model, graph: &Graph, node: usize) -> Option<TokenStream> {
     let name = format_ident!("x{node}");
-    let operand = |e: Expr| value_name(built, e.node());
-    Some(match built.graph.nodes()[node] {
+    let operand = |e: Expr| value_name(graph, e.node());
+    Some(match graph.nodes()[node] {
         Node::Input(_) => return None,
         Node::Constant(index) => {
-            let value = Literal::f64_suffixed(rational::to_f64(built.graph.constant(index)));
+            let value = Literal::f64_suffixed(rational::to_f64(graph.constant(index)));
             quote!(let #name: T = nalgebra::convert(#value);)
         }
         Node::Symbol(index, sine) => {
@@ -271,8 +405,8 @@ fn statement(model: &Model, built: &FunctionGraph, node: usize) -> Option<TokenS
     })
 }
 
-fn value_name(built: &FunctionGraph, node: usize) -> Ident {
-    match built.graph.nodes()[node] {
+fn value_name(graph: &Graph, node: usize) -> Ident {
+    match graph.nodes()[node] {
         Node::Input(input) => format_ident!("{}", input.to_string()),
         _ => format_ident!("x{node}"),
     }
@@ -283,7 +417,7 @@ fn result(built: &FunctionGraph) -> (TokenStream, TokenStream) {
     let (rows, columns) = built.shape;
     let value = |i: usize, j: usize| {
         let e = built.outputs[i * columns + j];
-        let name = value_name(built, e.node());
+        let name = value_name(&built.graph, e.node());
         if e.is_negative() { quote!(-#name) } else { quote!(#name) }
     };
     let columns_of: Vec<TokenStream> = (0..columns)

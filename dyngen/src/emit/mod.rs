@@ -8,7 +8,9 @@ mod tests;
 pub use friction::FrictionTerm;
 
 use crate::base::SetKind;
-use crate::dynamics::Function;
+use crate::dynamics::function::Argument;
+use crate::dynamics::{Function, FunctionGraph};
+use crate::graph::Preparation;
 use crate::model::{Error, Model};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
@@ -64,15 +66,21 @@ pub fn source(model: &Model, options: &Options) -> Result<String, Error> {
 pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     let set = model.set(options.parameters)?;
     let functions = Function::ALL.into_iter().filter(|f| options.functions.contains(f));
-    let functions: Vec<TokenStream> = functions
+    let mut preparation = Preparation::default();
+    let functions: Vec<FunctionGraph> = functions
         .map(|function| {
             let built = match &options.values {
                 Some(values) => model.baked_function(function, options.parameters, values)?,
                 None => model.function(function, options.parameters)?,
             };
-            Ok(code::function(model, &built))
+            Ok(built.without_preparation(&mut preparation))
         })
         .collect::<Result<_, Error>>()?;
+    let prepared = preparation.values().len();
+    let takes_parameters = functions.iter().any(|f| f.arguments().any(|a| a == Argument::Parameters));
+    let functions: Vec<TokenStream> =
+        functions.iter().map(|built| code::function(model, built, prepared)).collect();
+    let preparation = takes_parameters.then(|| code::preparation(model, &preparation));
     let (n, p) =
         (Literal::usize_unsuffixed(model.arm().dof()), Literal::usize_unsuffixed(set.parameters.len()));
     let names = set.names();
@@ -105,6 +113,8 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
         #values
 
         #trig
+
+        #preparation
 
         #(#functions)*
 

@@ -309,6 +309,25 @@ impl ConstantField {
     }
 }
 
+impl Algebra for ConstantField {
+    type Value = Constant;
+    fn integer(&self, value: i64) -> Constant {
+        self.rational(rational::integer(value))
+    }
+    fn is_zero(&self, a: &Constant) -> bool {
+        a.is_zero()
+    }
+    fn add(&self, a: &Constant, b: &Constant) -> Constant {
+        ConstantField::add(self, a, b)
+    }
+    fn neg(&self, a: &Constant) -> Constant {
+        ConstantField::neg(self, a)
+    }
+    fn mul(&self, a: &Constant, b: &Constant) -> Constant {
+        ConstantField::mul(self, a, b)
+    }
+}
+
 impl Constant {
     /// Whether it is zero.
     pub fn is_zero(&self) -> bool {

@@ -71,6 +71,24 @@ impl Builder {
         if negative { -quotient } else { quotient }
     }
 
+    /// A node of another graph, whose operands have been copied.
+    pub fn copy_node(&self, graph: &Graph, node: usize, copied: &[Expr]) -> Expr {
+        self.copy_node_with(graph, node, |e| copied[e.node()])
+    }
+
+    /// A node of another graph; `copied` gives the copy of an operand's node.
+    pub fn copy_node_with(&self, graph: &Graph, node: usize, copied: impl Fn(Expr) -> Expr) -> Expr {
+        let of = |e: Expr| if e.is_negative() { -copied(e) } else { copied(e) };
+        match graph.nodes()[node] {
+            Node::Constant(index) => self.constant(graph.constant(index)),
+            Node::Symbol(index, sine) => self.symbol(index as usize, sine),
+            Node::Input(input) => self.input(input),
+            Node::Add(x, y) => self.add(&of(x), &of(y)),
+            Node::Mul(x, y) => self.mul(&of(x), &of(y)),
+            Node::Div(x, y) => self.div(of(x), of(y)),
+        }
+    }
+
     fn value_of(&self, a: Expr) -> Option<Rational> {
         let graph = self.graph.borrow();
         let Node::Constant(index) = graph.nodes[a.node()] else { return None };

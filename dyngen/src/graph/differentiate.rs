@@ -33,8 +33,8 @@ fn rate(b: &Builder, graph: &Graph, rates: &HashMap<usize, Expr>, node: usize, d
     let of = |e: Expr| signed(rates, e);
     match graph.nodes()[node] {
         Node::Input(input) => match (input, direction) {
-            (Input::Sin(i), Direction::Position(j)) if i == j => b.input(Input::Cos(i)),
-            (Input::Cos(i), Direction::Position(j)) if i == j => -b.input(Input::Sin(i)),
+            (Input::Sin(sum), Direction::Position(j)) => times_sign(b.input(Input::Cos(sum)), sum.sign(j)),
+            (Input::Cos(sum), Direction::Position(j)) => times_sign(-b.input(Input::Sin(sum)), sum.sign(j)),
             (Input::Position(i), Direction::Position(j)) | (Input::Speed(i), Direction::Speed(j))
                 if i == j =>
             {
@@ -49,6 +49,20 @@ fn rate(b: &Builder, graph: &Graph, rates: &HashMap<usize, Expr>, node: usize, d
         Node::Div(x, y) => {
             let quotient = b.div(x, y);
             b.div(b.sub(&of(x), &b.mul(&quotient, &of(y))), y)
+        }
+    }
+}
+
+/// The derivative of a function of a sum of angles: `derivative` by the sum, with the joint's sign in it.
+fn times_sign(derivative: Expr, sign: Option<bool>) -> Expr {
+    match sign {
+        None => Expr::ZERO,
+        Some(negative) => {
+            if negative {
+                -derivative
+            } else {
+                derivative
+            }
         }
     }
 }

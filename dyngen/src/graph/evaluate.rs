@@ -1,6 +1,6 @@
 //! The value of expressions in any field: one sample, modulo the prime, or as a dual number.
 
-use super::{Expr, Graph, Input, Node};
+use super::{Expr, Graph, Input, JointSum, Node};
 use crate::exact::prime::Fp;
 use crate::exact::rational::Rational;
 
@@ -62,4 +62,17 @@ pub fn evaluate<F: Field>(
         values[node]?;
     }
     outputs.iter().map(|e| of(&values, *e)).collect()
+}
+
+/// Sine and cosine of a sum of angles by the addition theorem, from those of its joints.
+pub fn sine_and_cosine<F: Field>(sum: JointSum, of_joint: &dyn Fn(usize) -> (F, F)) -> (F, F) {
+    let signed = |(i, negative): (usize, bool)| {
+        let (s, c) = of_joint(i);
+        (if negative { s.neg() } else { s }, c)
+    };
+    let add = |(s, c): (F, F), (t, d): (F, F)| (s.mul(d).add(c.mul(t)), c.mul(d).add(s.mul(t).neg()));
+    let mut joints = sum.joints().map(signed);
+    // A sum has a joint.
+    let first = joints.next().unwrap_or_else(|| of_joint(0));
+    joints.fold(first, add)
 }

@@ -6,9 +6,13 @@
 mod build;
 pub mod differentiate;
 pub mod evaluate;
+mod joint_sum;
+mod preparation;
 pub mod tape;
 
 pub use build::Builder;
+pub use joint_sum::JointSum;
+pub use preparation::Preparation;
 
 use crate::exact::rational::Rational;
 use std::collections::HashMap;
@@ -54,10 +58,10 @@ impl std::ops::Neg for Expr {
 /// What a function is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Input {
-    /// sin q of a revolute joint, or sin(q + theta) where theta is no multiple of pi/2.
-    Sin(usize),
+    /// sin q of a revolute joint, or sin(q + theta) where theta is no multiple of pi/2; or of a sum of such angles.
+    Sin(JointSum),
     /// The cosine of the same angle.
-    Cos(usize),
+    Cos(JointSum),
     /// q of a prismatic joint.
     Position(usize),
     /// q̇
@@ -74,14 +78,16 @@ pub enum Input {
     Error(usize),
     /// A parameter of the set.
     Parameter(usize),
+    /// A value that was prepared of the parameters alone.
+    Prepared(usize),
 }
 
 impl fmt::Display for Input {
     /// The name in emitted code and listings.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (letters, index) = match self {
-            Input::Sin(i) => ("s", i),
-            Input::Cos(i) => ("c", i),
+            Input::Sin(sum) => return write!(f, "s{sum}"),
+            Input::Cos(sum) => return write!(f, "c{sum}"),
             Input::Position(i) => ("q", i),
             Input::Speed(i) => ("dq", i),
             Input::Acceleration(i) => ("ddq", i),
@@ -90,6 +96,7 @@ impl fmt::Display for Input {
             Input::ReferenceAcceleration(i) => ("ddqr", i),
             Input::Error(i) => ("e", i),
             Input::Parameter(i) => ("p", i),
+            Input::Prepared(i) => ("z", i),
         };
         write!(f, "{letters}{}", index + 1)
     }
@@ -161,24 +168,61 @@ impl Graph {
         (0..self.nodes.len()).filter(|n| needed[*n]).collect()
     }
 
+    /// For each node on what it depends.
+    pub fn holds(&self) -> Vec<Holds> {
+        let mut holds: Vec<Holds> = Vec::with_capacity(self.nodes.len());
+        for node in &self.nodes {
+            holds.push(match node {
+                Node::Input(Input::Parameter(_)) => Holds { parameters: true, state: false },
+                Node::Input(_) => Holds { parameters: false, state: true },
+                _ => operands(node).map(|e| holds[e.node()]).fold(Holds::default(), |sum, x| Holds {
+                    parameters: sum.parameters || x.parameters,
+                    state: sum.state || x.state,
+                }),
+            });
+        }
+        holds
+    }
+
     /// The operations that some outputs cost.
     pub fn operations(&self, outputs: &[Expr]) -> Operations {
+        self.count(outputs, |_| true)
+    }
+
+    /// The operations that some outputs cost beside those that depend on parameters alone and can be prepared.
+    pub fn operations_when_prepared(&self, outputs: &[Expr]) -> Operations {
+        let holds = self.holds();
+        self.count(outputs, |node| holds[node].state || !holds[node].parameters)
+    }
+
+    fn count(&self, outputs: &[Expr], counts: impl Fn(usize) -> bool) -> Operations {
         let mut count = Operations::default();
         let mut angles = std::collections::BTreeSet::new();
-        for node in self.needed(outputs) {
+        for node in self.needed(outputs).into_iter().filter(|n| counts(*n)) {
             match self.nodes[node] {
                 Node::Add(..) => count.add += 1,
                 Node::Mul(..) => count.mul += 1,
                 Node::Div(..) => count.div += 1,
-                Node::Input(Input::Sin(i) | Input::Cos(i)) => {
-                    angles.insert(i);
+                Node::Input(Input::Sin(sum) | Input::Cos(sum)) => {
+                    angles.insert(sum);
                 }
                 _ => {}
             }
         }
+        // A sum of angles is formed before its sine and cosine are taken.
+        count.add += angles.iter().map(|sum| sum.len() - 1).sum::<usize>();
         count.sin_cos = angles.len();
         count
     }
+}
+
+/// On what a value depends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Holds {
+    /// On parameters.
+    pub parameters: bool,
+    /// On any other input.
+    pub state: bool,
 }
 
 /// The operands of a node.

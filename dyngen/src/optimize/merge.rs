@@ -4,10 +4,10 @@
 //! are the same function but for a chance below 2⁻¹⁰⁰, and what is emitted is proven afterwards in any case: a false
 //! merge would stop the generator, not reach the code.
 
-use crate::exact::algebra::Algebra;
+use crate::arm::MAX_JOINTS;
 use crate::exact::constant::ConstantField;
 use crate::exact::prime::{Draws, Fp};
-use crate::graph::evaluate::Field;
+use crate::graph::evaluate::{Field, sine_and_cosine};
 use crate::graph::{Builder, Expr, Graph, Input, Node};
 use std::collections::{BTreeMap, HashMap};
 
@@ -17,7 +17,7 @@ type Fingerprint = [Fp; POINTS];
 /// The pass.
 pub(super) fn merge(graph: &Graph, outputs: &[Expr], field: &ConstantField) -> (Graph, Vec<Expr>) {
     let builder = Builder::new();
-    let mut inputs = Inputs { draws: Draws::new(0x006d_6572_6765), values: BTreeMap::new() };
+    let mut inputs = Inputs::new();
     let mut new: Vec<Expr> = vec![Expr::ZERO; graph.nodes().len()];
     let mut prints: Vec<Option<Fingerprint>> = vec![None; graph.nodes().len()];
     let mut known: HashMap<Fingerprint, Expr> = HashMap::new();
@@ -31,7 +31,7 @@ pub(super) fn merge(graph: &Graph, outputs: &[Expr], field: &ConstantField) -> (
             }
             known.get(&p).copied().or_else(|| known.get(&p.map(|x| -x)).map(|e| -*e))
         });
-        let built = replacement.unwrap_or_else(|| rebuild(&builder, graph, node, &new));
+        let built = replacement.unwrap_or_else(|| builder.copy_node(graph, node, &new));
         new[node] = built;
         if let (None, Some(p)) = (replacement, print) {
             known.insert(p, built);
@@ -43,17 +43,6 @@ pub(super) fn merge(graph: &Graph, outputs: &[Expr], field: &ConstantField) -> (
 
 fn signed(new: &[Expr], e: Expr) -> Expr {
     if e.is_negative() { -new[e.node()] } else { new[e.node()] }
-}
-
-fn rebuild(b: &Builder, graph: &Graph, node: usize, new: &[Expr]) -> Expr {
-    match graph.nodes()[node] {
-        Node::Constant(index) => b.constant(graph.constant(index)),
-        Node::Symbol(index, sine) => b.symbol(index as usize, sine),
-        Node::Input(input) => b.input(input),
-        Node::Add(x, y) => b.add(&signed(new, x), &signed(new, y)),
-        Node::Mul(x, y) => b.mul(&signed(new, x), &signed(new, y)),
-        Node::Div(x, y) => b.div(signed(new, x), signed(new, y)),
-    }
 }
 
 fn fingerprint(
@@ -80,19 +69,31 @@ fn fingerprint(
 /// Random values of inputs, sines and cosines on the circle.
 struct Inputs {
     draws: Draws,
+    /// Sine and cosine of every joint's angle.
+    joints: Vec<[(Fp, Fp); POINTS]>,
     values: BTreeMap<Input, Fingerprint>,
 }
 
 impl Inputs {
+    fn new() -> Self {
+        let mut draws = Draws::new(0x006d_6572_6765);
+        let mut points = || std::array::from_fn(|_| draws.element().circle_point());
+        let joints = (0..MAX_JOINTS).map(|_| points()).collect();
+        Inputs { draws, joints, values: BTreeMap::new() }
+    }
+
     fn value(&mut self, input: Input) -> Fingerprint {
         if let Some(found) = self.values.get(&input) {
             return *found;
         }
         match input {
-            Input::Sin(i) | Input::Cos(i) => {
-                let points: [(Fp, Fp); POINTS] = std::array::from_fn(|_| self.draws.element().circle_point());
-                self.values.insert(Input::Sin(i), points.map(|p| p.0));
-                self.values.insert(Input::Cos(i), points.map(|p| p.1));
+            Input::Sin(sum) | Input::Cos(sum) => {
+                let points: [(Fp, Fp); POINTS] = std::array::from_fn(|k| {
+                    let joints: Vec<(Fp, Fp)> = self.joints.iter().map(|points| points[k]).collect();
+                    sine_and_cosine(sum, &|i| joints[i])
+                });
+                self.values.insert(Input::Sin(sum), points.map(|p| p.0));
+                self.values.insert(Input::Cos(sum), points.map(|p| p.1));
             }
             other => {
                 let value = std::array::from_fn(|_| self.draws.element());
@@ -106,13 +107,16 @@ impl Inputs {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::exact::algebra::Algebra;
     use crate::exact::symbols::AngleSymbols;
+    use crate::graph::JointSum;
 
     #[test]
     fn different_forms_of_one_function_become_one_node() {
         let field = ConstantField::new(&AngleSymbols::default(), &mut Draws::new(1));
         let b = Builder::new();
-        let (s, c) = (b.input(Input::Sin(0)), b.input(Input::Cos(0)));
+        let sum = JointSum::joint(0);
+        let (s, c) = (b.input(Input::Sin(sum)), b.input(Input::Cos(sum)));
         let (x, y) = (b.input(Input::Speed(0)), b.input(Input::Speed(1)));
         let square = |e: Expr| b.mul(&e, &e);
         let one = b.add(&square(s), &square(c));

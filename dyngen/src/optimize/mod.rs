@@ -1,5 +1,6 @@
 //! Passes over a graph, in order, each with what holds after it.
 
+mod associate;
 mod merge;
 
 use crate::exact::constant::ConstantField;
@@ -12,7 +13,12 @@ pub type Pass = fn(&Graph, &[Expr], &ConstantField) -> (Graph, Vec<Expr>);
 pub const PASSES: &[(&str, Pass)] = &[
     // AFTER THIS POINT: no two nodes are equal as functions of the inputs, up to sign, and none is zero.
     ("merge", merge::merge),
+    // AFTER THIS POINT: no two terms occur together in two sums, and no two factors in two products.
+    ("associate", associate::associate),
 ];
+
+/// The passes that a form goes through before its cost is compared with that of others.
+pub const COMPARED: usize = 1;
 
 /// Runs passes one after another.
 pub fn optimize(

@@ -8,6 +8,7 @@ use crate::dynamics::function::Argument;
 use crate::exact::prime::{Draws, Fp};
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
+use crate::graph::evaluate::sine_and_cosine;
 use crate::graph::{Input, evaluate};
 
 /// A pose, rates and parameter values.
@@ -151,8 +152,9 @@ impl<'a> Point<'a> {
             false => Vec::new(),
         };
         let input = |input: Input| match input {
-            Input::Sin(i) | Input::Position(i) => self.positions[i].0,
-            Input::Cos(i) => self.positions[i].1,
+            Input::Sin(sum) => sine_and_cosine(sum, &|i| self.positions[i]).0,
+            Input::Cos(sum) => sine_and_cosine(sum, &|i| self.positions[i]).1,
+            Input::Position(i) => self.positions[i].0,
             Input::Speed(i) => self.speeds[i],
             Input::Acceleration(i) => self.accelerations[i],
             Input::ReferenceSpeed(i) => self.reference_speeds[i],
@@ -160,6 +162,8 @@ impl<'a> Point<'a> {
             Input::Error(i) => self.errors[i],
             Input::Torque(i) => torques[i],
             Input::Parameter(i) => sums[i],
+            // Proven is the function with its preparation; a value of its own has none here.
+            Input::Prepared(_) => Fp::ZERO,
         };
         let symbol = |index, sine| self.sets.field.modular_symbol(index, sine);
         evaluate::evaluate(&function.graph, &function.outputs, input, symbol)

@@ -51,6 +51,7 @@ impl DemoCommand {
         })?;
         let seconds = started.elapsed().as_secs_f64();
         output::write(&self.out, "explained.json", output::json(&demo.explained)?.as_bytes())?;
+        output::write(&self.out, "model.json", output::json(&demo.explained.model)?.as_bytes())?;
         output::write(&self.out, "report.html", demo::page(&demo).to_html().as_bytes())?;
         if self.json {
             let session = &demo.session;

@@ -20,7 +20,8 @@ use std::path::{Path, PathBuf};
 
 /// Find, name and add what the model lacks on logs; every addition is judged on another path.
 ///
-/// Writes explained.json and report.html; where two names fit equally well, also next_experiment.csv: the trajectory on which they
+/// Writes explained.json, report.html, and model.json: the model with what was named, for `powerball generate`, `verify` and the
+/// next `identify` or `explain`. Where two names fit equally well, also next_experiment.csv: the trajectory on which they
 /// differ most. With --experiment THE ARM MOVES along it.
 #[derive(Args, Debug)]
 #[command(
@@ -35,6 +36,10 @@ pub(crate) struct Explain {
     /// Logs of another path, on which additions must hold.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     validate: Vec<PathBuf>,
+    /// What is known already: model.json of an earlier `powerball explain` for the same arm file. It is taken out of the logs as it
+    /// stands; what is found comes to it.
+    #[arg(long, value_name = "FILE.json")]
+    model: Option<PathBuf>,
     /// Where two names fit equally well, record the experiment that tells them apart, and explain again with its log.
     #[arg(long)]
     experiment: bool,
@@ -55,35 +60,53 @@ impl Explain {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let progress = Progress::new();
         let arm = if self.experiment { Some(self.arm()?) } else { None };
-        let mut loaded = load(&self.inputs, &self.validate, &progress)?;
+        let mut loaded = load(&self.inputs, &self.validate, self.model.as_deref(), &progress)?;
+        loaded.take_out();
         let (say, options) = (|what: &str| progress.say(what), DataOptions::default());
         let told = Options { correct_unattributed: self.correct_unattributed, ..Options::default() };
         let refused = |e: ExplainError| Failure::Refused(e.to_string());
         let mut explained = explain_with(&loaded.body, &loaded.fit, &loaded.validate, &options, &told, &say)
             .map_err(refused)?;
-        if let Some(motion) = experiment::propose(&loaded.body, &mut explained, &options, &say) {
+        let motion = experiment::propose(&loaded.body, &mut explained, &options, &say);
+        if let Some(motion) = &motion {
             output::write(&self.inputs.out, TRAJECTORY, motion.to_csv().as_bytes())?;
-            if let Some((arm, note)) = arm {
+        }
+        match (arm, motion) {
+            (Some((arm, note)), Some(motion)) => {
                 progress.say("recording the experiment");
                 let file = self.inputs.out.join("experiment.csv");
                 self.record(&motion, arm, &file)?;
                 let (mut new, findings) =
                     read_logs(&[&file], loaded.body.arm()).map_err(|e| Failure::Refused(e.to_string()))?;
                 loaded.warnings.extend(findings.iter().map(ToString::to_string).chain(note));
-                if let Some(new) = new.pop() {
-                    let old = (loaded.fit.as_slice(), loaded.validate.as_slice());
+                if let Some(known) = &loaded.known {
+                    known.take_out(&loaded.body, &mut new);
+                }
+                let old = (loaded.fit.as_slice(), loaded.validate.as_slice());
+                for new in new {
                     explained = experiment::learn(&loaded.body, old, new, &explained, &options, &told, &say)
                         .map_err(refused)?;
-                    // What is still open may ask for another experiment, beside the one that was run.
-                    if let Some(motion) = experiment::propose(&loaded.body, &mut explained, &options, &say) {
-                        output::write(&self.inputs.out, TRAJECTORY, motion.to_csv().as_bytes())?;
-                    }
+                }
+                // What is still open may ask for another experiment.
+                if let Some(next) = experiment::propose(&loaded.body, &mut explained, &options, &say) {
+                    output::write(&self.inputs.out, TRAJECTORY, next.to_csv().as_bytes())?;
                 }
             }
+            (Some(_), None) => loaded.warnings.push(
+                "--experiment: nothing was recorded: these logs leave no names open that a path within the arm file's limits could \
+                 tell apart"
+                    .to_string(),
+            ),
+            (None, _) => {}
         }
         explained.warnings.splice(0..0, loaded.warnings);
         let text = output::json(&explained)?;
         output::write(&self.inputs.out, "explained.json", text.as_bytes())?;
+        if let Some(known) = &loaded.known {
+            explained.model.additions = known.additions.and(&explained.model.additions);
+        }
+        let model = output::json(&explained.model)?;
+        output::write(&self.inputs.out, "model.json", model.as_bytes())?;
         let mut page = Page::new(format!("What the model of {} lacks", explained.arm));
         add_to_page(&mut page, &explained);
         output::write(&self.inputs.out, "report.html", page.to_html().as_bytes())?;
@@ -112,7 +135,7 @@ impl Explain {
                         nothing of another arm; name that one's bus by --bus, or the virtual arm's file by --plant";
             return Ok((self.place().open()?, Some(note.to_string())));
         };
-        let arm = Undeclared::read(&file).map_err(Failure::Unusable)?.arm([0.0; 6], 1);
+        let arm = Undeclared::read(&file).map_err(Failure::Unusable)?.arm([0.0; 6], 1, false);
         let note = format!("the experiment was recorded on the virtual arm of {}", file.display());
         Ok((virtual_bus(arm.map_err(|e| Failure::Refused(e.to_string()))?)?, Some(note)))
     }

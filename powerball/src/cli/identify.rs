@@ -2,19 +2,21 @@
 
 use super::Failure;
 use super::identify_page::page;
-use super::inputs::same_file;
+use super::inputs::{Inputs, load, same_file};
 use super::output::{self, Progress};
-use super::reduced::{Reduced, reduce};
+use super::reduced::{Reduced, in_memory, reduce};
 use crate::estimate::{
-    ConsistentReport, Errors, FrictionLaw, JointFriction, ParameterEstimate, Solution, Spread, TorqueModel,
+    ConsistentReport, Errors, FrictionLaw, JointFriction, ParameterEstimate, Solution, Spread,
     consistent_fit, errors, identify, solve_instrumental, solve_reduced, solve_robust, spread, spread_of,
 };
 use crate::explain::{TorqueCurve, curves};
-use crate::log::read_logs;
+use crate::log::{Log, read_logs};
 use crate::regression::{Data, DataOptions, RigidBody};
+use crate::torque_model::{Additions, TorqueModel};
 use clap::{Args, ValueEnum};
+use dyngen::SetKind;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Fit the minimal inertial set and the friction of every joint (Eq. 16) to logs.
 ///
@@ -34,6 +36,10 @@ pub(crate) struct Identify {
     /// Logs on which the fit is judged, on another path.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     validate: Vec<PathBuf>,
+    /// What is known already: model.json of `powerball explain` for the same arm file. Inertial set and friction are fitted beside its
+    /// effects, which stay as they are. Logs alone, no summaries.
+    #[arg(long, value_name = "FILE.json")]
+    model: Option<PathBuf>,
     /// The friction of every joint.
     #[arg(long, value_enum, default_value_t)]
     friction: Friction,
@@ -78,6 +84,9 @@ pub(super) struct Identification {
     pub set: &'static str,
     pub parameters: Vec<ParameterEstimate>,
     pub friction: Vec<JointFriction>,
+    /// As in model.json, where a model was given.
+    #[serde(flatten)]
+    pub additions: Option<Additions>,
     pub fit: Spread,
     pub validate: Option<Spread>,
     pub physically_consistent: bool,
@@ -99,11 +108,16 @@ impl Identify {
             }
         }
         let whole = !matches!(self.estimator, Estimator::Weighted);
-        let Reduced { body, summary, logs, mut warnings } =
-            reduce(&self.arm, &self.log, &options, whole, &progress)?;
-        let (held_out, findings) =
-            read_logs(&self.validate, body.arm()).map_err(|e| Failure::Unusable(e.to_string()))?;
-        warnings.extend(findings.iter().map(ToString::to_string));
+        let (Reduced { body, summary, logs, mut warnings }, held_out, additions) = match &self.model {
+            Some(model) => self.known(model, &options, &progress)?,
+            None => {
+                let mut reduced = reduce(&self.arm, &self.log, &options, whole, &progress)?;
+                let (held_out, findings) = read_logs(&self.validate, reduced.body.arm())
+                    .map_err(|e| Failure::Unusable(e.to_string()))?;
+                reduced.warnings.extend(findings.iter().map(ToString::to_string));
+                (reduced, held_out, None)
+            }
+        };
         std::fs::create_dir_all(&self.out)
             .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", self.out.display())))?;
         progress.say("fitting");
@@ -131,14 +145,21 @@ impl Identify {
             }
         };
         let identified = identify(body.names(), &solution, &errors);
-        let model = TorqueModel::of(&solution);
+        let model = TorqueModel {
+            arm: body.arm().name.clone(),
+            set: SetKind::Minimal.to_string(),
+            parameters: identified.parameters.clone(),
+            friction: identified.friction.clone(),
+            // They were taken out of the logs.
+            additions: Additions::default(),
+        };
         let validate = if held_out.is_empty() {
             warnings
                 .push("no log was given to --validate: the errors below are those of the fit itself".into());
             None
         } else {
             let data = prepared(&body, &held_out, &options)?;
-            Some(spread(&data, &model.residual(&data)))
+            Some(spread(&data, &model.residual(&body, &data, &[])))
         };
         let figures = if held_out.is_empty() { &logs } else { &held_out };
         let figures =
@@ -163,6 +184,7 @@ impl Identify {
             set: "minimal",
             parameters: identified.parameters,
             friction: identified.friction,
+            additions,
             fit: spread_of(&solution, &solution.theta),
             validate,
             physically_consistent: reasons.is_empty(),
@@ -195,21 +217,34 @@ fn weighted(solution: Solution) -> (Solution, Errors) {
     (solution, errors)
 }
 
-fn prepared<'a>(
-    body: &'a RigidBody,
-    logs: &[crate::log::Log],
-    options: &DataOptions,
-) -> Result<Data<'a>, Failure> {
+impl Identify {
+    /// The logs of an arm of which a model is known, with what is known taken out of them.
+    fn known(
+        &self,
+        model: &Path,
+        options: &DataOptions,
+        progress: &Progress,
+    ) -> Result<(Reduced, Vec<Log>, Option<Additions>), Failure> {
+        let inputs =
+            Inputs { arm: self.arm.clone(), log: self.log.clone(), out: self.out.clone(), json: self.json };
+        let mut loaded = load(&inputs, &self.validate, Some(model), progress)?;
+        loaded.take_out();
+        let reduced = in_memory(loaded.body, loaded.fit, loaded.warnings, options)?;
+        Ok((reduced, loaded.validate, loaded.known.map(|known| known.additions)))
+    }
+}
+
+fn prepared<'a>(body: &'a RigidBody, logs: &[Log], options: &DataOptions) -> Result<Data<'a>, Failure> {
     Data::new(body, logs, options).map_err(|e| Failure::Refused(e.to_string()))
 }
 
 fn curves_of(
     body: &RigidBody,
-    logs: &[crate::log::Log],
+    logs: &[Log],
     options: &DataOptions,
     model: &TorqueModel,
 ) -> Result<Vec<TorqueCurve>, Failure> {
     let data = prepared(body, logs, options)?;
-    let residual = model.residual(&data);
+    let residual = model.residual(body, &data, &[]);
     Ok(curves(&data, &residual, &residual))
 }

@@ -4,6 +4,7 @@ use super::Failure;
 use super::output::Progress;
 use crate::log::{Log, common_clock, read_logs};
 use crate::regression::RigidBody;
+use crate::torque_model::TorqueModel;
 use clap::Args;
 use dyngen::Arm;
 use std::path::{Path, PathBuf};
@@ -31,12 +32,55 @@ pub(crate) struct Loaded {
     pub fit: Vec<Log>,
     pub validate: Vec<Log>,
     pub warnings: Vec<String>,
+    /// The model that was given.
+    pub known: Option<TorqueModel>,
 }
 
-/// Reads and checks everything before any work is done.
-pub(crate) fn load(inputs: &Inputs, validate: &[PathBuf], progress: &Progress) -> Result<Loaded, Failure> {
-    let arm = Arm::read(&inputs.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
-    let mut warnings = arm.notes();
+impl Loaded {
+    /// Takes what is known out of the logs.
+    pub(crate) fn take_out(&mut self) {
+        if let Some(known) = &self.known {
+            known.take_out(&self.body, &mut self.fit);
+            known.take_out(&self.body, &mut self.validate);
+        }
+    }
+}
+
+/// An arm with what is known of it beforehand.
+pub(crate) struct Known {
+    /// The arm as the model has it.
+    pub arm: Arm,
+    model: Option<(TorqueModel, PathBuf)>,
+}
+
+impl Known {
+    /// Reads an arm file and, where there is one, a model of the arm.
+    pub(crate) fn read(arm: &Path, model: Option<&Path>) -> Result<Known, Failure> {
+        let arm = Arm::read(arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let Some(file) = model else { return Ok(Known { arm, model: None }) };
+        let model = TorqueModel::read(file).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let changed = model.additions.arm_changes.of(&arm);
+        let arm = changed.map_err(|e| Failure::Unusable(format!("{}: {e}", file.display())))?;
+        Ok(Known { arm, model: Some((model, file.to_path_buf())) })
+    }
+
+    /// The model, if it is one of this arm.
+    pub(crate) fn model(self, body: &RigidBody) -> Result<Option<TorqueModel>, Failure> {
+        let Some((model, file)) = self.model else { return Ok(None) };
+        let checked = model.checked(body.names(), body.dof(), &file);
+        checked.map(Some).map_err(|e| Failure::Unusable(e.to_string()))
+    }
+}
+
+/// Reads and checks everything before any work is done. With a model the arm is as the model has it; the logs are as they are.
+pub(crate) fn load(
+    inputs: &Inputs,
+    validate: &[PathBuf],
+    model: Option<&Path>,
+    progress: &Progress,
+) -> Result<Loaded, Failure> {
+    let known = Known::read(&inputs.arm, model)?;
+    let mut warnings = known.arm.notes();
     for file in validate {
         if inputs.log.iter().any(|log| same_file(log, file)) {
             let name = file.display();
@@ -47,15 +91,16 @@ pub(crate) fn load(inputs: &Inputs, validate: &[PathBuf], progress: &Progress) -
     }
     progress.say("reading logs");
     let files: Vec<&PathBuf> = inputs.log.iter().chain(validate).collect();
-    let (mut logs, findings) = read_logs(&files, &arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+    let (mut logs, findings) = read_logs(&files, &known.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
     warnings.extend(findings.iter().map(ToString::to_string));
     common_clock(&mut logs);
     let rest = logs.split_off(inputs.log.len());
     progress.say("deriving and proving the arm's dynamics");
-    let body = RigidBody::new(&arm).map_err(|e| Failure::Refused(e.to_string()))?;
+    let body = RigidBody::new(&known.arm).map_err(|e| Failure::Refused(e.to_string()))?;
+    let known = known.model(&body)?;
     std::fs::create_dir_all(&inputs.out)
         .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", inputs.out.display())))?;
-    Ok(Loaded { body, fit: logs, validate: rest, warnings })
+    Ok(Loaded { body, fit: logs, validate: rest, warnings, known })
 }
 
 pub(super) fn same_file(a: &Path, b: &Path) -> bool {

@@ -6,6 +6,7 @@ mod demo;
 mod excite;
 mod explain;
 mod friction;
+mod generate;
 mod identify;
 mod identify_page;
 mod inputs;
@@ -57,6 +58,8 @@ enum Command {
     Verify(verify::Verify),
     /// Find, name and add what the model lacks on logs; judged on another path.
     Explain(explain::Explain),
+    /// Write a model with its effects as one Rust file for a controller.
+    Generate(generate::Generate),
 }
 
 /// Why a command did not do what it was asked for.
@@ -87,6 +90,7 @@ pub fn main() -> ExitCode {
         Command::Summarize(command) => command.run(),
         Command::Verify(command) => command.run(),
         Command::Explain(command) => command.run(),
+        Command::Generate(command) => command.run(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

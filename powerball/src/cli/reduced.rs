@@ -4,7 +4,7 @@ use super::Failure;
 use super::inputs::same_file;
 use super::output::Progress;
 use crate::log::{Log, LogError, read_log};
-use crate::regression::{DataOptions, RigidBody};
+use crate::regression::{DataOptions, RigidBody, silent_joints};
 use crate::signal::rest;
 use crate::summary::Summary;
 use dyngen::Arm;
@@ -103,8 +103,31 @@ pub(crate) fn reduce(
         return Err(Failure::Refused(refused.join("\n")));
     }
     warnings.extend(refused.into_iter().map(|r| format!("{r}; the log was left out")));
-    warnings.extend(rests(&summary));
+    warnings.extend(rests(&body, &summary, &shown));
     Ok(Reduced { body, summary, logs: shown, warnings })
+}
+
+/// Reduces logs that were read already.
+pub(crate) fn in_memory(
+    body: RigidBody,
+    logs: Vec<Log>,
+    mut warnings: Vec<String>,
+    options: &DataOptions,
+) -> Result<Reduced, Failure> {
+    let mut summary = Summary::new(&body, options);
+    let mut refused = Vec::new();
+    for log in &logs {
+        match summary.push(&body, log, options) {
+            Ok(notes) => warnings.extend(notes),
+            Err(error) => refused.push(format!("{}: {error}", log.file)),
+        }
+    }
+    if summary.logs.is_empty() {
+        return Err(Failure::Refused(refused.join("\n")));
+    }
+    warnings.extend(refused.into_iter().map(|r| format!("{r}; the log was left out")));
+    warnings.extend(rests(&body, &summary, &logs));
+    Ok(Reduced { body, summary, logs, warnings })
 }
 
 /// A file's summary; `None` where the file is something else.
@@ -124,13 +147,21 @@ fn read_summary(file: &Path) -> Result<Option<Summary>, String> {
 }
 
 /// What is to be said of joints that rested.
-fn rests(summary: &Summary) -> Vec<String> {
+fn rests(body: &RigidBody, summary: &Summary, shown: &[Log]) -> Vec<String> {
     let mut notes = Vec::new();
+    let silent = if shown.is_empty() { Vec::new() } else { silent_joints(body.arm(), shown) };
     for (j, octaves) in summary.joints.iter().enumerate() {
         let rested = summary.samples.saturating_sub(octaves.rows());
         if octaves.rows() < 20 {
-            let rests = || format!("joint {} rests in these logs: its friction cannot be judged", j + 1);
-            notes.push(summary.silent[j].clone().unwrap_or_else(rests));
+            let rests = || {
+                format!(
+                    "joint {} rests in these logs: neither its friction nor any effect on it can be judged; record paths on which it \
+                     swings (powerball excite)",
+                    j + 1
+                )
+            };
+            let why = silent.get(j).cloned().flatten().or_else(|| summary.silent[j].clone());
+            notes.push(why.unwrap_or_else(rests));
         } else if rested * 4 > summary.samples {
             notes.push(format!(
                 "joint {} rests in {:.0} % of the samples ({} s or longer, or at an end of a log); they were left out",

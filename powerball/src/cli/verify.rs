@@ -4,14 +4,13 @@ use super::Failure;
 use super::identify_page::torque_figure;
 use super::inputs::{Inputs, load};
 use super::output::{self, Progress};
-use crate::estimate::{JointVerdict, TorqueModel};
+use crate::estimate::{JointVerdict, verify};
 use crate::explain::{TorqueCurve, curves};
 use crate::regression::{Data, DataOptions};
 use crate::report::{Page, Table, Tone, number};
 use clap::Args;
 use serde::Serialize;
-use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Judge an identified model on logs that it has not seen (Fig. 8): errors with intervals, against the noise floor.
 ///
@@ -23,7 +22,7 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Verify {
     #[command(flatten)]
     inputs: Inputs,
-    /// The model: identified.json of `powerball identify` for the same arm file.
+    /// The model: identified.json of `powerball identify` or model.json of `powerball explain`, for the same arm file.
     #[arg(long, value_name = "FILE.json")]
     model: PathBuf,
     /// Largest error of a joint, as a share of the rms of its torque.
@@ -48,13 +47,12 @@ impl Verify {
             return Err(Failure::Unusable("--tolerance must be above 0".into()));
         }
         let progress = Progress::new();
-        let loaded = load(&self.inputs, &[], &progress)?;
-        let model = read_model(&self.model, loaded.body.names(), loaded.body.dof())?;
+        let loaded = load(&self.inputs, &[], Some(&self.model), &progress)?;
         progress.say("preparing signals");
         let data = Data::new(&loaded.body, &loaded.fit, &DataOptions::default())
             .map_err(|e| Failure::Refused(e.to_string()))?;
-        let joints = model.verify(&data, self.tolerance);
-        let residual = model.residual(&data);
+        let residual = loaded.known.map(|m| m.residual(&loaded.body, &data, &[])).unwrap_or_default();
+        let joints = verify(&data, &residual, self.tolerance);
         let verified = Verified {
             arm: loaded.body.arm().name.clone(),
             within_tolerance: joints.iter().all(|j| j.within != Some(false)),
@@ -94,44 +92,6 @@ impl Verify {
             self.inputs.out.join("report.html").display()
         )))
     }
-}
-
-/// The model of an identified.json; its parameters must be those of the arm's minimal set.
-fn read_model(path: &Path, names: &[String], dof: usize) -> Result<TorqueModel, Failure> {
-    let wrong = |what: String| Failure::Unusable(format!("{}: {what}", path.display()));
-    let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
-    let json: Value = serde_json::from_str(&text).map_err(|e| wrong(format!("is no JSON: {e}")))?;
-    let list = |key: &str| {
-        json[key].as_array().ok_or_else(|| wrong(format!("has no list '{key}': it is no identified.json")))
-    };
-    let parameters = list("parameters")?;
-    let inertial = names
-        .iter()
-        .map(|name| {
-            let found = parameters.iter().find(|p| p["name"] == name.as_str());
-            found.and_then(|p| p["value"].as_f64()).ok_or_else(|| {
-                wrong(format!(
-                    "has no value for the parameter {name}: it was identified for another arm file"
-                ))
-            })
-        })
-        .collect::<Result<_, Failure>>()?;
-    let joints = list("friction")?;
-    let friction = (1..=dof)
-        .map(|j| {
-            let found = joints.iter().find(|f| f["joint"] == j);
-            let gamma = |k: usize| found.and_then(|f| f[format!("gamma{k}")].as_f64());
-            let all = [gamma(1), gamma(2), gamma(3), gamma(4), gamma(5)];
-            let [Some(a), Some(b), Some(c), Some(d), Some(e)] = all else {
-                return Err(wrong(format!("has no friction for joint {j}")));
-            };
-            Ok([a, b, c, d, e])
-        })
-        .collect::<Result<_, Failure>>()?;
-    let offset = (1..=dof)
-        .map(|j| joints.iter().find(|f| f["joint"] == j).and_then(|f| f["offset"].as_f64()).unwrap_or(0.0))
-        .collect();
-    Ok(TorqueModel { inertial, friction, offset })
 }
 
 fn page(verified: &Verified, curves: &[TorqueCurve]) -> Page {

@@ -3,11 +3,12 @@
 use super::Failure;
 use super::output;
 use crate::bus::{self, BusUrl};
-use crate::virtual_arm::{Effect, VirtualArm, lwa4p, slave};
+use crate::virtual_arm::{Effect, Undeclared, VirtualArm, lwa4p, slave};
 use clap::Args;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// Put the virtual LWA 4P on a bus in real time: six CiA 402 drives, nodes 3 to 8, with the arm's dynamics behind them.
@@ -33,6 +34,9 @@ pub(crate) struct VirtualArmCommand {
     /// An effect that no model is told of, by name; see `powerball demo`.
     #[arg(long, value_name = "NAME")]
     effect: Option<String>,
+    /// The same as a file: virtual_arm.json, as `powerball demo` writes it beside its logs.
+    #[arg(long, value_name = "FILE", conflicts_with = "effect")]
+    plant: Option<PathBuf>,
     /// Draws the effect's size and the sensors' noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -82,7 +86,13 @@ impl VirtualArmCommand {
             }
             start.copy_from_slice(given);
         }
-        virtual_arm(start, self.seed, self.effect.as_deref(), self.commutated)
+        match &self.plant {
+            Some(file) => Undeclared::read(file)
+                .map_err(Failure::Unusable)?
+                .arm(start, self.seed, self.commutated)
+                .map_err(|e| Failure::Refused(e.to_string())),
+            None => virtual_arm(start, self.seed, self.effect.as_deref(), self.commutated),
+        }
     }
 }
 

@@ -109,8 +109,11 @@ pub fn run(
     let options = DataOptions::default();
     let mut explained = explain(&body, &logs, &held_out, &options, progress)?;
     if let Some(motion) = experiment::propose(&body, &mut explained, &options, progress) {
-        let file = folder.join(TRAJECTORY);
-        std::fs::write(&file, motion.to_csv()).map_err(|e| SessionError::Write(file.clone(), e))?;
+        let write = |motion: &Motion| {
+            let file = folder.join(TRAJECTORY);
+            std::fs::write(&file, motion.to_csv()).map_err(|e| SessionError::Write(file, e))
+        };
+        write(&motion)?;
         if with_experiment {
             progress("recording the experiment");
             let log = carry_out(&session, &motion, &folder.join("experiment.csv"), seed)?;
@@ -127,7 +130,9 @@ pub fn run(
                 &Options::default(),
                 progress,
             )?;
-            experiment::propose(&body, &mut explained, &options, progress);
+            if let Some(next) = experiment::propose(&body, &mut explained, &options, progress) {
+                write(&next)?;
+            }
         }
     }
     let verdict = Verdict::new(&session.effect, &explained);
@@ -137,7 +142,7 @@ pub fn run(
 /// Runs a motion on the arm of a session, after it, and logs it.
 fn carry_out(session: &Session, motion: &Motion, file: &Path, seed: u64) -> Result<PathBuf, DemoError> {
     let unwritten = |e| SessionError::Write(file.to_path_buf(), e);
-    let arm = session.undeclared.arm([0.0; 6], seed.wrapping_add(1)).map_err(SessionError::Arm)?;
+    let arm = session.undeclared.arm([0.0; 6], seed.wrapping_add(1), false).map_err(SessionError::Arm)?;
     let driver = Driver::new(LWA4P).map_err(SessionError::Driver)?;
     let master = Master::new(driver, Memory::new(arm, LWA4P.bitrate));
     let mut log = std::fs::File::create(file).map_err(unwritten)?;

@@ -1,7 +1,7 @@
 //! Friction that differs with the direction, or a constant torque: an offset of the current looks the same.
 
 use super::{Axis, Candidate, Class, Context, Effect, Found};
-use crate::regression::Column;
+use crate::correction::Law;
 use serde_json::{Value, json};
 
 /// τ = c, τ = d·|q̇|, or both.
@@ -27,11 +27,8 @@ impl Effect for Asymmetry {
         context.moving_joints().flat_map(on).collect()
     }
 
-    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        let column = |which: &usize| {
-            context.state_column(candidate.joints[0], |_, v| if *which == 0 { 1.0 } else { v.abs() })
-        };
-        FORMS[candidate.form].iter().map(column).collect()
+    fn laws(&self, _: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
+        FORMS[candidate.form].iter().map(|which| [Law::Constant, Law::SpeedMagnitude][*which]).collect()
     }
 
     fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {

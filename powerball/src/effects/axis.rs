@@ -13,8 +13,9 @@ pub enum Axis {
     Torque,
     /// Its size, where the residual is taken against the direction of motion.
     Load,
-    /// How far the joint has come since it turned back; the residual is taken against the direction of motion.
-    Travel,
+    /// How far the joint has come since it turned back, up to several times this way, rad or m; the residual is taken against
+    /// the direction of motion.
+    Travel(f64),
     /// How fast the rigid arm's torque changes.
     TorqueRate,
     /// Running time; the residual is taken against the direction of motion.

@@ -1,6 +1,6 @@
 //! Gravity that does not point where the arm file says: the base is not level.
 
-use super::{Axis, Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
 use crate::regression::Column;
 use dyngen::exact::rational;
 use serde_json::{Value, json};
@@ -34,9 +34,7 @@ impl Effect for BaseTilt {
 
     fn columns(&self, context: &Context<'_>, _: &Candidate) -> Vec<Column> {
         let data = context.data;
-        let [x, y, z] = [0, 1, 2].map(|k| rational::to_f64(&data.body.arm().gravity[k]));
-        // −(e_x × g) and −(e_y × g).
-        let turns = [[0.0, z, -y], [-z, 0.0, x]];
+        let turns = turns(context);
         let all = data.body.carried(context.fit.inertial());
         let carriers: Vec<usize> = (0..all.len()).filter(|k| all[*k] != 0.0 && k % 11 < 4).collect();
         let unit = |axis: usize| -> Option<Vec<Vec<f64>>> {
@@ -64,6 +62,14 @@ impl Effect for BaseTilt {
             .collect()
     }
 
+    fn part(&self, context: &Context<'_>, _: &Candidate, c: &[f64]) -> Part {
+        let turns = turns(context);
+        let gravity = &context.data.body.arm().gravity;
+        Part::Gravity([0, 1, 2].map(|k| {
+            rational::to_f64(&gravity[k]) + turns.iter().zip(c).map(|(turn, c)| c * turn[k]).sum::<f64>()
+        }))
+    }
+
     fn admissible(&self, _: &Candidate, c: &[f64]) -> bool {
         c.iter().all(|t| t.abs() < 0.5)
     }
@@ -71,4 +77,10 @@ impl Effect for BaseTilt {
     fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
         json!({ "tilt": found.first().map(|f| f.coefficients.to_vec()).unwrap_or_default() })
     }
+}
+
+/// The change of gravity for a turn about x and about y: −(e_x × g) and −(e_y × g).
+fn turns(context: &Context<'_>) -> [[f64; 3]; 2] {
+    let [x, y, z] = [0, 1, 2].map(|k| rational::to_f64(&context.data.body.arm().gravity[k]));
+    [[0.0, z, -y], [-z, 0.0, x]]
 }

@@ -1,6 +1,6 @@
 //! An inertial parameter that the arm file declares zero and that is not.
 
-use super::{Axis, Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
 use crate::regression::Column;
 use serde_json::{Value, json};
 
@@ -28,6 +28,10 @@ impl Effect for BrokenSymmetry {
 
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
         context.data.declared_zero_columns().get(candidate.form).cloned().into_iter().collect()
+    }
+
+    fn part(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Part {
+        Part::Parameter(context.data.declared_zero()[candidate.form], c[0])
     }
 
     fn parameters(&self, context: &Context<'_>, found: &[Found<'_>]) -> Value {

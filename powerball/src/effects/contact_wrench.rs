@@ -3,7 +3,7 @@
 use super::candidate::Window;
 use super::payload::{block_start, mask};
 use super::window_sums::Sums;
-use super::{Axis, Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
 use crate::estimate::Solver;
 use crate::regression::Column;
 use serde_json::{Value, json};
@@ -46,6 +46,10 @@ impl Effect for ContactWrench {
                 .collect(),
         };
         context.data.force_columns().iter().map(cut).collect()
+    }
+
+    fn part(&self, _: &Context<'_>, _: &Candidate, _: &[f64]) -> Part {
+        Part::Event
     }
 
     fn admissible(&self, _: &Candidate, c: &[f64]) -> bool {

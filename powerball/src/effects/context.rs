@@ -1,8 +1,10 @@
 //! What an effect may look at: the data, the model fitted so far, and what it leaves.
 
+use crate::correction::{Instant, Law, Memory};
 use crate::estimate::Fit;
 use crate::friction::TanhFriction;
 use crate::regression::{Column, Data, Recording};
+use crate::signal::{Butterworth, difference};
 use std::sync::OnceLock;
 
 /// Data together with the model fitted so far.
@@ -15,8 +17,8 @@ pub struct Context<'a> {
     /// What the model leaves on the data, by joint.
     pub residual: &'a [Vec<f64>],
     rigid: OnceLock<Vec<Vec<f64>>>,
+    friction: OnceLock<Vec<Vec<f64>>>,
     prediction: OnceLock<Vec<Vec<f64>>>,
-    top_speed: OnceLock<Vec<f64>>,
 }
 
 impl<'a> Context<'a> {
@@ -28,8 +30,8 @@ impl<'a> Context<'a> {
             fit,
             residual,
             rigid: OnceLock::new(),
+            friction: OnceLock::new(),
             prediction: OnceLock::new(),
-            top_speed: OnceLock::new(),
         }
     }
 
@@ -46,19 +48,23 @@ impl<'a> Context<'a> {
         })
     }
 
-    /// Rigid torque and friction by recording, n a sample, N·m.
-    pub fn prediction(&self) -> &[Vec<f64>] {
-        self.prediction.get_or_init(|| {
+    /// Eq. 16 friction by recording, n a sample, N·m.
+    pub fn friction(&self) -> &[Vec<f64>] {
+        self.friction.get_or_init(|| {
             let n = self.data.dof();
             let friction: Vec<TanhFriction<f64>> =
                 (0..n).map(|j| TanhFriction::new(self.fit.friction(j))).collect();
-            let mut torque = self.rigid().to_vec();
-            for (torque, recording) in torque.iter_mut().zip(&self.data.recordings) {
-                for (k, value) in torque.iter_mut().enumerate() {
-                    *value += friction[k % n].torque(recording.v[k]);
-                }
-            }
-            torque
+            let of =
+                |r: &Recording| r.v.iter().enumerate().map(|(k, v)| friction[k % n].torque(*v)).collect();
+            self.data.recordings.iter().map(of).collect()
+        })
+    }
+
+    /// Rigid torque and friction by recording, n a sample, N·m.
+    pub fn prediction(&self) -> &[Vec<f64>] {
+        self.prediction.get_or_init(|| {
+            let sum = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a + b).collect();
+            self.rigid().iter().zip(self.friction()).map(sum).collect()
         })
     }
 
@@ -74,16 +80,49 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// The speed that a joint exceeds in 5 % of its samples, rad/s.
+    /// The speed that a joint exceeds in 5 % of the samples that were fitted, rad/s.
     #[must_use]
     pub fn top_speed(&self, joint: usize) -> f64 {
-        self.top_speed.get_or_init(|| (0..self.data.dof()).map(|j| self.data.top_speed(j)).collect())[joint]
+        self.fit.top_speed[joint]
     }
 
-    /// A column on one joint that is a function of its position and speed.
-    pub fn state_column(&self, joint: usize, f: impl Fn(f64, f64) -> f64) -> Column {
-        self.data
-            .column_on(joint, |_, r| r.position(joint).zip(r.speed(joint)).map(|(q, v)| f(q, v)).collect())
+    /// The column of a law at a joint: the law along the recordings.
+    pub fn law_column(&self, joint: usize, law: Law<f64>) -> Column {
+        if law.moves_link() {
+            return self.moved_link_column(joint, law);
+        }
+        let torques = law.needs_torque();
+        self.data.column_on(joint, |r, recording| {
+            let none: &[f64] = &[];
+            let (rigid, friction) = if torques {
+                (self.rigid()[r].as_slice(), self.friction()[r].as_slice())
+            } else {
+                (none, none)
+            };
+            let mut memory = Memory::default();
+            let mut values = Vec::with_capacity(recording.len());
+            each_instant(recording, rigid, friction, |_, now| {
+                values.push(law.value(joint, now, &mut memory))
+            });
+            values
+        })
+    }
+
+    /// The change of rigid torque on all joints for a link that is moved, to first order.
+    fn moved_link_column(&self, joint: usize, law: Law<f64>) -> Column {
+        let n = self.data.dof();
+        let loads = || self.rigid().iter().flat_map(|t| t.iter().skip(joint).step_by(n));
+        let size = MOVED / loads().fold(1e-9f64, |top, load| top.max(law.shift(*load).abs()));
+        let difference: Vec<Vec<f64>> = (self.data.recordings.iter().zip(self.rigid()))
+            .map(|(recording, rigid)| {
+                let mut motion = [recording.q.clone(), recording.v.clone(), recording.a.clone()];
+                move_link(&mut motion, recording, rigid, joint, law, size);
+                let [q, v, a] = motion;
+                let moved = self.data.body.torque(&q, &v, &a, self.fit.inertial());
+                moved.iter().zip(rigid).map(|(a, b)| (a - b) / size).collect()
+            })
+            .collect();
+        self.data.column_over_all(&difference)
     }
 
     /// Times of a joint's rows in their log's own t, with the log: by row.
@@ -101,5 +140,71 @@ impl<'a> Context<'a> {
             );
         }
         times
+    }
+}
+
+/// The largest deflection that a difference is taken with, rad.
+const MOVED: f64 = 1e-4;
+/// A compliant joint's deflection is smoothed to this before it is differentiated twice, Hz: torques are noisy derivatives
+/// already.
+const SMOOTHING: f64 = 5.0;
+
+/// Adds to positions, speeds and accelerations how a law moves one link, `size` times: n values a sample, `rigid` the torque
+/// of the rigid arm where the motors are.
+pub(crate) fn move_link(
+    motion: &mut [Vec<f64>; 3],
+    recording: &Recording,
+    rigid: &[f64],
+    joint: usize,
+    law: Law<f64>,
+    size: f64,
+) {
+    let n = recording.dof;
+    let shift: Vec<f64> = rigid.iter().skip(joint).step_by(n).map(|t| size * law.shift(*t)).collect();
+    let rate = recording.rate;
+    let moves = match law {
+        // A deflection that follows the load has speed and acceleration.
+        Law::Compliance => {
+            let filter = Butterworth::low_pass(2, SMOOTHING.min(0.3 * rate), rate);
+            let shift = filter.map_or(shift.clone(), |f| f.zero_phase(&shift));
+            let (dv, da) = (
+                difference::derivative(&shift, 1.0 / rate),
+                difference::second_derivative(&shift, 1.0 / rate),
+            );
+            [shift, dv, da]
+        }
+        _ => [shift, Vec::new(), Vec::new()],
+    };
+    for (signal, by) in motion.iter_mut().zip(moves) {
+        for (value, by) in signal.iter_mut().skip(joint).step_by(n).zip(by) {
+            *value += by;
+        }
+    }
+}
+
+/// Goes through the instants of a recording in order; `rigid` and `friction` hold n values a sample, or nothing.
+pub(crate) fn each_instant(
+    recording: &Recording,
+    rigid: &[f64],
+    friction: &[f64],
+    mut at: impl FnMut(usize, &Instant<'_, f64>),
+) {
+    let n = recording.dof;
+    let mut temperature = vec![0.0; recording.temperature.as_ref().map_or(0, Vec::len)];
+    for k in 0..recording.len() {
+        let joints = k * n..(k + 1) * n;
+        for (now, logged) in temperature.iter_mut().zip(recording.temperature.iter().flatten()) {
+            *now = logged[k];
+        }
+        let now = Instant {
+            q: &recording.q[joints.clone()],
+            dq: &recording.v[joints.clone()],
+            ddq: &recording.a[joints.clone()],
+            rigid: rigid.get(joints.clone()).unwrap_or_default(),
+            friction: friction.get(joints).unwrap_or_default(),
+            temperature: &temperature,
+            running: recording.clock + k as f64 / recording.rate,
+        };
+        at(k, &now);
     }
 }

@@ -1,7 +1,7 @@
 //! A joint whose zero is off: the arm is not where the log says.
 
 use super::candidate::by_joint;
-use super::{Axis, Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
 use crate::regression::{Column, Recording};
 use serde_json::{Value, json};
 
@@ -32,7 +32,11 @@ impl Effect for EncoderOffset {
 
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
         let (j, offset) = (candidate.joints[0], candidate.values[0]);
-        let shifted = |r: &Recording| shifted_torque(context, r, j, |_| -offset);
+        let shifted = |r: &Recording| {
+            let mut q = r.q.clone();
+            q.iter_mut().skip(j).step_by(r.dof).for_each(|q| *q -= offset);
+            context.data.body.torque(&q, &r.v, &r.a, context.fit.inertial())
+        };
         let difference: Vec<Vec<f64>> = context
             .data
             .recordings
@@ -41,6 +45,10 @@ impl Effect for EncoderOffset {
             .map(|(r, rigid)| shifted(r).iter().zip(rigid).map(|(a, b)| (a - b) / offset).collect())
             .collect();
         vec![context.data.column_over_all(&difference)]
+    }
+
+    fn part(&self, _: &Context<'_>, _: &Candidate, c: &[f64]) -> Part {
+        Part::EncoderOffset(c[0])
     }
 
     fn admissible(&self, _: &Candidate, c: &[f64]) -> bool {
@@ -55,19 +63,4 @@ impl Effect for EncoderOffset {
     fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
         json!({ "offset": by_joint(found, |f| f.coefficients[0]) })
     }
-}
-
-/// Rigid torque with one joint's position moved by `shift` of the sample.
-pub(super) fn shifted_torque(
-    context: &Context<'_>,
-    r: &Recording,
-    joint: usize,
-    shift: impl Fn(usize) -> f64,
-) -> Vec<f64> {
-    let n = r.dof;
-    let mut q = r.q.clone();
-    for k in 0..r.len() {
-        q[k * n + joint] += shift(k);
-    }
-    context.data.body.torque(&q, &r.v, &r.a, context.fit.inertial())
 }

@@ -1,7 +1,7 @@
 //! One joint's motion that loads another: shared bearings, cables, belts through a joint.
 
 use super::{Axis, Candidate, Class, Context, Effect, Found};
-use crate::regression::Column;
+use crate::correction::Law;
 use serde_json::{Value, json};
 
 /// On joint i: c·tanh(γ·q̇ₖ), c·q̇ₖ or c·q̈ₖ of another joint k.
@@ -36,14 +36,13 @@ impl Effect for JointCoupling {
         candidates
     }
 
-    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        let (i, k) = (candidate.joints[0], candidate.values[0] as usize);
-        let gamma = context.steepness(k);
-        vec![context.data.column_on(i, |_, r| match candidate.form {
-            0 => r.speed(k).map(|v| (gamma * v).tanh()).collect(),
-            1 => r.speed(k).collect(),
-            _ => r.acceleration(k).collect(),
-        })]
+    fn laws(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
+        let other = candidate.values[0] as usize;
+        vec![match candidate.form {
+            0 => Law::OtherDirection { other, steepness: context.steepness(other) },
+            1 => Law::OtherSpeed { other },
+            _ => Law::OtherAcceleration { other },
+        }]
     }
 
     fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {

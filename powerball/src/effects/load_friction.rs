@@ -2,7 +2,7 @@
 
 use super::candidate::by_joint;
 use super::{Axis, Candidate, Class, Context, Effect, Found};
-use crate::regression::Column;
+use crate::correction::Law;
 use serde_json::{Value, json};
 
 /// τ = c·|τ_rigid|·tanh(γ·q̇), c ≥ 0 in N·m per N·m.
@@ -28,14 +28,8 @@ impl Effect for LoadFriction {
         context.moving_joints().map(|j| Candidate::on(j, 0, Vec::new(), 1)).collect()
     }
 
-    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        let (j, n) = (candidate.joints[0], context.data.dof());
-        let gamma = context.steepness(j);
-        let rigid = context.rigid();
-        vec![context.data.column_on(j, |r, recording| {
-            let load = rigid[r].iter().skip(j).step_by(n);
-            load.zip(recording.speed(j)).map(|(load, v)| load.abs() * (gamma * v).tanh()).collect()
-        })]
+    fn laws(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
+        vec![Law::Load { steepness: context.steepness(candidate.joints[0]) }]
     }
 
     fn non_negative(&self) -> bool {

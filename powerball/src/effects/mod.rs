@@ -20,7 +20,7 @@ mod position_ripple;
 mod spring;
 mod stribeck;
 mod temperature;
-mod time_delay;
+pub(crate) mod time_delay;
 mod torque_constant;
 mod velocity_nonlinearity;
 mod window_sums;
@@ -28,8 +28,11 @@ mod window_sums;
 pub use axis::Axis;
 pub use candidate::{Candidate, Found, Window};
 pub use context::Context;
+pub(crate) use context::{each_instant, move_link};
 
+use crate::correction::Law;
 use crate::regression::Column;
+use dyngen::arm::Parameter;
 use serde_json::Value;
 
 /// Effects of one class look alike: a wrong law of one is easily mended by another.
@@ -58,6 +61,25 @@ impl Class {
     }
 }
 
+/// What an effect is in a model of the arm.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Part {
+    /// Torques: its laws with their coefficients.
+    Laws,
+    /// A rigid arm with another value of a parameter that was taken for zero.
+    Parameter(Parameter, f64),
+    /// A rigid arm under another gravity, m/s² in the base frame.
+    Gravity([f64; 3]),
+    /// A body that the last link may hold: mass in kg and centre in m, in the last frame.
+    Payload(f64, [f64; 3]),
+    /// Logs whose position of the candidate's joints is so many rad above the true one.
+    EncoderOffset(f64),
+    /// Logs whose torque of the candidate's joints is so many s late.
+    Delay(f64),
+    /// Nothing that lasts.
+    Event,
+}
+
 /// A physical term that a model may lack.
 pub trait Effect: Sync {
     /// Its name in results.
@@ -72,8 +94,21 @@ pub trait Effect: Sync {
     /// The ways in which it could show in these data, worth a look each.
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate>;
 
+    /// The laws of a candidate at its first joint, one a column; none where it is no torque of a joint.
+    fn laws(&self, _context: &Context<'_>, _candidate: &Candidate) -> Vec<Law<f64>> {
+        Vec::new()
+    }
+
     /// The columns of a candidate on the context's data; the same on every data set.
-    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column>;
+    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
+        let laws = self.laws(context, candidate);
+        laws.into_iter().map(|law| context.law_column(candidate.joints[0], law)).collect()
+    }
+
+    /// What an accepted candidate is in a model of the arm.
+    fn part(&self, _context: &Context<'_>, _candidate: &Candidate, _coefficients: &[f64]) -> Part {
+        Part::Laws
+    }
 
     /// Whether the coefficients are physically possible.
     fn admissible(&self, _candidate: &Candidate, _coefficients: &[f64]) -> bool {

@@ -2,7 +2,7 @@
 
 use super::candidate::{Candidate, Found, Window};
 use super::window_sums::Sums;
-use super::{Axis, Class, Context, Effect};
+use super::{Axis, Class, Context, Effect, Part};
 use crate::estimate::Solver;
 use crate::regression::{Block, Column};
 use serde_json::{Value, json};
@@ -48,6 +48,10 @@ impl Effect for Payload {
         columns.iter().map(cut).collect()
     }
 
+    fn part(&self, _: &Context<'_>, _: &Candidate, c: &[f64]) -> Part {
+        Part::Payload(c[0], centre(c))
+    }
+
     fn admissible(&self, _: &Candidate, c: &[f64]) -> bool {
         c[0] > 0.0 && c[1..].iter().all(|h| h.abs() < REACH * c[0])
     }
@@ -62,10 +66,14 @@ impl Effect for Payload {
     fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
         let Some(first) = found.first() else { return Value::Null };
         let c = first.coefficients;
-        let com: Vec<f64> = c[1..].iter().map(|h| if c[0] != 0.0 { h / c[0] } else { 0.0 }).collect();
         let starts: Vec<f64> = first.candidate.windows.iter().map(|w| w.from).collect();
-        json!({ "mass": c[0], "com": com, "start_time": starts })
+        json!({ "mass": c[0], "com": centre(c), "start_time": starts })
     }
+}
+
+/// The centre of mass.
+fn centre(c: &[f64]) -> [f64; 3] {
+    [1, 2, 3].map(|k| if c[0] != 0.0 { c[k] / c[0] } else { 0.0 })
 }
 
 /// Columns for mass and first moments with the inertia of a point mass at `com`.
@@ -102,7 +110,7 @@ const STAYS: usize = 1;
 
 /// The windows on the context's logs. A payload that stays is also in logs that were not fitted, where their `t` and
 /// that of the logs with the payload are one clock.
-fn followed(context: &Context<'_>, candidate: &Candidate) -> Vec<Window> {
+pub(crate) fn followed(context: &Context<'_>, candidate: &Candidate) -> Vec<Window> {
     let (data, windows) = (context.data, &candidate.windows);
     let here = windows.iter().any(|w| data.logs.contains(&w.log));
     let Some(first) = windows.iter().min_by(|a, b| (a.from + a.offset).total_cmp(&(b.from + b.offset)))

@@ -1,7 +1,7 @@
 //! Torque that is periodic in a joint's or its motor's position: gear teeth, wave generators, cogging.
 
 use super::{Axis, Candidate, Class, Context, Effect, Found};
-use crate::regression::Column;
+use crate::correction::Law;
 use dyngen::exact::rational;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
@@ -53,9 +53,9 @@ impl Effect for PositionRipple {
         candidates
     }
 
-    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        let (j, k) = (candidate.joints[0], candidate.values[0]);
-        vec![context.state_column(j, |q, _| (k * q).cos()), context.state_column(j, |q, _| (k * q).sin())]
+    fn laws(&self, _: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
+        let order = candidate.values[0];
+        vec![Law::Cosine { order }, Law::Sine { order }]
     }
 
     fn neighbours(&self, candidate: &Candidate) -> Vec<Candidate> {

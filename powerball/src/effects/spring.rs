@@ -2,7 +2,7 @@
 
 use super::candidate::by_joint;
 use super::{Axis, Candidate, Class, Context, Effect, Found};
-use crate::regression::Column;
+use crate::correction::Law;
 use serde_json::{Value, json};
 
 /// τ = k·(q − q_rest).
@@ -25,9 +25,8 @@ impl Effect for Spring {
         context.moving_joints().map(|j| Candidate::on(j, 0, Vec::new(), 1)).collect()
     }
 
-    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        let j = candidate.joints[0];
-        vec![context.state_column(j, |q, _| q), context.state_column(j, |_, _| 1.0)]
+    fn laws(&self, _: &Context<'_>, _: &Candidate) -> Vec<Law<f64>> {
+        vec![Law::Position, Law::Constant]
     }
 
     fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {

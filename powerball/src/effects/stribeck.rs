@@ -2,7 +2,7 @@
 
 use super::candidate::{by_joint, geometric};
 use super::{Axis, Candidate, Class, Context, Effect, Found};
-use crate::regression::Column;
+use crate::correction::Law;
 use serde_json::{Value, json};
 
 /// τ = c·tanh(γ·q̇)·exp(−(q̇/v_s)²), c ≥ 0.
@@ -30,11 +30,11 @@ impl Effect for Stribeck {
         context.moving_joints().flat_map(on).collect()
     }
 
-    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        let (j, vs) = (candidate.joints[0], candidate.values[0]);
+    fn laws(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
+        let speed = candidate.values[0];
         // The sign must have changed well inside the bump.
-        let gamma = context.steepness(j).max(4.0 / vs);
-        vec![context.state_column(j, |_, v| (gamma * v).tanh() * (-(v / vs).powi(2)).exp())]
+        let steepness = context.steepness(candidate.joints[0]).max(4.0 / speed);
+        vec![Law::Stribeck { steepness, speed }]
     }
 
     fn non_negative(&self) -> bool {

@@ -2,12 +2,11 @@
 
 use super::candidate::{by_joint, geometric};
 use super::{Axis, Candidate, Class, Context, Effect, Found};
-use crate::friction::TanhFriction;
-use crate::regression::Column;
+use crate::correction::Law;
 use serde_json::{Value, json};
 
 /// τ = c·f(q̇)·e^(−t/T) on the clock common to all logs, f the whole friction (form 0) or its viscous part (form 1);
-/// where temperatures were logged, c·f(q̇)·(ϑ − ϑ₀)/10 K (forms 2 and 3).
+/// where temperatures were logged, c·f(q̇)·(ϑ − ϑ₀)/10 K (forms 2 and 3), ϑ₀ that at the start of the logs.
 pub(super) struct Temperature;
 
 impl Effect for Temperature {
@@ -28,32 +27,29 @@ impl Effect for Temperature {
         let end = context.data.recordings.iter().map(clock).fold(0.0, f64::max);
         // From the first seconds to much slower than the logs are long.
         let constants = geometric(10.0, (2.0 * end).max(40.0), 7);
-        let measured = context.data.recordings.iter().all(|r| r.temperature.is_some());
+        let recordings = &context.data.recordings;
+        let measured = recordings.iter().all(|r| r.temperature.is_some());
+        let at_start = |j: usize| recordings.first()?.temperature.as_ref()?.get(j)?.first().copied();
         let mut candidates = Vec::new();
         for j in context.moving_joints() {
             for form in 0..2 {
                 candidates.extend(constants.iter().map(|t| Candidate::on(j, form, vec![*t], 14)));
-                if measured {
-                    candidates.push(Candidate::on(j, form + 2, Vec::new(), 2));
+                if let Some(reference) = at_start(j).filter(|_| measured) {
+                    candidates.push(Candidate::on(j, form + 2, vec![reference], 2));
                 }
             }
         }
         candidates
     }
 
-    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        let j = candidate.joints[0];
-        let friction = TanhFriction::new(context.fit.friction(j));
-        let form = candidate.form;
-        vec![context.data.column_on(j, |_, r| {
-            let warmth = |k: usize| match (form < 2, &r.temperature) {
-                (true, _) => (-(r.clock + k as f64 / r.rate) / candidate.values[0]).exp(),
-                (false, Some(t)) => (t[j][k] - t[j][0]) / 10.0,
-                (false, None) => 0.0,
-            };
-            let part = |v: f64| if form.is_multiple_of(2) { friction.torque(v) } else { v };
-            r.speed(j).enumerate().map(|(k, v)| part(v) * warmth(k)).collect()
-        })]
+    fn laws(&self, _: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
+        let setting = candidate.values[0];
+        vec![match candidate.form {
+            0 => Law::CoolFriction { time_constant: setting },
+            1 => Law::CoolSpeed { time_constant: setting },
+            2 => Law::HotFriction { reference: setting },
+            _ => Law::HotSpeed { reference: setting },
+        }]
     }
 
     fn neighbours(&self, candidate: &Candidate) -> Vec<Candidate> {
@@ -76,7 +72,7 @@ impl Effect for Temperature {
                 _ => c / viscous.max(1e-9),
             }
         };
-        let time = |f: &Found<'_>| f.candidate.values.first().copied().unwrap_or(0.0);
+        let time = |f: &Found<'_>| if f.candidate.form < 2 { f.candidate.values[0] } else { 0.0 };
         json!({ "change": by_joint(found, change), "time_constant": by_joint(found, time) })
     }
 }

@@ -1,7 +1,7 @@
 //! Torque and position that were not sampled at the same time.
 
 use super::candidate::by_joint;
-use super::{Axis, Candidate, Class, Context, Effect, Found};
+use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
 use crate::regression::Column;
 use serde_json::{Value, json};
 
@@ -51,6 +51,10 @@ impl Effect for TimeDelay {
         vec![Column { parts: parts.collect() }]
     }
 
+    fn part(&self, _: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Part {
+        Part::Delay(candidate.values[0] * c[0])
+    }
+
     fn admissible(&self, candidate: &Candidate, c: &[f64]) -> bool {
         // The shifted torque must be seen whole, or the shift is another; below 10 µs nothing is late.
         (0.3..3.0).contains(&c[0]) && (c[0] * candidate.values[0]).abs() > 1e-5
@@ -66,7 +70,8 @@ impl Effect for TimeDelay {
     }
 }
 
-fn at(x: &[f64], k: f64) -> f64 {
+/// A signal between its samples.
+pub(crate) fn at(x: &[f64], k: f64) -> f64 {
     let k = k.clamp(0.0, (x.len() - 1) as f64);
     let low = (k as usize).min(x.len().saturating_sub(2));
     let share = k - low as f64;

@@ -1,7 +1,7 @@
 //! A wrong factor between current and torque, or one that falls as the motor saturates.
 
 use super::{Axis, Candidate, Class, Context, Effect, Found};
-use crate::regression::Column;
+use crate::correction::Law;
 use serde_json::{Value, json};
 
 /// τ_measured = τ·(1 + c) or τ·(1 + c·|τ|/τ_max) or τ·(1 + c·(τ/τ_max)²).
@@ -23,35 +23,32 @@ impl Effect for TorqueConstant {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let on = |j: usize| (0..FORMS).map(move |form| Candidate::on(j, form, Vec::new(), FORMS));
+        let on = |j: usize| {
+            let top = scale(context, j);
+            (0..FORMS).map(move |form| Candidate::on(j, form, vec![top], FORMS))
+        };
         context.moving_joints().flat_map(on).collect()
     }
 
-    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        let (j, n) = (candidate.joints[0], context.data.dof());
-        let prediction = context.prediction();
-        let of = |torque: &[f64]| torque.iter().skip(j).step_by(n).copied().collect::<Vec<f64>>();
-        let top = scale(context, j);
-        vec![context.data.column_on(j, |r, _| {
-            let bent = |t: f64| match candidate.form {
-                0 => t,
-                1 => t * t.abs() / top,
-                _ => t * (t / top).powi(2),
-            };
-            of(&prediction[r]).into_iter().map(bent).collect()
-        })]
+    fn laws(&self, _: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
+        let scale = candidate.values[0];
+        vec![match candidate.form {
+            0 => Law::Torque,
+            1 => Law::TorqueMagnitude { scale },
+            _ => Law::TorqueSquare { scale },
+        }]
     }
 
     fn admissible(&self, _: &Candidate, c: &[f64]) -> bool {
         c[0].abs() < 0.8
     }
 
-    fn parameters(&self, context: &Context<'_>, found: &[Found<'_>]) -> Value {
+    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
         let gain: Vec<f64> =
             found.iter().map(|f| if f.candidate.form == 0 { 1.0 + f.coefficients[0] } else { 1.0 }).collect();
         let bend: Vec<f64> =
             found.iter().map(|f| if f.candidate.form == 0 { 0.0 } else { f.coefficients[0] }).collect();
-        let at: Vec<f64> = found.iter().map(|f| scale(context, f.candidate.joints[0])).collect();
+        let at: Vec<f64> = found.iter().map(|f| f.candidate.values[0]).collect();
         match gain.as_slice() {
             [one] => json!({ "gain": one, "change_at_torque": bend[0], "torque": at[0] }),
             _ => json!({ "gain": gain, "change_at_torque": bend, "torque": at }),

@@ -1,7 +1,7 @@
 //! Friction at speed that Eq. 16 cannot bend to: growing faster or slower than in proportion.
 
 use super::{Axis, Candidate, Class, Context, Effect, Found};
-use crate::regression::Column;
+use crate::correction::Law;
 use serde_json::{Value, json};
 
 /// τ = c·q̇|q̇|, c·q̇³ or c·sign(q̇)·√|q̇|.
@@ -28,10 +28,9 @@ impl Effect for VelocityNonlinearity {
         context.moving_joints().flat_map(on).collect()
     }
 
-    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        let (j, power) = (candidate.joints[0], POWERS[candidate.form]);
-        let gamma = context.steepness(j);
-        vec![context.state_column(j, |_, v| (gamma * v).tanh() * v.abs().powf(power))]
+    fn laws(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
+        let steepness = context.steepness(candidate.joints[0]);
+        vec![Law::Power { steepness, power: POWERS[candidate.form] }]
     }
 
     fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {

@@ -30,6 +30,8 @@ pub struct Fit {
     pub sigma: Vec<f64>,
     /// How many times the variance of slow means exceeds that of independent samples, by joint, at least 1.
     pub inflation: Vec<f64>,
+    /// The speed that each joint exceeds in 5 % of the samples, rad/s.
+    pub top_speed: Vec<f64>,
     /// Residual by joint.
     pub residual: Vec<Vec<f64>>,
     /// The columns at these shapes.
@@ -85,6 +87,7 @@ pub fn fit(data: &Data<'_>, folds: &Folds, terms: &[Term], start: Option<&Fit>) 
         weights: done.weights,
         sigma: done.scatter.sigma,
         inflation: done.scatter.inflation,
+        top_speed: (0..data.dof()).map(|j| data.top_speed(j)).collect(),
         design,
         gram,
         free: done.free,

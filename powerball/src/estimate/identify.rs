@@ -3,25 +3,36 @@
 use super::errors::Errors;
 use super::reduced::Solution;
 use crate::regression::Data;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A parameter with its standard error.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ParameterEstimate {
     /// Its name: the sum it stands for.
     pub name: String,
     /// Its value, SI units.
     pub value: f64,
     /// Standard error; `None` where the logs do not determine the parameter.
+    #[serde(default)]
     pub std: Option<f64>,
     /// Standard error over |value|.
+    #[serde(default)]
     pub relative_std: Option<f64>,
     /// 95 % interval, by Student's t.
+    #[serde(default)]
     pub interval: Option<[f64; 2]>,
 }
 
+impl ParameterEstimate {
+    /// A value without an error.
+    #[must_use]
+    pub fn plain(name: &str, value: f64) -> ParameterEstimate {
+        ParameterEstimate { name: name.to_string(), value, std: None, relative_std: None, interval: None }
+    }
+}
+
 /// Eq. 16 of a joint with standard errors of γ1 … γ5.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointFriction {
     /// Joint, from 1.
     pub joint: usize,
@@ -36,10 +47,28 @@ pub struct JointFriction {
     /// γ5, N·m·s/rad.
     pub gamma5: f64,
     /// Constant torque, N·m, where the law has one.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub offset: Option<f64>,
     /// Standard errors of γ1 … γ5; null where not determined or at a bound.
+    #[serde(default)]
     pub std: [Option<f64>; 5],
+}
+
+impl JointFriction {
+    /// γ1 … γ5 without errors; `joint` counts from 0.
+    #[must_use]
+    pub fn plain(joint: usize, [gamma1, gamma2, gamma3, gamma4, gamma5]: [f64; 5]) -> JointFriction {
+        JointFriction {
+            joint: joint + 1,
+            gamma1,
+            gamma2,
+            gamma3,
+            gamma4,
+            gamma5,
+            offset: None,
+            std: [None; 5],
+        }
+    }
 }
 
 /// The parameters of a fit.

@@ -34,7 +34,7 @@ pub use solve::{Solver, bounded};
 pub use stream::{States, Stream, StreamFit};
 pub use torque_metric::TorqueMetric;
 pub use vary::Layout;
-pub use verify::{JointVerdict, TorqueModel};
+pub use verify::{JointVerdict, verify};
 
 #[cfg(test)]
 mod tests;

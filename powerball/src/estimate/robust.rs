@@ -6,7 +6,6 @@
 //! from six on (Hampel's ψ). The deviation is the median one of each joint, which outliers do not move.
 
 use super::reduced::{FrictionLaw, Solution, solve_reduced};
-use super::verify::TorqueModel;
 use crate::friction::TanhFriction;
 use crate::log::Log;
 use crate::regression::{DataError, DataOptions, Recording, RigidBody};
@@ -49,7 +48,7 @@ pub fn solve_robust(
     let mut solution = solve_reduced(&reduce(body, logs, options, |_| {})?, law);
     let mut doubted = vec![0.0; n];
     for round in 0..ROUNDS {
-        let model = TorqueModel::of(&solution);
+        let model = &solution;
         let mut misses: Vec<Vec<f64>> = vec![Vec::new(); n];
         reduce(body, logs, options, |recording| {
             for (j, miss) in model.misses(body, recording).into_iter().enumerate() {
@@ -87,19 +86,19 @@ pub fn solve_robust(
     Ok(Robust { solution, doubted })
 }
 
-impl TorqueModel {
+impl Solution {
     /// Measured less predicted torque at every sample of a recording, outside any band, by joint, N·m.
     fn misses(&self, body: &RigidBody, recording: &Recording) -> Vec<Vec<f64>> {
         let n = recording.dof;
-        let rigid = body.torque(&recording.q, &recording.v, &recording.a, &self.inertial);
+        let rigid = body.torque(&recording.q, &recording.v, &recording.a, self.inertial());
         (0..n)
             .map(|j| {
-                let friction = TanhFriction::new(self.friction[j]);
+                let friction = TanhFriction::new(self.friction(j));
                 let predicted = rigid.iter().skip(j).step_by(n).zip(recording.speed(j));
                 let torque = recording.torque[j].iter();
                 torque
                     .zip(predicted)
-                    .map(|(tau, (rigid, v))| tau - rigid - friction.torque(v) - self.offset[j])
+                    .map(|(tau, (rigid, v))| tau - rigid - friction.torque(v) - self.offset(j))
                     .collect()
             })
             .collect()

@@ -51,7 +51,7 @@ pub fn decide(
         let why = "one name only".to_string();
         return Ok(Decision { winner: None, why, evidence: 0.0, p_value: 1.0, held_out: 0.0 });
     };
-    let (own_a, own_b) = (a.own_columns(&data), b.own_columns(&data));
+    let (own_a, own_b) = (a.fitted_columns.len(), b.fitted_columns.len());
     let penalty = PER_COEFFICIENT * (own_b as f64 - own_a as f64);
     let blocks = leads(&data, a, b);
     let lead = blocks.iter().sum::<f64>() + penalty;

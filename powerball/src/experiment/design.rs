@@ -5,12 +5,12 @@
 //! together, would absorb a part of the difference: inertia, friction and its own coefficients move. What it cannot absorb, over the
 //! noise, is what an experiment along the path would show.
 
-use crate::estimate::{Folds, Gram, Solver};
+use crate::estimate::{Design as Columns, Folds, Gram, Solver};
 use crate::excite::{Error, Fourier, Limits, Settings, search};
 use crate::explain::{Hypothesis, Open};
 use crate::log::Log;
 use crate::motion::Motion;
-use crate::regression::{Data, DataOptions, RigidBody};
+use crate::regression::{Column, Data, DataOptions, RigidBody};
 use faer::Mat;
 
 /// A designed experiment.
@@ -22,6 +22,8 @@ pub struct Design {
     pub expected: Vec<f64>,
     /// The same over the whole path, all joints together: χ² by which the wrong name would fall behind.
     pub evidence: f64,
+    /// How much better the path tells what only one of the names has than the old logs.
+    pub narrows: f64,
     /// `evidence` of the middle one of random paths.
     pub usual: f64,
 }
@@ -51,12 +53,19 @@ pub fn design(body: &RigidBody, open: &Open, options: &DataOptions) -> Result<De
     let limits = Limits::of(body.arm(), settings.margin)?;
     let duels = duels(open);
     let (path, _, usual) = search(body.dof(), &settings, &limits, |path| {
-        let evidence = judge(body, open, &duels, path, COARSE, options).map_or(0.0, |j| j.0);
-        (-evidence, evidence)
+        let shows = judge(body, open, &duels, path, COARSE, options);
+        shows.map_or((0.0, 0.0), |s| (-s.evidence - s.narrows, s.evidence))
     })?;
-    let (evidence, expected) =
-        judge(body, open, &duels, &path, RATE, options).unwrap_or_else(|| (0.0, vec![0.0; body.dof()]));
-    Ok(Design { motion: path.sample(RATE), expected, evidence, usual })
+    let shows = judge(body, open, &duels, &path, RATE, options);
+    let shows =
+        shows.unwrap_or_else(|| Shows { evidence: 0.0, narrows: 0.0, by_joint: vec![0.0; body.dof()] });
+    Ok(Design {
+        motion: path.sample(RATE),
+        expected: shows.by_joint,
+        evidence: shows.evidence,
+        narrows: shows.narrows,
+        usual,
+    })
 }
 
 /// One name true, the other one fitted: what the old logs say of it.
@@ -64,12 +73,26 @@ struct Duel<'o> {
     truth: usize,
     rival: usize,
     model: &'o Hypothesis,
-    /// The rival's normal equations on the old logs, with the difference in the place of torques.
+    /// The rival's normal equations on the old logs.
     gram: Mat<f64>,
+    /// What the truth has and the rival may not absorb: the difference of both models, then each of the truth's own columns.
+    signals: Vec<Signal>,
+}
+
+/// A signal on the old logs.
+struct Signal {
+    /// A's with the rival's columns A.
     right: Vec<f64>,
-    /// The part of the difference that stays on the old logs.
+    /// s's.
+    square: f64,
+    /// The part of it that the rival cannot absorb.
     stays: f64,
 }
+
+/// The old logs leave a coefficient open by so many standard deviations.
+const OPEN: f64 = 2.0;
+/// A coefficient that is known so much better already counts no more.
+const ENOUGH: f64 = 20.0;
 
 fn duels(open: &Open) -> Vec<Duel<'_>> {
     let all = &open.hypotheses;
@@ -78,20 +101,39 @@ fn duels(open: &Open) -> Vec<Duel<'_>> {
         .map(|(truth, rival)| {
             let (other, fit) = (&all[truth].fit, &all[rival].fit);
             let gram = fit.gram.sum(&fit.weights, |_| true).0;
-            let (mut right, mut square) = (vec![0.0; fit.design.size], 0.0);
-            for j in 0..fit.design.dof() {
-                let w = fit.weights[j];
-                let difference: Vec<f64> =
-                    fit.residual[j].iter().zip(&other.residual[j]).map(|(r, t)| r - t).collect();
-                for (g, value) in fit.design.cross(j, &(0..difference.len()), &[&difference]) {
-                    right[g] += w * value[0];
-                }
-                square += w * difference.iter().map(|d| d * d).sum::<f64>();
-            }
-            let stays = left(&gram, &right, square, &fit.free).0;
-            Duel { truth, rival, model: &all[rival], gram, right, stays }
+            let apart = |(r, t): (&Vec<f64>, &Vec<f64>)| r.iter().zip(t).map(|(r, t)| r - t).collect();
+            let difference: Vec<Vec<f64>> = fit.residual.iter().zip(&other.residual).map(apart).collect();
+            let mut signals: Vec<Vec<Vec<f64>>> = vec![difference];
+            let rows: Vec<usize> = fit.residual.iter().map(Vec::len).collect();
+            signals.extend(all[truth].fitted_columns.iter().map(|c| by_joint(c, &rows)));
+            let signals = (signals.iter())
+                .map(|values| {
+                    let (right, square) = products(&fit.design, &fit.weights, values);
+                    let stays = left(&gram, &right, square, &fit.free).0;
+                    Signal { right, square, stays }
+                })
+                .collect();
+            Duel { truth, rival, model: &all[rival], gram, signals }
         })
         .collect()
+}
+
+/// A column's values on every joint.
+fn by_joint(column: &Column, rows: &[usize]) -> Vec<Vec<f64>> {
+    let on = |(j, rows): (usize, &usize)| column.at(j).map_or_else(|| vec![0.0; *rows], <[f64]>::to_vec);
+    rows.iter().enumerate().map(on).collect()
+}
+
+/// A's and s's of a signal, weighted.
+fn products(design: &Columns, weights: &[f64], signal: &[Vec<f64>]) -> (Vec<f64>, f64) {
+    let (mut right, mut square) = (vec![0.0; design.size], 0.0);
+    for (j, values) in signal.iter().enumerate() {
+        for (g, value) in design.cross(j, &(0..values.len()), &[values]) {
+            right[g] += weights[j] * value[0];
+        }
+        square += weights[j] * values.iter().map(|v| v * v).sum::<f64>();
+    }
+    (right, square)
 }
 
 /// The least χ² over the free coefficients, and those.
@@ -100,8 +142,20 @@ fn left(gram: &Mat<f64>, right: &[f64], square: f64, free: &[bool]) -> (f64, Vec
     (square - x.iter().zip(right).map(|(a, b)| a * b).sum::<f64>(), x)
 }
 
-/// χ² that the new path would add for the pair of names that is hardest to tell apart, and by joint the difference over
-/// the noise; `None` where the path moves nothing.
+/// What a path would show.
+#[derive(Clone, Debug)]
+struct Shows {
+    /// χ² that the new log would add.
+    evidence: f64,
+    /// How much better it would tell what only one of the names has, where the old logs leave that open: the variances of its
+    /// coefficients over those after the new log, less one. It decides where names predict the same as fitted (a spring that does
+    /// not grow is a constant torque).
+    narrows: f64,
+    /// The difference that stays over the noise, by joint.
+    by_joint: Vec<f64>,
+}
+
+/// What a path shows of the pair of names that is hardest to tell apart; `None` where the path moves nothing.
 fn judge(
     body: &RigidBody,
     open: &Open,
@@ -109,54 +163,64 @@ fn judge(
     path: &Fourier,
     rate: f64,
     options: &DataOptions,
-) -> Option<(f64, Vec<f64>)> {
+) -> Option<Shows> {
     let log = log_of(&path.sample(rate));
-    let mut data = Data::new(body, std::slice::from_ref(&log), options).ok()?;
+    let data = Data::new(body, std::slice::from_ref(&log), options).ok()?;
     let folds = Folds::new(&data);
     let n = data.dof();
-    let designs: Vec<_> = open.hypotheses.iter().map(|h| h.design(&data)).collect();
-    let predictions: Vec<Vec<Vec<f64>>> = (designs.iter().zip(&open.hypotheses))
-        .map(|(design, h)| (0..n).map(|j| design.predict(j, &h.fit.theta)).collect())
-        .collect();
-    let mut verdicts: Vec<(usize, usize, f64, Vec<f64>)> = Vec::new();
-    for duel in duels {
+    let rows: Vec<usize> = data.joints.iter().map(|j| j.len()).collect();
+    let designs: Vec<Columns> = open.hypotheses.iter().map(|h| h.design(&data)).collect();
+    let own: Vec<Vec<Column>> = open.hypotheses.iter().map(|h| h.own_columns(&data)).collect();
+    let predict = |h: usize, j: usize| designs[h].predict(j, &open.hypotheses[h].fit.theta);
+    let shows = |duel: &Duel<'_>| {
         let (fit, design) = (&duel.model.fit, &designs[duel.rival]);
-        for j in 0..n {
-            let (truth, rival) = (&predictions[duel.truth][j], &predictions[duel.rival][j]);
-            data.joints[j].torque = truth.iter().zip(rival).map(|(t, r)| t - r).collect();
-        }
-        let (gram, right, square) = Gram::new(&data, design, &folds).sum(&fit.weights, |_| true);
-        let both: Vec<f64> = right.iter().zip(&duel.right).map(|(a, b)| a + b).collect();
-        let old_square = duel.stays
-            + Solver::new(&duel.gram, |c| fit.free[c])
-                .solve(&duel.right)
-                .iter()
-                .zip(&duel.right)
-                .map(|(a, b)| a * b)
-                .sum::<f64>();
-        let (stays, x) = left(&(&gram + &duel.gram), &both, square + old_square, &fit.free);
+        let difference: Vec<Vec<f64>> = (0..n)
+            .map(|j| {
+                let (truth, rival) = (predict(duel.truth, j), predict(duel.rival, j));
+                truth.iter().zip(rival).map(|(t, r)| t - r).collect()
+            })
+            .collect();
+        let gram = &duel.gram + &Gram::new(&data, design, &folds).sum(&fit.weights, |_| true).0;
+        let stays = |signal: &[Vec<f64>], old: &Signal| {
+            let (right, square) = products(design, &fit.weights, signal);
+            let right: Vec<f64> = right.iter().zip(&old.right).map(|(a, b)| a + b).collect();
+            left(&gram, &right, square + old.square, &fit.free)
+        };
+        let (all, x) = stays(&difference, &duel.signals[0]);
+        let narrows = (own[duel.truth].iter().zip(&duel.signals[1..]))
+            .filter(|(_, old)| old.stays > 1e-6 * old.square)
+            .map(|(column, old)| {
+                let (after, _) = stays(&by_joint(column, &rows), old);
+                OPEN * OPEN * ((after - old.stays) / old.stays).clamp(0.0, ENOUGH)
+            })
+            .sum();
         let by_joint = (0..n)
             .map(|j| {
                 let absorbed = design.predict(j, &x);
-                let rest = data.joints[j].torque.iter().zip(&absorbed).map(|(d, a)| (d - a) * (d - a));
+                let rest = difference[j].iter().zip(&absorbed).map(|(d, a)| (d - a) * (d - a));
                 let rms = (rest.sum::<f64>() / absorbed.len().max(1) as f64).sqrt();
                 if fit.sigma[j] > 0.0 { rms / fit.sigma[j] } else { 0.0 }
             })
             .collect();
-        verdicts.push((duel.truth, duel.rival, stays - duel.stays, by_joint));
-    }
+        Shows { evidence: (all - duel.signals[0].stays).max(0.0), narrows, by_joint }
+    };
+    let shown: Vec<Shows> = duels.iter().map(shows).collect();
     // A name whose model holds the other one's as a special case absorbs all of it: only the way back can show a
     // difference, so both ways count together.
-    let mut worst: Option<(f64, Vec<f64>)> = None;
-    for (truth, rival, evidence, by_joint) in verdicts.iter().filter(|v| v.0 < v.1) {
-        let Some(back) = verdicts.iter().find(|v| v.0 == *rival && v.1 == *truth) else { continue };
-        let evidence = 0.5 * (evidence + back.2);
-        if worst.as_ref().is_none_or(|(w, _)| evidence < *w) {
-            let by_joint = by_joint.iter().zip(&back.3).map(|(a, b)| a.max(*b)).collect();
-            worst = Some((evidence, by_joint));
-        }
-    }
-    worst
+    let both_ways = |there: usize| -> Option<Shows> {
+        let duel = &duels[there];
+        let back = duels.iter().position(|d| d.truth == duel.rival && d.rival == duel.truth)?;
+        let (there, back) = (&shown[there], &shown[back]);
+        Some(Shows {
+            evidence: 0.5 * (there.evidence + back.evidence),
+            narrows: there.narrows + back.narrows,
+            by_joint: there.by_joint.iter().zip(&back.by_joint).map(|(a, b)| a.max(*b)).collect(),
+        })
+    };
+    (0..duels.len())
+        .filter(|d| duels[*d].truth < duels[*d].rival)
+        .filter_map(both_ways)
+        .min_by(|a, b| a.evidence.total_cmp(&b.evidence))
 }
 
 /// A motion as a log without torques.

@@ -1,8 +1,9 @@
 //! From the accepted effects to the result.
 
+use super::compose::Composed;
 use super::correction::correct;
 use super::curves::curves;
-use super::forward::{RuledOut, Session, Step};
+use super::forward::{ExplainError, RuledOut, Session, Step};
 use super::leftover::{depends_on, effective_samples, leftover};
 use super::naming::Comparison;
 use super::result::{Errors, Explained, NamedEffect, Rival, Unattributed};
@@ -12,7 +13,7 @@ use crate::parallel;
 use std::sync::Arc;
 
 impl Session<'_> {
-    fn coefficients(&self) -> Vec<Vec<f64>> {
+    pub(super) fn coefficients(&self) -> Vec<Vec<f64>> {
         let mut first = 0;
         self.accepted
             .iter()
@@ -24,10 +25,13 @@ impl Session<'_> {
             .collect()
     }
 
-    pub(super) fn result(mut self, before: Errors, base_residual: &[Vec<f64>]) -> Explained {
-        let residual = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
-        let after =
-            Errors { fit: spread(&self.data, &self.fit.residual), validate: spread(&self.other, &residual) };
+    pub(super) fn result(
+        mut self,
+        before: Errors,
+        base_residual: &[Vec<f64>],
+    ) -> Result<Explained, ExplainError> {
+        let Composed { model, fitted, held_out: residual } = self.composed()?;
+        let after = Errors { fit: spread(&self.data, &fitted), validate: spread(&self.other, &residual) };
         let curves = curves(&self.other, base_residual, &residual);
         let floor = noise_floor(&self.data);
         let context = Context::new(&self.data, &self.fit, &self.fit.residual);
@@ -86,7 +90,7 @@ impl Session<'_> {
         let effective_samples = effective_samples(&self.data, &self.fit.residual);
         self.false_positives.rate =
             self.false_positives.accepted as f64 / (self.false_positives.placebos.max(1)) as f64;
-        Explained {
+        Ok(Explained {
             arm: self.data.body.arm().name.clone(),
             before,
             after,
@@ -102,7 +106,8 @@ impl Session<'_> {
             warnings: self.doubts(),
             curves,
             shown,
-        }
+            model,
+        })
     }
 
     /// The next best names, and what an experiment has ruled out on the same joints.

@@ -1,6 +1,7 @@
 //! What these logs cannot show, and what to record instead.
 
 use super::forward::Session;
+use super::running_time::BESIDE;
 
 /// Said where the logs to judge on are repeats.
 const ONE_PATH: &str = "the logs of --validate run the same path as those of --log: what depends on positions (springs, zeros, \
@@ -38,6 +39,9 @@ impl Session<'_> {
         }
         if self.one_path {
             doubts.push(ONE_PATH.to_string());
+        }
+        if self.beside {
+            doubts.push(BESIDE.to_string());
         }
         let placebos = &self.false_positives;
         if placebos.accepted as f64 > MANY * placebos.placebos as f64 && placebos.accepted > 2 {

@@ -176,7 +176,8 @@ fn event_gains(screen: &Screen<'_>, trial: &Trial) -> Vec<f64> {
         .collect()
 }
 
-fn path_gain(
+/// The share of the squared error of `joints` that a trial takes away on the other path: the median over its logs.
+pub(super) fn path_gain(
     screen: &Screen<'_>,
     trial: &Trial,
     joints: &[usize],

@@ -10,6 +10,7 @@ use super::other_path::payload_on;
 use super::placebo::placebos;
 use super::result::{Errors, Explained, FalsePositives, NamedEffect, Rival};
 use super::rule;
+use super::running_time;
 use super::screen::{Screen, Trial};
 use crate::effects::{self, Candidate, Context, Effect};
 use crate::estimate::{Design, Fit, Folds, Solver, fit, friction_columns, noise_floor, spread};
@@ -24,6 +25,8 @@ pub enum ExplainError {
     Fit(DataError),
     /// The logs of the other path.
     Validate(DataError),
+    /// The arm that was found has no model.
+    Arm(String),
 }
 
 impl fmt::Display for ExplainError {
@@ -31,6 +34,7 @@ impl fmt::Display for ExplainError {
         match self {
             ExplainError::Fit(e) => write!(f, "--log: {e}"),
             ExplainError::Validate(e) => write!(f, "--validate: {e}"),
+            ExplainError::Arm(e) => f.write_str(e),
         }
     }
 }
@@ -87,6 +91,8 @@ pub struct Session<'a> {
     pub(super) other: Data<'a>,
     /// Whether the other logs run the path of the fitted ones.
     pub(super) one_path: bool,
+    /// Whether the other logs are taken to have been recorded in between the fitted ones.
+    pub(super) beside: bool,
     pub(super) folds: Folds,
     pub(super) effects: Vec<Box<dyn Effect>>,
     pub(super) accepted: Vec<Accepted>,
@@ -165,9 +171,11 @@ pub fn explain_with(
     let held =
         payload_on(body, logs, validate, options, &base, &mut other).map_err(ExplainError::Validate)?;
     let one_path = repeats(&data, &other);
+    let beside = running_time::settle(logs, validate, &data, &base, &mut other);
     let mut session = Session {
         held,
         one_path,
+        beside,
         data,
         other,
         folds,
@@ -199,7 +207,7 @@ pub fn explain_with(
     progress("asking placebos");
     session.count_false_positives();
     progress("looking at what is left");
-    Ok(session.result(before, &held_out))
+    session.result(before, &held_out)
 }
 
 impl Session<'_> {

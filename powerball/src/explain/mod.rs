@@ -4,8 +4,10 @@
 //! folds and another path, `placebo` measures how often the same questions are answered by chance on these very
 //! data, `rule` holds every threshold with its reason, `family` keeps what may stand together, `forward` adds one effect
 //! at a time, `naming` compares rivals, `open` keeps those that are not told apart, `leftover` says what stays,
-//! `correction` takes off of it what it can, `shown` draws what each name is seen by, `conclude` writes the result.
+//! `correction` takes off of it what it can, `shown` draws what each name is seen by, `compose` makes the model of what was
+//! accepted, `conclude` writes the result.
 
+mod compose;
 mod conclude;
 mod correction;
 mod curves;
@@ -23,6 +25,7 @@ mod page;
 mod placebo;
 mod result;
 mod rule;
+mod running_time;
 mod screen;
 mod shown;
 

@@ -36,15 +36,21 @@ fn same_path(a: &Recording, b: &Recording) -> bool {
     common > SAME * (own[0] * own[1]).sqrt()
 }
 
-/// Why a candidate cannot be judged on a repeated path; `None` where it can: what depends on speed, time or torque differs between
-/// repeats, and a ripple of many cycles resembles nothing else.
+/// Why a candidate cannot be judged on a repeated path; `None` where it can: what warms, is late or rubs at the joint's own speed
+/// is no function of the path alone, and a ripple of many cycles resembles nothing else. Positions, the rigid body's torque and
+/// the motion of other joints are functions of the path like any misfit.
 #[must_use]
 pub(super) fn cannot_be_judged(
     effect: &dyn Effect,
     candidate: &Candidate,
     data: &Data<'_>,
 ) -> Option<String> {
-    if effect.class() != Class::Position {
+    let of_the_path = match effect.class() {
+        Class::Position => true,
+        Class::Dynamics => effect.name() != "time_delay",
+        Class::Friction | Class::Event => false,
+    };
+    if !of_the_path {
         return None;
     }
     if effect.name() == "position_ripple"
@@ -57,5 +63,5 @@ pub(super) fn cannot_be_judged(
             return None;
         }
     }
-    Some("the logs to judge on run the same path: a term of the position cannot be told there from any other misfit; record another path".into())
+    Some("the logs to judge on run the same path: a function of the path cannot be told there from any other misfit; record another path".into())
 }

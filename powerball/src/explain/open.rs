@@ -25,6 +25,8 @@ pub struct Hypothesis {
     effects: Vec<(usize, Candidate)>,
     /// How many of them are of the open name.
     own: usize,
+    /// The columns of the open name on the logs that it was fitted to.
+    pub fitted_columns: Vec<Column>,
     /// The model.
     pub fit: Fit,
 }
@@ -38,12 +40,11 @@ impl Open {
 }
 
 impl Hypothesis {
-    /// Coefficients of the open name.
+    /// The columns of the open name on some data.
     #[must_use]
-    pub fn own_columns(&self, data: &Data<'_>) -> usize {
+    pub fn own_columns(&self, data: &Data<'_>) -> Vec<Column> {
         let context = Context::new(data, &self.fit, &[]);
-        let own = &self.effects[self.effects.len() - self.own..];
-        columns(&effects::all(), &context, own).len()
+        columns(&effects::all(), &context, &self.effects[self.effects.len() - self.own..])
     }
 
     /// The columns of the whole model on some data.
@@ -57,14 +58,13 @@ impl Hypothesis {
     /// What this name explains alone on some data, by joint, N·m.
     #[must_use]
     pub fn own_torque(&self, data: &Data<'_>) -> Vec<Vec<f64>> {
-        let context = Context::new(data, &self.fit, &[]);
-        let columns = columns(&effects::all(), &context, &self.effects);
-        let own = &self.effects[self.effects.len() - self.own..];
-        let first = columns.len() - self::columns(&effects::all(), &context, own).len();
+        let columns = self.own_columns(data);
+        let first = self.fit.design.size - self.fit.design.extra(0) - columns.len();
         let mut torque: Vec<Vec<f64>> = data.joints.iter().map(|rows| vec![0.0; rows.len()]).collect();
-        for (k, column) in columns.iter().enumerate().skip(first) {
+        for (k, column) in columns.iter().enumerate() {
+            let coefficient = self.fit.coefficient(first + k);
             for (j, values) in &column.parts {
-                torque[*j].iter_mut().zip(values).for_each(|(t, v)| *t += self.fit.coefficient(k) * v);
+                torque[*j].iter_mut().zip(values).for_each(|(t, v)| *t += coefficient * v);
             }
         }
         torque
@@ -75,7 +75,20 @@ impl Hypothesis {
     pub fn fitted_to(&self, data: &Data<'_>, folds: &Folds) -> Hypothesis {
         let mut effects = self.effects.clone();
         let fit = refitted(data, folds, &effects::all(), &mut effects, &self.fit);
-        Hypothesis { name: self.name, joints: self.joints.clone(), effects, own: self.own, fit }
+        Hypothesis::new(data, self.name, self.joints.clone(), effects, self.own, fit)
+    }
+
+    fn new(
+        data: &Data<'_>,
+        name: &'static str,
+        joints: Vec<usize>,
+        effects: Vec<(usize, Candidate)>,
+        own: usize,
+        fit: Fit,
+    ) -> Hypothesis {
+        let mut new = Hypothesis { name, joints, effects, own, fitted_columns: Vec::new(), fit };
+        new.fitted_columns = new.own_columns(data);
+        new
     }
 }
 
@@ -208,13 +221,7 @@ impl Session<'_> {
             let mut joints: Vec<usize> = candidates.iter().flat_map(|c| c.joints.clone()).collect();
             joints.sort_unstable();
             joints.dedup();
-            Hypothesis {
-                name: self.effects[*effect].name(),
-                joints,
-                effects: all,
-                own: candidates.len(),
-                fit,
-            }
+            Hypothesis::new(&self.data, self.effects[*effect].name(), joints, all, candidates.len(), fit)
         };
         Some(Open { hypotheses: question.proposals.iter().map(hypothesis).collect() })
     }

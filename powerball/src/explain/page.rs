@@ -89,8 +89,8 @@ fn effects(page: &mut Page, explained: &Explained) {
     if !explained.shown.is_empty() {
         page.paragraph(
             "Each figure shows the residual of the fitted logs over the signal that the effect depends on: grey dots without this effect but \
-             with all others, green dots with it. Lines are means over equal numbers of samples. Where the law is right the green line is \
-             flat, and the orange one runs through the grey dots.",
+             with all others, green dots with it. Lines are means over equal numbers of samples. Where the law is right, the orange line \
+             lies on the purple one and the blue line on zero.",
         );
     }
     for effect in explained.effects.iter().filter(|e| !e.rivals.is_empty()) {
@@ -110,9 +110,9 @@ fn sight(shown: &Shown) -> Figure {
         .height(1.3)
         .series(Series::points("without the effect", Ink::Grey, rows(1)))
         .series(Series::points("with it", Ink::Green, rows(2)))
-        .series(Series::broad("what the effect adds, mean", Ink::Orange, means(3)))
-        .line("without it, mean", Ink::Purple, means(1))
-        .line("with it, mean", Ink::Blue, means(2));
+        .series(Series::broad("mean of what it adds", Ink::Orange, means(3)))
+        .line("mean without", Ink::Purple, means(1))
+        .line("mean with it", Ink::Blue, means(2));
     Figure::new(format!("{} on joint {}", shown.effect, shown.joint), shown.signal.as_str()).panel(panel)
 }
 

@@ -5,6 +5,7 @@ use super::curves::TorqueCurve;
 use super::open::Open;
 use super::shown::Shown;
 use crate::estimate::Spread;
+use crate::torque_model::TorqueModel;
 use serde::Serialize;
 use serde_json::Value;
 use std::sync::Arc;
@@ -43,6 +44,9 @@ pub struct Explained {
     /// Torques over time on the other path, by joint; not part of the JSON.
     #[serde(skip)]
     pub curves: Vec<TorqueCurve>,
+    /// The model with everything that was named: model.json. Its errors are `after`.
+    #[serde(skip)]
+    pub model: TorqueModel,
     /// The plots that show the effects; not part of the JSON.
     #[serde(skip)]
     pub shown: Vec<Shown>,

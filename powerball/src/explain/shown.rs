@@ -15,9 +15,9 @@ pub struct Shown {
     pub signal: String,
     /// Whether torques are taken against the direction of motion: friction is then positive.
     pub against_motion: bool,
-    /// By row: the signal; the residual of the model without this effect but with all others; that with it.
-    pub rows: Vec<[f64; 3]>,
-    /// The same as means over equal shares of the rows, in the order of the signal, and what the effect adds.
+    /// By row: the signal; the residual of the model without this effect but with all others; that with it; what it adds.
+    pub rows: Vec<[f64; 4]>,
+    /// The same as means over equal shares of the rows, in the order of the signal; none over time.
     pub means: Vec<[f64; 4]>,
 }
 
@@ -25,6 +25,8 @@ pub struct Shown {
 const MEANS: usize = 24;
 /// Joints shown of an effect that acts on several.
 const JOINTS: usize = 2;
+/// What builds up over a way is seen within so many of it.
+const WAYS: f64 = 10.0;
 /// Steps of the encoders look like turning back; a joint turns back when it has come this far the other way, rad or m.
 const TURNED: f64 = 1e-3;
 
@@ -62,25 +64,19 @@ impl Session<'_> {
 
 fn plot(context: &Context<'_>, effect: &str, axis: Axis, joint: usize, own: &[f64]) -> Shown {
     let signal = values(context, axis, joint, own);
-    let against_motion = matches!(axis, Axis::Load | Axis::Travel | Axis::Warmth);
+    let against_motion = matches!(axis, Axis::Load | Axis::Travel(_) | Axis::Warmth);
     let speed = rows(context, joint, |r| context.data.recordings[r].speed(joint).collect());
     let sign = |row: usize| if against_motion { speed[row].signum() } else { 1.0 };
-    let rows: Vec<[f64; 3]> = (0..signal.len())
+    let seen = |row: &usize| !matches!(axis, Axis::Travel(way) if signal[*row] > WAYS * way);
+    let rows: Vec<[f64; 4]> = (0..signal.len())
+        .filter(seen)
         .map(|row| {
-            let after = context.residual[joint][row];
-            [signal[row], sign(row) * (after + own[row]), sign(row) * after]
+            let (after, own) = (sign(row) * context.residual[joint][row], sign(row) * own[row]);
+            [signal[row], after + own, after, own]
         })
         .collect();
-    let mut means = vec![[0.0; 4]; MEANS];
-    let mut counts = [0.0; MEANS];
-    for (row, bin) in quantile_bins(&signal, MEANS).into_iter().enumerate() {
-        let [x, before, after] = rows[row];
-        let add = [x, before, after, sign(row) * own[row]];
-        means[bin].iter_mut().zip(add).for_each(|(m, v)| *m += v);
-        counts[bin] += 1.0;
-    }
-    means.iter_mut().zip(counts).for_each(|(m, n)| m.iter_mut().for_each(|v| *v /= n));
-    means.retain(|m| m.iter().all(|v| v.is_finite()));
+    // Means over a time in which the arm goes here and there say nothing.
+    let means = if axis == Axis::Time { Vec::new() } else { means(&rows) };
     Shown {
         effect: effect.to_string(),
         joint: joint + 1,
@@ -89,6 +85,19 @@ fn plot(context: &Context<'_>, effect: &str, axis: Axis, joint: usize, own: &[f6
         rows,
         means,
     }
+}
+
+fn means(rows: &[[f64; 4]]) -> Vec<[f64; 4]> {
+    let mut means = vec![[0.0; 4]; MEANS];
+    let mut counts = [0.0; MEANS];
+    let signal: Vec<f64> = rows.iter().map(|row| row[0]).collect();
+    for (row, bin) in rows.iter().zip(quantile_bins(&signal, MEANS)) {
+        means[bin].iter_mut().zip(row).for_each(|(m, v)| *m += v);
+        counts[bin] += 1.0;
+    }
+    means.iter_mut().zip(counts).for_each(|(m, n)| m.iter_mut().for_each(|v| *v /= n));
+    means.retain(|m| m.iter().all(|v| v.is_finite()));
+    means
 }
 
 fn in_words(axis: Axis, joint: usize, context: &Context<'_>) -> String {
@@ -102,7 +111,7 @@ fn in_words(axis: Axis, joint: usize, context: &Context<'_>) -> String {
         Axis::Speed(j) => format!("speed of joint {} [{}/s]", j + 1, unit(j)),
         Axis::Torque => "torque of the rigid arm [N·m]".to_string(),
         Axis::Load => "size of the torque that the rigid arm asks of the joint [N·m]".to_string(),
-        Axis::Travel => format!("way since the joint turned back [{}]", unit(joint)),
+        Axis::Travel(_) => format!("way since the joint turned back [{}]", unit(joint)),
         Axis::TorqueRate => "change of the rigid arm's torque [N·m/s]".to_string(),
         Axis::Warmth | Axis::Time => "time along all logs [s]".to_string(),
         Axis::Law => "what the effect adds [N·m]".to_string(),
@@ -124,7 +133,7 @@ fn values(context: &Context<'_>, axis: Axis, joint: usize, own: &[f64]) -> Vec<f
         Axis::Speed(j) => rows(context, joint, |r| data.recordings[r].speed(j).collect()),
         Axis::Torque => rows(context, joint, rigid),
         Axis::Load => rows(context, joint, |r| rigid(r).into_iter().map(f64::abs).collect()),
-        Axis::Travel => rows(context, joint, |r| travel(data.recordings[r].position(joint))),
+        Axis::Travel(_) => rows(context, joint, |r| travel(data.recordings[r].position(joint))),
         Axis::TorqueRate => rows(context, joint, |r| {
             let (torque, rate) = (rigid(r), data.recordings[r].rate);
             let last = torque.len() - 1;
@@ -176,6 +185,17 @@ fn travel(q: impl Iterator<Item = f64>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn means_follow_the_signal_and_share_the_rows() {
+        let rows: Vec<[f64; 4]> =
+            (0..240).rev().map(|k| [f64::from(k), 2.0 * f64::from(k), 1.0, 0.0]).collect();
+        let means = means(&rows);
+        assert_eq!(means.len(), MEANS);
+        assert!(means.windows(2).all(|m| m[0][0] < m[1][0]));
+        assert!(means.iter().all(|m| (m[1] - 2.0 * m[0]).abs() < 1e-9 && m[2] == 1.0));
+        assert!(super::means(&[]).is_empty());
+    }
 
     #[test]
     fn travel_counts_from_where_the_joint_turned_back() {

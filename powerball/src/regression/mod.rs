@@ -12,3 +12,4 @@ pub use prepare::{Data, DataError, DataOptions};
 pub use recording::Recording;
 pub use rigid::RigidBody;
 pub use rows::{Block, Column, JointRows};
+pub use silent::silent_joints;

@@ -1,12 +1,12 @@
 //! Logs of an arm into rows: even grid, derivatives, band, rest removed, blocks laid out.
 
-use super::silent::{Silent, dead};
+use super::silent::{dead, silent_joints};
 use super::{Block, Column, JointRows, Recording, RigidBody};
 use crate::log::Log;
 use crate::parallel;
 use crate::signal::resample::median_step;
 use crate::signal::{Band, rest};
-use dyngen::arm::{JointKind, Parameter, ParameterKind};
+use dyngen::arm::{Parameter, ParameterKind};
 use std::fmt;
 use std::sync::OnceLock;
 
@@ -132,9 +132,7 @@ impl<'a> Data<'a> {
             })
             .collect();
         let top_speed = (0..n).map(|j| top_speed(&recordings, j)).collect();
-        let kinds: Vec<JointKind> = body.arm().joints.iter().map(|joint| joint.kind).collect();
-        let silent: Vec<Option<Silent>> =
-            kinds.iter().enumerate().map(|(j, kind)| Silent::of(&recordings, j, *kind)).collect();
+        let silent = silent_joints(body.arm(), logs);
         let mut kept = keep_moving(&recordings, &band, &rest_speed, n);
         for (j, kept) in kept.iter_mut().enumerate() {
             for (kept, recording) in kept.iter_mut().zip(&recordings) {
@@ -152,9 +150,6 @@ impl<'a> Data<'a> {
             }
         }
         let joints = joint_rows(body, &recordings, &band, kept);
-        let unit = |j: usize| if kinds[j] == JointKind::Prismatic { "m" } else { "rad" };
-        let silent: Vec<Option<String>> =
-            silent.iter().enumerate().map(|(j, s)| Some(s.as_ref()?.note(j + 1, unit(j)))).collect();
         if joints.iter().all(|j| j.len() < 20) {
             return Err(DataError::NoMotion(silent.into_iter().flatten().collect()));
         }

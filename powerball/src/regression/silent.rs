@@ -1,6 +1,8 @@
 //! Joints whose samples say nothing, and why.
 
 use super::Recording;
+use crate::log::Log;
+use dyngen::Arm;
 use dyngen::arm::JointKind;
 
 /// A joint that moves by less than this in all logs only winds up its gear and its seals: its friction is not sliding friction,
@@ -9,7 +11,7 @@ const LEAST_TRAVEL: [f64; 2] = [0.05, 0.01];
 
 /// Why a joint's samples cannot be used.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Silent {
+enum Silent {
     /// It does not move.
     Still,
     /// It moves by so little, with the least that would do.
@@ -18,19 +20,29 @@ pub(super) enum Silent {
     Dead,
 }
 
+/// For each joint why nothing can be said of it from these logs, and what to record instead; `None` where there can.
+#[must_use]
+pub fn silent_joints(arm: &Arm, logs: &[Log]) -> Vec<Option<String>> {
+    let why = |(j, joint): (usize, &dyngen::arm::Joint)| {
+        let unit = if joint.kind == JointKind::Prismatic { "m" } else { "rad" };
+        Silent::of(logs, j, joint.kind).map(|silent| silent.note(j + 1, unit))
+    };
+    arm.joints.iter().enumerate().map(why).collect()
+}
+
 impl Silent {
-    /// Why a joint says nothing in any recording; `None` where it does.
-    pub(super) fn of(recordings: &[Recording], joint: usize, kind: JointKind) -> Option<Silent> {
-        let positions = recordings.iter().flat_map(|r| r.position(joint));
-        let (low, high) =
-            positions.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| (l.min(q), h.max(q)));
+    fn of(logs: &[Log], joint: usize, kind: JointKind) -> Option<Silent> {
+        let positions = logs.iter().flat_map(|log| &log.q[joint]);
+        let [low, high] =
+            positions.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(*q), high.max(*q)]);
         let travel = (high - low).max(0.0);
         let least = LEAST_TRAVEL[usize::from(kind == JointKind::Prismatic)];
+        let changes = |log: &Log| log.torque[joint].windows(2).any(|pair| pair[0] != pair[1]);
         if travel < 1e-4 * least {
             Some(Silent::Still)
         } else if travel < least {
             Some(Silent::HardlyMoves(travel, least))
-        } else if recordings.iter().all(|r| dead(r, joint)) {
+        } else if !logs.iter().any(changes) {
             Some(Silent::Dead)
         } else {
             None
@@ -38,7 +50,7 @@ impl Silent {
     }
 
     /// In words, for the joint numbered from 1.
-    pub(super) fn note(&self, joint: usize, unit: &str) -> String {
+    fn note(&self, joint: usize, unit: &str) -> String {
         let lost = "neither its friction nor any effect on it can be judged, and its torque was not used";
         match self {
             Silent::Still => format!(

@@ -30,12 +30,14 @@ impl Undeclared {
         serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))
     }
 
-    /// The arm with closed brakes at `start`, rad; `seed` draws the sensors' noise.
+    /// The arm with closed brakes at `start`, rad; `seed` draws the sensors' noise, and where `commutated` the motors know
+    /// their commutation already.
     ///
     /// # Errors
     /// None for the arm file that is built in.
-    pub fn arm(&self, start: [f64; 6], seed: u64) -> Result<VirtualArm, Diagnostics> {
-        let setup = lwa4p::setup(start, seed)?;
+    pub fn arm(&self, start: [f64; 6], seed: u64, commutated: bool) -> Result<VirtualArm, Diagnostics> {
+        let mut setup = lwa4p::setup(start, seed)?;
+        setup.modules.iter_mut().for_each(|module| module.commutated = commutated);
         let plant = setup.plant.clone().with(self.effect.clone());
         VirtualArm::new(Setup { plant, age: self.age, ..setup })
             .ok_or_else(|| Diagnostics::whole_file("lwa4p.toml", "six joints are needed"))

@@ -3,12 +3,13 @@
 use super::case::Case;
 use super::judge::{Named, Outcome, named};
 use dyngen::Arm;
-use powerball::estimate::{Folds, consistent_fit, fit};
+use powerball::estimate::{Folds, FrictionLaw, consistent_fit, fit, solve_reduced};
 use powerball::explain::{Explained, explain};
 use powerball::friction::TanhFriction;
 use powerball::log::{Log, common_clock, read_logs};
 use powerball::motion::Motion;
 use powerball::regression::{Data, DataOptions, Recording, RigidBody};
+use powerball::summary::Summary;
 use powerball::virtual_arm::{Chain, Dynamics, Effect, Plant, Sensors, bodies};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -53,7 +54,12 @@ impl Measured {
         let plant = {
             let data = Data::new(&body, &logs[..FIT.len()], &options).map_err(|e| e.to_string())?;
             let base = fit(&data, &Folds::new(&data), &[], None);
-            let possible = consistent_fit(&data, &base).map_err(|e| e.to_string())?;
+            let mut summary = Summary::new(&body, &options);
+            for log in &logs[..FIT.len()] {
+                summary.push(&body, log, &options, None).map_err(|e| e.to_string())?;
+            }
+            let reduced = solve_reduced(&summary, FrictionLaw::Symmetric);
+            let possible = consistent_fit(&body, &reduced).map_err(|e| e.to_string())?;
             let links = bodies(&possible.consistent.all).ok_or("the arm has no bodies")?;
             let dynamics = Dynamics::new(Chain::new(&arm), links).ok_or("the arm is no chain of bodies")?;
             let friction = (0..data.dof()).map(|j| TanhFriction::new(base.friction(j))).collect();

@@ -1,3 +1,4 @@
+mod correction;
 mod measured;
 mod plant;
 mod study;

@@ -1,0 +1,354 @@
+//! The inertial parameters in the form that the recursions like best.
+//!
+//! Torques depend on a parameter set only through as many sums as its rank. Which sums is free: each is carried by one
+//! column of the dynamics, and the columns of second moments in the frames of the chain are cheaper than those of the
+//! arm's file. The sums are linear in the set's parameters and depend on no state, so they are prepared once.
+
+use super::body::constant;
+use super::chain::{self, LinkGeometry, Origins};
+use super::elements::{ArmElements, Source};
+use super::moments::{ENTRIES, Moments};
+use crate::arm::{Arm, JointKind, Parameter, ParameterKind};
+use crate::base::sets::{Combination, ParameterSet, minimal_coordinates};
+use crate::exact::algebra::Algebra;
+use crate::exact::constant::{Constant, ConstantField};
+use crate::exact::elimination::{self, Dependence};
+use crate::exact::rational::Rational;
+use crate::exact::symbols::AngleSymbols;
+use crate::graph::{Builder, Expr};
+
+/// What a link brings into the dynamics.
+#[derive(Clone, Debug)]
+pub struct LinkBody {
+    /// Moments in the link's frame.
+    pub moments: Moments<Expr>,
+    /// A mass at the next link's origin.
+    pub end_mass: Expr,
+    /// Inertia of the rotor that drives the link's joint.
+    pub rotor: Expr,
+    /// A sphere with unit moment of inertia, less the same one in the link before the stage.
+    pub flywheel: Expr,
+}
+
+/// A column of the dynamics that may carry a sum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Column {
+    Entry(usize, usize),
+    EndMass(usize),
+    Rotor(usize),
+    Flywheel(usize),
+    /// A parameter of the set as it is.
+    Given(usize),
+}
+
+/// A rule for which columns carry the sums.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Order {
+    /// Where the origins lie on their axes.
+    pub origins: Origins,
+    /// Masses at the ends of links, not first moments along the axes.
+    pub masses: bool,
+    /// Stages from the base whose links keep a flywheel, not one of the second moments across the axis.
+    pub flywheels: usize,
+}
+
+impl Order {
+    /// Rules for each place of the origins.
+    pub const RULES: usize = 6;
+
+    /// Every rule that is tried.
+    pub fn all() -> impl Iterator<Item = Order> {
+        [Origins::Inner, Origins::Outer].into_iter().flat_map(|origins| {
+            let of = move |(flywheels, masses): (usize, bool)| Order { origins, masses, flywheels };
+            [(2, true), (2, false), (1, true), (1, false), (0, true), (0, false)].into_iter().map(of)
+        })
+    }
+
+    fn rank(self, arm: &Arm, stage_of: &[usize], column: Column) -> (usize, usize) {
+        let revolute = |link: usize| arm.joints[link].kind == JointKind::Revolute;
+        let wheels = |link: usize| revolute(link) && stage_of[link] < self.flywheels;
+        let (rank, link) = match column {
+            Column::Entry(link, entry) => {
+                let rank = match entry {
+                    0 => {
+                        if revolute(link) {
+                            6
+                        } else {
+                            2
+                        }
+                    }
+                    3 if revolute(link) => {
+                        if self.masses {
+                            5
+                        } else {
+                            4
+                        }
+                    }
+                    6 if revolute(link) => 7,
+                    5 if wheels(link) => 3,
+                    1..=3 => 0,
+                    _ => {
+                        if revolute(link) {
+                            0
+                        } else {
+                            7
+                        }
+                    }
+                };
+                (rank, link)
+            }
+            Column::EndMass(link) => (if self.masses { 4 } else { 5 }, link),
+            Column::Flywheel(link) => (if wheels(link) { 0 } else { 9 }, link),
+            Column::Rotor(link) => (8, link),
+            Column::Given(parameter) => return (10, parameter),
+        };
+        (rank, link)
+    }
+}
+
+/// The sums and the columns that carry them.
+#[derive(Clone, Debug)]
+pub struct Regrouping {
+    /// The rule.
+    pub order: Order,
+    columns: Vec<(Column, Vec<(usize, Constant)>)>,
+}
+
+/// Lengths and twists as constants; what depends on q is not asked for.
+struct Constants<'a> {
+    field: &'a ConstantField,
+    arm: &'a Arm,
+}
+
+impl Constants<'_> {
+    fn number(&self, value: &Rational) -> Constant {
+        self.field.rational(value.clone())
+    }
+}
+
+impl Source<Constant> for Constants<'_> {
+    fn joint_trig(&mut self, _: usize) -> (Constant, Constant) {
+        (self.field.integer(0), self.field.integer(1))
+    }
+    fn position(&mut self, _: usize) -> Constant {
+        self.field.integer(0)
+    }
+    fn speed(&mut self, _: usize) -> Constant {
+        self.field.integer(0)
+    }
+    fn a(&mut self, joint: usize) -> Constant {
+        self.number(&self.arm.joints[joint].a)
+    }
+    fn d(&mut self, joint: usize) -> Constant {
+        self.number(&self.arm.joints[joint].d)
+    }
+    fn ratio(&mut self, _: usize) -> Constant {
+        self.field.integer(1)
+    }
+    fn gravity(&mut self, axis: usize) -> Constant {
+        self.number(&self.arm.gravity[axis])
+    }
+    fn symbol(&mut self, index: usize, sine: bool) -> Constant {
+        self.field.whole(self.field.symbol(index, sine).clone())
+    }
+}
+
+/// Moments in the chain's frames against parameters of the file, over an arm's constants.
+struct Map<'a> {
+    field: &'a ConstantField,
+    links: Vec<LinkGeometry<Constant>>,
+}
+
+impl<'a> Map<'a> {
+    fn new(arm: &Arm, symbols: &AngleSymbols, field: &'a ConstantField, origins: Origins) -> Self {
+        let elements = ArmElements::build(field, arm, symbols, &mut Constants { field, arm });
+        Map { field, links: chain::geometry(field, arm, origins, &elements) }
+    }
+
+    /// What a unit of a parameter of the file is in the link's frame.
+    fn of_parameter(&self, parameter: Parameter) -> Moments<Constant> {
+        use ParameterKind::*;
+        let f = self.field;
+        let mut v: [Constant; ENTRIES] = std::array::from_fn(|_| f.integer(0));
+        let half = |x: i64| f.rational(Rational::new(x.into(), 2.into()));
+        // J = ½ tr(I) − I
+        let square = |axis: usize| [4, 5, 6].map(|e| (e, if e == 4 + axis { half(-1) } else { half(1) }));
+        match parameter.kind {
+            M | Mx | My | Mz => v[parameter.kind as usize] = f.integer(1),
+            Ixx => square(0).into_iter().for_each(|(e, x)| v[e] = x),
+            Iyy => square(1).into_iter().for_each(|(e, x)| v[e] = x),
+            Izz => square(2).into_iter().for_each(|(e, x)| v[e] = x),
+            Iyz => v[7] = f.integer(1),
+            Ixz => v[8] = f.integer(1),
+            Ixy => v[9] = f.integer(1),
+            Im => {}
+        }
+        let link = &self.links[parameter.link];
+        let (s, c) = &link.file_turn;
+        Moments::from_entries(&v).turned_back_x(f, s, c).shifted(f, &link.file_origin)
+    }
+
+    /// Moments in a link's frame as a combination of parameters of the file.
+    fn of_moments(&self, link: usize, moments: &Moments<Constant>) -> Combination {
+        use ParameterKind::*;
+        let f = self.field;
+        let geometry = &self.links[link];
+        let back = geometry.file_origin.each_ref().map(|x| Algebra::neg(f, x));
+        let (s, c) = &geometry.file_turn;
+        let body = moments.shifted(f, &back).turned_back_x(f, &Algebra::neg(f, s), c);
+        let [xx, yy, zz] = &body.square;
+        let [x, y, z] = body.first;
+        let [yz, xz, xy] = body.mixed;
+        let inertia = [(Ixx, f.add(yy, zz)), (Iyy, f.add(zz, xx)), (Izz, f.add(xx, yy))];
+        [(M, body.mass), (Mx, x), (My, y), (Mz, z), (Iyz, yz), (Ixz, xz), (Ixy, xy)]
+            .into_iter()
+            .chain(inertia)
+            .filter(|(_, value)| !value.is_zero())
+            .map(|(kind, value)| (Parameter { link, kind }, value))
+            .collect()
+    }
+
+    fn unit(&self, link: usize, entry: usize) -> Combination {
+        let f = self.field;
+        let v = std::array::from_fn(|e| f.integer(i64::from(e == entry)));
+        self.of_moments(link, &Moments::from_entries(&v))
+    }
+
+    fn sphere(&self, link: usize, sign: i64) -> Combination {
+        let f = self.field;
+        let half = f.rational(Rational::new(sign.into(), 2.into()));
+        let v = std::array::from_fn(|e| if (4..7).contains(&e) { half.clone() } else { f.integer(0) });
+        self.of_moments(link, &Moments::from_entries(&v))
+    }
+
+    /// The parameters of the file that a column stands for.
+    fn parameters(&self, column: Column, before_stage: &[Option<usize>], set: &ParameterSet) -> Combination {
+        let f = self.field;
+        match column {
+            Column::Entry(link, entry) => self.unit(link, entry),
+            Column::EndMass(link) => {
+                let mass = std::array::from_fn(|e| f.integer(i64::from(e == 0)));
+                let at_end = Moments::from_entries(&mass).shifted(f, &self.links[link].reach);
+                self.of_moments(link, &at_end)
+            }
+            Column::Rotor(link) => vec![(Parameter { link, kind: ParameterKind::Im }, f.integer(1))],
+            Column::Flywheel(link) => {
+                let mut sum = self.sphere(link, 1);
+                if let Some(before) = before_stage[link] {
+                    sum.extend(self.sphere(before, -1));
+                }
+                sum
+            }
+            Column::Given(parameter) => set.parameters[parameter].carriers.clone(),
+        }
+    }
+}
+
+impl Regrouping {
+    /// The sums of a set under a rule. Without `minimal`, or where the elimination is not certified, the set's parameters
+    /// as they are.
+    pub fn new(
+        arm: &Arm,
+        symbols: &AngleSymbols,
+        field: &ConstantField,
+        minimal: &Dependence,
+        set: &ParameterSet,
+        order: Order,
+    ) -> Regrouping {
+        let map = Map::new(arm, symbols, field, order.origins);
+        let n = arm.dof();
+        let mut before_stage = vec![None; n];
+        let mut stage_of = vec![0; n];
+        for (s, stage) in chain::stages(arm).into_iter().enumerate() {
+            for i in stage.clone() {
+                before_stage[i] = stage.start.checked_sub(1);
+                stage_of[i] = s;
+            }
+        }
+        let mut columns: Vec<Column> = (0..n)
+            .flat_map(|link| {
+                let entries = (0..ENTRIES).map(move |entry| Column::Entry(link, entry));
+                entries.chain([Column::EndMass(link), Column::Rotor(link), Column::Flywheel(link)])
+            })
+            .collect();
+        let given = (0..set.parameters.len()).map(Column::Given);
+        columns.extend(given.clone());
+        columns.sort_by_key(|c| order.rank(arm, &stage_of, *c));
+        let coordinates: Vec<Option<Vec<(usize, Constant)>>> = columns
+            .iter()
+            .map(|c| {
+                let sum = map.parameters(*c, &before_stage, set);
+                sum.iter().all(|(p, _)| arm.keeps(*p)).then(|| minimal_coordinates(field, minimal, &sum))
+            })
+            .collect();
+        let (columns, coordinates): (Vec<Column>, Vec<_>) =
+            columns.into_iter().zip(coordinates).filter_map(|(c, x)| Some((c, x?))).unzip();
+        let dependence = elimination::dependence_of_columns(field, &coordinates, minimal.kept.len());
+        let Ok(dependence) = dependence else {
+            let one = |p: usize| vec![(p, field.integer(1))];
+            return Regrouping { order, columns: given.enumerate().map(|(p, c)| (c, one(p))).collect() };
+        };
+        let mut sums: Vec<(Column, Vec<(usize, Constant)>)> =
+            dependence.kept.iter().map(|k| (columns[*k], Vec::new())).collect();
+        for (column, coordinates) in columns.iter().zip(&dependence.coordinates) {
+            if let Column::Given(parameter) = column {
+                for (position, factor) in coordinates {
+                    sums[*position].1.push((*parameter, factor.clone()));
+                }
+            }
+        }
+        Regrouping { order, columns: sums }
+    }
+
+    /// The links with the sums in place, for values of the set's parameters.
+    pub fn bodies(
+        &self,
+        b: &Builder,
+        arm: &Arm,
+        symbols: &AngleSymbols,
+        field: &ConstantField,
+        set: &ParameterSet,
+        value: impl Fn(usize) -> Expr,
+    ) -> Vec<LinkBody> {
+        let none = LinkBody {
+            moments: Moments::none(b),
+            end_mass: Expr::ZERO,
+            rotor: Expr::ZERO,
+            flywheel: Expr::ZERO,
+        };
+        let mut bodies = vec![none; arm.dof()];
+        let map = Map::new(arm, symbols, field, self.order.origins);
+        let term = |factor: &Constant, x: Expr| b.mul(&constant(b, field, factor), &x);
+        for (column, sum) in &self.columns {
+            let sum =
+                sum.iter().fold(Expr::ZERO, |total, (p, factor)| b.add(&total, &term(factor, value(*p))));
+            let add = |to: &mut Expr, x: Expr| *to = b.add(to, &x);
+            match *column {
+                Column::Entry(link, entry) => {
+                    let mut entries = bodies[link].moments.entries();
+                    add(&mut entries[entry], sum);
+                    bodies[link].moments = Moments::from_entries(&entries);
+                }
+                Column::EndMass(link) => add(&mut bodies[link].end_mass, sum),
+                Column::Rotor(link) => add(&mut bodies[link].rotor, sum),
+                Column::Flywheel(link) => add(&mut bodies[link].flywheel, sum),
+                Column::Given(parameter) => {
+                    for (carrier, factor) in &set.parameters[parameter].carriers {
+                        let x = term(factor, sum);
+                        let body = &mut bodies[carrier.link];
+                        if carrier.kind == ParameterKind::Im {
+                            add(&mut body.rotor, x);
+                            continue;
+                        }
+                        let unit = map.of_parameter(*carrier).entries();
+                        let entries = body.moments.entries();
+                        body.moments = Moments::from_entries(&std::array::from_fn(|e| {
+                            b.add(&entries[e], &term(&unit[e], x))
+                        }));
+                    }
+                }
+            }
+        }
+        bodies
+    }
+}

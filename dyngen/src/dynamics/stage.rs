@@ -1,0 +1,213 @@
+//! The chain in expressions: stages of parallel axes with their angles, ready for a recursion.
+
+use super::body::{Vector, ZERO};
+use super::chain::{self, LinkGeometry, Origins};
+use super::elements::ArmElements;
+use crate::arm::{Arm, JointKind};
+use crate::exact::algebra::Algebra;
+use crate::graph::{Builder, Expr, Input, JointSum};
+
+/// Sine and cosine.
+pub type SinCos = (Expr, Expr);
+
+/// No turn.
+pub const STRAIGHT: SinCos = (Expr::ZERO, Expr::ONE);
+
+/// The form of a recursion: all forms give the same function, which is cheaper depends on the arm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Form {
+    /// Where origins lie on their axes.
+    pub origins: Origins,
+    /// Within a stage vectors are turned from link to link, not through the frame before the stage.
+    pub link_to_link: bool,
+    /// The last link keeps the axes of the frame before it, and its moments are turned instead.
+    pub last_in_frame_before: bool,
+    /// The regressor's forces are turned back to where their origin is at rest, not the axes' speeds outwards.
+    pub forces_home: bool,
+}
+
+impl Form {
+    /// One of them.
+    pub const FIRST: Form =
+        Form { origins: Origins::Inner, link_to_link: true, last_in_frame_before: true, forces_home: true };
+
+    /// Every form with some origins.
+    pub fn all(origins: Origins) -> impl Iterator<Item = Form> {
+        (0..8).map(move |k| Form {
+            origins,
+            link_to_link: k & 1 == 0,
+            last_in_frame_before: k & 2 == 0,
+            forces_home: k & 4 == 0,
+        })
+    }
+}
+
+/// A link in its stage.
+#[derive(Clone, Debug)]
+pub struct Member {
+    /// Its joint.
+    pub joint: usize,
+    /// Whether z points against the joint's axis.
+    pub reversed: bool,
+    /// The angle from the frame before the stage.
+    pub angle: SinCos,
+    /// The angle from the member before; for the first that from the frame before the stage.
+    pub step: SinCos,
+    /// From its origin to the next link's, in its own axes.
+    pub reach: Vector,
+    /// Gear ratio of its rotor.
+    pub ratio: Option<Expr>,
+}
+
+/// Joints with parallel axes, or one prismatic joint.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    /// How its joints move.
+    pub kind: JointKind,
+    /// The twist about x before it.
+    pub twist: SinCos,
+    /// Its links.
+    pub members: Vec<Member>,
+    /// Shift along z before its frame, of a prismatic joint.
+    pub shift: Expr,
+}
+
+/// An arm's stages from the base.
+#[derive(Clone, Debug)]
+pub struct Chain {
+    /// Gravity in the base frame.
+    pub gravity: Vector,
+    /// The stages.
+    pub stages: Vec<Stage>,
+    /// In which form recursions run along it.
+    pub form: Form,
+    /// The angle by which the last link's moments are turned back; straight unless the form says so.
+    pub last_turn: SinCos,
+}
+
+impl Chain {
+    /// The chain of an arm.
+    pub fn build(b: &Builder, arm: &Arm, elements: &ArmElements<Expr>, form: Form) -> Chain {
+        let links = chain::geometry(b, arm, form.origins, elements);
+        let stages = chain::stages(arm);
+        let mut stages: Vec<Stage> =
+            stages.into_iter().map(|joints| stage(b, arm, elements, &links, joints)).collect();
+        let mut last_turn = STRAIGHT;
+        if let Some(last) =
+            stages.last_mut().filter(|s| form.last_in_frame_before && s.kind == JointKind::Revolute)
+            && let Some(member) = last.members.last_mut()
+        {
+            // What is turned back to the frame before the stage has to come from there to the others.
+            last_turn = std::mem::replace(&mut member.angle, STRAIGHT);
+            if let [.., before, member] = &mut last.members[..] {
+                member.step = (-before.angle.0, before.angle.1);
+            } else if let Some(member) = last.members.last_mut() {
+                member.step = STRAIGHT;
+            }
+        }
+        Chain { gravity: elements.gravity, stages, form, last_turn }
+    }
+
+    /// Number of joints.
+    pub fn dof(&self) -> usize {
+        self.stages.iter().map(|s| s.members.len()).sum()
+    }
+}
+
+fn stage(
+    b: &Builder,
+    arm: &Arm,
+    elements: &ArmElements<Expr>,
+    links: &[LinkGeometry<Expr>],
+    joints: std::ops::Range<usize>,
+) -> Stage {
+    let first = joints.start;
+    let kind = arm.joints[first].kind;
+    let members = joints
+        .map(|i| {
+            let angle = match kind {
+                JointKind::Revolute => sum_of_angles(b, arm, links, first..i + 1),
+                JointKind::Prismatic => {
+                    signed(links[i].reversed, (elements.joints[i].sin, elements.joints[i].cos))
+                }
+            };
+            let step = if i == first { angle } else { sum_of_angles(b, arm, links, i..i + 1) };
+            let LinkGeometry { reversed, reach, .. } = links[i];
+            Member { joint: i, reversed, angle, step, reach, ratio: elements.joints[i].ratio }
+        })
+        .collect();
+    let shift = match kind {
+        JointKind::Revolute => Expr::ZERO,
+        JointKind::Prismatic if links[first].reversed => -elements.joints[first].shift,
+        JointKind::Prismatic => elements.joints[first].shift,
+    };
+    Stage { kind, twist: links[first].twist, members, shift }
+}
+
+fn signed(negative: bool, (s, c): SinCos) -> SinCos {
+    (if negative { -s } else { s }, c)
+}
+
+/// Sine and cosine of the sum of some joints' angles q + theta about the chain's z. Quarter turns swap and sign; any other
+/// theta is in the input.
+fn sum_of_angles(
+    b: &Builder,
+    arm: &Arm,
+    links: &[LinkGeometry<Expr>],
+    joints: std::ops::Range<usize>,
+) -> SinCos {
+    let (sum, negative) = JointSum::of(joints.clone().map(|i| (i, links[i].reversed)));
+    let (s, c) = signed(negative, (b.input(Input::Sin(sum)), b.input(Input::Cos(sum))));
+    let quarters: u8 = joints
+        .map(|i| {
+            let turns = arm.joints[i].theta.quarter_turns().unwrap_or(0);
+            if links[i].reversed { 4 - turns } else { turns }
+        })
+        .sum();
+    match quarters % 4 {
+        1 => (c, -s),
+        2 => (-s, -c),
+        3 => (-c, s),
+        _ => (s, c),
+    }
+}
+
+impl Stage {
+    /// The coordinates of the stage's links for values of the joints: about parallel axes the sums up to each joint.
+    pub fn coordinates(&self, b: &Builder, of_joint: &[Expr]) -> Vec<Expr> {
+        let mut sum = Expr::ZERO;
+        let own = |m: &Member| if m.reversed { -of_joint[m.joint] } else { of_joint[m.joint] };
+        self.members
+            .iter()
+            .map(|m| {
+                sum = b.add(&sum, &own(m));
+                sum
+            })
+            .collect()
+    }
+
+    /// Each member's reach in the axes of the frame before the stage.
+    pub fn reach_before(&self, b: &Builder, k: usize) -> Vector {
+        back_z(b, self.members[k].angle, &self.members[k].reach)
+    }
+}
+
+/// A vector's components in the axes before a turn about z.
+pub fn back_z(b: &Builder, (sin, cos): SinCos, v: &Vector) -> Vector {
+    super::elements::turn_z(b, &-sin, &cos, v)
+}
+
+/// A vector's components in the axes before a turn about x.
+pub fn back_x(b: &Builder, (sin, cos): SinCos, v: &Vector) -> Vector {
+    super::elements::turn_x(b, &-sin, &cos, v)
+}
+
+/// u + v
+pub fn plus(b: &Builder, u: &Vector, v: &Vector) -> Vector {
+    std::array::from_fn(|i| b.add(&u[i], &v[i]))
+}
+
+/// x·v
+pub fn scaled(b: &Builder, x: Expr, v: &Vector) -> Vector {
+    if x == Expr::ZERO { ZERO } else { v.map(|y| b.mul(&x, &y)) }
+}

@@ -1,0 +1,95 @@
+//! The laws against what they are said to be.
+
+use super::*;
+
+fn along(law: Law<f64>, q: &[f64]) -> Vec<f64> {
+    let mut memory = Memory::default();
+    let now =
+        |q| Instant { q, dq: &[], ddq: &[], rigid: &[2.0], friction: &[], temperature: &[], running: 0.0 };
+    q.iter().map(|x| law.value(0, &now(std::slice::from_ref(x)), &mut memory)).collect()
+}
+
+/// Wound fully one way and back by δ the state is 1 − 2·(1 − 1/e), whatever the step.
+#[test]
+fn the_presliding_state_winds_up_over_its_distance_whatever_the_step() {
+    let path = |steps: usize| -> Vec<f64> {
+        let up = (0..=steps).map(|k| k as f64 / steps as f64 * 0.1);
+        let down = (1..=steps).map(|k| 0.1 - k as f64 / steps as f64 * 0.01);
+        up.chain(down).collect()
+    };
+    for steps in [10, 1000] {
+        let z = along(Law::Presliding { distance: 0.01 }, &path(steps));
+        assert_eq!(z[0], 0.0);
+        assert!((z[steps] - 1.0).abs() < 1e-3);
+        approx::assert_abs_diff_eq!(z[2 * steps], -1.0 + 2.0 * (-1.0f64).exp(), epsilon = 1e-3);
+    }
+}
+
+#[test]
+fn the_gap_is_crossed_once_after_each_reversal() {
+    let q: Vec<f64> = (0..=100).map(|k| 0.01 * f64::from(50 - (k - 50i32).abs())).collect();
+    let torque = along(Law::Gap { gap: 0.055 }, &q);
+    assert!(torque[..51].iter().all(|x| *x == 0.0), "no gap before the first reversal");
+    assert_eq!(torque[51..].iter().filter(|x| **x == -2.0).count(), 5);
+    assert!(torque[60..].iter().all(|x| *x == 0.0));
+}
+
+/// Single precision is enough for a controller: a millionth of the torque.
+#[test]
+fn single_precision_agrees() {
+    let terms = [
+        (Law::Stribeck { steepness: 80.0, speed: 0.05 }, Law::Stribeck { steepness: 80.0f32, speed: 0.05 }),
+        (Law::Power { steepness: 80.0, power: 0.5 }, Law::Power { steepness: 80.0f32, power: 0.5 }),
+        (Law::Cosine { order: 7.0 }, Law::Cosine { order: 7.0f32 }),
+        (Law::Presliding { distance: 0.01 }, Law::Presliding { distance: 0.01f32 }),
+    ];
+    for (double, single) in terms {
+        let (mut a, mut b) = (Memory::default(), Memory::default());
+        for k in 0..200 {
+            let (q, v) = ((0.05 * f64::from(k)).sin(), (0.05 * f64::from(k)).cos());
+            let x = double.value(
+                0,
+                &Instant {
+                    q: &[q],
+                    dq: &[v],
+                    ddq: &[],
+                    rigid: &[],
+                    friction: &[],
+                    temperature: &[],
+                    running: 0.0,
+                },
+                &mut a,
+            );
+            let (q, v) = (q as f32, v as f32);
+            let y = single.value(
+                0,
+                &Instant {
+                    q: &[q],
+                    dq: &[v],
+                    ddq: &[],
+                    rigid: &[],
+                    friction: &[],
+                    temperature: &[],
+                    running: 0.0,
+                },
+                &mut b,
+            );
+            assert!((x - f64::from(y)).abs() < 1e-5, "{double:?} {k}: {x} {y}");
+        }
+    }
+}
+
+/// What a slice does not hold is zero and no panic, whatever joint a term names.
+#[test]
+fn a_joint_that_is_not_there_does_nothing() {
+    let mut corrector = Corrector::new([
+        Term { joint: 9, coefficient: 1.0, law: Law::Compliance },
+        Term { joint: 9, coefficient: 1.0, law: Law::OtherSpeed { other: 12 } },
+    ]);
+    let mut torque = [1.0, 2.0];
+    let now =
+        Instant { q: &[], dq: &[], ddq: &[], rigid: &[], friction: &[], temperature: &[], running: 0.0 };
+    corrector.move_links(&[1.0], &mut torque);
+    corrector.add_torques(&now, &mut torque);
+    assert_eq!(torque, [1.0, 2.0]);
+}
