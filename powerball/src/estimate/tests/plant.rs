@@ -40,7 +40,7 @@ pub(super) fn record(sensors: &Sensors, logs: usize, periods: usize, seed: u64) 
                 q: by_joint(&recording.q),
                 torque: by_joint(&recording.tau),
                 temperature: None,
-                pieces: vec![0..recording.t.len()],
+                pieces: std::iter::once(0..recording.t.len()).collect(),
                 clock: 0.0,
                 t: recording.t,
             }
