@@ -33,6 +33,7 @@ fn every_path_that_a_page_names_exists() {
         "docs/bus.md",
         "docs/transports.md",
         "docs/dyngen.md",
+        "docs/estimation.md",
         "docs/performance.md",
         "docs/explain.md",
         "docs/model.md",

@@ -110,3 +110,103 @@ fn a_model_of_another_arm_is_not_judged() {
         assert!(complaint.contains(reason) && complaint.contains("model.json"), "{complaint}");
     }
 }
+
+/// Summaries made one by one, mixed with a log, come to the answer of the logs, to the last digit; others are refused.
+#[test]
+fn summaries_stand_for_their_logs() {
+    let (folder, fit, other) = session("summaries");
+    let arm = folder.join("arm.toml").display().to_string();
+    let out = folder.join("result").display().to_string();
+    let file = |name: &str| folder.join(name).display().to_string();
+    let mut mixed = Vec::new();
+    for (k, log) in fit.iter().enumerate() {
+        let summary = file(&format!("{k}.summary"));
+        let done = powerball(&["summarize", "--arm", &arm, "--log", log, "--out", &summary, "--json"]);
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        assert_eq!(json(&done)["logs"][0], log.as_str());
+        mixed.push(if k == 0 { log.clone() } else { summary });
+    }
+    let answer = |logs: &[String]| json(&run(&["identify", "--arm", &arm], logs, &["--out", &out, "--json"]));
+    let (direct, reduced) = (answer(&fit), answer(&mixed));
+    for key in ["parameters", "friction", "fit", "consistent"] {
+        assert_eq!(direct[key], reduced[key], "{key}");
+    }
+
+    let refused = |files: &[String], rest: &[&str]| {
+        let done = run(&["identify", "--arm", &arm], files, &[&["--out", out.as_str()], rest].concat());
+        assert_eq!(done.status.code(), Some(2));
+        String::from_utf8_lossy(&done.stderr).into_owned()
+    };
+    assert!(refused(&mixed[1..2], &["--estimator", "robust"]).contains("give the log itself"));
+    assert!(refused(&[mixed[1].clone(), mixed[1].clone()], &[]).contains("given twice"));
+    let torn = file("torn.summary");
+    let bytes = std::fs::read(&mixed[1]).unwrap();
+    std::fs::write(&torn, &bytes[..bytes.len() / 2]).unwrap();
+    assert!(refused(&[torn], &[]).contains("torn or damaged"));
+    let changed = file("changed.toml");
+    let text = std::fs::read_to_string(&arm).unwrap().replacen("velocity = 1.257", "velocity = 1.25", 1);
+    std::fs::write(&changed, text).unwrap();
+    let done = run(&["identify", "--arm", &changed], &mixed[1..2], &["--out", &out]);
+    let complaint = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(
+        done.status.code() == Some(2) && complaint.contains("its arm file said something else"),
+        "{complaint}"
+    );
+    assert!(other.iter().all(|o| !fit.contains(o)));
+}
+
+/// Every estimator gives a model of these logs, and identified.json goes into generated code as it is.
+#[test]
+fn estimators_are_chosen_by_name_and_their_values_go_back() {
+    let (folder, fit, _) = session("estimators");
+    let arm = folder.join("arm.toml").display().to_string();
+    let weighted = json(&run(
+        &["identify", "--arm", &arm],
+        &fit,
+        &["--out", &folder.join("w").display().to_string(), "--json"],
+    ));
+    for estimator in ["robust", "instrumental"] {
+        let out = folder.join(estimator).display().to_string();
+        let options = ["--out", out.as_str(), "--estimator", estimator, "--friction", "asymmetric", "--json"];
+        let done = run(&["identify", "--arm", &arm], &fit, &options);
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let result = json(&done);
+        assert!(result["friction"][0]["offset"].is_number());
+        for (a, b) in
+            weighted["fit"]["rms"].as_array().unwrap().iter().zip(result["fit"]["rms"].as_array().unwrap())
+        {
+            assert!(b.as_f64().unwrap() < 1.2 * a.as_f64().unwrap());
+        }
+    }
+    let identified = folder.join("w/identified.json");
+    let values = dyngen::Values::read(&identified).unwrap();
+    let model = dyngen::Model::derive(dyngen::Arm::read(Path::new(&arm)).unwrap()).unwrap();
+    let values = values.of_set(&model, model.set(dyngen::SetKind::Minimal).unwrap()).unwrap();
+    assert_eq!(values[0], weighted["parameters"][0]["value"].as_f64().unwrap());
+
+    let out = folder.join("real.json").display().to_string();
+    let identified = identified.display().to_string();
+    let done = powerball(&["consistent", "--arm", &arm, "--values", &identified, "--out", &out, "--json"]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert!(json(&done)["distance"].as_array().unwrap().iter().all(|d| d.as_f64().unwrap() < 1.0));
+}
+
+/// Table 3 is no arm's: the nearest one is told with its distance, and is one by the generator's judgement.
+#[test]
+fn published_values_become_those_of_a_real_arm() {
+    let folder = scratch("published");
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (arm, table) =
+        (here.join("arm.toml").display().to_string(), here.join("table3.json").display().to_string());
+    let out = folder.join("real.json");
+    let written = out.display().to_string();
+    let done = powerball(&["consistent", "--arm", &arm, "--values", &table, "--out", &written, "--json"]);
+    let found = json(&done);
+    assert!(found["set"] == "published" && found["possible"] == false);
+    assert!(found["distance"][0].as_f64().unwrap() > 0.1);
+    let model = dyngen::Model::derive(dyngen::Arm::read(Path::new(&arm)).unwrap()).unwrap();
+    let (kind, values) = dyngen::Values::read(&out).unwrap().recognise(&model).unwrap();
+    assert!(dyngen::base::possible::check(&model, kind, &values).unwrap().possible);
+    let missing = powerball(&["consistent", "--arm", &arm, "--values", "nowhere.json", "--out", &written]);
+    assert_eq!(missing.status.code(), Some(2));
+}

@@ -6,8 +6,9 @@ use super::inputs::{Inputs, load, same_file};
 use super::output::{self, Progress};
 use super::reduced::{Reduced, in_memory, reduce};
 use crate::estimate::{
-    ConsistentReport, FrictionLaw, JointFriction, ParameterEstimate, Spread, consistent_fit, exchanged,
-    identify, solve_reduced, spread, spread_of,
+    ConsistentReport, Errors, FrictionLaw, JointFriction, ParameterEstimate, Solution, Spread,
+    consistent_fit, errors, exchanged, identify, solve_instrumental, solve_reduced, solve_robust, spread,
+    spread_of,
 };
 use crate::log::{Log, read_logs};
 use crate::regression::{Data, DataOptions, RigidBody};
@@ -42,6 +43,9 @@ pub(crate) struct Identify {
     /// The friction of every joint.
     #[arg(long, value_enum, default_value_t)]
     friction: Friction,
+    /// How rows are counted.
+    #[arg(long, value_enum, default_value_t)]
+    estimator: Estimator,
     /// Folder for the results; made if missing.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -58,6 +62,19 @@ enum Friction {
     Symmetric,
     /// Eq. 16 and a constant torque.
     Asymmetric,
+}
+
+/// An estimator by its name on the command line.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Estimator {
+    /// Least squares, every joint weighted by its noise.
+    #[default]
+    Weighted,
+    /// The same, and torque samples that the model cannot believe (knocks, spikes, brief collisions) count less or nothing.
+    Robust,
+    /// Instrumental variables: unbiased where positions are noisy. The regressor from every second sample of the positions,
+    /// its instruments from those between.
+    Instrumental,
 }
 
 /// identified.json.
@@ -92,10 +109,11 @@ impl Identify {
                 )));
             }
         }
-        let (Reduced { body, summary, shown, mut warnings }, held_out, additions) = match &self.model {
+        let whole = !matches!(self.estimator, Estimator::Weighted);
+        let (Reduced { body, summary, logs, mut warnings }, held_out, additions) = match &self.model {
             Some(model) => self.known(model, &options, &progress)?,
             None => {
-                let mut reduced = reduce(&self.arm, &self.log, &options, &progress)?;
+                let mut reduced = reduce(&self.arm, &self.log, &options, whole, &progress)?;
                 let (held_out, findings) = read_logs(&self.validate, reduced.body.arm())
                     .map_err(|e| Failure::Unusable(e.to_string()))?;
                 reduced.warnings.extend(findings.iter().map(ToString::to_string));
@@ -109,9 +127,27 @@ impl Identify {
             Friction::Symmetric => FrictionLaw::Symmetric,
             Friction::Asymmetric => FrictionLaw::Asymmetric,
         };
-        let solution = solve_reduced(&summary, law);
-        warnings.extend(exchanged(&body, &shown, &options, &spread_of(&solution, &solution.theta)));
-        let identified = identify(&summary, &solution);
+        let (solution, errors) = match self.estimator {
+            Estimator::Weighted => weighted(solve_reduced(&summary, law)),
+            Estimator::Instrumental => {
+                let start = solve_reduced(&summary, law);
+                solve_instrumental(&body, &logs, &options, &start).map_err(Failure::Refused)?
+            }
+            Estimator::Robust => {
+                let robust =
+                    solve_robust(&body, &logs, &options, law).map_err(|e| Failure::Refused(e.to_string()))?;
+                for (j, share) in robust.doubted.iter().enumerate().filter(|(_, share)| **share > 0.01) {
+                    warnings.push(format!(
+                        "joint {}: {:.1} % of the torque samples were beyond belief and counted less",
+                        j + 1,
+                        100.0 * share
+                    ));
+                }
+                weighted(robust.solution)
+            }
+        };
+        warnings.extend(exchanged(&body, &logs, &options, &spread_of(&solution, &solution.theta)));
+        let identified = identify(body.names(), &solution, &errors);
         let model = TorqueModel {
             arm: body.arm().name.clone(),
             set: SetKind::Minimal.to_string(),
@@ -128,7 +164,7 @@ impl Identify {
             let data = prepared(&body, &held_out, &options)?;
             Some(spread(&data, &model.residual(&body, &data, &[])))
         };
-        let figures = if held_out.is_empty() { &shown } else { &held_out };
+        let figures = if held_out.is_empty() { &logs } else { &held_out };
         let figures = Shown::new(&body, figures, &options, &model)?;
         let undetermined: Vec<&str> =
             identified.parameters.iter().filter(|p| p.std.is_none()).map(|p| p.name.as_str()).collect();
@@ -177,6 +213,11 @@ impl Identify {
         }
         Ok(())
     }
+}
+
+fn weighted(solution: Solution) -> (Solution, Errors) {
+    let errors = errors(&solution);
+    (solution, errors)
 }
 
 impl Identify {

@@ -1,6 +1,7 @@
 //! The `powerball` command: one file a subcommand.
 
 mod bus;
+mod consistent;
 mod demo;
 mod excite;
 mod excite_page;
@@ -50,6 +51,8 @@ enum Command {
     Excite(excite::Excite),
     /// Fit the minimal inertial set and the friction of every joint to logs.
     Identify(identify::Identify),
+    /// Find the nearest parameters that a real arm can have to given values.
+    Consistent(consistent::ConsistentCommand),
     /// Reduce logs to triangular factors, which `identify` takes in place of the logs.
     Summarize(summarize::Summarize),
     /// Judge an identified model on logs that it has not seen.
@@ -84,6 +87,7 @@ pub fn main() -> ExitCode {
         Command::Profile(command) => command.run(),
         Command::Excite(command) => command.run(),
         Command::Identify(command) => command.run(),
+        Command::Consistent(command) => command.run(),
         Command::Summarize(command) => command.run(),
         Command::Verify(command) => command.run(),
         Command::Explain(command) => command.run(),

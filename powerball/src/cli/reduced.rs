@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Reduced {
     pub body: RigidBody,
     pub summary: Summary,
-    /// The first logs as they were read, for figures.
-    pub shown: Vec<Log>,
+    /// The first logs as they were read, for figures; all where they were asked for.
+    pub logs: Vec<Log>,
     pub warnings: Vec<String>,
 }
 
@@ -31,11 +31,13 @@ pub(crate) fn body(arm: &Path, progress: &Progress) -> Result<(RigidBody, Vec<St
     Ok((body, arm.notes()))
 }
 
-/// Reads and reduces files, each a log or a summary; every file that is unusable is named.
+/// Reads and reduces files, each a log or a summary; every file that is unusable is named. Where logs are needed `whole`,
+/// all are kept and a summary is none.
 pub(crate) fn reduce(
     arm: &Path,
     files: &[PathBuf],
     options: &DataOptions,
+    whole: bool,
     progress: &Progress,
 ) -> Result<Reduced, Failure> {
     let (body, mut warnings) = body(arm, progress)?;
@@ -51,6 +53,12 @@ pub(crate) fn reduce(
         progress.say(&format!("reading {name}"));
         match read_summary(file) {
             Ok(None) => {}
+            Ok(Some(_)) if whole => {
+                unusable.push(format!(
+                    "{name}: is a summary, and this estimator looks at single samples: give the log itself"
+                ));
+                continue;
+            }
             Ok(Some(read)) => {
                 for (log, _) in &read.logs {
                     if summary.logs.iter().any(|(other, _)| other == log) {
@@ -73,7 +81,7 @@ pub(crate) fn reduce(
             Ok(log) => {
                 warnings.extend(findings.iter().map(ToString::to_string));
                 let mut one = Summary::new(&body, options);
-                match one.push(&body, &log, options, None) {
+                match one.push(&body, &log, options) {
                     Ok(notes) => warnings.extend(notes),
                     Err(error) => refused.push(format!("{name}: {error}")),
                 }
@@ -81,7 +89,7 @@ pub(crate) fn reduce(
                 if let Err(error) = summary.merge(&one) {
                     unusable.push(format!("{name}: {error}"));
                 }
-                if shown_samples < SHOWN {
+                if whole || shown_samples < SHOWN {
                     shown_samples += log.t.len();
                     shown.push(log);
                 }
@@ -96,7 +104,7 @@ pub(crate) fn reduce(
     }
     warnings.extend(refused.into_iter().map(|r| format!("{r}; the log was left out")));
     warnings.extend(rests(&body, &summary, &shown));
-    Ok(Reduced { body, summary, shown, warnings })
+    Ok(Reduced { body, summary, logs: shown, warnings })
 }
 
 /// Reduces logs that were read already.
@@ -109,7 +117,7 @@ pub(crate) fn in_memory(
     let mut summary = Summary::new(&body, options);
     let mut refused = Vec::new();
     for log in &logs {
-        match summary.push(&body, log, options, None) {
+        match summary.push(&body, log, options) {
             Ok(notes) => warnings.extend(notes),
             Err(error) => refused.push(format!("{}: {error}", log.file)),
         }
@@ -119,7 +127,7 @@ pub(crate) fn in_memory(
     }
     warnings.extend(refused.into_iter().map(|r| format!("{r}; the log was left out")));
     warnings.extend(rests(&body, &summary, &logs));
-    Ok(Reduced { body, summary, shown: logs, warnings })
+    Ok(Reduced { body, summary, logs, warnings })
 }
 
 /// A file's summary; `None` where the file is something else.
@@ -143,15 +151,17 @@ fn rests(body: &RigidBody, summary: &Summary, shown: &[Log]) -> Vec<String> {
     let mut notes = Vec::new();
     let silent = if shown.is_empty() { Vec::new() } else { silent_joints(body.arm(), shown) };
     for (j, octaves) in summary.joints.iter().enumerate() {
-        let rested = summary.samples - octaves.rows();
+        let rested = summary.samples.saturating_sub(octaves.rows());
         if octaves.rows() < 20 {
-            notes.push(silent.get(j).cloned().flatten().unwrap_or_else(|| {
+            let rests = || {
                 format!(
                     "joint {} rests in these logs: neither its friction nor any effect on it can be judged; record paths on which it \
                      swings (powerball excite)",
                     j + 1
                 )
-            }));
+            };
+            let why = silent.get(j).cloned().flatten().or_else(|| summary.silent[j].clone());
+            notes.push(why.unwrap_or_else(rests));
         } else if rested * 4 > summary.samples {
             notes.push(format!(
                 "joint {} rests in {:.0} % of the samples ({} s or longer, or at an end of a log); they were left out",

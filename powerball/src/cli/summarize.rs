@@ -48,7 +48,7 @@ struct Written {
 
 impl Summarize {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let reduced = reduce(&self.arm, &self.log, &DataOptions::default(), &Progress::new())?;
+        let reduced = reduce(&self.arm, &self.log, &DataOptions::default(), false, &Progress::new())?;
         let summary = &reduced.summary;
         let bytes = summary.to_bytes();
         output::write_file(&self.out, &bytes)?;

@@ -1,7 +1,9 @@
 //! The physically consistent parameters that are nearest to given values of a set.
 //!
 //! A body exists for a link's ten parameters exactly where its pseudo-inertia P is positive semi-definite (Wensing, Kim and
-//! Slotine 2018). Among all full parameter vectors π of such bodies and rotors of inertia ≥ 0, the one is sought whose sums K·π
+//! Slotine 2018). A link that carries the next joint's rotor has that rotor's mass in its own parameters, so what is left of
+//! it without a ring of the inertia Iₘ about the joint's axis must be a body: otherwise B(q) could be negative through
+//! Eq. 5's coupling although every link by itself is possible. Among all full parameter vectors π of such bodies and rotors of inertia ≥ 0, the one is sought whose sums K·π
 //! come nearest to the given values in a metric G: a convex problem,
 //!
 //! minimise ½·(Kπ − θ)ᵀ·G·(Kπ − θ) + μ·Σ (tr(P₀⁻¹·P) − ln det P) + μ·Σ (Iₘ/Iₘ₀ − ln Iₘ),
@@ -10,7 +12,7 @@
 //! open towards an ordinary body P₀ (entropic regularisation, Lee, Wensing and Park 2019). The certificate is the barrier's: the
 //! value found exceeds the least possible one by at most μ times the number of barrier dimensions.
 
-use dyngen::arm::{Parameter, ParameterKind};
+use dyngen::arm::{Arm, Convention, Parameter, ParameterKind};
 use dyngen::base::possible::pseudo_inertia;
 use dyngen::{Error, Model, SetKind};
 use faer::linalg::solvers::Solve;
@@ -73,7 +75,7 @@ pub fn nearest(model: &Model, kind: SetKind, values: &[f64], metric: &Mat<f64>) 
     let mut x = vec![0.0; kept.len()];
     let mut without_body = Vec::new();
     for link in 0..arm.dof() {
-        let parts: Vec<(usize, Matrix4<f64>)> = ParameterKind::ALL[..10]
+        let mut parts: Vec<(usize, Matrix4<f64>)> = ParameterKind::ALL[..10]
             .iter()
             .enumerate()
             .filter_map(|(i, kind)| {
@@ -93,6 +95,9 @@ pub fn nearest(model: &Model, kind: SetKind, values: &[f64], metric: &Mat<f64>) 
                 x[k] = value;
             }
         }
+        if let Some(k) = column(&Parameter { link: link + 1, kind: ParameterKind::Im }) {
+            parts.push((k, ring(arm, link + 1) * -1.0));
+        }
         let body = Link { parts };
         if body.matrix(&x).cholesky().is_some() {
             problem.links.push(body);
@@ -102,7 +107,8 @@ pub fn nearest(model: &Model, kind: SetKind, values: &[f64], metric: &Mat<f64>) 
         if let Some(k) = column(&Parameter { link, kind: ParameterKind::Im }) {
             let ratio = arm.joints[link].rotor_ratio.as_ref().map_or(1.0, dyngen::exact::rational::to_f64);
             let ordinary = ROTOR / (ratio * ratio);
-            x[k] = ordinary;
+            // The ordinary body at the link before has room for so much.
+            x[k] = ordinary.min(0.1 * MASS * RADIUS * RADIUS);
             problem.rotors.push((k, ordinary));
         }
     }
@@ -133,6 +139,21 @@ pub fn nearest(model: &Model, kind: SetKind, values: &[f64], metric: &Mat<f64>) 
         set: set_values,
         eigenvalues,
         without_body,
+    })
+}
+
+/// The pseudo-inertia of a rotor of unit inertia on the link before: a ring about the joint's axis, in that link's frame.
+fn ring(arm: &Arm, joint: usize) -> Matrix4<f64> {
+    let axis = match arm.convention {
+        Convention::Standard => [0.0, 0.0, 1.0],
+        Convention::Modified => {
+            let (sine, cosine) = arm.joints[joint].alpha.radians().sin_cos();
+            [0.0, -sine, cosine]
+        }
+    };
+    Matrix4::from_fn(|i, k| match (i < 3 && k < 3, i == k) {
+        (true, same) => 0.5 * (f64::from(u8::from(same)) - axis[i] * axis[k]),
+        _ => 0.0,
     })
 }
 
@@ -257,6 +278,19 @@ mod tests {
 
     fn model(text: &str) -> Model {
         Model::derive(Arm::parse(text, "arm").unwrap()).unwrap()
+    }
+
+    /// Rotors as large as Table 3's on links that must carry them: B(q) of what comes out is positive at random poses.
+    #[test]
+    fn links_have_room_for_their_rotors() {
+        let model = model(include_str!("../../arm.toml"));
+        let set = model.set(SetKind::Published).unwrap();
+        let values = Values::parse(include_str!("../../table3.json"), "table3.json").unwrap();
+        let values = values.of_set(&model, set).unwrap();
+        let metric = crate::estimate::TorqueMetric::new(&model, SetKind::Published).unwrap();
+        let found = nearest(&model, SetKind::Published, &values, &metric.matrix(1e-3)).unwrap();
+        let verdict = possible::check(&model, SetKind::Full, &kept(&model, &found.all)).unwrap();
+        assert!(verdict.possible, "{:?}", verdict.reasons);
     }
 
     fn unit(n: usize) -> Mat<f64> {

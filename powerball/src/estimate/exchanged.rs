@@ -28,7 +28,7 @@ pub fn exchanged(body: &RigidBody, logs: &[Log], options: &DataOptions, found: &
         let mut summary = Summary::new(body, options);
         for log in &changed {
             // What cannot be used was said before.
-            let _ = summary.push(body, log, options, None);
+            let _ = summary.push(body, log, options);
         }
         let solution = solve_reduced(&summary, FrictionLaw::Symmetric);
         let errors = spread_of(&solution, &solution.theta);
@@ -81,7 +81,7 @@ mod tests {
         let options = DataOptions::default();
         let said = |log: &Log| {
             let mut summary = Summary::new(&body, &options);
-            summary.push(&body, log, &options, None).unwrap();
+            summary.push(&body, log, &options).unwrap();
             let solution = solve_reduced(&summary, FrictionLaw::Symmetric);
             exchanged(&body, std::slice::from_ref(log), &options, &spread_of(&solution, &solution.theta))
         };

@@ -1,9 +1,8 @@
 //! A fit in the words of a model: values with standard errors that hold for coloured residuals.
 
-use super::errors::errors;
+use super::errors::Errors;
 use super::reduced::Solution;
 use crate::regression::Data;
-use crate::summary::Summary;
 use serde::{Deserialize, Serialize};
 
 /// A parameter with its standard error.
@@ -109,14 +108,11 @@ pub fn spread(data: &Data<'_>, residual: &[Vec<f64>]) -> Spread {
     Spread { rms: errors, relative, samples: data.joints.iter().map(|j| j.len()).max().unwrap_or(0) }
 }
 
-/// The values of a solution with standard errors that hold for coloured residuals (see [`errors`]).
+/// The values of a solution of the minimal set `names`, with their errors.
 #[must_use]
-pub fn identify(summary: &Summary, solution: &Solution) -> Identified {
+pub fn identify(names: &[String], solution: &Solution, errors: &Errors) -> Identified {
     let layout = solution.layout;
-    let errors = errors(solution);
-    let parameters = summary
-        .identity
-        .parameters
+    let parameters = names
         .iter()
         .enumerate()
         .map(|(c, name)| {

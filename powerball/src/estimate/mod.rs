@@ -10,9 +10,13 @@ mod fit;
 mod folds;
 mod friction_shape;
 mod identify;
+mod instrumental;
 mod noise;
 mod reduced;
+mod robust;
 mod solve;
+mod stream;
+mod torque_metric;
 mod vary;
 mod verify;
 
@@ -24,8 +28,15 @@ pub use exchanged::exchanged;
 pub use fit::{Fit, Term, fit, friction_columns};
 pub use folds::Folds;
 pub use identify::{Identified, JointFriction, ParameterEstimate, Spread, identify, spread, spread_of};
+pub use instrumental::solve_instrumental;
 pub use noise::noise_floor;
 pub use reduced::{FrictionLaw, Solution, solve_reduced};
+pub use robust::{Robust, solve_robust};
 pub use solve::{Solver, bounded};
+pub use stream::{States, Stream, StreamFit};
+pub use torque_metric::TorqueMetric;
 pub use vary::Layout;
 pub use verify::{JointVerdict, verify};
+
+#[cfg(test)]
+mod tests;

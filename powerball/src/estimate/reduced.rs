@@ -94,9 +94,9 @@ pub fn solve_reduced(summary: &Summary, law: FrictionLaw) -> Solution {
 #[derive(Debug)]
 pub(super) struct Part {
     /// By model column, then the torque: a column of the factor.
-    columns: Vec<Vec<f64>>,
+    pub(super) columns: Vec<Vec<f64>>,
     /// Index in the layout by model column.
-    global: Vec<usize>,
+    pub(super) global: Vec<usize>,
     pub(super) rows: u64,
 }
 

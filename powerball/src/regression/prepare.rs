@@ -71,7 +71,9 @@ pub struct Data<'a> {
     pub logs: Vec<String>,
     /// The speed below which a joint rests, by joint, rad/s.
     pub rest_speed: Vec<f64>,
-    /// Pieces of logs that were left out, in words.
+    /// By joint: why its samples say nothing, in words.
+    pub silent: Vec<Option<String>>,
+    /// Pieces of logs, and joints of some logs, that were left out, in words.
     pub left_out: Vec<String>,
     /// What was left out or done, in words.
     pub notes: Vec<String>,
@@ -87,6 +89,19 @@ impl<'a> Data<'a> {
     /// # Errors
     /// [`DataError`] where nothing usable remains.
     pub fn new(body: &'a RigidBody, logs: &[Log], options: &DataOptions) -> Result<Data<'a>, DataError> {
+        Data::corrected(body, logs, options, |_| {})
+    }
+
+    /// Prepares logs whose signals are corrected on the even grid before they pass the band.
+    ///
+    /// # Errors
+    /// As [`Data::new`].
+    pub fn corrected(
+        body: &'a RigidBody,
+        logs: &[Log],
+        options: &DataOptions,
+        correct: impl FnMut(&mut Recording),
+    ) -> Result<Data<'a>, DataError> {
         let n = body.dof();
         let mut steps: Vec<f64> = logs.iter().filter_map(|log| median_step(&log.t)).collect();
         steps.sort_by(f64::total_cmp);
@@ -94,7 +109,7 @@ impl<'a> Data<'a> {
         let rate = 1.0 / step;
         let band = Band::new(options.cutoff, rate);
         let mut left_out: Vec<String> = Vec::new();
-        let mut recordings = Vec::new();
+        let mut recordings: Vec<Recording> = Vec::new();
         for (index, log) in logs.iter().enumerate() {
             for piece in &log.pieces {
                 let span = log.t[piece.end - 1] - log.t[piece.start];
@@ -109,6 +124,7 @@ impl<'a> Data<'a> {
         if recordings.is_empty() {
             return Err(DataError::TooShort);
         }
+        recordings.iter_mut().for_each(correct);
         let rest_speed: Vec<f64> = (0..n)
             .map(|j| {
                 let speeds = recordings.iter().flat_map(|r| r.speed(j).map(f64::abs)).collect();
@@ -117,7 +133,6 @@ impl<'a> Data<'a> {
             .collect();
         let top_speed = (0..n).map(|j| top_speed(&recordings, j)).collect();
         let silent = silent_joints(body.arm(), logs);
-        let mut notes = left_out.clone();
         let mut kept = keep_moving(&recordings, &band, &rest_speed, n);
         for (j, kept) in kept.iter_mut().enumerate() {
             for (kept, recording) in kept.iter_mut().zip(&recordings) {
@@ -126,7 +141,7 @@ impl<'a> Data<'a> {
                     kept.clear();
                 }
                 if is_dead && silent[j].is_none() {
-                    notes.push(format!(
+                    left_out.push(format!(
                         "{}: the torque of joint {} never changes: the joint was left out of this log",
                         logs[recording.log].file,
                         j + 1
@@ -138,6 +153,7 @@ impl<'a> Data<'a> {
         if joints.iter().all(|j| j.len() < 20) {
             return Err(DataError::NoMotion(silent.into_iter().flatten().collect()));
         }
+        let mut notes = left_out.clone();
         let total: usize = recordings.iter().map(|r| band.kept(r.len()).len()).sum();
         for (j, rows) in joints.iter().enumerate() {
             let rested = total - rows.len();
@@ -165,6 +181,7 @@ impl<'a> Data<'a> {
             blocks,
             logs,
             rest_speed,
+            silent,
             left_out,
             notes,
             top_speed,
@@ -172,6 +189,31 @@ impl<'a> Data<'a> {
             force: OnceLock::new(),
             declared_zero: OnceLock::new(),
         })
+    }
+
+    /// The same rows with other signals: samples, band and blocks stay as they are.
+    #[must_use]
+    pub fn seen_otherwise(&self, correct: impl FnMut(&mut Recording)) -> Data<'a> {
+        let mut recordings = self.recordings.clone();
+        recordings.iter_mut().for_each(correct);
+        let kept = self.joints.iter().map(|j| j.kept.clone()).collect();
+        let joints = joint_rows(self.body, &recordings, &self.band, kept);
+        Data {
+            body: self.body,
+            recordings,
+            band: self.band.clone(),
+            joints,
+            blocks: self.blocks.clone(),
+            logs: self.logs.clone(),
+            rest_speed: self.rest_speed.clone(),
+            silent: self.silent.clone(),
+            left_out: self.left_out.clone(),
+            notes: self.notes.clone(),
+            top_speed: self.top_speed.clone(),
+            last_link: OnceLock::new(),
+            force: OnceLock::new(),
+            declared_zero: OnceLock::new(),
+        }
     }
 
     /// Joints.

@@ -40,21 +40,9 @@ impl Recording {
         let count = ((t[t.len() - 1] - start) / step).floor() as usize + 1;
         let rate = 1.0 / step;
         let dof = log.q.len();
-        let filter = Butterworth::low_pass(4, smoothing.min(0.4 * rate), rate)?;
-        let mut states = [vec![0.0; dof * count], vec![0.0; dof * count], vec![0.0; dof * count]];
-        for (j, q) in log.q.iter().enumerate() {
-            let smooth = filter.zero_phase(&resample::cubic(t, &q[piece.clone()], start, step, count));
-            let v = difference::derivative(&smooth, step);
-            let a = difference::second_derivative(&smooth, step);
-            for (state, values) in states.iter_mut().zip([smooth, v, a]) {
-                for (k, value) in values.into_iter().enumerate() {
-                    state[k * dof + j] = value;
-                }
-            }
-        }
         let onto = |x: &Vec<f64>| resample::linear(t, &x[piece.clone()], start, step, count);
-        let [q, v, a] = states;
-        Some(Recording {
+        let [q, v, a] = [const { Vec::new() }; 3].map(|_: Vec<f64>| vec![0.0; dof * count]);
+        let mut recording = Recording {
             log: index,
             start,
             clock: start + log.clock,
@@ -65,7 +53,33 @@ impl Recording {
             torque: log.torque.iter().map(onto).collect(),
             temperature: log.temperature.as_ref().map(|t| t.iter().map(onto).collect()),
             dof,
-        })
+        };
+        let positions: Vec<&[f64]> = log.q.iter().map(|q| &q[piece.clone()]).collect();
+        recording.follow(t, &positions, smoothing).then_some(recording)
+    }
+
+    /// Takes positions, speeds and accelerations from samples at times `t`, by joint, smoothed to `smoothing` Hz.
+    ///
+    /// `false` where there are too few samples or no such filter; nothing has changed then.
+    pub fn follow(&mut self, t: &[f64], positions: &[&[f64]], smoothing: f64) -> bool {
+        let Some(filter) = Butterworth::low_pass(4, smoothing.min(0.4 * self.rate), self.rate) else {
+            return false;
+        };
+        if t.len() < 2 {
+            return false;
+        }
+        let (step, count, dof) = (1.0 / self.rate, self.len(), self.dof);
+        for (j, q) in positions.iter().enumerate() {
+            let smooth = filter.zero_phase(&resample::cubic(t, q, self.start, step, count));
+            let v = difference::derivative(&smooth, step);
+            let a = difference::second_derivative(&smooth, step);
+            for (state, values) in [&mut self.q, &mut self.v, &mut self.a].into_iter().zip([smooth, v, a]) {
+                for (k, value) in values.into_iter().enumerate() {
+                    state[k * dof + j] = value;
+                }
+            }
+        }
+        true
     }
 
     /// Samples.

@@ -93,8 +93,13 @@ impl RigidBody {
     #[must_use]
     pub fn regressor(&self, q: &[f64], v: &[f64], a: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; q.len() / self.dof() * self.regressor.outputs()];
-        self.regressor.evaluate(q, v, a, &[], &mut out);
+        self.regressor_into(q, v, a, &mut out);
         out
+    }
+
+    /// The same into a slice of n × p numbers a sample.
+    pub fn regressor_into(&self, q: &[f64], v: &[f64], a: &[f64], out: &mut [f64]) {
+        self.regressor.evaluate(q, v, a, &[], out);
     }
 
     /// Joint torques of the minimal set's `parameters`, n a sample.

@@ -49,6 +49,8 @@ struct Head {
     /// Name and seconds.
     logs: Vec<(String, f64)>,
     samples: u64,
+    /// By joint: why a log said nothing of it.
+    silent: Vec<Option<String>>,
     /// By joint and octave.
     rows: Vec<Vec<u64>>,
     /// Of the doubles.
@@ -108,6 +110,7 @@ impl Summary {
             octaves: OCTAVES,
             logs: self.logs.clone(),
             samples: self.samples,
+            silent: self.silent.clone(),
             rows: self.joints.iter().map(|j| j.levels().iter().map(Triangle::rows).collect()).collect(),
             checksum: format!("{:016x}", fnv(&numbers)),
         };
@@ -151,6 +154,7 @@ impl Summary {
         let shaped = head.nodes == NODES
             && head.octaves == OCTAVES
             && head.rows.len() == joints
+            && head.silent.len() == joints
             && head.rows.iter().all(|r| r.len() == OCTAVES)
             && numbers.len() == 8 * each * OCTAVES * joints;
         if !shaped || format!("{:016x}", fnv(numbers)) != head.checksum {
@@ -179,6 +183,6 @@ impl Summary {
             smoothing: head.smoothing,
             steepness: head.steepness.iter().map(|[low, high]| Steepness::between(*low, *high)).collect(),
         };
-        Ok(Summary { identity, logs: head.logs, samples: head.samples, joints })
+        Ok(Summary { identity, logs: head.logs, samples: head.samples, silent: head.silent, joints })
     }
 }

@@ -11,7 +11,8 @@ mod triangle;
 
 pub use file::SummaryError;
 pub use octaves::{OCTAVES, Octaves, SLOW};
-pub use reduce::{Columns, RowWeights};
+pub use reduce::Columns;
+pub(crate) use reduce::parts;
 pub use steepness::{NODES, Steepness};
 pub use triangle::Triangle;
 
@@ -43,6 +44,8 @@ pub struct Summary {
     pub logs: Vec<(String, f64)>,
     /// Samples in the band, resting joints among them.
     pub samples: u64,
+    /// By joint: why a log said nothing of it, in words.
+    pub silent: Vec<Option<String>>,
     /// The rows of each joint.
     pub joints: Vec<Octaves>,
 }
@@ -70,7 +73,7 @@ impl Summary {
         };
         let columns = Columns { inertial: identity.parameters.len() };
         let joints = vec![Octaves::new(columns.width()); arm.dof()];
-        Summary { identity, logs: Vec::new(), samples: 0, joints }
+        Summary { identity, logs: Vec::new(), samples: 0, silent: vec![None; arm.dof()], joints }
     }
 
     /// The columns of its factors.
@@ -87,6 +90,9 @@ impl Summary {
         self.identity.same_as(&other.identity)?;
         for (octaves, other) in self.joints.iter_mut().zip(&other.joints) {
             octaves.merge(other);
+        }
+        for (silent, other) in self.silent.iter_mut().zip(&other.silent) {
+            *silent = other.clone().or(silent.take());
         }
         self.samples += other.samples;
         self.logs.extend(other.logs.iter().cloned());

@@ -6,6 +6,7 @@
 //! colour but hardly any memory between octaves, which is all that standard errors need.
 
 use super::Triangle;
+use crate::regression::JointRows;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Octaves. At the 25 rows a second of the usual band the last one holds what is slower than 0.1 Hz.
@@ -82,6 +83,20 @@ impl Octaves {
             }
         }
         self.levels[last].push(&sums.iter().map(Vec::as_slice).collect::<Vec<_>>());
+    }
+
+    /// Takes in a joint's rows, stretch by stretch; one vector a column.
+    pub fn push_rows(&mut self, rows: &JointRows, columns: &[Vec<f64>]) {
+        for (kept, range) in rows.kept.iter().zip(&rows.rows) {
+            let mut first = 0;
+            for k in 1..=kept.len() {
+                if k == kept.len() || kept[k] != kept[k - 1] + 1 {
+                    let run = range.start + first..range.start + k;
+                    self.push(&columns.iter().map(|c| &c[run.clone()]).collect::<Vec<_>>());
+                    first = k;
+                }
+            }
+        }
     }
 
     /// Takes in what other rows gave.

@@ -3,7 +3,7 @@
 use super::{Octaves, Steepness, Summary, steepness};
 use crate::log::Log;
 use crate::parallel;
-use crate::regression::{Data, DataError, DataOptions, RigidBody};
+use crate::regression::{Data, DataError, DataOptions, Recording, RigidBody};
 
 /// A log is worked on in parts of this length, s.
 const PART: f64 = 120.0;
@@ -64,13 +64,8 @@ impl Columns {
     }
 }
 
-/// How rows are counted before they go into a factor: from the columns of a joint, one factor a row.
-pub type RowWeights<'a> = &'a (dyn Fn(usize, &[Vec<f64>]) -> Vec<f64> + Sync);
-
 impl Summary {
     /// Takes a log in. Returns what was left out of it, in words.
-    ///
-    /// `weights` gives each row's factor √w where rows do not count alike.
     ///
     /// # Errors
     /// [`DataError`] where nothing of the log can be used; nothing has been taken in then.
@@ -79,22 +74,38 @@ impl Summary {
         body: &RigidBody,
         log: &Log,
         options: &DataOptions,
-        weights: Option<RowWeights<'_>>,
+    ) -> Result<Vec<String>, DataError> {
+        self.push_corrected(body, log, options, |_| {})
+    }
+
+    /// Takes a log in whose signals are corrected on the even grid, part by part.
+    ///
+    /// # Errors
+    /// As [`Summary::push`].
+    pub fn push_corrected(
+        &mut self,
+        body: &RigidBody,
+        log: &Log,
+        options: &DataOptions,
+        mut correct: impl FnMut(&mut Recording),
     ) -> Result<Vec<String>, DataError> {
         let (mut notes, mut seconds, mut refused) = (Vec::new(), 0.0, None);
         let mut joints = std::mem::take(&mut self.joints);
         let mut taken = false;
         for part in parts(log) {
-            match Data::new(body, std::slice::from_ref(&part), options) {
+            match Data::corrected(body, std::slice::from_ref(&part), options, &mut correct) {
                 Ok(data) => {
                     joints = parallel::map(&(0..data.dof()).collect::<Vec<_>>(), |&j| {
                         let mut octaves = joints[j].clone();
-                        self.push_joint(&mut octaves, &data, j, weights);
+                        self.push_joint(&mut octaves, &data, j);
                         octaves
                     });
                     seconds += data.recordings.iter().map(|r| r.len() as f64 / r.rate).sum::<f64>();
                     self.samples +=
                         data.recordings.iter().map(|r| data.band.kept(r.len()).len() as u64).sum::<u64>();
+                    for (silent, why) in self.silent.iter_mut().zip(data.silent) {
+                        *silent = why.or(silent.take());
+                    }
                     notes.extend(data.left_out);
                     taken = true;
                 }
@@ -111,40 +122,18 @@ impl Summary {
         }
     }
 
-    fn push_joint(
-        &self,
-        octaves: &mut Octaves,
-        data: &Data<'_>,
-        joint: usize,
-        weights: Option<RowWeights<'_>>,
-    ) {
+    fn push_joint(&self, octaves: &mut Octaves, data: &Data<'_>, joint: usize) {
         let rows = &data.joints[joint];
         if rows.is_empty() {
             return;
         }
-        let mut columns = self.columns().of(data, joint, &self.identity.steepness[joint]);
-        if let Some(weights) = weights {
-            let factors = weights(joint, &columns);
-            for column in &mut columns {
-                column.iter_mut().zip(&factors).for_each(|(c, f)| *c *= f);
-            }
-        }
-        for (kept, range) in rows.kept.iter().zip(&rows.rows) {
-            // Stretches without a gap.
-            let mut first = 0;
-            for k in 1..=kept.len() {
-                if k == kept.len() || kept[k] != kept[k - 1] + 1 {
-                    let run = range.start + first..range.start + k;
-                    octaves.push(&columns.iter().map(|c| &c[run.clone()]).collect::<Vec<_>>());
-                    first = k;
-                }
-            }
-        }
+        let columns = self.columns().of(data, joint, &self.identity.steepness[joint]);
+        octaves.push_rows(rows, &columns);
     }
 }
 
 /// A log in parts that share what a band leaves out at their ends: each piece of it in equal ones of about [`PART`].
-fn parts(log: &Log) -> Vec<Log> {
+pub(crate) fn parts(log: &Log) -> Vec<Log> {
     let whole = |log: &Log| log.t.last().unwrap_or(&0.0) - log.t.first().unwrap_or(&0.0);
     if whole(log) < 1.5 * PART {
         return vec![log.clone()];

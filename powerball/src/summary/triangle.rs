@@ -5,6 +5,8 @@
 //! so parts of a log, logs and machines can be joined in any order; the squares of numbers are never summed, which would
 //! cost half of their digits.
 
+use pulp::{Arch, NullaryFnOnce};
+
 /// An upper triangular factor of rows of a fixed width.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Triangle {
@@ -94,54 +96,106 @@ impl Triangle {
     /// Takes another factor's rows in.
     pub fn merge(&mut self, other: &Triangle) {
         debug_assert_eq!(self.width, other.width);
+        if self.rows == 0 {
+            // To the bit: a summary that was written and read again is the same.
+            self.clone_from(other);
+            return;
+        }
         let mut block = other.columns.clone();
         self.rows += other.rows;
         self.reflect(&mut block, other.width);
     }
 
     fn reflect(&mut self, block: &mut [f64], count: usize) {
-        let width = self.width;
-        if count == 0 {
-            return;
+        if count > 0 {
+            // Compiled for what the processor has; the same sums in the same order everywhere.
+            Arch::new().dispatch(Reflect { width: self.width, columns: &mut self.columns, block, count });
         }
+    }
+}
+
+/// Householder's reflections of a block of rows into a triangle.
+struct Reflect<'a> {
+    width: usize,
+    columns: &'a mut [f64],
+    block: &'a mut [f64],
+    count: usize,
+}
+
+impl NullaryFnOnce for Reflect<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Reflect { width, columns, block, count } = self;
         for k in 0..width {
             let (head, tail) = block.split_at_mut((k + 1) * count);
             let below = &head[k * count..];
-            let square = dot(below, below);
+            let [square] = dots(below, [below]);
             // Nothing, or so little that its square has lost its digits.
             if square < 1e-290 {
                 continue;
             }
-            let pivot = self.columns[k * width + k];
+            let pivot = columns[k * width + k];
             let length = (pivot * pivot + square).sqrt();
             // Away from cancellation: the reflected pivot has the other sign.
             let reflected = if pivot > 0.0 { -length } else { length };
             let lead = pivot - reflected;
             let scale = 1.0 / (length * (length + pivot.abs()));
-            self.columns[k * width + k] = reflected;
-            for (j, column) in (k + 1..width).zip(tail.chunks_exact_mut(count)) {
-                let top = &mut self.columns[j * width + k];
-                let share = scale * (lead * *top + dot(below, column));
+            columns[k * width + k] = reflected;
+            let mut share = |j: usize, along: f64| {
+                let top = &mut columns[j * width + k];
+                let share = scale * (lead * *top + along);
                 *top -= share * lead;
-                for (c, v) in column.iter_mut().zip(below) {
-                    *c -= share * v;
+                share
+            };
+            let mut j = k + 1;
+            // Four columns at a time share the loads of the one that is reflected.
+            let mut fours = tail.chunks_exact_mut(4 * count);
+            for four in &mut fours {
+                let (a, rest) = four.split_at_mut(count);
+                let (b, rest) = rest.split_at_mut(count);
+                let (c, d) = rest.split_at_mut(count);
+                let along = dots(below, [a, b, c, d]);
+                let shares: [f64; 4] = std::array::from_fn(|i| share(j + i, along[i]));
+                for i in 0..count {
+                    let v = below[i];
+                    a[i] -= shares[0] * v;
+                    b[i] -= shares[1] * v;
+                    c[i] -= shares[2] * v;
+                    d[i] -= shares[3] * v;
                 }
+                j += 4;
+            }
+            for column in fours.into_remainder().chunks_exact_mut(count) {
+                let [along] = dots(below, [column]);
+                let share = share(j, along);
+                column.iter_mut().zip(below).for_each(|(c, v)| *c -= share * v);
+                j += 1;
             }
         }
     }
 }
 
-/// A scalar product in eight sums, so that the processor's vector units can be used; the order is fixed.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let tail: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in a8.zip(b8) {
-        for i in 0..8 {
-            sums[i] += x[i] * y[i];
+/// Scalar products of one column with some others, each in eight sums, so that the processor's vector units can be used; the
+/// order is fixed.
+#[inline(always)]
+fn dots<const N: usize>(v: &[f64], others: [&[f64]; N]) -> [f64; N] {
+    let mut sums = [[0.0; 8]; N];
+    let whole = v.len() / 8 * 8;
+    for first in (0..whole).step_by(8) {
+        let x = &v[first..first + 8];
+        for (sum, other) in sums.iter_mut().zip(&others) {
+            let y = &other[first..first + 8];
+            for i in 0..8 {
+                sum[i] += x[i] * y[i];
+            }
         }
     }
-    sums.iter().sum::<f64>() + tail
+    std::array::from_fn(|n| {
+        let tail: f64 = v[whole..].iter().zip(&others[n][whole..]).map(|(x, y)| x * y).sum();
+        sums[n].iter().sum::<f64>() + tail
+    })
 }
 
 #[cfg(test)]
@@ -161,7 +215,7 @@ mod tests {
 
     fn products(t: &Triangle) -> Vec<f64> {
         let w = t.width();
-        (0..w * w).map(|i| dot(t.column(i / w), t.column(i % w))).collect()
+        (0..w * w).map(|i| dots(t.column(i / w), [t.column(i % w)])[0]).collect()
     }
 
     #[test]

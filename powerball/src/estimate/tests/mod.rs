@@ -1,0 +1,8 @@
+//! Fits of logs whose truth is known: the virtual arm's, on random paths.
+
+#![allow(clippy::unwrap_used)]
+
+mod coverage;
+mod estimators;
+mod plant;
+mod summaries;

@@ -1,0 +1,72 @@
+//! Reduced logs say what the logs say.
+
+use super::plant::{record, sensors, truth};
+use crate::estimate::{Folds, FrictionLaw, fit, solve_reduced};
+use crate::regression::{Data, DataOptions};
+use crate::summary::{Summary, SummaryError};
+
+/// The fit of summaries is that of the rows themselves, which knows no interpolation of steepnesses.
+#[test]
+fn a_reduced_fit_is_the_fit_of_the_rows() {
+    let (body, _) = truth();
+    let options = DataOptions::default();
+    let logs = record(&sensors(), 2, 3, 31);
+    let mut summary = Summary::new(&body, &options);
+    for log in &logs {
+        summary.push(&body, log, &options).unwrap();
+    }
+    let reduced = solve_reduced(&summary, FrictionLaw::Symmetric);
+    let data = Data::new(&body, &logs, &options).unwrap();
+    let direct = fit(&data, &Folds::new(&data), &[], None);
+    let errors = crate::estimate::errors(&reduced);
+    for (c, (a, b)) in reduced.theta.iter().zip(&direct.theta).enumerate() {
+        // The weights' colour is told from slow octaves here, from means over a second there.
+        let Some(std) = errors.std[c] else { continue };
+        assert!((a - b).abs() < 0.3 * std.max(1e-6), "{c}: {a} {b} ± {std}");
+    }
+}
+
+/// Written, read, merged in any order: the same answer; a long log is worked on in parts.
+#[test]
+fn summaries_join_to_the_answer_of_their_logs() {
+    let (body, _) = truth();
+    let options = DataOptions::default();
+    let mut logs = record(&sensors(), 2, 3, 32);
+    logs.extend(record(&sensors(), 1, 20, 33));
+    let one = |k: usize| {
+        let mut summary = Summary::new(&body, &options);
+        summary.push(&body, &logs[k], &options).unwrap();
+        Summary::from_bytes(&summary.to_bytes()).unwrap()
+    };
+    let joined = |order: [usize; 3]| {
+        let mut all = Summary::new(&body, &options);
+        order.iter().for_each(|k| all.merge(&one(*k)).unwrap());
+        all
+    };
+    let (a, b) = (joined([0, 1, 2]), joined([2, 0, 1]));
+    assert_eq!(a.to_bytes(), joined([0, 1, 2]).to_bytes());
+    let (a, b) = (solve_reduced(&a, FrictionLaw::Asymmetric), solve_reduced(&b, FrictionLaw::Asymmetric));
+    for (x, y) in a.theta.iter().zip(&b.theta) {
+        approx::assert_relative_eq!(x, y, max_relative = 1e-6, epsilon = 1e-7);
+    }
+    // 202 s at 200 Hz: parts have no seams.
+    let long = one(2);
+    let expected = (logs[2].t.len() as f64 - 120.0) / 8.0;
+    assert!((long.samples as f64 - expected).abs() < 4.0, "{} {expected}", long.samples);
+}
+
+#[test]
+fn damage_and_other_arms_are_named() {
+    let (body, _) = truth();
+    let options = DataOptions::default();
+    let empty = Summary::new(&body, &options);
+    let bytes = empty.to_bytes();
+    let unreadable = |bytes: &[u8]| matches!(Summary::from_bytes(bytes), Err(SummaryError::Unreadable(_)));
+    assert!(unreadable(b"t,q1") && unreadable(&bytes[..bytes.len() - 1]) && unreadable(&bytes[..100]));
+    let mut flipped = bytes.clone();
+    *flipped.last_mut().unwrap() ^= 1;
+    assert!(unreadable(&flipped));
+    let other = Summary::new(&body, &DataOptions { cutoff: 5.0, ..options });
+    let refused = Summary::new(&body, &options).merge(&other).unwrap_err();
+    assert!(refused.to_string().contains("band is 5 Hz"), "{refused}");
+}
