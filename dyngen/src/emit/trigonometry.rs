@@ -3,6 +3,8 @@
 //! Within 1 ulp for |angle| ≤ 10⁵ in `f64` and for every angle in `f32`; the same bits on every machine, in every lane, and
 //! next to whatever other angles. `f32` calls no operation on `f64`. Other scalars, such as dual numbers, bring their own
 //! sine and cosine.
+// Digits as they were published.
+#![allow(clippy::excessive_precision)]
 
 use core::any::{Any, TypeId};
 use nalgebra::{SimdBool, SimdRealField, convert};
@@ -172,7 +174,7 @@ fn reduced(angle: f32) -> [f32; 3] {
     let bits = angle.to_bits();
     let size = bits & 0x7fff_ffff;
     // Below π/4, and what is no number.
-    if size < 0x3f49_0fdb || size >= 0x7f80_0000 {
+    if !(0x3f49_0fdb..0x7f80_0000).contains(&size) {
         return [0.0, if size < 0x3f49_0fdb { angle } else { f32::NAN }, 0.0];
     }
     // angle = mantissa·2^(exponent − 150): 96 bits of 2/π from the first on that matters modulo four.
