@@ -198,5 +198,7 @@ fn reduced(angle: f32) -> [f32; 3] {
     let (r, tail) = ((rest >> 40) as u32 as f32 * unit, (rest >> 8) as u32 as f32 * (unit * 2.328_306_4e-10));
     let sign = if angle < 0.0 { -1.0 } else { 1.0 };
     let side = if fraction < 0 { -sign } else { sign };
-    [turns as f32 * sign, r * side, tail * side]
+    // Named: a product among an array's elements looks like a missing comma to clippy.
+    let (turns, r, tail) = (turns as f32 * sign, r * side, tail * side);
+    [turns, r, tail]
 }

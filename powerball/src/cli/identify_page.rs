@@ -284,9 +284,12 @@ fn of_logs(page: &mut Page, result: &Identification, shown: &Shown, held_out: bo
     }
 }
 
+/// The points of a joint's curve.
+type Points<'a> = dyn Fn(usize, &ShownJoint) -> Vec<(f64, f64)> + 'a;
+
 /// What repeats with the joints' and the motors' positions.
 fn spectra(page: &mut Page, arm: &Arm, shown: &Shown) {
-    let figure = |title: &str, label: &str, of: &dyn Fn(usize, &ShownJoint) -> Vec<(f64, f64)>| {
+    let figure = |title: &str, label: &str, of: &Points<'_>| {
         let panels = shown
             .joints
             .iter()

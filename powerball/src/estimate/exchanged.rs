@@ -67,7 +67,7 @@ mod tests {
             q: by_joint(&recording.q),
             torque: by_joint(&recording.tau),
             temperature: None,
-            pieces: vec![0..recording.t.len()],
+            pieces: std::iter::once(0..recording.t.len()).collect(),
             clock: 0.0,
         }
     }

@@ -56,7 +56,7 @@ impl Measured {
             let base = fit(&data, &Folds::new(&data), &[], None);
             let mut summary = Summary::new(&body, &options);
             for log in &logs[..FIT.len()] {
-                summary.push(&body, log, &options, None).map_err(|e| e.to_string())?;
+                summary.push(&body, log, &options).map_err(|e| e.to_string())?;
             }
             let reduced = solve_reduced(&summary, FrictionLaw::Symmetric);
             let possible = consistent_fit(&body, &reduced).map_err(|e| e.to_string())?;
