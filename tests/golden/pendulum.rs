@@ -370,6 +370,7 @@ mod trigonometry {
     //! Within 1 ulp for |angle| ≤ 10⁵ in `f64` and for every angle in `f32`; the same bits on every machine, in every lane, and
     //! next to whatever other angles. `f32` calls no operation on `f64`. Other scalars, such as dual numbers, bring their own
     //! sine and cosine.
+    #![allow(clippy::excessive_precision)]
     use core::any::{Any, TypeId};
     use nalgebra::{SimdBool, SimdRealField, convert};
     /// Sines and cosines, in the order of the angles.
@@ -561,7 +562,7 @@ mod trigonometry {
     fn reduced(angle: f32) -> [f32; 3] {
         let bits = angle.to_bits();
         let size = bits & 0x7fff_ffff;
-        if size < 0x3f49_0fdb || size >= 0x7f80_0000 {
+        if !(0x3f49_0fdb..0x7f80_0000).contains(&size) {
             return [0.0, if size < 0x3f49_0fdb { angle } else { f32::NAN }, 0.0];
         }
         let mantissa = u64::from((bits & 0x007f_ffff) | 0x0080_0000);
@@ -585,6 +586,7 @@ mod trigonometry {
         );
         let sign = if angle < 0.0 { -1.0 } else { 1.0 };
         let side = if fraction < 0 { -sign } else { sign };
-        [turns as f32 * sign, r * side, tail * side]
+        let (turns, r, tail) = (turns as f32 * sign, r * side, tail * side);
+        [turns, r, tail]
     }
 }

@@ -41,9 +41,7 @@ impl<T: SimdRealField + Copy> Trig<T> {
     #[must_use]
     pub fn new(q: &SVector<T, JOINTS>) -> Self {
         let [[q1, q2]] = q.data.0;
-        let (s1, c1) = q1.simd_sin_cos();
-        let (s2, c2) = q2.simd_sin_cos();
-        let (s1p2, c1p2) = (q1 + q2).simd_sin_cos();
+        let ([s1, s2, s1p2], [c1, c2, c1p2]) = trigonometry::sin_cos([q1, q2, q1 + q2]);
         Trig {
             sin: [s1, s2, s1p2],
             cos: [c1, c2, c1p2],
@@ -126,8 +124,7 @@ pub fn inverse_dynamics<T: SimdRealField + Copy>(
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
     let [[q1, q2]] = q.data.0;
-    let (s1, c1) = q1.simd_sin_cos();
-    let (s2, c2) = q2.simd_sin_cos();
+    let ([s1, s2], [c1, c2]) = trigonometry::sin_cos([q1, q2]);
     let trig = Trig {
         sin: [s1, s2, T::zero()],
         cos: [c1, c2, T::zero()],
@@ -136,6 +133,7 @@ pub fn inverse_dynamics<T: SimdRealField + Copy>(
     inverse_dynamics_with(&trig, dq, ddq, parameters)
 }
 /// [`inverse_dynamics`] with the sines and cosines passed in, so that several calls can share them.
+#[inline(always)]
 #[must_use]
 pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
@@ -213,8 +211,7 @@ pub fn regressor<T: SimdRealField + Copy>(
     ddq: &SVector<T, JOINTS>,
 ) -> SMatrix<T, JOINTS, PARAMETERS> {
     let [[q1, q2]] = q.data.0;
-    let (s1, c1) = q1.simd_sin_cos();
-    let (s2, c2) = q2.simd_sin_cos();
+    let ([s1, s2], [c1, c2]) = trigonometry::sin_cos([q1, q2]);
     let trig = Trig {
         sin: [s1, s2, T::zero()],
         cos: [c1, c2, T::zero()],
@@ -223,6 +220,7 @@ pub fn regressor<T: SimdRealField + Copy>(
     regressor_with(&trig, dq, ddq)
 }
 /// [`regressor`] with the sines and cosines passed in, so that several calls can share them.
+#[inline(always)]
 #[must_use]
 pub fn regressor_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
@@ -297,7 +295,7 @@ pub fn mass_matrix<T: SimdRealField + Copy>(
     parameters: &SVector<T, PARAMETERS>,
 ) -> SMatrix<T, JOINTS, JOINTS> {
     let [[_, q2]] = q.data.0;
-    let (s2, c2) = q2.simd_sin_cos();
+    let ([s2], [c2]) = trigonometry::sin_cos([q2]);
     let trig = Trig {
         sin: [T::zero(), s2, T::zero()],
         cos: [T::zero(), c2, T::zero()],
@@ -306,6 +304,7 @@ pub fn mass_matrix<T: SimdRealField + Copy>(
     mass_matrix_with(&trig, parameters)
 }
 /// [`mass_matrix`] with the sines and cosines passed in, so that several calls can share them.
+#[inline(always)]
 #[must_use]
 pub fn mass_matrix_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
@@ -341,7 +340,7 @@ pub fn coriolis_matrix<T: SimdRealField + Copy>(
     parameters: &SVector<T, PARAMETERS>,
 ) -> SMatrix<T, JOINTS, JOINTS> {
     let [[_, q2]] = q.data.0;
-    let (s2, c2) = q2.simd_sin_cos();
+    let ([s2], [c2]) = trigonometry::sin_cos([q2]);
     let trig = Trig {
         sin: [T::zero(), s2, T::zero()],
         cos: [T::zero(), c2, T::zero()],
@@ -350,6 +349,7 @@ pub fn coriolis_matrix<T: SimdRealField + Copy>(
     coriolis_matrix_with(&trig, dq, parameters)
 }
 /// [`coriolis_matrix`] with the sines and cosines passed in, so that several calls can share them.
+#[inline(always)]
 #[must_use]
 pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
@@ -389,8 +389,7 @@ pub fn gravity<T: SimdRealField + Copy>(
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
     let [[q1, q2]] = q.data.0;
-    let (s1, c1) = q1.simd_sin_cos();
-    let (s1p2, c1p2) = (q1 + q2).simd_sin_cos();
+    let ([s1, s1p2], [c1, c1p2]) = trigonometry::sin_cos([q1, q1 + q2]);
     let trig = Trig {
         sin: [s1, T::zero(), s1p2],
         cos: [c1, T::zero(), c1p2],
@@ -399,6 +398,7 @@ pub fn gravity<T: SimdRealField + Copy>(
     gravity_with(&trig, parameters)
 }
 /// [`gravity`] with the sines and cosines passed in, so that several calls can share them.
+#[inline(always)]
 #[must_use]
 pub fn gravity_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
@@ -434,8 +434,7 @@ pub fn forward_dynamics<T: SimdRealField + Copy>(
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
     let [[q1, q2]] = q.data.0;
-    let (s1, c1) = q1.simd_sin_cos();
-    let (s2, c2) = q2.simd_sin_cos();
+    let ([s1, s2], [c1, c2]) = trigonometry::sin_cos([q1, q2]);
     let trig = Trig {
         sin: [s1, s2, T::zero()],
         cos: [c1, c2, T::zero()],
@@ -444,6 +443,7 @@ pub fn forward_dynamics<T: SimdRealField + Copy>(
     forward_dynamics_with(&trig, dq, tau, parameters)
 }
 /// [`forward_dynamics`] with the sines and cosines passed in, so that several calls can share them.
+#[inline(always)]
 #[must_use]
 pub fn forward_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
@@ -521,8 +521,7 @@ pub fn forward_kinematics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
 ) -> SMatrix<T, 4, 4> {
     let [[q1, q2]] = q.data.0;
-    let (s1, c1) = q1.simd_sin_cos();
-    let (s2, c2) = q2.simd_sin_cos();
+    let ([s1, s2], [c1, c2]) = trigonometry::sin_cos([q1, q2]);
     let trig = Trig {
         sin: [s1, s2, T::zero()],
         cos: [c1, c2, T::zero()],
@@ -531,6 +530,7 @@ pub fn forward_kinematics<T: SimdRealField + Copy>(
     forward_kinematics_with(&trig)
 }
 /// [`forward_kinematics`] with the sines and cosines passed in, so that several calls can share them.
+#[inline(always)]
 #[must_use]
 pub fn forward_kinematics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
@@ -561,4 +561,230 @@ pub fn forward_kinematics_with<T: SimdRealField + Copy>(
             [x18, x19, x0, x1],
         ]),
     )
+}
+mod trigonometry {
+    //! Sines and cosines of several angles at once, by additions and multiplications alone.
+    //!
+    //! Within 1 ulp for |angle| ≤ 10⁵ in `f64` and for every angle in `f32`; the same bits on every machine, in every lane, and
+    //! next to whatever other angles. `f32` calls no operation on `f64`. Other scalars, such as dual numbers, bring their own
+    //! sine and cosine.
+    #![allow(clippy::excessive_precision)]
+    use core::any::{Any, TypeId};
+    use nalgebra::{SimdBool, SimdRealField, convert};
+    /// Sines and cosines, in the order of the angles.
+    #[inline(always)]
+    pub(super) fn sin_cos<T: SimdRealField + Copy, const N: usize>(
+        angles: [T; N],
+    ) -> ([T; N], [T; N]) {
+        if T::LANES == 1 { once(angles) } else { all(angles) }
+    }
+    /// The sine and cosine of one angle, in `f64` of one up to [`LIMIT`], without a branch.
+    #[inline(always)]
+    pub(super) fn near<T: SimdRealField + Copy>(angle: T) -> (T, T) {
+        let element = TypeId::of::<T::Element>();
+        if element == TypeId::of::<f64>() {
+            double(angle)
+        } else if element == TypeId::of::<f32>() {
+            single(angle)
+        } else {
+            angle.simd_sin_cos()
+        }
+    }
+    #[inline(never)]
+    fn once<T: SimdRealField + Copy, const N: usize>(
+        angles: [T; N],
+    ) -> ([T; N], [T; N]) {
+        all(angles)
+    }
+    #[inline(always)]
+    fn all<T: SimdRealField + Copy, const N: usize>(angles: [T; N]) -> ([T; N], [T; N]) {
+        let (mut sines, mut cosines) = (angles, angles);
+        for i in 0..N & !1 {
+            (sines[i], cosines[i]) = near(angles[i]);
+        }
+        for i in N & !1..N {
+            (sines[i], cosines[i]) = near(angles[i]);
+        }
+        if TypeId::of::<T::Element>() == TypeId::of::<f64>() {
+            let size = angles
+                .iter()
+                .fold(T::zero(), |sum, angle| sum + angle.simd_abs());
+            if !size.simd_le(convert(LIMIT)).all() {
+                for i in 0..N {
+                    let far = angles[i].simd_abs().simd_gt(convert(LIMIT));
+                    if far.any() {
+                        let (sine, cosine) = angles[i].simd_sin_cos();
+                        sines[i] = sine.select(far, sines[i]);
+                        cosines[i] = cosine.select(far, cosines[i]);
+                    }
+                }
+            }
+        }
+        (sines, cosines)
+    }
+    /// Up to here a double's quarter turns fit in the 16 bits that [`PARTS`] leave to them.
+    const LIMIT: f64 = 1e5;
+    /// π/2 = 37 + 37 + 53 bits: products of the first two with 16 bits are exact (Cody and Waite).
+    const PARTS: [f64; 3] = [
+        1.5707963267923333,
+        2.5633441515839558e-12,
+        1.0562999066987428e-23,
+    ];
+    /// Added and taken away again, 3·2⁵¹ leaves a double's nearest whole number, and 3·2⁵³ its nearest multiple of four.
+    const WHOLE: f64 = 6_755_399_441_055_744.0;
+    /// Coefficients of sin r = r + r³·(…) and cos r = 1 − r²/2 + r⁴·(…) for |r| ≤ π/4 in double precision (Sun's fdlibm).
+    const SINE: [f64; 6] = [
+        -1.66666666666666324348e-01,
+        8.33333333332248946124e-03,
+        -1.98412698298579493134e-04,
+        2.75573137070700676789e-06,
+        -2.50507602534068634195e-08,
+        1.58969099521155010221e-10,
+    ];
+    const COSINE: [f64; 6] = [
+        4.16666666666666019037e-02,
+        -1.38888888888741095749e-03,
+        2.48015872894767294178e-05,
+        -2.75573143513906633035e-07,
+        2.08757232129817482790e-09,
+        -1.13596475577881948265e-11,
+    ];
+    /// The same in single precision, interpolated at Chebyshev points.
+    const SINE_SINGLE: [f64; 4] = [
+        -0.1666666716337204,
+        0.008333331905305386,
+        -0.00019840082677546889,
+        2.7249313916399842e-06,
+    ];
+    const COSINE_SINGLE: [f64; 3] = [
+        0.0416666641831398,
+        -0.0013888300163671374,
+        2.4547436623834074e-05,
+    ];
+    /// In double precision, up to [`LIMIT`].
+    #[inline(always)]
+    fn double<T: SimdRealField + Copy>(angle: T) -> (T, T) {
+        let whole: T = convert(WHOLE);
+        let [first, second, third] = PARTS.map(convert::<f64, T>);
+        let turns = angle * convert(core::f64::consts::FRAC_2_PI) + whole - whole;
+        let near = angle - turns * first;
+        let part = turns * second;
+        let r = near - part;
+        let tail = near - r - part - turns * third;
+        let fours: T = convert(4.0 * WHOLE);
+        let turns = turns - (turns + fours - fours);
+        turned(
+            turns,
+            sine(r, tail, SINE.map(convert)),
+            cosine(r, tail, COSINE.map(convert)),
+        )
+    }
+    /// In single precision.
+    #[inline(always)]
+    fn single<T: SimdRealField + Copy>(angle: T) -> (T, T) {
+        let part = |which: usize| {
+            angle
+                .map_lanes(|mut x| {
+                    if let Some(x) = (&mut x as &mut dyn Any).downcast_mut::<f32>() {
+                        *x = reduced(*x)[which];
+                    }
+                    x
+                })
+        };
+        let (turns, r, tail) = (part(0), part(1), part(2));
+        turned(
+            turns,
+            sine(r, tail, SINE_SINGLE.map(convert)),
+            cosine(r, tail, COSINE_SINGLE.map(convert)),
+        )
+    }
+    /// The sine of r + tail, |r| ≤ π/4.
+    #[inline(always)]
+    fn sine<T: SimdRealField + Copy, const K: usize>(
+        r: T,
+        tail: T,
+        coefficients: [T; K],
+    ) -> T {
+        let z = r * r;
+        let slope = T::one() - convert::<f64, T>(0.5) * z;
+        r + (tail * slope + z * r * polynomial(z, coefficients))
+    }
+    /// The cosine of r + tail, |r| ≤ π/4.
+    #[inline(always)]
+    fn cosine<T: SimdRealField + Copy, const K: usize>(
+        r: T,
+        tail: T,
+        coefficients: [T; K],
+    ) -> T {
+        let one = T::one();
+        let z = r * r;
+        let half: T = convert::<f64, T>(0.5) * z;
+        let near = one - half;
+        near + (one - near - half + (z * z * polynomial(z, coefficients) - r * tail))
+    }
+    /// Σ coefficientₖ·zᵏ in pairs, which wait less for each other than Horner's form does.
+    #[inline(always)]
+    fn polynomial<T: SimdRealField + Copy, const K: usize>(
+        z: T,
+        coefficients: [T; K],
+    ) -> T {
+        let square = z * z;
+        let pair = |k: usize| {
+            if k + 1 < K {
+                coefficients[k] + z * coefficients[k + 1]
+            } else {
+                coefficients[k]
+            }
+        };
+        let last = (K - 1) & !1;
+        let mut sum = pair(last);
+        for k in (0..last).step_by(2).rev() {
+            sum = pair(k) + square * sum;
+        }
+        sum
+    }
+    /// Sine and cosine after whole quarter turns, −2 … 2, of which products and sums are exact.
+    #[inline(always)]
+    fn turned<T: SimdRealField + Copy>(turns: T, sine: T, cosine: T) -> (T, T) {
+        let along = T::one() - turns.simd_abs();
+        let across = turns + turns * along;
+        (sine * along + cosine * across, cosine * along - sine * across)
+    }
+    /// 2/π in binary, after a word of zeros.
+    const TWO_OVER_PI: [u32; 8] = [
+        0, 0xa2f9_836e, 0x4e44_1529, 0xfc27_57d1, 0xf534_ddc0, 0xdb62_9599, 0x3c43_9041,
+        0xfe51_63ab,
+    ];
+    /// Quarter turns, −2 … 1, and what is left of an angle in two parts, by integers: exact for every `f32` (Payne and Hanek).
+    #[inline(always)]
+    fn reduced(angle: f32) -> [f32; 3] {
+        let bits = angle.to_bits();
+        let size = bits & 0x7fff_ffff;
+        if !(0x3f49_0fdb..0x7f80_0000).contains(&size) {
+            return [0.0, if size < 0x3f49_0fdb { angle } else { f32::NAN }, 0.0];
+        }
+        let mantissa = u64::from((bits & 0x007f_ffff) | 0x0080_0000);
+        let exponent = size >> 23;
+        let (word, shift) = (((exponent - 120) >> 5) as usize, (exponent - 120) & 31);
+        let at = |k: usize| u64::from(TWO_OVER_PI[(word + k) & 7]);
+        let window = |k: usize| (((at(k) << 32) | at(k + 1)) << shift) >> 32;
+        let product = ((mantissa * window(0)) << 32)
+            .wrapping_add(mantissa * window(1))
+            .wrapping_add((mantissa * window(2)) >> 32);
+        let turns = product.wrapping_add(1 << 61) >> 62;
+        let fraction = product.wrapping_sub(turns << 62) as i64;
+        let turns = ((turns as i32 + 1) & 3) - 1;
+        let zeros = fraction.unsigned_abs().leading_zeros();
+        let leading = fraction.unsigned_abs().wrapping_shl(zeros) >> 32;
+        let rest = leading * 0xc90f_daa2;
+        let unit = f32::from_bits((106 - zeros) << 23);
+        let (r, tail) = (
+            (rest >> 40) as u32 as f32 * unit,
+            (rest >> 8) as u32 as f32 * (unit * 2.328_306_4e-10),
+        );
+        let sign = if angle < 0.0 { -1.0 } else { 1.0 };
+        let side = if fraction < 0 { -sign } else { sign };
+        let (turns, r, tail) = (turns as f32 * sign, r * side, tail * side);
+        [turns, r, tail]
+    }
 }

@@ -51,8 +51,14 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         let name = if earlier == 0 { "build" } else { PASSES[earlier - 1].0 };
         let graph = if earlier == count { built.clone() } else { after(earlier)? };
         let Operations { mul, add, div, sin_cos } = graph.operations();
+        let all = graph.graph.operations(&graph.outputs);
         // A String takes every write.
-        let _ = writeln!(text, "# after {name}: {mul} mul, {add} add, {div} div, {sin_cos} sin_cos");
+        let _ = writeln!(
+            text,
+            "# after {name}: {mul} mul, {add} add, {div} div, {sin_cos} sin_cos; of the parameters alone: {} mul, {} add",
+            all.mul - mul,
+            all.add - add
+        );
     }
     text.push_str(&listing(&built, &model.set(args.parameters.into()).map_err(Failure::refused)?.names()));
     print(&text)?;

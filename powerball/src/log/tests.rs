@@ -207,7 +207,7 @@ fn each_doubt_finds_its_fault_and_no_other() {
             &["drifts against the joints' speeds", "x.csv:2668: t: at 26.8"],
         ),
         (&swings(|_, r| r[5] = r[5].clamp(-100.0, 12.0)), &["tau1: at ", "stays at its extreme 12 for"]),
-        (&swings(|_, r| round(&mut r[6], 1.5)), &["tau2: has 2", "1.500e0 apart"]),
+        (&swings(|_, r| round(&mut r[6], 1.5)), &["tau2: has 12 levels", "1.500e0 apart"]),
         (&swings(|_, r| round(&mut r[1], 0.02)), &["q1: has 101 levels, 2.000e-2 apart: accelerations"]),
         (&swings(|_, r| r[5] = -r[5]), &["tau1: is ", "friction would have to drive the joint"]),
         (&swings(|_, r| (r[1], r[3]) = (-r[1], -r[3])), &["tau1: is ", "or that of q1"]),
