@@ -154,7 +154,7 @@ fn table(costs: &Costs) -> String {
             .to_string();
     let meaning = [
         ("trig", "sines and cosines of five joints"),
-        ("tau", "τ, trigonometry passed in, as below"),
+        ("tau", "τ, trigonometry and prepared parameters passed in, as below"),
         ("regressor", "Y, 6 × 19"),
         ("mass_matrix", "B"),
         ("coriolis", "C"),

@@ -34,7 +34,7 @@ macro_rules! precision {
     ($(#[$doc:meta])* $scalar:ident) => {
         $(#[$doc])*
         pub mod $scalar {
-            use crate::arm::{self, Trig};
+            use crate::arm::{self, Prepared, Trig};
             use nalgebra::{SMatrix, SVector};
             use powerball::friction::{TABLE_2, TanhFriction};
             use powerball::online::SquareRoot;
@@ -84,9 +84,15 @@ macro_rules! precision {
                 Trig::new(q)
             }
 
-            /// τ, with the trigonometry passed in, as everything below.
+            /// What the functions take of the parameters, made once.
             #[inline(never)]
-            pub fn tau(trig: &Trig<$scalar>, dq: &Joints, ddq: &Joints, p: &Parameters) -> Joints {
+            pub fn prepared(p: &Parameters) -> Prepared<$scalar> {
+                arm::prepare(p)
+            }
+
+            /// τ, with the trigonometry and the prepared parameters passed in, as everything below.
+            #[inline(never)]
+            pub fn tau(trig: &Trig<$scalar>, dq: &Joints, ddq: &Joints, p: &Prepared<$scalar>) -> Joints {
                 arm::inverse_dynamics_with(trig, dq, ddq, p)
             }
 
@@ -98,19 +104,19 @@ macro_rules! precision {
 
             /// B.
             #[inline(never)]
-            pub fn mass_matrix(trig: &Trig<$scalar>, p: &Parameters) -> SMatrix<$scalar, 6, 6> {
+            pub fn mass_matrix(trig: &Trig<$scalar>, p: &Prepared<$scalar>) -> SMatrix<$scalar, 6, 6> {
                 arm::mass_matrix_with(trig, p)
             }
 
             /// C.
             #[inline(never)]
-            pub fn coriolis(trig: &Trig<$scalar>, dq: &Joints, p: &Parameters) -> SMatrix<$scalar, 6, 6> {
+            pub fn coriolis(trig: &Trig<$scalar>, dq: &Joints, p: &Prepared<$scalar>) -> SMatrix<$scalar, 6, 6> {
                 arm::coriolis_matrix_with(trig, dq, p)
             }
 
             /// g.
             #[inline(never)]
-            pub fn gravity(trig: &Trig<$scalar>, p: &Parameters) -> Joints {
+            pub fn gravity(trig: &Trig<$scalar>, p: &Prepared<$scalar>) -> Joints {
                 arm::gravity_with(trig, p)
             }
 
@@ -138,7 +144,7 @@ macro_rules! precision {
 
             /// One control step: computed torque with friction, from where the joints are and should be.
             #[inline(never)]
-            pub fn control(is: [&Joints; 2], wanted: [&Joints; 3], p: &Parameters) -> Joints {
+            pub fn control(is: [&Joints; 2], wanted: [&Joints; 3], p: &Prepared<$scalar>) -> Joints {
                 let [q, dq] = is;
                 let [q_wanted, dq_wanted, ddq_wanted] = wanted;
                 let ddq = ddq_wanted + (dq_wanted - dq) * 40.0 + (q_wanted - q) * 400.0;

@@ -19,7 +19,7 @@ fn main() -> ! {
     let mut now = 0;
     loop {
         let [q, dq, ddq] = black_box(double::STATES[0]).map(Joints::from);
-        let p = black_box(Parameters::from(double::PARAMETERS));
+        let p = double::prepared(&black_box(Parameters::from(double::PARAMETERS)));
         let trig = double::trig(&q);
         let y = double::regressor(&trig, &dq, &ddq);
         black_box(double::mass_matrix(&trig, &p));

@@ -22,7 +22,7 @@ impl Hash {
 macro_rules! bits {
     ($out:expr, $scalar:ident) => {{
         use powerball_firmware::$scalar::*;
-        let p = Parameters::from(PARAMETERS);
+        let p = prepared(&Parameters::from(PARAMETERS));
         let names = [
             "trig",
             "tau",
@@ -92,7 +92,7 @@ fn main() {
 macro_rules! costs {
     ($out:expr, $counter:expr, $scalar:ident) => {{
         use powerball_firmware::$scalar::*;
-        let p = Parameters::from(PARAMETERS);
+        let p = prepared(&Parameters::from(PARAMETERS));
         let [q, dq, ddq] = STATES[0].map(Joints::from);
         let ready = trig(&q);
         let y = regressor(&ready, &dq, &ddq);

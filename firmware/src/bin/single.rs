@@ -17,7 +17,7 @@ fn main() -> ! {
     let mut online = SquareRoot::<f32, { arm::PARAMETERS }>::new(1e-3);
     loop {
         let [q, dq, ddq] = black_box(single::STATES[0]).map(Joints::from);
-        let p = black_box(Parameters::from(single::PARAMETERS));
+        let p = single::prepared(&black_box(Parameters::from(single::PARAMETERS)));
         let trig = single::trig(&q);
         let y = single::regressor(&trig, &dq, &ddq);
         black_box(single::mass_matrix(&trig, &p));
