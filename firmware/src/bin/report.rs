@@ -152,7 +152,9 @@ mod target {
             let _ = writeln!(out, "{info}");
         }
         debug::exit(debug::EXIT_FAILURE);
-        loop {}
+        loop {
+            core::hint::spin_loop();
+        }
     }
 
     #[entry]
@@ -173,6 +175,8 @@ mod target {
             }
             debug::exit(debug::EXIT_SUCCESS);
         }
-        loop {}
+        loop {
+            core::hint::spin_loop();
+        }
     }
 }

@@ -81,9 +81,8 @@ pub(super) fn table(outcomes: &[&Outcome]) -> String {
                 row[1 + answer(&settled.before, truth)] += 1;
                 if !settled.open.is_empty() {
                     row[4] += 1;
-                    match &settled.decided {
-                        Some(name) => row[if name == truth { 5 } else { 6 }] += 1,
-                        None => {}
+                    if let Some(name) = &settled.decided {
+                        row[if name == truth { 5 } else { 6 }] += 1;
                     }
                 }
                 row[7 + answer(&outcome.named, truth)] += 1;

@@ -115,7 +115,7 @@ impl Case {
             let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1000) + table as u64);
             let mut size = || {
                 let range = table.sizes();
-                (rng.random_range(range.start.ln()..range.end.ln()) as f64).exp()
+                f64::exp(rng.random_range(range.start.ln()..range.end.ln()))
             };
             let mut add =
                 |kinds: Vec<String>, sizes: Vec<f64>| cases.push(Case { table, kinds, sizes, seed });
