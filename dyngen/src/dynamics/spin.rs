@@ -15,7 +15,7 @@ pub struct Spin {
     pub omega: Vector,
     /// Angular velocity at the reference speeds.
     pub reference: Vector,
-    /// U = [ω̇×] + [ω×][ω×] by rows: the acceleration of a point at r, relative to the origin, is U·r.
+    /// `U = [ω̇×] + [ω×][ω×]` by rows: the acceleration of a point at r, relative to the origin, is U·r.
     pub rows: [Vector; 3],
 }
 

@@ -9,7 +9,7 @@ use faer::Mat;
 /// Friction columns of a joint: two saturating levels, the viscous one, and the two tangents of the shapes.
 pub(super) const FRICTION: usize = 5;
 
-/// Where a coefficient stands: the minimal set, [`FRICTION`] columns a joint, further columns.
+/// Where a coefficient stands: the minimal set, five friction columns a joint, further columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
     /// Inertial columns.
