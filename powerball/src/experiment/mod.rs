@@ -111,6 +111,7 @@ pub fn learn(
         .map(|h| RuledOut {
             effect: h.name.to_string(),
             joints: h.joints.clone(),
+            in_favour_of: decision.winner.unwrap_or_default().to_string(),
             why_not: format!("ruled out by the experiment: {}", decision.why),
         });
     let told = Options { ruled_out: told.ruled_out.iter().cloned().chain(losers).collect(), ..told.clone() };

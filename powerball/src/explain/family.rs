@@ -227,7 +227,13 @@ impl Session<'_> {
         let found = parallel::map(&open, |m| {
             let member = &family.members[*m];
             let columns = effect.columns(other, &member.candidate);
-            let extent = extent(&member.candidate);
+            // An experiment leaves the paths of the other logs on purpose: a fold that holds all of it out asks how the base
+            // model extrapolates. What the experiment speaks for is asked stretch by stretch of every log instead.
+            let spoken_for = self.told.ruled_out.iter().any(|r| r.in_favour_of == effect.name());
+            let extent = match extent(&member.candidate) {
+                Extent::Everywhere if spoken_for => Extent::SomeLogs,
+                extent => extent,
+            };
             evidence(
                 screen,
                 &member.trial,

@@ -115,6 +115,8 @@ pub struct RuledOut {
     pub effect: String,
     /// The joints, from 0.
     pub joints: Vec<usize>,
+    /// The name that the experiment speaks for instead.
+    pub in_favour_of: String,
     /// What showed it.
     pub why_not: String,
 }
