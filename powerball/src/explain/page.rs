@@ -17,10 +17,7 @@ pub fn add_to_page(page: &mut Page, explained: &Explained) {
 
 fn errors(page: &mut Page, explained: &Explained) {
     page.heading("Errors on the held-out path");
-    let [low, high] = explained.band;
     let (before, after) = (&explained.before.validate, &explained.after.validate);
-    let title = format!("Torque error on logs that were not fitted, {low} to {high} Hz");
-    let mut bars = BarPairs::new(title, "rms [N·m]", ["base model", "with the effects below"]);
     let mut table = Table::new([
         "joint",
         "base model [N·m]",
@@ -33,7 +30,6 @@ fn errors(page: &mut Page, explained: &Explained) {
     for joint in 0..before.rms.len() {
         let (b, a) = (before.rms[joint], after.rms[joint]);
         let floor = explained.noise_floor.get(joint).copied().unwrap_or(f64::NAN);
-        bars = bars.pair_with_floor(format!("joint {}", joint + 1), b, a, floor);
         table.push([
             (joint + 1).to_string(),
             number(b),
@@ -44,8 +40,23 @@ fn errors(page: &mut Page, explained: &Explained) {
             number(floor),
         ]);
     }
-    page.bars(&bars, "The dashed lines are what white measurement noise alone would leave in the band.");
+    page.bars(
+        &error_bars(explained),
+        "The dashed lines are what white measurement noise alone would leave in the band.",
+    );
     page.table(&table);
+}
+
+/// Held-out errors by joint, before and after.
+#[must_use]
+pub fn error_bars(explained: &Explained) -> BarPairs {
+    let [low, high] = explained.band;
+    let title = format!("Torque error on logs that were not fitted, {low} to {high} Hz");
+    let errors = explained.before.validate.rms.iter().zip(&explained.after.validate.rms);
+    let bars = BarPairs::new(title, "rms [N·m]", ["base model", "with what was named"]);
+    errors.zip(&explained.noise_floor).enumerate().fold(bars, |bars, (joint, ((before, after), floor))| {
+        bars.pair_with_floor(format!("joint {}", joint + 1), *before, *after, *floor)
+    })
 }
 
 fn effects(page: &mut Page, explained: &Explained) {
@@ -102,7 +113,8 @@ fn effects(page: &mut Page, explained: &Explained) {
 }
 
 /// The residual over the signal that shows an effect.
-fn sight(shown: &Shown) -> Figure {
+#[must_use]
+pub fn sight(shown: &Shown) -> Figure {
     let rows = |k: usize| shown.rows.iter().map(|row| (row[0], row[k])).collect();
     let means = |k: usize| shown.means.iter().map(|mean| (mean[0], mean[k])).collect();
     let what = if shown.against_motion { "residual against motion [N·m]" } else { "residual [N·m]" };
