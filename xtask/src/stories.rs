@@ -133,12 +133,15 @@ fn tell(page: &mut String, case: &Case, explained: &Explained, figures: &Path) -
     figure(page, "errors", "held-out errors before and after", error_bars(explained).to_file())?;
     let _ = writeln!(
         page,
-        "\n| joint | base model, N·m | with what was named, N·m | change |\n|---|---|---|---|"
+        "\n| joint | base model, N·m | with what was named, N·m | change, 95 % interval |\n|---|---|---|---|"
     );
-    let (before, after) = (&explained.before.validate, &explained.after.validate);
-    for (joint, (b, a)) in before.rms.iter().zip(&after.rms).enumerate() {
-        let change = if *b > 0.0 { 100.0 * (a / b - 1.0) } else { 0.0 };
-        let _ = writeln!(page, "| {} | {b:.3} | {a:.3} | {change:+.0} % |", joint + 1);
+    let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
+    for change in &explained.held_out_change {
+        let (b, a) = (before[change.joint - 1], after[change.joint - 1]);
+        let [low, high] = change.interval.map(|share| 100.0 * share);
+        let rms = 100.0 * change.rms;
+        let _ =
+            writeln!(page, "| {} | {b:.3} | {a:.3} | {rms:+.0} % ({low:+.0} to {high:+.0}) |", change.joint);
     }
     if explained.effects.is_empty() {
         let _ = writeln!(page, "\nNothing is named.");

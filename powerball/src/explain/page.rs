@@ -24,19 +24,22 @@ fn errors(page: &mut Page, explained: &Explained) {
         "of the torque",
         "with effects [N·m]",
         "of the torque",
-        "change",
+        "change, 95 % interval",
         "noise floor [N·m]",
     ]);
     for joint in 0..before.rms.len() {
         let (b, a) = (before.rms[joint], after.rms[joint]);
         let floor = explained.noise_floor.get(joint).copied().unwrap_or(f64::NAN);
+        let changed = explained.held_out_change.iter().find(|c| c.joint == joint + 1);
         table.push([
             (joint + 1).to_string(),
             number(b),
             percent(before.relative[joint]),
             number(a),
             percent(after.relative[joint]),
-            if b > 0.0 { change(a / b - 1.0) } else { String::new() },
+            changed.map_or_else(String::new, |c| {
+                format!("{} ({} to {})", change(c.rms), change(c.interval[0]), change(c.interval[1]))
+            }),
             number(floor),
         ]);
     }
