@@ -1,5 +1,5 @@
-//! Whether an effect is of one size at every pace. A name that is not the truth is fitted where most of the truth is, in
-//! slow motion say; in faster motion the same law then says something else than what is there. (Tests of constant parameters,
+//! Whether an effect is there at every pace. A name that is not the truth is fitted where most of the truth is, in
+//! slow motion say; in faster motion what the same law says is then not there. (Tests of constant parameters,
 //! after Chow 1960; here over octaves of time in the place of periods.)
 
 use super::forward::{Accepted, Session};
@@ -31,8 +31,8 @@ fn octaves(signal: &[f64]) -> [Vec<f64>; OCTAVES + 1] {
 }
 
 impl Session<'_> {
-    /// The last accepted effect that is surely of another size in some octave than over all, and by much. Everything that fits
-    /// must be in the model: what else is missing is seen as a change of size too.
+    /// The last accepted effect of which surely most is missing in some octave. Everything that fits must be in the model: what else
+    /// is missing is seen as a change of size too. (A change by more than the effect itself is not its own.)
     pub(super) fn inconstant(&self) -> Option<usize> {
         let (gram, _, _) = self.fit.gram.sum(&self.fit.weights, |_| true);
         let mut first = 0;
@@ -42,10 +42,12 @@ impl Session<'_> {
                 self.by_octave(&gram, first - a.columns, a)
             })
             .collect();
-        let surely = rule::CHANGE_ERRORS;
-        let changes = |(change, error): &(f64, f64)| change.abs() > rule::MOST_CHANGE.max(surely * error);
+        let missing = |(change, error): &(f64, f64)| {
+            let least = rule::LEAST_MISSING.max(rule::MISSING_ERRORS * error);
+            (least..2.0 - rule::LEAST_MISSING).contains(&-change)
+        };
         let judged = |a: &usize| !self.effects[self.accepted[*a].effect].abrupt();
-        (0..sizes.len()).rev().filter(judged).find(|a| sizes[*a].iter().any(changes))
+        (0..sizes.len()).rev().filter(judged).find(|a| sizes[*a].iter().any(missing))
     }
 
     /// An effect's size by octave, everything else refitted. `first` is the place of its columns among the terms.

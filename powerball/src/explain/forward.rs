@@ -355,12 +355,12 @@ impl Session<'_> {
         Some(Stepped::Accepted(self.effects[chosen].name()))
     }
 
-    /// Takes back what, now that everything that fits is in the model, is not what it is called: an effect that is not of one size
-    /// at every pace; or one that is not told apart from its rivals and beside which much is left, so that something else is
+    /// Takes back what, now that everything that fits is in the model, is not what it is called: an effect that is missing at some
+    /// pace; or one that is not told apart from its rivals and beside which much is left, so that something else is
     /// there. It stays as a rival of what comes. Returns its name and why.
     fn withhold(&mut self) -> Option<(&'static str, &'static str)> {
         let (taken, why) = if let Some(a) = self.inconstant() {
-            (vec![self.accepted.remove(a)], "it is not of one size in fast and in slow motion")
+            (vec![self.accepted.remove(a)], "what it says of some pace of motion is not there")
         } else {
             let weak = self.steps.iter().rev().find(|s| {
                 s.comparison.apart < rule::LEAST_MARGIN
