@@ -28,6 +28,10 @@ type Joints = SVector<f64, 6>;
 type Parameters = SVector<f64, { arm::PARAMETERS }>;
 type Block<T> = [[T; LANES]; arm::JOINTS];
 
+/// Where a line of the cache begins, as the module `batch` asks for.
+#[repr(align(64))]
+struct Aligned<T>(T);
+
 /// The virtual arm's links without rotors: for the functions by hand, and as the minimal set.
 fn links() -> ([Link; 6], Parameters) {
     let bodies = powerball::virtual_arm::lwa4p::links();
@@ -86,7 +90,8 @@ fn times(links: &[Link; 6], parameters: &Parameters, states: &[[Joints; 3]]) {
             })
         };
     }
-    let p = black_box(parameters);
+    let (p, prepared) = (black_box(parameters), arm::prepare(parameters));
+    let z = black_box(&prepared);
     let mut rows: Vec<Row<'_>> = vec![
         (
             "Newton–Euler by hand, 60 parameters",
@@ -95,8 +100,8 @@ fn times(links: &[Link; 6], parameters: &Parameters, states: &[[Joints; 3]]) {
         ),
         ("**τ**", each!(states, [q, dq, ddq] => arm::inverse_dynamics(q, dq, ddq, p)), Some(0.27)),
         (
-            "**τ**, sines and cosines passed in",
-            each!(ready, ([_, dq, ddq], trig) => arm::inverse_dynamics_with(trig, dq, ddq, p)),
+            "**τ**, sines, cosines and prepared parameters passed in",
+            each!(ready, ([_, dq, ddq], trig) => arm::inverse_dynamics_with(trig, dq, ddq, z)),
             Some(0.15),
         ),
         ("**Y**, 6 × 19", each!(states, [q, dq, ddq] => arm::regressor(q, dq, ddq)), Some(0.33)),
@@ -117,7 +122,8 @@ fn times(links: &[Link; 6], parameters: &Parameters, states: &[[Joints; 3]]) {
             each!(plain, [q, ..] => with_nalgebra.mass_matrix(q, links)),
             None,
         ),
-        ("six sines and cosines, emitted", each!(states, [q, ..] => arm::Trig::new(q)), None),
+        ("preparation of the parameters for all functions", each!(states, _ => arm::prepare(p)), None),
+        ("`Trig::new`: seven sines and cosines, emitted", each!(states, [q, ..] => arm::Trig::new(q)), None),
         ("six sines and cosines, `std`", each!(plain, [q, ..] => q.map(f64::sin_cos)), None),
         ("six sines and cosines, crate `libm`", each!(plain, [q, ..] => q.map(libm::sincos)), None),
     ];
@@ -189,8 +195,8 @@ fn batches(parameters: &Parameters, states: &[[Joints; 3]]) {
         std::array::from_fn(|i| std::array::from_fn(|lane| block[lane][k][i]))
     };
     let blocks: Vec<[Block<f64>; 3]> = blocks.iter().map(|b| std::array::from_fn(|k| lane(k, b))).collect();
-    let (mut torque, mut torque_any) = (Torque::NOTHING, Torque::NOTHING);
-    let (mut regressor, mut regressor_any) = (Regressor::NOTHING, Regressor::NOTHING);
+    let (mut torque, mut torque_any) = (Aligned(Torque::NOTHING), Aligned(Torque::NOTHING));
+    let (mut regressor, mut regressor_any) = (Aligned(Regressor::NOTHING), Aligned(Regressor::NOTHING));
     let best = support::paired(
         ROUNDS,
         [
@@ -199,15 +205,15 @@ fn batches(parameters: &Parameters, states: &[[Joints; 3]]) {
                     black_box(arm::inverse_dynamics(q, dq, ddq, parameters));
                 })
             },
-            &mut || All::<Torque> { blocks: &blocks, parameters, out: &mut torque_any }.run(),
-            &mut || batch::run(All::<Torque> { blocks: &blocks, parameters, out: &mut torque }),
+            &mut || All::<Torque> { blocks: &blocks, parameters, out: &mut torque_any.0 }.run(),
+            &mut || batch::run(All::<Torque> { blocks: &blocks, parameters, out: &mut torque.0 }),
             &mut || {
                 states.iter().for_each(|[q, dq, ddq]| {
                     black_box(arm::regressor(q, dq, ddq));
                 })
             },
-            &mut || All::<Regressor> { blocks: &blocks, parameters, out: &mut regressor_any }.run(),
-            &mut || batch::run(All::<Regressor> { blocks: &blocks, parameters, out: &mut regressor }),
+            &mut || All::<Regressor> { blocks: &blocks, parameters, out: &mut regressor_any.0 }.run(),
+            &mut || batch::run(All::<Regressor> { blocks: &blocks, parameters, out: &mut regressor.0 }),
         ],
     );
     let best = best.map(|time| time.as_secs_f64() * 1e9 / states.len() as f64);

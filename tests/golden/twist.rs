@@ -45,17 +45,24 @@ impl<T: SimdRealField + Copy> Trig<T> {
     /// From joint positions, rad (m where prismatic).
     #[must_use]
     pub fn new(q: &SVector<T, JOINTS>) -> Self {
-        let [[q1, q2, q3]] = q.data.0;
-        let ([s1, s3], [c1, c3]) = trigonometry::sin_cos([
-            q1,
-            q3 + nalgebra::convert::<f64, T>(0.2f64),
-        ]);
+        let [[_, q2, _]] = q.data.0;
+        let ([s1, s3], [c1, c3]) = trigonometry::sin_cos(q, angles_1_3);
         Trig {
             sin: [s1, T::zero(), s3],
             cos: [c1, T::zero(), c3],
             position: [T::zero(), q2, T::zero()],
         }
     }
+}
+#[inline(always)]
+fn angles_1_3<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 2] {
+    let [[q1, _, q3]] = q.data.0;
+    [q1, q3 + nalgebra::convert::<f64, T>(0.2f64)]
+}
+#[inline(always)]
+fn angles_3<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 1] {
+    let [[_, _, q3]] = q.data.0;
+    [q3 + nalgebra::convert::<f64, T>(0.2f64)]
 }
 /// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of calls.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -183,8 +190,8 @@ pub fn inverse_dynamics<T: SimdRealField + Copy>(
     ddq: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
-    let [[_, q2, q3]] = q.data.0;
-    let ([s3], [c3]) = trigonometry::sin_cos([q3 + nalgebra::convert::<f64, T>(0.2f64)]);
+    let [[_, q2, _]] = q.data.0;
+    let ([s3], [c3]) = trigonometry::sin_cos(q, angles_3);
     let trig = Trig {
         sin: [T::zero(), T::zero(), s3],
         cos: [T::zero(), T::zero(), c3],
@@ -464,8 +471,8 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
     let x266 = ddq1 * z13;
     let x267 = x8 * x261;
     let x268 = x264 - x267;
-    let x269 = x266 - x268;
-    SMatrix::from_array_storage(ArrayStorage([[-x269, -x246, x204]]))
+    let x269 = x268 - x266;
+    SMatrix::from_array_storage(ArrayStorage([[x269, -x246, x204]]))
 }
 /// Regressor Y(q, q̇, q̈): τ = Y·π for the parameters of [`PARAMETER_NAMES`].
 ///
@@ -482,8 +489,8 @@ pub fn regressor<T: SimdRealField + Copy>(
     dq: &SVector<T, JOINTS>,
     ddq: &SVector<T, JOINTS>,
 ) -> SMatrix<T, JOINTS, PARAMETERS> {
-    let [[_, q2, q3]] = q.data.0;
-    let ([s3], [c3]) = trigonometry::sin_cos([q3 + nalgebra::convert::<f64, T>(0.2f64)]);
+    let [[_, q2, _]] = q.data.0;
+    let ([s3], [c3]) = trigonometry::sin_cos(q, angles_3);
     let trig = Trig {
         sin: [T::zero(), T::zero(), s3],
         cos: [T::zero(), T::zero(), c3],
@@ -790,8 +797,8 @@ pub fn mass_matrix<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SMatrix<T, JOINTS, JOINTS> {
-    let [[_, q2, q3]] = q.data.0;
-    let ([s3], [c3]) = trigonometry::sin_cos([q3 + nalgebra::convert::<f64, T>(0.2f64)]);
+    let [[_, q2, _]] = q.data.0;
+    let ([s3], [c3]) = trigonometry::sin_cos(q, angles_3);
     let trig = Trig {
         sin: [T::zero(), T::zero(), s3],
         cos: [T::zero(), T::zero(), c3],
@@ -969,8 +976,8 @@ pub fn coriolis_matrix<T: SimdRealField + Copy>(
     dq: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SMatrix<T, JOINTS, JOINTS> {
-    let [[_, q2, q3]] = q.data.0;
-    let ([s3], [c3]) = trigonometry::sin_cos([q3 + nalgebra::convert::<f64, T>(0.2f64)]);
+    let [[_, q2, _]] = q.data.0;
+    let ([s3], [c3]) = trigonometry::sin_cos(q, angles_3);
     let trig = Trig {
         sin: [T::zero(), T::zero(), s3],
         cos: [T::zero(), T::zero(), c3],
@@ -1306,8 +1313,7 @@ pub fn gravity<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
-    let [[_, _, q3]] = q.data.0;
-    let ([s3], [c3]) = trigonometry::sin_cos([q3 + nalgebra::convert::<f64, T>(0.2f64)]);
+    let ([s3], [c3]) = trigonometry::sin_cos(q, angles_3);
     let trig = Trig {
         sin: [T::zero(), T::zero(), s3],
         cos: [T::zero(), T::zero(), c3],
@@ -1367,8 +1373,8 @@ pub fn gravity_with<T: SimdRealField + Copy>(
     let x21 = x19 + x20;
     let x22 = x10 * x21;
     let x23 = x13 * x18;
-    let x24 = x22 - x23;
-    SMatrix::from_array_storage(ArrayStorage([[x0, z21, -x24]]))
+    let x24 = x23 - x22;
+    SMatrix::from_array_storage(ArrayStorage([[x0, z21, x24]]))
 }
 /// Joint accelerations under joint torques: q̈ = B⁻¹·(τ − C·q̇ − g), without friction.
 ///
@@ -1387,8 +1393,8 @@ pub fn forward_dynamics<T: SimdRealField + Copy>(
     tau: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
-    let [[_, q2, q3]] = q.data.0;
-    let ([s3], [c3]) = trigonometry::sin_cos([q3 + nalgebra::convert::<f64, T>(0.2f64)]);
+    let [[_, q2, _]] = q.data.0;
+    let ([s3], [c3]) = trigonometry::sin_cos(q, angles_3);
     let trig = Trig {
         sin: [T::zero(), T::zero(), s3],
         cos: [T::zero(), T::zero(), c3],
@@ -1745,19 +1751,19 @@ pub fn forward_dynamics_with<T: SimdRealField + Copy>(
     let x347 = x240 * x334;
     let x348 = x239 + x347;
     let x349 = x341 * x348;
-    let x350 = x238 - x349;
+    let x350 = x349 - x238;
     let x351 = x240 * x335;
-    let x352 = x350 + x351;
+    let x352 = x350 - x351;
     let x353 = x346 * x352;
     let x354 = x338 * x348;
     let x355 = x240 * z22;
     let x356 = x341 * x353;
-    let x357 = x354 + x356;
+    let x357 = x356 - x354;
     let x358 = x335 * x353;
-    let x359 = x355 - x358;
+    let x359 = x355 + x358;
     let x360 = x334 * x357;
-    let x361 = x359 + x360;
-    SMatrix::from_array_storage(ArrayStorage([[x353, x357, -x361]]))
+    let x361 = x360 - x359;
+    SMatrix::from_array_storage(ArrayStorage([[-x353, -x357, x361]]))
 }
 /// Pose of the tool's frame (the last link's where the arm declares no tool) in the base frame.
 ///
@@ -1770,11 +1776,8 @@ pub fn forward_dynamics_with<T: SimdRealField + Copy>(
 pub fn forward_kinematics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
 ) -> SMatrix<T, 4, 4> {
-    let [[q1, q2, q3]] = q.data.0;
-    let ([s1, s3], [c1, c3]) = trigonometry::sin_cos([
-        q1,
-        q3 + nalgebra::convert::<f64, T>(0.2f64),
-    ]);
+    let [[_, q2, _]] = q.data.0;
+    let ([s1, s3], [c1, c3]) = trigonometry::sin_cos(q, angles_1_3);
     let trig = Trig {
         sin: [s1, T::zero(), s3],
         cos: [c1, T::zero(), c3],
@@ -1889,12 +1892,21 @@ mod trigonometry {
     #![allow(clippy::excessive_precision)]
     use core::any::{Any, TypeId};
     use nalgebra::{SimdBool, SimdRealField, convert};
-    /// Sines and cosines, in the order of the angles.
+    /// Sines and cosines of the angles that `angles` makes of joint positions, in their order.
+    ///
+    /// Positions and not angles are handed over, because a processor that reads in one piece what was just written in
+    /// several waits until that is done.
     #[inline(always)]
-    pub(super) fn sin_cos<T: SimdRealField + Copy, const N: usize>(
-        angles: [T; N],
+    pub(super) fn sin_cos<T: SimdRealField + Copy, Q, const N: usize>(
+        q: &Q,
+        angles: impl Fn(&Q) -> [T; N],
     ) -> ([T; N], [T; N]) {
-        if T::LANES == 1 { once(angles) } else { all(angles) }
+        if T::LANES == 1 {
+            let [sines, cosines] = once(q, angles);
+            (sines.0, cosines.0)
+        } else {
+            all(angles(q))
+        }
     }
     /// The sine and cosine of one angle, in `f64` of one up to [`LIMIT`], without a branch.
     #[inline(always)]
@@ -1908,11 +1920,16 @@ mod trigonometry {
             angle.simd_sin_cos()
         }
     }
+    /// Sines or cosines. No vector of them crosses a line of the cache: what does cannot be read before it is written there.
+    #[cfg_attr(target_arch = "x86_64", repr(align(16)))]
+    struct Row<T, const N: usize>([T; N]);
     #[inline(never)]
-    fn once<T: SimdRealField + Copy, const N: usize>(
-        angles: [T; N],
-    ) -> ([T; N], [T; N]) {
-        all(angles)
+    fn once<T: SimdRealField + Copy, Q, const N: usize>(
+        q: &Q,
+        angles: impl Fn(&Q) -> [T; N],
+    ) -> [Row<T, N>; 2] {
+        let (sines, cosines) = all(angles(q));
+        [Row(sines), Row(cosines)]
     }
     #[inline(always)]
     fn all<T: SimdRealField + Copy, const N: usize>(angles: [T; N]) -> ([T; N], [T; N]) {

@@ -1,6 +1,6 @@
 //! One function as tokens: straight-line code, one `let` for each node.
 
-use super::docs;
+use super::{docs, signs};
 use crate::arm::{Arm, JointKind};
 use crate::dynamics::chain;
 use crate::dynamics::function::{Argument, Size, trig_offset};
@@ -32,8 +32,14 @@ pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) ->
         true => (quote!(q), quote!(trig)),
         false => (quote!(_q), quote!(_trig)),
     };
-    let statements = sections(model, &built.graph, &built.outputs, &needed);
-    let (result, value) = result(built);
+    // Where it pays, by measurement.
+    let signs = if built.function.size() == (Size::Joints, Size::Fixed(1)) {
+        signs::held(&built.graph, &built.outputs, &needed)
+    } else {
+        vec![false; built.graph.nodes().len()]
+    };
+    let statements = sections(model, &built.graph, &built.outputs, &needed, &signs);
+    let (result, value) = result(built, &signs);
     // Where the result is a number, the last `let` is the result.
     let lint = is_number(built).then(|| quote!(#[allow(clippy::let_and_return)]));
     quote! {
@@ -64,12 +70,7 @@ pub(super) fn is_number(built: &FunctionGraph) -> bool {
 
 /// The struct of sines and cosines that functions share.
 pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
-    let all: BTreeSet<Input> = angles(arm)
-        .into_iter()
-        .flat_map(|sum| [Input::Sin(sum), Input::Cos(sum)])
-        .chain((0..arm.dof()).map(Input::Position))
-        .collect();
-    let (bindings, fields) = trig_fields(arm, &all);
+    let (bindings, fields) = trig_fields(arm, &all_inputs(arm));
     let sums: Vec<String> = chain::sums(arm)
         .iter()
         .enumerate()
@@ -125,6 +126,12 @@ pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
     }
 }
 
+/// Everything that is made of q.
+fn all_inputs(arm: &Arm) -> BTreeSet<Input> {
+    let turning = angles(arm).into_iter().flat_map(|sum| [Input::Sin(sum), Input::Cos(sum)]);
+    turning.chain((0..arm.dof()).map(Input::Position)).collect()
+}
+
 fn uses_positions(used: &BTreeSet<Input>) -> bool {
     used.iter().any(|i| matches!(i, Input::Sin(_) | Input::Cos(_) | Input::Position(_)))
 }
@@ -146,8 +153,8 @@ fn used(built: &FunctionGraph, needed: &[usize]) -> BTreeSet<Input> {
 
 /// What a function takes of q: the positions that it reads, and the angles whose sine or cosine it needs.
 struct Positions {
-    /// Whether each joint's position is read.
-    read: Vec<bool>,
+    /// Whether each joint's position is read as it is.
+    places: Vec<bool>,
     /// Each angle, and the names of its sine and cosine where they are read.
     angles: Vec<(JointSum, TokenStream, TokenStream)>,
     /// A `Trig` of them; the rest is zero, because nobody reads it.
@@ -159,9 +166,9 @@ impl Positions {
     fn new(arm: &Arm, used: &BTreeSet<Input>, position: impl Fn(usize) -> TokenStream) -> Positions {
         let zero = quote!(T::zero());
         let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
-        let mut read = vec![false; arm.dof()];
-        let (mut found, mut sines, mut cosines, mut places) =
-            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let places: Vec<bool> =
+            (0..arm.dof()).map(|i| !revolute(i) && used.contains(&Input::Position(i))).collect();
+        let (mut found, mut sines, mut cosines) = (Vec::new(), Vec::new(), Vec::new());
         for sum in angles(arm) {
             let turns = sum.joints().all(|(i, _)| revolute(i));
             let name = |input: Input| {
@@ -172,18 +179,14 @@ impl Positions {
                 |name: &Option<Ident>, other: TokenStream| name.as_ref().map_or(other, |name| quote!(#name));
             if sin.is_some() || cos.is_some() {
                 found.push((sum, or(&sin, quote!(_)), or(&cos, quote!(_))));
-                sum.joints().for_each(|(i, _)| read[i] = true);
             }
             sines.push(or(&sin, zero.clone()));
             cosines.push(or(&cos, zero.clone()));
         }
-        for i in 0..arm.dof() {
-            let place = !revolute(i) && used.contains(&Input::Position(i));
-            read[i] |= place;
-            places.push(if place { position(i) } else { zero.clone() });
-        }
-        let trig = quote!(Trig { sin: [#(#sines),*], cos: [#(#cosines),*], position: [#(#places),*] });
-        Positions { read, angles: found, trig }
+        let values =
+            places.iter().enumerate().map(|(i, read)| if *read { position(i) } else { zero.clone() });
+        let trig = quote!(Trig { sin: [#(#sines),*], cos: [#(#cosines),*], position: [#(#values),*] });
+        Positions { places, angles: found, trig }
     }
 }
 
@@ -205,22 +208,51 @@ fn angle(arm: &Arm, sum: JointSum, position: impl Fn(usize) -> TokenStream) -> T
     quote!(#(#terms)* #offset)
 }
 
-/// Takes q apart, computes all sines and cosines together, and builds a `Trig` of the inputs that are used. A pattern
-/// over the storage needs no bounds check and cannot panic.
+/// Computes all sines and cosines together, and builds a `Trig` of the inputs that are used. A pattern over the storage
+/// needs no bounds check and cannot panic.
 fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
     let position = |i: usize| lane_name(Argument::Positions, i).into_token_stream();
-    let Positions { read, angles, trig } = Positions::new(arm, used, position);
-    let patterns = (0..arm.dof()).map(|i| if read[i] { position(i) } else { quote!(_) });
+    let Positions { places, angles, trig } = Positions::new(arm, used, position);
+    let taken = places.contains(&true).then(|| {
+        let patterns = places.iter().enumerate().map(|(i, read)| if *read { position(i) } else { quote!(_) });
+        quote!(let [[#(#patterns),*]] = q.data.0;)
+    });
     let computed = (!angles.is_empty()).then(|| {
         let (sines, cosines) = (angles.iter().map(|a| &a.1), angles.iter().map(|a| &a.2));
-        let values = angles.iter().map(|(sum, ..)| angle(arm, *sum, position));
-        quote!(let ([#(#sines),*], [#(#cosines),*]) = trigonometry::sin_cos([#(#values),*]);)
+        let of = angles_name(angles.iter().map(|a| a.0));
+        quote!(let ([#(#sines),*], [#(#cosines),*]) = trigonometry::sin_cos(q, #of);)
     });
-    let bindings = quote! {
-        let [[#(#patterns),*]] = q.data.0;
-        #computed
-    };
-    (bindings, trig)
+    (quote!(#taken #computed), trig)
+}
+
+/// `angles_2_3_2m3`
+fn angles_name(sums: impl Iterator<Item = JointSum>) -> Ident {
+    Ident::new(&sums.fold("angles".to_string(), |name, sum| format!("{name}_{sum}")), Span::call_site())
+}
+
+/// The functions that make of q the angles whose sines and cosines are taken together, each once.
+pub(super) fn angle_functions(arm: &Arm, functions: &[FunctionGraph]) -> TokenStream {
+    let position = |i: usize| lane_name(Argument::Positions, i).into_token_stream();
+    let used = functions.iter().map(|built| used(built, &built.graph.needed(&built.outputs)));
+    let sets: BTreeSet<Vec<JointSum>> = used
+        .chain([all_inputs(arm)])
+        .map(|used| Positions::new(arm, &used, position).angles.into_iter().map(|a| a.0).collect())
+        .filter(|sums: &Vec<JointSum>| !sums.is_empty())
+        .collect();
+    let items = sets.iter().map(|sums| {
+        let (name, count) = (angles_name(sums.iter().copied()), Literal::usize_unsuffixed(sums.len()));
+        let reads = |i: usize| sums.iter().any(|sum| sum.sign(i).is_some());
+        let patterns = (0..arm.dof()).map(|i| if reads(i) { position(i) } else { quote!(_) });
+        let values = sums.iter().map(|sum| angle(arm, *sum, position));
+        quote! {
+            #[inline(always)]
+            fn #name<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; #count] {
+                let [[#(#patterns),*]] = q.data.0;
+                [#(#values),*]
+            }
+        }
+    });
+    quote!(#(#items)*)
 }
 
 /// What a function takes of q at one sample in a block.
@@ -241,7 +273,7 @@ impl TrigOfLane {
             let q = lane_name(Argument::Positions, i);
             quote!(#q[lane])
         };
-        let Positions { read, angles, trig } = Positions::new(arm, &used, position);
+        let Positions { places, angles, trig } = Positions::new(arm, &used, position);
         let lines = angles.iter().map(|(sum, sine, cosine)| {
             let angle = angle(arm, *sum, position);
             quote!(let (#sine, #cosine) = trigonometry::near(#angle);)
@@ -250,7 +282,9 @@ impl TrigOfLane {
             #(#lines)*
             let trig = #trig;
         };
-        let turning = angles.iter().flat_map(|(sum, ..)| sum.joints().map(|(i, _)| i)).collect();
+        let turning: BTreeSet<usize> =
+            angles.iter().flat_map(|(sum, ..)| sum.joints().map(|(i, _)| i)).collect();
+        let read = (0..arm.dof()).map(|i| places[i] || turning.contains(&i)).collect();
         TrigOfLane { lines, turning, read }
     }
 }
@@ -372,7 +406,8 @@ pub(super) fn preparation(model: &Model, preparation: &Preparation) -> TokenStre
             quote!(let #name = parameters[#i];)
         })
         .collect();
-    let statements = sections(model, &graph, preparation.values(), &needed);
+    let signs = vec![false; graph.nodes().len()];
+    let statements = sections(model, &graph, preparation.values(), &needed, &signs);
     let values = preparation.values().iter().map(|e| value_name(&graph, e.node()));
     let operations = preparation.operations();
     let doc = format!(" Operations: {} multiplications, {} additions.", operations.mul, operations.add);
@@ -421,10 +456,16 @@ const SECTION: usize = 256;
 /// The body, in blocks that hand on only what later ones need. Every `let` opens a scope within the one before, and a
 /// compiler that writes debug information goes through nested scopes by recursion: thousands of them in a row
 /// exhaust its stack.
-fn sections(model: &Model, graph: &Graph, outputs: &[Expr], needed: &[usize]) -> Vec<TokenStream> {
+fn sections(
+    model: &Model,
+    graph: &Graph,
+    outputs: &[Expr],
+    needed: &[usize],
+    signs: &[bool],
+) -> Vec<TokenStream> {
     let computed: Vec<usize> =
         needed.iter().copied().filter(|n| !matches!(graph.nodes()[*n], Node::Input(_))).collect();
-    let statement = |n: &usize| statement(model, graph, *n);
+    let statement = |n: &usize| statement(model, graph, *n, signs);
     if computed.len() <= 2 * SECTION {
         return computed.iter().filter_map(statement).collect();
     }
@@ -453,8 +494,8 @@ fn sections(model: &Model, graph: &Graph, outputs: &[Expr], needed: &[usize]) ->
     blocks
 }
 
-/// The `let` of a node; inputs are bound already.
-fn statement(model: &Model, graph: &Graph, node: usize) -> Option<TokenStream> {
+/// The `let` of a node; inputs are bound already. `signs` are those of [`signs::held`].
+fn statement(model: &Model, graph: &Graph, node: usize, signs: &[bool]) -> Option<TokenStream> {
     let name = format_ident!("x{node}");
     let operand = |e: Expr| value_name(graph, e.node());
     Some(match graph.nodes()[node] {
@@ -470,7 +511,13 @@ fn statement(model: &Model, graph: &Graph, node: usize) -> Option<TokenStream> {
         }
         Node::Add(a, b) => {
             let (x, y) = (operand(a), operand(b));
-            if b.is_negative() { quote!(let #name = #x - #y;) } else { quote!(let #name = #x + #y;) }
+            let [first, second] = [signs[a.node()], signs[b.node()] != b.is_negative()];
+            match (first != signs[node], second != signs[node]) {
+                (false, false) => quote!(let #name = #x + #y;),
+                (false, true) => quote!(let #name = #x - #y;),
+                (true, false) => quote!(let #name = #y - #x;),
+                (true, true) => quote!(let #name = -#x - #y;),
+            }
         }
         Node::Mul(a, b) => {
             let (x, y) = (operand(a), operand(b));
@@ -491,12 +538,12 @@ fn value_name(graph: &Graph, node: usize) -> Ident {
 }
 
 /// The type of the result and the expression that makes it. nalgebra stores columns.
-fn result(built: &FunctionGraph) -> (TokenStream, TokenStream) {
+fn result(built: &FunctionGraph, signs: &[bool]) -> (TokenStream, TokenStream) {
     let (rows, columns) = built.shape;
     let value = |i: usize, j: usize| {
         let e = built.outputs[i * columns + j];
         let name = value_name(&built.graph, e.node());
-        if e.is_negative() { quote!(-#name) } else { quote!(#name) }
+        if e.is_negative() != signs[e.node()] { quote!(-#name) } else { quote!(#name) }
     };
     let columns_of: Vec<TokenStream> = (0..columns)
         .map(|j| {

@@ -6,6 +6,7 @@ mod batch;
 mod code;
 mod docs;
 mod friction;
+mod signs;
 mod tests;
 #[cfg(test)]
 mod trigonometry;
@@ -93,6 +94,7 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
         (Literal::usize_unsuffixed(model.arm().dof()), Literal::usize_unsuffixed(set.parameters.len()));
     let names = set.names();
     let trig = code::trig_struct(model.arm());
+    let angles = code::angle_functions(model.arm(), &built);
     let trigonometry = code::trigonometry(model.arm());
     let values = options.values.as_ref().map(|values| {
         let values = values.iter().map(|x| Literal::f64_suffixed(*x));
@@ -122,6 +124,8 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
         #values
 
         #trig
+
+        #angles
 
         #preparation
 
