@@ -13,9 +13,11 @@ use powerball_workspace::arm as arm_file;
 use powerball_workspace::generated::lwa4p_rotorless_minimal as arm;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::cell::RefCell;
 use std::fmt::Write;
 use std::hint::black_box;
 use support::by_hand::{self, Link};
+use support::with_dynibo;
 use support::with_nalgebra;
 
 const FILE: &str = "tests/arms/lwa4p_rotorless.toml";
@@ -68,6 +70,7 @@ type Row<'a> = (&'static str, Box<dyn FnMut() + 'a>, Option<f64>);
 fn times(links: &[Link; 6], parameters: &Parameters, states: &[[Joints; 3]]) {
     let by_hand = by_hand::Arm::new(FILE, *links);
     let with_nalgebra = with_nalgebra::Arm::new(FILE);
+    let with_dynibo = RefCell::new(with_dynibo::Arm::new(&arm_file("lwa4p_rotorless"), links));
     for [q, dq, ddq] in states {
         let [a, b, c]: [[f64; 6]; 3] = [(*q).into(), (*dq).into(), (*ddq).into()];
         let torque = arm::inverse_dynamics(q, dq, ddq, parameters);
@@ -78,6 +81,10 @@ fn times(links: &[Link; 6], parameters: &Parameters, states: &[[Joints; 3]]) {
         assert!((torque - arm::regressor(q, dq, ddq) * parameters).amax() < limit);
         let mass = arm::mass_matrix(q, parameters);
         assert!((mass - with_nalgebra.mass_matrix(&a, links)).amax() < 1e-12);
+        let mut peer = with_dynibo.borrow_mut();
+        let theirs = Joints::from(peer.inverse_dynamics(&a, &b, &c));
+        assert!((torque - theirs - Joints::from(peer.more_gravity(&a, 9.81))).amax() < limit);
+        assert!((mass - SMatrix::from_column_slice(&peer.mass_matrix(&a))).amax() < 1e-12);
     }
     let plain: Vec<[[f64; 6]; 3]> = states.iter().map(|state| state.map(Into::into)).collect();
     let ready: Vec<_> = states.iter().map(|state| (*state, arm::Trig::new(&state[0]))).collect();
@@ -112,6 +119,16 @@ fn times(links: &[Link; 6], parameters: &Parameters, states: &[[Joints; 3]]) {
             Some(0.45),
         ),
         ("**g**", each!(states, [q, ..] => arm::gravity(q, p)), Some(0.14)),
+        (
+            "inverse dynamics with dynibo 0.5.3",
+            each!(plain, [q, dq, ddq] => with_dynibo.borrow_mut().inverse_dynamics(q, dq, ddq)),
+            None,
+        ),
+        (
+            "mass matrix with dynibo 0.5.3",
+            each!(plain, [q, ..] => with_dynibo.borrow_mut().mass_matrix(q)),
+            None,
+        ),
         (
             "numeric regressor with nalgebra, 6 × 60",
             each!(plain, [q, dq, ddq] => with_nalgebra.regressor(q, dq, ddq)),

@@ -1,6 +1,6 @@
 //! Functions over blocks of samples: loops that a compiler turns into vectors of whatever processor it compiles for.
 
-use super::code::TrigOfLane;
+use super::angles::TrigOfLane;
 use super::{code, docs};
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;

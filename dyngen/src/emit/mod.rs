@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 mod accuracy;
+mod angles;
 mod batch;
 mod code;
 mod docs;
@@ -93,9 +94,9 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     let (n, p) =
         (Literal::usize_unsuffixed(model.arm().dof()), Literal::usize_unsuffixed(set.parameters.len()));
     let names = set.names();
-    let trig = code::trig_struct(model.arm());
-    let angles = code::angle_functions(model.arm(), &built);
-    let trigonometry = code::trigonometry(model.arm());
+    let trig = angles::trig_struct(model.arm());
+    let angle_functions = angles::angle_functions(model.arm(), &built);
+    let trigonometry = angles::trigonometry(model.arm());
     let values = options.values.as_ref().map(|values| {
         let values = values.iter().map(|x| Literal::f64_suffixed(*x));
         quote! {
@@ -125,7 +126,7 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
 
         #trig
 
-        #angles
+        #angle_functions
 
         #preparation
 
