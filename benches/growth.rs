@@ -21,7 +21,7 @@ const ROUNDS: usize = 500;
 /// A row of the table.
 macro_rules! row {
     ($table:expr, $chain:ident) => {{
-        #[allow(dead_code)]
+        #[allow(dead_code, unreachable_pub)]
         mod $chain {
             include!(concat!(env!("OUT_DIR"), "/", stringify!($chain), ".rs"));
         }
