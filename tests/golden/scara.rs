@@ -134,7 +134,7 @@ impl<T: Copy> Parameters<T> for Prepared<T> {
 ///
 /// Returns τ, N·m (N where prismatic).
 ///
-/// Operations: 40 multiplications, 30 additions, 2 sines with cosines.
+/// Operations: 39 multiplications, 30 additions, 2 sines with cosines.
 #[must_use]
 pub fn inverse_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -203,42 +203,41 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
     let x53 = x25 * x48;
     let x54 = x25 * x49;
     let x55 = x25 * x44;
-    let x56 = x50 + x53;
-    let x57 = x51 - x54;
-    let x58 = x52 - x55;
-    let x59 = x17 * x48;
-    let x60 = x58 - x59;
-    let x61 = x16 * x48;
-    let x62 = x60 - x61;
-    let x64 = x44 * z4;
-    let x65 = x45 * z4;
-    let x66 = x46 * z4;
-    let x67 = x56 + x64;
-    let x68 = x57 - x65;
-    let x70 = x35 * z5;
-    let x71 = x31 * z5;
-    let x72 = x41 * z5;
-    let x74 = x31 * z6;
-    let x75 = x35 * z6;
-    let x76 = x38 * z6;
-    let x77 = x70 - x74;
-    let x78 = x71 + x75;
-    let x79 = x72 - x76;
-    let x81 = x31 * z7;
-    let x82 = x79 + x81;
-    let x83 = x2 * x68;
-    let x84 = x83 - x62;
-    let x85 = x67 + x77;
-    let x86 = x68 - x78;
-    let x87 = x84 - x82;
-    let x89 = ddq1 * z8;
-    let x90 = c2 * x86;
-    let x91 = s2 * x85;
-    let x92 = x90 + x91;
-    let x93 = x4 * x92;
-    let x94 = x89 - x93;
-    let x95 = x94 - x87;
-    SMatrix::from_array_storage(ArrayStorage([[x95, -x87, -x66, -x62]]))
+    let x56 = x16 + x17;
+    let x57 = x52 - x55;
+    let x58 = x48 * x56;
+    let x59 = x57 - x58;
+    let x61 = x44 * z4;
+    let x62 = x45 * z4;
+    let x63 = x46 * z4;
+    let x64 = x51 - x54;
+    let x65 = x62 - x64;
+    let x67 = x35 * z5;
+    let x68 = x31 * z5;
+    let x69 = x41 * z5;
+    let x71 = x31 * z6;
+    let x72 = x35 * z6;
+    let x73 = x38 * z6;
+    let x75 = x31 * z7;
+    let x76 = x2 * x65;
+    let x77 = x50 + x53;
+    let x78 = x61 + x77;
+    let x79 = x67 + x78;
+    let x80 = x71 - x79;
+    let x81 = x65 + x68;
+    let x82 = x72 + x81;
+    let x83 = x73 - x69;
+    let x84 = x83 - x75;
+    let x85 = x84 - x59;
+    let x86 = x85 - x76;
+    let x88 = ddq1 * z8;
+    let x89 = c2 * x82;
+    let x90 = s2 * x80;
+    let x91 = x89 + x90;
+    let x92 = x4 * x91;
+    let x93 = x86 - x88;
+    let x94 = x92 - x93;
+    SMatrix::from_array_storage(ArrayStorage([[x94, -x86, -x63, -x59]]))
 }
 /// Regressor Y(q, q̇, q̈): τ = Y·π for the parameters of [`PARAMETER_NAMES`].
 ///

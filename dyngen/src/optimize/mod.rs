@@ -1,6 +1,8 @@
 //! Passes over a graph, in order, each with what holds after it.
 
 mod associate;
+mod factor;
+mod flat;
 mod merge;
 
 use crate::exact::constant::ConstantField;
@@ -15,6 +17,8 @@ pub const PASSES: &[(&str, Pass)] = &[
     ("merge", merge::merge),
     // AFTER THIS POINT: no two terms occur together in two sums, and no two factors in two products.
     ("associate", associate::associate),
+    // AFTER THIS POINT: no two terms of a sum that occur nowhere else share a factor.
+    ("factor", factor::factor),
 ];
 
 /// The passes that a form goes through before its cost is compared with that of others.
