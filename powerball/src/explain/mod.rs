@@ -9,6 +9,7 @@
 
 mod compose;
 mod conclude;
+mod constancy;
 mod correction;
 mod curves;
 mod doubts;
