@@ -1,9 +1,8 @@
 //! Which values the emitted code holds with the other sign.
 //!
-//! A difference costs the same either way round, so that neighbours in a vector of results can be made to differ in
-//! their outer operation: one is a sum, the next what is left of a change of sign. LLVM otherwise joins neighbours into
-//! vectors of two from the results backwards, although their terms lie scattered, and the shuffles cost more than all
-//! that they save (half of the inverse dynamics' time again).
+//! A difference costs the same either way round, so that of neighbours in a vector of results every second can be minus what
+//! was computed. LLVM otherwise joins neighbours into vectors of two and follows their terms back through the function, where
+//! they lie scattered: the shuffles cost more than is saved, half of the inverse dynamics' time again.
 
 use crate::graph::{Expr, Graph, Node};
 

@@ -4,6 +4,7 @@
 //! parameters alone are multiplied first: that is prepared once. Then the pair of terms, or of factors, that occurs in most places becomes
 //! a node of its own, as long as one occurs twice.
 
+use super::cheaper;
 use super::flat::{Flat, Kind, Leaf};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
@@ -12,22 +13,10 @@ use std::collections::BTreeMap;
 
 /// The pass.
 pub(super) fn associate(graph: &Graph, outputs: &[Expr], _: &ConstantField) -> (Graph, Vec<Expr>) {
-    [Kind::Product, Kind::Sum].into_iter().fold(
-        (graph.clone(), outputs.to_vec()),
-        |(graph, outputs), kind| {
-            let regrouped = regroup(&graph, &outputs, kind);
-            // Where nothing is shared the order of evaluation stays as it was.
-            let cost = |graph: &Graph, outputs: &[Expr]| {
-                let operations = graph.operations_when_prepared(outputs);
-                operations.mul + operations.add
-            };
-            if cost(&regrouped.0, &regrouped.1) < cost(&graph, &outputs) {
-                regrouped
-            } else {
-                (graph, outputs)
-            }
-        },
-    )
+    [Kind::Product, Kind::Sum].into_iter().fold((graph.clone(), outputs.to_vec()), |form, kind| {
+        let regrouped = regroup(&form.0, &form.1, kind);
+        cheaper(form, regrouped)
+    })
 }
 
 fn regroup(graph: &Graph, outputs: &[Expr], kind: Kind) -> (Graph, Vec<Expr>) {

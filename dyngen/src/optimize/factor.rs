@@ -1,5 +1,6 @@
 //! Takes common factors out of sums: a·b + a·c becomes a·(b + c).
 
+use super::cheaper;
 use super::flat::{Flat, Kind, uses};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
@@ -39,16 +40,7 @@ pub(super) fn factor(graph: &Graph, outputs: &[Expr], _: &ConstantField) -> (Gra
     }
     let sign = |e: &Expr| if e.is_negative() { -copied[e.node()] } else { copied[e.node()] };
     let factored: Vec<Expr> = outputs.iter().map(sign).collect();
-    let result = b.finish();
-    // Where nothing is saved the order of evaluation stays as it was.
-    let cost = |graph: &Graph, outputs: &[Expr]| {
-        let operations = graph.operations_when_prepared(outputs);
-        operations.mul + operations.add
-    };
-    match cost(&result, &factored) < cost(graph, outputs) {
-        true => (result, factored),
-        false => (graph.clone(), outputs.to_vec()),
-    }
+    cheaper((graph.clone(), outputs.to_vec()), (b.finish(), factored))
 }
 
 /// A term whose factors have no signs.

@@ -24,6 +24,18 @@ pub const PASSES: &[(&str, Pass)] = &[
 /// The passes that a form goes through before its cost is compared with that of others.
 pub const COMPARED: usize = 1;
 
+/// A graph with its outputs.
+type Form = (Graph, Vec<Expr>);
+
+/// The new form where it costs less: where nothing is saved the order of evaluation stays as it was.
+fn cheaper(before: Form, after: Form) -> Form {
+    let cost = |(graph, outputs): &Form| {
+        let operations = graph.operations_when_prepared(outputs);
+        operations.mul + operations.add
+    };
+    if cost(&after) < cost(&before) { after } else { before }
+}
+
 /// Runs passes one after another.
 pub fn optimize(
     graph: Graph,
