@@ -1,5 +1,6 @@
 //! Studies that take longer than tests may.
 
+mod stories;
 mod study;
 
 use clap::{Parser, Subcommand};
@@ -16,11 +17,16 @@ struct Arguments {
 enum Command {
     /// How often `explain` gives the right name, where the truth is known
     Study(study::Arguments),
+    /// What `explain` finds in the measured logs, case by case, as a page with figures
+    Stories(stories::Arguments),
 }
 
 fn main() -> ExitCode {
-    let Arguments { command: Command::Study(arguments) } = Arguments::parse();
-    match study::run(&arguments) {
+    let done = match Arguments::parse().command {
+        Command::Study(arguments) => study::run(&arguments),
+        Command::Stories(arguments) => stories::run(&arguments),
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(message) => {
             eprintln!("error: {message}");
