@@ -13,9 +13,11 @@ use powerball_workspace::arm as arm_file;
 use powerball_workspace::generated::lwa4p_rotorless_minimal as arm;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::cell::RefCell;
 use std::fmt::Write;
 use std::hint::black_box;
 use support::by_hand::{self, Link};
+use support::with_dynibo;
 use support::with_nalgebra;
 
 const FILE: &str = "tests/arms/lwa4p_rotorless.toml";
@@ -27,6 +29,10 @@ const LANES: usize = 8;
 type Joints = SVector<f64, 6>;
 type Parameters = SVector<f64, { arm::PARAMETERS }>;
 type Block<T> = [[T; LANES]; arm::JOINTS];
+
+/// Where a line of the cache begins, as the module `batch` asks for.
+#[repr(align(64))]
+struct Aligned<T>(T);
 
 /// The virtual arm's links without rotors: for the functions by hand, and as the minimal set.
 fn links() -> ([Link; 6], Parameters) {
@@ -64,6 +70,7 @@ type Row<'a> = (&'static str, Box<dyn FnMut() + 'a>, Option<f64>);
 fn times(links: &[Link; 6], parameters: &Parameters, states: &[[Joints; 3]]) {
     let by_hand = by_hand::Arm::new(FILE, *links);
     let with_nalgebra = with_nalgebra::Arm::new(FILE);
+    let with_dynibo = RefCell::new(with_dynibo::Arm::new(&arm_file("lwa4p_rotorless"), links));
     for [q, dq, ddq] in states {
         let [a, b, c]: [[f64; 6]; 3] = [(*q).into(), (*dq).into(), (*ddq).into()];
         let torque = arm::inverse_dynamics(q, dq, ddq, parameters);
@@ -74,6 +81,10 @@ fn times(links: &[Link; 6], parameters: &Parameters, states: &[[Joints; 3]]) {
         assert!((torque - arm::regressor(q, dq, ddq) * parameters).amax() < limit);
         let mass = arm::mass_matrix(q, parameters);
         assert!((mass - with_nalgebra.mass_matrix(&a, links)).amax() < 1e-12);
+        let mut peer = with_dynibo.borrow_mut();
+        let theirs = Joints::from(peer.inverse_dynamics(&a, &b, &c));
+        assert!((torque - theirs - Joints::from(peer.more_gravity(&a, 9.81))).amax() < limit);
+        assert!((mass - SMatrix::from_column_slice(&peer.mass_matrix(&a))).amax() < 1e-12);
     }
     let plain: Vec<[[f64; 6]; 3]> = states.iter().map(|state| state.map(Into::into)).collect();
     let ready: Vec<_> = states.iter().map(|state| (*state, arm::Trig::new(&state[0]))).collect();
@@ -86,7 +97,8 @@ fn times(links: &[Link; 6], parameters: &Parameters, states: &[[Joints; 3]]) {
             })
         };
     }
-    let p = black_box(parameters);
+    let (p, prepared) = (black_box(parameters), arm::prepare(parameters));
+    let z = black_box(&prepared);
     let mut rows: Vec<Row<'_>> = vec![
         (
             "Newton–Euler by hand, 60 parameters",
@@ -95,8 +107,8 @@ fn times(links: &[Link; 6], parameters: &Parameters, states: &[[Joints; 3]]) {
         ),
         ("**τ**", each!(states, [q, dq, ddq] => arm::inverse_dynamics(q, dq, ddq, p)), Some(0.27)),
         (
-            "**τ**, sines and cosines passed in",
-            each!(ready, ([_, dq, ddq], trig) => arm::inverse_dynamics_with(trig, dq, ddq, p)),
+            "**τ**, sines, cosines and prepared parameters passed in",
+            each!(ready, ([_, dq, ddq], trig) => arm::inverse_dynamics_with(trig, dq, ddq, z)),
             Some(0.15),
         ),
         ("**Y**, 6 × 19", each!(states, [q, dq, ddq] => arm::regressor(q, dq, ddq)), Some(0.33)),
@@ -108,6 +120,16 @@ fn times(links: &[Link; 6], parameters: &Parameters, states: &[[Joints; 3]]) {
         ),
         ("**g**", each!(states, [q, ..] => arm::gravity(q, p)), Some(0.14)),
         (
+            "inverse dynamics with dynibo 0.5.3",
+            each!(plain, [q, dq, ddq] => with_dynibo.borrow_mut().inverse_dynamics(q, dq, ddq)),
+            None,
+        ),
+        (
+            "mass matrix with dynibo 0.5.3",
+            each!(plain, [q, ..] => with_dynibo.borrow_mut().mass_matrix(q)),
+            None,
+        ),
+        (
             "numeric regressor with nalgebra, 6 × 60",
             each!(plain, [q, dq, ddq] => with_nalgebra.regressor(q, dq, ddq)),
             None,
@@ -117,7 +139,8 @@ fn times(links: &[Link; 6], parameters: &Parameters, states: &[[Joints; 3]]) {
             each!(plain, [q, ..] => with_nalgebra.mass_matrix(q, links)),
             None,
         ),
-        ("six sines and cosines, emitted", each!(states, [q, ..] => arm::Trig::new(q)), None),
+        ("preparation of the parameters for all functions", each!(states, _ => arm::prepare(p)), None),
+        ("`Trig::new`: seven sines and cosines, emitted", each!(states, [q, ..] => arm::Trig::new(q)), None),
         ("six sines and cosines, `std`", each!(plain, [q, ..] => q.map(f64::sin_cos)), None),
         ("six sines and cosines, crate `libm`", each!(plain, [q, ..] => q.map(libm::sincos)), None),
     ];
@@ -189,8 +212,8 @@ fn batches(parameters: &Parameters, states: &[[Joints; 3]]) {
         std::array::from_fn(|i| std::array::from_fn(|lane| block[lane][k][i]))
     };
     let blocks: Vec<[Block<f64>; 3]> = blocks.iter().map(|b| std::array::from_fn(|k| lane(k, b))).collect();
-    let (mut torque, mut torque_any) = (Torque::NOTHING, Torque::NOTHING);
-    let (mut regressor, mut regressor_any) = (Regressor::NOTHING, Regressor::NOTHING);
+    let (mut torque, mut torque_any) = (Aligned(Torque::NOTHING), Aligned(Torque::NOTHING));
+    let (mut regressor, mut regressor_any) = (Aligned(Regressor::NOTHING), Aligned(Regressor::NOTHING));
     let best = support::paired(
         ROUNDS,
         [
@@ -199,15 +222,15 @@ fn batches(parameters: &Parameters, states: &[[Joints; 3]]) {
                     black_box(arm::inverse_dynamics(q, dq, ddq, parameters));
                 })
             },
-            &mut || All::<Torque> { blocks: &blocks, parameters, out: &mut torque_any }.run(),
-            &mut || batch::run(All::<Torque> { blocks: &blocks, parameters, out: &mut torque }),
+            &mut || All::<Torque> { blocks: &blocks, parameters, out: &mut torque_any.0 }.run(),
+            &mut || batch::run(All::<Torque> { blocks: &blocks, parameters, out: &mut torque.0 }),
             &mut || {
                 states.iter().for_each(|[q, dq, ddq]| {
                     black_box(arm::regressor(q, dq, ddq));
                 })
             },
-            &mut || All::<Regressor> { blocks: &blocks, parameters, out: &mut regressor_any }.run(),
-            &mut || batch::run(All::<Regressor> { blocks: &blocks, parameters, out: &mut regressor }),
+            &mut || All::<Regressor> { blocks: &blocks, parameters, out: &mut regressor_any.0 }.run(),
+            &mut || batch::run(All::<Regressor> { blocks: &blocks, parameters, out: &mut regressor.0 }),
         ],
     );
     let best = best.map(|time| time.as_secs_f64() * 1e9 / states.len() as f64);

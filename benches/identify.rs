@@ -1,6 +1,7 @@
 //! A million samples of six joints identified from memory: this project's stream, beside numpy with Pinocchio in the same run.
 //!
-//! `cargo bench --bench identify` (`PYTHON=…` names an interpreter that has both; without one only the stream is timed).
+//! `cargo bench --bench identify` (`PYTHON=…` names an interpreter that has both; without one only the stream is timed);
+//! `-- --write docs/performance.md` writes how the stream grows with the length of a log into the page.
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
@@ -13,15 +14,54 @@ use powerball::regression::RigidBody;
 use powerball_workspace::arm;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::fmt::Write as _;
+use std::hint::black_box;
 use std::io::Write;
 use std::process::Command;
 
 const SAMPLES: usize = 1_000_000;
 const ROUNDS: usize = 3;
+/// Samples that are taken in at once where the length grows.
+const BLOCK: usize = 10_000;
+
+/// Seconds and peak memory of logs of several lengths, taken in blocks as a reader hands them on.
+fn growth(body: &RigidBody) {
+    let shapes: Vec<[f64; 2]> = TABLE_2.iter().map(|g| [g[1], g[3]]).collect();
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut draw = |scale: f64| -> Vec<f64> {
+        (0..BLOCK * body.dof()).map(|_| scale * rng.random_range(-1.0..1.0)).collect()
+    };
+    let (q, dq, ddq, tau) = (draw(2.0), draw(1.0), draw(3.0), draw(10.0));
+    let mut table = "| samples | s | peak memory of the program, MB |\n|---|---|---|\n".to_string();
+    for blocks in [1, 10, 100] {
+        let [time] = support::paired(
+            ROUNDS,
+            [&mut || {
+                let mut stream = Stream::new(body, &shapes);
+                for _ in 0..blocks {
+                    stream.push(States { q: &q, dq: &dq, ddq: &ddq, tau: &tau });
+                }
+                black_box(stream.fit());
+            }],
+        );
+        let memory = peak_memory().map_or("not known here".to_string(), |mb| format!("{mb:.0}"));
+        let _ = writeln!(table, "| {} | {:.3} | {memory} |", blocks * BLOCK, time.as_secs_f64());
+    }
+    support::publish("identify-growth", &table);
+}
+
+/// The most memory that this program has held, MB, where Linux says so.
+fn peak_memory() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(line.trim().strip_suffix(" kB")?.parse::<f64>().ok()? / 1024.0)
+}
 
 fn main() {
     let arm = arm("arm");
     let body = RigidBody::new(&arm).unwrap();
+    // First: the peak of memory never sinks again.
+    growth(&body);
     let n = body.dof();
     let samples = std::env::var("SAMPLES").map_or(SAMPLES, |s| s.parse().unwrap());
     let mut rng = ChaCha8Rng::seed_from_u64(1);

@@ -1,5 +1,5 @@
-//! What a controller runs, on an emulated Cortex-M4F: `firmware/` is built, judged by its symbols, run, and compared with the
-//! host to the bit.
+//! What a controller runs, on an emulated Cortex-M4F and Cortex-M7: `firmware/` is built, judged by its symbols, run, and
+//! compared with the host to the bit.
 //!
 //! Sizes, stack and instruction counts do not depend on the machine. `firmware/costs.txt` holds them, and none may grow.
 //! `POWERBALL_BLESS=1 cargo test --release --test firmware` writes it, and the table in `docs/performance.md`, anew.
@@ -37,10 +37,22 @@ fn target_folder() -> PathBuf {
         .map_or_else(|| Path::new(env!("CARGO_TARGET_TMPDIR")).join("firmware"), PathBuf::from)
 }
 
+/// A board that QEMU has, and its core.
+const M4F: [&str; 2] = ["mps2-an386", "cortex-m4"];
+const M7: [&str; 2] = ["mps2-an500", "cortex-m7"];
+
 /// Cargo in the firmware's own workspace.
 fn cargo(arguments: &[&str]) -> std::process::Output {
+    cargo_with("", arguments)
+}
+
+/// With more flags for the target's code.
+fn cargo_with(flags: &str, arguments: &[&str]) -> std::process::Output {
     let mut command = Command::new(env!("CARGO"));
     command.args(arguments).args(["--release", "--locked"]).current_dir(root().join("firmware"));
+    if !flags.is_empty() {
+        command.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_RUSTFLAGS", flags);
+    }
     command.env("CARGO_TARGET_DIR", target_folder()).output().unwrap()
 }
 
@@ -48,10 +60,10 @@ fn built(name: &str) -> PathBuf {
     target_folder().join(TARGET).join("release").join(name)
 }
 
-/// What a program prints on the emulated board. One that hangs is killed.
-fn emulate(program: &Path) -> String {
+/// What a program prints on an emulated board. One that hangs is killed.
+fn emulate([board, core]: [&str; 2], program: &Path) -> String {
     let mut child = Command::new("qemu-system-arm")
-        .args(["-M", "mps2-an386", "-cpu", "cortex-m4", "-nographic", "-monitor", "none", "-serial", "none"])
+        .args(["-M", board, "-cpu", core, "-nographic", "-monitor", "none", "-serial", "none"])
         .args(["-semihosting-config", "enable=on,target=native", "-icount", "shift=0", "-kernel"])
         .arg(program)
         .stdin(Stdio::null())
@@ -149,8 +161,8 @@ fn read(text: &str) -> Costs {
 /// The table for people: single precision beside double.
 fn table(costs: &Costs) -> String {
     let mut text =
-        "| function | f32: code, B | stack, B | instructions | f64: code, B | stack, B | instructions |\n\
-                    |---|---|---|---|---|---|---|\n"
+        "| function | f32: code, B | stack, B | instructions | f64: code, B | stack, B | instructions | f64 on a Cortex-M7: code, B | stack, B | instructions |\n\
+                    |---|---|---|---|---|---|---|---|---|---|\n"
             .to_string();
     let meaning = [
         ("trig", "sines and cosines of five joints"),
@@ -165,7 +177,7 @@ fn table(costs: &Costs) -> String {
         ("control", "a control step: trigonometry, τ, friction, feedback"),
     ];
     for (name, words) in meaning {
-        let cells: Vec<String> = ["f32", "f64"]
+        let cells: Vec<String> = ["f32", "f64", "m7 f64"]
             .iter()
             .flat_map(|scalar| costs[&format!("{scalar} {name}")])
             .map(|n| n.to_string())
@@ -202,7 +214,10 @@ fn a_controller_runs_it_without_panic_allocation_or_soft_doubles_and_to_the_same
         "the search for doubles finds none"
     );
 
-    let report = emulate(&built("report"));
+    let report = emulate(M4F, &built("report"));
+    let out = cargo_with("-C target-cpu=cortex-m7", &["build", "--bin", "report", "--bin", "double"]);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let (report_m7, double_m7) = (emulate(M7, &built("report")), functions(&built("double")));
     let host = Command::new("rustc").arg("-vV").output().unwrap();
     let host = String::from_utf8_lossy(&host.stdout)
         .lines()
@@ -215,9 +230,14 @@ fn a_controller_runs_it_without_panic_allocation_or_soft_doubles_and_to_the_same
     };
     let here = bits(&String::from_utf8_lossy(&out.stdout));
     assert_eq!(bits(&report), here);
+    assert_eq!(bits(&report_m7), here);
     assert_eq!(here.len(), 19);
 
-    let costs = costs(&report, &single, &double);
+    let mut all = costs(&report, &single, &double);
+    // Single precision costs there what it costs on the smaller core.
+    let m7 = costs(&report_m7, &single, &double_m7).into_iter().filter(|(name, _)| name.starts_with("f64"));
+    all.extend(m7.map(|(name, cost)| (format!("m7 {name}"), cost)));
+    let costs = all;
     let path = root().join("firmware/costs.txt");
     if std::env::var_os("POWERBALL_BLESS").is_some() {
         std::fs::write(&path, written(&costs)).unwrap();

@@ -48,6 +48,20 @@ fn general_angles_and_any_gravity_are_proven() {
     prove_all("general angles, prismatic", &Model::derive(parse(&text)).unwrap());
 }
 
+/// Every length something: arms as they are built have few, and symmetries may leave a last link nothing but its mass.
+#[test]
+fn arms_with_lengths_everywhere_are_proven() {
+    for name in ["lwa4p_rotorless", "stanford", "puma560", "ur5e"] {
+        let line = |line: &str| match line.split(" = ").next() {
+            Some("a") => "a = 0.21".to_string(),
+            Some("d") => "d = 0.13".to_string(),
+            _ => line.to_string(),
+        };
+        let text: Vec<String> = arm_text(name).lines().map(line).collect();
+        prove_all(name, &Model::derive(parse(&text.join("\n"))).unwrap());
+    }
+}
+
 #[test]
 fn published_sums_that_lose_a_parameter_are_refused() {
     let model = Model::derive(paper_arm_with_ratios([1, 1, 1, 1, 1, 100].map(Some))).unwrap();

@@ -3,6 +3,7 @@
 #![allow(dead_code)]
 
 pub(crate) mod by_hand;
+pub(crate) mod with_dynibo;
 pub(crate) mod with_nalgebra;
 
 use std::path::Path;

@@ -256,7 +256,11 @@ fn inspect_shows_what_each_pass_leaves() {
     assert_eq!(listing.lines().filter(|l| l.starts_with("result[")).count(), 4);
     let wrong = dyngen(&["inspect", &arm(), "--function", "gravity", "--pass", "magic"]);
     assert_eq!(wrong.status.code(), Some(2));
-    assert!(text(&wrong.stderr).contains("there are build, merge, associate"), "{}", text(&wrong.stderr));
+    assert!(
+        text(&wrong.stderr).contains("there are build, merge, associate, factor"),
+        "{}",
+        text(&wrong.stderr)
+    );
 }
 
 #[test]

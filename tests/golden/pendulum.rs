@@ -31,14 +31,18 @@ impl<T: SimdRealField + Copy> Trig<T> {
     /// From joint positions, rad (m where prismatic).
     #[must_use]
     pub fn new(q: &SVector<T, JOINTS>) -> Self {
-        let [[q1]] = q.data.0;
-        let ([s1], [c1]) = trigonometry::sin_cos([q1]);
+        let ([s1], [c1]) = trigonometry::sin_cos(q, angles_1);
         Trig {
             sin: [s1],
             cos: [c1],
             position: [T::zero()],
         }
     }
+}
+#[inline(always)]
+fn angles_1<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 1] {
+    let [[q1]] = q.data.0;
+    [q1]
 }
 /// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of calls.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,8 +105,7 @@ pub fn inverse_dynamics<T: SimdRealField + Copy>(
     ddq: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
-    let [[q1]] = q.data.0;
-    let ([s1], [c1]) = trigonometry::sin_cos([q1]);
+    let ([s1], [c1]) = trigonometry::sin_cos(q, angles_1);
     let trig = Trig {
         sin: [s1],
         cos: [c1],
@@ -145,8 +148,7 @@ pub fn regressor<T: SimdRealField + Copy>(
     dq: &SVector<T, JOINTS>,
     ddq: &SVector<T, JOINTS>,
 ) -> SMatrix<T, JOINTS, PARAMETERS> {
-    let [[q1]] = q.data.0;
-    let ([s1], [c1]) = trigonometry::sin_cos([q1]);
+    let ([s1], [c1]) = trigonometry::sin_cos(q, angles_1);
     let trig = Trig {
         sin: [s1],
         cos: [c1],
@@ -250,8 +252,7 @@ pub fn gravity<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
-    let [[q1]] = q.data.0;
-    let ([s1], [c1]) = trigonometry::sin_cos([q1]);
+    let ([s1], [c1]) = trigonometry::sin_cos(q, angles_1);
     let trig = Trig {
         sin: [s1],
         cos: [c1],
@@ -291,8 +292,7 @@ pub fn forward_dynamics<T: SimdRealField + Copy>(
     tau: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
-    let [[q1]] = q.data.0;
-    let ([s1], [c1]) = trigonometry::sin_cos([q1]);
+    let ([s1], [c1]) = trigonometry::sin_cos(q, angles_1);
     let trig = Trig {
         sin: [s1],
         cos: [c1],
@@ -333,8 +333,7 @@ pub fn forward_dynamics_with<T: SimdRealField + Copy>(
 pub fn forward_kinematics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
 ) -> SMatrix<T, 4, 4> {
-    let [[q1]] = q.data.0;
-    let ([s1], [c1]) = trigonometry::sin_cos([q1]);
+    let ([s1], [c1]) = trigonometry::sin_cos(q, angles_1);
     let trig = Trig {
         sin: [s1],
         cos: [c1],
@@ -373,12 +372,21 @@ mod trigonometry {
     #![allow(clippy::excessive_precision)]
     use core::any::{Any, TypeId};
     use nalgebra::{SimdBool, SimdRealField, convert};
-    /// Sines and cosines, in the order of the angles.
+    /// Sines and cosines of the angles that `angles` makes of joint positions, in their order.
+    ///
+    /// Positions and not angles are handed over, because a processor that reads in one piece what was just written in
+    /// several waits until that is done.
     #[inline(always)]
-    pub(super) fn sin_cos<T: SimdRealField + Copy, const N: usize>(
-        angles: [T; N],
+    pub(super) fn sin_cos<T: SimdRealField + Copy, Q, const N: usize>(
+        q: &Q,
+        angles: impl Fn(&Q) -> [T; N],
     ) -> ([T; N], [T; N]) {
-        if T::LANES == 1 { once(angles) } else { all(angles) }
+        if T::LANES == 1 {
+            let [sines, cosines] = once(q, angles);
+            (sines.0, cosines.0)
+        } else {
+            all(angles(q))
+        }
     }
     /// The sine and cosine of one angle, in `f64` of one up to [`LIMIT`], without a branch.
     #[inline(always)]
@@ -392,11 +400,16 @@ mod trigonometry {
             angle.simd_sin_cos()
         }
     }
+    /// Sines or cosines. No vector of them crosses a line of the cache: what does cannot be read before it is written there.
+    #[cfg_attr(target_arch = "x86_64", repr(align(16)))]
+    struct Row<T, const N: usize>([T; N]);
     #[inline(never)]
-    fn once<T: SimdRealField + Copy, const N: usize>(
-        angles: [T; N],
-    ) -> ([T; N], [T; N]) {
-        all(angles)
+    fn once<T: SimdRealField + Copy, Q, const N: usize>(
+        q: &Q,
+        angles: impl Fn(&Q) -> [T; N],
+    ) -> [Row<T, N>; 2] {
+        let (sines, cosines) = all(angles(q));
+        [Row(sines), Row(cosines)]
     }
     #[inline(always)]
     fn all<T: SimdRealField + Copy, const N: usize>(angles: [T; N]) -> ([T; N], [T; N]) {

@@ -40,14 +40,33 @@ impl<T: SimdRealField + Copy> Trig<T> {
     /// From joint positions, rad (m where prismatic).
     #[must_use]
     pub fn new(q: &SVector<T, JOINTS>) -> Self {
-        let [[q1, q2]] = q.data.0;
-        let ([s1, s2, s1p2], [c1, c2, c1p2]) = trigonometry::sin_cos([q1, q2, q1 + q2]);
+        let ([s1, s2, s1p2], [c1, c2, c1p2]) = trigonometry::sin_cos(q, angles_1_2_1p2);
         Trig {
             sin: [s1, s2, s1p2],
             cos: [c1, c2, c1p2],
             position: [T::zero(), T::zero()],
         }
     }
+}
+#[inline(always)]
+fn angles_1_2<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 2] {
+    let [[q1, q2]] = q.data.0;
+    [q1, q2]
+}
+#[inline(always)]
+fn angles_1_2_1p2<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 3] {
+    let [[q1, q2]] = q.data.0;
+    [q1, q2, q1 + q2]
+}
+#[inline(always)]
+fn angles_1_1p2<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 2] {
+    let [[q1, q2]] = q.data.0;
+    [q1, q1 + q2]
+}
+#[inline(always)]
+fn angles_2<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 1] {
+    let [[_, q2]] = q.data.0;
+    [q2]
 }
 /// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of calls.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,8 +142,7 @@ pub fn inverse_dynamics<T: SimdRealField + Copy>(
     ddq: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
-    let [[q1, q2]] = q.data.0;
-    let ([s1, s2], [c1, c2]) = trigonometry::sin_cos([q1, q2]);
+    let ([s1, s2], [c1, c2]) = trigonometry::sin_cos(q, angles_1_2);
     let trig = Trig {
         sin: [s1, s2, T::zero()],
         cos: [c1, c2, T::zero()],
@@ -173,9 +191,9 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
     let x38 = x27 * z2;
     let x39 = x32 + x36;
     let x40 = x33 - x37;
-    let x41 = x34 - x38;
+    let x41 = x38 - x34;
     let x43 = x16 * z3;
-    let x44 = x41 + x43;
+    let x44 = x41 - x43;
     let x46 = x19 * z4;
     let x48 = x18 * z5;
     let x49 = x46 - x48;
@@ -189,11 +207,11 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
     let x58 = x9 * ddq2;
     let x59 = ddq1 + x58;
     let x61 = x59 * z7;
-    let x62 = x44 + x61;
+    let x62 = x44 - x61;
     let x63 = ddq2 * z7;
-    let x64 = x44 + x63;
-    let x65 = x57 + x64;
-    SMatrix::from_array_storage(ArrayStorage([[x65, x62]]))
+    let x64 = x44 - x63;
+    let x65 = x57 - x64;
+    SMatrix::from_array_storage(ArrayStorage([[x65, -x62]]))
 }
 /// Regressor Y(q, q̇, q̈): τ = Y·π for the parameters of [`PARAMETER_NAMES`].
 ///
@@ -210,8 +228,7 @@ pub fn regressor<T: SimdRealField + Copy>(
     dq: &SVector<T, JOINTS>,
     ddq: &SVector<T, JOINTS>,
 ) -> SMatrix<T, JOINTS, PARAMETERS> {
-    let [[q1, q2]] = q.data.0;
-    let ([s1, s2], [c1, c2]) = trigonometry::sin_cos([q1, q2]);
+    let ([s1, s2], [c1, c2]) = trigonometry::sin_cos(q, angles_1_2);
     let trig = Trig {
         sin: [s1, s2, T::zero()],
         cos: [c1, c2, T::zero()],
@@ -294,8 +311,7 @@ pub fn mass_matrix<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SMatrix<T, JOINTS, JOINTS> {
-    let [[_, q2]] = q.data.0;
-    let ([s2], [c2]) = trigonometry::sin_cos([q2]);
+    let ([s2], [c2]) = trigonometry::sin_cos(q, angles_2);
     let trig = Trig {
         sin: [T::zero(), s2, T::zero()],
         cos: [T::zero(), c2, T::zero()],
@@ -332,15 +348,14 @@ pub fn mass_matrix_with<T: SimdRealField + Copy>(
 ///
 /// Returns C, n × n.
 ///
-/// Operations: 7 multiplications, 4 additions, 1 sines with cosines.
+/// Operations: 6 multiplications, 3 additions, 1 sines with cosines.
 #[must_use]
 pub fn coriolis_matrix<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SMatrix<T, JOINTS, JOINTS> {
-    let [[_, q2]] = q.data.0;
-    let ([s2], [c2]) = trigonometry::sin_cos([q2]);
+    let ([s2], [c2]) = trigonometry::sin_cos(q, angles_2);
     let trig = Trig {
         sin: [T::zero(), s2, T::zero()],
         cos: [T::zero(), c2, T::zero()],
@@ -366,14 +381,12 @@ pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
     let x9 = c2 * z2;
     let x11 = s2 * z1;
     let x12 = x9 + x11;
-    let x13 = x7 * x9;
-    let x14 = x7 * x11;
-    let x15 = x13 + x14;
-    let x16 = x3 * x15;
-    let x17 = x3 * x12;
-    let x18 = dq1 * x17;
-    let x19 = x16 - x18;
-    SMatrix::from_array_storage(ArrayStorage([[-x19, x18], [-x16, x0]]))
+    let x13 = x7 * x12;
+    let x14 = x3 * x13;
+    let x15 = x3 * x12;
+    let x16 = dq1 * x15;
+    let x17 = x14 - x16;
+    SMatrix::from_array_storage(ArrayStorage([[-x17, x16], [-x14, x0]]))
 }
 /// Joint torques that hold the arm still: g(q).
 ///
@@ -388,8 +401,7 @@ pub fn gravity<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
-    let [[q1, q2]] = q.data.0;
-    let ([s1, s1p2], [c1, c1p2]) = trigonometry::sin_cos([q1, q1 + q2]);
+    let ([s1, s1p2], [c1, c1p2]) = trigonometry::sin_cos(q, angles_1_1p2);
     let trig = Trig {
         sin: [s1, T::zero(), s1p2],
         cos: [c1, T::zero(), c1p2],
@@ -409,12 +421,12 @@ pub fn gravity_with<T: SimdRealField + Copy>(
     let Prepared([_, _, _, _, _, _, _, _, z9, z10, z11, z12, _]) = parameters.prepared();
     let x9 = c1p2 * z9;
     let x11 = s1p2 * z10;
-    let x12 = x9 - x11;
+    let x12 = x11 - x9;
     let x14 = c1 * z11;
     let x16 = s1 * z12;
     let x17 = x14 - x16;
-    let x18 = x12 + x17;
-    SMatrix::from_array_storage(ArrayStorage([[x18, x12]]))
+    let x18 = x17 - x12;
+    SMatrix::from_array_storage(ArrayStorage([[x18, -x12]]))
 }
 /// Joint accelerations under joint torques: q̈ = B⁻¹·(τ − C·q̇ − g), without friction.
 ///
@@ -425,7 +437,7 @@ pub fn gravity_with<T: SimdRealField + Copy>(
 ///
 /// Returns q̈; not finite where the parameters make B singular.
 ///
-/// Operations: 27 multiplications, 19 additions, 1 divisions, 2 sines with cosines.
+/// Operations: 26 multiplications, 19 additions, 1 divisions, 2 sines with cosines.
 #[must_use]
 pub fn forward_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -433,8 +445,7 @@ pub fn forward_dynamics<T: SimdRealField + Copy>(
     tau: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
-    let [[q1, q2]] = q.data.0;
-    let ([s1, s2], [c1, c2]) = trigonometry::sin_cos([q1, q2]);
+    let ([s1, s2], [c1, c2]) = trigonometry::sin_cos(q, angles_1_2);
     let trig = Trig {
         sin: [s1, s2, T::zero()],
         cos: [c1, c2, T::zero()],
@@ -461,53 +472,52 @@ pub fn forward_dynamics_with<T: SimdRealField + Copy>(
     let x5: T = nalgebra::convert(0.4f64);
     let x10: T = nalgebra::convert(9.81f64);
     let x13 = dq1 + dq2;
-    let x14 = dq1 * dq1;
-    let x15 = s1 * x10;
-    let x16 = c1 * x10;
-    let x17 = x5 * x14;
-    let x18 = x15 - x17;
+    let x14 = s1 * x10;
+    let x15 = c1 * x10;
+    let x16 = dq1 * x5;
+    let x17 = dq1 * x16;
+    let x18 = x14 - x17;
     let x19 = x13 * x13;
     let x20 = c2 * x18;
-    let x21 = s2 * x16;
+    let x21 = s2 * x15;
     let x22 = x20 + x21;
-    let x23 = c2 * x16;
+    let x23 = c2 * x15;
     let x24 = s2 * x18;
     let x25 = x23 - x24;
-    let x27 = x19 * z1;
-    let x28 = x25 * z1;
-    let x30 = x19 * z2;
-    let x31 = x22 * z2;
-    let x32 = x28 - x31;
-    let x34 = x16 * z4;
-    let x36 = x15 * z5;
-    let x37 = x34 - x36;
-    let x38 = c2 * x30;
-    let x39 = s2 * x27;
-    let x40 = x38 + x39;
-    let x41 = x5 * x40;
-    let x42 = x37 - x41;
-    let x43 = x32 + x42;
-    let x46 = x43 - tau1;
-    let x47 = x32 - tau2;
-    let x48 = c2 * z1;
-    let x49 = s2 * z2;
-    let x50 = x48 - x49;
-    let x51 = x5 * x50;
-    let x53 = x51 + z3;
-    let x55 = x51 + z6;
-    let x56 = x53 + x55;
-    let x58 = x53 + z7;
-    let x60 = x58 * z13;
-    let x61 = x58 * x60;
-    let x62 = x56 - x61;
-    let x63 = x1 / x62;
-    let x64 = x47 * x60;
-    let x65 = x46 - x64;
-    let x66 = x63 * x65;
-    let x67 = x47 * z13;
-    let x68 = x60 * x66;
-    let x69 = x67 - x68;
-    SMatrix::from_array_storage(ArrayStorage([[-x66, -x69]]))
+    let x27 = x25 * z1;
+    let x29 = x22 * z2;
+    let x30 = x27 - x29;
+    let x32 = x15 * z4;
+    let x34 = x14 * z5;
+    let x35 = c2 * z2;
+    let x36 = s2 * z1;
+    let x37 = x35 + x36;
+    let x38 = x19 * x37;
+    let x39 = x5 * x38;
+    let x42 = x30 - tau2;
+    let x43 = c2 * z1;
+    let x44 = s2 * z2;
+    let x45 = x43 - x44;
+    let x46 = x5 * x45;
+    let x48 = x46 + z3;
+    let x50 = x48 + z7;
+    let x52 = x50 * z13;
+    let x53 = x50 * x52;
+    let x55 = x48 + z6;
+    let x56 = x46 + x55;
+    let x57 = x53 - x56;
+    let x58 = x1 / x57;
+    let x59 = x42 * x52;
+    let x60 = x30 + x32;
+    let x61 = x34 - x60;
+    let x62 = x39 + x61;
+    let x63 = tau1 + x62;
+    let x64 = x59 + x63;
+    let x65 = x58 * x64;
+    let x66 = x42 * z13;
+    let x67 = x52 * x65;
+    let x68 = x66 - x67;
+    SMatrix::from_array_storage(ArrayStorage([[-x65, -x68]]))
 }
 /// Pose of the tool's frame (the last link's where the arm declares no tool) in the base frame.
 ///
@@ -520,8 +530,7 @@ pub fn forward_dynamics_with<T: SimdRealField + Copy>(
 pub fn forward_kinematics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
 ) -> SMatrix<T, 4, 4> {
-    let [[q1, q2]] = q.data.0;
-    let ([s1, s2], [c1, c2]) = trigonometry::sin_cos([q1, q2]);
+    let ([s1, s2], [c1, c2]) = trigonometry::sin_cos(q, angles_1_2);
     let trig = Trig {
         sin: [s1, s2, T::zero()],
         cos: [c1, c2, T::zero()],
@@ -571,12 +580,21 @@ mod trigonometry {
     #![allow(clippy::excessive_precision)]
     use core::any::{Any, TypeId};
     use nalgebra::{SimdBool, SimdRealField, convert};
-    /// Sines and cosines, in the order of the angles.
+    /// Sines and cosines of the angles that `angles` makes of joint positions, in their order.
+    ///
+    /// Positions and not angles are handed over, because a processor that reads in one piece what was just written in
+    /// several waits until that is done.
     #[inline(always)]
-    pub(super) fn sin_cos<T: SimdRealField + Copy, const N: usize>(
-        angles: [T; N],
+    pub(super) fn sin_cos<T: SimdRealField + Copy, Q, const N: usize>(
+        q: &Q,
+        angles: impl Fn(&Q) -> [T; N],
     ) -> ([T; N], [T; N]) {
-        if T::LANES == 1 { once(angles) } else { all(angles) }
+        if T::LANES == 1 {
+            let [sines, cosines] = once(q, angles);
+            (sines.0, cosines.0)
+        } else {
+            all(angles(q))
+        }
     }
     /// The sine and cosine of one angle, in `f64` of one up to [`LIMIT`], without a branch.
     #[inline(always)]
@@ -590,11 +608,16 @@ mod trigonometry {
             angle.simd_sin_cos()
         }
     }
+    /// Sines or cosines. No vector of them crosses a line of the cache: what does cannot be read before it is written there.
+    #[cfg_attr(target_arch = "x86_64", repr(align(16)))]
+    struct Row<T, const N: usize>([T; N]);
     #[inline(never)]
-    fn once<T: SimdRealField + Copy, const N: usize>(
-        angles: [T; N],
-    ) -> ([T; N], [T; N]) {
-        all(angles)
+    fn once<T: SimdRealField + Copy, Q, const N: usize>(
+        q: &Q,
+        angles: impl Fn(&Q) -> [T; N],
+    ) -> [Row<T, N>; 2] {
+        let (sines, cosines) = all(angles(q));
+        [Row(sines), Row(cosines)]
     }
     #[inline(always)]
     fn all<T: SimdRealField + Copy, const N: usize>(angles: [T; N]) -> ([T; N], [T; N]) {

@@ -41,19 +41,32 @@ impl<T: SimdRealField + Copy> Trig<T> {
     /// From joint positions, rad (m where prismatic).
     #[must_use]
     pub fn new(q: &SVector<T, JOINTS>) -> Self {
-        let [[q1, q2, q3, q4]] = q.data.0;
-        let ([s1, s2, s4, s1p2], [c1, c2, c4, c1p2]) = trigonometry::sin_cos([
-            q1,
-            q2,
-            q4,
-            q1 + q2,
-        ]);
+        let [[_, _, q3, _]] = q.data.0;
+        let ([s1, s2, s4, s1p2], [c1, c2, c4, c1p2]) = trigonometry::sin_cos(
+            q,
+            angles_1_2_4_1p2,
+        );
         Trig {
             sin: [s1, s2, T::zero(), s4, s1p2],
             cos: [c1, c2, T::zero(), c4, c1p2],
             position: [T::zero(), T::zero(), q3, T::zero()],
         }
     }
+}
+#[inline(always)]
+fn angles_1_2_4<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 3] {
+    let [[q1, q2, _, q4]] = q.data.0;
+    [q1, q2, q4]
+}
+#[inline(always)]
+fn angles_1_2_4_1p2<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 4] {
+    let [[q1, q2, _, q4]] = q.data.0;
+    [q1, q2, q4, q1 + q2]
+}
+#[inline(always)]
+fn angles_2_4<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 2] {
+    let [[_, q2, _, q4]] = q.data.0;
+    [q2, q4]
 }
 /// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of calls.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,7 +134,7 @@ impl<T: Copy> Parameters<T> for Prepared<T> {
 ///
 /// Returns τ, N·m (N where prismatic).
 ///
-/// Operations: 40 multiplications, 30 additions, 2 sines with cosines.
+/// Operations: 39 multiplications, 30 additions, 2 sines with cosines.
 #[must_use]
 pub fn inverse_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
@@ -129,8 +142,7 @@ pub fn inverse_dynamics<T: SimdRealField + Copy>(
     ddq: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
-    let [[_, q2, _, q4]] = q.data.0;
-    let ([s2, s4], [c2, c4]) = trigonometry::sin_cos([q2, q4]);
+    let ([s2, s4], [c2, c4]) = trigonometry::sin_cos(q, angles_2_4);
     let trig = Trig {
         sin: [T::zero(), s2, T::zero(), s4, T::zero()],
         cos: [T::zero(), c2, T::zero(), c4, T::zero()],
@@ -191,42 +203,41 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
     let x53 = x25 * x48;
     let x54 = x25 * x49;
     let x55 = x25 * x44;
-    let x56 = x50 + x53;
-    let x57 = x51 - x54;
-    let x58 = x52 - x55;
-    let x59 = x17 * x48;
-    let x60 = x58 - x59;
-    let x61 = x16 * x48;
-    let x62 = x60 - x61;
-    let x64 = x44 * z4;
-    let x65 = x45 * z4;
-    let x66 = x46 * z4;
-    let x67 = x56 + x64;
-    let x68 = x57 - x65;
-    let x70 = x35 * z5;
-    let x71 = x31 * z5;
-    let x72 = x41 * z5;
-    let x74 = x31 * z6;
-    let x75 = x35 * z6;
-    let x76 = x38 * z6;
-    let x77 = x70 - x74;
-    let x78 = x71 + x75;
-    let x79 = x72 - x76;
-    let x81 = x31 * z7;
-    let x82 = x79 + x81;
-    let x83 = x2 * x68;
-    let x84 = x62 - x83;
-    let x85 = x67 + x77;
-    let x86 = x68 - x78;
-    let x87 = x82 + x84;
-    let x89 = ddq1 * z8;
-    let x90 = c2 * x86;
-    let x91 = s2 * x85;
-    let x92 = x90 + x91;
-    let x93 = x4 * x92;
-    let x94 = x89 - x93;
-    let x95 = x87 + x94;
-    SMatrix::from_array_storage(ArrayStorage([[x95, x87, -x66, -x62]]))
+    let x56 = x16 + x17;
+    let x57 = x52 - x55;
+    let x58 = x48 * x56;
+    let x59 = x57 - x58;
+    let x61 = x44 * z4;
+    let x62 = x45 * z4;
+    let x63 = x46 * z4;
+    let x64 = x51 - x54;
+    let x65 = x62 - x64;
+    let x67 = x35 * z5;
+    let x68 = x31 * z5;
+    let x69 = x41 * z5;
+    let x71 = x31 * z6;
+    let x72 = x35 * z6;
+    let x73 = x38 * z6;
+    let x75 = x31 * z7;
+    let x76 = x2 * x65;
+    let x77 = x50 + x53;
+    let x78 = x61 + x77;
+    let x79 = x67 + x78;
+    let x80 = x71 - x79;
+    let x81 = x65 + x68;
+    let x82 = x72 + x81;
+    let x83 = x73 - x69;
+    let x84 = x83 - x75;
+    let x85 = x84 - x59;
+    let x86 = x85 - x76;
+    let x88 = ddq1 * z8;
+    let x89 = c2 * x82;
+    let x90 = s2 * x80;
+    let x91 = x89 + x90;
+    let x92 = x4 * x91;
+    let x93 = x86 - x88;
+    let x94 = x92 - x93;
+    SMatrix::from_array_storage(ArrayStorage([[x94, -x86, -x63, -x59]]))
 }
 /// Regressor Y(q, q̇, q̈): τ = Y·π for the parameters of [`PARAMETER_NAMES`].
 ///
@@ -243,8 +254,7 @@ pub fn regressor<T: SimdRealField + Copy>(
     dq: &SVector<T, JOINTS>,
     ddq: &SVector<T, JOINTS>,
 ) -> SMatrix<T, JOINTS, PARAMETERS> {
-    let [[_, q2, _, q4]] = q.data.0;
-    let ([s2, s4], [c2, c4]) = trigonometry::sin_cos([q2, q4]);
+    let ([s2, s4], [c2, c4]) = trigonometry::sin_cos(q, angles_2_4);
     let trig = Trig {
         sin: [T::zero(), s2, T::zero(), s4, T::zero()],
         cos: [T::zero(), c2, T::zero(), c4, T::zero()],
@@ -349,8 +359,7 @@ pub fn mass_matrix<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SMatrix<T, JOINTS, JOINTS> {
-    let [[_, q2, _, q4]] = q.data.0;
-    let ([s2, s4], [c2, c4]) = trigonometry::sin_cos([q2, q4]);
+    let ([s2, s4], [c2, c4]) = trigonometry::sin_cos(q, angles_2_4);
     let trig = Trig {
         sin: [T::zero(), s2, T::zero(), s4, T::zero()],
         cos: [T::zero(), c2, T::zero(), c4, T::zero()],
@@ -427,8 +436,7 @@ pub fn coriolis_matrix<T: SimdRealField + Copy>(
     dq: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SMatrix<T, JOINTS, JOINTS> {
-    let [[_, q2, _, q4]] = q.data.0;
-    let ([s2, s4], [c2, c4]) = trigonometry::sin_cos([q2, q4]);
+    let ([s2, s4], [c2, c4]) = trigonometry::sin_cos(q, angles_2_4);
     let trig = Trig {
         sin: [T::zero(), s2, T::zero(), s4, T::zero()],
         cos: [T::zero(), c2, T::zero(), c4, T::zero()],
@@ -558,8 +566,7 @@ pub fn forward_dynamics<T: SimdRealField + Copy>(
     tau: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
 ) -> SVector<T, JOINTS> {
-    let [[_, q2, _, q4]] = q.data.0;
-    let ([s2, s4], [c2, c4]) = trigonometry::sin_cos([q2, q4]);
+    let ([s2, s4], [c2, c4]) = trigonometry::sin_cos(q, angles_2_4);
     let trig = Trig {
         sin: [T::zero(), s2, T::zero(), s4, T::zero()],
         cos: [T::zero(), c2, T::zero(), c4, T::zero()],
@@ -672,18 +679,18 @@ pub fn forward_dynamics_with<T: SimdRealField + Copy>(
     let x113 = x56 + x60;
     let x114 = tau1 - x113;
     let x115 = x111 - x114;
-    let x116 = x112 - x115;
+    let x116 = x115 - x112;
     let x117 = x107 * x116;
     let x118 = x96 * x110;
     let x120 = x66 * z13;
     let x121 = x67 * z12;
     let x122 = x99 * x117;
-    let x123 = x118 + x122;
+    let x123 = x122 - x118;
     let x124 = x93 * x117;
     let x125 = x92 * x123;
-    let x126 = x121 - x124;
-    let x127 = x125 + x126;
-    SMatrix::from_array_storage(ArrayStorage([[-x117, x123, x120, x127]]))
+    let x126 = x121 + x124;
+    let x127 = x125 - x126;
+    SMatrix::from_array_storage(ArrayStorage([[x117, -x123, x120, -x127]]))
 }
 /// Pose of the tool's frame (the last link's where the arm declares no tool) in the base frame.
 ///
@@ -696,8 +703,8 @@ pub fn forward_dynamics_with<T: SimdRealField + Copy>(
 pub fn forward_kinematics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
 ) -> SMatrix<T, 4, 4> {
-    let [[q1, q2, q3, q4]] = q.data.0;
-    let ([s1, s2, s4], [c1, c2, c4]) = trigonometry::sin_cos([q1, q2, q4]);
+    let [[_, _, q3, _]] = q.data.0;
+    let ([s1, s2, s4], [c1, c2, c4]) = trigonometry::sin_cos(q, angles_1_2_4);
     let trig = Trig {
         sin: [s1, s2, T::zero(), s4, T::zero()],
         cos: [c1, c2, T::zero(), c4, T::zero()],
@@ -756,12 +763,21 @@ mod trigonometry {
     #![allow(clippy::excessive_precision)]
     use core::any::{Any, TypeId};
     use nalgebra::{SimdBool, SimdRealField, convert};
-    /// Sines and cosines, in the order of the angles.
+    /// Sines and cosines of the angles that `angles` makes of joint positions, in their order.
+    ///
+    /// Positions and not angles are handed over, because a processor that reads in one piece what was just written in
+    /// several waits until that is done.
     #[inline(always)]
-    pub(super) fn sin_cos<T: SimdRealField + Copy, const N: usize>(
-        angles: [T; N],
+    pub(super) fn sin_cos<T: SimdRealField + Copy, Q, const N: usize>(
+        q: &Q,
+        angles: impl Fn(&Q) -> [T; N],
     ) -> ([T; N], [T; N]) {
-        if T::LANES == 1 { once(angles) } else { all(angles) }
+        if T::LANES == 1 {
+            let [sines, cosines] = once(q, angles);
+            (sines.0, cosines.0)
+        } else {
+            all(angles(q))
+        }
     }
     /// The sine and cosine of one angle, in `f64` of one up to [`LIMIT`], without a branch.
     #[inline(always)]
@@ -775,11 +791,16 @@ mod trigonometry {
             angle.simd_sin_cos()
         }
     }
+    /// Sines or cosines. No vector of them crosses a line of the cache: what does cannot be read before it is written there.
+    #[cfg_attr(target_arch = "x86_64", repr(align(16)))]
+    struct Row<T, const N: usize>([T; N]);
     #[inline(never)]
-    fn once<T: SimdRealField + Copy, const N: usize>(
-        angles: [T; N],
-    ) -> ([T; N], [T; N]) {
-        all(angles)
+    fn once<T: SimdRealField + Copy, Q, const N: usize>(
+        q: &Q,
+        angles: impl Fn(&Q) -> [T; N],
+    ) -> [Row<T, N>; 2] {
+        let (sines, cosines) = all(angles(q));
+        [Row(sines), Row(cosines)]
     }
     #[inline(always)]
     fn all<T: SimdRealField + Copy, const N: usize>(angles: [T; N]) -> ([T; N], [T; N]) {

@@ -170,7 +170,8 @@ fn body_column(
 ) -> Vec<Expr> {
     let geometry = &columns.links[parameter.link];
     let wrench = unit_wrench(b, chain, geometry, &view.motion, parameter);
-    let at_file = !is_second(parameter.kind) && geometry.file_origin != ZERO;
+    let origin = file_origin(b, chain, geometry, parameter.link);
+    let at_file = !is_second(parameter.kind) && origin != ZERO;
     let forced = |axis: usize| -> Expr {
         let Axis { angular, linear } = view.axes[axis];
         match &view.home {
@@ -179,7 +180,7 @@ fn body_column(
                 b.dot(&speeds[axis], &home)
             }
             _ if at_file => {
-                let speed = plus(b, &linear, &b.cross(&angular, &geometry.file_origin));
+                let speed = plus(b, &linear, &b.cross(&angular, &origin));
                 b.dot(&speed, &wrench.force)
             }
             _ => b.dot(&linear, &wrench.force),
@@ -204,6 +205,14 @@ fn of_joints(b: &Builder, chain: &Chain, coordinates: &[Expr]) -> Vec<Expr> {
     torques
 }
 
+/// The origin of the file's frame in the chain's axes.
+fn file_origin(b: &Builder, chain: &Chain, geometry: &LinkGeometry<Expr>, link: usize) -> Vector {
+    match link + 1 == chain.dof() {
+        true => back_z(b, chain.last_turn, &geometry.file_origin),
+        false => geometry.file_origin,
+    }
+}
+
 fn is_second(kind: ParameterKind) -> bool {
     !matches!(kind, ParameterKind::M | ParameterKind::Mx | ParameterKind::My | ParameterKind::Mz)
 }
@@ -224,10 +233,7 @@ fn unit_wrench(
     };
     let unit =
         |axis: usize| -> Vector { std::array::from_fn(|i| if i == axis { Expr::ONE } else { Expr::ZERO }) };
-    let mut origin = geometry.file_origin;
-    if last {
-        origin = back_z(b, chain.last_turn, &origin);
-    }
+    let origin = file_origin(b, chain, geometry, parameter.link);
     let acceleration = plus(b, &motion.acceleration, &motion.spin.times(b, &origin));
     let first = |axis: usize| {
         let arm = turn(&unit(axis));

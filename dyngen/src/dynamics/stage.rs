@@ -99,6 +99,7 @@ impl Chain {
         {
             // What is turned back to the frame before the stage has to come from there to the others.
             last_turn = std::mem::replace(&mut member.angle, STRAIGHT);
+            member.reach = back_z(b, last_turn, &member.reach);
             if let [.., before, member] = &mut last.members[..] {
                 member.step = (-before.angle.0, before.angle.1);
             } else if let Some(member) = last.members.last_mut() {

@@ -2,11 +2,16 @@
 
 #![allow(clippy::unwrap_used)]
 
-use super::trigonometry::sin_cos;
+use super::trigonometry;
+use nalgebra::SimdRealField;
 use num_bigint::BigInt;
 use num_traits::{Signed, ToPrimitive, Zero};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+fn sin_cos<T: SimdRealField + Copy, const N: usize>(angles: [T; N]) -> ([T; N], [T; N]) {
+    trigonometry::sin_cos(&angles, |angles| *angles)
+}
 
 /// Bits after the point.
 const BITS: usize = 320;

@@ -1,6 +1,6 @@
 //! Functions over blocks of samples: loops that a compiler turns into vectors of whatever processor it compiles for.
 
-use super::code::TrigOfLane;
+use super::angles::TrigOfLane;
 use super::{code, docs};
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;
@@ -29,7 +29,7 @@ pub(super) fn module(model: &Model, functions: &[FunctionGraph]) -> TokenStream 
         ///
         /// They are loops without branches, inlined into their caller so that they use the vectors that *it* is compiled
         /// for: `-C target-cpu`, or a dispatch at run time around the caller's loop. Eight samples suit every
-        /// processor.
+        /// processor, and arrays in a struct of `#[repr(align(64))]` its cache.
         #[allow(clippy::needless_range_loop)]
         pub mod batch {
             use super::*;

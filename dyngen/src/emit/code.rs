@@ -1,15 +1,14 @@
 //! One function as tokens: straight-line code, one `let` for each node.
 
-use super::docs;
-use crate::arm::{Arm, JointKind};
-use crate::dynamics::chain;
-use crate::dynamics::function::{Argument, Size, trig_offset};
+use super::angles::{positions, trig_of, uses_positions};
+use super::{docs, signs};
+use crate::dynamics::function::{Argument, Size};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::rational;
-use crate::graph::{Expr, Graph, Input, JointSum, Node, Preparation, operands};
+use crate::graph::{Expr, Graph, Input, Node, Preparation, operands};
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
-use quote::{ToTokens, format_ident, quote};
+use quote::{format_ident, quote};
 use std::collections::BTreeSet;
 
 /// A function's items: one that takes q, and one that takes [`Trig`] in its place.
@@ -32,8 +31,14 @@ pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) ->
         true => (quote!(q), quote!(trig)),
         false => (quote!(_q), quote!(_trig)),
     };
-    let statements = sections(model, &built.graph, &built.outputs, &needed);
-    let (result, value) = result(built);
+    // Where it pays, by measurement.
+    let signs = if built.function.size() == (Size::Joints, Size::Fixed(1)) {
+        signs::held(&built.graph, &built.outputs, &needed)
+    } else {
+        vec![false; built.graph.nodes().len()]
+    };
+    let statements = sections(model, &built.graph, &built.outputs, &needed, &signs);
+    let (result, value) = result(built, &signs);
     // Where the result is a number, the last `let` is the result.
     let lint = is_number(built).then(|| quote!(#[allow(clippy::let_and_return)]));
     quote! {
@@ -62,81 +67,8 @@ pub(super) fn is_number(built: &FunctionGraph) -> bool {
     matches!(built.function, Function::KineticEnergy | Function::PotentialEnergy)
 }
 
-/// The struct of sines and cosines that functions share.
-pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
-    let all: BTreeSet<Input> = angles(arm)
-        .into_iter()
-        .flat_map(|sum| [Input::Sin(sum), Input::Cos(sum)])
-        .chain((0..arm.dof()).map(Input::Position))
-        .collect();
-    let (bindings, fields) = trig_fields(arm, &all);
-    let sums: Vec<String> = chain::sums(arm)
-        .iter()
-        .enumerate()
-        .map(|(k, sum)| {
-            let text: String = sum
-                .joints()
-                .enumerate()
-                .map(|(k, (i, negative))| {
-                    let sign = if k == 0 {
-                        ""
-                    } else if negative {
-                        " − "
-                    } else {
-                        " + "
-                    };
-                    format!("{sign}q{}", i + 1)
-                })
-                .collect();
-            format!(" Angle {}: {text}, across parallel axes.", arm.dof() + k + 1)
-        })
-        .collect();
-    let count = Literal::usize_unsuffixed(angles(arm).len());
-    let shifted: Vec<String> = (0..arm.dof())
-        .filter(|i| trig_offset(arm, *i) != 0.0)
-        .map(|i| format!(" Joint {}: of q + {} rad.", i + 1, trig_offset(arm, i)))
-        .collect();
-    quote! {
-        /// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
-        pub const ANGLES: usize = #count;
-
-        /// Joint positions with their sines and cosines: computed once and shared between calls, or taken from
-        /// wherever the caller has them.
-        #(#[doc = #shifted])*
-        #(#[doc = #sums])*
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct Trig<T> {
-            /// Sine of each angle; not read for prismatic joints.
-            pub sin: [T; ANGLES],
-            /// Cosine of each angle; not read for prismatic joints.
-            pub cos: [T; ANGLES],
-            /// Position of each prismatic joint, m; not read for revolute joints.
-            pub position: [T; JOINTS],
-        }
-
-        impl<T: SimdRealField + Copy> Trig<T> {
-            /// From joint positions, rad (m where prismatic).
-            #[must_use]
-            pub fn new(q: &SVector<T, JOINTS>) -> Self {
-                #bindings
-                #fields
-            }
-        }
-    }
-}
-
-fn uses_positions(used: &BTreeSet<Input>) -> bool {
-    used.iter().any(|i| matches!(i, Input::Sin(_) | Input::Cos(_) | Input::Position(_)))
-}
-
-/// `let trig = …` with what a function uses; the rest is zero, because nobody reads it.
-fn trig_of(arm: &Arm, used: &BTreeSet<Input>) -> TokenStream {
-    let (bindings, fields) = trig_fields(arm, used);
-    if uses_positions(used) { quote!(#bindings let trig = #fields;) } else { quote!(let trig = #fields;) }
-}
-
 /// The inputs that a function reads.
-fn used(built: &FunctionGraph, needed: &[usize]) -> BTreeSet<Input> {
+pub(super) fn used(built: &FunctionGraph, needed: &[usize]) -> BTreeSet<Input> {
     let inputs = needed.iter().filter_map(|n| match built.graph.nodes()[*n] {
         Node::Input(input) => Some(input),
         _ => None,
@@ -144,161 +76,9 @@ fn used(built: &FunctionGraph, needed: &[usize]) -> BTreeSet<Input> {
     inputs.collect()
 }
 
-/// What a function takes of q: the positions that it reads, and the angles whose sine or cosine it needs.
-struct Positions {
-    /// Whether each joint's position is read.
-    read: Vec<bool>,
-    /// Each angle, and the names of its sine and cosine where they are read.
-    angles: Vec<(JointSum, TokenStream, TokenStream)>,
-    /// A `Trig` of them; the rest is zero, because nobody reads it.
-    trig: TokenStream,
-}
-
-impl Positions {
-    /// `position` is how a joint's position is read.
-    fn new(arm: &Arm, used: &BTreeSet<Input>, position: impl Fn(usize) -> TokenStream) -> Positions {
-        let zero = quote!(T::zero());
-        let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
-        let mut read = vec![false; arm.dof()];
-        let (mut found, mut sines, mut cosines, mut places) =
-            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for sum in angles(arm) {
-            let turns = sum.joints().all(|(i, _)| revolute(i));
-            let name = |input: Input| {
-                (turns && used.contains(&input)).then(|| format_ident!("{}", input.to_string()))
-            };
-            let (sin, cos) = (name(Input::Sin(sum)), name(Input::Cos(sum)));
-            let or =
-                |name: &Option<Ident>, other: TokenStream| name.as_ref().map_or(other, |name| quote!(#name));
-            if sin.is_some() || cos.is_some() {
-                found.push((sum, or(&sin, quote!(_)), or(&cos, quote!(_))));
-                sum.joints().for_each(|(i, _)| read[i] = true);
-            }
-            sines.push(or(&sin, zero.clone()));
-            cosines.push(or(&cos, zero.clone()));
-        }
-        for i in 0..arm.dof() {
-            let place = !revolute(i) && used.contains(&Input::Position(i));
-            read[i] |= place;
-            places.push(if place { position(i) } else { zero.clone() });
-        }
-        let trig = quote!(Trig { sin: [#(#sines),*], cos: [#(#cosines),*], position: [#(#places),*] });
-        Positions { read, angles: found, trig }
-    }
-}
-
-/// An angle of the joints at their positions.
-fn angle(arm: &Arm, sum: JointSum, position: impl Fn(usize) -> TokenStream) -> TokenStream {
-    let terms = sum.joints().enumerate().map(|(k, (i, negative))| {
-        let q = position(i);
-        match (k, negative) {
-            (0, _) => q,
-            (_, false) => quote!(+ #q),
-            (_, true) => quote!(- #q),
-        }
-    });
-    let offset = sum.value(|i| trig_offset(arm, i));
-    let offset = (offset != 0.0).then(|| {
-        let offset = Literal::f64_suffixed(offset);
-        quote!(+ nalgebra::convert::<f64, T>(#offset))
-    });
-    quote!(#(#terms)* #offset)
-}
-
-/// Takes q apart, computes all sines and cosines together, and builds a `Trig` of the inputs that are used. A pattern
-/// over the storage needs no bounds check and cannot panic.
-fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
-    let position = |i: usize| lane_name(Argument::Positions, i).into_token_stream();
-    let Positions { read, angles, trig } = Positions::new(arm, used, position);
-    let patterns = (0..arm.dof()).map(|i| if read[i] { position(i) } else { quote!(_) });
-    let computed = (!angles.is_empty()).then(|| {
-        let (sines, cosines) = (angles.iter().map(|a| &a.1), angles.iter().map(|a| &a.2));
-        let values = angles.iter().map(|(sum, ..)| angle(arm, *sum, position));
-        quote!(let ([#(#sines),*], [#(#cosines),*]) = trigonometry::sin_cos([#(#values),*]);)
-    });
-    let bindings = quote! {
-        let [[#(#patterns),*]] = q.data.0;
-        #computed
-    };
-    (bindings, trig)
-}
-
-/// What a function takes of q at one sample in a block.
-pub(super) struct TrigOfLane {
-    /// Lines without a branch that make its `trig`.
-    pub(super) lines: TokenStream,
-    /// Joints whose angles that is right for only where they are near.
-    pub(super) turning: BTreeSet<usize>,
-    /// Whether each joint's position is read.
-    pub(super) read: Vec<bool>,
-}
-
-impl TrigOfLane {
-    pub(super) fn new(model: &Model, built: &FunctionGraph) -> TrigOfLane {
-        let arm = model.arm();
-        let used = used(built, &built.graph.needed(&built.outputs));
-        let position = |i: usize| {
-            let q = lane_name(Argument::Positions, i);
-            quote!(#q[lane])
-        };
-        let Positions { read, angles, trig } = Positions::new(arm, &used, position);
-        let lines = angles.iter().map(|(sum, sine, cosine)| {
-            let angle = angle(arm, *sum, position);
-            quote!(let (#sine, #cosine) = trigonometry::near(#angle);)
-        });
-        let lines = quote! {
-            #(#lines)*
-            let trig = #trig;
-        };
-        let turning = angles.iter().flat_map(|(sum, ..)| sum.joints().map(|(i, _)| i)).collect();
-        TrigOfLane { lines, turning, read }
-    }
-}
-
 /// The name of an argument's value at a joint.
 pub(super) fn lane_name(argument: Argument, joint: usize) -> Ident {
     format_ident!("{}{}", argument.name(), joint + 1)
-}
-
-/// The module that computes sines and cosines, for an arm that has any.
-pub(super) fn trigonometry(arm: &Arm) -> TokenStream {
-    if arm.joints.iter().all(|joint| joint.kind != JointKind::Revolute) {
-        return quote!();
-    }
-    // The module that this crate compiles too: it parses.
-    let file = syn::parse_file(include_str!("trigonometry.rs"));
-    let (docs, items) = file.map_or((Vec::new(), Vec::new()), |file| (file.attrs, file.items));
-    quote! {
-        mod trigonometry {
-            #(#docs)*
-            #(#items)*
-        }
-    }
-}
-
-/// The angles of a `Trig`: those of the joints, then sums of parallel joints' angles.
-fn angles(arm: &Arm) -> Vec<JointSum> {
-    (0..arm.dof()).map(JointSum::joint).chain(chain::sums(arm)).collect()
-}
-
-/// Names for what is read of a `Trig`.
-fn positions(arm: &Arm, used: &BTreeSet<Input>) -> TokenStream {
-    let take = |field: &str, inputs: Vec<Input>| {
-        let field = Ident::new(field, Span::call_site());
-        let any = inputs.iter().any(|input| used.contains(input));
-        let names = inputs.into_iter().map(|input| {
-            let name = format_ident!("{}", input.to_string());
-            if used.contains(&input) { quote!(#name) } else { quote!(_) }
-        });
-        any.then(|| quote!(let [#(#names),*] = trig.#field;))
-    };
-    let lines = [
-        take("sin", angles(arm).into_iter().map(Input::Sin).collect()),
-        take("cos", angles(arm).into_iter().map(Input::Cos).collect()),
-        take("position", (0..arm.dof()).map(Input::Position).collect()),
-    ];
-    let lines = lines.iter().flatten();
-    quote!(#(#lines)*)
 }
 
 /// The inputs that an argument other than q brings.
@@ -372,7 +152,8 @@ pub(super) fn preparation(model: &Model, preparation: &Preparation) -> TokenStre
             quote!(let #name = parameters[#i];)
         })
         .collect();
-    let statements = sections(model, &graph, preparation.values(), &needed);
+    let signs = vec![false; graph.nodes().len()];
+    let statements = sections(model, &graph, preparation.values(), &needed, &signs);
     let values = preparation.values().iter().map(|e| value_name(&graph, e.node()));
     let operations = preparation.operations();
     let doc = format!(" Operations: {} multiplications, {} additions.", operations.mul, operations.add);
@@ -421,10 +202,16 @@ const SECTION: usize = 256;
 /// The body, in blocks that hand on only what later ones need. Every `let` opens a scope within the one before, and a
 /// compiler that writes debug information goes through nested scopes by recursion: thousands of them in a row
 /// exhaust its stack.
-fn sections(model: &Model, graph: &Graph, outputs: &[Expr], needed: &[usize]) -> Vec<TokenStream> {
+fn sections(
+    model: &Model,
+    graph: &Graph,
+    outputs: &[Expr],
+    needed: &[usize],
+    signs: &[bool],
+) -> Vec<TokenStream> {
     let computed: Vec<usize> =
         needed.iter().copied().filter(|n| !matches!(graph.nodes()[*n], Node::Input(_))).collect();
-    let statement = |n: &usize| statement(model, graph, *n);
+    let statement = |n: &usize| statement(model, graph, *n, signs);
     if computed.len() <= 2 * SECTION {
         return computed.iter().filter_map(statement).collect();
     }
@@ -453,8 +240,8 @@ fn sections(model: &Model, graph: &Graph, outputs: &[Expr], needed: &[usize]) ->
     blocks
 }
 
-/// The `let` of a node; inputs are bound already.
-fn statement(model: &Model, graph: &Graph, node: usize) -> Option<TokenStream> {
+/// The `let` of a node; inputs are bound already. `signs` are those of [`signs::held`].
+fn statement(model: &Model, graph: &Graph, node: usize, signs: &[bool]) -> Option<TokenStream> {
     let name = format_ident!("x{node}");
     let operand = |e: Expr| value_name(graph, e.node());
     Some(match graph.nodes()[node] {
@@ -470,7 +257,13 @@ fn statement(model: &Model, graph: &Graph, node: usize) -> Option<TokenStream> {
         }
         Node::Add(a, b) => {
             let (x, y) = (operand(a), operand(b));
-            if b.is_negative() { quote!(let #name = #x - #y;) } else { quote!(let #name = #x + #y;) }
+            let [first, second] = [signs[a.node()], signs[b.node()] != b.is_negative()];
+            match (first != signs[node], second != signs[node]) {
+                (false, false) => quote!(let #name = #x + #y;),
+                (false, true) => quote!(let #name = #x - #y;),
+                (true, false) => quote!(let #name = #y - #x;),
+                (true, true) => quote!(let #name = -#x - #y;),
+            }
         }
         Node::Mul(a, b) => {
             let (x, y) = (operand(a), operand(b));
@@ -491,12 +284,12 @@ fn value_name(graph: &Graph, node: usize) -> Ident {
 }
 
 /// The type of the result and the expression that makes it. nalgebra stores columns.
-fn result(built: &FunctionGraph) -> (TokenStream, TokenStream) {
+fn result(built: &FunctionGraph, signs: &[bool]) -> (TokenStream, TokenStream) {
     let (rows, columns) = built.shape;
     let value = |i: usize, j: usize| {
         let e = built.outputs[i * columns + j];
         let name = value_name(&built.graph, e.node());
-        if e.is_negative() { quote!(-#name) } else { quote!(#name) }
+        if e.is_negative() != signs[e.node()] { quote!(-#name) } else { quote!(#name) }
     };
     let columns_of: Vec<TokenStream> = (0..columns)
         .map(|j| {

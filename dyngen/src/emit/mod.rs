@@ -2,10 +2,12 @@
 
 #[cfg(test)]
 mod accuracy;
+mod angles;
 mod batch;
 mod code;
 mod docs;
 mod friction;
+mod signs;
 mod tests;
 #[cfg(test)]
 mod trigonometry;
@@ -92,8 +94,9 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     let (n, p) =
         (Literal::usize_unsuffixed(model.arm().dof()), Literal::usize_unsuffixed(set.parameters.len()));
     let names = set.names();
-    let trig = code::trig_struct(model.arm());
-    let trigonometry = code::trigonometry(model.arm());
+    let trig = angles::trig_struct(model.arm());
+    let angle_functions = angles::angle_functions(model.arm(), &built);
+    let trigonometry = angles::trigonometry(model.arm());
     let values = options.values.as_ref().map(|values| {
         let values = values.iter().map(|x| Literal::f64_suffixed(*x));
         quote! {
@@ -122,6 +125,8 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
         #values
 
         #trig
+
+        #angle_functions
 
         #preparation
 

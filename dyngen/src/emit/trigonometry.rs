@@ -9,11 +9,22 @@
 use core::any::{Any, TypeId};
 use nalgebra::{SimdBool, SimdRealField, convert};
 
-/// Sines and cosines, in the order of the angles.
+/// Sines and cosines of the angles that `angles` makes of joint positions, in their order.
+///
+/// Positions and not angles are handed over, because a processor that reads in one piece what was just written in
+/// several waits until that is done.
 #[inline(always)]
-pub(super) fn sin_cos<T: SimdRealField + Copy, const N: usize>(angles: [T; N]) -> ([T; N], [T; N]) {
+pub(super) fn sin_cos<T: SimdRealField + Copy, Q, const N: usize>(
+    q: &Q,
+    angles: impl Fn(&Q) -> [T; N],
+) -> ([T; N], [T; N]) {
     // Lanes are inlined into what was compiled for their vectors.
-    if T::LANES == 1 { once(angles) } else { all(angles) }
+    if T::LANES == 1 {
+        let [sines, cosines] = once(q, angles);
+        (sines.0, cosines.0)
+    } else {
+        all(angles(q))
+    }
 }
 
 /// The sine and cosine of one angle, in `f64` of one up to [`LIMIT`], without a branch.
@@ -29,9 +40,14 @@ pub(super) fn near<T: SimdRealField + Copy>(angle: T) -> (T, T) {
     }
 }
 
+/// Sines or cosines. No vector of them crosses a line of the cache: what does cannot be read before it is written there.
+#[cfg_attr(target_arch = "x86_64", repr(align(16)))]
+struct Row<T, const N: usize>([T; N]);
+
 #[inline(never)]
-fn once<T: SimdRealField + Copy, const N: usize>(angles: [T; N]) -> ([T; N], [T; N]) {
-    all(angles)
+fn once<T: SimdRealField + Copy, Q, const N: usize>(q: &Q, angles: impl Fn(&Q) -> [T; N]) -> [Row<T, N>; 2] {
+    let (sines, cosines) = all(angles(q));
+    [Row(sines), Row(cosines)]
 }
 
 #[inline(always)]

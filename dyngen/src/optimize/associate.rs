@@ -4,75 +4,26 @@
 //! parameters alone are multiplied first: that is prepared once. Then the pair of terms, or of factors, that occurs in most places becomes
 //! a node of its own, as long as one occurs twice.
 
+use super::cheaper;
+use super::flat::{Flat, Kind, Leaf};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
-use crate::graph::{Builder, Expr, Graph, Node, operands};
+use crate::graph::{Builder, Expr, Graph};
 use std::collections::BTreeMap;
-
-/// What is regrouped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Sum,
-    Product,
-}
-
-/// A leaf of a sum or product: a node of the graph, or a pair that was taken out, with its sign.
-type Leaf = (usize, bool);
 
 /// The pass.
 pub(super) fn associate(graph: &Graph, outputs: &[Expr], _: &ConstantField) -> (Graph, Vec<Expr>) {
-    [Kind::Product, Kind::Sum].into_iter().fold(
-        (graph.clone(), outputs.to_vec()),
-        |(graph, outputs), kind| {
-            let regrouped = regroup(&graph, &outputs, kind);
-            // Where nothing is shared the order of evaluation stays as it was.
-            let cost = |graph: &Graph, outputs: &[Expr]| {
-                let operations = graph.operations_when_prepared(outputs);
-                operations.mul + operations.add
-            };
-            if cost(&regrouped.0, &regrouped.1) < cost(&graph, &outputs) {
-                regrouped
-            } else {
-                (graph, outputs)
-            }
-        },
-    )
+    [Kind::Product, Kind::Sum].into_iter().fold((graph.clone(), outputs.to_vec()), |form, kind| {
+        let regrouped = regroup(&form.0, &form.1, kind);
+        cheaper(form, regrouped)
+    })
 }
 
 fn regroup(graph: &Graph, outputs: &[Expr], kind: Kind) -> (Graph, Vec<Expr>) {
     let needed = graph.needed(outputs);
     let holds = graph.holds();
     let nodes = graph.nodes();
-    let of_kind = |node: usize| {
-        holds[node].state
-            && match nodes[node] {
-                Node::Add(..) => kind == Kind::Sum,
-                Node::Mul(..) => kind == Kind::Product,
-                _ => false,
-            }
-    };
-    // A node is part of a larger one where that is its only use.
-    let (mut uses, mut uses_of_kind) = (vec![0usize; nodes.len()], vec![0usize; nodes.len()]);
-    outputs.iter().for_each(|e| uses[e.node()] += 1);
-    for node in &needed {
-        for operand in operands(&nodes[*node]) {
-            uses[operand.node()] += 1;
-            uses_of_kind[operand.node()] += usize::from(of_kind(*node));
-        }
-    }
-    let is_part = |node: usize| of_kind(node) && uses[node] == 1 && uses_of_kind[node] == 1;
-    let mut leaves: BTreeMap<usize, Vec<Leaf>> = BTreeMap::new();
-    for node in needed.iter().copied().filter(|n| of_kind(*n)) {
-        let mut own: Vec<Leaf> = Vec::new();
-        for operand in operands(&nodes[node]) {
-            match leaves.get(&operand.node()).filter(|_| is_part(operand.node())) {
-                Some(parts) => own.extend(parts.iter().map(|(n, s)| (*n, *s != operand.is_negative()))),
-                None => own.push((operand.node(), operand.is_negative())),
-            }
-        }
-        leaves.insert(node, own);
-    }
-    leaves.retain(|node, _| !is_part(*node));
+    let Flat { mut leaves, is_part } = Flat::of(graph, outputs, kind);
     let b = Builder::new();
     let mut copied = vec![Expr::ZERO; nodes.len()];
     let mut fixed: BTreeMap<usize, Vec<Leaf>> = BTreeMap::new();
@@ -105,7 +56,7 @@ fn regroup(graph: &Graph, outputs: &[Expr], kind: Kind) -> (Graph, Vec<Expr>) {
     for node in needed {
         if leaves.contains_key(&node) {
             copied[node] = build.combine(&leaves[&node], &copied);
-        } else if !is_part(node) {
+        } else if !is_part[node] {
             copied[node] = b.copy_node(graph, node, &copied);
         }
     }

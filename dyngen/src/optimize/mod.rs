@@ -1,6 +1,8 @@
 //! Passes over a graph, in order, each with what holds after it.
 
 mod associate;
+mod factor;
+mod flat;
 mod merge;
 
 use crate::exact::constant::ConstantField;
@@ -15,10 +17,24 @@ pub const PASSES: &[(&str, Pass)] = &[
     ("merge", merge::merge),
     // AFTER THIS POINT: no two terms occur together in two sums, and no two factors in two products.
     ("associate", associate::associate),
+    // AFTER THIS POINT: no two terms of a sum that occur nowhere else share a factor.
+    ("factor", factor::factor),
 ];
 
 /// The passes that a form goes through before its cost is compared with that of others.
 pub const COMPARED: usize = 1;
+
+/// A graph with its outputs.
+type Form = (Graph, Vec<Expr>);
+
+/// The new form where it costs less: where nothing is saved the order of evaluation stays as it was.
+fn cheaper(before: Form, after: Form) -> Form {
+    let cost = |(graph, outputs): &Form| {
+        let operations = graph.operations_when_prepared(outputs);
+        operations.mul + operations.add
+    };
+    if cost(&after) < cost(&before) { after } else { before }
+}
 
 /// Runs passes one after another.
 pub fn optimize(

@@ -1,0 +1,265 @@
+//! What functions take of joint positions: sines and cosines, all angles of a function at once.
+
+use super::code::{lane_name, used};
+use crate::arm::{Arm, JointKind};
+use crate::dynamics::FunctionGraph;
+use crate::dynamics::chain;
+use crate::dynamics::function::{Argument, trig_offset};
+use crate::graph::{Input, JointSum};
+use crate::model::Model;
+use proc_macro2::{Ident, Literal, Span, TokenStream};
+use quote::{ToTokens, format_ident, quote};
+use std::collections::BTreeSet;
+
+/// The struct of sines and cosines that functions share.
+pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
+    let (bindings, fields) = trig_fields(arm, &all_inputs(arm));
+    let sums: Vec<String> = chain::sums(arm)
+        .iter()
+        .enumerate()
+        .map(|(k, sum)| {
+            let text: String = sum
+                .joints()
+                .enumerate()
+                .map(|(k, (i, negative))| {
+                    let sign = if k == 0 {
+                        ""
+                    } else if negative {
+                        " − "
+                    } else {
+                        " + "
+                    };
+                    format!("{sign}q{}", i + 1)
+                })
+                .collect();
+            format!(" Angle {}: {text}, across parallel axes.", arm.dof() + k + 1)
+        })
+        .collect();
+    let count = Literal::usize_unsuffixed(angles(arm).len());
+    let shifted: Vec<String> = (0..arm.dof())
+        .filter(|i| trig_offset(arm, *i) != 0.0)
+        .map(|i| format!(" Joint {}: of q + {} rad.", i + 1, trig_offset(arm, i)))
+        .collect();
+    quote! {
+        /// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
+        pub const ANGLES: usize = #count;
+
+        /// Joint positions with their sines and cosines: computed once and shared between calls, or taken from
+        /// wherever the caller has them.
+        #(#[doc = #shifted])*
+        #(#[doc = #sums])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct Trig<T> {
+            /// Sine of each angle; not read for prismatic joints.
+            pub sin: [T; ANGLES],
+            /// Cosine of each angle; not read for prismatic joints.
+            pub cos: [T; ANGLES],
+            /// Position of each prismatic joint, m; not read for revolute joints.
+            pub position: [T; JOINTS],
+        }
+
+        impl<T: SimdRealField + Copy> Trig<T> {
+            /// From joint positions, rad (m where prismatic).
+            #[must_use]
+            pub fn new(q: &SVector<T, JOINTS>) -> Self {
+                #bindings
+                #fields
+            }
+        }
+    }
+}
+
+/// Everything that is made of q.
+fn all_inputs(arm: &Arm) -> BTreeSet<Input> {
+    let turning = angles(arm).into_iter().flat_map(|sum| [Input::Sin(sum), Input::Cos(sum)]);
+    turning.chain((0..arm.dof()).map(Input::Position)).collect()
+}
+
+pub(super) fn uses_positions(used: &BTreeSet<Input>) -> bool {
+    used.iter().any(|i| matches!(i, Input::Sin(_) | Input::Cos(_) | Input::Position(_)))
+}
+
+/// `let trig = …` with what a function uses; the rest is zero, because nobody reads it.
+pub(super) fn trig_of(arm: &Arm, used: &BTreeSet<Input>) -> TokenStream {
+    let (bindings, fields) = trig_fields(arm, used);
+    if uses_positions(used) { quote!(#bindings let trig = #fields;) } else { quote!(let trig = #fields;) }
+}
+
+/// What a function takes of q: the positions that it reads, and the angles whose sine or cosine it needs.
+struct Positions {
+    /// Whether each joint's position is read as it is.
+    places: Vec<bool>,
+    /// Each angle, and the names of its sine and cosine where they are read.
+    angles: Vec<(JointSum, TokenStream, TokenStream)>,
+    /// A `Trig` of them; the rest is zero, because nobody reads it.
+    trig: TokenStream,
+}
+
+impl Positions {
+    /// `position` is how a joint's position is read.
+    fn new(arm: &Arm, used: &BTreeSet<Input>, position: impl Fn(usize) -> TokenStream) -> Positions {
+        let zero = quote!(T::zero());
+        let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
+        let places: Vec<bool> =
+            (0..arm.dof()).map(|i| !revolute(i) && used.contains(&Input::Position(i))).collect();
+        let (mut found, mut sines, mut cosines) = (Vec::new(), Vec::new(), Vec::new());
+        for sum in angles(arm) {
+            let turns = sum.joints().all(|(i, _)| revolute(i));
+            let name = |input: Input| {
+                (turns && used.contains(&input)).then(|| format_ident!("{}", input.to_string()))
+            };
+            let (sin, cos) = (name(Input::Sin(sum)), name(Input::Cos(sum)));
+            let or =
+                |name: &Option<Ident>, other: TokenStream| name.as_ref().map_or(other, |name| quote!(#name));
+            if sin.is_some() || cos.is_some() {
+                found.push((sum, or(&sin, quote!(_)), or(&cos, quote!(_))));
+            }
+            sines.push(or(&sin, zero.clone()));
+            cosines.push(or(&cos, zero.clone()));
+        }
+        let values =
+            places.iter().enumerate().map(|(i, read)| if *read { position(i) } else { zero.clone() });
+        let trig = quote!(Trig { sin: [#(#sines),*], cos: [#(#cosines),*], position: [#(#values),*] });
+        Positions { places, angles: found, trig }
+    }
+}
+
+/// An angle of the joints at their positions.
+fn angle(arm: &Arm, sum: JointSum, position: impl Fn(usize) -> TokenStream) -> TokenStream {
+    let terms = sum.joints().enumerate().map(|(k, (i, negative))| {
+        let q = position(i);
+        match (k, negative) {
+            (0, _) => q,
+            (_, false) => quote!(+ #q),
+            (_, true) => quote!(- #q),
+        }
+    });
+    let offset = sum.value(|i| trig_offset(arm, i));
+    let offset = (offset != 0.0).then(|| {
+        let offset = Literal::f64_suffixed(offset);
+        quote!(+ nalgebra::convert::<f64, T>(#offset))
+    });
+    quote!(#(#terms)* #offset)
+}
+
+/// Computes all sines and cosines together, and builds a `Trig` of the inputs that are used. A pattern over the storage
+/// needs no bounds check and cannot panic.
+fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
+    let position = |i: usize| lane_name(Argument::Positions, i).into_token_stream();
+    let Positions { places, angles, trig } = Positions::new(arm, used, position);
+    let taken = places.contains(&true).then(|| {
+        let patterns = places.iter().enumerate().map(|(i, read)| if *read { position(i) } else { quote!(_) });
+        quote!(let [[#(#patterns),*]] = q.data.0;)
+    });
+    let computed = (!angles.is_empty()).then(|| {
+        let (sines, cosines) = (angles.iter().map(|a| &a.1), angles.iter().map(|a| &a.2));
+        let of = angles_name(angles.iter().map(|a| a.0));
+        quote!(let ([#(#sines),*], [#(#cosines),*]) = trigonometry::sin_cos(q, #of);)
+    });
+    (quote!(#taken #computed), trig)
+}
+
+/// `angles_2_3_2m3`
+fn angles_name(sums: impl Iterator<Item = JointSum>) -> Ident {
+    Ident::new(&sums.fold("angles".to_string(), |name, sum| format!("{name}_{sum}")), Span::call_site())
+}
+
+/// The functions that make of q the angles whose sines and cosines are taken together, each once.
+pub(super) fn angle_functions(arm: &Arm, functions: &[FunctionGraph]) -> TokenStream {
+    let position = |i: usize| lane_name(Argument::Positions, i).into_token_stream();
+    let used = functions.iter().map(|built| used(built, &built.graph.needed(&built.outputs)));
+    let sets: BTreeSet<Vec<JointSum>> = used
+        .chain([all_inputs(arm)])
+        .map(|used| Positions::new(arm, &used, position).angles.into_iter().map(|a| a.0).collect())
+        .filter(|sums: &Vec<JointSum>| !sums.is_empty())
+        .collect();
+    let items = sets.iter().map(|sums| {
+        let (name, count) = (angles_name(sums.iter().copied()), Literal::usize_unsuffixed(sums.len()));
+        let reads = |i: usize| sums.iter().any(|sum| sum.sign(i).is_some());
+        let patterns = (0..arm.dof()).map(|i| if reads(i) { position(i) } else { quote!(_) });
+        let values = sums.iter().map(|sum| angle(arm, *sum, position));
+        quote! {
+            #[inline(always)]
+            fn #name<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; #count] {
+                let [[#(#patterns),*]] = q.data.0;
+                [#(#values),*]
+            }
+        }
+    });
+    quote!(#(#items)*)
+}
+
+/// What a function takes of q at one sample in a block.
+pub(super) struct TrigOfLane {
+    /// Lines without a branch that make its `trig`.
+    pub(super) lines: TokenStream,
+    /// Joints whose angles that is right for only where they are near.
+    pub(super) turning: BTreeSet<usize>,
+    /// Whether each joint's position is read.
+    pub(super) read: Vec<bool>,
+}
+
+impl TrigOfLane {
+    pub(super) fn new(model: &Model, built: &FunctionGraph) -> TrigOfLane {
+        let arm = model.arm();
+        let used = used(built, &built.graph.needed(&built.outputs));
+        let position = |i: usize| {
+            let q = lane_name(Argument::Positions, i);
+            quote!(#q[lane])
+        };
+        let Positions { places, angles, trig } = Positions::new(arm, &used, position);
+        let lines = angles.iter().map(|(sum, sine, cosine)| {
+            let angle = angle(arm, *sum, position);
+            quote!(let (#sine, #cosine) = trigonometry::near(#angle);)
+        });
+        let lines = quote! {
+            #(#lines)*
+            let trig = #trig;
+        };
+        let turning: BTreeSet<usize> =
+            angles.iter().flat_map(|(sum, ..)| sum.joints().map(|(i, _)| i)).collect();
+        let read = (0..arm.dof()).map(|i| places[i] || turning.contains(&i)).collect();
+        TrigOfLane { lines, turning, read }
+    }
+}
+
+/// The module that computes sines and cosines, for an arm that has any.
+pub(super) fn trigonometry(arm: &Arm) -> TokenStream {
+    if arm.joints.iter().all(|joint| joint.kind != JointKind::Revolute) {
+        return quote!();
+    }
+    // The module that this crate compiles too: it parses.
+    let file = syn::parse_file(include_str!("trigonometry.rs"));
+    let (docs, items) = file.map_or((Vec::new(), Vec::new()), |file| (file.attrs, file.items));
+    quote! {
+        mod trigonometry {
+            #(#docs)*
+            #(#items)*
+        }
+    }
+}
+
+/// The angles of a `Trig`: those of the joints, then sums of parallel joints' angles.
+fn angles(arm: &Arm) -> Vec<JointSum> {
+    (0..arm.dof()).map(JointSum::joint).chain(chain::sums(arm)).collect()
+}
+
+/// Names for what is read of a `Trig`.
+pub(super) fn positions(arm: &Arm, used: &BTreeSet<Input>) -> TokenStream {
+    let take = |field: &str, inputs: Vec<Input>| {
+        let field = Ident::new(field, Span::call_site());
+        let any = inputs.iter().any(|input| used.contains(input));
+        let names = inputs.into_iter().map(|input| {
+            let name = format_ident!("{}", input.to_string());
+            if used.contains(&input) { quote!(#name) } else { quote!(_) }
+        });
+        any.then(|| quote!(let [#(#names),*] = trig.#field;))
+    };
+    let lines = [
+        take("sin", angles(arm).into_iter().map(Input::Sin).collect()),
+        take("cos", angles(arm).into_iter().map(Input::Cos).collect()),
+        take("position", (0..arm.dof()).map(Input::Position).collect()),
+    ];
+    let lines = lines.iter().flatten();
+    quote!(#(#lines)*)
+}
