@@ -1,5 +1,6 @@
 //! Studies that take longer than tests may.
 
+mod held_out;
 mod study;
 
 use clap::{Parser, Subcommand};
@@ -16,11 +17,16 @@ struct Arguments {
 enum Command {
     /// How often `explain` gives the right name, where the truth is known
     Study(study::Arguments),
+    /// What the base model leaves of each log when it is fitted to the others
+    HeldOut(held_out::Arguments),
 }
 
 fn main() -> ExitCode {
-    let Arguments { command: Command::Study(arguments) } = Arguments::parse();
-    match study::run(&arguments) {
+    let done = match Arguments::parse().command {
+        Command::Study(arguments) => study::run(&arguments),
+        Command::HeldOut(arguments) => held_out::run(&arguments),
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(message) => {
             eprintln!("error: {message}");

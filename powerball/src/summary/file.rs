@@ -59,7 +59,7 @@ struct Head {
 
 impl Identity {
     /// Whether two are of the same thing, and what differs.
-    pub(super) fn same_as(&self, other: &Identity) -> Result<(), SummaryError> {
+    pub(crate) fn same_as(&self, other: &Identity) -> Result<(), SummaryError> {
         let differs = |what: String| Err(SummaryError::Differs(what));
         if self.arm != other.arm {
             return differs(format!("it is of the arm '{}', not of '{}'", other.arm, self.arm));

@@ -1,9 +1,13 @@
 //! Reduced logs say what the logs say.
 
 use super::plant::{record, sensors, truth};
-use crate::estimate::{Folds, FrictionLaw, fit, solve_reduced};
+use crate::estimate::{
+    Folds, FrictionLaw, JointFriction, ParameterEstimate, fit, solve_reduced, spread, spread_of,
+};
 use crate::regression::{Data, DataOptions};
 use crate::summary::{Summary, SummaryError};
+use crate::torque_model::{Additions, TorqueModel};
+use dyngen::SetKind;
 
 /// The fit of summaries is that of the rows themselves, which knows no interpolation of steepnesses.
 #[test]
@@ -53,6 +57,38 @@ fn summaries_join_to_the_answer_of_their_logs() {
     let long = one(2);
     let expected = (logs[2].t.len() as f64 - 120.0) / 8.0;
     assert!((long.samples as f64 - expected).abs() < 4.0, "{} {expected}", long.samples);
+}
+
+/// What a solution leaves of another log is the same from that log's rows and from its summary.
+#[test]
+fn a_log_that_took_no_part_judges_the_fit() {
+    let (body, _) = truth();
+    let options = DataOptions::default();
+    let logs = record(&sensors(), 2, 3, 34);
+    let one = |k: usize| {
+        let mut summary = Summary::new(&body, &options);
+        summary.push(&body, &logs[k], &options).unwrap();
+        summary
+    };
+    let solution = solve_reduced(&one(0), FrictionLaw::Symmetric);
+    let there = solution.on(&one(1)).unwrap();
+    let reduced = spread_of(&there, &there.theta);
+    let data = Data::new(&body, &logs[1..], &options).unwrap();
+    let names = body.names().iter().zip(solution.inertial());
+    let model = TorqueModel {
+        arm: body.arm().name.clone(),
+        set: SetKind::Minimal.to_string(),
+        parameters: names.map(|(name, value)| ParameterEstimate::plain(name, *value)).collect(),
+        friction: (0..6).map(|j| JointFriction::plain(j, solution.friction(j))).collect(),
+        additions: Additions::default(),
+    };
+    let direct = spread(&data, &model.residual(&body, &data, &[]));
+    for j in 0..6 {
+        approx::assert_relative_eq!(reduced.rms[j], direct.rms[j], max_relative = 1e-3);
+        approx::assert_relative_eq!(reduced.relative[j], direct.relative[j], max_relative = 1e-3);
+    }
+    let other = Summary::new(&body, &DataOptions { cutoff: 5.0, ..options });
+    assert!(solution.on(&other).is_err());
 }
 
 #[test]
