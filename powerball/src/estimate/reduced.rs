@@ -82,7 +82,7 @@ impl Solution {
         let law = if self.layout.extra > 0 { FrictionLaw::Asymmetric } else { FrictionLaw::Symmetric };
         Ok(Solution {
             layout: self.layout,
-            identity: self.identity.clone(),
+            identity: summary.identity.clone(),
             shapes: self.shapes.clone(),
             theta: self.theta.clone(),
             weights: self.weights.clone(),
