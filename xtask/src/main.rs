@@ -1,6 +1,7 @@
 //! Studies that take longer than tests may.
 
 mod held_out;
+mod stories;
 mod study;
 
 use clap::{Parser, Subcommand};
@@ -19,12 +20,15 @@ enum Command {
     Study(study::Arguments),
     /// What the base model leaves of each log when it is fitted to the others
     HeldOut(held_out::Arguments),
+    /// What `explain` finds in the measured logs, case by case, as a page with figures
+    Stories(stories::Arguments),
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Study(arguments) => study::run(&arguments),
         Command::HeldOut(arguments) => held_out::run(&arguments),
+        Command::Stories(arguments) => stories::run(&arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -7,7 +7,7 @@ use super::output::{self, Progress};
 use crate::bus::{Bus, BusUrl};
 use crate::driver::lwa4p::LWA4P;
 use crate::experiment::{self, TRAJECTORY};
-use crate::explain::{ExplainError, Explained, Options, add_to_page, explain_with};
+use crate::explain::{Change, ExplainError, Explained, Options, add_to_page, explain_with};
 use crate::log::read_logs;
 use crate::motion::Motion;
 use crate::procedure::{RecordError, record};
@@ -192,7 +192,12 @@ fn summary(explained: &Explained) -> String {
         ("before", &explained.before.validate),
         ("after", &explained.after.validate),
     ]));
-    text.push('\n');
+    let whole = |share: f64| format!("{:+.0}", 100.0 * share);
+    let change = |c: &Change| {
+        format!("joint {} {} % ({} to {})", c.joint, whole(c.rms), whole(c.interval[0]), whole(c.interval[1]))
+    };
+    let changes: Vec<String> = explained.held_out_change.iter().map(change).collect();
+    text.push_str(&format!("\nchange with its 95 % interval: {}\n", changes.join(", ")));
     if explained.effects.is_empty() {
         text.push_str(
             "\nNo effect was accepted: these logs do not show that the model lacks anything with a name.\n",

@@ -18,6 +18,11 @@ impl Effect for Backlash {
         Class::Friction
     }
 
+    /// When the motor arrives at the other side of the gap depends on the load on the way.
+    fn abrupt(&self) -> bool {
+        true
+    }
+
     fn shown_by(&self, _: &Candidate) -> Axis {
         Axis::Torque
     }

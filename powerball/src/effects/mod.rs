@@ -88,6 +88,11 @@ pub trait Effect: Sync {
     /// What it is easily confused with.
     fn class(&self) -> Class;
 
+    /// Whether the instants at which it sets in are known only roughly, so that nothing can be said of its fast part.
+    fn abrupt(&self) -> bool {
+        self.class() == Class::Event
+    }
+
     /// The signal over which a joint's residual shows it.
     fn shown_by(&self, candidate: &Candidate) -> Axis;
 

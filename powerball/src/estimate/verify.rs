@@ -1,9 +1,9 @@
 //! A model that is there already, judged on logs that it has not seen.
 
-use super::distribution::t_quantile_975;
 use super::noise::noise_floor;
+use super::over_blocks;
 use super::spread;
-use crate::regression::Data;
+use crate::regression::{Block, Data};
 use serde::Serialize;
 
 /// How a joint's prediction does.
@@ -31,7 +31,7 @@ pub fn verify(data: &Data<'_>, residual: &[Vec<f64>], tolerance: f64) -> Vec<Joi
     (0..data.dof())
         .map(|j| {
             let rms = errors.rms[j];
-            let interval = interval(data, j, &residual[j], rms);
+            let interval = interval(data, j, &residual[j]);
             let torque = if errors.relative[j] > 0.0 { rms / errors.relative[j] } else { 0.0 };
             let moves = !data.joints[j].is_empty();
             JointVerdict {
@@ -46,24 +46,15 @@ pub fn verify(data: &Data<'_>, residual: &[Vec<f64>], tolerance: f64) -> Vec<Joi
         .collect()
 }
 
-/// The interval of the mean square as a ratio of sums over blocks, Student's t with as many degrees of freedom.
-fn interval(data: &Data<'_>, joint: usize, residual: &[f64], rms: f64) -> [f64; 2] {
-    let (mut count, mut squares) = (0.0, 0.0);
-    let mean = rms * rms;
-    let total = residual.len() as f64;
-    for block in &data.blocks {
+/// The interval of the mean square over blocks.
+fn interval(data: &Data<'_>, joint: usize, residual: &[f64]) -> [f64; 2] {
+    let of = |block: &Block| {
         let rows = block.rows[joint].clone();
-        if rows.is_empty() {
-            continue;
-        }
-        count += 1.0;
-        let excess: f64 = residual[rows].iter().map(|r| r * r - mean).sum();
-        squares += excess * excess;
-    }
-    if count < 2.0 || total == 0.0 {
+        (residual[rows.clone()].iter().map(|r| r * r).sum(), rows.len() as f64)
+    };
+    let (mean, half) = over_blocks(&data.blocks.iter().map(of).collect::<Vec<_>>());
+    if half.is_infinite() {
         return [0.0, f64::MAX];
     }
-    let error = (squares * count / (count - 1.0)).sqrt() / total;
-    let half = t_quantile_975(count - 1.0) * error;
     [(mean - half).max(0.0).sqrt(), (mean + half).sqrt()]
 }

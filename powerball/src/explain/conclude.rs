@@ -6,10 +6,12 @@ use super::curves::curves;
 use super::forward::{ExplainError, RuledOut, Session, Step};
 use super::leftover::{depends_on, effective_samples, leftover};
 use super::naming::Comparison;
-use super::result::{Errors, Explained, NamedEffect, Rival, Unattributed};
+use super::result::{Change, Errors, Explained, NamedEffect, Rival, Unattributed};
 use crate::effects::{Context, Found};
-use crate::estimate::{noise_floor, spread};
+use crate::estimate::{noise_floor, over_blocks, spread};
 use crate::parallel;
+use crate::regression::Data;
+use std::ops::Range;
 use std::sync::Arc;
 
 impl Session<'_> {
@@ -92,6 +94,7 @@ impl Session<'_> {
             self.false_positives.accepted as f64 / (self.false_positives.placebos.max(1)) as f64;
         Ok(Explained {
             arm: self.data.body.arm().name.clone(),
+            held_out_change: changes(&self.other, base_residual, &residual),
             before,
             after,
             noise_floor: floor,
@@ -159,4 +162,16 @@ impl Session<'_> {
             correction,
         })
     }
+}
+
+/// How the errors change, by joint that moves.
+fn changes(data: &Data<'_>, before: &[Vec<f64>], after: &[Vec<f64>]) -> Vec<Change> {
+    let of = |j: usize| {
+        let square = |residual: &[f64]| residual.iter().map(|r| r * r).sum::<f64>();
+        let block = |rows: &Range<usize>| (square(&after[j][rows.clone()]), square(&before[j][rows.clone()]));
+        let (ratio, half) = over_blocks(&data.blocks.iter().map(|b| block(&b.rows[j])).collect::<Vec<_>>());
+        let change = |square: f64| square.max(0.0).sqrt() - 1.0;
+        Change { joint: j + 1, rms: change(ratio), interval: [change(ratio - half), change(ratio + half)] }
+    };
+    (0..data.dof()).filter(|j| !data.joints[*j].is_empty()).map(of).collect()
 }

@@ -200,7 +200,7 @@ pub fn explain_with(
             }
             // Only now is it known what is left beside all that fits.
             None => match session.withhold() {
-                Some(name) => progress(&format!("{name} is not named: others fit as well and much is left")),
+                Some((name, why)) => progress(&format!("{name} is not named: {why}")),
                 None => break,
             },
         }
@@ -355,21 +355,34 @@ impl Session<'_> {
         Some(Stepped::Accepted(self.effects[chosen].name()))
     }
 
-    /// Takes back the last effect that is not told apart from its rivals and beside which much is left now that everything
-    /// that fits is in the model: then something else is there. It stays as a rival of what comes. Returns its name.
-    fn withhold(&mut self) -> Option<&'static str> {
-        let weak = self.steps.iter().rposition(|s| {
-            s.comparison.apart < rule::LEAST_MARGIN
-                && self.accepted.iter().any(|a| a.step == s.number)
-                && self.share_left(&s.square_before, &s.comparison.joints) > rule::MUCH_LEFT
-        })?;
-        let step = self.steps.remove(weak);
-        self.questions.extend(step.question.map(Question::withheld));
-        for a in self.accepted.extract_if(.., |a| a.step == step.number) {
-            self.given_up.push((a.effect, a.candidate));
-        }
+    /// Takes back what, now that everything that fits is in the model, is not what it is called: an effect that is not of one size
+    /// at every pace; or one that is not told apart from its rivals and beside which much is left, so that something else is
+    /// there. It stays as a rival of what comes. Returns its name and why.
+    fn withhold(&mut self) -> Option<(&'static str, &'static str)> {
+        let (taken, why) = if let Some(a) = self.inconstant() {
+            (vec![self.accepted.remove(a)], "it is not of one size in fast and in slow motion")
+        } else {
+            let weak = self.steps.iter().rev().find(|s| {
+                s.comparison.apart < rule::LEAST_MARGIN
+                    && self.accepted.iter().any(|a| a.step == s.number)
+                    && self.share_left(&s.square_before, &s.comparison.joints) > rule::MUCH_LEFT
+            })?;
+            let step = weak.number;
+            (
+                self.accepted.extract_if(.., |a| a.step == step).collect(),
+                "others fit as well and much is left",
+            )
+        };
+        let Accepted { effect, step, .. } = *taken.first()?;
+        // What was found beside it on its joints may be there because of it, and is asked again.
+        let joints: Vec<usize> = taken.iter().flat_map(|a| a.candidate.joints.clone()).collect();
+        self.accepted.retain(|a| a.step <= step || !a.candidate.joints.iter().any(|j| joints.contains(j)));
+        self.given_up.extend(taken.into_iter().map(|a| (a.effect, a.candidate)));
+        let accepted = &self.accepted;
+        let gone = self.steps.extract_if(.., |s| !accepted.iter().any(|a| a.step == s.number));
+        self.questions.extend(gone.filter_map(|s| s.question).map(Question::withheld));
         self.refit();
-        Some(self.effects[step.effect].name())
+        Some((self.effects[effect].name(), why))
     }
 
     /// The share of the excess over the noise floor that stayed on some joints, given the squared errors before.

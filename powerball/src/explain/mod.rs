@@ -9,6 +9,7 @@
 
 mod compose;
 mod conclude;
+mod constancy;
 mod correction;
 mod curves;
 mod doubts;
@@ -33,8 +34,8 @@ pub use correction::{Correction, Curve};
 pub use curves::{TorqueCurve, curves};
 pub use forward::{ExplainError, Options, RuledOut, Session, explain, explain_with};
 pub use open::{Hypothesis, Open};
-pub use page::add_to_page;
-pub use result::{Explained, NamedEffect, Rival, Unattributed};
+pub use page::{add_to_page, error_bars, sight};
+pub use result::{Change, Explained, NamedEffect, Rival, Unattributed};
 pub use shown::Shown;
 
 #[cfg(test)]

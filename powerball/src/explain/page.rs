@@ -17,35 +17,49 @@ pub fn add_to_page(page: &mut Page, explained: &Explained) {
 
 fn errors(page: &mut Page, explained: &Explained) {
     page.heading("Errors on the held-out path");
-    let [low, high] = explained.band;
     let (before, after) = (&explained.before.validate, &explained.after.validate);
-    let title = format!("Torque error on logs that were not fitted, {low} to {high} Hz");
-    let mut bars = BarPairs::new(title, "rms [N·m]", ["base model", "with the effects below"]);
     let mut table = Table::new([
         "joint",
         "base model [N·m]",
         "of the torque",
         "with effects [N·m]",
         "of the torque",
-        "change",
+        "change, 95 % interval",
         "noise floor [N·m]",
     ]);
     for joint in 0..before.rms.len() {
         let (b, a) = (before.rms[joint], after.rms[joint]);
         let floor = explained.noise_floor.get(joint).copied().unwrap_or(f64::NAN);
-        bars = bars.pair_with_floor(format!("joint {}", joint + 1), b, a, floor);
+        let changed = explained.held_out_change.iter().find(|c| c.joint == joint + 1);
         table.push([
             (joint + 1).to_string(),
             number(b),
             percent(before.relative[joint]),
             number(a),
             percent(after.relative[joint]),
-            if b > 0.0 { change(a / b - 1.0) } else { String::new() },
+            changed.map_or_else(String::new, |c| {
+                format!("{} ({} to {})", change(c.rms), change(c.interval[0]), change(c.interval[1]))
+            }),
             number(floor),
         ]);
     }
-    page.bars(&bars, "The dashed lines are what white measurement noise alone would leave in the band.");
+    page.bars(
+        &error_bars(explained),
+        "The dashed lines are what white measurement noise alone would leave in the band.",
+    );
     page.table(&table);
+}
+
+/// Held-out errors by joint, before and after.
+#[must_use]
+pub fn error_bars(explained: &Explained) -> BarPairs {
+    let [low, high] = explained.band;
+    let title = format!("Torque error on logs that were not fitted, {low} to {high} Hz");
+    let errors = explained.before.validate.rms.iter().zip(&explained.after.validate.rms);
+    let bars = BarPairs::new(title, "rms [N·m]", ["base model", "with what was named"]);
+    errors.zip(&explained.noise_floor).enumerate().fold(bars, |bars, (joint, ((before, after), floor))| {
+        bars.pair_with_floor(format!("joint {}", joint + 1), *before, *after, *floor)
+    })
 }
 
 fn effects(page: &mut Page, explained: &Explained) {
@@ -102,7 +116,8 @@ fn effects(page: &mut Page, explained: &Explained) {
 }
 
 /// The residual over the signal that shows an effect.
-fn sight(shown: &Shown) -> Figure {
+#[must_use]
+pub fn sight(shown: &Shown) -> Figure {
     let rows = |k: usize| shown.rows.iter().map(|row| (row[0], row[k])).collect();
     let means = |k: usize| shown.means.iter().map(|mean| (mean[0], mean[k])).collect();
     let what = if shown.against_motion { "residual against motion [N·m]" } else { "residual [N·m]" };

@@ -19,6 +19,8 @@ pub struct Explained {
     pub before: Errors,
     /// Errors with all accepted effects.
     pub after: Errors,
+    /// How the error of each joint that moves changes on the other path.
+    pub held_out_change: Vec<Change>,
     /// What white measurement noise alone would leave in the band, by joint, N·m.
     pub noise_floor: Vec<f64>,
     /// Accepted effects in the order in which they were added.
@@ -59,6 +61,17 @@ pub struct Errors {
     pub fit: Spread,
     /// On the other path.
     pub validate: Spread,
+}
+
+/// The change of a joint's error.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// rms after over rms before, less 1.
+    pub rms: f64,
+    /// Its 95 % interval, from blocks that count as independent.
+    pub interval: [f64; 2],
 }
 
 /// An effect with its evidence.

@@ -37,6 +37,11 @@ pub(super) const SAME_PART: f64 = 0.9;
 /// the excess over the noise floor: then something else is there, and what fits best only resembles it. The share is that of an
 /// earlier trial on other data.
 pub(super) const MUCH_LEFT: f64 = 0.35;
+/// An effect whose size in some octave differs from that over all by more than this share, and by more than [`CHANGE_ERRORS`], is not
+/// the effect that it is called.
+pub(super) const MOST_CHANGE: f64 = 0.5;
+/// See [`MOST_CHANGE`]: standard errors that chance exceeds once in 800, [`FAMILY_WISE`] over eight octaves.
+pub(super) const CHANGE_ERRORS: f64 = 3.2;
 /// Effects added at most.
 pub(super) const MOST_STEPS: usize = 12;
 

@@ -2,7 +2,7 @@
 
 use super::axis::{Axis, number};
 use super::escape;
-use super::figure::{WIDTH, draw_grid, svg, text_width, title};
+use super::figure::{WIDTH, draw_grid, file, svg, text_width, title};
 use std::fmt::Write as _;
 
 const LEFT: f64 = 62.0;
@@ -49,6 +49,12 @@ impl BarPairs {
     pub fn pair_with_floor(mut self, label: impl Into<String>, before: f64, after: f64, floor: f64) -> Self {
         self.pairs.push(Pair { label: label.into(), values: [before, after], floor: Some(floor) });
         self
+    }
+
+    /// The figure as a file of its own.
+    #[must_use]
+    pub fn to_file(&self) -> String {
+        file(&self.to_svg())
     }
 
     /// The figure as an SVG element.

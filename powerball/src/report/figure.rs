@@ -142,6 +142,12 @@ impl Figure {
         self
     }
 
+    /// The figure as a file of its own, for a page that is no [`Page`](super::Page); light and dark as the reader's screen is.
+    #[must_use]
+    pub fn to_file(&self) -> String {
+        file(&self.to_svg())
+    }
+
     /// The figure as an SVG element whose colours come from the page's style.
     pub(super) fn to_svg(&self) -> String {
         let xs = self.panels.iter().flat_map(|p| &p.series).flat_map(|s| s.points.iter().map(|p| p.0));
@@ -170,7 +176,7 @@ impl Figure {
     fn legend(&self) -> (String, f64) {
         let mut entries: Vec<(&str, Ink, Mark)> = Vec::new();
         for s in self.panels.iter().flat_map(|p| &p.series) {
-            if !s.name.is_empty() && !entries.iter().any(|e| e.0 == s.name) {
+            if !s.name.is_empty() && !s.points.is_empty() && !entries.iter().any(|e| e.0 == s.name) {
                 entries.push((&s.name, s.ink, s.mark));
             }
         }
@@ -195,6 +201,14 @@ impl Figure {
         }
         (out, if entries.is_empty() { 30.0 } else { y + 12.0 })
     }
+}
+
+/// A figure's element with its style and paper.
+pub(super) fn file(svg: &str) -> String {
+    let style = super::STYLE;
+    let element = svg.replacen("<svg ", "<svg xmlns=\"http://www.w3.org/2000/svg\" ", 1);
+    let paper = "<rect width=\"100%\" height=\"100%\" style=\"fill:var(--paper)\"/>";
+    element.replacen('>', &format!("><style>{style}</style>{paper}"), 1)
 }
 
 /// A figure's frame element.
@@ -307,5 +321,10 @@ mod tests {
         let svg = figure.to_svg();
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
         assert_eq!(svg.matches("class=\"s c1\" d=\"M").count(), 1);
+        assert!(!svg.contains(">c</text>"), "nothing is drawn of c");
+        let file = figure.to_file();
+        assert!(
+            file.starts_with("<svg xmlns=") && file.contains("--c1:") && file.trim_end().ends_with("</svg>")
+        );
     }
 }

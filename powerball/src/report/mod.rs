@@ -32,6 +32,9 @@ pub use figure::{Figure, Ink, Mark, Panel, Series};
 pub use page::{Page, Tone};
 pub use table::Table;
 
+/// The style of pages and figures.
+const STYLE: &str = include_str!("page.css");
+
 /// Text as it may stand in HTML, in an element or in a quoted attribute.
 pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());

@@ -110,7 +110,7 @@ impl Page {
              <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
              <meta name=\"color-scheme\" content=\"light dark\"><title>{title}</title>\n\
              <style>\n{}</style></head>\n<body><main>\n<h1>{title}</h1>\n{}</main></body></html>\n",
-            include_str!("page.css"),
+            super::STYLE,
             self.body
         )
     }

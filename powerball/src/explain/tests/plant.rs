@@ -36,6 +36,8 @@ pub(super) enum Truth {
     Coupling,
     Backlash,
     Elasticity,
+    /// A tool that swings: no effect of the library.
+    Swing,
 }
 
 impl Truth {
@@ -86,6 +88,7 @@ impl Truth {
             Truth::Coupling => "joint_coupling",
             Truth::Backlash => "backlash",
             Truth::Elasticity => "joint_elasticity",
+            Truth::Swing => "a tool that swings",
         }
     }
 }
@@ -220,6 +223,7 @@ pub(super) fn record(
         let (mut t, mut q_log) = (Vec::new(), vec![Vec::new(); n]);
         let mut tau_log = vec![Vec::new(); n];
         let mut z = 0.0;
+        let mut swing = [0.0f64; 2];
         let mut colour = vec![0.0; n];
         let mut previous = motion.at(0.0)[0][at];
         let mut play = 0.0f64;
@@ -316,6 +320,12 @@ pub(super) fn record(
                 Truth::MotorRipple => 0.4 * scale * (200.0 * x + 0.5).cos(),
                 Truth::Coupling => 0.8 * scale * (v[other] + 0.1 * (20.0 * v[other]).tanh()),
                 Truth::TorqueConstant => -0.06 * size * tau[at],
+                Truth::Swing => {
+                    let w = 2.0 * PI * 5.0;
+                    swing[1] -= (w * w * swing[0] + 0.06 * w * swing[1] + a[at]) / RATE;
+                    swing[0] += swing[1] / RATE;
+                    15.0 * scale * w * w * swing[0]
+                }
                 Truth::Backlash => {
                     // Lost motion: the load is not carried while the play is crossed.
                     play = f64::clamp(play + (x - previous), -0.01, 0.01);

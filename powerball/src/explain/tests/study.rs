@@ -53,6 +53,16 @@ fn nothing_is_found_where_nothing_is_missing() {
     }
 }
 
+/// In slow motion a tool that swings looks like a delay or like hysteresis, and fits far better than any rival.
+#[test]
+fn a_tool_that_swings_is_given_no_name() {
+    let body = RigidBody::new(&arm()).unwrap();
+    for seed in 0..3 {
+        let explained = run(&body, Truth::Swing, 1.0, Noise::White, seed);
+        assert_eq!(names(&explained), Vec::<String>::new(), "{seed}");
+    }
+}
+
 /// A repeat, even one that drifts, is known from another path; and there a spring is not named, whatever it would gain.
 #[test]
 fn nothing_of_the_position_is_named_on_a_repeated_path() {
