@@ -16,6 +16,9 @@ use rand_distr::{Distribution, StandardNormal};
 /// Poses that are tried for the middle of a random path.
 const PLACES: usize = 50;
 
+/// Samples a second at which found paths are compared.
+const JUDGED: f64 = 50.0;
+
 /// What path to look for, and how long.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
@@ -144,20 +147,27 @@ pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> R
             (figures.objective(settings.criterion), figures)
         })
     });
-    let mut best: Option<Excitation> = None;
-    let mut refused = None;
+    // Of what the searches found for Eq. 17 the best is taken by a condition number that no scale of rows or columns changes.
+    let value = |paths: &[Fourier], figures: &Figures| match settings.criterion {
+        Criterion::Condition { .. } if settings.searches > 1 => {
+            let motions: Vec<_> = paths.iter().map(|path| path.sample(JUDGED)).collect();
+            objective.conditions(&motions).normalised
+        }
+        criterion => figures.objective(criterion),
+    };
+    let (mut best, mut refused): (Option<(f64, Excitation)>, _) = (None, None);
     for found in found {
         match found {
             Ok((paths, figures, usual)) => {
-                let value = |figures: &Figures| figures.objective(settings.criterion);
-                if best.as_ref().is_none_or(|best| value(&figures) < value(&best.figures)) {
-                    best = Some(Excitation { paths, figures, usual });
+                let value = value(&paths, &figures);
+                if best.as_ref().is_none_or(|(least, _)| value < *least) {
+                    best = Some((value, Excitation { paths, figures, usual }));
                 }
             }
             Err(error) => refused = Some(error),
         }
     }
-    best.ok_or_else(|| refused.unwrap_or(Error::NoPose))
+    best.map(|(_, found)| found).ok_or_else(|| refused.unwrap_or(Error::NoPose))
 }
 
 /// The path within the limits whose value, the first thing that `judge` says, is smallest; what else it said of that path,
