@@ -107,6 +107,35 @@ fn a_trajectory_is_recorded() {
     );
 }
 
+/// With an arm file, the floor and the links bar trajectories, and ways to where they begin; nothing moves then.
+#[test]
+fn what_would_touch_is_not_recorded() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let arm = concat!(env!("CARGO_MANIFEST_DIR"), "/lwa4p.toml");
+    let (path, out) = (folder.join("touching_path.csv"), folder.join("touching_log.csv"));
+    let _ = std::fs::remove_file(&out);
+    let (path, out) = (path.to_str().unwrap(), out.to_str().unwrap());
+    // Joint 2 swings from one angle to another.
+    let swing = |from: f64, to: f64| {
+        let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
+        for k in 0..=800 {
+            let t = 0.005 * f64::from(k);
+            let q = from + 0.5 * (to - from) * (1.0 - (std::f64::consts::PI * t / 4.0).cos());
+            text += &format!("{t:.6},0,{q},0,0,0,0\n");
+        }
+        std::fs::write(path, text).unwrap();
+        let arguments = ["record", "--trajectory", path, "--out", out, "--arm", arm, "--json"];
+        let at = |floor: &'static str| powerball(&[&arguments[..], &["--floor", floor]].concat());
+        (at("0.1"), at("none"))
+    };
+    for (from, to, where_to) in [(0.0, 1.8, "on the trajectory"), (1.8, 1.7, "on the trajectory")] {
+        let (barred, free) = swing(from, to);
+        assert_eq!(barred.status.code(), Some(1), "{}", complaint(&barred));
+        assert!(complaint(&barred).contains(where_to) && complaint(&barred).contains("the floor"));
+        assert_eq!(json(&free)["record"]["samples"], 801, "{}", complaint(&free));
+    }
+}
+
 #[test]
 fn two_processes_meet_on_a_multicast_group() {
     // A port of this run's own.

@@ -1,5 +1,6 @@
 //! Studies that take longer than tests may.
 
+mod held_out;
 mod stories;
 mod study;
 
@@ -17,6 +18,8 @@ struct Arguments {
 enum Command {
     /// How often `explain` gives the right name, where the truth is known
     Study(study::Arguments),
+    /// What the base model leaves of each log when it is fitted to the others
+    HeldOut(held_out::Arguments),
     /// What `explain` finds in the measured logs, case by case, as a page with figures
     Stories(stories::Arguments),
 }
@@ -24,6 +27,7 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Study(arguments) => study::run(&arguments),
+        Command::HeldOut(arguments) => held_out::run(&arguments),
         Command::Stories(arguments) => stories::run(&arguments),
     };
     match done {

@@ -17,6 +17,9 @@ use std::path::{Path, PathBuf};
 /// An hour and more at 1 kHz.
 const MOST_SAMPLES: f64 = 5e6;
 
+/// Evaluations of one search, after which it hardly gains: more of them make more searches, each from starts of its own.
+const SEARCH: usize = 12_000;
+
 /// A floor at its base that blocks more than this share of an arm's poses is not what it was built on.
 const HANGS: f64 = 0.95;
 
@@ -55,9 +58,34 @@ enum Goal {
 
 /// A floor's height, or none.
 #[derive(Clone, Copy, Debug)]
-struct FloorAt(Option<f64>);
+pub(super) struct FloorAt(Option<f64>);
 
-fn floor(text: &str) -> Result<FloorAt, String> {
+/// Radius of the links' capsules, m, and the distance that they keep, where nothing is said.
+pub(super) const RADIUS: f64 = 0.06;
+pub(super) const CLEARANCE: f64 = 0.02;
+
+/// The links and the floor of an arm in a mounting, and the floor's height: at the base where nothing is said of it, the base stands upright
+/// and the arm can be above it, as an arm that is below its base wherever it is hangs over something.
+pub(super) fn surroundings(
+    arm: &Arm,
+    mounting: &Mounting,
+    shape: &Shape,
+    floor: Option<FloorAt>,
+    clearance: f64,
+    limits: &Limits,
+) -> (Space, Option<f64>) {
+    let up = mounting.up(arm);
+    let free =
+        |height: &f64| shape.blocked(&shape.floor(up, *height, &limits.0), clearance, &limits.0) < HANGS;
+    let height = match floor {
+        Some(FloorAt(height)) => height,
+        None => (up.z > 0.5).then_some(0.0).filter(free),
+    };
+    let floor = height.map(|height| shape.floor(up, height, &limits.0));
+    (Space { shape: shape.clone(), floor, clearance }, height)
+}
+
+pub(super) fn floor(text: &str) -> Result<FloorAt, String> {
     match text.parse::<f64>() {
         _ if text == "none" => Ok(FloorAt(None)),
         Ok(height) if height.is_finite() => Ok(FloorAt(Some(height))),
@@ -119,10 +147,10 @@ pub(crate) struct Excite {
     #[arg(long, value_name = "Z", value_parser = floor, allow_hyphen_values = true)]
     floor: Option<FloorAt>,
     /// Radius of the links' capsules, m.
-    #[arg(long, default_value_t = 0.06, allow_hyphen_values = true)]
+    #[arg(long, default_value_t = RADIUS, allow_hyphen_values = true)]
     radius: f64,
     /// Distance that capsules keep from each other and from the floor, m.
-    #[arg(long, default_value_t = 0.02, allow_hyphen_values = true)]
+    #[arg(long, default_value_t = CLEARANCE, allow_hyphen_values = true)]
     clearance: f64,
     /// Looks neither at the floor nor at links that touch.
     #[arg(long)]
@@ -138,7 +166,7 @@ pub(crate) struct Excite {
     #[arg(long, value_name = "Q1,…", value_delimiter = ',', allow_hyphen_values = true)]
     from: Option<Vec<f64>>,
     /// How many paths are tried.
-    #[arg(long, default_value_t = 12000)]
+    #[arg(long, default_value_t = 6 * SEARCH)]
     evaluations: usize,
     /// Samples a second.
     #[arg(long, default_value_t = 200.0)]
@@ -217,6 +245,7 @@ impl Excite {
                 Goal::Volume => Criterion::Volume,
             },
             evaluations: self.evaluations,
+            searches: (self.evaluations / SEARCH).max(1),
             seed: self.seed,
         };
         progress.say("searching");
@@ -313,14 +342,7 @@ impl Excite {
         let mut tasks = Vec::new();
         for (model, mounting) in models.iter().zip(mountings) {
             let space = (!self.no_collision).then(|| {
-                let up = mounting.up(arm);
-                let height = match self.floor {
-                    Some(FloorAt(height)) => height,
-                    // An arm that is below its base wherever it is hangs over something.
-                    None => (up.z > 0.5)
-                        .then_some(0.0)
-                        .filter(|z| shape.blocked(&shape.floor(up, *z, &limits.0), self.clearance, &limits.0) < HANGS),
-                };
+                let (space, height) = surroundings(arm, mounting, &shape, self.floor, self.clearance, &limits);
                 assumed.push(match (height, self.floor) {
                     (Some(height), Some(_)) => format!("base {mounting}: floor at {height} m"),
                     (Some(height), None) => {
@@ -328,8 +350,7 @@ impl Excite {
                     }
                     (None, _) => format!("base {mounting}: no floor"),
                 });
-                let floor = height.map(|height| shape.floor(up, height, &limits.0));
-                Space { shape: shape.clone(), floor, clearance: self.clearance }
+                space
             });
             let load = masses.as_ref().map(|masses| Load::new(model, masses, &limits.0)).transpose();
             let constraints = Constraints {

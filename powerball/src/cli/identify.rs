@@ -6,12 +6,13 @@ use super::inputs::{Inputs, load, same_file};
 use super::output::{self, Progress};
 use super::reduced::{Reduced, in_memory, reduce};
 use crate::estimate::{
-    ConsistentReport, Errors, FrictionLaw, JointFriction, ParameterEstimate, Solution, Spread,
-    consistent_fit, errors, exchanged, identify, solve_instrumental, solve_reduced, solve_robust, spread,
-    spread_of,
+    ConsistentReport, Errors, FrictionLaw, InBand, JointFriction, ParameterEstimate, Solution, Spread,
+    consistent_fit, errors, exchanged, identify, solve_in_band, solve_instrumental, solve_reduced,
+    solve_robust, spread, spread_of,
 };
 use crate::log::{Log, read_logs};
 use crate::regression::{Data, DataOptions, RigidBody};
+use crate::summary::BANDS;
 use crate::torque_model::{Additions, TorqueModel};
 use clap::{Args, ValueEnum};
 use dyngen::SetKind;
@@ -91,9 +92,12 @@ pub(super) struct Identification {
     pub validate: Option<Spread>,
     pub physically_consistent: bool,
     pub consistent: ConsistentReport,
+    /// The widest, Hz.
     pub band: [f64; 2],
-    /// What of the motion lies in the band; nothing where there are summaries alone.
-    pub band_reason: Option<String>,
+    /// The end of each joint's band, Hz: of its fit, and of its errors.
+    pub joint_bands: Vec<f64>,
+    /// Why these.
+    pub band_reason: String,
     pub warnings: Vec<String>,
 }
 
@@ -110,7 +114,7 @@ impl Identify {
             }
         }
         let whole = !matches!(self.estimator, Estimator::Weighted);
-        let (Reduced { body, summary, logs, mut warnings }, held_out, additions) = match &self.model {
+        let (Reduced { body, bands, logs, mut warnings }, held_out, additions) = match &self.model {
             Some(model) => self.known(model, &options, &progress)?,
             None => {
                 let mut reduced = reduce(&self.arm, &self.log, &options, whole, &progress)?;
@@ -127,10 +131,15 @@ impl Identify {
             Friction::Symmetric => FrictionLaw::Symmetric,
             Friction::Asymmetric => FrictionLaw::Asymmetric,
         };
+        let InBand { solution, bands: mut in_band } = solve_in_band(&bands, law);
+        if whole {
+            // What looks at single samples has one band.
+            in_band.fill(0);
+        }
         let (solution, errors) = match self.estimator {
-            Estimator::Weighted => weighted(solve_reduced(&summary, law)),
+            Estimator::Weighted => weighted(solution),
             Estimator::Instrumental => {
-                let start = solve_reduced(&summary, law);
+                let start = solve_reduced(bands.widest(), law);
                 solve_instrumental(&body, &logs, &options, &start).map_err(Failure::Refused)?
             }
             Estimator::Robust => {
@@ -156,16 +165,24 @@ impl Identify {
             // They were taken out of the logs.
             additions: Additions::default(),
         };
+        let joint_bands: Vec<f64> = in_band.iter().map(|band| BANDS[*band]).collect();
         let validate = if held_out.is_empty() {
             warnings
                 .push("no log was given to --validate: the errors below are those of the fit itself".into());
             None
         } else {
-            let data = prepared(&body, &held_out, &options)?;
-            Some(spread(&data, &model.residual(&body, &data, &[])))
+            let mut judged: Option<Spread> = None;
+            for (members, data) in by_band(&body, &held_out, &joint_bands)? {
+                let own = spread(&data, &model.residual(&body, &data, &[]));
+                let all = judged.get_or_insert_with(|| own.clone());
+                for j in members {
+                    (all.rms[j], all.relative[j]) = (own.rms[j], own.relative[j]);
+                }
+            }
+            judged
         };
         let figures = if held_out.is_empty() { &logs } else { &held_out };
-        let figures = Shown::new(&body, figures, &options, &model)?;
+        let figures = Shown::new(&body, figures, &options, &joint_bands, &model)?;
         let undetermined: Vec<&str> =
             identified.parameters.iter().filter(|p| p.std.is_none()).map(|p| p.name.as_str()).collect();
         if !undetermined.is_empty() {
@@ -191,8 +208,9 @@ impl Identify {
             validate,
             physically_consistent: reasons.is_empty(),
             consistent,
-            band: [0.0, options.cutoff],
-            band_reason: figures.band.clone(),
+            band: [0.0, BANDS[0]],
+            joint_bands,
+            band_reason: reason(&in_band, figures.motion),
             warnings,
         };
         let text = output::json(&result)?;
@@ -213,6 +231,31 @@ impl Identify {
         }
         Ok(())
     }
+}
+
+/// Why the joints' bands end where they do, and what of the motion lies in them: the arm moves below `motion` Hz.
+fn reason(bands: &[usize], motion: Option<f64>) -> String {
+    let mut why = vec![format!("0 to {} Hz, above which arms are not rigid", BANDS[0])];
+    for (k, high) in BANDS.iter().enumerate().skip(1) {
+        let joints: Vec<String> =
+            (1..=bands.len()).filter(|j| bands[j - 1] == k).map(|j| j.to_string()).collect();
+        if !joints.is_empty() {
+            why.push(format!(
+                "0 to {high} Hz for joint {}, whose model torque is below what it leaves in the octave above",
+                joints.join(", ")
+            ));
+        }
+    }
+    let lowest = bands.iter().map(|k| BANDS[*k]).fold(BANDS[0], f64::min);
+    let motion = motion.map_or(String::new(), |motion| {
+        let verdict = if motion > 0.5 * lowest {
+            "that is too near to the end of a band: move slower, or much of the torque is left out"
+        } else {
+            "gravity and inertia are within, and so is what friction does at reversals, several times faster"
+        };
+        format!("; 99 % of the power of the speeds lies below {motion:.1} Hz: {verdict}")
+    });
+    format!("band {}{motion}", why.join("; "))
 }
 
 fn weighted(solution: Solution) -> (Solution, Errors) {
@@ -243,4 +286,21 @@ pub(super) fn prepared<'a>(
     options: &DataOptions,
 ) -> Result<Data<'a>, Failure> {
     Data::new(body, logs, options).map_err(|e| Failure::Refused(e.to_string()))
+}
+
+/// Logs prepared in every band that a joint has, widest first, with the joints of that band, from 0.
+pub(super) fn by_band<'a>(
+    body: &'a RigidBody,
+    logs: &[Log],
+    joint_bands: &[f64],
+) -> Result<Vec<(Vec<usize>, Data<'a>)>, Failure> {
+    let members =
+        |band: f64| -> Vec<usize> { (0..joint_bands.len()).filter(|j| joint_bands[*j] == band).collect() };
+    let with = |band: f64| DataOptions { cutoff: band, ..DataOptions::default() };
+    BANDS
+        .iter()
+        .map(|band| (members(*band), *band))
+        .filter(|(members, _)| !members.is_empty())
+        .map(|(members, band)| Ok((members, prepared(body, logs, &with(band))?)))
+        .collect()
 }

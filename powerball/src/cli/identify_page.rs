@@ -1,7 +1,7 @@
 //! report.html of an identification: the one page that a lab prints.
 
 use super::Failure;
-use super::identify::{Identification, prepared};
+use super::identify::{Identification, by_band, prepared};
 use crate::estimate::noise_floor;
 use crate::explain::{TorqueCurve, curves};
 use crate::friction::TanhFriction;
@@ -32,8 +32,8 @@ pub(super) struct Shown {
     files: Vec<[String; 5]>,
     /// Noise alone, N·m.
     floor: Vec<f64>,
-    /// Why the band is wide enough, or is not.
-    pub(super) band: Option<String>,
+    /// The frequency below which 99 % of the power of the speeds lies, Hz.
+    pub(super) motion: Option<f64>,
 }
 
 /// One joint along the logs.
@@ -47,11 +47,12 @@ struct ShownJoint {
 }
 
 impl Shown {
-    /// What a model says of logs; nothing where there are none.
+    /// What a model says of logs; nothing where there are none. `bands` are the ends of the joints' bands, Hz, in which the noise floor counts.
     pub(super) fn new(
         body: &RigidBody,
         logs: &[Log],
         options: &DataOptions,
+        bands: &[f64],
         model: &TorqueModel,
     ) -> Result<Shown, Failure> {
         if logs.is_empty() {
@@ -59,6 +60,11 @@ impl Shown {
         }
         let data = prepared(body, logs, options)?;
         let residual = model.residual(body, &data, &[]);
+        let mut floor = noise_floor(&data);
+        for (members, data) in by_band(body, logs, bands)? {
+            let own = noise_floor(&data);
+            members.into_iter().for_each(|j| floor[j] = own[j]);
+        }
         let joint = |j: usize| {
             let f = &model.friction[j];
             let law = TanhFriction::new([f.gamma1, f.gamma2, f.gamma3, f.gamma4, f.gamma5]);
@@ -78,28 +84,19 @@ impl Shown {
             curves: curves(&data, &residual, &residual),
             joints: (0..data.dof()).map(joint).collect(),
             files: logs.iter().map(file).collect(),
-            floor: noise_floor(&data),
-            band: band(&data),
+            floor,
+            motion: motion(&data),
         })
     }
 }
 
-/// The band against what the logs hold: the motion must lie well within it, and what friction does at reversals above the motion.
-fn band(data: &Data<'_>) -> Option<String> {
+/// The frequency below which 99 % of the power of the speeds lies, Hz.
+fn motion(data: &Data<'_>) -> Option<f64> {
     let of = |r: &crate::regression::Recording| -> Vec<Vec<f64>> {
         (0..data.dof()).map(|j| r.speed(j).collect()).collect()
     };
     let speeds: Vec<Vec<f64>> = data.recordings.iter().flat_map(of).collect();
-    let motion = occupied(&speeds, data.rate(), 0.99)?;
-    let (cutoff, rate) = (data.band.cutoff, data.rate());
-    let verdict = if motion > 0.5 * cutoff {
-        "that is too near to its end: move slower, or much of the torque is left out"
-    } else {
-        "gravity and inertia are within it, and so is what friction does at reversals, several times faster"
-    };
-    Some(format!(
-        "band 0 to {cutoff} Hz at {rate:.0} samples a second: 99 % of the power of the speeds lies below {motion:.1} Hz; {verdict}"
-    ))
+    occupied(&speeds, data.rate(), 0.99)
 }
 
 /// Name, duration, samples, rate and pieces of a log.
@@ -135,14 +132,12 @@ fn along(data: &Data<'_>, value: impl Fn(usize, usize) -> f64) -> Vec<(f64, f64)
 /// The page; what is shown is of the held-out logs where there are any, else of the fitted ones.
 pub(super) fn page(result: &Identification, arm: &Arm, shown: &Shown, held_out: bool) -> Page {
     let mut page = Page::new(format!("Torque model of {}", result.arm));
-    let [low, high] = result.band;
+    let [_, high] = result.band;
     page.lead(&format!(
-        "Minimal inertial set and friction of Eq. 16, weighted least squares, {low} to {high} Hz. Standard errors hold for residuals that depend on each other within blocks of two seconds."
+        "Minimal inertial set and friction of Eq. 16, weighted least squares, each joint in a band of its own up to {high} Hz. Standard errors hold for residuals that depend on each other within blocks of two seconds."
     ));
     verdict(&mut page, result);
-    if let Some(band) = &result.band_reason {
-        page.paragraph(&format!("The {band}."));
-    }
+    page.paragraph(&format!("The {}.", result.band_reason));
     page.heading("Errors");
     let mut table = Table::new([
         "joint",

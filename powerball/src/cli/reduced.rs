@@ -3,10 +3,11 @@
 use super::Failure;
 use super::inputs::same_file;
 use super::output::Progress;
+use crate::estimate::reduce_in_bands;
 use crate::log::{Log, LogError, read_log};
 use crate::regression::{DataOptions, RigidBody, silent_joints};
 use crate::signal::rest;
-use crate::summary::Summary;
+use crate::summary::{Bands, Summary};
 use dyngen::Arm;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -14,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// What files came to.
 pub(crate) struct Reduced {
     pub body: RigidBody,
-    pub summary: Summary,
+    pub bands: Bands,
     /// The first logs as they were read, for figures; all where they were asked for.
     pub logs: Vec<Log>,
     pub warnings: Vec<String>,
@@ -41,7 +42,7 @@ pub(crate) fn reduce(
     progress: &Progress,
 ) -> Result<Reduced, Failure> {
     let (body, mut warnings) = body(arm, progress)?;
-    let mut summary = Summary::new(&body, options);
+    let mut bands = Bands::new(&body, options);
     let (mut shown, mut shown_samples): (Vec<Log>, usize) = (Vec::new(), 0);
     let (mut unusable, mut refused) = (Vec::new(), Vec::new());
     for (k, file) in files.iter().enumerate() {
@@ -60,12 +61,12 @@ pub(crate) fn reduce(
                 continue;
             }
             Ok(Some(read)) => {
-                for (log, _) in &read.logs {
-                    if summary.logs.iter().any(|(other, _)| other == log) {
+                for (log, _) in &read.widest().logs {
+                    if bands.widest().logs.iter().any(|(other, _)| other == log) {
                         warnings.push(format!("{name}: holds {log}, which is in already: it counts twice"));
                     }
                 }
-                if let Err(error) = summary.merge(&read) {
+                if let Err(error) = bands.merge(&read) {
                     unusable.push(format!("{name}: {error}"));
                 }
                 continue;
@@ -80,14 +81,15 @@ pub(crate) fn reduce(
             Err(LogError(reasons)) => unusable.extend(reasons.iter().map(ToString::to_string)),
             Ok(log) => {
                 warnings.extend(findings.iter().map(ToString::to_string));
-                let mut one = Summary::new(&body, options);
-                match one.push(&body, &log, options) {
-                    Ok(notes) => warnings.extend(notes),
-                    Err(error) => refused.push(format!("{name}: {error}")),
-                }
                 // A log and its summary must come to the same.
-                if let Err(error) = summary.merge(&one) {
-                    unusable.push(format!("{name}: {error}"));
+                match reduce_in_bands(&body, &log, options) {
+                    Ok((one, notes)) => {
+                        warnings.extend(notes);
+                        if let Err(error) = bands.merge(&one) {
+                            unusable.push(format!("{name}: {error}"));
+                        }
+                    }
+                    Err(error) => refused.push(format!("{name}: {error}")),
                 }
                 if whole || shown_samples < SHOWN {
                     shown_samples += log.t.len();
@@ -99,12 +101,12 @@ pub(crate) fn reduce(
     if !unusable.is_empty() {
         return Err(Failure::Unusable(unusable.join("\n")));
     }
-    if summary.logs.is_empty() {
+    if bands.widest().logs.is_empty() {
         return Err(Failure::Refused(refused.join("\n")));
     }
     warnings.extend(refused.into_iter().map(|r| format!("{r}; the log was left out")));
-    warnings.extend(rests(&body, &summary, &shown));
-    Ok(Reduced { body, summary, logs: shown, warnings })
+    warnings.extend(rests(&body, bands.widest(), &shown));
+    Ok(Reduced { body, bands, logs: shown, warnings })
 }
 
 /// Reduces logs that were read already.
@@ -114,24 +116,27 @@ pub(crate) fn in_memory(
     mut warnings: Vec<String>,
     options: &DataOptions,
 ) -> Result<Reduced, Failure> {
-    let mut summary = Summary::new(&body, options);
+    let mut bands = Bands::new(&body, options);
     let mut refused = Vec::new();
     for log in &logs {
-        match summary.push(&body, log, options) {
-            Ok(notes) => warnings.extend(notes),
+        match reduce_in_bands(&body, log, options) {
+            Ok((one, notes)) => {
+                warnings.extend(notes);
+                bands.merge(&one).map_err(|e| Failure::Unusable(format!("{}: {e}", log.file)))?;
+            }
             Err(error) => refused.push(format!("{}: {error}", log.file)),
         }
     }
-    if summary.logs.is_empty() {
+    if bands.widest().logs.is_empty() {
         return Err(Failure::Refused(refused.join("\n")));
     }
     warnings.extend(refused.into_iter().map(|r| format!("{r}; the log was left out")));
-    warnings.extend(rests(&body, &summary, &logs));
-    Ok(Reduced { body, summary, logs, warnings })
+    warnings.extend(rests(&body, bands.widest(), &logs));
+    Ok(Reduced { body, bands, logs, warnings })
 }
 
 /// A file's summary; `None` where the file is something else.
-fn read_summary(file: &Path) -> Result<Option<Summary>, String> {
+fn read_summary(file: &Path) -> Result<Option<Bands>, String> {
     let read = |mut f: std::fs::File| {
         let mut head = vec![0; 64];
         let count = f.read(&mut head)?;
@@ -143,7 +148,7 @@ fn read_summary(file: &Path) -> Result<Option<Summary>, String> {
         Ok(None)
     };
     let bytes = std::fs::File::open(file).and_then(read).map_err(|e| format!("cannot be read: {e}"))?;
-    bytes.map(|bytes| Summary::from_bytes(&bytes).map_err(|e| e.to_string())).transpose()
+    bytes.map(|bytes| Bands::from_bytes(&bytes).map_err(|e| e.to_string())).transpose()
 }
 
 /// What is to be said of joints that rested.

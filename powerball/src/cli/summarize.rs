@@ -4,6 +4,7 @@ use super::Failure;
 use super::output::{self, Progress};
 use super::reduced::reduce;
 use crate::regression::DataOptions;
+use crate::summary::BANDS;
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -11,7 +12,7 @@ use std::path::PathBuf;
 /// Reduce logs to triangular factors, which `powerball identify` takes in place of the logs.
 ///
 /// A summary is of one size however long the logs were, and holds all that a fit needs of them: the rows of every joint
-/// for any friction steepness, octave by octave. Summaries made one by one anywhere come to what their logs would
+/// for any friction steepness, octave by octave, in three bands. Summaries made one by one anywhere come to what their logs would
 /// have come to together. They are of one arm file; another one refuses them.
 #[derive(Args, Debug)]
 #[command(
@@ -42,15 +43,16 @@ struct Written {
     /// By joint.
     rows: Vec<u64>,
     bytes: usize,
-    band: [f64; 2],
+    /// Their ends, Hz.
+    bands: [f64; 3],
     warnings: Vec<String>,
 }
 
 impl Summarize {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let reduced = reduce(&self.arm, &self.log, &DataOptions::default(), false, &Progress::new())?;
-        let summary = &reduced.summary;
-        let bytes = summary.to_bytes();
+        let bytes = reduced.bands.to_bytes();
+        let summary = reduced.bands.widest();
         output::write_file(&self.out, &bytes)?;
         let written = Written {
             arm: summary.identity.arm.clone(),
@@ -59,7 +61,7 @@ impl Summarize {
             seconds: summary.logs.iter().map(|(_, seconds)| seconds).sum(),
             rows: summary.joints.iter().map(|j| j.rows()).collect(),
             bytes: bytes.len(),
-            band: [0.0, summary.identity.cutoff],
+            bands: BANDS,
             warnings: reduced.warnings,
         };
         if self.json {

@@ -1,6 +1,7 @@
 //! `powerball verify`: an identified model on another trajectory.
 
 use super::Failure;
+use super::identify::by_band;
 use super::identify_page::torque_figure;
 use super::inputs::{Inputs, load};
 use super::output::{self, Progress};
@@ -8,9 +9,11 @@ use crate::estimate::{JointVerdict, verify};
 use crate::explain::{TorqueCurve, curves};
 use crate::regression::{Data, DataOptions};
 use crate::report::{Page, Table, Tone, number};
+use crate::summary::BANDS;
 use clap::Args;
 use serde::Serialize;
-use std::path::PathBuf;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
 
 /// Judge an identified model on logs that it has not seen (Fig. 8): errors with intervals, against the noise floor.
 ///
@@ -38,6 +41,8 @@ struct Verified {
     tolerance: f64,
     within_tolerance: bool,
     band: [f64; 2],
+    /// The end of each joint's band, Hz, in which its error is taken: the one in which it was identified.
+    joint_bands: Vec<f64>,
     warnings: Vec<String>,
 }
 
@@ -51,14 +56,23 @@ impl Verify {
         progress.say("preparing signals");
         let data = Data::new(&loaded.body, &loaded.fit, &DataOptions::default())
             .map_err(|e| Failure::Refused(e.to_string()))?;
-        let residual = loaded.known.map(|m| m.residual(&loaded.body, &data, &[])).unwrap_or_default();
-        let joints = verify(&data, &residual, self.tolerance);
+        let residual_of = |data: &Data<'_>| {
+            loaded.known.as_ref().map(|m| m.residual(&loaded.body, data, &[])).unwrap_or_default()
+        };
+        let residual = residual_of(&data);
+        let mut joints = verify(&data, &residual, self.tolerance);
+        let joint_bands = joint_bands(&self.model, joints.len());
+        for (members, data) in by_band(&loaded.body, &loaded.fit, &joint_bands)? {
+            let own = verify(&data, &residual_of(&data), self.tolerance);
+            members.into_iter().for_each(|j| joints[j] = own[j].clone());
+        }
         let verified = Verified {
             arm: loaded.body.arm().name.clone(),
             within_tolerance: joints.iter().all(|j| j.within != Some(false)),
             joints,
             tolerance: self.tolerance,
             band: [0.0, data.band.cutoff],
+            joint_bands,
             warnings: loaded.warnings.into_iter().chain(data.notes.iter().cloned()).collect(),
         };
         let text = output::json(&verified)?;
@@ -92,6 +106,14 @@ impl Verify {
             self.inputs.out.join("report.html").display()
         )))
     }
+}
+
+/// The joints' bands of an identified.json; the widest where the file says nothing of them.
+fn joint_bands(model: &Path, dof: usize) -> Vec<f64> {
+    let said: Option<Value> = std::fs::read_to_string(model).ok().and_then(|t| serde_json::from_str(&t).ok());
+    let of =
+        |j: usize| said.as_ref()?.get("joint_bands")?.get(j)?.as_f64().filter(|band| BANDS.contains(band));
+    (0..dof).map(|j| of(j).unwrap_or(BANDS[0])).collect()
 }
 
 fn page(verified: &Verified, curves: &[TorqueCurve]) -> Page {

@@ -85,6 +85,7 @@ pub fn solve_instrumental(
     }
     let solution = Solution {
         layout,
+        identity: start.identity.clone(),
         shapes: start.shapes.clone(),
         theta,
         weights: start.weights.clone(),

@@ -1,5 +1,6 @@
 //! Weighted least squares in the minimal set, friction shapes included, with honest standard errors.
 
+mod band;
 mod consistent;
 mod consistent_fit;
 mod design;
@@ -21,6 +22,7 @@ mod torque_metric;
 mod vary;
 mod verify;
 
+pub use band::{InBand, reduce_in_bands, solve_in_band};
 pub use consistent::{Consistent, nearest};
 pub use consistent_fit::{ConsistentFit, ConsistentReport, consistent_fit};
 pub use design::{Design, Gram, runs};

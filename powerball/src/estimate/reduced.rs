@@ -2,7 +2,7 @@
 
 use super::friction_shape::Trials;
 use super::vary::{FRICTION, Layout, Products, Rows, Scatter, vary};
-use crate::summary::{Columns, NODES, OCTAVES, SLOW, Steepness, Summary, Triangle};
+use crate::summary::{Columns, Identity, NODES, OCTAVES, SLOW, Steepness, Summary, SummaryError, Triangle};
 use faer::Mat;
 
 /// What stands beside the minimal set in a model of a joint's torque.
@@ -30,6 +30,8 @@ pub struct Solution {
     pub free: Vec<bool>,
     /// The rows of each joint and octave at these shapes.
     pub(super) parts: Vec<Vec<Part>>,
+    /// Of what the logs were.
+    pub(super) identity: Identity,
 }
 
 impl Solution {
@@ -70,6 +72,30 @@ impl Solution {
         let torque: f64 = parts.iter().map(|p| p.left(&vec![0.0; theta.len()])).sum();
         (left / count, torque / count, rows)
     }
+
+    /// The same model on other reduced logs of the same arm and band: what it leaves of logs that took no part in it.
+    ///
+    /// # Errors
+    /// [`SummaryError::Differs`] where they are of another arm, set or band.
+    pub fn on(&self, summary: &Summary) -> Result<Solution, SummaryError> {
+        self.identity.same_as(&summary.identity)?;
+        let law = if self.layout.extra > 0 { FrictionLaw::Asymmetric } else { FrictionLaw::Symmetric };
+        Ok(Solution {
+            layout: self.layout,
+            identity: summary.identity.clone(),
+            shapes: self.shapes.clone(),
+            theta: self.theta.clone(),
+            weights: self.weights.clone(),
+            free: self.free.clone(),
+            parts: parts_at(&Reduced::new(summary, law), &self.shapes),
+        })
+    }
+}
+
+/// The columns of each joint and octave at given shapes.
+fn parts_at(reduced: &Reduced<'_>, shapes: &[[f64; 2]]) -> Vec<Vec<Part>> {
+    let joints = reduced.summary.joints.iter().enumerate();
+    joints.map(|(j, o)| o.levels().iter().map(|t| reduced.part(t, j, shapes[j])).collect()).collect()
 }
 
 /// Fits the base model to reduced logs.
@@ -77,16 +103,14 @@ impl Solution {
 pub fn solve_reduced(summary: &Summary, law: FrictionLaw) -> Solution {
     let reduced = Reduced::new(summary, law);
     let done = vary(&reduced, &[], None);
-    let parts = (0..reduced.layout.dof)
-        .map(|j| summary.joints[j].levels().iter().map(|t| reduced.part(t, j, done.shapes[j])).collect())
-        .collect();
     Solution {
         layout: reduced.layout,
+        identity: summary.identity.clone(),
+        parts: parts_at(&reduced, &done.shapes),
         shapes: done.shapes,
         theta: done.theta,
         weights: done.weights,
         free: done.free,
-        parts,
     }
 }
 

@@ -6,6 +6,7 @@ use super::fourier::{Fourier, Harmonics};
 use super::limits::Limits;
 use super::objective::{Criterion, Figures, Objective};
 use super::shape::poses;
+use crate::parallel;
 use dyngen::{Model, SetKind};
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
@@ -14,6 +15,9 @@ use rand_distr::{Distribution, StandardNormal};
 
 /// Poses that are tried for the middle of a random path.
 const PLACES: usize = 50;
+
+/// Samples a second at which found paths are compared.
+const JUDGED: f64 = 50.0;
 
 /// What path to look for, and how long.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +36,8 @@ pub struct Settings {
     pub criterion: Criterion,
     /// How many paths are judged in all.
     pub evaluations: usize,
+    /// How many searches share them, each from random starts of its own: a search can end in a valley that is not the deepest.
+    pub searches: usize,
     /// Seed of the search.
     pub seed: u64,
 }
@@ -47,6 +53,7 @@ impl Default for Settings {
             margin: 0.05,
             criterion: Criterion::Condition { lambda2: 1.0 },
             evaluations: 2000,
+            searches: 1,
             seed: 0,
         }
     }
@@ -131,11 +138,36 @@ pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> R
         })
         .collect();
     objective.scale_columns(&typical);
-    let (paths, figures, usual) = search_all(&constraints, settings, |paths| {
-        let figures = objective.judge(paths);
-        (figures.objective(settings.criterion), figures)
-    })?;
-    Ok(Excitation { paths, figures, usual })
+    let share =
+        Settings { evaluations: settings.evaluations.div_ceil(settings.searches), ..settings.clone() };
+    let streams: Vec<u64> = (0..settings.searches as u64).collect();
+    let found = parallel::map(&streams, |stream| {
+        search_from(*stream, &constraints, &share, |paths| {
+            let figures = objective.judge(paths);
+            (figures.objective(settings.criterion), figures)
+        })
+    });
+    // Of what the searches found for Eq. 17 the best is taken by a condition number that no scale of rows or columns changes.
+    let value = |paths: &[Fourier], figures: &Figures| match settings.criterion {
+        Criterion::Condition { .. } if settings.searches > 1 => {
+            let motions: Vec<_> = paths.iter().map(|path| path.sample(JUDGED)).collect();
+            objective.conditions(&motions).normalised
+        }
+        criterion => figures.objective(criterion),
+    };
+    let (mut best, mut refused): (Option<(f64, Excitation)>, _) = (None, None);
+    for found in found {
+        match found {
+            Ok((paths, figures, usual)) => {
+                let value = value(&paths, &figures);
+                if best.as_ref().is_none_or(|(least, _)| value < *least) {
+                    best = Some((value, Excitation { paths, figures, usual }));
+                }
+            }
+            Err(error) => refused = Some(error),
+        }
+    }
+    best.map(|(_, found)| found).ok_or_else(|| refused.unwrap_or(Error::NoPose))
 }
 
 /// The path within the limits whose value, the first thing that `judge` says, is smallest; what else it said of that path,
@@ -162,9 +194,19 @@ pub fn search<J: Clone>(
 pub fn search_all<J: Clone>(
     constraints: &[&Constraints],
     settings: &Settings,
-    mut judge: impl FnMut(&[Fourier]) -> (f64, J),
+    judge: impl FnMut(&[Fourier]) -> (f64, J),
 ) -> Result<(Vec<Fourier>, J, J), Error> {
     check(settings)?;
+    search_from(0, constraints, settings, judge)
+}
+
+/// One of the searches that the seed's streams of random numbers make.
+fn search_from<J: Clone>(
+    stream: u64,
+    constraints: &[&Constraints],
+    settings: &Settings,
+    mut judge: impl FnMut(&[Fourier]) -> (f64, J),
+) -> Result<(Vec<Fourier>, J, J), Error> {
     if constraints.iter().any(|c| poses(&c.limits.0).all(|q| c.lacks(&q) > 0.0)) {
         return Err(Error::NoPose);
     }
@@ -174,6 +216,7 @@ pub fn search_all<J: Clone>(
     let violation =
         |paths: &[Fourier]| -> f64 { constraints.iter().zip(paths).map(|(c, path)| c.violation(path)).sum() };
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
+    rng.set_stream(stream);
     let starts = (settings.evaluations / 8).max(1);
     let mut found: Vec<Judged<J>> = (0..starts)
         .map(|_| {
@@ -251,8 +294,8 @@ fn improved<J>(
 
 fn check(settings: &Settings) -> Result<(), Error> {
     let wrong = |what: &str| Err(Error::Setting(what.to_string()));
-    if settings.harmonics == 0 || settings.periods == 0 || settings.evaluations == 0 {
-        return wrong("the numbers of harmonics, periods and evaluations must be at least 1");
+    if [settings.harmonics, settings.periods, settings.evaluations, settings.searches].contains(&0) {
+        return wrong("the numbers of harmonics, periods, evaluations and searches must be at least 1");
     }
     if !(settings.fundamental.is_finite() && settings.fundamental > 0.0) {
         return wrong("the fundamental frequency must be above 0");

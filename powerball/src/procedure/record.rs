@@ -11,6 +11,9 @@ use serde::Serialize;
 use std::fmt::{self, Write as _};
 use std::io::{self, Write};
 
+/// Share of the joints' speeds and accelerations on the way to where a motion begins.
+const APPROACH: f64 = 0.25;
+
 /// Time that bringing up and enabling may take, µs: joints commutate one after the other.
 const PATIENCE: u64 = 60_000_000;
 
@@ -42,6 +45,8 @@ pub enum RecordError {
     Rejected(Rejection),
     /// The motion does not fit the arm or its rate.
     Motion(String),
+    /// The arm must not go where it would have to: why.
+    Barred(String),
     /// The log could not be written.
     Write(io::Error),
 }
@@ -51,7 +56,7 @@ impl fmt::Display for RecordError {
         match self {
             RecordError::Arm(e) => e.fmt(f),
             RecordError::Rejected(rejection) => write!(f, "the motion cannot be followed: {rejection}"),
-            RecordError::Motion(what) => f.write_str(what),
+            RecordError::Motion(what) | RecordError::Barred(what) => f.write_str(what),
             RecordError::Write(e) => write!(f, "the log cannot be written: {e}"),
         }
     }
@@ -216,6 +221,25 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         Ok(record)
     }
 
+    fn approach_and_record(
+        &mut self,
+        motion: &Motion,
+        barred: impl Fn(&Motion) -> Option<String>,
+        log: &mut impl Write,
+    ) -> Result<Record, RecordError> {
+        let begin: Option<[f64; N]> = motion.samples().next().and_then(|[q, ..]| q.try_into().ok());
+        if let Some(begin) = begin {
+            let way = way(self.master.driver().profile(), &self.target, &begin, APPROACH, 1.0);
+            if let Some(why) = barred(&way) {
+                return Err(RecordError::Barred(format!(
+                    "on the straight way to where the trajectory begins {why}: move the arm nearer to there first"
+                )));
+            }
+            self.go(&begin, APPROACH, 1.0)?;
+        }
+        self.record(motion, 0.0, true, log)
+    }
+
     fn check(&self, motion: &Motion) -> Result<(), RecordError> {
         let period = self.master.driver().profile().period_seconds();
         let wrong = |what| Err(RecordError::Motion(what));
@@ -277,21 +301,21 @@ fn header<const N: usize>(with_references: bool) -> String {
 }
 
 /// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its speed, follows the motion,
-/// writes the log, and stops.
+/// writes the log, and stops. `barred` says of the way to there, and then of the motion, why the arm must not go it.
 ///
 /// # Errors
-/// As [`Recorder::enable`] and [`Recorder::record`].
+/// As [`Recorder::enable`] and [`Recorder::record`], and [`RecordError::Barred`]; the arm has not moved then.
 pub fn record<B: Bus, const N: usize>(
     master: Master<B, N>,
     motion: &Motion,
+    barred: impl Fn(&Motion) -> Option<String>,
     log: &mut impl Write,
 ) -> Result<Record, RecordError> {
-    let mut recorder = Recorder::enable(master)?;
-    let begin: Option<[f64; N]> = motion.samples().next().and_then(|[q, ..]| q.try_into().ok());
-    if let Some(begin) = begin {
-        recorder.go(&begin, 0.25, 1.0)?;
+    if let Some(why) = barred(motion) {
+        return Err(RecordError::Barred(format!("on the trajectory {why}")));
     }
-    let done = recorder.record(motion, 0.0, true, log);
+    let mut recorder = Recorder::enable(master)?;
+    let done = recorder.approach_and_record(motion, barred, log);
     // Also where the recording failed, the arm is stopped; why it failed is what is told.
     let stopped = recorder.finish();
     let done = done?;
@@ -373,6 +397,24 @@ mod tests {
         assert!(matches!(cause, Cause::DataMissing(_) | Cause::HeartbeatLost(_)), "{cause:?}");
         assert_eq!(cause.node(), NodeId::new(5));
         assert!(log.ends_with(b"\n"));
+    }
+
+    /// Where the way to the beginning is barred nothing moves, and the arm is stopped.
+    #[test]
+    fn a_barred_way_is_not_gone() {
+        let mut motion = swing(6.0);
+        motion.q.iter_mut().skip(1).step_by(6).for_each(|q| *q += 0.2);
+        let highest = |m: &Motion| m.q.iter().skip(1).step_by(6).fold(f64::MIN, |a, b| a.max(*b));
+        let mut log = Vec::new();
+        // The way alone ends at joint 2 being lower than the trajectory gets.
+        let begin = motion.q[1];
+        let barred = |m: &Motion| (highest(m) <= begin + 1e-6).then(|| "it is barred".to_string());
+        let refused = record(arm(), &motion, barred, &mut log).unwrap_err().to_string();
+        assert!(refused.contains("way to where the trajectory begins it is barred"), "{refused}");
+        let refused = record(arm(), &motion, |_| Some("it is barred".into()), &mut log).unwrap_err();
+        assert!(refused.to_string().starts_with("on the trajectory"), "{refused}");
+        assert!(log.is_empty());
+        assert_eq!(record(arm(), &motion, |_| None, &mut log).unwrap().samples, motion.len());
     }
 
     #[test]

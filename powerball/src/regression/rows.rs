@@ -41,6 +41,22 @@ impl JointRows {
         self.torque.is_empty()
     }
 
+    /// Its rows that follow each other without a gap.
+    #[must_use]
+    pub fn runs(&self) -> Vec<Range<usize>> {
+        let mut runs = Vec::new();
+        for (kept, range) in self.kept.iter().zip(&self.rows) {
+            let mut first = 0;
+            for k in 1..=kept.len() {
+                if k == kept.len() || kept[k] != kept[k - 1] + 1 {
+                    runs.push(range.start + first..range.start + k);
+                    first = k;
+                }
+            }
+        }
+        runs
+    }
+
     /// A signal at full rate, one vector a recording, as a column of this joint.
     #[must_use]
     pub fn column<'r>(

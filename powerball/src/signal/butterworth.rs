@@ -20,17 +20,34 @@ impl Biquad {
         [gain - b0, b2 - a2 * gain]
     }
 
-    /// Filters in place; the state starts settled on the first sample, so a constant stays as it is.
-    fn run(&self, x: &mut [f64]) {
-        let Some(&first) = x.first() else { return };
-        let [mut s1, mut s2] = self.settled().map(|s| s * first);
+    /// One sample through the section in the given state.
+    #[inline(always)]
+    fn step(&self, [s1, s2]: &mut [f64; 2], x: f64) -> f64 {
         let [b0, b1, b2] = self.b;
         let [a1, a2] = self.a;
-        for v in x.iter_mut() {
-            let y = b0 * *v + s1;
-            s1 = b1 * *v - a1 * y + s2;
-            s2 = b2 * *v - a2 * y;
-            *v = y;
+        let y = b0 * x + *s1;
+        *s1 = b1 * x - a1 * y + *s2;
+        *s2 = b2 * x - a2 * y;
+        y
+    }
+}
+
+/// Filters samples in place through `N` sections, which start settled on the first sample, so a constant stays as it is.
+///
+/// A section waits for its own last result alone: the sections of one loop are worked on at the same time.
+fn run<'x, const N: usize>(sections: [Biquad; N], samples: impl Iterator<Item = &'x mut f64>) {
+    let mut states: Option<[[f64; 2]; N]> = None;
+    for x in samples {
+        let states = states.get_or_insert_with(|| {
+            let mut first = *x;
+            sections.each_ref().map(|section| {
+                let settled = section.settled().map(|s| s * first);
+                first = section.step(&mut settled.clone(), first);
+                settled
+            })
+        });
+        for (section, state) in sections.iter().zip(states) {
+            *x = section.step(state, *x);
         }
     }
 }
@@ -85,11 +102,19 @@ impl Butterworth {
         y.extend((1..=pad).rev().map(|k| 2.0 * x[0] - x[k]));
         y.extend_from_slice(x);
         y.extend((1..=pad).map(|k| 2.0 * x[n - 1] - x[n - 1 - k]));
-        for _ in 0..2 {
-            for section in &self.sections {
-                section.run(&mut y);
+        for pair in self.sections.chunks(2) {
+            match *pair {
+                [a, b] => run([a, b], y.iter_mut()),
+                [a, ..] => run([a], y.iter_mut()),
+                [] => {}
             }
-            y.reverse();
+        }
+        for pair in self.sections.chunks(2) {
+            match *pair {
+                [a, b] => run([a, b], y.iter_mut().rev()),
+                [a, ..] => run([a], y.iter_mut().rev()),
+                [] => {}
+            }
         }
         y.truncate(n + pad);
         y.drain(..pad);

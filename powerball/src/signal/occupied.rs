@@ -11,18 +11,10 @@ pub fn occupied(signals: &[Vec<f64>], rate: f64, share: f64) -> Option<f64> {
     // Power by frequency on a grid fine enough for motions, whatever the signals' lengths.
     const STEP: f64 = 0.02;
     let mut power = vec![0.0; (0.5 * rate / STEP).ceil() as usize + 1];
-    let mut planner = FftPlanner::new();
-    for signal in signals.iter().filter(|signal| signal.len() > 8) {
-        let n = signal.len();
-        let mean = signal.iter().sum::<f64>() / n as f64;
-        let window = |k: usize| 0.5 - 0.5 * (TAU * k as f64 / n as f64).cos();
-        let mut buffer: Vec<Complex<f64>> =
-            signal.iter().enumerate().map(|(k, x)| Complex::new((x - mean) * window(k), 0.0)).collect();
-        planner.plan_fft_forward(n).process(&mut buffer);
-        for (k, x) in buffer.iter().enumerate().take(n / 2 + 1) {
-            let bin = (k as f64 * rate / n as f64 / STEP).round() as usize;
-            if let Some(power) = power.get_mut(bin) {
-                *power += x.norm_sqr() / n as f64;
+    for signal in signals {
+        for (frequency, here) in periodogram(signal, rate) {
+            if let Some(power) = power.get_mut((frequency / STEP).round() as usize) {
+                *power += here;
             }
         }
     }
@@ -33,6 +25,28 @@ pub fn occupied(signals: &[Vec<f64>], rate: f64, share: f64) -> Option<f64> {
         sum >= share * total
     });
     found.filter(|_| total > 0.0).map(|bin| bin as f64 * STEP)
+}
+
+/// The sum of squares of a signal of `rate` Hz that lies between two frequencies, Hz, but for a factor that all signals of one length share.
+#[must_use]
+pub fn between(signal: &[f64], rate: f64, [low, high]: [f64; 2]) -> f64 {
+    periodogram(signal, rate).filter(|(f, _)| (low..high).contains(f)).map(|(_, power)| power).sum()
+}
+
+/// Frequencies in Hz and the power at each; nothing for a signal of a few samples.
+fn periodogram(signal: &[f64], rate: f64) -> impl Iterator<Item = (f64, f64)> {
+    let n = if signal.len() > 8 { signal.len() } else { 0 };
+    let mean = signal.iter().sum::<f64>() / n.max(1) as f64;
+    let window = |k: usize| 0.5 - 0.5 * (TAU * k as f64 / n as f64).cos();
+    let mut buffer: Vec<Complex<f64>> =
+        signal[..n].iter().enumerate().map(|(k, x)| Complex::new((x - mean) * window(k), 0.0)).collect();
+    FftPlanner::new().plan_fft_forward(n).process(&mut buffer);
+    let half = if n > 0 { n / 2 + 1 } else { 0 };
+    buffer
+        .into_iter()
+        .take(half)
+        .enumerate()
+        .map(move |(k, x)| (k as f64 * rate / n as f64, x.norm_sqr() / n as f64))
 }
 
 #[cfg(test)]
@@ -54,5 +68,10 @@ mod tests {
         // Less than a hundredth of the power.
         assert!((of(&[(0.5, 1.0), (4.0, 0.05)]) - 0.5).abs() < 0.06);
         assert_eq!(occupied(&[vec![1.0; 100]], 100.0, 0.99), None);
+        // A strong slow part does not leak into an octave where it is not.
+        let [inside, outside] =
+            [[2.5, 5.0], [5.0, 10.0]].map(|f| between(&signal(&[(0.5, 100.0), (4.0, 0.5)]), 100.0, f));
+        assert!(inside > 1e3 * outside && outside >= 0.0, "{inside} {outside}");
+        assert_eq!(between(&[1.0; 5], 100.0, [0.0, 50.0]), 0.0);
     }
 }

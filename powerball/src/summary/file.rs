@@ -1,13 +1,13 @@
 //! Summaries on disk: one line of JSON that says what it is, then the factors as little-endian doubles.
 
-use super::{Columns, Identity, NODES, OCTAVES, Octaves, Steepness, Summary, Triangle, fnv};
+use super::{Columns, Identity, NODES, OCTAVES, Octaves, Powers, Steepness, Summary, Triangle, fnv};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// First word of every summary.
 const FORMAT: &str = "powerball summary";
 /// Raised whenever a reader of the version before would misread.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Why a summary is of no use here.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -53,13 +53,14 @@ struct Head {
     silent: Vec<Option<String>>,
     /// By joint and octave.
     rows: Vec<Vec<u64>>,
+    spectrum: Vec<Powers>,
     /// Of the doubles.
     checksum: String,
 }
 
 impl Identity {
     /// Whether two are of the same thing, and what differs.
-    pub(super) fn same_as(&self, other: &Identity) -> Result<(), SummaryError> {
+    pub(crate) fn same_as(&self, other: &Identity) -> Result<(), SummaryError> {
         let differs = |what: String| Err(SummaryError::Differs(what));
         if self.arm != other.arm {
             return differs(format!("it is of the arm '{}', not of '{}'", other.arm, self.arm));
@@ -112,6 +113,7 @@ impl Summary {
             samples: self.samples,
             silent: self.silent.clone(),
             rows: self.joints.iter().map(|j| j.levels().iter().map(Triangle::rows).collect()).collect(),
+            spectrum: self.spectrum.clone(),
             checksum: format!("{:016x}", fnv(&numbers)),
         };
         // A head of text and finite numbers always is JSON.
@@ -127,11 +129,11 @@ impl Summary {
         bytes.starts_with(format!("{{\"format\":\"{FORMAT}\"").as_bytes())
     }
 
-    /// From the bytes of a file.
+    /// From bytes that begin with a summary's; also those after it.
     ///
     /// # Errors
     /// [`SummaryError::Unreadable`] where they are no summary, of another version, or damaged.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Summary, SummaryError> {
+    pub fn from_bytes(bytes: &[u8]) -> Result<(Summary, &[u8]), SummaryError> {
         let unreadable = |why: &str| SummaryError::Unreadable(why.to_string());
         if !Summary::is_summary(bytes) {
             return Err(unreadable("is no summary that `powerball summarize` wrote"));
@@ -151,12 +153,16 @@ impl Summary {
         let width = Columns { inertial: head.parameters.len() }.width();
         let each = Triangle::packed_len(width);
         let joints = head.steepness.len();
+        let length = 8 * each * OCTAVES * joints;
+        let after = numbers.get(length..).unwrap_or_default();
+        let numbers = &numbers[..length.min(numbers.len())];
         let shaped = head.nodes == NODES
             && head.octaves == OCTAVES
             && head.rows.len() == joints
             && head.silent.len() == joints
+            && head.spectrum.len() == joints
             && head.rows.iter().all(|r| r.len() == OCTAVES)
-            && numbers.len() == 8 * each * OCTAVES * joints;
+            && numbers.len() == length;
         if !shaped || format!("{:016x}", fnv(numbers)) != head.checksum {
             return Err(unreadable("it is torn or damaged: summarize the log anew"));
         }
@@ -183,6 +189,7 @@ impl Summary {
             smoothing: head.smoothing,
             steepness: head.steepness.iter().map(|[low, high]| Steepness::between(*low, *high)).collect(),
         };
-        Ok(Summary { identity, logs: head.logs, samples: head.samples, silent: head.silent, joints })
+        let (logs, samples, silent, spectrum) = (head.logs, head.samples, head.silent, head.spectrum);
+        Ok((Summary { identity, logs, samples, silent, joints, spectrum }, after))
     }
 }

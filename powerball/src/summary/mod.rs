@@ -1,14 +1,16 @@
 //! A log reduced to triangular factors: all that a fit needs of it, of one size however long it was.
 //!
-//! What is fixed when a log is reduced: the arm, the parameter set, the band. What is not: friction's steepnesses (see
-//! [`Steepness`]), the joints' weights, and the colour of the noise (see [`Octaves`]).
+//! What is fixed when a log is reduced: the arm, the parameter set, the bands. What is not: which of them counts (see [`Bands`]), friction's
+//! steepnesses (see [`Steepness`]), the joints' weights, and the colour of the noise (see [`Octaves`]).
 
+mod bands;
 mod file;
 mod octaves;
 mod reduce;
 mod steepness;
 mod triangle;
 
+pub use bands::{BANDS, Bands, Powers};
 pub use file::SummaryError;
 pub use octaves::{OCTAVES, Octaves, SLOW};
 pub use reduce::Columns;
@@ -48,6 +50,8 @@ pub struct Summary {
     pub silent: Vec<Option<String>>,
     /// The rows of each joint.
     pub joints: Vec<Octaves>,
+    /// Of the widest of several bands: see [`Bands::spectrum`].
+    pub spectrum: Vec<Powers>,
 }
 
 /// A joint without a speed limit is taken to move about this fast, rad/s or m/s.
@@ -73,7 +77,14 @@ impl Summary {
         };
         let columns = Columns { inertial: identity.parameters.len() };
         let joints = vec![Octaves::new(columns.width()); arm.dof()];
-        Summary { identity, logs: Vec::new(), samples: 0, silent: vec![None; arm.dof()], joints }
+        Summary {
+            identity,
+            logs: Vec::new(),
+            samples: 0,
+            silent: vec![None; arm.dof()],
+            joints,
+            spectrum: vec![Powers::default(); arm.dof()],
+        }
     }
 
     /// The columns of its factors.
@@ -93,6 +104,9 @@ impl Summary {
         }
         for (silent, other) in self.silent.iter_mut().zip(&other.silent) {
             *silent = other.clone().or(silent.take());
+        }
+        for (sum, other) in self.spectrum.iter_mut().flatten().zip(other.spectrum.iter().flatten()) {
+            (sum[0], sum[1]) = (sum[0] + other[0], sum[1] + other[1]);
         }
         self.samples += other.samples;
         self.logs.extend(other.logs.iter().cloned());

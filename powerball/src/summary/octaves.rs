@@ -87,15 +87,8 @@ impl Octaves {
 
     /// Takes in a joint's rows, stretch by stretch; one vector a column.
     pub fn push_rows(&mut self, rows: &JointRows, columns: &[Vec<f64>]) {
-        for (kept, range) in rows.kept.iter().zip(&rows.rows) {
-            let mut first = 0;
-            for k in 1..=kept.len() {
-                if k == kept.len() || kept[k] != kept[k - 1] + 1 {
-                    let run = range.start + first..range.start + k;
-                    self.push(&columns.iter().map(|c| &c[run.clone()]).collect::<Vec<_>>());
-                    first = k;
-                }
-            }
+        for run in rows.runs() {
+            self.push(&columns.iter().map(|c| &c[run.clone()]).collect::<Vec<_>>());
         }
     }
 

@@ -1,9 +1,14 @@
 //! Reduced logs say what the logs say.
 
 use super::plant::{record, sensors, truth};
-use crate::estimate::{Folds, FrictionLaw, fit, solve_reduced};
+use crate::estimate::{
+    Folds, FrictionLaw, JointFriction, ParameterEstimate, Solution, fit, reduce_in_bands, solve_in_band,
+    solve_reduced, spread, spread_of,
+};
 use crate::regression::{Data, DataOptions};
-use crate::summary::{Summary, SummaryError};
+use crate::summary::{BANDS, Bands, Summary, SummaryError};
+use crate::torque_model::{Additions, TorqueModel};
+use dyngen::SetKind;
 
 /// The fit of summaries is that of the rows themselves, which knows no interpolation of steepnesses.
 #[test]
@@ -36,7 +41,7 @@ fn summaries_join_to_the_answer_of_their_logs() {
     let one = |k: usize| {
         let mut summary = Summary::new(&body, &options);
         summary.push(&body, &logs[k], &options).unwrap();
-        Summary::from_bytes(&summary.to_bytes()).unwrap()
+        Summary::from_bytes(&summary.to_bytes()).unwrap().0
     };
     let joined = |order: [usize; 3]| {
         let mut all = Summary::new(&body, &options);
@@ -53,6 +58,72 @@ fn summaries_join_to_the_answer_of_their_logs() {
     let long = one(2);
     let expected = (logs[2].t.len() as f64 - 120.0) / 8.0;
     assert!((long.samples as f64 - expected).abs() < 4.0, "{} {expected}", long.samples);
+}
+
+/// A joint whose model sinks under its noise is fitted in a narrower band, the others as wide as before; summaries on disk say so too, and
+/// logs say it together.
+#[test]
+fn a_noisy_joint_asks_for_a_narrower_band() {
+    let (body, _) = truth();
+    let options = DataOptions::default();
+    let reduced = |noise: f64, seed: u64| -> Bands {
+        let mut noisy = sensors();
+        noisy.white[4] += noise;
+        let mut all = Bands::new(&body, &options);
+        for log in record(&noisy, 2, 3, seed) {
+            let (bands, notes) = reduce_in_bands(&body, &log, &options).unwrap();
+            assert!(notes.is_empty());
+            all.merge(&bands).unwrap();
+        }
+        all
+    };
+    let quiet = reduced(0.0, 35);
+    assert_eq!(solve_in_band(&quiet, FrictionLaw::Symmetric).bands, [0; 6]);
+    let noisy = reduced(1.0, 35);
+    let found = solve_in_band(&noisy, FrictionLaw::Symmetric);
+    assert!(found.bands[4] > 0 && found.bands.iter().sum::<usize>() == found.bands[4], "{:?}", found.bands);
+    assert_eq!(BANDS[0] / BANDS[1], 2.0);
+    let read = Bands::from_bytes(&noisy.to_bytes()).unwrap();
+    assert_eq!(read, noisy);
+    assert_eq!(solve_in_band(&read, FrictionLaw::Symmetric).solution.theta, found.solution.theta);
+    // White noise of the rows is what the narrower band leaves of it.
+    let rms = |solution: &Solution| spread_of(solution, &solution.theta).rms[4];
+    let wide = solve_reduced(noisy.widest(), FrictionLaw::Symmetric);
+    let share = (BANDS[found.bands[4]] / BANDS[0]).sqrt();
+    approx::assert_relative_eq!(rms(&found.solution), share * rms(&wide), max_relative = 0.1);
+    assert!(Bands::from_bytes(&noisy.widest().to_bytes()).is_err());
+}
+
+/// What a solution leaves of another log is the same from that log's rows and from its summary.
+#[test]
+fn a_log_that_took_no_part_judges_the_fit() {
+    let (body, _) = truth();
+    let options = DataOptions::default();
+    let logs = record(&sensors(), 2, 3, 34);
+    let one = |k: usize| {
+        let mut summary = Summary::new(&body, &options);
+        summary.push(&body, &logs[k], &options).unwrap();
+        summary
+    };
+    let solution = solve_reduced(&one(0), FrictionLaw::Symmetric);
+    let there = solution.on(&one(1)).unwrap();
+    let reduced = spread_of(&there, &there.theta);
+    let data = Data::new(&body, &logs[1..], &options).unwrap();
+    let names = body.names().iter().zip(solution.inertial());
+    let model = TorqueModel {
+        arm: body.arm().name.clone(),
+        set: SetKind::Minimal.to_string(),
+        parameters: names.map(|(name, value)| ParameterEstimate::plain(name, *value)).collect(),
+        friction: (0..6).map(|j| JointFriction::plain(j, solution.friction(j))).collect(),
+        additions: Additions::default(),
+    };
+    let direct = spread(&data, &model.residual(&body, &data, &[]));
+    for j in 0..6 {
+        approx::assert_relative_eq!(reduced.rms[j], direct.rms[j], max_relative = 1e-3);
+        approx::assert_relative_eq!(reduced.relative[j], direct.relative[j], max_relative = 1e-3);
+    }
+    let other = Summary::new(&body, &DataOptions { cutoff: 5.0, ..options });
+    assert!(solution.on(&other).is_err());
 }
 
 #[test]

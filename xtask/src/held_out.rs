@@ -1,0 +1,167 @@
+//! What the base model leaves of each log when it is fitted to the others, beside a plain model on the same rows.
+
+use dyngen::Arm;
+use faer::Mat;
+use powerball::estimate::{
+    FrictionLaw, Solver, Spread, reduce_in_bands, solve_in_band, solve_reduced, spread_of,
+};
+use powerball::log::read_logs;
+use powerball::regression::{DataOptions, RigidBody};
+use powerball::summary::{BANDS, Bands, Octaves, Powers, Summary, Triangle};
+use std::path::PathBuf;
+
+/// Which logs, and how they are seen.
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// The arm file
+    #[arg(long)]
+    arm: PathBuf,
+    /// The logs: each is held out once
+    #[arg(long, num_args = 2.., required = true)]
+    log: Vec<PathBuf>,
+}
+
+/// Sums of squares of errors and of torques of one log, by joint.
+type Squares = Vec<(f64, f64)>;
+
+/// Prints what is left of each joint's torque: log by log, their mean, and all samples together.
+pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
+    let arm = Arm::read(&arguments.arm).map_err(|e| e.to_string())?;
+    let body = RigidBody::new(&arm).map_err(|e| e.to_string())?;
+    let (logs, _) = read_logs(&arguments.log, &arm).map_err(|e| e.to_string())?;
+    let names: Vec<String> =
+        logs.iter().map(|l| l.file.rsplit('/').next().unwrap_or_default().to_string()).collect();
+    let reduced = |log| {
+        let reduced = reduce_in_bands(&body, log, &DataOptions::default());
+        reduced.map(|(bands, _)| bands).map_err(|e| e.to_string())
+    };
+    let logs = logs.iter().map(reduced).collect::<Result<Vec<Bands>, String>>()?;
+    let mut tables: Vec<[Vec<Squares>; 2]> = vec![Default::default(); BANDS.len() + 1];
+    println!(
+        "In each octave between bands, the model's power over that of what it leaves, by joint; and the bands' ends"
+    );
+    for (k, held_out) in logs.iter().enumerate() {
+        let mut others = Bands::new(&body, &DataOptions::default());
+        for (_, other) in logs.iter().enumerate().filter(|(other, _)| *other != k) {
+            others.merge(other).map_err(|e| e.to_string())?;
+        }
+        let asked = solve_in_band(&others, FrictionLaw::Symmetric).bands;
+        told(&names[k], &others, &asked);
+        let common = (0..BANDS.len()).map(|band| vec![band; arm.dof()]);
+        for (bands, [base, rival]) in std::iter::once(asked).chain(common).zip(&mut tables) {
+            let (others, held_out) = (others.of_joints(&bands), held_out.of_joints(&bands));
+            let solution = solve_reduced(&others, FrictionLaw::Symmetric);
+            let there = solution.on(&held_out).map_err(|e| e.to_string())?;
+            base.push(squares(&spread_of(&there, &there.theta), &held_out));
+            rival.push(Plain::fit(&others).squares(&held_out));
+        }
+    }
+    let titles = std::iter::once("the bands that the fitted logs ask for".to_string())
+        .chain(BANDS.iter().map(|band| format!("0 to {band} Hz")));
+    for (title, [base, rival]) in titles.zip(&tables) {
+        println!("\nHeld-out error over torque by joint, {title}: Eq. 16");
+        table(&names, base);
+        println!("The same rows, plain: rigid body, rotors, Coulomb, viscous and constant friction");
+        table(&names, rival);
+    }
+    Ok(())
+}
+
+/// Prints what the bands were chosen by.
+fn told(name: &str, others: &Bands, asked: &[usize]) {
+    for octave in 0..BANDS.len() - 1 {
+        let ratio = |powers: &Powers| format!("{:5.1}", powers[octave][0] / powers[octave][1]);
+        let ratios: Vec<String> = others.spectrum().iter().map(ratio).collect();
+        println!(
+            "without {name:<16}{:>4} to {:>2} Hz: {}",
+            BANDS[octave + 1],
+            BANDS[octave],
+            ratios.join(" ")
+        );
+    }
+    let ends: Vec<String> = asked.iter().map(|band| format!("{:5}", BANDS[*band])).collect();
+    println!("{:<40}{} Hz", "", ends.join(" "));
+}
+
+fn squares(spread: &Spread, held_out: &Summary) -> Squares {
+    let joints = spread.rms.iter().zip(&spread.relative).zip(&held_out.joints);
+    let of_joint = |((rms, share), octaves): ((&f64, &f64), &Octaves)| {
+        let rows = octaves.rows() as f64;
+        (rows * rms * rms, rows * (rms / share).powi(2))
+    };
+    joints.map(of_joint).collect()
+}
+
+fn table(names: &[String], logs: &[Squares]) {
+    let line = |name: &str, share: &dyn Fn(usize) -> f64| {
+        let shares: Vec<String> = (0..logs[0].len()).map(|j| format!("{:5.1} %", 100.0 * share(j))).collect();
+        println!("{name:<24}{}", shares.join(" "));
+    };
+    let share = |log: &Squares, j: usize| (log[j].0 / log[j].1).sqrt();
+    for (name, log) in names.iter().zip(logs) {
+        line(name, &|j| share(log, j));
+    }
+    line("mean of the logs", &|j| logs.iter().map(|log| share(log, j)).sum::<f64>() / logs.len() as f64);
+    line("all samples together", &|j| {
+        let sum = |of: fn(&(f64, f64)) -> f64| logs.iter().map(|log| of(&log[j])).sum::<f64>();
+        (sum(|s| s.0) / sum(|s| s.1)).sqrt()
+    });
+}
+
+/// The plain model: linear, joints weighted by what they leave.
+struct Plain {
+    /// The minimal set, then viscous, constant and Coulomb friction by joint.
+    theta: Vec<f64>,
+}
+
+/// Columns of its friction.
+const FRICTION: usize = 3;
+
+impl Plain {
+    fn fit(summary: &Summary) -> Plain {
+        let (p, torque) = (summary.identity.parameters.len(), summary.columns().torque());
+        let size = p + FRICTION * summary.joints.len();
+        let joints: Vec<Triangle> = summary.joints.iter().map(Octaves::total).collect();
+        let mut plain = Plain { theta: vec![0.0; size] };
+        for _ in 0..4 {
+            let (mut gram, mut right) = (Mat::<f64>::zeros(size, size), vec![0.0; size]);
+            let left = plain.squares(summary);
+            for (j, rows) in joints.iter().enumerate().filter(|(j, _)| left[*j].0 > 0.0) {
+                let weight = rows.rows() as f64 / left[j].0;
+                let dot = |a: usize, b: usize| -> f64 {
+                    rows.column(a).iter().zip(rows.column(b)).map(|(x, y)| x * y).sum()
+                };
+                let columns = columns(summary, j);
+                for (a, at) in &columns {
+                    right[*at] += weight * dot(*a, torque);
+                    columns.iter().for_each(|(b, to)| gram[(*at, *to)] += weight * dot(*a, *b));
+                }
+            }
+            plain.theta = Solver::new(&gram, |_| true).solve(&right);
+        }
+        plain
+    }
+
+    fn squares(&self, summary: &Summary) -> Squares {
+        let of_joint = |(j, octaves): (usize, &Octaves)| {
+            let rows = octaves.total();
+            let torque = rows.column(summary.columns().torque());
+            let mut left = torque.to_vec();
+            for (column, at) in columns(summary, j) {
+                left.iter_mut().zip(rows.column(column)).for_each(|(l, c)| *l -= self.theta[at] * c);
+            }
+            let sum = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+            (sum(&left), sum(torque))
+        };
+        summary.joints.iter().enumerate().map(of_joint).collect()
+    }
+}
+
+/// The columns of a joint's rows that the plain model takes, and where their coefficients stand.
+fn columns(summary: &Summary, joint: usize) -> Vec<(usize, usize)> {
+    let (p, columns) = (summary.identity.parameters.len(), summary.columns());
+    // The first node is the steepest: a step for all that is measurable.
+    let friction = [columns.viscous(), columns.constant(), columns.node(0)];
+    let friction = friction.into_iter().enumerate().map(|(k, c)| (c, p + FRICTION * joint + k));
+    (0..p).map(|c| (c, c)).chain(friction).collect()
+}
