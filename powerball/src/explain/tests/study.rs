@@ -40,6 +40,15 @@ fn one_missing_effect_is_named_with_its_figures() {
     for explained in [load, payload, ripple] {
         let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
         assert!(before.iter().zip(after).any(|(b, a)| *a < 0.95 * b), "{before:?} {after:?}");
+        for change in &explained.held_out_change {
+            let (b, a) = (before[change.joint - 1], after[change.joint - 1]);
+            approx::assert_relative_eq!(change.rms, a / b - 1.0, epsilon = 1e-9);
+            assert!(change.interval[0] < change.rms && change.rms < change.interval[1]);
+        }
+        // What the joint gained is sure, and no joint surely lost.
+        let surely =
+            |wanted: fn([f64; 2]) -> bool| explained.held_out_change.iter().any(|c| wanted(c.interval));
+        assert!(surely(|[_, high]| high < 0.0) && !surely(|[low, _]| low > 0.0));
     }
 }
 
