@@ -6,27 +6,22 @@ use super::forward::{Accepted, Session};
 use super::rule;
 use super::screen::dot;
 use crate::estimate::Solver;
+use crate::summary::{OCTAVES, halved};
 use faer::Mat;
 
-/// Octaves that are looked at, the fastest first; what is slower is taken together.
-const OCTAVES: usize = 7;
+/// By octave, fast to slow: how much larger or smaller the effect is there than over all, as a share, and the standard error of that.
+type ByOctave = [(f64, f64); OCTAVES];
 
-/// By octave: how much larger or smaller the effect is there than over all, as a share, and the standard error of that.
-type ByOctave = [(f64, f64); OCTAVES + 1];
-
-/// What a signal holds by octave (Haar's transform). What is left over at an odd end is left out.
-fn octaves(signal: &[f64]) -> [Vec<f64>; OCTAVES + 1] {
-    let mut level = signal.to_vec();
+/// What a signal holds by octave. An odd end is left out: by itself it tells fast from slow no more.
+fn octaves(signal: &[f64]) -> [Vec<f64>; OCTAVES] {
+    let mut slower = signal.to_vec();
     std::array::from_fn(|octave| {
-        if octave == OCTAVES {
-            return std::mem::take(&mut level);
+        if octave + 1 == OCTAVES {
+            return std::mem::take(&mut slower);
         }
-        let pairs = |join: fn(f64, f64) -> f64| -> Vec<f64> {
-            level.chunks_exact(2).map(|p| join(p[0], p[1]) * std::f64::consts::FRAC_1_SQRT_2).collect()
-        };
-        let (details, means) = (pairs(|a, b| a - b), pairs(|a, b| a + b));
-        level = means;
-        details
+        let (differences, sums) = halved(&slower);
+        slower = sums;
+        differences
     })
 }
 
@@ -62,12 +57,12 @@ impl Session<'_> {
                 *a -= fit.theta[c] * share;
             }
         }
-        let (mut along, mut square) = ([0.0; OCTAVES + 1], [0.0; OCTAVES + 1]);
+        let (mut along, mut square) = ([0.0; OCTAVES], [0.0; OCTAVES]);
         for j in 0..fit.design.dof() {
             let explained = fit.design.predict(j, &alone);
             for rows in &self.data.joints[j].rows {
                 let (x, e) = (octaves(&explained[rows.clone()]), octaves(&fit.residual[j][rows.clone()]));
-                for o in 0..=OCTAVES {
+                for o in 0..OCTAVES {
                     along[o] += fit.weights[j] * dot(&x[o], &e[o]);
                     square[o] += fit.weights[j] * dot(&x[o], &x[o]);
                 }

@@ -12,7 +12,7 @@ mod triangle;
 
 pub use bands::{BANDS, Bands, Powers};
 pub use file::SummaryError;
-pub use octaves::{OCTAVES, Octaves, SLOW};
+pub use octaves::{OCTAVES, Octaves, SLOW, halved};
 pub use reduce::Columns;
 pub(crate) use reduce::parts;
 pub use steepness::{NODES, Steepness};

@@ -14,6 +14,13 @@ pub const OCTAVES: usize = 8;
 /// Octaves from this one on are slower than the means over one second that weights are made of.
 pub const SLOW: usize = 5;
 
+/// The differences and the sums of neighbours over √2; a last value without a neighbour is in neither.
+#[must_use]
+pub fn halved(signal: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let turned = |p: &[f64]| ((p[0] - p[1]) * FRAC_1_SQRT_2, (p[0] + p[1]) * FRAC_1_SQRT_2);
+    signal.chunks_exact(2).map(turned).unzip()
+}
+
 /// One factor an octave, from fast to slow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Octaves {
@@ -62,24 +69,19 @@ impl Octaves {
         let last = self.levels.len() - 1;
         for level in &mut self.levels[..last] {
             let count = sums.first().map_or(0, Vec::len);
-            // A row without a neighbour stays as it is.
             let differences: Vec<Vec<f64>> = sums
-                .iter()
+                .iter_mut()
                 .map(|x| {
-                    let pairs = x.chunks_exact(2);
-                    let lone = pairs.remainder().to_vec();
-                    pairs.map(|p| (p[0] - p[1]) * FRAC_1_SQRT_2).chain(lone).collect()
+                    let (mut differences, slower) = halved(x);
+                    // A row without a neighbour stays as it is.
+                    differences.extend_from_slice(&x[count - count % 2..]);
+                    *x = slower;
+                    differences
                 })
                 .collect();
             level.push(&differences.iter().map(Vec::as_slice).collect::<Vec<_>>());
             if count < 2 {
                 return;
-            }
-            for x in &mut sums {
-                for i in 0..count / 2 {
-                    x[i] = (x[2 * i] + x[2 * i + 1]) * FRAC_1_SQRT_2;
-                }
-                x.truncate(count / 2);
             }
         }
         self.levels[last].push(&sums.iter().map(Vec::as_slice).collect::<Vec<_>>());
