@@ -2,7 +2,7 @@
 //! before and after. Figures show means over many samples; the logs themselves stay where they are.
 
 use dyngen::Arm;
-use powerball::explain::{Explained, NamedEffect, Shown, error_bars, explain, sight};
+use powerball::explain::{Explained, NamedEffect, Shown, error_bars, explain, figures, sight};
 use powerball::log::{common_clock, read_logs};
 use powerball::regression::{DataOptions, RigidBody};
 use std::fmt::Write as _;
@@ -202,22 +202,6 @@ fn evidence(page: &mut String, effect: &NamedEffect) {
         for rival in &effect.rivals {
             let _ = writeln!(page, "| {} | {} |", rival.effect, rival.why_not);
         }
-    }
-}
-
-/// Numbers of a result with three digits.
-fn figures(value: &serde_json::Value) -> String {
-    use serde_json::Value;
-    match value {
-        Value::Object(map) => {
-            map.iter().map(|(k, v)| format!("{k} {}", figures(v))).collect::<Vec<_>>().join(", ")
-        }
-        Value::Array(values) => format!("({})", values.iter().map(figures).collect::<Vec<_>>().join(" ")),
-        Value::Number(number) => {
-            number.as_f64().map_or_else(|| number.to_string(), powerball::report::number)
-        }
-        Value::String(text) => text.clone(),
-        other => other.to_string(),
     }
 }
 

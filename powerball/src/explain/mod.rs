@@ -34,7 +34,7 @@ pub use correction::{Correction, Curve};
 pub use curves::{TorqueCurve, curves};
 pub use forward::{ExplainError, Options, RuledOut, Session, explain, explain_with};
 pub use open::{Hypothesis, Open};
-pub use page::{add_to_page, error_bars, sight};
+pub use page::{add_to_page, error_bars, figures, sight};
 pub use result::{Change, Explained, NamedEffect, Rival, Unattributed};
 pub use shown::Shown;
 

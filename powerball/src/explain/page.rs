@@ -238,7 +238,8 @@ fn corrections(page: &mut Page, explained: &Explained) {
 }
 
 /// `{"mass": 1.5, "com": [0, 0, 0.1]}` as `mass 1.50, com (0, 0, 0.100)`.
-fn figures(parameters: &Value) -> String {
+#[must_use]
+pub fn figures(parameters: &Value) -> String {
     match parameters {
         Value::Object(map) => map
             .iter()
