@@ -19,6 +19,10 @@ impl Effect for BaseTilt {
         Class::Position
     }
 
+    fn of_the_body(&self) -> bool {
+        true
+    }
+
     fn shown_by(&self, _: &Candidate) -> Axis {
         Axis::Law
     }

@@ -16,6 +16,10 @@ impl Effect for BrokenSymmetry {
         Class::Position
     }
 
+    fn of_the_body(&self) -> bool {
+        true
+    }
+
     fn shown_by(&self, _: &Candidate) -> Axis {
         Axis::Law
     }

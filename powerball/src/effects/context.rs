@@ -43,7 +43,7 @@ impl<'a> Context<'a> {
     /// Torque of the rigid arm by recording, n a sample, N·m.
     pub fn rigid(&self) -> &[Vec<f64>] {
         self.rigid.get_or_init(|| {
-            let torque = |r: &Recording| self.data.body.torque(&r.q, &r.v, &r.a, self.fit.inertial());
+            let torque = |r: &Recording| self.fit.rigid_torque(self.data.body, &r.q, &r.v, &r.a);
             self.data.recordings.iter().map(torque).collect()
         })
     }
@@ -118,7 +118,7 @@ impl<'a> Context<'a> {
                 let mut motion = [recording.q.clone(), recording.v.clone(), recording.a.clone()];
                 move_link(&mut motion, recording, rigid, joint, law, size);
                 let [q, v, a] = motion;
-                let moved = self.data.body.torque(&q, &v, &a, self.fit.inertial());
+                let moved = self.fit.rigid_torque(self.data.body, &q, &v, &a);
                 moved.iter().zip(rigid).map(|(a, b)| (a - b) / size).collect()
             })
             .collect();

@@ -35,7 +35,7 @@ impl Effect for EncoderOffset {
         let shifted = |r: &Recording| {
             let mut q = r.q.clone();
             q.iter_mut().skip(j).step_by(r.dof).for_each(|q| *q -= offset);
-            context.data.body.torque(&q, &r.v, &r.a, context.fit.inertial())
+            context.fit.rigid_torque(context.data.body, &q, &r.v, &r.a)
         };
         let difference: Vec<Vec<f64>> = context
             .data

@@ -93,6 +93,11 @@ pub trait Effect: Sync {
         self.class() == Class::Event
     }
 
+    /// Whether it is a property of the body that all joints share.
+    fn of_the_body(&self) -> bool {
+        false
+    }
+
     /// The signal over which a joint's residual shows it.
     fn shown_by(&self, candidate: &Candidate) -> Axis;
 

@@ -25,6 +25,10 @@ impl Effect for Payload {
         Class::Event
     }
 
+    fn of_the_body(&self) -> bool {
+        true
+    }
+
     fn shown_by(&self, _: &Candidate) -> Axis {
         Axis::Time
     }

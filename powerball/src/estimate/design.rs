@@ -10,7 +10,8 @@ use std::ops::Range;
 
 /// The regression columns for given friction shapes and terms.
 ///
-/// Global order: the minimal set, `FRICTION` columns a joint, the terms' columns.
+/// Global order: the minimal set (one after the other for each joint, where [`Data::joints_apart`]), `FRICTION` columns a joint,
+/// the terms' columns.
 #[derive(Debug)]
 pub struct Design {
     /// Joint by joint: columns, column-major.
@@ -21,6 +22,8 @@ pub struct Design {
     pub size: usize,
     /// Inertial columns.
     pub inertial: usize,
+    /// Those of one joint.
+    pub set: usize,
 }
 
 #[derive(Debug)]
@@ -35,7 +38,9 @@ impl Design {
     /// Lays out the columns; `friction[j]` are joint j's `FRICTION` columns.
     #[must_use]
     pub fn new(data: &Data<'_>, friction: &[[Vec<f64>; FRICTION]], extra: &[Column]) -> Design {
-        let (n, p) = (data.dof(), data.body.names().len());
+        let (n, p) = (data.dof(), data.inertial_columns());
+        let layout = Layout::of(data, extra.len());
+        let own = |j: usize| if data.joints_apart { p * j } else { 0 };
         let joints = (0..n)
             .map(|j| {
                 let rows = data.joints[j].len();
@@ -45,24 +50,23 @@ impl Design {
                     // Links inside a joint do not load it: those columns are zero.
                     if column.iter().any(|v| *v != 0.0) {
                         values.extend_from_slice(column);
-                        global.push(c);
+                        global.push(own(j) + c);
                     }
                 }
                 for (k, column) in friction[j].iter().enumerate() {
                     values.extend_from_slice(column);
-                    global.push(p + FRICTION * j + k);
+                    global.push(layout.friction(j, k));
                 }
                 for (e, column) in extra.iter().enumerate() {
                     if let Some(column) = column.at(j) {
                         values.extend_from_slice(column);
-                        global.push(p + FRICTION * n + e);
+                        global.push(layout.extra(e));
                     }
                 }
                 Local { rows, values, global }
             })
             .collect();
-        let layout = Layout { inertial: p, dof: n, extra: extra.len() };
-        Design { joints, layout, size: layout.size(), inertial: p }
+        Design { joints, layout, size: layout.size(), inertial: layout.inertial, set: p }
     }
 
     /// Joints.

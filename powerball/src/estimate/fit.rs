@@ -5,7 +5,7 @@ use super::folds::Folds;
 use super::friction_shape::{self, Trials};
 use super::vary::{FRICTION, Layout, Products, Rows, Scatter, Start, vary};
 use crate::parallel;
-use crate::regression::{Column, Data};
+use crate::regression::{Column, Data, RigidBody};
 use faer::Mat;
 
 /// A column that was added to the base model.
@@ -49,10 +49,28 @@ impl Fit {
         self.design.layout.gamma(&self.theta, joint, self.shapes[joint])
     }
 
-    /// The minimal set's values.
+    /// The minimal set's values; where joints were fitted apart, the first joint's.
     #[must_use]
     pub fn inertial(&self) -> &[f64] {
-        &self.theta[..self.design.inertial]
+        &self.theta[..self.design.set]
+    }
+
+    /// Torque of the rigid arm along a motion, n a sample, N·m.
+    #[must_use]
+    pub fn rigid_torque(&self, body: &RigidBody, q: &[f64], v: &[f64], a: &[f64]) -> Vec<f64> {
+        let set = self.design.set;
+        let by_set = |theta: &[f64]| body.torque(q, v, a, &theta[..body.names().len()]);
+        if self.design.inertial == set {
+            return by_set(self.inertial());
+        }
+        let mut torque = vec![0.0; q.len()];
+        let n = self.design.dof();
+        for (j, own) in self.theta[..self.design.inertial].chunks_exact(set).enumerate() {
+            for (to, from) in torque.iter_mut().zip(by_set(own)).skip(j).step_by(n) {
+                *to = from;
+            }
+        }
+        torque
     }
 
     /// Coefficient of a term's column.
@@ -105,7 +123,7 @@ impl Rows for InMemory<'_> {
     type At = (Design, Gram);
 
     fn layout(&self) -> Layout {
-        Layout { inertial: self.data.body.names().len(), dof: self.data.dof(), extra: self.extra.len() }
+        Layout::of(self.data, self.extra.len())
     }
 
     fn moves(&self, joint: usize) -> bool {

@@ -4,6 +4,7 @@
 
 use super::friction_shape::{self, Trials};
 use super::solve::{Solver, bounded};
+use crate::regression::Data;
 use faer::Mat;
 
 /// Friction columns of a joint: two saturating levels, the viscous one, and the two tangents of the shapes.
@@ -21,6 +22,13 @@ pub struct Layout {
 }
 
 impl Layout {
+    /// That of some data's rows.
+    #[must_use]
+    pub fn of(data: &Data<'_>, extra: usize) -> Layout {
+        let (dof, set) = (data.dof(), data.inertial_columns());
+        Layout { inertial: if data.joints_apart { dof * set } else { set }, dof, extra }
+    }
+
     /// Columns in all.
     #[must_use]
     pub fn size(&self) -> usize {

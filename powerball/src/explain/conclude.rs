@@ -27,12 +27,11 @@ impl Session<'_> {
             .collect()
     }
 
-    pub(super) fn result(
-        mut self,
-        before: Errors,
-        base_residual: &[Vec<f64>],
-    ) -> Result<Explained, ExplainError> {
-        let Composed { model, fitted, held_out: residual } = self.composed()?;
+    pub(super) fn result(mut self) -> Result<Explained, ExplainError> {
+        let (before, base_residual) = (self.before.clone(), std::mem::take(&mut self.base_residual));
+        let base_residual = base_residual.as_slice();
+        let Composed { model, fitted, held_out: residual } =
+            if self.data.joints_apart { self.composed_apart()? } else { self.composed()? };
         let after = Errors { fit: spread(&self.data, &fitted), validate: spread(&self.other, &residual) };
         let curves = curves(&self.other, base_residual, &residual);
         let floor = noise_floor(&self.data);
@@ -90,8 +89,7 @@ impl Session<'_> {
             })
         });
         let effective_samples = effective_samples(&self.data, &self.fit.residual);
-        self.false_positives.rate =
-            self.false_positives.accepted as f64 / (self.false_positives.placebos.max(1)) as f64;
+        self.false_positives.rate = self.false_positives.share();
         Ok(Explained {
             arm: self.data.body.arm().name.clone(),
             held_out_change: changes(&self.other, base_residual, &residual),
@@ -104,7 +102,8 @@ impl Session<'_> {
             unattributed,
             next_experiment,
             experiment: None,
-            open: open.map(Arc::new),
+            // An experiment moves a body.
+            open: open.filter(|_| !self.data.joints_apart).map(Arc::new),
             false_positives: self.false_positives.clone(),
             warnings: self.doubts(),
             curves,

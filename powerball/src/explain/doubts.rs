@@ -1,7 +1,7 @@
 //! What these logs cannot show, and what to record instead.
 
+use super::apart::APART;
 use super::forward::Session;
-use super::running_time::BESIDE;
 
 /// Said where the logs to judge on are repeats.
 const ONE_PATH: &str = "the logs of --validate run the same path as those of --log: what depends on positions (springs, zeros, \
@@ -21,7 +21,13 @@ impl Session<'_> {
             }
         }
         let unseen: Vec<&str> = (self.data.body.names().iter().enumerate())
-            .filter(|(c, _)| !self.fit.free[*c])
+            .filter(|(c, _)| {
+                !self.fit.free[..self.fit.design.inertial]
+                    .iter()
+                    .skip(*c)
+                    .step_by(self.fit.design.set)
+                    .any(|f| *f)
+            })
             .map(|(_, name)| name.as_str())
             .collect();
         if !unseen.is_empty() {
@@ -37,12 +43,13 @@ impl Session<'_> {
                 "the logs to fit hold {seconds:.0} s: too little to tell small effects from chance; record several paths of 20 s or more"
             ));
         }
+        if self.data.joints_apart {
+            doubts.push(APART.to_string());
+        }
         if self.one_path {
             doubts.push(ONE_PATH.to_string());
         }
-        if self.beside {
-            doubts.push(BESIDE.to_string());
-        }
+        doubts.extend(self.clock.note().map(str::to_string));
         let placebos = &self.false_positives;
         if placebos.accepted as f64 > MANY * placebos.placebos as f64 && placebos.accepted > 2 {
             doubts.push(format!(

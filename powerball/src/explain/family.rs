@@ -26,6 +26,8 @@ pub(super) struct Member {
     /// Filled in once tested.
     pub(super) evidence: Option<Evidence>,
     pub(super) refusal: Option<String>,
+    /// Whether the logs to judge on can tell it from any other misfit.
+    pub(super) judged: bool,
 }
 
 impl Family {
@@ -37,6 +39,12 @@ impl Family {
             .filter(|m| m.candidate.joints.iter().any(|j| joints.contains(j)))
             .map(|m| m.trial.score.max(0.0))
             .sum()
+    }
+
+    /// Whether anything of it on the given joints can be judged.
+    #[must_use]
+    pub(super) fn judged_on(&self, joints: &[usize]) -> bool {
+        self.members.iter().any(|m| m.judged && m.candidate.joints.iter().any(|j| joints.contains(j)))
     }
 
     /// Why its best member on the given joints was refused.
@@ -88,6 +96,9 @@ impl Session<'_> {
         let mut families = Vec::new();
         for (e, candidates) in lists {
             let effect = self.effects[e].as_ref();
+            if self.data.joints_apart && effect.of_the_body() {
+                continue;
+            }
             let open: Vec<Candidate> = (candidates.into_iter())
                 .filter(|c| !self.has(e, c) && !self.is_ruled_out(effect.name(), c))
                 .collect();
@@ -99,7 +110,15 @@ impl Session<'_> {
                 match members.iter_mut().find(|m| m.candidate.joints == candidate.joints) {
                     Some(member) if member.trial.score >= trial.score => {}
                     Some(member) => (member.candidate, member.trial) = (candidate, trial),
-                    None => members.push(Member { candidate, trial, evidence: None, refusal: None }),
+                    None => {
+                        members.push(Member {
+                            candidate,
+                            trial,
+                            evidence: None,
+                            refusal: None,
+                            judged: true,
+                        });
+                    }
                 }
             }
             for member in &mut members {
@@ -118,7 +137,7 @@ impl Session<'_> {
                 } else if let Some(reason) =
                     self.one_path.then(|| cannot_be_judged(effect, &member.candidate, &self.data)).flatten()
                 {
-                    member.refusal = Some(reason);
+                    (member.refusal, member.judged) = (Some(reason), false);
                 } else if self.gave_up(e, &member.candidate) {
                     member.refusal = Some("did not last, or could not be told from its rivals".to_string());
                 } else if let Some(name) = self.mends(screen, e, member) {

@@ -10,7 +10,7 @@ use super::other_path::payload_on;
 use super::placebo::placebos;
 use super::result::{Errors, Explained, FalsePositives, NamedEffect, Rival};
 use super::rule;
-use super::running_time;
+use super::running_time::{self, Clock};
 use super::screen::{Screen, Trial};
 use crate::effects::{self, Candidate, Context, Effect};
 use crate::estimate::{Design, Fit, Folds, Solver, fit, friction_columns, noise_floor, spread};
@@ -85,14 +85,17 @@ const FINAL_PLACEBOS: usize = 200;
 
 /// An explanation in progress.
 pub struct Session<'a> {
+    /// Errors of the base model, and what it leaves on the other path.
+    pub(super) before: Errors,
+    pub(super) base_residual: Vec<Vec<f64>>,
     /// What is in logs of the other path only; its torque is taken out of them.
     pub(super) held: Option<NamedEffect>,
     pub(super) data: Data<'a>,
     pub(super) other: Data<'a>,
     /// Whether the other logs run the path of the fitted ones.
     pub(super) one_path: bool,
-    /// Whether the other logs are taken to have been recorded in between the fitted ones.
-    pub(super) beside: bool,
+    /// When the logs are taken to have been recorded.
+    pub(super) clock: Clock,
     pub(super) folds: Folds,
     pub(super) effects: Vec<Box<dyn Effect>>,
     pub(super) accepted: Vec<Accepted>,
@@ -163,56 +166,91 @@ pub fn explain_with(
     progress: &dyn Fn(&str),
 ) -> Result<Explained, ExplainError> {
     progress("preparing signals");
-    let data = Data::new(body, logs, options).map_err(ExplainError::Fit)?;
-    let mut other = Data::new(body, validate, options).map_err(ExplainError::Validate)?;
-    progress("fitting the base model");
-    let folds = Folds::new(&data);
-    let base = fit(&data, &folds, &[], None);
-    let held_out = base.residual_on(&other, &[]);
-    let before = Errors { fit: spread(&data, &base.residual), validate: spread(&other, &held_out) };
-    let held =
-        payload_on(body, logs, validate, options, &base, &mut other).map_err(ExplainError::Validate)?;
-    let one_path = repeats(&data, &other);
-    let beside = running_time::settle(logs, validate, &data, &base, &mut other);
-    let mut session = Session {
-        held,
-        one_path,
-        beside,
-        data,
-        other,
-        folds,
-        effects: effects::all(),
-        accepted: Vec::new(),
-        steps: Vec::new(),
-        fit: base,
-        false_positives: FalsePositives { family_wise: rule::FAMILY_WISE, ..FalsePositives::default() },
-        refused: Vec::new(),
-        given_up: Vec::new(),
-        told: told.clone(),
-        questions: Vec::new(),
-    };
-    for step in 0..rule::MOST_STEPS {
-        progress(&format!("step {}: screening candidates", step + 1));
-        match session.step(step) {
-            Some(Stepped::Accepted(name)) => progress(&format!("step {}: {name} accepted", step + 1)),
-            Some(Stepped::Chance) => {
-                progress(&format!("step {}: what fits best fits no better than placebos", step + 1));
-            }
-            // Only now is it known what is left beside all that fits.
-            None => match session.withhold() {
-                Some((name, why)) => progress(&format!("{name} is not named: {why}")),
-                None => break,
-            },
+    let mut session = Session::begin(body, logs, validate, options, told, false, progress)?;
+    session.run(progress);
+    if session.one_path {
+        progress("one path: joints by themselves");
+        let mut apart = Session::begin(body, logs, validate, options, told, true, progress)?;
+        apart.run(progress);
+        if apart.predicts_better_than(&session) {
+            session = apart;
         }
     }
-    while session.withhold().is_some() {}
-    progress("asking placebos");
-    session.count_false_positives();
     progress("looking at what is left");
-    session.result(before, &held_out)
+    session.result()
+}
+
+impl<'a> Session<'a> {
+    /// Fits the base model; `apart` gives every joint inertial parameters of its own.
+    pub(super) fn begin(
+        body: &'a RigidBody,
+        logs: &[Log],
+        validate: &[Log],
+        options: &DataOptions,
+        told: &Options,
+        apart: bool,
+        progress: &dyn Fn(&str),
+    ) -> Result<Session<'a>, ExplainError> {
+        let mut data = Data::new(body, logs, options).map_err(ExplainError::Fit)?;
+        let mut other = Data::new(body, validate, options).map_err(ExplainError::Validate)?;
+        data.take_apart(apart);
+        other.take_apart(apart);
+        progress("fitting the base model");
+        let folds = Folds::new(&data);
+        let base = fit(&data, &folds, &[], None);
+        let held_out = base.residual_on(&other, &[]);
+        let before = Errors { fit: spread(&data, &base.residual), validate: spread(&other, &held_out) };
+        let held = match apart {
+            true => None,
+            false => payload_on(body, logs, validate, options, &base, &mut other)
+                .map_err(ExplainError::Validate)?,
+        };
+        let one_path = repeats(&data, &other);
+        let clock = running_time::settle(logs, validate, &mut data, &base, &mut other);
+        Ok(Session {
+            before,
+            base_residual: held_out,
+            held,
+            one_path,
+            clock,
+            data,
+            other,
+            folds,
+            effects: effects::all(),
+            accepted: Vec::new(),
+            steps: Vec::new(),
+            fit: base,
+            false_positives: FalsePositives { family_wise: rule::FAMILY_WISE, ..FalsePositives::default() },
+            refused: Vec::new(),
+            given_up: Vec::new(),
+            told: told.clone(),
+            questions: Vec::new(),
+        })
+    }
 }
 
 impl Session<'_> {
+    /// Adds one effect after the other until nothing passes.
+    pub(super) fn run(&mut self, progress: &dyn Fn(&str)) {
+        for step in 0..rule::MOST_STEPS {
+            progress(&format!("step {}: screening candidates", step + 1));
+            match self.step(step) {
+                Some(Stepped::Accepted(name)) => progress(&format!("step {}: {name} accepted", step + 1)),
+                Some(Stepped::Chance) => {
+                    progress(&format!("step {}: what fits best fits no better than placebos", step + 1));
+                }
+                // Only now is it known what is left beside all that fits.
+                None => match self.withhold() {
+                    Some((name, why)) => progress(&format!("{name} is not named: {why}")),
+                    None => break,
+                },
+            }
+        }
+        while self.withhold().is_some() {}
+        progress("asking placebos");
+        self.count_false_positives();
+    }
+
     /// One step of the loop; `None` where nothing passes.
     fn step(&mut self, step: usize) -> Option<Stepped> {
         let other_residual = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
@@ -421,7 +459,7 @@ impl Session<'_> {
     }
 
     /// Refits everything; columns that depend on estimates are taken anew, twice.
-    fn refit(&mut self) {
+    pub(super) fn refit(&mut self) {
         let mut found: Vec<(usize, Candidate)> =
             self.accepted.iter().map(|a| (a.effect, a.candidate.clone())).collect();
         self.fit = refitted(&self.data, &self.folds, &self.effects, &mut found, &self.fit);

@@ -7,6 +7,7 @@
 //! `correction` takes off of it what it can, `shown` draws what each name is seen by, `compose` makes the model of what was
 //! accepted, `conclude` writes the result.
 
+mod apart;
 mod compose;
 mod conclude;
 mod constancy;

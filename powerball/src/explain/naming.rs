@@ -62,7 +62,9 @@ pub(super) fn compare(
         })
         .collect();
     let explained = explained(screen, &families[chosen], joints);
-    let close = others.iter().take_while(|(_, score)| own / score < rule::LEAST_MARGIN);
+    // What a repeated path cannot judge fits any misfit there: that it fits this one says nothing.
+    let close = (others.iter().take_while(|(_, score)| own / score < rule::LEAST_MARGIN))
+        .filter(|(f, _)| families[*f].judged_on(joints));
     let other = close
         .map(|(f, score)| (score, self::explained(screen, &families[*f], joints)))
         .find(|(_, theirs)| shared(&explained, theirs) < rule::SAME_PART);

@@ -141,3 +141,11 @@ pub struct FalsePositives {
     /// Family-wise level of the significance test.
     pub family_wise: f64,
 }
+
+impl FalsePositives {
+    /// The share of placebos that were accepted.
+    #[must_use]
+    pub(super) fn share(&self) -> f64 {
+        self.accepted as f64 / self.placebos.max(1) as f64
+    }
+}

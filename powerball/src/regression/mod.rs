@@ -1,5 +1,6 @@
 //! From logs to the rows of a regression: minimal-set regressor, friction columns, one band for all.
 
+mod apart;
 #[cfg(test)]
 pub(crate) mod newton_euler;
 mod prepare;

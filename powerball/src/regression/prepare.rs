@@ -77,6 +77,8 @@ pub struct Data<'a> {
     pub left_out: Vec<String>,
     /// What was left out or done, in words.
     pub notes: Vec<String>,
+    /// Whether joints are fitted apart (see [`Data::take_apart`]).
+    pub joints_apart: bool,
     top_speed: Vec<f64>,
     last_link: OnceLock<Vec<Column>>,
     force: OnceLock<Vec<Column>>,
@@ -184,6 +186,7 @@ impl<'a> Data<'a> {
             silent,
             left_out,
             notes,
+            joints_apart: false,
             top_speed,
             last_link: OnceLock::new(),
             force: OnceLock::new(),
@@ -209,6 +212,7 @@ impl<'a> Data<'a> {
             silent: self.silent.clone(),
             left_out: self.left_out.clone(),
             notes: self.notes.clone(),
+            joints_apart: false,
             top_speed: self.top_speed.clone(),
             last_link: OnceLock::new(),
             force: OnceLock::new(),

@@ -2,4 +2,5 @@ mod correction;
 mod measured;
 mod model;
 mod plant;
+mod repeats;
 mod study;
