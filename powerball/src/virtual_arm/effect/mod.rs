@@ -17,8 +17,8 @@ use serde::{Deserialize, Serialize};
 /// Elastic sliders that make up presliding.
 const SLIDERS: usize = 4;
 
-/// Stiffness of a gear's teeth once they touch, N·m/rad.
-const TEETH: f64 = 2.0e4;
+/// Stiffness of a gear's teeth once they touch, N·m/rad: so high that winding up is no second effect beside the play.
+const TEETH: f64 = 2.0e5;
 
 /// A gear that gives way: a spring between motor and link, with play.
 #[derive(Clone, Copy, Debug, PartialEq)]
