@@ -75,6 +75,13 @@ impl Bands {
         Ok(notes)
     }
 
+    /// The logs in the columns of another set of the same arm, as [`Summary::in_set`].
+    #[must_use]
+    pub fn in_set(&self, own: &RigidBody, general: &RigidBody) -> Option<Bands> {
+        let bands = self.bands.iter().map(|summary| summary.in_set(own, general));
+        Some(Bands { bands: bands.collect::<Option<_>>()? })
+    }
+
     /// Takes in what other logs of the same arm gave.
     ///
     /// # Errors
