@@ -7,7 +7,7 @@ use std::fmt;
 /// First word of every summary.
 const FORMAT: &str = "powerball summary";
 /// Raised whenever a reader of the version before would misread.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// Why a summary is of no use here.
 #[derive(Clone, Debug, PartialEq, Eq)]
