@@ -10,8 +10,17 @@ use crate::regression::{DataOptions, RigidBody};
 use crate::summary::Bands;
 use crate::virtual_arm::{Body, lwa4p};
 use dyngen::SetKind;
+use nalgebra::Vector3;
 
 const LAW: FrictionLaw = FrictionLaw::Symmetric;
+
+/// The virtual arm's links with the second one's centre 4 cm further along its z: the moments whose sum only one mounting sees
+/// would cancel else.
+fn links() -> Vec<Body> {
+    let mut links = lwa4p::links();
+    links[1] = links[1].moved(Vector3::new(0.0, 0.0, 0.04));
+    links
+}
 
 /// Logs as the base stood, reduced for the mounting that they are told to be of.
 fn reduced(stood: &str, told: &str, seed: u64, still: &[usize]) -> (RigidBody, Bands) {
@@ -20,7 +29,7 @@ fn reduced(stood: &str, told: &str, seed: u64, still: &[usize]) -> (RigidBody, B
     let body = RigidBody::mounted(&told.of(&arm).unwrap(), &arm).unwrap();
     let options = DataOptions::default();
     let mut bands = Bands::new(&body, &options);
-    let logs: Vec<Log> = record_mounted(stood.gravity(&arm), &sensors(), 2, 4, seed, still);
+    let logs: Vec<Log> = record_mounted(stood.gravity(&arm), links(), &sensors(), 2, 4, seed, still);
     for log in &logs {
         bands.merge(&reduce_in_bands(&body, log, &options).unwrap().0).unwrap();
     }
@@ -45,7 +54,7 @@ fn two_mountings_determine_what_one_does_not() {
     let parts = [reduced("filed", "filed", 1, &[]), reduced("90,0", "90,0", 2, &[])];
     let all = together(&parts);
     let (found, solution, spreads, contradictions) = fitted(&all);
-    let links: Vec<f64> = lwa4p::links().iter().flat_map(Body::parameters).collect();
+    let links: Vec<f64> = links().iter().flat_map(Body::parameters).collect();
     let truth = all.body.model().set_values(all.body.model().set(SetKind::Minimal).unwrap(), &links);
     let upright = parts[0].0.names();
     let mut unseen = 0;
@@ -55,6 +64,9 @@ fn two_mountings_determine_what_one_does_not() {
         if !upright.contains(&estimate.name) {
             let [low, high] = estimate.interval.unwrap();
             assert!(low <= *truth && *truth <= high, "{}", estimate.name);
+            if estimate.name == "mz2 + my3" {
+                assert!(truth.abs() > 20.0 * estimate.std.unwrap(), "next to nothing: {truth}");
+            }
             unseen += 1;
         }
     }

@@ -4,7 +4,7 @@ use crate::excite::{Fourier, Harmonics};
 use crate::log::Log;
 use crate::mounting::Mounting;
 use crate::regression::RigidBody;
-use crate::virtual_arm::{Body, Plant, Sensors, lwa4p};
+use crate::virtual_arm::{Body, Chain, Dynamics, Plant, Sensors, lwa4p};
 use dyngen::SetKind;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -25,12 +25,13 @@ pub(super) fn sensors() -> Sensors {
 /// Logs of random paths, each of `periods` times 10 s.
 pub(super) fn record(sensors: &Sensors, logs: usize, periods: usize, seed: u64) -> Vec<Log> {
     let filed = Mounting::Filed.gravity(&lwa4p::arm().unwrap());
-    record_mounted(filed, sensors, logs, periods, seed, &[])
+    record_mounted(filed, lwa4p::links(), sensors, logs, periods, seed, &[])
 }
 
-/// The same under any gravity in the base frame, with some joints held still.
+/// The same with other links under any gravity in the base frame, and some joints held still.
 pub(super) fn record_mounted(
     gravity: [f64; 3],
+    links: Vec<Body>,
     sensors: &Sensors,
     logs: usize,
     periods: usize,
@@ -38,8 +39,10 @@ pub(super) fn record_mounted(
     still: &[usize],
 ) -> Vec<Log> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let base = lwa4p::mounted(gravity).unwrap();
-    let plant = Plant::new(base.dynamics().clone(), base.friction().to_vec(), sensors.clone());
+    let mut chain = Chain::new(&lwa4p::arm().unwrap());
+    chain.gravity = gravity.into();
+    let friction = lwa4p::plant().unwrap().friction().to_vec();
+    let plant = Plant::new(Dynamics::new(chain, links).unwrap(), friction, sensors.clone());
     (0..logs)
         .map(|log| {
             let mut draw = |scale: f64| (0..5).map(|_| scale * rng.random_range(-1.0..1.0)).collect();
