@@ -2,6 +2,7 @@
 
 use crate::arm::{Arm, Parameter};
 use crate::base::sets::{Combination, ParameterSet, SetKind, Sets};
+use crate::base::span::Sum;
 use crate::dynamics::elements::angle_symbols;
 use crate::dynamics::function::{self, Subject};
 use crate::dynamics::regroup::{Order, Regrouping};
@@ -180,6 +181,12 @@ impl Model {
         let built = function::build(function, &subject, set, regroupings, baked, passes);
         prove::prove(&self.arm, &self.symbols, &self.sets, set, &built, baked)?;
         Ok(built)
+    }
+
+    /// The sums that a set's parameters stand for, in numbers.
+    pub fn sums(&self, set: &ParameterSet) -> Vec<Sum> {
+        let sum = |terms: &Combination| terms.iter().map(|(p, c)| (*p, self.sets.field.value(c))).collect();
+        set.parameters.iter().map(|p| sum(&p.terms)).collect()
     }
 
     /// The values of a set's parameters for given values of all parameters, eleven a link in the order of

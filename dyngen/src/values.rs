@@ -1,8 +1,11 @@
 //! Parameter values from a JSON file: `{"parameter": number, …}`, or a model with `"parameters": [{"name", "value"}, …]`.
 
 use crate::arm::Parameter;
+use crate::arm::sum::parse_sum;
+use crate::base::span::{Sum, combinations};
 use crate::base::{ParameterSet, SetKind};
 use crate::diagnostic::{Diagnostic, Diagnostics};
+use crate::exact::rational::to_f64;
 use crate::model::Model;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -76,8 +79,15 @@ impl Values {
         Err(Diagnostics(wrong.into_iter().map(diagnostic).collect()))
     }
 
-    /// The values of a set's parameters in order: given by the set's own names, or as values of the arm's parameters, of
-    /// which the set's sums are made.
+    /// Values that are there already; `file` names them in errors.
+    pub fn named<'n>(values: impl IntoIterator<Item = (&'n str, f64)>, file: &str) -> Values {
+        let by_name = values.into_iter().map(|(name, value)| (name.to_string(), value)).collect();
+        Values { file: file.to_string(), by_name }
+    }
+
+    /// The values of a set's parameters in order: given by the set's own names, as values of the arm's parameters, of
+    /// which the set's sums are made, or as values of other sums that determine the set's: those of the same arm under
+    /// another gravity, say.
     ///
     /// # Errors
     /// Every name that is missing or means nothing here.
@@ -85,7 +95,14 @@ impl Values {
         let names = set.names();
         let given = |name: &String| self.by_name.contains_key(name);
         let only_of_set = |name: &String| given(name) && Parameter::parse(name).is_none();
-        if names.iter().any(only_of_set) || names.iter().all(given) {
+        let complete = names.iter().all(given);
+        if complete && names.len() == self.by_name.len() {
+            return self.in_order(&names, &names);
+        }
+        if let Some(values) = self.of_other_sums(model, set) {
+            return Ok(values);
+        }
+        if complete || names.iter().any(only_of_set) {
             return self.in_order(&names, &names);
         }
         let kept: Vec<String> = model.arm().kept_parameters().iter().map(ToString::to_string).collect();
@@ -114,6 +131,19 @@ impl Values {
             Some(set) => Ok((set.kind, self.of_set(model, set)?)),
             None => Err(Diagnostics::whole_file(&self.file, "the arm has no parameters")),
         }
+    }
+
+    /// From values whose names are sums of parameters, where they determine the set.
+    fn of_other_sums(&self, model: &Model, set: &ParameterSet) -> Option<Vec<f64>> {
+        if self.by_name.keys().all(|name| Parameter::parse(name).is_some()) {
+            return None;
+        }
+        let sum = |name: &String| -> Option<Sum> {
+            Some(parse_sum(name).ok()?.iter().map(|(p, c)| (*p, to_f64(c))).collect())
+        };
+        let given: Vec<Sum> = self.by_name.keys().map(sum).collect::<Option<_>>()?;
+        let of_set = |row: Vec<f64>| row.iter().zip(self.by_name.values()).map(|(c, v)| c * v).sum();
+        Some(combinations(&model.sums(set), &given)?.into_iter().map(of_set).collect())
     }
 
     fn in_order(&self, names: &[String], allowed: &[String]) -> Result<Vec<f64>, Diagnostics> {

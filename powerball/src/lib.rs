@@ -29,6 +29,8 @@ pub mod log;
 pub mod model;
 #[cfg(feature = "std")]
 pub mod motion;
+#[cfg(feature = "std")]
+pub mod mounting;
 pub mod online;
 #[cfg(feature = "std")]
 mod parallel;

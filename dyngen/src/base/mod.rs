@@ -6,6 +6,7 @@ pub mod possible;
 pub mod preference;
 mod published;
 pub mod sets;
+pub mod span;
 pub mod symmetry;
 
 pub use sets::{ParameterSet, SetKind, SetParameter};

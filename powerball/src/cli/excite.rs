@@ -230,7 +230,9 @@ impl Excite {
         let files = self.files()?;
         progress.say("deriving and proving the arm's regressor");
         let mountings = self.mountings();
-        let derive = |mounting: &Mounting| -> Result<Model, Error> { Ok(Model::derive(mounting.of(&arm)?)?) };
+        let derive = |mounting: &Mounting| -> Result<Model, Error> {
+            Ok(Model::derive(mounting.of(&arm).map_err(Error::Setting)?)?)
+        };
         let models = mountings.iter().map(derive).collect::<Result<Vec<_>, _>>().map_err(refused)?;
         let mut assumed = Vec::new();
         let tasks = self.tasks(&arm, &models, &mountings, &mut assumed)?;

@@ -10,6 +10,7 @@ use crate::experiment::{self, TRAJECTORY};
 use crate::explain::{Change, ExplainError, Explained, Options, add_to_page, explain_with};
 use crate::log::read_logs;
 use crate::motion::Motion;
+use crate::mounting::Mounting;
 use crate::procedure::{RecordError, record};
 use crate::regression::DataOptions;
 use crate::report::Page;
@@ -60,7 +61,8 @@ impl Explain {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let progress = Progress::new();
         let arm = if self.experiment { Some(self.arm()?) } else { None };
-        let mut loaded = load(&self.inputs, &self.validate, self.model.as_deref(), &progress)?;
+        let mut loaded =
+            load(&self.inputs, &self.validate, self.model.as_deref(), Mounting::Filed, &progress)?;
         loaded.take_out();
         let (say, options) = (|what: &str| progress.say(what), DataOptions::default());
         let told = Options { correct_unattributed: self.correct_unattributed, ..Options::default() };

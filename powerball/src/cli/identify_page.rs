@@ -6,6 +6,7 @@ use crate::estimate::noise_floor;
 use crate::explain::{TorqueCurve, curves};
 use crate::friction::TanhFriction;
 use crate::log::Log;
+use crate::mounting::Mounting;
 use crate::regression::{Data, DataOptions, RigidBody};
 use crate::report::{Figure, Ink, Page, Panel, Series, Table, Tone, number};
 use crate::signal::occupied::occupied;
@@ -32,6 +33,8 @@ pub(super) struct Shown {
     files: Vec<[String; 5]>,
     /// Noise alone, N·m.
     floor: Vec<f64>,
+    /// How the base stood for them.
+    pub(super) mounting: Mounting,
     /// The frequency below which 99 % of the power of the speeds lies, Hz.
     pub(super) motion: Option<f64>,
 }
@@ -51,6 +54,7 @@ impl Shown {
     pub(super) fn new(
         body: &RigidBody,
         logs: &[Log],
+        mounting: Mounting,
         options: &DataOptions,
         bands: &[f64],
         model: &TorqueModel,
@@ -85,6 +89,7 @@ impl Shown {
             joints: (0..data.dof()).map(joint).collect(),
             files: logs.iter().map(file).collect(),
             floor,
+            mounting,
             motion: motion(&data),
         })
     }
@@ -160,6 +165,7 @@ pub(super) fn page(result: &Identification, arm: &Arm, shown: &Shown, held_out: 
         ]);
     }
     page.table(&table);
+    mountings(&mut page, result, shown);
     of_arm(&mut page, arm);
     of_logs(&mut page, result, shown, held_out);
     page.heading(if held_out { "Torques on the held-out logs" } else { "Torques on the fitted logs" });
@@ -170,6 +176,23 @@ pub(super) fn page(result: &Identification, arm: &Arm, shown: &Shown, held_out: 
     parameters(&mut page, result);
     friction(&mut page, result, shown);
     page
+}
+
+/// The fit by mounting of the base, where it was not always as filed.
+fn mountings(page: &mut Page, result: &Identification, shown: &Shown) {
+    if result.mountings.is_empty() {
+        return;
+    }
+    let mut table = Table::new(["base of the fitted logs", "logs", "error by joint [N·m]"]);
+    for mounted in &result.mountings {
+        let errors: Vec<String> = mounted.fit.rms.iter().map(|e| number(*e)).collect();
+        table.push([mounted.mounting.clone(), mounted.logs.len().to_string(), errors.join(", ")]);
+    }
+    page.table(&table);
+    page.paragraph(&format!(
+        "One set of parameters for all of them: what these mountings determine together. Figures are of logs with the base {}.",
+        shown.mounting
+    ));
 }
 
 /// What to think of the model, first.

@@ -3,6 +3,7 @@
 use super::Failure;
 use super::output::Progress;
 use crate::log::{Log, common_clock, read_logs};
+use crate::mounting::Mounting;
 use crate::regression::RigidBody;
 use crate::torque_model::TorqueModel;
 use clap::Args;
@@ -56,9 +57,21 @@ pub(crate) struct Known {
 impl Known {
     /// Reads an arm file and, where there is one, a model of the arm.
     pub(crate) fn read(arm: &Path, model: Option<&Path>) -> Result<Known, Failure> {
+        Known::mounted(arm, model, Mounting::Filed)
+    }
+
+    /// The same for logs that were recorded with the base mounted otherwise.
+    fn mounted(arm: &Path, model: Option<&Path>, mounting: Mounting) -> Result<Known, Failure> {
         let arm = Arm::read(arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let arm = mounting.of(&arm).map_err(Failure::Unusable)?;
         let Some(file) = model else { return Ok(Known { arm, model: None }) };
         let model = TorqueModel::read(file).map_err(|e| Failure::Unusable(e.to_string()))?;
+        if mounting != Mounting::Filed && model.additions.arm_changes.gravity.is_some() {
+            return Err(Failure::Unusable(format!(
+                "{}: says how the base is tilted where it stands as filed, and nothing of it mounted otherwise",
+                file.display()
+            )));
+        }
         let changed = model.additions.arm_changes.of(&arm);
         let arm = changed.map_err(|e| Failure::Unusable(format!("{}: {e}", file.display())))?;
         Ok(Known { arm, model: Some((model, file.to_path_buf())) })
@@ -67,19 +80,21 @@ impl Known {
     /// The model, if it is one of this arm.
     pub(crate) fn model(self, body: &RigidBody) -> Result<Option<TorqueModel>, Failure> {
         let Some((model, file)) = self.model else { return Ok(None) };
-        let checked = model.checked(body.names(), body.dof(), &file);
+        let checked = model.in_set_of(body).checked(body.names(), body.dof(), &file);
         checked.map(Some).map_err(|e| Failure::Unusable(e.to_string()))
     }
 }
 
-/// Reads and checks everything before any work is done. With a model the arm is as the model has it; the logs are as they are.
+/// Reads and checks everything before any work is done. With a model the arm is as the model has it; the logs are as they are, and all of one
+/// mounting of the base.
 pub(crate) fn load(
     inputs: &Inputs,
     validate: &[PathBuf],
     model: Option<&Path>,
+    mounting: Mounting,
     progress: &Progress,
 ) -> Result<Loaded, Failure> {
-    let known = Known::read(&inputs.arm, model)?;
+    let known = Known::mounted(&inputs.arm, model, mounting)?;
     let mut warnings = known.arm.notes();
     for file in validate {
         if inputs.log.iter().any(|log| same_file(log, file)) {

@@ -11,6 +11,7 @@ mod generate;
 mod identify;
 mod identify_page;
 mod inputs;
+mod mounted;
 mod output;
 mod profile;
 mod record;

@@ -1,8 +1,10 @@
 //! `powerball summarize`: a log as triangular factors.
 
 use super::Failure;
+use super::mounted::MountedFile;
 use super::output::{self, Progress};
-use super::reduced::reduce;
+use super::reduced::{Standing, reduce};
+use crate::mounting::Mounting;
 use crate::regression::DataOptions;
 use crate::summary::BANDS;
 use clap::Args;
@@ -25,6 +27,10 @@ pub(crate) struct Summarize {
     /// Logs (CSV or Parquet), or summaries to join.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     log: Vec<PathBuf>,
+    /// How the base stood for these logs: `filed`, ROLL,PITCH in degrees from there, or gravity in its frame as X,Y,Z in m/s². Logs of another
+    /// mounting go into a summary of their own, and `identify` joins them.
+    #[arg(long, value_name = "MOUNTING", allow_hyphen_values = true)]
+    mounting: Option<Mounting>,
     /// The summary to write.
     #[arg(long, value_name = "SUMMARY")]
     out: PathBuf,
@@ -38,6 +44,9 @@ pub(crate) struct Summarize {
 struct Written {
     arm: String,
     set: &'static str,
+    /// How the base stood, where it was not as the arm file says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mounting: Option<String>,
     logs: Vec<String>,
     seconds: f64,
     /// By joint.
@@ -50,13 +59,23 @@ struct Written {
 
 impl Summarize {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let reduced = reduce(&self.arm, &self.log, &DataOptions::default(), false, &Progress::new())?;
-        let bytes = reduced.bands.to_bytes();
-        let summary = reduced.bands.widest();
+        let mounted = |file: &PathBuf| MountedFile { file: file.clone(), mounting: self.mounting };
+        let files: Vec<MountedFile> = self.log.iter().map(mounted).collect();
+        let reduced = reduce(&self.arm, &files, &DataOptions::default(), false, &Progress::new())?;
+        let [Standing { mounting, bands, .. }] = reduced.standing.as_slice() else {
+            let mountings: Vec<String> = reduced.standing.iter().map(|s| s.mounting.to_string()).collect();
+            return Err(Failure::Unusable(format!(
+                "these are of several mountings of the base ({}): a summary has one; give them to identify as they are",
+                mountings.join("; ")
+            )));
+        };
+        let bytes = bands.to_bytes();
+        let summary = bands.widest();
         output::write_file(&self.out, &bytes)?;
         let written = Written {
             arm: summary.identity.arm.clone(),
             set: "minimal",
+            mounting: (*mounting != Mounting::Filed).then(|| mounting.to_string()),
             logs: summary.logs.iter().map(|(name, _)| name.clone()).collect(),
             seconds: summary.logs.iter().map(|(_, seconds)| seconds).sum(),
             rows: summary.joints.iter().map(|j| j.rows()).collect(),

@@ -7,6 +7,7 @@ use super::inputs::{Inputs, load};
 use super::output::{self, Progress};
 use crate::estimate::{JointVerdict, verify};
 use crate::explain::{TorqueCurve, curves};
+use crate::mounting::Mounting;
 use crate::regression::{Data, DataOptions};
 use crate::report::{Page, Table, Tone, number};
 use crate::summary::BANDS;
@@ -28,6 +29,9 @@ pub(crate) struct Verify {
     /// The model: identified.json of `powerball identify` or model.json of `powerball explain`, for the same arm file.
     #[arg(long, value_name = "FILE.json")]
     model: PathBuf,
+    /// How the base stood for these logs: `filed`, ROLL,PITCH in degrees from there, or gravity in its frame as X,Y,Z in m/s².
+    #[arg(long, value_name = "MOUNTING", allow_hyphen_values = true, default_value = "filed")]
+    mounting: Mounting,
     /// Largest error of a joint, as a share of the rms of its torque.
     #[arg(long, default_value_t = 0.1)]
     tolerance: f64,
@@ -52,7 +56,7 @@ impl Verify {
             return Err(Failure::Unusable("--tolerance must be above 0".into()));
         }
         let progress = Progress::new();
-        let loaded = load(&self.inputs, &[], Some(&self.model), &progress)?;
+        let loaded = load(&self.inputs, &[], Some(&self.model), self.mounting, &progress)?;
         progress.say("preparing signals");
         let data = Data::new(&loaded.body, &loaded.fit, &DataOptions::default())
             .map_err(|e| Failure::Refused(e.to_string()))?;

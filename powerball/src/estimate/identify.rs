@@ -91,6 +91,29 @@ pub struct Spread {
     pub samples: usize,
 }
 
+impl Spread {
+    /// That of several data together; each with the rows of every joint.
+    #[must_use]
+    pub fn pooled(parts: &[(Spread, Vec<usize>)]) -> Option<Spread> {
+        let dof = parts.first()?.0.rms.len();
+        // Sums of squares of the errors and of the torques, and rows.
+        let sums = |j: usize| {
+            parts.iter().fold([0.0; 3], |[left, torque, rows], (spread, count)| {
+                let (n, error) = (count[j] as f64, spread.rms[j]);
+                let measured = if spread.relative[j] > 0.0 { error / spread.relative[j] } else { 0.0 };
+                [left + n * error * error, torque + n * measured * measured, rows + n]
+            })
+        };
+        let sums: Vec<[f64; 3]> = (0..dof).map(sums).collect();
+        let ratio = |a: f64, b: f64| if b > 0.0 { (a / b).sqrt() } else { 0.0 };
+        Some(Spread {
+            rms: sums.iter().map(|[left, _, rows]| ratio(*left, *rows)).collect(),
+            relative: sums.iter().map(|[left, torque, _]| ratio(*left, *torque)).collect(),
+            samples: sums.iter().map(|[_, _, rows]| *rows as usize).max().unwrap_or(0),
+        })
+    }
+}
+
 /// The spread of residuals on their data.
 #[must_use]
 pub fn spread(data: &Data<'_>, residual: &[Vec<f64>]) -> Spread {

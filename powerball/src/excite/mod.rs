@@ -6,17 +6,16 @@ mod constraints;
 mod fourier;
 mod limits;
 mod load;
-mod mounting;
 mod objective;
 mod search;
 mod shape;
 
+pub use crate::mounting::Mounting;
 pub use capsule::Segment;
 pub use constraints::{Constraints, Space, Tightest};
 pub use fourier::{Fourier, Harmonics};
 pub use limits::{JointLimits, Limits, MissingLimits};
 pub use load::{Load, Masses};
-pub use mounting::Mounting;
 pub use objective::{Conditions, Criterion, Figures, Objective};
 pub use search::{Excitation, Settings, Task, optimise, optimise_all, search, search_all};
 pub use shape::{Contact, Floor, Nearness, Shape};

@@ -2,8 +2,8 @@
 
 use super::Error;
 use super::fourier::Fourier;
-use super::mounting::decimal;
 use crate::motion::Motion;
+use crate::mounting::together;
 use dyngen::arm::{Arm, Parameter, ParameterKind};
 use dyngen::base::preference::Preference;
 use dyngen::exact::rational::to_f64;
@@ -121,7 +121,8 @@ impl Objective {
         let reference = match models {
             [only] => *only,
             _ => {
-                general = general_model(models)?;
+                let arms: Vec<&Arm> = models.iter().map(|model| model.arm()).collect();
+                general = Model::derive(together(&arms).map_err(Error::Setting)?)?;
                 &general
             }
         };
@@ -292,19 +293,6 @@ fn customary(model: &Model) -> Result<Vec<usize>, Error> {
             Err(Error::Setting(format!("{} of {rank} base columns were found by numbers", chosen.len())))
         }
     }
-}
-
-/// The arm under gravity in a direction that no two mountings are special to.
-fn general_model(models: &[&Model]) -> Result<Model, Error> {
-    let mut arm = models[0].arm().clone();
-    let mut sum = [0.0; 3];
-    for (k, model) in models.iter().enumerate() {
-        let gravity = model.arm().gravity.each_ref().map(to_f64);
-        (0..3).for_each(|i| sum[i] += gravity[i] / (1.0 + 0.37 * k as f64));
-    }
-    let [x, y, z] = sum.map(decimal);
-    arm.gravity = [x?, y?, z?];
-    Ok(Model::derive(arm)?)
 }
 
 #[cfg(test)]

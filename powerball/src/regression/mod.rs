@@ -9,7 +9,7 @@ mod rigid;
 mod rows;
 mod silent;
 
-pub use prepare::{Data, DataError, DataOptions};
+pub use prepare::{Data, DataError, DataOptions, column_in_bands};
 pub use recording::Recording;
 pub use rigid::RigidBody;
 pub use rows::{Block, Column, JointRows};

@@ -104,12 +104,29 @@ impl<'a> Data<'a> {
         options: &DataOptions,
         correct: impl FnMut(&mut Recording),
     ) -> Result<Data<'a>, DataError> {
+        Data::in_bands(body, logs, options, 1, correct)?.pop().unwrap_or(Err(DataError::TooShort))
+    }
+
+    /// Prepares logs in `count` bands, each of half the cutoff of the one before, the first that of the options. What can be used in a band may
+    /// be too little in a narrower one.
+    ///
+    /// # Errors
+    /// As [`Data::new`], where nothing usable remains in any band.
+    pub fn in_bands(
+        body: &'a RigidBody,
+        logs: &[Log],
+        options: &DataOptions,
+        count: usize,
+        correct: impl FnMut(&mut Recording),
+    ) -> Result<Vec<Result<Data<'a>, DataError>>, DataError> {
         let n = body.dof();
         let mut steps: Vec<f64> = logs.iter().filter_map(|log| median_step(&log.t)).collect();
         steps.sort_by(f64::total_cmp);
         let step = *steps.get(steps.len() / 2).ok_or(DataError::TooShort)?;
         let rate = 1.0 / step;
-        let band = Band::new(options.cutoff, rate);
+        let widest = Band::new(options.cutoff, rate);
+        let bands: Vec<Band> =
+            std::iter::successors(Some(widest), |band| Some(band.halved(rate))).take(count).collect();
         let mut left_out: Vec<String> = Vec::new();
         let mut recordings: Vec<Recording> = Vec::new();
         for (index, log) in logs.iter().enumerate() {
@@ -133,14 +150,14 @@ impl<'a> Data<'a> {
                 rest::rest_speed(speeds, body.arm().joints[j].velocity)
             })
             .collect();
-        let top_speed = (0..n).map(|j| top_speed(&recordings, j)).collect();
+        let top_speed: Vec<f64> = (0..n).map(|j| top_speed(&recordings, j)).collect();
         let silent = silent_joints(body.arm(), logs);
-        let mut kept = keep_moving(&recordings, &band, &rest_speed, n);
-        for (j, kept) in kept.iter_mut().enumerate() {
-            for (kept, recording) in kept.iter_mut().zip(&recordings) {
+        let mut kept = keep_moving(&recordings, &bands, &rest_speed, n);
+        for j in 0..n {
+            for (r, recording) in recordings.iter().enumerate() {
                 let is_dead = dead(recording, j);
                 if is_dead || silent[j].is_some() {
-                    kept.clear();
+                    kept.iter_mut().for_each(|kept| kept[j][r].clear());
                 }
                 if is_dead && silent[j].is_none() {
                     left_out.push(format!(
@@ -151,47 +168,31 @@ impl<'a> Data<'a> {
                 }
             }
         }
-        let joints = joint_rows(body, &recordings, &band, kept);
-        if joints.iter().all(|j| j.len() < 20) {
-            return Err(DataError::NoMotion(silent.into_iter().flatten().collect()));
-        }
-        let mut notes = left_out.clone();
-        let total: usize = recordings.iter().map(|r| band.kept(r.len()).len()).sum();
-        for (j, rows) in joints.iter().enumerate() {
-            let rested = total - rows.len();
-            if let Some(why) = &silent[j] {
-                notes.push(why.clone());
-            } else if rows.len() < 20 {
-                notes.push(format!(
-                    "joint {} rests in these logs: neither its friction nor any effect on it can be judged; record paths on which it swings",
-                    j + 1
-                ));
-            } else if rested * 4 > total {
-                notes.push(format!(
-                    "joint {} rests in {:.0} % of the samples (|speed| below {:.4} for {} s or at an end of a log); they were left out",
-                    j + 1, 100.0 * rested as f64 / total as f64, rest_speed[j], rest::LONGEST_REVERSAL
-                ));
+        let joints = joint_rows(body, &recordings, &bands, kept);
+        let logs: Vec<String> = logs.iter().map(|log| log.file.clone()).collect();
+        let of_band = |(band, joints): (Band, Vec<JointRows>)| {
+            if joints.iter().all(|j| j.len() < 20) {
+                return Err(DataError::NoMotion(silent.iter().flatten().cloned().collect()));
             }
-        }
-        let logs = logs.iter().map(|log| log.file.clone()).collect();
-        let blocks = blocks_of(&recordings, &joints, &band, options.block);
-        Ok(Data {
-            body,
-            recordings,
-            band,
-            joints,
-            blocks,
-            logs,
-            rest_speed,
-            silent,
-            left_out,
-            notes,
-            joints_apart: false,
-            top_speed,
-            last_link: OnceLock::new(),
-            force: OnceLock::new(),
-            declared_zero: OnceLock::new(),
-        })
+            Ok(Data {
+                body,
+                notes: notes(&left_out, &recordings, &band, &joints, &silent, &rest_speed),
+                blocks: blocks_of(&recordings, &joints, &band, options.block),
+                recordings: recordings.clone(),
+                band,
+                joints,
+                logs: logs.clone(),
+                rest_speed: rest_speed.clone(),
+                silent: silent.clone(),
+                left_out: left_out.clone(),
+                joints_apart: false,
+                top_speed: top_speed.clone(),
+                last_link: OnceLock::new(),
+                force: OnceLock::new(),
+                declared_zero: OnceLock::new(),
+            })
+        };
+        Ok(bands.into_iter().zip(joints).map(of_band).collect())
     }
 
     /// The same rows with other signals: samples, band and blocks stay as they are.
@@ -200,7 +201,8 @@ impl<'a> Data<'a> {
         let mut recordings = self.recordings.clone();
         recordings.iter_mut().for_each(correct);
         let kept = self.joints.iter().map(|j| j.kept.clone()).collect();
-        let joints = joint_rows(self.body, &recordings, &self.band, kept);
+        let bands = std::slice::from_ref(&self.band);
+        let joints = joint_rows(self.body, &recordings, bands, vec![kept]).pop().unwrap_or_default();
         Data {
             body: self.body,
             recordings,
@@ -314,6 +316,28 @@ impl<'a> Data<'a> {
     }
 }
 
+/// A signal at full rate, one vector a recording, as a column of a joint in each of some bands, as [`Data::in_bands`] gives them.
+#[must_use]
+pub fn column_in_bands(
+    bands: &[Data<'_>],
+    joint: usize,
+    mut signal: impl FnMut(&Recording) -> Vec<f64>,
+) -> Vec<Vec<f64>> {
+    let mut columns: Vec<Vec<f64>> =
+        bands.iter().map(|data| Vec::with_capacity(data.joints[joint].len())).collect();
+    let Some(narrowest) = bands.last() else { return columns };
+    for (r, recording) in narrowest.recordings.iter().enumerate() {
+        if bands.iter().all(|data| data.joints[joint].kept[r].is_empty()) {
+            continue;
+        }
+        let passed = narrowest.band.pass_bands(&signal(recording), bands.len());
+        for ((column, passed), data) in columns.iter_mut().zip(passed).zip(bands) {
+            column.extend(data.joints[joint].kept[r].iter().map(|k| passed[*k]));
+        }
+    }
+    columns
+}
+
 fn top_speed(recordings: &[Recording], joint: usize) -> f64 {
     let mut speeds: Vec<f64> = recordings.iter().flat_map(|r| r.speed(joint).map(f64::abs)).collect();
     if speeds.is_empty() {
@@ -324,66 +348,105 @@ fn top_speed(recordings: &[Recording], joint: usize) -> f64 {
     top.max(1e-3)
 }
 
-fn keep_moving(recordings: &[Recording], band: &Band, limit: &[f64], n: usize) -> Vec<Vec<Vec<usize>>> {
-    let of_joint = |j: usize| {
-        let of_recording = |r: &Recording| {
-            let moving = rest::moving(&r.speed(j).collect::<Vec<_>>(), r.rate, limit[j]);
-            let kept = band.kept(r.len());
-            // A joint that never moves has the limit 0 and is never below it.
-            if limit[j] < 1e-5 {
-                return Vec::new();
-            }
-            (0..kept.len()).filter(|k| moving[kept[*k]]).collect()
-        };
-        recordings.iter().map(of_recording).collect()
-    };
-    (0..n).map(of_joint).collect()
+/// What was left out, and what is to be said of joints that rested.
+fn notes(
+    left_out: &[String],
+    recordings: &[Recording],
+    band: &Band,
+    joints: &[JointRows],
+    silent: &[Option<String>],
+    rest_speed: &[f64],
+) -> Vec<String> {
+    let mut notes = left_out.to_vec();
+    let total: usize = recordings.iter().map(|r| band.kept(r.len()).len()).sum();
+    for (j, rows) in joints.iter().enumerate() {
+        let rested = total - rows.len();
+        if let Some(why) = &silent[j] {
+            notes.push(why.clone());
+        } else if rows.len() < 20 {
+            notes.push(format!(
+                "joint {} rests in these logs: neither its friction nor any effect on it can be judged; record paths on which it swings",
+                j + 1
+            ));
+        } else if rested * 4 > total {
+            notes.push(format!(
+                "joint {} rests in {:.0} % of the samples (|speed| below {:.4} for {} s or at an end of a log); they were left out",
+                j + 1, 100.0 * rested as f64 / total as f64, rest_speed[j], rest::LONGEST_REVERSAL
+            ));
+        }
+    }
+    notes
 }
 
+/// By band, joint and recording: which of the band's kept samples are rows.
+fn keep_moving(
+    recordings: &[Recording],
+    bands: &[Band],
+    limit: &[f64],
+    n: usize,
+) -> Vec<Vec<Vec<Vec<usize>>>> {
+    let mut all = vec![vec![Vec::with_capacity(recordings.len()); n]; bands.len()];
+    for j in 0..n {
+        for r in recordings {
+            let moving = rest::moving(&r.speed(j).collect::<Vec<_>>(), r.rate, limit[j]);
+            for (of_band, band) in all.iter_mut().zip(bands) {
+                // A joint that never moves has the limit 0 and is never below it.
+                let kept = if limit[j] < 1e-5 { Vec::new() } else { band.kept(r.len()) };
+                of_band[j].push((0..kept.len()).filter(|k| moving[kept[*k]]).collect());
+            }
+        }
+    }
+    all
+}
+
+/// The rows by band and joint; the bands are each half of the one before.
 fn joint_rows(
     body: &RigidBody,
     recordings: &[Recording],
-    band: &Band,
-    kept: Vec<Vec<Vec<usize>>>,
-) -> Vec<JointRows> {
+    bands: &[Band],
+    kept: Vec<Vec<Vec<Vec<usize>>>>,
+) -> Vec<Vec<JointRows>> {
     let (n, p) = (body.dof(), body.names().len());
-    let mut joints: Vec<JointRows> = kept
-        .into_iter()
-        .map(|kept| {
-            let mut rows = Vec::new();
-            let mut end = 0;
-            for k in &kept {
-                rows.push(end..end + k.len());
-                end += k.len();
-            }
-            JointRows {
-                torque: Vec::with_capacity(end),
-                inertial: vec![Vec::with_capacity(end); p],
-                kept,
-                rows,
-            }
-        })
-        .collect();
+    let empty = |kept: Vec<Vec<usize>>| {
+        let mut rows = Vec::new();
+        let mut end = 0;
+        for k in &kept {
+            rows.push(end..end + k.len());
+            end += k.len();
+        }
+        JointRows { torque: Vec::with_capacity(end), inertial: vec![Vec::with_capacity(end); p], kept, rows }
+    };
+    let mut all: Vec<Vec<JointRows>> =
+        kept.into_iter().map(|joints| joints.into_iter().map(empty).collect()).collect();
+    let Some(narrowest) = bands.last() else { return all };
     for (r, recording) in recordings.iter().enumerate() {
         let y = body.regressor(&recording.q, &recording.v, &recording.a);
-        let per_joint: Vec<Vec<Vec<f64>>> = parallel::map(&(0..n).collect::<Vec<_>>(), |&j| {
+        // By joint, column and band.
+        let per_joint: Vec<Vec<Vec<Vec<f64>>>> = parallel::map(&(0..n).collect::<Vec<_>>(), |&j| {
             let pass = |signal: Vec<f64>| {
-                let passed = band.pass(&signal);
-                joints[j].kept[r].iter().map(|k| passed[*k]).collect::<Vec<f64>>()
+                let passed = narrowest.pass_bands(&signal, bands.len());
+                let rows = |(passed, joints): (Vec<f64>, &Vec<JointRows>)| {
+                    joints[j].kept[r].iter().map(|k| passed[*k]).collect()
+                };
+                passed.into_iter().zip(&all).map(rows).collect()
             };
             let mut columns = vec![pass(recording.torque[j].clone())];
             columns.extend((0..p).map(|c| pass(y.iter().skip(j * p + c).step_by(n * p).copied().collect())));
             columns
         });
-        for (joint, columns) in joints.iter_mut().zip(per_joint) {
-            let mut columns = columns.into_iter();
-            joint.torque.extend(columns.next().unwrap_or_default());
-            for (to, from) in joint.inertial.iter_mut().zip(columns) {
-                to.extend(from);
+        for (j, columns) in per_joint.into_iter().enumerate() {
+            for (c, bands) in columns.into_iter().enumerate() {
+                for (joints, from) in all.iter_mut().zip(bands) {
+                    let joint = &mut joints[j];
+                    match c.checked_sub(1) {
+                        None => joint.torque.extend(from),
+                        Some(c) => joint.inertial[c].extend(from),
+                    }
+                }
             }
         }
     }
-    joints
+    all
 }
 
 fn blocks_of(recordings: &[Recording], joints: &[JointRows], band: &Band, length: f64) -> Vec<Block> {

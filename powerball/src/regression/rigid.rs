@@ -1,7 +1,8 @@
 //! The rigid arm of a file at run time: columns of its minimal set and of what lies outside it.
 
 use dyngen::arm::ParameterKind;
-use dyngen::exact::rational;
+use dyngen::base::span::combinations;
+use dyngen::exact::rational::{self, Rational};
 use dyngen::{Arm, Error, Evaluator, Function, Model, SetKind};
 use std::sync::OnceLock;
 
@@ -14,6 +15,8 @@ pub struct RigidBody {
     regressor: Evaluator,
     torque: Evaluator,
     names: Vec<String>,
+    /// Gravity as the arm file has it, m/s².
+    filed: [Rational; 3],
     /// The arm without its declared symmetries, all parameters apart: built when first asked for.
     unconstrained: OnceLock<Option<Wide>>,
     /// The same at unit gravity along x, y and z of the base.
@@ -51,6 +54,14 @@ impl RigidBody {
     /// # Errors
     /// As [`Model::derive`] and [`Evaluator::new`].
     pub fn new(arm: &Arm) -> Result<RigidBody, Error> {
+        RigidBody::mounted(arm, arm)
+    }
+
+    /// The same for an arm under another gravity than that of its file.
+    ///
+    /// # Errors
+    /// As [`RigidBody::new`].
+    pub fn mounted(arm: &Arm, filed: &Arm) -> Result<RigidBody, Error> {
         let model = Model::derive(arm.clone())?;
         let regressor = Evaluator::new(&model, Function::Regressor, SetKind::Minimal)?;
         let torque = Evaluator::new(&model, Function::InverseDynamics, SetKind::Minimal)?;
@@ -60,6 +71,7 @@ impl RigidBody {
             regressor,
             torque,
             names,
+            filed: filed.gravity.clone(),
             unconstrained: OnceLock::new(),
             unit_gravity: OnceLock::new(),
         })
@@ -69,6 +81,26 @@ impl RigidBody {
     #[must_use]
     pub fn arm(&self) -> &Arm {
         self.model.arm()
+    }
+
+    /// Gravity in the base frame, m/s².
+    #[must_use]
+    pub fn gravity(&self) -> [f64; 3] {
+        self.arm().gravity.each_ref().map(rational::to_f64)
+    }
+
+    /// The arm under the gravity of its file.
+    #[must_use]
+    pub fn filed(&self) -> Arm {
+        Arm { gravity: self.filed.clone(), ..self.arm().clone() }
+    }
+
+    /// The parameters of the minimal set as combinations of those of the same arm's under another gravity, by row; `None` where these do not
+    /// determine them.
+    #[must_use]
+    pub fn parameters_from(&self, other: &RigidBody) -> Option<Vec<Vec<f64>>> {
+        let sums = |body: &RigidBody| Some(body.model.sums(body.model.set(SetKind::Minimal).ok()?));
+        combinations(&sums(self)?, &sums(other)?)
     }
 
     /// The arm with its parameter sets.

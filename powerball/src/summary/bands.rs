@@ -1,5 +1,6 @@
 //! Logs reduced in several bands: in which of them they speak of a model is decided when there is one.
 
+use super::reduce::push_in_bands;
 use super::{Summary, SummaryError};
 use crate::log::Log;
 use crate::regression::{DataError, DataOptions, RigidBody};
@@ -66,13 +67,14 @@ impl Bands {
         log: &Log,
         options: &DataOptions,
     ) -> Result<Vec<String>, DataError> {
-        let [widest, narrower @ ..] = self.bands.as_mut_slice() else { return Ok(Vec::new()) };
-        let notes = widest.push(body, log, &with(options, BANDS[0]))?;
-        for (summary, band) in narrower.iter_mut().zip(&BANDS[1..]) {
-            // What is missing is seen by its logs.
-            let _ = summary.push(body, log, &with(options, *band));
-        }
-        Ok(notes)
+        push_in_bands(&mut self.bands, body, log, &with(options, BANDS[0]), |_| {})
+    }
+
+    /// The logs in the columns of another set of the same arm, as [`Summary::in_set`].
+    #[must_use]
+    pub fn in_set(&self, own: &RigidBody, general: &RigidBody) -> Option<Bands> {
+        let bands = self.bands.iter().map(|summary| summary.in_set(own, general));
+        Some(Bands { bands: bands.collect::<Option<_>>()? })
     }
 
     /// Takes in what other logs of the same arm gave.

@@ -7,7 +7,7 @@ use std::fmt;
 /// First word of every summary.
 const FORMAT: &str = "powerball summary";
 /// Raised whenever a reader of the version before would misread.
-const VERSION: u32 = 2;
+const VERSION: u32 = 4;
 
 /// Why a summary is of no use here.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,6 +36,8 @@ struct Head {
     arm: String,
     /// Hexadecimal.
     arm_hash: String,
+    /// In the base frame, m/s²: how the base was mounted.
+    gravity: [f64; 3],
     set: String,
     parameters: Vec<String>,
     /// Hz.
@@ -64,6 +66,12 @@ impl Identity {
         let differs = |what: String| Err(SummaryError::Differs(what));
         if self.arm != other.arm {
             return differs(format!("it is of the arm '{}', not of '{}'", other.arm, self.arm));
+        }
+        if self.hash == other.hash && self.gravity != other.gravity {
+            return differs(format!(
+                "its base was mounted otherwise: gravity was {:?} m/s² in its frame, not {:?}",
+                other.gravity, self.gravity
+            ));
         }
         if self.parameters != other.parameters {
             return differs(format!(
@@ -102,6 +110,7 @@ impl Summary {
             version: VERSION,
             arm: id.arm.clone(),
             arm_hash: format!("{:016x}", id.hash),
+            gravity: id.gravity,
             set: "minimal".into(),
             parameters: id.parameters.clone(),
             band: id.cutoff,
@@ -184,6 +193,7 @@ impl Summary {
         let identity = Identity {
             arm: head.arm,
             hash,
+            gravity: head.gravity,
             parameters: head.parameters,
             cutoff: head.band,
             smoothing: head.smoothing,

@@ -18,6 +18,7 @@ pub(crate) use reduce::parts;
 pub use steepness::{NODES, Steepness};
 pub use triangle::Triangle;
 
+use crate::parallel;
 use crate::regression::{DataOptions, RigidBody};
 
 /// What must agree for summaries to be of the same thing.
@@ -27,6 +28,8 @@ pub struct Identity {
     pub arm: String,
     /// A hash of all else that its file says.
     pub hash: u64,
+    /// Gravity in the base frame as the base was mounted, m/s².
+    pub gravity: [f64; 3],
     /// The minimal set, in the order of the columns.
     pub parameters: Vec<String>,
     /// Band, Hz.
@@ -61,11 +64,12 @@ impl Summary {
     /// Of no log yet.
     #[must_use]
     pub fn new(body: &RigidBody, options: &DataOptions) -> Summary {
-        let arm = body.arm();
+        let arm = body.filed();
         let described = format!("{:?} {:?} {:?} {:?}", arm.convention, arm.gravity, arm.joints, arm.tool);
         let identity = Identity {
             arm: arm.name.clone(),
             hash: fnv(described.as_bytes()),
+            gravity: body.gravity(),
             parameters: body.names().to_vec(),
             cutoff: options.cutoff,
             smoothing: options.smoothing,
@@ -93,10 +97,27 @@ impl Summary {
         Columns { inertial: self.identity.parameters.len() }
     }
 
+    /// The same rows in the columns of the minimal set of `general`, which is the same arm under a gravity whose parameters determine those of
+    /// `own`, in whose columns the rows are; `None` where they do not.
+    #[must_use]
+    pub fn in_set(&self, own: &RigidBody, general: &RigidBody) -> Option<Summary> {
+        let rows = own.parameters_from(general)?;
+        let parameters = general.names().to_vec();
+        let inertial = |c: usize| -> Vec<(usize, f64)> {
+            rows.iter().enumerate().map(|(k, row)| (k, row[c])).filter(|(_, factor)| *factor != 0.0).collect()
+        };
+        let others = self.columns().inertial..self.columns().width();
+        let columns: Vec<Vec<(usize, f64)>> =
+            (0..parameters.len()).map(inertial).chain(others.map(|c| vec![(c, 1.0)])).collect();
+        let joints = parallel::map(&self.joints, |octaves| octaves.combined(&columns));
+        let identity = Identity { parameters, gravity: general.gravity(), ..self.identity.clone() };
+        Some(Summary { identity, joints, ..self.clone() })
+    }
+
     /// Takes in what other logs of the same arm gave.
     ///
     /// # Errors
-    /// [`SummaryError::Differs`] where they are of another arm, set or band.
+    /// [`SummaryError::Differs`] where they are of another arm, mounting, set or band.
     pub fn merge(&mut self, other: &Summary) -> Result<(), SummaryError> {
         self.identity.same_as(&other.identity)?;
         for (octaves, other) in self.joints.iter_mut().zip(&other.joints) {

@@ -94,6 +94,12 @@ impl Octaves {
         }
     }
 
+    /// The same rows with combinations of their columns, as [`Triangle::combined`].
+    #[must_use]
+    pub fn combined(&self, columns: &[Vec<(usize, f64)>]) -> Octaves {
+        Octaves { levels: self.levels.iter().map(|level| level.combined(columns)).collect() }
+    }
+
     /// Takes in what other rows gave.
     pub fn merge(&mut self, other: &Octaves) {
         for (level, other) in self.levels.iter_mut().zip(&other.levels) {

@@ -3,7 +3,7 @@
 use super::{Octaves, Steepness, Summary, steepness};
 use crate::log::Log;
 use crate::parallel;
-use crate::regression::{Data, DataError, DataOptions, Recording, RigidBody};
+use crate::regression::{Data, DataError, DataOptions, Recording, RigidBody, column_in_bands};
 
 /// A log is worked on in parts of this length, s.
 const PART: f64 = 120.0;
@@ -49,17 +49,19 @@ impl Columns {
         self.torque() + 1
     }
 
-    /// The columns on a joint's rows.
-    fn of(&self, data: &Data<'_>, joint: usize, steepness: &Steepness) -> Vec<Vec<f64>> {
-        let rows = &data.joints[joint];
-        let column = |f: &dyn Fn(f64) -> f64| {
-            rows.column(&data.band, &data.recordings, |_, r| r.speed(joint).map(f).collect())
+    /// The columns on a joint's rows in each band.
+    fn of(&self, bands: &[Data<'_>], joint: usize, steepness: &Steepness) -> Vec<Vec<Vec<f64>>> {
+        let column =
+            |f: &dyn Fn(f64) -> f64| column_in_bands(bands, joint, |r| r.speed(joint).map(f).collect());
+        let rows = || bands.iter().map(|data| &data.joints[joint]);
+        let mut columns: Vec<Vec<Vec<f64>>> = rows().map(|rows| rows.inertial.clone()).collect();
+        let mut push = |values: Vec<Vec<f64>>| {
+            columns.iter_mut().zip(values).for_each(|(columns, values)| columns.push(values));
         };
-        let mut columns = rows.inertial.clone();
-        columns.push(column(&|v| v));
-        columns.push(vec![1.0; rows.len()]);
-        columns.extend(steepness.nodes().iter().map(|g| column(&|v| (g * v).tanh())));
-        columns.push(rows.torque.clone());
+        push(column(&|v| v));
+        push(rows().map(|rows| vec![1.0; rows.len()]).collect());
+        steepness.nodes().iter().for_each(|g| push(column(&|v| (g * v).tanh())));
+        push(rows().map(|rows| rows.torque.clone()).collect());
         columns
     }
 }
@@ -87,48 +89,73 @@ impl Summary {
         body: &RigidBody,
         log: &Log,
         options: &DataOptions,
-        mut correct: impl FnMut(&mut Recording),
+        correct: impl FnMut(&mut Recording),
     ) -> Result<Vec<String>, DataError> {
-        let (mut notes, mut seconds, mut refused) = (Vec::new(), 0.0, None);
-        let mut joints = std::mem::take(&mut self.joints);
-        let mut taken = false;
-        for part in parts(log) {
-            match Data::corrected(body, std::slice::from_ref(&part), options, &mut correct) {
-                Ok(data) => {
-                    joints = parallel::map(&(0..data.dof()).collect::<Vec<_>>(), |&j| {
-                        let mut octaves = joints[j].clone();
-                        self.push_joint(&mut octaves, &data, j);
-                        octaves
-                    });
-                    seconds += data.recordings.iter().map(|r| r.len() as f64 / r.rate).sum::<f64>();
-                    self.samples +=
-                        data.recordings.iter().map(|r| data.band.kept(r.len()).len() as u64).sum::<u64>();
-                    for (silent, why) in self.silent.iter_mut().zip(data.silent) {
-                        *silent = why.or(silent.take());
-                    }
-                    notes.extend(data.left_out);
-                    taken = true;
-                }
-                Err(error) => refused = Some(error),
-            }
-        }
-        self.joints = joints;
-        match refused {
-            Some(error) if !taken => Err(error),
-            _ => {
-                self.logs.push((log.file.clone(), seconds));
-                Ok(notes)
-            }
-        }
+        push_in_bands(std::slice::from_mut(self), body, log, options, correct)
     }
 
-    fn push_joint(&self, octaves: &mut Octaves, data: &Data<'_>, joint: usize) {
-        let rows = &data.joints[joint];
-        if rows.is_empty() {
-            return;
+    /// Counts what is known of a log in the band beside its rows.
+    fn count(&mut self, data: &Data<'_>) {
+        self.samples += data.recordings.iter().map(|r| data.band.kept(r.len()).len() as u64).sum::<u64>();
+        for (silent, why) in self.silent.iter_mut().zip(&data.silent) {
+            *silent = why.clone().or(silent.take());
         }
-        let columns = self.columns().of(data, joint, &self.identity.steepness[joint]);
-        octaves.push_rows(rows, &columns);
+    }
+}
+
+/// Takes a log into summaries of bands, each of half the cutoff of the one before, the first that of the options. Returns what was left out of it
+/// in the first, in words.
+///
+/// # Errors
+/// [`DataError`] where nothing of the log can be used in the first band; nothing has been taken in then. A log that is too short for a narrower
+/// band is missing from that band alone.
+pub(super) fn push_in_bands(
+    summaries: &mut [Summary],
+    body: &RigidBody,
+    log: &Log,
+    options: &DataOptions,
+    mut correct: impl FnMut(&mut Recording),
+) -> Result<Vec<String>, DataError> {
+    let (mut notes, mut refused) = (Vec::new(), None);
+    // By band: the seconds that were taken in.
+    let mut seconds: Vec<Option<f64>> = vec![None; summaries.len()];
+    for part in parts(log) {
+        let part = std::slice::from_ref(&part);
+        let bands = Data::in_bands(body, part, options, summaries.len(), &mut correct);
+        let mut bands: Vec<Result<Data<'_>, DataError>> = bands.unwrap_or_else(|error| vec![Err(error)]);
+        // What is too little in a band is too little in narrower ones.
+        let usable = bands.iter().take_while(|band| band.is_ok()).count();
+        if let Some(Err(error)) = bands.drain(usable..).next().filter(|_| usable == 0) {
+            refused = Some(error);
+        }
+        let bands: Vec<Data<'_>> = bands.into_iter().flatten().collect();
+        let Some(widest) = bands.first() else { continue };
+        notes.extend(widest.left_out.iter().cloned());
+        let of_joint = |&j: &usize| -> Vec<Octaves> {
+            let columns = summaries[0].columns().of(&bands, j, &summaries[0].identity.steepness[j]);
+            let pushed = |((summary, data), columns): ((&Summary, &Data<'_>), Vec<Vec<f64>>)| {
+                let mut octaves = summary.joints[j].clone();
+                octaves.push_rows(&data.joints[j], &columns);
+                octaves
+            };
+            summaries.iter().zip(&bands).zip(columns).map(pushed).collect()
+        };
+        let joints = parallel::map(&(0..widest.dof()).collect::<Vec<_>>(), of_joint);
+        for (j, octaves) in joints.into_iter().enumerate() {
+            summaries.iter_mut().zip(octaves).for_each(|(summary, octaves)| summary.joints[j] = octaves);
+        }
+        for ((summary, data), seconds) in summaries.iter_mut().zip(&bands).zip(&mut seconds) {
+            summary.count(data);
+            let own: f64 = data.recordings.iter().map(|r| r.len() as f64 / r.rate).sum();
+            *seconds = Some(seconds.unwrap_or(0.0) + own);
+        }
+    }
+    for (summary, seconds) in summaries.iter_mut().zip(&seconds) {
+        summary.logs.extend(seconds.map(|seconds| (log.file.clone(), seconds)));
+    }
+    match refused {
+        Some(error) if seconds[0].is_none() => Err(error),
+        _ => Ok(notes),
     }
 }
 

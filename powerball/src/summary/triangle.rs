@@ -106,6 +106,21 @@ impl Triangle {
         self.reflect(&mut block, other.width);
     }
 
+    /// The factor of rows whose columns are combinations of this one's: each a sum of columns with factors.
+    #[must_use]
+    pub fn combined(&self, columns: &[Vec<(usize, f64)>]) -> Triangle {
+        let mut combined = Triangle::new(columns.len());
+        let mut block = vec![0.0; self.width * columns.len()];
+        for (to, sum) in block.chunks_exact_mut(self.width.max(1)).zip(columns) {
+            for (k, factor) in sum {
+                to.iter_mut().zip(self.column(*k)).for_each(|(x, c)| *x += factor * c);
+            }
+        }
+        combined.reflect(&mut block, self.width);
+        combined.rows = self.rows;
+        combined
+    }
+
     fn reflect(&mut self, block: &mut [f64], count: usize) {
         if count > 0 {
             // Compiled for what the processor has; the same sums in the same order everywhere.
@@ -239,6 +254,25 @@ mod tests {
         }
         for k in 0..width {
             assert!(whole.column(k)[k + 1..].iter().all(|x| *x == 0.0));
+        }
+    }
+
+    /// Combined columns have the products of the rows' combinations.
+    #[test]
+    fn columns_are_combined_as_their_rows() {
+        let all = rows(90, 4, 5);
+        let mut t = Triangle::new(4);
+        t.push(&slices(&all));
+        let sums = [vec![(3, 1.0)], vec![], vec![(0, 2.0), (2, -1.0)], vec![(1, 1.0)], vec![(2, 0.5)]];
+        let made: Vec<Vec<f64>> = sums
+            .iter()
+            .map(|sum| (0..90).map(|r| sum.iter().map(|(k, f)| f * all[*k][r]).sum()).collect())
+            .collect();
+        let combined = t.combined(&sums);
+        assert_eq!((combined.width(), combined.rows()), (5, 90));
+        for (k, product) in products(&combined).iter().enumerate() {
+            let direct: f64 = made[k / 5].iter().zip(&made[k % 5]).map(|(x, y)| x * y).sum();
+            approx::assert_abs_diff_eq!(*product, direct, epsilon = 1e-11);
         }
     }
 

@@ -154,7 +154,7 @@ impl TorqueModel {
                 Some(p) => parameters.push(p.clone()),
                 None => {
                     return wrong(format!(
-                        "has no value for the parameter {name}: it was identified for another arm file"
+                        "has no value for the parameter {name}: it was identified for another arm file, or in mountings that do not determine it"
                     ));
                 }
             }

@@ -18,6 +18,8 @@ pub use source::{Scalar, SourceError};
 
 use crate::correction::{Law, Term};
 use crate::estimate::{JointFriction, ParameterEstimate};
+use crate::regression::RigidBody;
+use dyngen::{SetKind, Values};
 use serde::{Deserialize, Serialize};
 
 /// The model of one arm; as JSON the keys are those of `identified.json` and more.
@@ -142,6 +144,24 @@ impl TorqueModel {
             Some(NamedTerm { effect: "constant torque".to_string(), term })
         };
         self.friction.iter().filter_map(constant).chain(self.additions.terms.iter().cloned()).collect()
+    }
+
+    /// The model in the minimal set of a body, whose parameters its own determine: those that logs of several mountings determine together, say.
+    /// Errors of converted values are not known. As it is where they do not.
+    #[must_use]
+    pub fn in_set_of(mut self, body: &RigidBody) -> TorqueModel {
+        let names = body.names();
+        if names.iter().all(|name| self.parameters.iter().any(|p| p.name == *name)) {
+            return self;
+        }
+        let values = Values::named(self.parameters.iter().map(|p| (p.name.as_str(), p.value)), &self.arm);
+        let model = body.model();
+        if let Some(values) = model.set(SetKind::Minimal).ok().and_then(|set| values.of_set(model, set).ok())
+        {
+            let plain = |(name, value): (&String, f64)| ParameterEstimate::plain(name, value);
+            self.parameters = names.iter().zip(values).map(plain).collect();
+        }
+        self
     }
 
     /// The minimal set's values in order.

@@ -4,5 +4,6 @@
 
 mod coverage;
 mod estimators;
+mod mountings;
 mod plant;
 mod summaries;

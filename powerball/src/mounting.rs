@@ -1,13 +1,12 @@
 //! How a base stands: gravity in its frame, and which way is up.
 
-use super::Error;
 use dyngen::Arm;
 use dyngen::exact::rational::{self, Rational, parse_rational};
 use nalgebra::{Rotation3, Vector3};
 use std::fmt;
 use std::str::FromStr;
 
-/// How the base stands for a trajectory.
+/// How the base stands for a trajectory or for a log of one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Mounting {
     /// As the arm file's gravity says.
@@ -40,6 +39,22 @@ impl Mounting {
         }
     }
 
+    /// The mounting that has this gravity in the base frame, m/s².
+    #[must_use]
+    pub fn with(gravity: [f64; 3], arm: &Arm) -> Mounting {
+        if gravity == Mounting::Filed.gravity(arm) { Mounting::Filed } else { Mounting::Gravity(gravity) }
+    }
+
+    /// As it is written on the command line.
+    #[must_use]
+    pub fn text(&self) -> String {
+        match self {
+            Mounting::Filed => "filed".to_string(),
+            Mounting::Turned { roll, pitch } => format!("{roll},{pitch}"),
+            Mounting::Gravity([x, y, z]) => format!("{x},{y},{z}"),
+        }
+    }
+
     /// Upwards in the base frame; z where there is no gravity.
     #[must_use]
     pub fn up(&self, arm: &Arm) -> Vector3<f64> {
@@ -49,8 +64,8 @@ impl Mounting {
     /// The arm mounted so. Gravity is taken to six decimals: turns by right angles stay exact.
     ///
     /// # Errors
-    /// Gravity that is no number.
-    pub fn of(&self, arm: &Arm) -> Result<Arm, Error> {
+    /// Gravity that is no number: which.
+    pub fn of(&self, arm: &Arm) -> Result<Arm, String> {
         let mut mounted = arm.clone();
         if *self != Mounting::Filed {
             let [x, y, z] = self.gravity(arm).map(decimal);
@@ -60,8 +75,27 @@ impl Mounting {
     }
 }
 
-pub(super) fn decimal(value: f64) -> Result<Rational, Error> {
-    parse_rational(&format!("{value:.6}")).map_err(Error::Setting)
+/// An arm, given as it is mounted for each of some paths, under gravity in a direction that no two of its mountings are special to: its minimal
+/// set is what the mountings determine together. The arm itself where there is one mounting alone.
+///
+/// # Errors
+/// No mounting, or gravity that is no number.
+pub fn together(arms: &[&Arm]) -> Result<Arm, String> {
+    let mut arm = (*arms.first().ok_or("no mounting was given")?).clone();
+    if let [_, _, ..] = arms {
+        let mut sum = [0.0; 3];
+        for (k, arm) in arms.iter().enumerate() {
+            let gravity = arm.gravity.each_ref().map(rational::to_f64);
+            (0..3).for_each(|i| sum[i] += gravity[i] / (1.0 + 0.37 * k as f64));
+        }
+        let [x, y, z] = sum.map(decimal);
+        arm.gravity = [x?, y?, z?];
+    }
+    Ok(arm)
+}
+
+fn decimal(value: f64) -> Result<Rational, String> {
+    parse_rational(&format!("{value:.6}"))
 }
 
 impl FromStr for Mounting {
@@ -110,6 +144,7 @@ mod tests {
         ];
         for (text, gravity) in cases {
             let mounting: Mounting = text.parse().unwrap();
+            assert_eq!(mounting.text(), text);
             assert_eq!(
                 mounting.of(&arm).unwrap().gravity.each_ref().map(rational::to_f64),
                 gravity,
