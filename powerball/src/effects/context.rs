@@ -148,6 +148,12 @@ const MOVED: f64 = 1e-4;
 /// A compliant joint's deflection is smoothed to this before it is differentiated twice, Hz: torques are noisy derivatives
 /// already.
 const SMOOTHING: f64 = 5.0;
+/// The load whose side a link hangs to is smoothed to this, Hz: going through the play is an impulse in the rigid torque of the motor's motion, and
+/// would change the side that it follows from.
+const SIDE: f64 = 3.0;
+/// The way through the play is smoothed as positions are, Hz and order (see [`DataOptions`](crate::regression::DataOptions)): both are differentiated
+/// alike.
+const WAY: (usize, f64) = (4, 8.0);
 
 /// Adds to positions, speeds and accelerations how a law moves one link, `size` times: n values a sample, `rigid` the torque
 /// of the rigid arm where the motors are.
@@ -160,21 +166,21 @@ pub(crate) fn move_link(
     size: f64,
 ) {
     let n = recording.dof;
-    let shift: Vec<f64> = rigid.iter().skip(joint).step_by(n).map(|t| size * law.shift(*t)).collect();
     let rate = recording.rate;
-    let moves = match law {
-        // A deflection that follows the load has speed and acceleration.
-        Law::Compliance => {
-            let filter = Butterworth::low_pass(2, SMOOTHING.min(0.3 * rate), rate);
-            let shift = filter.map_or(shift.clone(), |f| f.zero_phase(&shift));
-            let (dv, da) = (
-                difference::derivative(&shift, 1.0 / rate),
-                difference::second_derivative(&shift, 1.0 / rate),
-            );
-            [shift, dv, da]
-        }
-        _ => [shift, Vec::new(), Vec::new()],
+    let smooth = |(order, cutoff): (usize, f64), signal: Vec<f64>| {
+        let filter = Butterworth::low_pass(order, cutoff.min(0.3 * rate), rate);
+        filter.map_or(signal.clone(), |f| f.zero_phase(&signal))
     };
+    let load: Vec<f64> = rigid.iter().skip(joint).step_by(n).copied().collect();
+    let shifts = |load: Vec<f64>| load.iter().map(|t| size * law.shift(*t)).collect();
+    let shift = match law {
+        Law::Compliance => smooth((2, SMOOTHING), shifts(load)),
+        _ => smooth(WAY, shifts(smooth((2, SIDE), load))),
+    };
+    // What follows the load has speed and acceleration.
+    let (dv, da) =
+        (difference::derivative(&shift, 1.0 / rate), difference::second_derivative(&shift, 1.0 / rate));
+    let moves = [shift, dv, da];
     for (signal, by) in motion.iter_mut().zip(moves) {
         for (value, by) in signal.iter_mut().skip(joint).step_by(n).zip(by) {
             *value += by;

@@ -80,20 +80,30 @@ impl Plant {
     pub fn record(&self, motion: &Motion, start: f64, seed: u64) -> Recording {
         let n = motion.dof();
         let mut torques = Vec::with_capacity(motion.q.len());
-        let mut positions = motion.q.clone();
+        let mut windups = vec![0.0; motion.q.len()];
         let mut states = vec![State::default(); self.effects.len()];
         for (k, [q, dq, ddq]) in motion.samples().enumerate() {
             let t = start + k as f64 * motion.period;
             let rigid = self.rigid_torques(t, q, dq, ddq);
             let instant =
                 Instant { t, q, dq, rigid: &rigid, friction: &self.friction, dynamics: &self.dynamics };
-            let mut tau: Vec<f64> = (0..n).map(|i| rigid[i] + self.friction[i].torque(dq[i])).collect();
+            let mut tau = rigid.clone();
             for (effect, state) in self.effects.iter().zip(&mut states) {
                 effect.add_torque(&instant, state, &mut tau);
-                effect.add_windup(&instant, &mut positions[k * n..(k + 1) * n]);
+                effect.add_windup(&instant, &mut windups[k * n..(k + 1) * n]);
             }
             torques.extend(tau);
         }
+        // Eq. 16 is of the motor's side of the gear, where the encoder sits as well.
+        for (k, [_, dq, _]) in motion.samples().enumerate() {
+            let (last, next) = (k.saturating_sub(1), (k + 1).min(motion.len() - 1));
+            let time = (next - last).max(1) as f64 * motion.period;
+            for i in 0..n {
+                let winding = (windups[next * n + i] - windups[last * n + i]) / time;
+                torques[k * n + i] += self.friction[i].torque(dq[i] + winding);
+            }
+        }
+        let positions: Vec<f64> = motion.q.iter().zip(&windups).map(|(q, w)| q + w).collect();
         let mut recording = Recording {
             dof: n,
             t: (0..motion.len()).map(|k| start + k as f64 * motion.period).collect(),
