@@ -85,10 +85,10 @@ fn cases() -> Vec<Case> {
     cases.push(Case {
         name: "start_points",
         title: "SCHUNK arm: across start points",
-        question: "Repeats of two start points are fitted, those of a third are held out: another path.",
+        question: "All repeats from two start points are fitted, those from a third are held out.",
         folder: "lwa4p_rollouts",
-        fit: [repeats("A0", &mut (1..=20).step_by(3)), repeats("A1", &mut (1..=20).step_by(3))].concat(),
-        validate: repeats("A2", &mut (1..=20).step_by(3)),
+        fit: [repeats("A0", &mut (1..=20)), repeats("A1", &mut (1..=20))].concat(),
+        validate: repeats("A2", &mut (1..=20)),
     });
     cases
 }

@@ -5,38 +5,18 @@ use super::bus::{Where, virtual_bus};
 use super::output::{self, Progress};
 use crate::bus::{Bus, BusUrl};
 use crate::driver::lwa4p::LWA4P;
+use crate::mounting::Mounting;
 use crate::procedure::friction::{
     Experiment, FrictionError, JointFriction, analyse, is_complete, log_file, plan, run,
 };
-use crate::procedure::gravity_free::{self, Mounting};
+use crate::procedure::gravity_free;
 use crate::procedure::{RecordError, Recorder};
 use crate::report::{Figure, Ink, Page, Panel, Series, Table, number};
 use crate::virtual_arm::{VirtualArm, lwa4p};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use dyngen::{Arm, Model};
 use serde_json::json;
 use std::path::PathBuf;
-
-/// How the base stands.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Base {
-    /// As the arm file's gravity says.
-    Filed,
-    /// On its side, gravity along the base's x axis.
-    AlongX,
-    /// On its side, gravity along the base's y axis.
-    AlongY,
-}
-
-impl From<Base> for Mounting {
-    fn from(base: Base) -> Self {
-        match base {
-            Base::Filed => Mounting::AsFiled,
-            Base::AlongX => Mounting::AlongX,
-            Base::AlongY => Mounting::AlongY,
-        }
-    }
-}
 
 /// Move each joint at 18 constant speeds each way where gravity does not load it, and fit friction laws (Eq. 15, Eq. 16, Stribeck).
 ///
@@ -45,14 +25,15 @@ impl From<Base> for Mounting {
 /// they need it. THE ARM MOVES.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  powerball friction --out friction\n  \
-    powerball friction --bus socketcan:can0 --mounting along-x --joints 2,3 --out friction")]
+    powerball friction --bus socketcan:can0 --mounting 0,90 --joints 2,3 --out friction")]
 pub(crate) struct Friction {
     /// The arm file with limits; the built-in hardware arm where this is left out.
     #[arg(long, value_name = "ARM.toml")]
     arm: Option<PathBuf>,
-    /// How the base stands, on a real arm; the virtual arm is mounted as each joint needs it.
-    #[arg(long, value_enum, default_value = "filed")]
-    mounting: Base,
+    /// How the base stands, on a real arm: filed, ROLL,PITCH in degrees, or gravity in the base frame as X,Y,Z in m/s²; the virtual arm
+    /// is mounted as each joint needs it.
+    #[arg(long, default_value = "filed", allow_hyphen_values = true)]
+    mounting: Mounting,
     /// The joints, from 1, with commas between; all of them where this is left out.
     #[arg(long, value_delimiter = ',')]
     joints: Option<Vec<usize>>,
@@ -93,7 +74,7 @@ impl Friction {
         for joint in wanted.iter().map(|j| j - 1) {
             let mounting = match self.place.bus {
                 BusUrl::Virtual => gravity_free::find(&model, joint).map(|found| found.mounting),
-                _ => Some(self.mounting.into()),
+                _ => Some(self.mounting),
             };
             let planned = match mounting {
                 Some(mounting) => plan(&model, joint, mounting, LWA4P.period_seconds()).map_err(failure)?,
@@ -102,7 +83,12 @@ impl Friction {
             match planned {
                 Some(experiment) => experiments.push(experiment),
                 None => notes.push(match gravity_free::find(&model, joint) {
-                    Some(found) => format!("joint {} needs the base mounted {}", joint + 1, found.mounting),
+                    Some(found) => format!(
+                        "joint {} needs the base mounted {} (--mounting {})",
+                        joint + 1,
+                        found.mounting,
+                        found.mounting.text()
+                    ),
                     None => format!("joint {}: no pose keeps gravity off it in any mounting", joint + 1),
                 }),
             }
@@ -150,7 +136,13 @@ impl Friction {
 
     /// Records what is not there yet, one mounting after the other.
     fn record(&self, model: &Model, experiments: &[Experiment], progress: &Progress) -> Result<(), Failure> {
-        for mounting in Mounting::ALL {
+        let mut mountings: Vec<Mounting> = Vec::new();
+        for mounting in experiments.iter().map(|e| e.place.mounting) {
+            if !mountings.contains(&mounting) {
+                mountings.push(mounting);
+            }
+        }
+        for mounting in mountings {
             let open: Vec<&Experiment> = experiments
                 .iter()
                 .filter(|e| {

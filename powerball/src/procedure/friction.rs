@@ -1,11 +1,12 @@
 //! The friction experiment (§II.C): each joint alone at constant speeds where gravity does not load it, and the law that fits.
 
 use super::constant_speed::{self, Bounds, Plan};
-use super::gravity_free::{self, GravityFree, Mounting};
+use super::gravity_free::{self, GravityFree};
 use super::laws::{Point, Rated, choose};
 use super::{RecordError, Recorder, resume};
 use crate::bus::Bus;
 use crate::log::{LogError, read_log};
+use crate::mounting::Mounting;
 use dyngen::Model;
 use serde_json::{Value, json};
 use std::fmt;
@@ -191,7 +192,7 @@ mod tests {
         let model = Model::derive(lwa4p::arm().unwrap()).unwrap();
         let folder = std::env::temp_dir().join(format!("powerball_friction_{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
-        for (joint, mounting) in [(4, Mounting::AsFiled), (1, Mounting::AlongX)] {
+        for (joint, mounting) in [(4, Mounting::Filed), (1, Mounting::Turned { roll: 0.0, pitch: 90.0 })] {
             let experiment = plan(&model, joint, mounting, LWA4P.period_seconds()).unwrap().unwrap();
             let mut setup = lwa4p::setup([0.0; 6], 3).unwrap();
             setup.plant = lwa4p::mounted(mounting.gravity(model.arm())).unwrap();

@@ -1,47 +1,15 @@
 //! Poses in which gravity puts no torque on a joint, for any place of that joint: where friction can be seen alone.
 
+use crate::mounting::Mounting;
 use dyngen::arm::JointKind;
-use dyngen::{Arm, Evaluator, Function, Model, SetKind};
-use std::fmt;
+use dyngen::{Evaluator, Function, Model, SetKind};
 
-/// How the base is mounted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mounting {
-    /// As the arm file says.
-    AsFiled,
-    /// Lying on its side: gravity along the base's x axis.
-    AlongX,
-    /// Lying on its side: gravity along the base's y axis.
-    AlongY,
-}
-
-impl Mounting {
-    /// All of them, the arm file's first.
-    pub const ALL: [Mounting; 3] = [Mounting::AsFiled, Mounting::AlongX, Mounting::AlongY];
-
-    /// Gravity in the base frame, m/s²; an arm file without gravity gets 9.81.
-    #[must_use]
-    pub fn gravity(self, arm: &Arm) -> [f64; 3] {
-        let filed = arm.gravity.each_ref().map(dyngen::exact::rational::to_f64);
-        let size = filed.iter().map(|g| g * g).sum::<f64>().sqrt();
-        let size = if size > 0.0 { size } else { 9.81 };
-        match self {
-            Mounting::AsFiled => filed,
-            Mounting::AlongX => [size, 0.0, 0.0],
-            Mounting::AlongY => [0.0, size, 0.0],
-        }
-    }
-}
-
-impl fmt::Display for Mounting {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Mounting::AsFiled => "as in the arm file",
-            Mounting::AlongX => "on its side, gravity along the base's x axis",
-            Mounting::AlongY => "on its side, gravity along the base's y axis",
-        })
-    }
-}
+/// The mountings that are tried, in this order: as the arm file says, and on either side.
+const MOUNTINGS: [Mounting; 3] = [
+    Mounting::Filed,
+    Mounting::Turned { roll: 0.0, pitch: 90.0 },
+    Mounting::Turned { roll: 90.0, pitch: 0.0 },
+];
 
 /// A pose in which a joint feels no gravity.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,7 +31,7 @@ const SWEEPS: i32 = 4;
 /// The first mounting, and the pose nearest to zero, that keep gravity off a joint; `None` where no pose within the limits does.
 #[must_use]
 pub fn find(model: &Model, joint: usize) -> Option<GravityFree> {
-    Mounting::ALL.into_iter().map(|mounting| best(model, joint, mounting)).find(|found| found.leftover < FREE)
+    MOUNTINGS.into_iter().map(|mounting| best(model, joint, mounting)).find(|found| found.leftover < FREE)
 }
 
 /// The best pose of a mounting.
@@ -72,12 +40,15 @@ pub fn best(model: &Model, joint: usize, mounting: Mounting) -> GravityFree {
     let arm = model.arm();
     let n = arm.dof();
     let gravity = mounting.gravity(arm);
-    let size = gravity.iter().map(|g| g * g).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+    let size = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
     // The axes are proven with everything else; they depend on no parameter set.
     let jacobian = Evaluator::new(model, Function::Jacobian, SetKind::Minimal).ok();
     let prismatic = arm.joints[joint].kind == JointKind::Prismatic;
     let leftover = |q: &[f64]| {
         let Some(jacobian) = &jacobian else { return 1.0 };
+        if size == 0.0 {
+            return 0.0;
+        }
         let mut out = vec![0.0; 6 * n];
         jacobian.evaluate(q, &[], &[], &[], &mut out);
         let rows = if prismatic { 0 } else { 3 };
@@ -138,7 +109,7 @@ pub fn best(model: &Model, joint: usize, mounting: Mounting) -> GravityFree {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dyngen::Samples;
+    use dyngen::{Arm, Samples};
 
     fn model() -> Model {
         let text = include_str!("../../lwa4p.toml");
@@ -151,7 +122,7 @@ mod tests {
         let model = model();
         for joint in 0..6 {
             let found = find(&model, joint).unwrap();
-            let upright = found.mounting == Mounting::AsFiled;
+            let upright = found.mounting == Mounting::Filed;
             assert_eq!(upright, ![1, 2].contains(&joint), "joint {}: {found:?}", joint + 1);
         }
     }

@@ -59,12 +59,18 @@ impl TorqueModel {
                 1e3 * delay
             ));
         }
-        for t in self.terms().iter().filter(|t| t.term.law == correction::Law::Compliance) {
+        for t in self.terms() {
+            let (joint, size) = (t.term.joint + 1, t.term.coefficient);
+            let what = match t.term.law {
+                correction::Law::Compliance => format!("gives way by {size:e} rad for 1 N·m"),
+                correction::Law::HangingBack { .. } => {
+                    format!("hangs by {size:e} rad to the side of its load")
+                }
+                _ => continue,
+            };
             notes.push(format!(
-                "joint {}: gives way by {:e} rad for 1 N·m; the torque below has the deflection's part of the position, not that of \
-                 its speed and acceleration: give the motor a reference ahead of the link's by as much",
-                t.term.joint + 1,
-                t.term.coefficient
+                "joint {joint}: {what}; the torque below has its part of the position, not that of its speed and acceleration: \
+                 give the motor a reference ahead of the link's by as much"
             ));
         }
         notes
