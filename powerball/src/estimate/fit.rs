@@ -192,7 +192,7 @@ impl Rows for InMemory<'_> {
             inflation: residual
                 .iter()
                 .enumerate()
-                .map(|(j, r)| variance_inflation(self.data, j, r))
+                .map(|(j, r)| variance_inflation(self.data, j, r, MEAN_OVER))
                 .collect(),
         }
     }
@@ -213,14 +213,14 @@ fn residuals(data: &Data<'_>, design: &Design, theta: &[f64]) -> Vec<Vec<f64>> {
 }
 
 /// Seconds over which means are taken for [`variance_inflation`].
-pub(super) const MEAN_OVER: f64 = 1.0;
+pub(crate) const MEAN_OVER: f64 = 1.0;
 
-/// How much more the residual's means over 1 s vary than those of independent samples would.
+/// How much more the residual's means over some seconds vary than those of independent samples would.
 ///
 /// Coloured residuals tell less than their number of samples; this is by how much.
-fn variance_inflation(data: &Data<'_>, joint: usize, residual: &[f64]) -> f64 {
+pub(crate) fn variance_inflation(data: &Data<'_>, joint: usize, residual: &[f64], seconds: f64) -> f64 {
     let per_second = data.rate() / data.band.decimation as f64;
-    let length = ((MEAN_OVER * per_second).round() as usize).max(1);
+    let length = ((seconds * per_second).round() as usize).max(1);
     let (mut sum, mut count, mut square) = (0.0, 0usize, 0.0);
     for rows in &data.joints[joint].rows {
         for chunk in residual[rows.clone()].chunks_exact(length) {

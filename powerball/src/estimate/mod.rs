@@ -30,6 +30,7 @@ pub use design::{Design, Gram, runs};
 pub use errors::{Errors, errors};
 pub use exchanged::exchanged;
 pub use fit::{Fit, Term, fit, friction_columns};
+pub(crate) use fit::{MEAN_OVER, variance_inflation};
 pub use folds::Folds;
 pub use identify::{Identified, JointFriction, ParameterEstimate, Spread, identify, spread, spread_of};
 pub use instrumental::solve_instrumental;

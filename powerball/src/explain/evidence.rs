@@ -3,7 +3,7 @@
 use super::folds::fold_gains;
 use super::screen::{Screen, Trial, dot};
 use crate::estimate::distribution::f_tail;
-use crate::estimate::{Design, Folds, Solver};
+use crate::estimate::{Design, Folds, MEAN_OVER, Solver, variance_inflation};
 use crate::regression::{Column, Data};
 use faer::Mat;
 
@@ -21,14 +21,14 @@ pub(super) struct Evidence {
 }
 
 /// Where a candidate acts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Extent {
     /// In all logs.
     Everywhere,
     /// In some logs, for most of their time.
     SomeLogs,
-    /// For a short while: too short for blocks and folds.
-    Short,
+    /// For a while of so many seconds: too short for blocks and folds.
+    Short(f64),
 }
 
 /// The other path, prepared for one base model.
@@ -52,15 +52,17 @@ pub(super) fn evidence(
     extent: Extent,
     path: Option<(&Path<'_>, &[Column])>,
 ) -> Evidence {
-    let (local, short) = (extent != Extent::Everywhere, extent == Extent::Short);
+    let (p_value, fold_gains) = match extent {
+        Extent::Short(seconds) => (by_chance(screen, trial, seconds), event_gains(screen, trial)),
+        _ => {
+            let local = extent != Extent::Everywhere;
+            (wald(screen, trial), fold_gains(screen, trial, joints, folds, local))
+        }
+    };
     Evidence {
         score: trial.score,
-        p_value: if short { by_chance(trial) } else { wald(screen, trial) },
-        fold_gains: if short {
-            event_gains(screen, trial)
-        } else {
-            fold_gains(screen, trial, joints, folds, local)
-        },
+        p_value,
+        fold_gains,
         path_gain: path.map_or(0.0, |(path, columns)| path_gain(screen, trial, joints, path, columns)),
     }
 }
@@ -72,17 +74,7 @@ pub(super) fn wald(screen: &Screen<'_>, trial: &Trial) -> f64 {
     let columns = screen.residualised(trial);
     let mut square = Mat::<f64>::zeros(k, k);
     let mut meat = Mat::<f64>::zeros(k, k);
-    let after: Vec<Vec<f64>> = columns
-        .iter()
-        .zip(screen.context.residual)
-        .map(|(columns, residual)| {
-            let mut e = residual.clone();
-            for (column, theta) in columns.iter().zip(&trial.theta) {
-                e.iter_mut().zip(column).for_each(|(e, c)| *e -= theta * c);
-            }
-            e
-        })
-        .collect();
+    let after = left(screen, trial, &columns);
     let mut clusters = 0.0;
     for block in &data.blocks {
         let mut score = vec![0.0; k];
@@ -127,11 +119,33 @@ pub(super) fn wald(screen: &Screen<'_>, trial: &Trial) -> f64 {
     f_tail(wald / used * freedom / clusters, used, freedom)
 }
 
-/// The probability of the gain by chance, for events that are shorter than blocks; gains are over variance inflation.
-fn by_chance(trial: &Trial) -> f64 {
+/// What a trial leaves, given its columns with the base's shares taken out.
+fn left(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
+    let of = |(columns, residual): (&Vec<Vec<f64>>, &Vec<f64>)| {
+        let mut e = residual.clone();
+        for (column, theta) in columns.iter().zip(&trial.theta) {
+            e.iter_mut().zip(column).for_each(|(e, c)| *e -= theta * c);
+        }
+        e
+    };
+    columns.iter().zip(screen.context.residual).map(of).collect()
+}
+
+/// The probability of the gain by chance, for an event of some seconds, too short for blocks. Gains are over the variance inflation of means over
+/// 1 s; slow noise looks like an event that lasts as long as it stays, so it is that of means over the event's own duration that counts.
+fn by_chance(screen: &Screen<'_>, trial: &Trial, seconds: f64) -> f64 {
+    let data = screen.context.data;
+    let slower: Vec<f64> = (left(screen, trial, &screen.residualised(trial)).iter().enumerate())
+        .filter(|(j, e)| !e.is_empty() && trial.columns.iter().any(|c| c.at(*j).is_some()))
+        .map(|(j, e)| {
+            let inflation = |over: f64| variance_inflation(data, j, e, over);
+            (inflation(seconds.max(MEAN_OVER)) / inflation(MEAN_OVER)).max(1.0)
+        })
+        .collect();
+    let slower = slower.iter().sum::<f64>() / slower.len().max(1) as f64;
     let used = trial.theta.iter().filter(|t| **t != 0.0).count() as f64;
     // The inflation itself is known from about a hundred means.
-    f_tail(trial.gain / used.max(1.0), used, 100.0)
+    f_tail(trial.gain / slower.max(1.0) / used.max(1.0), used, 100.0)
 }
 
 /// Parts into which an event's own rows are cut.

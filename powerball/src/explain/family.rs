@@ -69,10 +69,12 @@ impl Family {
 }
 
 fn extent(candidate: &Candidate) -> Extent {
-    match candidate.windows.as_slice() {
-        [] => Extent::Everywhere,
-        windows if windows.iter().any(|w| w.to.is_finite()) => Extent::Short,
-        _ => Extent::SomeLogs,
+    let windows = &candidate.windows;
+    let lasting = windows.iter().map(|w| w.to - w.from).filter(|seconds| seconds.is_finite());
+    match lasting.reduce(f64::max) {
+        Some(seconds) => Extent::Short(seconds),
+        None if windows.is_empty() => Extent::Everywhere,
+        None => Extent::SomeLogs,
     }
 }
 
