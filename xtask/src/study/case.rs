@@ -36,6 +36,10 @@ pub(super) enum Table {
     Measured,
     /// The same, size 0.6
     MeasuredSmall,
+    /// One effect on an arm that was drawn by lot
+    Arms,
+    /// No effect, on arms that were drawn by lot
+    CleanArms,
 }
 
 impl Table {
@@ -46,6 +50,11 @@ impl Table {
     /// Whether it needs measured logs.
     pub(super) fn measured(self) -> bool {
         matches!(self, Table::Measured | Table::MeasuredSmall)
+    }
+
+    /// Whether every case has an arm of its own.
+    pub(super) fn draws_arms(self) -> bool {
+        matches!(self, Table::Arms | Table::CleanArms)
     }
 
     /// The name in results and on the command line.
@@ -70,6 +79,8 @@ impl Table {
             }
             Table::Measured => "one effect of size 1 put into the measured UR10e logs",
             Table::MeasuredSmall => "one effect of size 0.6 put into the measured UR10e logs",
+            Table::Arms => "one effect of size 0.3 to 1.5 on arms drawn by lot, white noise",
+            Table::CleanArms => "no effect, arms drawn by lot, white noise",
         }
     }
 
@@ -83,6 +94,8 @@ impl Table {
             Table::Single | Table::Small => 10,
             Table::Friction | Table::Misfit | Table::ColouredEffect | Table::Alike => 5,
             Table::Measured | Table::MeasuredSmall => 3,
+            Table::Arms => 5,
+            Table::CleanArms => 50,
         }
     }
 
@@ -120,7 +133,7 @@ impl Case {
             let mut add =
                 |kinds: Vec<String>, sizes: Vec<f64>| cases.push(Case { table, kinds, sizes, seed });
             match table {
-                Table::Clean | Table::Coloured => add(Vec::new(), Vec::new()),
+                Table::Clean | Table::Coloured | Table::CleanArms => add(Vec::new(), Vec::new()),
                 Table::Outside => {
                     for law in Outside::ALL {
                         add(vec![law.name().to_string()], vec![size()]);

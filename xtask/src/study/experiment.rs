@@ -1,10 +1,11 @@
 //! Logs of the virtual arm along exciting paths, with a truth scaled to a wanted size.
 
 use super::alike;
+use super::arms::{DRAWS, Drawn, LARGEST_FACTOR};
 use super::case::{Case, Table};
 use super::judge::Outcome;
 use super::law::{FrictionLaw, Law, Misfit, OtherFriction, Outside, OutsideLaw};
-use dyngen::{Model, SetKind};
+use dyngen::{Arm, Model, SetKind};
 use powerball::estimate::{Folds, fit, spread};
 use powerball::excite::{Settings, optimise};
 use powerball::explain::explain;
@@ -36,6 +37,9 @@ const WIDE: DataOptions = DataOptions { cutoff: 60.0, smoothing: 60.0, block: 2.
 pub(super) struct Bench {
     model: Model,
     body: RigidBody,
+    plant: Plant,
+    /// Where the arm was drawn by lot.
+    drawn: Option<Drawn>,
 }
 
 /// What is in the plant beside what its model knows.
@@ -79,14 +83,22 @@ struct Session {
 impl Bench {
     pub(super) fn new() -> Result<Bench, String> {
         let arm = lwa4p::arm().map_err(|e| e.to_string())?;
-        let body = RigidBody::new(&arm).map_err(|e| e.to_string())?;
-        let model = Model::derive(arm).map_err(|e| e.to_string())?;
-        Ok(Bench { model, body })
+        Bench::of(arm, lwa4p::plant().map_err(|e| e.to_string())?, None)
     }
 
-    /// Runs a case of simulated logs.
+    fn of(arm: Arm, plant: Plant, drawn: Option<Drawn>) -> Result<Bench, String> {
+        let body = RigidBody::new(&arm).map_err(|e| e.to_string())?;
+        let model = Model::derive(arm).map_err(|e| e.to_string())?;
+        Ok(Bench { model, body, plant, drawn })
+    }
+
+    /// Runs a case of simulated logs; `None` where no truth of its kind can be seen on the arm that was drawn.
     pub(super) fn run(&self, case: &Case) -> Result<Option<Outcome>, String> {
         let mut rng = case.rng();
+        if case.table.draws_arms() && self.drawn.is_none() {
+            let drawn = Drawn::new(&mut rng)?;
+            return Bench::of(drawn.arm.clone(), drawn.plant.clone(), Some(drawn))?.run(case);
+        }
         let mut session = self.session(case, &mut rng)?;
         if case.table == Table::Misfit {
             session.misfit = Some(self.misfit(&session, &mut rng)?);
@@ -94,7 +106,9 @@ impl Bench {
         let mut truths = Vec::new();
         let mut sizes = Vec::new();
         for (kind, size) in case.kinds.iter().zip(&case.sizes) {
-            let (truth, reached) = self.truth(&session, kind, *size, &mut rng)?;
+            let Some((truth, reached)) = self.truth(&session, kind, *size, &mut rng)? else {
+                return Ok(None);
+            };
             truths.push(truth);
             sizes.push(reached);
         }
@@ -121,7 +135,7 @@ impl Bench {
     }
 
     fn session(&self, case: &Case, rng: &mut ChaCha8Rng) -> Result<Session, String> {
-        let mut plant = lwa4p::plant().map_err(|e| e.to_string())?;
+        let mut plant = self.plant.clone();
         let friction: Vec<TanhFriction<f64>> = (plant.friction().iter())
             .map(|f| {
                 let mut share = || rng.random_range(0.6..1.5);
@@ -179,36 +193,59 @@ impl Bench {
         Ok(misfit)
     }
 
-    /// A truth of that kind whose visible size is `size`, and the size that was reached.
+    /// A truth of that kind whose visible size is `size`, and the size that was reached; `None` where the arm has none.
     fn truth(
         &self,
         session: &Session,
         kind: &str,
         size: f64,
         rng: &mut ChaCha8Rng,
-    ) -> Result<(Truth, f64), String> {
+    ) -> Result<Option<(Truth, f64)>, String> {
         let end = session.starts.last().copied().unwrap_or(0.0)
             + session.motions.last().map_or(0.0, Motion::duration);
         let begins = session.starts[2] + 3.0..session.starts[3] - PAUSE - 3.0;
-        let mut truth = match Outside::ALL.into_iter().find(|law| law.name() == kind) {
-            Some(law) => Truth::Law(OutsideLaw::draw(law, &session.plant, rng)),
-            None => Truth::Effect(
-                Effect::draw_named(kind, &session.plant, end, begins, rng)
-                    .ok_or_else(|| format!("no effect is called {kind}"))?,
-            ),
-        };
         let quiet = session.alone();
         let plain = self.base(&quiet.logs(&[], false))?;
-        let mut reached = 0.0;
+        for _ in 0..DRAWS {
+            let truth = match (Outside::ALL.into_iter().find(|law| law.name() == kind), &self.drawn) {
+                (Some(law), _) => Truth::Law(OutsideLaw::draw(law, &session.plant, rng)),
+                (None, Some(drawn)) => match drawn.effect(kind, end, begins.clone(), rng) {
+                    Some(effect) => Truth::Effect(effect),
+                    None => return Ok(None),
+                },
+                (None, None) => Truth::Effect(
+                    Effect::draw_named(kind, &session.plant, end, begins.clone(), rng)
+                        .ok_or_else(|| format!("no effect is called {kind}"))?,
+                ),
+            };
+            let (truth, reached, factor) = self.scaled(&quiet, truth, size, &plain)?;
+            // On an arm of any kind many a truth is a part of the base model, or next to nothing beside it.
+            if self.drawn.is_none() || ((0.8..1.25).contains(&(reached / size)) && factor < LARGEST_FACTOR) {
+                return Ok(Some((truth, reached)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// A truth scaled until its visible size is `size`, the size that it reached, and by how much it was scaled.
+    fn scaled(
+        &self,
+        quiet: &Session,
+        mut truth: Truth,
+        size: f64,
+        plain: &[Vec<f64>],
+    ) -> Result<(Truth, f64, f64), String> {
+        let (mut reached, mut factor) = (0.0, 1.0);
         for _ in 0..ROUNDS {
             let logs = quiet.logs(std::slice::from_ref(&truth), false);
-            reached = self.visible(&quiet, &logs, &plain)?.into_iter().fold(0.0, f64::max);
-            if (reached / size - 1.0).abs() < 0.03 {
+            reached = self.visible(quiet, &logs, plain)?.into_iter().fold(0.0, f64::max);
+            if (reached / size - 1.0).abs() < 0.03 || !(reached > 0.0) {
                 break;
             }
             truth = truth.scaled(size / reached);
+            factor *= size / reached;
         }
-        Ok((truth, reached))
+        Ok((truth, reached, factor))
     }
 
     /// What of a truth is left on the fitted logs when the base model was refitted, without noise and in a wide band,

@@ -4,6 +4,7 @@
 //! the lines.
 
 mod alike;
+mod arms;
 mod case;
 mod experiment;
 mod judge;
