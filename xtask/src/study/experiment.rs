@@ -239,7 +239,7 @@ impl Bench {
         for _ in 0..ROUNDS {
             let logs = quiet.logs(std::slice::from_ref(&truth), false);
             reached = self.visible(quiet, &logs, plain)?.into_iter().fold(0.0, f64::max);
-            if (reached / size - 1.0).abs() < 0.03 || !(reached > 0.0) {
+            if (reached / size - 1.0).abs() < 0.03 || reached <= 0.0 {
                 break;
             }
             truth = truth.scaled(size / reached);
