@@ -3,10 +3,12 @@
 use super::solve::Solver;
 use super::vary::{FRICTION, Rows};
 use crate::regression::Data;
+use crate::summary::{NODES, Steepness};
 use faer::Mat;
 
-/// Steepnesses tried for each level.
-const GRID: usize = 14;
+/// Steepnesses tried for each level. A steep level that is off by a grid's step leaves an error at which a second steep one is
+/// worth more than the bend that is there, and from two steep levels no descent finds the way back: the grid is fine.
+const GRID: usize = 64;
 
 /// Friction columns of a joint in the band: tanh(γ2 q̇), tanh(γ4 q̇), q̇, and ∂/∂ ln γ of the first two.
 #[must_use]
@@ -59,7 +61,7 @@ pub(super) fn search<R: Rows>(rows: &R, at: &R::At, weights: &[f64], joint: usiz
     let layout = rows.layout();
     let (lowest, highest) = rows.range(joint);
     // The ends of the range are hardly told from straight lines and steps.
-    let (low, high) = (5.0 * lowest, 0.5 * highest);
+    let (low, high) = (2.0 * lowest, 0.5 * highest);
     let steep: Vec<f64> = (0..GRID).map(|k| low * (high / low).powf(k as f64 / (GRID - 1) as f64)).collect();
     // Everything but this joint's levels and all tangents stays as nuisance.
     let nuisance = |c: usize| {
@@ -73,21 +75,31 @@ pub(super) fn search<R: Rows>(rows: &R, at: &R::At, weights: &[f64], joint: usiz
     let solver = Solver::new(&gram, nuisance);
     let base = solver.solve(&right);
     let weight = weights[joint];
-    let trials = rows.trials(at, joint, &steep);
-    let cross: Vec<Vec<f64>> =
-        (0..GRID).map(|g| (0..layout.size()).map(|c| weight * trials.cross[(c, g)]).collect()).collect();
+    // Columns at a few nodes hold those of all steepnesses between them.
+    let nodes = Steepness::between(low, high);
+    let trials = rows.trials(at, joint, &nodes.nodes());
+    let shares: Vec<[f64; NODES]> = steep.iter().map(|g| nodes.weights(*g)).collect();
+    let sum = |g: usize, of: &dyn Fn(usize) -> f64| -> f64 {
+        weight * shares[g].iter().enumerate().map(|(k, share)| share * of(k)).sum::<f64>()
+    };
+    let cross: Vec<Vec<f64>> = (0..GRID)
+        .map(|g| (0..layout.size()).map(|c| sum(g, &|k| trials.cross[(c, k)])).collect())
+        .collect();
+    let half: Vec<Vec<f64>> = (0..GRID)
+        .map(|g| (0..NODES).map(|i| sum(g, &|k| trials.square[(i.max(k), i.min(k))])).collect())
+        .collect();
     let (mut square, mut score) = (vec![vec![0.0; GRID]; GRID], vec![0.0; GRID]);
     let inner = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
     let projected: Vec<Vec<f64>> = cross.iter().map(|c| solver.solve(c)).collect();
     for a in 0..GRID {
         for b in 0..=a {
-            square[a][b] = weight * trials.square[(a, b)] - inner(&cross[a], &projected[b]);
+            square[a][b] = inner(&half[a], &shares[b]) - inner(&cross[a], &projected[b]);
         }
-        score[a] = weight * trials.score[a] - inner(&cross[a], &base);
+        score[a] = sum(a, &|k| trials.score[k]) - inner(&cross[a], &base);
     }
     let single =
         |a: usize| if score[a] > 0.0 && square[a][a] > 0.0 { score[a].powi(2) / square[a][a] } else { 0.0 };
-    let (mut best, mut found) = (0.0, [steep[GRID - 3], steep[2]]);
+    let (mut best, mut found) = (0.0, [steep[GRID - GRID / 5], steep[GRID / 5]]);
     for a in 0..GRID {
         for b in 0..a {
             let det = square[a][a] * square[b][b] - square[a][b].powi(2);
