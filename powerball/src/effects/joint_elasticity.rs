@@ -3,9 +3,11 @@
 use super::candidate::by_joint;
 use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::correction::Law;
+use crate::regression::Column;
 use serde_json::{Value, json};
 
-/// q_link = q − τ/K: the change of rigid torque on all joints for 1/K, to first order.
+/// q_link = q − τ/K: the change of rigid torque on all joints over 1/K. The candidate's value is the 1/K about which it is taken: none
+/// while nothing is known of it, when the change is taken to first order.
 pub(super) struct JointElasticity;
 
 impl Effect for JointElasticity {
@@ -27,6 +29,19 @@ impl Effect for JointElasticity {
 
     fn laws(&self, _: &Context<'_>, _: &Candidate) -> Vec<Law<f64>> {
         vec![Law::Compliance]
+    }
+
+    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
+        vec![context.moved_link_column(
+            candidate.joints[0],
+            Law::Compliance,
+            candidate.values.first().copied(),
+        )]
+    }
+
+    /// A soft gear moves its link so far that gravity there is another one.
+    fn refined(&self, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
+        (c[0] > 0.0).then(|| Candidate { values: vec![c[0]], ..candidate.clone() })
     }
 
     fn non_negative(&self) -> bool {

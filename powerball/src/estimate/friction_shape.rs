@@ -82,9 +82,8 @@ pub(super) fn search<R: Rows>(rows: &R, at: &R::At, weights: &[f64], joint: usiz
     let sum = |g: usize, of: &dyn Fn(usize) -> f64| -> f64 {
         weight * shares[g].iter().enumerate().map(|(k, share)| share * of(k)).sum::<f64>()
     };
-    let cross: Vec<Vec<f64>> = (0..GRID)
-        .map(|g| (0..layout.size()).map(|c| sum(g, &|k| trials.cross[(c, k)])).collect())
-        .collect();
+    let cross: Vec<Vec<f64>> =
+        (0..GRID).map(|g| (0..layout.size()).map(|c| sum(g, &|k| trials.cross[(c, k)])).collect()).collect();
     let half: Vec<Vec<f64>> = (0..GRID)
         .map(|g| (0..NODES).map(|i| sum(g, &|k| trials.square[(i.max(k), i.min(k))])).collect())
         .collect();

@@ -1,8 +1,8 @@
 //! The model along logs: the same laws in the same order as in the controller's code.
 
 use super::TorqueModel;
-use crate::correction::{Memory, Term, add_torques};
-use crate::effects::{Window, each_instant, move_link, time_delay};
+use crate::correction::{Law, Memory, Term, add_torques};
+use crate::effects::{PASSES, Window, each_instant, move_link, time_delay};
 use crate::friction::TanhFriction;
 use crate::parallel;
 use crate::regression::{Data, Recording, RigidBody};
@@ -36,12 +36,18 @@ impl TorqueModel {
             *q -= self.additions.log_changes.offset(k % n);
         }
         let recording = &true_places;
-        let mut motion = [recording.q.clone(), recording.v.clone(), recording.a.clone()];
-        let mut rigid = self.rigid(body, &motion, recording, held);
+        let motors = [recording.q.clone(), recording.v.clone(), recording.a.clone()];
+        let at_motors = self.rigid(body, &motors, recording, held);
         let terms: Vec<Term<f64>> = self.terms().iter().map(|t| t.term).collect();
-        if terms.iter().any(|t| t.law.moves_link()) {
-            for term in terms.iter().filter(|t| t.law.moves_link()) {
-                move_link(&mut motion, recording, &rigid, term.joint, term.law, term.coefficient);
+        let mut rigid = at_motors.clone();
+        let moving: Vec<&Term<f64>> = terms.iter().filter(|t| t.law.moves_link()).collect();
+        let passes = if moving.is_empty() { 0 } else { PASSES };
+        for _ in 0..passes {
+            let mut motion = motors.clone();
+            for term in &moving {
+                // Only what gives way does so under the load that it has there; play has a side.
+                let load = if term.law == Law::Compliance { &rigid } else { &at_motors };
+                move_link(&mut motion, recording, load, term.joint, term.law, term.coefficient);
             }
             rigid = self.rigid(body, &motion, recording, held);
         }
