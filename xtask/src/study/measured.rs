@@ -20,6 +20,9 @@ const HELD_OUT: [&str; 2] = ["5", "14"];
 /// The grid on which the motion is followed, s, and its smoothing, Hz.
 const STEP: f64 = 0.005;
 const SMOOTHING: f64 = 8.0;
+/// The same where a gear gives way: its way follows the torque, a second derivative, and is differentiated twice itself. The paths end well
+/// below.
+const SMOOTHING_OF_GEARS: f64 = 3.0;
 /// Rounds in which an effect is scaled to its size.
 const ROUNDS: usize = 3;
 /// Draws until one is an effect that is not in the logs already.
@@ -126,10 +129,12 @@ impl Measured {
         sensors.white.fill(0.0);
         let quiet = Plant::new(plant.dynamics().clone(), plant.friction().to_vec(), sensors);
         let with = quiet.clone().with(effect.clone());
+        let of_gear = matches!(effect, Effect::JointElasticity { .. } | Effect::Backlash { .. });
+        let smoothing = if of_gear { SMOOTHING_OF_GEARS } else { SMOOTHING };
         let mut logs = self.logs.clone();
         for log in &mut logs {
             for piece in log.pieces.clone() {
-                let Some(measured) = Recording::new(log, 0, piece.clone(), STEP, SMOOTHING) else { continue };
+                let Some(measured) = Recording::new(log, 0, piece.clone(), STEP, smoothing) else { continue };
                 let n = measured.dof;
                 let mut motion = Motion::new(n, STEP);
                 (motion.q, motion.dq, motion.ddq) =
