@@ -55,20 +55,31 @@ pub(super) struct Trials {
     pub score: Vec<f64>,
 }
 
-/// The pair of steepnesses that leaves the least on one joint, all else refitted, levels ≥ 0.
+/// The pair of steepnesses that leaves the least on one joint, all else refitted, levels ≥ 0. Where `present` holds the joint's
+/// steepnesses, they are among those tried, with their tangents: a bend beside a step that is known is then not
+/// outdone by a second step that corrects the first.
 #[must_use]
-pub(super) fn search<R: Rows>(rows: &R, at: &R::At, weights: &[f64], joint: usize) -> [f64; 2] {
+pub(super) fn search<R: Rows>(
+    rows: &R,
+    at: &R::At,
+    weights: &[f64],
+    joint: usize,
+    present: Option<[f64; 2]>,
+) -> [f64; 2] {
     let layout = rows.layout();
     let (lowest, highest) = rows.range(joint);
     // The ends of the range are hardly told from straight lines and steps.
     let (low, high) = (2.0 * lowest, 0.5 * highest);
-    let steep: Vec<f64> = (0..GRID).map(|k| low * (high / low).powf(k as f64 / (GRID - 1) as f64)).collect();
-    // Everything but this joint's levels and all tangents stays as nuisance.
+    let mut steep: Vec<f64> =
+        (0..GRID).map(|k| low * (high / low).powf(k as f64 / (GRID - 1) as f64)).collect();
+    steep.extend(present.into_iter().flatten().filter(|g| (low..=high).contains(g)));
+    let count = steep.len();
+    // Everything but this joint's levels and the other joints' tangents stays as nuisance.
     let nuisance = |c: usize| {
         let friction = c.checked_sub(layout.inertial).filter(|f| *f < FRICTION * layout.dof);
         friction.is_none_or(|f| {
             let (j, which) = (f / FRICTION, f % FRICTION);
-            which == 2 || (which < 2 && j != joint)
+            which == 2 || (which < 2 && j != joint) || (which > 2 && j == joint && present.is_some())
         })
     };
     let (gram, right, _) = rows.products(at, weights);
@@ -83,14 +94,14 @@ pub(super) fn search<R: Rows>(rows: &R, at: &R::At, weights: &[f64], joint: usiz
         weight * shares[g].iter().enumerate().map(|(k, share)| share * of(k)).sum::<f64>()
     };
     let cross: Vec<Vec<f64>> =
-        (0..GRID).map(|g| (0..layout.size()).map(|c| sum(g, &|k| trials.cross[(c, k)])).collect()).collect();
-    let half: Vec<Vec<f64>> = (0..GRID)
+        (0..count).map(|g| (0..layout.size()).map(|c| sum(g, &|k| trials.cross[(c, k)])).collect()).collect();
+    let half: Vec<Vec<f64>> = (0..count)
         .map(|g| (0..NODES).map(|i| sum(g, &|k| trials.square[(i.max(k), i.min(k))])).collect())
         .collect();
-    let (mut square, mut score) = (vec![vec![0.0; GRID]; GRID], vec![0.0; GRID]);
+    let (mut square, mut score) = (vec![vec![0.0; count]; count], vec![0.0; count]);
     let inner = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
     let projected: Vec<Vec<f64>> = cross.iter().map(|c| solver.solve(c)).collect();
-    for a in 0..GRID {
+    for a in 0..count {
         for b in 0..=a {
             square[a][b] = inner(&half[a], &shares[b]) - inner(&cross[a], &projected[b]);
         }
@@ -99,7 +110,7 @@ pub(super) fn search<R: Rows>(rows: &R, at: &R::At, weights: &[f64], joint: usiz
     let single =
         |a: usize| if score[a] > 0.0 && square[a][a] > 0.0 { score[a].powi(2) / square[a][a] } else { 0.0 };
     let (mut best, mut found) = (0.0, [steep[GRID - GRID / 5], steep[GRID / 5]]);
-    for a in 0..GRID {
+    for a in 0..count {
         for b in 0..a {
             let det = square[a][a] * square[b][b] - square[a][b].powi(2);
             if det <= 1e-9 * square[a][a] * square[b][b] {
@@ -110,7 +121,8 @@ pub(super) fn search<R: Rows>(rows: &R, at: &R::At, weights: &[f64], joint: usiz
             let gain =
                 if x >= 0.0 && z >= 0.0 { x * score[a] + z * score[b] } else { single(a).max(single(b)) };
             if gain > best {
-                (best, found) = (gain, [steep[a], steep[b]]);
+                // The steeper level comes first, whatever the order in which they were tried.
+                (best, found) = (gain, [steep[a].max(steep[b]), steep[a].min(steep[b])]);
             }
         }
     }

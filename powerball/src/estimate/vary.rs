@@ -143,10 +143,11 @@ pub(super) fn vary<R: Rows>(rows: &R, non_negative: &[usize], start: Option<Star
     // A start is near already.
     let rounds = if start.is_some() { 1 } else { WEIGHT_ROUNDS };
     for round in 0..rounds {
-        if start.is_none() && round < 2 {
+        if start.is_none() {
             for j in (0..n).filter(|j| rows.moves(*j)) {
                 let mut trial = shapes.clone();
-                trial[j] = friction_shape::search(rows, &state.at, &weights, j);
+                let present = (round > 0).then_some(shapes[j]);
+                trial[j] = friction_shape::search(rows, &state.at, &weights, j, present);
                 let next = State::new(rows, &bounds, &trial, &weights);
                 if next.error < state.error {
                     (state, shapes) = (next, trial);

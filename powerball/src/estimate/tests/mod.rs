@@ -4,6 +4,7 @@
 
 mod coverage;
 mod estimators;
+mod friction;
 mod mountings;
 mod plant;
 mod summaries;

@@ -1,6 +1,6 @@
 mod correction;
 mod measured;
 mod model;
+mod names;
 mod plant;
 mod repeats;
-mod study;
