@@ -114,16 +114,16 @@ impl<'a> Context<'a> {
         let n = self.data.dof();
         let loads = || self.rigid().iter().flat_map(|t| t.iter().skip(joint).step_by(n));
         let first_order = MOVED / loads().fold(1e-9f64, |top, load| top.max(law.shift(*load).abs()));
-        let (size, passes) = match about {
-            Some(size) if size > first_order => (size, PASSES),
-            _ => (first_order, 1),
+        let (size, passes, smoothing) = match about {
+            Some(size) if size > first_order => (size, PASSES, SOFT),
+            _ => (first_order, 1, STIFF),
         };
         let difference: Vec<Vec<f64>> = (self.data.recordings.iter().zip(self.rigid()))
             .map(|(recording, rigid)| {
                 let mut moved = rigid.clone();
                 for _ in 0..passes {
                     let mut motion = [recording.q.clone(), recording.v.clone(), recording.a.clone()];
-                    move_link(&mut motion, recording, &moved, joint, law, size);
+                    move_link(&mut motion, recording, &moved, joint, law, (size, smoothing));
                     let [q, v, a] = motion;
                     moved = self.fit.rigid_torque(self.data.body, &q, &v, &a);
                 }
@@ -154,8 +154,11 @@ impl<'a> Context<'a> {
 /// The largest deflection that a difference is taken with, rad.
 const MOVED: f64 = 1e-4;
 /// A compliant joint's deflection is smoothed to this before it is differentiated twice, Hz: torques are noisy derivatives
-/// already, and above the frequency at which a soft arm swings on its gear the deflection is not what its load says.
-const SMOOTHING: f64 = 2.5;
+/// already.
+const STIFF: f64 = 5.0;
+/// The same where it is as large as was found: above the frequency at which a soft arm swings on its gear the deflection is not what its
+/// load says.
+pub(crate) const SOFT: f64 = 2.5;
 /// A link that gives way far carries another load there: the load is taken so many times.
 pub(crate) const PASSES: usize = 2;
 /// The load whose side a link hangs to is smoothed to this, Hz: going through the play is an impulse in the rigid torque of the motor's motion, and
@@ -166,14 +169,14 @@ const SIDE: f64 = 3.0;
 const WAY: (usize, f64) = (4, 8.0);
 
 /// Adds to positions, speeds and accelerations how a law moves one link, `size` times: n values a sample, `rigid` the torque
-/// of the rigid arm where the motors are.
+/// of the rigid arm where the motors are. What gives way is smoothed, Hz.
 pub(crate) fn move_link(
     motion: &mut [Vec<f64>; 3],
     recording: &Recording,
     rigid: &[f64],
     joint: usize,
     law: Law<f64>,
-    size: f64,
+    (size, smoothing): (f64, f64),
 ) {
     let n = recording.dof;
     let rate = recording.rate;
@@ -184,7 +187,7 @@ pub(crate) fn move_link(
     let load: Vec<f64> = rigid.iter().skip(joint).step_by(n).copied().collect();
     let shifts = |load: Vec<f64>| load.iter().map(|t| size * law.shift(*t)).collect();
     let shift = match law {
-        Law::Compliance => smooth((2, SMOOTHING), shifts(load)),
+        Law::Compliance => smooth((2, smoothing), shifts(load)),
         _ => smooth(WAY, shifts(smooth((2, SIDE), load))),
     };
     // What follows the load has speed and acceleration.

@@ -28,7 +28,7 @@ mod window_sums;
 pub use axis::Axis;
 pub use candidate::{Candidate, Found, Window};
 pub use context::Context;
-pub(crate) use context::{PASSES, each_instant, move_link};
+pub(crate) use context::{PASSES, SOFT, each_instant, move_link};
 
 use crate::correction::Law;
 use crate::regression::Column;

@@ -69,7 +69,7 @@ pub(super) fn search<R: Rows>(
     let layout = rows.layout();
     let (lowest, highest) = rows.range(joint);
     // The ends of the range are hardly told from straight lines and steps.
-    let (low, high) = (2.0 * lowest, 0.5 * highest);
+    let (low, high) = (5.0 * lowest, 0.5 * highest);
     let mut steep: Vec<f64> =
         (0..GRID).map(|k| low * (high / low).powf(k as f64 / (GRID - 1) as f64)).collect();
     steep.extend(present.into_iter().flatten().filter(|g| (low..=high).contains(g)));

@@ -2,7 +2,7 @@
 
 use super::TorqueModel;
 use crate::correction::{Law, Memory, Term, add_torques};
-use crate::effects::{PASSES, Window, each_instant, move_link, time_delay};
+use crate::effects::{PASSES, SOFT, Window, each_instant, move_link, time_delay};
 use crate::friction::TanhFriction;
 use crate::parallel;
 use crate::regression::{Data, Recording, RigidBody};
@@ -47,7 +47,7 @@ impl TorqueModel {
             for term in &moving {
                 // Only what gives way does so under the load that it has there; play has a side.
                 let load = if term.law == Law::Compliance { &rigid } else { &at_motors };
-                move_link(&mut motion, recording, load, term.joint, term.law, term.coefficient);
+                move_link(&mut motion, recording, load, term.joint, term.law, (term.coefficient, SOFT));
             }
             rigid = self.rigid(body, &motion, recording, held);
         }
