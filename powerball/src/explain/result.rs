@@ -46,7 +46,8 @@ pub struct Explained {
     /// Torques over time on the other path, by joint; not part of the JSON.
     #[serde(skip)]
     pub curves: Vec<TorqueCurve>,
-    /// The model with everything that was named: model.json. Its errors are `after`.
+    /// The model with everything that was named: model.json. Its errors are `after`; not where joints were taken apart, as it has one body
+    /// for all.
     #[serde(skip)]
     pub model: TorqueModel,
     /// The plots that show the effects; not part of the JSON.

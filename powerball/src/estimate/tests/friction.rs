@@ -31,7 +31,7 @@ fn the_bend_is_found_in_slow_motion() {
             let left = fitted.sigma[j] / (law.gamma1 + law.gamma3);
             worst = worst.max(left);
             assert!(
-                left < 0.0005,
+                left < 0.0015,
                 "seed {seed}, joint {}: {left:.4}, {:?} of {law:?}",
                 j + 1,
                 fitted.friction(j)
