@@ -56,28 +56,15 @@ pub fn exchanged(body: &RigidBody, logs: &[Log], options: &DataOptions, found: &
 mod tests {
     use super::*;
     use crate::excite::{Settings, optimise};
-    use crate::virtual_arm::{Recording, lwa4p};
+    use crate::virtual_arm::lwa4p;
     use dyngen::SetKind;
-
-    fn log(recording: &Recording) -> Log {
-        let by_joint = |x: &[f64]| (0..6).map(|j| x.iter().skip(j).step_by(6).copied().collect()).collect();
-        Log {
-            file: "made.csv".into(),
-            t: recording.t.clone(),
-            q: by_joint(&recording.q),
-            torque: by_joint(&recording.tau),
-            temperature: None,
-            pieces: std::iter::once(0..recording.t.len()).collect(),
-            clock: 0.0,
-        }
-    }
 
     #[test]
     fn exchanged_torques_and_wrong_signs_are_named_and_sound_ones_are_not() {
         let body = RigidBody::new(&lwa4p::arm().unwrap()).unwrap();
         let settings = Settings { evaluations: 60, ..Settings::default() };
         let path = optimise(body.model(), SetKind::Minimal, &settings).unwrap().paths.swap_remove(0);
-        let sound = log(&lwa4p::plant().unwrap().record(&path.sample(200.0), 0.0, 5));
+        let sound = lwa4p::plant().unwrap().record(&path.sample(200.0), 0.0, 5).log("made.csv");
         let options = DataOptions::default();
         let said = |log: &Log| {
             let mut summary = Summary::new(&body, &options);

@@ -27,18 +27,7 @@ fn session(plant: &Plant, body: &RigidBody) -> (Vec<Log>, Vec<Log>, Explained) {
 }
 
 fn log(plant: &Plant, motion: &Motion, seed: u64) -> Log {
-    let recording = plant.record(motion, 0.0, seed);
-    let by_joint =
-        |values: &[f64]| (0..6).map(|j| values.iter().skip(j).step_by(6).copied().collect()).collect();
-    Log {
-        file: format!("log{seed}.csv"),
-        t: recording.t.clone(),
-        q: by_joint(&recording.q),
-        torque: by_joint(&recording.tau),
-        temperature: None,
-        pieces: std::iter::once(0..recording.t.len()).collect(),
-        clock: 0.0,
-    }
+    plant.record(motion, 0.0, seed).log(format!("log{seed}.csv"))
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::dynamics::Dynamics;
 use super::effect::{Effect, Instant, State};
 use crate::friction::TanhFriction;
+use crate::log::Log;
 use crate::motion::Motion;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -157,6 +158,23 @@ impl Recording {
     /// The number of joints n.
     pub fn dof(&self) -> usize {
         self.dof
+    }
+
+    /// As a log that was read.
+    pub fn log(&self, file: impl Into<String>) -> Log {
+        let n = self.dof;
+        let by_joint = |values: &[f64]| -> Vec<Vec<f64>> {
+            (0..n).map(|j| values.iter().skip(j).step_by(n).copied().collect()).collect()
+        };
+        Log {
+            file: file.into(),
+            q: by_joint(&self.q),
+            torque: by_joint(&self.tau),
+            temperature: None,
+            pieces: std::iter::once(0..self.t.len()).collect(),
+            clock: 0.0,
+            t: self.t.clone(),
+        }
     }
 
     /// As CSV with a header line: `t`, `q1…qn`, `tau1…taun`.

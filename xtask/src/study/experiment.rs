@@ -13,7 +13,7 @@ use powerball::friction::TanhFriction;
 use powerball::log::{Log, common_clock};
 use powerball::motion::Motion;
 use powerball::regression::{Data, DataOptions, RigidBody};
-use powerball::virtual_arm::{Effect, Plant, Recording, lwa4p};
+use powerball::virtual_arm::{Effect, Plant, lwa4p};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
@@ -335,26 +335,9 @@ impl Session {
             if let Some(law) = self.friction {
                 add(&OtherFriction { law, plant: &self.plant });
             }
-            logs.push(log(&recording, k));
+            logs.push(recording.log(format!("log{k}.csv")));
         }
         common_clock(&mut logs);
         logs
-    }
-}
-
-/// A recording as a log that was read.
-fn log(recording: &Recording, k: usize) -> Log {
-    let n = recording.dof();
-    let by_joint = |values: &[f64]| -> Vec<Vec<f64>> {
-        (0..n).map(|j| values.iter().skip(j).step_by(n).copied().collect()).collect()
-    };
-    Log {
-        file: format!("log{k}.csv"),
-        t: recording.t.clone(),
-        q: by_joint(&recording.q),
-        torque: by_joint(&recording.tau),
-        temperature: None,
-        pieces: std::iter::once(0..recording.t.len()).collect(),
-        clock: 0.0,
     }
 }

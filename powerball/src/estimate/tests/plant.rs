@@ -69,18 +69,7 @@ fn record_on(plant: &Plant, logs: usize, periods: usize, seed: u64, size: impl F
             let joints = (0..6).map(joint).collect();
             let path = Fourier { fundamental: std::f64::consts::TAU / 10.0, periods, ramp: 1.0, joints };
             let recording = plant.record(&path.sample(plant.sensors().rate), 0.0, 1000 * seed + log as u64);
-            let by_joint = |x: &[f64]| -> Vec<Vec<f64>> {
-                (0..6).map(|j| x.iter().skip(j).step_by(6).copied().collect()).collect()
-            };
-            Log {
-                file: format!("virtual {seed}.{log}"),
-                q: by_joint(&recording.q),
-                torque: by_joint(&recording.tau),
-                temperature: None,
-                pieces: std::iter::once(0..recording.t.len()).collect(),
-                clock: 0.0,
-                t: recording.t,
-            }
+            recording.log(format!("virtual {seed}.{log}"))
         })
         .collect()
 }

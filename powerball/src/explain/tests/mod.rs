@@ -4,3 +4,4 @@ mod model;
 mod names;
 mod plant;
 mod repeats;
+mod soft_gear;

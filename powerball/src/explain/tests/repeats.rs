@@ -25,23 +25,11 @@ fn runs(count: usize, warmth: f64, seed: u64) -> Vec<Log> {
     let sampled = path.sample(plant.sensors().rate);
     let speed: Vec<f64> = sampled.dq.iter().step_by(6).copied().collect();
     let run = |k: usize| {
-        let recording = plant.record(&sampled, 0.0, 1000 * seed + k as u64);
-        let by_joint = |x: &[f64]| -> Vec<Vec<f64>> {
-            (0..6).map(|j| x.iter().skip(j).step_by(6).copied().collect()).collect()
-        };
-        let mut torque = by_joint(&recording.tau);
-        for ((tau, v), t) in torque[0].iter_mut().zip(&speed).zip(&recording.t) {
+        let mut log = plant.record(&sampled, 0.0, 1000 * seed + k as u64).log(format!("run {k}"));
+        for ((tau, v), t) in log.torque[0].iter_mut().zip(&speed).zip(&log.t) {
             *tau += warmth * (-(k as f64 * DURATION + t) / WARMING).exp() * v;
         }
-        Log {
-            file: format!("run {k}"),
-            q: by_joint(&recording.q),
-            torque,
-            temperature: None,
-            pieces: std::iter::once(0..recording.t.len()).collect(),
-            clock: 0.0,
-            t: recording.t,
-        }
+        log
     };
     (0..count).map(run).collect()
 }
