@@ -69,7 +69,7 @@ impl<'c> Screen<'c> {
     /// Tries columns, whatever they mean.
     #[must_use]
     pub(super) fn try_columns(&self, columns: Vec<Column>, searched: f64) -> Option<Trial> {
-        if columns.is_empty() || !columns.iter().all(Column::is_usable) {
+        if columns.is_empty() || !columns.iter().all(Column::is_finite) {
             return None;
         }
         let fit = self.context.fit;
@@ -104,7 +104,8 @@ impl<'c> Screen<'c> {
             }
             score[a] -= dot(&base[a], &self.slope);
         }
-        // A column that the base can imitate wholly is no candidate.
+        // A column that the base can imitate wholly is no candidate; nor is one that this arm never feels, as a planar arm
+        // a force across its plane.
         let new = |a: usize| square[(a, a)] > 1e-6 * raw[a];
         let solver = Solver::new(&square, new);
         if solver.kept().is_empty() {

@@ -97,10 +97,9 @@ impl Column {
         self.parts.iter().find(|(j, _)| *j == joint).map(|(_, v)| v.as_slice())
     }
 
-    /// Whether all values are finite and some differ from zero.
+    /// Whether all values are finite.
     #[must_use]
-    pub fn is_usable(&self) -> bool {
+    pub fn is_finite(&self) -> bool {
         self.parts.iter().all(|(_, v)| v.iter().all(|x| x.is_finite()))
-            && self.parts.iter().any(|(_, v)| v.iter().any(|x| *x != 0.0))
     }
 }
