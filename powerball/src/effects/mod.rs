@@ -135,6 +135,17 @@ pub trait Effect: Sync {
         None
     }
 
+    /// What logs that were not fitted say themselves of an accepted candidate that may be in some logs and not in others;
+    /// `context` holds their residual without it.
+    fn seen_in(
+        &self,
+        _context: &Context<'_>,
+        _candidate: &Candidate,
+        _coefficients: &[f64],
+    ) -> Option<Candidate> {
+        None
+    }
+
     /// Nearby settings of a candidate's search, tried once it is accepted.
     fn neighbours(&self, _candidate: &Candidate) -> Vec<Candidate> {
         Vec::new()

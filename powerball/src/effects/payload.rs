@@ -13,7 +13,7 @@ pub(crate) struct Payload;
 
 /// A centre of mass farther than this from the flange, m, is no payload.
 const REACH: f64 = 1.0;
-/// Another log has the same payload if that explains this much more (in units of χ²).
+/// A log has the same payload if that explains this much more, and has it not if that explains this much more (in units of χ²).
 const ANOTHER_LOG: f64 = 10.0;
 
 impl Effect for Payload {
@@ -67,12 +67,53 @@ impl Effect for Payload {
         })
     }
 
+    /// A payload may have been taken off before another log, or held again in it. What the clocks say is overruled by a log that
+    /// clearly says otherwise, as a log among the fitted ones would.
+    fn seen_in(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
+        let data = context.data;
+        let taken = followed(context, candidate);
+        let mut seen = candidate.clone();
+        seen.windows.retain(|w| !data.logs.contains(&w.log));
+        for log in 0..data.logs.len() {
+            let start = data.recordings.iter().find(|r| r.log == log).map_or(0.0, |r| r.start);
+            let all = Window::new(data, log, start, f64::INFINITY);
+            let was = taken.iter().any(|w| w.log == all.log);
+            let explains = explained(
+                context,
+                &self.columns(context, &Candidate { windows: vec![all.clone()], ..seen.clone() }),
+                c,
+            );
+            let is = if was { explains > -ANOTHER_LOG } else { explains > ANOTHER_LOG };
+            if is {
+                seen.windows.push(all);
+            } else if was {
+                seen.form = 0;
+            }
+        }
+        Some(seen)
+    }
+
     fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
         let Some(first) = found.first() else { return Value::Null };
         let c = first.coefficients;
         let starts: Vec<f64> = first.candidate.windows.iter().map(|w| w.from).collect();
         json!({ "mass": c[0], "com": centre(c), "start_time": starts })
     }
+}
+
+/// How much less of χ² stays of a residual without some columns' torque.
+fn explained(context: &Context<'_>, columns: &[Column], c: &[f64]) -> f64 {
+    let by_joint = |j: usize| -> f64 {
+        let residual = &context.residual[j];
+        let mut torque = vec![0.0; residual.len()];
+        for (column, c) in columns.iter().zip(c) {
+            for (t, v) in torque.iter_mut().zip(column.at(j).unwrap_or_default()) {
+                *t += c * v;
+            }
+        }
+        context.fit.weights[j] * torque.iter().zip(residual).map(|(t, r)| t * (2.0 * r - t)).sum::<f64>()
+    };
+    (0..context.data.dof()).map(by_joint).sum()
 }
 
 /// The centre of mass.

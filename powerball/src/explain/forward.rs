@@ -466,6 +466,7 @@ impl Session<'_> {
         for (a, (_, candidate)) in self.accepted.iter_mut().zip(found) {
             a.candidate = candidate;
         }
+        self.look_into_other_logs();
     }
 
     /// Takes out what later additions made unneeded.

@@ -1,6 +1,8 @@
-//! Something held in the logs of the other path only: found there, and taken out before that path judges anything.
+//! Something held in logs of the other path: in those only, where it is found and taken out before that path judges anything; or in
+//! fitted ones, where each other log is asked whether it is held there too.
 
 use super::evidence::{Extent, evidence};
+use super::forward::Session;
 use super::naming::surprise;
 use super::result::NamedEffect;
 use super::rule;
@@ -96,6 +98,33 @@ pub(super) fn payload_on(
         class: effect.class().name().to_string(),
         rivals: Vec::new(),
     }))
+}
+
+impl Session<'_> {
+    /// Asks the other logs whether they have what is in some logs and not in others: one answer a log.
+    pub(super) fn look_into_other_logs(&mut self) {
+        for (k, coefficients) in self.coefficients().into_iter().enumerate() {
+            if self.accepted[k].candidate.windows.is_empty() {
+                continue;
+            }
+            let seen = {
+                let a = &self.accepted[k];
+                let effect = self.effects[a.effect].as_ref();
+                let mut without = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
+                let none: Vec<Vec<f64>> = vec![Vec::new(); self.other.dof()];
+                let own = effect.columns(&Context::new(&self.other, &self.fit, &none), &a.candidate);
+                for (column, c) in own.iter().zip(&coefficients) {
+                    for (j, values) in &column.parts {
+                        without[*j].iter_mut().zip(values).for_each(|(r, v)| *r += c * v);
+                    }
+                }
+                effect.seen_in(&Context::new(&self.other, &self.fit, &without), &a.candidate, &coefficients)
+            };
+            if let Some(seen) = seen {
+                self.accepted[k].candidate = seen;
+            }
+        }
+    }
 }
 
 /// Whether a log's error is out of all proportion.

@@ -2,6 +2,7 @@ mod correction;
 mod measured;
 mod model;
 mod names;
+mod planar;
 mod plant;
 mod repeats;
 mod soft_gear;
