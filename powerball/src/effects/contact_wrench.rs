@@ -7,14 +7,19 @@ use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
 use crate::estimate::Solver;
 use crate::regression::Column;
 use serde_json::{Value, json};
+use std::ops::Range;
 
 /// A constant force in the base frame at the last frame's origin, during a window of one log.
 pub(super) struct ContactWrench;
 
 /// Windows begin and end on a grid of this, s.
 const GRID: f64 = 0.5;
-/// Longest window in grid steps: what lasts longer is a payload or no event.
-const LONGEST: usize = 16;
+/// Longest window in grid steps that is tried from every step on, and anywhere.
+const SHORT: usize = 16;
+/// Ends of longer windows are looked for this many grid steps apart first.
+const COARSE: usize = 4;
+/// Longer windows keep away from their log's ends by a share of 1 / `CLEAR` of it: what is there until the end is a payload.
+const CLEAR: usize = 10;
 /// Larger forces are a rank-poor fit, N.
 const MOST: f64 = 2000.0;
 
@@ -66,7 +71,7 @@ impl Effect for ContactWrench {
     }
 }
 
-/// The window that explains most.
+/// The window that explains most: the best of all short ones and of longer ones on a coarse grid, with its ends moved.
 fn search(context: &Context<'_>) -> Option<Candidate> {
     let (data, fit) = (context.data, context.fit);
     let columns = data.force_columns();
@@ -76,37 +81,70 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     let (gram, _, _) = fit.gram.sum(&fit.weights, |_| true);
     let solver = Solver::new(&gram, |c| fit.free[c]);
     let steps = data.blocks_of(GRID);
-    let sums: Vec<Sums> = steps.iter().map(|b| Sums::of_block(context, columns, b)).collect();
-    let (mut best, mut found) = (0.0, None);
+    let mut before = vec![Sums::zero(fit.design.size, 3)];
+    for step in &steps {
+        let mut sum = before[before.len() - 1].clone();
+        sum.add(&Sums::of_block(context, columns, step), 1.0);
+        before.push(sum);
+    }
     let mut searched = 0.0;
-    for first in 0..steps.len() {
-        let mut window = Sums::zero(fit.design.size, 3);
-        for last in first..(first + LONGEST).min(steps.len()) {
-            if steps[last].log != steps[first].log {
-                break;
+    let mut best: Option<(f64, Range<usize>)> = None;
+    let mut consider = |window: Range<usize>, best: &mut Option<(f64, Range<usize>)>| {
+        let mut sums = before[window.end].clone();
+        sums.add(&before[window.start], -1.0);
+        searched += 1.0;
+        let (gain, force) = sums.gain(&solver);
+        if gain > best.as_ref().map_or(0.0, |(g, _)| *g) && force.iter().all(|f| f.abs() < MOST) {
+            *best = Some((gain, window));
+        }
+    };
+    let logs: Vec<Range<usize>> = (steps.chunk_by(|a, b| a.log == b.log))
+        .scan(0, |end, steps| {
+            *end += steps.len();
+            Some(*end - steps.len()..*end)
+        })
+        .collect();
+    for log in &logs {
+        for first in log.clone() {
+            for end in first + 1..=(first + SHORT).min(log.end) {
+                consider(first..end, &mut best);
             }
-            window.add(&sums[last], 1.0);
-            searched += 1.0;
-            let (gain, force) = window.gain(&solver);
-            if gain > best && force.iter().all(|f| f.abs() < MOST) {
-                (best, found) = (gain, Some((first, last)));
+        }
+        let inner = inner(log);
+        for first in inner.clone().step_by(COARSE) {
+            for end in (first + SHORT + 1..=inner.end).step_by(COARSE) {
+                consider(first..end, &mut best);
             }
         }
     }
-    let (first, last) = found?;
-    let from = block_start(context, &steps[first])?;
-    let step = 1.0 / data.rate();
+    let (_, coarse) = best.clone()?;
+    let log = logs.iter().find(|log| log.contains(&coarse.start))?;
+    if coarse.len() > SHORT {
+        let inner = inner(log);
+        let near =
+            |at: usize| at.saturating_sub(COARSE - 1).max(inner.start)..(at + COARSE).min(inner.end + 1);
+        for first in near(coarse.start) {
+            for end in near(coarse.end) {
+                consider(first..end, &mut best);
+            }
+        }
+    }
+    let (_, found) = best?;
+    let from = block_start(context, &steps[found.start])?;
     // To the last row before the next step begins.
-    let next = steps.get(last + 1).filter(|s| s.log == steps[last].log);
-    let to = next.and_then(|s| block_start(context, s)).map_or(f64::MAX, |t| t - 0.5 * step);
-    let window = Window::new(
-        data,
-        steps[first].log,
-        from,
-        if to == f64::MAX { end_of_log(context, steps[last].log) } else { to },
-    );
+    let to = match found.end < log.end {
+        true => block_start(context, &steps[found.end])? - 0.5 / data.rate(),
+        false => end_of_log(context, steps[found.start].log),
+    };
+    let window = Window::new(data, steps[found.start].log, from, to);
     let joints = (0..data.dof()).collect();
     Some(Candidate { joints, form: 0, values: Vec::new(), windows: vec![window], searched })
+}
+
+/// Where a log's longer windows lie.
+fn inner(log: &Range<usize>) -> Range<usize> {
+    let clear = log.len().div_ceil(CLEAR);
+    log.start + clear..log.end.saturating_sub(clear).max(log.start + clear)
 }
 
 fn end_of_log(context: &Context<'_>, log: usize) -> f64 {
