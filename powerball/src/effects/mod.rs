@@ -68,8 +68,8 @@ pub enum Part {
     Laws,
     /// A rigid arm with another value of a parameter that was taken for zero.
     Parameter(Parameter, f64),
-    /// A rigid arm under another gravity, m/s² in the base frame.
-    Gravity([f64; 3]),
+    /// A rigid arm under another gravity, m/s² in the base frame, and what all its parameters gain by what that shows; empty for nothing.
+    Gravity([f64; 3], Vec<f64>),
     /// A body that the last link may hold: mass in kg and centre in m, in the last frame.
     Payload(f64, [f64; 3]),
     /// Logs whose position of the candidate's joints is so many rad above the true one.

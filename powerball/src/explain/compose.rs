@@ -91,7 +91,10 @@ impl Session<'_> {
                     additions.arm_changes.not_zero.push(parameter.to_string());
                     not_zero.push((parameter, value));
                 }
-                Part::Gravity(gravity) => additions.arm_changes.gravity = Some(gravity),
+                Part::Gravity(gravity, gained) => {
+                    additions.arm_changes.gravity = Some(gravity);
+                    not_zero.extend(self.data.body.arm().all_parameters().into_iter().zip(gained));
+                }
                 Part::Payload(mass, com) => {
                     let windows = &a.candidate.windows;
                     additions.payloads.push(Payload {
