@@ -2,7 +2,7 @@ mod correction;
 mod measured;
 mod model;
 mod names;
-mod planar;
 mod plant;
 mod repeats;
+mod small_arms;
 mod soft_gear;
