@@ -76,7 +76,7 @@ impl Session<'_> {
             });
         }
         let shown = self.shown(&context);
-        let unattributed = self.unattributed(&context, &residual, &floor, &after);
+        let (unattributed, unexplained) = self.unattributed(&context, &residual, &floor, &after);
         let open = self.open(unattributed.is_some());
         let next_experiment = open.as_ref().map(|open| {
             let names = open.names();
@@ -105,7 +105,7 @@ impl Session<'_> {
             // An experiment moves a body.
             open: open.filter(|_| !self.data.joints_apart).map(Arc::new),
             false_positives: self.false_positives.clone(),
-            warnings: self.doubts(),
+            warnings: self.doubts().into_iter().chain(unexplained).collect(),
             curves,
             shown,
             model,
@@ -119,14 +119,14 @@ impl Session<'_> {
         comparison.rivals.iter().cloned().chain(self.told.ruled_out.iter().filter(here).map(out)).collect()
     }
 
-    /// The joints whose residual still depends on something.
+    /// The joints whose residual still depends on something, and what is to be said of those where more than noise is left that depends on nothing.
     fn unattributed(
         &self,
         context: &Context<'_>,
         other_residual: &[Vec<f64>],
         floor: &[f64],
         after: &Errors,
-    ) -> Option<Unattributed> {
+    ) -> (Option<Unattributed>, Option<String>) {
         let candidates: Vec<usize> = context
             .moving_joints()
             .filter(|j| after.fit.rms[*j] > 1.2 * floor[*j] && self.fit.inflation[*j] > 2.0)
@@ -139,9 +139,14 @@ impl Session<'_> {
                 .collect()
         });
         let mut signals: Vec<(String, f64)> = Vec::new();
-        let mut joints = Vec::new();
+        let (mut joints, mut nothing) = (Vec::new(), Vec::new());
         for (j, list) in candidates.iter().zip(found) {
             if list.is_empty() {
+                nothing.push(format!(
+                    "{} ({:.1} times the noise floor)",
+                    j + 1,
+                    after.fit.rms[*j] / floor[*j]
+                ));
                 continue;
             }
             joints.push(*j);
@@ -153,13 +158,21 @@ impl Session<'_> {
             }
         }
         signals.sort_by(|a, b| b.1.total_cmp(&a.1));
-        (!joints.is_empty()).then(|| Unattributed {
+        let unattributed = (!joints.is_empty()).then(|| Unattributed {
             rms: joints.iter().map(|j| after.fit.rms[*j]).collect(),
             joints: joints.iter().map(|j| j + 1).collect(),
             depends_on: signals.into_iter().map(|(name, _)| name).collect(),
             considered: self.refused.clone(),
             correction,
-        })
+        });
+        let unexplained = (!nothing.is_empty()).then(|| {
+            format!(
+                "what stays on joint {} is slower than white noise and depends on no position, speed, acceleration, load or time: slow noise \
+                 of the sensor, or something that comes and goes",
+                nothing.join(", ")
+            )
+        });
+        (unattributed, unexplained)
     }
 }
 
