@@ -1,6 +1,7 @@
 //! From logs to the rows of a regression: minimal-set regressor, friction columns, one band for all.
 
 mod apart;
+mod hidden;
 #[cfg(test)]
 pub(crate) mod newton_euler;
 mod prepare;

@@ -1,10 +1,10 @@
 //! The rigid arm of a file at run time: columns of its minimal set and of what lies outside it.
 
+use super::hidden::hidden;
 use dyngen::arm::ParameterKind;
 use dyngen::base::span::combinations;
 use dyngen::exact::rational::{self, Rational};
 use dyngen::{Arm, Error, Evaluator, Function, Model, SetKind};
-use faer::{Mat, Side};
 use std::sync::OnceLock;
 
 /// The rigid-body functions that an analysis needs, proven once and run over any number of samples.
@@ -192,41 +192,7 @@ impl RigidBody {
     /// Directions in the space of all parameters, eleven a link in the order of [`Arm::all_parameters`], that no motion under the arm's own gravity
     /// shows and that a gravity from another side does: how far from an upright first axis its link's weight is, say.
     pub fn hidden(&self) -> &[Vec<f64>] {
-        self.hidden.get_or_init(|| self.find_hidden().unwrap_or_default())
-    }
-
-    fn find_hidden(&self) -> Option<Vec<Vec<f64>>> {
-        let arm = self.arm();
-        let kept: Vec<usize> = arm.kept_parameters().iter().map(|p| p.index()).collect();
-        let mut shown = Mat::<f64>::zeros(self.names.len(), kept.len());
-        for (row, sum) in self.model.sums(self.model.set(SetKind::Minimal).ok()?).iter().enumerate() {
-            for (parameter, coefficient) in sum {
-                let column = kept.iter().position(|k| *k == parameter.index())?;
-                shown[(row, column)] = *coefficient;
-            }
-        }
-        let moments: Vec<usize> = kept.iter().copied().filter(|k| k % 11 < 4).collect();
-        let poses: Vec<f64> =
-            (0..HIDDEN_POSES * self.dof()).map(|k| (1.0 + k as f64 * 2.399).sin() * 2.0).collect();
-        let mut pulled = Mat::<f64>::zeros(3 * poses.len(), kept.len());
-        for axis in 0..3 {
-            let columns = self.gravity_columns(axis, &moments, &poses)?;
-            for (row, values) in columns.chunks_exact(moments.len()).enumerate() {
-                for (value, moment) in values.iter().zip(&moments) {
-                    let column = kept.iter().position(|k| k == moment)?;
-                    pulled[(axis * poses.len() + row, column)] = *value;
-                }
-            }
-        }
-        let (_, unseen) = split(&shown, shown.norm_l2())?;
-        let (felt, _) = split(&(&pulled * &unseen), pulled.norm_l2())?;
-        let directions = unseen * felt;
-        let whole = |d: usize| {
-            let mut all = vec![0.0; 11 * self.dof()];
-            kept.iter().enumerate().for_each(|(row, k)| all[*k] = directions[(row, d)]);
-            all
-        };
-        Some((0..directions.ncols()).map(whole).collect())
+        self.hidden.get_or_init(|| hidden(self).unwrap_or_default())
     }
 
     /// The index among [`Arm::all_parameters`] of a parameter of the last link.
@@ -234,21 +200,6 @@ impl RigidBody {
     pub fn last_link(&self, kind: ParameterKind) -> usize {
         11 * (self.dof() - 1) + kind as usize
     }
-}
-
-/// Poses at which it is seen whether a gravity from another side shows a parameter.
-const HIDDEN_POSES: usize = 8;
-
-/// Orthonormal directions that a matrix does not map to zero, and those that it does, for a matrix made of one of some norm.
-fn split(matrix: &Mat<f64>, norm: f64) -> Option<(Mat<f64>, Mat<f64>)> {
-    let found = (matrix.transpose() * matrix).self_adjoint_eigen(Side::Lower).ok()?;
-    let (values, vectors) = (found.S().column_vector(), found.U());
-    let pick = |seen: bool| {
-        let chosen: Vec<usize> =
-            (0..matrix.ncols()).filter(|k| (values[*k] > 1e-10 * norm * norm) == seen).collect();
-        Mat::from_fn(matrix.ncols(), chosen.len(), |row, k| vectors[(row, chosen[k])])
-    };
-    Some((pick(true), pick(false)))
 }
 
 fn pick(wide: &Wide, chosen: &[usize], q: &[f64], v: &[f64], a: &[f64], n: usize) -> Option<Vec<f64>> {
@@ -274,27 +225,6 @@ mod tests {
     use super::*;
     use crate::regression::newton_euler;
     use rand::{RngExt, SeedableRng};
-
-    #[test]
-    fn what_gravity_from_the_side_shows_is_known() {
-        let hidden = |text: &str, gravity: &str| {
-            let text = text.replace("[0, 0, -9.81]", gravity).replace("[0.0, 0.0, -9.81]", gravity);
-            RigidBody::new(&Arm::parse(&text, "arm.toml").unwrap()).unwrap().hidden().len()
-        };
-        let ur5e = include_str!("../../../tests/arms/ur5e.toml");
-        // The weight of all that turns about the upright first axis: how far from it, and whereto. Hung on a wall, it shows.
-        assert_eq!(hidden(ur5e, "[0, 0, -9.81]"), 2);
-        assert_eq!(hidden(ur5e, "[0, -9.81, 0]"), 0);
-        assert_eq!(hidden(include_str!("../../../tests/arms/scara.toml"), "[0, 0, -9.81]"), 2);
-        let planar = include_str!("../../../tests/arms/planar2r.toml");
-        assert_eq!(hidden(planar, "[0, -9.81, 0]"), 0);
-        // The numbers of base parameters say the same.
-        let count = |gravity: &str| {
-            let arm = Arm::parse(&ur5e.replace("[0, 0, -9.81]", gravity), "arm.toml").unwrap();
-            RigidBody::new(&arm).unwrap().names().len()
-        };
-        assert_eq!(count("[1, 2, -9]"), count("[0, 0, -9.81]") + 2);
-    }
 
     #[test]
     fn columns_agree_with_newton_euler() {
