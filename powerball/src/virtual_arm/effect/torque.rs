@@ -60,7 +60,10 @@ impl Effect {
                 }
             }
             Effect::JointCoupling { from, onto, share } => {
-                tau[*onto] += share * now.friction[*from].torque(now.dq[*from]);
+                let (felt, dq) = (now.friction[*from], now.dq[*from]);
+                let level = |level: f64, steepness: f64| level * direction(dq, 1.0 / steepness);
+                let levels = level(felt.gamma1, felt.gamma2) + level(felt.gamma3, felt.gamma4);
+                tau[*onto] += share * (levels + felt.gamma5 * dq);
             }
             _ => {}
         }
