@@ -2,10 +2,10 @@
 
 use super::candidate::Window;
 use super::payload::{block_start, mask};
-use super::window_sums::Sums;
+use super::window_sums::{Sums, explained};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
 use crate::estimate::Solver;
-use crate::regression::Column;
+use crate::regression::{Block, Column};
 use serde_json::{Value, json};
 use std::ops::Range;
 
@@ -22,6 +22,14 @@ const COARSE: usize = 4;
 const CLEAR: usize = 10;
 /// Larger forces are a rank-poor fit, N.
 const MOST: f64 = 2000.0;
+/// Grid of the same push in other logs, s: its force is known there, so that a row more or less can be told.
+const FINE: f64 = 0.1;
+/// A log has the same push if that explains this much, in units of χ², beyond what the best of all its windows explains by chance …
+const ANOTHER_LOG: f64 = 10.0;
+/// … and at least this share of the force's own torque, over at least this share of the time that it lasted: a push of another size or
+/// direction is another one, and resembles this one for a moment only.
+const SAME_FORCE: f64 = 0.8;
+const SAME_TIME: f64 = 0.5;
 
 impl Effect for ContactWrench {
     fn name(&self) -> &'static str {
@@ -61,10 +69,36 @@ impl Effect for ContactWrench {
         c.iter().all(|f| f.abs() < MOST)
     }
 
+    /// When the other logs have the same force: nothing of it is fitted to them but its times.
+    fn seen_in(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
+        let data = context.data;
+        let mut seen = candidate.clone();
+        seen.windows.retain(|w| !data.logs.contains(&w.log));
+        let lasted = seen.windows.iter().map(|w| w.to - w.from).fold(f64::INFINITY, f64::min);
+        let steps = data.blocks_of(FINE);
+        let explains = explained(context, data.force_columns(), c, &steps);
+        for log in by_log(&steps) {
+            let chance = 4.0 * (log.len().max(1) as f64).ln();
+            let mut open = vec![log.clone()];
+            while let Some(stretch) = open.pop() {
+                let found = best_run(&explains[stretch.clone()]);
+                let found = stretch.start + found.start..stretch.start + found.end;
+                let (less, own) =
+                    explains[found.clone()].iter().fold((0.0, 0.0), |sum, e| (sum.0 + e.0, sum.1 + e.1));
+                let as_long = found.len() as f64 * FINE > SAME_TIME * lasted;
+                if less > ANOTHER_LOG + chance && less > SAME_FORCE * own && as_long {
+                    seen.windows.push(window(context, &steps, &log, &found)?);
+                    open.extend([stretch.start..found.start, found.end..stretch.end]);
+                }
+            }
+        }
+        Some(seen)
+    }
+
     fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
         let windows = || found.iter().flat_map(|f| &f.candidate.windows);
         json!({
-            "force": found.iter().map(|f| f.coefficients.to_vec()).collect::<Vec<_>>(),
+            "force": found.iter().flat_map(|f| f.candidate.windows.iter().map(|_| f.coefficients.to_vec())).collect::<Vec<_>>(),
             "start_time": windows().map(|w| w.from).collect::<Vec<_>>(),
             "end_time": windows().map(|w| w.to).collect::<Vec<_>>(),
         })
@@ -98,12 +132,7 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
             *best = Some((gain, window));
         }
     };
-    let logs: Vec<Range<usize>> = (steps.chunk_by(|a, b| a.log == b.log))
-        .scan(0, |end, steps| {
-            *end += steps.len();
-            Some(*end - steps.len()..*end)
-        })
-        .collect();
+    let logs = by_log(&steps);
     for log in &logs {
         for first in log.clone() {
             for end in first + 1..=(first + SHORT).min(log.end) {
@@ -130,15 +159,48 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
         }
     }
     let (_, found) = best?;
+    let windows = vec![window(context, &steps, log, &found)?];
+    let joints = (0..data.dof()).collect();
+    Some(Candidate { joints, form: 0, values: Vec::new(), windows, searched })
+}
+
+/// The steps of each log.
+fn by_log(steps: &[Block]) -> Vec<Range<usize>> {
+    (steps.chunk_by(|a, b| a.log == b.log))
+        .scan(0, |end, steps| {
+            *end += steps.len();
+            Some(*end - steps.len()..*end)
+        })
+        .collect()
+}
+
+/// The window of some steps of a log.
+fn window(
+    context: &Context<'_>,
+    steps: &[Block],
+    log: &Range<usize>,
+    found: &Range<usize>,
+) -> Option<Window> {
+    let data = context.data;
     let from = block_start(context, &steps[found.start])?;
     // To the last row before the next step begins.
     let to = match found.end < log.end {
         true => block_start(context, &steps[found.end])? - 0.5 / data.rate(),
         false => end_of_log(context, steps[found.start].log),
     };
-    let window = Window::new(data, steps[found.start].log, from, to);
-    let joints = (0..data.dof()).collect();
-    Some(Candidate { joints, form: 0, values: Vec::new(), windows: vec![window], searched })
+    Some(Window::new(data, steps[found.start].log, from, to))
+}
+
+/// The steps in a row that together explain most.
+fn best_run(explains: &[(f64, f64)]) -> Range<usize> {
+    let (mut best, mut run) = ((0.0, 0..0), (0.0, 0..0));
+    for (k, (less, _)) in explains.iter().enumerate() {
+        run = if run.0 > 0.0 { (run.0 + less, run.1.start..k + 1) } else { (*less, k..k + 1) };
+        if run.0 > best.0 {
+            best = run.clone();
+        }
+    }
+    best.1
 }
 
 /// Where a log's longer windows lie.

@@ -1,7 +1,7 @@
 //! A body held by the last link, from the start of a log or from some time on.
 
 use super::candidate::{Candidate, Found, Window};
-use super::window_sums::Sums;
+use super::window_sums::{Sums, explained};
 use super::{Axis, Class, Context, Effect, Part};
 use crate::estimate::Solver;
 use crate::regression::{Block, Column};
@@ -78,11 +78,9 @@ impl Effect for Payload {
             let start = data.recordings.iter().find(|r| r.log == log).map_or(0.0, |r| r.start);
             let all = Window::new(data, log, start, f64::INFINITY);
             let was = taken.iter().any(|w| w.log == all.log);
-            let explains = explained(
-                context,
-                &self.columns(context, &Candidate { windows: vec![all.clone()], ..seen.clone() }),
-                c,
-            );
+            let columns = self.columns(context, &Candidate { windows: vec![all.clone()], ..seen.clone() });
+            let explains: f64 =
+                explained(context, &columns, c, &data.blocks).iter().map(|(less, _)| less).sum();
             let is = if was { explains > -ANOTHER_LOG } else { explains > ANOTHER_LOG };
             if is {
                 seen.windows.push(all);
@@ -99,21 +97,6 @@ impl Effect for Payload {
         let starts: Vec<f64> = first.candidate.windows.iter().map(|w| w.from).collect();
         json!({ "mass": c[0], "com": centre(c), "start_time": starts })
     }
-}
-
-/// How much less of χ² stays of a residual without some columns' torque.
-fn explained(context: &Context<'_>, columns: &[Column], c: &[f64]) -> f64 {
-    let by_joint = |j: usize| -> f64 {
-        let residual = &context.residual[j];
-        let mut torque = vec![0.0; residual.len()];
-        for (column, c) in columns.iter().zip(c) {
-            for (t, v) in torque.iter_mut().zip(column.at(j).unwrap_or_default()) {
-                *t += c * v;
-            }
-        }
-        context.fit.weights[j] * torque.iter().zip(residual).map(|(t, r)| t * (2.0 * r - t)).sum::<f64>()
-    };
-    (0..context.data.dof()).map(by_joint).sum()
 }
 
 /// The centre of mass.

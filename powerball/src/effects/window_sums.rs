@@ -1,4 +1,4 @@
-//! Cross products of a few columns with the base by stretch of time: any window is then a sum.
+//! Cross products of a few columns with the base by stretch of time: any window is then a sum. What a known torque explains of a stretch.
 
 use super::Context;
 use crate::estimate::Solver;
@@ -75,4 +75,30 @@ impl Sums {
         let x = solver.solve(&self.score);
         (x.iter().zip(&self.score).map(|(a, b)| a * b).sum(), x)
     }
+}
+
+/// How much less of χ² stays of a residual without the torque of some columns, and the χ² of that torque itself: by block.
+pub(super) fn explained(
+    context: &Context<'_>,
+    columns: &[Column],
+    c: &[f64],
+    blocks: &[Block],
+) -> Vec<(f64, f64)> {
+    let mut of = vec![(0.0, 0.0); blocks.len()];
+    for (j, residual) in context.residual.iter().enumerate() {
+        let mut torque = vec![0.0; residual.len()];
+        for (column, c) in columns.iter().zip(c) {
+            for (t, v) in torque.iter_mut().zip(column.at(j).unwrap_or_default()) {
+                *t += c * v;
+            }
+        }
+        let w = context.fit.weights[j];
+        for (block, (less, own)) in blocks.iter().zip(&mut of) {
+            for (t, r) in torque[block.rows[j].clone()].iter().zip(&residual[block.rows[j].clone()]) {
+                *less += w * t * (2.0 * r - t);
+                *own += w * t * t;
+            }
+        }
+    }
+    of
 }

@@ -56,9 +56,12 @@ impl Session<'_> {
             joints.dedup();
             let steps: Vec<&Step> = self.steps.iter().filter(|s| s.effect == e).collect();
             let (Some(first), Some(last)) = (steps.first(), steps.last()) else { continue };
-            let mut logs: Vec<String> =
-                found.iter().flat_map(|f| f.candidate.windows.iter().map(|w| w.log.clone())).collect();
-            logs.dedup();
+            let mut logs: Vec<String> = Vec::new();
+            for window in found.iter().flat_map(|f| &f.candidate.windows) {
+                if !logs.contains(&window.log) {
+                    logs.push(window.log.clone());
+                }
+            }
             let effect = self.effects[e].as_ref();
             named.push(NamedEffect {
                 effect: effect.name().to_string(),

@@ -196,13 +196,13 @@ impl Session<'_> {
 
     /// Whether two candidates of an effect are the same thing twice, so that one excludes the other. Several ripples, contacts
     /// and the like are not; a delay of all joints and one of a single joint are.
-    fn same(&self, effect: usize, a: &Candidate, b: &Candidate) -> bool {
+    pub(super) fn same(&self, effect: usize, a: &Candidate, b: &Candidate) -> bool {
         let joints = a.joints == b.joints;
         match (self.effects[effect].name(), a.values.first(), b.values.first()) {
             ("position_ripple", Some(x), Some(y)) => joints && (x - y).abs() < 0.5,
             ("joint_coupling", Some(x), Some(y)) => joints && x == y,
             ("broken_symmetry", ..) => joints && a.form == b.form,
-            ("contact_wrench", ..) => a.windows == b.windows,
+            ("contact_wrench", ..) => a.windows.iter().any(|w| b.windows.contains(w)),
             _ => a.joints.iter().any(|j| b.joints.contains(j)),
         }
     }

@@ -2,7 +2,6 @@
 
 use super::evidence::Path;
 use super::family::Member;
-use super::leftover::leftover;
 use super::naming::{Comparison, compare};
 use super::one_path::repeats;
 use super::open::{Question, refitted};
@@ -13,7 +12,7 @@ use super::rule;
 use super::running_time::{self, Clock};
 use super::screen::{Screen, Trial};
 use crate::effects::{self, Candidate, Context, Effect};
-use crate::estimate::{Design, Fit, Folds, Solver, fit, friction_columns, noise_floor, spread};
+use crate::estimate::{Design, Fit, Folds, fit, friction_columns, spread};
 use crate::log::Log;
 use crate::regression::{Column, Data, DataError, DataOptions, RigidBody};
 use std::fmt;
@@ -70,7 +69,7 @@ pub(super) struct Step {
     pub(super) number: usize,
     pub(super) effect: usize,
     /// Squared errors before it, by joint, (N·m)² summed over rows.
-    square_before: Vec<f64>,
+    pub(super) square_before: Vec<f64>,
     pub(super) comparison: Comparison,
     /// What an experiment would have to decide.
     pub(super) question: Option<Question>,
@@ -247,6 +246,8 @@ impl Session<'_> {
             }
         }
         while self.withhold().is_some() {}
+        progress("improving settings");
+        self.improve_settings();
         progress("asking placebos");
         self.count_false_positives();
     }
@@ -393,44 +394,6 @@ impl Session<'_> {
         Some(Stepped::Accepted(self.effects[chosen].name()))
     }
 
-    /// Takes back what, now that everything that fits is in the model, is not what it is called: an effect that is missing at some
-    /// pace; or one that is not told apart from its rivals and beside which much is left, so that something else is
-    /// there. It stays as a rival of what comes. Returns its name and why.
-    fn withhold(&mut self) -> Option<(&'static str, &'static str)> {
-        let (taken, why) = if let Some(a) = self.inconstant() {
-            (vec![self.accepted.remove(a)], "what it says of some pace of motion is not there")
-        } else {
-            let weak = self.steps.iter().rev().find(|s| {
-                s.comparison.apart < rule::LEAST_MARGIN
-                    && self.accepted.iter().any(|a| a.step == s.number)
-                    && self.share_left(&s.square_before, &s.comparison.joints) > rule::MUCH_LEFT
-            })?;
-            let step = weak.number;
-            (
-                self.accepted.extract_if(.., |a| a.step == step).collect(),
-                "others fit as well and much is left",
-            )
-        };
-        let Accepted { effect, step, .. } = *taken.first()?;
-        // What was found beside it on its joints may be there because of it, and is asked again.
-        let joints: Vec<usize> = taken.iter().flat_map(|a| a.candidate.joints.clone()).collect();
-        self.accepted.retain(|a| a.step <= step || !a.candidate.joints.iter().any(|j| joints.contains(j)));
-        self.given_up.extend(taken.into_iter().map(|a| (a.effect, a.candidate)));
-        let accepted = &self.accepted;
-        let gone = self.steps.extract_if(.., |s| !accepted.iter().any(|a| a.step == s.number));
-        self.questions.extend(gone.filter_map(|s| s.question).map(Question::withheld));
-        self.refit();
-        Some((self.effects[effect].name(), why))
-    }
-
-    /// The share of the excess over the noise floor that stayed on some joints, given the squared errors before.
-    fn share_left(&self, before: &[f64], joints: &[usize]) -> f64 {
-        let rms = |j: usize, square: f64| (square / self.data.joints[j].len().max(1) as f64).sqrt();
-        let before: Vec<f64> = before.iter().enumerate().map(|(j, s)| rms(j, *s)).collect();
-        let after = spread(&self.data, &self.fit.residual).rms;
-        leftover(&before, &after, &noise_floor(&self.data), joints)
-    }
-
     /// Asks placebos of every kind on the final residual: where nothing is missing any more, what passes is chance.
     fn count_false_positives(&mut self) {
         let context = Context::new(&self.data, &self.fit, &self.fit.residual);
@@ -467,32 +430,5 @@ impl Session<'_> {
             a.candidate = candidate;
         }
         self.look_into_other_logs();
-    }
-
-    /// Takes out what later additions made unneeded.
-    fn prune(&mut self) {
-        loop {
-            let (gram, right, square) = self.fit.gram.sum(&self.fit.weights, |_| true);
-            let error = |without: &dyn Fn(usize) -> bool| {
-                let theta = Solver::new(&gram, |c| self.fit.free[c] && !without(c)).solve(&right);
-                square - theta.iter().zip(&right).map(|(x, r)| x * r).sum::<f64>()
-            };
-            let full = error(&|_| false);
-            let mut first = 0;
-            let mut weakest: Option<(usize, f64)> = None;
-            for (k, a) in self.accepted.iter().enumerate() {
-                let columns = self.fit.design.extra(first)..self.fit.design.extra(first) + a.columns;
-                first += a.columns;
-                let penalty =
-                    rule::PER_COEFFICIENT * a.columns as f64 + 2.0 * a.candidate.searched.max(1.0).ln();
-                let score = error(&|c| columns.contains(&c)) - full - penalty;
-                if score < rule::LEAST_SCORE && weakest.is_none_or(|(_, w)| score < w) {
-                    weakest = Some((k, score));
-                }
-            }
-            let Some((k, _)) = weakest else { return };
-            self.accepted.remove(k);
-            self.refit();
-        }
     }
 }

@@ -34,18 +34,18 @@ pub(super) fn effective_samples(data: &Data<'_>, residual: &[Vec<f64>]) -> usize
     total as usize
 }
 
-/// Share of the excess over the floor that stays: (after² − floor²)/(before² − floor²) over some joints.
+/// Share of the excess over the floor that stays: (after² − floor²)/(before² − floor²) over some joints together, each in units of its floor.
 #[must_use]
 pub(super) fn leftover(before: &[f64], after: &[f64], floor: &[f64], joints: &[usize]) -> f64 {
-    let mean = joints
-        .iter()
-        .map(|j| {
-            let excess = |rms: f64| (rms * rms - floor[*j] * floor[*j]).max(0.0);
-            let old = excess(before[*j]);
-            if old > 0.0 { (excess(after[*j]) / old).min(1.0) } else { 0.0 }
-        })
-        .sum::<f64>();
-    mean / joints.len().max(1) as f64
+    let excess = |rms: &[f64]| -> f64 {
+        joints
+            .iter()
+            .filter(|j| floor[**j] > 0.0)
+            .map(|j| ((rms[*j] / floor[*j]).powi(2) - 1.0).max(0.0))
+            .sum()
+    };
+    let old = excess(before);
+    if old > 0.0 { (excess(after) / old).min(1.0) } else { 0.0 }
 }
 
 /// Quantile bins in which a residual's mean is taken.

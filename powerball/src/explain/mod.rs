@@ -3,9 +3,9 @@
 //! The rule, in the order of the files: `screen` refits the base with each candidate, `evidence` asks clusters,
 //! folds and another path, `placebo` measures how often the same questions are answered by chance on these very
 //! data, `rule` holds every threshold with its reason, `family` keeps what may stand together, `forward` adds one effect
-//! at a time, `naming` compares rivals, `open` keeps those that are not told apart, `leftover` says what stays,
-//! `correction` takes off of it what it can, `shown` draws what each name is seen by, `compose` makes the model of what was
-//! accepted, `conclude` writes the result.
+//! at a time, `taken_back` removes what does not stay, `settings` moves what stays to where everything together fits best, `naming`
+//! compares rivals, `open` keeps those that are not told apart, `leftover` says what stays, `correction` takes off of it what it
+//! can, `shown` draws what each name is seen by, `compose` makes the model of what was accepted, `conclude` writes the result.
 
 mod apart;
 mod compose;
@@ -29,7 +29,9 @@ mod result;
 mod rule;
 mod running_time;
 mod screen;
+mod settings;
 mod shown;
+mod taken_back;
 
 pub use correction::{Correction, Curve};
 pub use curves::{TorqueCurve, curves};

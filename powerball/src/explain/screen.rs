@@ -6,6 +6,7 @@ use crate::effects::{Candidate, Context, Effect};
 use crate::estimate::{Folds, Solver};
 use crate::regression::Column;
 use faer::Mat;
+use std::ops::Range;
 use std::sync::OnceLock;
 
 /// The base model prepared for many candidates.
@@ -40,9 +41,15 @@ impl<'c> Screen<'c> {
     /// Prepares the base model of a context.
     #[must_use]
     pub(super) fn new(context: &'c Context<'c>) -> Screen<'c> {
+        Screen::without(context, 0..0)
+    }
+
+    /// The same without some of the model's columns, of whose torque the context's residual is free.
+    #[must_use]
+    pub(super) fn without(context: &'c Context<'c>, columns: Range<usize>) -> Screen<'c> {
         let fit = context.fit;
         let (gram, _, _) = fit.gram.sum(&fit.weights, |_| true);
-        let solver = Solver::new(&gram, |c| fit.free[c]);
+        let solver = Solver::new(&gram, |c| fit.free[c] && !columns.contains(&c));
         let mut slope = vec![0.0; fit.design.size];
         for (j, residual) in context.residual.iter().enumerate() {
             for (g, value) in fit.design.cross(j, &(0..residual.len()), &[residual.as_slice()]) {
