@@ -124,11 +124,7 @@ impl Session<'_> {
         for k in which {
             let a = &self.accepted[*k];
             let columns = self.effects[a.effect].columns(context, &a.candidate);
-            for (column, c) in columns.iter().zip(&coefficients[*k]) {
-                for (j, values) in &column.parts {
-                    residual[*j].iter_mut().zip(values).for_each(|(r, v)| *r -= c * v);
-                }
-            }
+            columns.iter().zip(&coefficients[*k]).for_each(|(column, c)| column.add_to(residual, -c));
         }
     }
 }

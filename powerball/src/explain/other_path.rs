@@ -113,11 +113,7 @@ impl Session<'_> {
                 let mut without = self.fit.residual_on(&self.other, &self.other_columns(&self.fit));
                 let none: Vec<Vec<f64>> = vec![Vec::new(); self.other.dof()];
                 let own = effect.columns(&Context::new(&self.other, &self.fit, &none), &a.candidate);
-                for (column, c) in own.iter().zip(&coefficients) {
-                    for (j, values) in &column.parts {
-                        without[*j].iter_mut().zip(values).for_each(|(r, v)| *r += c * v);
-                    }
-                }
+                own.iter().zip(&coefficients).for_each(|(column, c)| column.add_to(&mut without, *c));
                 effect.seen_in(&Context::new(&self.other, &self.fit, &without), &a.candidate, &coefficients)
             };
             if let Some(seen) = seen {

@@ -56,11 +56,7 @@ impl Session<'_> {
             let mut without = self.fit.residual.clone();
             let columns =
                 effect.columns(&Context::new(&self.data, &self.fit, &self.fit.residual), &a.candidate);
-            for (column, c) in columns.iter().zip(&coefficients) {
-                for (j, values) in &column.parts {
-                    without[*j].iter_mut().zip(values).for_each(|(r, v)| *r += c * v);
-                }
-            }
+            columns.iter().zip(&coefficients).for_each(|(column, c)| column.add_to(&mut without, *c));
             let context = Context::new(&self.data, &self.fit, &without);
             let screen = Screen::without(&context, own);
             let Some(mut best) = screen.try_candidate(effect, &a.candidate) else { continue };

@@ -97,6 +97,13 @@ impl Column {
         self.parts.iter().find(|(j, _)| *j == joint).map(|(_, v)| v.as_slice())
     }
 
+    /// Adds a share of it to signals by joint and row.
+    pub fn add_to(&self, signals: &mut [Vec<f64>], share: f64) {
+        for (joint, values) in &self.parts {
+            signals[*joint].iter_mut().zip(values).for_each(|(s, v)| *s += share * v);
+        }
+    }
+
     /// Whether all values are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
