@@ -1,7 +1,7 @@
 //! An outside force on the last link during some time: a touch, a push, a thing leaned on.
 
 use super::candidate::Window;
-use super::payload::{block_start, mask};
+use super::payload::{ANOTHER_LOG, block_start, mask};
 use super::window_sums::{Sums, explained};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
 use crate::estimate::Solver;
@@ -24,10 +24,9 @@ const CLEAR: usize = 10;
 const MOST: f64 = 2000.0;
 /// Grid of the same push in other logs, s: its force is known there, so that a row more or less can be told.
 const FINE: f64 = 0.1;
-/// A log has the same push if that explains this much, in units of χ², beyond what the best of all its windows explains by chance …
-const ANOTHER_LOG: f64 = 10.0;
-/// … and at least this share of the force's own torque, over at least this share of the time that it lasted: a push of another size or
-/// direction is another one, and resembles this one for a moment only.
+/// A log has the same push if that explains enough ([`ANOTHER_LOG`], beyond what the best of all its windows explains by chance) and at
+/// least this share of the force's own torque, over at least this share of the time that it lasted: a push of another size or direction is
+/// another one, and resembles this one for a moment only.
 const SAME_FORCE: f64 = 0.8;
 const SAME_TIME: f64 = 0.5;
 

@@ -14,7 +14,7 @@ pub(crate) struct Payload;
 /// A centre of mass farther than this from the flange, m, is no payload.
 const REACH: f64 = 1.0;
 /// A log has the same payload if that explains this much more, and has it not if that explains this much more (in units of χ²).
-const ANOTHER_LOG: f64 = 10.0;
+pub(super) const ANOTHER_LOG: f64 = 10.0;
 
 impl Effect for Payload {
     fn name(&self) -> &'static str {
