@@ -1,4 +1,5 @@
-//! Generates the code that the tests compile: the arms of `tests/arms` and the paper's arm, for each parameter set.
+//! Generates the code that the tests compile: the arms of `tests/arms` and the paper's arm, for each
+//! parameter set.
 
 use dyngen::{Config, Function, SetKind};
 use std::path::{Path, PathBuf};
@@ -24,7 +25,8 @@ fn main() {
     }
 }
 
-/// An arm file for `benches/growth.rs`: revolute joints with twists of ±90° in turn, a length along and across every axis.
+/// An arm file for `benches/growth.rs`: revolute joints with twists of ±90° in turn, a length along and
+/// across every axis.
 fn chain(joints: usize, folder: &Path) -> PathBuf {
     let mut text = format!("name = \"chain{joints}\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\n");
     for i in 0..joints {

@@ -8,7 +8,7 @@ mod support;
 
 use dyngen::{Model, SetKind, Values};
 use nalgebra::{SMatrix, SVector};
-use powerball::batch::{self, Work};
+use powerball::logs::batch::{self, Work};
 use powerball_workspace::arm as arm_file;
 use powerball_workspace::generated::lwa4p_rotorless_minimal as arm;
 use rand::{RngExt, SeedableRng};

@@ -1,4 +1,5 @@
-//! The evaluator, which needs no compiler, against the compiled code of the same functions, over the same samples.
+//! The evaluator, which needs no compiler, against the compiled code of the same functions, over the same
+//! samples.
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
@@ -6,7 +7,7 @@ mod support;
 
 use dyngen::{Evaluator, Function, Model, Samples, SetKind};
 use nalgebra::SVector;
-use powerball::model::minimal as lwa4p;
+use powerball::controller::model::minimal as lwa4p;
 use powerball_workspace::arm;
 use powerball_workspace::generated::panda_minimal as panda;
 use rand::{RngExt, SeedableRng};

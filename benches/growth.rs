@@ -1,5 +1,5 @@
-//! How the emitted inverse dynamics and regressor grow with the number of joints: chains of revolute joints with twists of ±90°
-//! in turn and lengths along and across every axis, one to nine joints.
+//! How the emitted inverse dynamics and regressor grow with the number of joints: chains of revolute joints
+//! with twists of ±90° in turn and lengths along and across every axis, one to nine joints.
 //!
 //! `cargo bench --bench growth -- --write docs/performance.md` writes its table into the page.
 

@@ -1,16 +1,18 @@
-//! A million samples of six joints identified from memory: this project's stream, beside numpy with Pinocchio in the same run.
+//! A million samples of six joints identified from memory: this project's stream, beside numpy with Pinocchio
+//! in the same run.
 //!
-//! `cargo bench --bench identify` (`PYTHON=…` names an interpreter that has both; without one only the stream is timed);
-//! `-- --write docs/performance.md` writes how the stream grows with the length of a log into the page.
+//! `cargo bench --bench identify` (`PYTHON=…` names an interpreter that has both; without one only the stream
+//! is timed); `-- --write docs/performance.md` writes how the stream grows with the length of a log into the
+//! page.
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod support;
 
 use dyngen::exact::rational::to_f64;
-use powerball::estimate::{States, Stream};
-use powerball::friction::{TABLE_2, TanhFriction};
-use powerball::regression::RigidBody;
+use powerball::controller::friction::{TABLE_2, TanhFriction};
+use powerball::identification::estimate::{States, Stream};
+use powerball::logs::regression::RigidBody;
 use powerball_workspace::arm;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,8 +1,9 @@
-//! What a controller runs, on an emulated Cortex-M4F and Cortex-M7: `firmware/` is built, judged by its symbols, run, and
-//! compared with the host to the bit.
+//! What a controller runs, on an emulated Cortex-M4F and Cortex-M7: `firmware/` is built, judged by its
+//! symbols, run, and compared with the host to the bit.
 //!
-//! Sizes, stack and instruction counts do not depend on the machine. `firmware/costs.txt` holds them, and none may grow.
-//! `POWERBALL_BLESS=1 cargo test --release --test firmware` writes it, and the table in `docs/performance.md`, anew.
+//! Sizes, stack and instruction counts do not depend on the machine. `firmware/costs.txt` holds them, and
+//! none may grow. `POWERBALL_BLESS=1 cargo test --release --test firmware` writes it, and the table in
+//! `docs/performance.md`, anew.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -161,7 +162,8 @@ fn read(text: &str) -> Costs {
 /// The table for people: single precision beside double.
 fn table(costs: &Costs) -> String {
     let mut text =
-        "| function | f32: code, B | stack, B | instructions | f64: code, B | stack, B | instructions | f64 on a Cortex-M7: code, B | stack, B | instructions |\n\
+        "| function | f32: code, B | stack, B | instructions | f64: code, B | stack, B | instructions | f64 \
+            on a Cortex-M7: code, B | stack, B | instructions |\n\
                     |---|---|---|---|---|---|---|---|---|---|\n"
             .to_string();
     let meaning = [

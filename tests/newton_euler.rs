@@ -1,10 +1,12 @@
-//! What is evaluated and what is compiled agree with a numeric Newton–Euler that shares no code with the generator.
+//! What is evaluated and what is compiled agree with a numeric Newton–Euler that shares no code with the
+//! generator.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use dyngen::arm::{Arm, ParameterKind};
 use dyngen::{Evaluator, Function, Model, Samples, SetKind};
-use powerball::virtual_arm::{Chain, Dynamics, bodies};
+use powerball::identification::chain::Chain;
+use powerball::virtual_arm::{Dynamics, bodies};
 use powerball_workspace::generated;
 use powerball_workspace::{arm, paper_arm_with_ratios};
 use rand::{RngExt, SeedableRng};
@@ -14,8 +16,8 @@ use rand_chacha::ChaCha8Rng;
 const TOLERANCE: f64 = 1e-12;
 const STATES: usize = 20;
 
-/// Random values of all parameters of bodies that exist: point masses on the axes of each link's frame, thinned out
-/// by the arm's declared symmetries.
+/// Random values of all parameters of bodies that exist: point masses on the axes of each link's frame,
+/// thinned out by the arm's declared symmetries.
 fn values(arm: &Arm, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let mut all = Vec::new();
     for joint in &arm.joints {
@@ -200,7 +202,8 @@ fn evaluated_functions_agree_with_high_gear_ratios() {
     check_evaluator("stanford k = 50", stanford);
 }
 
-/// Compiled code agrees with the numeric Newton–Euler, and where that has no such function with the evaluator.
+/// Compiled code agrees with the numeric Newton–Euler, and where that has no such function with the
+/// evaluator.
 #[test]
 fn compiled_functions_agree_for_every_arm_and_set() {
     let mut rng = ChaCha8Rng::seed_from_u64(43);
@@ -287,7 +290,15 @@ fn rates_and_derivatives_agree_with_differences() {
         let jdot = difference(&after, &before, Function::Jacobian);
         let product: Vec<f64> =
             jdot.chunks(n).map(|row| row.iter().zip(&state.dq).map(|(a, b)| a * b).sum()).collect();
-        assert_close(&format!("{name}: J̇·q̇"), &value(Function::JacobianRateTimesSpeed), &product, DIFFERENCE);
+        assert_close(
+            &format!(
+                "{name}: \
+            J̇·q̇"
+            ),
+            &value(Function::JacobianRateTimesSpeed),
+            &product,
+            DIFFERENCE,
+        );
         // B·B⁻¹ = 1
         let (b, inverse) = (value(Function::MassMatrix), value(Function::MassMatrixInverse));
         let unit: Vec<f64> = (0..n * n).map(|k| f64::from(u8::from(k / n == k % n))).collect();

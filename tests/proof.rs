@@ -48,7 +48,8 @@ fn general_angles_and_any_gravity_are_proven() {
     prove_all("general angles, prismatic", &Model::derive(parse(&text)).unwrap());
 }
 
-/// Every length something: arms as they are built have few, and symmetries may leave a last link nothing but its mass.
+/// Every length something: arms as they are built have few, and symmetries may leave a last link nothing but
+/// its mass.
 #[test]
 fn arms_with_lengths_everywhere_are_proven() {
     for name in ["lwa4p_rotorless", "stanford", "puma560", "ur5e"] {
@@ -144,7 +145,8 @@ fn a_constant_that_is_slightly_off_is_noticed() {
     assert!(prove(model.arm(), model.symbols(), model.sets(), set, &built, None).is_err());
 }
 
-/// Y·π = B·q̈ + C·q̇ + g as polynomials: the graphs themselves, whatever the Lagrangian says, at a random point of the field.
+/// Y·π = B·q̈ + C·q̇ + g as polynomials: the graphs themselves, whatever the Lagrangian says, at a random
+/// point of the field.
 #[test]
 fn the_graphs_obey_the_equation_of_motion_in_the_ring() {
     use dyngen::exact::prime::{Draws, Fp};

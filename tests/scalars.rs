@@ -4,7 +4,7 @@
 
 use nalgebra::{SMatrix, SVector, SimdValue};
 use num_dual::Dual64;
-use powerball::batch::{self, Work};
+use powerball::logs::batch::{self, Work};
 use powerball_workspace::generated::{panda_minimal, stanford_minimal};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -34,8 +34,9 @@ fn lanes_are_the_samples() {
     }
 }
 
-/// A block of samples is its samples, to the bit, whatever vectors the processor has: an arm with a prismatic joint, with an
-/// angle beyond what is reduced without a branch in one lane, a vector, a matrix and a number as results.
+/// A block of samples is its samples, to the bit, whatever vectors the processor has: an arm with a prismatic
+/// joint, with an angle beyond what is reduced without a branch in one lane, a vector, a matrix and a number
+/// as results.
 #[test]
 fn blocks_are_the_samples() {
     const LANES: usize = 8;

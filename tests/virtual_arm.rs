@@ -1,11 +1,13 @@
-//! The virtual arm's numeric dynamics against references that share nothing with them: stored numbers of another
-//! library, Lagrange's equations of an energy written from homogeneous transforms, and conservation of energy.
+//! The virtual arm's numeric dynamics against references that share nothing with them: stored numbers of
+//! another library, Lagrange's equations of an energy written from homogeneous transforms, and conservation
+//! of energy.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use dyngen::Arm;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
-use powerball::virtual_arm::{Body, Chain, Dynamics};
+use powerball::identification::chain::Chain;
+use powerball::virtual_arm::{Body, Dynamics};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -82,7 +84,8 @@ fn assert_close(what: &str, got: &[f64], want: &[f64], tolerance: f64) {
     }
 }
 
-/// The Lagrangian, written from the definition of the table alone: homogeneous transforms and pseudo-inertias.
+/// The Lagrangian, written from the definition of the table alone: homogeneous transforms and
+/// pseudo-inertias.
 mod lagrangian {
     use super::*;
     use dyngen::arm::{Convention, JointKind};

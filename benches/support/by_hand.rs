@@ -1,9 +1,10 @@
-//! A recursive Newton–Euler as one writes it by hand for speed: fixed arrays, nothing on the heap, numbers from a table.
+//! A recursive Newton–Euler as one writes it by hand for speed: fixed arrays, nothing on the heap, numbers
+//! from a table.
 
 use powerball_workspace::root;
 
-/// The ten inertial parameters of a link about its frame's origin: m, m·x … m·z, Ixx, Ixy, Ixz, Iyy, Iyz, Izz, the
-/// products with the sign of the arm file.
+/// The ten inertial parameters of a link about its frame's origin: m, m·x … m·z, Ixx, Ixy, Ixz, Iyy, Iyz,
+/// Izz, the products with the sign of the arm file.
 pub(crate) type Link = [f64; 10];
 
 /// A Denavit–Hartenberg row with what does not change computed before.

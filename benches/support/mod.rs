@@ -1,4 +1,5 @@
-//! Paired timings: what is compared runs in turn in one process, so that ratios mean something on any machine.
+//! Paired timings: what is compared runs in turn in one process, so that ratios mean something on any
+//! machine.
 
 #![allow(dead_code)]
 

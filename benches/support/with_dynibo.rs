@@ -45,8 +45,8 @@ impl Arm {
     }
 }
 
-/// A link's frame in a URDF is the one that its joint turns: what follows in the Denavit–Hartenberg row stands in the next
-/// joint's origin, and in the place of the inertia.
+/// A link's frame in a URDF is the one that its joint turns: what follows in the Denavit–Hartenberg row
+/// stands in the next joint's origin, and in the place of the inertia.
 fn urdf(arm: &dyngen::Arm, links: &[Link; 6]) -> String {
     let number = dyngen::exact::rational::to_f64;
     let mut text = "<robot name='arm'><link name='l0'/>".to_string();

@@ -1,4 +1,5 @@
-//! The regressor and the mass matrix as one writes them with nalgebra: numeric, for any table, with matrices of fixed size.
+//! The regressor and the mass matrix as one writes them with nalgebra: numeric, for any table, with matrices
+//! of fixed size.
 
 use super::by_hand::Link;
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Rotation3, SMatrix, Vector3};

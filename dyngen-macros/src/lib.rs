@@ -22,7 +22,8 @@
 //! assert!((torque[0] - 2.0 * 9.81).abs() < 1e-12, "{} of the sum {}", torque[0], arm::PARAMETER_NAMES[0]);
 //! ```
 //!
-//! The code is that of `dyngen generate` and of `dyngen::Config`; the crate that uses it needs `nalgebra` 0.35.
+//! The code is that of `dyngen generate` and of `dyngen::Config`; the crate that uses it needs `nalgebra`
+//! 0.35.
 
 mod request;
 
@@ -38,12 +39,13 @@ use syn::{ItemMod, parse_macro_input, parse_quote};
 /// - `arm!("arm.toml")`: the minimal set, every function. The path is relative to the crate's `Cargo.toml`.
 /// - `arm! { file = "arm.toml", parameters = full, functions = [regressor, gravity] }`: what is named, only.
 /// - `arm! { toml = r#"…"#, … }`: the arm file's text in place.
-/// - `friction = ["viscous", "tanh:216"]`, `tests = true`: friction columns, and the arm's own consistency tests.
+/// - `friction = ["viscous", "tanh:216"]`, `tests = true`: friction columns, and the arm's own consistency
+///   tests.
 /// - `batch = true`: the module `batch` with the functions over blocks of samples.
 /// - `values = "values.json"` besides either: parameter values to bake in; the functions then take none.
 ///
-/// Everything that is wrong with the arm is reported at once, as errors of the compiler. The crate is built again
-/// when a file changes.
+/// Everything that is wrong with the arm is reported at once, as errors of the compiler. The crate is built
+/// again when a file changes.
 #[proc_macro]
 pub fn arm(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
     let request = parse_macro_input!(input as Request);

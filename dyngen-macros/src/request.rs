@@ -88,7 +88,8 @@ impl Call {
             _ => Err(Error::new(
                 key.span(),
                 format!(
-                    "there is no key `{key}`: there are file, toml, values, parameters, functions, friction, batch, tests"
+                    "there is no key `{key}`: there are file, toml, values, parameters, functions, friction, \
+                        batch, tests"
                 ),
             )),
         };

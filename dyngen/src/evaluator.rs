@@ -7,8 +7,8 @@ use crate::graph::tape::{LANES, Lane, Tape};
 use crate::graph::{Input, JointSum, Preparation};
 use crate::model::{Error, Model};
 
-/// Samples for an [`Evaluator`]: slices of n numbers a sample, one sample after another, and the values of the
-/// parameters. What a function does not take may stay empty.
+/// Samples for an [`Evaluator`]: slices of n numbers a sample, one sample after another, and the values of
+/// the parameters. What a function does not take may stay empty.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Samples<'a> {
     /// Joint positions, rad or m.
@@ -98,8 +98,8 @@ impl Evaluator {
         self.shape.0 * self.shape.1
     }
 
-    /// Runs over samples that lie one after another: `q`, `dq` and `drive` hold n numbers a sample, `out` takes
-    /// [`Evaluator::outputs`] numbers a sample. `drive` is q̈, or τ for forward dynamics.
+    /// Runs over samples that lie one after another: `q`, `dq` and `drive` hold n numbers a sample, `out`
+    /// takes [`Evaluator::outputs`] numbers a sample. `drive` is q̈, or τ for forward dynamics.
     ///
     /// # Panics
     /// As [`Evaluator::run`].

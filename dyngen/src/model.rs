@@ -48,7 +48,8 @@ impl fmt::Display for Error {
             Error::Unproven(e) => e.fmt(f),
             Error::NoPublishedSet => write!(
                 f,
-                "the arm file has no [[grouping]], so there is no published set: choose full, minimal or symbolic"
+                "the arm file has no [[grouping]], so there is no published set: choose full, minimal or \
+                    symbolic"
             ),
             Error::NotExact(lost) => {
                 write!(f, "the published sums do not keep the torque, so no code can be proven for them:")?;
@@ -111,12 +112,14 @@ impl Model {
     /// A function for a set as expressions that are proven equal to the Lagrangian.
     ///
     /// # Errors
-    /// [`Error::NotExact`] for published sums that lose parameters, [`Error::Disagreement`] where the proof fails.
+    /// [`Error::NotExact`] for published sums that lose parameters, [`Error::Disagreement`] where the proof
+    /// fails.
     pub fn function(&self, function: Function, kind: SetKind) -> Result<FunctionGraph, Error> {
         self.proven(function, kind, None, PASSES)
     }
 
-    /// A function after the given passes alone, proven like any other: to look into the optimiser, or to try a pass.
+    /// A function after the given passes alone, proven like any other: to look into the optimiser, or to try
+    /// a pass.
     ///
     /// # Errors
     /// As [`Model::function`].

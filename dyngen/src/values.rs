@@ -1,4 +1,5 @@
-//! Parameter values from a JSON file: `{"parameter": number, …}`, or a model with `"parameters": [{"name", "value"}, …]`.
+//! Parameter values from a JSON file: `{"parameter": number, …}`, or a model with `"parameters": [{"name",
+//! "value"}, …]`.
 
 use crate::arm::Parameter;
 use crate::arm::sum::parse_sum;
@@ -22,7 +23,8 @@ impl Values {
     /// Reads a file.
     ///
     /// # Errors
-    /// Where the file cannot be read, is no JSON object, or holds anything but finite numbers: all of these at once.
+    /// Where the file cannot be read, is no JSON object, or holds anything but finite numbers: all of these
+    /// at once.
     pub fn read(path: &Path) -> Result<Values, Diagnostics> {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path)
@@ -85,9 +87,9 @@ impl Values {
         Values { file: file.to_string(), by_name }
     }
 
-    /// The values of a set's parameters in order: given by the set's own names, as values of the arm's parameters, of
-    /// which the set's sums are made, or as values of other sums that determine the set's: those of the same arm under
-    /// another gravity, say.
+    /// The values of a set's parameters in order: given by the set's own names, as values of the arm's
+    /// parameters, of which the set's sums are made, or as values of other sums that determine the set's:
+    /// those of the same arm under another gravity, say.
     ///
     /// # Errors
     /// Every name that is missing or means nothing here.
@@ -117,8 +119,8 @@ impl Values {
         Ok(model.set_values(set, &all))
     }
 
-    /// The set whose names the values have, with the values in its order; the minimal set where they are values of the
-    /// arm's parameters.
+    /// The set whose names the values have, with the values in its order; the minimal set where they are
+    /// values of the arm's parameters.
     ///
     /// # Errors
     /// As [`Values::of_set`].

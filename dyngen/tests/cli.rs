@@ -248,7 +248,8 @@ fn inspect_shows_what_each_pass_leaves() {
     };
     let (built, merged) = (cost("build"), cost("merge"));
     assert!(merged[0] <= built[0] && merged[1] <= built[1], "{listing}");
-    // One line for each operation of the last graph but the sum of two angles, q2 − q3, and one for each joint's torque that is not zero.
+    // One line for each operation of the last graph but the sum of two angles, q2 − q3, and one for each
+    // joint's torque that is not zero.
     assert_eq!(
         listing.lines().filter(|l| l.starts_with('x')).count(),
         merged.iter().sum::<usize>() - merged[3] - 1
@@ -285,7 +286,8 @@ fn friction_terms_that_do_not_fit_are_refused() {
     assert!(source.contains("pub fn friction_columns<") && source.contains("FRICTION_TERMS: usize = 3"));
 }
 
-/// Against the definition: a parameter that is declared zero is let in again, and the rank says what it was worth.
+/// Against the definition: a parameter that is declared zero is let in again, and the rank says what it was
+/// worth.
 #[test]
 fn describe_says_what_each_symmetry_removed() {
     let rank = |path: &str| {
@@ -309,7 +311,8 @@ fn describe_says_what_each_symmetry_removed() {
     }
 }
 
-/// What `powerball explain` writes beside values is no parameter of the rigid arm; a list without names is refused.
+/// What `powerball explain` writes beside values is no parameter of the rigid arm; a list without names is
+/// refused.
 #[test]
 fn a_model_is_a_file_of_values() {
     let model = dyngen::Model::derive(dyngen::Arm::read(Path::new(&arm())).unwrap()).unwrap();

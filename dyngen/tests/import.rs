@@ -1,4 +1,5 @@
-//! An imported arm moves, weighs and resists as the URDF says: against a Newton–Euler in the URDF's own frames.
+//! An imported arm moves, weighs and resists as the URDF says: against a Newton–Euler in the URDF's own
+//! frames.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -51,8 +52,9 @@ struct Moving {
     joints: Vec<(Vector3<f64>, Vector3<f64>, bool)>,
 }
 
-/// Joint torques and the pose of a link by the laws of Newton and Euler, each link on its own: no frames but the
-/// URDF's, no merging, no recursion of forces. Joints other than those of the chain, and what they carry, are left out.
+/// Joint torques and the pose of a link by the laws of Newton and Euler, each link on its own: no frames but
+/// the URDF's, no merging, no recursion of forces. Joints other than those of the chain, and what they carry,
+/// are left out.
 fn reference(
     robot: &Robot,
     chain: &[&str],
@@ -301,7 +303,8 @@ fn ten_joints_are_one_too_many() {
     let mut text = "<robot name=\"snake\"><link name=\"l0\"/>".to_string();
     for i in 1..=10 {
         text += &format!(
-            "<link name=\"l{i}\"/><joint name=\"j{i}\" type=\"continuous\"><parent link=\"l{}\"/><child link=\"l{i}\"/>\
+            "<link name=\"l{i}\"/><joint name=\"j{i}\" type=\"continuous\"><parent link=\"l{}\"/><child \
+                link=\"l{i}\"/>\
              <origin xyz=\"0.1 0 0.2\"/></joint>",
             i - 1
         );

@@ -1,4 +1,5 @@
-//! Operation counts of every test arm's functions: exactly those of docs/performance.md, and within the bounds that were set.
+//! Operation counts of every test arm's functions: exactly those of docs/performance.md, and within the
+//! bounds that were set.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -92,7 +93,8 @@ fn the_counts_are_those_of_the_documentation() {
     assert_eq!(table, written);
 }
 
-/// What a guided search on one arm and the best public recursions left as goals: multiplications and additions of τ, Y, B, C and g.
+/// What a guided search on one arm and the best public recursions left as goals: multiplications and
+/// additions of τ, Y, B, C and g.
 #[test]
 fn the_counts_are_within_their_bounds() {
     let bounds: [(usize, [(usize, usize); 5]); 2] = [

@@ -172,7 +172,8 @@ fn the_command_ends_with_its_codes_whatever_it_reads() {
             let code = run.status.code();
             assert!(matches!(code, Some(0..=2)), "{command:?}: {code:?}: {said}\n{texts:#?}");
             assert!(!said.contains("panicked"), "{command:?}: {said}\n{texts:#?}");
-            // The first round is not damaged; check may find its values impossible, and says so on standard output.
+            // The first round is not damaged; check may find its values impossible, and says so on standard
+            // output.
             assert!(i > 0 || code == Some(0) || command[0] == "check", "{command:?}: {said}");
             assert!(
                 code == Some(0) || !said.is_empty() || !run.stdout.is_empty(),

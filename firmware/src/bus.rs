@@ -1,8 +1,8 @@
 //! One cycle of the driver: set-points in, frames out.
 
-use powerball::canopen::Frame;
-use powerball::driver::lwa4p::LWA4P;
-use powerball::driver::{Driver, QueueFull, Refusal, Rejection, Transmit};
+use powerball::bus::canopen::Frame;
+use powerball::bus::driver::lwa4p::LWA4P;
+use powerball::bus::driver::{Driver, QueueFull, Refusal, Rejection, Transmit};
 
 /// A transport that holds what one cycle sends.
 #[derive(Default)]

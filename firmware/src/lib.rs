@@ -1,5 +1,5 @@
-//! What a controller runs, as functions that are measured one by one: the emitted dynamics, friction, the online estimator
-//! and one step of a controller, in single and in double precision.
+//! What a controller runs, as functions that are measured one by one: the emitted dynamics, friction, the
+//! online estimator and one step of a controller, in single and in double precision.
 #![no_std]
 
 pub mod bus;
@@ -36,8 +36,8 @@ macro_rules! precision {
         pub mod $scalar {
             use crate::arm::{self, Prepared, Trig};
             use nalgebra::{SMatrix, SVector};
-            use powerball::friction::{TABLE_2, TanhFriction};
-            use powerball::online::SquareRoot;
+            use powerball::controller::friction::{TABLE_2, TanhFriction};
+            use powerball::controller::online::SquareRoot;
 
             /// Joints.
             pub type Joints = SVector<$scalar, 6>;

@@ -1,4 +1,5 @@
-//! A proof by the linker: the panic handler calls a function that does not exist, so a program that links cannot panic.
+//! A proof by the linker: the panic handler calls a function that does not exist, so a program that links
+//! cannot panic.
 
 unsafe extern "C" {
     fn a_panic_is_reachable() -> !;

@@ -1,4 +1,5 @@
-//! Any text as an arm file: an arm or errors, never a panic; small arms are derived and one function is proven.
+//! Any text as an arm file: an arm or errors, never a panic; small arms are derived and one function is
+//! proven.
 #![no_main]
 
 use dyngen::{Arm, Function, Model, SetKind};

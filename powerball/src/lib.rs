@@ -1,50 +1,39 @@
-//! The runtime of an arm: friction, filters, identification and the residual loop.
+//! The runtime of a robot arm: friction and torque corrections on a controller, a CANopen driver, and the way
+//! from logs to a model that explains them.
+//!
+//! The crate is a house of a few rooms. A room uses the rooms above it in this list and never one below it;
+//! each has a feature of its own, so that nobody builds what he does not use.
+//!
+//! | room | feature | `std` | who lives there |
+//! |---|---|---|---|
+//! | [`controller`] | always; `lwa4p` adds the LWA 4P's generated model | no | what runs in the control loop |
+//! | [`bus`] | `driver`; `bus` adds the ways to a bus | no; yes | CANopen, CiA 402, the arm's driver |
+//! | [`logs`] | `identify` | yes | log files, signals, rows of the regression, summaries |
+//! | [`identification`] | `identify` | yes | from rows to parameters, and the paths that excite them |
+//! | [`explanation`] | `explain` | yes | from what a model leaves to named effects, and to the model with them |
+//! | [`virtual_arm`] | `virtual-arm` | yes | an arm to try all of it on |
+//! | [`procedure`] | `procedure` | yes | the paper's steps on a bus |
+//! | [`report`] | `report` | yes | pages and figures of results |
+//! | [`commands`] | `cli` | yes | the `powerball` command, its pages, the demo |
+//!
+//! "The paper" is *Modeling and dynamic parameter identification of the SCHUNK Powerball robotic arm*;
+//! equations and tables that are cited by number are its own.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
-#[cfg(feature = "std")]
-pub mod batch;
-#[cfg(feature = "std")]
+#[cfg(feature = "driver")]
 pub mod bus;
-pub mod canopen;
-pub mod cia402;
 #[cfg(feature = "cli")]
-pub mod cli;
-pub mod correction;
-#[cfg(feature = "std")]
-pub mod demo;
-pub mod driver;
-#[cfg(feature = "std")]
-pub mod effects;
-#[cfg(feature = "std")]
-pub mod estimate;
-#[cfg(feature = "std")]
-pub mod excite;
-#[cfg(feature = "std")]
-pub mod experiment;
-#[cfg(feature = "std")]
-pub mod explain;
-pub mod friction;
-#[cfg(feature = "std")]
-pub mod log;
-pub mod model;
-#[cfg(feature = "std")]
-pub mod motion;
-#[cfg(feature = "std")]
-pub mod mounting;
-pub mod online;
-#[cfg(feature = "std")]
-mod parallel;
-#[cfg(feature = "std")]
+pub mod commands;
+pub mod controller;
+#[cfg(feature = "explain")]
+pub mod explanation;
+#[cfg(feature = "identify")]
+pub mod identification;
+#[cfg(feature = "identify")]
+pub mod logs;
+#[cfg(feature = "procedure")]
 pub mod procedure;
-#[cfg(feature = "std")]
-pub mod regression;
-#[cfg(feature = "std")]
+#[cfg(feature = "report")]
 pub mod report;
-#[cfg(feature = "std")]
-pub mod signal;
-#[cfg(feature = "std")]
-pub mod summary;
-#[cfg(feature = "std")]
-pub mod torque_model;
-#[cfg(feature = "std")]
+#[cfg(feature = "virtual-arm")]
 pub mod virtual_arm;

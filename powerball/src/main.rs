@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    powerball::cli::main()
+    powerball::commands::main()
 }

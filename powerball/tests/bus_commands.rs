@@ -107,7 +107,8 @@ fn a_trajectory_is_recorded() {
     );
 }
 
-/// With an arm file, the floor and the links bar trajectories, and ways to where they begin; nothing moves then.
+/// With an arm file, the floor and the links bar trajectories, and ways to where they begin; nothing moves
+/// then.
 #[test]
 fn what_would_touch_is_not_recorded() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
@@ -174,7 +175,8 @@ fn two_processes_meet_on_a_multicast_group() {
     arm.kill().unwrap();
     arm.wait().unwrap();
     assert!((state["nodes"][5]["position"].as_f64().unwrap() - 0.6).abs() < 1e-4, "{state}");
-    // In real time, on whatever machine this is: a driver that stopped the arm for being late has done its work too.
+    // In real time, on whatever machine this is: a driver that stopped the arm for being late has done its
+    // work too.
     match moved.status.code() {
         Some(0) => assert!((json(&moved)["at"].as_f64().unwrap() - 0.7).abs() < 2e-3, "{}", json(&moved)),
         _ => assert!(complaint(&moved).contains("the arm was stopped"), "{}", complaint(&moved)),

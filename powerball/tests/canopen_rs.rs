@@ -1,14 +1,15 @@
-//! The codecs and the SDO client against `canopen-rs`, written by others: what one end writes the other must read.
+//! The codecs and the SDO client against `canopen-rs`, written by others: what one end writes the other must
+//! read.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test's helpers may stop the test")]
 
 use canopen_rs::{Address, DataType, Entry, ObjectDictionary, Value as Theirs};
 use canopen_rs::{emcy, nmt as theirs, pdo as their_pdo, sdo as their_sdo};
-use powerball::canopen::client::{Client, SdoError, Value};
-use powerball::canopen::emcy::Emcy;
-use powerball::canopen::pdo::{self, Mapping};
-use powerball::canopen::sdo::{AbortCode, Chunk, Request, Response, Transfer};
-use powerball::canopen::{Cob, Frame, NodeId, Object, nmt};
+use powerball::bus::canopen::client::{Client, SdoError, Value};
+use powerball::bus::canopen::emcy::Emcy;
+use powerball::bus::canopen::pdo::{self, Mapping};
+use powerball::bus::canopen::sdo::{AbortCode, Chunk, Request, Response, Transfer};
+use powerball::bus::canopen::{Cob, Frame, NodeId, Object, nmt};
 
 const NODE: u8 = 5;
 

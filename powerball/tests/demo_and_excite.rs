@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use powerball::demo::{self, Session};
+use powerball::commands::demo::{self, Session};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -57,7 +57,8 @@ fn the_demo_finds_what_it_hid_and_writes_what_it_promises() {
     }
 }
 
-/// From logs that leave two names open to a decision, on the arm that the logs were made on and with nothing but its files.
+/// From logs that leave two names open to a decision, on the arm that the logs were made on and with nothing
+/// but its files.
 #[test]
 fn an_experiment_decides_what_logs_leave_open() {
     let folder = scratch("demo_experiment");

@@ -4,8 +4,9 @@
 
 use dyngen::arm::Parameter;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use powerball::friction::{TABLE_2, TanhFriction};
-use powerball::virtual_arm::{Chain, Dynamics, lwa4p};
+use powerball::controller::friction::{TABLE_2, TanhFriction};
+use powerball::identification::chain::Chain;
+use powerball::virtual_arm::{Dynamics, lwa4p};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -94,7 +95,8 @@ fn a_written_path_keeps_floor_links_and_torques() {
         for height in [elbow.z, wrist.z] {
             nearest = nearest.min(height + 0.1 - 0.05);
         }
-        // The upper arm from the shoulder to three radii before the elbow, the forearm from three radii behind it.
+        // The upper arm from the shoulder to three radii before the elbow, the forearm from three radii
+        // behind it.
         for s in 0..=40 {
             let upper = elbow * (f64::from(s) / 40.0 * (0.35 - 0.15) / 0.35);
             for t in 0..=40 {
@@ -121,7 +123,8 @@ fn a_written_path_keeps_floor_links_and_torques() {
     }
     let html = std::fs::read_to_string(&page).unwrap();
     assert_eq!(html.matches("<svg").count(), 3);
-    // The same path again from the same seed is checked by the search's own tests; here, that the file is what was told.
+    // The same path again from the same seed is checked by the search's own tests; here, that the file is
+    // what was told.
     let speed = told["joints"][0]["velocity"].as_f64().unwrap();
     let largest = rows.iter().fold(0.0f64, |m, row| m.max(row[7].abs()));
     assert!((speed - largest).abs() < 1e-8);

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use powerball::demo::Session;
+use powerball::commands::demo::Session;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -57,7 +57,8 @@ fn a_fit_comes_with_a_real_arm_that_costs_next_to_nothing() {
     let values = values.of_set(&model, set).unwrap();
     assert!(dyngen::base::possible::check(&model, dyngen::SetKind::Full, &values).unwrap().possible);
 
-    // On the other path the model does as the fit says, and the undeclared effect keeps it from the noise floor.
+    // On the other path the model does as the fit says, and the undeclared effect keeps it from the noise
+    // floor.
     let identified = format!("{out}/identified.json");
     let verify = |tolerance: &str| {
         run(
@@ -111,7 +112,8 @@ fn a_model_of_another_arm_is_not_judged() {
     }
 }
 
-/// Summaries made one by one, mixed with a log, come to the answer of the logs, to the last digit; others are refused.
+/// Summaries made one by one, mixed with a log, come to the answer of the logs, to the last digit; others are
+/// refused.
 #[test]
 fn summaries_stand_for_their_logs() {
     let (folder, fit, other) = session("summaries");

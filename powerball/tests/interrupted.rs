@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use dyngen::Arm;
-use powerball::log::{Log, read_log};
+use powerball::logs::log::{Log, read_log};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

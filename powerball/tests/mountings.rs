@@ -1,9 +1,10 @@
-//! `summarize`, `identify` and `verify` on logs of an arm whose base was mounted in two ways, as a user runs them.
+//! `summarize`, `identify` and `verify` on logs of an arm whose base was mounted in two ways, as a user runs
+//! them.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use powerball::excite::{Fourier, Harmonics};
-use powerball::mounting::Mounting;
+use powerball::identification::excite::{Fourier, Harmonics};
+use powerball::identification::mounting::Mounting;
 use powerball::virtual_arm::lwa4p;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -90,7 +91,8 @@ fn logs_of_two_mountings_come_to_one_model() {
     // Verified in the other mounting as it was judged there; told of the wrong one, not.
     let verify = |log: &str, mounting: &str| {
         powerball(&format!(
-            "verify --arm {arm} --model {out}/identified.json --log {log} {mounting} --out {out} --tolerance 0.5"
+            "verify --arm {arm} --model {out}/identified.json --log {log} {mounting} --out {out} --tolerance \
+                0.5"
         ))
     };
     assert!(verify(&side_2, "--mounting 90,0").status.success());

@@ -1,8 +1,9 @@
-//! Logs that cannot show what they are asked for: what `identify` and `explain` say of them, and how they end.
+//! Logs that cannot show what they are asked for: what `identify` and `explain` say of them, and how they
+//! end.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use powerball::demo::Session;
+use powerball::commands::demo::Session;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

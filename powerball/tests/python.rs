@@ -1,7 +1,8 @@
-//! python-canopen as master of the virtual arm and as slave of `powerball bus`, over UDP multicast and over slcan.
+//! python-canopen as master of the virtual arm and as slave of `powerball bus`, over UDP multicast and over
+//! slcan.
 //!
-//! `PYTHON` names the interpreter (python3 where it is not set). Where it lacks the packages the tests say so and pass,
-//! unless `REQUIRE_PYTHON` is set, as it is in `.ci/run`.
+//! `PYTHON` names the interpreter (python3 where it is not set). Where it lacks the packages the tests say so
+//! and pass, unless `REQUIRE_PYTHON` is set, as it is in `.ci/run`.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::panic)]

@@ -2,10 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use powerball::demo::Session;
-use powerball::explain::{Explained, explain};
-use powerball::log::{Log, common_clock, read_logs};
-use powerball::regression::{Data, DataOptions, RigidBody};
+use powerball::commands::demo::Session;
+use powerball::explanation::explain::{Explained, explain};
+use powerball::logs::log::{Log, common_clock, read_logs};
+use powerball::logs::regression::{Data, DataOptions, RigidBody};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -22,8 +22,8 @@ fn powerball(arguments: &[&str]) -> Output {
     done
 }
 
-/// A crate around a generated controller: without std and with every warning an error, and a program that reads states
-/// and prints torques. Built beside the other generated crates, so that nalgebra is built once.
+/// A crate around a generated controller: without std and with every warning an error, and a program that
+/// reads states and prints torques. Built beside the other generated crates, so that nalgebra is built once.
 fn controller(folder: &Path) -> PathBuf {
     let name = format!("controller_{}", folder.file_name().unwrap().to_str().unwrap());
     std::fs::create_dir_all(folder.join("src")).unwrap();
@@ -34,7 +34,8 @@ fn controller(folder: &Path) -> PathBuf {
     std::fs::write(folder.join("Cargo.toml"), manifest).unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     std::fs::copy(root.join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
-    let library = "//! A generated controller.\n#![no_std]\n#![deny(warnings, missing_docs, clippy::all)]\ninclude!(\"../controller.rs\");\n";
+    let library = "//! A generated controller.\n#![no_std]\n#![deny(warnings, missing_docs, \
+        clippy::all)]\ninclude!(\"../controller.rs\");\n";
     std::fs::write(folder.join("src/lib.rs"), library).unwrap();
     let program = format!(
         "use {name}::{{JOINTS, TorqueModel}};\nuse nalgebra::SVector;\n
@@ -86,7 +87,8 @@ fn run(program: &Path, input: String) -> Vec<Vec<f64>> {
     text.lines().map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect()
 }
 
-/// The held-out logs as the report sees them, through the controller: the largest difference by joint over the joint's torque.
+/// The held-out logs as the report sees them, through the controller: the largest difference by joint over
+/// the joint's torque.
 fn disagreement(program: &Path, data: &Data<'_>, explained: &Explained) -> Vec<f64> {
     let n = data.dof();
     let mut input = String::new();
@@ -172,7 +174,8 @@ fn the_controllers_torque_is_the_reports() {
             assert!((rms - said).abs() < 1e-9 * said, "{effect}: {rms} {said}");
         }
 
-        // The next identification begins with the model: as good from the start, and the effect is not found again.
+        // The next identification begins with the model: as good from the start, and the effect is not found
+        // again.
         let logs = text(&session.fit);
         let known = ["--model", model, "--out", out, "--json"];
         let done = powerball(

@@ -1,4 +1,5 @@
-//! Measured tables in the documentation: each stands between two markers and is written by the command that measures it.
+//! Measured tables in the documentation: each stands between two markers and is written by the command that
+//! measures it.
 
 use std::io::{Error, ErrorKind};
 use std::path::Path;

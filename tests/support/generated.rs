@@ -89,9 +89,9 @@ files! {
 
 generated! {
     "arm" Full from lwa4p_full;
-    "arm" Minimal from powerball::model::minimal;
-    "arm" Symbolic from powerball::model::symbolic;
-    "arm" Published from powerball::model::published;
+    "arm" Minimal from powerball::controller::model::minimal;
+    "arm" Symbolic from powerball::controller::model::symbolic;
+    "arm" Published from powerball::controller::model::published;
     "puma560" Full from puma560_full;
     "puma560" Minimal from puma560_minimal;
     "puma560" Symbolic from puma560_symbolic;

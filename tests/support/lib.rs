@@ -45,7 +45,8 @@ pub fn parse(text: &str) -> Arm {
     Arm::parse(text, "test").unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// The paper's arm with other gear ratios, one for each joint; `None` leaves the rotor out, and the grouping with it.
+/// The paper's arm with other gear ratios, one for each joint; `None` leaves the rotor out, and the grouping
+/// with it.
 pub fn paper_arm_with_ratios(ratios: [Option<u32>; 6]) -> Arm {
     let mut arm = arm("arm");
     for (joint, ratio) in arm.joints.iter_mut().zip(ratios) {

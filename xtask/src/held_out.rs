@@ -1,13 +1,14 @@
-//! What the base model leaves of each log when it is fitted to the others, beside a plain model on the same rows.
+//! What the base model leaves of each log when it is fitted to the others, beside a plain model on the same
+//! rows.
 
 use dyngen::Arm;
 use faer::Mat;
-use powerball::estimate::{
+use powerball::identification::estimate::{
     FrictionLaw, Solver, Spread, reduce_in_bands, solve_in_band, solve_reduced, spread_of,
 };
-use powerball::log::read_logs;
-use powerball::regression::{DataOptions, RigidBody};
-use powerball::summary::{BANDS, Bands, Octaves, Powers, Summary, Triangle};
+use powerball::logs::log::read_logs;
+use powerball::logs::regression::{DataOptions, RigidBody};
+use powerball::logs::summary::{BANDS, Bands, Octaves, Powers, Summary, Triangle};
 use std::path::PathBuf;
 
 /// Which logs, and how they are seen.
@@ -38,7 +39,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let logs = logs.iter().map(reduced).collect::<Result<Vec<Bands>, String>>()?;
     let mut tables: Vec<[Vec<Squares>; 2]> = vec![Default::default(); BANDS.len() + 1];
     println!(
-        "In each octave between bands, the model's power over that of what it leaves, by joint; and the bands' ends"
+        "In each octave between bands, the model's power over that of what it leaves, by joint; and the \
+            bands' ends"
     );
     for (k, held_out) in logs.iter().enumerate() {
         let mut others = Bands::new(&body, &DataOptions::default());

@@ -1,10 +1,12 @@
-//! What `explain` finds in measured logs: for each case the residual, what was named and on what evidence, and the errors
-//! before and after. Figures show means over many samples; the logs themselves stay where they are.
+//! What `explain` finds in measured logs: for each case the residual, what was named and on what evidence,
+//! and the errors before and after. Figures show means over many samples; the logs themselves stay where they
+//! are.
 
 use dyngen::Arm;
-use powerball::explain::{Explained, NamedEffect, Shown, error_bars, explain, figures, sight};
-use powerball::log::{common_clock, read_logs};
-use powerball::regression::{DataOptions, RigidBody};
+use powerball::explanation::explain::{Explained, NamedEffect, Shown, explain};
+use powerball::logs::log::{common_clock, read_logs};
+use powerball::logs::regression::{DataOptions, RigidBody};
+use powerball::report::explained::{error_bars, figures, sight};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -40,7 +42,8 @@ fn cases() -> Vec<Case> {
         Case {
             name: "ur10e",
             title: "UR10e: what a rigid arm with Eq. 16 friction lacks",
-            question: "Five exciting trajectories are fitted, two others are held out. Currents stand for torques.",
+            question: "Five exciting trajectories are fitted, two others are held out. Currents stand for \
+                torques.",
             folder: "ur10e",
             fit: ur10e(&["12a", "12b", "12c", "7", "8"]),
             validate: ur10e(&["5", "14"]),
@@ -48,7 +51,8 @@ fn cases() -> Vec<Case> {
         Case {
             name: "ur10e_load",
             title: "UR10e: a load that nobody declared",
-            question: "One of the fitted logs runs with a load of about 2.8 kg on the flange; the held-out one runs the same path without it.",
+            question: "One of the fitted logs runs with a load of about 2.8 kg on the flange; the held-out \
+                one runs the same path without it.",
             folder: "ur10e",
             fit: ur10e(&["12a", "12b", "12c", "14_load", "5", "8"]),
             validate: ur10e(&["14", "7"]),
@@ -68,7 +72,8 @@ fn cases() -> Vec<Case> {
                 "A2" => "SCHUNK arm, group A2: even repeats against odd ones",
                 _ => "SCHUNK arm, group B0: even repeats against odd ones",
             },
-            question: "One torque input is repeated while the arm warms up. Even repeats are fitted, odd ones held out. Both run one path: what only fits that path cannot be told there.",
+            question: "One torque input is repeated while the arm warms up. Even repeats are fitted, odd \
+                ones held out. Both run one path: what only fits that path cannot be told there.",
             folder: "lwa4p_rollouts",
             fit: repeats(group, &mut (2..=count).step_by(2)),
             validate: repeats(group, &mut (1..=count).step_by(2)),
@@ -77,7 +82,8 @@ fn cases() -> Vec<Case> {
     cases.push(Case {
         name: "b0_early_late",
         title: "SCHUNK arm, group B0: early repeats against late ones",
-        question: "The first half of the repeats is fitted and the second half held out: a model that does not know of warmth is wrong by then.",
+        question: "The first half of the repeats is fitted and the second half held out: a model that does \
+            not know of warmth is wrong by then.",
         folder: "lwa4p_rollouts",
         fit: repeats("B0", &mut (1..=7)),
         validate: repeats("B0", &mut (8..=14)),
@@ -98,10 +104,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let figures = arguments.write.with_file_name("figures");
     fs::create_dir_all(&figures).map_err(|e| format!("{}: {e}", figures.display()))?;
     let mut page = String::from(
-        "# What measured logs say\n\nEvery case is one run of `powerball explain`; the page is made, figures and all, by\n\n```sh\ncargo run --release -p xtask -- stories\n```\n\n\
-         Figures show means over equal numbers of samples (purple without the effect but with all others, blue with it, orange what it adds), torques \
-         against the direction of motion where that is said. [explain.md](explain.md) says what must be true before a name is given, and \
-         [study.md](study.md) how often a name is right where the truth is known. The data are described in [explain.md](explain.md#what-it-says-of-measured-logs).\n",
+        "# What measured logs say\n\nEvery case is one run of `powerball explain`; the page is made, figures \
+            and all, by\n\n```sh\ncargo run --release -p xtask -- stories\n```\n\n\
+         Figures show means over equal numbers of samples (purple without the effect but with all others, \
+         blue with it, orange what it adds), torques \
+         against the direction of motion where that is said. [explain.md](explain.md) says what must be true \
+         before a name is given, and \
+         [study.md](study.md) how often a name is right where the truth is known. The data are described in \
+         [explain.md](explain.md#what-it-says-of-measured-logs).\n",
     );
     for case in cases() {
         println!("{}", case.title);
@@ -160,7 +170,8 @@ fn tell(page: &mut String, case: &Case, explained: &Explained, figures: &Path) -
         Some(rest) => {
             let _ = writeln!(
                 page,
-                "\nThe residual of joint {} still depends on {}, and nothing that was tried explains that well enough to be named.",
+                "\nThe residual of joint {} still depends on {}, and nothing that was tried explains that \
+                    well enough to be named.",
                 list(&rest.joints),
                 rest.depends_on.join(", ")
             );
@@ -190,7 +201,8 @@ fn evidence(page: &mut String, effect: &NamedEffect) {
     let least = effect.held_out_gain.iter().copied().fold(f64::INFINITY, f64::min);
     let _ = writeln!(
         page,
-        "Squared errors of folds that were left out fall by {:.0} % on the joint where they fall least; p = {:.1e} over all that was tried; evidence {:.1} times that of \
+        "Squared errors of folds that were left out fall by {:.0} % on the joint where they fall least; p = \
+            {:.1e} over all that was tried; evidence {:.1} times that of \
          the next name; {:.0} % of the excess over noise stays on these joints.",
         100.0 * least,
         effect.p_value,

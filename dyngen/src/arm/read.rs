@@ -185,7 +185,13 @@ impl<'t> Reader<'t> {
             match ParameterKind::parse(name) {
                 Some(ParameterKind::Im) => {
                     sound = false;
-                    self.errors.error(item.span(), format!("{place}: Im is no inertial parameter of the link: leave rotor_ratio out where the joint has no rotor"));
+                    self.errors.error(
+                        item.span(),
+                        format!(
+                            "{place}: Im is no inertial parameter of the \
+                        link: leave rotor_ratio out where the joint has no rotor"
+                        ),
+                    );
                 }
                 Some(kind) if kinds.contains(&kind) => {
                     sound = false;
@@ -194,7 +200,15 @@ impl<'t> Reader<'t> {
                 Some(kind) => kinds.push(kind),
                 None => {
                     sound = false;
-                    self.errors.error(item.span(), format!("{place}: zero names {}, which is no parameter: they are m mx my mz Ixx Ixy Ixz Iyy Iyz Izz, without the link's number", describe(item)));
+                    self.errors.error(
+                        item.span(),
+                        format!(
+                            "{place}: zero names {}, which is no parameter: \
+                        they are m mx my mz Ixx Ixy Ixz Iyy Iyz Izz, without the link's \
+                        number",
+                            describe(item)
+                        ),
+                    );
                 }
             }
         }

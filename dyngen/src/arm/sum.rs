@@ -16,7 +16,10 @@ pub fn parse_sum(text: &str) -> Result<Vec<(Parameter, Rational)>, String> {
             None => (Rational::one(), term.as_str()),
         };
         let parameter = Parameter::parse(name).ok_or_else(|| {
-            format!("'{name}' names no parameter: they are m mx my mz Ixx Ixy Ixz Iyy Iyz Izz Im with the link's number, as in Iyy2")
+            format!(
+                "'{name}' names no parameter: they are m mx my mz Ixx Ixy Ixz Iyy Iyz Izz Im with the \
+                link's number, as in Iyy2"
+            )
         })?;
         let signed = if negative { -coefficient } else { coefficient };
         *total.entry(parameter).or_insert_with(Rational::zero) += signed;

@@ -1,8 +1,9 @@
 //! Which base columns to keep: those whose regressor is the cheapest.
 //!
-//! A few rules of choice give a start. From each, a kept column is exchanged for one that depends on it as long as that makes the
-//! code cheaper. All columns are built once, as one graph; what a choice costs is counted in it. Functions of parameter values do
-//! not depend on the choice: they sum the parameters up in their own way.
+//! A few rules of choice give a start. From each, a kept column is exchanged for one that depends on it as
+//! long as that makes the code cheaper. All columns are built once, as one graph; what a choice costs is
+//! counted in it. Functions of parameter values do not depend on the choice: they sum the parameters up in
+//! their own way.
 
 use super::preference::Preference;
 use super::sets::full_set;
@@ -30,7 +31,8 @@ pub struct Candidate {
 
 /// The cheapest base columns, and what the search from every rule found; of equal costs the first rule wins.
 ///
-/// Where angles are kept as symbols eliminations are slow, and the first rule's columns are taken as they are.
+/// Where angles are kept as symbols eliminations are slow, and the first rule's columns are taken as they
+/// are.
 ///
 /// # Errors
 /// Those of `eliminate`.
@@ -117,8 +119,8 @@ impl AllColumns {
         (dependence, Candidate { preference, exchanged, operations: operations.0 })
     }
 
-    /// The exchange that costs least, where one costs less than `operations`: its cost, the position and the column that
-    /// comes there.
+    /// The exchange that costs least, where one costs less than `operations`: its cost, the position and the
+    /// column that comes there.
     fn best_exchange(
         &self,
         form: &FunctionGraph,
@@ -143,7 +145,8 @@ impl AllColumns {
     }
 }
 
-/// The dependence with another column kept at a position; the column must depend on the one that was kept there.
+/// The dependence with another column kept at a position; the column must depend on the one that was kept
+/// there.
 fn exchange(field: &ConstantField, from: &Dependence, position: usize, column: usize) -> Option<Dependence> {
     let entering = &from.coordinates[column];
     let pivot = entering.iter().find(|(p, _)| *p == position).map(|(_, c)| c)?;

@@ -1,4 +1,5 @@
-//! The Lagrangian's exact coefficients: one row for each function of the motion, one column for each parameter.
+//! The Lagrangian's exact coefficients: one row for each function of the motion, one column for each
+//! parameter.
 
 use crate::arm::{Arm, JointKind};
 use crate::dynamics::elements::{ArmElements, Source};
@@ -127,9 +128,9 @@ impl LagrangianPolynomials {
         LagrangianPolynomials { variables, columns }
     }
 
-    /// The rows: for each function of q and q̇ (and of the sizes, where they are variables) its coefficient in
-    /// the columns of the parameters that the arm keeps. Constants, which change no torque, are left out; there are no total time
-    /// derivatives, because every other term is of degree 0 or 2 in the speeds.
+    /// The rows: for each function of q and q̇ (and of the sizes, where they are variables) its coefficient
+    /// in the columns of the parameters that the arm keeps. Constants, which change no torque, are left out;
+    /// there are no total time derivatives, because every other term is of degree 0 or 2 in the speeds.
     pub fn rows(&self, arm: &Arm, field: &ConstantField, sizes: Sizes) -> Vec<SparseRow> {
         let mut rows: BTreeMap<Monomial, BTreeMap<usize, Numerator>> = BTreeMap::new();
         // The same products of constants stand before many functions.

@@ -1,8 +1,8 @@
 //! Whether a real arm can have given parameter values.
 //!
 //! Two things are asked: is the mass matrix B(q) positive definite at every pose, and, where a link's ten
-//! parameters are all given, is its pseudo-inertia matrix positive semi-definite, which is exactly the condition for
-//! a distribution of mass to have them (Wensing, Kim and Slotine 2018).
+//! parameters are all given, is its pseudo-inertia matrix positive semi-definite, which is exactly the
+//! condition for a distribution of mass to have them (Wensing, Kim and Slotine 2018).
 
 use super::sets::{ParameterSet, SetKind};
 use crate::arm::{Arm, JointKind, Parameter, ParameterKind};
@@ -43,7 +43,8 @@ pub fn check(model: &Model, kind: SetKind, values: &[f64]) -> Result<Possibility
     let ((smallest, largest), pose, indefinite) = search.worst(arm);
     if smallest < -ROUNDING * largest.abs() {
         reasons.push(format!(
-            "B(q) is not positive definite: its smallest eigenvalue is {smallest:.6} at the pose shown, and it is \
+            "B(q) is not positive definite: its smallest eigenvalue is {smallest:.6} at the pose shown, and \
+                it is \
              negative at {indefinite} of {POSES} poses drawn at random"
         ));
     } else if smallest <= ROUNDING * largest.abs() {
@@ -81,7 +82,8 @@ impl Search<'_> {
         (values.first().copied().unwrap_or(0.0), values.last().copied().unwrap_or(0.0))
     }
 
-    /// The pose of the smallest eigenvalue: random poses within the limits, the best of them refined joint by joint.
+    /// The pose of the smallest eigenvalue: random poses within the limits, the best of them refined joint by
+    /// joint.
     fn worst(&self, arm: &Arm) -> ((f64, f64), Vec<f64>, usize) {
         let limits: Vec<[f64; 2]> = arm
             .joints
@@ -157,8 +159,8 @@ fn impossible_links(arm: &Arm, set: &ParameterSet, values: &[f64]) -> Vec<String
     reasons
 }
 
-/// The pseudo-inertia of a link from its ten inertial parameters, in order: [Σ s; sᵀ m] with the second moments Σ = ½ tr(I) − I.
-/// A body can have them exactly where it is positive semi-definite.
+/// The pseudo-inertia of a link from its ten inertial parameters, in order: [Σ s; sᵀ m] with the second
+/// moments Σ = ½ tr(I) − I. A body can have them exactly where it is positive semi-definite.
 #[must_use]
 pub fn pseudo_inertia(v: &[f64; 10]) -> Matrix4<f64> {
     let [m, mx, my, mz, xx, xy, xz, yy, yz, zz] = *v;
@@ -174,7 +176,8 @@ fn why_no_body(v: &[f64; 10], smallest: f64) -> String {
     }
     if let Some((name, value, others)) = triangle.iter().find(|(_, value, others)| value > others) {
         return format!(
-            "{name} = {value} exceeds the sum {others} of the other two moments of inertia, which no body's does"
+            "{name} = {value} exceeds the sum {others} of the other two moments of inertia, which no body's \
+                does"
         );
     }
     if v[0] == 0.0 {

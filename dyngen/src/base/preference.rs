@@ -23,8 +23,8 @@ impl Preference {
 
     /// All parameters that an arm keeps, those to be kept in a base set first.
     ///
-    /// For a revolute joint, what can be carried to the link before goes last: the mass, the first moment along the joint
-    /// axis and one of the two inertias across it.
+    /// For a revolute joint, what can be carried to the link before goes last: the mass, the first moment
+    /// along the joint axis and one of the two inertias across it.
     pub fn order(self, arm: &Arm) -> Vec<Parameter> {
         let mut order = arm.kept_parameters();
         let link = |p: &Parameter| if self.outer { arm.dof() - p.link } else { p.link };

@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 
 /// The file's groupings as a set.
 ///
-/// The sums are exact if and only if every combination of parameters that leaves all sums at zero also leaves the
-/// torque at zero. Such combinations have a basis with one vector for each parameter that carries no sum of its
-/// own; where that vector moves the torque, the parameter is lost.
+/// The sums are exact if and only if every combination of parameters that leaves all sums at zero also leaves
+/// the torque at zero. Such combinations have a basis with one vector for each parameter that carries no sum
+/// of its own; where that vector moves the torque, the parameter is lost.
 pub(super) fn published_set(
     arm: &Arm,
     field: &ConstantField,
@@ -50,8 +50,8 @@ pub(super) fn published_set(
     Ok(set)
 }
 
-/// For each grouping, the carrier columns that reproduce it and no other: the inverse of the grouping matrix on the
-/// kept columns. Groupings that depend on others (a repeated sum) have no carrier.
+/// For each grouping, the carrier columns that reproduce it and no other: the inverse of the grouping matrix
+/// on the kept columns. Groupings that depend on others (a repeated sum) have no carrier.
 fn right_inverse(
     field: &ConstantField,
     columns: &[Vec<(usize, Constant)>],

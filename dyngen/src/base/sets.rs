@@ -274,8 +274,8 @@ fn relations(
     minimal: &Dependence,
     parameters: &[SetParameter],
 ) -> Result<(usize, Vec<String>), Unproven> {
-    // The rows of this small matrix are the minimal columns, its columns the set's parameters. Denominators would
-    // not survive as polynomials, so the coordinates are cleared of them column by column.
+    // The rows of this small matrix are the minimal columns, its columns the set's parameters. Denominators
+    // would not survive as polynomials, so the coordinates are cleared of them column by column.
     let coordinates: Vec<Vec<(usize, Constant)>> =
         parameters.iter().map(|p| minimal_coordinates(field, minimal, &p.carriers)).collect();
     let dependence = elimination::dependence_of_columns(field, &coordinates, minimal.kept.len())?;

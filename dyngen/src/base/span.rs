@@ -8,8 +8,9 @@ pub type Sum = Vec<(Parameter, f64)>;
 /// Coefficients that differ by less than this share of the largest are the same.
 const SAME: f64 = 1e-9;
 
-/// Each of the `wanted` sums as a combination of the `given` ones, coefficient by coefficient in their order; `None` where one of them is
-/// none. Every given sum must have a parameter that no other one has, as those of a base set have: the column it was chosen for.
+/// Each of the `wanted` sums as a combination of the `given` ones, coefficient by coefficient in their order;
+/// `None` where one of them is none. Every given sum must have a parameter that no other one has, as those of
+/// a base set have: the column it was chosen for.
 #[must_use]
 pub fn combinations(wanted: &[Sum], given: &[Sum]) -> Option<Vec<Vec<f64>>> {
     let own: Vec<(Parameter, f64)> = given
@@ -48,7 +49,8 @@ mod tests {
     use crate::model::Model;
     use crate::values::Values;
 
-    /// What gravity in a general direction determines says what any gravity determines, for all values of all parameters; not the other way round.
+    /// What gravity in a general direction determines says what any gravity determines, for all values of all
+    /// parameters; not the other way round.
     #[test]
     fn a_general_gravity_says_what_others_do() {
         let text = include_str!("../../../powerball/lwa4p.toml");

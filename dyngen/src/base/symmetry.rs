@@ -1,4 +1,5 @@
-//! What each declared symmetry removed: the arm's file says that a parameter is zero, and this says what that saves.
+//! What each declared symmetry removed: the arm's file says that a parameter is zero, and this says what that
+//! saves.
 
 use super::coefficients::Sizes;
 use super::preference::Preference;
@@ -14,7 +15,8 @@ pub enum Removed {
     Nothing,
     /// A base parameter of its own: without this symmetry the rank is greater by one.
     BaseParameter,
-    /// A term of other base parameters: the rank stays, and the parameter acts as this combination of kept ones.
+    /// A term of other base parameters: the rank stays, and the parameter acts as this combination of kept
+    /// ones.
     Term(Combination),
 }
 

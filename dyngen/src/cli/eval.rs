@@ -9,7 +9,8 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example: dyngen eval arm.toml --function inverse_dynamics --states states.csv --values values.json"
+    after_help = "Example: dyngen eval arm.toml --function inverse_dynamics --states states.csv --values \
+        values.json"
 )]
 pub(super) struct Args {
     /// The arm file.

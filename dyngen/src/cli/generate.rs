@@ -6,9 +6,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
-#[command(
-    after_help = "Example: dyngen generate arm.toml -o arm.rs --parameters minimal --functions regressor,mass_matrix"
-)]
+#[command(after_help = "Example: dyngen generate arm.toml -o arm.rs --parameters minimal --functions \
+        regressor,mass_matrix")]
 pub(super) struct Args {
     /// The arm file.
     arm: PathBuf,
@@ -24,8 +23,8 @@ pub(super) struct Args {
     /// Bake parameter values in: a JSON file {"parameter": number, …}, by the set's names or the arm's.
     #[arg(long, value_name = "FILE.json")]
     values: Option<PathBuf>,
-    /// Friction columns for every joint, separated by commas: viscous, coulomb, tanh:SHAPE (s/rad; or one for each joint,
-    /// tanh:216:180:…).
+    /// Friction columns for every joint, separated by commas: viscous, coulomb, tanh:SHAPE (s/rad; or one for
+    /// each joint, tanh:216:180:…).
     #[arg(long, value_delimiter = ',', value_name = "TERMS")]
     friction: Vec<FrictionTerm>,
     /// Emit the module `batch` too: the functions over blocks of samples, for the processor's vectors.

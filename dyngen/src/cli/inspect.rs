@@ -55,7 +55,8 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         // A String takes every write.
         let _ = writeln!(
             text,
-            "# after {name}: {mul} mul, {add} add, {div} div, {sin_cos} sin_cos; of the parameters alone: {} mul, {} add",
+            "# after {name}: {mul} mul, {add} add, {div} div, {sin_cos} sin_cos; of the parameters alone: {} \
+                mul, {} add",
             all.mul - mul,
             all.add - add
         );

@@ -14,8 +14,8 @@ use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// From a DH table to the dynamics of a robot arm: exact base parameters and allocation-free Rust, proven equal to
-/// the Lagrangian.
+/// From a DH table to the dynamics of a robot arm: exact base parameters and allocation-free Rust, proven
+/// equal to the Lagrangian.
 #[derive(Parser)]
 #[command(version, after_help = "Example: dyngen describe arm.toml && dyngen generate arm.toml -o arm.rs")]
 struct Cli {

@@ -1,9 +1,10 @@
 //! The chain that the recursions run along: stages of parallel axes.
 //!
-//! A frame of the chain sits in each link with z along the link's own joint axis. Consecutive revolute joints with parallel
-//! axes form one stage: seen from the frame before them, each of their links turns by the sum of the angles up to it,
-//! so those sums are the coordinates. An axis that points the other way (a twist of pi) is turned round first, and its
-//! angle counts negatively. Origins lie on the axes, where as many as possible coincide.
+//! A frame of the chain sits in each link with z along the link's own joint axis. Consecutive revolute joints
+//! with parallel axes form one stage: seen from the frame before them, each of their links turns by the sum
+//! of the angles up to it, so those sums are the coordinates. An axis that points the other way (a twist of
+//! pi) is turned round first, and its angle counts negatively. Origins lie on the axes, where as many as
+//! possible coincide.
 
 use super::elements::{ArmElements, JointElements};
 use crate::arm::{Arm, Convention, JointKind};
@@ -16,7 +17,8 @@ use num_traits::Zero;
 pub struct LinkGeometry<V> {
     /// Whether z points against the joint axis of the arm's file.
     pub reversed: bool,
-    /// Sine and cosine of the twist about x from the frame of the link before; of a link within a stage 0 and 1.
+    /// Sine and cosine of the twist about x from the frame of the link before; of a link within a stage 0 and
+    /// 1.
     pub twist: (V, V),
     /// From the frame's origin to the next link's, in the frame's axes.
     pub reach: [V; 3],
@@ -83,8 +85,8 @@ pub fn reversed(arm: &Arm) -> Vec<bool> {
     reversed
 }
 
-/// For each joint, whether the origin of the chain's frame has moved along the axis by the joint's d, so that as many
-/// origins as possible coincide.
+/// For each joint, whether the origin of the chain's frame has moved along the axis by the joint's d, so that
+/// as many origins as possible coincide.
 fn slid(arm: &Arm, origins: Origins) -> Vec<bool> {
     let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
     // What it costs to reach the next origin: along the common normal, along this axis, along the next one.

@@ -121,8 +121,9 @@ fn mirrored(chain: &Chain, mut matrix: Vec<Expr>) -> Vec<Expr> {
     matrix
 }
 
-/// Fills the stage's own entries, in the joints' coordinates, and gives what each of the stage's coordinates makes of momentum,
-/// about the first origin in the axes before the stage, and the composite of all links from the stage on.
+/// Fills the stage's own entries, in the joints' coordinates, and gives what each of the stage's coordinates
+/// makes of momentum, about the first origin in the axes before the stage, and the composite of all links
+/// from the stage on.
 fn revolute(
     b: &Builder,
     chain: &Chain,
@@ -218,8 +219,8 @@ fn prismatic(
     at_link.shifted(b, &shift)
 }
 
-/// Carries a wrench about a stage's first origin, in the axes before the stage, through all stages before it and reports what
-/// each joint feels.
+/// Carries a wrench about a stage's first origin, in the axes before the stage, through all stages before it
+/// and reports what each joint feels.
 pub fn project_inwards(
     b: &Builder,
     stages: &[Stage],

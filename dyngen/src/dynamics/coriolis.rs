@@ -2,9 +2,10 @@
 //!
 //! A point of the arm at x moves by ẋ = Σ Jⱼ q̇ⱼ, and ∂Jⱼ/∂qₖ = ∂²x/∂qⱼ∂qₖ is symmetric in j and k, so
 //! C = Σ m JᵀJ̇ over all points is the matrix of Christoffel symbols. With r from the origin of a frame,
-//! Jⱼ = yⱼ + zⱼ×r and J̇ⱼ = ẏⱼ + żⱼ×r + zⱼ×ṙ, so beside a composite's mass, first moment s and second moments only
-//! Q = Σ m ṙ and K = Σ m ṙ rᵀ are needed. One pass inwards carries them; nothing is differentiated. Within a stage of parallel axes
-//! a coordinate turns one link and only displaces what is beyond, by t = z×p at its reach p.
+//! Jⱼ = yⱼ + zⱼ×r and J̇ⱼ = ẏⱼ + żⱼ×r + zⱼ×ṙ, so beside a composite's mass, first moment s and second moments
+//! only Q = Σ m ṙ and K = Σ m ṙ rᵀ are needed. One pass inwards carries them; nothing is differentiated.
+//! Within a stage of parallel axes a coordinate turns one link and only displaces what is beyond, by t = z×p
+//! at its reach p.
 
 use super::body::{Vector, ZERO};
 use super::composite::{pieces, unit_momentum, with_mass, z_cross};
@@ -108,8 +109,8 @@ fn axis_rate(omega: &Vector) -> Vector {
     [omega[1], -omega[0], Expr::ZERO]
 }
 
-/// The shares of a stage's coordinates about its first origin in the axes before it, its own entries of C, and the composite of
-/// all links from it on.
+/// The shares of a stage's coordinates about its first origin in the axes before it, its own entries of C,
+/// and the composite of all links from it on.
 fn revolute(
     b: &Builder,
     chain: &Chain,
@@ -199,7 +200,8 @@ fn prismatic(
     (vec![share.shifted(b, &shift, &shift_rate)], own, at_link.shifted(b, &shift, &shift_rate))
 }
 
-/// Carries a share from a stage's first origin, in the axes before the stage, inwards and reports C_ji and C_ij.
+/// Carries a share from a stage's first origin, in the axes before the stage, inwards and reports C_ji and
+/// C_ij.
 fn project(
     b: &Builder,
     (stages, motions): (&[Stage], &[StageMotion]),
@@ -295,7 +297,8 @@ impl Moving {
         }
     }
 
-    /// About the origin of a frame in which this one's lies at p and moves by ṗ: Q + m ṗ, and K + Q pᵀ + ṗ (s + m p)ᵀ.
+    /// About the origin of a frame in which this one's lies at p and moves by ṗ: Q + m ṗ, and K + Q pᵀ + ṗ (s
+    /// + m p)ᵀ.
     fn shifted(&self, b: &Builder, p: &Vector, rate: &Vector) -> Moving {
         let body = self.body.shifted(b, p);
         let spread = std::array::from_fn(|i| {
@@ -331,8 +334,8 @@ impl Moving {
         }
     }
 
-    /// A wheel of inertia κ on the link before that turns about z: what ½κ q̇ [z×] adds to K is what pairs of joints further in
-    /// get of it, ½κ q̇ᵢ zⱼ·(zₗ×zᵢ).
+    /// A wheel of inertia κ on the link before that turns about z: what ½κ q̇ [z×] adds to K is what pairs of
+    /// joints further in get of it, ½κ q̇ᵢ zⱼ·(zₗ×zᵢ).
     fn add_wheel(&mut self, b: &Builder, wheel: Expr, speed: Expr) {
         let spin = b.mul(&half(b, wheel), &speed);
         self.spread[1][0] = b.add(&self.spread[1][0], &spin);
@@ -360,8 +363,8 @@ impl Share {
         Share { column: of(&self.column), row: of(&self.row), drift: turn(&self.drift) }
     }
 
-    /// About the origin of a frame in which this one's lies at p and moves by ṗ. ẏⱼ seen from the new origin is ẏⱼ + żⱼ×p + zⱼ×ṗ, so
-    /// the drift gains ṗ × force.
+    /// About the origin of a frame in which this one's lies at p and moves by ṗ. ẏⱼ seen from the new origin
+    /// is ẏⱼ + żⱼ×p + zⱼ×ṗ, so the drift gains ṗ × force.
     fn shifted(&self, b: &Builder, p: &Vector, rate: &Vector) -> Share {
         Share {
             column: self.column.shifted(b, p),

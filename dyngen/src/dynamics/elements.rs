@@ -6,8 +6,8 @@ use crate::exact::rational::Rational;
 use crate::exact::symbols::{AngleSymbols, Trig};
 use num_traits::Zero;
 
-/// The arm's angles whose sine and cosine are no rationals: twists, the fixed angles of prismatic joints, and the
-/// tool's.
+/// The arm's angles whose sine and cosine are no rationals: twists, the fixed angles of prismatic joints, and
+/// the tool's.
 pub fn angle_symbols(arm: &Arm) -> AngleSymbols {
     let of_joints = arm.joints.iter().flat_map(|joint| {
         let fixed = (joint.kind == JointKind::Prismatic).then_some(&joint.theta);

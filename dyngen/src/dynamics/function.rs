@@ -47,7 +47,8 @@ pub enum Function {
     Gravity,
     /// q̈(q, q̇, τ)
     ForwardDynamics,
-    /// Homogeneous transform of the tool's frame (the last frame where no tool is declared) to the base, 4 × 4
+    /// Homogeneous transform of the tool's frame (the last frame where no tool is declared) to the base, 4 ×
+    /// 4
     ForwardKinematics,
     /// Geometric Jacobian of the tool's frame, 6 × n
     Jacobian,
@@ -336,8 +337,8 @@ pub struct Subject<'a> {
     pub minimal: &'a Dependence,
 }
 
-/// Builds a function of an arm for a parameter set, with its parameters as inputs or their values baked in, in the form
-/// that costs least, and runs passes over its graph.
+/// Builds a function of an arm for a parameter set, with its parameters as inputs or their values baked in,
+/// in the form that costs least, and runs passes over its graph.
 pub fn build(
     function: Function,
     subject: &Subject<'_>,

@@ -14,11 +14,11 @@ use crate::graph::{Builder, Expr};
 pub struct Felt {
     /// Its torque or force.
     pub torque: Expr,
-    /// The wrench of its link about the link's origin, in the link's axes; of the last link of a stage with all beyond. Of a prismatic
-    /// joint that before its turn.
+    /// The wrench of its link about the link's origin, in the link's axes; of the last link of a stage with
+    /// all beyond. Of a prismatic joint that before its turn.
     pub wrench: Wrench,
-    /// The force on all beyond a link that is not the last of its stage: in its axes, or in those before the stage if the form
-    /// turns vectors there.
+    /// The force on all beyond a link that is not the last of its stage: in its axes, or in those before the
+    /// stage if the form turns vectors there.
     pub later: Vector,
 }
 

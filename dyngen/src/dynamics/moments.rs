@@ -1,8 +1,8 @@
 //! Mass, first and second moments of a body about the origin of a frame.
 //!
-//! Second moments J = ∫ r rᵀ dm instead of the inertia tensor: a mass distribution on a joint axis (m, z and zz) belongs to
-//! the link on either side of the joint, so these three vanish once they are regrouped, and the moment of each
-//! other entry has only two or three components.
+//! Second moments J = ∫ r rᵀ dm instead of the inertia tensor: a mass distribution on a joint axis (m, z and
+//! zz) belongs to the link on either side of the joint, so these three vanish once they are regrouped, and
+//! the moment of each other entry has only two or three components.
 
 use super::elements::{turn_x, turn_z};
 use crate::exact::algebra::Algebra;

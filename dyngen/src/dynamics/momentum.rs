@@ -1,7 +1,7 @@
 //! Momentum, kinetic energy, and the velocity terms that momentum gives without a matrix.
 //!
-//! Of an arm at rest the Newton–Euler recursion makes of accelerations what momentum is of speeds: its accelerations are then velocities,
-//! its wrenches momenta p and h.
+//! Of an arm at rest the Newton–Euler recursion makes of accelerations what momentum is of speeds: its
+//! accelerations are then velocities, its wrenches momenta p and h.
 
 use super::body::Vector;
 use super::composite::z_cross;
@@ -35,8 +35,8 @@ pub fn kinetic_energy(b: &Builder, chain: &Chain, bodies: &[LinkBody], speeds: &
 
 /// Cᵀ·q̇, which for Christoffel symbols is ∂T/∂q (what a momentum observer needs).
 ///
-/// It is Σ m ẋ·J̇ over all points: for a coordinate that turns about z, −z·(ω×h + v×p); where it only displaces what is beyond
-/// by t = z×p, also ṫ times the momentum there.
+/// It is Σ m ẋ·J̇ over all points: for a coordinate that turns about z, −z·(ω×h + v×p); where it only
+/// displaces what is beyond by t = z×p, also ṫ times the momentum there.
 pub fn coriolis_transpose_times_speed(
     b: &Builder,
     chain: &Chain,

@@ -1,5 +1,5 @@
-//! Kinematics of the tool, or of the last link where no tool is declared: pose, Jacobian, and the acceleration that speeds
-//! alone make.
+//! Kinematics of the tool, or of the last link where no tool is declared: pose, Jacobian, and the
+//! acceleration that speeds alone make.
 
 use super::body::Vector;
 use super::chain::LinkGeometry;
@@ -90,7 +90,8 @@ pub fn forward_kinematics(b: &Builder, arm: &ArmElements<Expr>, tool: &ToolEleme
     rows
 }
 
-/// The geometric Jacobian, row-major 6 × n: velocity of the tool's origin above its angular velocity, in base axes.
+/// The geometric Jacobian, row-major 6 × n: velocity of the tool's origin above its angular velocity, in base
+/// axes.
 pub fn jacobian(b: &Builder, arm: &ArmElements<Expr>, tool: &ToolElements<Expr>) -> Vec<Expr> {
     let (joints, last) = poses(b, arm);
     let last = last.tool(b, tool);

@@ -61,8 +61,8 @@ pub struct Columns<'a> {
     pub forces_home: bool,
 }
 
-/// Y(q, q̇, q̈), row-major n × p: τ = Y·π for the parameters of a set; with reference speeds the regressor of Slotine and
-/// Li, Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g.
+/// Y(q, q̇, q̈), row-major n × p: τ = Y·π for the parameters of a set; with reference speeds the regressor of
+/// Slotine and Li, Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g.
 pub fn regressor(b: &Builder, chain: &Chain, columns: &Columns<'_>, drive: &Drive) -> Vec<Expr> {
     let (n, p) = (chain.dof(), columns.set.parameters.len());
     let motions = motions(b, chain, drive);
@@ -265,9 +265,11 @@ fn unit_wrench(
     }
 }
 
-/// I α + ω×(I ω) of a unit moment of inertia about an axis that is turned about z from x, or from y across it.
+/// I α + ω×(I ω) of a unit moment of inertia about an axis that is turned about z from x, or from y across
+/// it.
 ///
-/// With the second moment across the axis: with e that direction it is e×(U e), less the moment of the inertia about z.
+/// With the second moment across the axis: with e that direction it is e×(U e), less the moment of the
+/// inertia about z.
 fn turned_moment(b: &Builder, trig: SinCos, across: bool, motion: &LinkMotion) -> Vector {
     let spin = &motion.spin;
     let turn = |v: &Vector| super::elements::turn_z(b, &trig.0, &trig.1, v);
@@ -302,8 +304,8 @@ fn tensor_moment(b: &Builder, tensor: &[Vector; 3], motion: &LinkMotion) -> Vect
     moment
 }
 
-/// The torques of a unit of a rotor's inertia: on its own joint k·(k q̈ + z·α of the link before), and on that link the rate
-/// of the rotor's own angular momentum, k·(q̈ z + q̇ ω×z).
+/// The torques of a unit of a rotor's inertia: on its own joint k·(k q̈ + z·α of the link before), and on
+/// that link the rate of the rotor's own angular momentum, k·(q̈ z + q̇ ω×z).
 fn rotor_column(
     b: &Builder,
     chain: &Chain,

@@ -1,8 +1,9 @@
 //! The inertial parameters in the form that the recursions like best.
 //!
-//! Torques depend on a parameter set only through as many sums as its rank. Which sums is free: each is carried by one
-//! column of the dynamics, and the columns of second moments in the frames of the chain are cheaper than those of the
-//! arm's file. The sums are linear in the set's parameters and depend on no state, so they are prepared once.
+//! Torques depend on a parameter set only through as many sums as its rank. Which sums is free: each is
+//! carried by one column of the dynamics, and the columns of second moments in the frames of the chain are
+//! cheaper than those of the arm's file. The sums are linear in the set's parameters and depend on no state,
+//! so they are prepared once.
 
 use super::body::constant;
 use super::chain::{self, LinkGeometry, Origins};
@@ -245,8 +246,8 @@ impl<'a> Map<'a> {
 }
 
 impl Regrouping {
-    /// The sums of a set under a rule. Without `minimal`, or where the elimination is not certified, the set's parameters
-    /// as they are.
+    /// The sums of a set under a rule. Without `minimal`, or where the elimination is not certified, the
+    /// set's parameters as they are.
     pub fn new(
         arm: &Arm,
         symbols: &AngleSymbols,

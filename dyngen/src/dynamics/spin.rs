@@ -7,8 +7,8 @@ use crate::graph::{Builder, Expr};
 
 /// The motion of a frame in its own axes.
 ///
-/// Accelerations are those of Christoffel symbols: J·q̈ᵣ + J̇(q, q̇)·q̇ᵣ, symmetric in the speeds q̇ and reference speeds q̇ᵣ;
-/// where those are the same they are the accelerations of the motion itself.
+/// Accelerations are those of Christoffel symbols: J·q̈ᵣ + J̇(q, q̇)·q̇ᵣ, symmetric in the speeds q̇ and
+/// reference speeds q̇ᵣ; where those are the same they are the accelerations of the motion itself.
 #[derive(Clone, Copy, Debug)]
 pub struct Spin {
     /// Angular velocity at the speeds.
@@ -84,11 +84,11 @@ impl Spin {
         }
     }
 
-    /// The motion of a frame that turns about this one's z by an angle with the given sine and cosine, speed, reference
-    /// speed and acceleration.
+    /// The motion of a frame that turns about this one's z by an angle with the given sine and cosine, speed,
+    /// reference speed and acceleration.
     ///
-    /// Points of the axis move alike in both frames, so U's column along z is the same vector. What else U holds follows from
-    /// it, from ω, and from the angular acceleration about z.
+    /// Points of the axis move alike in both frames, so U's column along z is the same vector. What else U
+    /// holds follows from it, from ω, and from the angular acceleration about z.
     pub fn joined(
         &self,
         b: &Builder,

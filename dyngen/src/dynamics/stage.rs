@@ -22,7 +22,8 @@ pub struct Form {
     pub link_to_link: bool,
     /// The last link keeps the axes of the frame before it, and its moments are turned instead.
     pub last_in_frame_before: bool,
-    /// The regressor's forces are turned back to where their origin is at rest, not the axes' speeds outwards.
+    /// The regressor's forces are turned back to where their origin is at rest, not the axes' speeds
+    /// outwards.
     pub forces_home: bool,
 }
 
@@ -149,8 +150,8 @@ fn signed(negative: bool, (s, c): SinCos) -> SinCos {
     (if negative { -s } else { s }, c)
 }
 
-/// Sine and cosine of the sum of some joints' angles q + theta about the chain's z. Quarter turns swap and sign; any other
-/// theta is in the input.
+/// Sine and cosine of the sum of some joints' angles q + theta about the chain's z. Quarter turns swap and
+/// sign; any other theta is in the input.
 fn sum_of_angles(
     b: &Builder,
     arm: &Arm,
@@ -174,7 +175,8 @@ fn sum_of_angles(
 }
 
 impl Stage {
-    /// The coordinates of the stage's links for values of the joints: about parallel axes the sums up to each joint.
+    /// The coordinates of the stage's links for values of the joints: about parallel axes the sums up to each
+    /// joint.
     pub fn coordinates(&self, b: &Builder, of_joint: &[Expr]) -> Vec<Expr> {
         let mut sum = Expr::ZERO;
         let own = |m: &Member| if m.reversed { -of_joint[m.joint] } else { of_joint[m.joint] };

@@ -133,7 +133,8 @@ fn a_double_beyond_the_limit_is_right_and_disturbs_no_other() {
     assert_eq!((s[2], c[2]), (sin_cos([1.0]).0[0], sin_cos([1.0]).1[0]));
 }
 
-/// Every 499th number of all, and those next to multiples of π/2: an `f64` knows their sine well enough to judge.
+/// Every 499th number of all, and those next to multiples of π/2: an `f64` knows their sine well enough to
+/// judge.
 #[test]
 fn a_single_is_within_one_unit_of_the_last_place_wherever_it_is() {
     let all = (0..0x7f80_0000u32).step_by(499).map(f32::from_bits);

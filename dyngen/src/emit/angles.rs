@@ -44,8 +44,8 @@ pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
         /// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
         pub const ANGLES: usize = #count;
 
-        /// Joint positions with their sines and cosines: computed once and shared between calls, or taken from
-        /// wherever the caller has them.
+        /// Joint positions with their sines and cosines: computed once and shared between calls, or taken
+        /// from wherever the caller has them.
         #(#[doc = #shifted])*
         #(#[doc = #sums])*
         #[derive(Clone, Copy, Debug, PartialEq)]
@@ -142,8 +142,8 @@ fn angle(arm: &Arm, sum: JointSum, position: impl Fn(usize) -> TokenStream) -> T
     quote!(#(#terms)* #offset)
 }
 
-/// Computes all sines and cosines together, and builds a `Trig` of the inputs that are used. A pattern over the storage
-/// needs no bounds check and cannot panic.
+/// Computes all sines and cosines together, and builds a `Trig` of the inputs that are used. A pattern over
+/// the storage needs no bounds check and cannot panic.
 fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
     let position = |i: usize| lane_name(Argument::Positions, i).into_token_stream();
     let Positions { places, angles, trig } = Positions::new(arm, used, position);

@@ -1,4 +1,5 @@
-//! Functions over blocks of samples: loops that a compiler turns into vectors of whatever processor it compiles for.
+//! Functions over blocks of samples: loops that a compiler turns into vectors of whatever processor it
+//! compiles for.
 
 use super::angles::TrigOfLane;
 use super::{code, docs};
@@ -24,12 +25,12 @@ pub(super) fn module(model: &Model, functions: &[FunctionGraph]) -> TokenStream 
         }
     });
     quote! {
-        /// The functions over `LANES` samples at once, each quantity an array over the samples: for one sample they give
-        /// what the function of the same name gives, to the bit.
+        /// The functions over `LANES` samples at once, each quantity an array over the samples: for one
+        /// sample they give what the function of the same name gives, to the bit.
         ///
-        /// They are loops without branches, inlined into their caller so that they use the vectors that *it* is compiled
-        /// for: `-C target-cpu`, or a dispatch at run time around the caller's loop. Eight samples suit every
-        /// processor, and arrays in a struct of `#[repr(align(64))]` its cache.
+        /// They are loops without branches, inlined into their caller so that they use the vectors that *it*
+        /// is compiled for: `-C target-cpu`, or a dispatch at run time around the caller's loop. Eight
+        /// samples suit every processor, and arrays in a struct of `#[repr(align(64))]` its cache.
         #[allow(clippy::needless_range_loop)]
         pub mod batch {
             use super::*;

@@ -136,7 +136,8 @@ fn argument(
     }
 }
 
-/// What functions need of the parameters alone: the function that prepares it, and the trait by which they take it.
+/// What functions need of the parameters alone: the function that prepares it, and the trait by which they
+/// take it.
 pub(super) fn preparation(model: &Model, preparation: &Preparation) -> TokenStream {
     let count = Literal::usize_unsuffixed(preparation.values().len());
     let graph = preparation.graph();
@@ -158,11 +159,13 @@ pub(super) fn preparation(model: &Model, preparation: &Preparation) -> TokenStre
     let operations = preparation.operations();
     let doc = format!(" Operations: {} multiplications, {} additions.", operations.mul, operations.add);
     quote! {
-        /// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of calls.
+        /// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of
+        /// calls.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct Prepared<T>([T; #count]);
 
-        /// What the functions need of the parameters alone: pass it to those that end in `_with`, in place of the parameters.
+        /// What the functions need of the parameters alone: pass it to those that end in `_with`, in place of
+        /// the parameters.
         ///
         #[doc = #doc]
         #[inline]
@@ -199,9 +202,9 @@ pub(super) fn preparation(model: &Model, preparation: &Preparation) -> TokenStre
 /// Nodes in one block of code.
 const SECTION: usize = 256;
 
-/// The body, in blocks that hand on only what later ones need. Every `let` opens a scope within the one before, and a
-/// compiler that writes debug information goes through nested scopes by recursion: thousands of them in a row
-/// exhaust its stack.
+/// The body, in blocks that hand on only what later ones need. Every `let` opens a scope within the one
+/// before, and a compiler that writes debug information goes through nested scopes by recursion: thousands of
+/// them in a row exhaust its stack.
 fn sections(
     model: &Model,
     graph: &Graph,

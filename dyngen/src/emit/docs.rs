@@ -44,8 +44,10 @@ pub(super) fn parameters(set: &ParameterSet) -> String {
         return format!("The {count} parameters of the published set, in order, in SI units.");
     }
     format!(
-        "The {count} parameters of the set `{}`, in order, in SI units.\n\nEach is the sum that its name says, of \
-         masses m, first moments mx, my, mz and inertias of the links about the\norigins of their frames, and rotor \
+        "The {count} parameters of the set `{}`, in order, in SI units.\n\nEach is the sum that its name \
+            says, of \
+         masses m, first moments mx, my, mz and inertias of the links about the\norigins of their frames, \
+         and rotor \
          inertias Im.",
         set.kind
     )
@@ -62,14 +64,18 @@ fn words(function: Function) -> (&'static str, &'static str) {
         InverseDynamicsWithoutGravity => {
             ("Joint torques of a motion without gravity: B(q)·q̈ + C(q, q̇)·q̇.", "Returns the torques, N·m.")
         }
-        Regressor => {
-            ("Regressor Y(q, q̇, q̈): τ = Y·π for the parameters of [`PARAMETER_NAMES`].", "Returns Y, n × p.")
-        }
+        Regressor => (
+            "Regressor Y(q, q̇, q̈): τ = Y·π for the parameters of \
+                [`PARAMETER_NAMES`].",
+            "Returns Y, n × \
+                p.",
+        ),
         RegressorTransposeTimes => {
             ("Yᵀ(q, q̇, q̈)·e without Y itself.", "Returns one number for each parameter.")
         }
         SlotineLiRegressor => (
-            "Regressor of Slotine and Li: Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g, with C of Christoffel symbols.",
+            "Regressor of Slotine and Li: Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g, with C of Christoffel \
+                symbols.",
             "Returns Y, n × p.",
         ),
         SlotineLiTransposeTimes => (
@@ -81,9 +87,12 @@ fn words(function: Function) -> (&'static str, &'static str) {
             "Inverse of the mass matrix, B⁻¹(q).",
             "Returns n × n, symmetric; not finite where the parameters make B singular.",
         ),
-        CoriolisMatrix => {
-            ("Coriolis matrix C(q, q̇) of Christoffel symbols: Ḃ − 2C is skew-symmetric.", "Returns C, n × n.")
-        }
+        CoriolisMatrix => (
+            "Coriolis matrix C(q, q̇) of Christoffel symbols: Ḃ − 2C is \
+                skew-symmetric.",
+            "Returns C, n × \
+                n.",
+        ),
         CoriolisTimesSpeed => ("Coriolis and centrifugal torques C(q, q̇)·q̇.", "Returns the torques, N·m."),
         CoriolisTransposeTimesSpeed => (
             "Cᵀ(q, q̇)·q̇ of the Christoffel matrix, which is ∂T/∂q: what a momentum observer integrates.",
@@ -99,7 +108,8 @@ fn words(function: Function) -> (&'static str, &'static str) {
             "Returns the homogeneous transform, 4 × 4, lengths in m.",
         ),
         Jacobian => (
-            "Geometric Jacobian of the tool's frame (the last link's where the arm declares no tool), in base axes.",
+            "Geometric Jacobian of the tool's frame (the last link's where the arm declares no tool), in \
+                base axes.",
             "Returns 6 × n: velocity of the origin, m/s, above the angular velocity, rad/s.",
         ),
         JacobianRateTimesSpeed => (

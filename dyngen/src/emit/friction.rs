@@ -76,8 +76,10 @@ pub(super) fn items(terms: &[FrictionTerm], n: usize) -> TokenStream {
     let list: String = terms.iter().enumerate().map(|(k, term)| format!("\n{}. `{term}`", k + 1)).collect();
     let shapes = |what: &str| format!("{what}, one for each column:\n{list}");
     let columns_doc = docs::lines(&format!(
-        "{}\n\n* `dq`: joint speeds, rad/s\n\nReturns n × terms: row i holds joint i's columns, so joint i's friction is \
-         this row times its coefficients.\nIn a regression they stand beside the regressor, each in its own joint's rows.",
+        "{}\n\n* `dq`: joint speeds, rad/s\n\nReturns n × terms: row i holds joint i's columns, so joint i's \
+            friction is \
+         this row times its coefficients.\nIn a regression they stand beside the regressor, each in its own \
+         joint's rows.",
         shapes("Friction columns of every joint")
     ));
     let speeds: Vec<_> = (0..n).map(|i| quote::format_ident!("dq{}", i + 1)).collect();
@@ -118,7 +120,8 @@ pub(super) fn items(terms: &[FrictionTerm], n: usize) -> TokenStream {
             SMatrix::from_array_storage(ArrayStorage([#(#columns),*]))
         }
 
-        /// Friction torques of all joints: each row of [`friction_columns`] times the same row of coefficients.
+        /// Friction torques of all joints: each row of [`friction_columns`] times the same row of
+        /// coefficients.
         ///
         /// * `dq`: joint speeds, rad/s
         /// * `coefficients`: n × terms, N·m (N·m·s/rad where viscous)

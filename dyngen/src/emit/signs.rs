@@ -1,12 +1,14 @@
 //! Which values the emitted code holds with the other sign.
 //!
-//! A difference costs the same either way round, so that of neighbours in a vector of results every second can be minus what
-//! was computed. LLVM otherwise joins neighbours into vectors of two and follows their terms back through the function, where
-//! they lie scattered: the shuffles cost more than is saved, half of the inverse dynamics' time again.
+//! A difference costs the same either way round, so that of neighbours in a vector of results every second
+//! can be minus what was computed. LLVM otherwise joins neighbours into vectors of two and follows their
+//! terms back through the function, where they lie scattered: the shuffles cost more than is saved, half of
+//! the inverse dynamics' time again.
 
 use crate::graph::{Expr, Graph, Node};
 
-/// For each node whether minus its value is held, so that as many neighbours among the outputs as possible differ.
+/// For each node whether minus its value is held, so that as many neighbours among the outputs as possible
+/// differ.
 pub(super) fn held(graph: &Graph, outputs: &[Expr], needed: &[usize]) -> Vec<bool> {
     let mut wishes = vec![false; graph.nodes().len()];
     let mut signs = assign(graph, needed, &wishes);
@@ -45,8 +47,8 @@ fn is_difference(graph: &Graph, node: usize, signs: &[bool]) -> bool {
     matches!(graph.nodes()[node], Node::Add(a, b) if terms(a, b, signs)[0] != terms(a, b, signs)[1])
 }
 
-/// Signs that need no change of sign in between: a difference's is free, what else there is follows from its operands.
-/// Without a wish they are those of the graph.
+/// Signs that need no change of sign in between: a difference's is free, what else there is follows from its
+/// operands. Without a wish they are those of the graph.
 fn assign(graph: &Graph, needed: &[usize], wishes: &[bool]) -> Vec<bool> {
     let mut signs = vec![false; graph.nodes().len()];
     for node in needed {

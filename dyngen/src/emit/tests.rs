@@ -1,4 +1,5 @@
-//! The arm's own consistency tests, emitted beside its functions: identities that hold between them, in floating point.
+//! The arm's own consistency tests, emitted beside its functions: identities that hold between them, in
+//! floating point.
 
 use super::Options;
 use crate::arm::{Arm, ParameterKind};
@@ -159,7 +160,8 @@ pub(super) fn module(model: &Model, options: &Options) -> Result<TokenStream, Er
     })
 }
 
-/// Eleven parameters a link of bodies that keep the declared symmetries: a compact body whose mass shrinks outwards.
+/// Eleven parameters a link of bodies that keep the declared symmetries: a compact body whose mass shrinks
+/// outwards.
 fn sample_bodies(arm: &Arm) -> Vec<f64> {
     let mut all = Vec::with_capacity(11 * arm.dof());
     for link in 0..arm.dof() {

@@ -1,8 +1,8 @@
 //! Sines and cosines of several angles at once, by additions and multiplications alone.
 //!
-//! Within 1 ulp for |angle| ≤ 10⁵ in `f64` and for every angle in `f32`; the same bits on every machine, in every lane, and
-//! next to whatever other angles. `f32` calls no operation on `f64`. Other scalars, such as dual numbers, bring their own
-//! sine and cosine.
+//! Within 1 ulp for |angle| ≤ 10⁵ in `f64` and for every angle in `f32`; the same bits on every machine, in
+//! every lane, and next to whatever other angles. `f32` calls no operation on `f64`. Other scalars, such as
+//! dual numbers, bring their own sine and cosine.
 // Digits as they were published.
 #![allow(clippy::excessive_precision)]
 
@@ -11,8 +11,8 @@ use nalgebra::{SimdBool, SimdRealField, convert};
 
 /// Sines and cosines of the angles that `angles` makes of joint positions, in their order.
 ///
-/// Positions and not angles are handed over, because a processor that reads in one piece what was just written in
-/// several waits until that is done.
+/// Positions and not angles are handed over, because a processor that reads in one piece what was just
+/// written in several waits until that is done.
 #[inline(always)]
 pub(super) fn sin_cos<T: SimdRealField + Copy, Q, const N: usize>(
     q: &Q,
@@ -40,7 +40,8 @@ pub(super) fn near<T: SimdRealField + Copy>(angle: T) -> (T, T) {
     }
 }
 
-/// Sines or cosines. No vector of them crosses a line of the cache: what does cannot be read before it is written there.
+/// Sines or cosines. No vector of them crosses a line of the cache: what does cannot be read before it is
+/// written there.
 #[cfg_attr(target_arch = "x86_64", repr(align(16)))]
 struct Row<T, const N: usize>([T; N]);
 
@@ -61,7 +62,8 @@ fn all<T: SimdRealField + Copy, const N: usize>(angles: [T; N]) -> ([T; N], [T; 
         (sines[i], cosines[i]) = near(angles[i]);
     }
     if TypeId::of::<T::Element>() == TypeId::of::<f64>() {
-        // A sum that is not below the limit may have a term beyond it, and the scalar's own functions are right there.
+        // A sum that is not below the limit may have a term beyond it, and the scalar's own functions are
+        // right there.
         let size = angles.iter().fold(T::zero(), |sum, angle| sum + angle.simd_abs());
         if !size.simd_le(convert(LIMIT)).all() {
             for i in 0..N {
@@ -83,10 +85,12 @@ const LIMIT: f64 = 1e5;
 /// π/2 = 37 + 37 + 53 bits: products of the first two with 16 bits are exact (Cody and Waite).
 const PARTS: [f64; 3] = [1.5707963267923333, 2.5633441515839558e-12, 1.0562999066987428e-23];
 
-/// Added and taken away again, 3·2⁵¹ leaves a double's nearest whole number, and 3·2⁵³ its nearest multiple of four.
+/// Added and taken away again, 3·2⁵¹ leaves a double's nearest whole number, and 3·2⁵³ its nearest multiple
+/// of four.
 const WHOLE: f64 = 6_755_399_441_055_744.0;
 
-/// Coefficients of sin r = r + r³·(…) and cos r = 1 − r²/2 + r⁴·(…) for |r| ≤ π/4 in double precision (Sun's fdlibm).
+/// Coefficients of sin r = r + r³·(…) and cos r = 1 − r²/2 + r⁴·(…) for |r| ≤ π/4 in double precision (Sun's
+/// fdlibm).
 const SINE: [f64; 6] = [
     -1.66666666666666324348e-01,
     8.33333333332248946124e-03,
@@ -184,7 +188,8 @@ fn turned<T: SimdRealField + Copy>(turns: T, sine: T, cosine: T) -> (T, T) {
 const TWO_OVER_PI: [u32; 8] =
     [0, 0xa2f9_836e, 0x4e44_1529, 0xfc27_57d1, 0xf534_ddc0, 0xdb62_9599, 0x3c43_9041, 0xfe51_63ab];
 
-/// Quarter turns, −2 … 1, and what is left of an angle in two parts, by integers: exact for every `f32` (Payne and Hanek).
+/// Quarter turns, −2 … 1, and what is left of an angle in two parts, by integers: exact for every `f32`
+/// (Payne and Hanek).
 #[inline(always)]
 fn reduced(angle: f32) -> [f32; 3] {
     let bits = angle.to_bits();

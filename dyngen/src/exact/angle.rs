@@ -102,7 +102,10 @@ impl Angle {
                 -2 => "-pi".to_string(),
                 other => format!("{other}*pi/2"),
             };
-            format!("{value} is close to {exact} but is kept as a general angle; write \"{exact}\" if that is meant")
+            format!(
+                "{value} is close to {exact} but is kept as a general angle; write \"{exact}\" if that \
+                is meant"
+            )
         })
     }
 }

@@ -1,7 +1,7 @@
 //! The field of an arm's constants: rationals, with the sines and cosines of angles that are not rational.
 //!
-//! A constant is a fraction of polynomials over those symbols. For an arm whose angles are multiples of pi/2 it
-//! is a rational number.
+//! A constant is a fraction of polynomials over those symbols. For an arm whose angles are multiples of pi/2
+//! it is a rational number.
 
 use super::algebra::Algebra;
 use super::gcd;
@@ -31,8 +31,8 @@ pub struct ConstantField {
     ring: PolynomialRing<Rational>,
     /// For each symbol, its sine and cosine as elements.
     symbols: Vec<(Numerator, Numerator)>,
-    /// For each ring variable: its text, value, and whether its negative is its conjugate (a sine over its cosine, or a
-    /// root).
+    /// For each ring variable: its text, value, and whether its negative is its conjugate (a sine over its
+    /// cosine, or a root).
     variables: Vec<(String, f64, bool)>,
     /// For each ring variable, the symbol whose sine (`true`) or cosine it is.
     origins: Vec<(usize, bool)>,

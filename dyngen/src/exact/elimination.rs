@@ -39,8 +39,8 @@ impl std::error::Error for Unproven {}
 
 /// Finds the dependence of the columns of a matrix.
 ///
-/// `preference` lists all columns that take part, those to be kept first: a column is kept exactly when it does not
-/// depend on those before it. Columns that are not listed must not occur in `rows`.
+/// `preference` lists all columns that take part, those to be kept first: a column is kept exactly when it
+/// does not depend on those before it. Columns that are not listed must not occur in `rows`.
 ///
 /// # Errors
 /// [`Unproven`] where the prime divides a denominator of the matrix.

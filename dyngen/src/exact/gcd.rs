@@ -1,6 +1,7 @@
 //! Greatest common divisors of polynomials, so that fractions of symbols stay in lowest terms.
 //!
-//! Only for polynomials in variables whose squares have no rule: there the ring is a unique factorisation domain.
+//! Only for polynomials in variables whose squares have no rule: there the ring is a unique factorisation
+//! domain.
 
 use super::algebra::Algebra;
 use super::constant::Numerator;

@@ -1,7 +1,7 @@
 //! Values with the derivatives that the Euler–Lagrange equations need, modulo the prime.
 //!
-//! For L(q, q̇) the torque is τᵢ = d/dt ∂L/∂q̇ᵢ − ∂L/∂qᵢ. A jet carries L, dL/dt along the motion, ∂L/∂q̇ᵢ with
-//! its time derivative, and ∂L/∂qᵢ, so one evaluation of L over jets gives every torque exactly.
+//! For L(q, q̇) the torque is τᵢ = d/dt ∂L/∂q̇ᵢ − ∂L/∂qᵢ. A jet carries L, dL/dt along the motion, ∂L/∂q̇ᵢ
+//! with its time derivative, and ∂L/∂qᵢ, so one evaluation of L over jets gives every torque exactly.
 
 use super::algebra::Algebra;
 use super::prime::Fp;

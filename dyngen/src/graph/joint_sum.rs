@@ -15,8 +15,8 @@ impl JointSum {
         JointSum { plus: 1 << joint, minus: 0 }
     }
 
-    /// A sum of joints, each with its sign (`true`: minus), and whether the sum is minus what was asked for: the first
-    /// joint's sign is plus.
+    /// A sum of joints, each with its sign (`true`: minus), and whether the sum is minus what was asked for:
+    /// the first joint's sign is plus.
     pub fn of(joints: impl IntoIterator<Item = (usize, bool)>) -> (JointSum, bool) {
         let mut sum = JointSum { plus: 0, minus: 0 };
         for (joint, negative) in joints {

@@ -1,7 +1,7 @@
 //! Hash-consed expressions: what is emitted and evaluated.
 //!
-//! Every expression exists once. A sign costs nothing: an [`Expr`] is a node and a sign, so x and −x share their
-//! node, and sums and products are stored with the sign pulled out. Constants are exact.
+//! Every expression exists once. A sign costs nothing: an [`Expr`] is a node and a sign, so x and −x share
+//! their node, and sums and products are stored with the sign pulled out. Constants are exact.
 
 mod build;
 pub mod differentiate;
@@ -58,7 +58,8 @@ impl std::ops::Neg for Expr {
 /// What a function is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Input {
-    /// sin q of a revolute joint, or sin(q + theta) where theta is no multiple of pi/2; or of a sum of such angles.
+    /// sin q of a revolute joint, or sin(q + theta) where theta is no multiple of pi/2; or of a sum of such
+    /// angles.
     Sin(JointSum),
     /// The cosine of the same angle.
     Cos(JointSum),
@@ -189,7 +190,8 @@ impl Graph {
         self.count(outputs, |_| true)
     }
 
-    /// The operations that some outputs cost beside those that depend on parameters alone and can be prepared.
+    /// The operations that some outputs cost beside those that depend on parameters alone and can be
+    /// prepared.
     pub fn operations_when_prepared(&self, outputs: &[Expr]) -> Operations {
         let holds = self.holds();
         self.count(outputs, |node| holds[node].state || !holds[node].parameters)

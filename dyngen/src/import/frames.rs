@@ -1,9 +1,9 @@
 //! Denavit–Hartenberg frames on given joint axes.
 //!
-//! Normal k is the common normal of the axes k and k+1; it carries `a` and `alpha`, and its direction is the x axis of
-//! frame k. Joint k turns from normal k−1 to normal k: `theta` and `d`. The two conventions differ only in which axis a
-//! frame sits on, and so in which normal belongs to a row. J. Denavit, R. Hartenberg, J. Appl. Mech. 22 (1955) 215;
-//! J. J. Craig, Introduction to Robotics, 3rd ed., §3.4.
+//! Normal k is the common normal of the axes k and k+1; it carries `a` and `alpha`, and its direction is the
+//! x axis of frame k. Joint k turns from normal k−1 to normal k: `theta` and `d`. The two conventions differ
+//! only in which axis a frame sits on, and so in which normal belongs to a row. J. Denavit, R. Hartenberg, J.
+//! Appl. Mech. 22 (1955) 215; J. J. Craig, Introduction to Robotics, 3rd ed., §3.4.
 
 use super::Options;
 use super::chain::{Chain, ChainJoint};
@@ -54,8 +54,10 @@ pub(super) fn place(chain: &Chain, options: &Options) -> Result<Frames, String> 
         let farthest = normal.a.max(away[0]).max(away[1]);
         if farthest.is_nan() || farthest > LARGEST_LENGTH {
             return Err(format!(
-                "the axes of joints '{}' and '{}' are almost but not quite parallel, or far apart: their common normal \
-                 is {farthest:.0} m away. Where an angle such as 1.5708 stands for pi/2, --angle-tolerance 1e-4 takes \
+                "the axes of joints '{}' and '{}' are almost but not quite parallel, or far apart: their \
+                    common normal \
+                 is {farthest:.0} m away. Where an angle such as 1.5708 stands for pi/2, --angle-tolerance \
+                 1e-4 takes \
                  it so",
                 near.name, far.name
             ));

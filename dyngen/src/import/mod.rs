@@ -1,6 +1,7 @@
 //! Arms from other descriptions: a serial chain of a URDF becomes an arm file with inertial values beside it.
 //!
-//! 1. `chain`: from the tree of links to one chain: fixed joints merged, everything at q = 0 in the root link's frame.
+//! 1. `chain`: from the tree of links to one chain: fixed joints merged, everything at q = 0 in the root
+//!    link's frame.
 //! 2. `frames`: Denavit–Hartenberg frames on the joint axes, by their common normals.
 //! 3. `text`: the arm file, with the bodies' inertia moved into the new frames.
 //!

@@ -29,7 +29,8 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
         pose_text(&tip(chain, frames))
     ));
     comment(
-        "An arm file has no place for frame 0's pose: gravity is turned into it. Friction and meshes are left out."
+        "An arm file has no place for frame 0's pose: gravity is turned into it. Friction and meshes are \
+            left out."
             .to_string(),
     );
     chain.notes.iter().for_each(|note| comment(format!("Note: {note}.")));
@@ -54,7 +55,8 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
         };
         let _ = write!(
             text,
-            "\n# joint '{}', links {}\n[[joint]]\nkind = \"{kind}\"\na = {}\nalpha = {}\nd = {}\ntheta = {}\n",
+            "\n# joint '{}', links {}\n[[joint]]\nkind = \"{kind}\"\na = {}\nalpha = {}\nd = {}\ntheta = \
+                {}\n",
             plain(&joint.name),
             plain(&joint.links.iter().map(|l| format!("'{l}'")).collect::<Vec<_>>().join(", ")),
             length(row.a),

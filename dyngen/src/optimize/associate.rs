@@ -1,8 +1,8 @@
 //! Regroups sums and products so that more of them share a part.
 //!
-//! A sum of sums that are used nowhere else is one sum of many terms, and likewise a product. Of a product the factors that depend on
-//! parameters alone are multiplied first: that is prepared once. Then the pair of terms, or of factors, that occurs in most places becomes
-//! a node of its own, as long as one occurs twice.
+//! A sum of sums that are used nowhere else is one sum of many terms, and likewise a product. Of a product
+//! the factors that depend on parameters alone are multiplied first: that is prepared once. Then the pair of
+//! terms, or of factors, that occurs in most places becomes a node of its own, as long as one occurs twice.
 
 use super::cheaper;
 use super::flat::{Flat, Kind, Leaf};

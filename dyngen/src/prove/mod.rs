@@ -1,8 +1,8 @@
 //! Graph against Lagrangian: every function, exactly, at random points of a 61-bit prime field.
 //!
 //! The Lagrangian is evaluated over jets, which gives the Euler–Lagrange equations without any recursion. A
-//! wrong formula is a polynomial that is not zero; with degrees below 100 it vanishes at one random point with
-//! probability below 2⁻⁵⁴, and at both points with probability below 2⁻¹⁰⁸.
+//! wrong formula is a polynomial that is not zero; with degrees below 100 it vanishes at one random point
+//! with probability below 2⁻⁵⁴, and at both points with probability below 2⁻¹⁰⁸.
 
 mod point;
 mod series;
@@ -147,8 +147,8 @@ fn mass_matrix(point: &Point<'_>) -> Vec<Fp> {
     transpose(&columns)
 }
 
-/// The velocity terms h(v) = Σ c_ijk vⱼ vₖ with Christoffel symbols, which are symmetric in j and k, polarised:
-/// ½(h(u + v) − h(u) − h(v)) = Σ c_ijk uⱼ vₖ; for each parameter.
+/// The velocity terms h(v) = Σ c_ijk vⱼ vₖ with Christoffel symbols, which are symmetric in j and k,
+/// polarised: ½(h(u + v) − h(u) − h(v)) = Σ c_ijk uⱼ vₖ; for each parameter.
 fn polarised(point: &Point<'_>, u: &[Fp], v: &[Fp]) -> Vec<Vec<Fp>> {
     let half = Fp::from_integer(2).inverse().unwrap_or(Fp::ONE);
     let zeros = vec![Fp::ZERO; point.dof()];

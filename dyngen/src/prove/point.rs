@@ -102,8 +102,8 @@ impl<'a> Point<'a> {
         State { point: self, speeds, accelerations, gravity }
     }
 
-    /// Sine and cosine of q + theta: by the addition theorem where theta is a multiple of pi/2; the input holds any
-    /// other theta.
+    /// Sine and cosine of q + theta: by the addition theorem where theta is a multiple of pi/2; the input
+    /// holds any other theta.
     pub(super) fn joint_trig(&self, joint: usize) -> (Fp, Fp) {
         let (sin, cos) = self.positions[joint];
         let (st, ct) = match self.arm.joints[joint].theta.quarter_turns() {

@@ -1,4 +1,5 @@
-//! The Lagrangian's side at a state of the arm, modulo the prime: Euler–Lagrange over jets, without any recursion.
+//! The Lagrangian's side at a state of the arm, modulo the prime: Euler–Lagrange over jets, without any
+//! recursion.
 
 use super::point::Point;
 use crate::dynamics::elements::{ArmElements, Source};

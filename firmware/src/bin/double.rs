@@ -1,5 +1,5 @@
-//! A controller in double precision with the driver of the bus. That it links proves that it cannot panic and that nothing
-//! allocates.
+//! A controller in double precision with the driver of the bus. That it links proves that it cannot panic and
+//! that nothing allocates.
 #![no_std]
 #![no_main]
 
@@ -8,7 +8,7 @@ mod proof;
 
 use core::hint::black_box;
 use cortex_m_rt::entry;
-use powerball::online::SquareRoot;
+use powerball::controller::online::SquareRoot;
 use powerball_firmware::f64::{self as double, Joints, Parameters};
 use powerball_firmware::{arm, bus};
 
@@ -32,7 +32,7 @@ fn main() -> ! {
         black_box(double::estimate(&online));
         if let Ok(driver) = &mut driver {
             now += black_box(1000);
-            let came = black_box([powerball::canopen::Frame::from_raw(0x183, &[0; 8])]);
+            let came = black_box([powerball::bus::canopen::Frame::from_raw(0x183, &[0; 8])]);
             let _ = black_box(bus::step(
                 black_box(driver),
                 now,

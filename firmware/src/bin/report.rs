@@ -3,7 +3,7 @@
 
 use core::fmt::Write;
 use core::hint::black_box;
-use powerball::online::SquareRoot;
+use powerball::controller::online::SquareRoot;
 use powerball_firmware::{arm, bus};
 
 /// FNV-1a over the bits of numbers.
@@ -69,7 +69,7 @@ fn bits(out: &mut impl Write) {
     bits!(out, f64);
     let mut hash = Hash::NEW;
     if let Ok(mut driver) = bus::driver() {
-        let _ = driver.start(powerball::driver::ControlMode::InterpolatedPosition, false);
+        let _ = driver.start(powerball::bus::driver::ControlMode::InterpolatedPosition, false);
         for k in 0..200 {
             let (mailbox, _) = bus::step(&mut driver, 1000 * k, &[], &[0.0; 6]);
             mailbox.frames().for_each(|frame| {
@@ -166,7 +166,7 @@ mod target {
             costs!(out, counter, f64);
             let mut driver = bus::driver();
             if let Ok(driver) = &mut driver {
-                let _ = driver.start(powerball::driver::ControlMode::InterpolatedPosition, false);
+                let _ = driver.start(powerball::bus::driver::ControlMode::InterpolatedPosition, false);
                 let mut step = || {
                     let _ = black_box(bus::step(black_box(driver), 1, &[], black_box(&[0.0; 6])));
                 };

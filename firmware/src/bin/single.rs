@@ -1,5 +1,5 @@
-//! A controller in single precision. That it links proves that it cannot panic and that nothing allocates; the test looks
-//! for arithmetic on `f64` in its symbols.
+//! A controller in single precision. That it links proves that it cannot panic and that nothing allocates;
+//! the test looks for arithmetic on `f64` in its symbols.
 #![no_std]
 #![no_main]
 
@@ -8,7 +8,7 @@ mod proof;
 
 use core::hint::black_box;
 use cortex_m_rt::entry;
-use powerball::online::SquareRoot;
+use powerball::controller::online::SquareRoot;
 use powerball_firmware::arm;
 use powerball_firmware::f32::{self as single, Joints, Parameters};
 

@@ -1,9 +1,10 @@
 //! From where an arm is to where a motion begins.
 
-use crate::motion::Motion;
+use crate::identification::motion::Motion;
 
-/// A motion from rest at `from` to rest at `to`, rad, every `period` s: all joints along 10x³ − 15x⁴ + 6x⁵, as slowly as the
-/// joint needs that has the farthest to go at `speed` (rad/s) and `acceleration` (rad/s²), and for `least` s at least.
+/// A motion from rest at `from` to rest at `to`, rad, every `period` s: all joints along 10x³ − 15x⁴ + 6x⁵,
+/// as slowly as the joint needs that has the farthest to go at `speed` (rad/s) and `acceleration` (rad/s²),
+/// and for `least` s at least.
 pub fn approach(
     from: &[f64],
     to: &[f64],
@@ -12,7 +13,8 @@ pub fn approach(
     period: f64,
     least: f64,
 ) -> Motion {
-    // The polynomial's greatest speed is 15/8, its greatest acceleration 10/√3, for a unit way in a unit time.
+    // The polynomial's greatest speed is 15/8, its greatest acceleration 10/√3, for a unit way in a unit
+    // time.
     let (top_speed, top_acceleration) = (1.875, 10.0 / 3f64.sqrt());
     let mut time = least.max(period);
     for i in 0..from.len() {

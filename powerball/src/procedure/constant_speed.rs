@@ -1,10 +1,11 @@
-//! One joint at constant speeds, there and back: the motion of a friction experiment, and the mean torques of its log.
+//! One joint at constant speeds, there and back: the motion of a friction experiment, and the mean torques of
+//! its log.
 
 use super::laws::Point;
-use crate::motion::Motion;
+use crate::identification::motion::Motion;
 
-/// Speeds of the paper's experiment, rad/s: eleven up to 0.2, where a Stribeck effect would show, and seven more up to 0.55; less
-/// where the joint is not as fast.
+/// Speeds of the paper's experiment, rad/s: eleven up to 0.2, where a Stribeck effect would show, and seven
+/// more up to 0.55; less where the joint is not as fast.
 #[must_use]
 pub fn speeds(fastest: f64) -> Vec<f64> {
     let scale = (0.95 * fastest / 0.55).min(1.0);
@@ -52,8 +53,8 @@ const SETTLE: f64 = 0.25;
 /// Rest between two ways, s.
 const REST: f64 = 0.3;
 
-/// Plans the experiment of a joint: at each speed once in either direction over the same way, so that what gravity is left
-/// acts on both alike. `pose` holds the other joints.
+/// Plans the experiment of a joint: at each speed once in either direction over the same way, so that what
+/// gravity is left acts on both alike. `pose` holds the other joints.
 #[must_use]
 pub fn plan(joint: usize, pose: &[f64], bounds: Bounds, speeds: &[f64], period: f64) -> Plan {
     let [low, high] = bounds.position;
@@ -125,10 +126,11 @@ fn smooth(x: f64, time: f64) -> (f64, f64, f64) {
 const PARTS: usize = 5;
 
 impl Plan {
-    /// The mean torque of every plateau, with its standard error, from the joint's log: times from the start of the motion, s,
-    /// and torques, N·m. A plateau without enough samples is left out.
+    /// The mean torque of every plateau, with its standard error, from the joint's log: times from the start
+    /// of the motion, s, and torques, N·m. A plateau without enough samples is left out.
     ///
-    /// The error is that of the means of parts of the plateau, because samples next to each other are not independent.
+    /// The error is that of the means of parts of the plateau, because samples next to each other are not
+    /// independent.
     #[must_use]
     pub fn points(&self, t: &[f64], torque: &[f64]) -> Vec<Point> {
         let of = |plateau: &Plateau| {
@@ -189,7 +191,8 @@ mod tests {
         assert_eq!((first[1], last[1]), (0.0, 0.0));
     }
 
-    /// Means over the same way both ways: what depends on the position is in the constant torque, not in the friction.
+    /// Means over the same way both ways: what depends on the position is in the constant torque, not in the
+    /// friction.
     #[test]
     fn means_are_the_friction_and_a_constant() {
         let plan = example();

@@ -1,12 +1,13 @@
-//! The friction experiment (§II.C): each joint alone at constant speeds where gravity does not load it, and the law that fits.
+//! The friction experiment (§II.C): each joint alone at constant speeds where gravity does not load it, and
+//! the law that fits.
 
 use super::constant_speed::{self, Bounds, Plan};
 use super::gravity_free::{self, GravityFree};
 use super::laws::{Point, Rated, choose};
 use super::{RecordError, Recorder, resume};
-use crate::bus::Bus;
-use crate::log::{LogError, read_log};
-use crate::mounting::Mounting;
+use crate::bus::transport::Bus;
+use crate::identification::mounting::Mounting;
+use crate::logs::log::{LogError, read_log};
 use dyngen::Model;
 use serde_json::{Value, json};
 use std::fmt;
@@ -110,8 +111,8 @@ pub fn log_file(folder: &Path, joint: usize) -> PathBuf {
     folder.join(format!("friction_{}.csv", joint + 1))
 }
 
-/// Runs the experiment: goes to the pose and records the motion. A log that is there already and complete is kept, so that an
-/// experiment that was broken off goes on where it was.
+/// Runs the experiment: goes to the pose and records the motion. A log that is there already and complete is
+/// kept, so that an experiment that was broken off goes on where it was.
 ///
 /// # Errors
 /// Where the arm stops, or the log cannot be written.
@@ -179,14 +180,14 @@ impl JointFriction {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bus::{Master, Memory};
-    use crate::driver::Driver;
-    use crate::driver::lwa4p::LWA4P;
-    use crate::friction::{TABLE_2, TanhFriction};
+    use crate::bus::driver::Driver;
+    use crate::bus::driver::lwa4p::LWA4P;
+    use crate::bus::transport::{Master, Memory};
+    use crate::controller::friction::{TABLE_2, TanhFriction};
     use crate::virtual_arm::{VirtualArm, lwa4p};
 
-    /// Table 2's curves come back within 1 % of their range over the bus: encoder steps, current noise, servo and all. One
-    /// joint of each mounting.
+    /// Table 2's curves come back within 1 % of their range over the bus: encoder steps, current noise, servo
+    /// and all. One joint of each mounting.
     #[test]
     fn table_2_is_recovered_on_the_virtual_arm() {
         let model = Model::derive(lwa4p::arm().unwrap()).unwrap();

@@ -1,6 +1,7 @@
-//! Poses in which gravity puts no torque on a joint, for any place of that joint: where friction can be seen alone.
+//! Poses in which gravity puts no torque on a joint, for any place of that joint: where friction can be seen
+//! alone.
 
-use crate::mounting::Mounting;
+use crate::identification::mounting::Mounting;
 use dyngen::arm::JointKind;
 use dyngen::{Evaluator, Function, Model, SetKind};
 
@@ -18,7 +19,8 @@ pub struct GravityFree {
     pub mounting: Mounting,
     /// The joints, rad; the joint itself may be anywhere.
     pub pose: Vec<f64>,
-    /// What is left: the sine of the angle between the joint axis and gravity (its cosine where the joint is prismatic).
+    /// What is left: the sine of the angle between the joint axis and gravity (its cosine where the joint is
+    /// prismatic).
     pub leftover: f64,
 }
 
@@ -28,7 +30,8 @@ pub const FREE: f64 = 1e-3;
 const PLACES: usize = 49;
 const SWEEPS: i32 = 4;
 
-/// The first mounting, and the pose nearest to zero, that keep gravity off a joint; `None` where no pose within the limits does.
+/// The first mounting, and the pose nearest to zero, that keep gravity off a joint; `None` where no pose
+/// within the limits does.
 #[must_use]
 pub fn find(model: &Model, joint: usize) -> Option<GravityFree> {
     MOUNTINGS.into_iter().map(|mounting| best(model, joint, mounting)).find(|found| found.leftover < FREE)
@@ -59,7 +62,8 @@ pub fn best(model: &Model, joint: usize, mounting: Mounting) -> GravityFree {
     let middle = |i: usize| 0.0f64.clamp(range(i)[0], range(i)[1]);
     let mut pose: Vec<f64> = (0..n).map(middle).collect();
     let mut least = leftover(&pose);
-    // Quarter turns of several joints at once may be needed; of those that are as good the one nearest to zero.
+    // Quarter turns of several joints at once may be needed; of those that are as good the one nearest to
+    // zero.
     let quarter = std::f64::consts::FRAC_PI_2;
     let mut starts = vec![pose.clone()];
     for i in 0..joint.min(6) {

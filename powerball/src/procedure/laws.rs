@@ -1,6 +1,6 @@
 //! Friction laws fitted to the mean torques of constant speeds, and the choice between them.
 
-use crate::estimate::bounded;
+use crate::identification::estimate::bounded;
 use faer::Mat;
 
 /// The mean torque of one joint at one constant speed.
@@ -14,7 +14,8 @@ pub struct Point {
     pub error: f64,
 }
 
-/// A friction law: levels that are not negative times functions of the speed with shapes, and a constant torque beside them.
+/// A friction law: levels that are not negative times functions of the speed with shapes, and a constant
+/// torque beside them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Law {
     /// Eq. 16: γ1·tanh(γ2·v) + γ3·tanh(γ4·v) + γ5·v.
@@ -32,12 +33,13 @@ const GRID: usize = 13;
 const FINER: usize = 5;
 /// Later rounds, each half as wide as the one before: shapes to about 1e-3, where curves no longer differ.
 const ROUNDS: usize = 9;
-/// Two held-out errors closer than this share of their spread are not told apart; the law that comes first is taken.
+/// Two held-out errors closer than this share of their spread are not told apart; the law that comes first is
+/// taken.
 const ALIKE: f64 = 1.0;
 
 impl Law {
-    /// All of them; of those that fit equally well the first is taken: Eq. 16, because it is smooth and what everything else
-    /// here works with.
+    /// All of them; of those that fit equally well the first is taken: Eq. 16, because it is smooth and what
+    /// everything else here works with.
     pub const ALL: [Law; 4] = [Law::Tanh, Law::CoulombViscous, Law::Stribeck, Law::StribeckPower];
 
     /// Its name in results.
@@ -72,8 +74,8 @@ impl Law {
         }
     }
 
-    /// Fits the law: the levels by weighted least squares with bounds at every shape, the shapes by a grid over their whole
-    /// range that is refined around the best of several starts.
+    /// Fits the law: the levels by weighted least squares with bounds at every shape, the shapes by a grid
+    /// over their whole range that is refined around the best of several starts.
     #[must_use]
     pub fn fit(self, points: &[Point]) -> Fitted {
         let at = |shapes: &[f64]| self.levels(points, shapes);
@@ -154,7 +156,8 @@ pub struct Fitted {
     pub shapes: Vec<f64>,
     /// Its levels: N·m, N·m, N·m·s/rad.
     pub levels: [f64; 3],
-    /// A constant torque beside the friction, N·m: what gravity is left, or what differs between the directions.
+    /// A constant torque beside the friction, N·m: what gravity is left, or what differs between the
+    /// directions.
     pub offset: f64,
     /// χ² of the fit.
     pub error: f64,
@@ -203,8 +206,9 @@ impl Rated {
     }
 }
 
-/// Every law fitted and rated by leaving speeds out, and the index of the one that is chosen: the least held-out error, or the
-/// first one whose error is not told apart from it. `None` with fewer than five different speeds.
+/// Every law fitted and rated by leaving speeds out, and the index of the one that is chosen: the least
+/// held-out error, or the first one whose error is not told apart from it. `None` with fewer than five
+/// different speeds.
 #[must_use]
 pub fn choose(points: &[Point]) -> Option<(Vec<Rated>, usize)> {
     let mut speeds: Vec<f64> = points.iter().map(|p| p.speed.abs()).collect();
@@ -217,7 +221,7 @@ pub fn choose(points: &[Point]) -> Option<(Vec<Rated>, usize)> {
     let mut rated = Vec::new();
     let mut squares: Vec<Vec<f64>> = Vec::new();
     for law in Law::ALL {
-        let folds: Vec<Fitted> = crate::parallel::map(&speeds, |speed| {
+        let folds: Vec<Fitted> = crate::logs::parallel::map(&speeds, |speed| {
             let rest: Vec<Point> = points.iter().filter(|p| !near(p, *speed)).copied().collect();
             law.fit(&rest)
         });
@@ -248,7 +252,7 @@ pub fn choose(points: &[Point]) -> Option<(Vec<Rated>, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::friction::{TABLE_2, TanhFriction};
+    use crate::controller::friction::{TABLE_2, TanhFriction};
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 

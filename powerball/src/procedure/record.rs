@@ -1,12 +1,12 @@
 //! A motion in interpolated position mode, and the log of it.
 //!
-//! Every line of a log is written whole, by one call, when its cycle is over: whatever moment the program dies at, the
-//! file can be read up to there.
+//! Every line of a log is written whole, by one call, when its cycle is over: whatever moment the program
+//! dies at, the file can be read up to there.
 
 use super::approach;
-use crate::bus::{ArmError, Bus, Master, Moment};
-use crate::driver::{ControlMode, Phase, Profile, Rejection};
-use crate::motion::Motion;
+use crate::bus::driver::{ControlMode, Phase, Profile, Rejection};
+use crate::bus::transport::{ArmError, Bus, Master, Moment};
+use crate::identification::motion::Motion;
 use serde::Serialize;
 use std::fmt::{self, Write as _};
 use std::io::{self, Write};
@@ -30,7 +30,8 @@ pub struct Record {
     pub skipped: u64,
     /// Cycles in which the drives held their last set-points because new ones came too late.
     pub dropped: u64,
-    /// Greatest distance of each joint from the set-point of the cycle, rad; with the drives' interpolation delay in it.
+    /// Greatest distance of each joint from the set-point of the cycle, rad; with the drives' interpolation
+    /// delay in it.
     pub following_max: Vec<f64>,
     /// Root mean square of the same, rad.
     pub following_rms: Vec<f64>,
@@ -102,11 +103,11 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         &mut self.master
     }
 
-    /// Follows a motion, with `each` called for every cycle: the cycle's number and that of the sample that was given in it,
-    /// and the master, `None` where process data is missing.
+    /// Follows a motion, with `each` called for every cycle: the cycle's number and that of the sample that
+    /// was given in it, and the master, `None` where process data is missing.
     ///
-    /// Where set-points came too late for their slot, the sample is given again and the motion is a cycle longer: a joint
-    /// is never asked to catch up.
+    /// Where set-points came too late for their slot, the sample is given again and the motion is a cycle
+    /// longer: a joint is never asked to catch up.
     fn follow(
         &mut self,
         motion: &Motion,
@@ -153,7 +154,8 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         }
     }
 
-    /// Goes to a position and holds it: at a share of each joint's speed and acceleration, in `least` s at least.
+    /// Goes to a position and holds it: at a share of each joint's speed and acceleration, in `least` s at
+    /// least.
     ///
     /// # Errors
     /// As [`record`](Self::record).
@@ -162,11 +164,12 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         self.follow(&motion, |_, _| Ok(()))
     }
 
-    /// Follows a motion that begins where the arm is, and writes the log: `t` in s from `start` on, `q1…qn` in rad,
-    /// `tau1…taun` in N·m, and `ref1…refn`, the set-points, where `with_references`.
+    /// Follows a motion that begins where the arm is, and writes the log: `t` in s from `start` on, `q1…qn`
+    /// in rad, `tau1…taun` in N·m, and `ref1…refn`, the set-points, where `with_references`.
     ///
     /// # Errors
-    /// Where the motion does not fit the arm, the arm is stopped, or the log cannot be written. The log ends there.
+    /// Where the motion does not fit the arm, the arm is stopped, or the log cannot be written. The log ends
+    /// there.
     pub fn record(
         &mut self,
         motion: &Motion,
@@ -232,7 +235,8 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
             let way = way(self.master.driver().profile(), &self.target, &begin, APPROACH, 1.0);
             if let Some(why) = barred(&way) {
                 return Err(RecordError::Barred(format!(
-                    "on the straight way to where the trajectory begins {why}: move the arm nearer to there first"
+                    "on the straight way to where the trajectory begins {why}: move the arm nearer to there \
+                        first"
                 )));
             }
             self.go(&begin, APPROACH, 1.0)?;
@@ -252,7 +256,8 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         }
         if (motion.period - period).abs() > 1e-6 {
             return wrong(format!(
-                "the motion has a sample every {:.3} ms, the arm's SYNC comes every {:.3} ms: sample it at {} Hz",
+                "the motion has a sample every {:.3} ms, the arm's SYNC comes every {:.3} ms: sample it at \
+                    {} Hz",
                 1e3 * motion.period,
                 1e3 * period,
                 (1.0 / period).round()
@@ -300,8 +305,9 @@ fn header<const N: usize>(with_references: bool) -> String {
     out
 }
 
-/// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its speed, follows the motion,
-/// writes the log, and stops. `barred` says of the way to there, and then of the motion, why the arm must not go it.
+/// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its speed, follows the
+/// motion, writes the log, and stops. `barred` says of the way to there, and then of the motion, why the arm
+/// must not go it.
 ///
 /// # Errors
 /// As [`Recorder::enable`] and [`Recorder::record`], and [`RecordError::Barred`]; the arm has not moved then.
@@ -326,10 +332,10 @@ pub fn record<B: Bus, const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bus::Memory;
-    use crate::canopen::NodeId;
-    use crate::driver::lwa4p::LWA4P;
-    use crate::driver::{Cause, Driver};
+    use crate::bus::canopen::NodeId;
+    use crate::bus::driver::lwa4p::LWA4P;
+    use crate::bus::driver::{Cause, Driver};
+    use crate::bus::transport::Memory;
     use crate::virtual_arm::slave::Fault;
     use crate::virtual_arm::{VirtualArm, lwa4p};
 

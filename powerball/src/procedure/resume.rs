@@ -4,8 +4,8 @@ use std::fs::OpenOptions;
 use std::io;
 use std::path::Path;
 
-/// The whole rows of a log that a step writes: lines with as many numbers as the header has names. What a program that died did
-/// not finish is left out; a log that is not there has no rows.
+/// The whole rows of a log that a step writes: lines with as many numbers as the header has names. What a
+/// program that died did not finish is left out; a log that is not there has no rows.
 #[must_use]
 pub fn rows(path: &Path) -> Vec<Vec<f64>> {
     let Ok(text) = std::fs::read_to_string(path) else { return Vec::new() };

@@ -1,6 +1,6 @@
 //! Whether an arm is warm: the mean torque of each cycle, its exponential (Fig. 3), and a test of its trend.
 
-use crate::estimate::distribution::t_quantile_975;
+use crate::identification::estimate::distribution::t_quantile_975;
 
 /// The mean of τ·sign(q̇) over one cycle of a periodic motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,8 +51,8 @@ const STEPS: usize = 200;
 
 /// Fits the exponential of Fig. 3; `None` with fewer than five cycles.
 ///
-/// For each time constant the rest is linear least squares; time constants from one cycle to three times the whole duration
-/// are tried.
+/// For each time constant the rest is linear least squares; time constants from one cycle to three times the
+/// whole duration are tried.
 #[must_use]
 pub fn exponential(cycles: &[Cycle]) -> Option<Exponential> {
     if cycles.len() < 5 {
@@ -100,8 +100,8 @@ pub struct Trend {
 
 /// The trend, by a straight line through the last third of the cycles; `None` with fewer than six.
 ///
-/// Equivalence, not significance: noise makes the change that is still possible larger, so an arm is never called warm because
-/// nothing could be seen.
+/// Equivalence, not significance: noise makes the change that is still possible larger, so an arm is never
+/// called warm because nothing could be seen.
 #[must_use]
 pub fn trend(cycles: &[Cycle]) -> Option<Trend> {
     let count = (cycles.len() / 3).max(LEAST_CYCLES);

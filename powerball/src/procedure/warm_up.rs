@@ -2,9 +2,9 @@
 
 use super::settling::{Cycle, Exponential, Trend, cycles, exponential, trend};
 use super::{RecordError, Recorder};
-use crate::bus::Bus;
-use crate::driver::Profile;
-use crate::motion::Motion;
+use crate::bus::driver::Profile;
+use crate::bus::transport::Bus;
+use crate::identification::motion::Motion;
 use serde_json::{Value, json};
 use std::io::Write;
 
@@ -49,8 +49,8 @@ pub struct Warmth {
     pub seconds: f64,
 }
 
-/// One cycle of all joints, from rest to rest at one end of their swings: q = middle − A·cos ωt, so that cycles follow each other
-/// without a stop. Amplitudes keep the share of range, speed and acceleration.
+/// One cycle of all joints, from rest to rest at one end of their swings: q = middle − A·cos ωt, so that
+/// cycles follow each other without a stop. Amplitudes keep the share of range, speed and acceleration.
 #[must_use]
 pub fn swing<const N: usize>(profile: &Profile<N>, settings: &Settings) -> Motion {
     let period = profile.period_seconds();
@@ -97,7 +97,8 @@ impl Seen {
         self.motion.len() as f64 * self.motion.period
     }
 
-    /// Takes the rows (`t`, `q1…qn`, `tau1…taun`) of an earlier log of the same swing. `None` where they are of another one.
+    /// Takes the rows (`t`, `q1…qn`, `tau1…taun`) of an earlier log of the same swing. `None` where they are
+    /// of another one.
     #[must_use]
     pub fn earlier(mut self, rows: &[Vec<f64>]) -> Option<Seen> {
         let n = self.motion.dof();
@@ -141,15 +142,17 @@ impl Seen {
         }
     }
 
-    /// Greatest change that may still be to come on a joint, and the trends; `None` while it is too early to say.
+    /// Greatest change that may still be to come on a joint, and the trends; `None` while it is too early to
+    /// say.
     fn change(&self) -> Option<f64> {
         let all: Option<Vec<f64>> = self.cycles.iter().map(|c| trend(c).map(|t| t.change)).collect();
         all.map(|all| all.into_iter().fold(0.0, f64::max))
     }
 }
 
-/// Swings until every joint is warm, or the time is over. The log gets every cycle, t running on from `start`, which is 0 where a log
-/// begins; `seen` is what an earlier part of it showed. `progress` is told the time and the greatest change that may still be to come.
+/// Swings until every joint is warm, or the time is over. The log gets every cycle, t running on from
+/// `start`, which is 0 where a log begins; `seen` is what an earlier part of it showed. `progress` is told
+/// the time and the greatest change that may still be to come.
 ///
 /// # Errors
 /// Where the arm stops, or the log cannot be written.
@@ -216,13 +219,13 @@ impl Warmth {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bus::{Master, Memory};
-    use crate::driver::Driver;
-    use crate::driver::lwa4p::LWA4P;
+    use crate::bus::driver::Driver;
+    use crate::bus::driver::lwa4p::LWA4P;
+    use crate::bus::transport::{Master, Memory};
     use crate::virtual_arm::{Effect, VirtualArm, lwa4p};
 
-    /// An arm whose viscous friction falls by a fifth with 60 s: it is called warm when little of that is left, and the curve
-    /// has that time constant.
+    /// An arm whose viscous friction falls by a fifth with 60 s: it is called warm when little of that is
+    /// left, and the curve has that time constant.
     #[test]
     fn a_warming_arm_is_followed_until_it_is_warm() {
         let mut setup = lwa4p::setup([0.0; 6], 5).unwrap();
@@ -245,7 +248,8 @@ mod tests {
         // One that is given no time is not called warm.
         let short = Settings { most: 20.0, ..settings };
         assert!(!warm_up(&mut recorder, &short, seen(), 0.0, &mut Vec::new(), |_, _| ()).unwrap().warm);
-        // What the log says is what was seen, but for a cycle that it holds in part; another swing's log is not taken.
+        // What the log says is what was seen, but for a cycle that it holds in part; another swing's log is
+        // not taken.
         let rows: Vec<Vec<f64>> =
             text.lines().skip(1).map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
         let whole = seen().earlier(&rows[..rows.len() - 300]).unwrap();

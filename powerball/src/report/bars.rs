@@ -126,7 +126,8 @@ impl BarPairs {
         if self.pairs.iter().any(|p| p.floor.is_some()) {
             let _ = write!(
                 out,
-                "<path class=\"k dash c5\" d=\"M{x:.1} 34h20\"/><text x=\"{:.1}\" y=\"38\">noise floor</text>",
+                "<path class=\"k dash c5\" d=\"M{x:.1} 34h20\"/><text x=\"{:.1}\" y=\"38\">noise \
+                    floor</text>",
                 x + 26.0
             );
         }

@@ -2,9 +2,9 @@
 
 use std::collections::HashSet;
 
-/// A curve of at most about two points for each of `columns` columns: the lowest and the highest value of each
-/// column, in their order, so that no peak is lost. Points that are not finite break the curve and are kept as
-/// one break. The points must be ordered by their first coordinate within each unbroken piece.
+/// A curve of at most about two points for each of `columns` columns: the lowest and the highest value of
+/// each column, in their order, so that no peak is lost. Points that are not finite break the curve and are
+/// kept as one break. The points must be ordered by their first coordinate within each unbroken piece.
 pub(super) fn envelope(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)> {
     let finite = |p: &(f64, f64)| p.0.is_finite() && p.1.is_finite();
     let (low, high) = points

@@ -16,8 +16,9 @@ const LEGEND_LINE: f64 = 18.0;
 /// Points of a cloud beyond this number are not told apart by eye.
 const MOST_POINTS: usize = 2_500;
 
-/// The colour of a curve: the Okabe–Ito palette, which is told apart by colour-blind readers, each with a lighter
-/// twin for dark pages. By convention measured is blue, predicted orange, residuals grey (before) and green (after).
+/// The colour of a curve: the Okabe–Ito palette, which is told apart by colour-blind readers, each with a
+/// lighter twin for dark pages. By convention measured is blue, predicted orange, residuals grey (before) and
+/// green (after).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Ink {
@@ -142,7 +143,8 @@ impl Figure {
         self
     }
 
-    /// The figure as a file of its own, for a page that is no [`Page`](super::Page); light and dark as the reader's screen is.
+    /// The figure as a file of its own, for a page that is no [`Page`](super::Page); light and dark as the
+    /// reader's screen is.
     #[must_use]
     pub fn to_file(&self) -> String {
         file(&self.to_svg())

@@ -15,13 +15,14 @@
 //! # let _ = Series::points("unused", Ink::Grey, Vec::new());
 //! ```
 //!
-//! The figures are written here and not by a plotting library because colours have to follow the reader's light
-//! or dark scheme through CSS classes, and because curves need sub-pixel coordinates to look right when printed:
-//! the SVG backend of `plotters` writes fixed colours at whole pixels.
+//! The figures are written here and not by a plotting library because colours have to follow the reader's
+//! light or dark scheme through CSS classes, and because curves need sub-pixel coordinates to look right when
+//! printed: the SVG backend of `plotters` writes fixed colours at whole pixels.
 
 mod axis;
 mod bars;
 mod decimate;
+pub mod explained;
 mod figure;
 mod page;
 mod table;

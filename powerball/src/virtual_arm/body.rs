@@ -30,8 +30,8 @@ impl Body {
         }
     }
 
-    /// A body from its mass in kg, its centre of mass in the link's frame in m, and its tensor about the centre of
-    /// mass in kg·m².
+    /// A body from its mass in kg, its centre of mass in the link's frame in m, and its tensor about the
+    /// centre of mass in kg·m².
     pub fn about_centre(mass: f64, centre: Vector3<f64>, tensor: Matrix3<f64>, rotor: f64) -> Self {
         // Steiner: I = Ic + m (c·c E − c cᵀ).
         let shift = Matrix3::identity() * centre.norm_squared() - centre * centre.transpose();

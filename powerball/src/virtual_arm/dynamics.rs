@@ -1,10 +1,10 @@
 //! Recursive Newton–Euler in numbers, and what follows from it by superposition.
 //!
-//! This is the virtual arm's own physics. It shares no code with the generator, so that each can test the other.
-//! Everything is in SI units; forces and moments of link i are expressed in frame i, about its origin.
+//! This is the virtual arm's own physics. It shares no code with the generator, so that each can test the
+//! other. Everything is in SI units; forces and moments of link i are expressed in frame i, about its origin.
 
 use super::body::{Body, PER_LINK};
-use super::chain::Chain;
+use crate::identification::chain::Chain;
 use nalgebra::{Matrix3, Vector3};
 
 /// The largest number of joints that the recursion has room for.
@@ -55,8 +55,8 @@ impl Dynamics {
         self.run(&self.bodies, Pass { q, dq, ddq, gravity, outside: [Vector3::zeros(); 2] })
     }
 
-    /// As [`inverse`](Self::inverse), with a force (N) at the last frame's origin and a moment (N·m) that come from
-    /// outside, both in the base frame.
+    /// As [`inverse`](Self::inverse), with a force (N) at the last frame's origin and a moment (N·m) that
+    /// come from outside, both in the base frame.
     pub fn inverse_in_contact(
         &self,
         q: &[f64],
@@ -104,9 +104,9 @@ impl Dynamics {
 
     /// The Coriolis matrix of the Christoffel symbols, n × n, row-major.
     ///
-    /// The velocity terms h(q, q̇) = C(q, q̇)q̇ are a quadratic form in q̇, and the Christoffel symbols are its
-    /// symmetric bilinear form: C(q, q̇)v = ½(h(q̇ + v) − h(q̇) − h(v)). With v = e_j that is exact, no derivative of
-    /// B is needed.
+    /// The velocity terms h(q, q̇) = C(q, q̇)q̇ are a quadratic form in q̇, and the Christoffel symbols are
+    /// its symmetric bilinear form: C(q, q̇)v = ½(h(q̇ + v) − h(q̇) − h(v)). With v = e_j that is exact, no
+    /// derivative of B is needed.
     pub fn coriolis_matrix(&self, q: &[f64], dq: &[f64]) -> Vec<f64> {
         let n = self.dof();
         let zero = vec![0.0; n];
@@ -119,8 +119,8 @@ impl Dynamics {
         })
     }
 
-    /// Joint accelerations under joint torques `tau`; `None` where the mass matrix is not positive definite, which
-    /// no physically possible arm's is.
+    /// Joint accelerations under joint torques `tau`; `None` where the mass matrix is not positive definite,
+    /// which no physically possible arm's is.
     pub fn forward(&self, q: &[f64], dq: &[f64], tau: &[f64]) -> Option<Vec<f64>> {
         let bias = self.inverse(q, dq, &vec![0.0; self.dof()]);
         let rest: Vec<f64> = tau.iter().zip(&bias).map(|(t, b)| t - b).collect();
@@ -155,7 +155,8 @@ impl Dynamics {
         let mut force = [Vector3::zeros(); ROOM];
         let mut moment = [Vector3::zeros(); ROOM];
 
-        // Outwards. Gravity is an acceleration of the base against it. `to_base` turns frame i into the base frame.
+        // Outwards. Gravity is an acceleration of the base against it. `to_base` turns frame i into the base
+        // frame.
         let (mut w, mut dw, mut acc) = (Vector3::zeros(), Vector3::zeros(), -pass.gravity);
         let mut to_base = Matrix3::identity();
         for i in 0..n {
@@ -163,9 +164,9 @@ impl Dynamics {
             let (r, p) = row.pose(pass.q[i]);
             let (z, dq, ddq) = (row.axis(), pass.dq[i], pass.ddq[i]);
 
-            // Rotor i sits on link i−1 and spins about the joint's axis with the angular momentum k·Im·q̇·z more than
-            // link i−1 gives it. Its rate of change is a moment on link i−1 (frame i−1 here), and its share in the
-            // rotor's own equation of motion, times k, comes onto the joint.
+            // Rotor i sits on link i−1 and spins about the joint's axis with the angular momentum k·Im·q̇·z
+            // more than link i−1 gives it. Its rate of change is a moment on link i−1 (frame i−1 here), and
+            // its share in the rotor's own equation of motion, times k, comes onto the joint.
             let spin = row.ratio() * body.rotor;
             if i > 0 {
                 moment[i - 1] += spin * (ddq * z + dq * w.cross(&z));

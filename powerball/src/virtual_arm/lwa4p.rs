@@ -1,12 +1,12 @@
 //! The virtual LWA 4P: bodies, friction and sensors that a real one could have.
 
 use super::body::Body;
-use super::chain::Chain;
 use super::dynamics::Dynamics;
 use super::plant::{Plant, Sensors};
 use super::slave::{Identity, Module, Setup};
-use crate::driver::lwa4p::LWA4P;
-use crate::friction::{TABLE_2, TanhFriction};
+use crate::bus::driver::lwa4p::LWA4P;
+use crate::controller::friction::{TABLE_2, TanhFriction};
+use crate::identification::chain::Chain;
 use dyngen::{Arm, Diagnostics};
 
 /// The arm file of the hardware, which the virtual arm follows to the letter.
@@ -15,17 +15,17 @@ pub const ARM_FILE: &str = include_str!("../../lwa4p.toml");
 /// From the wrist's centre to the flange, m.
 pub(super) const FLANGE: f64 = 0.085;
 
-/// Rotor inertia of the ERB 145 and ERB 115 modules at the motor, kg·m²: what motors of their size have. Nothing is
-/// published.
+/// Rotor inertia of the ERB 145 and ERB 115 modules at the motor, kg·m²: what motors of their size have.
+/// Nothing is published.
 const ROTOR_145: f64 = 4.0e-5;
 const ROTOR_115: f64 = 1.0e-5;
 
 /// Each link as a box of even density: mass in kg, centre of mass and edges in m in the link's frame.
 ///
-/// The masses are those of the CAD model of the modules and tubes. Frame 2 lies at the elbow with x along the upper
-/// arm, frame 3 at the elbow with z along the forearm, frame 4 at the wrist with −y along the forearm, frames 5 and 6
-/// at the wrist. The centres of mass keep the symmetries of Eq. 12, and boxes along the axes then keep those of the
-/// tensors; a box is always a possible body.
+/// The masses are those of the CAD model of the modules and tubes. Frame 2 lies at the elbow with x along the
+/// upper arm, frame 3 at the elbow with z along the forearm, frame 4 at the wrist with −y along the forearm,
+/// frames 5 and 6 at the wrist. The centres of mass keep the symmetries of Eq. 12, and boxes along the axes
+/// then keep those of the tensors; a box is always a possible body.
 const LINKS: [(f64, [f64; 3], [f64; 3], f64); 6] = [
     (4.1513, [0.0, -0.020, 0.0], [0.13, 0.16, 0.13], ROTOR_145),
     (1.6770, [-0.175, 0.0, 0.030], [0.25, 0.10, 0.10], ROTOR_145),
@@ -48,8 +48,8 @@ pub fn arm() -> Result<Arm, Diagnostics> {
     Arm::parse(ARM_FILE, "lwa4p.toml")
 }
 
-/// The virtual arm without any undeclared effect: the rigid bodies of [`links`], Eq. 16 with Table 2, encoders of
-/// 0.001° and torque noise.
+/// The virtual arm without any undeclared effect: the rigid bodies of [`links`], Eq. 16 with Table 2,
+/// encoders of 0.001° and torque noise.
 ///
 /// # Errors
 /// As [`arm`].

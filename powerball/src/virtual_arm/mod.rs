@@ -1,9 +1,10 @@
 //! The virtual arm: numeric dynamics of its own and, on top of them, a plant to record logs from.
 //!
-//! Nothing here uses the generator's symbolics, so these numbers are an independent reference for generated code.
+//! Nothing here uses the generator's symbolics, so these numbers are an independent reference for generated
+//! code.
 
 mod body;
-mod chain;
+
 mod dynamics;
 mod effect;
 pub mod lwa4p;
@@ -14,7 +15,7 @@ pub mod slave;
 mod undeclared;
 
 pub use body::{Body, PER_LINK, bodies};
-pub use chain::{Chain, Row};
+
 pub use dynamics::{Dynamics, solve_positive_definite};
 pub use effect::{Effect, Gear, Instant, State};
 pub use plant::{Plant, Recording, Sensors};

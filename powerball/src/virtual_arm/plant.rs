@@ -2,9 +2,9 @@
 
 use super::dynamics::Dynamics;
 use super::effect::{Effect, Instant, State};
-use crate::friction::TanhFriction;
-use crate::log::Log;
-use crate::motion::Motion;
+use crate::controller::friction::TanhFriction;
+use crate::identification::motion::Motion;
+use crate::logs::log::Log;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -11,8 +11,8 @@ pub struct Gains {
     pub integral: f64,
     /// Torque at the current limit, N·m.
     pub limit: f64,
-    /// Coulomb friction that is fed forward with the sign of the wanted speed, N·m: without it a joint dwells at each
-    /// reversal until the integrator has turned round.
+    /// Coulomb friction that is fed forward with the sign of the wanted speed, N·m: without it a joint dwells
+    /// at each reversal until the integrator has turned round.
     pub friction: f64,
 }
 
@@ -20,8 +20,8 @@ pub struct Gains {
 const TURN: f64 = 5e-3;
 
 impl Gains {
-    /// Gains for an inertia in kg·m² at the joint: a velocity loop of 120 Hz, an integrator and a position loop that are
-    /// slower by four.
+    /// Gains for an inertia in kg·m² at the joint: a velocity loop of 120 Hz, an integrator and a position
+    /// loop that are slower by four.
     pub fn for_inertia(inertia: f64, limit: f64, friction: f64) -> Self {
         let bandwidth = std::f64::consts::TAU * 120.0;
         let velocity = inertia * bandwidth;
@@ -49,8 +49,8 @@ impl Servo {
         self.held = 0.0;
     }
 
-    /// The torque for the next `h` s, N·m: `wanted` and `actual` are position (rad) and speed (rad/s), `forward` is
-    /// torque that is fed forward.
+    /// The torque for the next `h` s, N·m: `wanted` and `actual` are position (rad) and speed (rad/s),
+    /// `forward` is torque that is fed forward.
     ///
     /// At the current limit the integrator waits, unless it leads away from the limit.
     pub fn torque(&mut self, h: f64, wanted: [f64; 2], actual: [f64; 2], forward: f64) -> f64 {

@@ -1,10 +1,11 @@
 //! The plant in time: what the arm does under the torques of its drives.
 //!
-//! Each step is linearly implicit in what is stiff. Friction is first a torque s·q̇' against the new speed q̇' with the secant
-//! s = f(q̇)/q̇ of the old one: Eq. 16's tanh(216 q̇) then dissipates at any step and comes to rest without chatter. With
-//! the speed so found, the chord of f from the old speed to the new one takes the secant's place: where friction has
-//! saturated, it no longer follows the speed. A gear that gives way is a spring and a damper between two masses, taken at
-//! the end of the step. Everything else is taken at its start.
+//! Each step is linearly implicit in what is stiff. Friction is first a torque s·q̇' against the new speed
+//! q̇' with the secant s = f(q̇)/q̇ of the old one: Eq. 16's tanh(216 q̇) then dissipates at any step and
+//! comes to rest without chatter. With the speed so found, the chord of f from the old speed to the new one
+//! takes the secant's place: where friction has saturated, it no longer follows the speed. A gear that gives
+//! way is a spring and a damper between two masses, taken at the end of the step. Everything else is taken at
+//! its start.
 
 use super::dynamics::{Dynamics, solve_positive_definite};
 use super::effect::{Gear, Instant, State};
@@ -12,7 +13,8 @@ use super::plant::Plant;
 
 /// Speeds nearer than this have no chord, rad/s.
 const REST: f64 = 1e-9;
-/// A closed brake holds this much more than the joint can ask for, N·m, and turns a millionth of a radian a second.
+/// A closed brake holds this much more than the joint can ask for, N·m, and turns a millionth of a radian a
+/// second.
 const BRAKE: f64 = 120.0;
 const BRAKE_CREEP: f64 = 1e-6;
 /// A winding gear's damping as a share of the critical one of the motor on its spring.
@@ -128,8 +130,8 @@ impl Simulation {
         self.brakes[joint] = closed;
     }
 
-    /// What each drive has to move at once, kg·m²: the diagonal of the mass matrix at the present pose, rotors included, or
-    /// the motor alone where its gear gives way.
+    /// What each drive has to move at once, kg·m²: the diagonal of the mass matrix at the present pose,
+    /// rotors included, or the motor alone where its gear gives way.
     pub fn inertias(&self) -> Vec<f64> {
         let n = self.dof();
         let matrix = self.plant.dynamics().mass_matrix(&self.q);
@@ -137,7 +139,8 @@ impl Simulation {
         motors.map(|(i, motor)| motor.map_or(matrix[i * n + i], |motor| motor.inertia)).collect()
     }
 
-    /// One step of `h` s under the drives' torques `tau` at the joints, N·m, which hold their value within it.
+    /// One step of `h` s under the drives' torques `tau` at the joints, N·m, which hold their value within
+    /// it.
     ///
     /// A plant that is no possible arm, or a torque that is no number, stops where it is.
     pub fn step(&mut self, h: f64, tau: &[f64]) {
@@ -178,8 +181,8 @@ impl Simulation {
         (0..self.dof()).map(|i| [self.dq[i], self.speed(i)]).collect()
     }
 
-    /// The new speeds of links and motors, and the links' accelerations, where friction on either side is an offset plus a
-    /// slope times the new speed. `None` stops the arm.
+    /// The new speeds of links and motors, and the links' accelerations, where friction on either side is an
+    /// offset plus a slope times the new speed. `None` stops the arm.
     fn solve(
         &mut self,
         h: f64,
@@ -248,8 +251,8 @@ impl Simulation {
         if self.brakes[joint] { BRAKE / self.speed(joint).abs().max(BRAKE_CREEP) } else { 0.0 }
     }
 
-    /// Torques against the motion, N·m, at given speeds: of the effects that rub, on the links' side, and of Eq. 16, on
-    /// the motors'.
+    /// Torques against the motion, N·m, at given speeds: of the effects that rub, on the links' side, and of
+    /// Eq. 16, on the motors'.
     fn friction(&self, speeds: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let mut rubbing = vec![0.0; self.dof()];
         if self.plant.effects().iter().any(|effect| effect.rubs_at().is_some()) {
@@ -303,7 +306,7 @@ fn chords(a: &AtSpeeds, b: &AtSpeeds, slope: impl Fn(usize) -> [f64; 2]) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::friction::TanhFriction;
+    use crate::controller::friction::TanhFriction;
     use crate::virtual_arm::{Effect, lwa4p};
 
     const POSE: [f64; 6] = [0.3, 0.6, -0.9, 0.2, 0.7, -0.4];

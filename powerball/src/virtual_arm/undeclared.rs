@@ -1,4 +1,5 @@
-//! The virtual arm with what no model is told of it, as a file: so that the arm of a session can be met again.
+//! The virtual arm with what no model is told of it, as a file: so that the arm of a session can be met
+//! again.
 
 use super::slave::Setup;
 use super::{Effect, VirtualArm, lwa4p};
@@ -30,8 +31,8 @@ impl Undeclared {
         serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))
     }
 
-    /// The arm with closed brakes at `start`, rad; `seed` draws the sensors' noise, and where `commutated` the motors know
-    /// their commutation already.
+    /// The arm with closed brakes at `start`, rad; `seed` draws the sensors' noise, and where `commutated`
+    /// the motors know their commutation already.
     ///
     /// # Errors
     /// None for the arm file that is built in.

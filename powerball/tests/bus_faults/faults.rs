@@ -1,9 +1,9 @@
 //! The faults, how each is made, and what must follow in each phase.
 
 use super::world::{CYCLE, VICTIM, Wire, World};
-use powerball::canopen::Micros;
-use powerball::cia402::Mode;
-use powerball::driver::{BusEvent, Cause, ControlMode, Phase};
+use powerball::bus::canopen::Micros;
+use powerball::bus::cia402::Mode;
+use powerball::bus::driver::{BusEvent, Cause, ControlMode, Phase};
 use powerball::virtual_arm::slave;
 
 /// What is made to happen.
@@ -154,7 +154,8 @@ impl Fault {
             Fault::DropFive | Fault::ShortFive if early || phase == Starting => GoesOn,
             Fault::DropFive | Fault::ShortFive => stop(4),
             Fault::Reboot if phase == Boot => GoesOn,
-            // The node is silent while it boots: missed within three cycles, and told as what it is when it has booted.
+            // The node is silent while it boots: missed within three cycles, and told as what it is when it
+            // has booted.
             Fault::Reboot | Fault::Silent => stop(4),
             // Nodes may complain while they boot: what counts is their state later.
             Fault::EmcyStorm if early => GoesOn,
@@ -263,7 +264,7 @@ impl Stage {
                 until(world, Phase::Running);
                 world.pilot.enable = false;
                 let emergency = slave::Fault::Emergency { code: 0x8611, register: 0x21 };
-                world.bus.peer_mut().arm.fault(powerball::canopen::NodeId::clamped(3), emergency);
+                world.bus.peer_mut().arm.fault(powerball::bus::canopen::NodeId::clamped(3), emergency);
                 until(world, Phase::Faulted);
                 world.run(20 * CYCLE);
                 if self == Stage::Resetting {

@@ -1,6 +1,6 @@
-//! Every fault × every mode × every phase: the arm is commanded to stop in time, no set-point leaves afterwards, the cause
-//! is latched, and only an explicit act enables again. Prints the matrix that `docs/bus.md` holds:
-//! `cargo test --release -p powerball --test bus_faults -- --nocapture`.
+//! Every fault × every mode × every phase: the arm is commanded to stop in time, no set-point leaves
+//! afterwards, the cause is latched, and only an explicit act enables again. Prints the matrix that
+//! `docs/bus.md` holds: `cargo test --release -p powerball --test bus_faults -- --nocapture`.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test's helpers may stop the test")]
 
@@ -9,8 +9,8 @@ mod rules;
 mod world;
 
 use faults::{Expected, Fault, Stage};
-use powerball::driver::lwa4p::LWA4P;
-use powerball::driver::{ControlMode, Phase, Refusal};
+use powerball::bus::driver::lwa4p::LWA4P;
+use powerball::bus::driver::{ControlMode, Phase, Refusal};
 use world::{CYCLE, VICTIM, World};
 
 /// For the drives to come to rest and close their brakes by themselves.

@@ -1,13 +1,15 @@
 //! What the driver does and does not do on the bus, one rule a test; many are mistakes of other drivers.
 
 use super::world::{CYCLE, VICTIM, Wire, World};
-use powerball::canopen::emcy::Emcy;
-use powerball::canopen::pdo::{Entry, Mapping};
-use powerball::canopen::{Cob, Micros, Object, cob};
-use powerball::cia402::{Controlword, Mode, State, objects, schunk};
-use powerball::driver::cause::Hindrance;
-use powerball::driver::lwa4p::LWA4P;
-use powerball::driver::{BusEvent, Cause, ControlMode, Driver, Phase, Profile, Refusal, Rejection, Verdict};
+use powerball::bus::canopen::emcy::Emcy;
+use powerball::bus::canopen::pdo::{Entry, Mapping};
+use powerball::bus::canopen::{Cob, Micros, Object, cob};
+use powerball::bus::cia402::{Controlword, Mode, State, objects, schunk};
+use powerball::bus::driver::cause::Hindrance;
+use powerball::bus::driver::lwa4p::LWA4P;
+use powerball::bus::driver::{
+    BusEvent, Cause, ControlMode, Driver, Phase, Profile, Refusal, Rejection, Verdict,
+};
 use powerball::virtual_arm::slave::Fault;
 
 fn started(control: ControlMode, profile: Profile<6>, commutated: bool, wire: Wire) -> World {
@@ -499,7 +501,8 @@ fn profiles_that_contradict_themselves_are_refused() {
     assert!(!refused(|_| {}));
 }
 
-/// The dimension factor 0x604C can be read in two ways that are inverse to each other. A tenth of a radian tells.
+/// The dimension factor 0x604C can be read in two ways that are inverse to each other. A tenth of a radian
+/// tells.
 #[test]
 fn a_wrong_velocity_scale_stops_the_first_move() {
     let mut profile = LWA4P;

@@ -1,11 +1,11 @@
 //! The driver, the virtual arm and a bus that can be made to fail, on one virtual clock.
 
-use powerball::bus::{Bus, BusError, Event, Memory, Peer};
-use powerball::canopen::sdo::{AbortCode, Chunk, Request, Response, Transfer};
-use powerball::canopen::{Cob, Frame, Micros, NodeId, Object};
-use powerball::cia402::{Command, Controlword};
-use powerball::driver::lwa4p::LWA4P;
-use powerball::driver::{BusEvent, ControlMode, Driver, Phase, Profile, QueueFull, Transmit};
+use powerball::bus::canopen::sdo::{AbortCode, Chunk, Request, Response, Transfer};
+use powerball::bus::canopen::{Cob, Frame, Micros, NodeId, Object};
+use powerball::bus::cia402::{Command, Controlword};
+use powerball::bus::driver::lwa4p::LWA4P;
+use powerball::bus::driver::{BusEvent, ControlMode, Driver, Phase, Profile, QueueFull, Transmit};
+use powerball::bus::transport::{Bus, BusError, Event, Memory, Peer};
 use powerball::virtual_arm::slave::CurrentMode;
 use powerball::virtual_arm::{VirtualArm, lwa4p};
 use std::collections::VecDeque;
@@ -148,7 +148,7 @@ impl Peer for Faulty {
         if self.storm > 0 && now.is_multiple_of(1000) {
             self.storm -= 1;
             let emcy =
-                powerball::canopen::emcy::Emcy { code: 0x3222, register: 5, vendor: [0x74, 0, 0, 0, 0] };
+                powerball::bus::canopen::emcy::Emcy { code: 0x3222, register: 5, vendor: [0x74, 0, 0, 0, 0] };
             self.out.push_back(emcy.frame(VICTIM));
         }
     }
@@ -374,7 +374,8 @@ impl World {
             .collect()
     }
 
-    /// A word that would move a joint, after `from`, or after that joint's own quick stop where one came since `since`.
+    /// A word that would move a joint, after `from`, or after that joint's own quick stop where one came
+    /// since `since`.
     pub(crate) fn motion_after_stop(
         &self,
         since: Micros,

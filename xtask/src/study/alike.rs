@@ -1,11 +1,11 @@
 //! Names that are easily taken for each other, and the experiment that tells them apart.
 
 use super::judge::{Named, Outcome, named};
-use powerball::experiment::{learn, propose};
-use powerball::explain::{Explained, Options};
-use powerball::log::Log;
-use powerball::motion::Motion;
-use powerball::regression::{DataOptions, RigidBody};
+use powerball::explanation::experiment::{learn, propose};
+use powerball::explanation::explain::{Explained, Options};
+use powerball::identification::motion::Motion;
+use powerball::logs::log::Log;
+use powerball::logs::regression::{DataOptions, RigidBody};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 
@@ -67,7 +67,8 @@ pub(super) fn table(outcomes: &[&Outcome]) -> String {
     let mut out = String::new();
     let _ = writeln!(
         out,
-        "| truth | easily taken for | cases | first answer: the name alone | a class with it | other | experiments \
+        "| truth | easily taken for | cases | first answer: the name alone | a class with it | other | \
+            experiments \
          | decided right | wrong | not | last answer: the name alone | a class with it | other |"
     );
     let _ = writeln!(out, "|---|---|---|---|---|---|---|---|---|---|---|---|---|");

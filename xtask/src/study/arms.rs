@@ -1,8 +1,9 @@
 //! Arms drawn by lot, with bodies, friction and sensors to go with them, and effects drawn for any arm.
 
 use dyngen::Arm;
-use powerball::friction::{TABLE_2, TanhFriction};
-use powerball::virtual_arm::{Body, Chain, Dynamics, Effect, Plant, Sensors};
+use powerball::controller::friction::{TABLE_2, TanhFriction};
+use powerball::identification::chain::Chain;
+use powerball::virtual_arm::{Body, Dynamics, Effect, Plant, Sensors};
 use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt};
 use std::f64::consts::PI;
@@ -48,8 +49,10 @@ impl Drawn {
             let zero = if plane { "zero = [\"mx\", \"Ixy\", \"Ixz\"]\n" } else { "" };
             let _ = write!(
                 text,
-                "\n[[joint]]\nkind = \"{kind}\"\na = {a}\nalpha = \"{alpha}\"\nd = {d}\ntheta = \"{theta}\"\n{zero}\
-                 rotor_ratio = {ratio}\nposition = {position:?}\nvelocity = {velocity}\nacceleration = {acceleration}\n"
+                "\n[[joint]]\nkind = \"{kind}\"\na = {a}\nalpha = \"{alpha}\"\nd = {d}\ntheta = \
+                    \"{theta}\"\n{zero}\
+                 rotor_ratio = {ratio}\nposition = {position:?}\nvelocity = {velocity}\nacceleration = \
+                 {acceleration}\n"
             );
             if plane {
                 symmetric.push(i);

@@ -75,7 +75,8 @@ impl Table {
             Table::ColouredEffect => "one effect of size 0.3 to 1.5, coloured noise",
             Table::Outside => "something outside the library, size 0.3 to 1.5",
             Table::Alike => {
-                "one effect of size 0.3 to 1.5 that is easily taken for another, logged on paths that use 30 % of the ranges"
+                "one effect of size 0.3 to 1.5 that is easily taken for another, logged on paths that use 30 \
+                    % of the ranges"
             }
             Table::Measured => "one effect of size 1 put into the measured UR10e logs",
             Table::MeasuredSmall => "one effect of size 0.6 put into the measured UR10e logs",

@@ -6,13 +6,13 @@ use super::case::{Case, Table};
 use super::judge::Outcome;
 use super::law::{FrictionLaw, Law, Misfit, OtherFriction, Outside, OutsideLaw};
 use dyngen::{Arm, Model, SetKind};
-use powerball::estimate::{Folds, fit, spread};
-use powerball::excite::{Settings, optimise};
-use powerball::explain::explain;
-use powerball::friction::TanhFriction;
-use powerball::log::{Log, common_clock};
-use powerball::motion::Motion;
-use powerball::regression::{Data, DataOptions, RigidBody};
+use powerball::controller::friction::TanhFriction;
+use powerball::explanation::explain::explain;
+use powerball::identification::estimate::{Folds, fit, spread};
+use powerball::identification::excite::{Settings, optimise};
+use powerball::identification::motion::Motion;
+use powerball::logs::log::{Log, common_clock};
+use powerball::logs::regression::{Data, DataOptions, RigidBody};
 use powerball::virtual_arm::{Effect, Plant, lwa4p};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -92,7 +92,8 @@ impl Bench {
         Ok(Bench { model, body, plant, drawn })
     }
 
-    /// Runs a case of simulated logs; `None` where no truth of its kind can be seen on the arm that was drawn.
+    /// Runs a case of simulated logs; `None` where no truth of its kind can be seen on the arm that was
+    /// drawn.
     pub(super) fn run(&self, case: &Case) -> Result<Option<Outcome>, String> {
         let mut rng = case.rng();
         if case.table.draws_arms() && self.drawn.is_none() {
@@ -193,7 +194,8 @@ impl Bench {
         Ok(misfit)
     }
 
-    /// A truth of that kind whose visible size is `size`, and the size that was reached; `None` where the arm has none.
+    /// A truth of that kind whose visible size is `size`, and the size that was reached; `None` where the arm
+    /// has none.
     fn truth(
         &self,
         session: &Session,
@@ -227,7 +229,8 @@ impl Bench {
         Ok(None)
     }
 
-    /// A truth scaled until its visible size is `size`, the size that it reached, and by how much it was scaled.
+    /// A truth scaled until its visible size is `size`, the size that it reached, and by how much it was
+    /// scaled.
     fn scaled(
         &self,
         quiet: &Session,
@@ -248,8 +251,8 @@ impl Bench {
         Ok((truth, reached, factor))
     }
 
-    /// What of a truth is left on the fitted logs when the base model was refitted, without noise and in a wide band,
-    /// over the noise of a sample, by joint; `plain` is what the model leaves without it.
+    /// What of a truth is left on the fitted logs when the base model was refitted, without noise and in a
+    /// wide band, over the noise of a sample, by joint; `plain` is what the model leaves without it.
     fn visible(&self, session: &Session, logs: &[Log], plain: &[Vec<f64>]) -> Result<Vec<f64>, String> {
         let with = self.base(logs)?;
         let sensors = session.plant.sensors();

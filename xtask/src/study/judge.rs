@@ -2,7 +2,7 @@
 
 use super::alike::Settled;
 use super::case::Case;
-use powerball::explain::Explained;
+use powerball::explanation::explain::Explained;
 use serde::{Deserialize, Serialize};
 
 /// A name that was given.

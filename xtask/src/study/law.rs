@@ -1,6 +1,6 @@
 //! Torques that are no effect of the library, and other laws of friction: functions of the true motion.
 
-use powerball::motion::Motion;
+use powerball::identification::motion::Motion;
 use powerball::virtual_arm::Plant;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

@@ -1,16 +1,18 @@
-//! Effects put into measured logs: what the plant would add along the motion that was measured is added to what was measured.
+//! Effects put into measured logs: what the plant would add along the motion that was measured is added to
+//! what was measured.
 
 use super::case::Case;
 use super::judge::{Named, Outcome, named};
 use dyngen::Arm;
-use powerball::estimate::{Folds, FrictionLaw, consistent_fit, fit, solve_reduced};
-use powerball::explain::{Explained, explain};
-use powerball::friction::TanhFriction;
-use powerball::log::{Log, common_clock, read_logs};
-use powerball::motion::Motion;
-use powerball::regression::{Data, DataOptions, Recording, RigidBody};
-use powerball::summary::Summary;
-use powerball::virtual_arm::{Chain, Dynamics, Effect, Plant, Sensors, bodies};
+use powerball::controller::friction::TanhFriction;
+use powerball::explanation::explain::{Explained, explain};
+use powerball::identification::chain::Chain;
+use powerball::identification::estimate::{Folds, FrictionLaw, consistent_fit, fit, solve_reduced};
+use powerball::identification::motion::Motion;
+use powerball::logs::log::{Log, common_clock, read_logs};
+use powerball::logs::regression::{Data, DataOptions, Recording, RigidBody};
+use powerball::logs::summary::Summary;
+use powerball::virtual_arm::{Dynamics, Effect, Plant, Sensors, bodies};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -20,8 +22,8 @@ const HELD_OUT: [&str; 2] = ["5", "14"];
 /// The grid on which the motion is followed, s, and its smoothing, Hz.
 const STEP: f64 = 0.005;
 const SMOOTHING: f64 = 8.0;
-/// The same where a gear gives way: its way follows the torque, a second derivative, and is differentiated twice itself. The paths end well
-/// below.
+/// The same where a gear gives way: its way follows the torque, a second derivative, and is differentiated
+/// twice itself. The paths end well below.
 const SMOOTHING_OF_GEARS: f64 = 3.0;
 /// Rounds in which an effect is scaled to its size.
 const ROUNDS: usize = 3;
@@ -158,7 +160,8 @@ impl Measured {
         Ok(logs)
     }
 
-    /// What of the change is left when the base model was refitted, over what is left after all that is known, worst joint.
+    /// What of the change is left when the base model was refitted, over what is left after all that is
+    /// known, worst joint.
     fn visible(&self, logs: &[Log]) -> Result<f64, String> {
         let residual = |logs: &[Log]| -> Result<Vec<Vec<f64>>, String> {
             let data = Data::new(&self.body, &logs[..FIT.len()], &DataOptions::default())

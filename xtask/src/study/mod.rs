@@ -1,7 +1,7 @@
 //! How often `explain` gives the right name, on logs whose truth is known.
 //!
-//! Each case is one line of a file of results, so that a study can be stopped and taken up again, and tables are made of
-//! the lines.
+//! Each case is one line of a file of results, so that a study can be stopped and taken up again, and tables
+//! are made of the lines.
 
 mod alike;
 mod arms;

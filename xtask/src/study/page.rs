@@ -18,7 +18,8 @@ pub(super) fn tables(outcomes: &[Outcome]) -> String {
     let mut out = String::new();
     let _ = writeln!(
         out,
-        "| table | cases | right name first | all named | a false name | nothing named | held-out error over clean, median | at most 1.1 |"
+        "| table | cases | right name first | all named | a false name | nothing named | held-out error over \
+            clean, median | at most 1.1 |"
     );
     let _ = writeln!(out, "|---|---|---|---|---|---|---|---|");
     for table in Table::all() {
@@ -42,7 +43,8 @@ pub(super) fn tables(outcomes: &[Outcome]) -> String {
         let _ = writeln!(out, "\n### {}\n", capital(table.words()));
         let _ = writeln!(
             out,
-            "| truth | cases | right name first | all named | a false name | nothing named | held-out error over clean, median | at most 1.1 | false names |"
+            "| truth | cases | right name first | all named | a false name | nothing named | held-out error \
+                over clean, median | at most 1.1 | false names |"
         );
         let _ = writeln!(out, "|---|---|---|---|---|---|---|---|---|");
         for (kind, mine) in kinds {

@@ -30,11 +30,11 @@ impl Effect {
         "backlash",
     ];
 
-    /// Draws an effect of that name for the virtual LWA 4P: its joint and its figures. `session` is the time in s
-    /// within which the logs are recorded, and what starts at some time starts within `begins`.
+    /// Draws an effect of that name for the virtual LWA 4P: its joint and its figures. `session` is the time
+    /// in s within which the logs are recorded, and what starts at some time starts within `begins`.
     ///
-    /// Sizes are chosen against the joint's friction and noise, such that the effect can be seen in a log but does
-    /// not outgrow what it disturbs. `None` for a name that is not known.
+    /// Sizes are chosen against the joint's friction and noise, such that the effect can be seen in a log but
+    /// does not outgrow what it disturbs. `None` for a name that is not known.
     pub fn draw_named(
         name: &str,
         plant: &Plant,

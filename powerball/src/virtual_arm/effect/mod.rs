@@ -1,8 +1,8 @@
 //! What a real arm does and its model may not know, as physical laws of the plant.
 //!
-//! These laws are written for the plant alone. Where an estimator has a term for the same phenomenon, its formula is
-//! another one: the gear's load friction is smooth here, presliding is a set of elastic sliders, and so on. A name is
-//! then found for its physics and not for its formula.
+//! These laws are written for the plant alone. Where an estimator has a term for the same phenomenon, its
+//! formula is another one: the gear's load friction is smooth here, presliding is a set of elastic sliders,
+//! and so on. A name is then found for its physics and not for its formula.
 
 mod draw;
 mod torque;
@@ -10,14 +10,15 @@ mod torque;
 use super::body::Body;
 use super::dynamics::Dynamics;
 use super::lwa4p::FLANGE;
-use crate::friction::TanhFriction;
+use crate::controller::friction::TanhFriction;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Elastic sliders that make up presliding.
 const SLIDERS: usize = 4;
 
-/// Stiffness of a gear's teeth once they touch, N·m/rad: so high that winding up is no second effect beside the play.
+/// Stiffness of a gear's teeth once they touch, N·m/rad: so high that winding up is no second effect beside
+/// the play.
 const TEETH: f64 = 2.0e5;
 
 /// A gear that gives way: a spring between motor and link, with play.
@@ -30,7 +31,8 @@ pub struct Gear {
 }
 
 impl Gear {
-    /// The torque onto the link, N·m, where the motor is `ahead` of it, rad at the joint, and whether teeth touch.
+    /// The torque onto the link, N·m, where the motor is `ahead` of it, rad at the joint, and whether teeth
+    /// touch.
     pub fn torque(&self, ahead: f64) -> (f64, bool) {
         let free = 0.5 * self.gap;
         (self.stiffness * (ahead - ahead.clamp(-free, free)), ahead.abs() >= free)
@@ -313,7 +315,8 @@ impl Effect {
                 format!("the base is tilted by ({:+.1}, {:+.1}) mrad", 1e3 * tilt[0], 1e3 * tilt[1])
             }
             Effect::ContactWrench { force, start, length, every } => format!(
-                "a force of ({:.0}, {:.0}, {:.0}) N on the wrist for {length:.1} s at t = {start:.1} s and every {every:.0} s after",
+                "a force of ({:.0}, {:.0}, {:.0}) N on the wrist for {length:.1} s at t = {start:.1} s and \
+                    every {every:.0} s after",
                 force[0], force[1], force[2]
             ),
             Effect::BrokenSymmetry { link, aside } => {
@@ -360,7 +363,8 @@ impl Effect {
         }
     }
 
-    /// The joint whose friction the effect changes, where its torque may turn round within a small change of speed.
+    /// The joint whose friction the effect changes, where its torque may turn round within a small change of
+    /// speed.
     pub(super) fn rubs_at(&self) -> Option<usize> {
         match self {
             Effect::LoadFriction { joint, .. }
@@ -382,7 +386,8 @@ impl Effect {
         }
     }
 
-    /// How far the motor is ahead of the link in an arm that follows its motion exactly, added to the positions.
+    /// How far the motor is ahead of the link in an arm that follows its motion exactly, added to the
+    /// positions.
     pub(super) fn add_windup(&self, now: &Instant<'_>, q: &mut [f64]) {
         if let Some((joint, gear)) = self.gear() {
             q[joint] += gear.windup(now.rigid[joint]);

@@ -75,8 +75,9 @@ fn direction(dq: f64, half: f64) -> f64 {
     dq / dq.hypot(half)
 }
 
-/// Elastic sliders in parallel, each of which slips after its own way, evenly spread up to `way`: the friction
-/// between −1 and 1 that a contact gives while it is dragged from position to position. It does not depend on time.
+/// Elastic sliders in parallel, each of which slips after its own way, evenly spread up to `way`: the
+/// friction between −1 and 1 that a contact gives while it is dragged from position to position. It does not
+/// depend on time.
 fn wind(memory: &mut Option<(f64, [f64; SLIDERS])>, q: f64, way: f64) -> f64 {
     let (last, mut wound) = memory.unwrap_or((q, [0.0; SLIDERS]));
     let mut sum = 0.0;

@@ -3,8 +3,8 @@
 use super::module::Module;
 use super::node::Node;
 use super::{Fault, Sample};
-use crate::bus::{Bus, BusError, Event, Peer};
-use crate::canopen::{Frame, Micros, NodeId};
+use crate::bus::canopen::{Frame, Micros, NodeId};
+use crate::bus::transport::{Bus, BusError, Event, Peer};
 use crate::virtual_arm::{Effect, Plant, Simulation};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -53,8 +53,8 @@ struct Noise {
 }
 
 impl VirtualArm {
-    /// An arm at rest with closed brakes, its nodes about to boot. `None` where plant, modules and start do not have
-    /// the same number of joints.
+    /// An arm at rest with closed brakes, its nodes about to boot. `None` where plant, modules and start do
+    /// not have the same number of joints.
     pub fn new(setup: Setup) -> Option<Self> {
         let Setup { plant, modules, start, age, seed } = setup;
         let n = plant.dynamics().dof();
@@ -122,7 +122,8 @@ impl VirtualArm {
         self.simulation.step(h, &self.torque);
     }
 
-    /// What the sensors say at this instant, between two ticks: the current is the mean of `before` and after.
+    /// What the sensors say at this instant, between two ticks: the current is the mean of `before` and
+    /// after.
     fn measure(&mut self, h: f64, before: &[f64]) {
         let sensors = self.simulation.plant().sensors();
         let (mut delay, mut gains) = (0.0, vec![1.0; self.nodes.len()]);
@@ -173,8 +174,9 @@ impl Peer for VirtualArm {
     }
 }
 
-/// Puts an arm on a bus with others, in the bus's time, until `stop` says so or the bus is gone. Gives the time, µs, by which
-/// the arm is behind the bus: a machine that is too slow for the physics slows the arm down, and not its answers.
+/// Puts an arm on a bus with others, in the bus's time, until `stop` says so or the bus is gone. Gives the
+/// time, µs, by which the arm is behind the bus: a machine that is too slow for the physics slows the arm
+/// down, and not its answers.
 ///
 /// # Errors
 /// What the bus says; a full queue loses the frame, as a drive does.

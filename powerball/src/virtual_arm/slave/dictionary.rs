@@ -1,9 +1,10 @@
-//! The drive's object dictionary with values: exactly the objects of the maker's DCF, their types, rights and defaults.
+//! The drive's object dictionary with values: exactly the objects of the maker's DCF, their types, rights and
+//! defaults.
 
-use crate::canopen::sdo::AbortCode;
-use crate::canopen::{NodeId, Object, objects};
-use crate::driver::dictionary::DataType;
-use crate::driver::lwa4p::DICTIONARY;
+use crate::bus::canopen::sdo::AbortCode;
+use crate::bus::canopen::{NodeId, Object, objects};
+use crate::bus::driver::dictionary::DataType;
+use crate::bus::driver::lwa4p::DICTIONARY;
 
 /// What an object holds. Numbers of all widths are `i64`; unsigned ones keep their value.
 #[derive(Clone, Debug, PartialEq)]
@@ -204,7 +205,7 @@ impl Dictionary {
         let raw = bytes.iter().rev().fold(0u32, |sum, byte| sum << 8 | u32::from(*byte));
         let number = match entry.kind {
             DataType::Real32 => return Ok(Value::Real(f32::from_bits(raw))),
-            kind if kind.is_signed() => i64::from(crate::canopen::pdo::sign_extend(raw, 8 * size as u8)),
+            kind if kind.is_signed() => i64::from(crate::bus::canopen::pdo::sign_extend(raw, 8 * size as u8)),
             _ => i64::from(raw),
         };
         let in_range = (entry.range[0]..=entry.range[1]).contains(&number);

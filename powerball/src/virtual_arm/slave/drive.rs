@@ -2,7 +2,7 @@
 
 use super::module::Module;
 use super::motion::{Reference, spline};
-use crate::cia402::{Command, Controlword, Mode, State, Statusword};
+use crate::bus::cia402::{Command, Controlword, Mode, State, Statusword};
 use crate::virtual_arm::servo::{Gains, Servo};
 
 /// A brake bites and lets go after this time, s.

@@ -25,7 +25,7 @@ pub use dictionary::{Dictionary, Entry, Identity, Value};
 pub use module::{CurrentMode, Module};
 pub use node::Node;
 
-use crate::cia402::Mode;
+use crate::bus::cia402::Mode;
 
 /// Radians in a milli-degree, the drives' unit of angles.
 const DEGREE: f64 = std::f64::consts::PI / 180_000.0;
@@ -55,7 +55,8 @@ pub enum Fault {
         /// Error register.
         register: u8,
     },
-    /// The motor supply goes (`false`), with the emergency 0x3222 and a commutation to be searched again, or returns.
+    /// The motor supply goes (`false`), with the emergency 0x3222 and a commutation to be searched again, or
+    /// returns.
     Supply(bool),
     /// The drive takes a mode's number and does not change to it.
     RefuseMode(Option<Mode>),

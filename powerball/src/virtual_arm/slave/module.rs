@@ -1,9 +1,10 @@
 //! What a joint's module is: the facts that its drive is set up with.
 
 use super::dictionary::Identity;
-use crate::canopen::{NodeId, Object};
+use crate::bus::canopen::{NodeId, Object};
 
-/// A mode in which the set-point is a current. The maker's public files have none, so this is told and not known.
+/// A mode in which the set-point is a current. The maker's public files have none, so this is told and not
+/// known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CurrentMode {
     /// Its number in 0x6060.

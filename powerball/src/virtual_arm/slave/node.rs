@@ -6,11 +6,11 @@ use super::module::Module;
 use super::process::{self, Pdos};
 use super::server::{Objects, Server};
 use super::{DEGREE, Fault, Sample};
-use crate::canopen::emcy::Emcy;
-use crate::canopen::nmt;
-use crate::canopen::sdo::AbortCode;
-use crate::canopen::{Cob, Frame, Micros, NodeId, Object, objects};
-use crate::cia402::{Controlword, Mode, State, objects as drive_objects, schunk};
+use crate::bus::canopen::emcy::Emcy;
+use crate::bus::canopen::nmt;
+use crate::bus::canopen::sdo::AbortCode;
+use crate::bus::canopen::{Cob, Frame, Micros, NodeId, Object, objects};
+use crate::bus::cia402::{Controlword, Mode, State, objects as drive_objects, schunk};
 use std::collections::VecDeque;
 
 /// From reset to boot-up, µs.

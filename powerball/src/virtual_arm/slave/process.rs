@@ -1,12 +1,12 @@
 //! The drive's process data: communication and mapping objects with the device's own rules.
 //!
-//! As on the real drive a PDO is changed in pre-operational only, after its COB-ID was made invalid; its mapping only
-//! while it maps nothing.
+//! As on the real drive a PDO is changed in pre-operational only, after its COB-ID was made invalid; its
+//! mapping only while it maps nothing.
 
 use super::dictionary::Dictionary;
-use crate::canopen::pdo::{Entry, INVALID, Mapping};
-use crate::canopen::sdo::AbortCode;
-use crate::canopen::{Frame, Object};
+use crate::bus::canopen::pdo::{Entry, INVALID, Mapping};
+use crate::bus::canopen::sdo::AbortCode;
+use crate::bus::canopen::{Frame, Object};
 
 /// Receive PDOs of the drive.
 pub(super) const RECEIVE: u16 = 2;

@@ -1,7 +1,7 @@
 //! The drive's SDO server: expedited and segmented transfers over its dictionary.
 
-use crate::canopen::Object;
-use crate::canopen::sdo::{AbortCode, Chunk, Request, Response, Transfer};
+use crate::bus::canopen::Object;
+use crate::bus::canopen::sdo::{AbortCode, Chunk, Request, Response, Transfer};
 
 /// Longest value that a client may write in segments.
 const LONGEST: usize = 256;
@@ -103,8 +103,8 @@ impl Server {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::canopen::client::{Client, SdoError, Value};
-    use crate::canopen::{Cob, Frame, NodeId};
+    use crate::bus::canopen::client::{Client, SdoError, Value};
+    use crate::bus::canopen::{Cob, Frame, NodeId};
 
     /// One object that takes anything but 13 bytes.
     #[derive(Default)]

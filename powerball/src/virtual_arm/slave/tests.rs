@@ -1,14 +1,14 @@
 //! The slaves as a master sees them, over a bus in memory.
 
 use super::{CurrentMode, Fault, VirtualArm};
-use crate::bus::blocking::{self, TransferError};
-use crate::bus::{Bus, Event, Memory};
-use crate::canopen::client::{SdoError, Value};
-use crate::canopen::emcy::Emcy;
-use crate::canopen::sdo::AbortCode;
-use crate::canopen::{Cob, Frame, Micros, NodeId, Object, cob, nmt, objects};
-use crate::cia402::{State, Statusword, objects as drive, schunk};
-use crate::driver::lwa4p::DICTIONARY;
+use crate::bus::canopen::client::{SdoError, Value};
+use crate::bus::canopen::emcy::Emcy;
+use crate::bus::canopen::sdo::AbortCode;
+use crate::bus::canopen::{Cob, Frame, Micros, NodeId, Object, cob, nmt, objects};
+use crate::bus::cia402::{State, Statusword, objects as drive, schunk};
+use crate::bus::driver::lwa4p::DICTIONARY;
+use crate::bus::transport::blocking::{self, TransferError};
+use crate::bus::transport::{Bus, Event, Memory};
 use crate::virtual_arm::{Simulation, lwa4p};
 
 const START: [f64; 6] = [0.2, 0.4, -0.6, 0.3, 0.5, -0.2];
@@ -368,7 +368,7 @@ fn faults_on_demand_do_what_they_say() {
     assert_eq!(beats(&mut bench), [0], "boot-up, and no heartbeat until it is set again");
     bench.bus.peer_mut().fault(node, Fault::Statusword(Some(0xFFFF)));
     assert_eq!(bench.number(5, drive::STATUSWORD) as u16, 0xFFFF);
-    bench.bus.peer_mut().fault(node, Fault::RefuseMode(Some(crate::cia402::Mode::InterpolatedPosition)));
+    bench.bus.peer_mut().fault(node, Fault::RefuseMode(Some(crate::bus::cia402::Mode::InterpolatedPosition)));
     bench.write(5, drive::MODE, 7).unwrap();
     assert_eq!(bench.number(5, drive::MODE_DISPLAY), 0);
     bench.bus.peer_mut().fault(node, Fault::Emergency { code: 0x4310, register: 8 });

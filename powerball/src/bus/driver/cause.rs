@@ -1,0 +1,308 @@
+//! Why the arm was stopped, or may not start: typed, with the node and what was seen.
+
+use super::guard::Rejection;
+use super::profile::ControlMode;
+use crate::bus::canopen::client::SdoError;
+use crate::bus::canopen::emcy::{Emcy, vendor_text};
+use crate::bus::canopen::pdo::MappingError;
+use crate::bus::canopen::{NodeId, Object};
+use crate::bus::cia402::{Mode, State, Statusword};
+use core::fmt;
+
+/// What a statusword gives as the reason that a transition did not happen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Hindrance {
+    /// The node sends no process data.
+    Silent,
+    /// Bit 4 is clear: no motor voltage (supply off, emergency stop, STO).
+    NoVoltage,
+    /// Bit 9 is clear: the drive does not obey the bus.
+    NotRemote,
+    /// Bit 11 is set: a limit inside the drive.
+    InternalLimit,
+    /// Bit 7 is set: a warning.
+    Warning,
+    /// The drive went to another state than the one on the way.
+    Elsewhere,
+    /// The statusword gives no reason.
+    Untold,
+}
+
+impl Hindrance {
+    /// The first reason that `status` gives; `None` where no data came.
+    pub(super) fn of(status: Option<Statusword>, on_the_way: bool) -> Hindrance {
+        let Some(status) = status else { return Hindrance::Silent };
+        if !on_the_way {
+            Hindrance::Elsewhere
+        } else if !status.has(Statusword::VOLTAGE_ENABLED) {
+            Hindrance::NoVoltage
+        } else if !status.has(Statusword::REMOTE) {
+            Hindrance::NotRemote
+        } else if status.has(Statusword::INTERNAL_LIMIT) {
+            Hindrance::InternalLimit
+        } else if status.has(Statusword::WARNING) {
+            Hindrance::Warning
+        } else {
+            Hindrance::Untold
+        }
+    }
+}
+
+impl fmt::Display for Hindrance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Hindrance::Silent => "the node sends no process data",
+            Hindrance::NoVoltage => "motor voltage is missing (supply, emergency stop or STO)",
+            Hindrance::NotRemote => "the drive does not obey the bus",
+            Hindrance::InternalLimit => "a limit inside the drive is active",
+            Hindrance::Warning => "the drive warns",
+            Hindrance::Elsewhere => "the drive went to another state",
+            Hindrance::Untold => "the statusword gives no reason",
+        })
+    }
+}
+
+/// Why the arm was stopped, or could not be made ready. The first one is latched until it is acknowledged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cause {
+    /// No heartbeat of a node in three of its periods.
+    HeartbeatLost(NodeId),
+    /// No process data of a node in so many cycles.
+    DataMissing(NodeId),
+    /// A node restarted.
+    Rebooted(NodeId),
+    /// A node reports an emergency.
+    Emergency(NodeId, Emcy),
+    /// A drive is in fault, or reacts to one.
+    DriveFault(NodeId, Statusword),
+    /// A drive left the state that it was in.
+    StateLost(NodeId, Statusword),
+    /// A drive shows a state that the standard does not know.
+    UnknownState(NodeId, Statusword),
+    /// A drive shows another mode than asked for.
+    WrongMode(NodeId, Mode),
+    /// A node left NMT operational.
+    NotOperational(NodeId),
+    /// Too many SYNCs were late, or left out: the caller polls too seldom.
+    Late,
+    /// The caller stopped giving set-points.
+    Starved,
+    /// Set-points were rejected again and again.
+    Setpoints(Rejection),
+    /// In velocity mode a joint went this part of the way that was asked for, less than half or more than
+    /// twice: the dimension factor 0x604C means something else than the profile says, or the joint is
+    /// blocked.
+    WrongVelocityScale(NodeId, f64),
+    /// A joint (from 0) moves faster than it may.
+    Overspeed(usize),
+    /// The CAN controller is off the bus.
+    BusOff,
+    /// The transport's queue is full.
+    TransmitQueueFull,
+    /// A node did not boot.
+    NoBoot(NodeId),
+    /// A node is not who it should be: object, expected, found.
+    WrongIdentity(NodeId, Object, u32, u32),
+    /// A drive does not offer the mode; its 0x6502.
+    ModeNotOffered(NodeId, Mode, u32),
+    /// An SDO transfer failed.
+    Sdo(NodeId, Object, SdoError),
+    /// A drive cannot be made to watch the master (0x1016, 0x200E): it may not be enabled.
+    NoWatch(NodeId, Object, SdoError),
+    /// An object reads back otherwise than written: written, read.
+    NotTaken(NodeId, Object, u32, u32),
+    /// A drive's value makes no sense: the object, what it reads.
+    Implausible(NodeId, Object, u32),
+    /// A transition did not happen: where the drive is, where it should be, why.
+    Transition(NodeId, State, State, Hindrance),
+    /// The commutation search did not end.
+    NoCommutation(NodeId),
+}
+
+impl Cause {
+    /// The node that it is about.
+    pub fn node(&self) -> Option<NodeId> {
+        Some(match *self {
+            Cause::HeartbeatLost(node)
+            | Cause::DataMissing(node)
+            | Cause::Rebooted(node)
+            | Cause::Emergency(node, _)
+            | Cause::DriveFault(node, _)
+            | Cause::StateLost(node, _)
+            | Cause::UnknownState(node, _)
+            | Cause::WrongMode(node, _)
+            | Cause::NotOperational(node)
+            | Cause::WrongVelocityScale(node, _)
+            | Cause::NoBoot(node)
+            | Cause::WrongIdentity(node, ..)
+            | Cause::ModeNotOffered(node, ..)
+            | Cause::Sdo(node, ..)
+            | Cause::NoWatch(node, ..)
+            | Cause::NotTaken(node, ..)
+            | Cause::Implausible(node, ..)
+            | Cause::Transition(node, ..)
+            | Cause::NoCommutation(node) => node,
+            _ => return None,
+        })
+    }
+
+    /// Whether the nodes' configuration can no longer be trusted, so that an acknowledged driver must start
+    /// anew.
+    pub fn needs_restart(&self) -> bool {
+        matches!(
+            self,
+            Cause::HeartbeatLost(_)
+                | Cause::Rebooted(_)
+                | Cause::NotOperational(_)
+                | Cause::WrongMode(..)
+                | Cause::BusOff
+                | Cause::NoBoot(_)
+                | Cause::WrongIdentity(..)
+                | Cause::ModeNotOffered(..)
+                | Cause::Sdo(..)
+                | Cause::NoWatch(..)
+                | Cause::NotTaken(..)
+                | Cause::Implausible(..)
+        )
+    }
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(node) = self.node() {
+            write!(f, "node {node}: ")?;
+        }
+        match self {
+            Cause::HeartbeatLost(_) => f.write_str("heartbeat lost"),
+            Cause::DataMissing(_) => f.write_str("process data missing"),
+            Cause::Rebooted(_) => f.write_str("restarted: it must be configured anew"),
+            Cause::Emergency(_, emcy) => emcy.fmt(f),
+            Cause::DriveFault(_, status) => write!(f, "drive fault, statusword {status:?}"),
+            Cause::StateLost(_, status) => write!(f, "the drive left its state, statusword {status:?}"),
+            Cause::UnknownState(_, status) => write!(f, "statusword {status:?}"),
+            Cause::WrongMode(_, mode) => write!(f, "the drive is in another mode than asked for: {mode}"),
+            Cause::NotOperational(_) => f.write_str("left NMT operational"),
+            Cause::Late => f.write_str("too many SYNCs late or left out: the driver is polled too seldom"),
+            Cause::Starved => f.write_str("no new set-points"),
+            Cause::Setpoints(rejection) => write!(f, "set-points rejected again and again: {rejection}"),
+            Cause::WrongVelocityScale(_, part) => {
+                write!(
+                    f,
+                    "went {part:.2} of the way that the velocities asked for: check the scale of 0x604C, or \
+                        free the joint"
+                )
+            }
+            Cause::Overspeed(joint) => write!(f, "joint {} moves faster than it may", joint + 1),
+            Cause::BusOff => f.write_str("CAN controller off the bus"),
+            Cause::TransmitQueueFull => f.write_str("transmit queue full"),
+            Cause::NoBoot(_) => f.write_str("no boot-up message: is it powered, and the bit rate right?"),
+            Cause::WrongIdentity(_, object, expected, found) => {
+                write!(f, "{object} reads 0x{found:08X} where 0x{expected:08X} is expected")
+            }
+            Cause::ModeNotOffered(_, mode, offered) => {
+                write!(f, "{mode} is not among the drive's modes (0x6502 reads 0x{offered:X})")
+            }
+            Cause::Sdo(_, object, error) => write!(f, "{object}: {error}"),
+            Cause::NoWatch(_, object, error) => {
+                write!(f, "cannot be made to watch the master, so it may not move; {object}: {error}")
+            }
+            Cause::NotTaken(_, object, written, read) => {
+                write!(f, "{object} reads back 0x{read:X} after 0x{written:X} was written")
+            }
+            Cause::Implausible(_, object, read) => {
+                write!(f, "{object} reads 0x{read:X}, which makes no sense")
+            }
+            Cause::Transition(_, from, to, why) => {
+                write!(f, "stays in \"{from}\", should be in \"{to}\": {why}")
+            }
+            Cause::NoCommutation(_) => f.write_str("the commutation search does not end"),
+        }
+    }
+}
+
+impl core::error::Error for Cause {}
+
+/// What a drive tells of its last error, read after a stop.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Details {
+    /// Error register 0x1001.
+    pub register: Option<u8>,
+    /// SCHUNK's code, lowest byte of 0x1002.
+    pub vendor_code: Option<u8>,
+    /// 0x200B:1.
+    pub detail: Option<f32>,
+    /// 0x200B:3, line in the firmware's source.
+    pub line: Option<u16>,
+}
+
+impl fmt::Display for Details {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut separator = "";
+        let mut part = |f: &mut fmt::Formatter<'_>, text: fmt::Arguments<'_>| {
+            write!(f, "{separator}{text}")?;
+            separator = ", ";
+            Ok(())
+        };
+        if let Some(register) = self.register {
+            part(f, format_args!("error register 0x{register:02X}"))?;
+        }
+        if let Some(code) = self.vendor_code {
+            part(f, format_args!("code 0x{code:02X} ({})", vendor_text(code).unwrap_or("not published")))?;
+        }
+        if let Some(detail) = self.detail {
+            part(f, format_args!("detail {detail}"))?;
+        }
+        if let Some(line) = self.line {
+            part(f, format_args!("firmware line {line}"))?;
+        }
+        Ok(())
+    }
+}
+
+/// Why a call was refused. Nothing has changed then.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Refusal {
+    /// Not now: what the driver is doing.
+    Phase(&'static str),
+    /// A cause is latched; acknowledge it first.
+    Latched(Cause),
+    /// The profile knows nothing of the mode.
+    NoMode(ControlMode),
+    /// The mode was not verified on hardware, and the caller does not accept that.
+    NotVerified(ControlMode),
+    /// The bus would be loaded by so much (1 is all of it) in the worst case.
+    BusLoad(f64),
+    /// The profile contradicts itself; what and where.
+    Profile(&'static str),
+    /// A PDO of the profile cannot be.
+    Mapping(MappingError),
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Refusal::Phase(what) => write!(f, "not now: the driver {what}"),
+            Refusal::Latched(cause) => write!(f, "acknowledge the cause of the last stop first: {cause}"),
+            Refusal::NoMode(mode) => write!(f, "the profile knows nothing of {mode} mode"),
+            Refusal::NotVerified(mode) => {
+                write!(
+                    f,
+                    "{mode} mode was never verified on the arm itself; accept that explicitly or choose \
+                        another"
+                )
+            }
+            Refusal::BusLoad(load) => {
+                write!(
+                    f,
+                    "the bus would be loaded to {:.1} % in the worst case: fewer objects, ",
+                    100.0 * load
+                )?;
+                f.write_str("a lower rate or a higher bit rate are needed")
+            }
+            Refusal::Profile(what) => write!(f, "the profile cannot be used: {what}"),
+            Refusal::Mapping(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for Refusal {}

@@ -1,0 +1,137 @@
+//! From a drive's DCF (or EDS) and one TOML of the arm to a Rust file of constant tables, offline.
+//!
+//! What comes out is checked: every mapped object is in the dictionary with its size and may be mapped, the
+//! bit rate is one that the drive has, and what the driver writes to make the drives watch it exists.
+//! `powerball profile` is the command.
+
+mod arm;
+mod dcf;
+mod write;
+
+pub use arm::{Arm, JointTable, Mapped, ModeTable, VelocityScaleTable, Watch};
+pub use dcf::{Access, Dcf, DcfError, Number, Variable};
+
+use crate::bus::canopen::objects::{CONSUMER_HEARTBEAT, PRODUCER_HEARTBEAT, SYNC_COB_ID};
+use crate::bus::canopen::pdo::{Entry, Mapping};
+use crate::bus::cia402::{objects, schunk};
+use std::fmt;
+
+/// Why a profile cannot be made.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ImportError {
+    /// The DCF, or an overlay.
+    Dcf(DcfError),
+    /// The TOML, in the words of its parser (with line and column).
+    Toml(String),
+    /// They do not fit together.
+    Mismatch(String),
+}
+
+impl fmt::Display for ImportError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ImportError::Dcf(error) => error.fmt(f),
+            ImportError::Toml(message) | ImportError::Mismatch(message) => f.write_str(message),
+        }
+    }
+}
+
+impl std::error::Error for ImportError {}
+
+impl From<DcfError> for ImportError {
+    fn from(error: DcfError) -> ImportError {
+        ImportError::Dcf(error)
+    }
+}
+
+/// Rust source with the constants `DICTIONARY` and `constant` (a `Profile`) for the arm of `toml` with the
+/// drives of `dcf` and its `overlays`. `source` is told in the file's head.
+///
+/// # Errors
+/// Where one of the files cannot be read, with the line, or where they contradict each other.
+pub fn rust_source(
+    dcf: &[u8],
+    overlays: &[Vec<u8>],
+    toml: &str,
+    constant: &str,
+    source: &str,
+) -> Result<String, ImportError> {
+    let mut drive = Dcf::parse(dcf)?;
+    for overlay in overlays {
+        drive.overlay(&Dcf::parse(overlay)?)?;
+    }
+    let arm: Arm = toml::from_str(toml).map_err(|error| ImportError::Toml(error.to_string()))?;
+    check(&drive, &arm)?;
+    write::source(&drive, &arm, constant, source)
+}
+
+fn mismatch<T>(message: String) -> Result<T, ImportError> {
+    Err(ImportError::Mismatch(message))
+}
+
+/// Whether the drive can do what the arm's file wants of it.
+fn check(drive: &Dcf, arm: &Arm) -> Result<(), ImportError> {
+    let rate = format!("baudrate_{}", arm.bitrate / 1000);
+    match drive.info.get(&rate).map(String::as_str) {
+        Some("1") => {}
+        _ => return mismatch(format!("the DCF does not offer {} bit/s ({rate} is not 1)", arm.bitrate)),
+    }
+    if arm.rate == 0 || !1_000_000u32.is_multiple_of(arm.rate) {
+        return mismatch(format!("rate = {}: a divisor of 1000000 Hz is expected", arm.rate));
+    }
+    let written =
+        [CONSUMER_HEARTBEAT, PRODUCER_HEARTBEAT, SYNC_COB_ID, schunk::SYNC_TIMEOUT_FACTOR, objects::MODE];
+    for object in written {
+        match drive.variables.get(&object) {
+            Some(variable) if matches!(variable.access, Access::ReadWrite | Access::WriteOnly) => {}
+            _ => {
+                return mismatch(format!(
+                    "the DCF has no writable {object}, without which the driver may not run"
+                ));
+            }
+        }
+    }
+    let mut nodes: Vec<u8> = arm.joint.iter().map(|joint| joint.node).chain([arm.master]).collect();
+    nodes.sort_unstable();
+    if nodes.windows(2).any(|pair| pair[0] == pair[1]) {
+        return mismatch("two joints, or a joint and the master, have the same node id".into());
+    }
+    if nodes.iter().any(|node| !(1..=127).contains(node)) {
+        return mismatch("node ids are 1 … 127".into());
+    }
+    Ok(())
+}
+
+/// A PDO of the arm's file with the sizes of the drive's.
+fn mapping(drive: &Dcf, mapped: &[Mapped], what: &str) -> Result<Mapping, ImportError> {
+    let mut entries = Vec::new();
+    for item in mapped {
+        let bits = match (drive.variables.get(&item.object), item.bits) {
+            (Some(variable), _) if !variable.mappable => {
+                return mismatch(format!(
+                    "{what}: {} cannot be in a PDO (PDOMapping=0 in the DCF)",
+                    item.object
+                ));
+            }
+            (Some(variable), told) => match (variable.bits(), told) {
+                (Some(bits), None) => bits,
+                (Some(bits), Some(told)) if bits == told => bits,
+                (bits, told) => {
+                    return mismatch(format!("{what}: {} has {bits:?} bits, not {told:?}", item.object));
+                }
+            },
+            (None, Some(bits)) => bits,
+            (None, None) => {
+                return mismatch(format!(
+                    "{what}: the DCF has no {}; tell its bits, as in \"6071/16\"",
+                    item.object
+                ));
+            }
+        };
+        entries.push(Entry::new(item.object, bits));
+    }
+    Mapping::new(&entries).map_err(|error| ImportError::Mismatch(format!("{what}: {error}")))
+}
+
+#[cfg(test)]
+mod tests;

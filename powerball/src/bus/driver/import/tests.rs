@@ -1,0 +1,71 @@
+//! The import against the drive's own file, where it is there, and against small ones that are wrong.
+
+use super::*;
+use std::path::{Path, PathBuf};
+
+const TOML: &str = include_str!("../../../../lwa4p_bus.toml");
+const SOURCE: &str =
+    "Schunk_0_63.dcf (D. Osswald, SCHUNK, 2013; public in ipa320/schunk_robots) and powerball/lwa4p_bus.toml";
+
+/// The DCF is not ours to copy; its place can be told by the environment.
+fn dcf() -> Option<Vec<u8>> {
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/hardware/Schunk_0_63_lwa4p.dcf");
+    let path = std::env::var_os("POWERBALL_DCF").map_or(beside, PathBuf::from);
+    let read = std::fs::read(&path).ok();
+    if read.is_none() {
+        eprintln!("skipped: {} is not there; set POWERBALL_DCF to the drive's DCF", path.display());
+    }
+    read
+}
+
+/// With `POWERBALL_BLESS` set, the committed table is written anew.
+#[test]
+fn the_committed_table_is_what_the_sources_give() {
+    let Some(dcf) = dcf() else { return };
+    let made = rust_source(&dcf, &[], TOML, "LWA4P", SOURCE).unwrap();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/driver/lwa4p.rs");
+    if std::env::var_os("POWERBALL_BLESS").is_some() {
+        std::fs::write(&path, &made).unwrap();
+    }
+    let committed = std::fs::read_to_string(&path).unwrap();
+    assert!(made == committed, "{} is stale; run this test with POWERBALL_BLESS=1", path.display());
+}
+
+#[test]
+fn the_drives_file_is_read_whole() {
+    let Some(bytes) = dcf() else { return };
+    let dcf = Dcf::parse(&bytes).unwrap();
+    // 3 mandatory, 60 optional and 29 objects of the vendor's.
+    let mut indices: Vec<u16> = dcf.variables.keys().map(|object| object.index).collect();
+    indices.dedup();
+    assert_eq!(indices.len(), 92);
+    let value = |index, sub, node| dcf.value(crate::bus::canopen::Object::new(index, sub), node);
+    assert_eq!(value(0x1014, 0, 5), Some(0x85));
+    assert_eq!(value(0x1200, 1, 8), Some(0x608));
+    // ParameterValue beats DefaultValue, and both know $NODEID in their spellings.
+    assert_eq!(value(0x1400, 1, 3), Some(0x203));
+    assert_eq!(value(0x1600, 2, 3), Some(0x6042_0010));
+    assert_eq!(value(0x60C2, 2, 3), Some(-3));
+    assert_eq!(value(0x6502, 0, 3), Some(0x43));
+    assert_eq!(value(0x6071, 0, 3), None);
+    assert_eq!(dcf.info["vendorname"], "SCHUNK GmbH & Co. KG");
+}
+
+const DRIVE: &str = "[DeviceInfo]\nBaudRate_500=1\n[1005]\nDataType=7\nAccessType=rw\n[1016sub1]\nDataType=7\n\
+    AccessType=rw\n[1017]\nDataType=6\nAccessType=rw\n[200E]\nDataType=5\nAccessType=rw\n[6060]\nDataType=2\n\
+    AccessType=rw\n[6040]\nDataType=6\nAccessType=rww\nPDOMapping=1\n[6041]\nDataType=6\nAccessType=ro\nPDOMapping=0\n";
+
+fn refused(toml: &str) -> String {
+    rust_source(DRIVE.as_bytes(), &[], toml, "ARM", "a test").unwrap_err().to_string()
+}
+
+#[test]
+fn contradictions_are_told() {
+    assert!(refused(&TOML.replace("bitrate = 500_000", "bitrate = 800_000")).contains("800000"));
+    assert!(refused(&TOML.replace("node = 4", "node = 3")).contains("same node id"));
+    assert!(refused(&TOML.replace("rate = 200 ", "rate = 300 ")).contains("divisor"));
+    assert!(refused(&TOML.replace("\"60C1:1\"", "\"60C1:x\"")).contains("60C1:x"));
+    // Line and column come from the TOML parser.
+    assert!(refused(&TOML.replace("master = 1", "master = \"one\"")).contains("line"));
+    assert!(refused(TOML).contains("0x607A:0"), "an object that the drive lacks");
+}

@@ -1,0 +1,306 @@
+//! What the driver must know of an arm before it speaks to it: constant tables, made offline from the drive's
+//! DCF and one TOML ([`super::import`] with `std`; [`super::lwa4p`] is the result for the SCHUNK Powerball
+//! LWA 4P).
+
+use super::cause::Refusal;
+use super::units::{JointUnits, VelocityScale};
+use crate::bus::canopen::pdo::Mapping;
+use crate::bus::canopen::{Micros, NodeId, Object};
+use crate::bus::cia402::{Controlword, Mode, objects};
+use core::fmt;
+
+/// How the joints are commanded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ControlMode {
+    /// Profile position: the drive plans the way to a target (rad).
+    ProfilePosition,
+    /// Velocity (rad/s).
+    Velocity,
+    /// Interpolated position: one point (rad) each SYNC.
+    InterpolatedPosition,
+    /// Current (A).
+    Current,
+}
+
+impl ControlMode {
+    /// All of them.
+    pub const ALL: [ControlMode; 4] = [
+        ControlMode::ProfilePosition,
+        ControlMode::Velocity,
+        ControlMode::InterpolatedPosition,
+        ControlMode::Current,
+    ];
+
+    /// Whether set-points are positions.
+    pub const fn is_position(self) -> bool {
+        matches!(self, ControlMode::ProfilePosition | ControlMode::InterpolatedPosition)
+    }
+}
+
+impl fmt::Display for ControlMode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            ControlMode::ProfilePosition => "profile position",
+            ControlMode::Velocity => "velocity",
+            ControlMode::InterpolatedPosition => "interpolated position",
+            ControlMode::Current => "current",
+        })
+    }
+}
+
+/// One mode as this drive has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ModeProfile {
+    /// Number in 0x6060.
+    pub mode: Mode,
+    /// Where the set-point goes; it and the controlword must be in `rpdo`.
+    pub setpoint: Object,
+    /// What the one receive PDO carries in this mode.
+    pub rpdo: Mapping,
+    /// Bits of the controlword, beside "enable operation", while the joint follows set-points.
+    pub running_bits: u16,
+    /// Whether this was seen to work on the arm itself. What was not is refused unless the caller accepts it.
+    pub verified_on_hardware: bool,
+}
+
+/// What 0x1018 must say, where it is known. What is `None` is read and told, not compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Identity {
+    /// Sub 1.
+    pub vendor: Option<u32>,
+    /// Sub 2.
+    pub product: Option<u32>,
+    /// Sub 3.
+    pub revision: Option<u32>,
+    /// Sub 4.
+    pub serial: Option<u32>,
+}
+
+/// One joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointProfile {
+    /// Its drive.
+    pub node: NodeId,
+    /// What 0x1018 must say.
+    pub identity: Identity,
+    /// Counts, currents and torques.
+    pub units: JointUnits,
+    /// Least and greatest position, rad; written to 0x607D.
+    pub position: [f64; 2],
+    /// Greatest speed, rad/s.
+    pub velocity: f64,
+    /// Greatest acceleration, rad/s².
+    pub acceleration: f64,
+    /// Greatest current, A.
+    pub current: f64,
+}
+
+/// Times and limits of the driver's reactions. [`Reactions::DEFAULT`] is what `docs/bus.md` argues for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reactions {
+    /// Consecutive cycles without a joint's data after which the arm is stopped.
+    pub missing_cycles: u8,
+    /// A SYNC later than this part of the period counts as late.
+    pub late_fraction: f64,
+    /// So many late SYNCs, without [`Reactions::forgiving_cycles`] good ones between them, stop the arm.
+    pub late_limit: u8,
+    /// So many SYNCs in a row that could not be sent at all stop the arm.
+    pub skipped_limit: u64,
+    /// Good cycles after which late ones and rejected set-points are forgotten.
+    pub forgiving_cycles: u16,
+    /// Consecutive rejected set-points that stop the arm.
+    pub rejected_limit: u8,
+    /// Consecutive cycles without a new set-point (once streaming began; not in profile position) that stop
+    /// the arm.
+    pub starved_cycles: u8,
+    /// Set-points may leave the limits by so much, rad.
+    pub position_margin: f64,
+    /// A step of a position may be so many times v_max·T, to allow for rounding.
+    pub step_factor: f64,
+    /// Greatest change of a current set-point in a cycle, as part of the joint's greatest current.
+    pub current_step: f64,
+    /// A joint measured faster than this times its greatest speed, for [`Reactions::missing_cycles`] cycles,
+    /// stops the arm.
+    pub overspeed_factor: f64,
+    /// So much way, rad, is asked for in velocity mode before it is compared with the way that was gone.
+    pub scale_way: f64,
+    /// For a node to boot.
+    pub boot_timeout: Micros,
+    /// For an SDO answer.
+    pub sdo_timeout: Micros,
+    /// Times that a silent SDO transfer is begun again.
+    pub sdo_retries: u8,
+    /// For a transition of the drive's state machine, and for the mode to be shown.
+    pub transition_timeout: Micros,
+    /// For the arm to come to rest on the quick-stop ramp.
+    pub stop_timeout: Micros,
+    /// For the brakes to close.
+    pub brake_time: Micros,
+    /// After a fault reset, before the state is looked at.
+    pub fault_reset_time: Micros,
+    /// Tries of the commutation search.
+    pub commutation_tries: u8,
+    /// Between two tries.
+    pub commutation_interval: Micros,
+    /// After a search, before the next joint: the supply recovers.
+    pub commutation_settle: Micros,
+    /// Enable and commutate one joint after the other, from the base on.
+    pub one_at_a_time: bool,
+    /// Below this speed, rad/s, a joint counts as at rest.
+    pub rest_velocity: f64,
+}
+
+impl Reactions {
+    /// Three cycles without data, five late ones, three rejected set-points and three cycles without one stop
+    /// the arm.
+    pub const DEFAULT: Reactions = Reactions {
+        missing_cycles: 3,
+        late_fraction: 0.2,
+        late_limit: 5,
+        skipped_limit: 3,
+        forgiving_cycles: 200,
+        rejected_limit: 3,
+        starved_cycles: 3,
+        position_margin: 0.0,
+        step_factor: 1.05,
+        current_step: 0.25,
+        overspeed_factor: 1.5,
+        scale_way: 0.1,
+        boot_timeout: 5_000_000,
+        sdo_timeout: 100_000,
+        sdo_retries: 2,
+        transition_timeout: 1_000_000,
+        stop_timeout: 1_000_000,
+        brake_time: 100_000,
+        fault_reset_time: 150_000,
+        commutation_tries: 50,
+        commutation_interval: 100_000,
+        commutation_settle: 1_000_000,
+        one_at_a_time: true,
+        rest_velocity: 0.01,
+    };
+}
+
+/// An arm of `N` joints.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Profile<const N: usize> {
+    /// Its name.
+    pub name: &'static str,
+    /// bit/s.
+    pub bitrate: u32,
+    /// Period of SYNC, µs. A multiple of 100, because 0x60C2 is written from it.
+    pub sync_period: Micros,
+    /// The node id under which the master's heartbeat goes out.
+    pub master: NodeId,
+    /// Period of the master's heartbeat, µs.
+    pub master_heartbeat: Micros,
+    /// A drive that misses the master's heartbeat for so long reacts; 0x1016, ms.
+    pub master_watch_ms: u16,
+    /// Cycles without a fresh interpolation point before a drive stops quickly; 0x200E, not 0.
+    pub sync_timeout_factor: u8,
+    /// Period of the drives' heartbeats, 0x1017, ms.
+    pub node_heartbeat_ms: u16,
+    /// Profile position.
+    pub profile_position: ModeProfile,
+    /// Velocity.
+    pub velocity: ModeProfile,
+    /// Interpolated position.
+    pub interpolated_position: ModeProfile,
+    /// Current, where anything is known of it.
+    pub current: Option<ModeProfile>,
+    /// What 0x604C must read for velocities to be scaled as [`VelocityScale`] says.
+    pub velocity_scale: VelocityScale,
+    /// What the drives send each SYNC; empty ones are switched off. Statusword, position and mode display
+    /// must be in them.
+    pub tpdos: [Mapping; 4],
+    /// The joints from the base on.
+    pub joints: [JointProfile; N],
+    /// Times and limits.
+    pub reactions: Reactions,
+}
+
+impl<const N: usize> Profile<N> {
+    /// What is known of `mode`.
+    pub const fn mode(&self, mode: ControlMode) -> Option<&ModeProfile> {
+        match mode {
+            ControlMode::ProfilePosition => Some(&self.profile_position),
+            ControlMode::Velocity => Some(&self.velocity),
+            ControlMode::InterpolatedPosition => Some(&self.interpolated_position),
+            ControlMode::Current => self.current.as_ref(),
+        }
+    }
+
+    /// Period of SYNC in s.
+    pub fn period_seconds(&self) -> f64 {
+        self.sync_period as f64 * 1e-6
+    }
+
+    /// Value and power of ten of the interpolation period 0x60C2, or `None` where it cannot be written.
+    pub const fn interpolation_period(&self) -> Option<(u8, i8)> {
+        let (ms, tenths) = (self.sync_period / 1000, self.sync_period / 100);
+        if self.sync_period.is_multiple_of(1000) && ms >= 1 && ms <= 255 {
+            Some((ms as u8, -3))
+        } else if self.sync_period.is_multiple_of(100) && tenths >= 1 && tenths <= 255 {
+            Some((tenths as u8, -4))
+        } else {
+            None
+        }
+    }
+
+    /// Whether the driver can work with this profile at all.
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        let wrong = |what| Err(Refusal::Profile(what));
+        for (j, joint) in self.joints.iter().enumerate() {
+            let others = self.joints.iter().skip(j + 1).map(|other| other.node);
+            if others.chain([self.master]).any(|node| node == joint.node) {
+                return wrong("a node id is used twice");
+            }
+            let [low, high] = joint.position;
+            let positive =
+                [joint.velocity, joint.acceleration, joint.current, joint.units.counts_per_radian.abs()];
+            if low.partial_cmp(&high) != Some(core::cmp::Ordering::Less)
+                || positive.iter().any(|value| !(value.is_finite() && *value > 0.0))
+            {
+                return wrong(
+                    "a joint's limits are no range, or its speed, acceleration, current or scale is not \
+                        positive",
+                );
+            }
+        }
+        if self.interpolation_period().is_none() {
+            return wrong(
+                "the SYNC period cannot be written to 0x60C2: whole ms to 255, or tenths to 25.5 are \
+                    expected",
+            );
+        }
+        if self.sync_timeout_factor == 0 || self.master_watch_ms == 0 || self.node_heartbeat_ms == 0 {
+            return wrong("the drives must watch the master and be watched: no such time may be 0");
+        }
+        if self.master_heartbeat == 0 || self.master_heartbeat > Micros::from(self.master_watch_ms) * 500 {
+            return wrong(
+                "the master's heartbeat must come at least twice in the time that the drives wait for it",
+            );
+        }
+        let sent = |object| self.tpdos.iter().any(|mapping| mapping.contains(object));
+        if ![objects::STATUSWORD, objects::POSITION, objects::VELOCITY, objects::MODE_DISPLAY]
+            .into_iter()
+            .all(sent)
+        {
+            return wrong("the transmit PDOs must hold statusword, position, velocity and mode display");
+        }
+        for mode in ControlMode::ALL.into_iter().filter_map(|mode| self.mode(mode)) {
+            if !(mode.rpdo.contains(objects::CONTROLWORD) && mode.rpdo.contains(mode.setpoint)) {
+                return wrong("a receive PDO must hold controlword and set-point");
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Running bits of interpolated position: interpolate.
+pub const INTERPOLATED_POSITION_BITS: u16 = Controlword::MODE_4;
+/// Running bits of velocity: without all three the ramp is held (0x7F).
+pub const VELOCITY_BITS: u16 = Controlword::MODE_4 | Controlword::MODE_5 | Controlword::MODE_6;
+/// Running bits of profile position: a new target is taken at once. The new set-point bit itself is a
+/// handshake.
+pub const PROFILE_POSITION_BITS: u16 = Controlword::MODE_5;

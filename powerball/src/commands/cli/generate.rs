@@ -1,0 +1,84 @@
+//! `powerball generate`: a model as a controller's code.
+
+use super::inputs::Known;
+use super::{Failure, output};
+use crate::explanation::torque_model::{Scalar, SourceError};
+use crate::logs::regression::RigidBody;
+use clap::{Args, ValueEnum};
+use dyngen::{Arm, Function};
+use std::path::{Path, PathBuf};
+
+/// Write a model with its effects as one Rust file for a controller: no std, no allocation, needs nalgebra
+/// alone.
+///
+/// `TorqueModel::torque` in it is the torque that the report of the model is of: rigid arm, friction and
+/// every effect. The rigid dynamics are proven equal to the Lagrangian before they are written.
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Example:\n  powerball generate --arm arm.toml --model result/model.json -o controller.rs \
+        --scalar f32"
+)]
+pub(crate) struct Generate {
+    /// The arm file (TOML) that the model was identified with.
+    #[arg(long, value_name = "ARM.toml")]
+    arm: PathBuf,
+    /// The model: model.json of `powerball explain` or identified.json of `powerball identify`.
+    #[arg(long, value_name = "FILE.json")]
+    model: PathBuf,
+    /// The file to write.
+    #[arg(short, long, value_name = "FILE.rs")]
+    output: PathBuf,
+    /// The scalar of the controller.
+    #[arg(long, value_enum, default_value = "f64")]
+    scalar: ScalarName,
+    /// More functions of the rigid arm beside the inverse dynamics, separated by commas: those of `dyngen
+    /// generate`.
+    #[arg(long, value_delimiter = ',', value_parser = function)]
+    functions: Vec<Function>,
+    /// Print what was written as one JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum ScalarName {
+    /// Single precision.
+    F32,
+    /// Double precision.
+    F64,
+}
+
+fn function(name: &str) -> Result<Function, String> {
+    let names = Function::ALL.map(Function::name).join(", ");
+    Function::parse(name.trim()).ok_or_else(|| format!("there is no function '{name}': there are {names}"))
+}
+
+impl Generate {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let known = Known::read(&self.arm, Some(&self.model))?;
+        let body = RigidBody::new(&known.arm).map_err(|e| Failure::Refused(e.to_string()))?;
+        let Some(model) = known.model(&body)? else { return Ok(()) };
+        let file = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let scalar = match self.scalar {
+            ScalarName::F32 => Scalar::F32,
+            ScalarName::F64 => Scalar::F64,
+        };
+        let source = model.source(&file, scalar, &self.functions).map_err(|e| match e {
+            SourceError::Changes(_) => Failure::Unusable(format!("{}: {e}", self.model.display())),
+            SourceError::Generator(_) => Failure::Refused(e.to_string()),
+        })?;
+        let folder = self.output.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let name = self.output.file_name().and_then(|n| n.to_str());
+        let name = name.ok_or_else(|| Failure::Unusable(format!("{}: is no file", self.output.display())))?;
+        output::write(folder, name, source.as_bytes())?;
+        let notes = model.not_compensated();
+        if self.json {
+            let terms = model.additions.terms.len();
+            let what = serde_json::json!({ "file": self.output, "terms": terms, "not_compensated": notes });
+            output::print(&output::json(&what)?);
+        } else {
+            notes.iter().for_each(|note| output::print(&format!("note: {note}")));
+        }
+        Ok(())
+    }
+}

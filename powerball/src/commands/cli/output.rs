@@ -1,0 +1,70 @@
+//! Results on disk and on the terminal.
+
+use super::Failure;
+use crate::identification::estimate::Spread;
+use std::io::{IsTerminal, Write};
+use std::path::Path;
+
+/// Progress on standard error, where a person looks at it.
+pub(crate) struct Progress(bool);
+
+impl Progress {
+    pub(crate) fn new() -> Progress {
+        Progress(std::io::stderr().is_terminal())
+    }
+
+    pub(crate) fn say(&self, what: &str) {
+        if self.0 {
+            eprintln!("  {what} …");
+        }
+    }
+}
+
+/// Writes a file of a folder whole or not at all: a reader never sees half of it.
+pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+    write_file(&folder.join(name), bytes)
+}
+
+/// The same for a path.
+pub(crate) fn write_file(target: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let name = target.file_name().unwrap_or_default().to_string_lossy();
+    let part = target.with_file_name(format!(".{name}.{}.part", std::process::id()));
+    let failure =
+        |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", target.display()));
+    let done = std::fs::File::create(&part).and_then(|mut file| {
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        std::fs::rename(&part, target)
+    });
+    done.map_err(|e| {
+        let _ = std::fs::remove_file(&part);
+        failure(e)
+    })
+}
+
+/// Serialises a result.
+pub(crate) fn json(value: &impl serde::Serialize) -> Result<String, Failure> {
+    serde_json::to_string_pretty(value).map_err(|e| Failure::Refused(format!("the result is no JSON: {e}")))
+}
+
+/// Prints to standard output; a closed pipe is no error.
+pub(crate) fn print(text: &str) {
+    let _ = writeln!(std::io::stdout(), "{text}");
+}
+
+/// Errors by joint as a table; several spreads side by side.
+pub(crate) fn table(columns: &[(&str, &Spread)]) -> String {
+    let mut text = String::from("joint");
+    for (name, _) in columns {
+        text.push_str(&format!("  {name:>26}"));
+    }
+    let joints = columns.iter().map(|(_, s)| s.rms.len()).max().unwrap_or(0);
+    for j in 0..joints {
+        text.push_str(&format!("\n{:>5}", j + 1));
+        for (_, spread) in columns {
+            let cell = format!("{:.4} N·m  {:5.1} %", spread.rms[j], 100.0 * spread.relative[j]);
+            text.push_str(&format!("  {cell:>26}"));
+        }
+    }
+    text
+}

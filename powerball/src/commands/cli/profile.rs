@@ -1,0 +1,63 @@
+//! `powerball profile`: an arm's constant tables from its drives' DCF and one TOML.
+
+use super::Failure;
+use crate::bus::driver::import;
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+/// Make the bus driver's constant tables of an arm: a Rust file.
+///
+/// The DCF (or EDS) is the drive maker's; the TOML says what it cannot know of the arm: nodes, rate, mapping,
+/// limits, scales.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  powerball profile --dcf Schunk_0_63.dcf --arm powerball/lwa4p_bus.toml \
+        --constant LWA4P -o lwa4p.rs")]
+pub(super) struct ProfileCommand {
+    /// The drive's DCF or EDS.
+    #[arg(long, value_name = "FILE")]
+    dcf: PathBuf,
+    /// More DCFs, whose values go over those of the first.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    overlay: Vec<PathBuf>,
+    /// The arm's TOML.
+    #[arg(long, value_name = "FILE")]
+    arm: PathBuf,
+    /// Name of the constant.
+    #[arg(long, default_value = "ARM")]
+    constant: String,
+    /// What the file's head calls its source; the file names unless given.
+    #[arg(long)]
+    source: Option<String>,
+    /// Where to write.
+    #[arg(short, long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+impl ProfileCommand {
+    pub(super) fn run(self) -> Result<(), Failure> {
+        let dcf = read(&self.dcf)?;
+        let overlays = self.overlay.iter().map(|path| read(path)).collect::<Result<Vec<_>, _>>()?;
+        let toml = String::from_utf8(read(&self.arm)?)
+            .map_err(|_| Failure::Unusable(format!("{}: not UTF-8", self.arm.display())))?;
+        let name =
+            |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let files = || {
+            let all = [&self.dcf].into_iter().chain(&self.overlay).chain([&self.arm]);
+            all.map(|path| name(path)).collect::<Vec<_>>().join(", ")
+        };
+        let source = self.source.clone().unwrap_or_else(files);
+        let made = import::rust_source(&dcf, &overlays, &toml, &self.constant, &source).map_err(|error| {
+            let file = match error {
+                import::ImportError::Dcf(_) => name(&self.dcf),
+                _ => name(&self.arm),
+            };
+            Failure::Unusable(format!("{file}: {error}"))
+        })?;
+        std::fs::write(&self.out, made)
+            .map_err(|error| Failure::Unusable(format!("{}: {error}", self.out.display())))
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    std::fs::read(path).map_err(|error| Failure::Unusable(format!("{}: {error}", path.display())))
+}

@@ -1,0 +1,106 @@
+//! `powerball record`: a trajectory in interpolated position mode, and its log.
+
+use super::Failure;
+use super::bus::{Where, master};
+use super::excite::{CLEARANCE, FloorAt, RADIUS, floor, surroundings};
+use super::output;
+use crate::bus::driver::lwa4p::LWA4P;
+use crate::identification::excite::{Constraints, Limits, Mounting, Shape};
+use crate::identification::motion::Motion;
+use crate::logs::log::LogFile;
+use crate::procedure::{RecordError, record};
+use clap::Args;
+use dyngen::Arm;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Bring the arm up, go to where a trajectory begins, follow it at 200 Hz, and log it.
+///
+/// The log has t, q1…q6 (rad), tau1…tau6 (N·m, as good as the profile's calibration) and ref1…ref6 (rad, the
+/// set-points). Each line is written whole: whatever happens, the log can be read up to there. A log whose
+/// name ends in .parquet is written as lines beside it, NAME.parquet.csv, and becomes Parquet when it ends;
+/// lines that a program left which died are put into NAME.interrupted-1.parquet by the next recording of that
+/// name.
+///
+/// With --arm neither the way to where the trajectory begins, each joint straight there from where the arm
+/// stands, nor the trajectory may touch the floor or another link, as capsules in the way of `powerball
+/// excite`. Without it nothing is looked at. THE ARM MOVES.
+#[derive(Args, Debug)]
+#[command(after_help = "Example:\n  powerball excite --arm powerball/lwa4p.toml --out path.csv\n  \
+    powerball record --trajectory path.csv --out log.csv --arm powerball/lwa4p.toml --floor -0.2 --bus \
+    socketcan:can0")]
+pub(crate) struct RecordCommand {
+    /// The trajectory: CSV with t, q1…q6 (rad), as `powerball excite` writes it at the arm's rate.
+    #[arg(long, value_name = "FILE")]
+    trajectory: PathBuf,
+    /// Where the log is written: Parquet where the name ends in .parquet, CSV else.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// The arm file: its geometry and limits, for the floor and the links.
+    #[arg(long, value_name = "ARM.toml")]
+    arm: Option<PathBuf>,
+    /// Height of the floor above the base frame's origin along the vertical, m, or `none`; as for `powerball
+    /// excite`.
+    #[arg(long, value_name = "Z", value_parser = floor, allow_hyphen_values = true, requires = "arm")]
+    floor: Option<FloorAt>,
+    #[command(flatten)]
+    place: Where,
+}
+
+impl RecordCommand {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let name = self.trajectory.display();
+        let text = std::fs::read_to_string(&self.trajectory)
+            .map_err(|e| Failure::Unusable(format!("{name}: cannot be read: {e}")))?;
+        let motion = Motion::from_csv(&text, LWA4P.joints.len())
+            .map_err(|why| Failure::Unusable(format!("{name}: {why}")))?;
+        let constraints = self.arm.as_ref().map(|file| self.constraints(file)).transpose()?;
+        let barred = |motion: &Motion| constraints.as_ref().and_then(|c| c.broken(motion));
+        let master = master(&self.place)?;
+        let unwritable =
+            |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", self.out.display()));
+        let (mut log, recovered) = LogFile::create(&self.out).map_err(unwritable)?;
+        if let Some(file) = &recovered {
+            let file = file.display();
+            eprintln!("powerball: an earlier recording was broken off: its lines are now in {file}");
+        }
+        let done = record(master, &motion, barred, &mut log);
+        // A recording that failed is closed too: what was recorded counts. Why it failed is what is told.
+        let closed = log.close();
+        let done = done.map_err(|e| match e {
+            RecordError::Motion(what) => Failure::Unusable(format!("{name}: {what}")),
+            other => Failure::Refused(other.to_string()),
+        })?;
+        closed.map_err(unwritable)?;
+        if self.place.json {
+            output::print(&json!({ "out": self.out, "record": done }).to_string());
+        } else {
+            let far = done.following_max.iter().fold(0.0f64, |far, e| far.max(*e));
+            output::print(&format!(
+                "{}: {} samples, {} missing; {} cycles late, {} left out, {} set-points held; at most {:.1} \
+                    mrad from the set-point",
+                self.out.display(),
+                done.samples,
+                done.missing,
+                done.late,
+                done.skipped,
+                done.dropped,
+                1e3 * far
+            ));
+        }
+        Ok(())
+    }
+
+    /// What must not be touched.
+    fn constraints(&self, file: &Path) -> Result<Constraints, Failure> {
+        let arm = Arm::read(file).map_err(|e| Failure::Unusable(e.to_string()))?;
+        if arm.dof() != LWA4P.joints.len() {
+            let name = file.display();
+            return Err(Failure::Unusable(format!("{name}: has {} joints, the arm on the bus 6", arm.dof())));
+        }
+        let limits = Limits::of(&arm, 0.0).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let shape = Shape::new(&arm, &limits.0, RADIUS);
+        let (space, _) = surroundings(&arm, &Mounting::Filed, &shape, self.floor, CLEARANCE, &limits);
+        Ok(Constraints { space: Some(space), ..Constraints::of(limits) })
+    }
+}

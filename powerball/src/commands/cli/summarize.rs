@@ -1,0 +1,106 @@
+//! `powerball summarize`: a log as triangular factors.
+
+use super::Failure;
+use super::mounted::MountedFile;
+use super::output::{self, Progress};
+use super::reduced::{Standing, reduce};
+use crate::identification::mounting::Mounting;
+use crate::logs::regression::DataOptions;
+use crate::logs::summary::BANDS;
+use clap::Args;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Reduce logs to triangular factors, which `powerball identify` takes in place of the logs.
+///
+/// A summary is of one size however long the logs were, and holds all that a fit needs of them: the rows of
+/// every joint for any friction steepness, octave by octave, in three bands. Summaries made one by one
+/// anywhere come to what their logs would have come to together. They are of one arm file; another one
+/// refuses them.
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Example:\n  powerball summarize --arm arm.toml --log a.csv --out a.summary\n  powerball \
+        identify --arm arm.toml --log a.summary b.summary c.csv --out result"
+)]
+pub(crate) struct Summarize {
+    /// The arm file (TOML).
+    #[arg(long, value_name = "ARM.toml")]
+    arm: PathBuf,
+    /// Logs (CSV or Parquet), or summaries to join.
+    #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
+    log: Vec<PathBuf>,
+    /// How the base stood for these logs: `filed`, ROLL,PITCH in degrees from there, or gravity in its frame
+    /// as X,Y,Z in m/s². Logs of another mounting go into a summary of their own, and `identify` joins them.
+    #[arg(long, value_name = "MOUNTING", allow_hyphen_values = true)]
+    mounting: Option<Mounting>,
+    /// The summary to write.
+    #[arg(long, value_name = "SUMMARY")]
+    out: PathBuf,
+    /// Print what was written as one JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What was written.
+#[derive(Serialize)]
+struct Written {
+    arm: String,
+    set: &'static str,
+    /// How the base stood, where it was not as the arm file says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mounting: Option<String>,
+    logs: Vec<String>,
+    seconds: f64,
+    /// By joint.
+    rows: Vec<u64>,
+    bytes: usize,
+    /// Their ends, Hz.
+    bands: [f64; 3],
+    warnings: Vec<String>,
+}
+
+impl Summarize {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let mounted = |file: &PathBuf| MountedFile { file: file.clone(), mounting: self.mounting };
+        let files: Vec<MountedFile> = self.log.iter().map(mounted).collect();
+        let reduced = reduce(&self.arm, &files, &DataOptions::default(), false, &Progress::new())?;
+        let [Standing { mounting, bands, .. }] = reduced.standing.as_slice() else {
+            let mountings: Vec<String> = reduced.standing.iter().map(|s| s.mounting.to_string()).collect();
+            return Err(Failure::Unusable(format!(
+                "these are of several mountings of the base ({}): a summary has one; give them to identify \
+                    as they are",
+                mountings.join("; ")
+            )));
+        };
+        let bytes = bands.to_bytes();
+        let summary = bands.widest();
+        output::write_file(&self.out, &bytes)?;
+        let written = Written {
+            arm: summary.identity.arm.clone(),
+            set: "minimal",
+            mounting: (*mounting != Mounting::Filed).then(|| mounting.to_string()),
+            logs: summary.logs.iter().map(|(name, _)| name.clone()).collect(),
+            seconds: summary.logs.iter().map(|(_, seconds)| seconds).sum(),
+            rows: summary.joints.iter().map(|j| j.rows()).collect(),
+            bytes: bytes.len(),
+            bands: BANDS,
+            warnings: reduced.warnings,
+        };
+        if self.json {
+            output::print(&output::json(&written)?);
+            return Ok(());
+        }
+        for warning in &written.warnings {
+            output::print(&format!("note: {warning}"));
+        }
+        output::print(&format!(
+            "{}: {} logs, {:.0} s, up to {} rows a joint, in {} kB",
+            self.out.display(),
+            written.logs.len(),
+            written.seconds,
+            written.rows.iter().max().unwrap_or(&0),
+            written.bytes / 1000
+        ));
+        Ok(())
+    }
+}

@@ -1,0 +1,119 @@
+//! `powerball virtual-arm`: the virtual arm on a bus with others.
+
+use super::Failure;
+use super::output;
+use crate::bus::transport::{self, BusUrl};
+use crate::virtual_arm::{Effect, Undeclared, VirtualArm, lwa4p, slave};
+use clap::Args;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Put the virtual LWA 4P on a bus in real time: six CiA 402 drives, nodes 3 to 8, with the arm's dynamics
+/// behind them.
+///
+/// Runs until Ctrl-C, or as long as `--for` says. The arm starts at rest with closed brakes.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:\n  powerball virtual-arm --bus udp:239.74.163.2:43113\n  \
+    powerball virtual-arm --bus slcan:/dev/pts/7 --for 60\n\nFrom another terminal:\n  \
+    powerball bus scan --bus udp:239.74.163.2:43113")]
+pub(crate) struct VirtualArmCommand {
+    /// The bus: socketcan:can0, slcan:/dev/ttyACM0 or udp:239.74.163.2:43113.
+    #[arg(long, value_name = "URL")]
+    bus: BusUrl,
+    /// Leaves the bus after so many seconds.
+    #[arg(long = "for", value_name = "SECONDS")]
+    seconds: Option<f64>,
+    /// Joint positions at the start, rad, six of them with commas between.
+    #[arg(long, value_name = "Q1,…", value_delimiter = ',', allow_negative_numbers = true)]
+    start: Option<Vec<f64>>,
+    /// The motors know their commutation already, as after a restart without loss of motor power.
+    #[arg(long)]
+    commutated: bool,
+    /// An effect that no model is told of, by name; see `powerball demo`.
+    #[arg(long, value_name = "NAME")]
+    effect: Option<String>,
+    /// The same as a file: virtual_arm.json, as `powerball demo` writes it beside its logs.
+    #[arg(long, value_name = "FILE", conflicts_with = "effect")]
+    plant: Option<PathBuf>,
+    /// Draws the effect's size and the sensors' noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print what was done as one JSON object on standard output, at the end.
+    #[arg(long)]
+    json: bool,
+}
+
+impl VirtualArmCommand {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        if self.bus == BusUrl::Virtual {
+            return Err(Failure::Unusable(
+                "--bus virtual is within one program: others would not see the arm. Use \
+                    udp:239.74.163.2:43113"
+                    .to_string(),
+            ));
+        }
+        if self.seconds.is_some_and(|s| !(s.is_finite() && s >= 0.0)) {
+            return Err(Failure::Unusable("--for needs a number of seconds".to_string()));
+        }
+        let mut arm = self.arm()?;
+        let mut bus = transport::open(&self.bus).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let nodes: Vec<u8> = arm.nodes().iter().map(|node| node.id().raw()).collect();
+        eprintln!("powerball: the virtual arm is on {}, nodes {nodes:?}", self.bus);
+        let started = Instant::now();
+        let length = self.seconds.map(Duration::from_secs_f64);
+        let stop = || length.is_some_and(|length| started.elapsed() >= length);
+        let behind = slave::serve(&mut arm, &mut bus, stop).map_err(|e| Failure::Refused(e.to_string()))?;
+        if behind > 0 {
+            let seconds = behind as f64 * 1e-6;
+            eprintln!("powerball: this machine was too slow at times: the arm is {seconds:.3} s behind");
+        }
+        if self.json {
+            let result = json!({
+                "bus": self.bus.to_string(), "nodes": nodes, "seconds": started.elapsed().as_secs_f64(),
+                "position": arm.simulation().links(),
+            });
+            output::print(&result.to_string());
+        }
+        Ok(())
+    }
+
+    fn arm(&self) -> Result<VirtualArm, Failure> {
+        let mut start = [0.0; 6];
+        if let Some(given) = &self.start {
+            if given.len() != start.len() || given.iter().any(|q| !q.is_finite()) {
+                return Err(Failure::Unusable("--start needs six positions in rad".to_string()));
+            }
+            start.copy_from_slice(given);
+        }
+        match &self.plant {
+            Some(file) => Undeclared::read(file)
+                .map_err(Failure::Unusable)?
+                .arm(start, self.seed, self.commutated)
+                .map_err(|e| Failure::Refused(e.to_string())),
+            None => virtual_arm(start, self.seed, self.effect.as_deref(), self.commutated),
+        }
+    }
+}
+
+/// The built-in arm with an effect by name.
+pub(crate) fn virtual_arm(
+    start: [f64; 6],
+    seed: u64,
+    effect: Option<&str>,
+    commutated: bool,
+) -> Result<VirtualArm, Failure> {
+    let broken = |what: String| Failure::Refused(format!("the built-in arm: {what}"));
+    let mut setup = lwa4p::setup(start, seed).map_err(|e| broken(e.to_string()))?;
+    setup.modules.iter_mut().for_each(|module| module.commutated = commutated);
+    if let Some(name) = effect {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let effect = Effect::draw_named(name, &setup.plant, 100.0, 1.0..2.0, &mut rng).ok_or_else(|| {
+            Failure::Unusable(format!("no effect is called {name}; there are {}", Effect::NAMES.join(", ")))
+        })?;
+        setup.plant = setup.plant.with(effect);
+    }
+    VirtualArm::new(setup).ok_or_else(|| broken("its parts do not fit".to_string()))
+}

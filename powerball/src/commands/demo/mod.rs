@@ -1,0 +1,152 @@
+//! The whole loop on the virtual arm: an effect that the model is not told of, found again from the logs
+//! alone.
+
+mod page;
+mod session;
+mod verdict;
+
+pub use page::page;
+pub use session::{Session, SessionError};
+pub use verdict::{Judgement, Verdict};
+
+use crate::bus::driver::Driver;
+use crate::bus::driver::lwa4p::LWA4P;
+use crate::bus::transport::{Master, Memory};
+use crate::explanation::effects;
+use crate::explanation::experiment::{self, TRAJECTORY};
+use crate::explanation::explain::{ExplainError, Explained, Options, explain};
+use crate::identification::motion::Motion;
+use crate::logs::log::{LogError, common_clock, read_logs};
+use crate::logs::regression::{DataOptions, RigidBody};
+use crate::procedure::record;
+use crate::virtual_arm::Effect;
+use dyngen::Arm;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// What was in the plant, what was found, and whether that is right.
+#[derive(Debug)]
+pub struct Demo {
+    /// The recording session with the truth.
+    pub session: Session,
+    /// What the residual loop says of the logs, which is all it was given.
+    pub explained: Explained,
+    /// Both compared.
+    pub verdict: Verdict,
+}
+
+/// Why the demo broke.
+#[derive(Debug)]
+pub enum DemoError {
+    /// No session could be recorded.
+    Session(SessionError),
+    /// The recorded files could not be read.
+    Read(String),
+    /// The arm's model is not to be had.
+    Model(String),
+    /// The logs hold too little.
+    Explain(ExplainError),
+}
+
+impl fmt::Display for DemoError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            DemoError::Session(e) => e.fmt(f),
+            DemoError::Read(what) | DemoError::Model(what) => f.write_str(what),
+            DemoError::Explain(e) => e.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for DemoError {}
+
+impl From<SessionError> for DemoError {
+    fn from(e: SessionError) -> Self {
+        DemoError::Session(e)
+    }
+}
+
+impl From<LogError> for DemoError {
+    fn from(e: LogError) -> Self {
+        DemoError::Read(e.to_string())
+    }
+}
+
+impl From<ExplainError> for DemoError {
+    fn from(e: ExplainError) -> Self {
+        DemoError::Explain(e)
+    }
+}
+
+/// The names that a demo draws from: effects that the plant has and the residual loop knows.
+pub fn names<'a>() -> Vec<&'a str> {
+    let known = effects::all();
+    Effect::NAMES.into_iter().filter(|name| known.iter().any(|effect| effect.name() == *name)).collect()
+}
+
+/// Records a session with an effect drawn by `seed`, or with the one of the given name, into `folder`, and
+/// explains it from the files alone, as a user would. Where names stay open, the trajectory that tells them
+/// apart is written there as well, and `with_experiment` runs it on the same arm and lets it decide.
+///
+/// # Errors
+/// Only where something broke; a wrong name is a result.
+pub fn run(
+    folder: &Path,
+    seed: u64,
+    name: Option<&str>,
+    with_experiment: bool,
+    progress: &dyn Fn(&str),
+) -> Result<Demo, DemoError> {
+    progress("searching exciting paths and recording them");
+    let names: Vec<&str> = name.map_or_else(names, |name| vec![name]);
+    let session = Session::record(folder, seed, &names)?;
+    progress("reading the logs");
+    let arm = Arm::read(&session.arm_file).map_err(|e| DemoError::Read(e.to_string()))?;
+    let files: Vec<_> = session.fit.iter().chain(&session.held_out).collect();
+    let (mut logs, _) = read_logs(&files, &arm)?;
+    common_clock(&mut logs);
+    let held_out = logs.split_off(session.fit.len());
+    let body = RigidBody::new(&arm).map_err(|e| DemoError::Model(e.to_string()))?;
+    let options = DataOptions::default();
+    let mut explained = explain(&body, &logs, &held_out, &options, progress)?;
+    if let Some(motion) = experiment::propose(&body, &mut explained, &options, progress) {
+        let write = |motion: &Motion| {
+            let file = folder.join(TRAJECTORY);
+            std::fs::write(&file, motion.to_csv()).map_err(|e| SessionError::Write(file, e))
+        };
+        write(&motion)?;
+        if with_experiment {
+            progress("recording the experiment");
+            let log = carry_out(&session, &motion, &folder.join("experiment.csv"), seed)?;
+            let (mut new, _) = read_logs(&[log], &arm)?;
+            let Some(new) = new.pop() else {
+                return Err(DemoError::Read("experiment.csv is missing".into()));
+            };
+            explained = experiment::learn(
+                &body,
+                (&logs, &held_out),
+                new,
+                &explained,
+                &options,
+                &Options::default(),
+                progress,
+            )?;
+            if let Some(next) = experiment::propose(&body, &mut explained, &options, progress) {
+                write(&next)?;
+            }
+        }
+    }
+    let verdict = Verdict::new(&session.effect, &explained);
+    Ok(Demo { session, explained, verdict })
+}
+
+/// Runs a motion on the arm of a session, after it, and logs it.
+fn carry_out(session: &Session, motion: &Motion, file: &Path, seed: u64) -> Result<PathBuf, DemoError> {
+    let unwritten = |e| SessionError::Write(file.to_path_buf(), e);
+    let arm = session.undeclared.arm([0.0; 6], seed.wrapping_add(1), false).map_err(SessionError::Arm)?;
+    let driver = Driver::new(LWA4P).map_err(SessionError::Driver)?;
+    let master = Master::new(driver, Memory::new(arm, LWA4P.bitrate));
+    let mut log = std::fs::File::create(file).map_err(unwritten)?;
+    record(master, motion, |_| None, &mut log).map_err(SessionError::Record)?;
+    Ok(file.to_path_buf())
+}

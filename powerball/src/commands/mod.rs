@@ -1,0 +1,6 @@
+//! The `powerball` command: it parses, calls the library and prints.
+
+mod cli;
+pub mod demo;
+
+pub use cli::main;

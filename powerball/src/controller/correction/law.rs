@@ -1,0 +1,335 @@
+//! Laws of torque that a rigid arm with Eq. 16 friction lacks.
+
+use nalgebra::RealField;
+
+/// What is known at one instant; one entry a joint. What a slice does not hold counts as zero.
+#[derive(Clone, Copy, Debug)]
+pub struct Instant<'a, T> {
+    /// Positions, rad (m where prismatic).
+    pub q: &'a [T],
+    /// Speeds, rad/s.
+    pub dq: &'a [T],
+    /// Accelerations, rad/s².
+    pub ddq: &'a [T],
+    /// Torque of the rigid arm, N·m.
+    pub rigid: &'a [T],
+    /// Eq. 16 friction, N·m.
+    pub friction: &'a [T],
+    /// Temperatures of the joints, °C.
+    pub temperature: &'a [T],
+    /// Time since the arm began to work, as cold as when its model was recorded, s.
+    pub running: T,
+}
+
+/// One basis function, N·m for a coefficient of 1 (rad for laws that move the link).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Law<T> {
+    /// 1: a constant torque.
+    Constant,
+    /// |q̇|: viscous friction that differs with the direction.
+    SpeedMagnitude,
+    /// |τ_rigid|·tanh(γ·q̇): gears rub harder under load.
+    Load {
+        /// γ, s/rad.
+        steepness: T,
+    },
+    /// tanh(γ·q̇)·exp(−(q̇/v)²): Stribeck's bump.
+    Stribeck {
+        /// γ, s/rad.
+        steepness: T,
+        /// v, rad/s.
+        speed: T,
+    },
+    /// tanh(γ·q̇)·|q̇|^p.
+    Power {
+        /// γ, s/rad.
+        steepness: T,
+        /// p.
+        power: T,
+    },
+    /// Dahl's presliding state z, −1 to 1, wound up over a distance: dz/dq = (1 − z·sign q̇)·sign q̇/δ; 0 at
+    /// the start.
+    Presliding {
+        /// δ, rad.
+        distance: T,
+    },
+    /// q: a spring's pull.
+    Position,
+    /// cos(k·q).
+    Cosine {
+        /// k, cycles a joint turn.
+        order: T,
+    },
+    /// sin(k·q).
+    Sine {
+        /// k, cycles a joint turn.
+        order: T,
+    },
+    /// f(q̇)·e^(−t/T): Eq. 16 friction that warmth takes away.
+    CoolFriction {
+        /// T, s.
+        time_constant: T,
+    },
+    /// q̇·e^(−t/T): its viscous part alone.
+    CoolSpeed {
+        /// T, s.
+        time_constant: T,
+    },
+    /// f(q̇)·(ϑ − ϑ₀)/10 K with a measured temperature.
+    HotFriction {
+        /// ϑ₀, °C.
+        reference: T,
+    },
+    /// q̇·(ϑ − ϑ₀)/10 K.
+    HotSpeed {
+        /// ϑ₀, °C.
+        reference: T,
+    },
+    /// tanh(γ·q̇ₖ) of another joint k.
+    OtherDirection {
+        /// k, from 0.
+        other: usize,
+        /// γ, s/rad.
+        steepness: T,
+    },
+    /// q̇ₖ of another joint k.
+    OtherSpeed {
+        /// k, from 0.
+        other: usize,
+    },
+    /// q̈ₖ of another joint k.
+    OtherAcceleration {
+        /// k, from 0.
+        other: usize,
+    },
+    /// τ of the rigid arm with friction: a factor between current and torque.
+    Torque,
+    /// τ·|τ|/s: a factor that changes with the torque.
+    TorqueMagnitude {
+        /// s, N·m.
+        scale: T,
+    },
+    /// τ·(τ/s)².
+    TorqueSquare {
+        /// s, N·m.
+        scale: T,
+    },
+    /// −τ_rigid while the motor crosses its play after a reversal, else 0.
+    Gap {
+        /// The play, rad.
+        gap: T,
+    },
+    /// The link gives way by −τ_rigid/K for a coefficient 1/K, rad/(N·m). Moves the link.
+    Compliance,
+    /// The link hangs to the side its load pushes it to: −tanh(50·τ_rigid/s). Moves the link.
+    HangingBack {
+        /// s, N·m: the largest load.
+        scale: T,
+    },
+}
+
+/// A law at a joint with its coefficient.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Term<T> {
+    /// The joint, from 0.
+    pub joint: usize,
+    /// The coefficient.
+    pub coefficient: T,
+    /// The law.
+    pub law: Law<T>,
+}
+
+/// What a law remembers from sample to sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Memory<T> {
+    begun: bool,
+    /// The last position, or the farthest one in the present direction.
+    place: T,
+    /// Presliding state, or the direction of the last reversal's end.
+    wound: T,
+    /// Where the motion last reversed.
+    turned: Option<T>,
+}
+
+impl<T: RealField + Copy> Default for Memory<T> {
+    fn default() -> Self {
+        Memory { begun: false, place: T::zero(), wound: T::zero(), turned: None }
+    }
+}
+
+fn of<T: RealField + Copy>(signal: &[T], joint: usize) -> T {
+    signal.get(joint).copied().unwrap_or_else(T::zero)
+}
+
+fn number<T: RealField>(x: f64) -> T {
+    nalgebra::convert(x)
+}
+
+impl<T: RealField + Copy> Law<T> {
+    /// Whether the law needs the torques of an instant.
+    #[must_use]
+    pub fn needs_torque(&self) -> bool {
+        matches!(
+            self,
+            Law::Load { .. }
+                | Law::CoolFriction { .. }
+                | Law::HotFriction { .. }
+                | Law::Torque
+                | Law::TorqueMagnitude { .. }
+                | Law::TorqueSquare { .. }
+                | Law::Gap { .. }
+        ) || self.moves_link()
+    }
+
+    /// Whether the law moves the link, so that the torque of the whole arm is another: [`Law::shift`] has it.
+    #[must_use]
+    pub fn moves_link(&self) -> bool {
+        matches!(self, Law::Compliance | Law::HangingBack { .. })
+    }
+
+    /// How far the link of a joint under `load` N·m is from where its motor is, rad for a coefficient of 1.
+    #[must_use]
+    pub fn shift(&self, load: T) -> T {
+        match *self {
+            Law::Compliance => -load,
+            Law::HangingBack { scale } => -(number::<T>(50.0) * load / scale).tanh(),
+            _ => T::zero(),
+        }
+    }
+
+    /// The torque for a coefficient of 1. Instants must be given in the order of time, each once.
+    #[must_use]
+    pub fn value(&self, joint: usize, now: &Instant<'_, T>, memory: &mut Memory<T>) -> T {
+        let (q, dq) = (of(now.q, joint), of(now.dq, joint));
+        let torque = || of(now.rigid, joint) + of(now.friction, joint);
+        let heat = |reference: T| match now.temperature.get(joint) {
+            Some(t) => (*t - reference) / number::<T>(10.0),
+            None => T::zero(),
+        };
+        match *self {
+            Law::Constant => T::one(),
+            Law::SpeedMagnitude => dq.abs(),
+            Law::Load { steepness } => of(now.rigid, joint).abs() * (steepness * dq).tanh(),
+            Law::Stribeck { steepness, speed } => {
+                let x = dq / speed;
+                (steepness * dq).tanh() * (-(x * x)).exp()
+            }
+            Law::Power { steepness, power } => (steepness * dq).tanh() * dq.abs().powf(power),
+            Law::Presliding { distance } => memory.wind(q, distance),
+            Law::Position => q,
+            Law::Cosine { order } => (order * q).cos(),
+            Law::Sine { order } => (order * q).sin(),
+            Law::CoolFriction { time_constant } => {
+                of(now.friction, joint) * (-now.running / time_constant).exp()
+            }
+            Law::CoolSpeed { time_constant } => dq * (-now.running / time_constant).exp(),
+            Law::HotFriction { reference } => of(now.friction, joint) * heat(reference),
+            Law::HotSpeed { reference } => dq * heat(reference),
+            Law::OtherDirection { other, steepness } => (steepness * of(now.dq, other)).tanh(),
+            Law::OtherSpeed { other } => of(now.dq, other),
+            Law::OtherAcceleration { other } => of(now.ddq, other),
+            Law::Torque => torque(),
+            Law::TorqueMagnitude { scale } => torque() * torque().abs() / scale,
+            Law::TorqueSquare { scale } => {
+                let share = torque() / scale;
+                torque() * (share * share)
+            }
+            Law::Gap { gap } => {
+                if memory.crosses(q, gap) {
+                    -of(now.rigid, joint)
+                } else {
+                    T::zero()
+                }
+            }
+            Law::Compliance | Law::HangingBack { .. } => T::zero(),
+        }
+    }
+}
+
+impl<T: RealField + Copy> Memory<T> {
+    /// Dahl's state at the next position, exact for a step of any size.
+    fn wind(&mut self, q: T, distance: T) -> T {
+        let step = if self.begun { q - self.place } else { T::zero() };
+        (self.begun, self.place) = (true, q);
+        if step != T::zero() {
+            let side = step.signum();
+            self.wound = side + (self.wound - side) * (-step.abs() / distance).exp();
+        }
+        self.wound
+    }
+
+    /// Whether the motor has moved less than the gap since its motion last reversed.
+    fn crosses(&mut self, q: T, gap: T) -> bool {
+        if !self.begun {
+            (self.begun, self.place) = (true, q);
+        }
+        let step = q - self.place;
+        let along = step * self.wound;
+        // A reversal counts once it is larger than encoder steps.
+        if along < T::zero() && step.abs() > gap * number(0.1) {
+            (self.turned, self.wound, self.place) = (Some(self.place), step.signum(), q);
+        } else if self.wound == T::zero() && step.abs() > gap {
+            (self.wound, self.place) = (step.signum(), q);
+        } else if along > T::zero() {
+            self.place = q;
+        }
+        self.turned.is_some_and(|turned| (q - turned).abs() < gap)
+    }
+}
+
+/// Adds the torque of every term, N·m, to `torque`; each term has its own memory.
+pub fn add_torques<T: RealField + Copy>(
+    terms: &[Term<T>],
+    memory: &mut [Memory<T>],
+    now: &Instant<'_, T>,
+    torque: &mut [T],
+) {
+    for (term, memory) in terms.iter().zip(memory) {
+        let value = term.law.value(term.joint, now, memory);
+        if let Some(torque) = torque.get_mut(term.joint) {
+            *torque += term.coefficient * value;
+        }
+    }
+}
+
+/// Moves positions from the motors' to the links', given the torque of the rigid arm at the motors'
+/// positions.
+pub fn move_links<T: RealField + Copy>(terms: &[Term<T>], rigid: &[T], q: &mut [T]) {
+    for term in terms.iter().filter(|term| term.law.moves_link()) {
+        if let Some(q) = q.get_mut(term.joint) {
+            *q += term.coefficient * term.law.shift(of(rigid, term.joint));
+        }
+    }
+}
+
+/// K terms with what they remember: the correction of a controller.
+#[derive(Clone, Debug)]
+pub struct Corrector<T, const K: usize> {
+    terms: [Term<T>; K],
+    memory: [Memory<T>; K],
+}
+
+impl<T: RealField + Copy, const K: usize> Corrector<T, K> {
+    /// A correction that remembers nothing yet.
+    #[must_use]
+    pub fn new(terms: [Term<T>; K]) -> Self {
+        Corrector { terms, memory: [Memory::default(); K] }
+    }
+
+    /// Whether some term moves a link: then the rigid torque must be taken again where
+    /// [`Corrector::move_links`] says.
+    #[must_use]
+    pub fn moves_links(&self) -> bool {
+        self.terms.iter().any(|term| term.law.moves_link())
+    }
+
+    /// See [`move_links`].
+    pub fn move_links(&self, rigid: &[T], q: &mut [T]) {
+        move_links(&self.terms, rigid, q);
+    }
+
+    /// See [`add_torques`]; call it once a sample.
+    pub fn add_torques(&mut self, now: &Instant<'_, T>, torque: &mut [T]) {
+        add_torques(&self.terms, &mut self.memory, now, torque);
+    }
+}

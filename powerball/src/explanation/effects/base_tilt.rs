@@ -1,0 +1,122 @@
+//! Gravity that does not point where the arm file says: the base is not level.
+
+use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
+use crate::identification::estimate::Solver;
+use crate::logs::regression::Column;
+use dyngen::exact::rational;
+use faer::Mat;
+use serde_json::{Value, json};
+
+/// Two columns: the change of gravity torque for a small turn of the base about its x and y axes.
+///
+/// A base turned by ω sees gravity turned by −ω: Δg = −ω × g. What the arm's own gravity never shows, such as
+/// the way of a link's weight from an upright first axis, acts too once gravity is turned; it is unknown, so
+/// that its products with the tilt are columns of their own ([`UNSHOWN`]).
+pub(super) struct BaseTilt;
+
+/// The form with the parameters that level gravity does not show
+/// ([`RigidBody::hidden`](crate::logs::regression::RigidBody::hidden)).
+const UNSHOWN: usize = 1;
+
+impl Effect for BaseTilt {
+    fn name(&self) -> &'static str {
+        "base_tilt"
+    }
+
+    fn class(&self) -> Class {
+        Class::Position
+    }
+
+    fn of_the_body(&self) -> bool {
+        true
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Law
+    }
+
+    fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
+        let joints: Vec<usize> = context.moving_joints().collect();
+        let weightless = context.data.body.arm().gravity.iter().all(|g| rational::to_f64(g) == 0.0);
+        if joints.is_empty() || weightless {
+            return Vec::new();
+        }
+        let with = |form| Candidate { joints: joints.clone(), ..Candidate::on(0, form, Vec::new(), 1) };
+        let forms = if context.data.body.hidden().is_empty() { 0..UNSHOWN } else { 0..UNSHOWN + 1 };
+        forms.map(with).collect()
+    }
+
+    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
+        let body = context.data.body;
+        let (turns, all) = (turns(context), body.carried(context.fit.inertial()));
+        let unshown: &[Vec<f64>] = if candidate.form == UNSHOWN { body.hidden() } else { &[] };
+        let known = turns.iter().map(|turn| pulled(context, turn, &all));
+        // A turn about the other axis has the same columns, of other parameters.
+        let unknown = unshown.iter().map(|direction| pulled(context, &turns[0], direction));
+        known.chain(unknown).collect::<Option<Vec<_>>>().unwrap_or_default()
+    }
+
+    fn part(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Part {
+        let turns = turns(context);
+        let gravity = &context.data.body.arm().gravity;
+        let (tilt, unshown) = c.split_at(2);
+        let change = |k: usize| turns.iter().zip(tilt).map(|(turn, c)| c * turn[k]).sum::<f64>();
+        let found = if candidate.form == UNSHOWN { moments(context, tilt, unshown) } else { Vec::new() };
+        Part::Gravity([0, 1, 2].map(|k| rational::to_f64(&gravity[k]) + change(k)), found)
+    }
+
+    fn admissible(&self, _: &Candidate, c: &[f64]) -> bool {
+        c.iter().take(2).all(|t| t.abs() < 0.5)
+    }
+
+    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
+        json!({ "tilt": found.first().map(|f| f.coefficients[..2].to_vec()).unwrap_or_default() })
+    }
+}
+
+/// The static torque of some parameters under some gravity.
+fn pulled(context: &Context<'_>, gravity: &[f64; 3], all: &[f64]) -> Option<Column> {
+    let data = context.data;
+    let carriers: Vec<usize> = (0..all.len()).filter(|k| all[*k] != 0.0 && k % 11 < 4).collect();
+    let by_recording = data.recordings.iter().map(|r| {
+        let mut torque = vec![0.0; r.q.len()];
+        for (axis, g) in gravity.iter().enumerate().filter(|(_, g)| **g != 0.0) {
+            let columns = data.body.gravity_columns(axis, &carriers, &r.q)?;
+            for (t, row) in torque.iter_mut().zip(columns.chunks_exact(carriers.len().max(1))) {
+                *t += g * row.iter().zip(&carriers).map(|(c, k)| c * all[*k]).sum::<f64>();
+            }
+        }
+        Some(torque)
+    });
+    Some(data.column_over_all(&by_recording.collect::<Option<Vec<_>>>()?))
+}
+
+/// What all parameters gain where the unshown ones' torques are those found: under the whole tilt they are
+/// those of so much of each direction.
+fn moments(context: &Context<'_>, tilt: &[f64], found: &[f64]) -> Vec<f64> {
+    let hidden = context.data.body.hidden();
+    let turns = turns(context);
+    let whole = [0, 1, 2].map(|k| turns.iter().zip(tilt).map(|(turn, t)| t * turn[k]).sum::<f64>());
+    let under = |gravity: &[f64; 3]| -> Vec<Column> {
+        hidden.iter().filter_map(|direction| pulled(context, gravity, direction)).collect()
+    };
+    let (own, unit) = (under(&whole), under(&turns[0]));
+    if own.len() < hidden.len() || unit.len() < hidden.len() {
+        return Vec::new();
+    }
+    let product = |a: &Column, b: &Column| -> f64 {
+        a.parts.iter().zip(&b.parts).flat_map(|((_, a), (_, b))| a.iter().zip(b)).map(|(a, b)| a * b).sum()
+    };
+    let gram = Mat::from_fn(own.len(), own.len(), |a, b| product(&own[a], &own[b]));
+    let right: Vec<f64> =
+        own.iter().map(|column| unit.iter().zip(found).map(|(u, c)| c * product(column, u)).sum()).collect();
+    let much = Solver::new(&gram, |_| true).solve(&right);
+    let gain = |k: usize| hidden.iter().zip(&much).map(|(direction, m)| m * direction[k]).sum();
+    (0..11 * context.data.dof()).map(gain).collect()
+}
+
+/// The change of gravity for a turn about x and about y: −(e_x × g) and −(e_y × g).
+fn turns(context: &Context<'_>) -> [[f64; 3]; 2] {
+    let [x, y, z] = [0, 1, 2].map(|k| rational::to_f64(&context.data.body.arm().gravity[k]));
+    [[0.0, z, -y], [-z, 0.0, x]]
+}

@@ -1,0 +1,217 @@
+//! An outside force on the last link during some time: a touch, a push, a thing leaned on.
+
+use super::candidate::Window;
+use super::payload::{ANOTHER_LOG, block_start, mask};
+use super::window_sums::{Sums, explained};
+use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
+use crate::identification::estimate::Solver;
+use crate::logs::regression::{Block, Column};
+use serde_json::{Value, json};
+use std::ops::Range;
+
+/// A constant force in the base frame at the last frame's origin, during a window of one log.
+pub(super) struct ContactWrench;
+
+/// Windows begin and end on a grid of this, s.
+const GRID: f64 = 0.5;
+/// Longest window in grid steps that is tried from every step on, and anywhere.
+const SHORT: usize = 16;
+/// Ends of longer windows are looked for this many grid steps apart first.
+const COARSE: usize = 4;
+/// Longer windows keep away from their log's ends by a share of 1 / `CLEAR` of it: what is there until the
+/// end is a payload.
+const CLEAR: usize = 10;
+/// Larger forces are a rank-poor fit, N.
+const MOST: f64 = 2000.0;
+/// Grid of the same push in other logs, s: its force is known there, so that a row more or less can be told.
+const FINE: f64 = 0.1;
+/// A log has the same push if that explains enough ([`ANOTHER_LOG`], beyond what the best of all its windows
+/// explains by chance) and at least this share of the force's own torque, over at least this share of the
+/// time that it lasted: a push of another size or direction is another one, and resembles this one for a
+/// moment only.
+const SAME_FORCE: f64 = 0.8;
+const SAME_TIME: f64 = 0.5;
+
+impl Effect for ContactWrench {
+    fn name(&self) -> &'static str {
+        "contact_wrench"
+    }
+
+    fn class(&self) -> Class {
+        Class::Event
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Time
+    }
+
+    fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
+        search(context).into_iter().collect()
+    }
+
+    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
+        let masks: Vec<Vec<f64>> =
+            (0..context.data.dof()).map(|j| mask(context, j, &candidate.windows)).collect();
+        let cut = |column: &Column| Column {
+            parts: column
+                .parts
+                .iter()
+                .map(|(j, values)| (*j, values.iter().zip(&masks[*j]).map(|(v, m)| v * m).collect()))
+                .collect(),
+        };
+        context.data.force_columns().iter().map(cut).collect()
+    }
+
+    fn part(&self, _: &Context<'_>, _: &Candidate, _: &[f64]) -> Part {
+        Part::Event
+    }
+
+    fn admissible(&self, _: &Candidate, c: &[f64]) -> bool {
+        c.iter().all(|f| f.abs() < MOST)
+    }
+
+    /// When the other logs have the same force: nothing of it is fitted to them but its times.
+    fn seen_in(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
+        let data = context.data;
+        let mut seen = candidate.clone();
+        seen.windows.retain(|w| !data.logs.contains(&w.log));
+        let lasted = seen.windows.iter().map(|w| w.to - w.from).fold(f64::INFINITY, f64::min);
+        let steps = data.blocks_of(FINE);
+        let explains = explained(context, data.force_columns(), c, &steps);
+        for log in by_log(&steps) {
+            let chance = 4.0 * (log.len().max(1) as f64).ln();
+            let mut open = vec![log.clone()];
+            while let Some(stretch) = open.pop() {
+                let found = best_run(&explains[stretch.clone()]);
+                let found = stretch.start + found.start..stretch.start + found.end;
+                let (less, own) =
+                    explains[found.clone()].iter().fold((0.0, 0.0), |sum, e| (sum.0 + e.0, sum.1 + e.1));
+                let as_long = found.len() as f64 * FINE > SAME_TIME * lasted;
+                if less > ANOTHER_LOG + chance && less > SAME_FORCE * own && as_long {
+                    seen.windows.push(window(context, &steps, &log, &found)?);
+                    open.extend([stretch.start..found.start, found.end..stretch.end]);
+                }
+            }
+        }
+        Some(seen)
+    }
+
+    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
+        let windows = || found.iter().flat_map(|f| &f.candidate.windows);
+        json!({
+            "force": found.iter().flat_map(|f| f.candidate.windows.iter().map(|_| f.coefficients.to_vec())).collect::<Vec<_>>(),
+            "start_time": windows().map(|w| w.from).collect::<Vec<_>>(),
+            "end_time": windows().map(|w| w.to).collect::<Vec<_>>(),
+        })
+    }
+}
+
+/// The window that explains most: the best of all short ones and of longer ones on a coarse grid, with its
+/// ends moved.
+fn search(context: &Context<'_>) -> Option<Candidate> {
+    let (data, fit) = (context.data, context.fit);
+    let columns = data.force_columns();
+    if columns.len() < 3 {
+        return None;
+    }
+    let (gram, _, _) = fit.gram.sum(&fit.weights, |_| true);
+    let solver = Solver::new(&gram, |c| fit.free[c]);
+    let steps = data.blocks_of(GRID);
+    let mut before = vec![Sums::zero(fit.design.size, 3)];
+    for step in &steps {
+        let mut sum = before[before.len() - 1].clone();
+        sum.add(&Sums::of_block(context, columns, step), 1.0);
+        before.push(sum);
+    }
+    let mut searched = 0.0;
+    let mut best: Option<(f64, Range<usize>)> = None;
+    let mut consider = |window: Range<usize>, best: &mut Option<(f64, Range<usize>)>| {
+        let mut sums = before[window.end].clone();
+        sums.add(&before[window.start], -1.0);
+        searched += 1.0;
+        let (gain, force) = sums.gain(&solver);
+        if gain > best.as_ref().map_or(0.0, |(g, _)| *g) && force.iter().all(|f| f.abs() < MOST) {
+            *best = Some((gain, window));
+        }
+    };
+    let logs = by_log(&steps);
+    for log in &logs {
+        for first in log.clone() {
+            for end in first + 1..=(first + SHORT).min(log.end) {
+                consider(first..end, &mut best);
+            }
+        }
+        let inner = inner(log);
+        for first in inner.clone().step_by(COARSE) {
+            for end in (first + SHORT + 1..=inner.end).step_by(COARSE) {
+                consider(first..end, &mut best);
+            }
+        }
+    }
+    let (_, coarse) = best.clone()?;
+    let log = logs.iter().find(|log| log.contains(&coarse.start))?;
+    if coarse.len() > SHORT {
+        let inner = inner(log);
+        let near =
+            |at: usize| at.saturating_sub(COARSE - 1).max(inner.start)..(at + COARSE).min(inner.end + 1);
+        for first in near(coarse.start) {
+            for end in near(coarse.end) {
+                consider(first..end, &mut best);
+            }
+        }
+    }
+    let (_, found) = best?;
+    let windows = vec![window(context, &steps, log, &found)?];
+    let joints = (0..data.dof()).collect();
+    Some(Candidate { joints, form: 0, values: Vec::new(), windows, searched })
+}
+
+/// The steps of each log.
+fn by_log(steps: &[Block]) -> Vec<Range<usize>> {
+    (steps.chunk_by(|a, b| a.log == b.log))
+        .scan(0, |end, steps| {
+            *end += steps.len();
+            Some(*end - steps.len()..*end)
+        })
+        .collect()
+}
+
+/// The window of some steps of a log.
+fn window(
+    context: &Context<'_>,
+    steps: &[Block],
+    log: &Range<usize>,
+    found: &Range<usize>,
+) -> Option<Window> {
+    let data = context.data;
+    let from = block_start(context, &steps[found.start])?;
+    // To the last row before the next step begins.
+    let to = match found.end < log.end {
+        true => block_start(context, &steps[found.end])? - 0.5 / data.rate(),
+        false => end_of_log(context, steps[found.start].log),
+    };
+    Some(Window::new(data, steps[found.start].log, from, to))
+}
+
+/// The steps in a row that together explain most.
+fn best_run(explains: &[(f64, f64)]) -> Range<usize> {
+    let (mut best, mut run) = ((0.0, 0..0), (0.0, 0..0));
+    for (k, (less, _)) in explains.iter().enumerate() {
+        run = if run.0 > 0.0 { (run.0 + less, run.1.start..k + 1) } else { (*less, k..k + 1) };
+        if run.0 > best.0 {
+            best = run.clone();
+        }
+    }
+    best.1
+}
+
+/// Where a log's longer windows lie.
+fn inner(log: &Range<usize>) -> Range<usize> {
+    let clear = log.len().div_ceil(CLEAR);
+    log.start + clear..log.end.saturating_sub(clear).max(log.start + clear)
+}
+
+fn end_of_log(context: &Context<'_>, log: usize) -> f64 {
+    let end = |r: &crate::logs::regression::Recording| r.start + r.len() as f64 / r.rate;
+    context.data.recordings.iter().filter(|r| r.log == log).map(end).fold(0.0, f64::max)
+}

@@ -1,0 +1,230 @@
+//! What an effect may look at: the data, the model fitted so far, and what it leaves.
+
+use crate::controller::correction::{Instant, Law, Memory};
+use crate::controller::friction::TanhFriction;
+use crate::identification::estimate::Fit;
+use crate::logs::regression::{Column, Data, Recording};
+use crate::logs::signal::{Butterworth, difference};
+use std::sync::OnceLock;
+
+/// Data together with the model fitted so far.
+#[derive(Debug)]
+pub struct Context<'a> {
+    /// The data; not always those that the model was fitted to.
+    pub data: &'a Data<'a>,
+    /// The model.
+    pub fit: &'a Fit,
+    /// What the model leaves on the data, by joint.
+    pub residual: &'a [Vec<f64>],
+    rigid: OnceLock<Vec<Vec<f64>>>,
+    friction: OnceLock<Vec<Vec<f64>>>,
+    prediction: OnceLock<Vec<Vec<f64>>>,
+}
+
+impl<'a> Context<'a> {
+    /// A model seen on some data.
+    #[must_use]
+    pub fn new(data: &'a Data<'a>, fit: &'a Fit, residual: &'a [Vec<f64>]) -> Context<'a> {
+        Context {
+            data,
+            fit,
+            residual,
+            rigid: OnceLock::new(),
+            friction: OnceLock::new(),
+            prediction: OnceLock::new(),
+        }
+    }
+
+    /// Joints that move.
+    pub fn moving_joints(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.data.dof()).filter(|j| self.data.joints[*j].len() >= 50)
+    }
+
+    /// Torque of the rigid arm by recording, n a sample, N·m.
+    pub fn rigid(&self) -> &[Vec<f64>] {
+        self.rigid.get_or_init(|| {
+            let torque = |r: &Recording| self.fit.rigid_torque(self.data.body, &r.q, &r.v, &r.a);
+            self.data.recordings.iter().map(torque).collect()
+        })
+    }
+
+    /// Eq. 16 friction by recording, n a sample, N·m.
+    pub fn friction(&self) -> &[Vec<f64>] {
+        self.friction.get_or_init(|| {
+            let n = self.data.dof();
+            let friction: Vec<TanhFriction<f64>> =
+                (0..n).map(|j| TanhFriction::new(self.fit.friction(j))).collect();
+            let of =
+                |r: &Recording| r.v.iter().enumerate().map(|(k, v)| friction[k % n].torque(*v)).collect();
+            self.data.recordings.iter().map(of).collect()
+        })
+    }
+
+    /// Rigid torque and friction by recording, n a sample, N·m.
+    pub fn prediction(&self) -> &[Vec<f64>] {
+        self.prediction.get_or_init(|| {
+            let sum = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a + b).collect();
+            self.rigid().iter().zip(self.friction()).map(sum).collect()
+        })
+    }
+
+    /// The steepest level of a joint's friction, s/rad: how fast its sign changes.
+    #[must_use]
+    pub fn steepness(&self, joint: usize) -> f64 {
+        let [g1, g2, g3, g4, _] = self.fit.friction(joint);
+        match (g1 > 0.0, g3 > 0.0) {
+            (true, true) => g2.max(g4),
+            (true, false) => g2,
+            (false, true) => g4,
+            (false, false) => 20.0 / self.top_speed(joint),
+        }
+    }
+
+    /// The speed that a joint exceeds in 5 % of the samples that were fitted, rad/s.
+    #[must_use]
+    pub fn top_speed(&self, joint: usize) -> f64 {
+        self.fit.top_speed[joint]
+    }
+
+    /// The column of a law at a joint: the law along the recordings.
+    pub fn law_column(&self, joint: usize, law: Law<f64>) -> Column {
+        if law.moves_link() {
+            return self.moved_link_column(joint, law, None);
+        }
+        let torques = law.needs_torque();
+        self.data.column_on(joint, |r, recording| {
+            let none: &[f64] = &[];
+            let (rigid, friction) = if torques {
+                (self.rigid()[r].as_slice(), self.friction()[r].as_slice())
+            } else {
+                (none, none)
+            };
+            let mut memory = Memory::default();
+            let mut values = Vec::with_capacity(recording.len());
+            each_instant(recording, rigid, friction, |_, now| {
+                values.push(law.value(joint, now, &mut memory))
+            });
+            values
+        })
+    }
+
+    /// The change of rigid torque on all joints for a link that is moved, over the law's coefficient: to
+    /// first order, or for a coefficient of about `about`.
+    pub(super) fn moved_link_column(&self, joint: usize, law: Law<f64>, about: Option<f64>) -> Column {
+        let n = self.data.dof();
+        let loads = || self.rigid().iter().flat_map(|t| t.iter().skip(joint).step_by(n));
+        let first_order = MOVED / loads().fold(1e-9f64, |top, load| top.max(law.shift(*load).abs()));
+        let (size, passes, smoothing) = match about {
+            Some(size) if size > first_order => (size, PASSES, SOFT),
+            _ => (first_order, 1, STIFF),
+        };
+        let difference: Vec<Vec<f64>> = (self.data.recordings.iter().zip(self.rigid()))
+            .map(|(recording, rigid)| {
+                let mut moved = rigid.clone();
+                for _ in 0..passes {
+                    let mut motion = [recording.q.clone(), recording.v.clone(), recording.a.clone()];
+                    move_link(&mut motion, recording, &moved, joint, law, (size, smoothing));
+                    let [q, v, a] = motion;
+                    moved = self.fit.rigid_torque(self.data.body, &q, &v, &a);
+                }
+                moved.iter().zip(rigid).map(|(a, b)| (a - b) / size).collect()
+            })
+            .collect();
+        self.data.column_over_all(&difference)
+    }
+
+    /// Times of a joint's rows in their log's own t, with the log: by row.
+    #[must_use]
+    pub fn row_times(&self, joint: usize) -> Vec<(usize, f64)> {
+        let data = self.data;
+        let rows = &data.joints[joint];
+        let mut times = Vec::with_capacity(rows.len());
+        for (r, recording) in data.recordings.iter().enumerate() {
+            let kept = data.band.kept(recording.len());
+            times.extend(
+                rows.kept[r]
+                    .iter()
+                    .map(|k| (recording.log, recording.start + kept[*k] as f64 / recording.rate)),
+            );
+        }
+        times
+    }
+}
+
+/// The largest deflection that a difference is taken with, rad.
+const MOVED: f64 = 1e-4;
+/// A compliant joint's deflection is smoothed to this before it is differentiated twice, Hz: torques are
+/// noisy derivatives already.
+const STIFF: f64 = 5.0;
+/// The same where it is as large as was found: above the frequency at which a soft arm swings on its gear the
+/// deflection is not what its load says.
+pub(crate) const SOFT: f64 = 2.5;
+/// A link that gives way far carries another load there: the load is taken so many times.
+pub(crate) const PASSES: usize = 2;
+/// The load whose side a link hangs to is smoothed to this, Hz: going through the play is an impulse in the
+/// rigid torque of the motor's motion, and would change the side that it follows from.
+const SIDE: f64 = 3.0;
+/// The way through the play is smoothed as positions are, Hz and order (see
+/// [`DataOptions`](crate::logs::regression::DataOptions)): both are differentiated alike.
+const WAY: (usize, f64) = (4, 8.0);
+
+/// Adds to positions, speeds and accelerations how a law moves one link, `size` times: n values a sample,
+/// `rigid` the torque of the rigid arm where the motors are. What gives way is smoothed, Hz.
+pub(crate) fn move_link(
+    motion: &mut [Vec<f64>; 3],
+    recording: &Recording,
+    rigid: &[f64],
+    joint: usize,
+    law: Law<f64>,
+    (size, smoothing): (f64, f64),
+) {
+    let n = recording.dof;
+    let rate = recording.rate;
+    let smooth = |(order, cutoff): (usize, f64), signal: Vec<f64>| {
+        let filter = Butterworth::low_pass(order, cutoff.min(0.3 * rate), rate);
+        filter.map_or(signal.clone(), |f| f.zero_phase(&signal))
+    };
+    let load: Vec<f64> = rigid.iter().skip(joint).step_by(n).copied().collect();
+    let shifts = |load: Vec<f64>| load.iter().map(|t| size * law.shift(*t)).collect();
+    let shift = match law {
+        Law::Compliance => smooth((2, smoothing), shifts(load)),
+        _ => smooth(WAY, shifts(smooth((2, SIDE), load))),
+    };
+    // What follows the load has speed and acceleration.
+    let (dv, da) =
+        (difference::derivative(&shift, 1.0 / rate), difference::second_derivative(&shift, 1.0 / rate));
+    let moves = [shift, dv, da];
+    for (signal, by) in motion.iter_mut().zip(moves) {
+        for (value, by) in signal.iter_mut().skip(joint).step_by(n).zip(by) {
+            *value += by;
+        }
+    }
+}
+
+/// Goes through the instants of a recording in order; `rigid` and `friction` hold n values a sample, or
+/// nothing.
+pub(crate) fn each_instant(
+    recording: &Recording,
+    rigid: &[f64],
+    friction: &[f64],
+    mut at: impl FnMut(usize, &Instant<'_, f64>),
+) {
+    let n = recording.dof;
+    let mut temperature = vec![0.0; recording.temperature.as_ref().map_or(0, Vec::len)];
+    for k in 0..recording.len() {
+        let joints = k * n..(k + 1) * n;
+        for (now, logged) in temperature.iter_mut().zip(recording.temperature.iter().flatten()) {
+            *now = logged[k];
+        }
+        let now = Instant {
+            q: &recording.q[joints.clone()],
+            dq: &recording.v[joints.clone()],
+            ddq: &recording.a[joints.clone()],
+            rigid: rigid.get(joints.clone()).unwrap_or_default(),
+            friction: friction.get(joints).unwrap_or_default(),
+            temperature: &temperature,
+            running: recording.clock + k as f64 / recording.rate,
+        };
+        at(k, &now);
+    }
+}

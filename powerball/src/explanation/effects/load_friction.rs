@@ -1,0 +1,46 @@
+//! Friction that grows with the torque a joint transmits: gears are pressed together harder.
+
+use super::candidate::by_joint;
+use super::{Axis, Candidate, Class, Context, Effect, Found};
+use crate::controller::correction::Law;
+use serde_json::{Value, json};
+
+/// τ = c·|τ_rigid|·tanh(γ·q̇), c ≥ 0 in N·m per N·m.
+pub(super) struct LoadFriction;
+
+/// A gear that loses more than this share of its torque would not be used.
+const MOST: f64 = 0.6;
+
+impl Effect for LoadFriction {
+    fn name(&self) -> &'static str {
+        "load_friction"
+    }
+
+    fn class(&self) -> Class {
+        Class::Friction
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Load
+    }
+
+    fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
+        context.moving_joints().map(|j| Candidate::on(j, 0, Vec::new(), 1)).collect()
+    }
+
+    fn laws(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
+        vec![Law::Load { steepness: context.steepness(candidate.joints[0]) }]
+    }
+
+    fn non_negative(&self) -> bool {
+        true
+    }
+
+    fn admissible(&self, _: &Candidate, coefficients: &[f64]) -> bool {
+        coefficients.iter().all(|c| *c < MOST)
+    }
+
+    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
+        json!({ "coefficient": by_joint(found, |f| f.coefficients[0]) })
+    }
+}

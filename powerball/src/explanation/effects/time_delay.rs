@@ -1,0 +1,79 @@
+//! Torque and position that were not sampled at the same time.
+
+use super::candidate::by_joint;
+use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
+use crate::logs::regression::Column;
+use serde_json::{Value, json};
+
+/// τ = τ_model(t − d) − τ_model(t), its coefficient near 1: all joints alike (form 0) or one joint (form 1).
+///
+/// A positive delay means that the logged torque is late.
+pub(super) struct TimeDelay;
+
+/// Starting values, s; the coefficient makes each a third to three times as long.
+const DELAYS: [f64; 7] = [0.000_8, 0.003, 0.008, 0.02, -0.000_8, -0.003, -0.01];
+
+impl Effect for TimeDelay {
+    fn name(&self) -> &'static str {
+        "time_delay"
+    }
+
+    fn class(&self) -> Class {
+        Class::Dynamics
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::TorqueRate
+    }
+
+    fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
+        let all: Vec<usize> = context.moving_joints().collect();
+        let mut candidates = Vec::new();
+        for delay in DELAYS {
+            let common = Candidate::on(0, 0, vec![delay], DELAYS.len());
+            candidates.push(Candidate { joints: all.clone(), ..common });
+            candidates.extend(all.iter().map(|j| Candidate::on(*j, 1, vec![delay], DELAYS.len())));
+        }
+        candidates
+    }
+
+    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
+        let n = context.data.dof();
+        let shift = candidate.values[0] * context.data.rate();
+        let prediction = context.prediction();
+        let parts = candidate.joints.iter().map(|&j| {
+            let column = context.data.column_on(j, |r, recording| {
+                let torque: Vec<f64> = prediction[r].iter().skip(j).step_by(n).copied().collect();
+                (0..recording.len()).map(|k| at(&torque, k as f64 - shift) - torque[k]).collect()
+            });
+            column.parts.into_iter().next().unwrap_or_default()
+        });
+        vec![Column { parts: parts.collect() }]
+    }
+
+    fn part(&self, _: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Part {
+        Part::Delay(candidate.values[0] * c[0])
+    }
+
+    fn admissible(&self, candidate: &Candidate, c: &[f64]) -> bool {
+        // The shifted torque must be seen whole, or the shift is another; below 10 µs nothing is late.
+        (0.3..3.0).contains(&c[0]) && (c[0] * candidate.values[0]).abs() > 1e-5
+    }
+
+    fn refined(&self, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
+        let delay = candidate.values[0] * c[0].clamp(0.3, 3.0);
+        Some(Candidate { values: vec![delay], ..candidate.clone() })
+    }
+
+    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
+        json!({ "delay": by_joint(found, |f| f.candidate.values[0] * f.coefficients[0]) })
+    }
+}
+
+/// A signal between its samples.
+pub(crate) fn at(x: &[f64], k: f64) -> f64 {
+    let k = k.clamp(0.0, (x.len() - 1) as f64);
+    let low = (k as usize).min(x.len().saturating_sub(2));
+    let share = k - low as f64;
+    x[low] * (1.0 - share) + x.get(low + 1).copied().unwrap_or(x[low]) * share
+}

@@ -1,0 +1,144 @@
+//! Which of two models old and new logs speak for.
+//!
+//! Both are fitted to all logs that may be fitted. Block by block the χ² of the one is taken from that of the
+//! other; blocks count as independent, so their sum has an honest error whatever colour the residual has
+//! (Vuong, Likelihood ratio tests for model selection and non-nested hypotheses, Econometrica 1989, with
+//! blocks in the place of samples).
+
+use crate::explanation::explain::{ExplainError, Hypothesis, Open};
+use crate::identification::estimate::Folds;
+use crate::identification::estimate::distribution::f_tail;
+use crate::logs::log::Log;
+use crate::logs::regression::{Data, DataOptions, RigidBody};
+
+/// What was decided.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decision {
+    /// The name that is right; `None` where these logs cannot say.
+    pub winner: Option<&'static str>,
+    /// Why, in words.
+    pub why: String,
+    /// χ² by which the better one leads on the fitted logs, after a penalty for coefficients.
+    pub evidence: f64,
+    /// Probability of such a lead by chance.
+    pub p_value: f64,
+    /// χ² by which it leads on the held-out logs.
+    pub held_out: f64,
+}
+
+/// Probability of a wrong decision that is accepted.
+const LEVEL: f64 = 0.01;
+/// What one coefficient gains by chance, twice over (Akaike).
+const PER_COEFFICIENT: f64 = 2.0;
+/// Two names whose models differ by less than this share of what either explains say the same.
+const SAME: f64 = 0.1;
+
+/// Decides between the first two open names.
+///
+/// # Errors
+/// Logs that hold too little.
+pub fn decide(
+    body: &RigidBody,
+    open: &Open,
+    fit: &[Log],
+    held_out: &[Log],
+    options: &DataOptions,
+) -> Result<Decision, ExplainError> {
+    let data = Data::new(body, fit, options).map_err(ExplainError::Fit)?;
+    let other = Data::new(body, held_out, options).map_err(ExplainError::Validate)?;
+    let folds = Folds::new(&data);
+    let fitted: Vec<Hypothesis> = open.hypotheses.iter().map(|h| h.fitted_to(&data, &folds)).collect();
+    let [a, b, ..] = fitted.as_slice() else {
+        let why = "one name only".to_string();
+        return Ok(Decision { winner: None, why, evidence: 0.0, p_value: 1.0, held_out: 0.0 });
+    };
+    let (own_a, own_b) = (a.fitted_columns.len(), b.fitted_columns.len());
+    let penalty = PER_COEFFICIENT * (own_b as f64 - own_a as f64);
+    let blocks = leads(&data, a, b);
+    let lead = blocks.iter().sum::<f64>() + penalty;
+    let held = leads(&other, a, b).iter().sum::<f64>();
+    let p_value = chance(&blocks, lead);
+    // From here on `first` is the one that leads.
+    let (first, second, sign) = if lead >= 0.0 { (a, b, 1.0) } else { (b, a, -1.0) };
+    let (evidence, held_out) = (sign * lead, sign * held);
+    let share = difference(&data, a, b);
+    let (winner, why) = if p_value < LEVEL && held_out > 0.0 {
+        (
+            Some(first.name),
+            format!(
+                "{} fits all logs better by χ² {evidence:.0} (p = {p_value:.1e} between blocks), and by \
+                    {held_out:.0} where nothing was fitted",
+                first.name
+            ),
+        )
+    } else if share < SAME && own_a != own_b {
+        let simpler = if own_a < own_b { a } else { b };
+        let more = if own_a < own_b { b } else { a };
+        (
+            Some(simpler.name),
+            format!(
+                "{} comes out the same within {:.0} % and needs {} more: it is {}",
+                more.name,
+                (100.0 * share).ceil(),
+                own_a.abs_diff(own_b),
+                simpler.name
+            ),
+        )
+    } else {
+        (
+            None,
+            format!(
+                "{} leads {} by χ² {evidence:.1} on the fitted and {held_out:.1} on the held-out logs (p = \
+                    {p_value:.2}): not enough",
+                first.name, second.name
+            ),
+        )
+    };
+    Ok(Decision { winner, why, evidence, p_value, held_out })
+}
+
+/// χ² of `b` less that of `a`, by block.
+fn leads(data: &Data<'_>, a: &Hypothesis, b: &Hypothesis) -> Vec<f64> {
+    let residual = |h: &Hypothesis| -> Vec<Vec<f64>> {
+        let design = h.design(data);
+        let rest = |j: usize| {
+            let predicted = design.predict(j, &h.fit.theta);
+            data.joints[j].torque.iter().zip(predicted).map(|(y, p)| y - p).collect()
+        };
+        (0..data.dof()).map(rest).collect()
+    };
+    let (of_a, of_b) = (residual(a), residual(b));
+    let joint = |j: usize, rows: &std::ops::Range<usize>| {
+        let weight = 0.5 * (a.fit.weights[j] + b.fit.weights[j]);
+        let square = |r: &[f64]| r.iter().map(|v| v * v).sum::<f64>();
+        weight * (square(&of_b[j][rows.clone()]) - square(&of_a[j][rows.clone()]))
+    };
+    (data.blocks.iter())
+        .map(|block| block.rows.iter().enumerate().map(|(j, rows)| joint(j, rows)).sum())
+        .collect()
+}
+
+/// Probability of a sum as far from zero by chance, from the spread of the blocks.
+fn chance(blocks: &[f64], lead: f64) -> f64 {
+    let n = blocks.len() as f64;
+    let mean = blocks.iter().sum::<f64>() / n;
+    let variance = blocks.iter().map(|b| (b - mean) * (b - mean)).sum::<f64>() * n / (n - 1.0);
+    if n < 4.0 || variance <= 0.0 { 1.0 } else { f_tail(lead * lead / variance, 1.0, n - 1.0) }
+}
+
+/// How much two models differ over what their own names explain, rms over rms, weighted by joint.
+fn difference(data: &Data<'_>, a: &Hypothesis, b: &Hypothesis) -> f64 {
+    let (own_a, own_b) = (a.own_torque(data), b.own_torque(data));
+    let (of_a, of_b) = (a.design(data), b.design(data));
+    let (mut apart, mut size) = (0.0, [0.0; 2]);
+    for j in 0..data.dof() {
+        let w = a.fit.weights[j];
+        let square = |x: &[f64]| w * x.iter().map(|v| v * v).sum::<f64>();
+        let (x, y) = (of_a.predict(j, &a.fit.theta), of_b.predict(j, &b.fit.theta));
+        apart += w * x.iter().zip(&y).map(|(x, y)| (x - y) * (x - y)).sum::<f64>();
+        size[0] += square(&own_a[j]);
+        size[1] += square(&own_b[j]);
+    }
+    let least = size[0].min(size[1]);
+    if least > 0.0 { (apart / least).sqrt() } else { f64::INFINITY }
+}

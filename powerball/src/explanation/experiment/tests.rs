@@ -1,0 +1,94 @@
+//! A hose that pulls nearly evenly over narrow paths: the logs cannot say whether it is a spring, and the
+//! experiment can.
+
+use super::{TRAJECTORY, design, learn, propose};
+use crate::explanation::explain::{Explained, Options, explain};
+use crate::identification::excite::{Limits, Settings, optimise};
+use crate::identification::motion::Motion;
+use crate::logs::log::{Log, common_clock};
+use crate::logs::regression::{DataOptions, RigidBody};
+use crate::virtual_arm::{Effect, Plant, lwa4p};
+use dyngen::{Model, SetKind};
+
+/// Logs along paths that leave most of every joint's range unused, and what they say.
+fn session(plant: &Plant, body: &RigidBody) -> (Vec<Log>, Vec<Log>, Explained) {
+    let model = Model::derive(lwa4p::arm().unwrap()).unwrap();
+    let mut logs: Vec<Log> = (0..5)
+        .map(|seed| {
+            let settings =
+                Settings { margin: 0.8, harmonics: 5, evaluations: 60, seed, ..Settings::default() };
+            let path = optimise(&model, SetKind::Minimal, &settings).unwrap().paths.swap_remove(0);
+            log(plant, &path.sample(200.0), seed)
+        })
+        .collect();
+    common_clock(&mut logs);
+    let held_out = logs.split_off(4);
+    let explained = explain(body, &logs, &held_out, &DataOptions::default(), &|_| ()).unwrap();
+    (logs, held_out, explained)
+}
+
+fn log(plant: &Plant, motion: &Motion, seed: u64) -> Log {
+    plant.record(motion, 0.0, seed).log(format!("log{seed}.csv"))
+}
+
+#[test]
+fn an_experiment_is_designed_within_the_limits_and_decides_what_the_logs_left_open() {
+    let arm = lwa4p::arm().unwrap();
+    let body = RigidBody::new(&arm).unwrap();
+    let truths = [
+        (Effect::Spring { joint: 0, stiffness: 0.4, rest: -2.0 }, "spring", "asymmetry"),
+        (Effect::Asymmetry { joint: 0, share: 0.0, constant: 0.8 }, "asymmetry", "spring"),
+    ];
+    for (effect, name, other) in truths {
+        let plant = lwa4p::plant().unwrap().with(effect);
+        let (fit, held_out, mut explained) = session(&plant, &body);
+        let open = explained.open.clone().expect("the narrow paths leave it open");
+        let mut names = open.names();
+        names.sort_unstable();
+        assert_eq!(names, ["asymmetry", "spring"]);
+        assert!(explained.experiment.is_none());
+
+        let options = DataOptions::default();
+        let designed = design(&body, &open, &options).unwrap();
+        assert!(designed.evidence >= designed.usual, "{} {}", designed.evidence, designed.usual);
+        assert!(designed.expected.iter().all(|d| d.is_finite()));
+        // What only joint 1 feels shows on joint 1.
+        assert!(designed.expected[0] > 10.0 * designed.expected[2], "{:?}", designed.expected);
+        let motion = propose(&body, &mut explained, &options, &|_| ()).unwrap();
+        assert_eq!(motion, designed.motion, "the same question has the same answer");
+        let limits = Limits::of(&arm, 0.0).unwrap();
+        for [q, dq, ddq] in motion.samples() {
+            for (i, limit) in limits.0.iter().enumerate() {
+                assert!((limit.position[0]..limit.position[1]).contains(&q[i]));
+                assert!(dq[i].abs() < limit.velocity && ddq[i].abs() < limit.acceleration);
+            }
+        }
+        let next = explained.next_experiment.clone().unwrap();
+        assert_eq!(next["trajectory"], TRAJECTORY);
+        assert_eq!(next["joints"], serde_json::json!([1]));
+
+        let new = log(&plant, &motion, 99);
+        let told = Options::default();
+        let again = learn(&body, (&fit, &held_out), new, &explained, &options, &told, &|_| ()).unwrap();
+        let experiment = again.experiment.unwrap();
+        assert_eq!(experiment["decided"], name, "{experiment}");
+        assert_eq!(again.effects.len(), 1, "{:?}", again.unattributed);
+        assert_eq!((again.effects[0].effect.as_str(), again.effects[0].joints.as_slice()), (name, &[1][..]));
+        let loser = again.effects[0].rivals.iter().find(|r| r.effect == other).unwrap();
+        assert!(loser.why_not.contains("ruled out by the experiment"), "{}", loser.why_not);
+    }
+}
+
+#[test]
+fn without_limits_there_is_advice_and_no_trajectory() {
+    let plant = lwa4p::plant().unwrap().with(Effect::Asymmetry { joint: 0, share: 0.0, constant: 0.8 });
+    let body = RigidBody::new(&lwa4p::arm().unwrap()).unwrap();
+    let (_, _, mut explained) = session(&plant, &body);
+    let mut arm = lwa4p::arm().unwrap();
+    arm.joints[3].velocity = None;
+    let body = RigidBody::new(&arm).unwrap();
+    assert!(propose(&body, &mut explained, &DataOptions::default(), &|_| ()).is_none());
+    let next = explained.next_experiment.unwrap();
+    assert!(next["advice"].as_str().unwrap().contains("other positions"));
+    assert!(next["no_trajectory"].as_str().unwrap().contains("joint 4: `velocity`"), "{next}");
+}

@@ -1,0 +1,73 @@
+//! A correction of what has no name may help and may not hurt.
+
+use super::plant::{Noise, Truth, arm, record};
+use crate::explanation::effects::Context;
+use crate::explanation::explain::correction::correct;
+use crate::explanation::explain::leftover::depends_on;
+use crate::explanation::explain::{Options, explain_with};
+use crate::identification::estimate::{Folds, fit};
+use crate::logs::log::Log;
+use crate::logs::regression::{Data, DataOptions, RigidBody};
+
+/// Adds to joint 2's torque what no effect of the library is: a bump over the product of two positions.
+fn disturbed(mut logs: Vec<Log>, size: f64) -> Vec<Log> {
+    for log in &mut logs {
+        for k in 0..log.t.len() {
+            log.torque[1][k] += size * (1.0 - ((log.q[0][k] * log.q[3][k] - 0.2) / 0.5).powi(2)).max(-1.0);
+        }
+    }
+    logs
+}
+
+#[test]
+fn a_curve_is_kept_where_it_helps_and_named_by_nothing() {
+    let body = RigidBody::new(&arm()).unwrap();
+    let logs = disturbed(record(body.arm(), Truth::Clean, 0.0, Noise::White, 7, 22.0, 5), 2.0);
+    let (to_fit, held_out) = logs.split_at(5);
+    let run = |correct_unattributed: bool| {
+        let told = Options { correct_unattributed, ..Options::default() };
+        explain_with(&body, to_fit, held_out, &DataOptions::default(), &told, &|_| ()).unwrap()
+    };
+    let (without, with) = (run(false), run(true));
+    let rest = without.unattributed.expect("nothing in the library is this");
+    assert!(rest.joints.contains(&2) && rest.correction.is_none());
+    // It is no part of the model: names and errors are the same.
+    assert_eq!(without.after.validate, with.after.validate);
+    assert_eq!(without.effects.len(), with.effects.len());
+    for c in with.unattributed.unwrap().correction.unwrap() {
+        assert!(c.rms_after < c.rms_before && c.fold_gains.iter().all(|g| *g > 0.0), "{c:?}");
+        assert!(c.curves.iter().all(|curve| curve.torque.iter().all(|t| t.is_finite())));
+    }
+}
+
+#[test]
+fn what_the_held_out_path_contradicts_is_not_kept() {
+    let body = RigidBody::new(&arm()).unwrap();
+    let clean = record(body.arm(), Truth::Clean, 0.0, Noise::White, 7, 22.0, 6);
+    let torque = |logs: &mut [Log], sign: f64| {
+        for log in logs {
+            for k in 0..log.t.len() {
+                log.torque[2][k] += sign * (4.0 * log.q[2][k]).sin();
+            }
+        }
+    };
+    // Fitted logs and held-out ones that agree, then held-out ones where the same torque has the other sign.
+    let helps = |sign: f64| {
+        let (mut to_fit, mut held_out) = (clean[..5].to_vec(), clean[5..].to_vec());
+        torque(&mut to_fit, 1.0);
+        torque(&mut held_out, sign);
+        let options = DataOptions::default();
+        let data = Data::new(&body, &to_fit, &options).unwrap();
+        let other = Data::new(&body, &held_out, &options).unwrap();
+        let folds = Folds::new(&data);
+        let base = fit(&data, &folds, &[], None);
+        let held = base.residual_on(&other, &[]);
+        let (here, there) = (Context::new(&data, &base, &base.residual), Context::new(&other, &base, &held));
+        let signals = depends_on(&here, 2);
+        assert!(signals.iter().any(|(name, _)| name == "q3"), "{signals:?}");
+        correct(&here, &there, &folds, 2, &signals)
+    };
+    let kept = helps(1.0).expect("the torque is there on both");
+    assert!(kept.rms_after < 0.9 * kept.rms_before, "{kept:?}");
+    assert!(helps(-1.0).is_none());
+}

@@ -1,0 +1,98 @@
+//! What a real arm's logs say; skipped where they are missing.
+
+use crate::explanation::explain::{Explained, explain};
+use crate::logs::log::{common_clock, read_logs};
+use crate::logs::regression::{DataOptions, RigidBody};
+use dyngen::Arm;
+use std::path::PathBuf;
+
+/// The folder of measured logs: `POWERBALL_DATA`, or `../shared/data` from the project's root.
+fn data() -> Option<PathBuf> {
+    let folder = std::env::var_os("POWERBALL_DATA")
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
+    if folder.join("ur10e/arm.toml").exists() {
+        return Some(folder);
+    }
+    println!("skipped: no measured logs in {}", folder.display());
+    None
+}
+
+fn ur10e(fit: &[&str], validate: &[&str]) -> Option<Explained> {
+    let files = |names: &[&str]| names.iter().map(|name| format!("fourier_{name}")).collect::<Vec<_>>();
+    explained("ur10e", &files(fit), &files(validate))
+}
+
+fn explained(arm: &str, fit: &[String], validate: &[String]) -> Option<Explained> {
+    let folder = data()?.join(arm);
+    let arm = Arm::read(&folder.join("arm.toml")).unwrap();
+    let files: Vec<PathBuf> =
+        fit.iter().chain(validate).map(|name| folder.join(format!("{name}.csv"))).collect();
+    let (mut logs, _) = read_logs(&files, &arm).unwrap();
+    common_clock(&mut logs);
+    let validate = logs.split_off(fit.len());
+    let body = RigidBody::new(&arm).unwrap();
+    Some(explain(&body, &logs, &validate, &DataOptions::default(), &|_| ()).unwrap())
+}
+
+fn joints<'e>(explained: &'e Explained, name: &str) -> &'e [usize] {
+    explained.effects.iter().find(|e| e.effect == name).map_or(&[], |e| &e.joints)
+}
+
+#[test]
+fn load_friction_of_the_ur10e_is_found_and_held_out_errors_fall() {
+    let Some(explained) = ur10e(&["12a", "12b", "12c", "7", "8"], &["14", "5"]) else { return };
+    let load = joints(&explained, "load_friction");
+    assert!(load.contains(&2) && load.contains(&3), "{load:?}");
+    assert!(joints(&explained, "payload").is_empty());
+    let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
+    assert!(after[1] < 0.65 * before[1] && after[2] < 0.75 * before[2], "{before:?} {after:?}");
+    assert!(explained.false_positives.rate <= 0.01);
+}
+
+#[test]
+fn the_load_of_the_ur10e_is_a_payload_on_either_side() {
+    let sides: [(&[&str], &[&str]); 2] = [
+        (&["12a", "12b", "12c", "14_load", "5", "8"], &["14", "7"]),
+        (&["12a", "12b", "12c", "14", "7"], &["14_load", "5"]),
+    ];
+    for (fit, validate) in sides {
+        let Some(explained) = ur10e(fit, validate) else { return };
+        let payload = explained.effects.iter().find(|e| e.effect == "payload").unwrap();
+        let mass = payload.parameters["mass"].as_f64().unwrap();
+        assert!((mass - 2.8).abs() < 0.15 * 2.8, "{mass}");
+        assert!(payload.logs.len() == 1 && payload.logs[0].contains("14_load"));
+        assert!(joints(&explained, "load_friction").contains(&2));
+    }
+}
+
+/// A SCHUNK arm runs one path again and again; no rigid body fits it. (The published analysis of these logs:
+/// warming friction, and ripple of joint 4 at 161 and 322 cycles a turn.)
+#[test]
+fn repeats_of_a_schunk_arm_warm_and_joint_4_ripples() {
+    let repeats = |runs: &mut dyn Iterator<Item = usize>| -> Vec<String> {
+        runs.map(|k| format!("B0_{k:02}")).collect()
+    };
+    let splits = [
+        [repeats(&mut (2..=14).step_by(2)), repeats(&mut (1..=14).step_by(2))],
+        [repeats(&mut (1..=7)), repeats(&mut (8..=14))],
+    ];
+    for [fit, validate] in splits {
+        let Some(explained) = explained("lwa4p_rollouts", &fit, &validate) else { return };
+        assert!(joints(&explained, "temperature").len() >= 3, "{:?}", explained.effects);
+        let ripple = explained.effects.iter().find(|e| e.effect == "position_ripple").unwrap();
+        let list = |key: &str| -> Vec<f64> {
+            ripple.parameters[key].as_array().unwrap().iter().filter_map(serde_json::Value::as_f64).collect()
+        };
+        let of_joint_4: Vec<f64> = (list("orders").into_iter().zip(list("joints")))
+            .filter(|(_, joint)| *joint == 4.0)
+            .map(|(order, _)| order)
+            .collect();
+        for known in [161.0, 322.0] {
+            assert!(of_joint_4.iter().any(|order| (order - known).abs() <= 1.0), "{of_joint_4:?}");
+        }
+        assert!(explained.false_positives.rate < 0.05);
+        for change in &explained.held_out_change {
+            assert!(change.interval[0] <= 0.0, "the held-out error surely rises: {change:?}");
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! What was found becomes the next model: the arm as it is, the logs put right, the terms known.
+
+use super::plant::{Noise, Truth, arm, record};
+use crate::explanation::explain::explain;
+use crate::explanation::torque_model::{Additions, Scalar};
+use crate::identification::estimate::{Folds, fit, spread};
+use crate::logs::regression::{Data, DataOptions, RigidBody};
+
+/// Whether a model holds what the plant has.
+type Holds = fn(&Additions) -> bool;
+
+/// With what was found taken out, the base model alone must do on the changed arm what the whole model did:
+/// its fit is another, with other columns, and knows nothing of the explanation.
+#[test]
+fn a_base_model_beside_what_is_known_does_as_well_as_the_whole() {
+    let body = RigidBody::new(&arm()).unwrap();
+    let options = DataOptions::default();
+    let given = |list: &[f64]| list.iter().any(|x| *x != 0.0);
+    let parts: [(Truth, Holds); 5] = [
+        (Truth::EncoderOffset, |a| a.log_changes.encoder_offset.iter().any(|o| (o - 0.03).abs() < 0.003)),
+        (Truth::TimeDelay, |a| a.log_changes.delay.iter().all(|d| (d - 0.006).abs() < 0.0006)),
+        (Truth::BaseTilt, |a| a.arm_changes.gravity.is_some_and(|g| (g[1] - 0.02 * 9.81).abs() < 0.02)),
+        (Truth::BrokenSymmetry, |a| a.arm_changes.not_zero.len() == 1),
+        (Truth::TorqueConstant, |a| a.terms.iter().any(|t| t.effect == "torque_constant")),
+    ];
+    for (truth, part) in parts {
+        let mut logs = record(body.arm(), truth, 1.0, Noise::White, 7, 22.0, 3);
+        let explained = explain(&body, &logs[..5], &logs[5..], &options, &|_| ()).unwrap();
+        let model = &explained.model;
+        assert!(part(&model.additions), "{truth:?}: {:?}", model.additions);
+        assert_eq!(given(&model.additions.log_changes.delay), truth == Truth::TimeDelay);
+
+        let changed = RigidBody::new(&model.additions.arm_changes.of(body.arm()).unwrap()).unwrap();
+        assert_eq!(model.parameters.len(), changed.names().len());
+        model.take_out(&changed, &mut logs);
+        let [data, other] = [&logs[..5], &logs[5..]].map(|logs| Data::new(&changed, logs, &options).unwrap());
+        let next = fit(&data, &Folds::new(&data), &[], None);
+        let rms = spread(&other, &next.residual_on(&other, &[])).rms;
+        let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
+        for j in 0..body.dof() {
+            assert!(rms[j] < 1.03 * after[j], "{truth:?}, joint {}: {} {}", j + 1, rms[j], after[j]);
+        }
+        let fall = |x: &[f64]| x.iter().zip(before).map(|(x, b)| x / b).fold(1.0, f64::min);
+        assert!(fall(&rms) < 0.9, "{truth:?}: {before:?} {rms:?}");
+        // And code of it can be proven.
+        assert!(model.source(body.arm(), Scalar::F64, &[]).is_ok());
+    }
+}

@@ -1,0 +1,216 @@
+//! Arms with few joints, which do not feel everything: one that moves in a plane, and one that stands upright
+//! with level gravity.
+
+use crate::controller::friction::TanhFriction;
+use crate::explanation::explain::{Explained, explain};
+use crate::identification::chain::Chain;
+use crate::identification::excite::{Fourier, Harmonics};
+use crate::logs::log::{Log, common_clock};
+use crate::logs::regression::{DataOptions, RigidBody};
+use crate::virtual_arm::{Body, Dynamics, Effect, Plant, Sensors};
+use dyngen::Arm;
+use dyngen::arm::JointKind;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+const PAYLOAD: f64 = 0.2;
+/// The first logs are fitted, the rest judges.
+const FITTED: usize = 4;
+const LOGS: usize = 6;
+
+/// Two links in a vertical plane.
+fn planar() -> (Arm, Plant) {
+    let arm = Arm::parse(include_str!("../../../../../tests/arms/planar2r.toml"), "planar2r.toml").unwrap();
+    let bodies = vec![
+        Body::even_box(4.0, [-0.2, 0.01, 0.0], [0.4, 0.08, 0.08], 4e-5),
+        Body::even_box(2.0, [-0.15, 0.0, 0.02], [0.3, 0.06, 0.06], 4e-5),
+    ];
+    let plant = plant(&arm, bodies, &[4.0, 2.0], &[0.2, 0.06]);
+    (arm, plant)
+}
+
+/// All axes upright.
+fn scara() -> (Arm, Plant) {
+    let arm = Arm::parse(include_str!("../../../../../tests/arms/scara.toml"), "scara.toml").unwrap();
+    let bodies = vec![
+        Body::even_box(6.0, [-0.15, 0.04, 0.0], [0.4, 0.1, 0.1], 0.0),
+        Body::even_box(4.0, [-0.12, 0.02, 0.0], [0.3, 0.1, 0.1], 0.0),
+        Body::even_box(1.5, [0.0, 0.0, -0.1], [0.05, 0.05, 0.3], 0.0),
+        Body::even_box(0.6, [0.03, 0.01, 0.02], [0.1, 0.06, 0.04], 0.0),
+    ];
+    let plant = plant(&arm, bodies, &[3.0, 1.5, 2.0, 0.05], &[0.1, 0.05, 0.1, 0.003]);
+    (arm, plant)
+}
+
+/// An arm with so much friction and white noise by joint, N·m or N.
+fn plant(arm: &Arm, bodies: Vec<Body>, levels: &[f64], white: &[f64]) -> Plant {
+    let friction = |level: &f64| TanhFriction::new([0.7 * level, 60.0, 0.3 * level, 4.0, *level]);
+    let sensors = Sensors {
+        rate: 200.0,
+        encoder_step: 0.0002f64.to_radians(),
+        white: white.to_vec(),
+        coloured: vec![0.0; white.len()],
+        colour_time: 0.15,
+    };
+    let dynamics = Dynamics::new(Chain::new(arm), bodies).unwrap();
+    Plant::new(dynamics, levels.iter().map(friction).collect(), sensors)
+}
+
+/// What is found in logs of an arm, those that are listed with an effect.
+fn explained(arm: (Arm, Plant), effect: Effect, listed: &[usize]) -> Explained {
+    explained_of(arm, &[(effect, listed)])
+}
+
+/// The same with several effects, each in logs of its own.
+fn explained_of((arm, usual): (Arm, Plant), effects: &[(Effect, &[usize])]) -> Explained {
+    const SEED: u64 = 7;
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let mut logs: Vec<Log> = (0..LOGS)
+        .map(|k| {
+            let joints = (arm.joints.iter())
+                .map(|joint| {
+                    let way = if joint.kind == JointKind::Prismatic { 0.06 } else { 0.6 };
+                    let mut draw =
+                        || (0..5).map(|l| way * rng.random_range(-1.0..1.0) / f64::from(l + 1)).collect();
+                    Harmonics { middle: 0.0, a: draw(), b: draw() }
+                })
+                .collect();
+            let path = Fourier { fundamental: TAU / 10.0, periods: 2, ramp: 1.0, joints };
+            let here = effects.iter().filter(|(_, listed)| listed.contains(&k));
+            let plant = here.fold(usual.clone(), |plant, (effect, _)| plant.with(effect.clone()));
+            plant.record(&path.sample(200.0), 0.0, SEED + k as u64).log(format!("log{k}"))
+        })
+        .collect();
+    common_clock(&mut logs);
+    let (fit, validate) = logs.split_at(FITTED);
+    let body = RigidBody::new(&arm).unwrap();
+    explain(&body, fit, validate, &DataOptions::default(), &|_| ()).unwrap()
+}
+
+fn names(explained: &Explained) -> Vec<&str> {
+    explained.effects.iter().map(|e| e.effect.as_str()).collect()
+}
+
+fn at_the_floor(explained: &Explained) {
+    for (after, floor) in explained.after.validate.rms.iter().zip(&explained.noise_floor) {
+        assert!(*after < 1.15 * floor, "{:?} {:?}", explained.after.validate.rms, explained.noise_floor);
+    }
+}
+
+/// The windows of what was found first, s.
+fn spans(explained: &Explained) -> Vec<(f64, f64)> {
+    let times = |name: &str| -> Vec<f64> {
+        explained.effects[0].parameters[name]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|t| t.as_f64().unwrap())
+            .collect()
+    };
+    times("start_time").into_iter().zip(times("end_time")).collect()
+}
+
+/// Checks one of them, whose ends lie on a grid of rows 0.05 s apart.
+fn lasts(explained: &Explained, which: usize, truth: Range<f64>) {
+    let (from, to) = spans(explained)[which];
+    approx::assert_relative_eq!(from, truth.start, epsilon = 0.15);
+    approx::assert_relative_eq!(to, truth.end, epsilon = 0.15);
+}
+
+#[test]
+fn logs_say_whether_a_payload_is_held_in_them() {
+    // Put on in the last fitted log, so that by the clock it stays; taken off before the others, or before
+    // one of them.
+    for listed in [&[3][..], &[3, 5], &[3, 4, 5], &[1], &[1, 4]] {
+        let payload = Effect::Payload { mass: PAYLOAD, centre: [0.05, 0.02, 0.0], start: 0.0 };
+        let explained = explained(planar(), payload, listed);
+        assert_eq!(names(&explained), ["payload"], "{listed:?}");
+        let found = &explained.effects[0];
+        let mass = found.parameters["mass"].as_f64().unwrap();
+        approx::assert_relative_eq!(mass, PAYLOAD, max_relative = 0.1);
+        let logs: Vec<String> = listed.iter().map(|k| format!("log{k}")).collect();
+        assert_eq!(found.logs, logs);
+        at_the_floor(&explained);
+    }
+}
+
+#[test]
+fn a_push_is_found_by_what_the_arm_feels_of_it() {
+    let push = Effect::ContactWrench { force: [1.5, 3.0, 20.0], start: 6.0, length: 4.0, every: 1e3 };
+    let explained = explained(planar(), push, &[2]);
+    assert_eq!(names(&explained), ["contact_wrench"]);
+    let force: Vec<f64> = explained.effects[0].parameters["force"][0]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|f| f.as_f64().unwrap())
+        .collect();
+    // Across its plane the arm feels nothing.
+    approx::assert_relative_eq!(force[0], 1.5, epsilon = 0.3);
+    approx::assert_relative_eq!(force[1], 3.0, epsilon = 0.3);
+    assert_eq!(force[2], 0.0);
+    assert_eq!(spans(&explained).len(), 1);
+    lasts(&explained, 0, 6.0..10.0);
+    at_the_floor(&explained);
+}
+
+#[test]
+fn the_same_push_is_seen_in_other_logs_and_another_one_is_not() {
+    let push = |force, start| Effect::ContactWrench { force, start, length: 4.0, every: 1e3 };
+    let (here, other) = (push([1.5, 3.0, 0.0], 6.0), push([-1.0, 1.0, 0.0], 12.0));
+    let explained = explained_of(planar(), &[(here.clone(), &[2, 4]), (other, &[5])]);
+    assert_eq!(names(&explained), ["contact_wrench"]);
+    let found = &explained.effects[0];
+    assert_eq!(found.logs, ["log2", "log4"]);
+    assert_eq!(spans(&explained).len(), 2);
+    assert_eq!(found.parameters["force"][0], found.parameters["force"][1]);
+    lasts(&explained, 1, 6.0..10.0);
+    // The other push stays in the errors.
+    let (after, floor) = (&explained.after.validate.rms, &explained.noise_floor);
+    assert!(after[0] > 1.15 * floor[0], "{after:?} {floor:?}");
+    // What stays without it is at its ends: a torque that sets in at once takes some rows in the band.
+    let alone = explained_of(planar(), &[(here, &[2, 4])]);
+    let excess = |rms: &[f64]| rms[0].powi(2) - alone.noise_floor[0].powi(2);
+    let (before, after) = (excess(&alone.before.validate.rms), excess(&alone.after.validate.rms));
+    assert!(after < 0.1 * before, "{before} {after}");
+}
+
+#[test]
+fn a_payload_is_found_with_the_instant_at_which_it_was_taken_up() {
+    const START: f64 = 7.3;
+    let payload = Effect::Payload { mass: PAYLOAD, centre: [0.05, 0.02, 0.0], start: START };
+    let explained = explained(planar(), payload, &[1]);
+    assert_eq!(names(&explained), ["payload"]);
+    let parameters = &explained.effects[0].parameters;
+    approx::assert_relative_eq!(parameters["start_time"][0].as_f64().unwrap(), START, epsilon = 0.15);
+    approx::assert_relative_eq!(parameters["mass"].as_f64().unwrap(), PAYLOAD, max_relative = 0.05);
+    at_the_floor(&explained);
+}
+
+#[test]
+fn a_push_of_many_seconds_is_one_push() {
+    let push = Effect::ContactWrench { force: [1.0, 2.0, 0.0], start: 4.0, length: 13.0, every: 1e3 };
+    let explained = explained(planar(), push, &[2]);
+    assert_eq!(names(&explained), ["contact_wrench"]);
+    assert_eq!(spans(&explained).len(), 1);
+    lasts(&explained, 0, 4.0..17.0);
+    at_the_floor(&explained);
+}
+
+#[test]
+fn a_tilted_base_shows_weight_that_level_gravity_hides() {
+    let tilt = [0.01, -0.015];
+    let explained = explained(scara(), Effect::BaseTilt { tilt }, &[0, 1, 2, 3, 4, 5]);
+    // Not also a spring or a constant torque of the first joint.
+    assert_eq!(names(&explained), ["base_tilt"]);
+    for (k, tilt) in tilt.into_iter().enumerate() {
+        approx::assert_relative_eq!(
+            explained.effects[0].parameters["tilt"][k].as_f64().unwrap(),
+            tilt,
+            epsilon = 1e-3
+        );
+    }
+    at_the_floor(&explained);
+}

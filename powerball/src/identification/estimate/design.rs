@@ -1,0 +1,211 @@
+//! The columns of all joints and their cross products, from which every fit is a small solve.
+
+use super::Folds;
+use super::vary::{FRICTION, Layout};
+use crate::logs::parallel;
+use crate::logs::regression::{Column, Data};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par};
+use std::ops::Range;
+
+/// The regression columns for given friction shapes and terms.
+///
+/// Global order: the minimal set (one after the other for each joint, where [`Data::joints_apart`]),
+/// `FRICTION` columns a joint, the terms' columns.
+#[derive(Debug)]
+pub struct Design {
+    /// Joint by joint: columns, column-major.
+    joints: Vec<Local>,
+    /// The global order.
+    pub layout: Layout,
+    /// Columns in all.
+    pub size: usize,
+    /// Inertial columns.
+    pub inertial: usize,
+    /// Those of one joint.
+    pub set: usize,
+}
+
+#[derive(Debug)]
+struct Local {
+    rows: usize,
+    values: Vec<f64>,
+    /// Global column by local one.
+    global: Vec<usize>,
+}
+
+impl Design {
+    /// Lays out the columns; `friction[j]` are joint j's `FRICTION` columns.
+    #[must_use]
+    pub fn new(data: &Data<'_>, friction: &[[Vec<f64>; FRICTION]], extra: &[Column]) -> Design {
+        let (n, p) = (data.dof(), data.inertial_columns());
+        let layout = Layout::of(data, extra.len());
+        let own = |j: usize| if data.joints_apart { p * j } else { 0 };
+        let joints = (0..n)
+            .map(|j| {
+                let rows = data.joints[j].len();
+                let mut values = Vec::with_capacity(rows * (p + FRICTION + extra.len()));
+                let mut global = Vec::new();
+                for (c, column) in data.joints[j].inertial.iter().enumerate() {
+                    // Links inside a joint do not load it: those columns are zero.
+                    if column.iter().any(|v| *v != 0.0) {
+                        values.extend_from_slice(column);
+                        global.push(own(j) + c);
+                    }
+                }
+                for (k, column) in friction[j].iter().enumerate() {
+                    values.extend_from_slice(column);
+                    global.push(layout.friction(j, k));
+                }
+                for (e, column) in extra.iter().enumerate() {
+                    if let Some(column) = column.at(j) {
+                        values.extend_from_slice(column);
+                        global.push(layout.extra(e));
+                    }
+                }
+                Local { rows, values, global }
+            })
+            .collect();
+        Design { joints, layout, size: layout.size(), inertial: layout.inertial, set: p }
+    }
+
+    /// Joints.
+    #[must_use]
+    pub fn dof(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Global index of a joint's friction column.
+    #[must_use]
+    pub fn friction(&self, joint: usize, which: usize) -> usize {
+        self.layout.friction(joint, which)
+    }
+
+    /// Global index of a term's column.
+    #[must_use]
+    pub fn extra(&self, which: usize) -> usize {
+        self.layout.extra(which)
+    }
+
+    fn matrix(&self, joint: usize, rows: &Range<usize>) -> MatRef<'_, f64> {
+        let local = &self.joints[joint];
+        MatRef::from_column_major_slice(&local.values, local.rows, local.global.len())
+            .subrows(rows.start, rows.len())
+    }
+
+    /// The prediction on a joint's rows.
+    #[must_use]
+    pub fn predict(&self, joint: usize, theta: &[f64]) -> Vec<f64> {
+        let local = &self.joints[joint];
+        let mut out = vec![0.0; local.rows];
+        for (column, g) in local.values.chunks_exact(local.rows.max(1)).zip(&local.global) {
+            let value = theta[*g];
+            if value != 0.0 {
+                out.iter_mut().zip(column).for_each(|(o, c)| *o += value * c);
+            }
+        }
+        out
+    }
+
+    /// A'C and friends on a row range of one joint: columns of the design times those of `other`.
+    #[must_use]
+    pub fn cross(&self, joint: usize, rows: &Range<usize>, other: &[&[f64]]) -> Vec<(usize, Vec<f64>)> {
+        let local = &self.joints[joint];
+        if rows.is_empty() || other.is_empty() {
+            return Vec::new();
+        }
+        let right = pack(other, rows);
+        let right = MatRef::from_column_major_slice(&right, rows.len(), other.len());
+        let left = self.matrix(joint, rows);
+        let mut out = Mat::zeros(local.global.len(), other.len());
+        matmul(out.as_mut(), Accum::Replace, left.transpose(), right, 1.0, Par::Seq);
+        local
+            .global
+            .iter()
+            .enumerate()
+            .map(|(i, g)| (*g, (0..other.len()).map(|c| out[(i, c)]).collect()))
+            .collect()
+    }
+}
+
+fn pack(columns: &[&[f64]], rows: &Range<usize>) -> Vec<f64> {
+    let mut packed = Vec::with_capacity(rows.len() * columns.len());
+    for column in columns {
+        packed.extend_from_slice(&column[rows.clone()]);
+    }
+    packed
+}
+
+/// A'A, A'y, y'y of one joint and cell.
+type Cell = (Mat<f64>, Vec<f64>, f64);
+
+/// Cross products of a design with itself and the torques, by joint and cell of folds.
+#[derive(Debug)]
+pub struct Gram {
+    /// `[joint][cell]`: (A'A, A'y, y'y), local.
+    parts: Vec<Vec<Cell>>,
+    globals: Vec<Vec<usize>>,
+    size: usize,
+}
+
+impl Gram {
+    /// Forms all cross products.
+    #[must_use]
+    pub fn new(data: &Data<'_>, design: &Design, folds: &Folds) -> Gram {
+        let joints: Vec<usize> = (0..design.dof()).collect();
+        let parts = parallel::map(&joints, |&j| {
+            let local = &design.joints[j];
+            let d = local.global.len();
+            let mut cells = vec![(Mat::zeros(d, d), vec![0.0; d], 0.0); folds.cells];
+            for (cell, rows) in runs(data, folds, j) {
+                let a = design.matrix(j, &rows);
+                let y = &data.joints[j].torque[rows.clone()];
+                let (gram, right, square) = &mut cells[cell];
+                matmul(gram.as_mut(), Accum::Add, a.transpose(), a, 1.0, Par::Seq);
+                for (c, r) in right.iter_mut().enumerate() {
+                    let column = &local.values[c * local.rows + rows.start..c * local.rows + rows.end];
+                    *r += column.iter().zip(y).map(|(a, b)| a * b).sum::<f64>();
+                }
+                *square += y.iter().map(|v| v * v).sum::<f64>();
+            }
+            cells
+        });
+        Gram { parts, globals: design.joints.iter().map(|l| l.global.clone()).collect(), size: design.size }
+    }
+
+    /// Σ w A'A, Σ w A'y and Σ w y'y over the cells for which `wanted` holds.
+    #[must_use]
+    pub fn sum(&self, weights: &[f64], wanted: impl Fn(usize) -> bool) -> (Mat<f64>, Vec<f64>, f64) {
+        let (mut gram, mut right, mut square) = (Mat::zeros(self.size, self.size), vec![0.0; self.size], 0.0);
+        for ((cells, global), w) in self.parts.iter().zip(&self.globals).zip(weights) {
+            for (cell, (g, r, s)) in cells.iter().enumerate() {
+                if !wanted(cell) {
+                    continue;
+                }
+                for (i, gi) in global.iter().enumerate() {
+                    for (k, gk) in global.iter().enumerate() {
+                        gram[(*gk, *gi)] += w * g[(k, i)];
+                    }
+                    right[*gi] += w * r[i];
+                }
+                square += w * s;
+            }
+        }
+        (gram, right, square)
+    }
+}
+
+/// The row ranges of a joint by cell, neighbouring blocks of one cell joined.
+#[must_use]
+pub fn runs(data: &Data<'_>, folds: &Folds, joint: usize) -> Vec<(usize, Range<usize>)> {
+    let mut runs: Vec<(usize, Range<usize>)> = Vec::new();
+    for (block, cell) in data.blocks.iter().zip(&folds.cell_of_block) {
+        let rows = block.rows[joint].clone();
+        match runs.last_mut() {
+            Some((last, range)) if last == cell && range.end == rows.start => range.end = rows.end,
+            _ => runs.push((*cell, rows)),
+        }
+    }
+    runs.retain(|(_, rows)| !rows.is_empty());
+    runs
+}

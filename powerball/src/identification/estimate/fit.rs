@@ -1,0 +1,234 @@
+//! The fit of rows in memory, with the columns of further terms.
+
+use super::design::{Design, Gram, runs};
+use super::folds::Folds;
+use super::friction_shape::{self, Trials};
+use super::vary::{FRICTION, Layout, Products, Rows, Scatter, Start, vary};
+use crate::logs::parallel;
+use crate::logs::regression::{Column, Data, RigidBody};
+use faer::Mat;
+
+/// A column that was added to the base model.
+#[derive(Clone, Debug)]
+pub struct Term {
+    /// Its values.
+    pub column: Column,
+    /// Whether its coefficient must not be negative.
+    pub non_negative: bool,
+}
+
+/// A fitted model on the rows it was fitted to.
+#[derive(Debug)]
+pub struct Fit {
+    /// γ2, γ4 by joint, s/rad.
+    pub shapes: Vec<[f64; 2]>,
+    /// All coefficients in the order of [`Design`]; those of tangents are 0.
+    pub theta: Vec<f64>,
+    /// 1/(σ²·inflation) by joint, 0 for a joint without rows.
+    pub weights: Vec<f64>,
+    /// Residual rms by joint, N·m.
+    pub sigma: Vec<f64>,
+    /// How many times the variance of slow means exceeds that of independent samples, by joint, at least 1.
+    pub inflation: Vec<f64>,
+    /// The speed that each joint exceeds in 5 % of the samples, rad/s.
+    pub top_speed: Vec<f64>,
+    /// Residual by joint.
+    pub residual: Vec<Vec<f64>>,
+    /// The columns at these shapes.
+    pub design: Design,
+    /// Their cross products.
+    pub gram: Gram,
+    /// The columns whose coefficients are free, tangents among them: what a screen must treat as refitted.
+    pub free: Vec<bool>,
+}
+
+impl Fit {
+    /// γ1 … γ5 of a joint.
+    #[must_use]
+    pub fn friction(&self, joint: usize) -> [f64; 5] {
+        self.design.layout.gamma(&self.theta, joint, self.shapes[joint])
+    }
+
+    /// The minimal set's values; where joints were fitted apart, the first joint's.
+    #[must_use]
+    pub fn inertial(&self) -> &[f64] {
+        &self.theta[..self.design.set]
+    }
+
+    /// Torque of the rigid arm along a motion, n a sample, N·m.
+    #[must_use]
+    pub fn rigid_torque(&self, body: &RigidBody, q: &[f64], v: &[f64], a: &[f64]) -> Vec<f64> {
+        let set = self.design.set;
+        let by_set = |theta: &[f64]| body.torque(q, v, a, &theta[..body.names().len()]);
+        if self.design.inertial == set {
+            return by_set(self.inertial());
+        }
+        let mut torque = vec![0.0; q.len()];
+        let n = self.design.dof();
+        for (j, own) in self.theta[..self.design.inertial].chunks_exact(set).enumerate() {
+            for (to, from) in torque.iter_mut().zip(by_set(own)).skip(j).step_by(n) {
+                *to = from;
+            }
+        }
+        torque
+    }
+
+    /// Coefficient of a term's column.
+    #[must_use]
+    pub fn coefficient(&self, term: usize) -> f64 {
+        self.theta[self.design.extra(term)]
+    }
+
+    /// The prediction of this model on other data with the same kind of columns.
+    #[must_use]
+    pub fn residual_on(&self, data: &Data<'_>, extra: &[Column]) -> Vec<Vec<f64>> {
+        let friction = friction_columns(data, &self.shapes);
+        let design = Design::new(data, &friction, extra);
+        residuals(data, &design, &self.theta)
+    }
+}
+
+/// Fits the base model with the given terms; `start` saves the search for shapes and weights.
+#[must_use]
+pub fn fit(data: &Data<'_>, folds: &Folds, terms: &[Term], start: Option<&Fit>) -> Fit {
+    let rows = InMemory { data, folds, extra: terms.iter().map(|t| t.column.clone()).collect() };
+    let layout = rows.layout();
+    let non_negative: Vec<usize> =
+        (0..terms.len()).filter(|t| terms[*t].non_negative).map(|t| layout.extra(t)).collect();
+    let start = start.map(|fit| Start { shapes: &fit.shapes, weights: &fit.weights });
+    let done = vary(&rows, &non_negative, start);
+    let (design, gram) = done.at;
+    Fit {
+        residual: residuals(data, &design, &done.theta),
+        shapes: done.shapes,
+        theta: done.theta,
+        weights: done.weights,
+        sigma: done.scatter.sigma,
+        inflation: done.scatter.inflation,
+        top_speed: (0..data.dof()).map(|j| data.top_speed(j)).collect(),
+        design,
+        gram,
+        free: done.free,
+    }
+}
+
+/// Rows of prepared logs with further columns.
+struct InMemory<'a> {
+    data: &'a Data<'a>,
+    folds: &'a Folds,
+    extra: Vec<Column>,
+}
+
+impl Rows for InMemory<'_> {
+    type At = (Design, Gram);
+
+    fn layout(&self) -> Layout {
+        Layout::of(self.data, self.extra.len())
+    }
+
+    fn moves(&self, joint: usize) -> bool {
+        !self.data.joints[joint].is_empty()
+    }
+
+    fn range(&self, joint: usize) -> (f64, f64) {
+        friction_shape::range(self.data.top_speed(joint))
+    }
+
+    fn power(&self, joint: usize) -> f64 {
+        let torque = &self.data.joints[joint].torque;
+        torque.iter().map(|y| y * y).sum::<f64>() / torque.len().max(1) as f64
+    }
+
+    fn at(&self, shapes: &[[f64; 2]]) -> (Design, Gram) {
+        let design = Design::new(self.data, &friction_columns(self.data, shapes), &self.extra);
+        let gram = Gram::new(self.data, &design, self.folds);
+        (design, gram)
+    }
+
+    fn products(&self, (_, gram): &(Design, Gram), weights: &[f64]) -> Products {
+        gram.sum(weights, |_| true)
+    }
+
+    fn trials(&self, (design, _): &(Design, Gram), joint: usize, steep: &[f64]) -> Trials {
+        let rows_of = &self.data.joints[joint];
+        let trial: Vec<Vec<f64>> = parallel::map(steep, |g| {
+            rows_of.column(&self.data.band, &self.data.recordings, |_, r| {
+                r.speed(joint).map(|v| (g * v).tanh()).collect()
+            })
+        });
+        let columns: Vec<&[f64]> = trial.iter().map(Vec::as_slice).collect();
+        let grid = steep.len();
+        let mut trials = Trials {
+            cross: Mat::zeros(design.size, grid),
+            square: Mat::zeros(grid, grid),
+            score: vec![0.0; grid],
+        };
+        for (_, rows) in runs(self.data, self.folds, joint) {
+            for (c, values) in design.cross(joint, &rows, &columns) {
+                for (k, value) in values.iter().enumerate() {
+                    trials.cross[(c, k)] += value;
+                }
+            }
+            let dot = |a: &[f64], b: &[f64]| {
+                a[rows.clone()].iter().zip(&b[rows.clone()]).map(|(x, y)| x * y).sum::<f64>()
+            };
+            for a in 0..grid {
+                for b in 0..=a {
+                    trials.square[(a, b)] += dot(&trial[a], &trial[b]);
+                }
+                trials.score[a] += dot(&trial[a], &rows_of.torque);
+            }
+        }
+        trials
+    }
+
+    fn scatter(&self, (design, _): &(Design, Gram), theta: &[f64]) -> Scatter {
+        let residual = residuals(self.data, design, theta);
+        Scatter {
+            sigma: residual
+                .iter()
+                .map(|r| (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt())
+                .collect(),
+            inflation: residual
+                .iter()
+                .enumerate()
+                .map(|(j, r)| variance_inflation(self.data, j, r, MEAN_OVER))
+                .collect(),
+        }
+    }
+}
+
+/// The friction columns of all joints for given shapes.
+#[must_use]
+pub fn friction_columns(data: &Data<'_>, shapes: &[[f64; 2]]) -> Vec<[Vec<f64>; FRICTION]> {
+    let joints: Vec<usize> = (0..shapes.len()).collect();
+    parallel::map(&joints, |&j| friction_shape::columns(data, j, shapes[j]))
+}
+
+fn residuals(data: &Data<'_>, design: &Design, theta: &[f64]) -> Vec<Vec<f64>> {
+    let joints: Vec<usize> = (0..data.dof()).collect();
+    parallel::map(&joints, |&j| {
+        data.joints[j].torque.iter().zip(design.predict(j, theta)).map(|(y, p)| y - p).collect()
+    })
+}
+
+/// Seconds over which means are taken for [`variance_inflation`].
+pub(crate) const MEAN_OVER: f64 = 1.0;
+
+/// How much more the residual's means over some seconds vary than those of independent samples would.
+///
+/// Coloured residuals tell less than their number of samples; this is by how much.
+pub(crate) fn variance_inflation(data: &Data<'_>, joint: usize, residual: &[f64], seconds: f64) -> f64 {
+    let per_second = data.rate() / data.band.decimation as f64;
+    let length = ((seconds * per_second).round() as usize).max(1);
+    let (mut sum, mut count, mut square) = (0.0, 0usize, 0.0);
+    for rows in &data.joints[joint].rows {
+        for chunk in residual[rows.clone()].chunks_exact(length) {
+            let total: f64 = chunk.iter().sum();
+            sum += total * total / length as f64;
+            square += chunk.iter().map(|v| v * v).sum::<f64>() / length as f64;
+            count += 1;
+        }
+    }
+    if count < 5 || square == 0.0 { 1.0 } else { (sum / square).max(1.0) }
+}

@@ -1,0 +1,190 @@
+//! A fit in the words of a model: values with standard errors that hold for coloured residuals.
+
+use super::errors::Errors;
+use super::reduced::Solution;
+use crate::logs::regression::Data;
+use serde::{Deserialize, Serialize};
+
+/// A parameter with its standard error.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ParameterEstimate {
+    /// Its name: the sum it stands for.
+    pub name: String,
+    /// Its value, SI units.
+    pub value: f64,
+    /// Standard error; `None` where the logs do not determine the parameter.
+    #[serde(default)]
+    pub std: Option<f64>,
+    /// Standard error over |value|.
+    #[serde(default)]
+    pub relative_std: Option<f64>,
+    /// 95 % interval, by Student's t.
+    #[serde(default)]
+    pub interval: Option<[f64; 2]>,
+}
+
+impl ParameterEstimate {
+    /// A value without an error.
+    #[must_use]
+    pub fn plain(name: &str, value: f64) -> ParameterEstimate {
+        ParameterEstimate { name: name.to_string(), value, std: None, relative_std: None, interval: None }
+    }
+}
+
+/// Eq. 16 of a joint with standard errors of γ1 … γ5.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JointFriction {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// γ1, N·m.
+    pub gamma1: f64,
+    /// γ2, s/rad.
+    pub gamma2: f64,
+    /// γ3, N·m.
+    pub gamma3: f64,
+    /// γ4, s/rad.
+    pub gamma4: f64,
+    /// γ5, N·m·s/rad.
+    pub gamma5: f64,
+    /// Constant torque, N·m, where the law has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset: Option<f64>,
+    /// Standard errors of γ1 … γ5; null where not determined or at a bound.
+    #[serde(default)]
+    pub std: [Option<f64>; 5],
+}
+
+impl JointFriction {
+    /// γ1 … γ5 without errors; `joint` counts from 0.
+    #[must_use]
+    pub fn plain(joint: usize, [gamma1, gamma2, gamma3, gamma4, gamma5]: [f64; 5]) -> JointFriction {
+        JointFriction {
+            joint: joint + 1,
+            gamma1,
+            gamma2,
+            gamma3,
+            gamma4,
+            gamma5,
+            offset: None,
+            std: [None; 5],
+        }
+    }
+}
+
+/// The parameters of a fit.
+#[derive(Clone, Debug, Serialize)]
+pub struct Identified {
+    /// The minimal set.
+    pub parameters: Vec<ParameterEstimate>,
+    /// Friction by joint.
+    pub friction: Vec<JointFriction>,
+}
+
+/// How large an error is, by joint.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// rms of the error, N·m.
+    pub rms: Vec<f64>,
+    /// rms of the error over rms of the measured torque.
+    pub relative: Vec<f64>,
+    /// Samples in the band, of all joints' rows the most.
+    pub samples: usize,
+}
+
+impl Spread {
+    /// That of several data together; each with the rows of every joint.
+    #[must_use]
+    pub fn pooled(parts: &[(Spread, Vec<usize>)]) -> Option<Spread> {
+        let dof = parts.first()?.0.rms.len();
+        // Sums of squares of the errors and of the torques, and rows.
+        let sums = |j: usize| {
+            parts.iter().fold([0.0; 3], |[left, torque, rows], (spread, count)| {
+                let (n, error) = (count[j] as f64, spread.rms[j]);
+                let measured = if spread.relative[j] > 0.0 { error / spread.relative[j] } else { 0.0 };
+                [left + n * error * error, torque + n * measured * measured, rows + n]
+            })
+        };
+        let sums: Vec<[f64; 3]> = (0..dof).map(sums).collect();
+        let ratio = |a: f64, b: f64| if b > 0.0 { (a / b).sqrt() } else { 0.0 };
+        Some(Spread {
+            rms: sums.iter().map(|[left, _, rows]| ratio(*left, *rows)).collect(),
+            relative: sums.iter().map(|[left, torque, _]| ratio(*left, *torque)).collect(),
+            samples: sums.iter().map(|[_, _, rows]| *rows as usize).max().unwrap_or(0),
+        })
+    }
+}
+
+/// The spread of residuals on their data.
+#[must_use]
+pub fn spread(data: &Data<'_>, residual: &[Vec<f64>]) -> Spread {
+    // A sum over nothing is -0 and would print so.
+    let rms = |x: &[f64]| (x.iter().fold(0.0, |sum, v| sum + v * v) / x.len().max(1) as f64).sqrt();
+    let errors: Vec<f64> = residual.iter().map(|r| rms(r)).collect();
+    let relative = errors
+        .iter()
+        .zip(&data.joints)
+        .map(|(e, joint)| {
+            let measured = rms(&joint.torque);
+            if measured > 0.0 { e / measured } else { 0.0 }
+        })
+        .collect();
+    Spread { rms: errors, relative, samples: data.joints.iter().map(|j| j.len()).max().unwrap_or(0) }
+}
+
+/// The values of a solution of the minimal set `names`, with their errors.
+#[must_use]
+pub fn identify(names: &[String], solution: &Solution, errors: &Errors) -> Identified {
+    let layout = solution.layout;
+    let parameters = names
+        .iter()
+        .enumerate()
+        .map(|(c, name)| {
+            let (value, std) = (solution.theta[c], errors.std[c]);
+            ParameterEstimate {
+                name: name.clone(),
+                value,
+                std,
+                relative_std: std.filter(|_| value != 0.0).map(|s| s / value.abs()),
+                interval: std.map(|s| [value - errors.quantile[c] * s, value + errors.quantile[c] * s]),
+            }
+        })
+        .collect();
+    let friction = (0..layout.dof)
+        .map(|j| {
+            let [gamma1, gamma2, gamma3, gamma4, gamma5] = solution.friction(j);
+            let at = |k: usize| layout.friction(j, k);
+            let std = |c: usize| errors.std[c];
+            // The tangent's coefficient is level · Δ ln γ.
+            let shape = |k: usize, gamma: f64| {
+                let level = solution.theta[at(k)];
+                std(at(3 + k)).filter(|_| level > 0.0).map(|s| s / level * gamma)
+            };
+            JointFriction {
+                joint: j + 1,
+                gamma1,
+                gamma2,
+                gamma3,
+                gamma4,
+                gamma5,
+                offset: (layout.extra > 0).then(|| solution.offset(j)),
+                std: [std(at(0)), shape(0, gamma2), std(at(1)), shape(1, gamma4), std(at(2))],
+            }
+        })
+        .collect();
+    Identified { parameters, friction }
+}
+
+/// The spread of what coefficients leave on the reduced logs.
+#[must_use]
+pub fn spread_of(solution: &Solution, theta: &[f64]) -> Spread {
+    let joints: Vec<(f64, f64, u64)> =
+        (0..solution.layout.dof).map(|j| solution.mean_squares(j, theta)).collect();
+    Spread {
+        rms: joints.iter().map(|(left, _, _)| left.sqrt()).collect(),
+        relative: joints
+            .iter()
+            .map(|(left, torque, _)| if *torque > 0.0 { (left / torque).sqrt() } else { 0.0 })
+            .collect(),
+        samples: joints.iter().map(|(_, _, rows)| *rows as usize).max().unwrap_or(0),
+    }
+}

@@ -1,0 +1,105 @@
+//! Logs of several mountings of the virtual arm, whose dynamics are Newton and Euler's.
+
+use super::plant::{record_mounted, sensors};
+use crate::identification::estimate::{
+    FrictionLaw, Identified, Solution, Spread, Together, errors, identify, reduce_in_bands, solve_in_band,
+};
+use crate::identification::mounting::Mounting;
+use crate::logs::log::Log;
+use crate::logs::regression::{DataOptions, RigidBody};
+use crate::logs::summary::Bands;
+use crate::virtual_arm::{Body, lwa4p};
+use dyngen::SetKind;
+use nalgebra::Vector3;
+
+const LAW: FrictionLaw = FrictionLaw::Symmetric;
+
+/// The virtual arm's links with the second one's centre 4 cm further along its z: the moments whose sum only
+/// one mounting sees would cancel else.
+fn links() -> Vec<Body> {
+    let mut links = lwa4p::links();
+    links[1] = links[1].moved(Vector3::new(0.0, 0.0, 0.04));
+    links
+}
+
+/// Logs as the base stood, reduced for the mounting that they are told to be of.
+fn reduced(stood: &str, told: &str, seed: u64, still: &[usize]) -> (RigidBody, Bands) {
+    let arm = lwa4p::arm().unwrap();
+    let [stood, told] = [stood, told].map(|text| text.parse::<Mounting>().unwrap());
+    let body = RigidBody::mounted(&told.of(&arm).unwrap(), &arm).unwrap();
+    let options = DataOptions::default();
+    let mut bands = Bands::new(&body, &options);
+    let logs: Vec<Log> = record_mounted(stood.gravity(&arm), links(), &sensors(), 2, 4, seed, still);
+    for log in &logs {
+        bands.merge(&reduce_in_bands(&body, log, &options).unwrap().0).unwrap();
+    }
+    (body, bands)
+}
+
+fn together(parts: &[(RigidBody, Bands)]) -> Together {
+    Together::new(&parts.iter().map(|(body, bands)| (body, bands)).collect::<Vec<_>>()).unwrap()
+}
+
+fn fitted(all: &Together) -> (Identified, Solution, Vec<Spread>, Vec<Vec<usize>>) {
+    let found = solve_in_band(&all.bands, LAW);
+    let identified = identify(all.body.names(), &found.solution, &errors(&found.solution));
+    let spreads = all.spreads(&found.solution, &found.bands).unwrap();
+    let contradictions = all.contradictions(&spreads, &found.bands, LAW);
+    (identified, found.solution, spreads, contradictions)
+}
+
+/// Upright only a sum of Ixz2 and of moments is seen; with the base on its side as well, all of them apart.
+#[test]
+fn two_mountings_determine_what_one_does_not() {
+    let parts = [reduced("filed", "filed", 1, &[]), reduced("90,0", "90,0", 2, &[])];
+    let all = together(&parts);
+    let (found, solution, spreads, contradictions) = fitted(&all);
+    let links: Vec<f64> = links().iter().flat_map(Body::parameters).collect();
+    let truth = all.body.model().set_values(all.body.model().set(SetKind::Minimal).unwrap(), &links);
+    let upright = parts[0].0.names();
+    let mut unseen = 0;
+    for (estimate, truth) in found.parameters.iter().zip(&truth) {
+        let miss = (estimate.value - truth).abs() / estimate.std.unwrap();
+        assert!(miss < 4.0, "{}: {miss} standard errors", estimate.name);
+        if !upright.contains(&estimate.name) {
+            let [low, high] = estimate.interval.unwrap();
+            assert!(low <= *truth && *truth <= high, "{}", estimate.name);
+            if estimate.name == "mz2 + my3" {
+                assert!(truth.abs() > 20.0 * estimate.std.unwrap(), "next to nothing: {truth}");
+            }
+            unseen += 1;
+        }
+    }
+    assert_eq!((found.parameters.len(), upright.len(), unseen), (24, 23, 2));
+    assert!(contradictions.iter().all(Vec::is_empty), "{contradictions:?}");
+    // In the columns of the set that both have in common the logs of one mounting are fitted as in their own.
+    let alone = solve_in_band(&parts[0].1, LAW).solution;
+    let own = alone.mean_squares(1, &alone.theta).0.sqrt();
+    approx::assert_relative_eq!(spreads[0].rms[1], own, max_relative = 0.02);
+    assert_eq!(solution.inertial().len(), 24);
+}
+
+/// A joint that moves in one mounting alone has its friction from there.
+#[test]
+fn friction_comes_from_the_mounting_in_which_a_joint_moves() {
+    let all = together(&[reduced("filed", "filed", 3, &[1]), reduced("90,0", "90,0", 4, &[])]);
+    let (found, ..) = fitted(&all);
+    let friction = &lwa4p::plant().unwrap().friction()[1].clone();
+    let f = &found.friction[1];
+    let law =
+        crate::controller::friction::TanhFriction::new([f.gamma1, f.gamma2, f.gamma3, f.gamma4, f.gamma5]);
+    for speed in [0.1, 0.3, 0.6] {
+        approx::assert_relative_eq!(law.torque(speed), friction.torque(speed), max_relative = 0.03);
+    }
+}
+
+/// A mounting that is told wrong does not go by in silence.
+#[test]
+fn a_wrong_mounting_contradicts_the_others() {
+    let right = reduced("filed", "filed", 1, &[]);
+    let own = solve_in_band(&right.1, LAW);
+    let own = crate::identification::estimate::spread_of(&own.solution, &own.solution.theta);
+    let (_, _, spreads, contradictions) = fitted(&together(&[right, reduced("90,0", "0,90", 2, &[])]));
+    assert!(contradictions.iter().any(|joints| !joints.is_empty()));
+    assert!(spreads[1].rms[1] > 5.0 * own.rms[1], "{:?} {:?}", spreads[1].rms, own.rms);
+}

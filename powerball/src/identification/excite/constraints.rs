@@ -1,0 +1,168 @@
+//! What a path must keep beside its joints' limits: torque, floor, and its own links.
+
+use super::fourier::Fourier;
+use super::limits::Limits;
+use super::load::Load;
+use super::shape::{Floor, Nearness, Shape};
+use crate::identification::motion::Motion;
+
+/// Instants a second at which the search looks at a path: between two of them a wrist at 40 m/s² comes at
+/// most two millimetres nearer than at either.
+const RATE: f64 = 50.0;
+/// What the search keeps beyond the clearance for that, m.
+const BETWEEN: f64 = 2e-3;
+/// The same for torques, as a share of the limit.
+const TORQUE_BETWEEN: f64 = 0.01;
+
+/// The capsules of an arm, and how far they are to stay apart.
+#[derive(Clone, Debug)]
+pub struct Space {
+    /// The capsules.
+    pub shape: Shape,
+    /// The floor, where there is one.
+    pub floor: Option<Floor>,
+    /// Smallest distance of surfaces, m.
+    pub clearance: f64,
+}
+
+/// What the paths of one mounting must keep.
+#[derive(Clone, Debug)]
+pub struct Constraints {
+    /// Positions, speeds and accelerations.
+    pub limits: Limits,
+    /// Floor and links, where they are looked at.
+    pub space: Option<Space>,
+    /// Torques, where they are looked at.
+    pub load: Option<Load>,
+    /// Where the arm is before it goes to the path's beginning, each joint straight there, rad.
+    pub from: Option<Vec<f64>>,
+}
+
+/// The tightest places of a motion.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tightest {
+    /// The nearest approach, and when, s.
+    pub nearest: Option<(Nearness, f64)>,
+    /// The largest torque of each joint, N·m, where torques are looked at.
+    pub torque: Option<Vec<f64>>,
+}
+
+impl Constraints {
+    /// The joints' limits alone.
+    #[must_use]
+    pub fn of(limits: Limits) -> Constraints {
+        Constraints { limits, space: None, load: None, from: None }
+    }
+
+    /// Whether there is more than the joints' limits.
+    #[must_use]
+    pub fn any(&self) -> bool {
+        self.space.is_some() || self.load.is_some()
+    }
+
+    /// How far a path is from keeping them: 0 where it does. Means over its instants of what surfaces lack in
+    /// distance, in radii, and of the torque that is too much, as a share of its limit.
+    #[must_use]
+    pub fn violation(&self, path: &Fourier) -> f64 {
+        if !self.any() {
+            return 0.0;
+        }
+        let motion = whole(path, self.load.is_some());
+        self.lack_of_space(&motion) + self.excess_of_torque(&motion)
+    }
+
+    /// What a pose lacks in distance, in radii; 0 where it is free.
+    #[must_use]
+    pub fn lacks(&self, q: &[f64]) -> f64 {
+        let Some(space) = &self.space else { return 0.0 };
+        let nearest = space.shape.nearest(q, space.floor.as_ref());
+        let lack = nearest.map_or(0.0, |near| space.clearance + BETWEEN - near.distance);
+        lack.max(0.0) / space.shape.radius().max(1e-3)
+    }
+
+    fn lack_of_space(&self, motion: &Motion) -> f64 {
+        let sum: f64 = motion.samples().map(|[q, ..]| self.lacks(q)).sum();
+        let Some(from) = self.from.as_ref().filter(|_| self.space.is_some()) else {
+            return sum / motion.len().max(1) as f64;
+        };
+        let steps = motion.len().clamp(1, 64);
+        let to = &motion.q[..from.len()];
+        let way = |k: usize| -> Vec<f64> {
+            let share = k as f64 / steps as f64;
+            from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect()
+        };
+        let way: f64 = (0..steps).map(|k| self.lacks(&way(k))).sum();
+        sum / motion.len().max(1) as f64 + way / steps as f64
+    }
+
+    fn excess_of_torque(&self, motion: &Motion) -> f64 {
+        let Some(load) = &self.load else { return 0.0 };
+        let shares = load.shares(&motion.q, &motion.dq, &motion.ddq);
+        let excess: f64 = shares.iter().map(|share| (share - 1.0 + TORQUE_BETWEEN).max(0.0)).sum();
+        excess / motion.len().max(1) as f64
+    }
+
+    /// The tightest places of a motion, sample by sample.
+    #[must_use]
+    pub fn tightest(&self, motion: &Motion) -> Tightest {
+        let mut tightest = Tightest::default();
+        if let Some(space) = &self.space {
+            for (k, [q, ..]) in motion.samples().enumerate() {
+                let Some(near) = space.shape.nearest(q, space.floor.as_ref()) else { continue };
+                if tightest.nearest.is_none_or(|(nearest, _)| near.distance < nearest.distance) {
+                    tightest.nearest = Some((near, k as f64 * motion.period));
+                }
+            }
+        }
+        tightest.torque = self.load.as_ref().map(|load| {
+            let n = motion.dof();
+            let mut peak = vec![0.0f64; n];
+            let torques = load.torques(&motion.q, &motion.dq, &motion.ddq);
+            torques.iter().enumerate().for_each(|(k, tau)| peak[k % n] = peak[k % n].max(tau.abs()));
+            peak
+        });
+        tightest
+    }
+
+    /// Why a motion does not keep the constraints; `None` where it does.
+    #[must_use]
+    pub fn broken(&self, motion: &Motion) -> Option<String> {
+        let tightest = self.tightest(motion);
+        let mut reasons = Vec::new();
+        if let (Some(space), Some((near, time))) = (&self.space, tightest.nearest)
+            && near.distance < space.clearance
+        {
+            let how = match near.distance < 0.0 {
+                true => format!("collide ({:.3} m into each other)", -near.distance),
+                false => format!("come within {:.3} m of each other", near.distance),
+            };
+            reasons.push(format!("{} {how} at {time:.2} s", near.contact));
+        }
+        if let (Some(load), Some(torque)) = (&self.load, &tightest.torque) {
+            for (i, (tau, limit)) in torque.iter().zip(load.limits()).enumerate() {
+                if tau > limit {
+                    reasons.push(format!("joint {} takes {tau:.1} N·m of {limit:.1}", i + 1));
+                }
+            }
+        }
+        (!reasons.is_empty()).then(|| reasons.join("; "))
+    }
+}
+
+/// All that a path passes through: its series once at full speed, and with `ends` its start and stop too.
+/// Those go along the same curve, but accelerate otherwise.
+fn whole(path: &Fourier, ends: bool) -> Motion {
+    let mut motion = Motion::new(path.joints.len(), 1.0 / RATE);
+    let count = |time: f64| (time * RATE).ceil() as usize;
+    let at = |k: usize, time: f64| time * k as f64 / count(time) as f64;
+    // The first sample is the beginning of the path either way.
+    (0..count(path.period())).for_each(|k| motion.push(path.series(at(k, path.period()))));
+    if ends {
+        for k in 0..=count(path.ramp) {
+            let t = at(k, path.ramp);
+            motion.push(path.at(t));
+            motion.push(path.at(path.duration() - t));
+        }
+    }
+    motion
+}

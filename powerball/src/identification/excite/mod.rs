@@ -1,0 +1,70 @@
+//! Exciting trajectories: finite Fourier series whose base regressor is well conditioned, within the arm's
+//! limits, off the floor and clear of the arm itself, for one mounting of the base or several. Eq. 17 to 20
+//! of the paper.
+
+mod capsule;
+mod constraints;
+mod fourier;
+mod limits;
+mod load;
+mod objective;
+mod search;
+mod shape;
+
+pub use crate::identification::mounting::Mounting;
+pub use capsule::Segment;
+pub use constraints::{Constraints, Space, Tightest};
+pub use fourier::{Fourier, Harmonics};
+pub use limits::{JointLimits, Limits, MissingLimits};
+pub use load::{Load, Masses};
+pub use objective::{Conditions, Criterion, Figures, Objective};
+pub use search::{Excitation, Settings, Task, optimise, optimise_all, search, search_all};
+pub use shape::{Contact, Floor, Nearness, Shape};
+
+use std::fmt;
+
+/// Why there is no exciting trajectory.
+#[derive(Clone, Debug)]
+pub enum Error {
+    /// The arm file does not say what the joints may do.
+    Limits(MissingLimits),
+    /// The arm's model or its regressor is not to be had.
+    Model(dyngen::Error),
+    /// A setting makes no sense: what is wrong with it.
+    Setting(String),
+    /// There is no room for the arm in any pose.
+    NoPose,
+    /// No path was found that keeps all constraints: where the best one breaks them.
+    NoPath(String),
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::Limits(e) => e.fmt(f),
+            Error::Model(e) => e.fmt(f),
+            Error::Setting(what) => f.write_str(what),
+            Error::NoPose => f.write_str(
+                "the arm touches itself or the floor in every pose that was tried: its capsules are too \
+                    thick for it, or the floor is too high",
+            ),
+            Error::NoPath(why) => {
+                write!(f, "no trajectory was found that keeps all constraints; in the best one {why}")
+            }
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+impl From<MissingLimits> for Error {
+    fn from(e: MissingLimits) -> Self {
+        Error::Limits(e)
+    }
+}
+
+impl From<dyngen::Error> for Error {
+    fn from(e: dyngen::Error) -> Self {
+        Error::Model(e)
+    }
+}

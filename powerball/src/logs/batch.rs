@@ -1,0 +1,66 @@
+//! Many samples at once: a loop compiled for several kinds of processor, of which the best that is there
+//! runs.
+//!
+//! The functions in a generated file's module `batch` are loops over blocks of samples. Compiled for any
+//! x86-64 they use vectors of two; inside a [`Work`] they use what the processor has (AVX2, AVX-512, NEON).
+//! The results stay the same, to the bit.
+//!
+//! ```
+//! use powerball::batch::{self, Work};
+//! use powerball::model::minimal::{self as arm, JOINTS, PARAMETERS};
+//! use nalgebra::SVector;
+//!
+//! /// Eight samples of each joint.
+//! type Block = [[f64; 8]; JOINTS];
+//!
+//! struct Torques<'a> {
+//!     /// q, q̇ and q̈ of each block.
+//!     motion: &'a [[Block; 3]],
+//!     parameters: &'a SVector<f64, PARAMETERS>,
+//!     out: &'a mut [Block],
+//! }
+//!
+//! impl Work for Torques<'_> {
+//!     type Output = ();
+//!     #[inline(always)]
+//!     fn run(self) {
+//!         for ([q, dq, ddq], out) in self.motion.iter().zip(self.out) {
+//!             arm::batch::inverse_dynamics(q, dq, ddq, self.parameters, out);
+//!         }
+//!     }
+//! }
+//!
+//! let motion = vec![[[[0.1; 8]; JOINTS]; 3]; 100];
+//! let mut out = vec![[[0.0; 8]; JOINTS]; 100];
+//! let parameters = SVector::repeat(0.5);
+//! batch::run(Torques { motion: &motion, parameters: &parameters, out: &mut out });
+//!
+//! let [q, dq, ddq] = [0.1; 3].map(SVector::repeat);
+//! assert_eq!(out[99][2][7], arm::inverse_dynamics(&q, &dq, &ddq, &parameters)[2]);
+//! ```
+
+/// Work on batches.
+pub trait Work {
+    /// What it gives.
+    type Output;
+
+    /// Does it. To be marked `#[inline(always)]`, and to call nothing large that is not: what is not inlined
+    /// into it is compiled for any processor.
+    fn run(self) -> Self::Output;
+}
+
+struct Dispatched<W>(W);
+
+impl<W: Work> pulp::WithSimd for Dispatched<W> {
+    type Output = W::Output;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> W::Output {
+        self.0.run()
+    }
+}
+
+/// Runs `work` as it was compiled for the best vectors that this processor has.
+pub fn run<W: Work>(work: W) -> W::Output {
+    pulp::Arch::new().dispatch(Dispatched(work))
+}

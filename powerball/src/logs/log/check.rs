@@ -1,0 +1,300 @@
+//! What can be wrong with numbers that are there: time, wraps, units, dead and saturated signals.
+
+use super::read::Effort;
+use super::{Doubts, Finding, Log, LogError, Severity, levels, signs, speeds};
+use crate::logs::signal::resample::median_step;
+use dyngen::Arm;
+use dyngen::arm::JointKind;
+use std::f64::consts::PI;
+
+/// A step between samples longer than this, s, or than [`GAP_STEPS`] median steps, is a gap.
+const GAP: f64 = 0.1;
+const GAP_STEPS: f64 = 5.0;
+/// Time stamps that do not rise: up to this share are left out, more make the log unusable.
+const MOST_STALE: f64 = 0.05;
+/// The fewest samples with which anything can be done.
+const FEWEST: usize = 20;
+/// Beyond this many times a limit of the arm a number is in another unit, not a bold motion.
+const ABSURD: f64 = 3.0;
+
+/// Samples as read: joint-major.
+pub(super) struct Raw {
+    line: Vec<usize>,
+    pub(super) t: Vec<f64>,
+    pub(super) q: Vec<Vec<f64>>,
+    pub(super) effort: Vec<Vec<f64>>,
+    temperature: Option<Vec<Vec<f64>>>,
+    pub(super) dq: Vec<Vec<f64>>,
+}
+
+impl Raw {
+    pub(super) fn new(dof: usize, temperature: bool) -> Raw {
+        let empty = || vec![Vec::new(); dof];
+        Raw {
+            line: Vec::new(),
+            t: Vec::new(),
+            q: empty(),
+            effort: empty(),
+            temperature: temperature.then(empty),
+            dq: empty(),
+        }
+    }
+
+    pub(super) fn push(&mut self, line: usize, values: &[f64]) {
+        let mut values = values.iter().copied();
+        self.line.push(line);
+        self.t.extend(values.next());
+        for joint in self.q.iter_mut().chain(&mut self.effort) {
+            joint.extend(values.next());
+        }
+        for joint in self.temperature.iter_mut().flatten().chain(&mut self.dq) {
+            joint.extend(values.next());
+        }
+    }
+
+    fn retain(&mut self, keep: &[bool]) {
+        let filter = |x: &mut Vec<f64>| {
+            if x.len() == keep.len() {
+                let mut k = keep.iter();
+                x.retain(|_| *k.next().unwrap_or(&true));
+            }
+        };
+        filter(&mut self.t);
+        self.q.iter_mut().chain(&mut self.effort).for_each(filter);
+        self.temperature.iter_mut().flatten().chain(&mut self.dq).for_each(filter);
+        let mut k = keep.iter();
+        self.line.retain(|_| *k.next().unwrap_or(&true));
+    }
+}
+
+pub(super) fn into_log(
+    mut raw: Raw,
+    effort: &Effort,
+    file: &str,
+    arm: &Arm,
+    findings: &mut Vec<Finding>,
+) -> Result<Log, LogError> {
+    let mut errors = Vec::new();
+    let finding = |line: Option<usize>, quantity: String, message: String| Finding {
+        file: file.to_string(),
+        line,
+        quantity,
+        message,
+    };
+
+    // Time that stands still or runs back.
+    let mut keep = vec![true; raw.t.len()];
+    let (mut latest, mut stale, mut first_stale) = (f64::NEG_INFINITY, 0usize, None);
+    for (k, &t) in raw.t.iter().enumerate() {
+        if t > latest {
+            latest = t;
+        } else {
+            keep[k] = false;
+            stale += 1;
+            first_stale.get_or_insert((raw.line[k], t, latest));
+        }
+    }
+    if let Some((line, t, latest)) = first_stale {
+        let found = format!("{stale} of {} time stamps do not rise (first: {t} after {latest})", raw.t.len());
+        if stale as f64 > MOST_STALE * raw.t.len() as f64 {
+            let message = format!("{found}: split the file where its clock restarts");
+            return Err(LogError(vec![finding(Some(line), "t".into(), message)]));
+        }
+        findings.push(finding(Some(line), "t".into(), format!("{found}; those samples were left out")));
+        raw.retain(&keep);
+    }
+    if raw.t.len() < FEWEST {
+        let message = format!("{} usable samples are too few: at least {FEWEST} are needed", raw.t.len());
+        return Err(LogError(vec![finding(None, "samples".into(), message)]));
+    }
+    let step = median_step(&raw.t).unwrap_or(1.0);
+    if step >= 0.5 {
+        let message = format!(
+            "the median step is {step} s: t must be in seconds (milliseconds or microseconds look like this)"
+        );
+        return Err(LogError(vec![finding(Some(raw.line[1]), "t".into(), message)]));
+    }
+    let uneven = raw.t.windows(2).filter(|w| (w[1] - w[0] - step).abs() > 0.05 * step).count();
+    if uneven as f64 > 0.01 * raw.t.len() as f64 {
+        let share = 100.0 * uneven as f64 / raw.t.len() as f64;
+        findings.push(finding(
+            None,
+            "t".into(),
+            format!(
+                "{share:.0} % of the steps differ from the median \
+            {step:.4} s; samples are interpolated onto an even grid of that step"
+            ),
+        ));
+    }
+
+    for j in 0..arm.dof() {
+        unwrap(&mut raw.q[j], &raw.line, &raw.t, j, arm, file, findings);
+        units(&raw, j, effort, arm, file, findings, &mut errors);
+    }
+    let name = if matches!(effort, Effort::Torque) { "tau" } else { "i" };
+    let mut doubts = Doubts { file, line: &raw.line, t: &raw.t, findings, errors: &mut errors };
+    for (j, (q, effort)) in raw.q.iter().zip(&raw.effort).enumerate() {
+        levels::effort(effort, &format!("{name}{}", j + 1), &mut doubts);
+        levels::steps(effort, &format!("{name}{}", j + 1), false, &mut doubts);
+        levels::steps(q, &format!("q{}", j + 1), true, &mut doubts);
+    }
+    speeds::look(&raw, step, &mut doubts);
+    signs::look(&raw, step, name, &mut doubts);
+    rate(&raw.t, &mut doubts);
+    if !errors.is_empty() {
+        return Err(LogError(errors));
+    }
+
+    // Pieces between gaps and jumps.
+    let (mut pieces, mut start) = (Vec::new(), 0);
+    for k in 1..=raw.t.len() {
+        if k < raw.t.len() {
+            let gap = raw.t[k] - raw.t[k - 1];
+            let jump = (0..arm.dof()).find(|&j| {
+                let limit = 5.0 * arm.joints[j].velocity.unwrap_or(10.0);
+                (raw.q[j][k] - raw.q[j][k - 1]).abs() > (limit * gap).max(0.02)
+            });
+            if gap > GAP.max(GAP_STEPS * step) {
+                let message =
+                    format!("at {:.3} s: a gap of {gap:.3} s: the log is used as two pieces", raw.t[k - 1]);
+                findings.push(finding(Some(raw.line[k]), "t".into(), message));
+            } else if let Some(j) = jump {
+                let by = raw.q[j][k] - raw.q[j][k - 1];
+                let message = format!(
+                    "at {:.3} s: jumps by {by:.4} in {gap:.4} s, faster than the joint can move: the log is \
+                        split there",
+                    raw.t[k]
+                );
+                findings.push(finding(Some(raw.line[k]), format!("q{}", j + 1), message));
+            } else {
+                continue;
+            }
+        }
+        pieces.push(start..k);
+        start = k;
+    }
+    let torque = match effort {
+        Effort::Torque => raw.effort,
+        Effort::Current(constants) => {
+            let scaled = |(x, c): (Vec<f64>, &f64)| x.into_iter().map(|i| i * c).collect();
+            raw.effort.into_iter().zip(constants).map(scaled).collect()
+        }
+    };
+    let temperature = raw.temperature.filter(|t| t.iter().flatten().all(|v| v.is_finite()));
+    Ok(Log { file: file.to_string(), t: raw.t, q: raw.q, torque, temperature, pieces, clock: 0.0 })
+}
+
+/// A clock that changes its pace: the mean step of the last third of the samples against the first.
+fn rate(t: &[f64], doubts: &mut Doubts<'_>) {
+    let third = t.len() / 3;
+    let (first, last) = (t[third] - t[0], t[t.len() - 1] - t[t.len() - 1 - third]);
+    // A gap is no drift.
+    let whole = |w: &[f64]| w.windows(2).all(|w| w[1] - w[0] <= GAP);
+    let change = last / first - 1.0;
+    if change.abs() > 0.01 && whole(&t[..=third]) && whole(&t[t.len() - 1 - third..]) {
+        let message = format!(
+            "the mean step changes by {:.1} % from the first third of the samples to the last: the clock \
+                drifts, or samples were lost evenly",
+            100.0 * change
+        );
+        doubts.add(Some(t.len() - 1 - third), "t".into(), message, Severity::Told);
+    }
+}
+
+fn unwrap(
+    q: &mut [f64],
+    line: &[usize],
+    t: &[f64],
+    j: usize,
+    arm: &Arm,
+    file: &str,
+    findings: &mut Vec<Finding>,
+) {
+    if arm.joints[j].kind != JointKind::Revolute {
+        return;
+    }
+    let (mut turns, mut wraps, mut first) = (0.0, 0usize, None);
+    let mut previous = q[0];
+    for (k, value) in q.iter_mut().enumerate().skip(1) {
+        let jump = *value - previous;
+        previous = *value;
+        if jump.abs() > PI && (jump.abs() - 2.0 * PI).abs() < 0.5 {
+            turns -= 2.0 * PI * jump.signum();
+            wraps += 1;
+            first.get_or_insert((line[k], t[k]));
+        }
+        *value += turns;
+    }
+    if let Some((line, t)) = first {
+        findings.push(Finding {
+            file: file.to_string(),
+            line: Some(line),
+            quantity: format!("q{}", j + 1),
+            message: format!(
+                "at {t:.3} s: the angle wraps by a full turn {wraps} times (first here); it was unwrapped"
+            ),
+        });
+    }
+}
+
+/// Numbers that only another unit explains.
+fn units(
+    raw: &Raw,
+    j: usize,
+    effort: &Effort,
+    arm: &Arm,
+    file: &str,
+    findings: &mut Vec<Finding>,
+    errors: &mut Vec<Finding>,
+) {
+    let joint = &arm.joints[j];
+    let mut error = |quantity: String, message: String| {
+        errors.push(Finding { file: file.to_string(), line: None, quantity, message });
+    };
+    let largest = |x: &[f64]| x.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let q = &raw.q[j];
+    let reach = joint.position.map_or(2.0 * PI, |[low, high]| low.abs().max(high.abs()));
+    let span = largest(q);
+    let (low, high) = q.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+    if joint.kind == JointKind::Revolute && span > ABSURD * reach.max(PI) && high - low > 2.0 * PI {
+        let message = format!(
+            "reaches {span:.1}, the joint {reach:.2} rad: angles must be in radians (degrees look like \
+                this); divide by 57.2958"
+        );
+        error(format!("q{}", j + 1), message);
+    } else if joint
+        .position
+        .is_some_and(|[low, high]| raw.q[j].iter().any(|v| *v < low - 0.1 || *v > high + 0.1))
+    {
+        findings.push(Finding {
+            file: file.to_string(),
+            line: None,
+            quantity: format!("q{}", j + 1),
+            message: "goes beyond the arm file's position limits: check the joint's zero, sign and unit"
+                .into(),
+        });
+    }
+    let mut magnitudes: Vec<f64> = raw.effort[j].iter().map(|v| v.abs()).collect();
+    magnitudes.sort_by(f64::total_cmp);
+    let typical = magnitudes[magnitudes.len() / 2];
+    if let Some(limit) = joint.torque {
+        match effort {
+            Effort::Torque if typical > ABSURD * limit => {
+                let message = format!(
+                    "is typically {typical:.0}, the joint's limit is {limit} N·m: torques must be in N·m \
+                        (mN·m look like this)"
+                );
+                error(format!("tau{}", j + 1), message);
+            }
+            Effort::Current(constants) if typical * constants[j].abs() > ABSURD * limit => {
+                let message = format!(
+                    "is typically {typical:.0}, which is {:.0} N·m where the joint's limit is {limit}: \
+                        currents must be in A (mA look like this)",
+                    typical * constants[j]
+                );
+                error(format!("i{}", j + 1), message);
+            }
+            _ => {}
+        }
+    }
+}

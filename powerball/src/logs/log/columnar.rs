@@ -1,0 +1,134 @@
+//! The same columns in Parquet.
+
+use super::{Finding, Log, LogError};
+use dyngen::Arm;
+
+/// Reads a log from the bytes of a Parquet file. Rows take the place of lines in findings.
+#[cfg(feature = "parquet")]
+pub(super) fn parse(
+    bytes: &[u8],
+    file: &str,
+    arm: &Arm,
+    findings: &mut Vec<Finding>,
+) -> Result<Log, LogError> {
+    use super::read::{Columns, Samples};
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+
+    let unreadable = |row: Option<usize>, e: &dyn std::fmt::Display| {
+        LogError(vec![Finding {
+            file: file.to_string(),
+            line: row,
+            quantity: "Parquet".into(),
+            message: format!("cannot be read: {e}; write the log again, or as CSV"),
+        }])
+    };
+    let reader =
+        SerializedFileReader::new(bytes::Bytes::copy_from_slice(bytes)).map_err(|e| unreadable(None, &e))?;
+    let schema = reader.metadata().file_metadata().schema();
+    let names: Vec<String> = schema.get_fields().iter().map(|field| field.name().to_string()).collect();
+    let mut samples = Samples::new(Columns::find(&names, arm, file, findings)?, arm);
+    let rows = reader.get_row_iter(None).map_err(|e| unreadable(None, &e))?;
+    for (k, row) in rows.enumerate() {
+        let row = row.map_err(|e| unreadable(Some(k + 1), &e))?;
+        let values: Vec<Option<f64>> = row.get_column_iter().map(|(_, field)| number(field)).collect();
+        samples.take(k + 1, &names, |column| values.get(column).copied().flatten());
+    }
+    samples.finish(file, arm, findings)
+}
+
+/// Reads a log from the bytes of a Parquet file.
+#[cfg(not(feature = "parquet"))]
+pub(super) fn parse(_: &[u8], file: &str, _: &Arm, _: &mut Vec<Finding>) -> Result<Log, LogError> {
+    Err(LogError(vec![Finding {
+        file: file.to_string(),
+        line: None,
+        quantity: "Parquet".into(),
+        message: "this build reads CSV alone: enable the feature `parquet`".into(),
+    }]))
+}
+
+#[cfg(feature = "parquet")]
+fn number(field: &parquet::record::Field) -> Option<f64> {
+    use parquet::record::Field;
+    match *field {
+        Field::Double(x) => Some(x),
+        Field::Float(x) => Some(f64::from(x)),
+        Field::Int(x) => Some(f64::from(x)),
+        Field::UInt(x) => Some(f64::from(x)),
+        Field::Long(x) => Some(x as f64),
+        Field::ULong(x) => Some(x as f64),
+        Field::Short(x) => Some(f64::from(x)),
+        Field::UShort(x) => Some(f64::from(x)),
+        Field::Byte(x) => Some(f64::from(x)),
+        Field::UByte(x) => Some(f64::from(x)),
+        _ => None,
+    }
+}
+
+/// Rows of a row group.
+#[cfg(feature = "parquet")]
+const GROUP: usize = 65_536;
+
+/// CSV lines of numbers as Parquet columns of doubles, a row group at a time; the number of rows. Lines that
+/// are torn or hold anything else are left out.
+#[cfg(feature = "parquet")]
+pub(super) fn from_csv(csv: impl std::io::Read, out: impl std::io::Write + Send) -> std::io::Result<usize> {
+    use parquet::data_type::DoubleType;
+    use parquet::errors::ParquetError;
+    use parquet::file::properties::WriterProperties;
+    use parquet::file::writer::SerializedFileWriter;
+    use parquet::schema::types::Type;
+    use std::io::Error;
+    use std::sync::Arc;
+
+    let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(csv);
+    let names: Vec<String> = reader.headers()?.iter().map(str::to_string).collect();
+    let column = |name: &String| {
+        let double = Type::primitive_type_builder(name, parquet::basic::Type::DOUBLE);
+        double.with_repetition(parquet::basic::Repetition::REQUIRED).build().map(Arc::new)
+    };
+    let schema = names
+        .iter()
+        .map(column)
+        .collect::<Result<Vec<_>, _>>()
+        .and_then(|fields| Type::group_type_builder("log").with_fields(fields).build());
+    let properties = WriterProperties::builder().set_compression(parquet::basic::Compression::SNAPPY).build();
+    let mut writer = schema
+        .and_then(|schema| SerializedFileWriter::new(out, Arc::new(schema), Arc::new(properties)))
+        .map_err(Error::other)?;
+    let mut write = |columns: &mut [Vec<f64>]| -> Result<(), ParquetError> {
+        let mut group = writer.next_row_group()?;
+        for values in columns {
+            if let Some(mut column) = group.next_column()? {
+                column.typed::<DoubleType>().write_batch(values, None, None)?;
+                column.close()?;
+            }
+            values.clear();
+        }
+        group.close().map(|_| ())
+    };
+    let (mut columns, mut rows) = (vec![Vec::new(); names.len()], 0);
+    for record in reader.records() {
+        let Ok(record) = record else { continue };
+        let values: Vec<f64> = record.iter().filter_map(|cell| cell.parse().ok()).collect();
+        if values.len() != names.len() || record.len() != names.len() {
+            continue;
+        }
+        columns.iter_mut().zip(values).for_each(|(column, value)| column.push(value));
+        rows += 1;
+        if rows % GROUP == 0 {
+            write(&mut columns).map_err(Error::other)?;
+        }
+    }
+    if rows % GROUP != 0 {
+        write(&mut columns).map_err(Error::other)?;
+    }
+    writer.close().map_err(Error::other)?;
+    Ok(rows)
+}
+
+/// CSV lines as Parquet columns.
+#[cfg(not(feature = "parquet"))]
+pub(super) fn from_csv(_: impl std::io::Read, _: impl std::io::Write + Send) -> std::io::Result<usize> {
+    Err(std::io::Error::other("this build writes CSV alone: enable the feature `parquet`"))
+}

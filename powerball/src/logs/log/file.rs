@@ -1,0 +1,165 @@
+//! A log while it is written: whatever moment the program dies at, what was written can be read.
+//!
+//! Lines of CSV need nothing after them. A Parquet file is none before its last bytes, so it is made of such
+//! lines: they are written to `NAME.parquet.csv`, and closing the log makes `NAME.parquet` of them, whole or
+//! not at all. Where a program died before that, the lines are still there, a log like any other; the next
+//! log of that name puts them into a Parquet file of their own first.
+
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// A log that is being written, line by line.
+#[derive(Debug)]
+pub struct LogFile {
+    path: PathBuf,
+    lines: PathBuf,
+    file: File,
+    begun: bool,
+}
+
+impl LogFile {
+    /// Begins a log at `path`: Parquet where its name ends in `.parquet`, CSV else. What was there before
+    /// stays until the first line is written. Also gives the file that took up what an earlier log of this
+    /// name left when its program died.
+    ///
+    /// # Errors
+    /// What the file system says, and Parquet in a build without it.
+    pub fn create(path: &Path) -> io::Result<(LogFile, Option<PathBuf>)> {
+        let columnar = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet"));
+        if columnar && !cfg!(feature = "parquet") {
+            return Err(io::Error::other("this build writes CSV alone: enable the feature `parquet`"));
+        }
+        let lines = if columnar { with_more(path, ".csv") } else { path.to_path_buf() };
+        let recovered = if columnar { recover(path, &lines)? } else { None };
+        let file = OpenOptions::new().create(true).append(true).open(&lines)?;
+        Ok((LogFile { path: path.to_path_buf(), lines, file, begun: false }, recovered))
+    }
+
+    /// Ends the log.
+    ///
+    /// # Errors
+    /// What the file system says (the lines are then still there), and where nothing was written.
+    pub fn close(mut self) -> io::Result<()> {
+        self.file.flush()?;
+        if !self.begun {
+            if self.file.metadata()?.len() == 0 {
+                fs::remove_file(&self.lines)?;
+            }
+            return Err(io::Error::other("nothing was recorded"));
+        }
+        if self.lines != self.path {
+            convert(&self.lines, &self.path)?;
+            fs::remove_file(&self.lines)?;
+        }
+        Ok(())
+    }
+}
+
+impl Write for LogFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if !self.begun {
+            self.file.set_len(0)?;
+            self.begun = true;
+        }
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+fn with_more(path: &Path, more: &str) -> PathBuf {
+    let mut name: OsString = path.as_os_str().to_owned();
+    name.push(more);
+    PathBuf::from(name)
+}
+
+/// Lines that a dead program left become a Parquet file under a name that is still free.
+fn recover(path: &Path, lines: &Path) -> io::Result<Option<PathBuf>> {
+    if !lines.exists() {
+        return Ok(None);
+    }
+    let free = (1..).map(|k| path.with_extension(format!("interrupted-{k}.parquet"))).find(|p| !p.exists());
+    let Some(target) = free else { return Ok(None) };
+    let rows = convert(lines, &target)?;
+    fs::remove_file(lines)?;
+    Ok((rows > 0).then_some(target))
+}
+
+/// Lines of CSV to a Parquet file, whole or not at all; the number of rows. Without rows there is no file.
+fn convert(lines: &Path, target: &Path) -> io::Result<usize> {
+    let part = with_more(target, &format!(".{}.part", std::process::id()));
+    let written = super::columnar::from_csv(File::open(lines)?, File::create(&part)?);
+    match written {
+        Ok(rows) if rows > 0 => fs::rename(&part, target).map(|()| rows),
+        other => {
+            let _ = fs::remove_file(&part);
+            other
+        }
+    }
+}
+
+#[cfg(test)]
+#[cfg(feature = "parquet")]
+mod tests {
+    use super::*;
+    use crate::logs::log::read_log;
+
+    const HEADER: &str = "t,q1,q2,tau1,tau2\n";
+
+    fn arm() -> dyngen::Arm {
+        let joint = "[[joint]]\nkind = \"revolute\"\na = 0.3\nalpha = 0\nd = 0\ntheta = 0\n";
+        let text =
+            format!("name = \"two\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\n{joint}{joint}");
+        dyngen::Arm::parse(&text, "two.toml").unwrap()
+    }
+
+    fn line(k: usize) -> String {
+        let t = 0.005 * k as f64;
+        format!("{t:.4},{:.7},{:.7},{:.4},{:.4}\n", t.sin(), t.cos(), 3.0 * t.sin(), t.cos() - 0.2)
+    }
+
+    /// A log that was closed says what the same lines as CSV say; one that was not is found by the next.
+    #[test]
+    fn closed_and_abandoned_logs_can_be_read() {
+        let folder = std::env::temp_dir().join(format!("powerball_log_file_{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let (parquet, csv) = (folder.join("a.parquet"), folder.join("a.csv"));
+        let begin = |path: &Path| LogFile::create(path).unwrap();
+        // More than one row group.
+        for path in [&parquet, &csv] {
+            let (mut log, recovered) = begin(path);
+            assert!(recovered.is_none());
+            log.write_all(HEADER.as_bytes()).unwrap();
+            (0..70_000).for_each(|k| log.write_all(line(k).as_bytes()).unwrap());
+            log.close().unwrap();
+        }
+        let read = |path: &Path| read_log(path, &arm(), &mut Vec::new()).unwrap();
+        let (a, b) = (read(&parquet), read(&csv));
+        assert_eq!((a.t, a.q, a.torque), (b.t, b.q, b.torque));
+        assert!(fs::metadata(&parquet).unwrap().len() < fs::metadata(&csv).unwrap().len());
+
+        // The program dies in the middle of a line.
+        let (mut log, _) = begin(&parquet);
+        log.write_all(HEADER.as_bytes()).unwrap();
+        (0..500).for_each(|k| log.write_all(line(k).as_bytes()).unwrap());
+        log.write_all(b"2.5,0.1,0").unwrap();
+        drop(log);
+        let lines = folder.join("a.parquet.csv");
+        assert_eq!(read(&lines).t.len(), 500);
+        assert_eq!(read(&parquet).t.len(), 70_000);
+        let (log, recovered) = begin(&parquet);
+        let recovered = recovered.unwrap();
+        assert_eq!(recovered, folder.join("a.interrupted-1.parquet"));
+        assert_eq!(read(&recovered).t.len(), 500);
+        // Nothing was recorded: that is said, and what was there stays.
+        assert!(log.close().unwrap_err().to_string().contains("nothing was recorded"));
+        assert!(begin(&csv).0.close().is_err());
+        assert_eq!((read(&parquet).t.len(), read(&csv).t.len()), (70_000, 70_000));
+        assert!(!lines.exists() && begin(&parquet).1.is_none());
+        fs::remove_dir_all(&folder).unwrap();
+    }
+}

@@ -1,0 +1,353 @@
+use super::read::parse;
+use super::*;
+use dyngen::Arm;
+use std::fmt::Write as _;
+
+const ARM: &str = r#"
+name = "two"
+convention = "standard"
+gravity = [0, 0, -9.81]
+[[joint]]
+kind = "revolute"
+a = 0.3
+alpha = "pi/2"
+d = 0.1
+theta = 0
+torque = 50
+torque_constant = 2.0
+position = [-3.2, 3.2]
+[[joint]]
+kind = "revolute"
+a = 0.2
+alpha = 0
+d = 0
+theta = 0
+torque = 50
+"#;
+
+fn arm() -> Arm {
+    Arm::parse(ARM, "two.toml").unwrap()
+}
+
+/// A log of 2 s at 100 Hz, each line passed through `line` first.
+fn text(header: &str, mut line: impl FnMut(usize, Vec<String>) -> Option<String>) -> String {
+    let mut text = format!("{header}\n");
+    for k in 0..200 {
+        let t = 0.01 * k as f64;
+        let fields = vec![
+            format!("{t:.4}"),
+            format!("{:.6}", (2.0 * t).sin()),
+            format!("{:.6}", (3.0 * t).cos()),
+            format!("{:.4}", 5.0 + (7.0 * t).sin()),
+            format!("{:.4}", (5.0 * t).cos()),
+        ];
+        if let Some(line) = line(k, fields) {
+            let _ = writeln!(text, "{line}");
+        }
+    }
+    text
+}
+
+const HEADER: &str = "t,q1,q2,tau1,tau2";
+
+fn read(text: &str) -> (Result<Log, LogError>, Vec<Finding>) {
+    let mut findings = Vec::new();
+    let log = parse(text.as_bytes(), "x.csv", &arm(), &mut findings);
+    (log, findings)
+}
+
+#[test]
+fn a_sound_log_is_read_without_findings() {
+    let (log, findings) = read(&text(HEADER, |_, f| Some(f.join(","))));
+    let log = log.unwrap();
+    assert!(findings.is_empty(), "{findings:?}");
+    assert_eq!(log.t.len(), 200);
+    assert!(matches!(log.pieces.as_slice(), [one] if *one == (0..200)));
+    assert_eq!(log.q[1][0], 1.0);
+}
+
+#[test]
+fn faults_are_found_with_their_line_and_taken_out() {
+    let spoilt = text(&format!("{HEADER},mode"), |k, mut f| {
+        f.push("run".into());
+        match k {
+            10 => f[2] = "nan".into(),
+            20 => f[0] = "0.19".into(),
+            100..150 => return None,
+            199 => return Some("1.99,0.1".into()),
+            _ => {}
+        }
+        Some(f.join(","))
+    });
+    let (log, findings) = read(&spoilt);
+    let log = log.unwrap();
+    let said = findings.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+    for part in [
+        "kept out: mode",
+        "x.csv:12: q2",
+        "x.csv:22: t: 1 of",
+        "torn",
+        "x.csv:102: t: at 0.990 s: a gap of 0.5",
+    ] {
+        assert!(said.contains(part), "{part} not in\n{said}");
+    }
+    assert_eq!(log.pieces.len(), 2);
+    assert!(log.q.iter().flatten().all(|v| v.is_finite()));
+}
+
+#[test]
+fn wraps_are_undone() {
+    let wrapped = text(HEADER, |k, mut f| {
+        let q = 2.0 + 0.02 * k as f64;
+        f[1] = format!("{:.6}", if q > std::f64::consts::PI { q - 2.0 * std::f64::consts::PI } else { q });
+        Some(f.join(","))
+    });
+    let (log, findings) = read(&wrapped);
+    let log = log.unwrap();
+    assert!((log.q[0][199] - 5.98).abs() < 1e-3);
+    assert!(findings.iter().any(|f| f.quantity == "q1" && f.message.contains("unwrapped")));
+}
+
+#[test]
+fn what_cannot_be_used_is_refused_with_its_reason() {
+    let plain = |header: &str| text(header, |_, f| Some(f.join(",")));
+    let cases = [
+        (plain("t,q1,q3,tau1,tau2"), "missing: q2"),
+        (plain("time,q1,q2,tau1,tau2"), "no column t"),
+        (plain("t,q1,q2,i1,i2"), "torque_constant (N·m/A at the joint) for joint 2"),
+        (plain("t,q1,q2,tau1,tau1"), "twice"),
+        (
+            text(HEADER, |k, mut f| {
+                f[0] = format!("{}", 10 * k);
+                Some(f.join(","))
+            }),
+            "milliseconds",
+        ),
+        (
+            text(HEADER, |k, mut f| {
+                f[1] = format!("{}", k as f64 * 0.9 - 90.0);
+                Some(f.join(","))
+            }),
+            "degrees",
+        ),
+        (
+            text(HEADER, |k, mut f| {
+                f[3] = format!("{}", 4000 + k);
+                Some(f.join(","))
+            }),
+            "mN·m",
+        ),
+        (
+            text(HEADER, |k, mut f| {
+                if k % 3 == 0 {
+                    f[1] = "".into()
+                }
+                Some(f.join(","))
+            }),
+            "no finite number",
+        ),
+        (
+            text(HEADER, |k, mut f| {
+                if k > 100 {
+                    f[0] = format!("{}", 0.01 * (k - 101) as f64)
+                }
+                Some(f.join(","))
+            }),
+            "clock restarts",
+        ),
+        (HEADER.to_string(), "too few"),
+        (String::new(), "no column t"),
+    ];
+    for (text, reason) in cases {
+        let (log, _) = read(&text);
+        let said = log.err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(said.contains(reason), "'{reason}' not in '{said}'");
+    }
+}
+
+/// A log of 40 s at 100 Hz with speeds and friction, its columns passed through `change`: t, q1, q2, dq1,
+/// dq2, tau1, tau2.
+fn swings(mut change: impl FnMut(usize, &mut [f64; 7])) -> String {
+    let mut text = String::from("t,q1,q2,dq1,dq2,tau1,tau2\n");
+    for k in 0..4000 {
+        let t = 0.01 * k as f64;
+        let (w1, w2) = (1.3, 1.9);
+        let (v1, v2) = (w1 * (w1 * t).cos(), -w2 * (w2 * t).sin());
+        let tau = |v: f64, q: f64| 4.0 * (20.0 * v).tanh() + 2.0 * v + 9.0 * q.cos();
+        let (q1, q2) = ((w1 * t).sin(), (w2 * t).cos());
+        let mut row = [t, q1, q2, v1, v2, tau(v1, q1 + q2), tau(v2, q2)];
+        change(k, &mut row);
+        let row: Vec<String> = row.iter().map(|x| format!("{x:.6}")).collect();
+        let _ = writeln!(text, "{}", row.join(","));
+    }
+    text
+}
+
+/// What is said of a log: findings, or why it cannot be used.
+fn said(text: &str) -> Vec<String> {
+    let (log, findings) = read(text);
+    let errors = log.err().map(|e| e.0).unwrap_or_default();
+    findings.iter().chain(&errors).map(ToString::to_string).collect()
+}
+
+#[test]
+fn each_doubt_finds_its_fault_and_no_other() {
+    assert_eq!(said(&swings(|_, _| ())), Vec::<String>::new());
+    let round = |x: &mut f64, step: f64| *x = (*x / step).round() * step;
+    let cases: [(&str, &[&str]); 12] = [
+        (
+            &swings(|_, r| r.swap(3, 4)),
+            &["dq1: is not the slope of q1, but dq2 is", "dq2: is not the slope of q2"],
+        ),
+        (&swings(|_, r| r[3] = -r[3]), &["dq1: is -1.000 times the slope of q1: their signs differ"]),
+        (&swings(|_, r| r[4] *= 57.2958), &["dq2: is 57.2", "degrees a second"]),
+        (&swings(|k, r| r[4] = (0.001 * (k * k) as f64).sin()), &["dq2: does not follow q2"]),
+        (&swings(|_, r| r[0] *= 1.02), &["t: passes 2.0 % too fast for the joints' speeds"]),
+        (
+            &swings(|_, r| r[0] += 2e-4 * r[0] * r[0]),
+            &["drifts against the joints' speeds", "x.csv:2668: t: at 26.8"],
+        ),
+        (&swings(|_, r| r[5] = r[5].clamp(-100.0, 12.0)), &["tau1: at ", "stays at its extreme 12 for"]),
+        (&swings(|_, r| round(&mut r[6], 1.5)), &["tau2: has 12 levels", "1.500e0 apart"]),
+        (&swings(|_, r| round(&mut r[1], 0.02)), &["q1: has 101 levels, 2.000e-2 apart: accelerations"]),
+        (&swings(|_, r| r[5] = -r[5]), &["tau1: is ", "friction would have to drive the joint"]),
+        (&swings(|_, r| (r[1], r[3]) = (-r[1], -r[3])), &["tau1: is ", "or that of q1"]),
+        (&swings(|_, r| r[6] = 3.0), &["tau2: never changes"]),
+    ];
+    for (text, parts) in cases {
+        let found = said(text);
+        let all = found.join("\n");
+        assert!(parts.iter().all(|part| all.contains(part)), "{parts:?} not in\n{all}");
+        // Of the kind that is meant, and of no other; a drifting clock is off altogether too.
+        assert!(found.len() <= 3, "{parts:?}:\n{all}");
+    }
+}
+
+/// Sound logs of real arms are not doubted beyond what is so: uneven steps and columns that are not known.
+#[test]
+fn measured_logs_give_no_false_findings() {
+    let folder = std::env::var_os("POWERBALL_DATA").map_or_else(
+        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
+        std::path::PathBuf::from,
+    );
+    for (name, most) in [("ur10e", 11), ("lwa4p_rollouts", 74)] {
+        let folder = folder.join(name);
+        let Ok(arm) = Arm::read(&folder.join("arm.toml")) else {
+            println!("skipped: there are no measured logs in {}", folder.display());
+            return;
+        };
+        let mut count = 0;
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_none_or(|e| e != "csv") {
+                continue;
+            }
+            let mut findings = Vec::new();
+            read_log(&path, &arm, &mut findings).unwrap();
+            for finding in &findings {
+                let known = ["kept out:", "of the steps differ from the median", "never changes"];
+                assert!(known.iter().any(|part| finding.message.contains(part)), "{finding}");
+            }
+            count += 1;
+        }
+        assert_eq!(count, most);
+    }
+}
+
+#[test]
+fn garbage_is_no_panic() {
+    use rand::{RngExt, SeedableRng};
+    let sound = text(HEADER, |_, f| Some(f.join(","))).into_bytes();
+    for seed in 0..200 {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut bytes = sound.clone();
+        for _ in 0..rng.random_range(1..40) {
+            let at = rng.random_range(0..bytes.len());
+            match rng.random_range(0..3) {
+                0 => bytes[at] = rng.random(),
+                1 => bytes.truncate(at.max(1)),
+                _ => drop(bytes.remove(at)),
+            }
+            if bytes.len() < 2 {
+                break;
+            }
+        }
+        let mut findings = Vec::new();
+        if let Ok(log) = parse(&bytes, "x.csv", &arm(), &mut findings) {
+            assert!(log.q.iter().chain(&log.torque).flatten().all(|v| v.is_finite()));
+        }
+    }
+}
+
+#[test]
+fn a_clock_that_runs_on_is_common_and_others_follow_each_other() {
+    let log = |from: f64, to: f64| Log {
+        file: String::new(),
+        t: vec![from, to],
+        q: vec![],
+        torque: vec![],
+        temperature: None,
+        pieces: vec![],
+        clock: 0.0,
+    };
+    let mut running = [log(10.0, 20.0), log(40.0, 50.0), log(20.5, 30.0)];
+    common_clock(&mut running);
+    assert_eq!(running.map(|l| l.t[0] + l.clock), [0.0, 30.0, 10.5]);
+    let mut restarted = [log(0.0, 20.0), log(0.0, 10.0), log(1.0, 5.0)];
+    common_clock(&mut restarted);
+    assert_eq!(restarted.map(|l| l.t[0] + l.clock), [0.0, 20.0, 30.0]);
+}
+
+/// Parquet with these columns of doubles; NaN stands for a missing value.
+#[cfg(feature = "parquet")]
+fn parquet_of(csv: &str) -> Vec<u8> {
+    use parquet::data_type::DoubleType;
+    use parquet::file::properties::WriterProperties;
+    use parquet::file::writer::SerializedFileWriter;
+    use parquet::schema::parser::parse_message_type;
+    use std::sync::Arc;
+
+    let mut lines = csv.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let rows: Vec<Vec<Option<f64>>> = lines.map(|l| l.split(',').map(|x| x.parse().ok()).collect()).collect();
+    let fields: String = names.iter().map(|n| format!("OPTIONAL DOUBLE {n};")).collect();
+    let schema = Arc::new(parse_message_type(&format!("message log {{ {fields} }}")).unwrap());
+    let properties = WriterProperties::builder().set_compression(parquet::basic::Compression::SNAPPY).build();
+    let mut bytes = Vec::new();
+    let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::new(properties)).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    for k in 0..names.len() {
+        let levels: Vec<i16> = rows.iter().map(|r| i16::from(r[k].is_some())).collect();
+        let values: Vec<f64> = rows.iter().filter_map(|r| r[k]).collect();
+        let mut column = group.next_column().unwrap().unwrap();
+        column.typed::<DoubleType>().write_batch(&values, Some(&levels), None).unwrap();
+        column.close().unwrap();
+    }
+    group.close().unwrap();
+    writer.close().unwrap();
+    bytes
+}
+
+#[cfg(feature = "parquet")]
+#[test]
+fn parquet_says_the_same_as_csv() {
+    // One value is missing in line 50.
+    let csv = text("t,q1,q2,tau1,tau2", |k, mut fields| {
+        if k == 50 {
+            fields[3] = "nothing".into();
+        }
+        Some(fields[..5].join(","))
+    });
+    let (mut of_csv, mut of_parquet) = (Vec::new(), Vec::new());
+    let a = parse(csv.as_bytes(), "log", &arm(), &mut of_csv).unwrap();
+    let b = parse(&parquet_of(&csv), "log", &arm(), &mut of_parquet).unwrap();
+    assert_eq!((a.t, a.q, a.torque, a.pieces), (b.t, b.q, b.torque, b.pieces));
+    let messages = |f: &[Finding]| f.iter().map(|f| f.message.clone()).collect::<Vec<_>>();
+    assert_eq!(messages(&of_csv), messages(&of_parquet));
+    // Row 51 is line 52.
+    assert_eq!((of_csv[0].line, of_parquet[0].line), (Some(52), Some(51)));
+    let missing = parse(&parquet_of("t,q1,q2,tau1\n0,0,0,0\n"), "log", &arm(), &mut of_parquet);
+    assert!(missing.unwrap_err().to_string().contains("missing: tau2"));
+    let torn = parse(&parquet_of(&csv)[..500], "torn.parquet", &arm(), &mut of_parquet);
+    assert!(torn.unwrap_err().to_string().contains("torn.parquet: Parquet: cannot be read"));
+}

@@ -1,0 +1,11 @@
+//! From log files to rows of the regression.
+//!
+//! [`log`] reads files and doubts them, [`signal`] filters and differentiates, [`regression`] makes rows,
+//! [`summary`] keeps of them what a fit needs.
+
+pub mod batch;
+pub mod log;
+pub(crate) mod parallel;
+pub mod regression;
+pub mod signal;
+pub mod summary;

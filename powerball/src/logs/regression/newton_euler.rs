@@ -1,0 +1,96 @@
+//! A numeric Newton–Euler regressor, independent of the generator: the plant and the check of tests.
+
+use dyngen::Arm;
+use dyngen::arm::{Convention, JointKind};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+/// The regressor of all eleven parameters a link (n × 11n, row-major) at one state, for gravity `g` in the
+/// base frame.
+pub(crate) fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec<f64> {
+    let n = arm.dof();
+    let number = dyngen::exact::rational::to_f64;
+    let mut y = vec![0.0; n * 11 * n];
+    let (mut axes, mut points) = (Vec::new(), Vec::new());
+    let (mut r, mut p) = (Matrix3::identity(), Vector3::zeros());
+    let (mut w, mut dw, mut acc) = (Vector3::zeros(), Vector3::zeros(), -Vector3::from(g));
+    for (i, joint) in arm.joints.iter().enumerate() {
+        let prismatic = joint.kind == JointKind::Prismatic;
+        let (theta, d) = if prismatic {
+            (joint.theta.radians(), number(&joint.d) + q[i])
+        } else {
+            (joint.theta.radians() + q[i], number(&joint.d))
+        };
+        let twist = *Rotation3::from_axis_angle(&Vector3::x_axis(), joint.alpha.radians()).matrix();
+        let turn = *Rotation3::from_axis_angle(&Vector3::z_axis(), theta).matrix();
+        let shift = Vector3::new(number(&joint.a), 0.0, 0.0);
+        let along = Vector3::new(0.0, 0.0, d);
+        // The joint's axis and a point on it are fixed in link i − 1.
+        let (axis, point, r_next, p_next) = match arm.convention {
+            Convention::Standard => {
+                let next = r * turn * twist;
+                (r * Vector3::z(), p, next, p + r * (along + turn * shift))
+            }
+            Convention::Modified => {
+                let frame = r * twist;
+                let point = p + r * shift;
+                (frame * Vector3::z(), point, frame * turn, point + frame * along)
+            }
+        };
+        if let Some(ratio) = &joint.rotor_ratio {
+            let (k, column) = (number(ratio), 11 * i + 10);
+            y[i * 11 * n + column] += k * k * a[i] + k * axis.dot(&dw);
+            let moment = axis * (k * a[i]) + w.cross(&axis) * (k * v[i]);
+            for j in 0..i {
+                if arm.joints[j].kind == JointKind::Revolute {
+                    let z: Vector3<f64> = axes[j];
+                    y[j * 11 * n + column] += z.dot(&moment);
+                }
+            }
+        }
+        axes.push(axis);
+        points.push(point);
+        let arm_vector = p_next - p;
+        let (w0, dw0) = (w, dw);
+        if prismatic {
+            acc += dw0.cross(&arm_vector)
+                + w0.cross(&w0.cross(&arm_vector))
+                + axis * a[i]
+                + w0.cross(&axis) * (2.0 * v[i]);
+        } else {
+            w = w0 + axis * v[i];
+            dw = dw0 + axis * a[i] + w0.cross(&axis) * v[i];
+            // To the axis with link i − 1, from there with link i.
+            let (to_axis, from_axis) = (point - p, p_next - point);
+            acc += dw0.cross(&to_axis)
+                + w0.cross(&w0.cross(&to_axis))
+                + dw.cross(&from_axis)
+                + w.cross(&w.cross(&from_axis));
+        }
+        (r, p) = (r_next, p_next);
+
+        let local = r.transpose();
+        let (lw, ldw, la) = (local * w, local * dw, local * acc);
+        let mut columns = vec![(la, Vector3::zeros())];
+        for e in [Vector3::x(), Vector3::y(), Vector3::z()] {
+            columns.push((ldw.cross(&e) + lw.cross(&lw.cross(&e)), e.cross(&la)));
+        }
+        for (m, k) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
+            let mut inertia = Matrix3::zeros();
+            let sign = if m == k { 1.0 } else { -1.0 };
+            inertia[(m, k)] = sign;
+            inertia[(k, m)] = sign;
+            columns.push((Vector3::zeros(), inertia * ldw + lw.cross(&(inertia * lw))));
+        }
+        for j in 0..=i {
+            let z = local * axes[j];
+            let lever = local * (p - points[j]);
+            for (k, (force, moment)) in columns.iter().enumerate() {
+                y[j * 11 * n + 11 * i + k] = match arm.joints[j].kind {
+                    JointKind::Revolute => z.dot(&(moment + lever.cross(force))),
+                    JointKind::Prismatic => z.dot(force),
+                };
+            }
+        }
+    }
+    y
+}

@@ -1,0 +1,485 @@
+//! Logs of an arm into rows: even grid, derivatives, band, rest removed, blocks laid out.
+
+use super::silent::{dead, silent_joints};
+use super::{Block, Column, JointRows, Recording, RigidBody};
+use crate::logs::log::Log;
+use crate::logs::parallel;
+use crate::logs::signal::resample::median_step;
+use crate::logs::signal::{Band, rest};
+use dyngen::arm::{Parameter, ParameterKind};
+use std::fmt;
+use std::sync::OnceLock;
+
+/// How logs are prepared.
+#[derive(Clone, Debug)]
+pub struct DataOptions {
+    /// Band of the regression, Hz: torques and columns pass the same zero-phase low-pass.
+    pub cutoff: f64,
+    /// Smoothing of positions before they are differentiated, Hz. The noise of accelerations grows with its
+    /// power 2.5.
+    pub smoothing: f64,
+    /// Length of a block, s: residuals further apart count as independent.
+    pub block: f64,
+}
+
+impl Default for DataOptions {
+    fn default() -> Self {
+        DataOptions { cutoff: 10.0, smoothing: 8.0, block: 2.0 }
+    }
+}
+
+/// Why logs cannot be analysed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DataError {
+    /// No log has a stretch long enough.
+    TooShort,
+    /// No joint says anything: why, joint by joint.
+    NoMotion(Vec<String>),
+}
+
+impl fmt::Display for DataError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            DataError::TooShort => {
+                write!(f, "the logs hold no stretch of at least a second without gaps: record longer")
+            }
+            DataError::NoMotion(why) => write!(
+                f,
+                "no joint moves enough in these logs, with torques that change: friction and inertia cannot \
+                    be seen; record an \
+                 exciting motion\n  {}",
+                why.join("\n  ")
+            ),
+        }
+    }
+}
+
+impl std::error::Error for DataError {}
+
+/// Everything that regressions over some logs share.
+#[derive(Debug)]
+pub struct Data<'a> {
+    /// The arm's rigid-body functions.
+    pub body: &'a RigidBody,
+    /// The pieces of all logs.
+    pub recordings: Vec<Recording>,
+    /// The band.
+    pub band: Band,
+    /// The rows by joint.
+    pub joints: Vec<JointRows>,
+    /// The blocks, in order of time and log.
+    pub blocks: Vec<Block>,
+    /// File names by log.
+    pub logs: Vec<String>,
+    /// The speed below which a joint rests, by joint, rad/s.
+    pub rest_speed: Vec<f64>,
+    /// By joint: why its samples say nothing, in words.
+    pub silent: Vec<Option<String>>,
+    /// Pieces of logs, and joints of some logs, that were left out, in words.
+    pub left_out: Vec<String>,
+    /// What was left out or done, in words.
+    pub notes: Vec<String>,
+    /// Whether joints are fitted apart (see [`Data::take_apart`]).
+    pub joints_apart: bool,
+    top_speed: Vec<f64>,
+    last_link: OnceLock<Vec<Column>>,
+    force: OnceLock<Vec<Column>>,
+    declared_zero: OnceLock<Vec<Column>>,
+}
+
+impl<'a> Data<'a> {
+    /// Prepares logs.
+    ///
+    /// # Errors
+    /// [`DataError`] where nothing usable remains.
+    pub fn new(body: &'a RigidBody, logs: &[Log], options: &DataOptions) -> Result<Data<'a>, DataError> {
+        Data::corrected(body, logs, options, |_| {})
+    }
+
+    /// Prepares logs whose signals are corrected on the even grid before they pass the band.
+    ///
+    /// # Errors
+    /// As [`Data::new`].
+    pub fn corrected(
+        body: &'a RigidBody,
+        logs: &[Log],
+        options: &DataOptions,
+        correct: impl FnMut(&mut Recording),
+    ) -> Result<Data<'a>, DataError> {
+        Data::in_bands(body, logs, options, 1, correct)?.pop().unwrap_or(Err(DataError::TooShort))
+    }
+
+    /// Prepares logs in `count` bands, each of half the cutoff of the one before, the first that of the
+    /// options. What can be used in a band may be too little in a narrower one.
+    ///
+    /// # Errors
+    /// As [`Data::new`], where nothing usable remains in any band.
+    pub fn in_bands(
+        body: &'a RigidBody,
+        logs: &[Log],
+        options: &DataOptions,
+        count: usize,
+        correct: impl FnMut(&mut Recording),
+    ) -> Result<Vec<Result<Data<'a>, DataError>>, DataError> {
+        let n = body.dof();
+        let mut steps: Vec<f64> = logs.iter().filter_map(|log| median_step(&log.t)).collect();
+        steps.sort_by(f64::total_cmp);
+        let step = *steps.get(steps.len() / 2).ok_or(DataError::TooShort)?;
+        let rate = 1.0 / step;
+        let widest = Band::new(options.cutoff, rate);
+        let bands: Vec<Band> =
+            std::iter::successors(Some(widest), |band| Some(band.halved(rate))).take(count).collect();
+        let mut left_out: Vec<String> = Vec::new();
+        let mut recordings: Vec<Recording> = Vec::new();
+        for (index, log) in logs.iter().enumerate() {
+            for piece in &log.pieces {
+                let span = log.t[piece.end - 1] - log.t[piece.start];
+                if span < 1.0 {
+                    left_out
+                        .push(format!("{}: a piece of {span:.2} s is too short and was left out", log.file));
+                    continue;
+                }
+                recordings.extend(Recording::new(log, index, piece.clone(), step, options.smoothing));
+            }
+        }
+        if recordings.is_empty() {
+            return Err(DataError::TooShort);
+        }
+        recordings.iter_mut().for_each(correct);
+        let rest_speed: Vec<f64> = (0..n)
+            .map(|j| {
+                let speeds = recordings.iter().flat_map(|r| r.speed(j).map(f64::abs)).collect();
+                rest::rest_speed(speeds, body.arm().joints[j].velocity)
+            })
+            .collect();
+        let top_speed: Vec<f64> = (0..n).map(|j| top_speed(&recordings, j)).collect();
+        let silent = silent_joints(body.arm(), logs);
+        let mut kept = keep_moving(&recordings, &bands, &rest_speed, n);
+        for j in 0..n {
+            for (r, recording) in recordings.iter().enumerate() {
+                let is_dead = dead(recording, j);
+                if is_dead || silent[j].is_some() {
+                    kept.iter_mut().for_each(|kept| kept[j][r].clear());
+                }
+                if is_dead && silent[j].is_none() {
+                    left_out.push(format!(
+                        "{}: the torque of joint {} never changes: the joint was left out of this log",
+                        logs[recording.log].file,
+                        j + 1
+                    ));
+                }
+            }
+        }
+        let joints = joint_rows(body, &recordings, &bands, kept);
+        let logs: Vec<String> = logs.iter().map(|log| log.file.clone()).collect();
+        let of_band = |(band, joints): (Band, Vec<JointRows>)| {
+            if joints.iter().all(|j| j.len() < 20) {
+                return Err(DataError::NoMotion(silent.iter().flatten().cloned().collect()));
+            }
+            Ok(Data {
+                body,
+                notes: notes(&left_out, &recordings, &band, &joints, &silent, &rest_speed),
+                blocks: blocks_of(&recordings, &joints, &band, options.block),
+                recordings: recordings.clone(),
+                band,
+                joints,
+                logs: logs.clone(),
+                rest_speed: rest_speed.clone(),
+                silent: silent.clone(),
+                left_out: left_out.clone(),
+                joints_apart: false,
+                top_speed: top_speed.clone(),
+                last_link: OnceLock::new(),
+                force: OnceLock::new(),
+                declared_zero: OnceLock::new(),
+            })
+        };
+        Ok(bands.into_iter().zip(joints).map(of_band).collect())
+    }
+
+    /// The same rows with other signals: samples, band and blocks stay as they are.
+    #[must_use]
+    pub fn seen_otherwise(&self, correct: impl FnMut(&mut Recording)) -> Data<'a> {
+        let mut recordings = self.recordings.clone();
+        recordings.iter_mut().for_each(correct);
+        let kept = self.joints.iter().map(|j| j.kept.clone()).collect();
+        let bands = std::slice::from_ref(&self.band);
+        let joints = joint_rows(self.body, &recordings, bands, vec![kept]).pop().unwrap_or_default();
+        Data {
+            body: self.body,
+            recordings,
+            band: self.band.clone(),
+            joints,
+            blocks: self.blocks.clone(),
+            logs: self.logs.clone(),
+            rest_speed: self.rest_speed.clone(),
+            silent: self.silent.clone(),
+            left_out: self.left_out.clone(),
+            notes: self.notes.clone(),
+            joints_apart: false,
+            top_speed: self.top_speed.clone(),
+            last_link: OnceLock::new(),
+            force: OnceLock::new(),
+            declared_zero: OnceLock::new(),
+        }
+    }
+
+    /// Joints.
+    #[must_use]
+    pub fn dof(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// The speed that a joint exceeds in 5 % of its samples, rad/s, at least 1e-3.
+    #[must_use]
+    pub fn top_speed(&self, joint: usize) -> f64 {
+        self.top_speed[joint]
+    }
+
+    /// Samples a second on the even grid.
+    #[must_use]
+    pub fn rate(&self) -> f64 {
+        self.recordings.first().map_or(0.0, |r| r.rate)
+    }
+
+    /// Stretches of about `length` seconds, in order.
+    #[must_use]
+    pub fn blocks_of(&self, length: f64) -> Vec<Block> {
+        blocks_of(&self.recordings, &self.joints, &self.band, length)
+    }
+
+    /// The ten inertial parameters of the last link as columns over all joints; empty where they cannot be
+    /// had.
+    pub fn last_link_columns(&self) -> &[Column] {
+        self.last_link.get_or_init(|| {
+            let chosen: Vec<usize> =
+                ParameterKind::ALL[..10].iter().map(|kind| self.body.last_link(*kind)).collect();
+            self.columns_over_all(10, |r| self.body.parameter_columns(&chosen, &r.q, &r.v, &r.a))
+        })
+    }
+
+    /// Torques for unit forces on the origin of the last frame along the base axes; empty where they cannot
+    /// be had.
+    pub fn force_columns(&self) -> &[Column] {
+        self.force.get_or_init(|| {
+            // The static torque of a unit mass under unit gravity is that of a unit force.
+            let mass = [self.body.last_link(ParameterKind::M)];
+            (0..3)
+                .flat_map(|axis| self.columns_over_all(1, |r| self.body.gravity_columns(axis, &mass, &r.q)))
+                .collect()
+        })
+    }
+
+    /// The parameters that the arm file declares zero.
+    #[must_use]
+    pub fn declared_zero(&self) -> Vec<Parameter> {
+        let arm = self.body.arm();
+        let declared = |p: &Parameter| p.kind != ParameterKind::Im && !arm.keeps(*p);
+        arm.all_parameters().into_iter().filter(declared).collect()
+    }
+
+    /// Their columns, in the same order.
+    pub fn declared_zero_columns(&self) -> &[Column] {
+        self.declared_zero.get_or_init(|| {
+            let chosen: Vec<usize> = self.declared_zero().iter().map(|p| p.index()).collect();
+            self.columns_over_all(chosen.len(), |r| self.body.parameter_columns(&chosen, &r.q, &r.v, &r.a))
+        })
+    }
+
+    /// Columns from a function that gives n × count values a sample.
+    fn columns_over_all(&self, count: usize, of: impl Fn(&Recording) -> Option<Vec<f64>>) -> Vec<Column> {
+        let Some(all) = self.recordings.iter().map(of).collect::<Option<Vec<Vec<f64>>>>() else {
+            return Vec::new();
+        };
+        let one = |c: usize| -> Vec<Vec<f64>> {
+            all.iter().map(|x| x.iter().skip(c).step_by(count).copied().collect()).collect()
+        };
+        (0..count).map(|c| self.column_over_all(&one(c))).collect()
+    }
+
+    /// A column from full-rate signals on one joint.
+    pub fn column_on<'s>(
+        &'s self,
+        joint: usize,
+        signal: impl FnMut(usize, &'s Recording) -> Vec<f64>,
+    ) -> Column {
+        Column::on(joint, self.joints[joint].column(&self.band, &self.recordings, signal))
+    }
+
+    /// A column from full-rate signals with n values a sample, one for each joint.
+    #[must_use]
+    pub fn column_over_all(&self, signals: &[Vec<f64>]) -> Column {
+        let n = self.dof();
+        let part = |j: usize| {
+            let signal = |r: usize, _: &Recording| -> Vec<f64> {
+                signals[r].iter().skip(j).step_by(n).copied().collect()
+            };
+            (j, self.joints[j].column(&self.band, &self.recordings, signal))
+        };
+        Column { parts: parallel::map(&(0..n).collect::<Vec<_>>(), |j| part(*j)) }
+    }
+}
+
+/// A signal at full rate, one vector a recording, as a column of a joint in each of some bands, as
+/// [`Data::in_bands`] gives them.
+#[must_use]
+pub fn column_in_bands(
+    bands: &[Data<'_>],
+    joint: usize,
+    mut signal: impl FnMut(&Recording) -> Vec<f64>,
+) -> Vec<Vec<f64>> {
+    let mut columns: Vec<Vec<f64>> =
+        bands.iter().map(|data| Vec::with_capacity(data.joints[joint].len())).collect();
+    let Some(narrowest) = bands.last() else { return columns };
+    for (r, recording) in narrowest.recordings.iter().enumerate() {
+        if bands.iter().all(|data| data.joints[joint].kept[r].is_empty()) {
+            continue;
+        }
+        let passed = narrowest.band.pass_bands(&signal(recording), bands.len());
+        for ((column, passed), data) in columns.iter_mut().zip(passed).zip(bands) {
+            column.extend(data.joints[joint].kept[r].iter().map(|k| passed[*k]));
+        }
+    }
+    columns
+}
+
+fn top_speed(recordings: &[Recording], joint: usize) -> f64 {
+    let mut speeds: Vec<f64> = recordings.iter().flat_map(|r| r.speed(joint).map(f64::abs)).collect();
+    if speeds.is_empty() {
+        return 1.0;
+    }
+    let at = (speeds.len() * 95 / 100).min(speeds.len() - 1);
+    let (_, top, _) = speeds.select_nth_unstable_by(at, f64::total_cmp);
+    top.max(1e-3)
+}
+
+/// What was left out, and what is to be said of joints that rested.
+fn notes(
+    left_out: &[String],
+    recordings: &[Recording],
+    band: &Band,
+    joints: &[JointRows],
+    silent: &[Option<String>],
+    rest_speed: &[f64],
+) -> Vec<String> {
+    let mut notes = left_out.to_vec();
+    let total: usize = recordings.iter().map(|r| band.kept(r.len()).len()).sum();
+    for (j, rows) in joints.iter().enumerate() {
+        let rested = total - rows.len();
+        if let Some(why) = &silent[j] {
+            notes.push(why.clone());
+        } else if rows.len() < 20 {
+            notes.push(format!(
+                "joint {} rests in these logs: neither its friction nor any effect on it can be judged; \
+                    record paths on which it swings",
+                j + 1
+            ));
+        } else if rested * 4 > total {
+            notes.push(format!(
+                "joint {} rests in {:.0} % of the samples (|speed| below {:.4} for {} s or at an end of a \
+                    log); they were left out",
+                j + 1,
+                100.0 * rested as f64 / total as f64,
+                rest_speed[j],
+                rest::LONGEST_REVERSAL
+            ));
+        }
+    }
+    notes
+}
+
+/// By band, joint and recording: which of the band's kept samples are rows.
+fn keep_moving(
+    recordings: &[Recording],
+    bands: &[Band],
+    limit: &[f64],
+    n: usize,
+) -> Vec<Vec<Vec<Vec<usize>>>> {
+    let mut all = vec![vec![Vec::with_capacity(recordings.len()); n]; bands.len()];
+    for j in 0..n {
+        for r in recordings {
+            let moving = rest::moving(&r.speed(j).collect::<Vec<_>>(), r.rate, limit[j]);
+            for (of_band, band) in all.iter_mut().zip(bands) {
+                // A joint that never moves has the limit 0 and is never below it.
+                let kept = if limit[j] < 1e-5 { Vec::new() } else { band.kept(r.len()) };
+                of_band[j].push((0..kept.len()).filter(|k| moving[kept[*k]]).collect());
+            }
+        }
+    }
+    all
+}
+
+/// The rows by band and joint; the bands are each half of the one before.
+fn joint_rows(
+    body: &RigidBody,
+    recordings: &[Recording],
+    bands: &[Band],
+    kept: Vec<Vec<Vec<Vec<usize>>>>,
+) -> Vec<Vec<JointRows>> {
+    let (n, p) = (body.dof(), body.names().len());
+    let empty = |kept: Vec<Vec<usize>>| {
+        let mut rows = Vec::new();
+        let mut end = 0;
+        for k in &kept {
+            rows.push(end..end + k.len());
+            end += k.len();
+        }
+        JointRows { torque: Vec::with_capacity(end), inertial: vec![Vec::with_capacity(end); p], kept, rows }
+    };
+    let mut all: Vec<Vec<JointRows>> =
+        kept.into_iter().map(|joints| joints.into_iter().map(empty).collect()).collect();
+    let Some(narrowest) = bands.last() else { return all };
+    for (r, recording) in recordings.iter().enumerate() {
+        let y = body.regressor(&recording.q, &recording.v, &recording.a);
+        // By joint, column and band.
+        let per_joint: Vec<Vec<Vec<Vec<f64>>>> = parallel::map(&(0..n).collect::<Vec<_>>(), |&j| {
+            let pass = |signal: Vec<f64>| {
+                let passed = narrowest.pass_bands(&signal, bands.len());
+                let rows = |(passed, joints): (Vec<f64>, &Vec<JointRows>)| {
+                    joints[j].kept[r].iter().map(|k| passed[*k]).collect()
+                };
+                passed.into_iter().zip(&all).map(rows).collect()
+            };
+            let mut columns = vec![pass(recording.torque[j].clone())];
+            columns.extend((0..p).map(|c| pass(y.iter().skip(j * p + c).step_by(n * p).copied().collect())));
+            columns
+        });
+        for (j, columns) in per_joint.into_iter().enumerate() {
+            for (c, bands) in columns.into_iter().enumerate() {
+                for (joints, from) in all.iter_mut().zip(bands) {
+                    let joint = &mut joints[j];
+                    match c.checked_sub(1) {
+                        None => joint.torque.extend(from),
+                        Some(c) => joint.inertial[c].extend(from),
+                    }
+                }
+            }
+        }
+    }
+    all
+}
+
+fn blocks_of(recordings: &[Recording], joints: &[JointRows], band: &Band, length: f64) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    for (r, recording) in recordings.iter().enumerate() {
+        let kept = band.kept(recording.len());
+        let per_second = recording.rate / band.decimation as f64;
+        // Blocks of equal length, as near to the wanted one as the recording allows.
+        let count = ((kept.len() as f64 / per_second / length).round() as usize).max(1);
+        for b in 0..count {
+            let (from, to) = (kept.len() * b / count, kept.len() * (b + 1) / count);
+            let rows: Vec<_> = joints
+                .iter()
+                .map(|joint| {
+                    let base = joint.rows[r].start;
+                    let below = |limit: usize| joint.kept[r].partition_point(|k| *k < limit);
+                    base + below(from)..base + below(to)
+                })
+                .collect();
+            if rows.iter().any(|r| !r.is_empty()) {
+                blocks.push(Block { recording: r, log: recording.log, rows });
+            }
+        }
+    }
+    blocks
+}

@@ -1,0 +1,113 @@
+//! The rows of each joint: which samples count, and where blocks and logs begin.
+
+use super::Recording;
+use crate::logs::signal::Band;
+use std::ops::Range;
+
+/// A stretch of about [`super::DataOptions::block`] seconds of one recording: the unit that is taken as
+/// independent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// Which recording.
+    pub recording: usize,
+    /// Which log.
+    pub log: usize,
+    /// Rows of each joint that lie in it; empty where the joint rests.
+    pub rows: Vec<Range<usize>>,
+}
+
+/// What the samples of one joint say.
+#[derive(Clone, Debug)]
+pub struct JointRows {
+    /// Torque in the band, N·m.
+    pub torque: Vec<f64>,
+    /// Columns of the minimal set in the band, column-major: p × rows.
+    pub inertial: Vec<Vec<f64>>,
+    /// By recording: which of the band's kept samples are rows.
+    pub kept: Vec<Vec<usize>>,
+    /// By recording: its rows.
+    pub rows: Vec<Range<usize>>,
+}
+
+impl JointRows {
+    /// Rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.torque.len()
+    }
+
+    /// Whether the joint has no row: it never moves.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.torque.is_empty()
+    }
+
+    /// Its rows that follow each other without a gap.
+    #[must_use]
+    pub fn runs(&self) -> Vec<Range<usize>> {
+        let mut runs = Vec::new();
+        for (kept, range) in self.kept.iter().zip(&self.rows) {
+            let mut first = 0;
+            for k in 1..=kept.len() {
+                if k == kept.len() || kept[k] != kept[k - 1] + 1 {
+                    runs.push(range.start + first..range.start + k);
+                    first = k;
+                }
+            }
+        }
+        runs
+    }
+
+    /// A signal at full rate, one vector a recording, as a column of this joint.
+    #[must_use]
+    pub fn column<'r>(
+        &self,
+        band: &Band,
+        recordings: &'r [Recording],
+        mut signal: impl FnMut(usize, &'r Recording) -> Vec<f64>,
+    ) -> Vec<f64> {
+        let mut column = Vec::with_capacity(self.len());
+        for (r, recording) in recordings.iter().enumerate() {
+            if self.kept[r].is_empty() {
+                continue;
+            }
+            let passed = band.pass(&signal(r, recording));
+            column.extend(self.kept[r].iter().map(|k| passed[*k]));
+        }
+        column
+    }
+}
+
+/// A regression column: its values on the joints it acts on.
+#[derive(Clone, Debug, Default)]
+pub struct Column {
+    /// (joint, values by row), each joint at most once.
+    pub parts: Vec<(usize, Vec<f64>)>,
+}
+
+impl Column {
+    /// A column that acts on one joint.
+    #[must_use]
+    pub fn on(joint: usize, values: Vec<f64>) -> Column {
+        Column { parts: vec![(joint, values)] }
+    }
+
+    /// The values on a joint, where the column acts on it.
+    #[must_use]
+    pub fn at(&self, joint: usize) -> Option<&[f64]> {
+        self.parts.iter().find(|(j, _)| *j == joint).map(|(_, v)| v.as_slice())
+    }
+
+    /// Adds a share of it to signals by joint and row.
+    pub fn add_to(&self, signals: &mut [Vec<f64>], share: f64) {
+        for (joint, values) in &self.parts {
+            signals[*joint].iter_mut().zip(values).for_each(|(s, v)| *s += share * v);
+        }
+    }
+
+    /// Whether all values are finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.parts.iter().all(|(_, v)| v.iter().all(|x| x.is_finite()))
+    }
+}

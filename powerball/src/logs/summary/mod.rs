@@ -1,0 +1,142 @@
+//! A log reduced to triangular factors: all that a fit needs of it, of one size however long it was.
+//!
+//! What is fixed when a log is reduced: the arm, the parameter set, the bands. What is not: which of them
+//! counts (see [`Bands`]), friction's steepnesses (see [`Steepness`]), the joints' weights, and the colour of
+//! the noise (see [`Octaves`]).
+
+mod bands;
+mod file;
+mod octaves;
+mod reduce;
+mod steepness;
+mod triangle;
+
+pub use bands::{BANDS, Bands, Powers};
+pub use file::SummaryError;
+pub use octaves::{OCTAVES, Octaves, SLOW, halved};
+pub use reduce::Columns;
+pub(crate) use reduce::parts;
+pub use steepness::{NODES, Steepness};
+pub use triangle::Triangle;
+
+use crate::logs::parallel;
+use crate::logs::regression::{DataOptions, RigidBody};
+
+/// What must agree for summaries to be of the same thing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Identity {
+    /// The arm's name.
+    pub arm: String,
+    /// A hash of all else that its file says.
+    pub hash: u64,
+    /// Gravity in the base frame as the base was mounted, m/s².
+    pub gravity: [f64; 3],
+    /// The minimal set, in the order of the columns.
+    pub parameters: Vec<String>,
+    /// Band, Hz.
+    pub cutoff: f64,
+    /// Smoothing of positions, Hz.
+    pub smoothing: f64,
+    /// The steepnesses of each joint.
+    pub steepness: Vec<Steepness>,
+}
+
+/// Logs of one arm, reduced.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary {
+    /// Of what.
+    pub identity: Identity,
+    /// The logs that went in, and the seconds of each.
+    pub logs: Vec<(String, f64)>,
+    /// Samples in the band, resting joints among them.
+    pub samples: u64,
+    /// By joint: why a log said nothing of it, in words.
+    pub silent: Vec<Option<String>>,
+    /// The rows of each joint.
+    pub joints: Vec<Octaves>,
+    /// Of the widest of several bands: see [`Bands::spectrum`].
+    pub spectrum: Vec<Powers>,
+}
+
+/// A joint without a speed limit is taken to move about this fast, rad/s or m/s.
+const ORDINARY_SPEED: f64 = 1.0;
+
+impl Summary {
+    /// Of no log yet.
+    #[must_use]
+    pub fn new(body: &RigidBody, options: &DataOptions) -> Summary {
+        let arm = body.filed();
+        let described = format!("{:?} {:?} {:?} {:?}", arm.convention, arm.gravity, arm.joints, arm.tool);
+        let identity = Identity {
+            arm: arm.name.clone(),
+            hash: fnv(described.as_bytes()),
+            gravity: body.gravity(),
+            parameters: body.names().to_vec(),
+            cutoff: options.cutoff,
+            smoothing: options.smoothing,
+            steepness: arm
+                .joints
+                .iter()
+                .map(|j| Steepness::new(j.velocity.filter(|v| *v > 0.0).unwrap_or(ORDINARY_SPEED)))
+                .collect(),
+        };
+        let columns = Columns { inertial: identity.parameters.len() };
+        let joints = vec![Octaves::new(columns.width()); arm.dof()];
+        Summary {
+            identity,
+            logs: Vec::new(),
+            samples: 0,
+            silent: vec![None; arm.dof()],
+            joints,
+            spectrum: vec![Powers::default(); arm.dof()],
+        }
+    }
+
+    /// The columns of its factors.
+    #[must_use]
+    pub fn columns(&self) -> Columns {
+        Columns { inertial: self.identity.parameters.len() }
+    }
+
+    /// The same rows in the columns of the minimal set of `general`, which is the same arm under a gravity
+    /// whose parameters determine those of `own`, in whose columns the rows are; `None` where they do not.
+    #[must_use]
+    pub fn in_set(&self, own: &RigidBody, general: &RigidBody) -> Option<Summary> {
+        let rows = own.parameters_from(general)?;
+        let parameters = general.names().to_vec();
+        let inertial = |c: usize| -> Vec<(usize, f64)> {
+            rows.iter().enumerate().map(|(k, row)| (k, row[c])).filter(|(_, factor)| *factor != 0.0).collect()
+        };
+        let others = self.columns().inertial..self.columns().width();
+        let columns: Vec<Vec<(usize, f64)>> =
+            (0..parameters.len()).map(inertial).chain(others.map(|c| vec![(c, 1.0)])).collect();
+        let joints = parallel::map(&self.joints, |octaves| octaves.combined(&columns));
+        let identity = Identity { parameters, gravity: general.gravity(), ..self.identity.clone() };
+        Some(Summary { identity, joints, ..self.clone() })
+    }
+
+    /// Takes in what other logs of the same arm gave.
+    ///
+    /// # Errors
+    /// [`SummaryError::Differs`] where they are of another arm, mounting, set or band.
+    pub fn merge(&mut self, other: &Summary) -> Result<(), SummaryError> {
+        self.identity.same_as(&other.identity)?;
+        for (octaves, other) in self.joints.iter_mut().zip(&other.joints) {
+            octaves.merge(other);
+        }
+        for (silent, other) in self.silent.iter_mut().zip(&other.silent) {
+            *silent = other.clone().or(silent.take());
+        }
+        for (sum, other) in self.spectrum.iter_mut().flatten().zip(other.spectrum.iter().flatten()) {
+            (sum[0], sum[1]) = (sum[0] + other[0], sum[1] + other[1]);
+        }
+        self.samples += other.samples;
+        self.logs.extend(other.logs.iter().cloned());
+        Ok(())
+    }
+}
+
+/// The hash of Fowler, Noll and Vo (FNV-1a, 64 bits): the same on every machine.
+fn fnv(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, b| (hash ^ u64::from(*b)).wrapping_mul(0x100_0000_01b3))
+}

@@ -1,0 +1,273 @@
+//! An explanation as sections of a page.
+
+use crate::explanation::explain::{Explained, NamedEffect, Shown, TorqueCurve};
+use crate::report::{BarPairs, Figure, Ink, Page, Panel, Series, Table, Tone, number};
+use serde_json::Value;
+
+/// Adds everything that an explanation says to a page: errors, effects with their evidence, torques over
+/// time, what stays, and what was found in the logs.
+pub fn add_to_page(page: &mut Page, explained: &Explained) {
+    errors(page, explained);
+    effects(page, explained);
+    torques(page, explained);
+    rest(page, explained);
+}
+
+fn errors(page: &mut Page, explained: &Explained) {
+    page.heading("Errors on the held-out path");
+    let (before, after) = (&explained.before.validate, &explained.after.validate);
+    let mut table = Table::new([
+        "joint",
+        "base model [N·m]",
+        "of the torque",
+        "with effects [N·m]",
+        "of the torque",
+        "change, 95 % interval",
+        "noise floor [N·m]",
+    ]);
+    for joint in 0..before.rms.len() {
+        let (b, a) = (before.rms[joint], after.rms[joint]);
+        let floor = explained.noise_floor.get(joint).copied().unwrap_or(f64::NAN);
+        let changed = explained.held_out_change.iter().find(|c| c.joint == joint + 1);
+        table.push([
+            (joint + 1).to_string(),
+            number(b),
+            percent(before.relative[joint]),
+            number(a),
+            percent(after.relative[joint]),
+            changed.map_or_else(String::new, |c| {
+                format!("{} ({} to {})", change(c.rms), change(c.interval[0]), change(c.interval[1]))
+            }),
+            number(floor),
+        ]);
+    }
+    page.bars(
+        &error_bars(explained),
+        "The dashed lines are what white measurement noise alone would leave in the band.",
+    );
+    page.table(&table);
+}
+
+/// Held-out errors by joint, before and after.
+#[must_use]
+pub fn error_bars(explained: &Explained) -> BarPairs {
+    let [low, high] = explained.band;
+    let title = format!("Torque error on logs that were not fitted, {low} to {high} Hz");
+    let errors = explained.before.validate.rms.iter().zip(&explained.after.validate.rms);
+    let bars = BarPairs::new(title, "rms [N·m]", ["base model", "with what was named"]);
+    errors.zip(&explained.noise_floor).enumerate().fold(bars, |bars, (joint, ((before, after), floor))| {
+        bars.pair_with_floor(format!("joint {}", joint + 1), *before, *after, *floor)
+    })
+}
+
+fn effects(page: &mut Page, explained: &Explained) {
+    page.heading("What the model lacked");
+    if explained.effects.is_empty() {
+        page.paragraph(
+            "No effect was accepted: these logs do not show that the model lacks anything with a name.",
+        );
+    } else {
+        let mut table = Table::new([
+            "effect",
+            "joints",
+            "figures (SI units)",
+            "held-out gain",
+            "p",
+            "margin",
+            "left over",
+        ]);
+        for effect in &explained.effects {
+            let gain = effect.held_out_gain.iter().copied().fold(f64::INFINITY, f64::min);
+            table.push([
+                effect.effect.clone(),
+                list(&effect.joints),
+                figures(&effect.parameters),
+                percent(gain),
+                number(effect.p_value),
+                format!("{:.2}", effect.margin),
+                percent(effect.leftover),
+            ]);
+        }
+        page.table(&table);
+        page.paragraph(
+            "Gain: by how much the squared error of folds that were left out falls, on the joint where it \
+                falls least. \
+             Margin: evidence over that of the next best name. Left over: share of the residual's excess \
+             over noise \
+             that stays on these joints.",
+        );
+    }
+    for shown in &explained.shown {
+        page.figure(&sight(shown), "");
+    }
+    if !explained.shown.is_empty() {
+        page.paragraph(
+            "Each figure shows the residual of the fitted logs over the signal that the effect depends on: \
+                grey dots without this effect but \
+             with all others, green dots with it. Lines are means over equal numbers of samples. Where the \
+             law is right, the orange line \
+             lies on the purple one and the blue line on zero.",
+        );
+    }
+    for effect in explained.effects.iter().filter(|e| !e.rivals.is_empty()) {
+        page.folded(
+            &format!("Rivals of {} on joint {}", effect.effect, list(&effect.joints)),
+            &rivals(effect),
+        );
+    }
+}
+
+/// The residual over the signal that shows an effect.
+#[must_use]
+pub fn sight(shown: &Shown) -> Figure {
+    let rows = |k: usize| shown.rows.iter().map(|row| (row[0], row[k])).collect();
+    let means = |k: usize| shown.means.iter().map(|mean| (mean[0], mean[k])).collect();
+    let what = if shown.against_motion { "residual against motion [N·m]" } else { "residual [N·m]" };
+    let panel = Panel::new(what)
+        .height(1.3)
+        .series(Series::points("without the effect", Ink::Grey, rows(1)))
+        .series(Series::points("with it", Ink::Green, rows(2)))
+        .series(Series::broad("mean of what it adds", Ink::Orange, means(3)))
+        .line("mean without", Ink::Purple, means(1))
+        .line("mean with it", Ink::Blue, means(2));
+    Figure::new(format!("{} on joint {}", shown.effect, shown.joint), shown.signal.as_str()).panel(panel)
+}
+
+fn rivals(effect: &NamedEffect) -> Table {
+    let mut table = Table::new(["name", "why it was not given"]);
+    for rival in &effect.rivals {
+        table.push([rival.effect.clone(), rival.why_not.clone()]);
+    }
+    table
+}
+
+fn torques(page: &mut Page, explained: &Explained) {
+    page.heading("Torques on the held-out path");
+    let moving = explained.curves.iter().enumerate().filter(|(_, curve)| !curve.t.is_empty());
+    for (joint, curve) in moving {
+        page.figure(&figure(joint, curve), "");
+    }
+    page.paragraph("The logs follow each other without their pauses. Phases of rest are left out.");
+}
+
+fn figure(joint: usize, curve: &TorqueCurve) -> Figure {
+    let measured = curve.points(|row| curve.measured[row]);
+    let predicted = curve.points(|row| curve.measured[row] - curve.after[row]);
+    let torque = Panel::new("torque [N·m]").line("measured", Ink::Blue, measured).series(Series::line(
+        "predicted with the effects",
+        Ink::Orange,
+        predicted,
+    ));
+    let residual = Panel::new("error [N·m]")
+        .height(0.75)
+        .line("error of the base model", Ink::Grey, curve.points(|row| curve.before[row]))
+        .line("error with the effects", Ink::Green, curve.points(|row| curve.after[row]));
+    Figure::new(format!("Joint {}", joint + 1), "time along the logs [s]").panel(torque).panel(residual)
+}
+
+fn rest(page: &mut Page, explained: &Explained) {
+    page.heading("What stays open");
+    match &explained.unattributed {
+        Some(rest) => {
+            let signals = rest.depends_on.join(", ");
+            let text = format!(
+                "The residual of joint {} still depends on {signals}, and nothing in the library explains it \
+                    well enough to be named.",
+                list(&rest.joints)
+            );
+            page.note(Tone::Bad, &text);
+            let mut table = Table::new(["considered", "why it was not given"]);
+            rest.considered.iter().for_each(|r| table.push([r.effect.clone(), r.why_not.clone()]));
+            if !table.is_empty() {
+                page.folded("Names that were considered", &table);
+            }
+        }
+        None => page.paragraph("Nothing that these logs could show."),
+    }
+    corrections(page, explained);
+    if let Some(experiment) = &explained.experiment {
+        let text = |key: &str| experiment.get(key).and_then(Value::as_str).unwrap_or_default();
+        match experiment.get("decided").and_then(Value::as_str) {
+            Some(name) => {
+                page.note(Tone::Good, &format!("The experiment decides for {name}: {}.", text("why")));
+            }
+            None => page.note(Tone::Plain, &format!("The experiment does not decide: {}.", text("why"))),
+        }
+    }
+    if let Some(advice) =
+        explained.next_experiment.as_ref().and_then(|next| next.get("advice")).and_then(Value::as_str)
+    {
+        page.note(Tone::Plain, &format!("Next experiment: {advice}"));
+    }
+    let placebos = &explained.false_positives;
+    page.paragraph(&format!(
+        "How often the rule is wrong on these data: {} of {} effects that cannot be there were accepted. The \
+            residuals \
+         are worth {} independent samples.",
+        placebos.accepted, placebos.placebos, explained.effective_samples
+    ));
+    if !explained.warnings.is_empty() {
+        let mut table = Table::new(["found in the logs and the arm file"]);
+        explained.warnings.iter().for_each(|w| table.push([w.clone()]));
+        page.table(&table);
+    }
+}
+
+fn corrections(page: &mut Page, explained: &Explained) {
+    let Some(kept) = explained.unattributed.as_ref().and_then(|u| u.correction.as_ref()) else { return };
+    if kept.is_empty() {
+        page.paragraph("No curve of these signals lowers held-out errors: none is kept.");
+        return;
+    }
+    let mut table = Table::new([
+        "corrected joint",
+        "by a curve of",
+        "within [N·m]",
+        "held-out error [N·m]",
+        "corrected [N·m]",
+    ]);
+    for c in kept {
+        let signals: Vec<&str> = c.curves.iter().map(|curve| curve.signal.as_str()).collect();
+        let limit = format!("±{}", number(c.limit));
+        table.push([
+            c.joint.to_string(),
+            signals.join(", "),
+            limit,
+            number(c.rms_before),
+            number(c.rms_after),
+        ]);
+    }
+    page.table(&table);
+    page.paragraph(
+        "A correction is a number for the controller and no finding: it names nothing, and is no \
+        part of the errors above.",
+    );
+}
+
+/// `{"mass": 1.5, "com": [0, 0, 0.1]}` as `mass 1.50, com (0, 0, 0.100)`.
+#[must_use]
+pub fn figures(parameters: &Value) -> String {
+    match parameters {
+        Value::Object(map) => map
+            .iter()
+            .map(|(name, value)| format!("{name} {}", figures(value)))
+            .collect::<Vec<_>>()
+            .join(", "),
+        Value::Array(values) => format!("({})", values.iter().map(figures).collect::<Vec<_>>().join(", ")),
+        Value::Number(value) => value.as_f64().map_or_else(|| value.to_string(), number),
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    }
+}
+
+fn list(joints: &[usize]) -> String {
+    joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.1} %", 100.0 * share)
+}
+
+fn change(share: f64) -> String {
+    format!("{:+.0} %", 100.0 * share).replace('-', "\u{2212}")
+}
