@@ -2,6 +2,9 @@
 
 pub mod correction;
 pub mod friction;
+mod joint_number;
 #[cfg(feature = "lwa4p")]
 pub mod model;
 pub mod online;
+
+pub use joint_number::JointNumber;

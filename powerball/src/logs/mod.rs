@@ -6,6 +6,9 @@
 pub mod batch;
 pub mod log;
 pub(crate) mod parallel;
+mod progress;
 pub mod regression;
 pub mod signal;
 pub mod summary;
+
+pub use progress::Progress;
