@@ -12,7 +12,8 @@ pub(super) fn parse(
     findings: &mut Vec<Finding>,
 ) -> Result<Log, LogError> {
     use super::read::{Columns, Samples};
-    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use super::zstd_pages::RowGroup;
+    use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 
     let unreadable = |row: Option<usize>, e: &dyn std::fmt::Display| {
         LogError(vec![Finding {
@@ -22,16 +23,21 @@ pub(super) fn parse(
             message: format!("cannot be read: {e}; write the log again, or as CSV"),
         }])
     };
-    let reader =
-        SerializedFileReader::new(bytes::Bytes::copy_from_slice(bytes)).map_err(|e| unreadable(None, &e))?;
+    let bytes = bytes::Bytes::copy_from_slice(bytes);
+    let reader = SerializedFileReader::new(bytes.clone()).map_err(|e| unreadable(None, &e))?;
     let schema = reader.metadata().file_metadata().schema();
     let names: Vec<String> = schema.get_fields().iter().map(|field| field.name().to_string()).collect();
     let mut samples = Samples::new(Columns::find(&names, arm, file, findings)?, arm);
-    let rows = reader.get_row_iter(None).map_err(|e| unreadable(None, &e))?;
-    for (k, row) in rows.enumerate() {
-        let row = row.map_err(|e| unreadable(Some(k + 1), &e))?;
-        let values: Vec<Option<f64>> = row.get_column_iter().map(|(_, field)| number(field)).collect();
-        samples.take(k + 1, &names, |column| values.get(column).copied().flatten());
+    let mut count = 0;
+    for group in 0..reader.num_row_groups() {
+        let inner = reader.get_row_group(group).map_err(|e| unreadable(Some(count + 1), &e))?;
+        let group = RowGroup::new(inner, &bytes).map_err(|e| unreadable(Some(count + 1), &e))?;
+        for row in group.get_row_iter(None).map_err(|e| unreadable(Some(count + 1), &e))? {
+            count += 1;
+            let row = row.map_err(|e| unreadable(Some(count), &e))?;
+            let values: Vec<Option<f64>> = row.get_column_iter().map(|(_, field)| number(field)).collect();
+            samples.take(count, &names, |column| values.get(column).copied().flatten());
+        }
     }
     samples.finish(file, arm, findings)
 }

@@ -9,6 +9,8 @@ mod levels;
 mod read;
 mod signs;
 mod speeds;
+#[cfg(feature = "parquet")]
+mod zstd_pages;
 
 pub use clock::common_clock;
 use doubts::{Doubts, Severity};

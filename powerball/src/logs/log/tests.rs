@@ -351,3 +351,32 @@ fn parquet_says_the_same_as_csv() {
     let torn = parse(&parquet_of(&csv)[..500], "torn.parquet", &arm(), &mut of_parquet);
     assert!(torn.unwrap_err().to_string().contains("torn.parquet: Parquet: cannot be read"));
 }
+
+/// What pyarrow wrote (`tests/data/README.md`), in both versions of data pages, with a dictionary and a missing value.
+#[cfg(feature = "parquet")]
+#[test]
+fn columns_compressed_with_zstandard_are_read() {
+    for file in [
+        include_bytes!("../../../../tests/data/zstd_v1.parquet").as_slice(),
+        include_bytes!("../../../../tests/data/zstd_v2.parquet"),
+    ] {
+        let mut findings = Vec::new();
+        let log = parse(file, "zstd.parquet", &arm(), &mut findings).unwrap();
+        assert_eq!(log.t.len(), 299);
+        for (k, t) in log.t.iter().enumerate() {
+            let row = if k < 50 { k } else { k + 1 };
+            assert_eq!(*t, row as f64 * 0.004);
+            assert!((log.q[0][k] - 0.5 * (1.3 * t).sin()).abs() < 1e-15);
+            assert!((log.torque[0][k] - 3.0 * t.cos()).abs() < 1e-15);
+            assert_eq!(log.torque[1][k], (row / 20) as f64);
+        }
+        assert!(findings.iter().any(|f| f.message.contains("note")), "{findings:?}");
+        // Cut or damaged anywhere, the file is refused or read, and nothing panics.
+        for end in (0..file.len()).step_by(97) {
+            let _ = parse(&file[..end], "torn.parquet", &arm(), &mut Vec::new());
+            let mut damaged = file.to_vec();
+            damaged[end] ^= 0x55;
+            let _ = parse(&damaged, "damaged.parquet", &arm(), &mut Vec::new());
+        }
+    }
+}
