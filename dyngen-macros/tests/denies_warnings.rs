@@ -3,15 +3,16 @@
 
 pub mod arm {
     //! A slider on a turntable.
-    dyngen_macros::arm!("arms/slider.toml");
+    dyngen_macros::arm!("tests/arms/slider.toml");
 }
 
-#[dyngen_macros::model(file = "arms/slider.toml", parameters = symbolic)]
+#[dyngen_macros::model(file = "tests/arms/slider.toml", parameters = symbolic)]
 pub mod symbolic {
     //! The same for any size.
 }
 
-fn main() {
+#[test]
+fn it_compiles_and_has_its_constants() {
     assert_eq!(arm::JOINTS, 2);
     assert!(symbolic::PARAMETERS >= arm::PARAMETERS);
 }
