@@ -37,3 +37,8 @@ pub mod procedure;
 pub mod report;
 #[cfg(feature = "virtual-arm")]
 pub mod virtual_arm;
+
+#[cfg(feature = "identify")]
+pub use identification::{Identified, IdentifyError, IdentifyOptions, Source, identify};
+#[cfg(feature = "identify")]
+pub use logs::log::{Arrays, Log};

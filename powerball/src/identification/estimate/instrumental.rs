@@ -12,7 +12,7 @@
 //! starts from.
 
 use super::distribution::t_quantile_975;
-use super::errors::Errors;
+use super::errors::StandardErrors;
 use super::friction_shape;
 use super::reduced::{Part, Solution};
 use crate::logs::log::Log;
@@ -30,7 +30,7 @@ pub fn solve_instrumental(
     logs: &[Log],
     options: &DataOptions,
     start: &Solution,
-) -> Result<(Solution, Errors), String> {
+) -> Result<(Solution, StandardErrors), String> {
     let layout = start.layout;
     let rows = rows(body, logs, options, start)?;
     let free: Vec<usize> = (0..layout.size()).filter(|c| start.free[*c] && !layout.is_tangent(*c)).collect();
@@ -94,7 +94,7 @@ pub fn solve_instrumental(
         free: (0..layout.size()).map(|c| place[c].is_some()).collect(),
         parts: levels.into_iter().map(|j| j.into_iter().map(|l| l.part).collect()).collect(),
     };
-    Ok((solution, Errors { std, quantile }))
+    Ok((solution, StandardErrors { std, quantile }))
 }
 
 /// By joint, where it moves: the model's columns by their index, and the rows [Z A y].

@@ -11,7 +11,8 @@ pub(super) fn parse(
     arm: &Arm,
     findings: &mut Vec<Finding>,
 ) -> Result<Log, LogError> {
-    use super::read::{Columns, Samples};
+    use super::columns::Columns;
+    use super::samples::Samples;
     use parquet::file::reader::{FileReader, SerializedFileReader};
 
     let unreadable = |row: Option<usize>, e: &dyn std::fmt::Display| {
@@ -26,7 +27,7 @@ pub(super) fn parse(
         SerializedFileReader::new(bytes::Bytes::copy_from_slice(bytes)).map_err(|e| unreadable(None, &e))?;
     let schema = reader.metadata().file_metadata().schema();
     let names: Vec<String> = schema.get_fields().iter().map(|field| field.name().to_string()).collect();
-    let mut samples = Samples::new(Columns::find(&names, arm, file, findings)?, arm);
+    let mut samples = Samples::new(Columns::find(&names, arm, file, findings)?, arm, "row");
     let rows = reader.get_row_iter(None).map_err(|e| unreadable(None, &e))?;
     for (k, row) in rows.enumerate() {
         let row = row.map_err(|e| unreadable(Some(k + 1), &e))?;

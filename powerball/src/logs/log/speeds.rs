@@ -6,7 +6,7 @@
 //! and noise hardly count. On sound logs of real arms the two agree within 0.1 % with a correlation of
 //! 1.0000.
 
-use super::check::Raw;
+use super::raw::Raw;
 use super::{Doubts, Severity};
 
 /// Length of the stretches that are compared, s.
