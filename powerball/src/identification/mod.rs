@@ -9,6 +9,7 @@ mod identify;
 mod known;
 pub mod motion;
 pub mod mounting;
+mod nearest;
 mod source;
 mod summarize;
 mod verify;
@@ -17,6 +18,7 @@ pub use identify::{
     Along, Estimator, Identified, IdentifyError, IdentifyOptions, JointAlong, LogFacts, MountedFit, identify,
 };
 pub use known::KnownModel;
+pub use nearest::{NearestArm, NearestError, ValueChange, nearest_arm};
 pub use source::{Input, Source};
 pub use summarize::{Summarized, summarize};
 pub use verify::{Verified, VerifyOptions, verify};

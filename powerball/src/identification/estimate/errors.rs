@@ -14,6 +14,7 @@
 //! known enters by Satterthwaite's degrees of freedom.
 
 use super::distribution::t_quantile_975;
+use super::normal_equations::zeros;
 use super::reduced::Solution;
 use super::solve::Solver;
 use faer::Mat;
@@ -57,7 +58,7 @@ pub fn standard_errors(solution: &Solution) -> StandardErrors {
     let mut groups = Vec::new();
     for (parts, weight) in solution.parts.iter().zip(&solution.weights) {
         for part in parts.iter().filter(|p| p.rows > 0 && *weight > 0.0) {
-            let mut products = (Mat::zeros(size, size), vec![0.0; size], 0.0);
+            let mut products = zeros(size);
             part.add_to(&mut products, 1.0);
             let turned = &inverse * &products.0;
             let spread = (0..size)

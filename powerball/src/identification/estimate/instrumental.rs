@@ -18,6 +18,7 @@ use super::reduced::{Part, Solution};
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, DataOptions, Recording, RigidBody};
 use crate::logs::summary::{Octaves, Triangle, parts};
+use crate::logs::vector::dot;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 
@@ -215,8 +216,4 @@ impl Level {
 
 fn weighted<'a>(levels: &'a [Vec<Level>], weights: &'a [f64]) -> impl Iterator<Item = (&'a Level, f64)> {
     levels.iter().zip(weights).flat_map(|(joint, weight)| joint.iter().map(move |level| (level, *weight)))
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -16,6 +16,7 @@ mod friction_shape;
 mod instrumental;
 mod mountings;
 mod noise;
+mod normal_equations;
 mod ratio;
 mod reduced;
 mod robust;

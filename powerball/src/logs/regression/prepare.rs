@@ -72,7 +72,7 @@ pub struct Data<'a> {
     pub blocks: Vec<Block>,
     /// File names by log.
     pub logs: Vec<String>,
-    /// The speed below which a joint rests, by joint, rad/s.
+    /// The velocity below which a joint rests, by joint, rad/s.
     pub rest_speed: Vec<f64>,
     /// By joint: why its samples say nothing, in words.
     pub silent: Vec<Option<String>>,
@@ -231,7 +231,7 @@ impl<'a> Data<'a> {
         self.joints.len()
     }
 
-    /// The speed that a joint exceeds in 5 % of its samples, rad/s, at least 1e-3.
+    /// The velocity that a joint exceeds in 5 % of its samples, rad/s, at least 1e-3.
     #[must_use]
     pub fn top_speed(&self, joint: usize) -> f64 {
         self.top_speed[joint]
