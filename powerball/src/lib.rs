@@ -18,6 +18,26 @@
 //!
 //! "The paper" is *Modeling and dynamic parameter identification of the SCHUNK Powerball robotic arm*;
 //! equations and tables that are cited by number are its own.
+//!
+//! # From logs to a model
+//!
+#![cfg_attr(feature = "identify", doc = "```")]
+#![cfg_attr(not(feature = "identify"), doc = "```ignore")]
+//! use powerball::{Arrays, IdentifyOptions, Log, identify};
+//! # let arm = "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n[[joint]]\n\
+//! #     kind = \"revolute\"\na = 0.5\nalpha = 0\nd = 0\ntheta = 0\n";
+//! let arm = dyngen::Arm::parse(arm, "pendulum.toml")?;
+//! let t: Vec<f64> = (0..4000).map(|k| 0.005 * f64::from(k)).collect();
+//! let q: Vec<f64> = t.iter().map(|t| (3.0 * t).sin()).collect();
+//! // 1 kg at 0.5 m, without friction.
+//! let torque = q.iter().map(|q| 0.25 * -9.0 * q + 0.5 * 9.81 * q.cos()).collect();
+//! let arrays = Arrays { t: &t, q: &[q], torque: &[torque], ..Arrays::default() };
+//! let (log, _findings) = Log::from_arrays("swing", &arm, &arrays)?;
+//! let model = identify(&arm, [&log], [], &IdentifyOptions::default())?;
+//! assert!(model.fit.relative[0] < 1e-3);
+//! println!("{}", serde_json::to_string_pretty(&model)?);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
 #[cfg(feature = "driver")]
@@ -37,3 +57,8 @@ pub mod procedure;
 pub mod report;
 #[cfg(feature = "virtual-arm")]
 pub mod virtual_arm;
+
+#[cfg(feature = "identify")]
+pub use identification::{Identified, IdentifyError, IdentifyOptions, Source, identify};
+#[cfg(feature = "identify")]
+pub use logs::log::{Arrays, Log};

@@ -212,3 +212,57 @@ fn published_values_become_those_of_a_real_arm() {
     let missing = powerball(&["consistent", "--arm", &arm, "--values", "nowhere.json", "--out", &written]);
     assert_eq!(missing.status.code(), Some(2));
 }
+
+/// The library gives what the command writes: of files, of logs in memory, and of what was made of them; and
+/// says why it does not.
+#[test]
+fn the_library_gives_what_the_command_writes() {
+    use powerball::identification::{IdentifyError, VerifyOptions, summarize, verify};
+    use powerball::logs::{Progress, regression::DataOptions};
+    use powerball::{IdentifyOptions, Log, Source, identify};
+    let (folder, fit, other) = session("library");
+    let arm = folder.join("arm.toml").display().to_string();
+    let out = folder.join("result").display().to_string();
+    let held_out: Vec<&str> = other.iter().map(String::as_str).collect();
+    let rest = [&["--out", &out, "--json", "--validate"][..], &held_out].concat();
+    let mut written = json(&run(&["identify", "--arm", &arm], &fit, &rest));
+    let arm = dyngen::Arm::read(Path::new(&arm)).unwrap();
+    let file = |name: &String| Source::file(name);
+    let options = IdentifyOptions::default();
+    let files = identify(&arm, fit.iter().map(file), other.iter().map(file), &options).unwrap();
+    assert_eq!(serde_json::to_value(&files).unwrap(), written);
+
+    let read = |files: &[String]| -> (Vec<Log>, usize) {
+        let read = files.iter().map(|f| Log::read(f, &arm).unwrap());
+        read.fold((Vec::new(), 0), |(mut logs, count), (log, findings)| {
+            logs.push(log);
+            (logs, count + findings.len())
+        })
+    };
+    let ((logs, a), (judges, b)) = (read(&fit), read(&other));
+    let memory = identify(&arm, &logs, &judges, &options).unwrap();
+    let memory_json = serde_json::to_value(&memory).unwrap();
+    let warnings = |value: &Value| value["warnings"].as_array().unwrap().len();
+    assert_eq!(warnings(&memory_json) + a + b, warnings(&written));
+    written["warnings"] = memory_json["warnings"].clone();
+    assert_eq!(memory_json, written);
+
+    // Sufficient statistics stand for their logs, and a model is judged as it was in the fit.
+    let summary = summarize(&arm, &logs, &DataOptions::default(), Progress::default()).unwrap();
+    let reduced = identify(&arm, [&summary.bands], [], &options).unwrap();
+    assert_eq!((&reduced.parameters, &reduced.fit), (&memory.parameters, &memory.fit));
+    let settings =
+        VerifyOptions { joint_bands: memory.joint_bands.clone(), tolerance: 0.5, ..VerifyOptions::default() };
+    let judged = verify(&arm, &memory.model(), &judges, &settings).unwrap();
+    for (joint, rms) in judged.joints.iter().zip(&memory.validate.as_ref().unwrap().rms) {
+        approx::assert_relative_eq!(joint.rms, *rms, max_relative = 1e-12);
+    }
+
+    let nowhere = identify(&arm, [Source::file("nowhere.csv")], [], &options).unwrap_err();
+    assert!(matches!(&nowhere, IdentifyError::Unusable(reasons) if reasons[0].starts_with("nowhere.csv")));
+    let itself = identify(&arm, [file(&fit[0])], [file(&fit[0])], &options).unwrap_err();
+    assert!(matches!(&itself, IdentifyError::JudgesItself(name) if *name == fit[0]) && itself.is_input());
+    let too_short = Log { pieces: Vec::new(), ..logs[0].clone() };
+    let refused = identify(&arm, [&too_short], [], &options).unwrap_err();
+    assert!(matches!(refused, IdentifyError::NothingUsable(_)) && !refused.is_input());
+}

@@ -1,7 +1,24 @@
 //! From rows to parameters: fits, their errors, and the paths that excite them.
+//!
+//! [`identify`] is the whole way from logs to a model; [`estimate`] holds its fits.
 
 pub mod chain;
 pub mod estimate;
 pub mod excite;
+mod identify;
+mod known;
 pub mod motion;
 pub mod mounting;
+mod nearest;
+mod source;
+mod summarize;
+mod verify;
+
+pub use identify::{
+    Along, Estimator, Identified, IdentifyError, IdentifyOptions, JointAlong, LogFacts, MountedFit, identify,
+};
+pub use known::KnownModel;
+pub use nearest::{NearestArm, NearestError, ValueChange, nearest_arm};
+pub use source::{Input, Source};
+pub use summarize::{Summarized, summarize};
+pub use verify::{Verified, VerifyOptions, verify};

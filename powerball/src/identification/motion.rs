@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-/// Joint positions, speeds and accelerations at evenly spaced times, sample after sample.
+/// Joint positions, velocities and accelerations at evenly spaced times, sample after sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
     dof: usize,
@@ -42,7 +42,7 @@ impl Motion {
         self.len().saturating_sub(1) as f64 * self.period
     }
 
-    /// Adds a sample: position, speed and acceleration of each joint.
+    /// Adds a sample: position, velocity and acceleration of each joint.
     pub fn push(&mut self, joints: impl IntoIterator<Item = [f64; 3]>) {
         for [q, dq, ddq] in joints {
             self.q.push(q);

@@ -1,11 +1,11 @@
 //! The page of an excitation: what the arm will do, and how it keeps its limits.
 
-use super::excite::{Told, Trajectory};
+use crate::identification::excite::{Excited, Trajectory};
 use crate::report::{Figure, Ink, Page, Panel, Series, Table, number};
 
 const INKS: [Ink; 6] = [Ink::Blue, Ink::Orange, Ink::Green, Ink::Purple, Ink::Sky, Ink::Grey];
 
-pub(super) fn page(told: &Told) -> Page {
+pub(super) fn page(told: &Excited) -> Page {
     let mut page = Page::new(format!("Exciting trajectory of {}", told.arm));
     let (good, usual) = (&told.found.figures, &told.found.usual);
     page.lead(

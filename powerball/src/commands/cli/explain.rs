@@ -9,7 +9,6 @@ use crate::bus::transport::{Bus, BusUrl};
 use crate::explanation::experiment::{self, TRAJECTORY};
 use crate::explanation::explain::{Change, ExplainError, Explained, Options, explain_with};
 use crate::identification::motion::Motion;
-use crate::identification::mounting::Mounting;
 use crate::logs::log::read_logs;
 use crate::logs::regression::DataOptions;
 use crate::procedure::{RecordError, record};
@@ -65,8 +64,7 @@ impl Explain {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let progress = Progress::new();
         let arm = if self.experiment { Some(self.arm()?) } else { None };
-        let mut loaded =
-            load(&self.inputs, &self.validate, self.model.as_deref(), Mounting::Filed, &progress)?;
+        let mut loaded = load(&self.inputs, &self.validate, self.model.as_deref(), &progress)?;
         loaded.take_out();
         let (say, options) = (|what: &str| progress.say(what), DataOptions::default());
         let told = Options { correct_unattributed: self.correct_unattributed, ..Options::default() };

@@ -1,142 +1,22 @@
 //! report.html of an identification: the one page that a lab prints.
 
-use super::Failure;
-use super::identify::{Identification, by_band, prepared};
+use crate::controller::JointNumber;
 use crate::controller::friction::TanhFriction;
-use crate::explanation::explain::{TorqueCurve, curves};
-use crate::explanation::torque_model::TorqueModel;
-use crate::identification::estimate::noise_floor;
-use crate::identification::mounting::Mounting;
-use crate::logs::log::Log;
-use crate::logs::regression::{Data, DataOptions, RigidBody};
-use crate::logs::signal::occupied::occupied;
-use crate::logs::signal::turns::{Turns, turns};
+use crate::identification::estimate::TorqueCurve;
+use crate::identification::{Along, Identified, JointAlong};
+use crate::logs::signal::turns::Turns;
 use crate::report::{Figure, Ink, Page, Panel, Series, Table, Tone, number};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 use dyngen::exact::rational::to_f64;
 
 const INKS: [Ink; 6] = [Ink::Blue, Ink::Orange, Ink::Green, Ink::Purple, Ink::Sky, Ink::Grey];
-/// Rows of a joint that its spectra are taken of; more would show no more.
-const ROWS: usize = 20_000;
-/// Cycles a turn: of the joint, and of the motor.
-const JOINT_TURN: f64 = 24.0;
-const MOTOR_TURN: f64 = 2.6;
 /// Within this share of its torque a joint is well predicted.
 const GOOD: f64 = 0.1;
 
-/// What the page shows of logs: held-out ones where there are any.
-#[derive(Default)]
-pub(super) struct Shown {
-    curves: Vec<TorqueCurve>,
-    joints: Vec<ShownJoint>,
-    files: Vec<[String; 5]>,
-    /// Noise alone, N·m.
-    floor: Vec<f64>,
-    /// How the base stood for them.
-    pub(super) mounting: Mounting,
-    /// The frequency below which 99 % of the power of the speeds lies, Hz.
-    pub(super) motion: Option<f64>,
-}
-
-/// One joint along the logs.
-struct ShownJoint {
-    position: Vec<(f64, f64)>,
-    speed: Vec<(f64, f64)>,
-    /// What is left for friction, by speed, N·m.
-    friction: Vec<(f64, f64)>,
-    by_joint: Turns,
-    by_motor: Turns,
-}
-
-impl Shown {
-    /// What a model says of logs; nothing where there are none. `bands` are the ends of the joints' bands,
-    /// Hz, in which the noise floor counts.
-    pub(super) fn new(
-        body: &RigidBody,
-        logs: &[Log],
-        mounting: Mounting,
-        options: &DataOptions,
-        bands: &[f64],
-        model: &TorqueModel,
-    ) -> Result<Shown, Failure> {
-        if logs.is_empty() {
-            return Ok(Shown::default());
-        }
-        let data = prepared(body, logs, options)?;
-        let residual = model.residual(body, &data, &[]);
-        let mut floor = noise_floor(&data);
-        for (members, data) in by_band(body, logs, bands)? {
-            let own = noise_floor(&data);
-            members.into_iter().for_each(|j| floor[j] = own[j]);
-        }
-        let joint = |j: usize| {
-            let f = &model.friction[j];
-            let law = TanhFriction::new([f.gamma1, f.gamma2, f.gamma3, f.gamma4, f.gamma5]);
-            let (q, v) = rows(&data, j);
-            let ratio = body.arm().joints[j].rotor_ratio.as_ref().map(to_f64);
-            let some = q.len().min(ROWS);
-            let by = |least: f64, most: f64| turns(&q[..some], &residual[j][..some], least, most);
-            ShownJoint {
-                position: along(&data, |r, k| data.recordings[r].q[k * data.dof() + j]),
-                speed: along(&data, |r, k| data.recordings[r].v[k * data.dof() + j]),
-                friction: v.iter().zip(&residual[j]).map(|(v, e)| (*v, e + law.torque(*v))).collect(),
-                by_joint: by(1.0, JOINT_TURN),
-                by_motor: ratio.map_or(Turns::default(), |ratio| by(0.2 * ratio, MOTOR_TURN * ratio)),
-            }
-        };
-        Ok(Shown {
-            curves: curves(&data, &residual, &residual),
-            joints: (0..data.dof()).map(joint).collect(),
-            files: logs.iter().map(file).collect(),
-            floor,
-            mounting,
-            motion: motion(&data),
-        })
-    }
-}
-
-/// The frequency below which 99 % of the power of the speeds lies, Hz.
-fn motion(data: &Data<'_>) -> Option<f64> {
-    let of = |r: &crate::logs::regression::Recording| -> Vec<Vec<f64>> {
-        (0..data.dof()).map(|j| r.speed(j).collect()).collect()
-    };
-    let speeds: Vec<Vec<f64>> = data.recordings.iter().flat_map(of).collect();
-    occupied(&speeds, data.rate(), 0.99)
-}
-
-/// Name, duration, samples, rate and pieces of a log.
-fn file(log: &Log) -> [String; 5] {
-    let span = log.t.last().unwrap_or(&0.0) - log.t.first().unwrap_or(&0.0);
-    let rate = log.t.len().saturating_sub(1) as f64 / span.max(f64::MIN_POSITIVE);
-    let name =
-        std::path::Path::new(&log.file).file_name().map_or(log.file.clone(), |n| n.to_string_lossy().into());
-    [name, format!("{span:.1}"), log.t.len().to_string(), format!("{rate:.1}"), log.pieces.len().to_string()]
-}
-
-/// Positions and speeds of a joint's rows.
-fn rows(data: &Data<'_>, j: usize) -> (Vec<f64>, Vec<f64>) {
-    let at = data.recordings.iter().zip(&data.joints[j].kept).flat_map(|(recording, kept)| {
-        let sample = data.band.kept(recording.len());
-        kept.iter().map(move |k| (recording, sample[*k])).collect::<Vec<_>>()
-    });
-    at.map(|(r, k)| (r.q[k * data.dof() + j], r.v[k * data.dof() + j])).unzip()
-}
-
-/// A value of every sample in the band along the logs, one after the other, broken between them.
-fn along(data: &Data<'_>, value: impl Fn(usize, usize) -> f64) -> Vec<(f64, f64)> {
-    let (mut points, mut start) = (Vec::new(), 0.0);
-    for (r, recording) in data.recordings.iter().enumerate() {
-        let kept = data.band.kept(recording.len());
-        points.extend(kept.iter().map(|k| (start + *k as f64 / recording.rate, value(r, *k))));
-        start += recording.len() as f64 / recording.rate + 1.0;
-        points.push((start, f64::NAN));
-    }
-    points
-}
-
 /// The page; what is shown is of the held-out logs where there are any, else of the fitted ones.
-pub(super) fn page(result: &Identification, arm: &Arm, shown: &Shown, held_out: bool) -> Page {
+pub(super) fn page(result: &Identified) -> Page {
+    let (arm, shown, held_out) = (&result.described, &result.along, result.validate.is_some());
     let mut page = Page::new(format!("Torque model of {}", result.arm));
     let [_, high] = result.band;
     page.lead(&format!(
@@ -159,12 +39,12 @@ pub(super) fn page(result: &Identification, arm: &Arm, shown: &Shown, held_out: 
         let percent = |x: f64| format!("{:.1} %", 100.0 * x);
         let held = result.validate.as_ref();
         table.push([
-            (j + 1).to_string(),
+            JointNumber::from_index(j).to_string(),
             number(result.fit.rms[j]),
             percent(result.fit.relative[j]),
             held.map_or(String::new(), |s| number(s.rms[j])),
             held.map_or(String::new(), |s| percent(s.relative[j])),
-            shown.floor.get(j).map_or(String::new(), |f| number(*f)),
+            shown.noise_floor.get(j).map_or(String::new(), |f| number(*f)),
         ]);
     }
     page.table(&table);
@@ -182,7 +62,7 @@ pub(super) fn page(result: &Identification, arm: &Arm, shown: &Shown, held_out: 
 }
 
 /// The fit by mounting of the base, where it was not always as filed.
-fn mountings(page: &mut Page, result: &Identification, shown: &Shown) {
+fn mountings(page: &mut Page, result: &Identified, shown: &Along) {
     if result.mountings.is_empty() {
         return;
     }
@@ -200,7 +80,7 @@ fn mountings(page: &mut Page, result: &Identification, shown: &Shown) {
 }
 
 /// What to think of the model, first.
-fn verdict(page: &mut Page, result: &Identification) {
+fn verdict(page: &mut Page, result: &Identified) {
     let judged = result.validate.as_ref().unwrap_or(&result.fit);
     let where_to = if result.validate.is_some() {
         "logs that took no part in the fit"
@@ -264,13 +144,13 @@ fn of_arm(page: &mut Page, arm: &Arm) {
         "theta [rad]",
         "gear ratio",
         "range",
-        "speed",
+        "velocity",
         "torque",
     ]);
     for (j, joint) in arm.joints.iter().enumerate() {
         let given = |x: Option<f64>| x.map_or("–".to_string(), number);
         table.push([
-            (j + 1).to_string(),
+            JointNumber::from_index(j).to_string(),
             if joint.kind == JointKind::Revolute { "revolute" } else { "prismatic" }.to_string(),
             number(to_f64(&joint.a)),
             number(joint.alpha.radians()),
@@ -285,23 +165,32 @@ fn of_arm(page: &mut Page, arm: &Arm) {
     page.table(&table);
 }
 
-fn of_logs(page: &mut Page, result: &Identification, shown: &Shown, held_out: bool) {
+fn of_logs(page: &mut Page, result: &Identified, shown: &Along, held_out: bool) {
     page.heading(if held_out { "Trajectory and data: the held-out logs" } else { "Trajectory and data" });
-    if !shown.files.is_empty() {
+    if !shown.logs.is_empty() {
         let mut table = Table::new(["log", "duration [s]", "samples", "rate [Hz]", "pieces"]);
-        shown.files.iter().for_each(|row| table.push(row.clone()));
+        for log in &shown.logs {
+            table.push([
+                log.name.clone(),
+                format!("{:.1}", log.seconds),
+                log.samples.to_string(),
+                format!("{:.1}", log.rate),
+                log.pieces.to_string(),
+            ]);
+        }
         page.table(&table);
-        let panel = |label: &str, of: fn(&ShownJoint) -> &Vec<(f64, f64)>, named: bool| {
+        let panel = |label: &str, of: fn(&JointAlong) -> &Vec<(f64, f64)>, named: bool| {
             shown.joints.iter().enumerate().fold(Panel::new(label), |panel, (j, joint)| {
-                let name = if named { format!("joint {}", j + 1) } else { String::new() };
+                let name =
+                    if named { format!("joint {}", JointNumber::from_index(j)) } else { String::new() };
                 panel.line(name, INKS[j % INKS.len()], of(joint).clone())
             })
         };
         page.figure(
             &Figure::new("Motion", "time along the logs [s]")
                 .panel(panel("position [rad]", |j| &j.position, true))
-                .panel(panel("speed [rad/s]", |j| &j.speed, false)),
-            "Positions as logged and smoothed, speeds computed from them.",
+                .panel(panel("velocity [rad/s]", |j| &j.velocity, false)),
+            "Positions as logged and smoothed, velocities computed from them.",
         );
     }
     if !result.warnings.is_empty() {
@@ -312,10 +201,10 @@ fn of_logs(page: &mut Page, result: &Identification, shown: &Shown, held_out: bo
 }
 
 /// The points of a joint's curve.
-type Points<'a> = dyn Fn(usize, &ShownJoint) -> Vec<(f64, f64)> + 'a;
+type Points<'a> = dyn Fn(usize, &JointAlong) -> Vec<(f64, f64)> + 'a;
 
 /// What repeats with the joints' and the motors' positions.
-fn spectra(page: &mut Page, arm: &Arm, shown: &Shown) {
+fn spectra(page: &mut Page, arm: &Arm, shown: &Along) {
     let figure = |title: &str, label: &str, of: &Points<'_>| {
         let panels = shown
             .joints
@@ -326,7 +215,7 @@ fn spectra(page: &mut Page, arm: &Arm, shown: &Shown) {
         let mut count = 0;
         let figure = panels.fold(Figure::new(title, label), |figure, (j, points)| {
             count += 1;
-            figure.panel(Panel::new(format!("{} [N·m]", j + 1)).height(0.6).line(
+            figure.panel(Panel::new(format!("{} [N·m]", JointNumber::from_index(j))).height(0.6).line(
                 "",
                 INKS[j % INKS.len()],
                 points,
@@ -371,7 +260,7 @@ fn spectra(page: &mut Page, arm: &Arm, shown: &Shown) {
     }
 }
 
-fn parameters(page: &mut Page, result: &Identification) {
+fn parameters(page: &mut Page, result: &Identified) {
     page.heading("Inertial parameters");
     let mut table =
         Table::new(["parameter", "value (SI units)", "standard error", "95 % interval", "relative"]);
@@ -390,12 +279,12 @@ fn parameters(page: &mut Page, result: &Identification) {
     page.table(&table);
 }
 
-fn friction(page: &mut Page, result: &Identification, shown: &Shown) {
+fn friction(page: &mut Page, result: &Identified, shown: &Along) {
     page.heading("Friction: γ1 tanh(γ2 q̇) + γ3 tanh(γ4 q̇) + γ5 q̇");
     let mut table =
         Table::new(["joint", "γ1 [N·m]", "γ2 [s/rad]", "γ3 [N·m]", "γ4 [s/rad]", "γ5 [N·m·s/rad]"]);
     for f in &result.friction {
-        let gamma = [f.gamma1, f.gamma2, f.gamma3, f.gamma4, f.gamma5];
+        let gamma = f.gamma();
         let cell = |k: usize| match f.std[k] {
             Some(std) => format!("{} ± {}", number(gamma[k]), number(std)),
             None => number(gamma[k]),
@@ -406,7 +295,7 @@ fn friction(page: &mut Page, result: &Identification, shown: &Shown) {
     for (f, joint) in
         result.friction.iter().zip(&shown.joints).filter(|(_, joint)| !joint.friction.is_empty())
     {
-        let law = TanhFriction::new([f.gamma1, f.gamma2, f.gamma3, f.gamma4, f.gamma5]);
+        let law = TanhFriction::new(f.gamma());
         let top = joint.friction.iter().fold(0.0f64, |m, (v, _)| m.max(v.abs()));
         let curve = (-200..=200).map(|k| f64::from(k) / 200.0 * top).map(|v| (v, law.torque(v))).collect();
         let panel = Panel::new("torque [N·m]")
@@ -416,7 +305,10 @@ fn friction(page: &mut Page, result: &Identification, shown: &Shown) {
                 joint.friction.clone(),
             ))
             .line("Eq. 16", Ink::Orange, curve);
-        page.figure(&Figure::new(format!("Friction of joint {}", f.joint), "speed [rad/s]").panel(panel), "");
+        page.figure(
+            &Figure::new(format!("Friction of joint {}", f.joint), "velocity [rad/s]").panel(panel),
+            "",
+        );
     }
 }
 
@@ -430,5 +322,7 @@ pub(super) fn torque_figure(joint: usize, curve: &TorqueCurve) -> Figure {
         Ink::Grey,
         curve.points(|k| curve.after[k]),
     );
-    Figure::new(format!("Joint {}", joint + 1), "time along the logs [s]").panel(torque).panel(error)
+    Figure::new(format!("Joint {}", JointNumber::from_index(joint)), "time along the logs [s]")
+        .panel(torque)
+        .panel(error)
 }

@@ -1,8 +1,9 @@
-//! What `identify` and `explain` share: an arm, logs, a folder for results.
+//! What `explain` reads: an arm, logs, what is known already; and a folder for results.
 
 use super::Failure;
-use super::output::Progress;
-use crate::explanation::torque_model::TorqueModel;
+use super::output::{self, Progress};
+use crate::explanation::torque_model::{ModelFile, TorqueModel};
+use crate::identification::KnownModel;
 use crate::identification::mounting::Mounting;
 use crate::logs::log::{Log, common_clock, read_logs};
 use crate::logs::regression::RigidBody;
@@ -51,51 +52,35 @@ impl Loaded {
 pub(crate) struct Known {
     /// The arm as the model has it.
     pub arm: Arm,
-    model: Option<(TorqueModel, PathBuf)>,
+    model: Option<ModelFile>,
 }
 
 impl Known {
     /// Reads an arm file and, where there is one, a model of the arm.
     pub(crate) fn read(arm: &Path, model: Option<&Path>) -> Result<Known, Failure> {
-        Known::mounted(arm, model, Mounting::Filed)
-    }
-
-    /// The same for logs that were recorded with the base mounted otherwise.
-    fn mounted(arm: &Path, model: Option<&Path>, mounting: Mounting) -> Result<Known, Failure> {
         let arm = Arm::read(arm).map_err(|e| Failure::Unusable(e.to_string()))?;
-        let arm = mounting.of(&arm).map_err(Failure::Unusable)?;
         let Some(file) = model else { return Ok(Known { arm, model: None }) };
-        let model = TorqueModel::read(file).map_err(|e| Failure::Unusable(e.to_string()))?;
-        if mounting != Mounting::Filed && model.additions.arm_changes.gravity.is_some() {
-            return Err(Failure::Unusable(format!(
-                "{}: says how the base is tilted where it stands as filed, and nothing of it mounted \
-                    otherwise",
-                file.display()
-            )));
-        }
-        let changed = model.additions.arm_changes.of(&arm);
-        let arm = changed.map_err(|e| Failure::Unusable(format!("{}: {e}", file.display())))?;
-        Ok(Known { arm, model: Some((model, file.to_path_buf())) })
+        let model = ModelFile::read(file).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let arm = model.arm(&arm, Mounting::Filed).map_err(Failure::Unusable)?;
+        Ok(Known { arm, model: Some(model) })
     }
 
     /// The model, if it is one of this arm.
     pub(crate) fn model(self, body: &RigidBody) -> Result<Option<TorqueModel>, Failure> {
-        let Some((model, file)) = self.model else { return Ok(None) };
-        let checked = model.in_set_of(body).checked(body.names(), body.dof(), &file);
-        checked.map(Some).map_err(|e| Failure::Unusable(e.to_string()))
+        let checked = self.model.map(|model| model.checked(body)).transpose();
+        checked.map_err(|e| Failure::Unusable(e.to_string()))
     }
 }
 
 /// Reads and checks everything before any work is done. With a model the arm is as the model has it; the logs
-/// are as they are, and all of one mounting of the base.
+/// are as they are.
 pub(crate) fn load(
     inputs: &Inputs,
     validate: &[PathBuf],
     model: Option<&Path>,
-    mounting: Mounting,
     progress: &Progress,
 ) -> Result<Loaded, Failure> {
-    let known = Known::mounted(&inputs.arm, model, mounting)?;
+    let known = Known::read(&inputs.arm, model)?;
     let mut warnings = known.arm.notes();
     for file in validate {
         if inputs.log.iter().any(|log| same_file(log, file)) {
@@ -114,12 +99,11 @@ pub(crate) fn load(
     progress.say("deriving and proving the arm's dynamics");
     let body = RigidBody::new(&known.arm).map_err(|e| Failure::Refused(e.to_string()))?;
     let known = known.model(&body)?;
-    std::fs::create_dir_all(&inputs.out)
-        .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", inputs.out.display())))?;
+    output::make_folder(&inputs.out)?;
     Ok(Loaded { body, fit: logs, validate: rest, warnings, known })
 }
 
-pub(super) fn same_file(a: &Path, b: &Path) -> bool {
+fn same_file(a: &Path, b: &Path) -> bool {
     match (a.canonicalize(), b.canonicalize()) {
         (Ok(a), Ok(b)) => a == b,
         _ => a == b,

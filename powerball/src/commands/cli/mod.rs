@@ -15,12 +15,12 @@ mod mounted;
 mod output;
 mod profile;
 mod record;
-mod reduced;
 mod summarize;
 mod verify;
 mod virtual_arm;
 mod warm_up;
 
+use crate::identification::IdentifyError;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -71,6 +71,12 @@ pub(crate) enum Failure {
     Refused(String),
     /// Wrong use or unreadable input: exit code 2.
     Unusable(String),
+}
+
+impl From<IdentifyError> for Failure {
+    fn from(e: IdentifyError) -> Self {
+        if e.is_input() { Failure::Unusable(e.to_string()) } else { Failure::Refused(e.to_string()) }
+    }
 }
 
 /// Runs the command line of this process.

@@ -1,22 +1,15 @@
 //! Logs with the mounting of the base that each was recorded in.
 
+use crate::identification::Source;
 use crate::identification::mounting::Mounting;
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 use std::path::PathBuf;
 
-/// A log, and the mounting that was said of it.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct MountedFile {
-    pub file: PathBuf,
-    /// Nothing said is as the arm file says, or as the summary itself does.
-    pub mounting: Option<Mounting>,
-}
-
 /// Logs to fit and to judge by. A mounting on the command line counts for the files after it.
 #[derive(Clone, Debug)]
 pub(crate) struct MountedLogs {
-    pub log: Vec<MountedFile>,
-    pub validate: Vec<MountedFile>,
+    pub log: Vec<Source<'static>>,
+    pub validate: Vec<Source<'static>>,
 }
 
 /// As they stand on the command line.
@@ -52,7 +45,7 @@ impl FromArgMatches for MountedLogs {
         let mountings: Vec<(usize, Mounting)> = places("mounting").into_iter().zip(mounting).collect();
         let mounted = |(at, file): (usize, PathBuf)| {
             let before = mountings.iter().rev().find(|(place, _)| *place < at);
-            MountedFile { file, mounting: before.map(|(_, mounting)| *mounting) }
+            Source { mounting: before.map(|(_, mounting)| *mounting), ..Source::file(file) }
         };
         let files = |of: &str, files: Vec<PathBuf>| places(of).into_iter().zip(files).map(mounted).collect();
         Ok(MountedLogs { log: files("log", log), validate: files("validate", validate) })
@@ -80,8 +73,8 @@ mod tests {
         let line = "x --log a b --validate c --mounting 90,0 --log d --mounting -90,0 --validate e --log f g";
         let logs = Line::parse_from(line.split(' ')).logs;
         let turned = |roll| Some(Mounting::Turned { roll, pitch: 0.0 });
-        let of = |files: &[MountedFile]| -> Vec<(String, Option<Mounting>)> {
-            files.iter().map(|f| (f.file.display().to_string(), f.mounting)).collect()
+        let of = |files: &[Source<'_>]| -> Vec<(String, Option<Mounting>)> {
+            files.iter().map(|f| (f.name(), f.mounting)).collect()
         };
         let expected =
             [("a", None), ("b", None), ("d", turned(90.0)), ("f", turned(-90.0)), ("g", turned(-90.0))];

@@ -1,6 +1,7 @@
 //! Results on disk and on the terminal.
 
 use super::Failure;
+use crate::controller::JointNumber;
 use crate::identification::estimate::Spread;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -18,6 +19,12 @@ impl Progress {
             eprintln!("  {what} …");
         }
     }
+}
+
+/// Makes a folder for results, where it is missing.
+pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
+    let failure = |e| Failure::Unusable(format!("{}: cannot be made: {e}", folder.display()));
+    std::fs::create_dir_all(folder).map_err(failure)
 }
 
 /// Writes a file of a folder whole or not at all: a reader never sees half of it.
@@ -60,7 +67,7 @@ pub(crate) fn table(columns: &[(&str, &Spread)]) -> String {
     }
     let joints = columns.iter().map(|(_, s)| s.rms.len()).max().unwrap_or(0);
     for j in 0..joints {
-        text.push_str(&format!("\n{:>5}", j + 1));
+        text.push_str(&format!("\n{:>5}", JointNumber::from_index(j).number()));
         for (_, spread) in columns {
             let cell = format!("{:.4} N·m  {:5.1} %", spread.rms[j], 100.0 * spread.relative[j]);
             text.push_str(&format!("  {cell:>26}"));

@@ -1,13 +1,13 @@
-//! `powerball summarize`: a log as triangular factors.
+//! `powerball summarize`: a log as the sufficient statistics of its fit, R factors.
 
-use super::Failure;
-use super::mounted::MountedFile;
-use super::output::{self, Progress};
-use super::reduced::{Standing, reduce};
+use super::{Failure, output};
 use crate::identification::mounting::Mounting;
+use crate::identification::{Source, Summarized, summarize};
+use crate::logs::Progress;
 use crate::logs::regression::DataOptions;
 use crate::logs::summary::BANDS;
 use clap::Args;
+use dyngen::Arm;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -61,30 +61,25 @@ struct Written {
 
 impl Summarize {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let mounted = |file: &PathBuf| MountedFile { file: file.clone(), mounting: self.mounting };
-        let files: Vec<MountedFile> = self.log.iter().map(mounted).collect();
-        let reduced = reduce(&self.arm, &files, &DataOptions::default(), false, &Progress::new())?;
-        let [Standing { mounting, bands, .. }] = reduced.standing.as_slice() else {
-            let mountings: Vec<String> = reduced.standing.iter().map(|s| s.mounting.to_string()).collect();
-            return Err(Failure::Unusable(format!(
-                "these are of several mountings of the base ({}): a summary has one; give them to identify \
-                    as they are",
-                mountings.join("; ")
-            )));
-        };
+        let arm = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let terminal = output::Progress::new();
+        let say = |what: &str| terminal.say(what);
+        let source = |file: &PathBuf| Source { mounting: self.mounting, ..Source::file(file) };
+        let Summarized { mounting, bands, warnings } =
+            summarize(&arm, self.log.iter().map(source), &DataOptions::default(), Progress::to(&say))?;
         let bytes = bands.to_bytes();
         let summary = bands.widest();
         output::write_file(&self.out, &bytes)?;
         let written = Written {
             arm: summary.identity.arm.clone(),
             set: "minimal",
-            mounting: (*mounting != Mounting::Filed).then(|| mounting.to_string()),
+            mounting: (mounting != Mounting::Filed).then(|| mounting.to_string()),
             logs: summary.logs.iter().map(|(name, _)| name.clone()).collect(),
             seconds: summary.logs.iter().map(|(_, seconds)| seconds).sum(),
             rows: summary.joints.iter().map(|j| j.rows()).collect(),
             bytes: bytes.len(),
             bands: BANDS,
-            warnings: reduced.warnings,
+            warnings,
         };
         if self.json {
             output::print(&output::json(&written)?);

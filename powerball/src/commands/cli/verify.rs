@@ -1,18 +1,15 @@
 //! `powerball verify`: an identified model on another trajectory.
 
-use super::Failure;
-use super::identify::by_band;
 use super::identify_page::torque_figure;
-use super::inputs::{Inputs, load};
-use super::output::{self, Progress};
-use crate::explanation::explain::{TorqueCurve, curves};
-use crate::identification::estimate::{JointVerdict, verify};
+use super::inputs::Inputs;
+use super::{Failure, output};
+use crate::explanation::torque_model::ModelFile;
 use crate::identification::mounting::Mounting;
-use crate::logs::regression::{Data, DataOptions};
-use crate::logs::summary::BANDS;
+use crate::identification::{Source, Verified, VerifyOptions, verify};
+use crate::logs::Progress;
 use crate::report::{Page, Table, Tone, number};
 use clap::Args;
-use serde::Serialize;
+use dyngen::Arm;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -41,52 +38,24 @@ pub(crate) struct Verify {
     tolerance: f64,
 }
 
-/// verified.json.
-#[derive(Serialize)]
-struct Verified {
-    arm: String,
-    joints: Vec<JointVerdict>,
-    tolerance: f64,
-    within_tolerance: bool,
-    band: [f64; 2],
-    /// The end of each joint's band, Hz, in which its error is taken: the one in which it was identified.
-    joint_bands: Vec<f64>,
-    warnings: Vec<String>,
-}
-
 impl Verify {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        if !(self.tolerance.is_finite() && self.tolerance > 0.0) {
-            return Err(Failure::Unusable("--tolerance must be above 0".into()));
-        }
-        let progress = Progress::new();
-        let loaded = load(&self.inputs, &[], Some(&self.model), self.mounting, &progress)?;
-        progress.say("preparing signals");
-        let data = Data::new(&loaded.body, &loaded.fit, &DataOptions::default())
-            .map_err(|e| Failure::Refused(e.to_string()))?;
-        let residual_of = |data: &Data<'_>| {
-            loaded.known.as_ref().map(|m| m.residual(&loaded.body, data, &[])).unwrap_or_default()
-        };
-        let residual = residual_of(&data);
-        let mut joints = verify(&data, &residual, self.tolerance);
-        let joint_bands = joint_bands(&self.model, joints.len());
-        for (members, data) in by_band(&loaded.body, &loaded.fit, &joint_bands)? {
-            let own = verify(&data, &residual_of(&data), self.tolerance);
-            members.into_iter().for_each(|j| joints[j] = own[j].clone());
-        }
-        let verified = Verified {
-            arm: loaded.body.arm().name.clone(),
-            within_tolerance: joints.iter().all(|j| j.within != Some(false)),
-            joints,
+        let arm = Arm::read(&self.inputs.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let model = ModelFile::read(&self.model).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let terminal = output::Progress::new();
+        let say = |what: &str| terminal.say(what);
+        let options = VerifyOptions {
             tolerance: self.tolerance,
-            band: [0.0, data.band.cutoff],
-            joint_bands,
-            warnings: loaded.warnings.into_iter().chain(data.notes.iter().cloned()).collect(),
+            joint_bands: joint_bands(&self.model),
+            progress: Progress::to(&say),
+            ..VerifyOptions::default()
         };
+        let logs = self.inputs.log.iter().map(|file| Source::file(file).mounted(self.mounting));
+        let verified = verify(&arm, &model, logs, &options)?;
+        output::make_folder(&self.inputs.out)?;
         let text = output::json(&verified)?;
         output::write(&self.inputs.out, "verified.json", text.as_bytes())?;
-        let shown = page(&verified, &curves(&data, &residual, &residual));
-        output::write(&self.inputs.out, "report.html", shown.to_html().as_bytes())?;
+        output::write(&self.inputs.out, "report.html", page(&verified).to_html().as_bytes())?;
         if self.inputs.json {
             output::print(&text);
         } else {
@@ -116,15 +85,14 @@ impl Verify {
     }
 }
 
-/// The joints' bands of an identified.json; the widest where the file says nothing of them.
-fn joint_bands(model: &Path, dof: usize) -> Vec<f64> {
+/// The joints' bands of an identified.json; none where the file says nothing of them.
+fn joint_bands(model: &Path) -> Vec<f64> {
     let said: Option<Value> = std::fs::read_to_string(model).ok().and_then(|t| serde_json::from_str(&t).ok());
-    let of =
-        |j: usize| said.as_ref()?.get("joint_bands")?.get(j)?.as_f64().filter(|band| BANDS.contains(band));
-    (0..dof).map(|j| of(j).unwrap_or(BANDS[0])).collect()
+    let bands = said.as_ref().and_then(|json| json.get("joint_bands")?.as_array());
+    bands.map_or(Vec::new(), |bands| bands.iter().map(|band| band.as_f64().unwrap_or(0.0)).collect())
 }
 
-fn page(verified: &Verified, curves: &[TorqueCurve]) -> Page {
+fn page(verified: &Verified) -> Page {
     let mut page = Page::new(format!("Torque model of {}, verified", verified.arm));
     page.lead(
         "A model on logs that it has not seen: measured against predicted torque, 95 % intervals of \
@@ -149,7 +117,7 @@ fn page(verified: &Verified, curves: &[TorqueCurve]) -> Page {
         ]);
     }
     page.table(&table);
-    for (joint, curve) in curves.iter().enumerate().filter(|(_, c)| !c.t.is_empty()) {
+    for (joint, curve) in verified.curves.iter().enumerate().filter(|(_, c)| !c.t.is_empty()) {
         page.figure(&torque_figure(joint, curve), "");
     }
     page

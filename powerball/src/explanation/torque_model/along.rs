@@ -20,11 +20,7 @@ impl TorqueModel {
             let here: Vec<&Window> = held.iter().filter(|w| w.log == *log).collect();
             self.torque(body, recording, &|t| here.iter().any(|w| t >= w.from && t <= w.to))
         });
-        let predicted = data.column_over_all(&torque);
-        let of_joint = |(rows, (_, predicted)): (&crate::logs::regression::JointRows, &(usize, Vec<f64>))| {
-            rows.torque.iter().zip(predicted).map(|(y, p)| y - p).collect()
-        };
-        data.joints.iter().zip(&predicted.parts).map(of_joint).collect()
+        data.residual(&torque)
     }
 
     /// The torque along one recording, n a sample, N·m as logged; `held` says by the log's time whether the

@@ -5,6 +5,7 @@
 //! the logs, at true positions: an encoder's offset is taken off first.
 
 mod along;
+mod as_known;
 mod changes;
 mod file;
 mod known;
@@ -12,14 +13,14 @@ mod source;
 #[cfg(test)]
 mod tests;
 
+pub use as_known::ModelFile;
 pub use changes::Unchanged;
 pub use file::FileError;
 pub use source::{Scalar, SourceError};
 
 use crate::controller::correction::{Law, Term};
-use crate::identification::estimate::{JointFriction, ParameterEstimate};
+use crate::identification::estimate::{JointFriction, ParameterEstimate, in_set_of};
 use crate::logs::regression::RigidBody;
-use dyngen::{SetKind, Values};
 use serde::{Deserialize, Serialize};
 
 /// The model of one arm; as JSON the keys are those of `identified.json` and more.
@@ -151,16 +152,8 @@ impl TorqueModel {
     /// not.
     #[must_use]
     pub fn in_set_of(mut self, body: &RigidBody) -> TorqueModel {
-        let names = body.names();
-        if names.iter().all(|name| self.parameters.iter().any(|p| p.name == *name)) {
-            return self;
-        }
-        let values = Values::named(self.parameters.iter().map(|p| (p.name.as_str(), p.value)), &self.arm);
-        let model = body.model();
-        if let Some(values) = model.set(SetKind::Minimal).ok().and_then(|set| values.of_set(model, set).ok())
-        {
-            let plain = |(name, value): (&String, f64)| ParameterEstimate::plain(name, value);
-            self.parameters = names.iter().zip(values).map(plain).collect();
+        if let Some(parameters) = in_set_of(&self.parameters, &self.arm, body) {
+            self.parameters = parameters;
         }
         self
     }
@@ -174,6 +167,6 @@ impl TorqueModel {
     /// γ1 … γ5 by joint.
     #[must_use]
     pub fn gammas(&self) -> Vec<[f64; 5]> {
-        self.friction.iter().map(|f| [f.gamma1, f.gamma2, f.gamma3, f.gamma4, f.gamma5]).collect()
+        self.friction.iter().map(JointFriction::gamma).collect()
     }
 }

@@ -14,12 +14,16 @@
 //! The certificate is the barrier's: the value found exceeds the least possible one by at most μ times the
 //! number of barrier dimensions.
 
+use crate::logs::vector::dot;
 use dyngen::arm::{Arm, Convention, Parameter, ParameterKind};
 use dyngen::base::possible::pseudo_inertia;
 use dyngen::{Error, Model, SetKind};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use nalgebra::Matrix4;
+
+/// Dynamic parameters of a link.
+const PER_LINK: usize = ParameterKind::ALL.len();
 
 /// Consistent parameters with their certificate.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,12 +130,12 @@ pub fn nearest(model: &Model, kind: SetKind, values: &[f64], metric: &Mat<f64>) 
     }
     let set_values = times(&problem.sums, &x);
     let miss: Vec<f64> = set_values.iter().zip(values).map(|(a, b)| a - b).collect();
-    let mut all = vec![0.0; 11 * arm.dof()];
+    let mut all = vec![0.0; PER_LINK * arm.dof()];
     for (p, value) in kept.iter().zip(&x) {
         all[p.index()] = *value;
     }
     let eigenvalues = all
-        .chunks_exact(11)
+        .chunks_exact(PER_LINK)
         .filter_map(|link| link.first_chunk::<10>())
         .map(|link| pseudo_inertia(link).symmetric_eigenvalues().min())
         .collect();
@@ -270,10 +274,6 @@ fn times_transposed(a: &Mat<f64>, x: &[f64]) -> Vec<f64> {
     (0..a.ncols()).map(|k| (0..a.nrows()).map(|i| a[(i, k)] * x[i]).sum()).collect()
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -345,7 +345,7 @@ mod tests {
         approx::assert_relative_eq!(distance(&found.all), found.distance, max_relative = 1e-9);
         for _ in 0..200 {
             let mut other = vec![0.0; found.all.len()];
-            for link in other.chunks_exact_mut(11) {
+            for link in other.chunks_exact_mut(PER_LINK) {
                 for _ in 0..3 {
                     let m: f64 = rng.random_range(0.0..3.0);
                     let r: [f64; 3] = std::array::from_fn(|_| rng.random_range(-0.3..0.3));

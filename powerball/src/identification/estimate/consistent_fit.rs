@@ -1,7 +1,7 @@
 //! A fit whose parameters a real arm can have, and what that costs.
 
 use super::consistent::{Consistent, nearest};
-use super::identify::{Spread, spread_of};
+use super::estimates::{Spread, spread_of};
 use super::reduced::Solution;
 use super::solve::{Solver, bounded};
 use crate::logs::regression::RigidBody;

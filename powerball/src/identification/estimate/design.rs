@@ -1,6 +1,7 @@
 //! The columns of all joints and their cross products, from which every fit is a small solve.
 
 use super::Folds;
+use super::normal_equations::{Products, add_products, zeros};
 use super::vary::{FRICTION, Layout};
 use crate::logs::parallel;
 use crate::logs::regression::{Column, Data};
@@ -136,14 +137,11 @@ fn pack(columns: &[&[f64]], rows: &Range<usize>) -> Vec<f64> {
     packed
 }
 
-/// A'A, A'y, y'y of one joint and cell.
-type Cell = (Mat<f64>, Vec<f64>, f64);
-
 /// Cross products of a design with itself and the torques, by joint and cell of folds.
 #[derive(Debug)]
 pub struct Gram {
     /// `[joint][cell]`: (A'A, A'y, y'y), local.
-    parts: Vec<Vec<Cell>>,
+    parts: Vec<Vec<Products>>,
     globals: Vec<Vec<usize>>,
     size: usize,
 }
@@ -156,7 +154,7 @@ impl Gram {
         let parts = parallel::map(&joints, |&j| {
             let local = &design.joints[j];
             let d = local.global.len();
-            let mut cells = vec![(Mat::zeros(d, d), vec![0.0; d], 0.0); folds.cells];
+            let mut cells = vec![zeros(d); folds.cells];
             for (cell, rows) in runs(data, folds, j) {
                 let a = design.matrix(j, &rows);
                 let y = &data.joints[j].torque[rows.clone()];
@@ -176,22 +174,13 @@ impl Gram {
     /// Σ w A'A, Σ w A'y and Σ w y'y over the cells for which `wanted` holds.
     #[must_use]
     pub fn sum(&self, weights: &[f64], wanted: impl Fn(usize) -> bool) -> (Mat<f64>, Vec<f64>, f64) {
-        let (mut gram, mut right, mut square) = (Mat::zeros(self.size, self.size), vec![0.0; self.size], 0.0);
+        let mut sum = zeros(self.size);
         for ((cells, global), w) in self.parts.iter().zip(&self.globals).zip(weights) {
-            for (cell, (g, r, s)) in cells.iter().enumerate() {
-                if !wanted(cell) {
-                    continue;
-                }
-                for (i, gi) in global.iter().enumerate() {
-                    for (k, gk) in global.iter().enumerate() {
-                        gram[(*gk, *gi)] += w * g[(k, i)];
-                    }
-                    right[*gi] += w * r[i];
-                }
-                square += w * s;
+            for (_, products) in cells.iter().enumerate().filter(|(cell, _)| wanted(*cell)) {
+                add_products(&mut sum, global, products, *w);
             }
         }
-        (gram, right, square)
+        sum
     }
 }
 

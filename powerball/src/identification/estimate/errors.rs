@@ -14,6 +14,7 @@
 //! known enters by Satterthwaite's degrees of freedom.
 
 use super::distribution::t_quantile_975;
+use super::normal_equations::zeros;
 use super::reduced::Solution;
 use super::solve::Solver;
 use faer::Mat;
@@ -21,7 +22,7 @@ use faer::linalg::solvers::Solve;
 
 /// The errors of all coefficients, tangents among them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Errors {
+pub struct StandardErrors {
     /// Standard errors; `None` where a coefficient is not determined or at a bound.
     pub std: Vec<Option<f64>>,
     /// Half the width of a 95 % interval in standard errors: Student's t with the degrees of freedom of each.
@@ -42,7 +43,7 @@ struct Group {
 
 /// The errors of a solution.
 #[must_use]
-pub fn errors(solution: &Solution) -> Errors {
+pub fn standard_errors(solution: &Solution) -> StandardErrors {
     let size = solution.layout.size();
     let (gram, _, _) = solution.products();
     let solver = Solver::new(&gram, |c| solution.free[c]);
@@ -57,7 +58,7 @@ pub fn errors(solution: &Solution) -> Errors {
     let mut groups = Vec::new();
     for (parts, weight) in solution.parts.iter().zip(&solution.weights) {
         for part in parts.iter().filter(|p| p.rows > 0 && *weight > 0.0) {
-            let mut products = (Mat::zeros(size, size), vec![0.0; size], 0.0);
+            let mut products = zeros(size);
             part.add_to(&mut products, 1.0);
             let turned = &inverse * &products.0;
             let spread = (0..size)
@@ -79,7 +80,7 @@ pub fn errors(solution: &Solution) -> Errors {
         let freedom = if doubt > 0.0 { variance * variance / doubt } else { f64::from(u16::MAX) };
         (std[c], quantile[c]) = (Some(variance.sqrt()), t_quantile_975(freedom.max(1.0)));
     }
-    Errors { std, quantile }
+    StandardErrors { std, quantile }
 }
 
 /// λ and its degrees of freedom by group.

@@ -3,9 +3,11 @@
 use super::design::{Design, Gram, runs};
 use super::folds::Folds;
 use super::friction_shape::{self, Trials};
-use super::vary::{FRICTION, Layout, Products, Rows, Scatter, Start, vary};
+use super::normal_equations::Products;
+use super::vary::{FRICTION, Layout, Rows, Scatter, Start, vary};
 use crate::logs::parallel;
 use crate::logs::regression::{Column, Data, RigidBody};
+use crate::logs::vector::dot;
 use faer::Mat;
 
 /// A column that was added to the base model.
@@ -30,7 +32,7 @@ pub struct Fit {
     pub sigma: Vec<f64>,
     /// How many times the variance of slow means exceeds that of independent samples, by joint, at least 1.
     pub inflation: Vec<f64>,
-    /// The speed that each joint exceeds in 5 % of the samples, rad/s.
+    /// The velocity that each joint exceeds in 5 % of the samples, rad/s.
     pub top_speed: Vec<f64>,
     /// Residual by joint.
     pub residual: Vec<Vec<f64>>,
@@ -169,14 +171,12 @@ impl Rows for InMemory<'_> {
                     trials.cross[(c, k)] += value;
                 }
             }
-            let dot = |a: &[f64], b: &[f64]| {
-                a[rows.clone()].iter().zip(&b[rows.clone()]).map(|(x, y)| x * y).sum::<f64>()
-            };
+            let here = |a: &[f64], b: &[f64]| dot(&a[rows.clone()], &b[rows.clone()]);
             for a in 0..grid {
                 for b in 0..=a {
-                    trials.square[(a, b)] += dot(&trial[a], &trial[b]);
+                    trials.square[(a, b)] += here(&trial[a], &trial[b]);
                 }
-                trials.score[a] += dot(&trial[a], &rows_of.torque);
+                trials.score[a] += here(&trial[a], &rows_of.torque);
             }
         }
         trials

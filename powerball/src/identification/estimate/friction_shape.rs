@@ -33,8 +33,8 @@ pub(super) fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f6
     ]
 }
 
-/// The steepnesses that make sense for a joint whose fast speed is `top`, s/rad: from straight over its
-/// speeds to a step.
+/// The steepnesses that make sense for a joint whose fast velocity is `top`, s/rad: from straight over its
+/// velocities to a step.
 #[must_use]
 pub(super) fn range(top: f64) -> (f64, f64) {
     (0.2 / top, 2000.0 / top)

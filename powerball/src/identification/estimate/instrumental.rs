@@ -12,12 +12,13 @@
 //! starts from.
 
 use super::distribution::t_quantile_975;
-use super::errors::Errors;
+use super::errors::StandardErrors;
 use super::friction_shape;
 use super::reduced::{Part, Solution};
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, DataOptions, Recording, RigidBody};
 use crate::logs::summary::{Octaves, Triangle, parts};
+use crate::logs::vector::dot;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 
@@ -30,7 +31,7 @@ pub fn solve_instrumental(
     logs: &[Log],
     options: &DataOptions,
     start: &Solution,
-) -> Result<(Solution, Errors), String> {
+) -> Result<(Solution, StandardErrors), String> {
     let layout = start.layout;
     let rows = rows(body, logs, options, start)?;
     let free: Vec<usize> = (0..layout.size()).filter(|c| start.free[*c] && !layout.is_tangent(*c)).collect();
@@ -94,7 +95,7 @@ pub fn solve_instrumental(
         free: (0..layout.size()).map(|c| place[c].is_some()).collect(),
         parts: levels.into_iter().map(|j| j.into_iter().map(|l| l.part).collect()).collect(),
     };
-    Ok((solution, Errors { std, quantile }))
+    Ok((solution, StandardErrors { std, quantile }))
 }
 
 /// By joint, where it moves: the model's columns by their index, and the rows [Z A y].
@@ -215,8 +216,4 @@ impl Level {
 
 fn weighted<'a>(levels: &'a [Vec<Level>], weights: &'a [f64]) -> impl Iterator<Item = (&'a Level, f64)> {
     levels.iter().zip(weights).flat_map(|(joint, weight)| joint.iter().map(move |level| (level, *weight)))
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -1,19 +1,22 @@
 //! Weighted least squares in the minimal set, friction shapes included, with honest standard errors.
 
 mod band;
+mod base_model;
 mod consistent;
 mod consistent_fit;
+mod curves;
 mod design;
 pub mod distribution;
 mod errors;
+mod estimates;
 mod exchanged;
 mod fit;
 mod folds;
 mod friction_shape;
-mod identify;
 mod instrumental;
 mod mountings;
 mod noise;
+mod normal_equations;
 mod ratio;
 mod reduced;
 mod robust;
@@ -21,18 +24,21 @@ mod solve;
 mod stream;
 mod torque_metric;
 mod vary;
-mod verify;
+mod verdict;
 
 pub use band::{InBand, reduce_in_bands, solve_in_band};
+pub use base_model::BaseModel;
+pub(crate) use base_model::in_set_of;
 pub use consistent::{Consistent, nearest};
 pub use consistent_fit::{ConsistentFit, ConsistentReport, consistent_fit};
+pub use curves::{TorqueCurve, curves};
 pub use design::{Design, Gram, runs};
-pub use errors::{Errors, errors};
+pub use errors::{StandardErrors, standard_errors};
+pub use estimates::{Estimates, JointFriction, ParameterEstimate, Spread, estimates, spread, spread_of};
 pub use exchanged::exchanged;
 pub use fit::{Fit, Term, fit, friction_columns};
 pub(crate) use fit::{MEAN_OVER, variance_inflation};
 pub use folds::Folds;
-pub use identify::{Identified, JointFriction, ParameterEstimate, Spread, identify, spread, spread_of};
 pub use instrumental::solve_instrumental;
 pub use mountings::Together;
 pub use noise::noise_floor;
@@ -43,7 +49,7 @@ pub use solve::{Solver, bounded};
 pub use stream::{States, Stream, StreamFit};
 pub use torque_metric::TorqueMetric;
 pub use vary::Layout;
-pub use verify::{JointVerdict, verify};
+pub use verdict::{JointVerdict, verdicts};
 
 #[cfg(test)]
 mod tests;

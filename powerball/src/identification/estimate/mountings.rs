@@ -5,7 +5,7 @@
 //! parameters are combinations of its ones. Factors are put into its columns and joined there, so that a
 //! summary need not know which others it will meet.
 
-use super::identify::Spread;
+use super::estimates::Spread;
 use super::reduced::{Solution, solve_reduced};
 use super::{FrictionLaw, spread_of};
 use crate::identification::mounting::together;

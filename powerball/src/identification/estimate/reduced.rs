@@ -1,10 +1,12 @@
 //! The fit of reduced logs.
 
 use super::friction_shape::Trials;
-use super::vary::{FRICTION, Layout, Products, Rows, Scatter, vary};
+use super::normal_equations::{Products, add_columns, zeros};
+use super::vary::{FRICTION, Layout, Rows, Scatter, vary};
 use crate::logs::summary::{
     Columns, Identity, NODES, OCTAVES, SLOW, Steepness, Summary, SummaryError, Triangle,
 };
+use crate::logs::vector::dot;
 use faer::Mat;
 
 /// What stands beside the minimal set in a model of a joint's torque.
@@ -58,8 +60,7 @@ impl Solution {
 
     /// Σ w·A'A, Σ w·A'y, Σ w·y'y.
     pub(super) fn products(&self) -> Products {
-        let mut sum =
-            (Mat::zeros(self.layout.size(), self.layout.size()), vec![0.0; self.layout.size()], 0.0);
+        let mut sum = zeros(self.layout.size());
         for (parts, weight) in self.parts.iter().zip(&self.weights) {
             parts.iter().for_each(|part| part.add_to(&mut sum, *weight));
         }
@@ -143,24 +144,10 @@ impl Part {
     }
 
     /// Adds the products times a weight.
-    pub(super) fn add_to(&self, (gram, right, square): &mut Products, weight: f64) {
+    pub(super) fn add_to(&self, products: &mut Products, weight: f64) {
         let Some((torque, columns)) = self.columns.split_last() else { return };
-        for (i, (a, gi)) in columns.iter().zip(&self.global).enumerate() {
-            for (b, gk) in columns.iter().zip(&self.global).take(i + 1) {
-                let value = weight * dot(a, b);
-                gram[(*gi, *gk)] += value;
-                if gi != gk {
-                    gram[(*gk, *gi)] += value;
-                }
-            }
-            right[*gi] += weight * dot(a, torque);
-        }
-        *square += weight * dot(torque, torque);
+        add_columns(products, &self.global, columns, torque, weight);
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 /// Reduced logs as rows of a fit.
@@ -267,8 +254,7 @@ impl Rows for Reduced<'_> {
     }
 
     fn products(&self, at: &Vec<[Part; 2]>, weights: &[f64]) -> Products {
-        let size = self.layout.size();
-        let mut sum = (Mat::zeros(size, size), vec![0.0; size], 0.0);
+        let mut sum = zeros(self.layout.size());
         for ([all, _], weight) in at.iter().zip(weights) {
             all.add_to(&mut sum, *weight);
         }

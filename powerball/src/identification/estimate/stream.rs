@@ -3,11 +3,11 @@
 //! For states of a simulation, or of logs that were filtered elsewhere. Steepnesses of friction are given;
 //! logs as they were recorded go through [`crate::logs::summary`] instead.
 
+use super::normal_equations::{add_columns, zeros};
 use super::solve::Solver;
 use crate::logs::parallel;
 use crate::logs::regression::RigidBody;
 use crate::logs::summary::Triangle;
-use faer::Mat;
 
 /// Samples that are worked on together: their rows stay in a second-level cache.
 const BLOCK: usize = 128;
@@ -136,21 +136,16 @@ impl<'a> Stream<'a> {
         let mut rms = vec![1.0; n];
         let mut theta = vec![0.0; size];
         for _ in 0..3 {
-            let (mut gram, mut right) = (Mat::<f64>::zeros(size, size), vec![0.0; size]);
+            let mut products = zeros(size);
             for (j, factor) in self.factors.iter().enumerate().filter(|(j, _)| rms[*j] > 0.0) {
                 let last = factor.width() - 1;
+                let columns: Vec<&[f64]> = (0..last).map(|k| factor.column(k)).collect();
+                let places: Vec<usize> = (0..last).map(|k| global(j, k)).collect();
                 let weight = 1.0 / (rms[j] * rms[j]);
-                let product = |a: usize, b: usize| -> f64 {
-                    factor.column(a).iter().zip(factor.column(b)).map(|(x, y)| x * y).sum()
-                };
-                for a in 0..last {
-                    for b in 0..last {
-                        gram[(global(j, a), global(j, b))] += weight * product(a, b);
-                    }
-                    right[global(j, a)] += weight * product(a, last);
-                }
+                add_columns(&mut products, &places, &columns, factor.column(last), weight);
             }
-            theta = Solver::new(&gram, |_| true).solve(&right);
+            let (gram, right, _) = &products;
+            theta = Solver::new(gram, |_| true).solve(right);
             for (j, factor) in self.factors.iter().enumerate() {
                 let last = factor.width() - 1;
                 let mut left = factor.column(last).to_vec();

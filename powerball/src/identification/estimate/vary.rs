@@ -5,6 +5,7 @@
 //! fitted alike.
 
 use super::friction_shape::{self, Trials};
+use super::normal_equations::Products;
 use super::solve::{Solver, bounded};
 use crate::logs::regression::Data;
 use faer::Mat;
@@ -67,9 +68,6 @@ impl Layout {
         (0..self.dof).flat_map(|j| [0, 1, 2].map(|k| self.friction(j, k))).collect()
     }
 }
-
-/// Σ w·A'A, Σ w·A'y and Σ w·y'y.
-pub(super) type Products = (Mat<f64>, Vec<f64>, f64);
 
 /// How a model misses its rows, by joint.
 #[derive(Clone, Debug, Default)]

@@ -28,7 +28,7 @@ pub struct Space {
 /// What the paths of one mounting must keep.
 #[derive(Clone, Debug)]
 pub struct Constraints {
-    /// Positions, speeds and accelerations.
+    /// Positions, velocities and accelerations.
     pub limits: Limits,
     /// Floor and links, where they are looked at.
     pub space: Option<Space>,
@@ -149,7 +149,7 @@ impl Constraints {
     }
 }
 
-/// All that a path passes through: its series once at full speed, and with `ends` its start and stop too.
+/// All that a path passes through: its series once at full velocity, and with `ends` its start and stop too.
 /// Those go along the same curve, but accelerate otherwise.
 fn whole(path: &Fourier, ends: bool) -> Motion {
     let mut motion = Motion::new(path.joints.len(), 1.0 / RATE);

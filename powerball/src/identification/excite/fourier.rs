@@ -19,8 +19,8 @@ pub struct Harmonics {
 
 /// A periodic path of all joints, and how it is run through.
 ///
-/// The series themselves (Eq. 18) are at full speed at every time. To start and stop at rest the path stays
-/// as it is and time is bent: the series is run through at the speed σ̇(t), which rises smoothly from 0 to 1
+/// The series themselves (Eq. 18) are at full velocity at every time. To start and stop at rest the path stays
+/// as it is and time is bent: the series is run through at the velocity σ̇(t), which rises smoothly from 0 to 1
 /// within `ramp` seconds and falls again at the end.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fourier {
@@ -98,7 +98,7 @@ impl Fourier {
         self.joints.iter().map(|joint| joint.a.len()).max().unwrap_or(0)
     }
 
-    /// Position, speed and acceleration of every joint at time `t` from 0 to [`duration`](Self::duration).
+    /// Position, velocity and acceleration of every joint at time `t` from 0 to [`duration`](Self::duration).
     pub fn at(&self, t: f64) -> impl Iterator<Item = [f64; 3]> + '_ {
         let [s, ds, dds] = self.warp(t);
         self.series(s).map(move |[q, first, second]| [q, first * ds, second * ds * ds + first * dds])

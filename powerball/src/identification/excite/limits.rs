@@ -8,7 +8,7 @@ use std::fmt;
 pub struct JointLimits {
     /// Lowest and highest position.
     pub position: [f64; 2],
-    /// Highest speed.
+    /// Highest velocity.
     pub velocity: f64,
     /// Highest acceleration.
     pub acceleration: f64,
@@ -25,7 +25,7 @@ pub struct Limits(pub Vec<JointLimits>);
 pub struct MissingLimits(pub Vec<String>);
 
 impl Limits {
-    /// The limits of an arm, drawn in by `margin`: 0.05 leaves 5 % of the range, the speed, the acceleration
+    /// The limits of an arm, drawn in by `margin`: 0.05 leaves 5 % of the range, the velocity, the acceleration
     /// and the torque unused.
     ///
     /// # Errors

@@ -10,6 +10,9 @@ use dyngen::{Evaluator, Function, Model, SetKind, Values};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
 
+/// Dynamic parameters of a link.
+const PER_LINK: usize = ParameterKind::ALL.len();
+
 /// kg/m³: a module of aluminium, motor, gear and air.
 const DENSITY: f64 = 1500.0;
 /// An arm can hold itself: its weight takes at most this share of a joint's torque in any pose.
@@ -56,7 +59,7 @@ impl Masses {
             .and_then(|values| values.recognise(model))
             .map_err(|e| Error::Setting(e.to_string()))?;
         // Whatever the set, its carriers move like it.
-        let mut all = vec![0.0; 11 * model.arm().dof()];
+        let mut all = vec![0.0; PER_LINK * model.arm().dof()];
         for (parameter, value) in model.set(kind)?.parameters.iter().zip(values) {
             for (carrier, coefficient) in &parameter.carriers {
                 all[carrier.index()] += model.sets().field.value(coefficient) * value;
@@ -91,11 +94,11 @@ impl Masses {
         for (i, joint) in arm.joints.iter().enumerate() {
             let ratio = joint.rotor_ratio.as_ref().map(to_f64);
             if let (Some(k), Some(torque), Some(acceleration)) = (ratio, joint.torque, joint.acceleration) {
-                masses.parameters[11 * i + ParameterKind::Im as usize] =
+                masses.parameters[PER_LINK * i + ParameterKind::Im as usize] =
                     ROTOR * torque / (acceleration * k * k);
             }
         }
-        let total: f64 = masses.parameters.iter().step_by(11).sum();
+        let total: f64 = masses.parameters.iter().step_by(PER_LINK).sum();
         masses.reserve = 0.5;
         masses.origin = format!(
             "no model was given: links are taken as solid capsules of {:.0} kg/m³ ({total:.1} kg in all), \
@@ -112,11 +115,11 @@ fn bodies(arm: &Arm, shape: &Shape, limits: &[JointLimits]) -> Vec<f64> {
     let radius = shape.radius();
     let middle: Vec<f64> = limits.iter().map(|l| 0.5 * (l.position[0] + l.position[1])).collect();
     let frames = crate::identification::chain::Chain::new(arm).poses(&middle);
-    let mut all = vec![0.0; 11 * n];
+    let mut all = vec![0.0; PER_LINK * n];
     let mut add = |link: usize, mass: f64, at: Vector3<f64>| {
         // A ball's own inertia, moved to the frame's origin.
         let own = 0.4 * mass * radius * radius;
-        let row = &mut all[11 * link..11 * (link + 1)];
+        let row = &mut all[PER_LINK * link..PER_LINK * (link + 1)];
         row[0] += mass;
         (0..3).for_each(|i| row[1 + i] += mass * at[i]);
         let square = at.norm_squared();

@@ -1,6 +1,6 @@
 //! Exciting trajectories: finite Fourier series whose base regressor is well conditioned, within the arm's
 //! limits, off the floor and clear of the arm itself, for one mounting of the base or several. Eq. 17 to 20
-//! of the paper.
+//! of the paper. [`excite`] is the whole way from an arm to trajectories.
 
 mod capsule;
 mod constraints;
@@ -10,6 +10,8 @@ mod load;
 mod objective;
 mod search;
 mod shape;
+mod surroundings;
+mod trajectories;
 
 pub use crate::identification::mounting::Mounting;
 pub use capsule::Segment;
@@ -20,6 +22,8 @@ pub use load::{Load, Masses};
 pub use objective::{Conditions, Criterion, Figures, Objective};
 pub use search::{Excitation, Settings, Task, optimise, optimise_all, search, search_all};
 pub use shape::{Contact, Floor, Nearness, Shape};
+pub use surroundings::{CLEARANCE, FloorAt, RADIUS, surroundings};
+pub use trajectories::{Collision, ExciteOptions, Excited, MassSource, Trajectory, excite};
 
 use std::fmt;
 
@@ -36,6 +40,15 @@ pub enum Error {
     NoPose,
     /// No path was found that keeps all constraints: where the best one breaks them.
     NoPath(String),
+    /// The arm cannot stand where it is said to be before the trajectory.
+    NoStart {
+        /// How the base stands.
+        mounting: Mounting,
+        /// What is in the way.
+        why: String,
+    },
+    /// The trajectory does not keep its constraints between the instants of the search: where.
+    Broken(String),
 }
 
 impl fmt::Display for Error {
@@ -51,6 +64,10 @@ impl fmt::Display for Error {
             Error::NoPath(why) => {
                 write!(f, "no trajectory was found that keeps all constraints; in the best one {why}")
             }
+            Error::NoStart { mounting, why } => {
+                write!(f, "the arm cannot stand at --from, base {mounting}: {why}")
+            }
+            Error::Broken(why) => write!(f, "the trajectory that was found does not hold: {why}"),
         }
     }
 }

@@ -31,7 +31,7 @@ pub struct Settings {
     pub periods: usize,
     /// Duration of the start and of the stop, s.
     pub ramp: f64,
-    /// Share of range, speed and acceleration that stays unused.
+    /// Share of range, velocity and acceleration that stays unused.
     pub margin: f64,
     /// What makes a path a good one.
     pub criterion: Criterion,

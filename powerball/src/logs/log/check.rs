@@ -1,6 +1,6 @@
 //! What can be wrong with numbers that are there: time, wraps, units, dead and saturated signals.
 
-use super::read::Effort;
+use super::raw::{Effort, Raw};
 use super::{Doubts, Finding, Log, LogError, Severity, levels, signs, speeds};
 use crate::logs::signal::resample::median_step;
 use dyngen::Arm;
@@ -17,56 +17,7 @@ const FEWEST: usize = 20;
 /// Beyond this many times a limit of the arm a number is in another unit, not a bold motion.
 const ABSURD: f64 = 3.0;
 
-/// Samples as read: joint-major.
-pub(super) struct Raw {
-    line: Vec<usize>,
-    pub(super) t: Vec<f64>,
-    pub(super) q: Vec<Vec<f64>>,
-    pub(super) effort: Vec<Vec<f64>>,
-    temperature: Option<Vec<Vec<f64>>>,
-    pub(super) dq: Vec<Vec<f64>>,
-}
-
-impl Raw {
-    pub(super) fn new(dof: usize, temperature: bool) -> Raw {
-        let empty = || vec![Vec::new(); dof];
-        Raw {
-            line: Vec::new(),
-            t: Vec::new(),
-            q: empty(),
-            effort: empty(),
-            temperature: temperature.then(empty),
-            dq: empty(),
-        }
-    }
-
-    pub(super) fn push(&mut self, line: usize, values: &[f64]) {
-        let mut values = values.iter().copied();
-        self.line.push(line);
-        self.t.extend(values.next());
-        for joint in self.q.iter_mut().chain(&mut self.effort) {
-            joint.extend(values.next());
-        }
-        for joint in self.temperature.iter_mut().flatten().chain(&mut self.dq) {
-            joint.extend(values.next());
-        }
-    }
-
-    fn retain(&mut self, keep: &[bool]) {
-        let filter = |x: &mut Vec<f64>| {
-            if x.len() == keep.len() {
-                let mut k = keep.iter();
-                x.retain(|_| *k.next().unwrap_or(&true));
-            }
-        };
-        filter(&mut self.t);
-        self.q.iter_mut().chain(&mut self.effort).for_each(filter);
-        self.temperature.iter_mut().flatten().chain(&mut self.dq).for_each(filter);
-        let mut k = keep.iter();
-        self.line.retain(|_| *k.next().unwrap_or(&true));
-    }
-}
-
+/// The log of samples that were read; what is odd about them is added to `findings`.
 pub(super) fn into_log(
     mut raw: Raw,
     effort: &Effort,

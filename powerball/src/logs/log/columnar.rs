@@ -11,7 +11,8 @@ pub(super) fn parse(
     arm: &Arm,
     findings: &mut Vec<Finding>,
 ) -> Result<Log, LogError> {
-    use super::read::{Columns, Samples};
+    use super::columns::Columns;
+    use super::samples::Samples;
     use super::zstd_pages::RowGroup;
     use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 
@@ -27,7 +28,7 @@ pub(super) fn parse(
     let reader = SerializedFileReader::new(bytes.clone()).map_err(|e| unreadable(None, &e))?;
     let schema = reader.metadata().file_metadata().schema();
     let names: Vec<String> = schema.get_fields().iter().map(|field| field.name().to_string()).collect();
-    let mut samples = Samples::new(Columns::find(&names, arm, file, findings)?, arm);
+    let mut samples = Samples::new(Columns::find(&names, arm, file, findings)?, arm, "row");
     let mut count = 0;
     for group in 0..reader.num_row_groups() {
         let inner = reader.get_row_group(group).map_err(|e| unreadable(Some(count + 1), &e))?;

@@ -1,17 +1,26 @@
 //! Logs of joint positions and torques: read, checked, and every doubt about them said.
+//!
+//! Files ([`Log::read`]: CSV or Parquet), arrays ([`Log::from_arrays`]) and samples ([`Log::from_samples`])
+//! come to columns by name, and these pass the same checks.
 
+mod arrays;
 mod check;
 mod clock;
 mod columnar;
+mod columns;
 mod doubts;
 mod file;
 mod levels;
+mod raw;
 mod read;
+mod samples;
 mod signs;
 mod speeds;
+mod text;
 #[cfg(feature = "parquet")]
 mod zstd_pages;
 
+pub use arrays::{Arrays, Sample};
 pub use clock::common_clock;
 use doubts::{Doubts, Severity};
 pub use file::LogFile;
@@ -42,7 +51,8 @@ pub struct Log {
 pub struct Finding {
     /// The file.
     pub file: String,
-    /// Line in the file, from 1; `None` where the whole file is meant.
+    /// Line in the file, or number of the sample of a log from memory, from 1; `None` where the whole log is
+    /// meant.
     pub line: Option<usize>,
     /// The column or quantity.
     pub quantity: String,

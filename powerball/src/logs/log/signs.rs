@@ -5,7 +5,7 @@
 //! more torque than backward ones. Where it is clearly the other way round, torque or position has the wrong
 //! sign. On sound logs of a UR10e the difference is 1 to 40 standard errors above zero.
 
-use super::check::Raw;
+use super::raw::Raw;
 use super::{Doubts, Severity};
 
 /// Half swings in either direction, at least.

@@ -165,7 +165,7 @@ fn what_cannot_be_used_is_refused_with_its_reason() {
     }
 }
 
-/// A log of 40 s at 100 Hz with speeds and friction, its columns passed through `change`: t, q1, q2, dq1,
+/// A log of 40 s at 100 Hz with velocities and friction, its columns passed through `change`: t, q1, q2, dq1,
 /// dq2, tau1, tau2.
 fn swings(mut change: impl FnMut(usize, &mut [f64; 7])) -> String {
     let mut text = String::from("t,q1,q2,dq1,dq2,tau1,tau2\n");
@@ -379,4 +379,67 @@ fn columns_compressed_with_zstandard_are_read() {
             let _ = parse(&damaged, "damaged.parquet", &arm(), &mut Vec::new());
         }
     }
+}
+
+/// Signals of [`text`] in memory: a log from them is the log from the file.
+fn signals(text: &str) -> (Vec<f64>, [Vec<Vec<f64>>; 2]) {
+    let rows: Vec<Vec<f64>> =
+        text.lines().skip(1).map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
+    let column = |c: usize| -> Vec<f64> { rows.iter().map(|row| row[c]).collect() };
+    (column(0), [vec![column(1), column(2)], vec![column(3), column(4)]])
+}
+
+#[test]
+fn arrays_and_samples_pass_the_checks_of_files() {
+    // An angle that wraps, and a hole.
+    let text = text(HEADER, |k, mut fields| {
+        if k >= 100 {
+            let q: f64 = fields[2].parse().unwrap();
+            fields[2] = format!("{:.6}", q - 2.0 * std::f64::consts::PI);
+        }
+        if k == 50 {
+            fields[3] = "NaN".into();
+        }
+        Some(fields.join(","))
+    });
+    let (from_file, expected) = read(&text);
+    let from_file = from_file.unwrap();
+    let (t, [q, torque]) = signals(&text);
+    let arrays = Arrays { t: &t, q: &q, torque: &torque, ..Arrays::default() };
+    let by_array = Log::from_arrays("x.csv", &arm(), &arrays).unwrap();
+    let rows: Vec<[Vec<f64>; 2]> =
+        (0..t.len()).map(|k| [&q, &torque].map(|x| x.iter().map(|x| x[k]).collect())).collect();
+    let samples: Vec<Sample<'_>> = t
+        .iter()
+        .zip(&rows)
+        .map(|(t, [q, torque])| Sample { t: *t, q, torque, ..Sample::default() })
+        .collect();
+    let by_sample = Log::from_samples("x.csv", &arm(), samples).unwrap();
+    for (log, findings) in [by_array, by_sample] {
+        assert_eq!((&log.t, &log.q, &log.torque), (&from_file.t, &from_file.q, &from_file.torque));
+        assert_eq!(log.pieces, from_file.pieces);
+        // Findings are those of the file; a sample counts from 1 where a line counts its header.
+        let quantities = |all: &[Finding]| all.iter().map(|f| f.quantity.clone()).collect::<Vec<_>>();
+        assert_eq!(quantities(&findings), quantities(&expected));
+        assert!(findings.len() == 2 && findings[0].line == Some(51) && expected[0].line == Some(52));
+        assert!(findings[0].message.starts_with("1 of 200 samples"), "{}", findings[0].message);
+    }
+}
+
+#[test]
+fn arrays_that_are_no_log_name_quantity_and_sample() {
+    let (t, [q, torque]) = signals(&text(HEADER, |_, fields| Some(fields.join(","))));
+    let of = |q: &[Vec<f64>], torque: &[Vec<f64>]| {
+        Log::from_arrays("run", &arm(), &Arrays { t: &t, q, torque, ..Arrays::default() })
+            .unwrap_err()
+            .to_string()
+    };
+    let short = vec![q[0].clone(), q[1][..99].to_vec()];
+    assert_eq!(of(&short, &torque), "run: q2: has 99 values for 200 times t: give one for each");
+    assert!(of(&q[..1], &torque).contains("missing: q2"));
+    assert!(of(&q, &[]).contains("missing: tau1, tau2"));
+    let degrees: Vec<Vec<f64>> = q.iter().map(|q| q.iter().map(|x| 900.0 * x).collect()).collect();
+    assert!(of(&degrees, &torque).contains("angles must be in radians"), "{}", of(&degrees, &torque));
+    let holes = vec![torque[0].iter().map(|_| f64::NAN).collect(), torque[1].clone()];
+    assert!(of(&q, &holes).starts_with("run:1: tau1: 200 of 200 samples"), "{}", of(&q, &holes));
 }

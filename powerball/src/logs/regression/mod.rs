@@ -6,12 +6,14 @@ mod hidden;
 pub(crate) mod newton_euler;
 mod prepare;
 mod recording;
+mod rest_notes;
 mod rigid;
 mod rows;
 mod silent;
 
 pub use prepare::{Data, DataError, DataOptions, column_in_bands};
 pub use recording::Recording;
+pub(crate) use rest_notes::{FEWEST_ROWS, rest_note};
 pub use rigid::RigidBody;
 pub use rows::{Block, Column, JointRows};
 pub use silent::silent_joints;

@@ -1,5 +1,6 @@
 //! Logs of an arm into rows: even grid, derivatives, band, rest removed, blocks laid out.
 
+use super::rest_notes::{FEWEST_ROWS, notes};
 use super::silent::{dead, silent_joints};
 use super::{Block, Column, JointRows, Recording, RigidBody};
 use crate::logs::log::Log;
@@ -71,7 +72,7 @@ pub struct Data<'a> {
     pub blocks: Vec<Block>,
     /// File names by log.
     pub logs: Vec<String>,
-    /// The speed below which a joint rests, by joint, rad/s.
+    /// The velocity below which a joint rests, by joint, rad/s.
     pub rest_speed: Vec<f64>,
     /// By joint: why its samples say nothing, in words.
     pub silent: Vec<Option<String>>,
@@ -173,7 +174,7 @@ impl<'a> Data<'a> {
         let joints = joint_rows(body, &recordings, &bands, kept);
         let logs: Vec<String> = logs.iter().map(|log| log.file.clone()).collect();
         let of_band = |(band, joints): (Band, Vec<JointRows>)| {
-            if joints.iter().all(|j| j.len() < 20) {
+            if joints.iter().all(|j| j.len() < FEWEST_ROWS) {
                 return Err(DataError::NoMotion(silent.iter().flatten().cloned().collect()));
             }
             Ok(Data {
@@ -230,7 +231,7 @@ impl<'a> Data<'a> {
         self.joints.len()
     }
 
-    /// The speed that a joint exceeds in 5 % of its samples, rad/s, at least 1e-3.
+    /// The velocity that a joint exceeds in 5 % of its samples, rad/s, at least 1e-3.
     #[must_use]
     pub fn top_speed(&self, joint: usize) -> f64 {
         self.top_speed[joint]
@@ -318,6 +319,15 @@ impl<'a> Data<'a> {
         };
         Column { parts: parallel::map(&(0..n).collect::<Vec<_>>(), |j| part(*j)) }
     }
+
+    /// Measured less predicted torque by joint and row, from torques along the recordings, n a sample.
+    #[must_use]
+    pub fn residual(&self, predicted: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let of_joint = |(rows, (_, predicted)): (&JointRows, &(usize, Vec<f64>))| {
+            rows.torque.iter().zip(predicted).map(|(y, p)| y - p).collect()
+        };
+        self.joints.iter().zip(&self.column_over_all(predicted).parts).map(of_joint).collect()
+    }
 }
 
 /// A signal at full rate, one vector a recording, as a column of a joint in each of some bands, as
@@ -351,41 +361,6 @@ fn top_speed(recordings: &[Recording], joint: usize) -> f64 {
     let at = (speeds.len() * 95 / 100).min(speeds.len() - 1);
     let (_, top, _) = speeds.select_nth_unstable_by(at, f64::total_cmp);
     top.max(1e-3)
-}
-
-/// What was left out, and what is to be said of joints that rested.
-fn notes(
-    left_out: &[String],
-    recordings: &[Recording],
-    band: &Band,
-    joints: &[JointRows],
-    silent: &[Option<String>],
-    rest_speed: &[f64],
-) -> Vec<String> {
-    let mut notes = left_out.to_vec();
-    let total: usize = recordings.iter().map(|r| band.kept(r.len()).len()).sum();
-    for (j, rows) in joints.iter().enumerate() {
-        let rested = total - rows.len();
-        if let Some(why) = &silent[j] {
-            notes.push(why.clone());
-        } else if rows.len() < 20 {
-            notes.push(format!(
-                "joint {} rests in these logs: neither its friction nor any effect on it can be judged; \
-                    record paths on which it swings",
-                j + 1
-            ));
-        } else if rested * 4 > total {
-            notes.push(format!(
-                "joint {} rests in {:.0} % of the samples (|speed| below {:.4} for {} s or at an end of a \
-                    log); they were left out",
-                j + 1,
-                100.0 * rested as f64 / total as f64,
-                rest_speed[j],
-                rest::LONGEST_REVERSAL
-            ));
-        }
-    }
-    notes
 }
 
 /// By band, joint and recording: which of the band's kept samples are rows.

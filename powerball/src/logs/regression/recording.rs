@@ -1,4 +1,4 @@
-//! One piece of a log on an even grid: positions smoothed once, speeds and accelerations from them.
+//! One piece of a log on an even grid: positions smoothed once, velocities and accelerations from them.
 
 use crate::logs::log::Log;
 use crate::logs::signal::{Butterworth, difference, resample};
@@ -17,7 +17,7 @@ pub struct Recording {
     pub rate: f64,
     /// Smoothed positions, n a sample.
     pub q: Vec<f64>,
-    /// Speeds, n a sample.
+    /// Velocities, n a sample.
     pub v: Vec<f64>,
     /// Accelerations, n a sample.
     pub a: Vec<f64>,
@@ -58,7 +58,7 @@ impl Recording {
         recording.follow(t, &positions, smoothing).then_some(recording)
     }
 
-    /// Takes positions, speeds and accelerations from samples at times `t`, by joint, smoothed to `smoothing`
+    /// Takes positions, velocities and accelerations from samples at times `t`, by joint, smoothed to `smoothing`
     /// Hz.
     ///
     /// `false` where there are too few samples or no such filter; nothing has changed then.
@@ -100,7 +100,7 @@ impl Recording {
         self.q.iter().skip(joint).step_by(self.dof).copied()
     }
 
-    /// One joint's speeds.
+    /// One joint's velocities.
     pub fn speed(&self, joint: usize) -> impl Iterator<Item = f64> + '_ {
         self.v.iter().skip(joint).step_by(self.dof).copied()
     }

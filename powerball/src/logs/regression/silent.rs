@@ -6,7 +6,7 @@ use dyngen::Arm;
 use dyngen::arm::JointKind;
 
 /// A joint that moves by less than this in all logs only winds up its gear and its seals: its friction is not
-/// sliding friction, and nothing that depends on position or speed can be told from a constant. rad, and m
+/// sliding friction, and nothing that depends on position or velocity can be told from a constant. rad, and m
 /// for prismatic joints.
 const LEAST_TRAVEL: [f64; 2] = [0.05, 0.01];
 

@@ -5,16 +5,16 @@ use super::Butterworth;
 /// A joint that is slower than this for [`LONGEST_REVERSAL`] is at rest, rad/s (m/s), unless it is a slow
 /// joint.
 pub const REST_SPEED: f64 = 0.03;
-/// A slow joint's limit: this share of the speed it stays under in 95 % of its samples.
+/// A slow joint's limit: this share of the velocity it stays under in 95 % of its samples.
 pub const REST_SHARE: f64 = 0.03;
-/// Below this share of its speed limit a joint rests whatever else it does: it may only tremble all along.
+/// Below this share of its velocity limit a joint rests whatever else it does: it may only tremble all along.
 pub const REST_OF_LIMIT: f64 = 1e-3;
 /// A reversal that takes longer than this is a stop, s.
 pub const LONGEST_REVERSAL: f64 = 0.5;
-/// Speeds are judged below this frequency, Hz: encoder steps at rest look fast above it.
+/// Velocities are judged below this frequency, Hz: encoder steps at rest look fast above it.
 const SMOOTHING: f64 = 2.0;
 
-/// The speed below which a joint counts as resting, from samples of |q̇| of all its recordings and its speed
+/// The velocity below which a joint counts as resting, from samples of |q̇| of all its recordings and its velocity
 /// limit if known.
 #[must_use]
 pub fn rest_speed(mut speeds: Vec<f64>, limit: Option<f64>) -> f64 {
@@ -26,10 +26,10 @@ pub fn rest_speed(mut speeds: Vec<f64>, limit: Option<f64>) -> f64 {
     REST_SPEED.min((REST_SHARE * *p95).max(REST_OF_LIMIT * limit.unwrap_or(0.0)))
 }
 
-/// Which samples of a joint's speed `v` (rad/s, at `rate` Hz) are motion; heads and tails at rest and stops
+/// Which samples of a joint's velocity `v` (rad/s, at `rate` Hz) are motion; heads and tails at rest and stops
 /// are not.
 ///
-/// Rest is a stretch of at least [`LONGEST_REVERSAL`] in which the speed, smoothed to 2 Hz, stays below
+/// Rest is a stretch of at least [`LONGEST_REVERSAL`] in which the velocity, smoothed to 2 Hz, stays below
 /// `limit`.
 #[must_use]
 pub fn moving(v: &[f64], rate: f64, limit: f64) -> Vec<bool> {

@@ -1,4 +1,5 @@
-//! A log reduced to triangular factors: all that a fit needs of it, of one size however long it was.
+//! A log reduced to the sufficient statistics of its fit: R factors of the QR decomposition of its rows, of
+//! one size however long it was.
 //!
 //! What is fixed when a log is reduced: the arm, the parameter set, the bands. What is not: which of them
 //! counts (see [`Bands`]), friction's steepnesses (see [`Steepness`]), the joints' weights, and the colour of
@@ -58,7 +59,7 @@ pub struct Summary {
     pub spectrum: Vec<Powers>,
 }
 
-/// A joint without a speed limit is taken to move about this fast, rad/s or m/s.
+/// A joint without a velocity limit is taken to move about this fast, rad/s or m/s.
 const ORDINARY_SPEED: f64 = 1.0;
 
 impl Summary {

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 
 /// Columns that stand for all steepnesses.
 pub const NODES: usize = 32;
-/// The range of a joint whose speed limit is v: nearly straight up to v, and a step for all that is
+/// The range of a joint whose velocity limit is v: nearly straight up to v, and a step for all that is
 /// measurable.
 const LOW: f64 = 0.5;
 const HIGH: f64 = 2000.0;

@@ -2,7 +2,7 @@
 
 use super::plant::{record, sensors, truth};
 use crate::identification::estimate::{
-    FrictionLaw, InBand, errors, identify, reduce_in_bands, solve_in_band,
+    FrictionLaw, InBand, estimates, reduce_in_bands, solve_in_band, standard_errors,
 };
 use crate::logs::regression::DataOptions;
 use crate::logs::summary::{BANDS, Bands};
@@ -36,7 +36,7 @@ fn coverage(experiments: u64, logs: usize, periods: usize, colour: f64) -> (Coun
         }
         let InBand { solution, bands } = solve_in_band(&reduced, FrictionLaw::Symmetric);
         bands.iter().for_each(|band| in_band[*band] += 1);
-        let found = identify(body.names(), &solution, &errors(&solution));
+        let found = estimates(body.names(), &solution, &standard_errors(&solution));
         for ((count, estimate), truth) in counts.iter_mut().zip(&found.parameters).zip(&truth) {
             let [low, high] = estimate.interval.unwrap();
             let std = estimate.std.unwrap();

@@ -2,7 +2,7 @@
 
 use super::plant::{record, sensors, truth};
 use crate::identification::estimate::{
-    Errors, FrictionLaw, Solution, errors, solve_instrumental, solve_reduced, solve_robust,
+    FrictionLaw, Solution, StandardErrors, solve_instrumental, solve_reduced, solve_robust, standard_errors,
 };
 use crate::logs::log::Log;
 use crate::logs::regression::{DataOptions, RigidBody};
@@ -21,7 +21,7 @@ fn weighted(body: &RigidBody, logs: &[Log]) -> Solution {
 }
 
 /// Error of the inertial parameters in the standard errors of a fit without faults, rms.
-fn miss(solution: &Solution, truth: &[f64], clean: &Errors) -> f64 {
+fn miss(solution: &Solution, truth: &[f64], clean: &StandardErrors) -> f64 {
     let terms =
         solution.inertial().iter().zip(truth).zip(&clean.std).filter_map(|((x, t), s)| Some((x - t) / (*s)?));
     (terms.clone().map(|z| z * z).sum::<f64>() / terms.count() as f64).sqrt()
@@ -33,7 +33,7 @@ fn knocks_do_not_bend_the_robust_fit() {
     let (body, truth) = truth();
     let mut logs = record(&sensors(), 2, 3, 11);
     let clean = weighted(&body, &logs);
-    let clean_errors = errors(&clean);
+    let clean_errors = standard_errors(&clean);
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     for log in &mut logs {
         for (torque, limit) in log.torque.iter_mut().zip([60.0, 60.0, 60.0, 20.0, 10.0, 10.0]) {
@@ -63,7 +63,7 @@ fn without_knocks_the_robust_fit_is_the_weighted_one() {
     let logs = record(&sensors(), 1, 3, 12);
     let clean = weighted(&body, &logs);
     let robust = solve_robust(&body, &logs, &DataOptions::default(), FrictionLaw::Symmetric).unwrap();
-    let clean_errors = errors(&clean);
+    let clean_errors = standard_errors(&clean);
     assert!(miss(&robust.solution, clean.inertial(), &clean_errors) < 0.5);
     assert!(miss(&robust.solution, &truth, &clean_errors) < 2.0);
 }
@@ -84,7 +84,7 @@ fn instruments_are_not_biased_by_noisy_positions() {
     let (unbiased, unbiased_errors) =
         solve_instrumental(&body, &logs, &DataOptions::default(), &start).unwrap();
     let [biased, unbiased] =
-        [(&start, &errors(&start)), (&unbiased, &unbiased_errors)].map(|(s, e)| miss(s, &truth, e));
+        [(&start, &standard_errors(&start)), (&unbiased, &unbiased_errors)].map(|(s, e)| miss(s, &truth, e));
     println!("least squares {biased:.2}, instrumental {unbiased:.2} standard errors");
     assert!(biased > 3.0 && unbiased < 2.0, "least squares {biased}, instrumental {unbiased}");
 }

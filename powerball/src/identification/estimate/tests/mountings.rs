@@ -2,7 +2,8 @@
 
 use super::plant::{record_mounted, sensors};
 use crate::identification::estimate::{
-    FrictionLaw, Identified, Solution, Spread, Together, errors, identify, reduce_in_bands, solve_in_band,
+    Estimates, FrictionLaw, Solution, Spread, Together, estimates, reduce_in_bands, solve_in_band,
+    standard_errors,
 };
 use crate::identification::mounting::Mounting;
 use crate::logs::log::Log;
@@ -40,9 +41,9 @@ fn together(parts: &[(RigidBody, Bands)]) -> Together {
     Together::new(&parts.iter().map(|(body, bands)| (body, bands)).collect::<Vec<_>>()).unwrap()
 }
 
-fn fitted(all: &Together) -> (Identified, Solution, Vec<Spread>, Vec<Vec<usize>>) {
+fn fitted(all: &Together) -> (Estimates, Solution, Vec<Spread>, Vec<Vec<usize>>) {
     let found = solve_in_band(&all.bands, LAW);
-    let identified = identify(all.body.names(), &found.solution, &errors(&found.solution));
+    let identified = estimates(all.body.names(), &found.solution, &standard_errors(&found.solution));
     let spreads = all.spreads(&found.solution, &found.bands).unwrap();
     let contradictions = all.contradictions(&spreads, &found.bands, LAW);
     (identified, found.solution, spreads, contradictions)

@@ -30,7 +30,7 @@ pub(super) fn record(sensors: &Sensors, logs: usize, periods: usize, seed: u64) 
     record_mounted(filed, lwa4p::links(), sensors, logs, periods, seed, &[])
 }
 
-/// The same at a share of the speed, with other friction.
+/// The same at a share of the velocity, with other friction.
 pub(super) fn record_slow(
     share: f64,
     friction: Vec<TanhFriction<f64>>,

@@ -23,7 +23,7 @@ fn a_reduced_fit_is_the_fit_of_the_rows() {
     let reduced = solve_reduced(&summary, FrictionLaw::Symmetric);
     let data = Data::new(&body, &logs, &options).unwrap();
     let direct = fit(&data, &Folds::new(&data), &[], None);
-    let errors = crate::identification::estimate::errors(&reduced);
+    let errors = crate::identification::estimate::standard_errors(&reduced);
     for (c, (a, b)) in reduced.theta.iter().zip(&direct.theta).enumerate() {
         // The weights' colour is told from slow octaves here, from means over a second there.
         let Some(std) = errors.std[c] else { continue };

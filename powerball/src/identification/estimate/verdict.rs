@@ -26,7 +26,7 @@ pub struct JointVerdict {
 
 /// Judges what a model leaves on data: an error up to `tolerance` times the rms torque of a joint passes.
 #[must_use]
-pub fn verify(data: &Data<'_>, residual: &[Vec<f64>], tolerance: f64) -> Vec<JointVerdict> {
+pub fn verdicts(data: &Data<'_>, residual: &[Vec<f64>], tolerance: f64) -> Vec<JointVerdict> {
     let errors = spread(data, residual);
     let floor = noise_floor(data);
     (0..data.dof())

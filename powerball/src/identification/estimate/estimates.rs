@@ -1,6 +1,6 @@
 //! A fit in the words of a model: values with standard errors that hold for coloured residuals.
 
-use super::errors::Errors;
+use super::errors::StandardErrors;
 use super::reduced::Solution;
 use crate::logs::regression::Data;
 use serde::{Deserialize, Serialize};
@@ -69,11 +69,17 @@ impl JointFriction {
             std: [None; 5],
         }
     }
+
+    /// γ1 … γ5.
+    #[must_use]
+    pub fn gamma(&self) -> [f64; 5] {
+        [self.gamma1, self.gamma2, self.gamma3, self.gamma4, self.gamma5]
+    }
 }
 
-/// The parameters of a fit.
+/// The values of a fit with their standard errors.
 #[derive(Clone, Debug, Serialize)]
-pub struct Identified {
+pub struct Estimates {
     /// The minimal set.
     pub parameters: Vec<ParameterEstimate>,
     /// Friction by joint.
@@ -133,7 +139,7 @@ pub fn spread(data: &Data<'_>, residual: &[Vec<f64>]) -> Spread {
 
 /// The values of a solution of the minimal set `names`, with their errors.
 #[must_use]
-pub fn identify(names: &[String], solution: &Solution, errors: &Errors) -> Identified {
+pub fn estimates(names: &[String], solution: &Solution, errors: &StandardErrors) -> Estimates {
     let layout = solution.layout;
     let parameters = names
         .iter()
@@ -171,7 +177,7 @@ pub fn identify(names: &[String], solution: &Solution, errors: &Errors) -> Ident
             }
         })
         .collect();
-    Identified { parameters, friction }
+    Estimates { parameters, friction }
 }
 
 /// The spread of what coefficients leave on the reduced logs.

@@ -1,0 +1,295 @@
+//! Logs and summaries, taken in one after another: the sufficient statistics of each mounting of the base.
+
+use super::error::IdentifyError;
+use crate::controller::JointNumber;
+use crate::identification::estimate::{Together, reduce_in_bands};
+use crate::identification::mounting::Mounting;
+use crate::identification::source::{Input, Source, read_summary};
+use crate::logs::Progress;
+use crate::logs::log::{Log, LogError, read_log};
+use crate::logs::regression::{DataOptions, FEWEST_ROWS, RigidBody, rest_note, silent_joints};
+use crate::logs::summary::{Bands, Octaves, Summary};
+use dyngen::Arm;
+use std::path::Path;
+
+/// An arm as its base stood for some logs.
+#[derive(Debug)]
+pub(crate) struct Mounted {
+    pub mounting: Mounting,
+    pub body: RigidBody,
+    pub bands: Bands,
+    /// The first logs as they were read, for figures; all where they were asked for.
+    pub logs: Vec<Log>,
+    /// The logs by which the fit is judged.
+    pub held_out: Vec<Log>,
+}
+
+impl Mounted {
+    pub(crate) fn new(
+        arm: &Arm,
+        mounting: Mounting,
+        options: &DataOptions,
+    ) -> Result<Mounted, IdentifyError> {
+        let mounted = mounting.of(arm).map_err(IdentifyError::Mounting)?;
+        Ok(Mounted::of(RigidBody::mounted(&mounted, arm)?, mounting, options))
+    }
+
+    /// The same for a body that is there already.
+    pub(crate) fn of(body: RigidBody, mounting: Mounting, options: &DataOptions) -> Mounted {
+        let bands = Bands::new(&body, options);
+        Mounted { mounting, body, bands, logs: Vec::new(), held_out: Vec::new() }
+    }
+
+    /// Whether the base stands so.
+    fn is(&self, mounting: Mounting, arm: &Arm) -> bool {
+        mounting.of(arm).is_ok_and(|mounted| mounted.gravity == self.body.arm().gravity)
+    }
+}
+
+/// What logs came to.
+#[derive(Debug)]
+pub(crate) struct Gathered {
+    /// The fitted logs by mounting, in the order in which the mountings came up; never empty.
+    pub mounted: Vec<Mounted>,
+    /// Mountings of which there are logs to judge by alone.
+    pub elsewhere: Vec<Mounted>,
+    /// All fitted logs, where there are several mountings.
+    pub together: Option<Together>,
+    /// What is to be said of the logs.
+    pub warnings: Vec<String>,
+}
+
+impl Gathered {
+    fn of(
+        mounted: Vec<Mounted>,
+        warnings: Vec<String>,
+        progress: Progress<'_>,
+    ) -> Result<Gathered, IdentifyError> {
+        let mut gathered = Gathered { mounted, elsewhere: Vec::new(), together: None, warnings };
+        if let [_, _, ..] = gathered.mounted.as_slice() {
+            progress.say("deriving and proving what the mountings determine together");
+            let parts: Vec<(&RigidBody, &Bands)> =
+                gathered.mounted.iter().map(|m| (&m.body, &m.bands)).collect();
+            gathered.together = Some(Together::new(&parts).map_err(IdentifyError::Together)?);
+        }
+        let kept: Vec<Log> = gathered.mounted.iter().flat_map(|m| m.logs.iter().cloned()).collect();
+        let notes = rest_notes(gathered.body().arm(), gathered.bands().widest(), &kept);
+        gathered.warnings.extend(notes);
+        Ok(gathered)
+    }
+
+    /// Takes a log in to judge the fit by.
+    pub(crate) fn hold_out(
+        &mut self,
+        log: Log,
+        mounting: Mounting,
+        options: &DataOptions,
+    ) -> Result<(), IdentifyError> {
+        let arm = self.mounted[0].body.filed();
+        let mut all = self.mounted.iter_mut().chain(&mut self.elsewhere);
+        match all.find(|m| m.is(mounting, &arm)) {
+            Some(mounted) => mounted.held_out.push(log),
+            None => {
+                let mounted = Mounted::new(&arm, mounting, options)?;
+                self.elsewhere.push(Mounted { held_out: vec![log], ..mounted });
+            }
+        }
+        Ok(())
+    }
+
+    /// The mountings of which there are logs to judge by.
+    pub(crate) fn judging(&self) -> impl Iterator<Item = &Mounted> {
+        self.mounted.iter().chain(&self.elsewhere).filter(|m| !m.held_out.is_empty())
+    }
+
+    /// The arm in whose minimal set the logs are fitted.
+    pub(crate) fn body(&self) -> &RigidBody {
+        self.together.as_ref().map_or(&self.mounted[0].body, |all| &all.body)
+    }
+
+    /// The sufficient statistics of all logs.
+    pub(crate) fn bands(&self) -> &Bands {
+        self.together.as_ref().map_or(&self.mounted[0].bands, |all| &all.bands)
+    }
+}
+
+/// Samples of logs that are kept for figures.
+const SHOWN: usize = 300_000;
+
+/// Takes logs and summaries in, one after another; every one that is unusable is named at the end.
+pub(crate) struct Gathering<'a> {
+    arm: &'a Arm,
+    options: &'a DataOptions,
+    progress: Progress<'a>,
+    /// Whether single samples are needed: a summary has none.
+    needs_samples: bool,
+    mounted: Vec<Mounted>,
+    samples_kept: usize,
+    warnings: Vec<String>,
+    unusable: Vec<String>,
+    refused: Vec<String>,
+}
+
+impl<'a> Gathering<'a> {
+    pub(crate) fn new(
+        arm: &'a Arm,
+        options: &'a DataOptions,
+        needs_samples: bool,
+        progress: Progress<'a>,
+    ) -> Gathering<'a> {
+        Gathering {
+            arm,
+            options,
+            progress,
+            needs_samples,
+            mounted: Vec::new(),
+            samples_kept: 0,
+            warnings: Vec::new(),
+            unusable: Vec::new(),
+            refused: Vec::new(),
+        }
+    }
+
+    /// Begins with a mounting whose body is there already.
+    pub(crate) fn with(mut self, mounted: Mounted) -> Gathering<'a> {
+        self.mounted.push(mounted);
+        self
+    }
+
+    /// Warnings that come first.
+    pub(crate) fn said(mut self, warnings: Vec<String>) -> Gathering<'a> {
+        self.warnings.extend(warnings);
+        self
+    }
+
+    /// Takes all sources in, in their order.
+    pub(crate) fn all(mut self, sources: &[Source<'_>]) -> Result<Gathered, IdentifyError> {
+        for (k, source) in sources.iter().enumerate() {
+            match sources[..k].iter().any(|other| other.same_file(source)) {
+                true => self.unusable.push(format!("{}: given twice", source.name())),
+                false => self.take(source)?,
+            }
+        }
+        self.finish()
+    }
+
+    fn take(&mut self, source: &Source<'_>) -> Result<(), IdentifyError> {
+        let said = source.mounting;
+        match &source.input {
+            Input::Log(log) => self.take_log(&source.name(), log.as_ref().clone(), said),
+            Input::Summary(summary) => self.take_summary(&source.name(), summary, said),
+            Input::File(path) => self.take_file(&source.name(), path, said),
+        }
+    }
+
+    fn take_file(&mut self, name: &str, path: &Path, said: Option<Mounting>) -> Result<(), IdentifyError> {
+        self.progress.say(&format!("reading {name}"));
+        match read_summary(path) {
+            Ok(Some(summary)) => self.take_summary(name, &summary, said),
+            Ok(None) => self.take_samples(name, path, said),
+            Err(reason) => {
+                self.unusable.push(format!("{name}: {reason}"));
+                Ok(())
+            }
+        }
+    }
+
+    fn take_samples(&mut self, name: &str, path: &Path, said: Option<Mounting>) -> Result<(), IdentifyError> {
+        let mut findings = Vec::new();
+        match read_log(path, self.arm, &mut findings) {
+            Err(LogError(reasons)) => {
+                self.unusable.extend(reasons.iter().map(ToString::to_string));
+                Ok(())
+            }
+            Ok(log) => {
+                self.warnings.extend(findings.iter().map(ToString::to_string));
+                self.take_log(name, log, said)
+            }
+        }
+    }
+
+    fn take_summary(
+        &mut self,
+        name: &str,
+        read: &Bands,
+        said: Option<Mounting>,
+    ) -> Result<(), IdentifyError> {
+        if self.needs_samples {
+            self.unusable.push(format!(
+                "{name}: is a summary, and this estimator looks at single samples: give the log itself"
+            ));
+            return Ok(());
+        }
+        let own = Mounting::with(read.widest().identity.gravity, self.arm);
+        let place = self.place(own)?;
+        if let Some(said) = said.filter(|said| !self.mounted[place].is(*said, self.arm)) {
+            self.unusable.push(format!("{name}: was recorded with the base {own}, not {said}"));
+            return Ok(());
+        }
+        let bands = &mut self.mounted[place].bands;
+        for (log, _) in &read.widest().logs {
+            if bands.widest().logs.iter().any(|(other, _)| other == log) {
+                self.warnings.push(format!("{name}: holds {log}, which is in already: it counts twice"));
+            }
+        }
+        if let Err(error) = bands.merge(read) {
+            self.unusable.push(format!("{name}: {error}"));
+        }
+        Ok(())
+    }
+
+    fn take_log(&mut self, name: &str, log: Log, said: Option<Mounting>) -> Result<(), IdentifyError> {
+        let place = self.place(said.unwrap_or_default())?;
+        let Mounted { body, bands, logs, .. } = &mut self.mounted[place];
+        // A log and its summary must come to the same.
+        match reduce_in_bands(body, &log, self.options) {
+            Ok((one, notes)) => {
+                self.warnings.extend(notes);
+                if let Err(error) = bands.merge(&one) {
+                    self.unusable.push(format!("{name}: {error}"));
+                }
+            }
+            Err(error) => self.refused.push(format!("{name}: {error}")),
+        }
+        if self.needs_samples || self.samples_kept < SHOWN {
+            self.samples_kept += log.t.len();
+            logs.push(log);
+        }
+        Ok(())
+    }
+
+    /// Where logs of a mounting go.
+    fn place(&mut self, mounting: Mounting) -> Result<usize, IdentifyError> {
+        if let Some(place) = self.mounted.iter().position(|m| m.is(mounting, self.arm)) {
+            return Ok(place);
+        }
+        self.progress.say("deriving and proving the arm's dynamics");
+        self.mounted.push(Mounted::new(self.arm, mounting, self.options)?);
+        Ok(self.mounted.len() - 1)
+    }
+
+    fn finish(mut self) -> Result<Gathered, IdentifyError> {
+        if !self.unusable.is_empty() {
+            return Err(IdentifyError::Unusable(self.unusable));
+        }
+        self.mounted.retain(|m| !m.bands.widest().logs.is_empty());
+        if self.mounted.is_empty() {
+            return Err(IdentifyError::NothingUsable(self.refused));
+        }
+        self.warnings.extend(self.refused.into_iter().map(|r| format!("{r}; the log was left out")));
+        Gathered::of(self.mounted, self.warnings, self.progress)
+    }
+}
+
+/// What is to be said of joints that rested.
+fn rest_notes(arm: &Arm, summary: &Summary, kept: &[Log]) -> Vec<String> {
+    let silent = if kept.is_empty() { Vec::new() } else { silent_joints(arm, kept) };
+    let note = |(j, octaves): (usize, &Octaves)| {
+        let (joint, rows) = (JointNumber::from_index(j), octaves.rows() as usize);
+        let why = || silent.get(j).cloned().flatten().or_else(|| summary.silent[j].clone());
+        let hardly = rows < FEWEST_ROWS;
+        let why = if hardly { why() } else { None };
+        why.or_else(|| rest_note(joint, rows, summary.samples as usize, None))
+    };
+    summary.joints.iter().enumerate().filter_map(note).collect()
+}

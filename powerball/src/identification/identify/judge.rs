@@ -1,0 +1,79 @@
+//! What a model leaves of the validation set, each joint in the band in which it was fitted.
+
+use super::along::Along;
+use super::error::IdentifyError;
+use super::gather::{Gathered, Mounted};
+use super::options::IdentifyOptions;
+use crate::identification::estimate::{BaseModel, Spread, spread};
+use crate::logs::log::Log;
+use crate::logs::regression::{Data, DataOptions, RigidBody};
+use crate::logs::summary::BANDS;
+
+/// Logs prepared in every band that a joint has, widest first, with the joints of that band, from 0.
+pub(crate) fn by_band<'a>(
+    body: &'a RigidBody,
+    logs: &[Log],
+    joint_bands: &[f64],
+    options: &DataOptions,
+) -> Result<Vec<(Vec<usize>, Data<'a>)>, IdentifyError> {
+    let members =
+        |band: f64| -> Vec<usize> { (0..joint_bands.len()).filter(|j| joint_bands[*j] == band).collect() };
+    let with = |band: f64| DataOptions { cutoff: band, ..options.clone() };
+    BANDS
+        .iter()
+        .map(|band| (members(*band), *band))
+        .filter(|(members, _)| !members.is_empty())
+        .map(|(members, band)| Ok((members, Data::new(body, logs, &with(band))?)))
+        .collect()
+}
+
+/// What the model leaves of the logs to judge by; `None` where there are none.
+pub(super) fn validate(
+    gathered: &Gathered,
+    model: &BaseModel,
+    joint_bands: &[f64],
+    options: &IdentifyOptions<'_>,
+) -> Result<Option<Spread>, IdentifyError> {
+    let judge = |mounted: &Mounted| of_mounting(mounted, model, joint_bands, &options.data);
+    let judged = gathered.judging().map(judge).collect::<Result<Vec<_>, _>>()?;
+    Ok(match judged.as_slice() {
+        [(only, _)] => Some(only.clone()),
+        several => Spread::pooled(several),
+    })
+}
+
+/// What the model leaves of the logs of one mounting; and the rows of each joint.
+fn of_mounting(
+    mounted: &Mounted,
+    model: &BaseModel,
+    joint_bands: &[f64],
+    options: &DataOptions,
+) -> Result<(Spread, Vec<usize>), IdentifyError> {
+    let body = &mounted.body;
+    let model = model.clone().in_set_of(body);
+    let mut judged: Option<(Spread, Vec<usize>)> = None;
+    for (members, data) in by_band(body, &mounted.held_out, joint_bands, options)? {
+        let own = spread(&data, &model.residual(body, &data));
+        let (all, rows) = judged.get_or_insert_with(|| (own.clone(), vec![0; body.dof()]));
+        for j in members {
+            (all.rms[j], all.relative[j]) = (own.rms[j], own.relative[j]);
+            rows[j] = data.joints[j].len();
+        }
+    }
+    judged.ok_or(IdentifyError::NoBand)
+}
+
+/// The model along the logs of the first mounting: those to judge by where there are any, else the fitted
+/// ones.
+pub(super) fn along(
+    gathered: &Gathered,
+    model: &BaseModel,
+    joint_bands: &[f64],
+    options: &IdentifyOptions<'_>,
+) -> Result<Along, IdentifyError> {
+    let held_out = gathered.judging().next();
+    let shown = held_out.unwrap_or(&gathered.mounted[0]);
+    let logs = if held_out.is_some() { &shown.held_out } else { &shown.logs };
+    let model = model.clone().in_set_of(&shown.body);
+    Along::new(&shown.body, logs, shown.mounting, &options.data, joint_bands, &model)
+}

@@ -1,0 +1,163 @@
+//! From logs to a model: one function, and what it takes and gives.
+//!
+//! `gather` makes sufficient statistics of logs, by mounting; `fit` fits them; `by_mounting` says what the fit
+//! leaves of each mounting; `judge` what the model leaves of other logs; `along` what a page shows of it.
+
+mod along;
+mod by_mounting;
+mod error;
+mod fit;
+mod gather;
+mod in_memory;
+mod judge;
+mod options;
+mod result;
+
+pub use along::{Along, JointAlong, LogFacts};
+pub use by_mounting::MountedFit;
+pub use error::IdentifyError;
+pub(crate) use gather::Gathering;
+pub(crate) use in_memory::{InMemory, one_mounting};
+pub(crate) use judge::by_band;
+pub use options::{Estimator, IdentifyOptions};
+pub use result::Identified;
+
+use super::estimate::{BaseModel, consistent_fit, estimates, spread_of};
+use super::source::Source;
+use crate::logs::summary::BANDS;
+use dyngen::{Arm, SetKind};
+use fit::{Fitted, fit};
+use gather::{Gathered, Mounted};
+
+/// Fits the minimal inertial set and the friction of every joint (Eq. 16) to logs, and judges them on the
+/// logs of another path, `validate`, where there are any.
+///
+/// `logs` are [`Log`](crate::logs::log::Log)s, or [`Source`]s where some are files, summaries, or of a base
+/// that was mounted otherwise.
+///
+/// ```
+/// use powerball::{Arrays, IdentifyOptions, Log, identify};
+/// # let arm = "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n[[joint]]\n\
+/// #     kind = \"revolute\"\na = 0.5\nalpha = 0\nd = 0\ntheta = 0\n";
+/// let arm = dyngen::Arm::parse(arm, "pendulum.toml")?;
+/// // A swing of 1 kg at 0.5 m with 0.3 N·m of friction.
+/// let swing = |t: &f64| {
+///     let (sin, cos) = (3.0 * t).sin_cos();
+///     (sin, 0.25 * -9.0 * sin + 0.5 * 9.81 * sin.cos() + 0.3 * (90.0 * cos).tanh())
+/// };
+/// let t: Vec<f64> = (0..4000).map(|k| 0.005 * f64::from(k)).collect();
+/// let (q, torque) = t.iter().map(swing).unzip();
+/// let arrays = Arrays { t: &t, q: &[q], torque: &[torque], ..Arrays::default() };
+/// let (log, _findings) = Log::from_arrays("swing", &arm, &arrays)?;
+/// let model = identify(&arm, [&log], [], &IdentifyOptions::default())?;
+/// assert!((model.friction[0].gamma1 + model.friction[0].gamma3 - 0.3).abs() < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`IdentifyError`]: what is wrong with the logs, or why they have no answer.
+pub fn identify<'a, S: Into<Source<'a>>>(
+    arm: &Arm,
+    logs: impl IntoIterator<Item = S>,
+    validate: impl IntoIterator<Item = S>,
+    options: &IdentifyOptions<'_>,
+) -> Result<Identified, IdentifyError> {
+    let logs: Vec<Source<'a>> = logs.into_iter().map(Into::into).collect();
+    let validate: Vec<Source<'a>> = validate.into_iter().map(Into::into).collect();
+    let mut gathered = gather_logs(arm, &logs, &validate, options)?;
+    let mut warnings = std::mem::take(&mut gathered.warnings);
+    options.progress.say("fitting");
+    let fitted = fit(&gathered, options, &mut warnings)?;
+    let mountings = by_mounting::fits(&gathered, &fitted, options, &mut warnings)?;
+    conclude(&gathered, &fitted, mountings, options, warnings)
+}
+
+/// The sufficient statistics of the logs to fit, and the logs to judge by; without what is known already.
+fn gather_logs(
+    arm: &Arm,
+    logs: &[Source<'_>],
+    validate: &[Source<'_>],
+    options: &IdentifyOptions<'_>,
+) -> Result<Gathered, IdentifyError> {
+    if let Some(both) = validate.iter().find(|file| logs.iter().any(|log| log.same_file(file))) {
+        return Err(IdentifyError::JudgesItself(both.name()));
+    }
+    let needs_samples = options.estimator.needs_samples();
+    let mut gathered = match options.known {
+        Some(known) => {
+            let mounting = one_mounting(logs.iter().chain(validate), "--model takes")?;
+            let mut read = InMemory::read(arm, known, [logs, validate], mounting, options.progress)?;
+            read.known.take_out(&read.body, &mut read.fit);
+            read.known.take_out(&read.body, &mut read.validate);
+            let fit: Vec<Source<'_>> =
+                read.fit.into_iter().map(|log| Source::from(log).mounted(mounting)).collect();
+            let start = Mounted::of(read.body, mounting, &options.data);
+            let mut gathered = Gathering::new(&read.arm, &options.data, true, options.progress)
+                .with(start)
+                .said(read.warnings)
+                .all(&fit)?;
+            for log in read.validate {
+                gathered.hold_out(log, mounting, &options.data)?;
+            }
+            gathered
+        }
+        None => {
+            let mut gathered = Gathering::new(arm, &options.data, needs_samples, options.progress)
+                .said(arm.notes())
+                .all(logs)?;
+            for (log, mounting) in in_memory::held_out(validate, arm, &mut gathered.warnings)? {
+                gathered.hold_out(log, mounting, &options.data)?;
+            }
+            gathered
+        }
+    };
+    if needs_samples && gathered.together.take().is_some() {
+        return Err(IdentifyError::SeveralMountings("--estimator robust and instrumental take"));
+    }
+    Ok(gathered)
+}
+
+/// What is told of a fit.
+fn conclude(
+    gathered: &Gathered,
+    fitted: &Fitted,
+    mountings: Vec<MountedFit>,
+    options: &IdentifyOptions<'_>,
+    mut warnings: Vec<String>,
+) -> Result<Identified, IdentifyError> {
+    let (body, solution) = (gathered.body(), &fitted.solution);
+    let found = estimates(body.names(), solution, &fitted.errors);
+    let model = BaseModel {
+        arm: body.arm().name.clone(),
+        parameters: found.parameters.clone(),
+        friction: found.friction.clone(),
+    };
+    let joint_bands: Vec<f64> = fitted.bands.iter().map(|band| BANDS[*band]).collect();
+    let validate = judge::validate(gathered, &model, &joint_bands, options)?;
+    if validate.is_none() {
+        warnings.push("no log was given to --validate: the errors below are those of the fit itself".into());
+    }
+    let along = judge::along(gathered, &model, &joint_bands, options)?;
+    warnings.extend(result::undetermined(&found.parameters));
+    let values: Vec<f64> = found.parameters.iter().map(|p| p.value).collect();
+    let reasons = body.impossible(&values)?;
+    warnings.extend(reasons.iter().map(|r| format!("no real arm can have these values: {r}")));
+    options.progress.say("looking for the nearest real arm");
+    Ok(Identified {
+        arm: model.arm,
+        set: SetKind::Minimal.to_string(),
+        parameters: found.parameters,
+        friction: found.friction,
+        fit: spread_of(solution, &solution.theta),
+        validate,
+        physically_consistent: reasons.is_empty(),
+        consistent: consistent_fit(body, solution)?.report(body, solution),
+        mountings,
+        band: [0.0, BANDS[0]],
+        joint_bands,
+        band_reason: result::band_reason(&fitted.bands, along.motion),
+        warnings,
+        along,
+        described: body.filed(),
+    })
+}

@@ -1,0 +1,101 @@
+//! What an identification gives, and the words for it.
+
+use super::along::Along;
+use super::by_mounting::MountedFit;
+use crate::controller::JointNumber;
+use crate::identification::estimate::{
+    BaseModel, ConsistentReport, JointFriction, ParameterEstimate, Spread,
+};
+use crate::logs::summary::BANDS;
+use dyngen::Arm;
+use serde::Serialize;
+
+/// A model with its errors; as JSON it is `identified.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Identified {
+    /// The arm's name.
+    pub arm: String,
+    /// The parameter set: "minimal".
+    pub set: String,
+    /// The set's values with their standard errors.
+    pub parameters: Vec<ParameterEstimate>,
+    /// Eq. 16 by joint.
+    pub friction: Vec<JointFriction>,
+    /// What the fit leaves of its own logs.
+    pub fit: Spread,
+    /// What the model leaves of the validation set, where there is one.
+    pub validate: Option<Spread>,
+    /// Whether a real arm can have these values.
+    pub physically_consistent: bool,
+    /// The nearest values that a real arm can have, with what that costs.
+    pub consistent: ConsistentReport,
+    /// How the base stood for the fitted logs, where it was not as the arm file says or not always the same.
+    /// The parameters are those that these mountings determine together.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub mountings: Vec<MountedFit>,
+    /// The widest band of a joint, Hz.
+    pub band: [f64; 2],
+    /// The end of each joint's band, Hz: of its fit, and of its errors.
+    pub joint_bands: Vec<f64>,
+    /// Why these, in words.
+    pub band_reason: String,
+    /// What is to be said of the logs, the arm file and the fit.
+    pub warnings: Vec<String>,
+    /// The model along the validation set, or along the fitted logs where there is none.
+    #[serde(skip)]
+    pub along: Along,
+    /// The arm as it was identified: that of the file, with what a known model changes of it.
+    #[serde(skip)]
+    pub described: Arm,
+}
+
+impl Identified {
+    /// The model alone.
+    #[must_use]
+    pub fn model(&self) -> BaseModel {
+        BaseModel {
+            arm: self.arm.clone(),
+            parameters: self.parameters.clone(),
+            friction: self.friction.clone(),
+        }
+    }
+}
+
+/// What to say of parameters that the logs do not determine.
+pub(super) fn undetermined(parameters: &[ParameterEstimate]) -> Option<String> {
+    let names: Vec<&str> = parameters.iter().filter(|p| p.std.is_none()).map(|p| p.name.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "these logs do not determine {}: they were set to 0; record a motion that excites them",
+            names.join("; ")
+        )
+    })
+}
+
+/// Why the joints' bands end where they do, and what of the motion lies in them: the arm moves below `motion`
+/// Hz.
+pub(super) fn band_reason(bands: &[usize], motion: Option<f64>) -> String {
+    let mut why = vec![format!("0 to {} Hz, above which arms are not rigid", BANDS[0])];
+    for (k, high) in BANDS.iter().enumerate().skip(1) {
+        let joints: Vec<String> = (0..bands.len())
+            .filter(|j| bands[*j] == k)
+            .map(|j| JointNumber::from_index(j).to_string())
+            .collect();
+        if !joints.is_empty() {
+            why.push(format!(
+                "0 to {high} Hz for joint {}, whose model torque is below what it leaves in the octave above",
+                joints.join(", ")
+            ));
+        }
+    }
+    let lowest = bands.iter().map(|k| BANDS[*k]).fold(BANDS[0], f64::min);
+    let motion = motion.map_or(String::new(), |motion| {
+        let verdict = if motion > 0.5 * lowest {
+            "that is too near to the end of a band: move slower, or much of the torque is left out"
+        } else {
+            "gravity and inertia are within, and so is what friction does at reversals, several times faster"
+        };
+        format!("; 99 % of the power of the speeds lies below {motion:.1} Hz: {verdict}")
+    });
+    format!("band {}{motion}", why.join("; "))
+}

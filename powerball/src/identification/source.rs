@@ -1,0 +1,139 @@
+//! What an identification takes: logs and summaries of logs, in memory or in files, each with its mounting.
+
+use super::mounting::Mounting;
+use crate::logs::log::Log;
+use crate::logs::summary::{Bands, Summary};
+use std::borrow::Cow;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// A log, or the sufficient statistics of logs, and how the base stood for it.
+///
+/// Made from a [`Log`], from [`Bands`] or from the path of a file of either: files are read one after the
+/// other and dropped again, so that more logs can be fitted than fit into memory.
+#[derive(Clone, Debug)]
+pub struct Source<'a> {
+    /// What it is.
+    pub input: Input<'a>,
+    /// How the base stood. Nothing said is as the arm file says, or as the summary itself does.
+    pub mounting: Option<Mounting>,
+}
+
+/// A log or its sufficient statistics.
+#[derive(Clone, Debug)]
+pub enum Input<'a> {
+    /// The samples of a log.
+    Log(Cow<'a, Log>),
+    /// The R factors of logs, as `powerball summarize` writes them.
+    Summary(Cow<'a, Bands>),
+    /// A file with either, recognised by its content.
+    File(Cow<'a, Path>),
+}
+
+impl<'a> Source<'a> {
+    /// A file: CSV, Parquet or a summary.
+    #[must_use]
+    pub fn file(path: impl Into<PathBuf>) -> Source<'a> {
+        Source::from(path.into())
+    }
+
+    /// The same, recorded with the base mounted so.
+    #[must_use]
+    pub fn mounted(self, mounting: Mounting) -> Source<'a> {
+        Source { mounting: Some(mounting), ..self }
+    }
+
+    /// What messages call it: the file, or the log's own name.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match &self.input {
+            Input::Log(log) => log.file.clone(),
+            Input::File(path) => path.display().to_string(),
+            Input::Summary(bands) => {
+                let logs: Vec<&str> = bands.widest().logs.iter().map(|(name, _)| name.as_str()).collect();
+                format!("the summary of {}", logs.join(", "))
+            }
+        }
+    }
+
+    /// Whether both are one file.
+    pub(super) fn same_file(&self, other: &Source<'_>) -> bool {
+        let (Input::File(a), Input::File(b)) = (&self.input, &other.input) else { return false };
+        match (a.canonicalize(), b.canonicalize()) {
+            (Ok(a), Ok(b)) => a == b,
+            _ => a == b,
+        }
+    }
+}
+
+/// The summary in a file; `None` where the file is something else.
+///
+/// # Errors
+/// Why the file cannot be read, in words.
+pub(super) fn read_summary(file: &Path) -> Result<Option<Bands>, String> {
+    let read = |mut f: std::fs::File| {
+        let mut head = vec![0; 64];
+        let count = f.read(&mut head)?;
+        head.truncate(count);
+        if Summary::is_summary(&head) {
+            f.read_to_end(&mut head)?;
+            return Ok(Some(head));
+        }
+        Ok(None)
+    };
+    let bytes = std::fs::File::open(file).and_then(read).map_err(|e| format!("cannot be read: {e}"))?;
+    bytes.map(|bytes| Bands::from_bytes(&bytes).map_err(|e| e.to_string())).transpose()
+}
+
+impl<'a> From<Input<'a>> for Source<'a> {
+    fn from(input: Input<'a>) -> Self {
+        Source { input, mounting: None }
+    }
+}
+
+impl<'a> From<&'a Log> for Source<'a> {
+    fn from(log: &'a Log) -> Self {
+        Input::Log(Cow::Borrowed(log)).into()
+    }
+}
+
+impl From<Log> for Source<'_> {
+    fn from(log: Log) -> Self {
+        Input::Log(Cow::Owned(log)).into()
+    }
+}
+
+impl<'a> From<&'a Bands> for Source<'a> {
+    fn from(summary: &'a Bands) -> Self {
+        Input::Summary(Cow::Borrowed(summary)).into()
+    }
+}
+
+impl From<Bands> for Source<'_> {
+    fn from(summary: Bands) -> Self {
+        Input::Summary(Cow::Owned(summary)).into()
+    }
+}
+
+impl<'a> From<&'a Path> for Source<'a> {
+    fn from(path: &'a Path) -> Self {
+        Input::File(Cow::Borrowed(path)).into()
+    }
+}
+
+impl From<PathBuf> for Source<'_> {
+    fn from(path: PathBuf) -> Self {
+        Input::File(Cow::Owned(path)).into()
+    }
+}
+
+impl<'a> From<&'a Source<'_>> for Source<'a> {
+    fn from(source: &'a Source<'_>) -> Self {
+        let input = match &source.input {
+            Input::Log(log) => Input::Log(Cow::Borrowed(log.as_ref())),
+            Input::Summary(bands) => Input::Summary(Cow::Borrowed(bands.as_ref())),
+            Input::File(path) => Input::File(Cow::Borrowed(path.as_ref())),
+        };
+        Source { input, mounting: source.mounting }
+    }
+}
