@@ -2,7 +2,8 @@
 
 use super::world::{CYCLE, VICTIM, Wire, World};
 use powerball::bus::canopen::Micros;
-use powerball::bus::cia402::Mode;
+use powerball::bus::cia402::{Mode, Statusword};
+use powerball::bus::driver::cause::Hindrance;
 use powerball::bus::driver::{BusEvent, Cause, ControlMode, Phase};
 use powerball::virtual_arm::slave;
 
@@ -30,10 +31,14 @@ pub(crate) enum Fault {
     JumpOnce,
     JumpAgain,
     LostMaster,
+    NoVoltage,
+    NotRemote,
+    InternalLimit,
+    PositionJump,
 }
 
 impl Fault {
-    pub(crate) const ALL: [(Fault, &'static str); 21] = [
+    pub(crate) const ALL: [(Fault, &'static str); 25] = [
         (Fault::DropOne, "one frame dropped"),
         (Fault::DropFive, "5 cycles of frames dropped"),
         (Fault::DelayOne, "one frame 2 ms late"),
@@ -55,6 +60,10 @@ impl Fault {
         (Fault::JumpOnce, "one jumping set-point"),
         (Fault::JumpAgain, "jumping set-points"),
         (Fault::LostMaster, "master lost"),
+        (Fault::NoVoltage, "voltage bit lost"),
+        (Fault::NotRemote, "remote bit lost"),
+        (Fault::InternalLimit, "internal limit"),
+        (Fault::PositionJump, "position jumps"),
     ];
 
     pub(crate) fn inject(self, world: &mut World) {
@@ -91,6 +100,10 @@ impl Fault {
             Fault::JumpOnce => bad(world, 1, jump),
             Fault::JumpAgain => bad(world, u32::MAX, jump),
             Fault::LostMaster => world.run_without_driver(800_000),
+            Fault::NoVoltage => wire(world, Wire::Status { set: 0, clear: Statusword::VOLTAGE_ENABLED }),
+            Fault::NotRemote => wire(world, Wire::Status { set: 0, clear: Statusword::REMOTE }),
+            Fault::InternalLimit => wire(world, Wire::Status { set: Statusword::INTERNAL_LIMIT, clear: 0 }),
+            Fault::PositionJump => wire(world, Wire::Shift { by: 5000, frames: 1 }),
         }
     }
 
@@ -125,6 +138,10 @@ impl Fault {
                 Fault::UnknownStatus => matches!(cause, Cause::UnknownState(..)),
                 Fault::LateLong => matches!(cause, Cause::Late),
                 Fault::NanAgain | Fault::JumpAgain => matches!(cause, Cause::Setpoints(_)),
+                Fault::NoVoltage => matches!(cause, Cause::Hindered(_, Hindrance::NoVoltage, _)),
+                Fault::NotRemote => matches!(cause, Cause::Hindered(_, Hindrance::NotRemote, _)),
+                Fault::InternalLimit => matches!(cause, Cause::Hindered(_, Hindrance::InternalLimit, _)),
+                Fault::PositionJump => matches!(cause, Cause::PositionJump(..)),
                 _ => false,
             }
     }
@@ -176,6 +193,17 @@ impl Fault {
             // They meet an arm that comes to run later.
             Fault::NanAgain | Fault::JumpAgain if !matches!(phase, Stopping | Faulted | Resetting) => Refused,
             Fault::LostMaster => SlavesStop,
+            // What the victim shows counts once it has torque, or its brake is open.
+            Fault::NoVoltage | Fault::NotRemote | Fault::InternalLimit => match phase {
+                Running | Commutating => Stops { cycles: 5 },
+                Enabling => Stops { cycles: 40 },
+                Stopping | Resetting => GoesOn,
+                _ => stop(0),
+            },
+            Fault::PositionJump => match phase {
+                Stopping | Resetting => GoesOn,
+                _ => stop(3),
+            },
             Fault::QueueFull | Fault::LateOnce | Fault::LateLong => match phase {
                 Faulted => Stays,
                 _ => GoesOn,

@@ -20,7 +20,7 @@ fn started(control: ControlMode, profile: Profile<6>, commutated: bool, wire: Wi
     world
 }
 
-fn running(control: ControlMode) -> World {
+pub(super) fn running(control: ControlMode) -> World {
     let mut world = started(control, LWA4P, true, Wire::Good);
     assert!(
         world.run_until(20_000_000, |w| w.driver.phase() == Phase::Running),

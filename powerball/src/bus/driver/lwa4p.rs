@@ -95,6 +95,8 @@ pub const LWA4P: Profile<6> = Profile {
             velocity: 1.257,
             acceleration: 4.36,
             current: 5.0,
+            following_error: 0.05,
+            velocity_error: 0.3,
         },
         JointProfile {
             node: NodeId::clamped(4),
@@ -109,6 +111,8 @@ pub const LWA4P: Profile<6> = Profile {
             velocity: 1.257,
             acceleration: 4.36,
             current: 5.0,
+            following_error: 0.05,
+            velocity_error: 0.3,
         },
         JointProfile {
             node: NodeId::clamped(5),
@@ -123,6 +127,8 @@ pub const LWA4P: Profile<6> = Profile {
             velocity: 1.257,
             acceleration: 4.36,
             current: 5.0,
+            following_error: 0.05,
+            velocity_error: 0.3,
         },
         JointProfile {
             node: NodeId::clamped(6),
@@ -137,6 +143,8 @@ pub const LWA4P: Profile<6> = Profile {
             velocity: 1.257,
             acceleration: 4.36,
             current: 5.0,
+            following_error: 0.05,
+            velocity_error: 0.3,
         },
         JointProfile {
             node: NodeId::clamped(7),
@@ -151,6 +159,8 @@ pub const LWA4P: Profile<6> = Profile {
             velocity: 1.257,
             acceleration: 8.73,
             current: 2.0,
+            following_error: 0.05,
+            velocity_error: 0.3,
         },
         JointProfile {
             node: NodeId::clamped(8),
@@ -165,6 +175,8 @@ pub const LWA4P: Profile<6> = Profile {
             velocity: 1.257,
             acceleration: 8.73,
             current: 2.0,
+            following_error: 0.05,
+            velocity_error: 0.3,
         },
     ],
     reactions: Reactions::DEFAULT,

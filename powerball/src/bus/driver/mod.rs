@@ -50,6 +50,7 @@ mod bringup;
 pub mod budget;
 pub mod cause;
 mod cycle;
+mod demand;
 pub mod dictionary;
 mod guard;
 #[cfg(feature = "bus")]
@@ -62,6 +63,7 @@ mod receive;
 mod script;
 mod stop;
 pub mod units;
+mod watch;
 
 pub use budget::{Budget, Verdict};
 pub use cause::{Cause, Details, Refusal};

@@ -58,8 +58,12 @@ impl<const N: usize> Driver<N> {
         if !self.joints.get_mut(j).is_some_and(|joint| joint.update(number, &mapping, frame)) {
             return;
         }
+        if mapping.contains(objects::POSITION) {
+            self.watch_position(j, tx);
+        }
         if mapping.contains(objects::STATUSWORD) {
             self.judge_state(j, tx);
+            self.watch_status(j, tx);
         }
         if mapping.contains(objects::MODE_DISPLAY) {
             self.judge_mode(j, tx);

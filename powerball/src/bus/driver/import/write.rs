@@ -153,6 +153,8 @@ fn joint_source(joint: &JointTable) -> String {
         ("velocity", format!("{:?}", joint.velocity)),
         ("acceleration", format!("{:?}", joint.acceleration)),
         ("current", format!("{:?}", joint.current)),
+        ("following_error", format!("{:?}", joint.following_error)),
+        ("velocity_error", format!("{:?}", joint.velocity_error)),
     ];
     let fields: String =
         fields.iter().map(|(name, value)| format!("            {name}: {value},\n")).collect();

@@ -1,0 +1,102 @@
+//! A joint that does not do what it is told: each way stops the arm, is told, and stays stopped.
+
+use super::rules::running;
+use super::world::{CYCLE, VICTIM, Wire, World};
+use powerball::bus::cia402::Statusword;
+use powerball::bus::driver::cause::Hindrance;
+use powerball::bus::driver::{Cause, ControlMode, Phase, Refusal};
+use powerball::virtual_arm::slave::Fault;
+
+/// Runs until the arm is stopped by a cause that `told` knows, at most `cycles` from now; then nothing moves.
+fn stopped(mut world: World, cycles: u64, told: impl Fn(&Cause) -> bool) {
+    let begin = world.now();
+    assert!(world.run_until(cycles * CYCLE, |w| w.driver.cause().is_some()), "not seen in {cycles} cycles");
+    let cause = *world.driver.cause().unwrap();
+    println!("{} cycles: {cause}", (world.now() - begin) / CYCLE);
+    assert!(told(&cause) && cause.node() == Some(VICTIM), "{cause}");
+    assert!(world.run_until(4_000_000, |w| w.driver.phase() == Phase::Faulted));
+    let at = world.now();
+    world.run(500_000);
+    assert_eq!(world.motion_after(at), None);
+    assert!(matches!(world.driver.enable(), Err(Refusal::Latched(_))));
+}
+
+fn with_fault(control: ControlMode, fault: Fault) -> World {
+    let mut world = running(control);
+    world.bus.peer_mut().arm.fault(VICTIM, fault);
+    world
+}
+
+fn with_wire(control: ControlMode, wire: Wire) -> World {
+    let mut world = running(control);
+    world.bus.peer_mut().wire = wire;
+    world
+}
+
+/// The set-points swing by 0.1 rad from end to end, with a period of 3.1 s: the time is that in which they have gone
+/// farther than the following error that may be.
+#[test]
+fn a_brake_that_closes_on_a_moving_joint_stops_the_arm() {
+    for control in [ControlMode::InterpolatedPosition, ControlMode::ProfilePosition, ControlMode::Velocity] {
+        stopped(with_fault(control, Fault::BrakeStuck(true)), 1200, |cause| {
+            matches!(
+                cause,
+                Cause::FollowingError(..)
+                    | Cause::Stuck(..)
+                    | Cause::WrongVelocityScale(..)
+                    | Cause::VelocityError(..)
+                    | Cause::TorqueLimit(..)
+                    | Cause::Emergency(..)
+                    | Cause::DriveFault(..)
+            )
+        });
+    }
+}
+
+/// The encoder stays where it is while everything else goes on: only the master can see it.
+#[test]
+fn an_encoder_that_stands_still_stops_the_arm() {
+    for control in [ControlMode::InterpolatedPosition, ControlMode::ProfilePosition] {
+        stopped(with_wire(control, Wire::Freeze(None)), 1200, |cause| {
+            matches!(cause, Cause::FollowingError(..) | Cause::Stuck(..))
+        });
+    }
+}
+
+#[test]
+fn bits_of_the_statusword_stop_the_arm() {
+    let interpolated = ControlMode::InterpolatedPosition;
+    let set = |bits| Wire::Status { set: bits, clear: 0 };
+    let hindered = |why| move |cause: &Cause| matches!(cause, Cause::Hindered(_, told, _) if *told == why);
+    stopped(with_wire(interpolated, set(Statusword::MODE_13)), 3, hindered(Hindrance::FollowingError));
+    stopped(
+        with_wire(interpolated, Wire::Status { set: 0, clear: Statusword::MODE_12 }),
+        5,
+        hindered(Hindrance::NotInterpolating),
+    );
+    // A warning is told, once, and stops nothing.
+    let mut world = with_wire(interpolated, set(Statusword::WARNING));
+    world.run(50 * CYCLE);
+    assert_eq!(world.driver.phase(), Phase::Running);
+    let warnings: Vec<_> = world
+        .driver
+        .notes()
+        .filter(|note| matches!(note.cause, Cause::Hindered(VICTIM, Hindrance::Warning, _)))
+        .collect();
+    assert_eq!(warnings.len(), 1);
+    assert_eq!(warnings[0].times, 1);
+}
+
+/// A position that creeps beyond its limits is no jump.
+#[test]
+fn a_position_beyond_its_limits_stops_the_arm() {
+    let mut world = running(ControlMode::Current);
+    let mut by = 0;
+    while world.driver.cause().is_none() && by < 200_000 {
+        by += 200;
+        world.bus.peer_mut().wire = Wire::Shift { by, frames: u32::MAX };
+        world.run(CYCLE);
+    }
+    let cause = *world.driver.cause().unwrap();
+    assert!(matches!(cause, Cause::PositionLimit(VICTIM, ..)), "{cause}");
+}
