@@ -71,6 +71,8 @@ impl fmt::Display for Hindrance {
 /// Why the arm was stopped, or could not be made ready. The first one is latched until it is acknowledged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cause {
+    /// The program was asked to end, by a signal.
+    Interrupted,
     /// No heartbeat of a node in three of its periods.
     HeartbeatLost(NodeId),
     /// No process data of a node in so many cycles.
@@ -200,6 +202,7 @@ impl fmt::Display for Cause {
             write!(f, "node {node}: ")?;
         }
         match self {
+            Cause::Interrupted => f.write_str("the program was asked to end"),
             Cause::HeartbeatLost(_) => f.write_str("heartbeat lost"),
             Cause::DataMissing(_) => f.write_str("process data missing"),
             Cause::Rebooted(_) => f.write_str("restarted: it must be configured anew"),

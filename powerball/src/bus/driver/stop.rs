@@ -48,6 +48,15 @@ impl<const N: usize> Driver<N> {
         }
     }
 
+    /// Stops the arm because the program was asked to end: as [`Driver::stop`], and latched, so that nothing moves
+    /// again. Once is enough.
+    pub fn interrupt(&mut self, now: Micros, tx: &mut impl Transmit) {
+        self.now = now;
+        if self.cause != Some(Cause::Interrupted) {
+            self.trip(Cause::Interrupted, tx);
+        }
+    }
+
     /// What the transport tells.
     pub fn event(&mut self, event: BusEvent, now: Micros, tx: &mut impl Transmit) {
         self.now = now;
