@@ -151,7 +151,7 @@ fn a_signal_stops_the_arm_and_closes_the_log() {
         assert_eq!(ended.status.code(), Some(1), "{told}");
         assert!(told.contains("asked to end"), "{told}");
         assert!(!lines.exists(), "the log was not closed");
-        assert!(read(Path::new(&log)).time.len() > 50);
+        assert!(read(Path::new(&log)).t.len() > 50);
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::rules::{running, started};
 use super::world::{CYCLE, VICTIM, Wire, World};
+use powerball::bus::canopen::{Cob, Frame, cob, nmt};
 use powerball::bus::cia402::Statusword;
 use powerball::bus::driver::cause::Hindrance;
 use powerball::bus::driver::lwa4p::LWA4P;
@@ -106,4 +107,39 @@ fn a_position_beyond_its_limits_stops_the_arm() {
     }
     let cause = *world.driver.cause().unwrap();
     assert!(matches!(cause, Cause::PositionLimit(VICTIM, ..)), "{cause}");
+}
+
+/// Nothing at all is sent where another master is heard before the start: neither a reset nor a heartbeat.
+#[test]
+fn another_master_is_heard_before_anything_is_sent() {
+    let frames = [
+        cob::SYNC,
+        nmt::Command::Start.frame(None),
+        nmt::State::Operational.frame(LWA4P.master),
+        Frame::from_raw(Cob::Rpdo(2, VICTIM).id(), &[0; 8]).unwrap(),
+    ];
+    for frame in frames {
+        let mut world = World::new(true, LWA4P);
+        world.bus.peer_mut().foreign = Some(frame);
+        world.driver.start(ControlMode::InterpolatedPosition, false).unwrap();
+        assert!(world.run_until(1_000_000, |w| w.driver.phase() == Phase::Faulted));
+        assert!(matches!(world.driver.cause(), Some(Cause::OtherMaster(_))));
+        world.run(500_000);
+        assert!(world.bus.peer().heard.is_empty(), "{:?}", world.bus.peer().heard.first());
+    }
+}
+
+/// Only the arm's own nodes are reset and started: other devices on the bus are none of its business.
+#[test]
+fn no_other_device_is_managed() {
+    let mut world = running(ControlMode::InterpolatedPosition);
+    world.stop();
+    world.run(500_000);
+    let heard = &world.bus.peer().heard;
+    let mut commands = heard.iter().filter(|(_, frame)| frame.raw_id() == 0).peekable();
+    assert!(commands.peek().is_some());
+    for (_, frame) in commands {
+        let node = frame.bytes()[1];
+        assert!(LWA4P.joints.iter().any(|joint| joint.node.raw() == node), "node {node} (0 is all of them)");
+    }
 }

@@ -71,12 +71,14 @@ pub(crate) struct Faulty {
     pub(crate) heard: Vec<(Micros, Frame)>,
     /// Emergencies that the victim still sends, one a millisecond: a quarter of the bus.
     pub(crate) storm: u32,
+    /// What another master says every 5 ms.
+    pub(crate) foreign: Option<Frame>,
 }
 
 impl Faulty {
     fn new(arm: VirtualArm) -> Faulty {
         let (late, out, heard) = (Vec::new(), VecDeque::new(), Vec::new());
-        Faulty { arm, wire: Wire::Good, now: 0, late, out, swapped: None, heard, storm: 0 }
+        Faulty { arm, wire: Wire::Good, now: 0, late, out, swapped: None, heard, storm: 0, foreign: None }
     }
 
     /// What the victim's server is made to answer, where it is.
@@ -176,6 +178,9 @@ impl Peer for Faulty {
         // A frame that waits to change places with the next one does not wait for ever.
         if let Some((_, frame)) = self.swapped.take_if(|(at, _)| now > *at + 10_000) {
             self.out.push_back(frame);
+        }
+        if now.is_multiple_of(5000) {
+            self.out.extend(self.foreign);
         }
         if self.storm > 0 && now.is_multiple_of(1000) {
             self.storm -= 1;

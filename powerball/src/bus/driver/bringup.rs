@@ -32,7 +32,7 @@ impl<const N: usize> Driver<N> {
                 (joint.booted, joint.status, joint.mode, joint.emergency) = (None, None, None, None);
                 (joint.current_limit, joint.declined) = (None, 0);
             }
-            if self.send(nmt::Command::ResetNode.frame(None), tx) {
+            if self.manage(nmt::Command::ResetNode, tx) {
                 self.bring_up.resets = 1;
                 self.enter(Phase::Boot);
             }
@@ -284,7 +284,7 @@ impl<const N: usize> Driver<N> {
             (joint.status, joint.mode, joint.nmt) = (None, None, None);
         }
         (self.late_run, self.good_run) = (0, 0);
-        self.send(nmt::Command::Start.frame(None), tx);
+        self.manage(nmt::Command::Start, tx);
         self.sync.start(now);
         self.enter(Phase::Starting);
     }

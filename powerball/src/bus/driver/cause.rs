@@ -1,5 +1,6 @@
 //! Why the arm was stopped, or may not start: typed, with the node and what was seen.
 
+use super::foreign::Foreign;
 use super::guard::Rejection;
 use super::profile::ControlMode;
 use crate::bus::canopen::client::SdoError;
@@ -71,6 +72,10 @@ impl fmt::Display for Hindrance {
 /// Why the arm was stopped, or could not be made ready. The first one is latched until it is acknowledged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cause {
+    /// Another master is on the bus: what it was heard to send.
+    OtherMaster(Foreign),
+    /// Process data of a node comes twice: two nodes have its id.
+    TwoNodes(NodeId),
     /// The program was asked to end, by a signal.
     Interrupted,
     /// No heartbeat of a node in three of its periods.
@@ -154,6 +159,7 @@ impl Cause {
             | Cause::UnknownState(node, _)
             | Cause::WrongMode(node, _)
             | Cause::NotOperational(node)
+            | Cause::TwoNodes(node)
             | Cause::Hindered(node, ..)
             | Cause::FollowingError(node, ..)
             | Cause::VelocityError(node, ..)
@@ -181,6 +187,8 @@ impl Cause {
         matches!(
             self,
             Cause::HeartbeatLost(_)
+                | Cause::OtherMaster(_)
+                | Cause::TwoNodes(_)
                 | Cause::Rebooted(_)
                 | Cause::NotOperational(_)
                 | Cause::WrongMode(..)
@@ -202,6 +210,10 @@ impl fmt::Display for Cause {
             write!(f, "node {node}: ")?;
         }
         match self {
+            Cause::OtherMaster(what) => {
+                write!(f, "another master is on the bus, it sends {what}: end it, or leave the arm to it")
+            }
+            Cause::TwoNodes(_) => f.write_str("its process data comes twice: two nodes have this id"),
             Cause::Interrupted => f.write_str("the program was asked to end"),
             Cause::HeartbeatLost(_) => f.write_str("heartbeat lost"),
             Cause::DataMissing(_) => f.write_str("process data missing"),

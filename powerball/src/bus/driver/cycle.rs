@@ -109,7 +109,20 @@ impl<const N: usize> Driver<N> {
                 self.trip(Cause::DataMissing(self.node(j)), tx);
             }
         }
+        self.judge_duplicates(tx);
         self.watch_motion(tx);
+    }
+
+    fn judge_duplicates(&mut self, tx: &mut impl Transmit) {
+        let limit = self.profile.reactions.duplicate_cycles;
+        for j in 0..N {
+            let Some(joint) = self.joints.get_mut(j) else { continue };
+            let twice = core::mem::take(&mut joint.duplicated);
+            joint.duplicate_run = if twice { joint.duplicate_run.saturating_add(1) } else { 0 };
+            if joint.duplicate_run == limit {
+                self.trip(Cause::TwoNodes(self.node(j)), tx);
+            }
+        }
     }
 
     fn judge_lateness(&mut self, tick: Tick, tx: &mut impl Transmit) {

@@ -79,6 +79,9 @@ pub struct Joint {
     /// Transmit PDOs that came since the last SYNC, by bit.
     pub(super) arrived: u8,
     pub(super) missing_run: u8,
+    /// Process data came twice in this cycle, and in how many cycles in a row.
+    pub(super) duplicated: bool,
+    pub(super) duplicate_run: u8,
     pub(super) overspeed_run: u8,
     pub(super) progress: Progress,
     /// Accepted set-point, and those that have left; rad, rad/s or A.
@@ -123,6 +126,8 @@ impl Joint {
             heartbeat: HeartbeatConsumer::new(heartbeat_timeout),
             arrived: 0,
             missing_run: 0,
+            duplicated: false,
+            duplicate_run: 0,
             overspeed_run: 0,
             progress: Progress::Waiting,
             target: 0.0,
@@ -166,6 +171,7 @@ impl Joint {
         let bit = 1 << (number - 1);
         if self.arrived & bit != 0 {
             self.counters.duplicates += 1;
+            self.duplicated = true;
         }
         self.arrived |= bit;
         true

@@ -148,6 +148,10 @@ pub struct Reactions {
     pub current_limit_part: f64,
     /// … for so long stops the arm.
     pub current_limit_time: Micros,
+    /// Nothing is sent for so long before the start, to hear whether another master is there.
+    pub listen_time: Micros,
+    /// Cycles in a row in which process data of a node comes twice that stop the arm.
+    pub duplicate_cycles: u8,
     /// For a node to boot.
     pub boot_timeout: Micros,
     /// For an SDO answer.
@@ -199,6 +203,8 @@ impl Reactions {
         position_tolerance: 0.02,
         current_limit_part: 0.98,
         current_limit_time: 300_000,
+        listen_time: 300_000,
+        duplicate_cycles: 5,
         boot_timeout: 5_000_000,
         sdo_timeout: 100_000,
         sdo_retries: 2,

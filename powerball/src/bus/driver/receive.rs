@@ -17,6 +17,9 @@ impl<const N: usize> Driver<N> {
         if self.phase == Phase::Idle || self.silent {
             return;
         }
+        if self.is_foreign(frame, tx) || self.phase == Phase::Listening {
+            return;
+        }
         let node = match Cob::of(frame) {
             Some(Cob::Tpdo(_, node) | Cob::Emcy(node) | Cob::SdoResponse(node) | Cob::Heartbeat(node)) => {
                 node
