@@ -125,3 +125,51 @@ fn a_killed_warm_up_goes_on_with_what_it_saw() {
     let (_, told) = run(&["--most", "20"]);
     assert!(told["seconds"].as_f64().unwrap() < 30.0);
 }
+
+/// Ctrl-C, twice: the arm is stopped, the log is closed and whole, and the reason is told.
+#[cfg(all(unix, feature = "parquet"))]
+#[test]
+fn a_signal_stops_the_arm_and_closes_the_log() {
+    let folder = scratch("signalled_record");
+    for signal in ["-INT", "-TERM", "-HUP"] {
+        let path = |name: &str| folder.join(name).display().to_string();
+        let (motion, log) = (path("motion.csv"), path(&format!("log{signal}.parquet")));
+        trajectory(Path::new(&motion), 3000);
+        let lines = PathBuf::from(format!("{log}.csv"));
+        let child = powerball(&["record", "--trajectory", &motion, "--out", &log]).spawn().unwrap();
+        let begun = Instant::now();
+        while std::fs::metadata(&lines).map_or(0, |m| m.len()) < 20_000 {
+            assert!(begun.elapsed() < Duration::from_secs(120));
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        for _ in 0..2 {
+            let id = child.id().to_string();
+            assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
+        }
+        let ended = child.wait_with_output().unwrap();
+        let told = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(1), "{told}");
+        assert!(told.contains("asked to end"), "{told}");
+        assert!(!lines.exists(), "the log was not closed");
+        assert!(read(Path::new(&log)).t.len() > 50);
+    }
+}
+
+/// A disk that is full, or a limit of file sizes: the arm is stopped, and the reason is told.
+#[cfg(unix)]
+#[test]
+fn a_log_that_cannot_grow_stops_the_arm() {
+    let folder = scratch("full_disk");
+    let motion = folder.join("motion.csv");
+    trajectory(&motion, 60);
+    let script = format!(
+        "ulimit -f 64; exec {} record --trajectory {} --out {}",
+        env!("CARGO_BIN_EXE_powerball"),
+        motion.display(),
+        folder.join("log.csv").display()
+    );
+    let ended = Command::new("bash").args(["-c", &script]).output().unwrap();
+    let told = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(1), "{told}");
+    assert!(told.contains("cannot be written"), "{told}");
+}

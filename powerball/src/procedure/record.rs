@@ -73,7 +73,7 @@ impl<E: Into<ArmError>> From<E> for RecordError {
 
 /// An arm that is enabled in interpolated position mode and holds its position between motions.
 #[derive(Debug)]
-pub struct Recorder<B, const N: usize> {
+pub struct Recorder<B: Bus, const N: usize> {
     master: Master<B, N>,
     /// The set-point that is held.
     target: [f64; N],

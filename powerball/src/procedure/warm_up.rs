@@ -222,14 +222,14 @@ mod tests {
     use crate::bus::driver::Driver;
     use crate::bus::driver::lwa4p::LWA4P;
     use crate::bus::transport::{Master, Memory};
-    use crate::virtual_arm::{Effect, VirtualArm, lwa4p};
+    use crate::virtual_arm::{PlantEffect, VirtualArm, lwa4p};
 
     /// An arm whose viscous friction falls by a fifth with 60 s: it is called warm when little of that is
     /// left, and the curve has that time constant.
     #[test]
     fn a_warming_arm_is_followed_until_it_is_warm() {
         let mut setup = lwa4p::setup([0.0; 6], 5).unwrap();
-        setup.plant = setup.plant.with(Effect::Temperature { change: -0.2, time_constant: 60.0 });
+        setup.plant = setup.plant.with(PlantEffect::Temperature { change: -0.2, time_constant: 60.0 });
         let bus = Memory::new(VirtualArm::new(setup).unwrap(), LWA4P.bitrate);
         let mut recorder = Recorder::enable(Master::new(Driver::new(LWA4P).unwrap(), bus)).unwrap();
         let mut log = Vec::new();

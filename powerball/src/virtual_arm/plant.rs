@@ -1,7 +1,7 @@
 //! The plant: an arm that follows a motion, and the log that its drives would give.
 
 use super::dynamics::Dynamics;
-use super::effect::{Effect, Instant, State};
+use super::effect::{Instant, PlantEffect, State};
 use crate::controller::friction::TanhFriction;
 use crate::identification::motion::Motion;
 use crate::logs::log::Log;
@@ -32,7 +32,7 @@ pub struct Plant {
     dynamics: Dynamics,
     friction: Vec<TanhFriction<f64>>,
     sensors: Sensors,
-    effects: Vec<Effect>,
+    effects: Vec<PlantEffect>,
 }
 
 /// A log as the drives give it.
@@ -55,7 +55,7 @@ impl Plant {
 
     /// The plant with one more effect.
     #[must_use]
-    pub fn with(mut self, effect: Effect) -> Self {
+    pub fn with(mut self, effect: PlantEffect) -> Self {
         self.effects.push(effect);
         self
     }
@@ -131,7 +131,7 @@ impl Plant {
     }
 
     /// The effects, in the order in which they were added.
-    pub fn effects(&self) -> &[Effect] {
+    pub fn effects(&self) -> &[PlantEffect] {
         &self.effects
     }
 
@@ -277,11 +277,12 @@ mod tests {
     fn effects_act_where_they_sit_and_those_that_are_friction_dissipate() {
         let motion = swing();
         let plain = quiet().record(&motion, 0.0, 0);
-        for name in Effect::NAMES {
+        for name in PlantEffect::NAMES {
             for seed in 0..5 {
                 let mut rng = ChaCha8Rng::seed_from_u64(seed);
                 let effect =
-                    Effect::draw_named(name, &lwa4p::plant().unwrap(), 20.0, 5.0..15.0, &mut rng).unwrap();
+                    PlantEffect::draw_named(name, &lwa4p::plant().unwrap(), 20.0, 5.0..15.0, &mut rng)
+                        .unwrap();
                 let with = quiet().with(effect.clone()).record(&motion, 0.0, 0);
                 let change: Vec<f64> = with.tau.iter().zip(&plain.tau).map(|(a, b)| a - b).collect();
                 let largest =

@@ -307,7 +307,7 @@ fn chords(a: &AtSpeeds, b: &AtSpeeds, slope: impl Fn(usize) -> [f64; 2]) -> Vec<
 mod tests {
     use super::*;
     use crate::controller::friction::TanhFriction;
-    use crate::virtual_arm::{Effect, lwa4p};
+    use crate::virtual_arm::{PlantEffect, lwa4p};
 
     const POSE: [f64; 6] = [0.3, 0.6, -0.9, 0.2, 0.7, -0.4];
 
@@ -390,7 +390,7 @@ mod tests {
     #[test]
     fn a_winding_gear_stretches_by_its_load_and_rings_at_its_frequency() {
         let (joint, stiffness) = (1, 2000.0);
-        let plant = without_friction().with(Effect::JointElasticity { joint, stiffness });
+        let plant = without_friction().with(PlantEffect::JointElasticity { joint, stiffness });
         let mut simulation = Simulation::new(plant, &POSE, 0.0);
         // The brake holds the motor, the link swings on the spring, the other joints are held.
         let rest = simulation.links()[joint];
@@ -417,7 +417,7 @@ mod tests {
     #[test]
     fn a_gear_with_play_lets_the_link_fall_through_it_once() {
         let (joint, gap) = (1, 0.02);
-        let plant = without_friction().with(Effect::Backlash { joint, gap });
+        let plant = without_friction().with(PlantEffect::Backlash { joint, gap });
         let mut simulation = Simulation::new(plant, &POSE, 0.0);
         let hang = simulation.position(joint) - simulation.links()[joint];
         simulation.q[joint] += 0.9 * gap * hang.signum();
@@ -430,9 +430,9 @@ mod tests {
     fn every_effect_can_move_with_the_arm() {
         use rand::SeedableRng;
         let plain = lwa4p::plant().unwrap();
-        for name in Effect::NAMES {
+        for name in PlantEffect::NAMES {
             let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
-            let effect = Effect::draw_named(name, &plain, 20.0, 0.1..0.2, &mut rng).unwrap();
+            let effect = PlantEffect::draw_named(name, &plain, 20.0, 0.1..0.2, &mut rng).unwrap();
             let mut simulation = open(plain.clone().with(effect));
             let hold = simulation.plant().dynamics().gravity(&POSE);
             (0..1000).for_each(|_| simulation.step(1e-3, &hold));

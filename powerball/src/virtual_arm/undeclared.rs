@@ -2,7 +2,7 @@
 //! again.
 
 use super::slave::Setup;
-use super::{Effect, VirtualArm, lwa4p};
+use super::{PlantEffect, VirtualArm, lwa4p};
 use dyngen::Diagnostics;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -12,7 +12,7 @@ use std::path::Path;
 #[serde(deny_unknown_fields)]
 pub struct Undeclared {
     /// What is in the plant and in no model.
-    pub effect: Effect,
+    pub effect: PlantEffect,
     /// Its age, s: what warms has been warming for so long.
     pub age: f64,
 }
@@ -54,9 +54,9 @@ mod tests {
     #[test]
     fn every_effect_survives_its_file() {
         let plant = lwa4p::plant().unwrap();
-        for (seed, name) in Effect::NAMES.into_iter().enumerate() {
+        for (seed, name) in PlantEffect::NAMES.into_iter().enumerate() {
             let mut rng = ChaCha8Rng::seed_from_u64(seed as u64);
-            let effect = Effect::draw_named(name, &plant, 100.0, 1.0..2.0, &mut rng).unwrap();
+            let effect = PlantEffect::draw_named(name, &plant, 100.0, 1.0..2.0, &mut rng).unwrap();
             let undeclared = Undeclared { effect, age: 100.0 };
             let text = serde_json::to_string(&undeclared).unwrap();
             assert!(text.contains(name), "{text}");

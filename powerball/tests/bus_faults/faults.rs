@@ -1,9 +1,10 @@
 //! The faults, how each is made, and what must follow in each phase.
 
 use super::world::{CYCLE, VICTIM, Wire, World};
-use powerball::bus::canopen::Micros;
-use powerball::bus::cia402::Mode;
-use powerball::bus::driver::{BusEvent, Cause, ControlMode, Phase};
+use powerball::bus::canopen::{Cob, Frame, Micros, cob};
+use powerball::bus::cia402::{Mode, Statusword};
+use powerball::bus::driver::cause::Hindrance;
+use powerball::bus::driver::{BusEvent, Cause, ControlMode, Foreign, Phase};
 use powerball::virtual_arm::slave;
 
 /// What is made to happen.
@@ -30,10 +31,17 @@ pub(crate) enum Fault {
     JumpOnce,
     JumpAgain,
     LostMaster,
+    NoVoltage,
+    NotRemote,
+    InternalLimit,
+    PositionJump,
+    TwoNodes,
+    OtherSync,
+    OtherSetpoints,
 }
 
 impl Fault {
-    pub(crate) const ALL: [(Fault, &'static str); 21] = [
+    pub(crate) const ALL: [(Fault, &'static str); 28] = [
         (Fault::DropOne, "one frame dropped"),
         (Fault::DropFive, "5 cycles of frames dropped"),
         (Fault::DelayOne, "one frame 2 ms late"),
@@ -55,6 +63,13 @@ impl Fault {
         (Fault::JumpOnce, "one jumping set-point"),
         (Fault::JumpAgain, "jumping set-points"),
         (Fault::LostMaster, "master lost"),
+        (Fault::NoVoltage, "voltage bit lost"),
+        (Fault::NotRemote, "remote bit lost"),
+        (Fault::InternalLimit, "internal limit"),
+        (Fault::PositionJump, "position jumps"),
+        (Fault::TwoNodes, "two nodes with one id"),
+        (Fault::OtherSync, "SYNC of another master"),
+        (Fault::OtherSetpoints, "set-points of another master"),
     ];
 
     pub(crate) fn inject(self, world: &mut World) {
@@ -91,6 +106,15 @@ impl Fault {
             Fault::JumpOnce => bad(world, 1, jump),
             Fault::JumpAgain => bad(world, u32::MAX, jump),
             Fault::LostMaster => world.run_without_driver(800_000),
+            Fault::NoVoltage => wire(world, Wire::Status { set: 0, clear: Statusword::VOLTAGE_ENABLED }),
+            Fault::NotRemote => wire(world, Wire::Status { set: 0, clear: Statusword::REMOTE }),
+            Fault::InternalLimit => wire(world, Wire::Status { set: Statusword::INTERNAL_LIMIT, clear: 0 }),
+            Fault::TwoNodes => wire(world, Wire::Duplicate { frames: u32::MAX }),
+            Fault::OtherSync => world.bus.peer_mut().foreign = Some(cob::SYNC),
+            Fault::OtherSetpoints => {
+                world.bus.peer_mut().foreign = Frame::from_raw(Cob::Rpdo(1, VICTIM).id(), &[0; 6])
+            }
+            Fault::PositionJump => wire(world, Wire::Shift { by: 5000, frames: 1 }),
         }
     }
 
@@ -98,6 +122,7 @@ impl Fault {
     pub(crate) fn repair(self, world: &mut World) {
         world.bus.peer_mut().wire = Wire::Good;
         world.bus.peer_mut().storm = 0;
+        world.bus.peer_mut().foreign = None;
         world.pilot.bad = 0;
         world.bus.peer_mut().arm.fault(VICTIM, slave::Fault::Silent(false));
         world.bus.peer_mut().arm.fault(VICTIM, slave::Fault::Statusword(None));
@@ -125,6 +150,13 @@ impl Fault {
                 Fault::UnknownStatus => matches!(cause, Cause::UnknownState(..)),
                 Fault::LateLong => matches!(cause, Cause::Late),
                 Fault::NanAgain | Fault::JumpAgain => matches!(cause, Cause::Setpoints(_)),
+                Fault::NoVoltage => matches!(cause, Cause::Hindered(_, Hindrance::NoVoltage, _)),
+                Fault::NotRemote => matches!(cause, Cause::Hindered(_, Hindrance::NotRemote, _)),
+                Fault::InternalLimit => matches!(cause, Cause::Hindered(_, Hindrance::InternalLimit, _)),
+                Fault::TwoNodes => matches!(cause, Cause::TwoNodes(_)),
+                Fault::OtherSync => matches!(cause, Cause::OtherMaster(Foreign::Sync)),
+                Fault::OtherSetpoints => matches!(cause, Cause::OtherMaster(Foreign::Setpoints(VICTIM))),
+                Fault::PositionJump => matches!(cause, Cause::PositionJump(..)),
                 _ => false,
             }
     }
@@ -176,6 +208,19 @@ impl Fault {
             // They meet an arm that comes to run later.
             Fault::NanAgain | Fault::JumpAgain if !matches!(phase, Stopping | Faulted | Resetting) => Refused,
             Fault::LostMaster => SlavesStop,
+            // What the victim shows counts once it has torque, or its brake is open.
+            Fault::NoVoltage | Fault::NotRemote | Fault::InternalLimit => match phase {
+                Running | Commutating => Stops { cycles: 5 },
+                Enabling => Stops { cycles: 40 },
+                Stopping | Resetting => GoesOn,
+                _ => stop(0),
+            },
+            Fault::TwoNodes => stop(7),
+            Fault::OtherSync | Fault::OtherSetpoints => stop(3),
+            Fault::PositionJump => match phase {
+                Stopping | Resetting => GoesOn,
+                _ => stop(3),
+            },
             Fault::QueueFull | Fault::LateOnce | Fault::LateLong => match phase {
                 Faulted => Stays,
                 _ => GoesOn,

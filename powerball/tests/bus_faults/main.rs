@@ -5,6 +5,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test's helpers may stop the test")]
 
 mod faults;
+mod motion;
 mod rules;
 mod world;
 
@@ -84,7 +85,14 @@ fn cell(fault: Fault, stage: Stage, control: ControlMode) -> Result<String, Stri
             Ok(format!("stop ≤ {cycles}"))
         }
         Expected::Refused => {
-            world.pilot.enable |= matches!(fault, Fault::NanAgain | Fault::JumpAgain);
+            world.pilot.enable |= matches!(
+                fault,
+                Fault::NanAgain
+                    | Fault::JumpAgain
+                    | Fault::NoVoltage
+                    | Fault::NotRemote
+                    | Fault::InternalLimit
+            );
             let came = world
                 .run_until(12_000_000, |w| w.driver.phase() == Phase::Faulted && w.driver.cause().is_some());
             if !came {

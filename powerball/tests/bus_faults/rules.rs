@@ -12,7 +12,7 @@ use powerball::bus::driver::{
 };
 use powerball::virtual_arm::slave::Fault;
 
-fn started(control: ControlMode, profile: Profile<6>, commutated: bool, wire: Wire) -> World {
+pub(super) fn started(control: ControlMode, profile: Profile<6>, commutated: bool, wire: Wire) -> World {
     let mut world = World::new(commutated, profile);
     world.run(100_000);
     world.bus.peer_mut().wire = wire;
@@ -20,7 +20,7 @@ fn started(control: ControlMode, profile: Profile<6>, commutated: bool, wire: Wi
     world
 }
 
-fn running(control: ControlMode) -> World {
+pub(super) fn running(control: ControlMode) -> World {
     let mut world = started(control, LWA4P, true, Wire::Good);
     assert!(
         world.run_until(20_000_000, |w| w.driver.phase() == Phase::Running),

@@ -40,6 +40,18 @@ pub(crate) enum Wire {
     },
     /// The mode display, fifth byte of its second transmit PDO, says this.
     Mode(u8),
+    /// The statusword, first in its first transmit PDO, with these bits set and cleared.
+    Status {
+        set: u16,
+        clear: u16,
+    },
+    /// The position, last in its first transmit PDO, is off by so many mdeg.
+    Shift {
+        by: i32,
+        frames: u32,
+    },
+    /// The position stays as it is in the first frame.
+    Freeze(Option<i32>),
     /// Its server refuses this object.
     Refuse(Object),
     /// Its server reads this value for this object, whatever was written.
@@ -59,12 +71,14 @@ pub(crate) struct Faulty {
     pub(crate) heard: Vec<(Micros, Frame)>,
     /// Emergencies that the victim still sends, one a millisecond: a quarter of the bus.
     pub(crate) storm: u32,
+    /// What another master says every 5 ms.
+    pub(crate) foreign: Option<Frame>,
 }
 
 impl Faulty {
     fn new(arm: VirtualArm) -> Faulty {
         let (late, out, heard) = (Vec::new(), VecDeque::new(), Vec::new());
-        Faulty { arm, wire: Wire::Good, now: 0, late, out, swapped: None, heard, storm: 0 }
+        Faulty { arm, wire: Wire::Good, now: 0, late, out, swapped: None, heard, storm: 0, foreign: None }
     }
 
     /// What the victim's server is made to answer, where it is.
@@ -120,6 +134,26 @@ impl Faulty {
                 bytes[4] = *mode;
                 self.out.extend(Frame::from_raw(frame.raw_id(), &bytes));
             }
+            wire @ (Wire::Status { .. } | Wire::Shift { .. } | Wire::Freeze(_))
+                if frame.raw_id() == Cob::Tpdo(1, VICTIM).id() && frame.bytes().len() == 8 =>
+            {
+                let b = frame.bytes();
+                let mut status = u16::from_le_bytes([b[0], b[1]]);
+                let mut position = i32::from_le_bytes([b[4], b[5], b[6], b[7]]);
+                match wire {
+                    Wire::Status { set, clear } => status = status & !*clear | *set,
+                    Wire::Shift { by, frames } if *frames > 0 => {
+                        *frames -= 1;
+                        position += *by;
+                    }
+                    Wire::Freeze(at) => position = *at.get_or_insert(position),
+                    _ => {}
+                }
+                let mut bytes = b.to_vec();
+                bytes[..2].copy_from_slice(&status.to_le_bytes());
+                bytes[4..].copy_from_slice(&position.to_le_bytes());
+                self.out.extend(Frame::from_raw(frame.raw_id(), &bytes));
+            }
             _ => self.out.push_back(frame),
         }
     }
@@ -144,6 +178,9 @@ impl Peer for Faulty {
         // A frame that waits to change places with the next one does not wait for ever.
         if let Some((_, frame)) = self.swapped.take_if(|(at, _)| now > *at + 10_000) {
             self.out.push_back(frame);
+        }
+        if now.is_multiple_of(5000) {
+            self.out.extend(self.foreign);
         }
         if self.storm > 0 && now.is_multiple_of(1000) {
             self.storm -= 1;

@@ -3,7 +3,7 @@
 use dyngen::Arm;
 use powerball::controller::friction::{TABLE_2, TanhFriction};
 use powerball::identification::chain::Chain;
-use powerball::virtual_arm::{Body, Dynamics, Effect, Plant, Sensors};
+use powerball::virtual_arm::{Body, Dynamics, Plant, PlantEffect as Effect, Sensors};
 use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt};
 use std::f64::consts::PI;

@@ -3,7 +3,7 @@
 use super::alike::PAIRS;
 use super::law::Outside;
 use clap::ValueEnum;
-use powerball::virtual_arm::Effect;
+use powerball::virtual_arm::PlantEffect as Effect;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

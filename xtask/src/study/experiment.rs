@@ -13,7 +13,7 @@ use powerball::identification::excite::{Settings, optimise};
 use powerball::identification::motion::Motion;
 use powerball::logs::log::{Log, common_clock};
 use powerball::logs::regression::{Data, DataOptions, RigidBody};
-use powerball::virtual_arm::{Effect, Plant, lwa4p};
+use powerball::virtual_arm::{Plant, PlantEffect as Effect, lwa4p};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

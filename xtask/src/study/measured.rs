@@ -12,7 +12,7 @@ use powerball::identification::motion::Motion;
 use powerball::logs::log::{Log, common_clock, read_logs};
 use powerball::logs::regression::{Data, DataOptions, Recording, RigidBody};
 use powerball::logs::summary::Summary;
-use powerball::virtual_arm::{Dynamics, Effect, Plant, Sensors, bodies};
+use powerball::virtual_arm::{Dynamics, Plant, PlantEffect as Effect, Sensors, bodies};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

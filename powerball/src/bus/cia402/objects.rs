@@ -26,6 +26,8 @@ pub const POSITION_DEMAND: Object = o(0x6062, 0);
 pub const POSITION: Object = o(0x6064, 0);
 /// Following error window, u32, mdeg.
 pub const FOLLOWING_ERROR_WINDOW: Object = o(0x6065, 0);
+/// Time beyond the window after which a following error is one, u16, ms.
+pub const FOLLOWING_ERROR_TIME: Object = o(0x6066, 0);
 /// Velocity demand, i32, mdeg/s.
 pub const VELOCITY_DEMAND: Object = o(0x606B, 0);
 /// Actual velocity, i32, mdeg/s.

@@ -30,8 +30,9 @@ impl<const N: usize> Driver<N> {
                 joint.client.cancel();
                 joint.heartbeat.stop();
                 (joint.booted, joint.status, joint.mode, joint.emergency) = (None, None, None, None);
+                (joint.current_limit, joint.declined) = (None, 0);
             }
-            if self.send(nmt::Command::ResetNode.frame(None), tx) {
+            if self.manage(nmt::Command::ResetNode, tx) {
                 self.bring_up.resets = 1;
                 self.enter(Phase::Boot);
             }
@@ -74,8 +75,11 @@ impl<const N: usize> Driver<N> {
     /// The write that joint `j` is at, while configuring and verifying.
     fn write_of(&self, j: usize, step: usize) -> Option<Write> {
         let verifying = self.phase == Phase::Verify;
+        let declined = self.joints.get(j).map_or(0, |joint| joint.declined);
+        let kept =
+            |write: &Write| write.verify != 0 && write.optional().is_none_or(|bit| declined & bit == 0);
         configuration(&self.profile, self.mode_profile(), self.control, j)
-            .filter(|write| !verifying || write.verify != 0)
+            .filter(|write| !verifying || kept(write))
             .nth(step)
     }
 
@@ -200,6 +204,16 @@ impl<const N: usize> Driver<N> {
                 _ => Ok(()),
             };
         }
+        // A drive need not tell it; the profile's limit counts then.
+        if object == objects::MAX_CURRENT {
+            let told = number.ok().filter(|n| (1..=u32::from(u16::MAX)).contains(n));
+            joint.current_limit =
+                told.map(|n| joint.units.current(n as i32).abs()).filter(|limit| *limit > 0.0);
+            return match number {
+                Ok(_) | Err(SdoError::Aborted(_)) => Ok(()),
+                Err(error) => Err(failed(error)),
+            };
+        }
         let number = number.map_err(failed)?;
         match object {
             objects::SUPPORTED_MODES => {
@@ -224,10 +238,20 @@ impl<const N: usize> Driver<N> {
         Ok(())
     }
 
-    fn judge_write(&self, j: usize, object: Object, result: Result<Value, SdoError>) -> Result<(), Cause> {
-        let watch =
-            self.joints.get(j).and_then(|joint| self.write_of(j, joint.step)).is_some_and(|w| w.is_watch());
-        let cause = if watch { Cause::NoWatch } else { Cause::Sdo };
+    fn judge_write(
+        &mut self,
+        j: usize,
+        object: Object,
+        result: Result<Value, SdoError>,
+    ) -> Result<(), Cause> {
+        let write = self.joints.get(j).and_then(|joint| self.write_of(j, joint.step));
+        if let (Err(SdoError::Aborted(_)), Some(bit)) = (result, write.and_then(|write| write.optional())) {
+            if let Some(joint) = self.joints.get_mut(j) {
+                joint.declined |= bit;
+            }
+            return Ok(());
+        }
+        let cause = if write.is_some_and(|write| write.is_watch()) { Cause::NoWatch } else { Cause::Sdo };
         result.map(|_| ()).map_err(|error| cause(self.node(j), object, error))
     }
 
@@ -255,11 +279,12 @@ impl<const N: usize> Driver<N> {
         let now = self.now;
         for joint in &mut self.joints {
             joint.heartbeat.beat(now);
+            joint.watched = super::watch::Watched::default();
             (joint.arrived, joint.missing_run, joint.overspeed_run) = (0, 0, 0);
             (joint.status, joint.mode, joint.nmt) = (None, None, None);
         }
         (self.late_run, self.good_run) = (0, 0);
-        self.send(nmt::Command::Start.frame(None), tx);
+        self.manage(nmt::Command::Start, tx);
         self.sync.start(now);
         self.enter(Phase::Starting);
     }
@@ -317,6 +342,7 @@ impl<const N: usize> Driver<N> {
                 joint.preset(control);
                 (joint.swept, joint.swept_from) = (0.0, joint.position);
             }
+            self.release_watch();
             (self.fresh, self.rejection, self.streaming) = (false, None, false);
             (self.rejected_run, self.starved_run) = (0, 0);
             self.enter(Phase::Running);

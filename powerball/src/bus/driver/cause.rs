@@ -1,5 +1,6 @@
 //! Why the arm was stopped, or may not start: typed, with the node and what was seen.
 
+use super::foreign::Foreign;
 use super::guard::Rejection;
 use super::profile::ControlMode;
 use crate::bus::canopen::client::SdoError;
@@ -22,6 +23,10 @@ pub enum Hindrance {
     InternalLimit,
     /// Bit 7 is set: a warning.
     Warning,
+    /// Bit 13 is set in a position mode: the drive's own following error.
+    FollowingError,
+    /// Bit 12 fell while interpolating: the drive no longer follows its points.
+    NotInterpolating,
     /// The drive went to another state than the one on the way.
     Elsewhere,
     /// The statusword gives no reason.
@@ -56,6 +61,8 @@ impl fmt::Display for Hindrance {
             Hindrance::NotRemote => "the drive does not obey the bus",
             Hindrance::InternalLimit => "a limit inside the drive is active",
             Hindrance::Warning => "the drive warns",
+            Hindrance::FollowingError => "the drive reports a following error",
+            Hindrance::NotInterpolating => "the drive no longer follows its interpolation points",
             Hindrance::Elsewhere => "the drive went to another state",
             Hindrance::Untold => "the statusword gives no reason",
         })
@@ -65,6 +72,12 @@ impl fmt::Display for Hindrance {
 /// Why the arm was stopped, or could not be made ready. The first one is latched until it is acknowledged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cause {
+    /// Another master is on the bus: what it was heard to send.
+    OtherMaster(Foreign),
+    /// Process data of a node comes twice: two nodes have its id.
+    TwoNodes(NodeId),
+    /// The program was asked to end, by a signal.
+    Interrupted,
     /// No heartbeat of a node in three of its periods.
     HeartbeatLost(NodeId),
     /// No process data of a node in so many cycles.
@@ -89,7 +102,21 @@ pub enum Cause {
     Starved,
     /// Set-points were rejected again and again.
     Setpoints(Rejection),
-    /// In velocity mode a joint went this part of the way that was asked for, less than half or more than
+    /// A drive with torque shows that it cannot use it; its statusword.
+    Hindered(NodeId, Hindrance, Statusword),
+    /// A joint is not where it was told to be: following error beyond the drive's delay, and its limit, rad.
+    FollowingError(NodeId, f64, f64),
+    /// A joint does not have the velocity that it was told: error and limit, rad/s.
+    VelocityError(NodeId, f64, f64),
+    /// A joint stands still so far from the target of its profile, rad.
+    Stuck(NodeId, f64),
+    /// A measured position jumped: by how much, and what its greatest velocity explains, rad.
+    PositionJump(NodeId, f64, f64),
+    /// A joint was measured beyond its limits: where, and the limit with its tolerance, rad.
+    PositionLimit(NodeId, f64, f64),
+    /// A joint's current stays at its limit: current and limit, A.
+    TorqueLimit(NodeId, f64, f64),
+    /// In velocity mode a joint went this part of the travel that was asked for, less than half or more than
     /// twice: the dimension factor 0x604C means something else than the profile says, or the joint is
     /// blocked.
     WrongVelocityScale(NodeId, f64),
@@ -132,6 +159,14 @@ impl Cause {
             | Cause::UnknownState(node, _)
             | Cause::WrongMode(node, _)
             | Cause::NotOperational(node)
+            | Cause::TwoNodes(node)
+            | Cause::Hindered(node, ..)
+            | Cause::FollowingError(node, ..)
+            | Cause::VelocityError(node, ..)
+            | Cause::Stuck(node, _)
+            | Cause::PositionJump(node, ..)
+            | Cause::PositionLimit(node, ..)
+            | Cause::TorqueLimit(node, ..)
             | Cause::WrongVelocityScale(node, _)
             | Cause::NoBoot(node)
             | Cause::WrongIdentity(node, ..)
@@ -152,6 +187,8 @@ impl Cause {
         matches!(
             self,
             Cause::HeartbeatLost(_)
+                | Cause::OtherMaster(_)
+                | Cause::TwoNodes(_)
                 | Cause::Rebooted(_)
                 | Cause::NotOperational(_)
                 | Cause::WrongMode(..)
@@ -173,6 +210,11 @@ impl fmt::Display for Cause {
             write!(f, "node {node}: ")?;
         }
         match self {
+            Cause::OtherMaster(what) => {
+                write!(f, "another master is on the bus, it sends {what}: end it, or leave the arm to it")
+            }
+            Cause::TwoNodes(_) => f.write_str("its process data comes twice: two nodes have this id"),
+            Cause::Interrupted => f.write_str("the program was asked to end"),
             Cause::HeartbeatLost(_) => f.write_str("heartbeat lost"),
             Cause::DataMissing(_) => f.write_str("process data missing"),
             Cause::Rebooted(_) => f.write_str("restarted: it must be configured anew"),
@@ -185,10 +227,38 @@ impl fmt::Display for Cause {
             Cause::Late => f.write_str("too many SYNCs late or left out: the driver is polled too seldom"),
             Cause::Starved => f.write_str("no new set-points"),
             Cause::Setpoints(rejection) => write!(f, "set-points rejected again and again: {rejection}"),
+            Cause::Hindered(_, why, status) => write!(f, "{why}, statusword {status:?}"),
+            Cause::FollowingError(_, error, limit) => {
+                write!(
+                    f,
+                    "following error {error:.4} rad, {limit:.4} may be: is the joint blocked, its brake closed?"
+                )
+            }
+            Cause::VelocityError(_, error, limit) => {
+                write!(f, "velocity error {error:.3} rad/s, {limit:.3} may be: is the joint blocked?")
+            }
+            Cause::Stuck(_, left) => {
+                write!(f, "stands still {left:.4} rad from its target: is it blocked, its brake closed?")
+            }
+            Cause::PositionJump(_, step, most) => {
+                write!(
+                    f,
+                    "the measured position jumped by {step:.4} rad, {most:.4} can be: check the encoder"
+                )
+            }
+            Cause::PositionLimit(_, q, limit) => {
+                write!(f, "measured at {q:.4} rad, beyond the limit {limit:.4} rad")
+            }
+            Cause::TorqueLimit(_, current, limit) => {
+                write!(
+                    f,
+                    "its current stays at {current:.2} A, the limit is {limit:.2} A: blocked, or loaded too much"
+                )
+            }
             Cause::WrongVelocityScale(_, part) => {
                 write!(
                     f,
-                    "went {part:.2} of the way that the velocities asked for: check the scale of 0x604C, or \
+                    "went {part:.2} of the travel that the velocities asked for: check the scale of 0x604C, or \
                         free the joint"
                 )
             }

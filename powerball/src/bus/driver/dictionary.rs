@@ -63,6 +63,48 @@ pub struct Entry {
     pub name: &'static str,
 }
 
+/// What may be done with a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Access {
+    /// Only read.
+    ReadOnly,
+    /// Only written.
+    WriteOnly,
+    /// Both.
+    ReadWrite,
+}
+
+impl Entry {
+    /// A variable that cannot be mapped and whose value after power-up is not known.
+    pub const fn new(index: u16, sub: u8, data_type: DataType, access: Access, name: &'static str) -> Entry {
+        Entry {
+            object: Object::new(index, sub),
+            data_type,
+            readable: !matches!(access, Access::WriteOnly),
+            writable: !matches!(access, Access::ReadOnly),
+            mappable: false,
+            default: None,
+            plus_node: false,
+            name,
+        }
+    }
+
+    /// The same, which can be in a PDO.
+    pub const fn mapped(self) -> Entry {
+        Entry { mappable: true, ..self }
+    }
+
+    /// The same with its value after power-up.
+    pub const fn default(self, value: i64) -> Entry {
+        Entry { default: Some(value), ..self }
+    }
+
+    /// The same with its value after power-up, to which the node's number is added.
+    pub const fn default_plus_node(self, value: i64) -> Entry {
+        Entry { default: Some(value), plus_node: true, ..self }
+    }
+}
+
 /// The entry of `object` in a table that is sorted by object.
 pub fn find(table: &'static [Entry], object: Object) -> Option<&'static Entry> {
     table.binary_search_by_key(&object, |entry| entry.object).ok().and_then(|at| table.get(at))

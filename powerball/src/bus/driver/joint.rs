@@ -1,7 +1,9 @@
 //! One joint while the driver runs: what its drive says, and what it is told.
 
+use super::demand::Demand;
 use super::profile::{ControlMode, JointProfile, ModeProfile};
 use super::units::{JointUnits, Saturated, to_i16};
+use super::watch::Watched;
 use crate::bus::canopen::client::Client;
 use crate::bus::canopen::emcy::Emcy;
 use crate::bus::canopen::nmt;
@@ -77,11 +79,19 @@ pub struct Joint {
     /// Transmit PDOs that came since the last SYNC, by bit.
     pub(super) arrived: u8,
     pub(super) missing_run: u8,
+    /// Process data came twice in this cycle, and in how many cycles in a row.
+    pub(super) duplicated: bool,
+    pub(super) duplicate_run: u8,
     pub(super) overspeed_run: u8,
     pub(super) progress: Progress,
-    /// Accepted set-point, and the one that left last; rad, rad/s or A.
+    /// Accepted set-point, and those that have left; rad, rad/s or A.
     pub(super) target: f64,
-    pub(super) sent: f64,
+    pub(super) demand: Demand,
+    pub(super) watched: Watched,
+    /// Greatest current that the drive gives (0x6073), A, where it tells.
+    pub(super) current_limit: Option<f64>,
+    /// Settings that the drive declined and need not have, by bit.
+    pub(super) declined: u8,
     /// Profile position: the target announced last, and whether its announcing bit is up.
     pub(super) announced: Option<i32>,
     pub(super) raised: bool,
@@ -116,10 +126,15 @@ impl Joint {
             heartbeat: HeartbeatConsumer::new(heartbeat_timeout),
             arrived: 0,
             missing_run: 0,
+            duplicated: false,
+            duplicate_run: 0,
             overspeed_run: 0,
             progress: Progress::Waiting,
             target: 0.0,
-            sent: 0.0,
+            demand: Demand::at_rest(0.0),
+            watched: Watched::default(),
+            current_limit: None,
+            declined: 0,
             announced: None,
             raised: false,
             swept: 0.0,
@@ -156,6 +171,7 @@ impl Joint {
         let bit = 1 << (number - 1);
         if self.arrived & bit != 0 {
             self.counters.duplicates += 1;
+            self.duplicated = true;
         }
         self.arrived |= bit;
         true
@@ -178,7 +194,7 @@ impl Joint {
     /// Target := what holds the joint, forgetting every set-point.
     pub(super) fn preset(&mut self, control: ControlMode) {
         self.target = self.hold(control);
-        self.sent = self.target;
+        self.demand = Demand::at_rest(self.target);
         self.announced = None;
         self.raised = false;
     }
@@ -186,7 +202,7 @@ impl Joint {
     /// A cycle of `period` s with the velocity that was sent. Once enough way was asked for: the part of it
     /// that the joint has gone, and a new beginning.
     pub(super) fn sweep(&mut self, period: f64, enough: f64) -> Option<f64> {
-        self.swept += self.sent * period;
+        self.swept += self.demand.last() * period;
         if self.swept.abs() < enough {
             return None;
         }

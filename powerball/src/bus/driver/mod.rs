@@ -5,11 +5,11 @@
 //! the arm stands in a [`Profile`]. Set-points and measurements are in SI.
 //!
 //! ```text
-//! Idle ─start→ Boot → Identify → Configure → Verify → Starting → Ready ─enable→ Enabling → Running (set each
-//! cycle)
-//!
-//! Enabling, Running ─stop→ Stopping → Ready            any phase ─cause→ Stopping (where joints may move) →
-//! Faulted Faulted ─acknowledge→ Resetting → Starting           or Idle, where the cause asks for a restart
+//! Idle ─start→ Listening → Boot → Identify → Configure → Verify → Starting → Ready
+//! Ready ─enable→ Enabling → Running (set each cycle)
+//! Enabling, Running ─stop→ Stopping → Ready
+//! any phase ─cause→ Stopping (where joints may move) → Faulted
+//! Faulted ─acknowledge→ Resetting → Starting, or Idle, where the cause asks for a restart
 //! ```
 //!
 //! # A cycle
@@ -36,11 +36,16 @@
 //! | unexpected state or mode | each statusword and mode display | stop, [`Cause::DriveFault`], [`Cause::StateLost`], [`Cause::UnknownState`], [`Cause::WrongMode`] | at once |
 //! | left NMT operational | heartbeat | stop, [`Cause::NotOperational`], restart needed | at once |
 //! | error passive | transport | counted | |
+//! | another master: SYNC, NMT, set-points for our nodes, our own heartbeat | listening before the start, and always | before: refused, nothing was sent; later: stop, [`Cause::OtherMaster`], restart needed | at once |
+//! | two nodes with one id | process data twice in a cycle, 5 cycles in a row | stop, [`Cause::TwoNodes`], restart needed | 5 cycles |
 //! | bus-off | transport | queue discarded, silence (also of the heartbeat, so that the drives stop themselves), [`Cause::BusOff`], restart needed | at once |
 //! | transmit queue full | transport | queue discarded, stop, repeated until it could be queued | at once |
 //! | set-point NaN, jumping, outside the limits | before it leaves | rejected, the last one held, counted; 3 cycles in a row: stop, [`Cause::Setpoints`] | 3 cycles |
 //! | no new set-point | in the slot | the last one held; 3 cycles in a row: stop, [`Cause::Starved`] (not in profile position) | 3 cycles |
 //! | velocities mean something else | way asked for and way gone, while the scale is not verified on hardware | stop, [`Cause::WrongVelocityScale`] | 0.1 rad |
+//! | joint not where or not as fast as told, stuck, jumping, beyond its limits, at its current limit | each cycle | stop, [`Cause::FollowingError`], [`Cause::VelocityError`], [`Cause::Stuck`], [`Cause::PositionJump`], [`Cause::PositionLimit`], [`Cause::TorqueLimit`] | [`profile::Reactions`] |
+//! | voltage, remote, internal limit, interpolation, following error in the statusword | each statusword of a joint with torque | stop, [`Cause::Hindered`] | at once, 3 cycles |
+//! | the program is asked to end | the caller, by a signal | stop, [`Cause::Interrupted`] | at once |
 //! | joint too fast | measured velocity | 3 cycles in a row: stop, [`Cause::Overspeed`] | 3 cycles |
 //! | refused transition | state and time | stop, [`Cause::Transition`] with the reason that the statusword gives | its time limit |
 //!
@@ -50,7 +55,9 @@ mod bringup;
 pub mod budget;
 pub mod cause;
 mod cycle;
+mod demand;
 pub mod dictionary;
+mod foreign;
 mod guard;
 #[cfg(feature = "bus")]
 pub mod import;
@@ -62,9 +69,11 @@ mod receive;
 mod script;
 mod stop;
 pub mod units;
+mod watch;
 
 pub use budget::{Budget, Verdict};
 pub use cause::{Cause, Details, Refusal};
+pub use foreign::Foreign;
 pub use guard::Rejection;
 pub use joint::{Joint, JointCounters};
 pub use link::{BusEvent, QueueFull, Transmit};
@@ -81,6 +90,8 @@ use stop::{ResetStage, StopStage};
 pub enum Phase {
     /// Nothing: no frame leaves.
     Idle,
+    /// Nothing is sent: another master would be heard.
+    Listening,
     /// The nodes were reset; their boot-up messages are awaited.
     Boot,
     /// Who they are and what they offer is read.
@@ -107,8 +118,9 @@ pub enum Phase {
 
 impl Phase {
     /// All of them.
-    pub const ALL: [Phase; 12] = [
+    pub const ALL: [Phase; 13] = [
         Phase::Idle,
+        Phase::Listening,
         Phase::Boot,
         Phase::Identify,
         Phase::Configure,
@@ -126,6 +138,7 @@ impl Phase {
     pub const fn text(self) -> &'static str {
         match self {
             Phase::Idle => "is idle",
+            Phase::Listening => "listens for another master",
             Phase::Boot => "waits for the nodes to boot",
             Phase::Identify => "identifies the nodes",
             Phase::Configure => "configures the nodes",
@@ -297,7 +310,8 @@ impl<const N: usize> Driver<N> {
         self.bring_up = BringUp::default();
         self.sync.stop();
         self.joints.iter_mut().for_each(|joint| joint.heartbeat.stop());
-        self.enter(Phase::Boot);
+        // Who was heard by its nodes until now has listened all the time, and must not fall silent.
+        self.enter(if self.phase == Phase::Ready { Phase::Boot } else { Phase::Listening });
         Ok(verdict)
     }
 
@@ -429,6 +443,10 @@ impl<const N: usize> Driver<N> {
         if self.phase == Phase::Idle || self.silent {
             return;
         }
+        if self.phase == Phase::Listening {
+            self.poll_listening();
+            return;
+        }
         if self.heartbeat.poll(now) {
             let frame = crate::bus::canopen::nmt::State::Operational.frame(self.profile.master);
             self.send(frame, tx);
@@ -442,7 +460,7 @@ impl<const N: usize> Driver<N> {
             Phase::Enabling => self.poll_enabling(tx),
             Phase::Stopping => self.retry_stop(tx),
             Phase::Faulted => self.poll_diagnosis(tx),
-            Phase::Idle | Phase::Ready | Phase::Running | Phase::Resetting => {}
+            Phase::Idle | Phase::Listening | Phase::Ready | Phase::Running | Phase::Resetting => {}
         }
         self.check_queue(tx);
     }

@@ -93,6 +93,11 @@ pub struct JointProfile {
     pub acceleration: f64,
     /// Greatest current, A.
     pub current: f64,
+    /// Greatest following error, rad: beyond the delay with which a drive follows. Written to 0x6065 where the
+    /// drive has it, and watched by the driver in interpolated position mode always.
+    pub following_error: f64,
+    /// Greatest velocity error, rad/s, watched in velocity mode.
+    pub velocity_error: f64,
 }
 
 /// Times and limits of the driver's reactions. [`Reactions::DEFAULT`] is what `docs/bus.md` argues for.
@@ -122,8 +127,31 @@ pub struct Reactions {
     /// A joint measured faster than this times its greatest speed, for [`Reactions::missing_cycles`] cycles,
     /// stops the arm.
     pub overspeed_factor: f64,
-    /// So much way, rad, is asked for in velocity mode before it is compared with the way that was gone.
-    pub scale_way: f64,
+    /// So much travel, rad, is asked for in velocity mode before it is compared with the travel that was gone.
+    pub scale_travel: f64,
+    /// Cycles in a row beyond [`JointProfile::following_error`] that stop the arm; their time is written to 0x6066
+    /// where the drive has it.
+    pub following_cycles: u8,
+    /// Cycles in a row beyond [`JointProfile::velocity_error`] that stop the arm.
+    pub velocity_cycles: u8,
+    /// Profile position: a joint away from its target that moves less than this, rad, …
+    pub still_travel: f64,
+    /// … in this time stops the arm.
+    pub still_time: Micros,
+    /// Cycles in a row with an internal limit, or without interpolation, that stop the arm.
+    pub status_cycles: u8,
+    /// A position may jump by so much, rad, beside what the greatest velocity explains.
+    pub jump_margin: f64,
+    /// A measured position may be so far beyond its limits, rad.
+    pub position_tolerance: f64,
+    /// A current above this part of the greatest one …
+    pub current_limit_part: f64,
+    /// … for so long stops the arm.
+    pub current_limit_time: Micros,
+    /// Nothing is sent for so long before the start, to hear whether another master is there.
+    pub listen_time: Micros,
+    /// Cycles in a row in which process data of a node comes twice that stop the arm.
+    pub duplicate_cycles: u8,
     /// For a node to boot.
     pub boot_timeout: Micros,
     /// For an SDO answer.
@@ -165,7 +193,18 @@ impl Reactions {
         step_factor: 1.05,
         current_step: 0.25,
         overspeed_factor: 1.5,
-        scale_way: 0.1,
+        scale_travel: 0.1,
+        following_cycles: 4,
+        velocity_cycles: 20,
+        still_travel: 0.002,
+        still_time: 500_000,
+        status_cycles: 3,
+        jump_margin: 0.01,
+        position_tolerance: 0.02,
+        current_limit_part: 0.98,
+        current_limit_time: 300_000,
+        listen_time: 300_000,
+        duplicate_cycles: 5,
         boot_timeout: 5_000_000,
         sdo_timeout: 100_000,
         sdo_retries: 2,
@@ -256,14 +295,20 @@ impl<const N: usize> Profile<N> {
                 return wrong("a node id is used twice");
             }
             let [low, high] = joint.position;
-            let positive =
-                [joint.velocity, joint.acceleration, joint.current, joint.units.counts_per_radian.abs()];
+            let positive = [
+                joint.velocity,
+                joint.acceleration,
+                joint.current,
+                joint.following_error,
+                joint.velocity_error,
+                joint.units.counts_per_radian.abs(),
+            ];
             if low.partial_cmp(&high) != Some(core::cmp::Ordering::Less)
                 || positive.iter().any(|value| !(value.is_finite() && *value > 0.0))
             {
                 return wrong(
-                    "a joint's limits are no range, or its speed, acceleration, current or scale is not \
-                        positive",
+                    "a joint's limits are no range, or its velocity, acceleration, current, greatest following or \
+                        velocity error or scale is not positive",
                 );
             }
         }

@@ -17,6 +17,9 @@ impl<const N: usize> Driver<N> {
         if self.phase == Phase::Idle || self.silent {
             return;
         }
+        if self.is_foreign(frame, tx) || self.phase == Phase::Listening {
+            return;
+        }
         let node = match Cob::of(frame) {
             Some(Cob::Tpdo(_, node) | Cob::Emcy(node) | Cob::SdoResponse(node) | Cob::Heartbeat(node)) => {
                 node
@@ -58,8 +61,12 @@ impl<const N: usize> Driver<N> {
         if !self.joints.get_mut(j).is_some_and(|joint| joint.update(number, &mapping, frame)) {
             return;
         }
+        if mapping.contains(objects::POSITION) {
+            self.watch_position(j, tx);
+        }
         if mapping.contains(objects::STATUSWORD) {
             self.judge_state(j, tx);
+            self.watch_status(j, tx);
         }
         if mapping.contains(objects::MODE_DISPLAY) {
             self.judge_mode(j, tx);

@@ -49,6 +49,16 @@ impl Write {
         self.number as u32 & self.verify
     }
 
+    /// For a setting that a drive need not have: a bit by which it is known. What declines it is watched by the
+    /// driver alone.
+    pub(super) fn optional(&self) -> Option<u8> {
+        match self.object {
+            objects::FOLLOWING_ERROR_WINDOW => Some(1),
+            objects::FOLLOWING_ERROR_TIME => Some(2),
+            _ => None,
+        }
+    }
+
     /// Whether the drive's watching of the master depends on it.
     pub(super) fn is_watch(&self) -> bool {
         self.object == CONSUMER_HEARTBEAT || self.object == schunk::SYNC_TIMEOUT_FACTOR
@@ -130,6 +140,11 @@ pub(super) fn configuration<const N: usize>(
             Write::new(objects::POSITION_LIMIT_MIN, a.min(b), 4),
             Write::new(objects::POSITION_LIMIT_MAX, a.max(b), 4),
         ];
+        let following_time = u64::from(profile.reactions.following_cycles) * profile.sync_period / 1000;
+        let following = [
+            Write::new(objects::FOLLOWING_ERROR_WINDOW, counts(joint.following_error).abs(), 4),
+            Write::new(objects::FOLLOWING_ERROR_TIME, following_time as i64, 2),
+        ];
         let profile_position = [
             Write::new(objects::PROFILE_VELOCITY, counts(joint.velocity).abs(), 4),
             Write::new(objects::PROFILE_ACCELERATION, counts(joint.acceleration).abs(), 4),
@@ -140,6 +155,7 @@ pub(super) fn configuration<const N: usize>(
             .chain(transmit)
             .chain(general)
             .chain(limits)
+            .chain(following.into_iter().filter(move |_| control.is_position()))
             .chain(profile_position.into_iter().filter(move |_| moves))
             .chain(linear.then_some(Write::new(objects::INTERPOLATION_SUB_MODE, 0, 2)))
             .chain([Write::new(objects::MODE, mode_code, 1)])
@@ -150,10 +166,12 @@ pub(super) fn configuration<const N: usize>(
 pub(super) fn questions(mode: &ModeProfile, control: ControlMode) -> impl Iterator<Item = Object> {
     let always =
         [VENDOR_ID, PRODUCT_CODE, REVISION, SERIAL_NUMBER, objects::SUPPORTED_MODES, objects::RATED_CURRENT];
+    // The greatest current is per mille of the rated one, and so asked for after it.
+    let always = always.into_iter().chain([objects::MAX_CURRENT]);
     let velocity = [objects::VL_FACTOR_NUMERATOR, objects::VL_FACTOR_DENOMINATOR];
     let scaled = control == ControlMode::Velocity;
     // The target itself: a drive that has it not says so now, and not in the middle of its mapping.
-    always.into_iter().chain(velocity.into_iter().filter(move |_| scaled)).chain([mode.setpoint])
+    always.chain(velocity.into_iter().filter(move |_| scaled)).chain([mode.setpoint])
 }
 
 #[cfg(test)]
@@ -172,8 +190,13 @@ mod tests {
     fn the_drives_dictionary_takes_the_configuration() {
         for control in ControlMode::ALL {
             for write in writes(control) {
-                let entry =
-                    dictionary::find(DICTIONARY, write.object).unwrap_or_else(|| panic!("{}", write.object));
+                let entry = dictionary::find(DICTIONARY, write.object);
+                // This drive has a window for the following error, and no time for it.
+                if write.object == objects::FOLLOWING_ERROR_TIME {
+                    assert!(entry.is_none() && write.optional().is_some());
+                    continue;
+                }
+                let entry = entry.unwrap_or_else(|| panic!("{}", write.object));
                 assert!(entry.writable, "{}", write.object);
                 assert_eq!(entry.data_type.size(), Some(usize::from(write.size)), "{}", write.object);
                 assert!(write.verify == 0 || entry.readable, "{}", write.object);

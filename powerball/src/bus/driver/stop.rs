@@ -42,9 +42,19 @@ impl<const N: usize> Driver<N> {
         self.now = now;
         match self.phase {
             Phase::Enabling | Phase::Running => self.begin_stop(tx),
+            Phase::Listening => self.enter(Phase::Idle),
             Phase::Boot | Phase::Identify | Phase::Configure | Phase::Verify => self.give_up(Phase::Idle, tx),
             Phase::Starting | Phase::Resetting => self.begin_stop(tx),
             Phase::Idle | Phase::Ready | Phase::Stopping | Phase::Faulted => {}
+        }
+    }
+
+    /// Stops the arm because the program was asked to end: as [`Driver::stop`], and latched, so that nothing moves
+    /// again. Once is enough.
+    pub fn interrupt(&mut self, now: Micros, tx: &mut impl Transmit) {
+        self.now = now;
+        if self.cause != Some(Cause::Interrupted) {
+            self.trip(Cause::Interrupted, tx);
         }
     }
 
@@ -99,7 +109,8 @@ impl<const N: usize> Driver<N> {
             Phase::Boot | Phase::Identify | Phase::Configure | Phase::Verify => {
                 self.give_up(Phase::Faulted, tx)
             }
-            Phase::Starting | Phase::Ready | Phase::Resetting => self.fault(),
+            // Nothing was sent yet, and nothing is.
+            Phase::Listening | Phase::Starting | Phase::Ready | Phase::Resetting => self.fault(),
             Phase::Idle | Phase::Stopping | Phase::Faulted => {}
         }
     }
@@ -109,7 +120,7 @@ impl<const N: usize> Driver<N> {
         self.joints.iter_mut().for_each(|joint| joint.client.cancel());
         (self.details, self.diagnosis) = (Details::default(), None);
         self.sync.stop();
-        self.send(nmt::Command::EnterPreOperational.frame(None), tx);
+        self.manage(nmt::Command::EnterPreOperational, tx);
         self.enter(phase);
     }
 

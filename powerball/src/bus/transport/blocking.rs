@@ -56,7 +56,18 @@ pub fn read(bus: &mut dyn Bus, node: NodeId, object: Object) -> Result<Value, Tr
 /// # Errors
 /// As [`read`].
 pub fn write(bus: &mut dyn Bus, node: NodeId, object: Object, value: Value) -> Result<(), TransferError> {
-    let mut client = Client::new(node, TIMEOUT);
+    write_within(bus, node, object, value, TIMEOUT)
+}
+
+/// The same with `timeout` µs for each answer.
+pub(super) fn write_within(
+    bus: &mut dyn Bus,
+    node: NodeId,
+    object: Object,
+    value: Value,
+    timeout: Micros,
+) -> Result<(), TransferError> {
+    let mut client = Client::new(node, timeout);
     let first = client.write(object, value, bus.now());
     run(bus, node, client, first).map(|_| ())
 }

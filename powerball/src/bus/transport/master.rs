@@ -1,17 +1,28 @@
 //! A driver on a bus: the loop that neither of them has.
 
-use super::{Bus, BusError, Event};
-use crate::bus::canopen::{Frame, Micros};
+use super::{Bus, BusError, Event, Interrupt, blocking};
+use crate::bus::canopen::client::Value;
+use crate::bus::canopen::objects::CONSUMER_HEARTBEAT;
+use crate::bus::canopen::{Frame, Micros, NodeId, nmt};
 use crate::bus::driver::{BusEvent, Cause, Driver, Phase, QueueFull, Refusal, Transmit};
 use std::fmt;
 
+/// For the arm to come to rest with closed brakes and without torque, µs.
+const STOP: Micros = 5_000_000;
+
 /// A [`Driver`] with the [`Bus`] that its arm is on.
+///
+/// However a program leaves it, by an error, a panic or a signal ([`Master::with_interrupt`]), the arm is stopped: a
+/// master that is dropped while joints may have torque sends quick stop, closes the brakes, takes the torque away and
+/// tells the drives that they need not watch it any more. A program that is killed (SIGKILL) or a machine that
+/// loses its power sends nothing: then the drives' own watching stops them.
 #[derive(Debug)]
-pub struct Master<B, const N: usize> {
+pub struct Master<B: Bus, const N: usize> {
     driver: Driver<N>,
     bus: B,
     cycle: u64,
     told: bool,
+    interrupt: Interrupt,
 }
 
 /// What has happened in a [`step`](Master::step).
@@ -92,7 +103,15 @@ impl<B: Bus> Transmit for Out<'_, B> {
 impl<B: Bus, const N: usize> Master<B, N> {
     /// A driver and the bus of its arm.
     pub fn new(driver: Driver<N>, bus: B) -> Self {
-        Master { driver, bus, cycle: 0, told: true }
+        Master { driver, bus, cycle: 0, told: true, interrupt: Interrupt::default() }
+    }
+
+    /// The same, stopped by signals: the stop leaves within 10 ms of one.
+    #[must_use]
+    pub fn with_interrupt(mut self, interrupt: Interrupt) -> Self {
+        interrupt.guard(true);
+        self.interrupt = interrupt;
+        self
     }
 
     /// The driver.
@@ -131,6 +150,9 @@ impl<B: Bus, const N: usize> Master<B, N> {
             Some((_, Event::Restarted)) | None => {}
         }
         let now = out.bus.now();
+        if self.interrupt.is_asked() {
+            driver.interrupt(now, &mut out);
+        }
         driver.poll(now, &mut out);
         match out.wrong {
             Some(BusError::Off) => driver.event(BusEvent::BusOff, now, &mut out),
@@ -189,15 +211,144 @@ impl<B: Bus, const N: usize> Master<B, N> {
     /// # Errors
     /// As [`wait_for`](Self::wait_for).
     pub fn stop(&mut self) -> Result<(), ArmError> {
+        self.bring_to_rest()?;
+        self.check()
+    }
+
+    fn bring_to_rest(&mut self) -> Result<(), ArmError> {
         let now = self.bus.now();
         let mut out = Out { bus: &mut self.bus, wrong: None };
         self.driver.stop(now, &mut out);
-        let until = now + 5_000_000;
-        while !matches!(self.driver.phase(), Phase::Ready | Phase::Idle | Phase::Faulted) {
+        let until = now + STOP;
+        while !self.is_at_rest() {
             if self.step(until)? == Moment::Over {
                 return Err(ArmError::Slow(Phase::Ready, self.driver.phase()));
             }
         }
-        self.check()
+        Ok(())
+    }
+
+    fn is_at_rest(&self) -> bool {
+        matches!(self.driver.phase(), Phase::Ready | Phase::Idle | Phase::Faulted)
+    }
+
+    /// The drives need not watch this master any more: it leaves in order, and none of them takes its silence for
+    /// an emergency. A node that does not answer is left as it is.
+    fn disarm_watch(&mut self) {
+        let silent = matches!(self.driver.cause(), Some(Cause::BusOff));
+        if self.driver.phase() == Phase::Idle || silent {
+            return;
+        }
+        let nodes: Vec<NodeId> = self.driver.profile().joints.iter().map(|joint| joint.node).collect();
+        for node in &nodes {
+            let _ = self.bus.send(&nmt::Command::EnterPreOperational.frame(Some(*node)));
+        }
+        for node in nodes {
+            let off = Value::number(0, 4);
+            let _ = blocking::write_within(&mut self.bus, node, CONSUMER_HEARTBEAT, off, DISARM);
+        }
+    }
+}
+
+/// For each drive's answer when the watch is disarmed, µs.
+const DISARM: Micros = 20_000;
+
+impl<B: Bus, const N: usize> Drop for Master<B, N> {
+    fn drop(&mut self) {
+        // What cannot be done here is done by the drives, which watch.
+        if self.is_at_rest() || self.bring_to_rest().is_ok() {
+            self.disarm_watch();
+        }
+        self.interrupt.guard(false);
+    }
+}
+
+#[cfg(all(test, feature = "virtual-arm"))]
+mod tests {
+    use super::*;
+    use crate::bus::cia402::State;
+    use crate::bus::driver::ControlMode;
+    use crate::bus::driver::lwa4p::LWA4P;
+    use crate::bus::transport::Memory;
+    use crate::virtual_arm::{VirtualArm, lwa4p};
+
+    fn bus() -> Memory<VirtualArm> {
+        let mut setup = lwa4p::setup([0.1; 6], 1).unwrap();
+        setup.modules.iter_mut().for_each(|module| module.commutated = true);
+        Memory::new(VirtualArm::new(setup).unwrap(), LWA4P.bitrate)
+    }
+
+    /// A master whose joints all move.
+    fn moving(bus: &mut Memory<VirtualArm>) -> Master<&mut Memory<VirtualArm>, 6> {
+        let mut master = Master::new(Driver::new(LWA4P).unwrap(), bus);
+        master.driver_mut().start(ControlMode::Velocity, false).unwrap();
+        master.wait_for(Phase::Ready, 20_000_000).unwrap();
+        master.driver_mut().enable().unwrap();
+        master.wait_for(Phase::Running, 20_000_000).unwrap();
+        fly(&mut master, 100);
+        master
+    }
+
+    fn fly<B: Bus>(master: &mut Master<B, 6>, cycles: u64) {
+        let end = master.driver().counters().cycles + cycles;
+        while master.driver().counters().cycles < end && master.driver().phase() == Phase::Running {
+            if master.step(Micros::MAX).unwrap() == Moment::Cycle {
+                let velocity = master.driver().joints().map(|joint| (joint.velocity + 0.01).min(0.2));
+                let _ = master.driver_mut().set(&velocity);
+            }
+        }
+    }
+
+    fn rests(bus: &Memory<VirtualArm>) {
+        let arm = bus.peer();
+        for (j, node) in arm.nodes().iter().enumerate() {
+            assert!(node.brake_closed() && !node.state().has_torque(), "joint {}: {}", j + 1, node.state());
+            assert!(arm.simulation().speed(j).abs() < 1e-3);
+            assert_ne!(node.state(), State::Fault);
+            // Nothing was missed by the drive: no emergency stands in its error history.
+            let history = crate::bus::canopen::Object::new(0x1003, 0);
+            assert_eq!(node.dictionary().get(history), 0, "joint {}", j + 1);
+        }
+    }
+
+    #[test]
+    fn a_master_that_is_dropped_stops_the_arm_and_leaves_no_emergency() {
+        let mut bus = bus();
+        drop(moving(&mut bus));
+        rests(&bus);
+        // Long after the drives would have missed its heartbeat.
+        while bus.receive(bus.now() + 1_000_000).unwrap().is_some() {}
+        rests(&bus);
+    }
+
+    #[test]
+    fn a_panic_stops_the_arm() {
+        let mut bus = bus();
+        let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            let _master = moving(&mut bus);
+            panic!("of the caller");
+        }));
+        assert!(panicked.is_err());
+        rests(&bus);
+    }
+
+    /// The quick stop leaves with the next step, at most 10 ms later; asking twice does not cut it short.
+    #[test]
+    fn an_interrupt_is_a_latched_stop() {
+        let mut bus = bus();
+        let interrupt = Interrupt::default();
+        let mut master = moving(&mut bus).with_interrupt(interrupt.clone());
+        interrupt.ask();
+        let asked = master.bus().now();
+        while master.driver().phase() != Phase::Stopping {
+            master.step(Micros::MAX).unwrap();
+        }
+        assert!(master.bus().now() - asked <= 10_000);
+        interrupt.ask();
+        let told = master.wait_for(Phase::Running, 5_000_000).unwrap_err();
+        assert!(matches!(told, ArmError::Stopped(Cause::Interrupted, _)), "{told}");
+        assert!(master.driver_mut().enable().is_err());
+        drop(master);
+        rests(&bus);
     }
 }

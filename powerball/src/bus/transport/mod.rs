@@ -4,6 +4,7 @@
 //! the bus, so that a bus in memory can run faster than real time.
 
 pub mod blocking;
+mod interrupt;
 mod master;
 mod memory;
 mod msgpack;
@@ -15,6 +16,7 @@ mod socketcan;
 mod udp;
 mod url;
 
+pub use interrupt::Interrupt;
 pub use master::{ArmError, Master, Moment};
 pub use memory::{Memory, Peer};
 #[cfg(unix)]
@@ -95,6 +97,24 @@ pub trait Bus: fmt::Debug {
 }
 
 impl<B: Bus + ?Sized> Bus for Box<B> {
+    fn now(&self) -> Micros {
+        (**self).now()
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        (**self).send(frame)
+    }
+
+    fn receive(&mut self, until: Micros) -> Result<Option<(Micros, Event)>, BusError> {
+        (**self).receive(until)
+    }
+
+    fn flush(&mut self) {
+        (**self).flush();
+    }
+}
+
+impl<B: Bus + ?Sized> Bus for &mut B {
     fn now(&self) -> Micros {
         (**self).now()
     }

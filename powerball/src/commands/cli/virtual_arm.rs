@@ -3,7 +3,7 @@
 use super::Failure;
 use super::output;
 use crate::bus::transport::{self, BusUrl};
-use crate::virtual_arm::{Effect, Undeclared, VirtualArm, lwa4p, slave};
+use crate::virtual_arm::{PlantEffect, Undeclared, VirtualArm, lwa4p, slave};
 use clap::Args;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -110,9 +110,13 @@ pub(crate) fn virtual_arm(
     setup.modules.iter_mut().for_each(|module| module.commutated = commutated);
     if let Some(name) = effect {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let effect = Effect::draw_named(name, &setup.plant, 100.0, 1.0..2.0, &mut rng).ok_or_else(|| {
-            Failure::Unusable(format!("no effect is called {name}; there are {}", Effect::NAMES.join(", ")))
-        })?;
+        let effect =
+            PlantEffect::draw_named(name, &setup.plant, 100.0, 1.0..2.0, &mut rng).ok_or_else(|| {
+                Failure::Unusable(format!(
+                    "no effect is called {name}; there are {}",
+                    PlantEffect::NAMES.join(", ")
+                ))
+            })?;
         setup.plant = setup.plant.with(effect);
     }
     VirtualArm::new(setup).ok_or_else(|| broken("its parts do not fit".to_string()))

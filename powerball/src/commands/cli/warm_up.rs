@@ -8,7 +8,7 @@ use crate::bus::transport::{Bus, BusUrl};
 use crate::procedure::warm_up::{Seen, Settings, Warmth, swing, warm_up};
 use crate::procedure::{RecordError, Recorder, resume};
 use crate::report::{Figure, Ink, Page, Panel, Series};
-use crate::virtual_arm::{Effect, VirtualArm, lwa4p};
+use crate::virtual_arm::{PlantEffect, VirtualArm, lwa4p};
 use clap::Args;
 use std::fs::File;
 use std::path::PathBuf;
@@ -81,7 +81,8 @@ impl WarmUp {
             BusUrl::Virtual => {
                 let broken = |e: String| Failure::Refused(format!("the built-in arm: {e}"));
                 let mut setup = lwa4p::setup([0.0; 6], 1).map_err(|e| broken(e.to_string()))?;
-                setup.plant = setup.plant.with(Effect::Temperature { change: -0.25, time_constant: 120.0 });
+                setup.plant =
+                    setup.plant.with(PlantEffect::Temperature { change: -0.25, time_constant: 120.0 });
                 setup.age = start;
                 virtual_bus(VirtualArm::new(setup).ok_or_else(|| broken("its parts do not fit".into()))?)?
             }

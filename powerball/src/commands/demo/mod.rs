@@ -19,7 +19,7 @@ use crate::identification::motion::Motion;
 use crate::logs::log::{LogError, common_clock, read_logs};
 use crate::logs::regression::{DataOptions, RigidBody};
 use crate::procedure::record;
-use crate::virtual_arm::Effect;
+use crate::virtual_arm::PlantEffect as Effect;
 use dyngen::Arm;
 use std::fmt;
 use std::path::{Path, PathBuf};

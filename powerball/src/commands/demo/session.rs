@@ -9,7 +9,7 @@ use crate::identification::excite::{self, Settings};
 use crate::identification::motion::Motion;
 use crate::procedure::{RecordError, Recorder, way};
 use crate::virtual_arm::slave::Setup;
-use crate::virtual_arm::{Effect, Plant, Undeclared, VirtualArm, lwa4p};
+use crate::virtual_arm::{Plant, PlantEffect as Effect, Undeclared, VirtualArm, lwa4p};
 use dyngen::{Model, SetKind};
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};

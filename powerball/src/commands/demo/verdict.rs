@@ -1,7 +1,7 @@
 //! Whether what was found is what is there.
 
 use crate::explanation::explain::Explained;
-use crate::virtual_arm::Effect;
+use crate::virtual_arm::PlantEffect as Effect;
 use serde::Serialize;
 
 /// How well the truth was found.

@@ -7,7 +7,7 @@ use crate::identification::excite::{Limits, Settings, optimise};
 use crate::identification::motion::Motion;
 use crate::logs::log::{Log, common_clock};
 use crate::logs::regression::{DataOptions, RigidBody};
-use crate::virtual_arm::{Effect, Plant, lwa4p};
+use crate::virtual_arm::{Plant, PlantEffect as Effect, lwa4p};
 use dyngen::{Model, SetKind};
 
 /// Logs along paths that leave most of every joint's range unused, and what they say.

@@ -1,13 +1,13 @@
 //! Effects drawn by lot, of sizes that matter and that happen.
 
-use super::Effect;
+use super::PlantEffect;
 use crate::virtual_arm::plant::Plant;
 use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt};
 use std::f64::consts::PI;
 use std::ops::Range;
 
-impl Effect {
+impl PlantEffect {
     /// The names that [`draw_named`](Self::draw_named) knows.
     pub const NAMES: [&'static str; 18] = [
         "load_friction",
@@ -41,7 +41,7 @@ impl Effect {
         session: f64,
         begins: Range<f64>,
         rng: &mut impl Rng,
-    ) -> Option<Effect> {
+    ) -> Option<PlantEffect> {
         let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
         let any = rng.random_range(0..plant.friction().len());
         let large = rng.random_range(0..4);
@@ -51,26 +51,26 @@ impl Effect {
         let moment = rng.random_range(begins);
         Some(match name {
             // The joints that gravity loads.
-            "load_friction" => Effect::LoadFriction {
+            "load_friction" => PlantEffect::LoadFriction {
                 joint: rng.random_range(1..3),
                 coefficient: rng.random_range(0.05..0.11),
             },
-            "stribeck" => Effect::Stribeck {
+            "stribeck" => PlantEffect::Stribeck {
                 joint: large,
                 level: plant.friction()[large].gamma1 * rng.random_range(0.3..0.6),
                 speed: rng.random_range(0.03..0.07),
             },
-            "velocity_nonlinearity" => Effect::VelocityNonlinearity {
+            "velocity_nonlinearity" => PlantEffect::VelocityNonlinearity {
                 joint: large,
                 torque: plant.friction()[large].gamma5 * rng.random_range(0.35..0.7),
                 exponent: rng.random_range(2.2..3.0),
             },
-            "asymmetry" => Effect::Asymmetry {
+            "asymmetry" => PlantEffect::Asymmetry {
                 joint: any,
                 share: rng.random_range(0.1..0.3),
                 constant: coulomb * rng.random_range(0.0..0.15),
             },
-            "hysteresis" => Effect::Hysteresis {
+            "hysteresis" => PlantEffect::Hysteresis {
                 joint: any,
                 level: coulomb * rng.random_range(0.3..0.6),
                 way: rng.random_range(0.010..0.030),
@@ -78,35 +78,37 @@ impl Effect {
             // What joint 2 can still carry on an exciting path.
             "payload" => {
                 let aside = [0, 1].map(|_| rng.random_range(-0.04..0.04));
-                Effect::payload(rng.random_range(0.6..1.2), aside, rng.random_range(0.03..0.10), moment)
+                PlantEffect::payload(rng.random_range(0.6..1.2), aside, rng.random_range(0.03..0.10), moment)
             }
-            "spring" => Effect::Spring {
+            "spring" => PlantEffect::Spring {
                 joint: any,
                 stiffness: 6.0 * noise * rng.random_range(0.5..1.2),
                 rest: rng.random_range(-0.5..0.5),
             },
-            "position_ripple" => Effect::PositionRipple {
+            "position_ripple" => PlantEffect::PositionRipple {
                 joint: any,
                 // Teeth and wave generator turn with the motor, bearings and cables with the joint.
                 order: *[5.0, 9.0, 14.0, 100.0, 160.0].choose(rng)?,
                 amplitude: noise * rng.random_range(1.2..2.5),
                 phase: rng.random_range(-PI..PI),
             },
-            "temperature" => Effect::Temperature {
+            "temperature" => PlantEffect::Temperature {
                 change: -rng.random_range(0.15..0.30),
                 time_constant: session * rng.random_range(0.3..0.6),
             },
-            "torque_constant" => Effect::TorqueConstant {
+            "torque_constant" => PlantEffect::TorqueConstant {
                 joint: rng.random_range(1..3),
                 gain: 1.0 + sign * rng.random_range(0.04..0.1),
             },
-            "time_delay" => Effect::TimeDelay { delay: rng.random_range(0.006..0.018) },
-            "encoder_offset" => Effect::EncoderOffset {
+            "time_delay" => PlantEffect::TimeDelay { delay: rng.random_range(0.006..0.018) },
+            "encoder_offset" => PlantEffect::EncoderOffset {
                 joint: rng.random_range(1..3),
                 offset: sign * rng.random_range(0.03..0.08),
             },
-            "base_tilt" => Effect::BaseTilt { tilt: [0, 1].map(|_| sign * rng.random_range(0.02..0.06)) },
-            "contact_wrench" => Effect::ContactWrench {
+            "base_tilt" => {
+                PlantEffect::BaseTilt { tilt: [0, 1].map(|_| sign * rng.random_range(0.02..0.06)) }
+            }
+            "contact_wrench" => PlantEffect::ContactWrench {
                 force: [0, 1, 2].map(|_| sign * rng.random_range(5.0..15.0)),
                 start: session * rng.random_range(0.0..0.1),
                 length: rng.random_range(2.0..5.0),
@@ -115,22 +117,22 @@ impl Effect {
             // The elbow and the forearm, whose centres of mass are declared to lie in a plane.
             "broken_symmetry" => {
                 let link = rng.random_range(2..4);
-                Effect::BrokenSymmetry {
+                PlantEffect::BrokenSymmetry {
                     link,
                     aside: sign * [0.02, 0.06][link - 2] * rng.random_range(0.8..1.5),
                 }
             }
-            "joint_elasticity" => Effect::JointElasticity {
+            "joint_elasticity" => PlantEffect::JointElasticity {
                 joint: rng.random_range(1..3),
                 stiffness: rng.random_range(1500.0..3500.0),
             },
             "backlash" => {
-                Effect::Backlash { joint: rng.random_range(1..3), gap: rng.random_range(0.01..0.03) }
+                PlantEffect::Backlash { joint: rng.random_range(1..3), gap: rng.random_range(0.01..0.03) }
             }
             // Both axes of a module share a housing.
             "joint_coupling" => {
                 let [from, onto] = [[0, 1], [1, 0], [2, 3], [3, 2], [4, 5], [5, 4]][rng.random_range(0..6)];
-                Effect::JointCoupling { from, onto, share: rng.random_range(0.06..0.15) }
+                PlantEffect::JointCoupling { from, onto, share: rng.random_range(0.06..0.15) }
             }
             _ => return None,
         })
@@ -138,30 +140,30 @@ impl Effect {
 
     /// The same effect about `factor` times as large, where and when it is.
     #[must_use]
-    pub fn scaled(&self, factor: f64) -> Effect {
+    pub fn scaled(&self, factor: f64) -> PlantEffect {
         let mut scaled = self.clone();
         match &mut scaled {
-            Effect::LoadFriction { coefficient: x, .. }
-            | Effect::Stribeck { level: x, .. }
-            | Effect::VelocityNonlinearity { torque: x, .. }
-            | Effect::Hysteresis { level: x, .. }
-            | Effect::Payload { mass: x, .. }
-            | Effect::Spring { stiffness: x, .. }
-            | Effect::PositionRipple { amplitude: x, .. }
-            | Effect::Temperature { change: x, .. }
-            | Effect::TimeDelay { delay: x }
-            | Effect::EncoderOffset { offset: x, .. }
-            | Effect::BrokenSymmetry { aside: x, .. }
-            | Effect::Backlash { gap: x, .. }
-            | Effect::JointCoupling { share: x, .. } => *x *= factor,
-            Effect::Asymmetry { share, constant, .. } => {
+            PlantEffect::LoadFriction { coefficient: x, .. }
+            | PlantEffect::Stribeck { level: x, .. }
+            | PlantEffect::VelocityNonlinearity { torque: x, .. }
+            | PlantEffect::Hysteresis { level: x, .. }
+            | PlantEffect::Payload { mass: x, .. }
+            | PlantEffect::Spring { stiffness: x, .. }
+            | PlantEffect::PositionRipple { amplitude: x, .. }
+            | PlantEffect::Temperature { change: x, .. }
+            | PlantEffect::TimeDelay { delay: x }
+            | PlantEffect::EncoderOffset { offset: x, .. }
+            | PlantEffect::BrokenSymmetry { aside: x, .. }
+            | PlantEffect::Backlash { gap: x, .. }
+            | PlantEffect::JointCoupling { share: x, .. } => *x *= factor,
+            PlantEffect::Asymmetry { share, constant, .. } => {
                 *share *= factor;
                 *constant *= factor;
             }
-            Effect::TorqueConstant { gain, .. } => *gain = 1.0 + factor * (*gain - 1.0),
-            Effect::BaseTilt { tilt } => tilt.iter_mut().for_each(|x| *x *= factor),
-            Effect::ContactWrench { force, .. } => force.iter_mut().for_each(|x| *x *= factor),
-            Effect::JointElasticity { stiffness, .. } => *stiffness /= factor,
+            PlantEffect::TorqueConstant { gain, .. } => *gain = 1.0 + factor * (*gain - 1.0),
+            PlantEffect::BaseTilt { tilt } => tilt.iter_mut().for_each(|x| *x *= factor),
+            PlantEffect::ContactWrench { force, .. } => force.iter_mut().for_each(|x| *x *= factor),
+            PlantEffect::JointElasticity { stiffness, .. } => *stiffness /= factor,
         }
         scaled
     }
@@ -177,9 +179,9 @@ mod tests {
     #[test]
     fn every_name_is_drawn_as_itself_and_the_same_seed_draws_the_same() {
         let plant = lwa4p::plant().unwrap();
-        for name in Effect::NAMES {
+        for name in PlantEffect::NAMES {
             let draw = |seed| {
-                Effect::draw_named(name, &plant, 100.0, 30.0..60.0, &mut ChaCha8Rng::seed_from_u64(seed))
+                PlantEffect::draw_named(name, &plant, 100.0, 30.0..60.0, &mut ChaCha8Rng::seed_from_u64(seed))
                     .unwrap()
             };
             assert_eq!(draw(5).name(), name);
@@ -187,7 +189,8 @@ mod tests {
             assert!((0..20).any(|seed| draw(seed) != draw(5)), "{name}");
         }
         assert!(
-            Effect::draw_named("ghosts", &plant, 1.0, 0.0..1.0, &mut ChaCha8Rng::seed_from_u64(1)).is_none()
+            PlantEffect::draw_named("ghosts", &plant, 1.0, 0.0..1.0, &mut ChaCha8Rng::seed_from_u64(1))
+                .is_none()
         );
     }
 }

@@ -45,10 +45,10 @@ impl Gear {
     }
 }
 
-/// One undeclared effect. Joints count from 0 here and from 1 in [`joints`](Effect::joints).
+/// One undeclared effect. Joints count from 0 here and from 1 in [`joints`](PlantEffect::joints).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Effect {
+pub enum PlantEffect {
     /// The gear's teeth rub in proportion to the torque that they carry, N·m of friction for each N·m.
     LoadFriction {
         /// The joint.
@@ -219,28 +219,28 @@ pub struct State {
     sliders: Option<(f64, [f64; SLIDERS])>,
 }
 
-impl Effect {
+impl PlantEffect {
     /// The name under which the effect is known to users.
     pub fn name(&self) -> &'static str {
         match self {
-            Effect::LoadFriction { .. } => "load_friction",
-            Effect::Stribeck { .. } => "stribeck",
-            Effect::VelocityNonlinearity { .. } => "velocity_nonlinearity",
-            Effect::Asymmetry { .. } => "asymmetry",
-            Effect::Hysteresis { .. } => "hysteresis",
-            Effect::Payload { .. } => "payload",
-            Effect::Spring { .. } => "spring",
-            Effect::PositionRipple { .. } => "position_ripple",
-            Effect::Temperature { .. } => "temperature",
-            Effect::TorqueConstant { .. } => "torque_constant",
-            Effect::TimeDelay { .. } => "time_delay",
-            Effect::EncoderOffset { .. } => "encoder_offset",
-            Effect::BaseTilt { .. } => "base_tilt",
-            Effect::ContactWrench { .. } => "contact_wrench",
-            Effect::BrokenSymmetry { .. } => "broken_symmetry",
-            Effect::JointElasticity { .. } => "joint_elasticity",
-            Effect::Backlash { .. } => "backlash",
-            Effect::JointCoupling { .. } => "joint_coupling",
+            PlantEffect::LoadFriction { .. } => "load_friction",
+            PlantEffect::Stribeck { .. } => "stribeck",
+            PlantEffect::VelocityNonlinearity { .. } => "velocity_nonlinearity",
+            PlantEffect::Asymmetry { .. } => "asymmetry",
+            PlantEffect::Hysteresis { .. } => "hysteresis",
+            PlantEffect::Payload { .. } => "payload",
+            PlantEffect::Spring { .. } => "spring",
+            PlantEffect::PositionRipple { .. } => "position_ripple",
+            PlantEffect::Temperature { .. } => "temperature",
+            PlantEffect::TorqueConstant { .. } => "torque_constant",
+            PlantEffect::TimeDelay { .. } => "time_delay",
+            PlantEffect::EncoderOffset { .. } => "encoder_offset",
+            PlantEffect::BaseTilt { .. } => "base_tilt",
+            PlantEffect::ContactWrench { .. } => "contact_wrench",
+            PlantEffect::BrokenSymmetry { .. } => "broken_symmetry",
+            PlantEffect::JointElasticity { .. } => "joint_elasticity",
+            PlantEffect::Backlash { .. } => "backlash",
+            PlantEffect::JointCoupling { .. } => "joint_coupling",
         }
     }
 
@@ -251,18 +251,18 @@ impl Effect {
 
     fn joint(&self) -> Option<usize> {
         match self {
-            Effect::LoadFriction { joint, .. }
-            | Effect::Stribeck { joint, .. }
-            | Effect::VelocityNonlinearity { joint, .. }
-            | Effect::Asymmetry { joint, .. }
-            | Effect::Hysteresis { joint, .. }
-            | Effect::Spring { joint, .. }
-            | Effect::PositionRipple { joint, .. }
-            | Effect::TorqueConstant { joint, .. }
-            | Effect::EncoderOffset { joint, .. }
-            | Effect::JointElasticity { joint, .. }
-            | Effect::Backlash { joint, .. }
-            | Effect::JointCoupling { onto: joint, .. } => Some(*joint),
+            PlantEffect::LoadFriction { joint, .. }
+            | PlantEffect::Stribeck { joint, .. }
+            | PlantEffect::VelocityNonlinearity { joint, .. }
+            | PlantEffect::Asymmetry { joint, .. }
+            | PlantEffect::Hysteresis { joint, .. }
+            | PlantEffect::Spring { joint, .. }
+            | PlantEffect::PositionRipple { joint, .. }
+            | PlantEffect::TorqueConstant { joint, .. }
+            | PlantEffect::EncoderOffset { joint, .. }
+            | PlantEffect::JointElasticity { joint, .. }
+            | PlantEffect::Backlash { joint, .. }
+            | PlantEffect::JointCoupling { onto: joint, .. } => Some(*joint),
             _ => None,
         }
     }
@@ -270,63 +270,63 @@ impl Effect {
     /// The effect's figures in words.
     pub fn describe(&self) -> String {
         match self {
-            Effect::LoadFriction { coefficient, .. } => {
+            PlantEffect::LoadFriction { coefficient, .. } => {
                 format!("gear friction of {coefficient:.3} N·m for each N·m that the gear carries")
             }
-            Effect::Stribeck { level, speed, .. } => {
+            PlantEffect::Stribeck { level, speed, .. } => {
                 format!(
                     "{level:.2} N·m more friction at the smallest speeds, gone beyond about {speed:.3} rad/s"
                 )
             }
-            Effect::VelocityNonlinearity { torque, exponent, .. } => {
+            PlantEffect::VelocityNonlinearity { torque, exponent, .. } => {
                 format!("{torque:.2} N·m·|q̇|^{exponent:.1} of churning losses")
             }
-            Effect::Asymmetry { share, constant, .. } => {
+            PlantEffect::Asymmetry { share, constant, .. } => {
                 format!(
                     "Coulomb friction {:+.0} % in the positive direction, {constant:+.2} N·m always",
                     100.0 * share
                 )
             }
-            Effect::Hysteresis { level, way, .. } => {
+            PlantEffect::Hysteresis { level, way, .. } => {
                 format!("{level:.2} N·m of friction that builds up over {:.1} mrad", 1e3 * way)
             }
-            Effect::Payload { mass, centre, start } => format!(
+            PlantEffect::Payload { mass, centre, start } => format!(
                 "{mass:.2} kg at ({:.3}, {:.3}, {:.3}) m of the last frame from t = {start:.1} s on",
                 centre[0], centre[1], centre[2]
             ),
-            Effect::Spring { stiffness, rest, .. } => {
+            PlantEffect::Spring { stiffness, rest, .. } => {
                 format!("a hose of {stiffness:.2} N·m/rad that is slack at {rest:+.2} rad")
             }
-            Effect::PositionRipple { order, amplitude, .. } => {
+            PlantEffect::PositionRipple { order, amplitude, .. } => {
                 format!("{amplitude:.2} N·m of ripple, {order:.0} cycles a turn")
             }
-            Effect::Temperature { change, time_constant } => {
+            PlantEffect::Temperature { change, time_constant } => {
                 format!(
                     "viscous friction changes by {:+.0} % with a time constant of {time_constant:.0} s",
                     100.0 * change
                 )
             }
-            Effect::TorqueConstant { gain, .. } => format!("logged torque is {gain:.3} of the true one"),
-            Effect::TimeDelay { delay } => format!("torques are logged {:.1} ms late", 1e3 * delay),
-            Effect::EncoderOffset { offset, .. } => {
+            PlantEffect::TorqueConstant { gain, .. } => format!("logged torque is {gain:.3} of the true one"),
+            PlantEffect::TimeDelay { delay } => format!("torques are logged {:.1} ms late", 1e3 * delay),
+            PlantEffect::EncoderOffset { offset, .. } => {
                 format!("the encoder's zero is off by {:+.1} mrad", 1e3 * offset)
             }
-            Effect::BaseTilt { tilt } => {
+            PlantEffect::BaseTilt { tilt } => {
                 format!("the base is tilted by ({:+.1}, {:+.1}) mrad", 1e3 * tilt[0], 1e3 * tilt[1])
             }
-            Effect::ContactWrench { force, start, length, every } => format!(
+            PlantEffect::ContactWrench { force, start, length, every } => format!(
                 "a force of ({:.0}, {:.0}, {:.0}) N on the wrist for {length:.1} s at t = {start:.1} s and \
                     every {every:.0} s after",
                 force[0], force[1], force[2]
             ),
-            Effect::BrokenSymmetry { link, aside } => {
+            PlantEffect::BrokenSymmetry { link, aside } => {
                 format!("the centre of mass of link {} lies {:+.1} mm off its plane", link + 1, 1e3 * aside)
             }
-            Effect::JointElasticity { stiffness, .. } => {
+            PlantEffect::JointElasticity { stiffness, .. } => {
                 format!("the gear winds up by a radian for {stiffness:.0} N·m")
             }
-            Effect::Backlash { gap, .. } => format!("the gear has {:.1} mrad of play", 1e3 * gap),
-            Effect::JointCoupling { from, share, .. } => {
+            PlantEffect::Backlash { gap, .. } => format!("the gear has {:.1} mrad of play", 1e3 * gap),
+            PlantEffect::JointCoupling { from, share, .. } => {
                 format!("{:.0} % of the friction of joint {} is felt here", 100.0 * share, from + 1)
             }
         }
@@ -335,7 +335,7 @@ impl Effect {
     /// The arm at time `t` where the effect changes its bodies or the direction of gravity.
     pub(super) fn changed_dynamics(&self, arm: &Dynamics, t: f64) -> Option<Dynamics> {
         match self {
-            Effect::Payload { mass, centre, start } if t >= *start => {
+            PlantEffect::Payload { mass, centre, start } if t >= *start => {
                 let mut bodies = arm.bodies().to_vec();
                 let last = bodies.last_mut()?;
                 // An even ball of the density of aluminium.
@@ -347,13 +347,13 @@ impl Effect {
                 last.inertia += load.inertia;
                 Dynamics::new(arm.chain().clone(), bodies)
             }
-            Effect::BrokenSymmetry { link, aside } => {
+            PlantEffect::BrokenSymmetry { link, aside } => {
                 let mut bodies = arm.bodies().to_vec();
                 let body = bodies.get_mut(*link)?;
                 *body = body.moved(Vector3::new(*aside, 0.0, 0.0));
                 Dynamics::new(arm.chain().clone(), bodies)
             }
-            Effect::BaseTilt { tilt } => {
+            PlantEffect::BaseTilt { tilt } => {
                 let mut chain = arm.chain().clone();
                 let turn = nalgebra::Rotation3::from_euler_angles(tilt[0], tilt[1], 0.0);
                 chain.gravity = turn.inverse() * chain.gravity;
@@ -367,10 +367,10 @@ impl Effect {
     /// speed.
     pub(super) fn rubs_at(&self) -> Option<usize> {
         match self {
-            Effect::LoadFriction { joint, .. }
-            | Effect::Stribeck { joint, .. }
-            | Effect::VelocityNonlinearity { joint, .. }
-            | Effect::Asymmetry { joint, .. } => Some(*joint),
+            PlantEffect::LoadFriction { joint, .. }
+            | PlantEffect::Stribeck { joint, .. }
+            | PlantEffect::VelocityNonlinearity { joint, .. }
+            | PlantEffect::Asymmetry { joint, .. } => Some(*joint),
             _ => None,
         }
     }
@@ -378,10 +378,10 @@ impl Effect {
     /// The gear that the effect makes of a joint's stiff one.
     pub(super) fn gear(&self) -> Option<(usize, Gear)> {
         match self {
-            Effect::JointElasticity { joint, stiffness } => {
+            PlantEffect::JointElasticity { joint, stiffness } => {
                 Some((*joint, Gear { stiffness: *stiffness, gap: 0.0 }))
             }
-            Effect::Backlash { joint, gap } => Some((*joint, Gear { stiffness: TEETH, gap: *gap })),
+            PlantEffect::Backlash { joint, gap } => Some((*joint, Gear { stiffness: TEETH, gap: *gap })),
             _ => None,
         }
     }
@@ -397,13 +397,13 @@ impl Effect {
     /// What the effect does to the logged positions and torques, n values a sample.
     pub(super) fn distort(&self, q: &mut [f64], tau: &mut [f64], n: usize, period: f64) {
         match self {
-            Effect::EncoderOffset { joint, offset } => {
+            PlantEffect::EncoderOffset { joint, offset } => {
                 q.chunks_exact_mut(n).for_each(|q| q[*joint] += offset)
             }
-            Effect::TorqueConstant { joint, gain } => {
+            PlantEffect::TorqueConstant { joint, gain } => {
                 tau.chunks_exact_mut(n).for_each(|tau| tau[*joint] *= gain)
             }
-            Effect::TimeDelay { delay } => {
+            PlantEffect::TimeDelay { delay } => {
                 let shift = delay / period;
                 let (whole, part) = (shift.floor() as usize, shift.fract());
                 let at =
@@ -421,7 +421,7 @@ impl Effect {
     }
 
     /// The payload's place: `mass` kg, its centre `beyond` m beyond the flange and `aside` m beside the axis.
-    fn payload(mass: f64, aside: [f64; 2], beyond: f64, start: f64) -> Effect {
-        Effect::Payload { mass, centre: [aside[0], aside[1], FLANGE + beyond], start }
+    fn payload(mass: f64, aside: [f64; 2], beyond: f64, start: f64) -> PlantEffect {
+        PlantEffect::Payload { mass, centre: [aside[0], aside[1], FLANGE + beyond], start }
     }
 }

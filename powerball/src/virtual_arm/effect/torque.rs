@@ -1,6 +1,6 @@
 //! The joint torques of the effects that are torques.
 
-use super::{Effect, Instant, SLIDERS, State};
+use super::{Instant, PlantEffect, SLIDERS, State};
 
 /// Below this speed the teeth of a gear do not yet rub at full strength, rad/s.
 const RUB_SPEED: f64 = 0.004;
@@ -9,47 +9,47 @@ const HOSE_STIFFENS_OVER: f64 = 6.0;
 /// Share and place of the second harmonic of a ripple.
 const SECOND_HARMONIC: (f64, f64) = (0.25, 0.7);
 
-impl Effect {
+impl PlantEffect {
     /// Adds the effect's torque, N·m, to the torques that the drives must give.
     pub(in crate::virtual_arm) fn add_torque(&self, now: &Instant<'_>, state: &mut State, tau: &mut [f64]) {
         match self {
-            Effect::LoadFriction { joint, coefficient } => {
+            PlantEffect::LoadFriction { joint, coefficient } => {
                 let carried = now.rigid[*joint];
                 tau[*joint] += coefficient * carried.hypot(0.02) * direction(now.dq[*joint], RUB_SPEED);
             }
-            Effect::Stribeck { joint, level, speed } => {
+            PlantEffect::Stribeck { joint, level, speed } => {
                 let dq = now.dq[*joint];
                 let film = 1.0 / (1.0 + (dq / speed).powi(2));
                 tau[*joint] += level * film * direction(dq, RUB_SPEED);
             }
-            Effect::VelocityNonlinearity { joint, torque, exponent } => {
+            PlantEffect::VelocityNonlinearity { joint, torque, exponent } => {
                 let dq = now.dq[*joint];
                 tau[*joint] += torque * dq.abs().powf(*exponent) * dq.signum();
             }
-            Effect::Asymmetry { joint, share, constant } => {
+            PlantEffect::Asymmetry { joint, share, constant } => {
                 let gamma = now.friction[*joint];
                 let forwards = 0.5 * (1.0 + direction(now.dq[*joint], RUB_SPEED));
                 tau[*joint] += constant + share * (gamma.gamma1 + gamma.gamma3) * forwards;
             }
-            Effect::Hysteresis { joint, level, way } => {
+            PlantEffect::Hysteresis { joint, level, way } => {
                 tau[*joint] += level * wind(&mut state.sliders, now.q[*joint], *way);
             }
-            Effect::Spring { joint, stiffness, rest } => {
+            PlantEffect::Spring { joint, stiffness, rest } => {
                 let x = now.q[*joint] - rest;
                 tau[*joint] += stiffness * x * (1.0 + (x / HOSE_STIFFENS_OVER).powi(2));
             }
-            Effect::PositionRipple { joint, order, amplitude, phase } => {
+            PlantEffect::PositionRipple { joint, order, amplitude, phase } => {
                 let x = order * now.q[*joint] + phase;
                 let (share, place) = SECOND_HARMONIC;
                 tau[*joint] += amplitude * (x.sin() + share * (2.0 * x + place).sin());
             }
-            Effect::Temperature { change, time_constant } => {
+            PlantEffect::Temperature { change, time_constant } => {
                 let warm = 1.0 - (-now.t / time_constant).exp();
                 for i in 0..tau.len() {
                     tau[i] += change * warm * now.friction[i].gamma5 * now.dq[i];
                 }
             }
-            Effect::ContactWrench { force, start, length, every }
+            PlantEffect::ContactWrench { force, start, length, every }
                 if now.t >= *start && (now.t - start).rem_euclid(*every) < *length =>
             {
                 // The force's share alone: the arm at rest with it and without it.
@@ -59,7 +59,7 @@ impl Effect {
                     tau[i] += with - without;
                 }
             }
-            Effect::JointCoupling { from, onto, share } => {
+            PlantEffect::JointCoupling { from, onto, share } => {
                 let (felt, dq) = (now.friction[*from], now.dq[*from]);
                 let level = |level: f64, steepness: f64| level * direction(dq, 1.0 / steepness);
                 let levels = level(felt.gamma1, felt.gamma2) + level(felt.gamma3, felt.gamma4);

@@ -5,7 +5,7 @@ use super::node::Node;
 use super::{Fault, Sample};
 use crate::bus::canopen::{Frame, Micros, NodeId};
 use crate::bus::transport::{Bus, BusError, Event, Peer};
-use crate::virtual_arm::{Effect, Plant, Simulation};
+use crate::virtual_arm::{Plant, PlantEffect, Simulation};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -68,7 +68,7 @@ impl VirtualArm {
         let nodes = modules.into_iter().zip(tuned).map(|(m, (i, f))| Node::new(m, [i, f])).collect();
         let mut offsets = vec![0.0; n];
         for effect in simulation.plant().effects() {
-            if let Effect::EncoderOffset { joint, offset } = effect {
+            if let PlantEffect::EncoderOffset { joint, offset } = effect {
                 offsets[*joint] += offset;
             }
         }
@@ -129,8 +129,8 @@ impl VirtualArm {
         let (mut delay, mut gains) = (0.0, vec![1.0; self.nodes.len()]);
         for effect in self.simulation.plant().effects() {
             match effect {
-                Effect::TimeDelay { delay: late } => delay += late,
-                Effect::TorqueConstant { joint, gain } => gains[*joint] *= gain,
+                PlantEffect::TimeDelay { delay: late } => delay += late,
+                PlantEffect::TorqueConstant { joint, gain } => gains[*joint] *= gain,
                 _ => {}
             }
         }

@@ -77,6 +77,8 @@ pub(super) struct Drive {
     /// Since the brake was asked to be other than it is, s.
     brake_wait: f64,
     brake_closed: bool,
+    /// The brake bites and does not let go.
+    pub(super) brake_stuck: bool,
     /// Motor supply is there.
     pub(super) supply: bool,
     /// What tripped the drive and was not told yet.
@@ -109,6 +111,7 @@ impl Drive {
             halted: false,
             brake_wait: 0.0,
             brake_closed: true,
+            brake_stuck: false,
             supply: true,
             trip: None,
             torque: 0.0,
@@ -330,7 +333,7 @@ impl Drive {
     /// The brake follows what is asked of it with its delay.
     fn brake(&mut self, h: f64, inputs: &Inputs) {
         let halted = self.halted && self.reference.speed == 0.0;
-        let close = !self.state.has_torque() || !self.supply || halted || inputs.brake;
+        let close = !self.state.has_torque() || !self.supply || halted || inputs.brake || self.brake_stuck;
         self.brake_wait = if close == self.brake_closed { 0.0 } else { self.brake_wait + h };
         if self.brake_wait >= BRAKE_TIME {
             (self.brake_closed, self.brake_wait) = (close, 0.0);

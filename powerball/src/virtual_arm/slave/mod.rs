@@ -62,6 +62,8 @@ pub enum Fault {
     RefuseMode(Option<Mode>),
     /// The statusword is this, whatever the drive does.
     Statusword(Option<u16>),
+    /// The brake closes and stays closed, whatever the drive asks of it. `false` ends it.
+    BrakeStuck(bool),
     /// Heartbeats stop while everything else goes on.
     NoHeartbeat(bool),
 }

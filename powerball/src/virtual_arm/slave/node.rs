@@ -151,6 +151,7 @@ impl Node {
             }
             Fault::RefuseMode(mode) => self.refused = mode,
             Fault::Statusword(word) => self.garbage = word,
+            Fault::BrakeStuck(on) => self.drive.brake_stuck = on,
             Fault::NoHeartbeat(on) => self.mute_heartbeat = on,
         }
     }

@@ -93,6 +93,12 @@ pub struct JointTable {
     pub rated_current: f64,
     /// Greatest current, A.
     pub current: f64,
+    /// Greatest following error, rad.
+    #[serde(default = "following_error")]
+    pub following_error: f64,
+    /// Greatest velocity error, rad/s.
+    #[serde(default = "velocity_error")]
+    pub velocity_error: f64,
     /// Counts in a degree; negative where the drive counts against the joint.
     #[serde(default = "thousand")]
     pub counts_per_degree: f64,
@@ -104,6 +110,14 @@ pub struct JointTable {
     pub revision: Option<u32>,
     /// 0x1018:4, where it is known.
     pub serial: Option<u32>,
+}
+
+fn following_error() -> f64 {
+    0.05
+}
+
+fn velocity_error() -> f64 {
+    0.3
 }
 
 fn thousand() -> f64 {

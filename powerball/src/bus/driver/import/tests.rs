@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 const TOML: &str = include_str!("../../../../lwa4p_bus.toml");
 const SOURCE: &str =
-    "Schunk_0_63.dcf (D. Osswald, SCHUNK, 2013; public in ipa320/schunk_robots) and powerball/lwa4p_bus.toml";
+    "Schunk_0_63.dcf (D. Osswald, SCHUNK, 2013; ipa320/schunk_robots) and powerball/lwa4p_bus.toml";
 
 /// The DCF is not ours to copy; its place can be told by the environment.
 fn dcf() -> Option<Vec<u8>> {
@@ -23,7 +23,7 @@ fn dcf() -> Option<Vec<u8>> {
 fn the_committed_table_is_what_the_sources_give() {
     let Some(dcf) = dcf() else { return };
     let made = rust_source(&dcf, &[], TOML, "LWA4P", SOURCE).unwrap();
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/driver/lwa4p.rs");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/bus/driver/lwa4p.rs");
     if std::env::var_os("POWERBALL_BLESS").is_some() {
         std::fs::write(&path, &made).unwrap();
     }
@@ -53,7 +53,8 @@ fn the_drives_file_is_read_whole() {
 
 const DRIVE: &str = "[DeviceInfo]\nBaudRate_500=1\n[1005]\nDataType=7\nAccessType=rw\n[1016sub1]\nDataType=7\n\
     AccessType=rw\n[1017]\nDataType=6\nAccessType=rw\n[200E]\nDataType=5\nAccessType=rw\n[6060]\nDataType=2\n\
-    AccessType=rw\n[6040]\nDataType=6\nAccessType=rww\nPDOMapping=1\n[6041]\nDataType=6\nAccessType=ro\nPDOMapping=0\n";
+    AccessType=rw\n[6040]\nDataType=6\nAccessType=rww\nPDOMapping=1\n\
+    [6041]\nDataType=6\nAccessType=ro\nPDOMapping=0\n";
 
 fn refused(toml: &str) -> String {
     rust_source(DRIVE.as_bytes(), &[], toml, "ARM", "a test").unwrap_err().to_string()

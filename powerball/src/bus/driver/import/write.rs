@@ -5,6 +5,9 @@ use crate::bus::canopen::Object;
 use crate::bus::canopen::pdo::Mapping;
 use std::fmt::Write;
 
+/// Rows that would be longer go on in a second line.
+const LINE: usize = 110;
+
 pub(super) fn source(drive: &Dcf, arm: &Arm, constant: &str, source: &str) -> Result<String, ImportError> {
     let mut out = String::new();
     // Writing to a string cannot fail.
@@ -15,7 +18,7 @@ pub(super) fn source(drive: &Dcf, arm: &Arm, constant: &str, source: &str) -> Re
          #![cfg_attr(rustfmt, rustfmt_skip)]\n\n\
          use crate::bus::canopen::pdo::{{Entry as Mapped, Mapping}};\nuse \
          crate::bus::canopen::{{NodeId, Object}};\n\
-         use crate::bus::cia402::Mode;\nuse crate::bus::driver::dictionary::{{DataType, Entry}};\n\
+         use crate::bus::cia402::Mode;\nuse crate::bus::driver::dictionary::{{Access as A, DataType as T, Entry}};\n\
          use \
          crate::bus::driver::profile::{{self, Identity, JointProfile, ModeProfile, Profile, Reactions}};\n\
          use crate::bus::driver::units::{{JointUnits, MILLIDEGREES_PER_RADIAN, VelocityScale}};\n\n",
@@ -59,8 +62,8 @@ fn profile(out: &mut String, drive: &Dcf, arm: &Arm, constant: &str) -> Result<(
     }
     let scale = &arm.velocity_scale;
     line(format!(
-        "    velocity_scale: VelocityScale {{ numerator: {}, denominator: {}, millidegrees: {:?}, \
-         verified_on_hardware: {} }},",
+        "    velocity_scale: VelocityScale {{\n        numerator: {},\n        denominator: {},\n        \
+         millidegrees: {:?},\n        verified_on_hardware: {},\n    }},",
         scale.numerator, scale.denominator, scale.millidegrees_per_second, scale.verified_on_hardware
     ));
     line("    tpdos: [".into());
@@ -69,7 +72,8 @@ fn profile(out: &mut String, drive: &Dcf, arm: &Arm, constant: &str) -> Result<(
     }
     for number in 1..=4 {
         let mapped = arm.transmit.get(&number.to_string()).map_or(&[][..], Vec::as_slice);
-        line(format!("        {},", mapped_source(drive, mapped, &format!("transmit PDO {number}"))?.0));
+        let (source, _) = mapped_source(drive, mapped, &format!("transmit PDO {number}"), 8)?;
+        line(format!("        {source},"));
     }
     line("    ],".into());
     line("    joints: [".into());
@@ -86,21 +90,27 @@ fn object(object: Object) -> String {
     format!("Object::new(0x{:04X}, {})", object.index, object.sub)
 }
 
-fn mapped_source(drive: &Dcf, mapped: &[Mapped], what: &str) -> Result<(String, Mapping), ImportError> {
+/// A mapping as source whose first line begins at column `indent`.
+fn mapped_source(
+    drive: &Dcf,
+    mapped: &[Mapped],
+    what: &str,
+    indent: usize,
+) -> Result<(String, Mapping), ImportError> {
     let mapping = mapping(drive, mapped, what)?;
     if mapping.is_empty() {
         return Ok(("Mapping::EMPTY".into(), mapping));
     }
-    let entries: Vec<String> = mapping
+    let entries: String = mapping
         .entries()
         .iter()
-        .map(|entry| format!("Mapped::new({}, {})", object(entry.object), entry.bits))
+        .map(|entry| format!("{:indent$}    Mapped::new({}, {}),\n", "", object(entry.object), entry.bits))
         .collect();
-    Ok((format!("Mapping::of(&[{}])", entries.join(", ")), mapping))
+    Ok((format!("Mapping::of(&[\n{entries}{:indent$}])", ""), mapping))
 }
 
 fn mode(drive: &Dcf, table: &ModeTable, name: &str, bits: &str) -> Result<String, ImportError> {
-    let (rpdo, mapping) = mapped_source(drive, &table.receive, &format!("[mode.{name}]"))?;
+    let (rpdo, mapping) = mapped_source(drive, &table.receive, &format!("[mode.{name}]"), 8)?;
     for needed in [crate::bus::cia402::objects::CONTROLWORD, table.setpoint.object] {
         if !mapping.contains(needed) {
             return mismatch(format!("[mode.{name}]: receive lacks {needed}"));
@@ -121,24 +131,34 @@ fn joint_source(joint: &JointTable) -> String {
         other => format!("{:?} * MILLIDEGREES_PER_RADIAN", other / 1000.0),
     };
     let JointTable { vendor, product, revision, serial, .. } = joint;
-    let identity = format!(
-        "Identity {{ vendor: {vendor:?}, product: {product:?}, revision: {revision:?}, serial: {serial:?} }}"
-    );
-    format!(
-        "JointProfile {{\n            node: NodeId::clamped({}),\n            identity: {identity},\n            \
-         units: JointUnits {{ counts_per_radian: {counts}, rated_current: {:?}, rated_torque: \
-         {:?}, torque_verified: {} }},\n            \
-         position: {:?},\n            velocity: {:?},\n            acceleration: {:?},\n            current: \
-         {:?},\n        }}",
-        joint.node,
-        joint.rated_current,
-        joint.rated_torque,
-        joint.torque_verified,
-        joint.position,
-        joint.velocity,
-        joint.acceleration,
-        joint.current
-    )
+    let fields = [
+        ("node", format!("NodeId::clamped({})", joint.node)),
+        (
+            "identity",
+            format!(
+                "Identity {{ vendor: {vendor:?}, product: {product:?}, revision: {revision:?}, \
+                 serial: {serial:?} }}"
+            ),
+        ),
+        (
+            "units",
+            format!(
+                "JointUnits {{\n                counts_per_radian: {counts},\n                \
+                 rated_current: {:?},\n                rated_torque: {:?},\n                \
+                 torque_verified: {},\n            }}",
+                joint.rated_current, joint.rated_torque, joint.torque_verified
+            ),
+        ),
+        ("position", format!("{:?}", joint.position)),
+        ("velocity", format!("{:?}", joint.velocity)),
+        ("acceleration", format!("{:?}", joint.acceleration)),
+        ("current", format!("{:?}", joint.current)),
+        ("following_error", format!("{:?}", joint.following_error)),
+        ("velocity_error", format!("{:?}", joint.velocity_error)),
+    ];
+    let fields: String =
+        fields.iter().map(|(name, value)| format!("            {name}: {value},\n")).collect();
+    format!("JointProfile {{\n{fields}        }}")
 }
 
 fn dictionary(out: &mut String, drive: &Dcf) -> Result<(), ImportError> {
@@ -157,20 +177,24 @@ fn dictionary(out: &mut String, drive: &Dcf) -> Result<(), ImportError> {
             0x000A => "OctetString",
             other => return mismatch(format!("{at}: data type 0x{other:04X} is not known here")),
         };
-        let default = variable.default;
-        let _ = writeln!(
-            out,
-            "    Entry {{ object: {}, data_type: DataType::{data_type}, readable: {}, writable: \
-                {}, mappable: {}, \
-             default: {:?}, plus_node: {}, name: {:?} }},",
-            object(*at),
-            variable.access != Access::WriteOnly,
-            matches!(variable.access, Access::ReadWrite | Access::WriteOnly),
-            variable.mappable,
-            default.map(|number| number.of(0)),
-            default.is_some_and(|number| number.depends_on_node()),
-            variable.name
+        let access = match variable.access {
+            Access::WriteOnly => "WriteOnly",
+            Access::ReadWrite => "ReadWrite",
+            _ => "ReadOnly",
+        };
+        let mapped = if variable.mappable { ".mapped()" } else { "" };
+        let default = match variable.default {
+            Some(number) if number.depends_on_node() => format!(".default_plus_node({})", number.of(0)),
+            Some(number) => format!(".default({})", number.of(0)),
+            None => String::new(),
+        };
+        let row = format!(
+            "    Entry::new(0x{:04X}, {}, T::{data_type}, A::{access}, {:?})",
+            at.index, at.sub, variable.name
         );
+        let rest = format!("{mapped}{default},");
+        let fits = row.len() + rest.len() <= LINE;
+        let _ = writeln!(out, "{row}{}{rest}", if fits { "" } else { "\n        " });
     }
     out.push_str("];\n");
     Ok(())

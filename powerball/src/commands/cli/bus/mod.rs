@@ -12,7 +12,7 @@ use crate::bus::canopen::{Micros, NodeId};
 use crate::bus::driver::Driver;
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::blocking::TransferError;
-use crate::bus::transport::{self, Bus, BusUrl, Event, Master, Memory};
+use crate::bus::transport::{self, Bus, BusUrl, Event, Interrupt, Master, Memory};
 use crate::virtual_arm::VirtualArm;
 use clap::{Args, Subcommand};
 
@@ -94,7 +94,9 @@ impl Where {
             let reactions = &mut profile.reactions;
             (reactions.late_limit, reactions.skipped_limit, reactions.missing_cycles) = (u8::MAX, 20, 20);
         }
-        Ok(Master::new(Driver::new(profile).map_err(refused)?, bus))
+        let signals = |e| Failure::Unusable(format!("cannot listen to signals: {e}"));
+        let interrupt = Interrupt::install().map_err(signals)?;
+        Ok(Master::new(Driver::new(profile).map_err(refused)?, bus).with_interrupt(interrupt))
     }
 }
 

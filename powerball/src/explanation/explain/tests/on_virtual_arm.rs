@@ -4,7 +4,7 @@ use crate::explanation::explain::{Explained, explain};
 use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::log::common_clock;
 use crate::logs::regression::{DataOptions, RigidBody};
-use crate::virtual_arm::{Effect, lwa4p};
+use crate::virtual_arm::{PlantEffect as Effect, lwa4p};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

@@ -7,7 +7,7 @@ use crate::identification::chain::Chain;
 use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::log::{Log, common_clock};
 use crate::logs::regression::{DataOptions, RigidBody};
-use crate::virtual_arm::{Body, Dynamics, Effect, Plant, Sensors};
+use crate::virtual_arm::{Body, Dynamics, Plant, PlantEffect as Effect, Sensors};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 use rand::{RngExt, SeedableRng};
