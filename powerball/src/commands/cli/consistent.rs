@@ -4,7 +4,7 @@ use super::Failure;
 use super::output::{self, Progress};
 use crate::identification::estimate::{TorqueMetric, nearest};
 use clap::Args;
-use dyngen::base::possible;
+use dyngen::consistency;
 use dyngen::{Arm, Model, SetKind, Values};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -73,7 +73,7 @@ impl ConsistentCommand {
         progress.say("deriving the arm");
         let model = Model::derive(arm).map_err(refused)?;
         let (kind, given) = values.recognise(&model).map_err(unusable)?;
-        let verdict = possible::check(&model, kind, &given).map_err(refused)?;
+        let verdict = consistency::check(&model, kind, &given).map_err(refused)?;
         progress.say("looking for the nearest real arm");
         let metric = TorqueMetric::new(&model, kind).map_err(refused)?;
         let consistent = nearest(&model, kind, &given, &metric.matrix(SAME)).map_err(refused)?;
