@@ -11,7 +11,9 @@ mod slider {
 
 mod slider_full {
     //! From a file, a choice.
-    dyngen_macros::arm! { file = "tests/arms/slider.toml", parameters = full, functions = [regressor, gravity] }
+    dyngen_macros::arm! {
+        file = "tests/arms/slider.toml", parameters = full, functions = [regressor, gravity]
+    }
 }
 
 #[dyngen_macros::model("tests/arms/slider.toml")]

@@ -1,11 +1,11 @@
 //! Generation from a build script.
 
 use crate::arm::Arm;
-use crate::base::SetKind;
 use crate::diagnostic::Diagnostics;
 use crate::dynamics::Function;
 use crate::emit::{self, FrictionTerm, Options};
 use crate::model::{Error, Model};
+use crate::parameters::SetKind;
 use crate::values::Values;
 use std::fmt;
 use std::path::{Path, PathBuf};

@@ -2,7 +2,8 @@
 
 use crate::base::SetKind;
 use crate::dynamics::Function;
-use crate::dynamics::function::{Argument, trig_offset};
+use crate::dynamics::build::trig_offset;
+use crate::dynamics::function::Argument;
 use crate::graph::tape::{LANES, Lane, Tape};
 use crate::graph::{Input, JointSum, Preparation};
 use crate::model::{Error, Model};

@@ -3,6 +3,7 @@
 pub mod arm;
 pub mod base;
 mod config;
+pub mod consistency;
 pub mod diagnostic;
 pub mod dynamics;
 pub mod emit;
@@ -11,17 +12,19 @@ pub mod exact;
 pub mod graph;
 #[cfg(feature = "urdf")]
 pub mod import;
+pub mod lagrangian;
 mod model;
 pub mod optimize;
+pub mod parameters;
 pub mod prove;
 mod values;
 
 pub use arm::Arm;
-pub use base::{ParameterSet, SetKind};
 pub use config::{Config, GenerateError};
 pub use diagnostic::{Diagnostic, Diagnostics};
 pub use dynamics::Function;
 pub use emit::FrictionTerm;
 pub use evaluator::{Evaluator, Samples};
 pub use model::{Error, Model};
+pub use parameters::{ParameterSet, SetKind};
 pub use values::Values;

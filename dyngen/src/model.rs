@@ -1,16 +1,17 @@
 //! An arm with its exact parameter sets: where every function starts.
 
 use crate::arm::{Arm, Parameter};
-use crate::base::sets::{Combination, ParameterSet, SetKind, Sets};
-use crate::base::span::Sum;
-use crate::dynamics::elements::angle_symbols;
-use crate::dynamics::function::{self, Subject};
+use crate::base::Sets;
+use crate::dynamics::build::{self, Subject};
 use crate::dynamics::regroup::{Order, Regrouping};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::elimination::Unproven;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
+use crate::lagrangian::elements::angle_symbols;
 use crate::optimize::{PASSES, Pass};
+use crate::parameters::span::Sum;
+use crate::parameters::{Combination, ParameterSet, SetKind};
 use crate::prove::{self, Disagreement};
 use std::fmt;
 use std::sync::OnceLock;
@@ -181,7 +182,7 @@ impl Model {
             let orders = Order::all().step_by(if self.symbols.angles.is_empty() { 1 } else { Order::RULES });
             orders.map(of).collect()
         });
-        let built = function::build(function, &subject, set, regroupings, baked, passes);
+        let built = build::build(function, &subject, set, regroupings, baked, passes);
         prove::prove(&self.arm, &self.symbols, &self.sets, set, &built, baked)?;
         Ok(built)
     }

@@ -3,11 +3,11 @@
 
 use crate::arm::Parameter;
 use crate::arm::sum::parse_sum;
-use crate::base::span::{Sum, combinations};
-use crate::base::{ParameterSet, SetKind};
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::exact::rational::to_f64;
 use crate::model::Model;
+use crate::parameters::span::{Sum, combinations};
+use crate::parameters::{ParameterSet, SetKind};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -169,5 +169,49 @@ impl Values {
         }
         let diagnostic = |message| Diagnostic { file: self.file.clone(), line: 0, column: 0, message };
         Err(Diagnostics(wrong.into_iter().map(diagnostic).collect()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm::Arm;
+    use crate::exact::rational::integer;
+
+    /// What gravity in a general direction determines says what any gravity determines, for all values of all
+    /// parameters; not the other way round.
+    #[test]
+    fn a_general_gravity_says_what_others_do() {
+        let text = include_str!("../../powerball/lwa4p.toml");
+        let of = |gravity: [i64; 3]| {
+            let mut arm = Arm::parse(text, "lwa4p.toml").unwrap();
+            arm.gravity = gravity.map(integer);
+            Model::derive(arm).unwrap()
+        };
+        let (general, upright) = (of([0, -5, -9]), of([0, 0, -9]));
+        let sets = [&general, &upright].map(|m| m.set(SetKind::Minimal).unwrap());
+        let sums = [general.sums(sets[0]), upright.sums(sets[1])];
+        assert!(sums[0].len() > sums[1].len());
+        let combined = combinations(&sums[1], &sums[0]).unwrap();
+        let all: Vec<f64> = (0..66).map(|k| f64::from((37 * k + 11) % 101) / 50.0 - 1.0).collect();
+        let [values, expected] = [general.set_values(sets[0], &all), upright.set_values(sets[1], &all)];
+        for (row, expected) in combined.iter().zip(&expected) {
+            let value: f64 = row.iter().zip(&values).map(|(c, v)| c * v).sum();
+            assert!((value - expected).abs() < 1e-9 * expected.abs().max(1.0), "{value} {expected}");
+        }
+        assert_eq!(combinations(&sums[0], &sums[1]), None);
+
+        // By their names alone, as from a file.
+        let names = sets[0].names();
+        let named = |skip: &str| {
+            let pairs = names.iter().map(String::as_str).zip(values.iter().copied());
+            Values::named(pairs.filter(|(name, _)| *name != skip), "identified.json")
+        };
+        let read = named("").of_set(&upright, sets[1]).unwrap();
+        for (value, expected) in read.iter().zip(&expected) {
+            assert!((value - expected).abs() < 1e-9 * expected.abs().max(1.0), "{value} {expected}");
+        }
+        let missing = named("mz2 + my3").of_set(&upright, sets[1]).unwrap_err().to_string();
+        assert!(missing.contains("no value for Ixz2 + 7/20*mz2 + 7/20*my3"), "{missing}");
     }
 }

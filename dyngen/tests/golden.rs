@@ -1,4 +1,5 @@
-//! The generated code of four small arms: the committed bytes, and that they compile under the strictest lints.
+//! The generated code of four small arms: the committed bytes, and that they compile under the strictest
+//! lints.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -51,7 +52,8 @@ fn generated_code_is_what_was_reviewed() {
     );
 }
 
-/// A crate of its own without std, in which every warning is an error, clippy's too, and whose emitted tests are run.
+/// A crate of its own without std, in which every warning is an error, clippy's too, and whose emitted tests
+/// are run.
 #[test]
 fn generated_code_compiles_without_a_warning_and_passes_its_own_tests() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("golden");

@@ -55,7 +55,7 @@ fn a_fit_comes_with_a_real_arm_that_costs_next_to_nothing() {
     let model = dyngen::Model::derive(dyngen::Arm::read(Path::new(arm)).unwrap()).unwrap();
     let set = model.set(dyngen::SetKind::Full).unwrap();
     let values = values.of_set(&model, set).unwrap();
-    assert!(dyngen::base::possible::check(&model, dyngen::SetKind::Full, &values).unwrap().possible);
+    assert!(dyngen::consistency::check(&model, dyngen::SetKind::Full, &values).unwrap().possible);
 
     // On the other path the model does as the fit says, and the undeclared effect keeps it from the noise
     // floor.
@@ -208,7 +208,7 @@ fn published_values_become_those_of_a_real_arm() {
     assert!(found["distance"][0].as_f64().unwrap() > 0.1);
     let model = dyngen::Model::derive(dyngen::Arm::read(Path::new(&arm)).unwrap()).unwrap();
     let (kind, values) = dyngen::Values::read(&out).unwrap().recognise(&model).unwrap();
-    assert!(dyngen::base::possible::check(&model, kind, &values).unwrap().possible);
+    assert!(dyngen::consistency::check(&model, kind, &values).unwrap().possible);
     let missing = powerball(&["consistent", "--arm", &arm, "--values", "nowhere.json", "--out", &written]);
     assert_eq!(missing.status.code(), Some(2));
 }

@@ -86,7 +86,7 @@ fn logs_of_two_mountings_come_to_one_model() {
     let at = set.names().iter().position(|n| n == "Ixz2 + 7/20*mz2 + 7/20*my3").unwrap();
     approx::assert_relative_eq!(baked[at], value("Ixz2") + 0.35 * value("mz2 + my3"), max_relative = 1e-12);
     let full = of("consistent.json").of_set(&model, model.set(dyngen::SetKind::Full).unwrap()).unwrap();
-    assert!(dyngen::base::possible::check(&model, dyngen::SetKind::Full, &full).unwrap().possible);
+    assert!(dyngen::consistency::check(&model, dyngen::SetKind::Full, &full).unwrap().possible);
 
     // Verified in the other mounting as it was judged there; told of the wrong one, not.
     let verify = |log: &str, mounting: &str| {

@@ -25,8 +25,8 @@ pub const PARAMETER_NAMES: [&str; PARAMETERS] = [
 ];
 /// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
 pub const ANGLES: usize = 5;
-/// Joint positions with their sines and cosines: computed once and shared between calls, or taken from
-/// wherever the caller has them.
+/// Joint positions with their sines and cosines: computed once and shared between calls, or taken
+/// from wherever the caller has them.
 /// Angle 5: q1 + q2, across parallel axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trig<T> {
@@ -68,10 +68,12 @@ fn angles_2_4<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 2] {
     let [[_, q2, _, q4]] = q.data.0;
     [q2, q4]
 }
-/// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of calls.
+/// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of
+/// calls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prepared<T>([T; 13]);
-/// What the functions need of the parameters alone: pass it to those that end in `_with`, in place of the parameters.
+/// What the functions need of the parameters alone: pass it to those that end in `_with`, in place of
+/// the parameters.
 ///
 /// Operations: 7 multiplications, 3 additions.
 #[inline]
@@ -757,16 +759,16 @@ pub fn forward_kinematics_with<T: SimdRealField + Copy>(
 mod trigonometry {
     //! Sines and cosines of several angles at once, by additions and multiplications alone.
     //!
-    //! Within 1 ulp for |angle| ≤ 10⁵ in `f64` and for every angle in `f32`; the same bits on every machine, in every lane, and
-    //! next to whatever other angles. `f32` calls no operation on `f64`. Other scalars, such as dual numbers, bring their own
-    //! sine and cosine.
+    //! Within 1 ulp for |angle| ≤ 10⁵ in `f64` and for every angle in `f32`; the same bits on every machine, in
+    //! every lane, and next to whatever other angles. `f32` calls no operation on `f64`. Other scalars, such as
+    //! dual numbers, bring their own sine and cosine.
     #![allow(clippy::excessive_precision)]
     use core::any::{Any, TypeId};
     use nalgebra::{SimdBool, SimdRealField, convert};
     /// Sines and cosines of the angles that `angles` makes of joint positions, in their order.
     ///
-    /// Positions and not angles are handed over, because a processor that reads in one piece what was just written in
-    /// several waits until that is done.
+    /// Positions and not angles are handed over, because a processor that reads in one piece what was just
+    /// written in several waits until that is done.
     #[inline(always)]
     pub(super) fn sin_cos<T: SimdRealField + Copy, Q, const N: usize>(
         q: &Q,
@@ -791,7 +793,8 @@ mod trigonometry {
             angle.simd_sin_cos()
         }
     }
-    /// Sines or cosines. No vector of them crosses a line of the cache: what does cannot be read before it is written there.
+    /// Sines or cosines. No vector of them crosses a line of the cache: what does cannot be read before it is
+    /// written there.
     #[cfg_attr(target_arch = "x86_64", repr(align(16)))]
     struct Row<T, const N: usize>([T; N]);
     #[inline(never)]
@@ -836,9 +839,11 @@ mod trigonometry {
         2.5633441515839558e-12,
         1.0562999066987428e-23,
     ];
-    /// Added and taken away again, 3·2⁵¹ leaves a double's nearest whole number, and 3·2⁵³ its nearest multiple of four.
+    /// Added and taken away again, 3·2⁵¹ leaves a double's nearest whole number, and 3·2⁵³ its nearest multiple
+    /// of four.
     const WHOLE: f64 = 6_755_399_441_055_744.0;
-    /// Coefficients of sin r = r + r³·(…) and cos r = 1 − r²/2 + r⁴·(…) for |r| ≤ π/4 in double precision (Sun's fdlibm).
+    /// Coefficients of sin r = r + r³·(…) and cos r = 1 − r²/2 + r⁴·(…) for |r| ≤ π/4 in double precision (Sun's
+    /// fdlibm).
     const SINE: [f64; 6] = [
         -1.66666666666666324348e-01,
         8.33333333332248946124e-03,
@@ -961,7 +966,8 @@ mod trigonometry {
         0, 0xa2f9_836e, 0x4e44_1529, 0xfc27_57d1, 0xf534_ddc0, 0xdb62_9599, 0x3c43_9041,
         0xfe51_63ab,
     ];
-    /// Quarter turns, −2 … 1, and what is left of an angle in two parts, by integers: exact for every `f32` (Payne and Hanek).
+    /// Quarter turns, −2 … 1, and what is left of an angle in two parts, by integers: exact for every `f32`
+    /// (Payne and Hanek).
     #[inline(always)]
     fn reduced(angle: f32) -> [f32; 3] {
         let bits = angle.to_bits();

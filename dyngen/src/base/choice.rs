@@ -8,8 +8,8 @@
 use super::preference::Preference;
 use super::sets::full_set;
 use crate::arm::Arm;
+use crate::dynamics::build::{self, Subject};
 use crate::dynamics::chain::Origins;
-use crate::dynamics::function::{self, Subject};
 use crate::dynamics::stage::Form;
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::constant::{Constant, ConstantField};
@@ -79,7 +79,7 @@ impl AllColumns {
         for (column, parameter) in full.parameters.iter().enumerate() {
             place[parameter.carriers[0].0.index()] = Some(column);
         }
-        let build = |form| function::build_in(form, None, Function::Regressor, subject, &full, None, PASSES);
+        let build = |form| build::build_in(form, None, Function::Regressor, subject, &full, None, PASSES);
         AllColumns {
             forms: [Origins::Inner, Origins::Outer].into_iter().flat_map(Form::all).map(build).collect(),
             place,

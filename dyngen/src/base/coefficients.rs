@@ -2,14 +2,14 @@
 //! parameter.
 
 use crate::arm::{Arm, JointKind};
-use crate::dynamics::elements::{ArmElements, Source};
-use crate::dynamics::lagrangian::twice_lagrangian;
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::{ConstantField, Numerator};
 use crate::exact::elimination::SparseRow;
 use crate::exact::polynomial::{Monomial, Polynomial, PolynomialRing, Square};
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
+use crate::lagrangian::elements::{ArmElements, Source};
+use crate::lagrangian::twice_lagrangian;
 use std::collections::BTreeMap;
 
 /// A variable of the Lagrangian.

@@ -1,12 +1,11 @@
-//! Parameter sets: exact relations, published groupings, the choice of columns, physical possibility.
+//! Parameter sets: exact relations, published groupings, the choice of columns.
 
 pub mod choice;
 pub mod coefficients;
-pub mod possible;
 pub mod preference;
 mod published;
 pub mod sets;
-pub mod span;
 pub mod symmetry;
 
-pub use sets::{ParameterSet, SetKind, SetParameter};
+pub use crate::parameters::{ParameterSet, SetKind, SetParameter, span};
+pub use sets::Sets;

@@ -1,9 +1,10 @@
 //! A published parameter set, checked: exact or not, and what it loses.
 
-use super::sets::{ParameterSet, SetKind, SetParameter, combination_text, minimal_coordinates, unexamined};
+use super::sets::{combination_text, unexamined};
 use crate::arm::{Arm, Parameter};
 use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{self, Dependence, Unproven};
+use crate::parameters::{ParameterSet, SetKind, SetParameter, minimal_coordinates};
 use std::collections::BTreeMap;
 
 /// The file's groupings as a set.

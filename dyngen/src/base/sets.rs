@@ -10,84 +10,7 @@ use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{self, Dependence, SparseRow, Unproven};
 use crate::exact::prime::Draws;
 use crate::exact::symbols::AngleSymbols;
-use std::fmt;
-
-/// Which parameter set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum SetKind {
-    /// Every parameter that the declared symmetries leave.
-    Full,
-    /// Exact for the numbers in the file: as many as the rank.
-    Minimal,
-    /// Exact for every size of the arm: lengths and ratios are variables.
-    Symbolic,
-    /// The file's `[[grouping]]`.
-    Published,
-}
-
-impl SetKind {
-    /// All four.
-    pub const ALL: [SetKind; 4] = [SetKind::Full, SetKind::Minimal, SetKind::Symbolic, SetKind::Published];
-
-    /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            SetKind::Full => "full",
-            SetKind::Minimal => "minimal",
-            SetKind::Symbolic => "symbolic",
-            SetKind::Published => "published",
-        }
-    }
-
-    /// The set of that name.
-    pub fn parse(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
-    }
-}
-
-impl fmt::Display for SetKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-/// A linear combination of the arm's parameters.
-pub type Combination = Vec<(Parameter, Constant)>;
-
-/// One parameter of a set.
-#[derive(Clone, Debug)]
-pub struct SetParameter {
-    /// The sum it stands for as text, or the name in the publication.
-    pub name: String,
-    /// The sum it stands for.
-    pub terms: Combination,
-    /// How it enters the dynamics: the inertial parameters that carry its value when all others are zero.
-    pub carriers: Combination,
-}
-
-/// A parameter set with what is known exactly of it.
-#[derive(Clone, Debug)]
-pub struct ParameterSet {
-    /// Which one.
-    pub kind: SetKind,
-    /// Its parameters, in order.
-    pub parameters: Vec<SetParameter>,
-    /// The rank of its columns for the numbers in the file.
-    pub rank: usize,
-    /// The linear relations that hold between its columns for the numbers in the file, one text each.
-    pub relations: Vec<String>,
-    /// Whether the torque stays the same when all parameters are replaced by the set's sums.
-    pub exact: bool,
-    /// Where it is not exact: the parameters that the sums lose, and why.
-    pub lost: Vec<(Parameter, String)>,
-}
-
-impl ParameterSet {
-    /// The names, in order.
-    pub fn names(&self) -> Vec<String> {
-        self.parameters.iter().map(|p| p.name.clone()).collect()
-    }
-}
+use crate::parameters::{Combination, ParameterSet, SetKind, SetParameter, minimal_coordinates};
 
 /// How well the torques determine a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -246,26 +169,6 @@ fn named_combination_text<'a>(
         })
         .collect();
     sum_text(terms.iter().map(|(name, value)| (name, value)))
-}
-
-/// A combination of parameters in coordinates of the minimal columns.
-pub fn minimal_coordinates(
-    field: &ConstantField,
-    minimal: &Dependence,
-    combination: &[(Parameter, Constant)],
-) -> Vec<(usize, Constant)> {
-    let mut sum: std::collections::BTreeMap<usize, Constant> = std::collections::BTreeMap::new();
-    for (parameter, factor) in combination {
-        for (position, coordinate) in &minimal.coordinates[parameter.index()] {
-            let term = field.mul(factor, coordinate);
-            let total = match sum.get(position) {
-                Some(old) => field.add(old, &term),
-                None => term,
-            };
-            sum.insert(*position, total);
-        }
-    }
-    sum.into_iter().filter(|(_, c)| !c.is_zero()).collect()
 }
 
 /// The rank of a set's columns and the relations among them, each as `name = combination of names`.

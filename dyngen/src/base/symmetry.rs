@@ -3,10 +3,10 @@
 
 use super::coefficients::Sizes;
 use super::preference::Preference;
-use super::sets::Combination;
+use super::sets::Sets;
 use crate::arm::{Arm, Parameter};
 use crate::exact::elimination::{self, SparseRow, Unproven};
-use crate::model::Model;
+use crate::parameters::Combination;
 
 /// What the torques would show of a parameter that is declared zero, beside those that are kept.
 #[derive(Clone, Debug)]
@@ -32,13 +32,12 @@ pub struct Symmetry {
 /// Each declared symmetry of an arm, by itself, for the numbers in its file.
 ///
 /// # Errors
-/// As [`Model::derive`].
-pub fn symmetries(model: &Model) -> Result<Vec<Symmetry>, Unproven> {
-    let arm = model.arm();
-    let field = &model.sets().field;
+/// As [`Sets::derive`].
+pub fn symmetries(arm: &Arm, sets: &Sets) -> Result<Vec<Symmetry>, Unproven> {
+    let field = &sets.field;
     let mut without: Arm = arm.clone();
     without.joints.iter_mut().for_each(|joint| joint.zero.clear());
-    let rows = model.sets().lagrangian.rows(&without, field, Sizes::Numbers);
+    let rows = sets.lagrangian.rows(&without, field, Sizes::Numbers);
     let kept: Vec<usize> = Preference::ALL[0].order(arm).iter().map(|p| p.index()).collect();
     let all = arm.all_parameters();
     let declared = all.iter().filter(|p| without.keeps(**p) && !arm.keeps(**p));

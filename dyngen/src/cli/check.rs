@@ -2,7 +2,7 @@
 
 use super::{Failure, model, print};
 use dyngen::Values;
-use dyngen::base::possible;
+use dyngen::consistency;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -23,7 +23,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let model = model(&args.arm)?;
     let (kind, values) =
         Values::read(&args.values).and_then(|v| v.recognise(&model)).map_err(Failure::input)?;
-    let verdict = possible::check(&model, kind, &values).map_err(Failure::refused)?;
+    let verdict = consistency::check(&model, kind, &values).map_err(Failure::refused)?;
     if args.json {
         let object = serde_json::json!({
             "possible": verdict.possible,

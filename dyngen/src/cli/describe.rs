@@ -37,7 +37,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         .collect::<Result<_, Failure>>()?;
     // What every function together needs of the parameters alone.
     operations.push(("prepare", preparation.operations()));
-    let symmetries = symmetry::symmetries(&model).map_err(Failure::refused)?;
+    let symmetries = symmetry::symmetries(model.arm(), model.sets()).map_err(Failure::refused)?;
     let text = match args.json {
         true => format!("{}\n", json_text(&model, &operations, &symmetries)),
         false => table(&model, &operations, &symmetries),
@@ -99,7 +99,10 @@ fn set_json(model: &Model, set: &ParameterSet) -> Value {
             let terms: Vec<Value> = p
                 .terms
                 .iter()
-                .map(|(q, c)| json!({"parameter": q.to_string(), "coefficient": field.text(c), "value": field.value(c)}))
+                .map(|(q, c)| {
+                    let coefficient = field.text(c);
+                    json!({"parameter": q.to_string(), "coefficient": coefficient, "value": field.value(c)})
+                })
                 .collect();
             json!({"name": p.name, "terms": terms})
         })

@@ -84,28 +84,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
 
 /// Names of the result's columns: tau1 …, and for a matrix Y1_1 (row, column).
 fn header(function: Function, (rows, columns): (usize, usize)) -> Vec<String> {
-    use Function::*;
-    let letter = match function {
-        InverseDynamics
-        | InverseDynamicsWithoutGravity
-        | CoriolisTimesSpeed
-        | CoriolisTransposeTimesSpeed => "tau",
-        Gravity => "g",
-        ForwardDynamics => "ddq",
-        Regressor | SlotineLiRegressor => "Y",
-        RegressorTransposeTimes | SlotineLiTransposeTimes => "Yte",
-        MassMatrix => "B",
-        MassMatrixInverse => "Binv",
-        CoriolisMatrix => "C",
-        ForwardKinematics => "T",
-        Jacobian => "J",
-        JacobianRateTimesSpeed => "a",
-        KineticEnergy | KineticEnergyRegressor => "T",
-        PotentialEnergy | PotentialEnergyRegressor => "U",
-        Momentum => "p",
-        TorqueByPosition => "dtau_dq",
-        TorqueBySpeed => "dtau_ddq",
-    };
+    let letter = function.letter();
     let name = |k: usize| {
         if columns == 1 {
             format!("{letter}{}", k + 1)

@@ -6,10 +6,10 @@
 //! pi) is turned round first, and its angle counts negatively. Origins lie on the axes, where as many as
 //! possible coincide.
 
-use super::elements::{ArmElements, JointElements};
 use crate::arm::{Arm, Convention, JointKind};
 use crate::exact::algebra::Algebra;
 use crate::graph::JointSum;
+use crate::lagrangian::elements::{ArmElements, JointElements};
 use num_traits::Zero;
 
 /// A link's place in the chain.

@@ -275,10 +275,10 @@ pub fn gravity(b: &Builder, chain: &Chain, bodies: &[LinkBody]) -> Vec<Expr> {
     // Gravity in the axes before each stage, and in each link's.
     let mut before = Vec::with_capacity(chain.stages.len());
     for stage in &chain.stages {
-        g = super::elements::turn_x(b, &stage.twist.0, &stage.twist.1, &g);
+        g = crate::lagrangian::elements::turn_x(b, &stage.twist.0, &stage.twist.1, &g);
         before.push(g);
         if let Some(last) = stage.members.last() {
-            g = super::elements::turn_z(b, &last.angle.0, &last.angle.1, &g);
+            g = crate::lagrangian::elements::turn_z(b, &last.angle.0, &last.angle.1, &g);
         }
     }
     let (mut mass, mut first) = (Expr::ZERO, super::body::ZERO);

@@ -1,14 +1,14 @@
 //! The columns of the energies: Eq. 5 and 6 themselves.
 
 use super::body::constant;
-use super::elements::ArmElements;
-use super::lagrangian::twice_lagrangian;
 use crate::arm::Arm;
-use crate::base::ParameterSet;
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
 use crate::exact::rational::Rational;
 use crate::graph::{Builder, Expr};
+use crate::lagrangian::elements::ArmElements;
+use crate::lagrangian::twice_lagrangian;
+use crate::parameters::ParameterSet;
 
 /// One row, 1 × p: T = row·π.
 pub fn kinetic_regressor(
@@ -48,7 +48,7 @@ fn of_set(
     let half = b.constant(&Rational::new(1.into(), 2.into()));
     let half = if negate { -half } else { half };
     let columns = twice_lagrangian(b, elements);
-    let column = |carriers: &crate::base::sets::Combination| {
+    let column = |carriers: &crate::parameters::Combination| {
         carriers.iter().fold(Expr::ZERO, |sum, (p, factor)| {
             b.add(&sum, &b.mul(&constant(b, field, factor), &columns[p.index()]))
         })

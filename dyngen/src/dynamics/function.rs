@@ -1,21 +1,5 @@
-//! The functions of an arm, each built as a graph.
+//! The functions of an arm: their names, shapes and arguments, in one table.
 
-use super::chain::{self, Origins};
-use super::elements::{ArmElements, Source, ToolElements};
-use super::motion;
-use super::regroup::Regrouping;
-use super::stage::{Chain, Form};
-use super::{composite, coriolis, energy, forward, inverse, momentum, pose, regressor};
-use crate::arm::Arm;
-use crate::base::ParameterSet;
-use crate::exact::algebra::Algebra;
-use crate::exact::constant::ConstantField;
-use crate::exact::elimination::Dependence;
-use crate::exact::rational::Rational;
-use crate::exact::symbols::AngleSymbols;
-use crate::graph::differentiate::{self, Direction};
-use crate::graph::{Builder, Expr, Graph, Input, JointSum, Operations, Preparation};
-use crate::optimize::{self, COMPARED, Pass};
 use std::fmt;
 
 /// A function of the arm's state.
@@ -132,65 +116,303 @@ impl Argument {
     }
 }
 
+/// What the cost of a function depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// On the form of the recursion and on how it sums the parameters up.
+    Dynamics,
+    /// On the form of the recursion.
+    Regressor,
+    /// On neither.
+    Other,
+}
+
+/// What is known of a function beside its equations.
+struct Row {
+    function: Function,
+    /// On the command line and in the emitted code.
+    name: &'static str,
+    /// Before the numbers of its entries, as a column of a table.
+    letter: &'static str,
+    size: (Size, Size),
+    arguments: &'static [Argument],
+    kind: Kind,
+    /// What it computes.
+    what: &'static str,
+    /// What it returns, with the unit.
+    returns: &'static str,
+}
+
+use Argument::*;
+use Function::*;
+use Size::{Fixed, Joints, Parameters as ByParameter};
+
+/// One row for each function, in the order of [`Function::ALL`].
+const TABLE: [Row; 23] = [
+    Row {
+        function: InverseDynamics,
+        name: "inverse_dynamics",
+        letter: "tau",
+        size: (Joints, Fixed(1)),
+        arguments: &[Positions, Speeds, Accelerations, Parameters],
+        kind: Kind::Dynamics,
+        what: "Joint torques of a motion: τ = B(q)·q̈ + C(q, q̇)·q̇ + g(q), without friction.",
+        returns: "Returns τ, N·m (N where prismatic).",
+    },
+    Row {
+        function: InverseDynamicsWithoutGravity,
+        name: "inverse_dynamics_without_gravity",
+        letter: "tau",
+        size: (Joints, Fixed(1)),
+        arguments: &[Positions, Speeds, Accelerations, Parameters],
+        kind: Kind::Dynamics,
+        what: "Joint torques of a motion without gravity: B(q)·q̈ + C(q, q̇)·q̇.",
+        returns: "Returns the torques, N·m.",
+    },
+    Row {
+        function: Regressor,
+        name: "regressor",
+        letter: "Y",
+        size: (Joints, ByParameter),
+        arguments: &[Positions, Speeds, Accelerations],
+        kind: Kind::Regressor,
+        what: "Regressor Y(q, q̇, q̈): τ = Y·π for the parameters of [`PARAMETER_NAMES`].",
+        returns: "Returns Y, n × p.",
+    },
+    Row {
+        function: RegressorTransposeTimes,
+        name: "regressor_transpose_times",
+        letter: "Yte",
+        size: (ByParameter, Fixed(1)),
+        arguments: &[Positions, Speeds, Accelerations, Errors],
+        kind: Kind::Regressor,
+        what: "Yᵀ(q, q̇, q̈)·e without Y itself.",
+        returns: "Returns one number for each parameter.",
+    },
+    Row {
+        function: SlotineLiRegressor,
+        name: "slotine_li_regressor",
+        letter: "Y",
+        size: (Joints, ByParameter),
+        arguments: &[Positions, Speeds, ReferenceSpeeds, ReferenceAccelerations],
+        kind: Kind::Regressor,
+        what: "Regressor of Slotine and Li: Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g, \
+            with C of Christoffel symbols.",
+        returns: "Returns Y, n × p.",
+    },
+    Row {
+        function: SlotineLiTransposeTimes,
+        name: "slotine_li_transpose_times",
+        letter: "Yte",
+        size: (ByParameter, Fixed(1)),
+        arguments: &[Positions, Speeds, ReferenceSpeeds, ReferenceAccelerations, Errors],
+        kind: Kind::Regressor,
+        what: "Yᵀ(q, q̇, q̇ᵣ, q̈ᵣ)·e of Slotine and Li's regressor: the direction of their adaptation law.",
+        returns: "Returns one number for each parameter.",
+    },
+    Row {
+        function: MassMatrix,
+        name: "mass_matrix",
+        letter: "B",
+        size: (Joints, Joints),
+        arguments: &[Positions, Parameters],
+        kind: Kind::Dynamics,
+        what: "Mass matrix B(q), symmetric.",
+        returns: "Returns B, n × n, kg·m².",
+    },
+    Row {
+        function: MassMatrixInverse,
+        name: "mass_matrix_inverse",
+        letter: "Binv",
+        size: (Joints, Joints),
+        arguments: &[Positions, Parameters],
+        kind: Kind::Dynamics,
+        what: "Inverse of the mass matrix, B⁻¹(q).",
+        returns: "Returns n × n, symmetric; not finite where the parameters make B singular.",
+    },
+    Row {
+        function: CoriolisMatrix,
+        name: "coriolis_matrix",
+        letter: "C",
+        size: (Joints, Joints),
+        arguments: &[Positions, Speeds, Parameters],
+        kind: Kind::Dynamics,
+        what: "Coriolis matrix C(q, q̇) of Christoffel symbols: Ḃ − 2C is skew-symmetric.",
+        returns: "Returns C, n × n.",
+    },
+    Row {
+        function: CoriolisTimesSpeed,
+        name: "coriolis_times_speed",
+        letter: "tau",
+        size: (Joints, Fixed(1)),
+        arguments: &[Positions, Speeds, Parameters],
+        kind: Kind::Dynamics,
+        what: "Coriolis and centrifugal torques C(q, q̇)·q̇.",
+        returns: "Returns the torques, N·m.",
+    },
+    Row {
+        function: CoriolisTransposeTimesSpeed,
+        name: "coriolis_transpose_times_speed",
+        letter: "tau",
+        size: (Joints, Fixed(1)),
+        arguments: &[Positions, Speeds, Parameters],
+        kind: Kind::Dynamics,
+        what: "Cᵀ(q, q̇)·q̇ of the Christoffel matrix, which is ∂T/∂q: what a momentum observer integrates.",
+        returns: "Returns the torques, N·m.",
+    },
+    Row {
+        function: Gravity,
+        name: "gravity",
+        letter: "g",
+        size: (Joints, Fixed(1)),
+        arguments: &[Positions, Parameters],
+        kind: Kind::Dynamics,
+        what: "Joint torques that hold the arm still: g(q).",
+        returns: "Returns g, N·m.",
+    },
+    Row {
+        function: ForwardDynamics,
+        name: "forward_dynamics",
+        letter: "ddq",
+        size: (Joints, Fixed(1)),
+        arguments: &[Positions, Speeds, Torques, Parameters],
+        kind: Kind::Dynamics,
+        what: "Joint accelerations under joint torques: q̈ = B⁻¹·(τ − C·q̇ − g), without friction.",
+        returns: "Returns q̈; not finite where the parameters make B singular.",
+    },
+    Row {
+        function: ForwardKinematics,
+        name: "forward_kinematics",
+        letter: "T",
+        size: (Fixed(4), Fixed(4)),
+        arguments: &[Positions],
+        kind: Kind::Other,
+        what: "Pose of the tool's frame (the last link's where the arm declares no tool) in the base frame.",
+        returns: "Returns the homogeneous transform, 4 × 4, lengths in m.",
+    },
+    Row {
+        function: Jacobian,
+        name: "jacobian",
+        letter: "J",
+        size: (Fixed(6), Joints),
+        arguments: &[Positions],
+        kind: Kind::Other,
+        what: "Geometric Jacobian of the tool's frame (the last link's where the arm declares no tool), \
+            in base axes.",
+        returns: "Returns 6 × n: velocity of the origin, m/s, above the angular velocity, rad/s.",
+    },
+    Row {
+        function: JacobianRateTimesSpeed,
+        name: "jacobian_rate_times_speed",
+        letter: "a",
+        size: (Fixed(6), Fixed(1)),
+        arguments: &[Positions, Speeds],
+        kind: Kind::Other,
+        what: "J̇(q, q̇)·q̇ of the geometric Jacobian: acceleration of the tool's frame where q̈ = 0.",
+        returns: "Returns six numbers: acceleration of the origin, m/s², \
+            above the angular acceleration, rad/s².",
+    },
+    Row {
+        function: KineticEnergy,
+        name: "kinetic_energy",
+        letter: "T",
+        size: (Fixed(1), Fixed(1)),
+        arguments: &[Positions, Speeds, Parameters],
+        kind: Kind::Dynamics,
+        what: "Kinetic energy T = ½ q̇ᵀ·B·q̇.",
+        returns: "Returns T, J.",
+    },
+    Row {
+        function: PotentialEnergy,
+        name: "potential_energy",
+        letter: "U",
+        size: (Fixed(1), Fixed(1)),
+        arguments: &[Positions, Parameters],
+        kind: Kind::Other,
+        what: "Potential energy U(q) under gravity, up to a constant: ∂U/∂q = g(q).",
+        returns: "Returns U, J.",
+    },
+    Row {
+        function: KineticEnergyRegressor,
+        name: "kinetic_energy_regressor",
+        letter: "T",
+        size: (Fixed(1), ByParameter),
+        arguments: &[Positions, Speeds],
+        kind: Kind::Other,
+        what: "Row of the kinetic energy: T = row·π.",
+        returns: "Returns 1 × p.",
+    },
+    Row {
+        function: PotentialEnergyRegressor,
+        name: "potential_energy_regressor",
+        letter: "U",
+        size: (Fixed(1), ByParameter),
+        arguments: &[Positions],
+        kind: Kind::Other,
+        what: "Row of the potential energy, up to a constant: U = row·π.",
+        returns: "Returns 1 × p.",
+    },
+    Row {
+        function: Momentum,
+        name: "momentum",
+        letter: "p",
+        size: (Joints, Fixed(1)),
+        arguments: &[Positions, Speeds, Parameters],
+        kind: Kind::Dynamics,
+        what: "Generalised momentum B(q)·q̇.",
+        returns: "Returns the momenta, N·m·s.",
+    },
+    Row {
+        function: TorqueByPosition,
+        name: "torque_by_position",
+        letter: "dtau_dq",
+        size: (Joints, Joints),
+        arguments: &[Positions, Speeds, Accelerations, Parameters],
+        kind: Kind::Dynamics,
+        what: "∂τ/∂q of the inverse dynamics.",
+        returns: "Returns n × n; column j is the derivative by q of joint j.",
+    },
+    Row {
+        function: TorqueBySpeed,
+        name: "torque_by_speed",
+        letter: "dtau_ddq",
+        size: (Joints, Joints),
+        arguments: &[Positions, Speeds, Accelerations, Parameters],
+        kind: Kind::Dynamics,
+        what: "∂τ/∂q̇ of the inverse dynamics.",
+        returns: "Returns n × n; column j is the derivative by q̇ of joint j.",
+    },
+];
+
 impl Function {
     /// All of them, in the order in which they are emitted.
     pub const ALL: [Function; 23] = {
-        use Function::*;
-        [
-            InverseDynamics,
-            InverseDynamicsWithoutGravity,
-            Regressor,
-            RegressorTransposeTimes,
-            SlotineLiRegressor,
-            SlotineLiTransposeTimes,
-            MassMatrix,
-            MassMatrixInverse,
-            CoriolisMatrix,
-            CoriolisTimesSpeed,
-            CoriolisTransposeTimesSpeed,
-            Gravity,
-            ForwardDynamics,
-            ForwardKinematics,
-            Jacobian,
-            JacobianRateTimesSpeed,
-            KineticEnergy,
-            PotentialEnergy,
-            KineticEnergyRegressor,
-            PotentialEnergyRegressor,
-            Momentum,
-            TorqueByPosition,
-            TorqueBySpeed,
-        ]
+        let mut all = [InverseDynamics; 23];
+        let mut k = 0;
+        while k < all.len() {
+            all[k] = TABLE[k].function;
+            k += 1;
+        }
+        all
     };
+
+    fn row(self) -> &'static Row {
+        &TABLE[self as usize]
+    }
 
     /// The name on the command line and in the emitted code.
     pub fn name(self) -> &'static str {
-        use Function::*;
-        match self {
-            InverseDynamics => "inverse_dynamics",
-            InverseDynamicsWithoutGravity => "inverse_dynamics_without_gravity",
-            Regressor => "regressor",
-            RegressorTransposeTimes => "regressor_transpose_times",
-            SlotineLiRegressor => "slotine_li_regressor",
-            SlotineLiTransposeTimes => "slotine_li_transpose_times",
-            MassMatrix => "mass_matrix",
-            MassMatrixInverse => "mass_matrix_inverse",
-            CoriolisMatrix => "coriolis_matrix",
-            CoriolisTimesSpeed => "coriolis_times_speed",
-            CoriolisTransposeTimesSpeed => "coriolis_transpose_times_speed",
-            Gravity => "gravity",
-            ForwardDynamics => "forward_dynamics",
-            ForwardKinematics => "forward_kinematics",
-            Jacobian => "jacobian",
-            JacobianRateTimesSpeed => "jacobian_rate_times_speed",
-            KineticEnergy => "kinetic_energy",
-            PotentialEnergy => "potential_energy",
-            KineticEnergyRegressor => "kinetic_energy_regressor",
-            PotentialEnergyRegressor => "potential_energy_regressor",
-            Momentum => "momentum",
-            TorqueByPosition => "torque_by_position",
-            TorqueBySpeed => "torque_by_speed",
-        }
+        self.row().name
+    }
+
+    /// What stands before the number of an entry where results are columns of a table: `tau`, `Y`.
+    pub fn letter(self) -> &'static str {
+        self.row().letter
+    }
+
+    /// What it computes, and what it returns with the unit: one sentence each.
+    pub fn meaning(self) -> (&'static str, &'static str) {
+        (self.row().what, self.row().returns)
     }
 
     /// The function of that name.
@@ -200,21 +422,7 @@ impl Function {
 
     /// Rows and columns of the result.
     pub fn size(self) -> (Size, Size) {
-        use Function::*;
-        use Size::{Fixed, Joints, Parameters};
-        match self {
-            Regressor | SlotineLiRegressor => (Joints, Parameters),
-            RegressorTransposeTimes | SlotineLiTransposeTimes => (Parameters, Fixed(1)),
-            MassMatrix | MassMatrixInverse | CoriolisMatrix | TorqueByPosition | TorqueBySpeed => {
-                (Joints, Joints)
-            }
-            ForwardKinematics => (Fixed(4), Fixed(4)),
-            Jacobian => (Fixed(6), Joints),
-            JacobianRateTimesSpeed => (Fixed(6), Fixed(1)),
-            KineticEnergy | PotentialEnergy => (Fixed(1), Fixed(1)),
-            KineticEnergyRegressor | PotentialEnergyRegressor => (Fixed(1), Parameters),
-            _ => (Joints, Fixed(1)),
-        }
+        self.row().size
     }
 
     /// Rows and columns of the result for n joints and p parameters.
@@ -230,36 +438,11 @@ impl Function {
 
     /// What it takes.
     pub fn arguments(self) -> &'static [Argument] {
-        use Argument::*;
-        use Function::*;
-        match self {
-            InverseDynamics | InverseDynamicsWithoutGravity | TorqueByPosition | TorqueBySpeed => {
-                &[Positions, Speeds, Accelerations, Parameters]
-            }
-            Regressor => &[Positions, Speeds, Accelerations],
-            RegressorTransposeTimes => &[Positions, Speeds, Accelerations, Errors],
-            SlotineLiRegressor => &[Positions, Speeds, ReferenceSpeeds, ReferenceAccelerations],
-            SlotineLiTransposeTimes => &[Positions, Speeds, ReferenceSpeeds, ReferenceAccelerations, Errors],
-            MassMatrix | MassMatrixInverse | Gravity | PotentialEnergy => &[Positions, Parameters],
-            CoriolisMatrix | CoriolisTimesSpeed | CoriolisTransposeTimesSpeed | KineticEnergy | Momentum => {
-                &[Positions, Speeds, Parameters]
-            }
-            ForwardDynamics => &[Positions, Speeds, Torques, Parameters],
-            ForwardKinematics | Jacobian | PotentialEnergyRegressor => &[Positions],
-            JacobianRateTimesSpeed | KineticEnergyRegressor => &[Positions, Speeds],
-        }
+        self.row().arguments
     }
 
-    fn kind(self) -> Kind {
-        use Function::*;
-        match self {
-            ForwardKinematics | Jacobian | JacobianRateTimesSpeed => Kind::Other,
-            PotentialEnergy | KineticEnergyRegressor | PotentialEnergyRegressor => Kind::Other,
-            Regressor | RegressorTransposeTimes | SlotineLiRegressor | SlotineLiTransposeTimes => {
-                Kind::Regressor
-            }
-            _ => Kind::Dynamics,
-        }
+    pub(super) fn kind(self) -> Kind {
+        self.row().kind
     }
 
     /// Whether it takes an argument.
@@ -268,282 +451,21 @@ impl Function {
     }
 }
 
-/// What the cost of a function depends on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    /// On the form of the recursion and on how it sums the parameters up.
-    Dynamics,
-    /// On the form of the recursion.
-    Regressor,
-    /// On neither.
-    Other,
-}
-
 impl fmt::Display for Function {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
 }
 
-/// A function as expressions.
-#[derive(Clone, Debug)]
-pub struct FunctionGraph {
-    /// Which function.
-    pub function: Function,
-    /// The expressions.
-    pub graph: Graph,
-    /// The result, row-major.
-    pub outputs: Vec<Expr>,
-    /// Its rows and columns.
-    pub shape: (usize, usize),
-    /// Number of joints.
-    pub joints: usize,
-    /// Number of parameters of the set.
-    pub parameters: usize,
-    /// Whether the parameters' values are constants of the graph.
-    pub baked: bool,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-impl FunctionGraph {
-    /// What it costs, without what is prepared of the parameters alone.
-    pub fn operations(&self) -> Operations {
-        self.graph.operations_when_prepared(&self.outputs)
-    }
-
-    /// The function without what depends on the parameters alone, which `preparation` takes.
-    #[must_use]
-    pub fn without_preparation(&self, preparation: &mut Preparation) -> FunctionGraph {
-        let (graph, outputs) = preparation.take_out(&self.graph, &self.outputs);
-        FunctionGraph { graph, outputs, ..self.clone() }
-    }
-
-    /// What it takes: the function's arguments, without the parameters where their values are baked in.
-    pub fn arguments(&self) -> impl Iterator<Item = Argument> + '_ {
-        let baked = self.baked;
-        self.function.arguments().iter().copied().filter(move |a| !(baked && *a == Argument::Parameters))
-    }
-}
-
-/// What functions are built from: an arm with what is known exactly of it.
-#[derive(Clone, Copy, Debug)]
-pub struct Subject<'a> {
-    /// The arm.
-    pub arm: &'a Arm,
-    /// Its angles that are kept as symbols.
-    pub symbols: &'a AngleSymbols,
-    /// The field of its constants.
-    pub field: &'a ConstantField,
-    /// How all its parameters depend on those of the minimal set.
-    pub minimal: &'a Dependence,
-}
-
-/// Builds a function of an arm for a parameter set, with its parameters as inputs or their values baked in,
-/// in the form that costs least, and runs passes over its graph.
-pub fn build(
-    function: Function,
-    subject: &Subject<'_>,
-    set: &ParameterSet,
-    regroupings: &[Regrouping],
-    baked: Option<&[Rational]>,
-    passes: &[(&str, Pass)],
-) -> FunctionGraph {
-    // The forms are compared after the first passes; the others go over the cheapest.
-    let (passes, rest) = passes.split_at(passes.len().min(COMPARED));
-    let mut best: Option<((usize, usize), FunctionGraph)> = None;
-    let mut keep_cheapest = |built: FunctionGraph| {
-        let operations = built.operations();
-        let cost = (operations.mul + operations.add, operations.add);
-        if best.as_ref().is_none_or(|(lowest, _)| cost < *lowest) {
-            best = Some((cost, built));
-        }
-    };
-    let both = [Origins::Inner, Origins::Outer];
-    match function.kind() {
-        Kind::Dynamics => {
-            for regrouping in regroupings {
-                for form in Form::all(regrouping.order.origins).take(4) {
-                    keep_cheapest(build_in(form, Some(regrouping), function, subject, set, baked, passes));
-                }
-            }
-        }
-        Kind::Regressor => {
-            for form in both.into_iter().flat_map(Form::all) {
-                keep_cheapest(build_in(form, None, function, subject, set, baked, passes));
-            }
-        }
-        Kind::Other => {}
-    }
-    let cheapest = match best {
-        Some((_, built)) => built,
-        None => build_in(Form::FIRST, None, function, subject, set, baked, passes),
-    };
-    let (graph, outputs) = optimize::optimize(cheapest.graph, cheapest.outputs, subject.field, rest);
-    FunctionGraph { graph, outputs, ..cheapest }
-}
-
-/// Builds a function in one form, with its parameters summed up in one way.
-pub fn build_in(
-    form: Form,
-    regrouping: Option<&Regrouping>,
-    function: Function,
-    subject: &Subject<'_>,
-    set: &ParameterSet,
-    baked: Option<&[Rational]>,
-    passes: &[(&str, Pass)],
-) -> FunctionGraph {
-    let Subject { arm, symbols, field, .. } = *subject;
-    let b = Builder::new();
-    let value = |i: usize| match baked {
-        Some(values) => b.constant(&values[i]),
-        None => b.input(Input::Parameter(i)),
-    };
-    let n = arm.dof();
-    let elements = ArmElements::build(&b, arm, symbols, &mut Inputs { b: &b, arm });
-    let chain = Chain::build(&b, arm, &elements, form);
-    let mut bodies = regrouping.map_or(Vec::new(), |r| r.bodies(&b, arm, symbols, field, set, value));
-    if let Some(last) = bodies.last_mut() {
-        last.moments = last.moments.turned_back_z(&b, &chain.last_turn.0, &chain.last_turn.1);
-    }
-    let speeds: Vec<Expr> = (0..n).map(|i| b.input(Input::Speed(i))).collect();
-    let input = |of: fn(usize) -> Input| -> Vec<Expr> { (0..n).map(|i| b.input(of(i))).collect() };
-    let none = vec![Expr::ZERO; n];
-    let torque = |accelerations: &[Expr], gravity: bool| {
-        let drive = motion::Drive {
-            speeds: speeds.clone(),
-            reference: speeds.clone(),
-            accelerations: accelerations.to_vec(),
-            gravity,
-        };
-        inverse::inverse_dynamics(&b, &chain, &bodies, &drive)
-    };
-    let geometry = chain::geometry(&b, arm, form.origins, &elements);
-    let regressor = |drive: &motion::Drive| {
-        let columns = regressor::Columns { set, field, links: &geometry, forces_home: form.forces_home };
-        regressor::regressor(&b, &chain, &columns, drive)
-    };
-    let motion = || motion::Drive {
-        speeds: speeds.clone(),
-        reference: speeds.clone(),
-        accelerations: input(Input::Acceleration),
-        gravity: true,
-    };
-    let reference = || motion::Drive {
-        speeds: speeds.clone(),
-        reference: input(Input::ReferenceSpeed),
-        accelerations: input(Input::ReferenceAcceleration),
-        gravity: true,
-    };
-    let transposed = |rows: Vec<Expr>| -> Vec<Expr> {
-        let p = set.parameters.len();
-        let product = |c: usize| {
-            (0..n).fold(Expr::ZERO, |sum, i| b.add(&sum, &b.mul(&rows[i * p + c], &b.input(Input::Error(i)))))
-        };
-        (0..p).map(product).collect()
-    };
-    let derivatives = |direction: fn(usize) -> Direction| -> Vec<Expr> {
-        let torques = torque(&input(Input::Acceleration), true);
-        let columns: Vec<Vec<Expr>> =
-            (0..n).map(|j| differentiate::derivative(&b, &torques, direction(j))).collect();
-        (0..n * n).map(|k| columns[k % n][k / n]).collect()
-    };
-    let tool =
-        || ToolElements::build(&b, arm, symbols, |x| b.constant(x), |index, sine| b.symbol(index, sine));
-    let outputs = match function {
-        Function::InverseDynamics => torque(&input(Input::Acceleration), true),
-        Function::InverseDynamicsWithoutGravity => torque(&input(Input::Acceleration), false),
-        Function::Regressor => regressor(&motion()),
-        Function::RegressorTransposeTimes => transposed(regressor(&motion())),
-        Function::SlotineLiRegressor => regressor(&reference()),
-        Function::SlotineLiTransposeTimes => transposed(regressor(&reference())),
-        Function::MassMatrix => composite::mass_matrix(&b, &chain, &bodies),
-        Function::MassMatrixInverse => {
-            forward::inverse_symmetric(&b, &composite::mass_matrix(&b, &chain, &bodies), n)
-        }
-        Function::CoriolisMatrix => coriolis::coriolis_matrix(&b, &chain, &bodies, &speeds),
-        Function::CoriolisTimesSpeed => torque(&none, false),
-        Function::CoriolisTransposeTimesSpeed => {
-            momentum::coriolis_transpose_times_speed(&b, &chain, &bodies, &speeds)
-        }
-        Function::Gravity => composite::gravity(&b, &chain, &bodies),
-        Function::ForwardDynamics => {
-            let bias = torque(&none, true);
-            let right: Vec<Expr> = input(Input::Torque).iter().zip(&bias).map(|(t, c)| b.sub(t, c)).collect();
-            forward::solve_symmetric(&b, &composite::mass_matrix(&b, &chain, &bodies), &right)
-        }
-        Function::ForwardKinematics => pose::forward_kinematics(&b, &elements, &tool()),
-        Function::Jacobian => pose::jacobian(&b, &elements, &tool()),
-        Function::JacobianRateTimesSpeed => {
-            let drive = motion::Drive {
-                speeds: speeds.clone(),
-                reference: speeds.clone(),
-                accelerations: none,
-                gravity: false,
-            };
-            let straight = Chain::build(&b, arm, &elements, Form { last_in_frame_before: false, ..form });
-            pose::jacobian_rate_times_speed(&b, &elements, &straight, &geometry[n - 1], &tool(), &drive)
-        }
-        Function::KineticEnergy => vec![momentum::kinetic_energy(&b, &chain, &bodies, &speeds)],
-        Function::PotentialEnergy => {
-            let row = energy::potential_regressor(&b, arm, &elements, set, field);
-            let term = |(i, column): (usize, &Expr)| b.mul(column, &value(i));
-            let terms: Vec<Expr> = row.iter().enumerate().map(term).collect();
-            vec![terms.iter().fold(Expr::ZERO, |sum, t| b.add(&sum, t))]
-        }
-        Function::KineticEnergyRegressor => energy::kinetic_regressor(&b, arm, &elements, set, field),
-        Function::PotentialEnergyRegressor => energy::potential_regressor(&b, arm, &elements, set, field),
-        Function::Momentum => momentum::momentum(&b, &chain, &bodies, &speeds),
-        Function::TorqueByPosition => derivatives(Direction::Position),
-        Function::TorqueBySpeed => derivatives(Direction::Speed),
-    };
-    let parameters = set.parameters.len();
-    let (graph, outputs) = optimize::optimize(b.finish(), outputs, field, passes);
-    let shape = function.shape(n, parameters);
-    FunctionGraph { function, graph, outputs, shape, joints: n, parameters, baked: baked.is_some() }
-}
-
-/// The arm's quantities as inputs and constants of a graph.
-struct Inputs<'a> {
-    b: &'a Builder,
-    arm: &'a Arm,
-}
-
-impl Source<Expr> for Inputs<'_> {
-    fn joint_trig(&mut self, joint: usize) -> (Expr, Expr) {
-        let sum = JointSum::joint(joint);
-        let (s, c) = (self.b.input(Input::Sin(sum)), self.b.input(Input::Cos(sum)));
-        // A constant of quarter turns only swaps and signs; any other is added to the angle itself.
-        match self.arm.joints[joint].theta.quarter_turns() {
-            Some(1) => (c, -s),
-            Some(2) => (-s, -c),
-            Some(3) => (-c, s),
-            _ => (s, c),
+    #[test]
+    fn every_function_finds_its_own_row() {
+        for function in Function::ALL {
+            assert_eq!(function.row().function, function);
+            assert_eq!(Function::parse(function.name()), Some(function));
         }
     }
-    fn position(&mut self, joint: usize) -> Expr {
-        self.b.input(Input::Position(joint))
-    }
-    fn speed(&mut self, joint: usize) -> Expr {
-        self.b.input(Input::Speed(joint))
-    }
-    fn a(&mut self, joint: usize) -> Expr {
-        self.b.constant(&self.arm.joints[joint].a)
-    }
-    fn d(&mut self, joint: usize) -> Expr {
-        self.b.constant(&self.arm.joints[joint].d)
-    }
-    fn ratio(&mut self, joint: usize) -> Expr {
-        self.arm.joints[joint].rotor_ratio.as_ref().map_or(Expr::ZERO, |k| self.b.constant(k))
-    }
-    fn gravity(&mut self, axis: usize) -> Expr {
-        self.b.constant(&self.arm.gravity[axis])
-    }
-    fn symbol(&mut self, index: usize, sine: bool) -> Expr {
-        self.b.symbol(index, sine)
-    }
-}
-
-/// What is added to q before its sine and cosine are taken: theta where it is no multiple of pi/2.
-pub fn trig_offset(arm: &Arm, joint: usize) -> f64 {
-    let theta = &arm.joints[joint].theta;
-    if theta.quarter_turns().is_some() { 0.0 } else { theta.radians() }
 }

@@ -1,15 +1,14 @@
-//! Kinematics, the Lagrangian (exact), and the recursions that are emitted (graph), one file a function.
+//! Kinematics and the recursions that are emitted, as graphs, one file a function.
 
 pub mod body;
+pub mod build;
 pub mod chain;
 pub mod composite;
 pub mod coriolis;
-pub mod elements;
 pub mod energy;
 pub mod forward;
 pub mod function;
 pub mod inverse;
-pub mod lagrangian;
 pub mod moments;
 pub mod momentum;
 pub mod motion;
@@ -20,4 +19,5 @@ pub mod spin;
 pub mod stage;
 pub mod wrench;
 
-pub use function::{Function, FunctionGraph};
+pub use build::FunctionGraph;
+pub use function::Function;

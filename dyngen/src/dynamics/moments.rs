@@ -4,8 +4,8 @@
 //! zz) belongs to the link on either side of the joint, so these three vanish once they are regrouped, and
 //! the moment of each other entry has only two or three components.
 
-use super::elements::{turn_x, turn_z};
 use crate::exact::algebra::Algebra;
+use crate::lagrangian::elements::{turn_x, turn_z};
 
 /// A body's moments.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,12 +1,12 @@
 //! The forward pass: how every frame of the chain moves.
 
 use super::body::{Vector, ZERO};
-use super::elements::turn_z;
 use super::spin::Spin;
 use super::stage::{Chain, Stage, back_z, plus, scaled};
 use crate::arm::JointKind;
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
+use crate::lagrangian::elements::turn_z;
 
 /// What drives the recursion beside the joints' positions.
 #[derive(Clone, Debug)]
@@ -55,7 +55,7 @@ pub fn motions(b: &Builder, chain: &Chain, drive: &Drive) -> Vec<StageMotion> {
     for stage in &chain.stages {
         let before = spin.turned_x(b, stage.twist);
         let (sin, cos) = stage.twist;
-        acceleration = super::elements::turn_x(b, &sin, &cos, &acceleration);
+        acceleration = crate::lagrangian::elements::turn_x(b, &sin, &cos, &acceleration);
         let speeds = stage.coordinates(b, &drive.speeds);
         let reference = stage.coordinates(b, &drive.reference);
         let accelerations = stage.coordinates(b, &drive.accelerations);

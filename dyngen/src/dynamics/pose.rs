@@ -3,12 +3,12 @@
 
 use super::body::Vector;
 use super::chain::LinkGeometry;
-use super::elements::{ArmElements, JointElements, ToolElements, turn_x};
 use super::motion::{Drive, motions};
 use super::stage::{Chain, back_x, plus, scaled};
 use crate::arm::{Convention, JointKind};
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
+use crate::lagrangian::elements::{ArmElements, JointElements, ToolElements, turn_x};
 
 /// A frame in the base: its axes as columns, and its origin.
 #[derive(Clone, Copy, Debug)]

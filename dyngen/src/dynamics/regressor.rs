@@ -8,10 +8,10 @@ use super::spin::{Spin, turned_tensor};
 use super::stage::{Chain, STRAIGHT, SinCos, Stage, back_x, back_z, plus, scaled};
 use super::wrench::Wrench;
 use crate::arm::{JointKind, Parameter, ParameterKind};
-use crate::base::ParameterSet;
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
 use crate::graph::{Builder, Expr};
+use crate::parameters::ParameterSet;
 
 /// What a unit of a coordinate's speed gives a frame.
 #[derive(Clone, Copy, Debug)]
@@ -92,12 +92,12 @@ fn views(b: &Builder, chain: &Chain, motions: &[StageMotion]) -> (Vec<LinkView>,
     let mut seen: Vec<Axis> = Vec::new();
     let (mut views, mut before_stages) = (Vec::with_capacity(chain.dof()), Vec::new());
     let mut home: Option<(Vec<Turn>, Vec<Vector>)> = None;
-    let turn_z = |(s, c): SinCos, v: &Vector| super::elements::turn_z(b, &s, &c, v);
+    let turn_z = |(s, c): SinCos, v: &Vector| crate::lagrangian::elements::turn_z(b, &s, &c, v);
     for (stage, motion) in chain.stages.iter().zip(motions) {
         let (s, c) = stage.twist;
         for axis in &mut seen {
-            axis.angular = super::elements::turn_x(b, &s, &c, &axis.angular);
-            axis.linear = super::elements::turn_x(b, &s, &c, &axis.linear);
+            axis.angular = crate::lagrangian::elements::turn_x(b, &s, &c, &axis.angular);
+            axis.linear = crate::lagrangian::elements::turn_x(b, &s, &c, &axis.linear);
         }
         if let Some((turns, _)) = &mut home {
             turns.push(Turn::X(stage.twist));
@@ -272,7 +272,7 @@ fn unit_wrench(
 /// inertia about z.
 fn turned_moment(b: &Builder, trig: SinCos, across: bool, motion: &LinkMotion) -> Vector {
     let spin = &motion.spin;
-    let turn = |v: &Vector| super::elements::turn_z(b, &trig.0, &trig.1, v);
+    let turn = |v: &Vector| crate::lagrangian::elements::turn_z(b, &trig.0, &trig.1, v);
     let own = Spin { omega: turn(&spin.omega), reference: turn(&spin.reference), ..*spin };
     let [along, beside, _] = turn(&spin.rows[2]);
     let (height, about_z) =

@@ -7,16 +7,16 @@
 
 use super::body::constant;
 use super::chain::{self, LinkGeometry, Origins};
-use super::elements::{ArmElements, Source};
 use super::moments::{ENTRIES, Moments};
 use crate::arm::{Arm, JointKind, Parameter, ParameterKind};
-use crate::base::sets::{Combination, ParameterSet, minimal_coordinates};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{self, Dependence};
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::{Builder, Expr};
+use crate::lagrangian::elements::{ArmElements, Source};
+use crate::parameters::{Combination, ParameterSet, minimal_coordinates};
 
 /// What a link brings into the dynamics.
 #[derive(Clone, Debug)]

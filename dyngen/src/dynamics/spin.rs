@@ -1,9 +1,9 @@
 //! How frames move: ω, and the accelerations of their points.
 
 use super::body::Vector;
-use super::elements::{turn_x, turn_z};
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
+use crate::lagrangian::elements::{turn_x, turn_z};
 
 /// The motion of a frame in its own axes.
 ///

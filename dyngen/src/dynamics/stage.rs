@@ -2,10 +2,10 @@
 
 use super::body::{Vector, ZERO};
 use super::chain::{self, LinkGeometry, Origins};
-use super::elements::ArmElements;
 use crate::arm::{Arm, JointKind};
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr, Input, JointSum};
+use crate::lagrangian::elements::ArmElements;
 
 /// Sine and cosine.
 pub type SinCos = (Expr, Expr);
@@ -197,12 +197,12 @@ impl Stage {
 
 /// A vector's components in the axes before a turn about z.
 pub fn back_z(b: &Builder, (sin, cos): SinCos, v: &Vector) -> Vector {
-    super::elements::turn_z(b, &-sin, &cos, v)
+    crate::lagrangian::elements::turn_z(b, &-sin, &cos, v)
 }
 
 /// A vector's components in the axes before a turn about x.
 pub fn back_x(b: &Builder, (sin, cos): SinCos, v: &Vector) -> Vector {
-    super::elements::turn_x(b, &-sin, &cos, v)
+    crate::lagrangian::elements::turn_x(b, &-sin, &cos, v)
 }
 
 /// u + v

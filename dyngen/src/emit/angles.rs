@@ -3,8 +3,9 @@
 use super::code::{lane_name, used};
 use crate::arm::{Arm, JointKind};
 use crate::dynamics::FunctionGraph;
+use crate::dynamics::build::trig_offset;
 use crate::dynamics::chain;
-use crate::dynamics::function::{Argument, trig_offset};
+use crate::dynamics::function::Argument;
 use crate::graph::{Input, JointSum};
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};

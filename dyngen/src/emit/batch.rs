@@ -20,7 +20,9 @@ pub(super) fn module(model: &Model, functions: &[FunctionGraph]) -> TokenStream 
             fn are_near<T: SimdRealField + Copy>(angles: &[T]) -> bool {
                 let limit = nalgebra::convert(6000.0);
                 // No early end: that would be a branch for each angle.
-                angles.iter().fold(true, |near, angle| near & nalgebra::SimdBool::all(angle.simd_abs().simd_le(limit)))
+                angles
+                    .iter()
+                    .fold(true, |near, angle| near & nalgebra::SimdBool::all(angle.simd_abs().simd_le(limit)))
             }
         }
     });

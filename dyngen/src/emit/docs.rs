@@ -1,9 +1,9 @@
 //! The words of a generated file: its head, and the documentation of each function.
 
 use super::Options;
-use crate::base::{ParameterSet, SetKind};
-use crate::dynamics::{Function, FunctionGraph};
+use crate::dynamics::FunctionGraph;
 use crate::model::Model;
+use crate::parameters::{ParameterSet, SetKind};
 
 /// The comment at the head of the file.
 pub(super) fn head(model: &Model, options: &Options) -> String {
@@ -53,87 +53,6 @@ pub(super) fn parameters(set: &ParameterSet) -> String {
     )
 }
 
-/// What a function computes, and what it returns.
-fn words(function: Function) -> (&'static str, &'static str) {
-    use Function::*;
-    match function {
-        InverseDynamics => (
-            "Joint torques of a motion: τ = B(q)·q̈ + C(q, q̇)·q̇ + g(q), without friction.",
-            "Returns τ, N·m (N where prismatic).",
-        ),
-        InverseDynamicsWithoutGravity => {
-            ("Joint torques of a motion without gravity: B(q)·q̈ + C(q, q̇)·q̇.", "Returns the torques, N·m.")
-        }
-        Regressor => (
-            "Regressor Y(q, q̇, q̈): τ = Y·π for the parameters of \
-                [`PARAMETER_NAMES`].",
-            "Returns Y, n × \
-                p.",
-        ),
-        RegressorTransposeTimes => {
-            ("Yᵀ(q, q̇, q̈)·e without Y itself.", "Returns one number for each parameter.")
-        }
-        SlotineLiRegressor => (
-            "Regressor of Slotine and Li: Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g, with C of Christoffel \
-                symbols.",
-            "Returns Y, n × p.",
-        ),
-        SlotineLiTransposeTimes => (
-            "Yᵀ(q, q̇, q̇ᵣ, q̈ᵣ)·e of Slotine and Li's regressor: the direction of their adaptation law.",
-            "Returns one number for each parameter.",
-        ),
-        MassMatrix => ("Mass matrix B(q), symmetric.", "Returns B, n × n, kg·m²."),
-        MassMatrixInverse => (
-            "Inverse of the mass matrix, B⁻¹(q).",
-            "Returns n × n, symmetric; not finite where the parameters make B singular.",
-        ),
-        CoriolisMatrix => (
-            "Coriolis matrix C(q, q̇) of Christoffel symbols: Ḃ − 2C is \
-                skew-symmetric.",
-            "Returns C, n × \
-                n.",
-        ),
-        CoriolisTimesSpeed => ("Coriolis and centrifugal torques C(q, q̇)·q̇.", "Returns the torques, N·m."),
-        CoriolisTransposeTimesSpeed => (
-            "Cᵀ(q, q̇)·q̇ of the Christoffel matrix, which is ∂T/∂q: what a momentum observer integrates.",
-            "Returns the torques, N·m.",
-        ),
-        Gravity => ("Joint torques that hold the arm still: g(q).", "Returns g, N·m."),
-        ForwardDynamics => (
-            "Joint accelerations under joint torques: q̈ = B⁻¹·(τ − C·q̇ − g), without friction.",
-            "Returns q̈; not finite where the parameters make B singular.",
-        ),
-        ForwardKinematics => (
-            "Pose of the tool's frame (the last link's where the arm declares no tool) in the base frame.",
-            "Returns the homogeneous transform, 4 × 4, lengths in m.",
-        ),
-        Jacobian => (
-            "Geometric Jacobian of the tool's frame (the last link's where the arm declares no tool), in \
-                base axes.",
-            "Returns 6 × n: velocity of the origin, m/s, above the angular velocity, rad/s.",
-        ),
-        JacobianRateTimesSpeed => (
-            "J̇(q, q̇)·q̇ of the geometric Jacobian: acceleration of the tool's frame where q̈ = 0.",
-            "Returns six numbers: acceleration of the origin, m/s², above the angular acceleration, rad/s².",
-        ),
-        KineticEnergy => ("Kinetic energy T = ½ q̇ᵀ·B·q̇.", "Returns T, J."),
-        PotentialEnergy => {
-            ("Potential energy U(q) under gravity, up to a constant: ∂U/∂q = g(q).", "Returns U, J.")
-        }
-        KineticEnergyRegressor => ("Row of the kinetic energy: T = row·π.", "Returns 1 × p."),
-        PotentialEnergyRegressor => {
-            ("Row of the potential energy, up to a constant: U = row·π.", "Returns 1 × p.")
-        }
-        Momentum => ("Generalised momentum B(q)·q̇.", "Returns the momenta, N·m·s."),
-        TorqueByPosition => {
-            ("∂τ/∂q of the inverse dynamics.", "Returns n × n; column j is the derivative by q of joint j.")
-        }
-        TorqueBySpeed => {
-            ("∂τ/∂q̇ of the inverse dynamics.", "Returns n × n; column j is the derivative by q̇ of joint j.")
-        }
-    }
-}
-
 /// The documentation of a function's variant that takes sines and cosines.
 pub(super) fn function_with(built: &FunctionGraph) -> String {
     format!(
@@ -144,7 +63,7 @@ pub(super) fn function_with(built: &FunctionGraph) -> String {
 
 /// The documentation of a function.
 pub(super) fn function(built: &FunctionGraph) -> String {
-    let (what, returns) = words(built.function);
+    let (what, returns) = built.function.meaning();
     let arguments: String =
         built.function.arguments().iter().map(|a| format!("\n* `{}`: {}", a.name(), a.meaning())).collect();
     let operations = built.operations();

@@ -14,11 +14,11 @@ mod trigonometry;
 
 pub use friction::FrictionTerm;
 
-use crate::base::SetKind;
 use crate::dynamics::function::Argument;
 use crate::dynamics::{Function, FunctionGraph};
 use crate::graph::Preparation;
 use crate::model::{Error, Model};
+use crate::parameters::SetKind;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 

@@ -3,7 +3,7 @@
 
 use super::Options;
 use crate::arm::{Arm, ParameterKind};
-use crate::base::possible;
+use crate::consistency;
 use crate::dynamics::Function;
 use crate::model::{Error, Model};
 use proc_macro2::{Literal, TokenStream};
@@ -21,7 +21,7 @@ pub(super) fn module(model: &Model, options: &Options) -> Result<TokenStream, Er
         None => model.set_values(set, &sample_bodies(model.arm())),
     };
     // Forward dynamics and definiteness are for values that a real arm can have.
-    let possible = possible::check(model, options.parameters, &values)?.possible;
+    let possible = consistency::check(model, options.parameters, &values)?.possible;
     let has = |needed: &[Function]| needed.iter().all(|f| options.functions.contains(f));
     let baked = options.values.is_some();
     let p = if baked { quote!() } else { quote!(, &parameters()) };

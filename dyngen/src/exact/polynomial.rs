@@ -99,7 +99,7 @@ where
     /// A ring with one rule for each variable.
     ///
     /// # Panics
-    /// With more than [`VARIABLES`] variables, which [`crate::arm::MAX_JOINTS`] rules out.
+    /// With more than [`VARIABLES`] variables, which the largest number of joints rules out.
     pub fn new(squares: Vec<Square<C>>) -> Self {
         assert!(squares.len() <= VARIABLES, "{} variables, at most {VARIABLES}", squares.len());
         PolynomialRing { squares }

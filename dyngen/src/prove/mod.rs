@@ -9,12 +9,13 @@ mod series;
 mod state;
 
 use crate::arm::Arm;
-use crate::base::sets::{ParameterSet, Sets};
+use crate::base::Sets;
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::prime::{Draws, Fp};
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::differentiate::Direction;
+use crate::parameters::ParameterSet;
 use point::Point;
 use series::PoseSeries;
 use std::fmt;

@@ -2,7 +2,7 @@
 
 use super::state::State;
 use crate::arm::{Arm, JointKind, Parameter};
-use crate::base::sets::{Combination, ParameterSet, Sets};
+use crate::base::Sets;
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;
 use crate::exact::prime::{Draws, Fp};
@@ -10,6 +10,7 @@ use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::evaluate::sine_and_cosine;
 use crate::graph::{Input, evaluate};
+use crate::parameters::{Combination, ParameterSet};
 
 /// A pose, rates and parameter values.
 pub(super) struct Point<'a> {

@@ -2,10 +2,10 @@
 
 use super::point::Point;
 use crate::arm::Convention;
-use crate::dynamics::elements::{ArmElements, Source, ToolElements};
 use crate::exact::algebra::Algebra;
 use crate::exact::prime::Fp;
 use crate::exact::rational::Rational;
+use crate::lagrangian::elements::{ArmElements, Source, ToolElements};
 
 /// x₀ + x₁ t + x₂ t²
 type Series = [Fp; 3];

@@ -2,14 +2,14 @@
 //! recursion.
 
 use super::point::Point;
-use crate::dynamics::elements::{ArmElements, Source};
-use crate::dynamics::lagrangian::twice_lagrangian;
 use crate::exact::algebra::Algebra;
 use crate::exact::dual::Duals;
 use crate::exact::jet::{Jet, Jets};
 use crate::exact::prime::Fp;
 use crate::exact::rational::Rational;
 use crate::graph::differentiate::Direction;
+use crate::lagrangian::elements::{ArmElements, Source};
+use crate::lagrangian::twice_lagrangian;
 
 /// A motion of the arm at a point's pose.
 #[derive(Clone, Copy)]

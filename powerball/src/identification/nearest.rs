@@ -2,7 +2,7 @@
 
 use super::estimate::{TorqueMetric, nearest};
 use crate::logs::Progress;
-use dyngen::base::possible;
+use dyngen::consistency;
 use dyngen::{Arm, Diagnostics, Error, Model, Values};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -80,7 +80,7 @@ pub fn nearest_arm(arm: &Arm, values: &Values, progress: Progress<'_>) -> Result
     progress.say("deriving the arm");
     let model = Model::derive(arm.clone())?;
     let (kind, given) = values.recognise(&model).map_err(NearestError::Values)?;
-    let verdict = possible::check(&model, kind, &given)?;
+    let verdict = consistency::check(&model, kind, &given)?;
     progress.say("looking for the nearest real arm");
     let metric = TorqueMetric::new(&model, kind)?;
     let consistent = nearest(&model, kind, &given, &metric.matrix(SAME))?;

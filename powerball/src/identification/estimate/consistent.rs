@@ -16,7 +16,7 @@
 
 use crate::logs::vector::dot;
 use dyngen::arm::{Arm, Convention, Parameter, ParameterKind};
-use dyngen::base::possible::pseudo_inertia;
+use dyngen::consistency::pseudo_inertia;
 use dyngen::{Error, Model, SetKind};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
@@ -277,7 +277,7 @@ fn times_transposed(a: &Mat<f64>, x: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dyngen::base::possible;
+    use dyngen::consistency;
     use dyngen::{Arm, Values};
     use rand::{RngExt, SeedableRng};
 
@@ -295,7 +295,7 @@ mod tests {
         let values = values.of_set(&model, set).unwrap();
         let metric = crate::identification::estimate::TorqueMetric::new(&model, SetKind::Published).unwrap();
         let found = nearest(&model, SetKind::Published, &values, &metric.matrix(1e-3)).unwrap();
-        let verdict = possible::check(&model, SetKind::Full, &kept(&model, &found.all)).unwrap();
+        let verdict = consistency::check(&model, SetKind::Full, &kept(&model, &found.all)).unwrap();
         assert!(verdict.possible, "{:?}", verdict.reasons);
     }
 
@@ -314,7 +314,7 @@ mod tests {
         let found = nearest(&model, SetKind::Minimal, &values, &unit(values.len())).unwrap();
         assert!(found.distance <= found.gap, "{} {}", found.distance, found.gap);
         assert!(found.eigenvalues.iter().all(|e| *e > 0.0) && found.without_body.is_empty());
-        assert!(possible::check(&model, SetKind::Full, &kept(&model, &found.all)).unwrap().possible);
+        assert!(consistency::check(&model, SetKind::Full, &kept(&model, &found.all)).unwrap().possible);
     }
 
     fn kept(model: &Model, all: &[f64]) -> Vec<f64> {
@@ -329,12 +329,12 @@ mod tests {
         let set = model.set(SetKind::Published).unwrap();
         let values = Values::parse(include_str!("../../../table3.json"), "table3.json").unwrap();
         let values = values.of_set(&model, set).unwrap();
-        assert!(!possible::check(&model, SetKind::Published, &values).unwrap().possible);
+        assert!(!consistency::check(&model, SetKind::Published, &values).unwrap().possible);
         let metric = unit(values.len());
         let found = nearest(&model, SetKind::Published, &values, &metric).unwrap();
         let full = kept(&model, &found.all);
-        assert!(possible::check(&model, SetKind::Full, &full).unwrap().possible);
-        assert!(possible::check(&model, SetKind::Published, &found.set).unwrap().possible);
+        assert!(consistency::check(&model, SetKind::Full, &full).unwrap().possible);
+        assert!(consistency::check(&model, SetKind::Published, &found.set).unwrap().possible);
         // Mixtures with other real arms are real arms too: the distance must not fall along any of them.
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(4);
         let distance = |all: &[f64]| {

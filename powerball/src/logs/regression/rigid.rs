@@ -151,7 +151,7 @@ impl RigidBody {
     /// # Errors
     /// As [`Model::function`].
     pub fn impossible(&self, values: &[f64]) -> Result<Vec<String>, Error> {
-        Ok(dyngen::base::possible::check(&self.model, SetKind::Minimal, values)?.reasons)
+        Ok(dyngen::consistency::check(&self.model, SetKind::Minimal, values)?.reasons)
     }
 
     /// Values of all eleven parameters a link that move like the minimal set's `values`.

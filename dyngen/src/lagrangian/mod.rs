@@ -1,9 +1,11 @@
 //! The Lagrangian of Eq. 5 and 6, linear in the dynamic parameters: the one definition that all else is
 //! derived from or proven against.
 
-use super::elements::{ArmElements, JointElements, turn_x, turn_z};
-use crate::arm::{Convention, ParameterKind};
+pub mod elements;
+
+use crate::arm::{Convention, JointKind, ParameterKind};
 use crate::exact::algebra::Algebra;
+use elements::{ArmElements, JointElements, turn_x, turn_z};
 
 /// The motion of a link frame relative to the base, in the frame's own axes.
 struct Motion<V> {
@@ -72,8 +74,8 @@ fn advance<A: Algebra>(alg: &A, joint: &JointElements<A::Value>, state: &mut Mot
         *v = turn_z(alg, &joint.sin, &joint.cos, v);
     }
     let moved = match joint.kind {
-        crate::arm::JointKind::Revolute => &mut state.omega[2],
-        crate::arm::JointKind::Prismatic => &mut state.velocity[2],
+        JointKind::Revolute => &mut state.omega[2],
+        JointKind::Prismatic => &mut state.velocity[2],
     };
     *moved = alg.add(moved, &joint.speed);
 }

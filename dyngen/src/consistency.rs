@@ -4,12 +4,12 @@
 //! parameters are all given, is its pseudo-inertia matrix positive semi-definite, which is exactly the
 //! condition for a distribution of mass to have them (Wensing, Kim and Slotine 2018).
 
-use super::sets::{ParameterSet, SetKind};
 use crate::arm::{Arm, JointKind, Parameter, ParameterKind};
 use crate::dynamics::Function;
 use crate::evaluator::Evaluator;
 use crate::exact::prime::Draws;
 use crate::model::{Error, Model};
+use crate::parameters::{ParameterSet, SetKind, SetParameter};
 use nalgebra::{Matrix4, SMatrix};
 
 /// Poses that are drawn before the worst of them are refined.
@@ -136,7 +136,8 @@ impl Search<'_> {
 /// Links whose parameters are all given and are those of no body, and rotors of negative inertia.
 fn impossible_links(arm: &Arm, set: &ParameterSet, values: &[f64]) -> Vec<String> {
     let given = |p: Parameter| {
-        let single = |s: &super::sets::SetParameter| matches!(&s.terms[..], [(q, c)] if *q == p && c.as_rational() == Some(crate::exact::rational::integer(1)));
+        let one = Some(crate::exact::rational::integer(1));
+        let single = |s: &SetParameter| matches!(&s.terms[..], [(q, c)] if *q == p && c.as_rational() == one);
         set.parameters.iter().position(single).map(|i| values[i])
     };
     let mut reasons = Vec::new();
