@@ -5,8 +5,8 @@ use faer::Mat;
 /// Σ w·A'A, Σ w·A'y, Σ w·y'y.
 pub(super) type Products = (Mat<f64>, Vec<f64>, f64);
 
-/// Σ aᵢ·bᵢ in the order of the rows. Standard errors of nearly dependent columns hang on the last digits of
-/// these sums, so their order is kept, where [`crate::logs::vector::dot`] changes it for speed.
+/// Σ aᵢ·bᵢ in the order of the rows: standard errors of nearly dependent columns hang on the last digits of
+/// these sums.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -27,7 +27,7 @@ pub(super) fn parse(
         SerializedFileReader::new(bytes::Bytes::copy_from_slice(bytes)).map_err(|e| unreadable(None, &e))?;
     let schema = reader.metadata().file_metadata().schema();
     let names: Vec<String> = schema.get_fields().iter().map(|field| field.name().to_string()).collect();
-    let mut samples = Samples::new(Columns::find(&names, arm, file, findings)?, arm, "row");
+    let mut samples = Samples::new(Columns::find(&names, arm, file, findings)?, arm, "line");
     let rows = reader.get_row_iter(None).map_err(|e| unreadable(None, &e))?;
     for (k, row) in rows.enumerate() {
         let row = row.map_err(|e| unreadable(Some(k + 1), &e))?;
