@@ -10,6 +10,5 @@ mod progress;
 pub mod regression;
 pub mod signal;
 pub mod summary;
-pub(crate) mod vector;
 
 pub use progress::Progress;

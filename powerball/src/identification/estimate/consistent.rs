@@ -14,7 +14,7 @@
 //! The certificate is the barrier's: the value found exceeds the least possible one by at most μ times the
 //! number of barrier dimensions.
 
-use crate::logs::vector::dot;
+use super::normal_equations::dot;
 use dyngen::arm::{Arm, Convention, Parameter, ParameterKind};
 use dyngen::consistency::pseudo_inertia;
 use dyngen::{Error, Model, SetKind};

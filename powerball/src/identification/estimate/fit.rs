@@ -4,10 +4,10 @@ use super::design::{Design, Gram, runs};
 use super::folds::Folds;
 use super::friction_shape::{self, Trials};
 use super::normal_equations::Products;
+use super::normal_equations::dot;
 use super::vary::{FRICTION, Layout, Rows, Scatter, Start, vary};
 use crate::logs::parallel;
 use crate::logs::regression::{Column, Data, RigidBody};
-use crate::logs::vector::dot;
 use faer::Mat;
 
 /// A column that was added to the base model.

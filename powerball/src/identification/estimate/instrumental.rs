@@ -14,11 +14,11 @@
 use super::distribution::t_quantile_975;
 use super::errors::StandardErrors;
 use super::friction_shape;
+use super::normal_equations::dot;
 use super::reduced::{Part, Solution};
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, DataOptions, Recording, RigidBody};
 use crate::logs::summary::{Octaves, Triangle, parts};
-use crate::logs::vector::dot;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 

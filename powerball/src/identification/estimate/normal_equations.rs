@@ -1,10 +1,15 @@
 //! Normal equations, summed over joints and parts of logs.
 
-use crate::logs::vector::dot;
 use faer::Mat;
 
 /// Σ w·A'A, Σ w·A'y, Σ w·y'y.
 pub(super) type Products = (Mat<f64>, Vec<f64>, f64);
+
+/// Σ aᵢ·bᵢ in the order of the rows: standard errors of nearly dependent columns hang on the last digits of
+/// these sums.
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
 
 /// Of no row yet, for so many coefficients.
 pub(super) fn zeros(size: usize) -> Products {

@@ -1,12 +1,11 @@
 //! The fit of reduced logs.
 
 use super::friction_shape::Trials;
-use super::normal_equations::{Products, add_columns, zeros};
+use super::normal_equations::{Products, add_columns, dot, zeros};
 use super::vary::{FRICTION, Layout, Rows, Scatter, vary};
 use crate::logs::summary::{
     Columns, Identity, NODES, OCTAVES, SLOW, Steepness, Summary, SummaryError, Triangle,
 };
-use crate::logs::vector::dot;
 use faer::Mat;
 
 /// What stands beside the minimal set in a model of a joint's torque.

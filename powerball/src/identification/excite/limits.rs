@@ -25,8 +25,8 @@ pub struct Limits(pub Vec<JointLimits>);
 pub struct MissingLimits(pub Vec<String>);
 
 impl Limits {
-    /// The limits of an arm, drawn in by `margin`: 0.05 leaves 5 % of the range, the velocity, the acceleration
-    /// and the torque unused.
+    /// The limits of an arm, drawn in by `margin`: 0.05 leaves 5 % of the range, the velocity, the
+    /// acceleration and the torque unused.
     ///
     /// # Errors
     /// Every limit that the arm file misses, joint by joint.

@@ -210,8 +210,8 @@ fn tasks<'m>(
         None => assumed.push("floor and self-collision were not looked at".to_string()),
         Some(Collision { radius, clearance, .. }) => {
             assumed.push(format!(
-                "links are capsules of radius {radius} m along the frames of the file, {clearance} m clear of \
-                    each other and of the floor; adjoining ones may fold to about {:.0}°",
+                "links are capsules of radius {radius} m along the frames of the file, {clearance} m clear \
+                    of each other and of the floor; adjoining ones may fold to about {:.0}°",
                 2.0 * ((1.0 + 0.5 * clearance / radius) / 3.0).min(1.0).asin().to_degrees()
             ));
             for (a, b) in shape.always_touching() {

@@ -63,8 +63,9 @@ fn spreads(
     for (joints, mounted) in contradictions.iter().zip(&gathered.mounted).filter(|(j, _)| !j.is_empty()) {
         let joints: Vec<String> = joints.iter().map(ToString::to_string).collect();
         warnings.push(format!(
-            "one set of parameters leaves more than twice as much of the logs with the base {} on joint {} as a \
-                set of their own: is the mounting of each log told right, and was it one arm with one load?",
+            "one set of parameters leaves more than twice as much of the logs with the base {} on joint {} \
+                as a set of their own: is the mounting of each log told right, and was it one arm with one \
+                load?",
             mounted.mounting,
             joints.join(", ")
         ));

@@ -1,7 +1,7 @@
 //! From logs to a model: one function, and what it takes and gives.
 //!
-//! `gather` makes sufficient statistics of logs, by mounting; `fit` fits them; `by_mounting` says what the fit
-//! leaves of each mounting; `judge` what the model leaves of other logs; `along` what a page shows of it.
+//! `gather` makes sufficient statistics of logs, by mounting; `fit` fits them; `by_mounting` says what the
+//! fit leaves of each mounting; `judge` what the model leaves of other logs; `along` what a page shows of it.
 
 mod along;
 mod by_mounting;

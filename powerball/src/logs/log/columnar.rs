@@ -28,7 +28,7 @@ pub(super) fn parse(
     let reader = SerializedFileReader::new(bytes.clone()).map_err(|e| unreadable(None, &e))?;
     let schema = reader.metadata().file_metadata().schema();
     let names: Vec<String> = schema.get_fields().iter().map(|field| field.name().to_string()).collect();
-    let mut samples = Samples::new(Columns::find(&names, arm, file, findings)?, arm, "row");
+    let mut samples = Samples::new(Columns::find(&names, arm, file, findings)?, arm, "line");
     let mut count = 0;
     for group in 0..reader.num_row_groups() {
         let inner = reader.get_row_group(group).map_err(|e| unreadable(Some(count + 1), &e))?;

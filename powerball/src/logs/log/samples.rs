@@ -56,8 +56,8 @@ impl Samples {
                 ))]));
             }
             findings.push(finding(format!(
-                "{bad} of {total} {called}s hold no finite number in every needed column (the first is this one) \
-                    and were left out; short holes are filled by interpolation, long ones split the log"
+                "{bad} of {total} {called}s hold no finite number in every needed column (the first is this \
+                    one) and were left out; short holes are filled by interpolation, long ones split the log"
             )));
         }
         check::into_log(self.raw, &self.columns.effort, file, arm, findings)

@@ -1,10 +1,10 @@
 //! Logged velocities against logged positions: units, signs, columns that were exchanged, and clocks that
 //! disagree.
 //!
-//! Velocities are computed from positions; logged ones are used for these doubts alone. What a joint moves within
-//! half a second is held against the integral of its logged velocity: no derivative is taken, so encoder steps
-//! and noise hardly count. On sound logs of real arms the two agree within 0.1 % with a correlation of
-//! 1.0000.
+//! Velocities are computed from positions; logged ones are used for these doubts alone. What a joint moves
+//! within half a second is held against the integral of its logged velocity: no derivative is taken, so
+//! encoder steps and noise hardly count. On sound logs of real arms the two agree within 0.1 % with a
+//! correlation of 1.0000.
 
 use super::raw::Raw;
 use super::{Doubts, Severity};

@@ -58,8 +58,8 @@ impl Recording {
         recording.follow(t, &positions, smoothing).then_some(recording)
     }
 
-    /// Takes positions, velocities and accelerations from samples at times `t`, by joint, smoothed to `smoothing`
-    /// Hz.
+    /// Takes positions, velocities and accelerations from samples at times `t`, by joint, smoothed to
+    /// `smoothing` Hz.
     ///
     /// `false` where there are too few samples or no such filter; nothing has changed then.
     pub fn follow(&mut self, t: &[f64], positions: &[&[f64]], smoothing: f64) -> bool {

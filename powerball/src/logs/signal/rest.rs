@@ -14,8 +14,8 @@ pub const LONGEST_REVERSAL: f64 = 0.5;
 /// Velocities are judged below this frequency, Hz: encoder steps at rest look fast above it.
 const SMOOTHING: f64 = 2.0;
 
-/// The velocity below which a joint counts as resting, from samples of |q̇| of all its recordings and its velocity
-/// limit if known.
+/// The velocity below which a joint counts as resting, from samples of |q̇| of all its recordings and its
+/// velocity limit if known.
 #[must_use]
 pub fn rest_speed(mut speeds: Vec<f64>, limit: Option<f64>) -> f64 {
     if speeds.is_empty() {
@@ -26,8 +26,8 @@ pub fn rest_speed(mut speeds: Vec<f64>, limit: Option<f64>) -> f64 {
     REST_SPEED.min((REST_SHARE * *p95).max(REST_OF_LIMIT * limit.unwrap_or(0.0)))
 }
 
-/// Which samples of a joint's velocity `v` (rad/s, at `rate` Hz) are motion; heads and tails at rest and stops
-/// are not.
+/// Which samples of a joint's velocity `v` (rad/s, at `rate` Hz) are motion; heads and tails at rest and
+/// stops are not.
 ///
 /// Rest is a stretch of at least [`LONGEST_REVERSAL`] in which the velocity, smoothed to 2 Hz, stays below
 /// `limit`.
