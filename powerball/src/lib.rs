@@ -37,3 +37,6 @@ pub mod procedure;
 pub mod report;
 #[cfg(feature = "virtual-arm")]
 pub mod virtual_arm;
+
+#[cfg(feature = "explain")]
+pub use explanation::{ExplainError, ExplainOptions, Explained, Rule, explain};

@@ -96,7 +96,28 @@ pub(crate) fn load(
     progress: &Progress,
 ) -> Result<Loaded, Failure> {
     let known = Known::mounted(&inputs.arm, model, mounting)?;
-    let mut warnings = known.arm.notes();
+    let Recorded { fit, validate, warnings } = recorded(inputs, validate, &known.arm, progress)?;
+    progress.say("deriving and proving the arm's dynamics");
+    let body = RigidBody::new(&known.arm).map_err(|e| Failure::Refused(e.to_string()))?;
+    let known = known.model(&body)?;
+    Ok(Loaded { body, fit, validate, warnings, known })
+}
+
+/// The logs of a command, on a common clock, and what was found in them and in the arm file.
+pub(crate) struct Recorded {
+    pub fit: Vec<Log>,
+    pub validate: Vec<Log>,
+    pub warnings: Vec<String>,
+}
+
+/// Reads the logs and makes the folder of the results.
+pub(crate) fn recorded(
+    inputs: &Inputs,
+    validate: &[PathBuf],
+    arm: &Arm,
+    progress: &Progress,
+) -> Result<Recorded, Failure> {
+    let mut warnings = arm.notes();
     for file in validate {
         if inputs.log.iter().any(|log| same_file(log, file)) {
             let name = file.display();
@@ -107,16 +128,13 @@ pub(crate) fn load(
     }
     progress.say("reading logs");
     let files: Vec<&PathBuf> = inputs.log.iter().chain(validate).collect();
-    let (mut logs, findings) = read_logs(&files, &known.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+    let (mut logs, findings) = read_logs(&files, arm).map_err(|e| Failure::Unusable(e.to_string()))?;
     warnings.extend(findings.iter().map(ToString::to_string));
     common_clock(&mut logs);
-    let rest = logs.split_off(inputs.log.len());
-    progress.say("deriving and proving the arm's dynamics");
-    let body = RigidBody::new(&known.arm).map_err(|e| Failure::Refused(e.to_string()))?;
-    let known = known.model(&body)?;
+    let validate = logs.split_off(inputs.log.len());
     std::fs::create_dir_all(&inputs.out)
         .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", inputs.out.display())))?;
-    Ok(Loaded { body, fit: logs, validate: rest, warnings, known })
+    Ok(Recorded { fit: logs, validate, warnings })
 }
 
 pub(super) fn same_file(a: &Path, b: &Path) -> bool {
