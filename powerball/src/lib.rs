@@ -62,3 +62,5 @@ pub mod virtual_arm;
 pub use identification::{Identified, IdentifyError, IdentifyOptions, Source, identify};
 #[cfg(feature = "identify")]
 pub use logs::log::{Arrays, Log};
+#[cfg(feature = "explain")]
+pub use explanation::{ExplainError, ExplainOptions, Explained, Rule, explain};

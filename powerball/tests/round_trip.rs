@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use powerball::commands::demo::Session;
-use powerball::explanation::explain::{Explained, explain};
+use powerball::explanation::{ExplainOptions, Explained, explain_body};
 use powerball::logs::log::{Log, common_clock, read_logs};
 use powerball::logs::regression::{Data, DataOptions, RigidBody};
 use std::fmt::Write;
@@ -142,7 +142,7 @@ fn the_controllers_torque_is_the_reports() {
         common_clock(&mut fit);
         let held_out = fit.split_off(session.fit.len());
         let options = DataOptions::default();
-        let explained = explain(&body, &fit, &held_out, &options, &|_| ()).unwrap();
+        let explained = explain_body(&body, &fit, &held_out, &ExplainOptions::default()).unwrap();
         assert!(
             explained.model.additions.terms.iter().any(|t| t.effect == effect),
             "{:?}",

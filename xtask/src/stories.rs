@@ -3,9 +3,10 @@
 //! are.
 
 use dyngen::Arm;
-use powerball::explanation::explain::{Explained, NamedEffect, Shown, explain};
-use powerball::logs::log::{common_clock, read_logs};
-use powerball::logs::regression::{DataOptions, RigidBody};
+use powerball::controller::JointNumber;
+use powerball::explanation::explain::{NamedEffect, Shown};
+use powerball::explanation::{ExplainOptions, Explained, explain};
+use powerball::logs::log::read_logs;
 use powerball::report::explained::{error_bars, figures, sight};
 use std::fmt::Write as _;
 use std::fs;
@@ -126,10 +127,8 @@ fn explained(case: &Case, data: &Path) -> Result<Explained, String> {
     let arm = Arm::read(&folder.join("arm.toml")).map_err(|e| e.to_string())?;
     let files: Vec<PathBuf> = case.fit.iter().chain(&case.validate).map(|file| folder.join(file)).collect();
     let (mut logs, _) = read_logs(&files, &arm).map_err(|e| e.to_string())?;
-    common_clock(&mut logs);
     let held_out = logs.split_off(case.fit.len());
-    let body = RigidBody::new(&arm).map_err(|e| e.to_string())?;
-    explain(&body, &logs, &held_out, &DataOptions::default(), &|_| ()).map_err(|e| e.to_string())
+    explain(&arm, &logs, &held_out, &ExplainOptions::default()).map_err(|e| e.to_string())
 }
 
 fn tell(page: &mut String, case: &Case, explained: &Explained, figures: &Path) -> Result<(), String> {
@@ -147,7 +146,7 @@ fn tell(page: &mut String, case: &Case, explained: &Explained, figures: &Path) -
     );
     let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
     for change in &explained.held_out_change {
-        let (b, a) = (before[change.joint - 1], after[change.joint - 1]);
+        let (b, a) = (before[change.joint.index()], after[change.joint.index()]);
         let [low, high] = change.interval.map(|share| 100.0 * share);
         let rms = 100.0 * change.rms;
         let _ =
@@ -178,11 +177,11 @@ fn tell(page: &mut String, case: &Case, explained: &Explained, figures: &Path) -
         }
         None => page.push_str("\nNothing else is left that these logs could show.\n"),
     }
-    let placebos = &explained.false_positives;
+    let chance = &explained.false_positives;
     let _ = writeln!(
         page,
         "Of {} effects that cannot be in these logs, {} were accepted.",
-        placebos.placebos, placebos.accepted
+        chance.surrogates, chance.accepted
     );
     for warning in explained.warnings.iter().filter(|w| !w.contains(".csv")) {
         let _ = writeln!(page, "\n> {warning}");
@@ -196,7 +195,7 @@ fn evidence(page: &mut String, effect: &NamedEffect) {
         "\n**{}** on joint {}: `{}`.",
         effect.effect,
         list(&effect.joints),
-        figures(&effect.parameters)
+        figures(&effect.figures)
     );
     let least = effect.held_out_gain.iter().copied().fold(f64::INFINITY, f64::min);
     let _ = writeln!(
@@ -217,7 +216,7 @@ fn evidence(page: &mut String, effect: &NamedEffect) {
     }
 }
 
-fn list(joints: &[usize]) -> String {
+fn list(joints: &[JointNumber]) -> String {
     joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 

@@ -1,6 +1,40 @@
 //! From what a model leaves to named effects, and to the model that has them.
+//!
+//! | folder | what lives there |
+//! |---|---|
+//! | [`effects`] | one file an effect that a model may lack: **how a log row becomes a column** |
+//! | [`mod@explain`] | the pipeline that finds effects; its `comparison` **decides that a name is given** |
+//! | [`experiment`] | where names stay open: the path on which they differ most, and what its log decides |
+//! | [`torque_model`] | a model with its effects: its file, its torque along logs, its controller's code |
+//!
+//! [`explain()`] is the door, and [`Rule`] holds every threshold.
+//!
+//! ```no_run
+//! use powerball::logs::log::read_logs;
+//! use powerball::{ExplainOptions, explain};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let arm = dyngen::Arm::read("arm.toml".as_ref())?;
+//! let (logs, _) = read_logs(&["a.csv", "b.csv", "c.csv"], &arm)?;
+//! let (validate, _) = read_logs(&["another_path.csv"], &arm)?;
+//! let explained = explain(&arm, &logs, &validate, &ExplainOptions::default())?;
+//! for found in &explained.effects {
+//!     println!("{} on joints {:?}: {:?}", found.effect, found.joints, found.figures);
+//! }
+//! std::fs::write("explained.json", serde_json::to_string_pretty(&explained)?)?;
+//! # Ok(())
+//! # }
+//! ```
 
+mod door;
 pub mod effects;
 pub mod experiment;
 pub mod explain;
+mod options;
+mod rule;
 pub mod torque_model;
+
+pub use door::{Prepared, explain};
+pub use explain::{Explained, explain_body};
+pub use options::{ExplainError, ExplainOptions, RuledOut};
+pub use rule::Rule;

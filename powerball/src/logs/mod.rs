@@ -10,5 +10,6 @@ mod progress;
 pub mod regression;
 pub mod signal;
 pub mod summary;
+pub(crate) mod vector;
 
 pub use progress::Progress;

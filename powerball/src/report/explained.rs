@@ -1,5 +1,7 @@
 //! An explanation as sections of a page.
 
+use crate::controller::JointNumber;
+use crate::explanation::effects::Figures;
 use crate::explanation::explain::{Explained, NamedEffect, Shown, TorqueCurve};
 use crate::report::{BarPairs, Figure, Ink, Page, Panel, Series, Table, Tone, number};
 use serde_json::Value;
@@ -28,7 +30,7 @@ fn errors(page: &mut Page, explained: &Explained) {
     for joint in 0..before.rms.len() {
         let (b, a) = (before.rms[joint], after.rms[joint]);
         let floor = explained.noise_floor.get(joint).copied().unwrap_or(f64::NAN);
-        let changed = explained.held_out_change.iter().find(|c| c.joint == joint + 1);
+        let changed = explained.held_out_change.iter().find(|c| c.joint.index() == joint);
         table.push([
             (joint + 1).to_string(),
             number(b),
@@ -81,7 +83,7 @@ fn effects(page: &mut Page, explained: &Explained) {
             table.push([
                 effect.effect.clone(),
                 list(&effect.joints),
-                figures(&effect.parameters),
+                figures(&effect.figures),
                 percent(gain),
                 number(effect.p_value),
                 format!("{:.2}", effect.margin),
@@ -186,25 +188,21 @@ fn rest(page: &mut Page, explained: &Explained) {
     }
     corrections(page, explained);
     if let Some(experiment) = &explained.experiment {
-        let text = |key: &str| experiment.get(key).and_then(Value::as_str).unwrap_or_default();
-        match experiment.get("decided").and_then(Value::as_str) {
-            Some(name) => {
-                page.note(Tone::Good, &format!("The experiment decides for {name}: {}.", text("why")));
-            }
-            None => page.note(Tone::Plain, &format!("The experiment does not decide: {}.", text("why"))),
+        let why = &experiment.why;
+        match experiment.decided {
+            Some(name) => page.note(Tone::Good, &format!("The experiment decides for {name}: {why}.")),
+            None => page.note(Tone::Plain, &format!("The experiment does not decide: {why}.")),
         }
     }
-    if let Some(advice) =
-        explained.next_experiment.as_ref().and_then(|next| next.get("advice")).and_then(Value::as_str)
-    {
-        page.note(Tone::Plain, &format!("Next experiment: {advice}"));
+    if let Some(next) = &explained.next_experiment {
+        page.note(Tone::Plain, &format!("Next experiment: {}", next.advice));
     }
-    let placebos = &explained.false_positives;
+    let chance = &explained.false_positives;
     page.paragraph(&format!(
         "How often the rule is wrong on these data: {} of {} effects that cannot be there were accepted. The \
             residuals \
          are worth {} independent samples.",
-        placebos.accepted, placebos.placebos, explained.effective_samples
+        chance.accepted, chance.surrogates, explained.effective_samples
     ));
     if !explained.warnings.is_empty() {
         let mut table = Table::new(["found in the logs and the arm file"]);
@@ -246,21 +244,26 @@ fn corrections(page: &mut Page, explained: &Explained) {
 
 /// `{"mass": 1.5, "com": [0, 0, 0.1]}` as `mass 1.50, com (0, 0, 0.100)`.
 #[must_use]
-pub fn figures(parameters: &Value) -> String {
-    match parameters {
+pub fn figures(figures: &Figures) -> String {
+    serde_json::to_value(figures).map_or_else(|_| String::new(), |tree| in_words(&tree))
+}
+
+/// Every figure by the name that it has in files.
+fn in_words(tree: &Value) -> String {
+    match tree {
         Value::Object(map) => map
             .iter()
-            .map(|(name, value)| format!("{name} {}", figures(value)))
+            .map(|(name, value)| format!("{name} {}", in_words(value)))
             .collect::<Vec<_>>()
             .join(", "),
-        Value::Array(values) => format!("({})", values.iter().map(figures).collect::<Vec<_>>().join(", ")),
+        Value::Array(values) => format!("({})", values.iter().map(in_words).collect::<Vec<_>>().join(", ")),
         Value::Number(value) => value.as_f64().map_or_else(|| value.to_string(), number),
         Value::String(text) => text.clone(),
         other => other.to_string(),
     }
 }
 
-fn list(joints: &[usize]) -> String {
+fn list(joints: &[JointNumber]) -> String {
     joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 

@@ -2,10 +2,11 @@
 
 use super::judge::{Named, Outcome, named};
 use powerball::explanation::experiment::{learn, propose};
-use powerball::explanation::explain::{Explained, Options};
+use powerball::explanation::explain::Trajectory;
+use powerball::explanation::{ExplainOptions, Explained};
 use powerball::identification::motion::Motion;
 use powerball::logs::log::Log;
-use powerball::logs::regression::{DataOptions, RigidBody};
+use powerball::logs::regression::RigidBody;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 
@@ -40,25 +41,24 @@ pub(super) fn settle(
     mut explained: Explained,
     record: impl FnOnce(&Motion) -> Log,
 ) -> Result<(Explained, Settled), String> {
-    let options = DataOptions::default();
+    let options = ExplainOptions::default();
     let mut settled =
         Settled { before: named(&explained), open: Vec::new(), decided: None, expected: 0.0, evidence: 0.0 };
-    let Some(motion) = propose(body, &mut explained, &options, &|_| ()) else {
+    let Some(motion) = propose(body, &mut explained, &options) else {
         return Ok((explained, settled));
     };
-    let number = |value: &Option<serde_json::Value>, key: &str| {
-        value.as_ref().and_then(|v| v.get(key)).and_then(serde_json::Value::as_f64).unwrap_or(0.0)
-    };
-    settled.expected = number(&explained.next_experiment, "expected_evidence");
+    if let Some(Trajectory::Designed { expected_evidence, .. }) =
+        explained.next_experiment.as_ref().map(|next| &next.trajectory)
+    {
+        settled.expected = *expected_evidence;
+    }
     settled.open = explained.open.iter().flat_map(|o| o.names()).map(ToString::to_string).collect();
     let new = record(&motion);
-    let explained = learn(body, (to_fit, held_out), new, &explained, &options, &Options::default(), &|_| ())
-        .map_err(|e| e.to_string())?;
-    settled.evidence = number(&explained.experiment, "evidence");
-    settled.decided = (explained.experiment.as_ref())
-        .and_then(|e| e.get("decided"))
-        .and_then(serde_json::Value::as_str)
-        .map(ToString::to_string);
+    let explained = learn(body, (to_fit, held_out), new, &explained, &options).map_err(|e| e.to_string())?;
+    if let Some(experiment) = &explained.experiment {
+        settled.evidence = experiment.evidence;
+        settled.decided = experiment.decided.map(ToString::to_string);
+    }
     Ok((explained, settled))
 }
 

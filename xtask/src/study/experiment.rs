@@ -4,10 +4,10 @@ use super::alike;
 use super::arms::{DRAWS, Drawn, LARGEST_FACTOR};
 use super::case::{Case, Table};
 use super::judge::Outcome;
-use super::law::{FrictionLaw, Law, Misfit, OtherFriction, Outside, OutsideLaw};
+use super::law::{ExtraTorque, Misfit, OtherFriction, OtherLaw, Outside, OutsideLaw};
 use dyngen::{Arm, Model, SetKind};
 use powerball::controller::friction::TanhFriction;
-use powerball::explanation::explain::explain;
+use powerball::explanation::{ExplainOptions, explain_body};
 use powerball::identification::estimate::{Folds, fit, spread};
 use powerball::identification::excite::{Settings, optimise};
 use powerball::identification::motion::Motion;
@@ -73,7 +73,7 @@ impl Truth {
 /// A session on one arm: its paths, and what of its logs is not the plant's.
 struct Session {
     plant: Plant,
-    friction: Option<FrictionLaw>,
+    friction: Option<OtherLaw>,
     misfit: Option<Misfit>,
     motions: Vec<Motion>,
     starts: Vec<f64>,
@@ -117,8 +117,8 @@ impl Bench {
         let (to_fit, held_out) = logs.split_at(FIT.len());
         let start = Instant::now();
         let options = DataOptions::default();
-        let explained =
-            explain(&self.body, to_fit, held_out, &options, &|_| ()).map_err(|e| e.to_string())?;
+        let explained = explain_body(&self.body, to_fit, held_out, &ExplainOptions::default())
+            .map_err(|e| e.to_string())?;
         let (explained, settled) = if case.table == Table::Alike {
             let record = |motion: &Motion| session.new_log(motion, &truths);
             let (again, settled) = alike::settle(&self.body, (to_fit, held_out), explained, record)?;
@@ -178,7 +178,7 @@ impl Bench {
             starts.push(now);
             now += motion.duration() + PAUSE;
         }
-        let friction = (case.table == Table::Friction).then(|| FrictionLaw::draw(rng));
+        let friction = (case.table == Table::Friction).then(|| OtherLaw::draw(rng));
         Ok(Session { plant, friction, misfit: None, motions, starts, seed: rng.random() })
     }
 
@@ -323,7 +323,7 @@ impl Session {
         let mut logs: Vec<Log> = Vec::new();
         for (k, (motion, start)) in self.motions.iter().zip(&self.starts).enumerate() {
             let mut recording = plant.record(motion, *start, self.seed.wrapping_add(k as u64));
-            let mut add = |law: &dyn Law| {
+            let mut add = |law: &dyn ExtraTorque| {
                 let torques = law.torques(motion, *start);
                 recording.tau.iter_mut().zip(torques).for_each(|(tau, t)| *tau += t);
             };

@@ -2,7 +2,7 @@
 
 use super::alike::Settled;
 use super::case::Case;
-use powerball::explanation::explain::Explained;
+use powerball::explanation::Explained;
 use serde::{Deserialize, Serialize};
 
 /// A name that was given.
@@ -116,7 +116,7 @@ pub(super) fn named(explained: &Explained) -> Vec<Named> {
     (explained.effects.iter())
         .map(|e| Named {
             effect: e.effect.clone(),
-            joints: e.joints.clone(),
+            joints: e.joints.iter().map(|j| j.number()).collect(),
             alike: e
                 .rivals
                 .iter()

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{PI, TAU};
 
 /// What a joint feels along a motion, N·m for each sample and joint.
-pub(super) trait Law {
+pub(super) trait ExtraTorque {
     /// The torques along `motion`, which begins at `start` s, `n` values a sample.
     fn torques(&self, motion: &Motion, start: f64) -> Vec<f64>;
 }
@@ -78,7 +78,7 @@ impl OutsideLaw {
     }
 }
 
-impl Law for OutsideLaw {
+impl ExtraTorque for OutsideLaw {
     fn torques(&self, motion: &Motion, start: f64) -> Vec<f64> {
         let n = motion.dof();
         let mut out = vec![0.0; motion.q.len()];
@@ -133,7 +133,7 @@ impl Misfit {
     }
 }
 
-impl Law for Misfit {
+impl ExtraTorque for Misfit {
     fn torques(&self, motion: &Motion, _start: f64) -> Vec<f64> {
         let mut out = Vec::with_capacity(motion.q.len());
         for [q, dq, _] in motion.samples() {
@@ -154,7 +154,7 @@ impl Law for Misfit {
 
 /// Friction of another law in the place of Eq. 16.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum FrictionLaw {
+pub(super) enum OtherLaw {
     /// Coulomb friction that sets in like an algebraic curve, and viscous friction.
     Algebraic,
     /// Coulomb friction that sets in like an arc tangent, and viscous friction.
@@ -163,28 +163,28 @@ pub(super) enum FrictionLaw {
     Gudermann,
 }
 
-impl FrictionLaw {
-    pub(super) fn draw(rng: &mut ChaCha8Rng) -> FrictionLaw {
-        [FrictionLaw::Algebraic, FrictionLaw::ArcTangent, FrictionLaw::Gudermann][rng.random_range(0..3)]
+impl OtherLaw {
+    pub(super) fn draw(rng: &mut ChaCha8Rng) -> OtherLaw {
+        [OtherLaw::Algebraic, OtherLaw::ArcTangent, OtherLaw::Gudermann][rng.random_range(0..3)]
     }
 }
 
 /// The law, and the friction that it takes the place of.
 pub(super) struct OtherFriction<'a> {
-    pub(super) law: FrictionLaw,
+    pub(super) law: OtherLaw,
     pub(super) plant: &'a Plant,
 }
 
-impl Law for OtherFriction<'_> {
+impl ExtraTorque for OtherFriction<'_> {
     fn torques(&self, motion: &Motion, _start: f64) -> Vec<f64> {
         let mut out = Vec::with_capacity(motion.q.len());
         for [_, dq, _] in motion.samples() {
             for (v, g) in dq.iter().zip(self.plant.friction()) {
                 let coulomb = g.gamma1 + g.gamma3;
                 let other = match self.law {
-                    FrictionLaw::Algebraic => coulomb * v / v.hypot(0.01) + g.gamma5 * v,
-                    FrictionLaw::ArcTangent => coulomb * (v / 0.004).atan() * 2.0 / PI + g.gamma5 * v,
-                    FrictionLaw::Gudermann => {
+                    OtherLaw::Algebraic => coulomb * v / v.hypot(0.01) + g.gamma5 * v,
+                    OtherLaw::ArcTangent => coulomb * (v / 0.004).atan() * 2.0 / PI + g.gamma5 * v,
+                    OtherLaw::Gudermann => {
                         let curve = |x: f64| 2.0 / PI * (0.5 * PI * x).sinh().atan();
                         g.gamma1 * curve(g.gamma2 * v) + g.gamma3 * curve(g.gamma4 * v) + g.gamma5 * v
                     }

@@ -5,7 +5,7 @@ use super::case::Case;
 use super::judge::{Named, Outcome, named};
 use dyngen::Arm;
 use powerball::controller::friction::TanhFriction;
-use powerball::explanation::explain::{Explained, explain};
+use powerball::explanation::{ExplainOptions, Explained, explain_body};
 use powerball::identification::chain::Chain;
 use powerball::identification::estimate::{Folds, FrictionLaw, consistent_fit, fit, solve_reduced};
 use powerball::identification::motion::Motion;
@@ -54,8 +54,9 @@ impl Measured {
         common_clock(&mut logs);
         let body = RigidBody::new(&arm).map_err(|e| e.to_string())?;
         let options = DataOptions::default();
-        let explained = explain(&body, &logs[..FIT.len()], &logs[FIT.len()..], &options, &|_| ())
-            .map_err(|e| e.to_string())?;
+        let explained =
+            explain_body(&body, &logs[..FIT.len()], &logs[FIT.len()..], &ExplainOptions::default())
+                .map_err(|e| e.to_string())?;
         let plant = {
             let data = Data::new(&body, &logs[..FIT.len()], &options).map_err(|e| e.to_string())?;
             let base = fit(&data, &Folds::new(&data), &[], None);
@@ -114,7 +115,7 @@ impl Measured {
         let logs = self.with(&effect)?;
         let start = Instant::now();
         let (to_fit, held_out) = logs.split_at(FIT.len());
-        let explained = explain(&self.body, to_fit, held_out, &DataOptions::default(), &|_| ())
+        let explained = explain_body(&self.body, to_fit, held_out, &ExplainOptions::default())
             .map_err(|e| e.to_string())?;
         let seconds = start.elapsed().as_secs_f64();
         let before = &self.explained.after.validate.rms;

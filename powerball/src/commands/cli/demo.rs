@@ -3,6 +3,7 @@
 use super::Failure;
 use super::output::{self, Progress};
 use crate::commands::demo::{self, Demo, DemoError, SessionError};
+use crate::logs;
 use clap::Args;
 use serde_json::json;
 use std::fmt::Write as _;
@@ -42,9 +43,13 @@ impl DemoCommand {
         std::fs::create_dir_all(&self.out)
             .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", self.out.display())))?;
         let started = std::time::Instant::now();
-        let demo = demo::run(&self.out, self.seed, self.effect.as_deref(), self.experiment, &|what| {
-            progress.say(what)
-        })
+        let demo = demo::run(
+            &self.out,
+            self.seed,
+            self.effect.as_deref(),
+            self.experiment,
+            logs::Progress::to(&|what| progress.say(what)),
+        )
         .map_err(|e| match e {
             DemoError::Session(SessionError::UnknownEffect(_) | SessionError::Write(..)) => {
                 Failure::Unusable(e.to_string())

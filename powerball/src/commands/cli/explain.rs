@@ -2,22 +2,29 @@
 
 use super::Failure;
 use super::bus::{Where, virtual_bus};
-use super::inputs::{Inputs, load};
+use super::inputs::{Inputs, recorded};
 use super::output::{self, Progress};
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::{Bus, BusUrl};
+use crate::controller::JointNumber;
 use crate::explanation::experiment::{self, TRAJECTORY};
-use crate::explanation::explain::{Change, ExplainError, Explained, Options, explain_with};
+use crate::explanation::explain::{Change, Explained, FalsePositives, NamedEffect, Unattributed};
+use crate::explanation::torque_model::TorqueModel;
+use crate::explanation::{ExplainError, ExplainOptions, Prepared, explain_body};
 use crate::identification::motion::Motion;
-use crate::logs::log::read_logs;
-use crate::logs::regression::DataOptions;
+use crate::logs;
+use crate::logs::log::{Log, read_logs};
 use crate::procedure::{RecordError, record};
 use crate::report::Page;
 use crate::report::explained::add_to_page;
 use crate::virtual_arm::Undeclared;
 use clap::Args;
-use serde_json::Value;
+use dyngen::Arm;
 use std::path::{Path, PathBuf};
+
+/// Said where an experiment has nothing to tell apart.
+const NOTHING_OPEN: &str = "--experiment: nothing was recorded: these logs leave no names open that a path \
+    within the arm file's limits could tell apart";
 
 /// Find, name and add what the model lacks on logs; every addition is judged on another path.
 ///
@@ -63,64 +70,78 @@ pub(crate) struct Explain {
 impl Explain {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let progress = Progress::new();
-        let arm = if self.experiment { Some(self.arm()?) } else { None };
-        let mut loaded = load(&self.inputs, &self.validate, self.model.as_deref(), &progress)?;
-        loaded.take_out();
-        let (say, options) = (|what: &str| progress.say(what), DataOptions::default());
-        let told = Options { correct_unattributed: self.correct_unattributed, ..Options::default() };
-        let refused = |e: ExplainError| Failure::Refused(e.to_string());
-        let mut explained = explain_with(&loaded.body, &loaded.fit, &loaded.validate, &options, &told, &say)
-            .map_err(refused)?;
-        let motion = experiment::propose(&loaded.body, &mut explained, &options, &say);
+        let experiment = if self.experiment { Some(self.arm()?) } else { None };
+        let arm = Arm::read(&self.inputs.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let known = self.model.as_deref().map(TorqueModel::read).transpose();
+        let known = known.map_err(|e| Failure::Unusable(e.to_string()))?;
+        let mut recorded = recorded(&self.inputs, &self.validate, &arm, &progress)?;
+        let say = |what: &str| progress.say(what);
+        let options = ExplainOptions {
+            known,
+            correct_unattributed: self.correct_unattributed,
+            progress: logs::Progress::to(&say),
+            ..ExplainOptions::default()
+        };
+        let refused = |e| self.failure(&e);
+        let prepared = Prepared::new(&arm, &recorded.fit, &recorded.validate, &options).map_err(refused)?;
+        let mut explained =
+            explain_body(&prepared.body, &prepared.logs, &prepared.validate, &options).map_err(refused)?;
+        let motion = self.proposed(&prepared, &mut explained, &options)?;
+        match (experiment, motion) {
+            (Some((bus, note)), Some(motion)) => {
+                progress.say("recording the experiment");
+                let (new, notes) = self.recorded(&motion, bus, &arm)?;
+                recorded.warnings.extend(notes.into_iter().chain(note));
+                let old = (prepared.logs.as_slice(), prepared.validate.as_slice());
+                for new in prepared.without_known(new) {
+                    explained =
+                        experiment::learn(&prepared.body, old, new, &explained, &options).map_err(refused)?;
+                }
+                // What is still open may ask for another experiment.
+                self.proposed(&prepared, &mut explained, &options)?;
+            }
+            (Some(_), None) => recorded.warnings.push(NOTHING_OPEN.to_string()),
+            (None, _) => {}
+        }
+        explained.warnings.splice(0..0, recorded.warnings);
+        self.write(&prepared.with_known(explained))
+    }
+
+    /// The trajectory of the experiment that an explanation asks for, written.
+    fn proposed(
+        &self,
+        prepared: &Prepared,
+        explained: &mut Explained,
+        options: &ExplainOptions<'_>,
+    ) -> Result<Option<Motion>, Failure> {
+        let motion = experiment::propose(&prepared.body, explained, options);
         if let Some(motion) = &motion {
             output::write(&self.inputs.out, TRAJECTORY, motion.to_csv().as_bytes())?;
         }
-        match (arm, motion) {
-            (Some((arm, note)), Some(motion)) => {
-                progress.say("recording the experiment");
-                let file = self.inputs.out.join("experiment.csv");
-                self.record(&motion, arm, &file)?;
-                let (mut new, findings) =
-                    read_logs(&[&file], loaded.body.arm()).map_err(|e| Failure::Refused(e.to_string()))?;
-                loaded.warnings.extend(findings.iter().map(ToString::to_string).chain(note));
-                if let Some(known) = &loaded.known {
-                    known.take_out(&loaded.body, &mut new);
-                }
-                let old = (loaded.fit.as_slice(), loaded.validate.as_slice());
-                for new in new {
-                    explained = experiment::learn(&loaded.body, old, new, &explained, &options, &told, &say)
-                        .map_err(refused)?;
-                }
-                // What is still open may ask for another experiment.
-                if let Some(next) = experiment::propose(&loaded.body, &mut explained, &options, &say) {
-                    output::write(&self.inputs.out, TRAJECTORY, next.to_csv().as_bytes())?;
-                }
-            }
-            (Some(_), None) => loaded.warnings.push(
-                "--experiment: nothing was recorded: these logs leave no names open that a path within the \
-                    arm file's limits could \
-                 tell apart"
-                    .to_string(),
-            ),
-            (None, _) => {}
-        }
-        explained.warnings.splice(0..0, loaded.warnings);
-        let text = output::json(&explained)?;
+        Ok(motion)
+    }
+
+    /// Writes and prints the result.
+    fn write(&self, explained: &Explained) -> Result<(), Failure> {
+        let text = output::json(explained)?;
         output::write(&self.inputs.out, "explained.json", text.as_bytes())?;
-        if let Some(known) = &loaded.known {
-            explained.model.additions = known.additions.and(&explained.model.additions);
-        }
         let model = output::json(&explained.model)?;
         output::write(&self.inputs.out, "model.json", model.as_bytes())?;
         let mut page = Page::new(format!("What the model of {} lacks", explained.arm));
-        add_to_page(&mut page, &explained);
+        add_to_page(&mut page, explained);
         output::write(&self.inputs.out, "report.html", page.to_html().as_bytes())?;
-        if self.inputs.json {
-            output::print(&text);
-        } else {
-            output::print(&summary(&explained));
-        }
+        output::print(&if self.inputs.json { text } else { summary(explained) });
         Ok(())
+    }
+
+    /// Why there is no explanation: a known model that cannot be used is a wrong input.
+    fn failure(&self, e: &ExplainError) -> Failure {
+        match (e, &self.model) {
+            (ExplainError::Changes(_) | ExplainError::Known(_), Some(file)) => {
+                Failure::Unusable(format!("{}: {e}", file.display()))
+            }
+            _ => Failure::Refused(e.to_string()),
+        }
     }
 }
 
@@ -151,6 +172,19 @@ impl Explain {
         Where { bus: self.bus.clone(), json: self.inputs.json }
     }
 
+    /// Records the experiment and reads its log, with what is to be said of that.
+    fn recorded(
+        &self,
+        motion: &Motion,
+        bus: Box<dyn Bus>,
+        arm: &Arm,
+    ) -> Result<(Vec<Log>, Vec<String>), Failure> {
+        let file = self.inputs.out.join("experiment.csv");
+        self.record(motion, bus, &file)?;
+        let (new, findings) = read_logs(&[&file], arm).map_err(|e| Failure::Refused(e.to_string()))?;
+        Ok((new, findings.iter().map(ToString::to_string).collect()))
+    }
+
     fn record(&self, motion: &Motion, bus: Box<dyn Bus>, file: &Path) -> Result<(), Failure> {
         if motion.dof() != LWA4P.joints.len() {
             return Err(Failure::Unusable(format!(
@@ -175,17 +209,15 @@ impl Explain {
 /// kind.
 pub(super) fn open_in_words(explained: &Explained) -> String {
     let mut text = String::new();
-    let of = |value: &Option<Value>, key: &str| -> Option<String> {
-        value.as_ref()?.get(key)?.as_str().map(str::to_string)
-    };
-    if let Some(why) = of(&explained.experiment, "why") {
-        match of(&explained.experiment, "decided") {
+    if let Some(experiment) = &explained.experiment {
+        let why = &experiment.why;
+        match experiment.decided {
             Some(name) => text.push_str(&format!("\nThe experiment decides for {name}: {why}\n")),
             None => text.push_str(&format!("\nThe experiment does not decide: {why}\n")),
         }
     }
-    if let Some(advice) = of(&explained.next_experiment, "advice") {
-        text.push_str(&format!("\nNext experiment: {advice}\n"));
+    if let Some(next) = &explained.next_experiment {
+        text.push_str(&format!("\nNext experiment: {}\n", next.advice));
     }
     text
 }
@@ -195,64 +227,79 @@ fn summary(explained: &Explained) -> String {
     for warning in &explained.warnings {
         text.push_str(&format!("note: {warning}\n"));
     }
-    let [low, high] = explained.band;
-    text.push_str(&format!("\nErrors on the other path, {low} to {high} Hz\n"));
-    text.push_str(&output::table(&[
-        ("before", &explained.before.validate),
-        ("after", &explained.after.validate),
-    ]));
-    let whole = |share: f64| format!("{:+.0}", 100.0 * share);
-    let change = |c: &Change| {
-        format!("joint {} {} % ({} to {})", c.joint, whole(c.rms), whole(c.interval[0]), whole(c.interval[1]))
-    };
-    let changes: Vec<String> = explained.held_out_change.iter().map(change).collect();
-    text.push_str(&format!("\nchange with its 95 % interval: {}\n", changes.join(", ")));
+    text.push_str(&errors_in_words(explained));
     if explained.effects.is_empty() {
         text.push_str(
             "\nNo effect was accepted: these logs do not show that the model lacks anything with a name.\n",
         );
     }
     for effect in &explained.effects {
-        let joints: Vec<String> = effect.joints.iter().map(ToString::to_string).collect();
-        text.push_str(&format!(
-            "\n{} on joint {}: {}\n  p = {:.1e}, margin {:.2} over the next name, {:.0} % of the excess \
-                left\n",
-            effect.effect,
-            joints.join(", "),
-            effect.parameters,
-            effect.p_value,
-            effect.margin,
-            100.0 * effect.leftover
-        ));
-        for rival in &effect.rivals {
-            text.push_str(&format!("  not {}: {}\n", rival.effect, rival.why_not));
-        }
+        text.push_str(&effect_in_words(effect));
     }
     if let Some(unattributed) = &explained.unattributed {
-        let joints: Vec<String> = unattributed.joints.iter().map(ToString::to_string).collect();
-        text.push_str(&format!(
-            "\nUnattributed on joint {}: depends on {}\n",
-            joints.join(", "),
-            unattributed.depends_on.join(", ")
-        ));
-        for c in unattributed.correction.iter().flatten() {
-            let signals: Vec<&str> = c.curves.iter().map(|curve| curve.signal.as_str()).collect();
-            text.push_str(&format!(
-                "  a curve of {} within ±{:.2} N·m lowers the held-out error of joint {} from {:.4} to {:.4} \
-                    N·m\n",
-                signals.join(" and "),
-                c.limit,
-                c.joint,
-                c.rms_before,
-                c.rms_after
-            ));
-        }
-        if unattributed.correction.as_ref().is_some_and(Vec::is_empty) {
-            text.push_str("  no curve of these signals lowers held-out errors: none is kept\n");
-        }
+        text.push_str(&unattributed_in_words(unattributed));
     }
     text.push_str(&open_in_words(explained));
-    let fp = &explained.false_positives;
-    text.push_str(&format!("\n{} of {} placebos were accepted", fp.accepted, fp.placebos));
+    let FalsePositives { accepted, surrogates, .. } = &explained.false_positives;
+    text.push_str(&format!("\n{accepted} of {surrogates} time-shift surrogates were accepted"));
     text
+}
+
+fn errors_in_words(explained: &Explained) -> String {
+    let [low, high] = explained.band;
+    let whole = |share: f64| format!("{:+.0}", 100.0 * share);
+    let change = |c: &Change| {
+        format!("joint {} {} % ({} to {})", c.joint, whole(c.rms), whole(c.interval[0]), whole(c.interval[1]))
+    };
+    let changes: Vec<String> = explained.held_out_change.iter().map(change).collect();
+    let (before, after) = (&explained.before.validate, &explained.after.validate);
+    format!(
+        "\nErrors on the other path, {low} to {high} Hz\n{}\nchange with its 95 % interval: {}\n",
+        output::table(&[("before", before), ("after", after)]),
+        changes.join(", ")
+    )
+}
+
+fn effect_in_words(effect: &NamedEffect) -> String {
+    let mut text = format!(
+        "\n{} on joint {}: {}\n  p = {:.1e}, margin {:.2} over the next name, {:.0} % of the excess left\n",
+        effect.effect,
+        list(&effect.joints),
+        serde_json::to_string(&effect.figures).unwrap_or_default(),
+        effect.p_value,
+        effect.margin,
+        100.0 * effect.leftover
+    );
+    for rival in &effect.rivals {
+        text.push_str(&format!("  not {}: {}\n", rival.effect, rival.why_not));
+    }
+    text
+}
+
+fn unattributed_in_words(unattributed: &Unattributed) -> String {
+    let mut text = format!(
+        "\nUnattributed on joint {}: depends on {}\n",
+        list(&unattributed.joints),
+        unattributed.depends_on.join(", ")
+    );
+    for c in unattributed.correction.iter().flatten() {
+        let signals: Vec<&str> = c.curves.iter().map(|curve| curve.signal.as_str()).collect();
+        text.push_str(&format!(
+            "  a curve of {} within ±{:.2} N·m lowers the held-out error of joint {} from {:.4} to {:.4} \
+             N·m\n",
+            signals.join(" and "),
+            c.limit,
+            c.joint,
+            c.rms_before,
+            c.rms_after
+        ));
+    }
+    if unattributed.correction.as_ref().is_some_and(Vec::is_empty) {
+        text.push_str("  no curve of these signals lowers held-out errors: none is kept\n");
+    }
+    text
+}
+
+fn list(joints: &[JointNumber]) -> String {
+    joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }

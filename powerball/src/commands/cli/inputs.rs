@@ -28,26 +28,6 @@ pub(crate) struct Inputs {
     pub json: bool,
 }
 
-/// The arm and the logs of a command, read.
-pub(crate) struct Loaded {
-    pub body: RigidBody,
-    pub fit: Vec<Log>,
-    pub validate: Vec<Log>,
-    pub warnings: Vec<String>,
-    /// The model that was given.
-    pub known: Option<TorqueModel>,
-}
-
-impl Loaded {
-    /// Takes what is known out of the logs.
-    pub(crate) fn take_out(&mut self) {
-        if let Some(known) = &self.known {
-            known.take_out(&self.body, &mut self.fit);
-            known.take_out(&self.body, &mut self.validate);
-        }
-    }
-}
-
 /// An arm with what is known of it beforehand.
 pub(crate) struct Known {
     /// The arm as the model has it.
@@ -72,16 +52,21 @@ impl Known {
     }
 }
 
-/// Reads and checks everything before any work is done. With a model the arm is as the model has it; the logs
-/// are as they are.
-pub(crate) fn load(
+/// The logs of a command, on a common clock, and what was found in them and in the arm file.
+pub(crate) struct Recorded {
+    pub fit: Vec<Log>,
+    pub validate: Vec<Log>,
+    pub warnings: Vec<String>,
+}
+
+/// Reads the logs and makes the folder of the results.
+pub(crate) fn recorded(
     inputs: &Inputs,
     validate: &[PathBuf],
-    model: Option<&Path>,
+    arm: &Arm,
     progress: &Progress,
-) -> Result<Loaded, Failure> {
-    let known = Known::read(&inputs.arm, model)?;
-    let mut warnings = known.arm.notes();
+) -> Result<Recorded, Failure> {
+    let mut warnings = arm.notes();
     for file in validate {
         if inputs.log.iter().any(|log| same_file(log, file)) {
             let name = file.display();
@@ -92,15 +77,12 @@ pub(crate) fn load(
     }
     progress.say("reading logs");
     let files: Vec<&PathBuf> = inputs.log.iter().chain(validate).collect();
-    let (mut logs, findings) = read_logs(&files, &known.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+    let (mut logs, findings) = read_logs(&files, arm).map_err(|e| Failure::Unusable(e.to_string()))?;
     warnings.extend(findings.iter().map(ToString::to_string));
     common_clock(&mut logs);
-    let rest = logs.split_off(inputs.log.len());
-    progress.say("deriving and proving the arm's dynamics");
-    let body = RigidBody::new(&known.arm).map_err(|e| Failure::Refused(e.to_string()))?;
-    let known = known.model(&body)?;
+    let validate = logs.split_off(inputs.log.len());
     output::make_folder(&inputs.out)?;
-    Ok(Loaded { body, fit: logs, validate: rest, warnings, known })
+    Ok(Recorded { fit: logs, validate, warnings })
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {

@@ -14,10 +14,11 @@ use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::{Master, Memory};
 use crate::explanation::effects;
 use crate::explanation::experiment::{self, TRAJECTORY};
-use crate::explanation::explain::{ExplainError, Explained, Options, explain};
+use crate::explanation::explain::Explained;
+use crate::explanation::{ExplainError, ExplainOptions, Prepared, explain_body};
 use crate::identification::motion::Motion;
-use crate::logs::log::{LogError, common_clock, read_logs};
-use crate::logs::regression::{DataOptions, RigidBody};
+use crate::logs::Progress;
+use crate::logs::log::{LogError, read_logs};
 use crate::procedure::record;
 use crate::virtual_arm::PlantEffect as Effect;
 use dyngen::Arm;
@@ -42,8 +43,6 @@ pub enum DemoError {
     Session(SessionError),
     /// The recorded files could not be read.
     Read(String),
-    /// The arm's model is not to be had.
-    Model(String),
     /// The logs hold too little.
     Explain(ExplainError),
 }
@@ -52,7 +51,7 @@ impl fmt::Display for DemoError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             DemoError::Session(e) => e.fmt(f),
-            DemoError::Read(what) | DemoError::Model(what) => f.write_str(what),
+            DemoError::Read(what) => f.write_str(what),
             DemoError::Explain(e) => e.fmt(f),
         }
     }
@@ -95,43 +94,34 @@ pub fn run(
     seed: u64,
     name: Option<&str>,
     with_experiment: bool,
-    progress: &dyn Fn(&str),
+    progress: Progress<'_>,
 ) -> Result<Demo, DemoError> {
-    progress("searching exciting paths and recording them");
+    progress.say("searching exciting paths and recording them");
     let names: Vec<&str> = name.map_or_else(names, |name| vec![name]);
     let session = Session::record(folder, seed, &names)?;
-    progress("reading the logs");
+    progress.say("reading the logs");
     let arm = Arm::read(&session.arm_file).map_err(|e| DemoError::Read(e.to_string()))?;
     let files: Vec<_> = session.fit.iter().chain(&session.held_out).collect();
     let (mut logs, _) = read_logs(&files, &arm)?;
-    common_clock(&mut logs);
     let held_out = logs.split_off(session.fit.len());
-    let body = RigidBody::new(&arm).map_err(|e| DemoError::Model(e.to_string()))?;
-    let options = DataOptions::default();
-    let mut explained = explain(&body, &logs, &held_out, &options, progress)?;
-    if let Some(motion) = experiment::propose(&body, &mut explained, &options, progress) {
+    let options = ExplainOptions { progress, ..ExplainOptions::default() };
+    let Prepared { body, logs, validate, .. } = Prepared::new(&arm, &logs, &held_out, &options)?;
+    let mut explained = explain_body(&body, &logs, &validate, &options)?;
+    if let Some(motion) = experiment::propose(&body, &mut explained, &options) {
         let write = |motion: &Motion| {
             let file = folder.join(TRAJECTORY);
             std::fs::write(&file, motion.to_csv()).map_err(|e| SessionError::Write(file, e))
         };
         write(&motion)?;
         if with_experiment {
-            progress("recording the experiment");
+            progress.say("recording the experiment");
             let log = carry_out(&session, &motion, &folder.join("experiment.csv"), seed)?;
             let (mut new, _) = read_logs(&[log], &arm)?;
             let Some(new) = new.pop() else {
                 return Err(DemoError::Read("experiment.csv is missing".into()));
             };
-            explained = experiment::learn(
-                &body,
-                (&logs, &held_out),
-                new,
-                &explained,
-                &options,
-                &Options::default(),
-                progress,
-            )?;
-            if let Some(next) = experiment::propose(&body, &mut explained, &options, progress) {
+            explained = experiment::learn(&body, (&logs, &validate), new, &explained, &options)?;
+            if let Some(next) = experiment::propose(&body, &mut explained, &options) {
                 write(&next)?;
             }
         }

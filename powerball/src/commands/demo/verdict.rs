@@ -36,8 +36,9 @@ pub struct Verdict {
 impl Verdict {
     /// Compares.
     pub fn new(effect: &Effect, explained: &Explained) -> Verdict {
-        let named: Vec<(String, Vec<usize>)> =
-            explained.effects.iter().map(|e| (e.effect.clone(), e.joints.clone())).collect();
+        let named: Vec<(String, Vec<usize>)> = (explained.effects.iter())
+            .map(|e| (e.effect.clone(), e.joints.iter().map(|j| j.number()).collect()))
+            .collect();
         let joints = effect.joints();
         let hit = |(name, at): &(String, Vec<usize>)| {
             name == effect.name() && joints.iter().all(|joint| at.contains(joint))

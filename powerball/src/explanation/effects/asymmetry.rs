@@ -2,12 +2,30 @@
 
 use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 /// τ = c, τ = d·|q̇|, or both.
 pub(super) struct Asymmetry;
 
-const FORMS: [&[usize]; 3] = [&[0], &[1], &[0, 1]];
+/// Which of the two it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Settings {
+    /// A constant torque.
+    Constant,
+    /// A torque in proportion to |q̇|.
+    Viscous,
+    /// Both.
+    Both,
+}
+
+/// What it is, by joint.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// The constant torque, N·m.
+    pub torque: Vec<f64>,
+    /// The torque over |q̇|, N·m·s/rad.
+    pub viscous: Vec<f64>,
+}
 
 impl Effect for Asymmetry {
     fn name(&self) -> &'static str {
@@ -19,30 +37,31 @@ impl Effect for Asymmetry {
     }
 
     fn shown_by(&self, candidate: &Candidate) -> Axis {
-        Axis::Speed(candidate.joints[0])
+        Axis::Velocity(candidate.joints[0])
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let on = |j: usize| (0..FORMS.len()).map(move |form| Candidate::on(j, form, Vec::new(), FORMS.len()));
-        context.moving_joints().flat_map(on).collect()
+        const ALL: [Settings; 3] = [Settings::Constant, Settings::Viscous, Settings::Both];
+        context.moving_joints().flat_map(|j| ALL.map(|which| Candidate::on(j, which, ALL.len()))).collect()
     }
 
     fn laws(&self, _: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
-        FORMS[candidate.form].iter().map(|which| [Law::Constant, Law::SpeedMagnitude][*which]).collect()
+        match Settings::of(candidate) {
+            Some(Settings::Constant) => vec![Law::Constant],
+            Some(Settings::Viscous) => vec![Law::SpeedMagnitude],
+            Some(Settings::Both) => vec![Law::Constant, Law::SpeedMagnitude],
+            None => Vec::new(),
+        }
     }
 
-    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
-        let of = |which: usize| -> Vec<f64> {
-            let sum = |f: &Found<'_>| {
-                FORMS[f.candidate.form]
-                    .iter()
-                    .zip(f.coefficients)
-                    .filter(|(w, _)| **w == which)
-                    .map(|(_, c)| c)
-                    .sum()
-            };
-            found.iter().map(sum).collect()
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+        let both = |f: &Found<'_>| match (Settings::of(f.candidate), f.coefficients) {
+            (Some(Settings::Viscous), [viscous]) => (0.0, *viscous),
+            (_, [torque]) => (*torque, 0.0),
+            (_, [torque, viscous, ..]) => (*torque, *viscous),
+            (_, []) => (0.0, 0.0),
         };
-        json!({ "torque": of(0), "viscous": of(1) })
+        let (torque, viscous) = found.iter().map(both).unzip();
+        Figures { torque, viscous }.into()
     }
 }

@@ -1,13 +1,39 @@
-//! Play in a gear: after a reversal the motor turns through a gap before it drives the link again.
+//! Backlash in a gear: after a reversal the motor turns through a gap before it drives the link again.
 
-use super::candidate::{by_joint, geometric};
-use super::{Axis, Candidate, Class, Context, Effect, Found};
+use super::candidate::geometric;
+use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
-use serde_json::{Value, json};
+use serde::Serialize;
 
-/// Form 0: the rigid torque is missing while the motor is in the gap after a reversal of its motion. Form 1:
-/// the link hangs back by half the gap on the side its load pushes it to.
+/// The rigid torque is missing while the motor is in the gap, or the link stands beside the motor by half the
+/// gap.
 pub(super) struct Backlash;
+
+/// What of the backlash shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Settings {
+    /// The rigid torque is missing while the motor crosses a gap after a reversal of its motion.
+    Gap {
+        /// The gap, rad.
+        gap: f64,
+    },
+    /// The link stands back by half the gap on the side its load pushes it to.
+    Offset {
+        /// The largest load, N·m.
+        scale: f64,
+    },
+}
+
+/// What it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// The gap, rad.
+    pub gap: ByJoint,
+}
+
+/// Gaps tried on a joint, and the largest, rad.
+const GAPS: usize = 6;
+const MOST: f64 = 0.05;
 
 impl Effect for Backlash {
     fn name(&self) -> &'static str {
@@ -31,20 +57,21 @@ impl Effect for Backlash {
         let n = context.data.dof();
         let loads = |j: usize| context.rigid().iter().flat_map(move |t| t.iter().skip(j).step_by(n));
         let top = |j: usize| loads(j).fold(1e-9f64, |top, load| top.max(load.abs()));
-        let on = |j: usize| {
-            let gaps = geometric(5e-4, 0.05, 6).into_iter().map(move |gap| Candidate::on(j, 0, vec![gap], 7));
-            gaps.chain([Candidate::on(j, 1, vec![top(j)], 7)])
-        };
-        context.moving_joints().flat_map(on).collect()
+        let mut candidates = Vec::new();
+        for j in context.moving_joints() {
+            let gaps = geometric(5e-4, MOST, GAPS).into_iter().map(|gap| Settings::Gap { gap });
+            let all = gaps.chain([Settings::Offset { scale: top(j.index()) }]);
+            candidates.extend(all.map(|settings| Candidate::on(j, settings, GAPS + 1)));
+        }
+        candidates
     }
 
     fn laws(&self, _: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
-        let setting = candidate.values[0];
-        vec![if candidate.form == 0 {
-            Law::Gap { gap: setting }
-        } else {
-            Law::HangingBack { scale: setting }
-        }]
+        match Settings::of(candidate) {
+            Some(Settings::Gap { gap }) => vec![Law::Gap { gap: *gap }],
+            Some(Settings::Offset { scale }) => vec![Law::HangingBack { scale: *scale }],
+            None => Vec::new(),
+        }
     }
 
     fn non_negative(&self) -> bool {
@@ -52,13 +79,18 @@ impl Effect for Backlash {
     }
 
     fn admissible(&self, candidate: &Candidate, c: &[f64]) -> bool {
-        if candidate.form == 0 { (0.1..2.0).contains(&c[0]) } else { c[0] < 0.05 }
+        match Settings::of(candidate) {
+            Some(Settings::Gap { .. }) => (0.1..2.0).contains(&c[0]),
+            Some(Settings::Offset { .. }) => c[0] < MOST,
+            None => false,
+        }
     }
 
-    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
-        let gap = |f: &Found<'_>| {
-            if f.candidate.form == 0 { f.candidate.values[0] } else { 2.0 * f.coefficients[0] }
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+        let gap = |f: &Found<'_>| match Settings::of(f.candidate) {
+            Some(Settings::Gap { gap }) => *gap,
+            _ => 2.0 * f.coefficients[0],
         };
-        json!({ "gap": by_joint(found, gap) })
+        Figures { gap: ByJoint::of(found, gap) }.into()
     }
 }

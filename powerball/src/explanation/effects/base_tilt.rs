@@ -1,22 +1,38 @@
 //! Gravity that does not point where the arm file says: the base is not level.
 
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
+use crate::controller::JointNumber;
 use crate::identification::estimate::Solver;
 use crate::logs::regression::Column;
+use dyngen::arm::ParameterKind;
 use dyngen::exact::rational;
 use faer::Mat;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 /// Two columns: the change of gravity torque for a small turn of the base about its x and y axes.
 ///
 /// A base turned by ω sees gravity turned by −ω: Δg = −ω × g. What the arm's own gravity never shows, such as
 /// the way of a link's weight from an upright first axis, acts too once gravity is turned; it is unknown, so
-/// that its products with the tilt are columns of their own ([`UNSHOWN`]).
+/// that its products with the tilt are columns of their own ([`Settings::unshown`]).
 pub(super) struct BaseTilt;
 
-/// The form with the parameters that level gravity does not show
-/// ([`RigidBody::hidden`](crate::logs::regression::RigidBody::hidden)).
-const UNSHOWN: usize = 1;
+/// What is fitted beside the tilt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// Whether the parameters that level gravity does not show are fitted too
+    /// ([`RigidBody::hidden`](crate::logs::regression::RigidBody::hidden)).
+    pub unshown: bool,
+}
+
+/// What it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// The turn of the base about its x and y axes, rad.
+    pub tilt: [f64; 2],
+}
+
+/// Of a link's eleven parameters gravity feels those before the inertias: the mass and the first moments.
+const FELT: usize = ParameterKind::Ixx as usize;
 
 impl Effect for BaseTilt {
     fn name(&self) -> &'static str {
@@ -36,20 +52,20 @@ impl Effect for BaseTilt {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let joints: Vec<usize> = context.moving_joints().collect();
+        let joints: Vec<JointNumber> = context.moving_joints().collect();
         let weightless = context.data.body.arm().gravity.iter().all(|g| rational::to_f64(g) == 0.0);
         if joints.is_empty() || weightless {
             return Vec::new();
         }
-        let with = |form| Candidate { joints: joints.clone(), ..Candidate::on(0, form, Vec::new(), 1) };
-        let forms = if context.data.body.hidden().is_empty() { 0..UNSHOWN } else { 0..UNSHOWN + 1 };
-        forms.map(with).collect()
+        let kinds: &[bool] = if context.data.body.hidden().is_empty() { &[false] } else { &[false, true] };
+        let with = |unshown: &bool| Candidate::on_all(joints.clone(), Settings { unshown: *unshown }, 1);
+        kinds.iter().map(with).collect()
     }
 
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
         let body = context.data.body;
         let (turns, all) = (turns(context), body.carried(context.fit.inertial()));
-        let unshown: &[Vec<f64>] = if candidate.form == UNSHOWN { body.hidden() } else { &[] };
+        let unshown: &[Vec<f64>] = if with_unshown(candidate) { body.hidden() } else { &[] };
         let known = turns.iter().map(|turn| pulled(context, turn, &all));
         // A turn about the other axis has the same columns, of other parameters.
         let unknown = unshown.iter().map(|direction| pulled(context, &turns[0], direction));
@@ -61,7 +77,7 @@ impl Effect for BaseTilt {
         let gravity = &context.data.body.arm().gravity;
         let (tilt, unshown) = c.split_at(2);
         let change = |k: usize| turns.iter().zip(tilt).map(|(turn, c)| c * turn[k]).sum::<f64>();
-        let found = if candidate.form == UNSHOWN { moments(context, tilt, unshown) } else { Vec::new() };
+        let found = if with_unshown(candidate) { moments(context, tilt, unshown) } else { Vec::new() };
         Part::Gravity([0, 1, 2].map(|k| rational::to_f64(&gravity[k]) + change(k)), found)
     }
 
@@ -69,15 +85,24 @@ impl Effect for BaseTilt {
         c.iter().take(2).all(|t| t.abs() < 0.5)
     }
 
-    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
-        json!({ "tilt": found.first().map(|f| f.coefficients[..2].to_vec()).unwrap_or_default() })
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+        let tilt = match found.first().map(|f| f.coefficients) {
+            Some([x, y, ..]) => [*x, *y],
+            _ => [0.0; 2],
+        };
+        Figures { tilt }.into()
     }
+}
+
+fn with_unshown(candidate: &Candidate) -> bool {
+    Settings::of(candidate).is_some_and(|settings| settings.unshown)
 }
 
 /// The static torque of some parameters under some gravity.
 fn pulled(context: &Context<'_>, gravity: &[f64; 3], all: &[f64]) -> Option<Column> {
     let data = context.data;
-    let carriers: Vec<usize> = (0..all.len()).filter(|k| all[*k] != 0.0 && k % 11 < 4).collect();
+    let carriers: Vec<usize> =
+        (0..all.len()).filter(|k| all[*k] != 0.0 && k % ParameterKind::ALL.len() < FELT).collect();
     let by_recording = data.recordings.iter().map(|r| {
         let mut torque = vec![0.0; r.q.len()];
         for (axis, g) in gravity.iter().enumerate().filter(|(_, g)| **g != 0.0) {
@@ -112,7 +137,7 @@ fn moments(context: &Context<'_>, tilt: &[f64], found: &[f64]) -> Vec<f64> {
         own.iter().map(|column| unit.iter().zip(found).map(|(u, c)| c * product(column, u)).sum()).collect();
     let much = Solver::new(&gram, |_| true).solve(&right);
     let gain = |k: usize| hidden.iter().zip(&much).map(|(direction, m)| m * direction[k]).sum();
-    (0..11 * context.data.dof()).map(gain).collect()
+    (0..ParameterKind::ALL.len() * context.data.dof()).map(gain).collect()
 }
 
 /// The change of gravity for a turn about x and about y: −(e_x × g) and −(e_y × g).

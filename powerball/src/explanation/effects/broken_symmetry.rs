@@ -1,11 +1,29 @@
 //! An inertial parameter that the arm file declares zero and that is not.
 
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
+use crate::controller::JointNumber;
 use crate::logs::regression::Column;
-use serde_json::{Value, json};
+use dyngen::arm::Parameter;
+use serde::Serialize;
 
 /// The torque column of one declared-zero parameter, which acts on all joints up to its link.
 pub(super) struct BrokenSymmetry;
+
+/// Which parameter it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// The parameter that is declared zero.
+    pub parameter: Parameter,
+}
+
+/// What it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// The parameters' names.
+    pub parameters: Vec<String>,
+    /// Their values, SI units.
+    pub values: Vec<f64>,
+}
 
 impl Effect for BrokenSymmetry {
     fn name(&self) -> &'static str {
@@ -24,24 +42,36 @@ impl Effect for BrokenSymmetry {
         Axis::Law
     }
 
+    fn excludes(&self, a: &Candidate, b: &Candidate) -> bool {
+        a.joints == b.joints && a.settings == b.settings
+    }
+
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
         let zero = context.data.declared_zero();
-        let on = |(k, p): (usize, &dyngen::arm::Parameter)| Candidate::on(p.link, k, Vec::new(), zero.len());
-        zero.iter().enumerate().map(on).collect()
+        let on = |parameter: &Parameter| {
+            let joint = JointNumber::from_index(parameter.link);
+            Candidate::on(joint, Settings { parameter: *parameter }, zero.len())
+        };
+        zero.iter().map(on).collect()
     }
 
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        context.data.declared_zero_columns().get(candidate.form).cloned().into_iter().collect()
+        let Some(Settings { parameter }) = Settings::of(candidate) else { return Vec::new() };
+        let place = context.data.declared_zero().iter().position(|zero| zero == parameter);
+        let column = place.and_then(|place| context.data.declared_zero_columns().get(place));
+        column.cloned().into_iter().collect()
     }
 
-    fn part(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Part {
-        Part::Parameter(context.data.declared_zero()[candidate.form], c[0])
+    fn part(&self, _: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Part {
+        Settings::of(candidate).map_or(Part::Event, |settings| Part::Parameter(settings.parameter, c[0]))
     }
 
-    fn parameters(&self, context: &Context<'_>, found: &[Found<'_>]) -> Value {
-        let zero = context.data.declared_zero();
-        let names: Vec<String> = found.iter().map(|f| zero[f.candidate.form].to_string()).collect();
-        let values: Vec<f64> = found.iter().map(|f| f.coefficients[0]).collect();
-        json!({ "parameters": names, "values": values })
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+        let name = |f: &Found<'_>| Settings::of(f.candidate).map(|settings| settings.parameter.to_string());
+        Figures {
+            parameters: found.iter().filter_map(name).collect(),
+            values: found.iter().map(|f| f.coefficients[0]).collect(),
+        }
+        .into()
     }
 }

@@ -1,5 +1,7 @@
 //! One way in which an effect could show.
 
+use super::{Effect, Settings};
+use crate::controller::JointNumber;
 use crate::logs::regression::Data;
 
 /// A time span of one log.
@@ -27,12 +29,10 @@ impl Window {
 /// An effect on some joints with the settings of its search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// Joints, from 0.
-    pub joints: Vec<usize>,
-    /// Which of the effect's laws.
-    pub form: usize,
-    /// The law's settings that are not coefficients.
-    pub values: Vec<f64>,
+    /// Its joints, at least one.
+    pub joints: Vec<JointNumber>,
+    /// What of its law is no coefficient, and so of which effect it is.
+    pub settings: Settings,
     /// Where it is, if not everywhere.
     pub windows: Vec<Window>,
     /// How many alternatives the search chose this one from: what looking elsewhere costs.
@@ -42,8 +42,38 @@ pub struct Candidate {
 impl Candidate {
     /// On one joint, everywhere.
     #[must_use]
-    pub fn on(joint: usize, form: usize, values: Vec<f64>, searched: usize) -> Candidate {
-        Candidate { joints: vec![joint], form, values, windows: Vec::new(), searched: searched as f64 }
+    pub fn on(joint: JointNumber, settings: impl Into<Settings>, searched: usize) -> Candidate {
+        Candidate::on_all(vec![joint], settings, searched)
+    }
+
+    /// On several joints, everywhere.
+    #[must_use]
+    pub fn on_all(joints: Vec<JointNumber>, settings: impl Into<Settings>, searched: usize) -> Candidate {
+        Candidate { joints, settings: settings.into(), windows: Vec::new(), searched: searched as f64 }
+    }
+
+    /// The same with other settings.
+    #[must_use]
+    pub fn with(&self, settings: impl Into<Settings>) -> Candidate {
+        Candidate { settings: settings.into(), ..self.clone() }
+    }
+
+    /// The effect that it is of.
+    #[must_use]
+    pub fn effect(&self) -> &'static dyn Effect {
+        self.settings.effect()
+    }
+
+    /// Whether it acts on one of some joints.
+    #[must_use]
+    pub fn is_on(&self, joints: &[JointNumber]) -> bool {
+        self.joints.iter().any(|j| joints.contains(j))
+    }
+
+    /// Whether it and another one are the same thing twice (see [`Effect::excludes`]).
+    #[must_use]
+    pub fn excludes(&self, other: &Candidate) -> bool {
+        self.effect() == other.effect() && self.effect().excludes(self, other)
     }
 }
 
@@ -63,10 +93,8 @@ pub(super) fn geometric(low: f64, high: f64, count: usize) -> Vec<f64> {
     (0..count).map(|k| low * (high / low).powf(k as f64 / last)).collect()
 }
 
-/// One list entry by joint where several joints have it, else the number alone.
-pub(super) fn by_joint(found: &[Found<'_>], value: impl Fn(&Found<'_>) -> f64) -> serde_json::Value {
-    match found {
-        [one] => serde_json::json!(value(one)),
-        many => serde_json::json!(many.iter().map(value).collect::<Vec<f64>>()),
-    }
+/// A setting near another one: that share of the way to so many times it.
+#[must_use]
+pub(super) fn scaled(setting: f64, factor: f64, share: f64) -> f64 {
+    setting + share * (setting * factor - setting)
 }

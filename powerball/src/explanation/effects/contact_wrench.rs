@@ -1,16 +1,31 @@
 //! An outside force on the last link during some time: a touch, a push, a thing leaned on.
 
 use super::candidate::Window;
-use super::payload::{ANOTHER_LOG, block_start, mask};
+use super::payload::{all_joints, block_start, mask};
 use super::window_sums::{Sums, explained};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
 use crate::identification::estimate::Solver;
 use crate::logs::regression::{Block, Column};
-use serde_json::{Value, json};
+use serde::Serialize;
 use std::ops::Range;
 
 /// A constant force in the base frame at the last frame's origin, during a window of one log.
 pub(super) struct ContactWrench;
+
+/// It has no settings but its windows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings;
+
+/// What it is, one entry a window.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// When it ended, in the log's own t, s.
+    pub end_time: Vec<f64>,
+    /// The force in the base frame, N.
+    pub force: Vec<Vec<f64>>,
+    /// When it began, in the log's own t, s.
+    pub start_time: Vec<f64>,
+}
 
 /// Windows begin and end on a grid of this, s.
 const GRID: f64 = 0.5;
@@ -25,12 +40,6 @@ const CLEAR: usize = 10;
 const MOST: f64 = 2000.0;
 /// Grid of the same push in other logs, s: its force is known there, so that a row more or less can be told.
 const FINE: f64 = 0.1;
-/// A log has the same push if that explains enough ([`ANOTHER_LOG`], beyond what the best of all its windows
-/// explains by chance) and at least this share of the force's own torque, over at least this share of the
-/// time that it lasted: a push of another size or direction is another one, and resembles this one for a
-/// moment only.
-const SAME_FORCE: f64 = 0.8;
-const SAME_TIME: f64 = 0.5;
 
 impl Effect for ContactWrench {
     fn name(&self) -> &'static str {
@@ -43,6 +52,10 @@ impl Effect for ContactWrench {
 
     fn shown_by(&self, _: &Candidate) -> Axis {
         Axis::Time
+    }
+
+    fn excludes(&self, a: &Candidate, b: &Candidate) -> bool {
+        a.windows.iter().any(|w| b.windows.contains(w))
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
@@ -70,9 +83,10 @@ impl Effect for ContactWrench {
         c.iter().all(|f| f.abs() < MOST)
     }
 
-    /// When the other logs have the same force: nothing of it is fitted to them but its times.
+    /// When the other logs have the same force: nothing of it is fitted to them but its times. It must
+    /// explain more than the best of all windows of a log explains by chance.
     fn seen_in(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
-        let data = context.data;
+        let (data, rule) = (context.data, context.rule);
         let mut seen = candidate.clone();
         seen.windows.retain(|w| !data.logs.contains(&w.log));
         let lasted = seen.windows.iter().map(|w| w.to - w.from).fold(f64::INFINITY, f64::min);
@@ -86,8 +100,8 @@ impl Effect for ContactWrench {
                 let found = stretch.start + found.start..stretch.start + found.end;
                 let (less, own) =
                     explains[found.clone()].iter().fold((0.0, 0.0), |sum, e| (sum.0 + e.0, sum.1 + e.1));
-                let as_long = found.len() as f64 * FINE > SAME_TIME * lasted;
-                if less > ANOTHER_LOG + chance && less > SAME_FORCE * own && as_long {
+                let as_long = found.len() as f64 * FINE > rule.same_time * lasted;
+                if less > rule.another_log + chance && less > rule.same_force * own && as_long {
                     seen.windows.push(window(context, &steps, &log, &found)?);
                     open.extend([stretch.start..found.start, found.end..stretch.end]);
                 }
@@ -96,13 +110,15 @@ impl Effect for ContactWrench {
         Some(seen)
     }
 
-    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
         let windows = || found.iter().flat_map(|f| &f.candidate.windows);
-        json!({
-            "force": found.iter().flat_map(|f| f.candidate.windows.iter().map(|_| f.coefficients.to_vec())).collect::<Vec<_>>(),
-            "start_time": windows().map(|w| w.from).collect::<Vec<_>>(),
-            "end_time": windows().map(|w| w.to).collect::<Vec<_>>(),
-        })
+        let force = |f: &Found<'_>| vec![f.coefficients.to_vec(); f.candidate.windows.len()];
+        Figures {
+            end_time: windows().map(|w| w.to).collect(),
+            force: found.iter().flat_map(force).collect(),
+            start_time: windows().map(|w| w.from).collect(),
+        }
+        .into()
     }
 }
 
@@ -162,8 +178,7 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     }
     let (_, found) = best?;
     let windows = vec![window(context, &steps, log, &found)?];
-    let joints = (0..data.dof()).collect();
-    Some(Candidate { joints, form: 0, values: Vec::new(), windows, searched })
+    Some(Candidate { joints: all_joints(data), settings: Settings.into(), windows, searched })
 }
 
 /// The steps of each log.

@@ -1,13 +1,18 @@
 //! What an effect may look at: the data, the model fitted so far, and what it leaves.
 
+use crate::controller::JointNumber;
 use crate::controller::correction::{Instant, Law, Memory};
 use crate::controller::friction::TanhFriction;
+use crate::explanation::rule::Rule;
 use crate::identification::estimate::Fit;
 use crate::logs::regression::{Column, Data, Recording};
 use crate::logs::signal::{Butterworth, difference};
 use std::sync::OnceLock;
 
-/// Data together with the model fitted so far.
+/// Rows of a joint that moves, at least.
+const LEAST_ROWS: usize = 50;
+
+/// Data together with the model fitted so far, and the rule that judges.
 #[derive(Debug)]
 pub struct Context<'a> {
     /// The data; not always those that the model was fitted to.
@@ -16,6 +21,8 @@ pub struct Context<'a> {
     pub fit: &'a Fit,
     /// What the model leaves on the data, by joint.
     pub residual: &'a [Vec<f64>],
+    /// The thresholds of the rule.
+    pub rule: &'a Rule,
     rigid: OnceLock<Vec<Vec<f64>>>,
     friction: OnceLock<Vec<Vec<f64>>>,
     prediction: OnceLock<Vec<Vec<f64>>>,
@@ -24,20 +31,28 @@ pub struct Context<'a> {
 impl<'a> Context<'a> {
     /// A model seen on some data.
     #[must_use]
-    pub fn new(data: &'a Data<'a>, fit: &'a Fit, residual: &'a [Vec<f64>]) -> Context<'a> {
+    pub fn new(data: &'a Data<'a>, fit: &'a Fit, residual: &'a [Vec<f64>], rule: &'a Rule) -> Context<'a> {
         Context {
             data,
             fit,
             residual,
+            rule,
             rigid: OnceLock::new(),
             friction: OnceLock::new(),
             prediction: OnceLock::new(),
         }
     }
 
+    /// The same where columns are wanted and nothing else: what the model leaves is not known.
+    #[must_use]
+    pub fn for_columns(data: &'a Data<'a>, fit: &'a Fit, rule: &'a Rule) -> Context<'a> {
+        Context::new(data, fit, &[], rule)
+    }
+
     /// Joints that move.
-    pub fn moving_joints(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.data.dof()).filter(|j| self.data.joints[*j].len() >= 50)
+    pub fn moving_joints(&self) -> impl Iterator<Item = JointNumber> + '_ {
+        let moves = |j: &usize| self.data.joints[*j].len() >= LEAST_ROWS;
+        (0..self.data.dof()).filter(moves).map(JointNumber::from_index)
     }
 
     /// Torque of the rigid arm by recording, n a sample, N·m.
@@ -70,8 +85,8 @@ impl<'a> Context<'a> {
 
     /// The steepest level of a joint's friction, s/rad: how fast its sign changes.
     #[must_use]
-    pub fn steepness(&self, joint: usize) -> f64 {
-        let [g1, g2, g3, g4, _] = self.fit.friction(joint);
+    pub fn steepness(&self, joint: JointNumber) -> f64 {
+        let [g1, g2, g3, g4, _] = self.fit.friction(joint.index());
         match (g1 > 0.0, g3 > 0.0) {
             (true, true) => g2.max(g4),
             (true, false) => g2,
@@ -82,15 +97,16 @@ impl<'a> Context<'a> {
 
     /// The speed that a joint exceeds in 5 % of the samples that were fitted, rad/s.
     #[must_use]
-    pub fn top_speed(&self, joint: usize) -> f64 {
-        self.fit.top_speed[joint]
+    pub fn top_speed(&self, joint: JointNumber) -> f64 {
+        self.fit.top_speed[joint.index()]
     }
 
     /// The column of a law at a joint: the law along the recordings.
-    pub fn law_column(&self, joint: usize, law: Law<f64>) -> Column {
+    pub fn law_column(&self, joint: JointNumber, law: Law<f64>) -> Column {
         if law.moves_link() {
             return self.moved_link_column(joint, law, None);
         }
+        let joint = joint.index();
         let torques = law.needs_torque();
         self.data.column_on(joint, |r, recording| {
             let none: &[f64] = &[];
@@ -110,8 +126,8 @@ impl<'a> Context<'a> {
 
     /// The change of rigid torque on all joints for a link that is moved, over the law's coefficient: to
     /// first order, or for a coefficient of about `about`.
-    pub(super) fn moved_link_column(&self, joint: usize, law: Law<f64>, about: Option<f64>) -> Column {
-        let n = self.data.dof();
+    pub(super) fn moved_link_column(&self, joint: JointNumber, law: Law<f64>, about: Option<f64>) -> Column {
+        let (joint, n) = (joint.index(), self.data.dof());
         let loads = || self.rigid().iter().flat_map(|t| t.iter().skip(joint).step_by(n));
         let first_order = MOVED / loads().fold(1e-9f64, |top, load| top.max(law.shift(*load).abs()));
         let (size, passes, smoothing) = match about {

@@ -1,12 +1,25 @@
 //! A joint whose zero is off: the arm is not where the log says.
 
-use super::candidate::by_joint;
-use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
+use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found, Part};
 use crate::logs::regression::{Column, Recording};
-use serde_json::{Value, json};
+use serde::Serialize;
 
 /// τ = (τ_rigid(q − o) − τ_rigid(q))/o with coefficient o: logged position = true position + o.
 pub(super) struct EncoderOffset;
+
+/// Where the secant is taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The offset that the column is taken about, rad.
+    pub about: f64,
+}
+
+/// What it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// Logged less true position, rad.
+    pub offset: ByJoint,
+}
 
 /// The offset at which the first secant is taken, rad.
 const FIRST: f64 = 0.01;
@@ -27,11 +40,12 @@ impl Effect for EncoderOffset {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        context.moving_joints().map(|j| Candidate::on(j, 0, vec![FIRST], 1)).collect()
+        context.moving_joints().map(|j| Candidate::on(j, Settings { about: FIRST }, 1)).collect()
     }
 
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        let (j, offset) = (candidate.joints[0], candidate.values[0]);
+        let Some(Settings { about: offset }) = Settings::of(candidate) else { return Vec::new() };
+        let j = candidate.joints[0].index();
         let shifted = |r: &Recording| {
             let mut q = r.q.clone();
             q.iter_mut().skip(j).step_by(r.dof).for_each(|q| *q -= offset);
@@ -56,11 +70,11 @@ impl Effect for EncoderOffset {
     }
 
     fn refined(&self, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
-        let offset = c[0].clamp(-MOST, MOST);
-        (offset.abs() > 1e-5).then(|| Candidate { values: vec![offset], ..candidate.clone() })
+        let about = c[0].clamp(-MOST, MOST);
+        (about.abs() > 1e-5).then(|| candidate.with(Settings { about }))
     }
 
-    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
-        json!({ "offset": by_joint(found, |f| f.coefficients[0]) })
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+        Figures { offset: ByJoint::of(found, |f| f.coefficients[0]) }.into()
     }
 }

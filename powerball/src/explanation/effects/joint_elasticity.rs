@@ -1,14 +1,27 @@
 //! A joint that gives way under its torque: the link is not where the motor's encoder says.
 
-use super::candidate::by_joint;
-use super::{Axis, Candidate, Class, Context, Effect, Found};
+use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
 use crate::logs::regression::Column;
-use serde_json::{Value, json};
+use serde::Serialize;
 
-/// q_link = q − τ/K: the change of rigid torque on all joints over 1/K. The candidate's value is the 1/K
-/// about which it is taken: none while nothing is known of it, when the change is taken to first order.
+/// q_link = q − τ/K: the change of rigid torque on all joints over 1/K.
 pub(super) struct JointElasticity;
+
+/// Where the change of torque is taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The compliance 1/K that it is taken about, rad/(N·m); `None` while nothing is known of it, when the
+    /// change is taken to first order.
+    pub about: Option<f64>,
+}
+
+/// What it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// K, N·m/rad.
+    pub stiffness: ByJoint,
+}
 
 impl Effect for JointElasticity {
     fn name(&self) -> &'static str {
@@ -24,7 +37,7 @@ impl Effect for JointElasticity {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        context.moving_joints().map(|j| Candidate::on(j, 0, Vec::new(), 1)).collect()
+        context.moving_joints().map(|j| Candidate::on(j, Settings { about: None }, 1)).collect()
     }
 
     fn laws(&self, _: &Context<'_>, _: &Candidate) -> Vec<Law<f64>> {
@@ -32,23 +45,20 @@ impl Effect for JointElasticity {
     }
 
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        vec![context.moved_link_column(
-            candidate.joints[0],
-            Law::Compliance,
-            candidate.values.first().copied(),
-        )]
+        let Some(Settings { about }) = Settings::of(candidate) else { return Vec::new() };
+        vec![context.moved_link_column(candidate.joints[0], Law::Compliance, *about)]
     }
 
     /// A soft gear moves its link so far that gravity there is another one.
     fn refined(&self, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
-        (c[0] > 0.0).then(|| Candidate { values: vec![c[0]], ..candidate.clone() })
+        (c[0] > 0.0).then(|| candidate.with(Settings { about: Some(c[0]) }))
     }
 
     fn non_negative(&self) -> bool {
         true
     }
 
-    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
-        json!({ "stiffness": by_joint(found, |f| 1.0 / f.coefficients[0].max(1e-12)) })
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+        Figures { stiffness: ByJoint::of(found, |f| 1.0 / f.coefficients[0].max(1e-12)) }.into()
     }
 }

@@ -1,12 +1,22 @@
 //! Friction that grows with the torque a joint transmits: gears are pressed together harder.
 
-use super::candidate::by_joint;
-use super::{Axis, Candidate, Class, Context, Effect, Found};
+use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 /// τ = c·|τ_rigid|·tanh(γ·q̇), c ≥ 0 in N·m per N·m.
 pub(super) struct LoadFriction;
+
+/// It has no settings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings;
+
+/// What it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// c, N·m of friction for each N·m of load.
+    pub coefficient: ByJoint,
+}
 
 /// A gear that loses more than this share of its torque would not be used.
 const MOST: f64 = 0.6;
@@ -25,7 +35,7 @@ impl Effect for LoadFriction {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        context.moving_joints().map(|j| Candidate::on(j, 0, Vec::new(), 1)).collect()
+        context.moving_joints().map(|j| Candidate::on(j, Settings, 1)).collect()
     }
 
     fn laws(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
@@ -40,7 +50,7 @@ impl Effect for LoadFriction {
         coefficients.iter().all(|c| *c < MOST)
     }
 
-    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
-        json!({ "coefficient": by_joint(found, |f| f.coefficients[0]) })
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+        Figures { coefficient: ByJoint::of(found, |f| f.coefficients[0]) }.into()
     }
 }

@@ -1,21 +1,44 @@
 //! A body held by the last link, from the start of a log or from some time on.
 
-use super::candidate::{Candidate, Found, Window};
 use super::window_sums::{Sums, explained};
-use super::{Axis, Class, Context, Effect, Part};
+use super::{Axis, Candidate, Class, Context, Effect, Found, Part, Window};
+use crate::controller::JointNumber;
 use crate::identification::estimate::Solver;
-use crate::logs::regression::{Block, Column};
-use serde_json::{Value, json};
+use crate::logs::regression::{Block, Column, Data};
+use dyngen::arm::ParameterKind;
+use serde::Serialize;
 
 /// Mass and first moment in the last frame as four columns; the inertia is that of a point mass at the centre
-/// of mass last estimated (`values`), so a few rounds make it consistent.
-pub(crate) struct Payload;
+/// of mass last estimated, so a few rounds make it consistent.
+pub(super) struct Payload;
+
+/// What columns and windows depend on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The centre of mass that the inertia is taken about, m in the last frame; `None` while nothing is known
+    /// of it.
+    pub com: Option<[f64; 3]>,
+    /// Whether it is in every log that was recorded after its start.
+    pub stays: bool,
+}
+
+/// What it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// Its centre in the last frame, m.
+    pub com: [f64; 3],
+    /// Its mass, kg.
+    pub mass: f64,
+    /// From when on, one for each log that has it, in the log's own t, s.
+    pub start_time: Vec<f64>,
+}
 
 /// A centre of mass farther than this from the flange, m, is no payload.
 const REACH: f64 = 1.0;
-/// A log has the same payload if that explains this much more, and has it not if that explains this much more
-/// (in units of χ²).
-pub(super) const ANOTHER_LOG: f64 = 10.0;
+/// A rigid body's inertial parameters: all of a link's but its rotor's.
+const OF_A_BODY: usize = ParameterKind::Im as usize;
+/// … of which the mass and the first moments come before the inertias.
+const INERTIAS: usize = ParameterKind::Ixx as usize;
 
 impl Effect for Payload {
     fn name(&self) -> &'static str {
@@ -30,6 +53,10 @@ impl Effect for Payload {
         true
     }
 
+    fn may_be_in_validation_only(&self) -> bool {
+        true
+    }
+
     fn shown_by(&self, _: &Candidate) -> Axis {
         Axis::Time
     }
@@ -39,9 +66,10 @@ impl Effect for Payload {
     }
 
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        let columns = payload_columns(context, &candidate.values);
+        let Some(settings) = Settings::of(candidate) else { return Vec::new() };
+        let columns = payload_columns(context, settings.com);
         let n = context.data.dof();
-        let windows = followed(context, candidate);
+        let windows = self.windows(context, candidate);
         let masks: Vec<Vec<f64>> = (0..n).map(|j| mask(context, j, &windows)).collect();
         let cut = |column: &Column| Column {
             parts: column
@@ -53,6 +81,26 @@ impl Effect for Payload {
         columns.iter().map(cut).collect()
     }
 
+    /// A payload that stays is also in logs that were not fitted, where their `t` and that of the logs with
+    /// the payload are one clock.
+    fn windows(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Window> {
+        let (data, windows) = (context.data, &candidate.windows);
+        let here = windows.iter().any(|w| data.logs.contains(&w.log));
+        let stays = Settings::of(candidate).is_some_and(|settings| settings.stays);
+        let Some(first) = windows.iter().min_by(|a, b| (a.from + a.offset).total_cmp(&(b.from + b.offset)))
+        else {
+            return Vec::new();
+        };
+        if here || !stays {
+            return windows.clone();
+        }
+        data.recordings
+            .iter()
+            .filter(|r| (r.clock - r.start - first.offset).abs() < 1e-6)
+            .map(|r| Window::new(data, r.log, first.from, f64::INFINITY))
+            .collect()
+    }
+
     fn part(&self, _: &Context<'_>, _: &Candidate, c: &[f64]) -> Part {
         Part::Payload(c[0], centre(c))
     }
@@ -62,18 +110,17 @@ impl Effect for Payload {
     }
 
     fn refined(&self, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
-        (c[0] > 0.0).then(|| Candidate {
-            values: c[1..].iter().map(|h| (h / c[0]).clamp(-REACH, REACH)).collect(),
-            ..candidate.clone()
-        })
+        let settings = Settings::of(candidate)?;
+        let com = || centre(c).map(|x| x.clamp(-REACH, REACH));
+        (c[0] > 0.0).then(|| candidate.with(Settings { com: Some(com()), ..*settings }))
     }
 
     /// A payload may have been taken off before another log, or held again in it. What the clocks say is
     /// overruled by a log that clearly says otherwise, as a log among the fitted ones would.
     fn seen_in(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
-        let data = context.data;
-        let taken = followed(context, candidate);
-        let mut seen = candidate.clone();
+        let (data, another_log) = (context.data, context.rule.another_log);
+        let taken = self.windows(context, candidate);
+        let (mut seen, settings) = (candidate.clone(), *Settings::of(candidate)?);
         seen.windows.retain(|w| !data.logs.contains(&w.log));
         for log in 0..data.logs.len() {
             let start = data.recordings.iter().find(|r| r.log == log).map_or(0.0, |r| r.start);
@@ -82,21 +129,20 @@ impl Effect for Payload {
             let columns = self.columns(context, &Candidate { windows: vec![all.clone()], ..seen.clone() });
             let explains: f64 =
                 explained(context, &columns, c, &data.blocks).iter().map(|(less, _)| less).sum();
-            let is = if was { explains > -ANOTHER_LOG } else { explains > ANOTHER_LOG };
+            let is = if was { explains > -another_log } else { explains > another_log };
             if is {
                 seen.windows.push(all);
             } else if was {
-                seen.form = 0;
+                seen.settings = Settings { stays: false, ..settings }.into();
             }
         }
         Some(seen)
     }
 
-    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
-        let Some(first) = found.first() else { return Value::Null };
-        let c = first.coefficients;
-        let starts: Vec<f64> = first.candidate.windows.iter().map(|w| w.from).collect();
-        json!({ "mass": c[0], "com": centre(c), "start_time": starts })
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+        let c = found[0].coefficients;
+        let start_time = found[0].candidate.windows.iter().map(|w| w.from).collect();
+        Figures { com: centre(c), mass: c[0], start_time }.into()
     }
 }
 
@@ -106,12 +152,12 @@ fn centre(c: &[f64]) -> [f64; 3] {
 }
 
 /// Columns for mass and first moments with the inertia of a point mass at `com`.
-fn payload_columns(context: &Context<'_>, com: &[f64]) -> Vec<Column> {
+fn payload_columns(context: &Context<'_>, com: Option<[f64; 3]>) -> Vec<Column> {
     let links = context.data.last_link_columns();
-    if links.len() < 10 {
+    if links.len() < OF_A_BODY {
         return Vec::new();
     }
-    let [x, y, z] = [0, 1, 2].map(|k| com.get(k).copied().unwrap_or(0.0));
+    let [x, y, z] = com.unwrap_or_default();
     // By first moment: what Ixx Ixy Ixz Iyy Iyz Izz it carries; the mass carries none of its own.
     let inertia = [
         [0.0; 6],
@@ -124,35 +170,13 @@ fn payload_columns(context: &Context<'_>, com: &[f64]) -> Vec<Column> {
         .enumerate()
         .map(|(c, shares)| {
             let mut column = links[c].clone();
-            for (share, link) in shares.iter().zip(&links[4..]).filter(|(s, _)| **s != 0.0) {
+            for (share, link) in shares.iter().zip(&links[INERTIAS..]).filter(|(s, _)| **s != 0.0) {
                 for ((_, values), (_, more)) in column.parts.iter_mut().zip(&link.parts) {
                     values.iter_mut().zip(more).for_each(|(v, m)| *v += share * m);
                 }
             }
             column
         })
-        .collect()
-}
-
-/// A candidate's form where the payload is in every log that was recorded after its start.
-const STAYS: usize = 1;
-
-/// The windows on the context's logs. A payload that stays is also in logs that were not fitted, where their
-/// `t` and that of the logs with the payload are one clock.
-pub(crate) fn followed(context: &Context<'_>, candidate: &Candidate) -> Vec<Window> {
-    let (data, windows) = (context.data, &candidate.windows);
-    let here = windows.iter().any(|w| data.logs.contains(&w.log));
-    let Some(first) = windows.iter().min_by(|a, b| (a.from + a.offset).total_cmp(&(b.from + b.offset)))
-    else {
-        return Vec::new();
-    };
-    if here || candidate.form != STAYS {
-        return windows.clone();
-    }
-    data.recordings
-        .iter()
-        .filter(|r| (r.clock - r.start - first.offset).abs() < 1e-6)
-        .map(|r| Window::new(data, r.log, first.from, f64::INFINITY))
         .collect()
 }
 
@@ -167,7 +191,7 @@ pub(super) fn mask(context: &Context<'_>, joint: usize, windows: &[Window]) -> V
 /// The start in each log that explains most, then the logs that share the payload.
 fn search(context: &Context<'_>) -> Option<Candidate> {
     let (data, fit) = (context.data, context.fit);
-    let columns = payload_columns(context, &[]);
+    let columns = payload_columns(context, None);
     if columns.is_empty() {
         return None;
     }
@@ -203,7 +227,7 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
         let others = (0..starts.len()).filter(|s| chosen.iter().all(|c| starts[*c].0 != starts[*s].0));
         let next = others.map(|s| (s, gain(&with(s), &solver))).max_by(|a, b| a.1.total_cmp(&b.1));
         match next {
-            Some((s, gain)) if gain > explained + ANOTHER_LOG => {
+            Some((s, gain)) if gain > explained + context.rule.another_log => {
                 total = with(s);
                 explained = gain;
                 chosen.push(s);
@@ -217,8 +241,13 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     let first = windows.iter().map(|w| w.from + w.offset).fold(f64::INFINITY, f64::min);
     let has = |log: usize| windows.iter().any(|w| w.log == data.logs[log]);
     let stays = data.recordings.iter().filter(|r| r.clock >= first).all(|r| has(r.log));
-    let form = if stays { STAYS } else { 0 };
-    Some(Candidate { joints: (0..data.dof()).collect(), form, values: Vec::new(), windows, searched })
+    let settings = Settings { com: None, stays }.into();
+    Some(Candidate { joints: all_joints(data), settings, windows, searched })
+}
+
+/// Every joint of the arm.
+pub(super) fn all_joints(data: &Data<'_>) -> Vec<JointNumber> {
+    (0..data.dof()).map(JointNumber::from_index).collect()
 }
 
 /// What a payload with positive mass explains over some rows.

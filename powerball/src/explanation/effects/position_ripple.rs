@@ -1,22 +1,45 @@
 //! Torque that is periodic in a joint's or its motor's position: gear teeth, wave generators, cogging.
 
 use super::{Axis, Candidate, Class, Context, Effect, Found};
+use crate::controller::JointNumber;
 use crate::controller::correction::Law;
+use crate::explanation::rule::Rule;
+use crate::logs::regression::Data;
 use dyngen::exact::rational;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
-use serde_json::{Value, json};
-use std::f64::consts::PI;
+use serde::Serialize;
+use std::f64::consts::TAU;
 
 /// τ = a·cos(k·q) + b·sin(k·q), k ≥ 2 cycles a joint turn.
 ///
 /// k = 1 is left out: an arm's own weight turns that way.
 pub(super) struct PositionRipple;
 
+/// What is searched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// k, cycles a joint turn.
+    pub order: f64,
+}
+
+/// What it is, one entry a ripple.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// N·m.
+    pub amplitudes: Vec<f64>,
+    /// The joints.
+    pub joints: Vec<JointNumber>,
+    /// Cycles a joint turn.
+    pub orders: Vec<f64>,
+}
+
 /// Whole orders up to here are tried one by one, higher ones are found by a scan.
 const SMALL_ORDERS: usize = 20;
 /// Bins of a turn in the scan: orders up to half of it.
 const BINS: usize = 2048;
+/// Two ripples of a joint whose orders differ by less than this are one.
+const SAME_ORDER: f64 = 0.5;
 /// Peaks of the scan that are looked at closely.
 const PEAKS: usize = 4;
 
@@ -30,50 +53,67 @@ impl Effect for PositionRipple {
     }
 
     fn shown_by(&self, candidate: &Candidate) -> Axis {
-        Axis::Cycle(candidate.values[0])
+        Axis::Cycle(order(candidate))
+    }
+
+    /// A ripple of many cycles along the path resembles nothing else.
+    fn is_function_of_path(&self, candidate: &Candidate, data: &Data<'_>, rule: &Rule) -> bool {
+        let positions = || data.recordings.iter().flat_map(|r| r.position(candidate.joints[0].index()));
+        let (low, high) =
+            positions().fold((f64::MAX, f64::MIN), |(l, h): (f64, f64), q| (l.min(q), h.max(q)));
+        order(candidate) * (high - low) / TAU < rule.few_cycles
+    }
+
+    fn excludes(&self, a: &Candidate, b: &Candidate) -> bool {
+        a.joints == b.joints && (order(a) - order(b)).abs() < SAME_ORDER
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
         let mut candidates = Vec::new();
         for j in context.moving_joints() {
             for k in 2..=SMALL_ORDERS {
-                candidates.push(Candidate::on(j, 0, vec![k as f64], SMALL_ORDERS));
+                candidates.push(Candidate::on(j, Settings { order: k as f64 }, SMALL_ORDERS));
             }
             // Orders of the motor and of twice the motor (a wave generator has two lobes).
-            if let Some(ratio) = &context.data.body.arm().joints[j].rotor_ratio {
+            if let Some(ratio) = &context.data.body.arm().joints[j.index()].rotor_ratio {
                 let ratio = rational::to_f64(ratio).abs();
                 for k in [ratio, 2.0 * ratio].into_iter().filter(|k| *k > SMALL_ORDERS as f64) {
-                    candidates.push(Candidate::on(j, 0, vec![k], SMALL_ORDERS));
+                    candidates.push(Candidate::on(j, Settings { order: k }, SMALL_ORDERS));
                 }
             }
-            for order in scan(context, j) {
-                candidates.push(Candidate::on(j, 0, vec![order], BINS / 2));
+            for order in scan(context, j.index()) {
+                candidates.push(Candidate::on(j, Settings { order }, BINS / 2));
             }
         }
         candidates
     }
 
     fn laws(&self, _: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
-        let order = candidate.values[0];
+        let order = order(candidate);
         vec![Law::Cosine { order }, Law::Sine { order }]
     }
 
-    fn neighbours(&self, candidate: &Candidate) -> Vec<Candidate> {
-        let k = candidate.values[0];
-        let near = |d: f64| Candidate { values: vec![k + d], ..candidate.clone() };
-        if k < SMALL_ORDERS as f64 {
+    fn neighbours(&self, candidate: &Candidate, share: f64) -> Vec<Candidate> {
+        let order = order(candidate);
+        let near = |d: f64| candidate.with(Settings { order: order + share * d });
+        if order < SMALL_ORDERS as f64 {
             return Vec::new();
         }
         [-0.3, -0.1, -0.03, 0.03, 0.1, 0.3].map(near).to_vec()
     }
 
-    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
-        json!({
-            "orders": found.iter().map(|f| f.candidate.values[0]).collect::<Vec<_>>(),
-            "amplitudes": found.iter().map(|f| f.coefficients[0].hypot(f.coefficients[1])).collect::<Vec<_>>(),
-            "joints": found.iter().map(|f| f.candidate.joints[0] + 1).collect::<Vec<_>>(),
-        })
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+        Figures {
+            amplitudes: found.iter().map(|f| f.coefficients[0].hypot(f.coefficients[1])).collect(),
+            joints: found.iter().map(|f| f.candidate.joints[0]).collect(),
+            orders: found.iter().map(|f| order(f.candidate)).collect(),
+        }
+        .into()
     }
+}
+
+fn order(candidate: &Candidate) -> f64 {
+    Settings::of(candidate).map_or(f64::NAN, |settings| settings.order)
 }
 
 /// The orders above [`SMALL_ORDERS`] at which the residual, sorted by position, oscillates most.
@@ -88,7 +128,7 @@ fn scan(context: &Context<'_>, joint: usize) -> Vec<f64> {
         positions.extend(rows.kept[r].iter().map(|k| q[kept[*k]]));
     }
     let (low, high) = positions.iter().fold((f64::MAX, f64::MIN), |(l, h), q| (l.min(*q), h.max(*q)));
-    let width = 2.0 * PI / BINS as f64;
+    let width = TAU / BINS as f64;
     if high - low <= 20.0 * width || high - low > 100.0 {
         return Vec::new();
     }

@@ -1,12 +1,24 @@
 //! A torque that grows with position: a hose, a cable, a balancer.
 
-use super::candidate::by_joint;
-use super::{Axis, Candidate, Class, Context, Effect, Found};
+use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 /// τ = k·(q − q_rest).
 pub(super) struct Spring;
+
+/// It has no settings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings;
+
+/// What it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// The position at which it does not pull, rad.
+    pub rest: ByJoint,
+    /// k, N·m/rad.
+    pub stiffness: ByJoint,
+}
 
 impl Effect for Spring {
     fn name(&self) -> &'static str {
@@ -22,17 +34,18 @@ impl Effect for Spring {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        context.moving_joints().map(|j| Candidate::on(j, 0, Vec::new(), 1)).collect()
+        context.moving_joints().map(|j| Candidate::on(j, Settings, 1)).collect()
     }
 
     fn laws(&self, _: &Context<'_>, _: &Candidate) -> Vec<Law<f64>> {
         vec![Law::Position, Law::Constant]
     }
 
-    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
         let rest = |f: &Found<'_>| {
             if f.coefficients[0] == 0.0 { 0.0 } else { -f.coefficients[1] / f.coefficients[0] }
         };
-        json!({ "stiffness": by_joint(found, |f| f.coefficients[0]), "rest": by_joint(found, rest) })
+        let stiffness = ByJoint::of(found, |f| f.coefficients[0]);
+        Figures { rest: ByJoint::of(found, rest), stiffness }.into()
     }
 }

@@ -1,12 +1,31 @@
 //! Friction that falls with rising speed where a film of lubricant builds up.
 
-use super::candidate::{by_joint, geometric};
-use super::{Axis, Candidate, Class, Context, Effect, Found};
+use super::candidate::{geometric, scaled};
+use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 /// τ = c·tanh(γ·q̇)·exp(−(q̇/v_s)²), c ≥ 0.
 pub(super) struct Stribeck;
+
+/// What is searched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// v_s, rad/s.
+    pub velocity: f64,
+}
+
+/// What it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// c, N·m.
+    pub level: ByJoint,
+    /// v_s, rad/s.
+    pub speed: ByJoint,
+}
+
+/// Velocities tried on a joint.
+const TRIED: usize = 8;
 
 impl Effect for Stribeck {
     fn name(&self) -> &'static str {
@@ -18,20 +37,20 @@ impl Effect for Stribeck {
     }
 
     fn shown_by(&self, candidate: &Candidate) -> Axis {
-        Axis::Speed(candidate.joints[0])
+        Axis::Velocity(candidate.joints[0])
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let on = |j: usize| {
+        let on = |j| {
             let top = context.top_speed(j);
-            let speeds = geometric(0.02 * top, 0.3 * top, 8);
-            speeds.into_iter().map(move |v| Candidate::on(j, 0, vec![v], 8))
+            let velocities = geometric(0.02 * top, 0.3 * top, TRIED).into_iter();
+            velocities.map(move |velocity| Candidate::on(j, Settings { velocity }, TRIED))
         };
         context.moving_joints().flat_map(on).collect()
     }
 
     fn laws(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
-        let speed = candidate.values[0];
+        let speed = velocity(candidate);
         // The sign must have changed well inside the bump.
         let steepness = context.steepness(candidate.joints[0]).max(4.0 / speed);
         vec![Law::Stribeck { steepness, speed }]
@@ -41,15 +60,17 @@ impl Effect for Stribeck {
         true
     }
 
-    fn neighbours(&self, candidate: &Candidate) -> Vec<Candidate> {
-        let near = |f: f64| Candidate { values: vec![candidate.values[0] * f], ..candidate.clone() };
+    fn neighbours(&self, candidate: &Candidate, share: f64) -> Vec<Candidate> {
+        let near = |f: f64| candidate.with(Settings { velocity: scaled(velocity(candidate), f, share) });
         [0.7, 0.85, 1.2, 1.4].map(near).to_vec()
     }
 
-    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
-        json!({
-            "level": by_joint(found, |f| f.coefficients[0]),
-            "speed": by_joint(found, |f| f.candidate.values[0]),
-        })
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+        let level = ByJoint::of(found, |f| f.coefficients[0]);
+        Figures { level, speed: ByJoint::of(found, |f| velocity(f.candidate)) }.into()
     }
+}
+
+fn velocity(candidate: &Candidate) -> f64 {
+    Settings::of(candidate).map_or(f64::NAN, |settings| settings.velocity)
 }

@@ -1,14 +1,59 @@
 //! Friction that changes as the joint warms: lubricant thins.
 
-use super::candidate::{by_joint, geometric};
-use super::{Axis, Candidate, Class, Context, Effect, Found};
+use super::candidate::{geometric, scaled};
+use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
-use serde_json::{Value, json};
+use crate::logs::regression::Recording;
+use serde::Serialize;
 
-/// τ = c·f(q̇)·e^(−t/T) on the clock common to all logs, f the whole friction (form 0) or its viscous part
-/// (form 1); where temperatures were logged, c·f(q̇)·(ϑ − ϑ₀)/10 K (forms 2 and 3), ϑ₀ that at the start of
-/// the logs.
+/// τ = c·f(q̇)·e^(−t/T) on the clock common to all logs, or, where temperatures were logged, c·f(q̇)·(ϑ −
+/// ϑ₀)/10 K; f is the whole friction or its viscous part.
 pub(super) struct Temperature;
+
+/// What of the friction changes, and with what.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// What changes.
+    pub of: Friction,
+    /// With what.
+    pub with: Warmth,
+}
+
+/// What of a joint's friction changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Friction {
+    /// All of Eq. 16.
+    Whole,
+    /// Its viscous part.
+    Viscous,
+}
+
+/// With what friction changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Warmth {
+    /// With the running time.
+    RunningTime {
+        /// T, s.
+        time_constant: f64,
+    },
+    /// With the logged temperature.
+    Logged {
+        /// ϑ₀: the temperature at the start of the logs, °C.
+        reference: f64,
+    },
+}
+
+/// What it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// From cold to warm (or over 10 K), as a share of what the friction was when cold.
+    pub change: ByJoint,
+    /// T, s; 0 where the change follows a logged temperature.
+    pub time_constant: ByJoint,
+}
+
+/// Time constants tried on a joint.
+const TRIED: usize = 7;
 
 impl Effect for Temperature {
     fn name(&self) -> &'static str {
@@ -19,24 +64,32 @@ impl Effect for Temperature {
         Class::Friction
     }
 
+    fn needs_running_time(&self) -> bool {
+        true
+    }
+
     fn shown_by(&self, _: &Candidate) -> Axis {
         Axis::Warmth
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let clock = |r: &crate::logs::regression::Recording| r.clock + r.len() as f64 / r.rate;
+        let clock = |r: &Recording| r.clock + r.len() as f64 / r.rate;
         let end = context.data.recordings.iter().map(clock).fold(0.0, f64::max);
         // From the first seconds to much slower than the logs are long.
-        let constants = geometric(10.0, (2.0 * end).max(40.0), 7);
+        let constants = geometric(10.0, (2.0 * end).max(40.0), TRIED);
         let recordings = &context.data.recordings;
         let measured = recordings.iter().all(|r| r.temperature.is_some());
         let at_start = |j: usize| recordings.first()?.temperature.as_ref()?.get(j)?.first().copied();
         let mut candidates = Vec::new();
         for j in context.moving_joints() {
-            for form in 0..2 {
-                candidates.extend(constants.iter().map(|t| Candidate::on(j, form, vec![*t], 14)));
-                if let Some(reference) = at_start(j).filter(|_| measured) {
-                    candidates.push(Candidate::on(j, form + 2, vec![reference], 2));
+            for of in [Friction::Whole, Friction::Viscous] {
+                let on = |with, searched| Candidate::on(j, Settings { of, with }, searched);
+                for time_constant in &constants {
+                    let with = Warmth::RunningTime { time_constant: *time_constant };
+                    candidates.push(on(with, 2 * TRIED));
+                }
+                if let Some(reference) = at_start(j.index()).filter(|_| measured) {
+                    candidates.push(on(Warmth::Logged { reference }, 2));
                 }
             }
         }
@@ -44,36 +97,44 @@ impl Effect for Temperature {
     }
 
     fn laws(&self, _: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
-        let setting = candidate.values[0];
-        vec![match candidate.form {
-            0 => Law::CoolFriction { time_constant: setting },
-            1 => Law::CoolSpeed { time_constant: setting },
-            2 => Law::HotFriction { reference: setting },
-            _ => Law::HotSpeed { reference: setting },
+        let Some(Settings { of, with }) = Settings::of(candidate) else { return Vec::new() };
+        vec![match (of, *with) {
+            (Friction::Whole, Warmth::RunningTime { time_constant }) => Law::CoolFriction { time_constant },
+            (Friction::Viscous, Warmth::RunningTime { time_constant }) => Law::CoolSpeed { time_constant },
+            (Friction::Whole, Warmth::Logged { reference }) => Law::HotFriction { reference },
+            (Friction::Viscous, Warmth::Logged { reference }) => Law::HotSpeed { reference },
         }]
     }
 
-    fn neighbours(&self, candidate: &Candidate) -> Vec<Candidate> {
-        let near = |f: f64| {
-            let values = candidate.values.iter().map(|t| t * f).collect();
-            Candidate { values, ..candidate.clone() }
+    fn neighbours(&self, candidate: &Candidate, share: f64) -> Vec<Candidate> {
+        let Some(Settings { of, with: Warmth::RunningTime { time_constant } }) = Settings::of(candidate)
+        else {
+            return Vec::new();
         };
-        if candidate.form < 2 { [0.65, 0.8, 1.25, 1.5].map(near).to_vec() } else { Vec::new() }
+        let near = |f: f64| {
+            let with = Warmth::RunningTime { time_constant: scaled(*time_constant, f, share) };
+            candidate.with(Settings { of: *of, with })
+        };
+        [0.65, 0.8, 1.25, 1.5].map(near).to_vec()
     }
 
-    fn parameters(&self, context: &Context<'_>, found: &[Found<'_>]) -> Value {
-        // From cold to warm, as a share of what it was cold.
+    fn figures(&self, context: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
         let change = |f: &Found<'_>| {
             let c = f.coefficients[0];
-            let viscous = context.fit.friction(f.candidate.joints[0])[4];
-            match f.candidate.form {
-                0 => -c / (1.0 + c),
-                1 => -c / (viscous + c),
-                2 => c,
-                _ => c / viscous.max(1e-9),
+            let viscous = context.fit.friction(f.candidate.joints[0].index())[4];
+            match Settings::of(f.candidate) {
+                Some(Settings { of: Friction::Whole, with: Warmth::RunningTime { .. } }) => -c / (1.0 + c),
+                Some(Settings { of: Friction::Viscous, with: Warmth::RunningTime { .. } }) => {
+                    -c / (viscous + c)
+                }
+                Some(Settings { of: Friction::Viscous, .. }) => c / viscous.max(1e-9),
+                _ => c,
             }
         };
-        let time = |f: &Found<'_>| if f.candidate.form < 2 { f.candidate.values[0] } else { 0.0 };
-        json!({ "change": by_joint(found, change), "time_constant": by_joint(found, time) })
+        let time = |f: &Found<'_>| match Settings::of(f.candidate).map(|settings| settings.with) {
+            Some(Warmth::RunningTime { time_constant }) => time_constant,
+            _ => 0.0,
+        };
+        Figures { change: ByJoint::of(found, change), time_constant: ByJoint::of(found, time) }.into()
     }
 }

@@ -1,14 +1,29 @@
 //! Torque and position that were not sampled at the same time.
 
-use super::candidate::by_joint;
-use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
-use crate::logs::regression::Column;
-use serde_json::{Value, json};
+use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found, Part};
+use crate::controller::JointNumber;
+use crate::explanation::rule::Rule;
+use crate::logs::regression::{Column, Data};
+use serde::Serialize;
 
-/// τ = τ_model(t − d) − τ_model(t), its coefficient near 1: all joints alike (form 0) or one joint (form 1).
+/// τ = τ_model(t − d) − τ_model(t), its coefficient near 1: all joints alike or one joint.
 ///
 /// A positive delay means that the logged torque is late.
 pub(super) struct TimeDelay;
+
+/// Where the shifted torque is taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// d, s.
+    pub delay: f64,
+}
+
+/// What it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// By how much the logged torque is late, s.
+    pub delay: ByJoint,
+}
 
 /// Starting values, s; the coefficient makes each a third to three times as long.
 const DELAYS: [f64; 7] = [0.000_8, 0.003, 0.008, 0.02, -0.000_8, -0.003, -0.01];
@@ -26,22 +41,27 @@ impl Effect for TimeDelay {
         Axis::TorqueRate
     }
 
+    /// The same path is run early or late alike.
+    fn is_function_of_path(&self, _: &Candidate, _: &Data<'_>, _: &Rule) -> bool {
+        false
+    }
+
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let all: Vec<usize> = context.moving_joints().collect();
+        let all: Vec<JointNumber> = context.moving_joints().collect();
         let mut candidates = Vec::new();
         for delay in DELAYS {
-            let common = Candidate::on(0, 0, vec![delay], DELAYS.len());
-            candidates.push(Candidate { joints: all.clone(), ..common });
-            candidates.extend(all.iter().map(|j| Candidate::on(*j, 1, vec![delay], DELAYS.len())));
+            candidates.push(Candidate::on_all(all.clone(), Settings { delay }, DELAYS.len()));
+            candidates.extend(all.iter().map(|j| Candidate::on(*j, Settings { delay }, DELAYS.len())));
         }
         candidates
     }
 
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
         let n = context.data.dof();
-        let shift = candidate.values[0] * context.data.rate();
+        let shift = delay(candidate) * context.data.rate();
         let prediction = context.prediction();
-        let parts = candidate.joints.iter().map(|&j| {
+        let parts = candidate.joints.iter().map(|j| {
+            let j = j.index();
             let column = context.data.column_on(j, |r, recording| {
                 let torque: Vec<f64> = prediction[r].iter().skip(j).step_by(n).copied().collect();
                 (0..recording.len()).map(|k| at(&torque, k as f64 - shift) - torque[k]).collect()
@@ -52,22 +72,26 @@ impl Effect for TimeDelay {
     }
 
     fn part(&self, _: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Part {
-        Part::Delay(candidate.values[0] * c[0])
+        Part::Delay(delay(candidate) * c[0])
     }
 
     fn admissible(&self, candidate: &Candidate, c: &[f64]) -> bool {
         // The shifted torque must be seen whole, or the shift is another; below 10 µs nothing is late.
-        (0.3..3.0).contains(&c[0]) && (c[0] * candidate.values[0]).abs() > 1e-5
+        (0.3..3.0).contains(&c[0]) && (c[0] * delay(candidate)).abs() > 1e-5
     }
 
     fn refined(&self, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
-        let delay = candidate.values[0] * c[0].clamp(0.3, 3.0);
-        Some(Candidate { values: vec![delay], ..candidate.clone() })
+        let delay = delay(candidate) * c[0].clamp(0.3, 3.0);
+        Some(candidate.with(Settings { delay }))
     }
 
-    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
-        json!({ "delay": by_joint(found, |f| f.candidate.values[0] * f.coefficients[0]) })
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+        Figures { delay: ByJoint::of(found, |f| delay(f.candidate) * f.coefficients[0]) }.into()
     }
+}
+
+fn delay(candidate: &Candidate) -> f64 {
+    Settings::of(candidate).map_or(f64::NAN, |settings| settings.delay)
 }
 
 /// A signal between its samples.

@@ -1,13 +1,43 @@
 //! A wrong factor between current and torque, or one that falls as the motor saturates.
 
-use super::{Axis, Candidate, Class, Context, Effect, Found};
+use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
+use crate::controller::JointNumber;
 use crate::controller::correction::Law;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 /// τ_measured = τ·(1 + c) or τ·(1 + c·|τ|/τ_max) or τ·(1 + c·(τ/τ_max)²).
 pub(super) struct TorqueConstant;
 
-const FORMS: usize = 3;
+/// How the factor changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// With which power of the torque.
+    pub kind: Kind,
+    /// τ_max, N·m.
+    pub scale: f64,
+}
+
+/// With which power of the torque the factor changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// It is another one throughout.
+    Constant,
+    /// It changes with |τ|.
+    Linear,
+    /// It changes with τ²: a motor that saturates.
+    Square,
+}
+
+/// What it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// The change of the factor at [`torque`](Self::torque).
+    pub change_at_torque: ByJoint,
+    /// The factor at small torques.
+    pub gain: ByJoint,
+    /// τ_max, N·m.
+    pub torque: ByJoint,
+}
 
 impl Effect for TorqueConstant {
     fn name(&self) -> &'static str {
@@ -23,19 +53,20 @@ impl Effect for TorqueConstant {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let on = |j: usize| {
-            let top = scale(context, j);
-            (0..FORMS).map(move |form| Candidate::on(j, form, vec![top], FORMS))
+        const ALL: [Kind; 3] = [Kind::Constant, Kind::Linear, Kind::Square];
+        let on = |j: JointNumber| {
+            let scale = scale(context, j.index());
+            ALL.map(|kind| Candidate::on(j, Settings { kind, scale }, ALL.len()))
         };
         context.moving_joints().flat_map(on).collect()
     }
 
     fn laws(&self, _: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
-        let scale = candidate.values[0];
-        vec![match candidate.form {
-            0 => Law::Torque,
-            1 => Law::TorqueMagnitude { scale },
-            _ => Law::TorqueSquare { scale },
+        let Some(Settings { kind, scale }) = Settings::of(candidate).copied() else { return Vec::new() };
+        vec![match kind {
+            Kind::Constant => Law::Torque,
+            Kind::Linear => Law::TorqueMagnitude { scale },
+            Kind::Square => Law::TorqueSquare { scale },
         }]
     }
 
@@ -43,16 +74,18 @@ impl Effect for TorqueConstant {
         c[0].abs() < 0.8
     }
 
-    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
-        let gain: Vec<f64> =
-            found.iter().map(|f| if f.candidate.form == 0 { 1.0 + f.coefficients[0] } else { 1.0 }).collect();
-        let bend: Vec<f64> =
-            found.iter().map(|f| if f.candidate.form == 0 { 0.0 } else { f.coefficients[0] }).collect();
-        let at: Vec<f64> = found.iter().map(|f| f.candidate.values[0]).collect();
-        match gain.as_slice() {
-            [one] => json!({ "gain": one, "change_at_torque": bend[0], "torque": at[0] }),
-            _ => json!({ "gain": gain, "change_at_torque": bend, "torque": at }),
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+        let constant =
+            |f: &Found<'_>| Settings::of(f.candidate).is_some_and(|settings| settings.kind == Kind::Constant);
+        let gain = |f: &Found<'_>| if constant(f) { 1.0 + f.coefficients[0] } else { 1.0 };
+        let change = |f: &Found<'_>| if constant(f) { 0.0 } else { f.coefficients[0] };
+        let torque = |f: &Found<'_>| Settings::of(f.candidate).map_or(f64::NAN, |settings| settings.scale);
+        Figures {
+            change_at_torque: ByJoint::of(found, change),
+            gain: ByJoint::of(found, gain),
+            torque: ByJoint::of(found, torque),
         }
+        .into()
     }
 }
 

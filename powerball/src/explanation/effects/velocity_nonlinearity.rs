@@ -2,10 +2,26 @@
 
 use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 /// τ = c·q̇|q̇|, c·q̇³ or c·sign(q̇)·√|q̇|.
 pub(super) struct VelocityNonlinearity;
+
+/// What is searched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The power of q̇.
+    pub power: f64,
+}
+
+/// What it is, by joint.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// c, N·m for 1 rad/s.
+    pub coefficient: Vec<f64>,
+    /// The power of q̇.
+    pub power: Vec<f64>,
+}
 
 const POWERS: [f64; 3] = [2.0, 3.0, 0.5];
 
@@ -19,22 +35,28 @@ impl Effect for VelocityNonlinearity {
     }
 
     fn shown_by(&self, candidate: &Candidate) -> Axis {
-        Axis::Speed(candidate.joints[0])
+        Axis::Velocity(candidate.joints[0])
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let on =
-            |j: usize| (0..POWERS.len()).map(move |form| Candidate::on(j, form, Vec::new(), POWERS.len()));
+        let on = |j| POWERS.map(|power| Candidate::on(j, Settings { power }, POWERS.len()));
         context.moving_joints().flat_map(on).collect()
     }
 
     fn laws(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
         let steepness = context.steepness(candidate.joints[0]);
-        vec![Law::Power { steepness, power: POWERS[candidate.form] }]
+        vec![Law::Power { steepness, power: power(candidate) }]
     }
 
-    fn parameters(&self, _: &Context<'_>, found: &[Found<'_>]) -> Value {
-        let by = |f: fn(&Found<'_>) -> f64| found.iter().map(f).collect::<Vec<_>>();
-        json!({ "coefficient": by(|f| f.coefficients[0]), "power": by(|f| POWERS[f.candidate.form]) })
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+        Figures {
+            coefficient: found.iter().map(|f| f.coefficients[0]).collect(),
+            power: found.iter().map(|f| power(f.candidate)).collect(),
+        }
+        .into()
     }
+}
+
+fn power(candidate: &Candidate) -> f64 {
+    Settings::of(candidate).map_or(f64::NAN, |settings| settings.power)
 }

@@ -4,6 +4,7 @@
 use super::Context;
 use crate::identification::estimate::Solver;
 use crate::logs::regression::{Block, Column};
+use crate::logs::vector::dot;
 use faer::Mat;
 
 /// Weighted cross products of k columns over some rows.
@@ -38,14 +39,12 @@ impl Sums {
                     sums.cross[g * k + c] += w * values[c];
                 }
             }
-            let dot = |a: &[f64], b: &[f64]| -> f64 {
-                a[rows.clone()].iter().zip(&b[rows.clone()]).map(|(x, y)| x * y).sum()
-            };
+            let over = |a: &[f64], b: &[f64]| dot(&a[rows.clone()], &b[rows.clone()]);
             for a in 0..k {
                 for b in 0..k {
-                    sums.square[a * k + b] += w * dot(parts[a], parts[b]);
+                    sums.square[a * k + b] += w * over(parts[a], parts[b]);
                 }
-                sums.score[a] += w * dot(parts[a], &context.residual[j]);
+                sums.score[a] += w * over(parts[a], &context.residual[j]);
             }
         }
         sums
@@ -67,14 +66,14 @@ impl Sums {
         let mut gram = Mat::zeros(k, k);
         for i in 0..k {
             for c in 0..k {
-                let shared: f64 = cross[i].iter().zip(&base[c]).map(|(a, b)| a * b).sum();
+                let shared = dot(&cross[i], &base[c]);
                 gram[(i, c)] = self.square[i * k + c] - shared;
             }
         }
         // What the base takes over almost wholly says nothing.
         let solver = Solver::new(&gram, |i| gram[(i, i)] > 1e-6 * self.square[i * k + i]);
         let x = solver.solve(&self.score);
-        (x.iter().zip(&self.score).map(|(a, b)| a * b).sum(), x)
+        (dot(&x, &self.score), x)
     }
 }
 

@@ -5,11 +5,12 @@
 //! (Vuong, Likelihood ratio tests for model selection and non-nested hypotheses, Econometrica 1989, with
 //! blocks in the place of samples).
 
-use crate::explanation::explain::{ExplainError, Hypothesis, Open};
+use crate::explanation::explain::{Hypothesis, Open};
+use crate::explanation::options::{ExplainError, ExplainOptions};
 use crate::identification::estimate::Folds;
 use crate::identification::estimate::distribution::f_tail;
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, DataOptions, RigidBody};
+use crate::logs::regression::{Data, RigidBody};
 
 /// What was decided.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,13 +27,6 @@ pub struct Decision {
     pub held_out: f64,
 }
 
-/// Probability of a wrong decision that is accepted.
-const LEVEL: f64 = 0.01;
-/// What one coefficient gains by chance, twice over (Akaike).
-const PER_COEFFICIENT: f64 = 2.0;
-/// Two names whose models differ by less than this share of what either explains say the same.
-const SAME: f64 = 0.1;
-
 /// Decides between the first two open names.
 ///
 /// # Errors
@@ -42,10 +36,11 @@ pub fn decide(
     open: &Open,
     fit: &[Log],
     held_out: &[Log],
-    options: &DataOptions,
+    options: &ExplainOptions<'_>,
 ) -> Result<Decision, ExplainError> {
-    let data = Data::new(body, fit, options).map_err(ExplainError::Fit)?;
-    let other = Data::new(body, held_out, options).map_err(ExplainError::Validate)?;
+    let rule = &options.rule;
+    let data = Data::new(body, fit, &options.data).map_err(ExplainError::Fit)?;
+    let other = Data::new(body, held_out, &options.data).map_err(ExplainError::Validate)?;
     let folds = Folds::new(&data);
     let fitted: Vec<Hypothesis> = open.hypotheses.iter().map(|h| h.fitted_to(&data, &folds)).collect();
     let [a, b, ..] = fitted.as_slice() else {
@@ -53,7 +48,7 @@ pub fn decide(
         return Ok(Decision { winner: None, why, evidence: 0.0, p_value: 1.0, held_out: 0.0 });
     };
     let (own_a, own_b) = (a.fitted_columns.len(), b.fitted_columns.len());
-    let penalty = PER_COEFFICIENT * (own_b as f64 - own_a as f64);
+    let penalty = rule.per_coefficient * (own_b as f64 - own_a as f64);
     let blocks = leads(&data, a, b);
     let lead = blocks.iter().sum::<f64>() + penalty;
     let held = leads(&other, a, b).iter().sum::<f64>();
@@ -62,7 +57,7 @@ pub fn decide(
     let (first, second, sign) = if lead >= 0.0 { (a, b, 1.0) } else { (b, a, -1.0) };
     let (evidence, held_out) = (sign * lead, sign * held);
     let share = difference(&data, a, b);
-    let (winner, why) = if p_value < LEVEL && held_out > 0.0 {
+    let (winner, why) = if p_value < rule.decision_level && held_out > 0.0 {
         (
             Some(first.name),
             format!(
@@ -71,7 +66,7 @@ pub fn decide(
                 first.name
             ),
         )
-    } else if share < SAME && own_a != own_b {
+    } else if share < rule.same_model && own_a != own_b {
         let simpler = if own_a < own_b { a } else { b };
         let more = if own_a < own_b { b } else { a };
         (

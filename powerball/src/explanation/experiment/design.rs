@@ -7,16 +7,17 @@
 //! coefficients move. What it cannot absorb, over the noise, is what an experiment along the path would show.
 
 use crate::explanation::explain::{Hypothesis, Open};
-use crate::identification::estimate::{Design as Columns, Folds, Gram, Solver};
+use crate::identification::estimate::{Design, Folds, Gram, Solver};
 use crate::identification::excite::{Error, Fourier, Limits, Settings, search};
 use crate::identification::motion::Motion;
 use crate::logs::log::Log;
 use crate::logs::regression::{Column, Data, DataOptions, RigidBody};
+use crate::logs::vector::dot;
 use faer::Mat;
 
 /// A designed experiment.
 #[derive(Clone, Debug)]
-pub struct Design {
+pub struct DesignedExperiment {
     /// What the arm is to follow, from rest to rest.
     pub motion: Motion,
     /// rms of the difference that would stay, over the residual's own rms, by joint.
@@ -49,7 +50,7 @@ fn settings() -> Settings {
 ///
 /// # Errors
 /// Limits that the arm file misses.
-pub fn design(body: &RigidBody, open: &Open, options: &DataOptions) -> Result<Design, Error> {
+pub fn design(body: &RigidBody, open: &Open, options: &DataOptions) -> Result<DesignedExperiment, Error> {
     let settings = settings();
     let limits = Limits::of(body.arm(), settings.margin)?;
     let duels = duels(open);
@@ -60,7 +61,7 @@ pub fn design(body: &RigidBody, open: &Open, options: &DataOptions) -> Result<De
     let shows = judge(body, open, &duels, &path, RATE, options);
     let shows =
         shows.unwrap_or_else(|| Shows { evidence: 0.0, narrows: 0.0, by_joint: vec![0.0; body.dof()] });
-    Ok(Design {
+    Ok(DesignedExperiment {
         motion: path.sample(RATE),
         expected: shows.by_joint,
         evidence: shows.evidence,
@@ -127,7 +128,7 @@ fn by_joint(column: &Column, rows: &[usize]) -> Vec<Vec<f64>> {
 }
 
 /// A's and s's of a signal, weighted.
-fn products(design: &Columns, weights: &[f64], signal: &[Vec<f64>]) -> (Vec<f64>, f64) {
+fn products(design: &Design, weights: &[f64], signal: &[Vec<f64>]) -> (Vec<f64>, f64) {
     let (mut right, mut square) = (vec![0.0; design.size], 0.0);
     for (j, values) in signal.iter().enumerate() {
         for (g, value) in design.cross(j, &(0..values.len()), &[values]) {
@@ -141,7 +142,7 @@ fn products(design: &Columns, weights: &[f64], signal: &[Vec<f64>]) -> (Vec<f64>
 /// The least χ² over the free coefficients, and those.
 fn left(gram: &Mat<f64>, right: &[f64], square: f64, free: &[bool]) -> (f64, Vec<f64>) {
     let x = Solver::new(gram, |c| free[c]).solve(right);
-    (square - x.iter().zip(right).map(|(a, b)| a * b).sum::<f64>(), x)
+    (square - dot(&x, right), x)
 }
 
 /// What a path would show.
@@ -171,7 +172,7 @@ fn judge(
     let folds = Folds::new(&data);
     let n = data.dof();
     let rows: Vec<usize> = data.joints.iter().map(|j| j.len()).collect();
-    let designs: Vec<Columns> = open.hypotheses.iter().map(|h| h.design(&data)).collect();
+    let designs: Vec<Design> = open.hypotheses.iter().map(|h| h.design(&data)).collect();
     let own: Vec<Vec<Column>> = open.hypotheses.iter().map(|h| h.own_columns(&data)).collect();
     let predict = |h: usize, j: usize| designs[h].predict(j, &open.hypotheses[h].fit.theta);
     let shows = |duel: &Duel<'_>| {

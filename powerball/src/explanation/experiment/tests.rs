@@ -2,11 +2,13 @@
 //! experiment can.
 
 use super::{TRAJECTORY, design, learn, propose};
-use crate::explanation::explain::{Explained, Options, explain};
+use crate::controller::JointNumber;
+use crate::explanation::ExplainOptions;
+use crate::explanation::explain::{Explained, explain_body};
 use crate::identification::excite::{Limits, Settings, optimise};
 use crate::identification::motion::Motion;
 use crate::logs::log::{Log, common_clock};
-use crate::logs::regression::{DataOptions, RigidBody};
+use crate::logs::regression::RigidBody;
 use crate::virtual_arm::{Plant, PlantEffect as Effect, lwa4p};
 use dyngen::{Model, SetKind};
 
@@ -23,7 +25,7 @@ fn session(plant: &Plant, body: &RigidBody) -> (Vec<Log>, Vec<Log>, Explained) {
         .collect();
     common_clock(&mut logs);
     let held_out = logs.split_off(4);
-    let explained = explain(body, &logs, &held_out, &DataOptions::default(), &|_| ()).unwrap();
+    let explained = explain_body(body, &logs, &held_out, &ExplainOptions::default()).unwrap();
     (logs, held_out, explained)
 }
 
@@ -48,13 +50,13 @@ fn an_experiment_is_designed_within_the_limits_and_decides_what_the_logs_left_op
         assert_eq!(names, ["asymmetry", "spring"]);
         assert!(explained.experiment.is_none());
 
-        let options = DataOptions::default();
-        let designed = design(&body, &open, &options).unwrap();
+        let options = ExplainOptions::default();
+        let designed = design(&body, &open, &options.data).unwrap();
         assert!(designed.evidence >= designed.usual, "{} {}", designed.evidence, designed.usual);
         assert!(designed.expected.iter().all(|d| d.is_finite()));
         // What only joint 1 feels shows on joint 1.
         assert!(designed.expected[0] > 10.0 * designed.expected[2], "{:?}", designed.expected);
-        let motion = propose(&body, &mut explained, &options, &|_| ()).unwrap();
+        let motion = propose(&body, &mut explained, &options).unwrap();
         assert_eq!(motion, designed.motion, "the same question has the same answer");
         let limits = Limits::of(&arm, 0.0).unwrap();
         for [q, dq, ddq] in motion.samples() {
@@ -63,17 +65,20 @@ fn an_experiment_is_designed_within_the_limits_and_decides_what_the_logs_left_op
                 assert!(dq[i].abs() < limit.velocity && ddq[i].abs() < limit.acceleration);
             }
         }
-        let next = explained.next_experiment.clone().unwrap();
+        let next = serde_json::to_value(&explained.next_experiment).unwrap();
         assert_eq!(next["trajectory"], TRAJECTORY);
         assert_eq!(next["joints"], serde_json::json!([1]));
 
         let new = log(&plant, &motion, 99);
-        let told = Options::default();
-        let again = learn(&body, (&fit, &held_out), new, &explained, &options, &told, &|_| ()).unwrap();
-        let experiment = again.experiment.unwrap();
+        let again = learn(&body, (&fit, &held_out), new, &explained, &options).unwrap();
+        let experiment = serde_json::to_value(again.experiment.unwrap()).unwrap();
         assert_eq!(experiment["decided"], name, "{experiment}");
         assert_eq!(again.effects.len(), 1, "{:?}", again.unattributed);
-        assert_eq!((again.effects[0].effect.as_str(), again.effects[0].joints.as_slice()), (name, &[1][..]));
+        let first = JointNumber::from_index(0);
+        assert_eq!(
+            (again.effects[0].effect.as_str(), again.effects[0].joints.as_slice()),
+            (name, &[first][..])
+        );
         let loser = again.effects[0].rivals.iter().find(|r| r.effect == other).unwrap();
         assert!(loser.why_not.contains("ruled out by the experiment"), "{}", loser.why_not);
     }
@@ -87,8 +92,8 @@ fn without_limits_there_is_advice_and_no_trajectory() {
     let mut arm = lwa4p::arm().unwrap();
     arm.joints[3].velocity = None;
     let body = RigidBody::new(&arm).unwrap();
-    assert!(propose(&body, &mut explained, &DataOptions::default(), &|_| ()).is_none());
-    let next = explained.next_experiment.unwrap();
+    assert!(propose(&body, &mut explained, &ExplainOptions::default()).is_none());
+    let next = serde_json::to_value(explained.next_experiment.unwrap()).unwrap();
     assert!(next["advice"].as_str().unwrap().contains("other positions"));
     assert!(next["no_trajectory"].as_str().unwrap().contains("joint 4: `velocity`"), "{next}");
 }

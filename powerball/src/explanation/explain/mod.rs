@@ -1,46 +1,101 @@
-//! From what a model leaves to named effects: the rule that accepts, names or refuses them.
+//! From what a base model leaves to named effects: the pipeline.
 //!
-//! The rule, in the order of the files: `screen` refits the base with each candidate, `evidence` asks
-//! clusters, folds and another path, `placebo` measures how often the same questions are answered by chance
-//! on these very data, `rule` holds every threshold with its reason, `family` keeps what may stand together,
-//! `forward` adds one effect at a time, `taken_back` removes what does not stay, `settings` moves what stays
-//! to where everything together fits best, `naming` compares rivals, `open` keeps those that are not told
-//! apart, `leftover` says what stays, `correction` takes off of it what it can, `shown` draws what each name
-//! is seen by, `compose` makes the model of what was accepted, `conclude` writes the result.
+//! [`explain_body`] is the whole of it. `prepare` makes rows of the logs and fits the base model; the loop of
+//! `find` proposes one effect after the other (`step`) until nothing passes and nothing is taken back;
+//! `results` makes the model and the report of the `findings`. Each uses what stands above it here, never
+//! what stands below:
+//!
+//! | | |
+//! |---|---|
+//! | `study` | the rows and what was told: what does not change while effects are looked for |
+//! | `model` | what was accepted, and the fit with it: what does |
+//! | `named` | what is said of an effect |
+//! | `search` | candidates screened and tested; settings refined; backward elimination |
+//! | `comparison` | **whether a name is given**, what stays open, what is taken back |
+//! | `special` | what is special of some logs: one path, another running time, something held |
+//! | `prepare`, `step` | the base model, and one step of the loop |
+//! | `findings`, `results` | what was found; the model, the report and its figures |
 
-mod apart;
-mod compose;
-mod conclude;
-mod constancy;
-mod correction;
-mod curves;
-mod doubts;
-mod evidence;
-mod family;
-mod folds;
-mod forward;
-mod leftover;
-mod naming;
-mod one_path;
-mod open;
-mod other_path;
+mod comparison;
+mod findings;
+mod model;
+mod named;
+mod prepare;
+mod results;
+mod search;
+mod special;
+mod step;
+mod study;
 
-mod placebo;
-mod result;
-mod rule;
-mod running_time;
-mod screen;
-mod settings;
-mod shown;
-mod taken_back;
+pub use comparison::{Hypothesis, Open};
+pub use named::{FalsePositives, NamedEffect, Rival, Spreads};
+pub use results::{
+    Change, Correction, Curve, Experiment, Explained, NextExperiment, Shown, TorqueCurve, Trajectory,
+    Unattributed, curves,
+};
 
-pub use correction::{Correction, Curve};
-pub use curves::{TorqueCurve, curves};
-pub use forward::{ExplainError, Options, RuledOut, Session, explain, explain_with};
-pub use open::{Hypothesis, Open};
+use crate::explanation::options::{ExplainError, ExplainOptions};
+use crate::logs::log::Log;
+use crate::logs::regression::RigidBody;
+use comparison::{History, withhold};
+use findings::Findings;
+use model::Model;
+use prepare::{Begun, Inertia, prepare};
+use step::{Outcome, Proposed, accept, propose};
 
-pub use result::{Change, Explained, NamedEffect, Rival, Unattributed};
-pub use shown::Shown;
+/// Explains what the base model of an arm that is derived already lacks on `logs`, judged on `validate`. The
+/// logs are taken as they are: their clocks are joined already, and what is known is taken out of them.
+///
+/// # Errors
+/// [`ExplainError`] where logs hold too little.
+pub fn explain_body(
+    body: &RigidBody,
+    logs: &[Log],
+    validate: &[Log],
+    options: &ExplainOptions<'_>,
+) -> Result<Explained, ExplainError> {
+    options.progress.say("preparing signals");
+    let mut findings = find(prepare(body, (logs, validate), options, Inertia::Shared)?);
+    if findings.study.one_path {
+        options.progress.say("one path: joints by themselves");
+        findings = findings.or_better(find(prepare(body, (logs, validate), options, Inertia::PerJoint)?));
+    }
+    options.progress.say("looking at what is left");
+    results::conclude(findings)
+}
+
+/// Adds one effect after the other until nothing passes and nothing is taken back.
+fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
+    let (mut model, mut history) = (Model::new(base), History::default());
+    for number in 0..study.rule().most_steps {
+        study.say(&format!("step {}: screening candidates", number + 1));
+        let Proposed { refused, outcome } = propose(&study, &model, number);
+        history.refused = refused;
+        match outcome {
+            Outcome::Named(choice) => {
+                let step = accept(&study, &mut model, *choice, number);
+                study.say(&format!("step {}: {} accepted", number + 1, step.effect.name()));
+                history.steps.push(step);
+            }
+            Outcome::Chance(candidates) => {
+                study.say(&format!("step {}: what fits best fits no better than by chance", number + 1));
+                model.given_up.extend(candidates);
+            }
+            // Only now is it known what is left beside all that fits.
+            Outcome::Nothing(question) => {
+                history.questions.extend(question);
+                let Some(taken) = withhold(&study, &mut model, &mut history) else { break };
+                study.say(&format!("{} is not named: {}", taken.effect.name(), taken.why));
+            }
+        }
+    }
+    while withhold(&study, &mut model, &mut history).is_some() {}
+    study.say("refining settings");
+    search::refine(&study, &mut model);
+    study.say("asking time-shift surrogates");
+    let false_positives = search::false_positives(&study, &model);
+    Findings { study, beforehand, model, history, false_positives }
+}
 
 #[cfg(test)]
 mod tests;

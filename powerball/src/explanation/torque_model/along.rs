@@ -81,9 +81,10 @@ impl TorqueModel {
         let Some(payload) = self.additions.payloads.last().filter(|_| holds.contains(&true)) else {
             return torque;
         };
-        let last: Vec<usize> = ParameterKind::ALL[..10].iter().map(|kind| body.last_link(*kind)).collect();
-        let Some(columns) = body.parameter_columns(&last, q, v, a) else { return torque };
         let added = payload.parameters();
+        let of_a_body = &ParameterKind::ALL[..added.len()];
+        let last: Vec<usize> = of_a_body.iter().map(|kind| body.last_link(*kind)).collect();
+        let Some(columns) = body.parameter_columns(&last, q, v, a) else { return torque };
         for (row, columns) in columns.chunks_exact(added.len()).enumerate().filter(|(row, _)| holds[row / n])
         {
             torque[row] += columns.iter().zip(&added).map(|(c, p)| c * p).sum::<f64>();

@@ -1,6 +1,7 @@
 //! The next identification: what is known is taken out of the logs, and what is found comes to it.
 
 use super::{Additions, LogChanges, NamedTerm, TorqueModel};
+use crate::controller::JointNumber;
 use crate::controller::correction::{Law, Term};
 use crate::logs::log::Log;
 use crate::logs::regression::{DataOptions, Recording, RigidBody};
@@ -47,7 +48,7 @@ impl Additions {
     pub fn and(&self, found: &Additions) -> Additions {
         let mut known = self.clone();
         for (joint, offset) in found.log_changes.encoder_offset.iter().enumerate() {
-            known.put_zero_right(joint, *offset);
+            known.put_zero_right(JointNumber::from_index(joint), *offset);
         }
         known.terms.extend(found.terms.iter().cloned());
         known.join();
@@ -60,7 +61,8 @@ impl Additions {
 
     /// The same torque with terms that were fitted at logged positions of a joint written for true ones,
     /// `offset` rad less.
-    pub(crate) fn put_zero_right(&mut self, joint: usize, offset: f64) {
+    pub(crate) fn put_zero_right(&mut self, joint: JointNumber, offset: f64) {
+        let joint = joint.index();
         let mut constants = Vec::new();
         for NamedTerm { effect, term } in self.terms.iter().filter(|t| t.term.joint == joint) {
             if term.law == Law::Position {

@@ -3,6 +3,7 @@
 use super::changes::with_open_hand;
 use super::{TorqueModel, Unchanged};
 use crate::controller::{correction, friction};
+use dyngen::arm::{Parameter, ParameterKind};
 use dyngen::emit::{self, Options};
 use dyngen::{Arm, Function, Model, SetKind};
 use std::fmt::{self, Write};
@@ -92,8 +93,9 @@ impl TorqueModel {
             Some(payload) => {
                 Some(dynamics(&with_open_hand(&arm), vec![Function::InverseDynamics], |model| {
                     let mut all = vec![0.0; model.arm().all_parameters().len()];
-                    let first = 11 * (model.arm().dof() - 1);
-                    all[first..first + 10].copy_from_slice(&payload.parameters());
+                    let first = Parameter { link: model.arm().dof() - 1, kind: ParameterKind::M }.index();
+                    let held = payload.parameters();
+                    all[first..first + held.len()].copy_from_slice(&held);
                     model.set(SetKind::Minimal).map(|set| model.set_values(set, &all)).unwrap_or_default()
                 })?)
             }

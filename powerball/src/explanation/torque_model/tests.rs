@@ -143,7 +143,7 @@ fn putting_a_zero_right_does_not_change_the_torque() {
     logged.parameters.iter_mut().for_each(|p| p.value = 0.0);
     let (offset, never) = (0.03, |_: f64| false);
     let mut right = logged.clone();
-    right.additions.put_zero_right(1, offset);
+    right.additions.put_zero_right(crate::controller::JointNumber::from_index(1), offset);
     right.additions.log_changes.encoder_offset = vec![0.0, offset, 0.0, 0.0, 0.0, 0.0];
     let recording = recording(6, offset);
     let (a, b) = (logged.torque(&body, &recording, &never), right.torque(&body, &recording, &never));

@@ -1,10 +1,12 @@
 //! A correction of what has no name may help and may not hurt.
 
+use super::numbered;
 use super::plant::{Noise, Truth, arm, record};
 use crate::explanation::effects::Context;
-use crate::explanation::explain::correction::correct;
-use crate::explanation::explain::leftover::depends_on;
-use crate::explanation::explain::{Options, explain_with};
+use crate::explanation::explain::explain_body;
+use crate::explanation::explain::results::correction::correct;
+use crate::explanation::explain::results::dependencies::depends_on;
+use crate::explanation::{ExplainOptions, Rule};
 use crate::identification::estimate::{Folds, fit};
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, DataOptions, RigidBody};
@@ -25,12 +27,12 @@ fn a_curve_is_kept_where_it_helps_and_named_by_nothing() {
     let logs = disturbed(record(body.arm(), Truth::Clean, 0.0, Noise::White, 7, 22.0, 5), 2.0);
     let (to_fit, held_out) = logs.split_at(5);
     let run = |correct_unattributed: bool| {
-        let told = Options { correct_unattributed, ..Options::default() };
-        explain_with(&body, to_fit, held_out, &DataOptions::default(), &told, &|_| ()).unwrap()
+        let options = ExplainOptions { correct_unattributed, ..ExplainOptions::default() };
+        explain_body(&body, to_fit, held_out, &options).unwrap()
     };
     let (without, with) = (run(false), run(true));
     let rest = without.unattributed.expect("nothing in the library is this");
-    assert!(rest.joints.contains(&2) && rest.correction.is_none());
+    assert!(rest.joints.contains(&numbered(&[2])[0]) && rest.correction.is_none());
     // It is no part of the model: names and errors are the same.
     assert_eq!(without.after.validate, with.after.validate);
     assert_eq!(without.effects.len(), with.effects.len());
@@ -62,7 +64,9 @@ fn what_the_held_out_path_contradicts_is_not_kept() {
         let folds = Folds::new(&data);
         let base = fit(&data, &folds, &[], None);
         let held = base.residual_on(&other, &[]);
-        let (here, there) = (Context::new(&data, &base, &base.residual), Context::new(&other, &base, &held));
+        let rule = Rule::default();
+        let here = Context::new(&data, &base, &base.residual, &rule);
+        let there = Context::new(&other, &base, &held, &rule);
         let signals = depends_on(&here, 2);
         assert!(signals.iter().any(|(name, _)| name == "q3"), "{signals:?}");
         correct(&here, &there, &folds, 2, &signals)

@@ -1,8 +1,10 @@
 //! What a real arm's logs say; skipped where they are missing.
 
-use crate::explanation::explain::{Explained, explain};
+use super::figures;
+use crate::explanation::ExplainOptions;
+use crate::explanation::explain::{Explained, explain_body};
 use crate::logs::log::{common_clock, read_logs};
-use crate::logs::regression::{DataOptions, RigidBody};
+use crate::logs::regression::RigidBody;
 use dyngen::Arm;
 use std::path::PathBuf;
 
@@ -31,11 +33,12 @@ fn explained(arm: &str, fit: &[String], validate: &[String]) -> Option<Explained
     common_clock(&mut logs);
     let validate = logs.split_off(fit.len());
     let body = RigidBody::new(&arm).unwrap();
-    Some(explain(&body, &logs, &validate, &DataOptions::default(), &|_| ()).unwrap())
+    Some(explain_body(&body, &logs, &validate, &ExplainOptions::default()).unwrap())
 }
 
-fn joints<'e>(explained: &'e Explained, name: &str) -> &'e [usize] {
-    explained.effects.iter().find(|e| e.effect == name).map_or(&[], |e| &e.joints)
+fn joints(explained: &Explained, name: &str) -> Vec<usize> {
+    let effect = explained.effects.iter().find(|e| e.effect == name);
+    effect.map_or_else(Vec::new, |e| e.joints.iter().map(|j| j.number()).collect())
 }
 
 #[test]
@@ -58,7 +61,7 @@ fn the_load_of_the_ur10e_is_a_payload_on_either_side() {
     for (fit, validate) in sides {
         let Some(explained) = ur10e(fit, validate) else { return };
         let payload = explained.effects.iter().find(|e| e.effect == "payload").unwrap();
-        let mass = payload.parameters["mass"].as_f64().unwrap();
+        let mass = figures(payload)["mass"].as_f64().unwrap();
         assert!((mass - 2.8).abs() < 0.15 * 2.8, "{mass}");
         assert!(payload.logs.len() == 1 && payload.logs[0].contains("14_load"));
         assert!(joints(&explained, "load_friction").contains(&2));
@@ -81,7 +84,7 @@ fn repeats_of_a_schunk_arm_warm_and_joint_4_ripples() {
         assert!(joints(&explained, "temperature").len() >= 3, "{:?}", explained.effects);
         let ripple = explained.effects.iter().find(|e| e.effect == "position_ripple").unwrap();
         let list = |key: &str| -> Vec<f64> {
-            ripple.parameters[key].as_array().unwrap().iter().filter_map(serde_json::Value::as_f64).collect()
+            figures(ripple)[key].as_array().unwrap().iter().filter_map(serde_json::Value::as_f64).collect()
         };
         let of_joint_4: Vec<f64> = (list("orders").into_iter().zip(list("joints")))
             .filter(|(_, joint)| *joint == 4.0)

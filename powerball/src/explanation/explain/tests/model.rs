@@ -1,9 +1,11 @@
 //! What was found becomes the next model: the arm as it is, the logs put right, the terms known.
 
 use super::plant::{Noise, Truth, arm, record};
-use crate::explanation::explain::explain;
-use crate::explanation::torque_model::{Additions, Scalar};
+use crate::explanation::explain::{Explained, explain_body};
+use crate::explanation::torque_model::{Additions, Scalar, TorqueModel};
+use crate::explanation::{ExplainError, ExplainOptions, explain};
 use crate::identification::estimate::{Folds, fit, spread};
+use crate::logs::log::common_clock;
 use crate::logs::regression::{Data, DataOptions, RigidBody};
 
 /// Whether a model holds what the plant has.
@@ -14,7 +16,7 @@ type Holds = fn(&Additions) -> bool;
 #[test]
 fn a_base_model_beside_what_is_known_does_as_well_as_the_whole() {
     let body = RigidBody::new(&arm()).unwrap();
-    let options = DataOptions::default();
+    let (told, options) = (ExplainOptions::default(), DataOptions::default());
     let given = |list: &[f64]| list.iter().any(|x| *x != 0.0);
     let parts: [(Truth, Holds); 5] = [
         (Truth::EncoderOffset, |a| a.log_changes.encoder_offset.iter().any(|o| (o - 0.03).abs() < 0.003)),
@@ -25,7 +27,7 @@ fn a_base_model_beside_what_is_known_does_as_well_as_the_whole() {
     ];
     for (truth, part) in parts {
         let mut logs = record(body.arm(), truth, 1.0, Noise::White, 7, 22.0, 3);
-        let explained = explain(&body, &logs[..5], &logs[5..], &options, &|_| ()).unwrap();
+        let explained = explain_body(&body, &logs[..5], &logs[5..], &told).unwrap();
         let model = &explained.model;
         assert!(part(&model.additions), "{truth:?}: {:?}", model.additions);
         assert_eq!(given(&model.additions.log_changes.delay), truth == Truth::TimeDelay);
@@ -45,4 +47,32 @@ fn a_base_model_beside_what_is_known_does_as_well_as_the_whole() {
         // And code of it can be proven.
         assert!(model.source(body.arm(), Scalar::F64, &[]).is_ok());
     }
+}
+
+/// The door joins the clocks of logs and takes out what is known, and what is known comes back into the model.
+#[test]
+fn the_door_needs_nothing_prepared() {
+    let body = RigidBody::new(&arm()).unwrap();
+    let mut logs = record(body.arm(), Truth::Temperature, 1.0, Noise::White, 7, 22.0, 3);
+    common_clock(&mut logs);
+    let json = |explained: &Explained| serde_json::to_value(explained).unwrap();
+    let prepared = explain_body(&body, &logs[..5], &logs[5..], &ExplainOptions::default()).unwrap();
+    let is_warm = |explained: &Explained| explained.effects.iter().any(|e| e.effect == "temperature");
+    assert!(is_warm(&prepared));
+
+    logs.iter_mut().for_each(|log| log.clock = 0.0);
+    let door = |known: Option<TorqueModel>| {
+        let options = ExplainOptions { known, ..ExplainOptions::default() };
+        explain(body.arm(), &logs[..5], &logs[5..], &options)
+    };
+    let explained = door(None).unwrap();
+    assert_eq!(json(&explained), json(&prepared));
+
+    let again = door(Some(explained.model.clone())).unwrap();
+    assert!(!is_warm(&again), "{:?}", again.effects);
+    assert!(again.model.additions.terms.iter().any(|t| t.effect == "temperature"));
+
+    let mut another = explained.model;
+    another.parameters.truncate(1);
+    assert!(matches!(door(Some(another)), Err(ExplainError::Known(_))));
 }

@@ -1,14 +1,17 @@
 //! What the rule does on logs whose truth is known.
 
+use super::figures;
 use super::plant::{Noise, Truth, arm, record};
-use crate::explanation::explain::one_path::repeats;
-use crate::explanation::explain::{Explained, explain};
+use crate::explanation::ExplainOptions;
+use crate::explanation::Rule;
+use crate::explanation::explain::special::repeats;
+use crate::explanation::explain::{Explained, explain_body};
 use crate::logs::regression::{Data, DataOptions, RigidBody};
 
 fn run(body: &RigidBody, truth: Truth, size: f64, noise: Noise, seed: u64) -> Explained {
     let logs = record(body.arm(), truth, size, noise, 7, 22.0, seed);
     let (fit, validate) = logs.split_at(5);
-    explain(body, fit, validate, &DataOptions::default(), &|_| ()).unwrap()
+    explain_body(body, fit, validate, &ExplainOptions::default()).unwrap()
 }
 
 fn names(explained: &Explained) -> Vec<String> {
@@ -22,7 +25,7 @@ fn names(explained: &Explained) -> Vec<String> {
 #[test]
 fn one_missing_effect_is_named_with_its_figures() {
     let body = RigidBody::new(&arm()).unwrap();
-    let figure = |explained: &Explained, name: &str| explained.effects[0].parameters[name].as_f64().unwrap();
+    let figure = |explained: &Explained, name: &str| figures(&explained.effects[0])[name].as_f64().unwrap();
     let load = run(&body, Truth::LoadFriction, 1.0, Noise::White, 3);
     assert_eq!(load.effects[0].effect, "load_friction");
     approx::assert_abs_diff_eq!(figure(&load, "coefficient"), 0.08, epsilon = 0.008);
@@ -33,7 +36,7 @@ fn one_missing_effect_is_named_with_its_figures() {
     let ripple = run(&body, Truth::MotorRipple, 1.0, Noise::White, 3);
     assert_eq!(ripple.effects[0].effect, "position_ripple");
     approx::assert_abs_diff_eq!(
-        ripple.effects[0].parameters["orders"][0].as_f64().unwrap(),
+        figures(&ripple.effects[0])["orders"][0].as_f64().unwrap(),
         200.0,
         epsilon = 0.5
     );
@@ -41,7 +44,7 @@ fn one_missing_effect_is_named_with_its_figures() {
         let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
         assert!(before.iter().zip(after).any(|(b, a)| *a < 0.95 * b), "{before:?} {after:?}");
         for change in &explained.held_out_change {
-            let (b, a) = (before[change.joint - 1], after[change.joint - 1]);
+            let (b, a) = (before[change.joint.index()], after[change.joint.index()]);
             approx::assert_relative_eq!(change.rms, a / b - 1.0, epsilon = 1e-9);
             assert!(change.interval[0] < change.rms && change.rms < change.interval[1]);
         }
@@ -82,9 +85,9 @@ fn nothing_of_the_position_is_named_on_a_repeated_path() {
     let data = |logs: &[crate::logs::log::Log]| Data::new(&body, logs, &DataOptions::default()).unwrap();
     let mut drifted = logs[0].clone();
     drifted.q.iter_mut().flatten().for_each(|q| *q = 0.03 + 1.2 * *q);
-    assert!(repeats(&data(&logs[..3]), &data(&[drifted])));
-    assert!(!repeats(&data(&logs[..3]), &data(&logs[4..])));
-    let repeated = explain(&body, &logs[..5], &logs[..2], &DataOptions::default(), &|_| ()).unwrap();
+    assert!(repeats(&Rule::default(), &data(&logs[..3]), &data(&[drifted])));
+    assert!(!repeats(&Rule::default(), &data(&logs[..3]), &data(&logs[4..])));
+    let repeated = explain_body(&body, &logs[..5], &logs[..2], &ExplainOptions::default()).unwrap();
     assert!(!names(&repeated).iter().any(|n| n.starts_with("spring")), "{:?}", names(&repeated));
     assert!(repeated.warnings.iter().any(|w| w.contains("run the same path")));
 }

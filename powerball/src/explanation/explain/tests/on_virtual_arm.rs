@@ -1,9 +1,11 @@
 //! How large an effect of the virtual arm is found to be, and what stays of it on another path.
 
-use crate::explanation::explain::{Explained, explain};
+use super::{figures, numbered};
+use crate::explanation::ExplainOptions;
+use crate::explanation::explain::{Explained, explain_body};
 use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::log::common_clock;
-use crate::logs::regression::{DataOptions, RigidBody};
+use crate::logs::regression::RigidBody;
 use crate::virtual_arm::{PlantEffect as Effect, lwa4p};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -26,7 +28,7 @@ fn explained(effect: Option<Effect>) -> Explained {
         .collect();
     common_clock(&mut logs);
     let (fit, validate) = logs.split_at(5);
-    explain(&body, fit, validate, &DataOptions::default(), &|_| ()).unwrap()
+    explain_body(&body, fit, validate, &ExplainOptions::default()).unwrap()
 }
 
 /// A gear so soft that gravity on its link is another one: to first order it looks like a spring of another
@@ -36,8 +38,8 @@ fn a_soft_gear_is_named_with_its_stiffness() {
     const STIFFNESS: f64 = 170.0;
     let explained = explained(Some(Effect::JointElasticity { joint: 2, stiffness: STIFFNESS }));
     let first = &explained.effects[0];
-    assert_eq!((first.effect.as_str(), first.joints.as_slice()), ("joint_elasticity", &[3][..]));
-    let stiffness = first.parameters["stiffness"].as_f64().unwrap();
+    assert_eq!((first.effect.as_str(), first.joints.clone()), ("joint_elasticity", numbered(&[3])));
+    let stiffness = figures(first)["stiffness"].as_f64().unwrap();
     approx::assert_relative_eq!(stiffness, STIFFNESS, max_relative = 0.1);
 }
 
@@ -48,10 +50,10 @@ fn the_friction_of_another_joint_is_felt_with_all_its_parts() {
     let clean = explained(None);
     let coupled = explained(Some(Effect::JointCoupling { from: 3, onto: 2, share: SHARE }));
     let [found] = coupled.effects.as_slice() else { panic!("{:?}", coupled.effects) };
-    assert_eq!((found.effect.as_str(), found.joints.as_slice()), ("joint_coupling", &[3][..]));
-    assert_eq!(found.parameters["from_joint"][0], 4);
-    assert_eq!(found.parameters["law"][0], "friction");
-    let share = found.parameters["coefficient"][0].as_f64().unwrap();
+    assert_eq!((found.effect.as_str(), found.joints.clone()), ("joint_coupling", numbered(&[3])));
+    assert_eq!(figures(found)["from_joint"][0], 4);
+    assert_eq!(figures(found)["law"][0], "friction");
+    let share = figures(found)["coefficient"][0].as_f64().unwrap();
     approx::assert_relative_eq!(share, SHARE, max_relative = 0.05);
     let (before, after) = (&coupled.before.validate.rms, &coupled.after.validate.rms);
     assert!(before[2] > 1.3 * after[2], "{before:?} {after:?}");

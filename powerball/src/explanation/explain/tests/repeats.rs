@@ -1,6 +1,9 @@
 //! One path run again and again while a joint warms, with and without a rigid body that fits.
 
-use crate::explanation::explain::{Explained, explain};
+use super::{figures, numbered};
+use crate::controller::JointNumber;
+use crate::explanation::ExplainOptions;
+use crate::explanation::explain::{Explained, explain_body};
 use crate::identification::estimate::{Folds, fit};
 use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::log::{Log, common_clock};
@@ -53,7 +56,7 @@ fn even_to_odd(logs: Vec<Log>) -> Explained {
     fit.append(&mut validate);
     common_clock(&mut fit);
     let validate = fit.split_off(count);
-    explain(&body, &fit, &validate, &DataOptions::default(), &|_| ()).unwrap()
+    explain_body(&body, &fit, &validate, &ExplainOptions::default()).unwrap()
 }
 
 fn taken_apart(explained: &Explained) -> bool {
@@ -66,10 +69,10 @@ fn warmth_is_found_with_a_body_that_fits_and_without() {
         let logs = runs(12, 6.0, 5);
         let explained = even_to_odd(if inconsistent { without_a_body(logs) } else { logs });
         assert_eq!(taken_apart(&explained), inconsistent, "{:?}", explained.warnings);
-        let names: Vec<(&str, &[usize])> =
-            explained.effects.iter().map(|e| (e.effect.as_str(), e.joints.as_slice())).collect();
-        assert_eq!(names, [("temperature", &[1][..])], "inconsistent: {inconsistent}");
-        let time = explained.effects[0].parameters["time_constant"].as_f64().unwrap();
+        let names: Vec<(&str, Vec<JointNumber>)> =
+            explained.effects.iter().map(|e| (e.effect.as_str(), e.joints.clone())).collect();
+        assert_eq!(names, [("temperature", numbered(&[1]))], "inconsistent: {inconsistent}");
+        let time = figures(&explained.effects[0])["time_constant"].as_f64().unwrap();
         assert!((time - WARMING).abs() < 0.2 * WARMING, "{time}");
         assert!(explained.false_positives.rate < 0.05);
         // Nothing that is reported as better on one joint was paid for by another.

@@ -1,12 +1,14 @@
 //! Arms with few joints, which do not feel everything: one that moves in a plane, and one that stands upright
 //! with level gravity.
 
+use super::figures;
 use crate::controller::friction::TanhFriction;
-use crate::explanation::explain::{Explained, explain};
+use crate::explanation::ExplainOptions;
+use crate::explanation::explain::{Explained, explain_body};
 use crate::identification::chain::Chain;
 use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::log::{Log, common_clock};
-use crate::logs::regression::{DataOptions, RigidBody};
+use crate::logs::regression::RigidBody;
 use crate::virtual_arm::{Body, Dynamics, Plant, PlantEffect as Effect, Sensors};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
@@ -86,7 +88,7 @@ fn explained_of((arm, usual): (Arm, Plant), effects: &[(Effect, &[usize])]) -> E
     common_clock(&mut logs);
     let (fit, validate) = logs.split_at(FITTED);
     let body = RigidBody::new(&arm).unwrap();
-    explain(&body, fit, validate, &DataOptions::default(), &|_| ()).unwrap()
+    explain_body(&body, fit, validate, &ExplainOptions::default()).unwrap()
 }
 
 fn names(explained: &Explained) -> Vec<&str> {
@@ -102,12 +104,7 @@ fn at_the_floor(explained: &Explained) {
 /// The windows of what was found first, s.
 fn spans(explained: &Explained) -> Vec<(f64, f64)> {
     let times = |name: &str| -> Vec<f64> {
-        explained.effects[0].parameters[name]
-            .as_array()
-            .unwrap()
-            .iter()
-            .map(|t| t.as_f64().unwrap())
-            .collect()
+        figures(&explained.effects[0])[name].as_array().unwrap().iter().map(|t| t.as_f64().unwrap()).collect()
     };
     times("start_time").into_iter().zip(times("end_time")).collect()
 }
@@ -128,7 +125,7 @@ fn logs_say_whether_a_payload_is_held_in_them() {
         let explained = explained(planar(), payload, listed);
         assert_eq!(names(&explained), ["payload"], "{listed:?}");
         let found = &explained.effects[0];
-        let mass = found.parameters["mass"].as_f64().unwrap();
+        let mass = figures(found)["mass"].as_f64().unwrap();
         approx::assert_relative_eq!(mass, PAYLOAD, max_relative = 0.1);
         let logs: Vec<String> = listed.iter().map(|k| format!("log{k}")).collect();
         assert_eq!(found.logs, logs);
@@ -141,7 +138,7 @@ fn a_push_is_found_by_what_the_arm_feels_of_it() {
     let push = Effect::ContactWrench { force: [1.5, 3.0, 20.0], start: 6.0, length: 4.0, every: 1e3 };
     let explained = explained(planar(), push, &[2]);
     assert_eq!(names(&explained), ["contact_wrench"]);
-    let force: Vec<f64> = explained.effects[0].parameters["force"][0]
+    let force: Vec<f64> = figures(&explained.effects[0])["force"][0]
         .as_array()
         .unwrap()
         .iter()
@@ -165,7 +162,7 @@ fn the_same_push_is_seen_in_other_logs_and_another_one_is_not() {
     let found = &explained.effects[0];
     assert_eq!(found.logs, ["log2", "log4"]);
     assert_eq!(spans(&explained).len(), 2);
-    assert_eq!(found.parameters["force"][0], found.parameters["force"][1]);
+    assert_eq!(figures(found)["force"][0], figures(found)["force"][1]);
     lasts(&explained, 1, 6.0..10.0);
     // The other push stays in the errors.
     let (after, floor) = (&explained.after.validate.rms, &explained.noise_floor);
@@ -183,7 +180,7 @@ fn a_payload_is_found_with_the_instant_at_which_it_was_taken_up() {
     let payload = Effect::Payload { mass: PAYLOAD, centre: [0.05, 0.02, 0.0], start: START };
     let explained = explained(planar(), payload, &[1]);
     assert_eq!(names(&explained), ["payload"]);
-    let parameters = &explained.effects[0].parameters;
+    let parameters = figures(&explained.effects[0]);
     approx::assert_relative_eq!(parameters["start_time"][0].as_f64().unwrap(), START, epsilon = 0.15);
     approx::assert_relative_eq!(parameters["mass"].as_f64().unwrap(), PAYLOAD, max_relative = 0.05);
     at_the_floor(&explained);
@@ -207,7 +204,7 @@ fn a_tilted_base_shows_weight_that_level_gravity_hides() {
     assert_eq!(names(&explained), ["base_tilt"]);
     for (k, tilt) in tilt.into_iter().enumerate() {
         approx::assert_relative_eq!(
-            explained.effects[0].parameters["tilt"][k].as_f64().unwrap(),
+            figures(&explained.effects[0])["tilt"][k].as_f64().unwrap(),
             tilt,
             epsilon = 1e-3
         );

@@ -1,0 +1,89 @@
+//! The door: from an arm and logs to an explanation.
+
+use super::explain::{Explained, explain_body};
+use super::options::{ExplainError, ExplainOptions};
+use super::torque_model::TorqueModel;
+use crate::logs::log::{Log, common_clock};
+use crate::logs::regression::RigidBody;
+use dyngen::Arm;
+use std::path::Path;
+
+/// Explains what the base model of an arm lacks on `logs`; every addition is judged on `validate`, the logs
+/// of another path.
+///
+/// The clocks of all logs are joined, in the order `logs`, then `validate`; the arm's dynamics are derived
+/// and proven; and what is known already is taken out of the logs and comes back into the model. Serialized,
+/// the result is explained.json, and its model is model.json.
+///
+/// # Errors
+/// [`ExplainError`] where logs hold too little, where the arm's dynamics cannot be derived, and where the
+/// known model is another arm's.
+pub fn explain(
+    arm: &Arm,
+    logs: &[Log],
+    validate: &[Log],
+    options: &ExplainOptions<'_>,
+) -> Result<Explained, ExplainError> {
+    let prepared = Prepared::new(arm, logs, validate, options)?;
+    let explained = explain_body(&prepared.body, &prepared.logs, &prepared.validate, options)?;
+    Ok(prepared.with_known(explained))
+}
+
+/// An arm that is derived, and logs from which what is known is taken out: for those who also propose
+/// experiments.
+#[derive(Debug)]
+pub struct Prepared {
+    /// The arm as it is known to be.
+    pub body: RigidBody,
+    /// Logs to fit, on the common clock.
+    pub logs: Vec<Log>,
+    /// The validation set, on the common clock.
+    pub validate: Vec<Log>,
+    known: Option<TorqueModel>,
+}
+
+impl Prepared {
+    /// Joins the clocks, derives the dynamics and takes out what is known.
+    ///
+    /// # Errors
+    /// [`ExplainError`] as [`explain`].
+    pub fn new(
+        arm: &Arm,
+        logs: &[Log],
+        validate: &[Log],
+        options: &ExplainOptions<'_>,
+    ) -> Result<Prepared, ExplainError> {
+        let mut all: Vec<Log> = logs.iter().chain(validate).cloned().collect();
+        common_clock(&mut all);
+        options.progress.say("deriving and proving the arm's dynamics");
+        let changed = options.known.as_ref().map(|known| known.additions.arm_changes.of(arm)).transpose();
+        let body = RigidBody::new(changed.map_err(ExplainError::Changes)?.as_ref().unwrap_or(arm))
+            .map_err(ExplainError::Arm)?;
+        let checked = |known: TorqueModel| {
+            known.in_set_of(&body).checked(body.names(), body.dof(), Path::new("the known model"))
+        };
+        let known = options.known.clone().map(checked).transpose().map_err(ExplainError::Known)?;
+        let validate = all.split_off(logs.len());
+        let mut prepared = Prepared { body, logs: Vec::new(), validate: Vec::new(), known };
+        (prepared.logs, prepared.validate) = (prepared.without_known(all), prepared.without_known(validate));
+        Ok(prepared)
+    }
+
+    /// Other logs of the same arm, without what is known.
+    #[must_use]
+    pub fn without_known(&self, mut logs: Vec<Log>) -> Vec<Log> {
+        if let Some(known) = &self.known {
+            known.take_out(&self.body, &mut logs);
+        }
+        logs
+    }
+
+    /// An explanation whose model holds what was known too.
+    #[must_use]
+    pub fn with_known(&self, mut explained: Explained) -> Explained {
+        if let Some(known) = &self.known {
+            explained.model.additions = known.additions.and(&explained.model.additions);
+        }
+        explained
+    }
+}

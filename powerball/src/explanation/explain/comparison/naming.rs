@@ -1,0 +1,107 @@
+//! Which name a residual gets, and why the others do not.
+
+use super::super::named::Rival;
+use super::super::search::{Group, Screen};
+use crate::controller::JointNumber;
+use crate::explanation::rule::Rule;
+use crate::logs::vector::dot;
+
+/// How a chosen group compares with the others on its joints.
+#[derive(Clone, Debug)]
+pub(crate) struct Comparison {
+    /// Its score over that of the next best name.
+    pub(crate) margin: f64,
+    /// The next best names.
+    pub(crate) rivals: Vec<Rival>,
+    /// A name that fits as well.
+    pub(crate) twin: Option<String>,
+    /// Its score over that of the next best name that explains something else of the same residual. A name
+    /// that explains the same part is another word for it; one that explains another part as well as this one
+    /// is a sign that neither is true.
+    pub(crate) apart: f64,
+    /// The joints on which they were compared.
+    pub(crate) joints: Vec<JointNumber>,
+}
+
+/// Rivals listed at most.
+const LISTED: usize = 3;
+
+/// Compares the group at `chosen` with the others, each on the chosen joints only.
+#[must_use]
+pub(crate) fn compare(
+    screen: &Screen<'_>,
+    groups: &[Group],
+    chosen: usize,
+    joints: &[JointNumber],
+) -> Comparison {
+    let rule = screen.context.rule;
+    let own = groups[chosen].score_on(joints);
+    let mut others: Vec<(usize, f64)> = (0..groups.len())
+        .filter(|f| *f != chosen)
+        .map(|f| (f, groups[f].score_on(joints)))
+        .filter(|(_, score)| *score > 0.0)
+        .collect();
+    others.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let next = others.first().map_or(0.0, |(_, score)| *score);
+    let margin = if next > rule.least_score / 2.0 { own / next } else { surprise(rule, own) };
+    let rivals = others
+        .iter()
+        .take(LISTED)
+        .map(|(f, score)| {
+            let group = &groups[*f];
+            let why_not = if own / score < rule.least_margin {
+                format!(
+                    "fits as well within {:.0} %: these logs do not tell the two apart",
+                    100.0 * (rule.least_margin - 1.0)
+                )
+            } else {
+                let share = 100.0 * score / own;
+                match group.refusal_on(joints) {
+                    Some(reason) => format!("explains {share:.0} % as much, and {reason}"),
+                    None => format!("explains {share:.0} % as much"),
+                }
+            };
+            Rival { effect: group.name().to_string(), why_not }
+        })
+        .collect();
+    let explained = explained(screen, &groups[chosen], joints);
+    // What a repeated path cannot judge fits any misfit there: that it fits this one says nothing.
+    let close = (others.iter().take_while(|(_, score)| own / score < rule.least_margin))
+        .filter(|(f, _)| groups[*f].judged_on(joints));
+    let other = close
+        .map(|(f, score)| (score, self::explained(screen, &groups[*f], joints)))
+        .find(|(_, theirs)| shared(&explained, theirs) < rule.same_part);
+    let apart = other.map_or(surprise(rule, own), |(score, _)| own / score);
+    let twin = others
+        .first()
+        .filter(|(_, score)| own / score < rule.least_margin)
+        .map(|(f, _)| groups[*f].name().to_string());
+    Comparison { margin, rivals, twin, apart, joints: joints.to_vec() }
+}
+
+/// What a group's members on the given joints explain of each joint's residual, in standard deviations.
+fn explained(screen: &Screen<'_>, group: &Group, joints: &[JointNumber]) -> Vec<Vec<f64>> {
+    let mut sum: Vec<Vec<f64>> = screen.context.residual.iter().map(|r| vec![0.0; r.len()]).collect();
+    for member in group.on(joints) {
+        for (j, columns) in screen.residualised(&member.trial).iter().enumerate() {
+            let weight = screen.context.fit.weights[j].sqrt();
+            for (column, theta) in columns.iter().zip(&member.trial.theta) {
+                sum[j].iter_mut().zip(column).for_each(|(s, c)| *s += weight * theta * c);
+            }
+        }
+    }
+    sum
+}
+
+/// The share of one signal's power that the other has as well.
+fn shared(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
+    let sum = |x: &[Vec<f64>], y: &[Vec<f64>]| x.iter().zip(y).map(|(x, y)| dot(x, y)).sum::<f64>();
+    let power = sum(a, a) * sum(b, b);
+    if power > 0.0 { sum(a, b).powi(2) / power } else { 0.0 }
+}
+
+/// The margin of a name without a rival: its score over the least that could have counted.
+#[must_use]
+pub(crate) fn surprise(rule: &Rule, score: f64) -> f64 {
+    score / (rule.least_score / 2.0)
+}

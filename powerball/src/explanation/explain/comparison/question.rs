@@ -1,0 +1,69 @@
+//! A question that logs leave open: which of two names is right.
+
+use super::super::search::{Group, Member};
+use crate::controller::JointNumber;
+use crate::explanation::effects::Candidate;
+use crate::explanation::rule::Rule;
+
+/// Why names are open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Why {
+    /// A name was given, and another one fits as well.
+    Twin,
+    /// What fits best was not given.
+    Withheld,
+    /// Several fit a part, none passes.
+    Refused,
+}
+
+/// Proposals for the same residual, from one step.
+#[derive(Clone, Debug)]
+pub(crate) struct Question {
+    pub(crate) why: Why,
+    /// The joints that it is about.
+    pub(crate) joints: Vec<JointNumber>,
+    /// The candidates of each name.
+    pub(crate) proposals: Vec<Vec<Candidate>>,
+}
+
+impl Question {
+    /// A chosen group against its twin.
+    pub(crate) fn twins(
+        rule: &Rule,
+        groups: &[Group],
+        chosen: usize,
+        twin: Option<&str>,
+        joints: &[JointNumber],
+    ) -> Option<Question> {
+        let twin = groups.iter().position(|g| Some(g.name()) == twin)?;
+        Question::of(rule, [&groups[chosen], &groups[twin]], joints, Why::Twin)
+    }
+
+    /// The same where the name is not given.
+    pub(crate) fn withheld(self) -> Question {
+        Question { why: Why::Withheld, ..self }
+    }
+
+    /// The two best of the groups that were all refused.
+    pub(crate) fn refused(rule: &Rule, groups: &[Group]) -> Option<Question> {
+        let mut best: Vec<(&Group, &Member)> = (groups.iter())
+            .filter_map(|group| Some((group, group.best()?)))
+            .filter(|(_, best)| best.trial.score >= rule.least_score)
+            .collect();
+        best.sort_by(|a, b| b.1.trial.score.total_cmp(&a.1.trial.score));
+        let (first, own) = *best.first()?;
+        let joints = &own.candidate.joints;
+        let (second, _) = *best.iter().skip(1).find(|(_, other)| other.candidate.is_on(joints))?;
+        Question::of(rule, [first, second], joints, Why::Refused)
+    }
+
+    fn of(rule: &Rule, which: [&Group; 2], joints: &[JointNumber], why: Why) -> Option<Question> {
+        let proposal = |group: &Group| {
+            let enough = group.on(joints).filter(|m| m.trial.score >= rule.least_score);
+            let candidates: Vec<Candidate> = enough.map(|m| m.candidate.clone()).collect();
+            (!candidates.is_empty()).then_some(candidates)
+        };
+        let proposals = which.into_iter().map(proposal).collect::<Option<Vec<_>>>()?;
+        Some(Question { why, joints: joints.to_vec(), proposals })
+    }
+}

@@ -1,0 +1,153 @@
+//! The base model with what was accepted: what a step changes.
+
+use super::study::Study;
+use crate::explanation::effects::{Candidate, Context, Effect};
+use crate::explanation::rule::Rule;
+use crate::identification::estimate::{Fit, Folds, Term, fit};
+use crate::logs::regression::{Column, Data};
+use std::ops::Range;
+
+/// An accepted effect on its joints.
+#[derive(Clone, Debug)]
+pub(super) struct Accepted {
+    /// The effect with its settings.
+    pub(super) candidate: Candidate,
+    /// How many columns of the fit it has.
+    pub(super) columns: usize,
+    pub(super) p_value: f64,
+    pub(super) fold_gain: f64,
+    /// Squared error that fell when it was accepted, by joint, (N·m)² summed over rows.
+    pub(super) explained: Vec<f64>,
+    /// The step that accepted it.
+    pub(super) step: usize,
+}
+
+/// The model in the making.
+#[derive(Debug)]
+pub(super) struct Model {
+    /// What was accepted, in the order of its columns.
+    pub(super) accepted: Vec<Accepted>,
+    /// Accepted once and taken out again, or no better than chance: not tried again.
+    pub(super) given_up: Vec<Candidate>,
+    /// The base model with all of it, fitted.
+    pub(super) fit: Fit,
+}
+
+impl Accepted {
+    /// The effect.
+    pub(super) fn effect(&self) -> &'static dyn Effect {
+        self.candidate.effect()
+    }
+}
+
+impl Model {
+    /// The base model alone.
+    pub(super) fn new(base: Fit) -> Model {
+        Model { accepted: Vec::new(), given_up: Vec::new(), fit: base }
+    }
+
+    /// The model seen on the logs that it was fitted to.
+    pub(super) fn context<'c>(&'c self, study: &'c Study<'_>) -> Context<'c> {
+        Context::new(&study.data, &self.fit, &self.fit.residual, study.rule())
+    }
+
+    /// Whether a candidate or one that excludes it was accepted.
+    pub(super) fn has(&self, candidate: &Candidate) -> bool {
+        self.accepted.iter().any(|a| a.candidate.excludes(candidate))
+    }
+
+    /// Whether a candidate was given up.
+    pub(super) fn gave_up(&self, candidate: &Candidate) -> bool {
+        self.given_up.iter().any(|c| c.joints == candidate.joints && c.excludes(candidate))
+    }
+
+    /// The places of each accepted effect's columns among all of the fit.
+    pub(super) fn places(&self) -> Vec<Range<usize>> {
+        let mut first = 0;
+        let place = |a: &Accepted| {
+            first += a.columns;
+            self.fit.design.extra(first - a.columns)..self.fit.design.extra(first)
+        };
+        self.accepted.iter().map(place).collect()
+    }
+
+    /// The coefficients of each accepted effect.
+    pub(super) fn coefficients(&self) -> Vec<Vec<f64>> {
+        self.places().into_iter().map(|place| self.fit.theta[place].to_vec()).collect()
+    }
+
+    /// Measured less predicted torque of the validation set, by joint and row, N·m.
+    pub(super) fn residual_on_validation(&self, study: &Study<'_>) -> Vec<Vec<f64>> {
+        self.fit.residual_on(&study.validation, &self.columns_on_validation(study))
+    }
+
+    /// The columns of what was accepted on the validation set.
+    pub(super) fn columns_on_validation(&self, study: &Study<'_>) -> Vec<Column> {
+        let context = Context::for_columns(&study.validation, &self.fit, study.rule());
+        let columns = |a: &Accepted| a.effect().columns(&context, &a.candidate);
+        self.accepted.iter().flat_map(columns).collect()
+    }
+
+    /// Fits everything again, and asks the validation logs whether they have what is in some logs only.
+    pub(super) fn refit(&mut self, study: &Study<'_>) {
+        let mut candidates: Vec<Candidate> = self.accepted.iter().map(|a| a.candidate.clone()).collect();
+        self.fit = refitted(&study.data, &study.folds, &mut candidates, &self.fit, study.rule());
+        for (a, candidate) in self.accepted.iter_mut().zip(candidates) {
+            a.candidate = candidate;
+        }
+        for k in 0..self.accepted.len() {
+            if let Some(seen) = self.seen_in_validation(study, k) {
+                self.accepted[k].candidate = seen;
+            }
+        }
+    }
+
+    /// What the validation logs say themselves of an effect that is in some logs and not in others.
+    fn seen_in_validation(&self, study: &Study<'_>, k: usize) -> Option<Candidate> {
+        let a = &self.accepted[k];
+        if a.candidate.windows.is_empty() {
+            return None;
+        }
+        let coefficients = &self.coefficients()[k];
+        let mut without = self.residual_on_validation(study);
+        let context = Context::for_columns(&study.validation, &self.fit, study.rule());
+        let own = a.effect().columns(&context, &a.candidate);
+        own.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut without, *c));
+        let context = Context::new(&study.validation, &self.fit, &without, study.rule());
+        a.effect().seen_in(&context, &a.candidate, coefficients)
+    }
+}
+
+/// Fits the base model with some candidates; columns that depend on estimates are taken anew, twice.
+pub(super) fn refitted(
+    data: &Data<'_>,
+    folds: &Folds,
+    candidates: &mut [Candidate],
+    start: &Fit,
+    rule: &Rule,
+) -> Fit {
+    let once = |candidates: &mut [Candidate], start: &Fit| {
+        let context = Context::new(data, start, &start.residual, rule);
+        let mut terms: Vec<Term> = Vec::new();
+        let mut counts = Vec::new();
+        for candidate in candidates.iter() {
+            let effect = candidate.effect();
+            let (before, non_negative) = (terms.len(), effect.non_negative());
+            let columns = effect.columns(&context, candidate).into_iter();
+            terms.extend(columns.map(|column| Term { column, non_negative }));
+            counts.push(terms.len() - before);
+        }
+        let fitted = fit(data, folds, &terms, Some(start));
+        let mut first = 0;
+        for (candidate, count) in candidates.iter_mut().zip(counts) {
+            let coefficients: Vec<f64> = (first..first + count).map(|c| fitted.coefficient(c)).collect();
+            first += count;
+            if let Some(refined) = candidate.effect().refined(candidate, &coefficients) {
+                *candidate = refined;
+            }
+        }
+        fitted
+    };
+    let first = once(candidates, start);
+    once(candidates, &first)
+}

@@ -1,0 +1,70 @@
+//! What is said of an effect.
+
+use crate::controller::JointNumber;
+use crate::explanation::effects::Figures;
+use crate::identification::estimate::Spread;
+use serde::Serialize;
+
+/// Errors on the fitted logs and on the validation set.
+#[derive(Clone, Debug, Serialize)]
+pub struct Spreads {
+    /// On the logs that were fitted.
+    pub fit: Spread,
+    /// On the validation set.
+    pub validate: Spread,
+}
+
+/// An effect with its evidence.
+#[derive(Clone, Debug, Serialize)]
+pub struct NamedEffect {
+    /// Its name.
+    pub effect: String,
+    /// Its joints.
+    pub joints: Vec<JointNumber>,
+    /// Its physical reading, SI units.
+    #[serde(rename = "parameters")]
+    pub figures: Figures,
+    /// Held-out error of its joints before it was added, N·m.
+    pub rms_before: Vec<f64>,
+    /// … and after.
+    pub rms_after: Vec<f64>,
+    /// Probability of as much by chance, over all joints and candidates tried: the worst of its joints.
+    pub p_value: f64,
+    /// Share by which held-out squared errors fall: the median over folds, by joint.
+    pub held_out_gain: Vec<f64>,
+    /// Logs it is in, where it is in some only.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub logs: Vec<String>,
+    /// Its penalised gain over that of the next best name on the same joints.
+    pub margin: f64,
+    /// Share of the residual's excess over the noise floor that stays on its joints after all effects.
+    pub leftover: f64,
+    /// What it is of: see `rivals` where another name fits as well.
+    pub class: String,
+    /// Names that were considered for the same residual.
+    pub rivals: Vec<Rival>,
+}
+
+/// A name that was considered and not given.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Rival {
+    /// The name.
+    pub effect: String,
+    /// Why it was not given.
+    pub why_not: String,
+}
+
+/// The rule applied to time-shift surrogates: candidates that cannot be true, shifted in time within each
+/// recording.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct FalsePositives {
+    /// Surrogates tried.
+    #[serde(rename = "placebos")]
+    pub surrogates: usize,
+    /// Surrogates that the whole rule accepted.
+    pub accepted: usize,
+    /// Their share.
+    pub rate: f64,
+    /// Family-wise level of the significance test.
+    pub family_wise: f64,
+}

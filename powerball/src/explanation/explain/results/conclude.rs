@@ -1,0 +1,135 @@
+//! From what was found to the result.
+
+use super::super::comparison::{Comparison, Step, leftover, open};
+use super::super::findings::Findings;
+use super::super::model::{Accepted, Model};
+use super::super::named::{NamedEffect, Rival, Spreads};
+use super::super::study::Study;
+use super::compose::{Composed, compose, compose_per_joint};
+use super::curves::curves;
+use super::dependencies::effective_samples;
+use super::doubts::doubts;
+use super::explained::{Change, Explained};
+use super::next::NextExperiment;
+use super::shown::shown;
+use super::unattributed::unattributed;
+use crate::controller::JointNumber;
+use crate::explanation::effects::{Effect, Found};
+use crate::explanation::options::{ExplainError, RuledOut};
+use crate::identification::estimate::{noise_floor, over_blocks, spread};
+use crate::logs::regression::Data;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Makes the result.
+pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainError> {
+    let held = findings.beforehand.held.as_ref();
+    let Composed { model: torque_model, fitted, held_out } = match findings.study.data.joints_apart {
+        true => compose_per_joint(&mut findings.study, &findings.model)?,
+        false => compose(&findings.study, &findings.model, held)?,
+    };
+    let (study, model, history) = (&findings.study, &findings.model, &findings.history);
+    let before = &findings.beforehand;
+    let after = Spreads { fit: spread(&study.data, &fitted), validate: spread(&study.validation, &held_out) };
+    let floor = noise_floor(&study.data);
+    let left = |joints: &[JointNumber]| leftover(&before.errors.fit.rms, &after.fit.rms, &floor, joints);
+    let mut named: Vec<NamedEffect> = held.map(|held| held.named.clone()).into_iter().collect();
+    named.extend(named_effects(study, model, &history.steps, &left));
+    let (unattributed, unexplained) = unattributed(study, model, history, &held_out, &floor, &after);
+    let open = open(study, model, history, unattributed.is_some());
+    Ok(Explained {
+        arm: study.data.body.arm().name.clone(),
+        held_out_change: changes(&study.validation, &before.residual, &held_out),
+        before: before.errors.clone(),
+        noise_floor: floor,
+        effects: named,
+        band: [0.0, study.data.band.cutoff],
+        effective_samples: effective_samples(&study.data, &model.fit.residual),
+        unattributed,
+        next_experiment: open.as_ref().map(|open| NextExperiment::not_designed(open.names())),
+        experiment: None,
+        // An experiment moves a body.
+        open: open.filter(|_| !study.data.joints_apart).map(Arc::new),
+        warnings: doubts(&findings).into_iter().chain(unexplained).collect(),
+        curves: curves(&study.validation, &before.residual, &held_out),
+        shown: shown(study, model),
+        model: torque_model,
+        false_positives: findings.false_positives,
+        after,
+    })
+}
+
+/// The accepted effects, each once with all of its joints, in the order in which they were added.
+fn named_effects(
+    study: &Study<'_>,
+    model: &Model,
+    steps: &[Step],
+    left: &dyn Fn(&[JointNumber]) -> f64,
+) -> Vec<NamedEffect> {
+    let mut order: Vec<&'static dyn Effect> = Vec::new();
+    for effect in model.accepted.iter().map(Accepted::effect) {
+        if !order.contains(&effect) {
+            order.push(effect);
+        }
+    }
+    order.into_iter().filter_map(|effect| named_effect(study, model, steps, effect, left)).collect()
+}
+
+fn named_effect(
+    study: &Study<'_>,
+    model: &Model,
+    steps: &[Step],
+    effect: &'static dyn Effect,
+    left: &dyn Fn(&[JointNumber]) -> f64,
+) -> Option<NamedEffect> {
+    let coefficients = model.coefficients();
+    let own = || model.accepted.iter().zip(&coefficients).filter(|(a, _)| a.effect() == effect);
+    let found: Vec<Found<'_>> =
+        own().map(|(a, c)| Found { candidate: &a.candidate, coefficients: c }).collect();
+    let mut joints: Vec<JointNumber> = found.iter().flat_map(|f| f.candidate.joints.clone()).collect();
+    joints.sort_unstable();
+    joints.dedup();
+    let mut logs: Vec<String> = Vec::new();
+    for window in found.iter().flat_map(|f| &f.candidate.windows) {
+        if !logs.contains(&window.log) {
+            logs.push(window.log.clone());
+        }
+    }
+    let mut steps = steps.iter().filter(|s| s.effect == effect);
+    let first = steps.next()?;
+    let last = steps.next_back().unwrap_or(first);
+    Some(NamedEffect {
+        effect: effect.name().to_string(),
+        figures: effect.figures(&model.context(study), &found),
+        rms_before: joints.iter().map(|j| first.before[j.index()]).collect(),
+        rms_after: joints.iter().map(|j| last.after[j.index()]).collect(),
+        p_value: own().map(|(a, _)| a.p_value).fold(0.0, f64::max),
+        held_out_gain: own().map(|(a, _)| a.fold_gain).collect(),
+        logs,
+        margin: first.comparison.margin,
+        leftover: left(&joints),
+        class: effect.class().name().to_string(),
+        rivals: rivals(&study.options.ruled_out, &first.comparison, effect.name()),
+        joints,
+    })
+}
+
+/// The next best names, and what an experiment has ruled out on the same joints.
+fn rivals(ruled_out: &[RuledOut], comparison: &Comparison, name: &str) -> Vec<Rival> {
+    let here = |r: &&RuledOut| r.effect != name && r.joints.iter().any(|j| comparison.joints.contains(j));
+    let out = |r: &RuledOut| Rival { effect: r.effect.clone(), why_not: r.why_not.clone() };
+    comparison.rivals.iter().cloned().chain(ruled_out.iter().filter(here).map(out)).collect()
+}
+
+/// How the errors change, by joint that moves.
+fn changes(data: &Data<'_>, before: &[Vec<f64>], after: &[Vec<f64>]) -> Vec<Change> {
+    let of = |j: usize| {
+        let square = |residual: &[f64]| residual.iter().map(|r| r * r).sum::<f64>();
+        let block = |rows: &Range<usize>| (square(&after[j][rows.clone()]), square(&before[j][rows.clone()]));
+        let (ratio, half) = over_blocks(&data.blocks.iter().map(|b| block(&b.rows[j])).collect::<Vec<_>>());
+        let change = |square: f64| square.max(0.0).sqrt() - 1.0;
+        let interval = [change(ratio - half), change(ratio + half)];
+        Change { joint: JointNumber::from_index(j), rms: change(ratio), interval }
+    };
+    (0..data.dof()).filter(|j| !data.joints[*j].is_empty()).map(of).collect()
+}

@@ -1,0 +1,68 @@
+//! What an explanation says; serialized it is explained.json.
+
+use super::super::comparison::Open;
+use super::super::named::{FalsePositives, NamedEffect, Spreads};
+use super::curves::TorqueCurve;
+use super::next::{Experiment, NextExperiment};
+use super::shown::Shown;
+use super::unattributed::Unattributed;
+use crate::controller::JointNumber;
+use crate::explanation::torque_model::TorqueModel;
+use serde::Serialize;
+use std::sync::Arc;
+
+/// The result of the residual loop.
+#[derive(Clone, Debug, Serialize)]
+pub struct Explained {
+    /// The arm's name.
+    pub arm: String,
+    /// Errors of the base model.
+    pub before: Spreads,
+    /// Errors with all accepted effects.
+    pub after: Spreads,
+    /// How the error of each joint that moves changes on the validation set.
+    pub held_out_change: Vec<Change>,
+    /// What white measurement noise alone would leave in the band, by joint, N·m.
+    pub noise_floor: Vec<f64>,
+    /// Accepted effects in the order in which they were added.
+    pub effects: Vec<NamedEffect>,
+    /// Band of all errors here, Hz.
+    pub band: [f64; 2],
+    /// Samples that the residuals are worth, all joints together.
+    pub effective_samples: usize,
+    /// What no candidate explains.
+    pub unattributed: Option<Unattributed>,
+    /// What to record to tell the names apart that these logs leave open.
+    pub next_experiment: Option<NextExperiment>,
+    /// What an experiment that was made for open names has decided.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub experiment: Option<Experiment>,
+    /// The open names, fitted; not part of the JSON.
+    #[serde(skip)]
+    pub open: Option<Arc<Open>>,
+    /// How often the rule accepts effects that are not there, on these data.
+    pub false_positives: FalsePositives,
+    /// What was found in logs and arm file, and what was done about it.
+    pub warnings: Vec<String>,
+    /// Torques over time on the validation set, by joint; not part of the JSON.
+    #[serde(skip)]
+    pub curves: Vec<TorqueCurve>,
+    /// The model with everything that was named: model.json. Its errors are `after`; not where joints were
+    /// taken apart, as it has one body for all.
+    #[serde(skip)]
+    pub model: TorqueModel,
+    /// The plots that show the effects; not part of the JSON.
+    #[serde(skip)]
+    pub shown: Vec<Shown>,
+}
+
+/// The change of a joint's error.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// The joint.
+    pub joint: JointNumber,
+    /// rms after over rms before, less 1.
+    pub rms: f64,
+    /// Its 95 % interval, from blocks that count as independent.
+    pub interval: [f64; 2],
+}

@@ -1,0 +1,26 @@
+//! What is said of what was found.
+//!
+//! `conclude` makes the result ([`Explained`]): `compose` the model of what was accepted and what that
+//! leaves, `unattributed` and `dependencies` what stays without a name and what it depends on, `correction`
+//! the curves that take a part of it off, `doubts` what a reader must know, `curves` and `shown` the figures,
+//! `next` what an experiment would decide. JSON is made of these types by whoever writes it, and nothing here
+//! reads it.
+
+mod compose;
+mod conclude;
+pub(super) mod correction;
+mod curves;
+pub(super) mod dependencies;
+mod doubts;
+mod explained;
+mod next;
+mod shown;
+mod unattributed;
+
+pub(super) use conclude::conclude;
+pub use correction::{Correction, Curve};
+pub use curves::{TorqueCurve, curves};
+pub use explained::{Change, Explained};
+pub use next::{Experiment, NextExperiment, Trajectory};
+pub use shown::Shown;
+pub use unattributed::Unattributed;

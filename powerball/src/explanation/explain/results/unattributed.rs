@@ -1,0 +1,83 @@
+//! What stays without a name.
+
+use super::super::comparison::History;
+use super::super::model::Model;
+use super::super::named::{Rival, Spreads};
+use super::super::study::Study;
+use super::correction::{Correction, correct};
+use super::dependencies::depends_on;
+use crate::controller::JointNumber;
+use crate::explanation::effects::Context;
+use crate::logs::parallel;
+use serde::Serialize;
+
+/// What stays without a name.
+#[derive(Clone, Debug, Serialize)]
+pub struct Unattributed {
+    /// Joints.
+    pub joints: Vec<JointNumber>,
+    /// Signals that the residual depends on, the strongest first.
+    pub depends_on: Vec<String>,
+    /// rms of the residual of those joints on the fitted logs, N·m.
+    pub rms: Vec<f64>,
+    /// Effects that fit a part of it but not well enough to be named.
+    pub considered: Vec<Rival>,
+    /// Curves that take a part of it off, where they were asked for: those of the joints whose held-out
+    /// errors fall by them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correction: Option<Vec<Correction>>,
+}
+
+/// The joints whose residual still depends on something, and what is to be said of those where more than
+/// noise is left that depends on nothing.
+pub(crate) fn unattributed(
+    study: &Study<'_>,
+    model: &Model,
+    history: &History,
+    held_out: &[Vec<f64>],
+    floor: &[f64],
+    after: &Spreads,
+) -> (Option<Unattributed>, Option<String>) {
+    let (rule, context) = (study.rule(), model.context(study));
+    let rms = &after.fit.rms;
+    let is_left =
+        |j: &usize| rms[*j] > rule.above_floor * floor[*j] && model.fit.inflation[*j] > rule.coloured;
+    let candidates: Vec<usize> = context.moving_joints().map(JointNumber::index).filter(is_left).collect();
+    let found = parallel::map(&candidates, |j| depends_on(&context, *j));
+    let there = Context::new(&study.validation, &model.fit, held_out, rule);
+    let correction = study.options.correct_unattributed.then(|| {
+        let of = |(j, list): (&usize, &Vec<(String, f64)>)| correct(&context, &there, &study.folds, *j, list);
+        candidates.iter().zip(&found).filter_map(of).collect()
+    });
+    let mut signals: Vec<(String, f64)> = Vec::new();
+    let (mut joints, mut nothing) = (Vec::new(), Vec::new());
+    for (j, list) in candidates.iter().zip(found) {
+        if list.is_empty() {
+            nothing.push(format!("{} ({:.1} times the noise floor)", j + 1, rms[*j] / floor[*j]));
+            continue;
+        }
+        joints.push(JointNumber::from_index(*j));
+        for (name, share) in list {
+            match signals.iter_mut().find(|(n, _)| *n == name) {
+                Some((_, s)) => *s = s.max(share),
+                None => signals.push((name, share)),
+            }
+        }
+    }
+    signals.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let unattributed = (!joints.is_empty()).then(|| Unattributed {
+        rms: joints.iter().map(|j| rms[j.index()]).collect(),
+        joints,
+        depends_on: signals.into_iter().map(|(name, _)| name).collect(),
+        considered: history.refused.clone(),
+        correction,
+    });
+    let unexplained = (!nothing.is_empty()).then(|| {
+        format!(
+            "what stays on joint {} is slower than white noise and depends on no position, speed, \
+             acceleration, load or time: slow noise of the sensor, or something that comes and goes",
+            nothing.join(", ")
+        )
+    });
+    (unattributed, unexplained)
+}

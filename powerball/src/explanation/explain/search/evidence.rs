@@ -1,0 +1,252 @@
+//! What speaks for a candidate: blocks that agree, folds that gain, a validation set that gains.
+
+use super::folds::fold_gains;
+use super::screen::{Screen, Trial};
+use crate::controller::JointNumber;
+use crate::explanation::effects::Candidate;
+use crate::identification::estimate::distribution::f_tail;
+use crate::identification::estimate::{Design, Folds, MEAN_OVER, Solver, variance_inflation};
+use crate::logs::regression::{Column, Data};
+use crate::logs::vector::dot;
+use faer::Mat;
+
+/// The evidence for one candidate.
+#[derive(Clone, Debug)]
+pub(crate) struct Evidence {
+    /// Penalised gain.
+    pub(crate) score: f64,
+    /// Cluster-robust Wald test over blocks, base refitted: the probability of such coefficients by chance.
+    pub(crate) p_value: f64,
+    /// Share by which the held-out squared error of the candidate's joints falls, by fold.
+    pub(crate) fold_gains: Vec<f64>,
+    /// The same on the validation set: the median over its logs.
+    pub(crate) validation_gain: f64,
+}
+
+/// Where a candidate acts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Extent {
+    /// In all logs.
+    Everywhere,
+    /// In some logs, for most of their time.
+    SomeLogs,
+    /// For a while of so many seconds: too short for blocks and folds.
+    Short(f64),
+}
+
+impl Extent {
+    /// That of a candidate.
+    pub(crate) fn of(candidate: &Candidate) -> Extent {
+        let windows = &candidate.windows;
+        let lasting = windows.iter().map(|w| w.to - w.from).filter(|seconds| seconds.is_finite());
+        match lasting.reduce(f64::max) {
+            Some(seconds) => Extent::Short(seconds),
+            None if windows.is_empty() => Extent::Everywhere,
+            None => Extent::SomeLogs,
+        }
+    }
+}
+
+/// The validation set, prepared for one base model.
+#[derive(Debug)]
+pub(crate) struct Validation<'p> {
+    /// Its data.
+    pub(crate) data: &'p Data<'p>,
+    /// The base's columns on it.
+    pub(crate) design: Design,
+    /// What the base leaves on it.
+    pub(crate) residual: Vec<Vec<f64>>,
+}
+
+/// Gathers the evidence for a trial. `validation` holds the validation set and the candidate's columns there.
+#[must_use]
+pub(crate) fn evidence(
+    screen: &Screen<'_>,
+    trial: &Trial,
+    joints: &[JointNumber],
+    folds: &Folds,
+    extent: Extent,
+    validation: Option<(&Validation<'_>, &[Column])>,
+) -> Evidence {
+    let (p_value, fold_gains) = match extent {
+        Extent::Short(seconds) => (by_chance(screen, trial, seconds), event_gains(screen, trial)),
+        _ => {
+            let local = extent != Extent::Everywhere;
+            (wald(screen, trial), fold_gains(screen, trial, joints, folds, local))
+        }
+    };
+    Evidence {
+        score: trial.score,
+        p_value,
+        fold_gains,
+        validation_gain: validation
+            .map_or(0.0, |(set, columns)| validation_gain(screen, trial, joints, set, columns)),
+    }
+}
+
+/// The Wald test of the coefficients with blocks as clusters: within a block residuals may depend on each
+/// other.
+pub(crate) fn wald(screen: &Screen<'_>, trial: &Trial) -> f64 {
+    let (data, fit) = (screen.context.data, screen.context.fit);
+    let k = trial.columns.len();
+    let columns = screen.residualised(trial);
+    let mut square = Mat::<f64>::zeros(k, k);
+    let mut meat = Mat::<f64>::zeros(k, k);
+    let after = left(screen, trial, &columns);
+    let mut clusters = 0.0;
+    for block in &data.blocks {
+        let mut score = vec![0.0; k];
+        let mut touched = false;
+        for (j, rows) in block.rows.iter().enumerate() {
+            let w = fit.weights[j];
+            if rows.is_empty() || w == 0.0 {
+                continue;
+            }
+            for a in 0..k {
+                let own = &columns[j][a][rows.clone()];
+                score[a] += w * dot(own, &after[j][rows.clone()]);
+                for b in 0..=a {
+                    square[(a, b)] += w * dot(own, &columns[j][b][rows.clone()]);
+                }
+            }
+            touched = true;
+        }
+        if touched {
+            clusters += 1.0;
+        }
+        for a in 0..k {
+            for b in 0..k {
+                meat[(a, b)] += score[a] * score[b];
+            }
+        }
+    }
+    for a in 0..k {
+        for b in 0..a {
+            square[(b, a)] = square[(a, b)];
+        }
+    }
+    // Wald: θ' S M⁻¹ S θ with S the residualised gram and M the sum over clusters.
+    let s: Vec<f64> = (0..k).map(|a| (0..k).map(|b| square[(a, b)] * trial.theta[b]).sum()).collect();
+    let used = trial.theta.iter().filter(|t| **t != 0.0).count() as f64;
+    let solver = Solver::new(&meat, |a| trial.theta[a] != 0.0);
+    let wald = dot(&s, &solver.solve(&s));
+    let freedom = clusters - used;
+    if freedom < 3.0 || used == 0.0 {
+        return 1.0;
+    }
+    f_tail(wald / used * freedom / clusters, used, freedom)
+}
+
+/// What a trial leaves, given its columns with the base's shares taken out.
+fn left(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
+    let of = |(columns, residual): (&Vec<Vec<f64>>, &Vec<f64>)| {
+        let mut e = residual.clone();
+        for (column, theta) in columns.iter().zip(&trial.theta) {
+            e.iter_mut().zip(column).for_each(|(e, c)| *e -= theta * c);
+        }
+        e
+    };
+    columns.iter().zip(screen.context.residual).map(of).collect()
+}
+
+/// The probability of the gain by chance, for an event of some seconds, too short for blocks. Gains are over
+/// the variance inflation of means over 1 s; slow noise looks like an event that lasts as long as it stays,
+/// so it is that of means over the event's own duration that counts.
+fn by_chance(screen: &Screen<'_>, trial: &Trial, seconds: f64) -> f64 {
+    let data = screen.context.data;
+    let slower: Vec<f64> = (left(screen, trial, &screen.residualised(trial)).iter().enumerate())
+        .filter(|(j, e)| !e.is_empty() && trial.columns.iter().any(|c| c.at(*j).is_some()))
+        .map(|(j, e)| {
+            let inflation = |over: f64| variance_inflation(data, j, e, over);
+            (inflation(seconds.max(MEAN_OVER)) / inflation(MEAN_OVER)).max(1.0)
+        })
+        .collect();
+    let slower = slower.iter().sum::<f64>() / slower.len().max(1) as f64;
+    let used = trial.theta.iter().filter(|t| **t != 0.0).count() as f64;
+    // The inflation itself is known from about a hundred means.
+    f_tail(trial.gain / slower.max(1.0) / used.max(1.0), used, 100.0)
+}
+
+/// Parts into which an event's own rows are cut.
+const EVENT_PARTS: usize = 5;
+
+/// Held-out gains of a short event: each part of its rows is predicted from the other parts.
+fn event_gains(screen: &Screen<'_>, trial: &Trial) -> Vec<f64> {
+    let fit = screen.context.fit;
+    let columns = screen.residualised(trial);
+    let k = trial.columns.len();
+    let mut parts = vec![(Mat::<f64>::zeros(k, k), vec![0.0; k], 0.0); EVENT_PARTS];
+    for j in 0..fit.design.dof() {
+        let (w, residual) = (fit.weights[j], &screen.context.residual[j]);
+        let Some(values) = trial.columns[0].at(j) else { continue };
+        let rows: Vec<usize> = (0..values.len())
+            .filter(|i| trial.columns.iter().any(|c| c.at(j).is_some_and(|v| v[*i] != 0.0)))
+            .collect();
+        for (n, i) in rows.iter().enumerate() {
+            let (gram, right, square) = &mut parts[n * EVENT_PARTS / rows.len()];
+            for a in 0..k {
+                for b in 0..k {
+                    gram[(a, b)] += w * columns[j][a][*i] * columns[j][b][*i];
+                }
+                right[a] += w * columns[j][a][*i] * residual[*i];
+            }
+            *square += w * residual[*i] * residual[*i];
+        }
+    }
+    (0..EVENT_PARTS)
+        .filter_map(|held| {
+            let (mut gram, mut right) = (Mat::<f64>::zeros(k, k), vec![0.0; k]);
+            for (_, (g, r, _)) in parts.iter().enumerate().filter(|(p, _)| *p != held) {
+                gram += g;
+                right.iter_mut().zip(r).for_each(|(t, f)| *t += f);
+            }
+            let x = Solver::new(&gram, |_| true).solve(&right);
+            let (gram, right, square) = &parts[held];
+            let quadratic: f64 =
+                (0..k).map(|a| x[a] * (0..k).map(|b| gram[(a, b)] * x[b]).sum::<f64>()).sum();
+            (*square > 0.0).then(|| (2.0 * dot(&x, right) - quadratic) / square)
+        })
+        .collect()
+}
+
+/// The share of the squared error of `joints` that a trial takes away on the validation set: the median over
+/// its logs.
+pub(crate) fn validation_gain(
+    screen: &Screen<'_>,
+    trial: &Trial,
+    joints: &[JointNumber],
+    validation: &Validation<'_>,
+    columns: &[Column],
+) -> f64 {
+    let fit = screen.context.fit;
+    let mut shift = vec![0.0; fit.design.size];
+    for (base, theta) in trial.base.iter().zip(&trial.theta) {
+        shift.iter_mut().zip(base).for_each(|(s, b)| *s -= theta * b);
+    }
+    let mut change = vec![0.0; validation.data.logs.len()];
+    let mut scale = vec![0.0; validation.data.logs.len()];
+    for j in 0..fit.design.dof() {
+        let mut moved = validation.design.predict(j, &shift);
+        for (column, theta) in columns.iter().zip(&trial.theta) {
+            if let Some(values) = column.at(j) {
+                moved.iter_mut().zip(values).for_each(|(m, v)| *m += theta * v);
+            }
+        }
+        for (recording, rows) in validation.data.recordings.iter().zip(&validation.data.joints[j].rows) {
+            let (r, m) = (&validation.residual[j][rows.clone()], &moved[rows.clone()]);
+            change[recording.log] += fit.weights[j] * (2.0 * dot(r, m) - dot(m, m));
+            if joints.contains(&JointNumber::from_index(j)) {
+                scale[recording.log] += fit.weights[j] * dot(r, r);
+            }
+        }
+    }
+    let gains: Vec<f64> = change.iter().zip(&scale).filter(|(_, s)| **s > 0.0).map(|(c, s)| c / s).collect();
+    // The median keeps one odd log (something held, something touched) from deciding.
+    let mut sorted = gains.clone();
+    sorted.sort_by(f64::total_cmp);
+    match sorted.len() {
+        0 => 0.0,
+        n if n % 2 == 1 => sorted[n / 2],
+        n => 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]),
+    }
+}

@@ -1,0 +1,258 @@
+//! The best candidates of every effect, and which of them may stand beside each other and beside what was
+//! accepted.
+
+use super::super::model::{Accepted, Model};
+use super::super::study::Study;
+use super::evidence::{Evidence, Extent, Validation, evidence};
+use super::refusal::refusal;
+use super::screen::{Screen, Trial};
+use crate::controller::JointNumber;
+use crate::explanation::effects::{self, Candidate, Context, Effect};
+use crate::logs::parallel;
+
+/// A candidate group: one effect's best candidates.
+#[derive(Debug)]
+pub(crate) struct Group {
+    pub(crate) effect: &'static dyn Effect,
+    pub(crate) members: Vec<Member>,
+}
+
+/// One candidate of a group.
+#[derive(Debug)]
+pub(crate) struct Member {
+    pub(crate) candidate: Candidate,
+    pub(crate) trial: Trial,
+    /// Filled in once tested.
+    pub(crate) evidence: Option<Evidence>,
+    pub(crate) refusal: Option<String>,
+    /// Whether the validation set can tell it from any other misfit.
+    pub(crate) judged: bool,
+}
+
+impl Group {
+    /// The effect's name.
+    pub(crate) fn name(&self) -> &'static str {
+        self.effect.name()
+    }
+
+    /// The members that act on one of some joints.
+    pub(crate) fn on<'g>(&'g self, joints: &'g [JointNumber]) -> impl Iterator<Item = &'g Member> {
+        self.members.iter().filter(|m| m.candidate.is_on(joints))
+    }
+
+    /// The summed score of what acts on the given joints.
+    pub(crate) fn score_on(&self, joints: &[JointNumber]) -> f64 {
+        self.on(joints).map(|m| m.trial.score.max(0.0)).sum()
+    }
+
+    /// Whether anything of it on the given joints can be judged.
+    pub(crate) fn judged_on(&self, joints: &[JointNumber]) -> bool {
+        self.on(joints).any(|m| m.judged)
+    }
+
+    /// Why its best member on the given joints was refused.
+    pub(crate) fn refusal_on(&self, joints: &[JointNumber]) -> Option<String> {
+        best(self.on(joints)).and_then(|m| m.refusal.clone())
+    }
+
+    /// Its best member.
+    pub(crate) fn best(&self) -> Option<&Member> {
+        best(self.members.iter())
+    }
+
+    /// What was not refused.
+    pub(crate) fn passing(&self) -> impl Iterator<Item = &Member> {
+        self.members.iter().filter(|m| m.refusal.is_none())
+    }
+
+    /// Columns of what was not refused.
+    pub(crate) fn columns(&self) -> usize {
+        self.passing().map(|m| m.trial.columns.len()).sum()
+    }
+
+    /// Summed score of what was not refused.
+    pub(crate) fn potential(&self) -> f64 {
+        self.passing().map(|m| m.trial.score).sum()
+    }
+}
+
+fn best<'m>(members: impl Iterator<Item = &'m Member>) -> Option<&'m Member> {
+    members.max_by(|a, b| a.trial.score.total_cmp(&b.trial.score))
+}
+
+/// The candidate group of every effect, and how many candidates were tried in all.
+pub(crate) fn groups(study: &Study<'_>, model: &Model, screen: &Screen<'_>) -> (Vec<Group>, f64) {
+    let mut tests = 0.0;
+    let mut groups = Vec::new();
+    let lists: Vec<_> = effects::all().iter().map(|e| (*e, e.candidates(screen.context))).collect();
+    for (effect, candidates) in lists {
+        if study.data.joints_apart && effect.of_the_body() {
+            continue;
+        }
+        let open: Vec<Candidate> =
+            candidates.into_iter().filter(|c| !model.has(c) && !is_ruled_out(study, c)).collect();
+        tests += open.iter().map(|c| c.searched.max(1.0)).fold(0.0, f64::max).max(open.len() as f64);
+        let mut members = compatible(screen, best_by_joint(screen, open));
+        for member in &mut members {
+            if let Some((reason, judged)) = untested_refusal(study, model, screen, member) {
+                (member.refusal, member.judged) = (Some(reason), judged);
+            }
+        }
+        if !members.is_empty() {
+            groups.push(Group { effect, members });
+        }
+    }
+    (groups, tests)
+}
+
+/// The best candidate for each set of joints, its settings moved to better ones near by.
+fn best_by_joint(screen: &Screen<'_>, candidates: Vec<Candidate>) -> Vec<Member> {
+    let trials = parallel::map(&candidates, |c| screen.try_candidate(c));
+    let mut members: Vec<Member> = Vec::new();
+    for (candidate, trial) in candidates.into_iter().zip(trials) {
+        let Some(trial) = trial.filter(|t| t.score > 0.0) else { continue };
+        match members.iter_mut().find(|m| m.candidate.joints == candidate.joints) {
+            Some(member) if member.trial.score >= trial.score => {}
+            Some(member) => (member.candidate, member.trial) = (candidate, trial),
+            None => members.push(Member { candidate, trial, evidence: None, refusal: None, judged: true }),
+        }
+    }
+    for member in &mut members {
+        for candidate in member.candidate.effect().neighbours(&member.candidate, 1.0) {
+            if let Some(trial) = screen.try_candidate(&candidate)
+                && trial.score > member.trial.score
+            {
+                (member.candidate, member.trial) = (candidate, trial);
+            }
+        }
+    }
+    members
+}
+
+/// Members that do not exclude each other: the best one that acts on several joints with what goes beside
+/// it, or those of single joints, whichever explain more.
+fn compatible(screen: &Screen<'_>, mut members: Vec<Member>) -> Vec<Member> {
+    let rule = screen.context.rule;
+    members.sort_by(|a, b| b.trial.score.total_cmp(&a.trial.score));
+    let choose = |first: &dyn Fn(&Member) -> bool| -> (f64, Vec<usize>) {
+        let mut kept: Vec<usize> = Vec::new();
+        for m in (0..members.len()).filter(|m| first(&members[*m])) {
+            if !kept.iter().any(|k| members[*k].candidate.excludes(&members[m].candidate)) {
+                kept.push(m);
+            }
+        }
+        (kept.iter().map(|m| members[*m].trial.score).sum(), kept)
+    };
+    let (single, wide) = (choose(&|m| m.candidate.joints.len() == 1), choose(&|_| true));
+    // One cause for all joints is preferred to one for each.
+    let as_good = single.0 - (rule.as_good * single.0).max(rule.as_good_score);
+    let kept = if as_good > wide.0 { single.1 } else { wide.1 };
+    let mut at = 0;
+    members.retain(|_| {
+        at += 1;
+        kept.contains(&(at - 1))
+    });
+    members
+}
+
+/// Why a member need not be tested, and whether it could have been judged.
+fn untested_refusal(
+    study: &Study<'_>,
+    model: &Model,
+    screen: &Screen<'_>,
+    member: &Member,
+) -> Option<(String, bool)> {
+    let (rule, candidate) = (study.rule(), &member.candidate);
+    if member.trial.score < rule.least_score {
+        return Some((format!("explains too little (score {:.1})", member.trial.score), true));
+    }
+    if study.one_path && candidate.effect().is_function_of_path(candidate, &study.data, rule) {
+        let why = "the logs to judge on run the same path: a function of the path cannot be told there \
+            from any other misfit; record another path";
+        return Some((why.to_string(), false));
+    }
+    if model.gave_up(candidate) {
+        return Some(("did not last, or could not be told from its rivals".to_string(), true));
+    }
+    mends(model, screen, member).map(|name| (format!("only mends the law of {name}"), true))
+}
+
+fn is_ruled_out(study: &Study<'_>, candidate: &Candidate) -> bool {
+    let name = candidate.effect().name();
+    study.options.ruled_out.iter().any(|r| r.effect == name && candidate.is_on(&r.joints))
+}
+
+/// Whether one of `event`'s windows begins or ends within `same_event` s of the beginning of one of
+/// `earlier`'s.
+fn begins_beside(earlier: &Candidate, event: &Candidate, same_event: f64) -> bool {
+    let near = |a: f64, b: f64| (a - b).abs() < same_event;
+    earlier.windows.iter().any(|e| {
+        let mut same_log = event.windows.iter().filter(|w| w.log == e.log);
+        same_log.any(|w| near(w.from, e.from) || near(w.to, e.from))
+    })
+}
+
+/// The accepted effect of which a member would only mend the law: on the joints where no accepted effect
+/// is large beside it, it would not count.
+fn mends(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<&'static str> {
+    let (rule, effect) = (screen.context.rule, member.candidate.effect());
+    // An event mends nothing that lasts; but an event beside the beginning of another one mends its time.
+    let beside = |a: &Accepted| begins_beside(&a.candidate, &member.candidate, rule.same_event);
+    let lasting: Vec<&Accepted> =
+        model.accepted.iter().filter(|a| a.candidate.windows.is_empty() || beside(a)).collect();
+    let mut mended = None;
+    let mut rest = 0.0;
+    for (joint, gain) in screen.gains(&member.trial, &member.candidate.joints) {
+        let small = lasting.iter().find(|a| {
+            let alike = a.effect().class() == effect.class() && a.effect() != effect;
+            let share = if alike { rule.mends_only } else { rule.mends_any };
+            let explained = a.explained.get(joint.index()).copied().unwrap_or(0.0);
+            gain < share * explained * model.fit.weights[joint.index()]
+        });
+        match small {
+            Some(a) => mended = Some(a.effect().name()),
+            None => rest += gain.max(0.0),
+        }
+    }
+    mended.filter(|_| rest < rule.least_score)
+}
+
+/// What the evidence for members is asked of.
+pub(crate) struct Tester<'t> {
+    pub(crate) study: &'t Study<'t>,
+    pub(crate) screen: &'t Screen<'t>,
+    /// Candidates that were tried in all.
+    pub(crate) tests: f64,
+    pub(crate) validation: &'t Validation<'t>,
+    /// The model seen on the validation set.
+    pub(crate) there: &'t Context<'t>,
+}
+
+impl Tester<'_> {
+    /// Gathers the evidence for the members of a group that are still open, and judges it.
+    pub(crate) fn test(&self, group: &mut Group) {
+        let open: Vec<usize> = (0..group.members.len())
+            .filter(|m| group.members[*m].refusal.is_none() && group.members[*m].evidence.is_none())
+            .collect();
+        // An experiment leaves the paths of the other logs on purpose: a fold that holds all of it out
+        // asks how the base model extrapolates. What the experiment speaks for is asked stretch by
+        // stretch of every log instead.
+        let spoken_for = self.study.options.ruled_out.iter().any(|r| r.in_favour_of == group.name());
+        let found = parallel::map(&open, |m| {
+            let Member { candidate, trial, .. } = &group.members[*m];
+            let columns = group.effect.columns(self.there, candidate);
+            let extent = match Extent::of(candidate) {
+                Extent::Everywhere if spoken_for => Extent::SomeLogs,
+                extent => extent,
+            };
+            let there = Some((self.validation, columns.as_slice()));
+            evidence(self.screen, trial, &candidate.joints, &self.study.folds, extent, there)
+        });
+        for (m, evidence) in open.into_iter().zip(found) {
+            let member = &mut group.members[m];
+            let local = !member.candidate.windows.is_empty();
+            member.refusal = refusal(self.study.rule(), &evidence, self.tests, local);
+            member.evidence = Some(evidence);
+        }
+    }
+}

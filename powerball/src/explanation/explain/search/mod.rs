@@ -1,0 +1,25 @@
+//! How candidates are looked for, and what speaks for them.
+//!
+//! A screen refits the base model with each candidate (`screen`); the best ones of each effect are a
+//! candidate group (`groups`); for the group that could reach most the evidence is gathered from independent
+//! blocks, from held-out folds and from the validation set (`evidence`, `folds`), and judged (`refusal`);
+//! time-shift surrogates say how often these very data agree by chance (`surrogates`). What stays in the
+//! model is moved to where everything together fits best (`refinement`), and what later additions made
+//! unneeded goes out again (`elimination`).
+
+mod elimination;
+mod evidence;
+mod folds;
+mod groups;
+mod refinement;
+mod refusal;
+mod screen;
+mod surrogates;
+
+pub(super) use elimination::eliminate;
+pub(super) use evidence::{Extent, Validation, evidence, validation_gain};
+pub(super) use groups::{Group, Member, Tester, groups};
+pub(super) use refinement::refine;
+pub(super) use refusal::refusal;
+pub(super) use screen::{Screen, Trial};
+pub(super) use surrogates::{false_positives, surrogates};

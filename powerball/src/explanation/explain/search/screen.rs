@@ -1,0 +1,169 @@
+//! What a candidate would explain with the base refitted: a small solve a candidate.
+
+use super::folds::FoldBase;
+use crate::controller::JointNumber;
+use crate::explanation::effects::{Candidate, Context};
+use crate::explanation::rule::Rule;
+use crate::identification::estimate::{Folds, Solver};
+use crate::logs::regression::Column;
+use crate::logs::vector::dot;
+use faer::Mat;
+use std::ops::Range;
+use std::sync::OnceLock;
+
+/// The base model prepared for many candidates.
+#[derive(Debug)]
+pub(crate) struct Screen<'c> {
+    /// The model and its residual.
+    pub(crate) context: &'c Context<'c>,
+    /// The base's normal equations over its free columns, shape tangents among them.
+    pub(crate) solver: Solver,
+    /// A'r: zero but for bounds and unfinished shapes.
+    slope: Vec<f64>,
+    /// The base fitted without each fold: whole logs, stretches.
+    folds: [OnceLock<Vec<FoldBase>>; 2],
+}
+
+/// A candidate tried on the base.
+#[derive(Clone, Debug)]
+pub(crate) struct Trial {
+    /// Its columns.
+    pub(crate) columns: Vec<Column>,
+    /// Its coefficients.
+    pub(crate) theta: Vec<f64>,
+    /// For each of its columns: the base columns' shares in it.
+    pub(crate) base: Vec<Vec<f64>>,
+    /// χ² explained, over variance inflation.
+    pub(crate) gain: f64,
+    /// Gain after penalties for coefficients and search.
+    pub(crate) score: f64,
+}
+
+/// What a score takes off a gain: for coefficients, and for having searched.
+pub(crate) fn penalty(rule: &Rule, coefficients: usize, searched: f64) -> f64 {
+    rule.per_coefficient * coefficients as f64 + 2.0 * searched.max(1.0).ln()
+}
+
+impl<'c> Screen<'c> {
+    /// Prepares the base model of a context.
+    #[must_use]
+    pub(crate) fn new(context: &'c Context<'c>) -> Screen<'c> {
+        Screen::without(context, 0..0)
+    }
+
+    /// The same without some of the model's columns, of whose torque the context's residual is free.
+    #[must_use]
+    pub(crate) fn without(context: &'c Context<'c>, columns: Range<usize>) -> Screen<'c> {
+        let fit = context.fit;
+        let (gram, _, _) = fit.gram.sum(&fit.weights, |_| true);
+        let solver = Solver::new(&gram, |c| fit.free[c] && !columns.contains(&c));
+        let mut slope = vec![0.0; fit.design.size];
+        for (j, residual) in context.residual.iter().enumerate() {
+            for (g, value) in fit.design.cross(j, &(0..residual.len()), &[residual.as_slice()]) {
+                slope[g] += fit.weights[j] * value[0];
+            }
+        }
+        Screen { context, solver, slope, folds: [OnceLock::new(), OnceLock::new()] }
+    }
+
+    /// The base fitted without each fold (see [`Folds::folds`]).
+    pub(crate) fn folds(&self, folds: &Folds, local: bool) -> &[FoldBase] {
+        self.folds[usize::from(local)].get_or_init(|| FoldBase::all(self.context.fit, folds, local))
+    }
+
+    /// Tries a candidate; `None` where it has no usable column or is physically impossible.
+    #[must_use]
+    pub(crate) fn try_candidate(&self, candidate: &Candidate) -> Option<Trial> {
+        let effect = candidate.effect();
+        let columns = effect.columns(self.context, candidate);
+        let trial = self.try_columns(columns, candidate.searched)?;
+        let sound = !(effect.non_negative() && trial.theta.iter().any(|t| *t <= 0.0));
+        (sound && effect.admissible(candidate, &trial.theta)).then_some(trial)
+    }
+
+    /// Tries columns, whatever they mean.
+    #[must_use]
+    pub(crate) fn try_columns(&self, columns: Vec<Column>, searched: f64) -> Option<Trial> {
+        if columns.is_empty() || !columns.iter().all(Column::is_finite) {
+            return None;
+        }
+        let fit = self.context.fit;
+        let k = columns.len();
+        let mut cross = vec![vec![0.0; fit.design.size]; k];
+        let (mut square, mut score) = (Mat::<f64>::zeros(k, k), vec![0.0; k]);
+        for j in 0..fit.design.dof() {
+            let parts: Vec<&[f64]> = columns.iter().filter_map(|c| c.at(j)).collect();
+            let w = fit.weights[j];
+            if parts.len() < k || w == 0.0 {
+                continue;
+            }
+            let residual = &self.context.residual[j];
+            for (g, values) in fit.design.cross(j, &(0..residual.len()), &parts) {
+                for c in 0..k {
+                    cross[c][g] += w * values[c];
+                }
+            }
+            for a in 0..k {
+                for b in 0..=a {
+                    square[(a, b)] += w * dot(parts[a], parts[b]);
+                }
+                score[a] += w * dot(parts[a], residual);
+            }
+        }
+        let base: Vec<Vec<f64>> = cross.iter().map(|c| self.solver.solve(c)).collect();
+        let raw: Vec<f64> = (0..k).map(|a| square[(a, a)]).collect();
+        for a in 0..k {
+            for b in 0..=a {
+                square[(a, b)] -= dot(&cross[a], &base[b]);
+                square[(b, a)] = square[(a, b)];
+            }
+            score[a] -= dot(&base[a], &self.slope);
+        }
+        // A column that the base can imitate wholly is no candidate; nor is one that this arm never feels, as
+        // a planar arm a force across its plane.
+        let new = |a: usize| square[(a, a)] > 1e-6 * raw[a];
+        let solver = Solver::new(&square, new);
+        if solver.kept().is_empty() {
+            return None;
+        }
+        let theta = solver.solve(&score);
+        let gain = dot(&theta, &score);
+        let score = gain - penalty(self.context.rule, solver.kept().len(), searched);
+        gain.is_finite().then_some(Trial { columns, theta, base, gain, score })
+    }
+
+    /// The gain by joint: on the only joint all of it, else where the squared error falls.
+    #[must_use]
+    pub(crate) fn gains(&self, trial: &Trial, joints: &[JointNumber]) -> Vec<(JointNumber, f64)> {
+        if let [joint] = joints {
+            return vec![(*joint, trial.gain)];
+        }
+        let columns = self.residualised(trial);
+        let fall = |j: usize| {
+            let mut moved = vec![0.0; self.context.residual[j].len()];
+            for (column, theta) in columns[j].iter().zip(&trial.theta) {
+                moved.iter_mut().zip(column).for_each(|(m, c)| *m += theta * c);
+            }
+            let change = 2.0 * dot(&self.context.residual[j], &moved) - dot(&moved, &moved);
+            self.context.fit.weights[j] * change
+        };
+        joints.iter().map(|j| (*j, fall(j.index()))).collect()
+    }
+
+    /// The columns with the base's shares taken out, by joint and column.
+    #[must_use]
+    pub(crate) fn residualised(&self, trial: &Trial) -> Vec<Vec<Vec<f64>>> {
+        let design = &self.context.fit.design;
+        let of = |j: usize| {
+            let one = |(column, base): (&Column, &Vec<f64>)| {
+                let mut values: Vec<f64> = design.predict(j, base).iter().map(|v| -v).collect();
+                if let Some(own) = column.at(j) {
+                    values.iter_mut().zip(own).for_each(|(v, o)| *v += o);
+                }
+                values
+            };
+            trial.columns.iter().zip(&trial.base).map(one).collect()
+        };
+        (0..design.dof()).map(of).collect()
+    }
+}

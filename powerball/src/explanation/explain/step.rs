@@ -1,0 +1,177 @@
+//! One step of the search: screen all candidates, test the groups that could be best, compare names, accept.
+
+use super::comparison::{Comparison, Question, Step, compare};
+use super::model::{Accepted, Model};
+use super::named::Rival;
+use super::search::{Group, Member, Screen, Tester, Trial, Validation, eliminate, groups, surrogates};
+use super::study::Study;
+use crate::controller::JointNumber;
+use crate::explanation::effects::{Candidate, Context, Effect};
+use crate::identification::estimate::{Design, Fit, friction_columns, spread};
+
+/// What a step found, before anything is changed.
+pub(super) struct Proposed {
+    /// Effects of which nothing passed, and why.
+    pub(super) refused: Vec<Rival>,
+    pub(super) outcome: Outcome,
+}
+
+/// How a step ended.
+pub(super) enum Outcome {
+    /// A group passed.
+    Named(Box<Choice>),
+    /// What fitted best scored no more than surrogates do.
+    Chance(Vec<Candidate>),
+    /// Nothing passed; names that fit a part may be open.
+    Nothing(Option<Question>),
+}
+
+/// A group that is accepted.
+pub(super) struct Choice {
+    effect: &'static dyn Effect,
+    members: Vec<Member>,
+    comparison: Comparison,
+    question: Option<Question>,
+    /// Candidates that were tried in all.
+    tested: f64,
+    /// rms on the validation set before it, by joint, N·m.
+    before: Vec<f64>,
+}
+
+/// Screens, tests and compares; changes nothing.
+pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize) -> Proposed {
+    let context = model.context(study);
+    let screen = Screen::new(&context);
+    let (mut groups, tests) = groups(study, model, &screen);
+    let columns = model.columns_on_validation(study);
+    let residual = model.fit.residual_on(&study.validation, &columns);
+    let design =
+        Design::new(&study.validation, &friction_columns(&study.validation, &model.fit.shapes), &columns);
+    let validation = Validation { data: &study.validation, design, residual: residual.clone() };
+    let there = Context::new(&study.validation, &model.fit, &residual, study.rule());
+    let tester = Tester { study, screen: &screen, tests, validation: &validation, there: &there };
+    let best = most_promising(&mut groups, &tester);
+    let refused = refused(&groups);
+    let Some(best) = best else {
+        let question = Question::refused(study.rule(), &groups);
+        return Proposed { refused, outcome: Outcome::Nothing(question) };
+    };
+    let chosen = simplest_as_good(&mut groups, best, &tester);
+    let above = above_chance(study, &screen, &groups[chosen], tests, number);
+    if above.is_empty() {
+        let chance = groups[chosen].passing().map(|m| m.candidate.clone()).collect();
+        return Proposed { refused, outcome: Outcome::Chance(chance) };
+    }
+    let members = &groups[chosen].members;
+    let mut joints: Vec<JointNumber> =
+        above.iter().flat_map(|m| members[*m].candidate.joints.clone()).collect();
+    joints.sort_unstable();
+    joints.dedup();
+    let comparison = compare(&screen, &groups, chosen, &joints);
+    let question = Question::twins(study.rule(), &groups, chosen, comparison.twin.as_deref(), &joints);
+    let Group { effect, members } = groups.swap_remove(chosen);
+    let kept = members.into_iter().enumerate().filter(|(m, _)| above.contains(m)).map(|(_, member)| member);
+    let before = spread(&study.validation, &residual).rms;
+    let choice = Choice { effect, members: kept.collect(), comparison, question, tested: tests, before };
+    Proposed { refused, outcome: Outcome::Named(Box::new(choice)) }
+}
+
+/// The group that scores most once tested. Groups are tested in the order of what they could reach, until
+/// none left could beat the best.
+fn most_promising(groups: &mut [Group], tester: &Tester<'_>) -> Option<usize> {
+    let mut order: Vec<usize> = (0..groups.len()).collect();
+    order.sort_by(|a, b| groups[*b].potential().total_cmp(&groups[*a].potential()));
+    let mut best: Option<(usize, f64)> = None;
+    for g in order {
+        if best.is_some_and(|(_, score)| groups[g].potential() <= score) {
+            continue;
+        }
+        tester.test(&mut groups[g]);
+        let score = groups[g].potential();
+        if score > best.map_or(0.0, |(_, s)| s) {
+            best = Some((g, score));
+        }
+    }
+    best.map(|(g, _)| g)
+}
+
+/// What needs fewer columns and is as good is preferred.
+fn simplest_as_good(groups: &mut [Group], best: usize, tester: &Tester<'_>) -> usize {
+    let rule = tester.study.rule();
+    let top = groups[best].potential();
+    let least = top - (rule.as_good * top).max(rule.as_good_score);
+    let mut chosen = best;
+    for g in 0..groups.len() {
+        let simpler = groups[g].columns() < groups[chosen].columns();
+        if g == chosen || groups[g].potential() < least || !simpler {
+            continue;
+        }
+        tester.test(&mut groups[g]);
+        if groups[g].potential() >= least && groups[g].columns() < groups[chosen].columns() {
+            chosen = g;
+        }
+    }
+    chosen
+}
+
+/// Of every group of which nothing passes, why its best member does not.
+fn refused(groups: &[Group]) -> Vec<Rival> {
+    let nothing = groups.iter().filter(|g| g.potential() == 0.0);
+    let why = |g: &Group| {
+        let why_not = g.best()?.refusal.clone()?;
+        Some(Rival { effect: g.name().to_string(), why_not })
+    };
+    nothing.filter_map(why).collect()
+}
+
+/// The places of the members of a group that score more than time-shift surrogates do.
+fn above_chance(
+    study: &Study<'_>,
+    screen: &Screen<'_>,
+    group: &Group,
+    tests: f64,
+    number: usize,
+) -> Vec<usize> {
+    let rule = study.rule();
+    let trials: Vec<(&Trial, &[JointNumber])> =
+        group.passing().map(|m| (&m.trial, m.candidate.joints.as_slice())).collect();
+    let found = surrogates(screen, &trials, &study.folds, tests, rule.step_surrogates, number as u64);
+    let mut scores = found.scores;
+    scores.sort_by(f64::total_cmp);
+    let level = scores.get((scores.len() as f64 * rule.surrogate_level) as usize).copied().unwrap_or(0.0);
+    let above = |m: &Member| m.refusal.is_none() && m.trial.score > level;
+    (0..group.members.len()).filter(|m| above(&group.members[*m])).collect()
+}
+
+/// Takes a choice into the model: everything is refitted, and what it made unneeded goes out.
+pub(super) fn accept(study: &Study<'_>, model: &mut Model, choice: Choice, number: usize) -> Step {
+    let Choice { effect, members, comparison, question, tested, before } = choice;
+    let squares =
+        |fit: &Fit| -> Vec<f64> { fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect() };
+    let square_before = squares(&model.fit);
+    let added: Vec<Candidate> = members.iter().map(|m| m.candidate.clone()).collect();
+    let first = model.accepted.len();
+    for member in members {
+        let Some(evidence) = member.evidence else { continue };
+        let mut gains = evidence.fold_gains;
+        gains.sort_by(f64::total_cmp);
+        model.accepted.push(Accepted {
+            columns: member.trial.columns.len(),
+            candidate: member.candidate,
+            p_value: (evidence.p_value * tested).min(1.0),
+            fold_gain: gains.get(gains.len() / 2).copied().unwrap_or(0.0),
+            explained: Vec::new(),
+            step: number,
+        });
+    }
+    model.refit(study);
+    let fell = square_before.iter().zip(squares(&model.fit)).map(|(b, a)| (b - a).max(0.0));
+    let fell: Vec<f64> = fell.collect();
+    model.accepted[first..].iter_mut().for_each(|a| a.explained.clone_from(&fell));
+    eliminate(study, model);
+    // What does not last is not tried again: it would be accepted and taken out for ever.
+    let gone = added.into_iter().filter(|candidate| !model.has(candidate)).collect::<Vec<_>>();
+    model.given_up.extend(gone);
+    let after = spread(&study.validation, &model.residual_on_validation(study)).rms;
+    Step { number, effect, square_before, comparison, question, before, after }
+}

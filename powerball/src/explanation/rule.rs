@@ -1,0 +1,165 @@
+//! Every threshold that decides what an explanation says, with its reason.
+
+/// The thresholds of the rule that accepts, names or refuses effects.
+///
+/// The defaults are those of every published figure (`docs/study.md`, `docs/measured.md`). A gain is a fall
+/// of χ², the squared error in units of independent samples; a score is a gain after penalties for
+/// coefficients and for having searched.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rule {
+    /// Effects added at most.
+    pub most_steps: usize,
+
+    /// Least score of an effect: e^(−10/2) is a likelihood ratio of 150 after the penalties.
+    pub least_score: f64,
+    /// Penalty for each coefficient: what one coefficient gains by chance, twice over (Akaike).
+    pub per_coefficient: f64,
+    /// Probability of accepting anything at all where nothing is missing, over all joints and candidates.
+    pub family_wise: f64,
+    /// The held-out squared error must fall by this share on average over folds: 1 % of the rms, below which
+    /// no user would notice.
+    pub least_gain: f64,
+    /// … and it must fall at all in this share of the folds: four of five.
+    pub folds_that_must_gain: f64,
+    /// No fold may lose more than this share of its squared error.
+    pub worst_fold: f64,
+
+    /// Share of the time-shift surrogates whose score a candidate must exceed.
+    pub surrogate_level: f64,
+    /// Surrogates that a step asks.
+    pub step_surrogates: usize,
+    /// Surrogates that state the false-positive rate.
+    pub final_surrogates: usize,
+    /// A shifted column that still correlates so much with the unshifted one (a periodic motion) is no
+    /// surrogate.
+    pub surrogate_correlation: f64,
+
+    /// A term of the class of an accepted one, on the same joint, that gains less than this share of it mends
+    /// that one's law and is no effect of its own.
+    pub mends_only: f64,
+    /// The same for a term of another class: laws are wrong by a few percent, and that shows in any guise.
+    pub mends_any: f64,
+    /// Two events this close count as one whose time is a little off, s.
+    pub same_event: f64,
+
+    /// A group with fewer columns is preferred where the better one's score is larger by less than this share
+    /// or [`as_good_score`](Self::as_good_score): these data do not tell the two apart.
+    pub as_good: f64,
+    /// See [`as_good`](Self::as_good): a likelihood ratio of 4.
+    pub as_good_score: f64,
+    /// Two names whose gains differ by less than this factor cannot be told apart by these data.
+    pub least_margin: f64,
+    /// Two names of which one explains this share of what the other does are words for the same part of a
+    /// residual. Names for the same thing share 98 % and more of it, names for different things less than 70
+    /// % (noise-free trials on other data).
+    pub same_part: f64,
+    /// A name that is not told apart ([`least_margin`](Self::least_margin)) from the next best one for
+    /// another part ([`same_part`](Self::same_part)) is not given where it leaves more than this share of the
+    /// excess over the noise floor: then something else is there, and what fits best only resembles it. The
+    /// share is that of an earlier trial on other data.
+    pub much_left: f64,
+    /// An effect of which this share is missing in some octave, and by more than
+    /// [`missing_errors`](Self::missing_errors), is not the effect that it is called: most of it is not
+    /// there.
+    pub least_missing: f64,
+    /// See [`least_missing`](Self::least_missing): standard errors that chance exceeds once in 800,
+    /// [`family_wise`](Self::family_wise) over eight octaves.
+    pub missing_errors: f64,
+
+    /// A setting is refined for more than chance gains by one more coefficient, in units of χ².
+    pub refinement_gain: f64,
+
+    /// Two recordings are one path where their positions over time correlate more than this: a path that
+    /// drifts with warmth keeps its shape, and two different paths hardly correlate.
+    pub same_path: f64,
+    /// A ripple with fewer cycles along the path than this is as good as any other smooth function of the
+    /// position.
+    pub few_cycles: f64,
+    /// On repeats of one path whatever errs alike in all of them is fitted by whoever has more parameters;
+    /// the per-joint fit is taken only where it lowers the held-out squared error by more than this share, 5
+    /// % of the rms.
+    pub clearly_better: f64,
+    /// Two runs start at the same place where every joint does to this share of its travel in all logs.
+    pub same_start: f64,
+
+    /// A validation log whose squared error is this many times that of the fitted logs holds something that
+    /// they do not.
+    pub odd_log: f64,
+    /// A log has the same payload if that explains this much more, and has it not if that explains this much
+    /// more (in units of χ²). The same for a push.
+    pub another_log: f64,
+    /// A log has the same push if that also explains this share of the force's own torque: a push of another
+    /// size or direction is another one.
+    pub same_force: f64,
+    /// … over at least this share of the time that it lasted: another push resembles this one for a moment
+    /// only.
+    pub same_time: f64,
+
+    /// A residual of this many times the noise floor is looked at for what it depends on …
+    pub above_floor: f64,
+    /// … where the variance of its slow means exceeds that of white noise by this factor.
+    pub coloured: f64,
+    /// Least share of a residual's variance that a signal must explain to be named as one that it depends on.
+    pub least_share: f64,
+    /// The correction of what has no name stays within so many rms of what is left.
+    pub correction_bound: f64,
+
+    /// Below this time of motion a reader is warned that the folds are too short to tell much, s.
+    pub least_time: f64,
+    /// A share of accepted surrogates above this is no chance: the residuals are not what the tests take them
+    /// for, and a reader is warned.
+    pub many_accepted: f64,
+
+    /// Probability of a wrong decision between two names by an experiment.
+    pub decision_level: f64,
+    /// Two names whose models differ by less than this share of what either explains say the same.
+    pub same_model: f64,
+    /// A difference of so many units of χ² can be seen through the noise: a likelihood ratio of 150.
+    pub visible: f64,
+}
+
+impl Default for Rule {
+    fn default() -> Self {
+        Rule {
+            most_steps: 12,
+            least_score: 10.0,
+            per_coefficient: 2.0,
+            family_wise: 0.01,
+            least_gain: 0.02,
+            folds_that_must_gain: 0.8,
+            worst_fold: -0.05,
+            surrogate_level: 0.99,
+            step_surrogates: 60,
+            final_surrogates: 200,
+            surrogate_correlation: 0.4,
+            mends_only: 0.15,
+            mends_any: 0.05,
+            same_event: 2.0,
+            as_good: 0.02,
+            as_good_score: 3.0,
+            least_margin: 1.1,
+            same_part: 0.9,
+            much_left: 0.35,
+            least_missing: 0.5,
+            missing_errors: 3.2,
+            refinement_gain: 1.0,
+            same_path: 0.9,
+            few_cycles: 5.0,
+            clearly_better: 0.1,
+            same_start: 0.05,
+            odd_log: 2.0,
+            another_log: 10.0,
+            same_force: 0.8,
+            same_time: 0.5,
+            above_floor: 1.2,
+            coloured: 2.0,
+            least_share: 0.02,
+            correction_bound: 2.0,
+            least_time: 30.0,
+            many_accepted: 0.05,
+            decision_level: 0.01,
+            same_model: 0.1,
+            visible: 10.0,
+        }
+    }
+}
