@@ -1,6 +1,6 @@
 //! `dyngen import`.
 
-use super::Failure;
+use super::{Failure, same_file};
 use dyngen::arm::Convention;
 use dyngen::import::{self, ImportError, Options};
 use std::path::{Path, PathBuf};
@@ -17,6 +17,9 @@ pub(super) struct Args {
     /// The arm file to write; the inertial values go beside it, as FILE.values.json.
     #[arg(short, long, value_name = "FILE.toml")]
     output: PathBuf,
+    /// Replace an arm file or values that are there already.
+    #[arg(long)]
+    force: bool,
     /// Where frame i sits: on joint i (modified) or at the far end of link i (standard).
     #[arg(long, value_enum, default_value = "modified")]
     convention: Frames,
@@ -53,8 +56,25 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         eprintln!("{file}: note: {note}");
     }
     let values = args.output.with_extension("values.json");
+    for path in [&args.output, &values] {
+        refuse_to_replace(path, &args.urdf, args.force)?;
+    }
     write(&[(&args.output, &imported.text), (&values, &imported.values_json())])?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Edited files are not lost by accident, and the original is never written over.
+fn refuse_to_replace(path: &Path, original: &Path, force: bool) -> Result<(), Failure> {
+    let place = path.display();
+    if same_file(path, original) {
+        return Err(Failure::input(format!("{place} is the file that is imported: choose another -o")));
+    }
+    if path.exists() && !force {
+        return Err(Failure::input(format!(
+            "{place} is there already and may have been edited: --force replaces it, or choose another -o"
+        )));
+    }
+    Ok(())
 }
 
 /// Writes all files or none: each is complete on the disk before the first takes its name.
