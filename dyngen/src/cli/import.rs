@@ -11,6 +11,12 @@ use std::process::ExitCode;
 pub(super) struct Args {
     /// The URDF file (xacro has to be run before).
     urdf: PathBuf,
+    /// The link that stands still; the root where it is left out.
+    #[arg(long, value_name = "LINK")]
+    base: Option<String>,
+    /// A joint that is held at a position, rad or m; may be repeated.
+    #[arg(long, value_name = "JOINT=VALUE", value_parser = lock)]
+    lock: Vec<(String, f64)>,
     /// The link that ends the chain; needed where the robot is a tree.
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
@@ -34,6 +40,12 @@ enum Frames {
     Standard,
 }
 
+fn lock(text: &str) -> Result<(String, f64), String> {
+    let (joint, value) = text.rsplit_once('=').ok_or("must be JOINT=VALUE, such as finger=0.02")?;
+    let number = value.parse().ok().filter(|x: &f64| x.is_finite());
+    Ok((joint.to_string(), number.ok_or_else(|| format!("'{value}' is no number of rad or m"))?))
+}
+
 fn tolerance(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|x| (0.0..=0.01).contains(x));
     value.ok_or_else(|| "must be a number of radians from 0 to 0.01".to_string())
@@ -47,7 +59,13 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         Frames::Modified => Convention::Modified,
         Frames::Standard => Convention::Standard,
     };
-    let options = Options { tip: args.tip.clone(), convention, angle_tolerance: args.angle_tolerance };
+    let options = Options {
+        base: args.base.clone(),
+        lock: args.lock.clone(),
+        tip: args.tip.clone(),
+        convention,
+        angle_tolerance: args.angle_tolerance,
+    };
     let imported = import::urdf(&text, &file, &options).map_err(|e| match e {
         ImportError::Unreadable(_) => Failure::input(e),
         ImportError::Refused(_) => Failure::refused(e),
@@ -59,7 +77,12 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     for path in [&args.output, &values] {
         refuse_to_replace(path, &args.urdf, args.force)?;
     }
-    write(&[(&args.output, &imported.text), (&values, &imported.values_json())])?;
+    let json = imported.values_json();
+    let mut files: Vec<(&Path, &str)> = vec![(&args.output, &imported.text)];
+    if !imported.values.is_empty() {
+        files.push((&values, &json));
+    }
+    write(&files)?;
     Ok(ExitCode::SUCCESS)
 }
 
