@@ -4,7 +4,7 @@
 //! parameters are all given, is its pseudo-inertia matrix positive semi-definite, which is exactly the
 //! condition for a distribution of mass to have them (Wensing, Kim and Slotine 2018).
 
-use crate::arm::{Arm, JointKind, Parameter, ParameterKind};
+use crate::arm::{Arm, JointKind, MAX_JOINTS, Parameter, ParameterKind};
 use crate::dynamics::Function;
 use crate::evaluator::Evaluator;
 use crate::exact::prime::Draws;
@@ -70,12 +70,12 @@ impl Search<'_> {
             return (f64::NEG_INFINITY, f64::INFINITY);
         }
         // The largest arm's matrix, padded; its extra rows are zero and are skipped below.
-        let matrix = SMatrix::<f64, 9, 9>::from_fn(|i, j| {
+        let matrix = SMatrix::<f64, MAX_JOINTS, MAX_JOINTS>::from_fn(|i, j| {
             if i < n && j < n { 0.5 * (flat[i * n + j] + flat[j * n + i]) } else { 0.0 }
         });
         let eigen = matrix.symmetric_eigen();
-        let mut values: Vec<f64> = (0..9)
-            .filter(|k| (0..n).any(|i| eigen.eigenvectors[(i, *k)].abs() > 0.5 / 9f64.sqrt()))
+        let mut values: Vec<f64> = (0..MAX_JOINTS)
+            .filter(|k| (0..n).any(|i| eigen.eigenvectors[(i, *k)].abs() > 0.5 / (MAX_JOINTS as f64).sqrt()))
             .map(|k| eigen.eigenvalues[k])
             .collect();
         values.sort_by(f64::total_cmp);

@@ -104,10 +104,14 @@ impl Values {
         if let Some(values) = self.of_other_sums(model, set) {
             return Ok(values);
         }
-        if complete || names.iter().any(only_of_set) {
+        // A set without sums has names of the arm's parameters, and its values may stand among all of them.
+        let kept = model.arm().kept_parameters();
+        let of_arm = |name: &String| Parameter::parse(name).is_some_and(|p| kept.contains(&p));
+        let all_of_arm = self.by_name.keys().all(of_arm);
+        if !all_of_arm && (complete || names.iter().any(only_of_set)) {
             return self.in_order(&names, &names);
         }
-        let kept: Vec<String> = model.arm().kept_parameters().iter().map(ToString::to_string).collect();
+        let kept: Vec<String> = kept.iter().map(ToString::to_string).collect();
         let needed: Vec<Parameter> =
             set.parameters.iter().flat_map(|p| p.terms.iter().map(|(q, _)| *q)).collect();
         let needed_names: Vec<String> = needed.iter().map(ToString::to_string).collect();

@@ -276,7 +276,6 @@ fn what_is_no_serial_arm_is_refused_by_name() {
         (odd("rpy=\"-0.3 0.9 1.3\"", "rpy=\"nan 0.9 1.3\""), vec!["'two'", "origin", "not finite"]),
         (odd("mass value=\"1.7\"", "mass value=\"-1.7\""), vec!["link 'b'", "mass", "negative"]),
         (odd("mass value=\"1.7\"", "mass value=\"inf\""), vec!["link 'b'", "not finite"]),
-        (odd("lower=\"-2\" upper=\"1.5\"", "lower=\"2\" upper=\"1.5\""), vec!["'one'", "limits 2 … 1.5"]),
         (odd("parent link=\"b\"", "parent link=\"x\""), vec!["'three'", "'x'"]),
         (odd("parent link=\"a\"", "parent link=\"c\""), vec!["loop"]),
         (odd("child link=\"c\"", "child link=\"a\""), vec!["link 'a'", "'one' and 'three'"]),
@@ -299,9 +298,9 @@ fn what_is_no_serial_arm_is_refused_by_name() {
 }
 
 #[test]
-fn ten_joints_are_one_too_many() {
+fn seventeen_joints_are_one_too_many() {
     let mut text = "<robot name=\"snake\"><link name=\"l0\"/>".to_string();
-    for i in 1..=10 {
+    for i in 1..=17 {
         text += &format!(
             "<link name=\"l{i}\"/><joint name=\"j{i}\" type=\"continuous\"><parent link=\"l{}\"/><child \
                 link=\"l{i}\"/>\
@@ -311,8 +310,8 @@ fn ten_joints_are_one_too_many() {
     }
     text += "</robot>";
     let reason = refusal(&text, None);
-    assert!(reason.contains("10 joints") && reason.contains("'j1' to 'j10'"), "{reason}");
-    assert_eq!(imported(&text, Some("l9")).unwrap().arm.dof(), 9);
+    assert!(reason.contains("17 joints") && reason.contains("'j1' to 'j17'"), "{reason}");
+    assert_eq!(imported(&text, Some("l16")).unwrap().arm.dof(), 16);
 }
 
 #[test]
@@ -325,4 +324,104 @@ fn what_is_no_urdf_is_unreadable() {
             &text[..text.len().min(40)]
         );
     }
+}
+
+#[test]
+fn limits_that_are_no_range_are_left_out_and_said() {
+    let turned = ODD.replacen("lower=\"-2\" upper=\"1.5\"", "lower=\"2\" upper=\"1.5\"", 1);
+    let odd = imported(&turned, None).unwrap();
+    assert_eq!(odd.arm.joints[0].position, None);
+    let said = odd.notes.iter().any(|n| n.starts_with("line ") && n.contains("'one': its limits 2 … 1.5"));
+    assert!(said, "{:?}", odd.notes);
+}
+
+/// What ROS tools put up with changes nothing of the arm.
+#[test]
+fn what_stands_beside_the_arm_is_put_up_with() {
+    let clutter = "<material/><material name=\"m\"/><material name=\"m\"><texture/></material>\
+                   <drake:joint><drake:deep link=\"x\"/></drake:joint><gazebo><joint/></gazebo>\
+                   <transmission name=\"t\"><joint name=\"one\"/></transmission>";
+    let crowded = ODD.replacen("<link name=\"wall\"/>", &format!("{clutter}<link name=\"wall\"/>"), 1);
+    assert_ne!(crowded, ODD);
+    assert_eq!(imported(&crowded, None).unwrap().arm, imported(ODD, None).unwrap().arm);
+    assert_eq!(imported(&format!("\u{feff}\n{ODD}"), None).unwrap().arm, imported(ODD, None).unwrap().arm);
+}
+
+#[test]
+fn other_kinds_of_file_are_recognised() {
+    let xacro = "<robot name=\"x\" xmlns:xacro=\"http://www.ros.org/wiki/xacro\"><xacro:macro/></robot>";
+    let cases = [
+        (xacro, "xacro FILE.xacro -o robot.urdf"),
+        ("<sdf version=\"1.7\"><model name=\"m\"/></sdf>", "SDF"),
+        ("<!DOCTYPE html><html><body><br></body></html>", "HTML"),
+        ("<mujoco model=\"m\"/>", "MJCF"),
+        (
+            "<robot name=\"x\">\n<joint name=\"j\" type=\"fixed\"/></robot>",
+            "line 2: joint 'j' has no <parent",
+        ),
+        (
+            "<robot name=\"x\">\n<link name=\"l\"><inertial><mass value=\"1kg\"/></inertial></link></robot>",
+            "'1kg'",
+        ),
+    ];
+    for (text, words) in cases {
+        match imported(text, None) {
+            Err(ImportError::Unreadable(reason)) => assert!(reason.contains(words), "{words} in {reason}"),
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+/// The importer's own values make every set of the arm it wrote, also where a set has no sums.
+#[test]
+fn imported_values_fit_every_set_of_their_arm() {
+    let one = ODD.replacen("name=\"two\" type=\"revolute\"", "name=\"two\" type=\"fixed\"", 1);
+    let one = one.replacen("name=\"three\" type=\"prismatic\"", "name=\"three\" type=\"fixed\"", 1);
+    let slide = one.replacen("name=\"one\" type=\"revolute\"", "name=\"one\" type=\"prismatic\"", 1);
+    for text in [LWA4P, PUMA, SLIDER, ODD, &one, &slide] {
+        let imported = imported(text, None).unwrap();
+        let values = dyngen::Values::parse(&imported.values_json(), "arm.values.json").unwrap();
+        let model = Model::derive(imported.arm.clone()).unwrap();
+        let mut all = vec![0.0; model.arm().all_parameters().len()];
+        imported.values.iter().for_each(|(p, value)| all[p.index()] = *value);
+        for kind in [SetKind::Full, SetKind::Minimal, SetKind::Symbolic] {
+            let set = model.set(kind).unwrap();
+            assert_eq!(values.of_set(&model, set).unwrap(), model.set_values(set, &all), "{kind}");
+        }
+    }
+}
+
+/// A joint that is held at a position is a fixed joint with that position in its origin, and what hangs on it
+/// counts; what is left out is said in kilograms.
+#[test]
+fn held_joints_keep_their_mass_and_a_base_starts_the_chain() {
+    let hand = |lock: &[(&str, f64)]| {
+        let lock = lock.iter().map(|(name, value)| (name.to_string(), *value)).collect();
+        let options = Options { tip: Some("hand".into()), lock, ..Options::default() };
+        import::urdf(FIXED, "robot.urdf", &options)
+    };
+    let mass = |imported: &Imported| {
+        imported
+            .values
+            .iter()
+            .map(|(p, v)| (p.kind as usize == 0, v))
+            .filter(|(m, _)| *m)
+            .map(|(_, v)| *v)
+            .sum::<f64>()
+    };
+    let (open, held) = (hand(&[]).unwrap(), hand(&[("left", 0.01), ("right", 0.02)]).unwrap());
+    assert!(open.notes.iter().any(|n| n.contains("'left'") && n.contains(" kg")), "{:?}", open.notes);
+    assert!(held.notes.iter().all(|n| !n.contains("left out")), "{:?}", held.notes);
+    assert!(mass(&held) > mass(&open), "{} {}", mass(&held), mass(&open));
+    let Err(ImportError::Refused(reasons)) = hand(&[("thumb", 0.0)]) else { panic!("accepted") };
+    assert!(reasons[0].contains("no joint 'thumb'"), "{reasons:?}");
+
+    let from = |base: &str, tip: &str| {
+        let options = Options { base: Some(base.into()), tip: Some(tip.into()), ..Options::default() };
+        import::urdf(ODD, "robot.urdf", &options)
+    };
+    let arm = from("a", "c").unwrap().arm;
+    assert_eq!((arm.dof(), arm.joints[1].kind), (2, JointKind::Prismatic));
+    let Err(ImportError::Refused(reasons)) = from("b", "a") else { panic!("accepted") };
+    assert!(reasons[0].contains("not behind"), "{reasons:?}");
 }

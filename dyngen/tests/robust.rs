@@ -154,7 +154,7 @@ fn the_command_ends_with_its_codes_whatever_it_reads() {
         &["eval", &arm, "--function", "inverse_dynamics", "--states", &states, "--values", &values],
         &["check", &arm, "--values", &values],
         &["generate", &arm, "-o", &out, "--functions", "gravity"],
-        &["import", &urdf, "--tip", "hand", "-o", &out],
+        &["import", &urdf, "--tip", "hand", "-o", &out, "--force"],
     ];
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     for i in 0..mutants(100) {

@@ -11,7 +11,7 @@ pub use parameter::{Parameter, ParameterKind};
 use std::path::Path;
 
 /// The most joints an arm may have.
-pub const MAX_JOINTS: usize = 9;
+pub const MAX_JOINTS: usize = 16;
 
 /// Which Denavit–Hartenberg convention the table follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

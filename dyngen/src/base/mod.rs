@@ -1,7 +1,10 @@
 //! Parameter sets: exact relations, published groupings, the choice of columns.
 
+mod certificate;
 pub mod choice;
 pub mod coefficients;
+#[cfg(test)]
+mod expanded;
 pub mod preference;
 mod published;
 pub mod sets;

@@ -32,6 +32,13 @@ impl Preference {
         order
     }
 
+    /// All eleven parameters of a link by their place in it, those to be kept in a base set first.
+    pub(super) fn within_link(self, arm: &Arm, link: usize) -> Vec<usize> {
+        let mut order = ParameterKind::ALL;
+        order.sort_by_key(|kind| (self.rank(arm, Parameter { link, kind: *kind }), *kind));
+        order.map(|kind| kind as usize).to_vec()
+    }
+
     fn rank(self, arm: &Arm, parameter: Parameter) -> u8 {
         use ParameterKind::*;
         let joint = &arm.joints[parameter.link];

@@ -1,7 +1,8 @@
 //! The parameter sets of an arm and the exact relations between them.
 
+use super::certificate;
 use super::choice::{self, Candidate};
-use super::coefficients::{LagrangianPolynomials, Sizes};
+use super::coefficients::{self, Sizes};
 use super::preference::Preference;
 use super::published;
 use crate::arm::sum::sum_text;
@@ -43,8 +44,8 @@ pub struct Sets {
     pub sets: Vec<ParameterSet>,
     /// The dependence of the columns for the numbers in the file.
     pub minimal: Dependence,
-    /// The Lagrangian of all the arm's parameters, those declared zero too.
-    pub(super) lagrangian: LagrangianPolynomials,
+    /// Rows that span those of the Lagrangian for all the arm's parameters, those declared zero too.
+    pub(super) rows: Vec<SparseRow>,
     /// The rules that were tried for the choice of the minimal set's columns.
     pub candidates: Vec<Candidate>,
 }
@@ -57,15 +58,19 @@ impl Sets {
     pub fn derive(arm: &Arm, symbols: &AngleSymbols) -> Result<Sets, Unproven> {
         // The values of general angles modulo the prime; any fixed seed keeps the choice reproducible.
         let field = ConstantField::new(symbols, &mut Draws::new(0x6479_6e67_656e));
-        let lagrangian = LagrangianPolynomials::derive(arm, symbols);
         let columns = arm.dof() * 11;
         let eliminate = |rows: &[SparseRow], preference: Preference| {
             let order: Vec<usize> = preference.order(arm).iter().map(|p| p.index()).collect();
             elimination::dependence(&field, rows, columns, &order)
         };
-        let rows = lagrangian.rows(arm, &field, Sizes::Numbers);
-        let (minimal, candidates) = choice::cheapest(arm, symbols, &field, |p| eliminate(&rows, p))?;
-        let symbolic = eliminate(&lagrangian.rows(arm, &field, Sizes::Variables), Preference::ALL[0])?;
+        let all = |sizes| coefficients::all_rows(arm, symbols, &field, sizes);
+        let rows = all(Sizes::Numbers)?;
+        let kept = coefficients::kept(arm, &rows);
+        let (minimal, candidates) = choice::cheapest(arm, symbols, &field, |p| eliminate(&kept, p))?;
+        certificate::certify(arm, symbols, &field, Sizes::Numbers, &minimal)?;
+        let symbolic = coefficients::kept(arm, &all(Sizes::Variables)?);
+        let symbolic = eliminate(&symbolic, Preference::ALL[0])?;
+        certificate::certify(arm, symbols, &field, Sizes::Variables, &symbolic)?;
         let mut sets = vec![
             full_set(arm, &field),
             base_set(SetKind::Minimal, arm, &field, &minimal),
@@ -78,7 +83,7 @@ impl Sets {
             let (rank, relations) = relations(&field, &minimal, &set.parameters)?;
             (set.rank, set.relations) = (rank, relations);
         }
-        Ok(Sets { field, sets, minimal, lagrangian, candidates })
+        Ok(Sets { field, sets, minimal, rows, candidates })
     }
 
     /// The set of that kind, if the arm has it.

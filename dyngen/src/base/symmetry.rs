@@ -1,7 +1,7 @@
 //! What each declared symmetry removed: the arm's file says that a parameter is zero, and this says what that
 //! saves.
 
-use super::coefficients::Sizes;
+use super::coefficients;
 use super::preference::Preference;
 use super::sets::Sets;
 use crate::arm::{Arm, Parameter};
@@ -37,7 +37,7 @@ pub fn symmetries(arm: &Arm, sets: &Sets) -> Result<Vec<Symmetry>, Unproven> {
     let field = &sets.field;
     let mut without: Arm = arm.clone();
     without.joints.iter_mut().for_each(|joint| joint.zero.clear());
-    let rows = sets.lagrangian.rows(&without, field, Sizes::Numbers);
+    let rows = coefficients::kept(&without, &sets.rows);
     let kept: Vec<usize> = Preference::ALL[0].order(arm).iter().map(|p| p.index()).collect();
     let all = arm.all_parameters();
     let declared = all.iter().filter(|p| without.keeps(**p) && !arm.keeps(**p));

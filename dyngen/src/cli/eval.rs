@@ -68,9 +68,13 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let evaluator = Evaluator::new(&model, function, set.kind).map_err(Failure::refused)?;
     let mut out = vec![0.0; states.rows.len() * evaluator.outputs()];
     evaluator.run(&samples, &mut out);
+    let width = evaluator.outputs().max(1);
+    if let Some(wrong) = out.iter().position(|x| !x.is_finite()) {
+        return Err(not_finite(&states, function, wrong / width));
+    }
     let mut text = header(function, evaluator.shape()).join(",");
     text.push('\n');
-    for row in out.chunks(evaluator.outputs().max(1)) {
+    for row in out.chunks(width) {
         for (i, value) in row.iter().enumerate() {
             let separator = if i == 0 { "" } else { "," };
             // The shortest text that reads back as the same number. A String takes every write.
@@ -80,6 +84,19 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     }
     print(&text)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Why a result is no number: nothing of it is printed.
+fn not_finite(states: &States, function: Function, row: usize) -> Failure {
+    let line = states.rows.get(row).map_or(0, |(line, _)| *line);
+    let solves = matches!(function, Function::ForwardDynamics | Function::MassMatrixInverse);
+    let why = if solves {
+        "the mass matrix B(q) is singular there with these parameter values; `dyngen check` says which link \
+         cannot be real"
+    } else {
+        "the state or a parameter value is too large"
+    };
+    Failure::refused(format!("{}:{line}: {function} is not finite: {why}", states.file))
 }
 
 /// Names of the result's columns: tau1 …, and for a matrix Y1_1 (row, column).

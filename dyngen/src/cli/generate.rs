@@ -1,6 +1,6 @@
 //! `dyngen generate`.
 
-use super::{Failure, Set};
+use super::{Failure, Set, same_file};
 use dyngen::{Config, FrictionTerm, Function, GenerateError};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -60,6 +60,12 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         GenerateError::Model(_) => Failure::refused(e),
         _ => Failure::input(e),
     };
+    for input in std::iter::once(&args.arm).chain(&args.values) {
+        if same_file(&args.output, input) {
+            let file = input.display();
+            return Err(Failure::input(format!("{file} is an input: choose another -o")));
+        }
+    }
     if !args.check {
         config.write(&args.output).map_err(failure)?;
         return Ok(ExitCode::SUCCESS);

@@ -1,6 +1,6 @@
 //! `dyngen import`.
 
-use super::Failure;
+use super::{Failure, same_file};
 use dyngen::arm::Convention;
 use dyngen::import::{self, ImportError, Options};
 use std::path::{Path, PathBuf};
@@ -11,12 +11,21 @@ use std::process::ExitCode;
 pub(super) struct Args {
     /// The URDF file (xacro has to be run before).
     urdf: PathBuf,
+    /// The link that stands still; the root where it is left out.
+    #[arg(long, value_name = "LINK")]
+    base: Option<String>,
+    /// A joint that is held at a position, rad or m; may be repeated.
+    #[arg(long, value_name = "JOINT=VALUE", value_parser = lock)]
+    lock: Vec<(String, f64)>,
     /// The link that ends the chain; needed where the robot is a tree.
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
     /// The arm file to write; the inertial values go beside it, as FILE.values.json.
     #[arg(short, long, value_name = "FILE.toml")]
     output: PathBuf,
+    /// Replace an arm file or values that are there already.
+    #[arg(long)]
+    force: bool,
     /// Where frame i sits: on joint i (modified) or at the far end of link i (standard).
     #[arg(long, value_enum, default_value = "modified")]
     convention: Frames,
@@ -29,6 +38,12 @@ pub(super) struct Args {
 enum Frames {
     Modified,
     Standard,
+}
+
+fn lock(text: &str) -> Result<(String, f64), String> {
+    let (joint, value) = text.rsplit_once('=').ok_or("must be JOINT=VALUE, such as finger=0.02")?;
+    let number = value.parse().ok().filter(|x: &f64| x.is_finite());
+    Ok((joint.to_string(), number.ok_or_else(|| format!("'{value}' is no number of rad or m"))?))
 }
 
 fn tolerance(text: &str) -> Result<f64, String> {
@@ -44,7 +59,13 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         Frames::Modified => Convention::Modified,
         Frames::Standard => Convention::Standard,
     };
-    let options = Options { tip: args.tip.clone(), convention, angle_tolerance: args.angle_tolerance };
+    let options = Options {
+        base: args.base.clone(),
+        lock: args.lock.clone(),
+        tip: args.tip.clone(),
+        convention,
+        angle_tolerance: args.angle_tolerance,
+    };
     let imported = import::urdf(&text, &file, &options).map_err(|e| match e {
         ImportError::Unreadable(_) => Failure::input(e),
         ImportError::Refused(_) => Failure::refused(e),
@@ -53,8 +74,30 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         eprintln!("{file}: note: {note}");
     }
     let values = args.output.with_extension("values.json");
-    write(&[(&args.output, &imported.text), (&values, &imported.values_json())])?;
+    for path in [&args.output, &values] {
+        refuse_to_replace(path, &args.urdf, args.force)?;
+    }
+    let json = imported.values_json();
+    let mut files: Vec<(&Path, &str)> = vec![(&args.output, &imported.text)];
+    if !imported.values.is_empty() {
+        files.push((&values, &json));
+    }
+    write(&files)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Edited files are not lost by accident, and the original is never written over.
+fn refuse_to_replace(path: &Path, original: &Path, force: bool) -> Result<(), Failure> {
+    let place = path.display();
+    if same_file(path, original) {
+        return Err(Failure::input(format!("{place} is the file that is imported: choose another -o")));
+    }
+    if path.exists() && !force {
+        return Err(Failure::input(format!(
+            "{place} is there already and may have been edited: --force replaces it, or choose another -o"
+        )));
+    }
+    Ok(())
 }
 
 /// Writes all files or none: each is complete on the disk before the first takes its name.

@@ -109,6 +109,11 @@ fn model(path: &Path) -> Result<Model, Failure> {
     Model::derive(arm).map_err(Failure::refused)
 }
 
+/// Whether two paths lead to one file that is there.
+fn same_file(one: &Path, other: &Path) -> bool {
+    matches!((one.canonicalize(), other.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
 /// Writes to standard output; a reader that went away is no error.
 fn print(text: &str) -> Result<(), Failure> {
     use std::io::Write;

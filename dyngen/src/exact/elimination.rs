@@ -119,6 +119,60 @@ fn independent_rows(
     Ok(chosen)
 }
 
+/// The columns whose unit vector lies in the space that the rows span, modulo the prime; the space has one for
+/// every vector of its reduced form that has a single entry.
+///
+/// # Errors
+/// [`Unproven`] where the prime divides a denominator.
+pub fn unit_vectors(
+    field: &ConstantField,
+    rows: &[SparseRow],
+    columns: usize,
+    preference: &[usize],
+) -> Result<Vec<usize>, Unproven> {
+    let mut place = vec![usize::MAX; columns];
+    for (i, column) in preference.iter().enumerate() {
+        place[*column] = i;
+    }
+    let mut echelon: BTreeMap<usize, Vec<Fp>> = BTreeMap::new();
+    for row in rows {
+        let mut dense = vec![Fp::ZERO; preference.len()];
+        for (column, entry) in row {
+            dense[place[*column]] = field.modular_whole(entry).ok_or(Unproven)?;
+        }
+        if let Some(lead) = reduce_modular(&mut dense, &echelon) {
+            let scale = dense[lead].inverse().ok_or(Unproven)?;
+            dense.iter_mut().for_each(|x| *x = *x * scale);
+            echelon.insert(lead, dense);
+        }
+    }
+    // From the last row upwards each is freed of the leads below it.
+    let leads: Vec<usize> = echelon.keys().copied().collect();
+    for lead in leads.iter().rev() {
+        let Some(mut row) = echelon.remove(lead) else { continue };
+        for (other, pivot) in echelon.range(lead + 1..) {
+            let factor = row[*other];
+            row.iter_mut().zip(pivot).for_each(|(x, y)| *x = *x - factor * *y);
+        }
+        echelon.insert(*lead, row);
+    }
+    let single = |row: &[Fp]| row.iter().filter(|x| **x != Fp::ZERO).count() == 1;
+    Ok(echelon.iter().filter(|(_, row)| single(row)).map(|(lead, _)| preference[*lead]).collect())
+}
+
+/// The rank of a dense matrix modulo the prime.
+pub fn rank(rows: Vec<Vec<Fp>>) -> usize {
+    let mut echelon: BTreeMap<usize, Vec<Fp>> = BTreeMap::new();
+    for mut row in rows {
+        if let Some(lead) = reduce_modular(&mut row, &echelon) {
+            let scale = row[lead].inverse().unwrap_or(Fp::ONE);
+            row.iter_mut().for_each(|x| *x = *x * scale);
+            echelon.insert(lead, row);
+        }
+    }
+    echelon.len()
+}
+
 fn reduce_modular(row: &mut [Fp], echelon: &BTreeMap<usize, Vec<Fp>>) -> Option<usize> {
     for lead in 0..row.len() {
         if row[lead] == Fp::ZERO {

@@ -105,6 +105,22 @@ where
         PolynomialRing { squares }
     }
 
+    /// The same ring with more variables after its own.
+    ///
+    /// # Panics
+    /// As [`PolynomialRing::new`].
+    #[must_use]
+    pub fn extended(&self, more: Vec<Square<C>>) -> Self {
+        let mut squares = self.squares.clone();
+        squares.extend(more);
+        Self::new(squares)
+    }
+
+    /// How many variables it has.
+    pub fn variables(&self) -> usize {
+        self.squares.len()
+    }
+
     /// The variable itself.
     pub fn variable(&self, index: usize) -> Polynomial<C> {
         Polynomial { terms: vec![(Monomial::default().with(index, 1), C::one())] }

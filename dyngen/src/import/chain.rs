@@ -2,10 +2,10 @@
 
 use super::Options;
 use super::pose::Pose;
+use super::urdf::{Joint, Link, Origin, Robot};
 use crate::arm::{JointKind, MAX_JOINTS};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::collections::BTreeMap;
-use urdf_rs::{Joint, JointType, Link, Robot};
 
 /// A serial arm at q = 0, everything in the root link's frame.
 pub(super) struct Chain {
@@ -47,14 +47,25 @@ pub(super) struct Mass {
 
 /// Reads the chain, or says every reason why there is none.
 pub(super) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<String>> {
-    let tree = Tree::new(robot)?;
+    let mut tree = Tree::new(robot)?;
+    tree.locked = locked(robot, options)?;
+    if let Some(name) = &options.base {
+        tree.root =
+            tree.link(name).ok_or_else(|| vec![format!("there is no link '{name}' to be the base")])?;
+    }
+    let tree = tree;
     let tip = match &options.tip {
         Some(name) => {
             tree.link(name).ok_or_else(|| vec![format!("there is no link '{name}' to be the tip")])?
         }
         None => tree.only_tip().map_err(|reason| vec![reason])?,
     };
-    let path = tree.path(tip);
+    let Some(path) = tree.path(tip) else {
+        let (base, tip) = (&robot.links[tree.root].name, &robot.links[tip].name);
+        return Err(vec![format!(
+            "the tip '{tip}' is not behind the base '{base}': choose another --base or --tip"
+        )]);
+    };
     let mut walk = Walk {
         tree: &tree,
         options,
@@ -65,11 +76,11 @@ pub(super) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<Strin
     };
     let mut pose = Pose::identity();
     walk.body(tree.root, &pose);
-    for joint in path.iter().map(|j| &robot.joints[*j]) {
-        let (at, moves) = walk.joint(joint, &pose);
+    for (index, joint) in path.iter().map(|j| (*j, &robot.joints[*j])) {
+        let (at, moves) = walk.joint(index, joint, &pose);
         pose = at;
         // What is fixed to a body was found with the body.
-        if let (true, Some(child)) = (moves, tree.link(&joint.child.link)) {
+        if let (true, Some(child)) = (moves, tree.link(&joint.child)) {
             walk.body(child, &pose);
         }
     }
@@ -92,6 +103,18 @@ pub(super) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<Strin
     if !refused.is_empty() {
         return Err(refused);
     }
+    let mut notes = notes;
+    let massless = joints.iter().filter(|joint| joint.masses.is_empty());
+    let massless: Vec<String> = massless.map(|joint| format!("'{}'", joint.name)).collect();
+    if massless.len() == joints.len() {
+        notes.push("no link has an inertia: there are no parameter values".to_string());
+    } else if !massless.is_empty() {
+        notes.push(format!(
+            "behind {} no link has an inertia of its own: where nothing heavier follows, the mass matrix is \
+             singular",
+            massless.join(", ")
+        ));
+    }
     Ok(Chain {
         name: robot.name.clone(),
         root: robot.links[tree.root].name.clone(),
@@ -100,6 +123,23 @@ pub(super) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<Strin
         joints,
         notes,
     })
+}
+
+/// The joints that are held at a position, by their index.
+fn locked(robot: &Robot, options: &Options) -> Result<BTreeMap<usize, f64>, Vec<String>> {
+    let mut locked = BTreeMap::new();
+    let mut wrong = Vec::new();
+    for (name, value) in &options.lock {
+        let moving = |j: &Joint| matches!(j.kind.as_str(), "revolute" | "continuous" | "prismatic");
+        match robot.joints.iter().position(|j| j.name == *name) {
+            Some(index) if moving(&robot.joints[index]) && value.is_finite() => {
+                locked.insert(index, *value);
+            }
+            Some(_) => wrong.push(format!("joint '{name}' cannot be held at {value}")),
+            None => wrong.push(format!("there is no joint '{name}' to be held at {value}")),
+        }
+    }
+    if wrong.is_empty() { Ok(locked) } else { Err(wrong) }
 }
 
 /// The links of a URDF by their joints.
@@ -111,6 +151,8 @@ struct Tree<'r> {
     /// The joints below a link.
     below: Vec<Vec<usize>>,
     root: usize,
+    /// Joints that are held at a position, rad or m.
+    locked: BTreeMap<usize, f64>,
 }
 
 impl<'r> Tree<'r> {
@@ -125,10 +167,9 @@ impl<'r> Tree<'r> {
         let mut above = vec![None; robot.links.len()];
         let mut below = vec![Vec::new(); robot.links.len()];
         for (j, joint) in robot.joints.iter().enumerate() {
-            let ends =
-                [&joint.parent.link, &joint.child.link].map(|name| by_name.get(name.as_str()).copied());
+            let ends = [&joint.parent, &joint.child].map(|name| by_name.get(name.as_str()).copied());
             let [Some(parent), Some(child)] = ends else {
-                let missing = if ends[0].is_none() { &joint.parent.link } else { &joint.child.link };
+                let missing = if ends[0].is_none() { &joint.parent } else { &joint.child };
                 reasons
                     .push(format!("joint '{}' names the link '{missing}', which is not there", joint.name));
                 continue;
@@ -137,7 +178,7 @@ impl<'r> Tree<'r> {
                 let first: &Joint = &robot.joints[first];
                 reasons.push(format!(
                     "link '{}' is the child of two joints, '{}' and '{}': a closed loop is no serial chain",
-                    joint.child.link, first.name, joint.name
+                    joint.child, first.name, joint.name
                 ));
             }
             below[parent].push(j);
@@ -148,7 +189,7 @@ impl<'r> Tree<'r> {
         };
         match roots[..] {
             [root] if reasons.is_empty() => {
-                let tree = Tree { robot, by_name, above, below, root };
+                let tree = Tree { robot, by_name, above, below, root, locked: BTreeMap::new() };
                 let reached = tree.all_below(root);
                 let lost: Vec<usize> = (0..robot.links.len()).filter(|i| !reached.contains(i)).collect();
                 if lost.is_empty() {
@@ -170,11 +211,11 @@ impl<'r> Tree<'r> {
     }
 
     fn child(&self, joint: usize) -> usize {
-        self.link(&self.robot.joints[joint].child.link).unwrap_or(self.root)
+        self.link(&self.robot.joints[joint].child).unwrap_or(self.root)
     }
 
     fn moves(&self, joint: usize) -> bool {
-        self.robot.joints[joint].joint_type != JointType::Fixed
+        self.robot.joints[joint].kind != "fixed" && !self.locked.contains_key(&joint)
     }
 
     /// A link and all links below it.
@@ -188,16 +229,22 @@ impl<'r> Tree<'r> {
         found
     }
 
-    /// The joints from the root to a link.
-    fn path(&self, link: usize) -> Vec<usize> {
+    /// The mass of a link and all links below it, kg.
+    fn mass_below(&self, link: usize) -> f64 {
+        self.all_below(link).into_iter().map(|l| self.robot.links[l].mass).sum()
+    }
+
+    /// The joints from the root to a link; none where it is not below the root.
+    fn path(&self, link: usize) -> Option<Vec<usize>> {
         let mut path = Vec::new();
         let mut at = link;
-        while let Some(joint) = self.above[at] {
+        while at != self.root {
+            let joint = self.above[at]?;
             path.push(joint);
-            at = self.link(&self.robot.joints[joint].parent.link).unwrap_or(self.root);
+            at = self.link(&self.robot.joints[joint].parent).unwrap_or(self.root);
         }
         path.reverse();
-        path
+        Some(path)
     }
 
     /// The end of the one chain that moves, or where it branches.
@@ -221,7 +268,7 @@ impl<'r> Tree<'r> {
                     let joints: Vec<String> =
                         moving.iter().map(|j| format!("'{}'", self.robot.joints[*j].name)).collect();
                     // Where the branches hang first: there the arm ends more often than in a finger.
-                    let forks = moving.iter().map(|j| self.robot.joints[*j].parent.link.as_str());
+                    let forks = moving.iter().map(|j| self.robot.joints[*j].parent.as_str());
                     let leaves = self.all_below(body).into_iter().filter(|l| self.below[*l].is_empty());
                     let mut ends: Vec<&str> = forks.collect();
                     ends.extend(leaves.map(|l| self.robot.links[l].name.as_str()));
@@ -252,16 +299,18 @@ struct Walk<'r> {
 
 impl Walk<'_> {
     /// Adds a joint of the chain and gives the pose behind it, and whether it moves.
-    fn joint(&mut self, joint: &Joint, parent: &Pose) -> (Pose, bool) {
+    fn joint(&mut self, index: usize, joint: &Joint, parent: &Pose) -> (Pose, bool) {
         let name = joint.name.clone();
-        let kind = match joint.joint_type {
-            JointType::Fixed => None,
-            JointType::Revolute | JointType::Continuous => Some(JointKind::Revolute),
-            JointType::Prismatic => Some(JointKind::Prismatic),
-            JointType::Floating | JointType::Planar | JointType::Spherical => {
-                let kind = format!("{:?}", joint.joint_type).to_lowercase();
+        if !self.tree.moves(index) {
+            return (self.fixed(index, joint, parent), false);
+        }
+        let kind = match joint.kind.as_str() {
+            "revolute" | "continuous" => Some(JointKind::Revolute),
+            "prismatic" => Some(JointKind::Prismatic),
+            other => {
                 self.refused.push(format!(
-                    "joint '{name}' is {kind}: an arm file has revolute and prismatic joints only"
+                    "line {}: joint '{name}' is {other}: an arm file has revolute and prismatic joints only",
+                    joint.line
                 ));
                 None
             }
@@ -270,22 +319,23 @@ impl Walk<'_> {
         let Some(kind) = kind else { return (pose, false) };
         if let Some(mimic) = &joint.mimic {
             self.refused.push(format!(
-                "joint '{name}' mimics joint '{}': joints of an arm file move on their own",
-                mimic.joint
+                "joint '{name}' mimics joint '{mimic}': joints of an arm file move on their own"
             ));
         }
-        let axis = Vector3::from(joint.axis.xyz.0);
+        let axis = Vector3::from(joint.axis);
         let length = axis.norm();
         if !length.is_finite() || length < 1e-9 {
-            self.refused.push(format!("joint '{name}': its axis {:?} has no direction", joint.axis.xyz.0));
+            self.refused.push(format!("joint '{name}': its axis {:?} has no direction", joint.axis));
         }
-        let limit = &joint.limit;
-        let (lower, upper) = (limit.lower, limit.upper);
-        let bounded = joint.joint_type != JointType::Continuous && usable(lower) && usable(upper);
+        let Joint { lower, upper, velocity, effort, .. } = *joint;
+        let bounded = joint.kind != "continuous" && usable(lower) && usable(upper);
         if lower.is_nan() || upper.is_nan() || bounded && lower > upper {
-            self.refused.push(format!("joint '{name}': its limits {lower} … {upper} are no range"));
+            self.notes.push(format!(
+                "line {}: joint '{name}': its limits {lower} … {upper} are no range and are left out",
+                joint.line
+            ));
         }
-        if joint.joint_type != JointType::Continuous && lower == upper {
+        if joint.kind != "continuous" && lower == upper {
             self.notes.push(format!("joint '{name}' has no position limits"));
         }
         self.joints.push(ChainJoint {
@@ -294,12 +344,31 @@ impl Walk<'_> {
             point: pose.origin,
             direction: pose.rotation * (axis / length),
             position: (bounded && lower < upper).then_some([lower, upper]),
-            velocity: (limit.velocity > 0.0 && usable(limit.velocity)).then_some(limit.velocity),
-            torque: (limit.effort > 0.0 && usable(limit.effort)).then_some(limit.effort),
+            velocity: (velocity > 0.0 && usable(velocity)).then_some(velocity),
+            torque: (effort > 0.0 && usable(effort)).then_some(effort),
             links: Vec::new(),
             masses: Vec::new(),
         });
         (pose, true)
+    }
+
+    /// The pose behind a joint that is fixed, or held at a position.
+    fn fixed(&mut self, index: usize, joint: &Joint, parent: &Pose) -> Pose {
+        let pose = self.origin(&joint.origin, parent, &format!("joint '{}'", joint.name));
+        let Some(value) = self.tree.locked.get(&index) else { return pose };
+        let axis = Vector3::from(joint.axis);
+        if axis.norm().is_nan() || axis.norm() < 1e-9 {
+            self.refused.push(format!("joint '{}': its axis {:?} has no direction", joint.name, joint.axis));
+            return pose;
+        }
+        let moved = match joint.kind.as_str() {
+            "prismatic" => Pose { rotation: Matrix3::identity(), origin: axis.normalize() * *value },
+            _ => Pose {
+                rotation: Rotation3::new(axis.normalize() * *value).into_inner(),
+                origin: Vector3::zeros(),
+            },
+        };
+        pose.then(&moved)
     }
 
     /// Adds a link and all that is fixed to it to the body of the last joint.
@@ -311,12 +380,16 @@ impl Walk<'_> {
             for j in &self.tree.below[at] {
                 let joint = &self.tree.robot.joints[*j];
                 if !self.tree.moves(*j) {
-                    let pose = self.origin(&joint.origin, &pose, &format!("joint '{}'", joint.name));
+                    let pose = self.fixed(*j, joint, &pose);
                     rigid.push((self.tree.child(*j), pose));
                 } else if !self.path.contains(j) {
                     self.notes.push(format!(
-                        "left out: joint '{}' on link '{}', with all that it carries",
-                        joint.name, self.tree.robot.links[at].name
+                        "left out: joint '{}' on link '{}', with all that it carries: {} kg (--lock {}=0 keeps it \
+                         at a position)",
+                        joint.name,
+                        self.tree.robot.links[at].name,
+                        self.tree.mass_below(self.tree.child(*j)),
+                        joint.name
                     ));
                 }
             }
@@ -329,19 +402,20 @@ impl Walk<'_> {
         if self.joints.is_empty() {
             return;
         }
-        let inertial = &link.inertial;
-        let i = &inertial.inertia;
-        let place = format!("link '{}'", link.name);
-        let mass = inertial.mass.value;
-        let tensor = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
+        let place = format!("line {}: link '{}'", link.line, link.name);
+        let (mass, [xx, xy, xz, yy, yz, zz]) = (link.mass, link.inertia);
+        let tensor = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         if !usable(mass) || !tensor.iter().all(|x| usable(*x)) {
             self.refused.push(format!("{place}: its inertia has a number that is not finite"));
         } else if mass < 0.0 {
             self.refused.push(format!("{place}: its mass {mass} kg is negative"));
         }
-        let frame = self.origin(&inertial.origin, pose, &format!("{place}: inertial"));
+        let frame = self.origin(&link.origin, pose, &format!("{place}: inertial"));
         if let Some(joint) = self.joints.last_mut() {
             joint.links.push(link.name.clone());
+            if let Some(reason) = impossible(mass, &tensor) {
+                self.notes.push(format!("{place}: {reason}"));
+            }
             if mass != 0.0 || tensor.iter().any(|x| *x != 0.0) {
                 let inertia = frame.rotation * tensor * frame.rotation.transpose();
                 joint.masses.push(Mass { mass, centre: frame.origin, inertia });
@@ -349,8 +423,8 @@ impl Walk<'_> {
         }
     }
 
-    fn origin(&mut self, origin: &urdf_rs::Pose, parent: &Pose, place: &str) -> Pose {
-        if !origin.xyz.0.iter().chain(&origin.rpy.0).all(|x| usable(*x)) {
+    fn origin(&mut self, origin: &Origin, parent: &Pose, place: &str) -> Pose {
+        if !origin.xyz.iter().chain(&origin.rpy).all(|x| usable(*x)) {
             self.refused.push(format!("{place}: its origin has a number that is not finite"));
         }
         parent.then(&Pose::of(origin, self.options.angle_tolerance))
@@ -360,4 +434,25 @@ impl Walk<'_> {
 /// Finite, and not so large that it stands for infinity.
 fn usable(value: f64) -> bool {
     value.abs() < 1e30
+}
+
+/// Why no body has this mass and inertia about its centre of mass.
+fn impossible(mass: f64, tensor: &Matrix3<f64>) -> Option<String> {
+    let mut moments: Vec<f64> = tensor.symmetric_eigenvalues().iter().copied().collect();
+    moments.sort_by(f64::total_cmp);
+    let [least, middle, most] = moments[..] else { return None };
+    let rounding = 1e-6 * most.abs();
+    if mass == 0.0 && most > 0.0 {
+        return Some("it has moments of inertia but no mass".to_string());
+    }
+    if least < -rounding {
+        return Some(format!("its inertia is that of no body: the principal moment {least:.3e} is negative"));
+    }
+    (most > least + middle + rounding).then(|| {
+        format!(
+            "its inertia is that of no body: the principal moment {most:.3e} exceeds the sum of the other two, \
+             {:.3e}",
+            least + middle
+        )
+    })
 }

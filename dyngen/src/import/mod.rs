@@ -11,6 +11,7 @@ mod chain;
 mod frames;
 mod pose;
 mod text;
+mod urdf;
 
 use crate::arm::{Arm, Convention, Parameter};
 use std::fmt;
@@ -18,6 +19,10 @@ use std::fmt;
 /// How to read a URDF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
+    /// The link that stands still, and in whose frame everything is given; the root where it is left out.
+    pub base: Option<String>,
+    /// Joints that are held at a position, rad or m: they become part of what they are fixed to.
+    pub lock: Vec<(String, f64)>,
     /// The link that ends the chain; may be left out where the URDF is one chain already.
     pub tip: Option<String>,
     /// The convention of the arm file.
@@ -29,7 +34,13 @@ pub struct Options {
 impl Default for Options {
     /// The whole chain, modified convention, 1e-9 rad.
     fn default() -> Self {
-        Options { tip: None, convention: Convention::Modified, angle_tolerance: 1e-9 }
+        Options {
+            base: None,
+            lock: Vec::new(),
+            tip: None,
+            convention: Convention::Modified,
+            angle_tolerance: 1e-9,
+        }
     }
 }
 
@@ -40,7 +51,7 @@ pub struct Imported {
     pub arm: Arm,
     /// The arm file.
     pub text: String,
-    /// The values of all parameters that the arm keeps, in order, SI units.
+    /// The values of all parameters that the arm keeps, in order, SI units; none where no link has an inertia.
     pub values: Vec<(Parameter, f64)>,
     /// Frame 0 in the root link's frame: a homogeneous transform, row by row, m.
     pub base: [[f64; 4]; 4],
@@ -85,37 +96,18 @@ pub fn urdf(text: &str, file: &str, options: &Options) -> Result<Imported, Impor
     let refused = |reasons: Vec<String>| {
         ImportError::Refused(reasons.into_iter().map(|reason| format!("{file}: {reason}")).collect())
     };
-    let robot = read(text).map_err(|e| ImportError::Unreadable(format!("{file}: not a URDF: {e}")))?;
+    let unreadable = |e: String| {
+        let lines: Vec<String> = e.lines().map(|line| format!("{file}: not a URDF: {line}")).collect();
+        ImportError::Unreadable(lines.join("\n"))
+    };
+    let robot = urdf::read(text).map_err(unreadable)?;
     let chain = chain::chain(&robot, options).map_err(refused)?;
     let frames = frames::place(&chain, options).map_err(|reason| refused(vec![reason]))?;
     let text = text::arm_file(&chain, &frames, file, options);
     let arm = Arm::parse(&text, file)
         .map_err(|e| refused(e.0.into_iter().map(|d| format!("as an arm file: {}", d.message)).collect()))?;
     let base = frames.base.rows();
-    Ok(Imported { arm, text, values: text::values(&chain, &frames), base, notes: chain.notes })
-}
-
-/// A larger file is no robot.
-const LARGEST_FILE: usize = 64 << 20;
-/// A deeper document is no URDF, and XML readers follow nesting by recursion.
-const DEEPEST: usize = 100;
-
-fn read(text: &str) -> Result<urdf_rs::Robot, String> {
-    if text.len() > LARGEST_FILE {
-        return Err("larger than 64 MiB".to_string());
-    }
-    let mut depth = 0usize;
-    for piece in text.split('<').skip(1) {
-        let tag = piece.split('>').next().unwrap_or("");
-        match tag.as_bytes().first() {
-            Some(b'/') => depth = depth.saturating_sub(1),
-            Some(b'?' | b'!') => {}
-            _ if tag.ends_with('/') => {}
-            _ => depth += 1,
-        }
-        if depth > DEEPEST {
-            return Err(format!("elements are nested more than {DEEPEST} deep"));
-        }
-    }
-    urdf_rs::read_from_string(text).map_err(|e| e.to_string())
+    let heavy = chain.joints.iter().any(|joint| !joint.masses.is_empty());
+    let values = if heavy { text::values(&chain, &frames) } else { Vec::new() };
+    Ok(Imported { arm, text, values, base, notes: chain.notes })
 }

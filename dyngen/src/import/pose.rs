@@ -16,12 +16,12 @@ impl Pose {
     }
 
     /// From a URDF's `<origin>`: R = Rz(yaw)·Ry(pitch)·Rx(roll).
-    pub(super) fn of(origin: &urdf_rs::Pose, tolerance: f64) -> Self {
-        let [(sr, cr), (sp, cp), (sy, cy)] = origin.rpy.0.map(|angle| sin_cos(angle, tolerance));
+    pub(super) fn of(origin: &super::urdf::Origin, tolerance: f64) -> Self {
+        let [(sr, cr), (sp, cp), (sy, cy)] = origin.rpy.map(|angle| sin_cos(angle, tolerance));
         let x = Matrix3::new(1.0, 0.0, 0.0, 0.0, cr, -sr, 0.0, sr, cr);
         let y = Matrix3::new(cp, 0.0, sp, 0.0, 1.0, 0.0, -sp, 0.0, cp);
         let z = Matrix3::new(cy, -sy, 0.0, sy, cy, 0.0, 0.0, 0.0, 1.0);
-        Pose { rotation: z * y * x, origin: Vector3::from(origin.xyz.0) }
+        Pose { rotation: z * y * x, origin: Vector3::from(origin.xyz) }
     }
 
     /// From an axis z, a direction x at right angles to it, and an origin.

@@ -8,15 +8,16 @@ use crate::exact::algebra::Algebra;
 use elements::{ArmElements, JointElements, turn_x, turn_z};
 
 /// The motion of a link frame relative to the base, in the frame's own axes.
-struct Motion<V> {
+#[derive(Clone, Debug)]
+pub struct Motion<V> {
     /// Angular velocity.
-    omega: [V; 3],
+    pub omega: [V; 3],
     /// Velocity of the origin.
-    velocity: [V; 3],
+    pub velocity: [V; 3],
     /// Gravity.
-    gravity: [V; 3],
+    pub gravity: [V; 3],
     /// Gravity · position of the origin.
-    height: V,
+    pub height: V,
 }
 
 /// Twice the coefficient of every dynamic parameter in the Lagrangian, eleven a link in the order of Eq. 10:
@@ -34,19 +35,30 @@ pub fn twice_lagrangian<A: Algebra>(alg: &A, arm: &ArmElements<A::Value>) -> Vec
     };
     let mut columns = Vec::with_capacity(arm.joints.len() * ParameterKind::ALL.len());
     for joint in &arm.joints {
-        if arm.convention == Convention::Modified {
-            twist(alg, joint, &mut state);
-        }
-        // Before it turns, z is the joint axis in axes that are fixed in the link before.
-        let rotor = rotor_column(alg, joint, &state.omega[2]);
-        advance(alg, joint, &mut state);
-        if arm.convention == Convention::Standard {
-            twist(alg, joint, &mut state);
-        }
+        let rotor = step(alg, arm.convention, joint, &mut state);
         columns.extend(link_columns(alg, &state));
         columns.push(rotor);
     }
     columns
+}
+
+/// From the motion of a link to that of the next one; returns the column of the rotor between them.
+pub fn step<A: Algebra>(
+    alg: &A,
+    convention: Convention,
+    joint: &JointElements<A::Value>,
+    state: &mut Motion<A::Value>,
+) -> A::Value {
+    if convention == Convention::Modified {
+        twist(alg, joint, state);
+    }
+    // Before it turns, z is the joint axis in axes that are fixed in the link before.
+    let rotor = rotor_column(alg, joint, &state.omega[2]);
+    advance(alg, joint, state);
+    if convention == Convention::Standard {
+        twist(alg, joint, state);
+    }
+    rotor
 }
 
 /// Rx(α) Tx(a).
@@ -89,7 +101,7 @@ fn rotor_column<A: Algebra>(alg: &A, joint: &JointElements<A::Value>, omega_z: &
 }
 
 /// The ten inertial columns of a link: m, first moments, then the inertia tensor with the signs of Eq. 8.
-fn link_columns<A: Algebra>(alg: &A, state: &Motion<A::Value>) -> Vec<A::Value> {
+pub fn link_columns<A: Algebra>(alg: &A, state: &Motion<A::Value>) -> Vec<A::Value> {
     let two = alg.integer(2);
     let Motion { omega: w, velocity: v, gravity: g, height } = state;
     let mut columns = vec![alg.add(&alg.dot(v, v), &alg.mul(&two, height))];

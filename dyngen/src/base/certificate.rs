@@ -1,0 +1,122 @@
+//! Both halves of a dependence of columns, certified at random points of the prime field by the Lagrangian itself.
+//!
+//! That the kept columns are independent is certain where a minor of their values does not vanish modulo the prime.
+//! That a relation holds is as certain as a proof of a function is: a wrong one is a polynomial that is not zero
+//! and vanishes at a random point with probability below 2⁻⁵⁴; as many points are taken as there are columns.
+
+use super::coefficients::Sizes;
+use crate::arm::{Arm, JointKind};
+use crate::exact::constant::ConstantField;
+use crate::exact::elimination::{Dependence, Unproven, rank};
+use crate::exact::prime::{Draws, Fp, PrimeField};
+use crate::exact::rational::Rational;
+use crate::exact::symbols::AngleSymbols;
+use crate::lagrangian::elements::{ArmElements, Source};
+use crate::lagrangian::twice_lagrangian;
+
+/// Points beyond one for each kept column.
+const MORE: usize = 4;
+
+/// Certifies a dependence of the columns of the parameters that the arm keeps.
+///
+/// # Errors
+/// [`Unproven`] where a kept column depends on others, a relation does not hold, or the prime divides a number.
+pub(super) fn certify(
+    arm: &Arm,
+    symbols: &AngleSymbols,
+    field: &ConstantField,
+    sizes: Sizes,
+    dependence: &Dependence,
+) -> Result<(), Unproven> {
+    let mut draws = Draws::new(0x6365_7274);
+    let mut relations: Vec<(usize, Vec<(usize, Fp)>)> = Vec::new();
+    for parameter in arm.kept_parameters() {
+        let column = parameter.index();
+        if !dependence.kept.contains(&column) {
+            let factor = |(position, c): &(usize, _)| Some((dependence.kept[*position], field.modular(c)?));
+            let terms: Option<Vec<(usize, Fp)>> = dependence.coordinates[column].iter().map(factor).collect();
+            relations.push((column, terms.ok_or(Unproven)?));
+        }
+    }
+    let mut kept = Vec::new();
+    for _ in 0..dependence.kept.len() + MORE {
+        let mut point = Point::draw(arm, field, sizes, &mut draws);
+        let columns = |point: &mut Point<'_>| {
+            let elements = ArmElements::build(&PrimeField, arm, symbols, point);
+            twice_lagrangian(&PrimeField, &elements)
+        };
+        let moving = columns(&mut point);
+        // A constant changes no torque: columns count up to one, which depends on the sizes alone.
+        point.joints.iter_mut().for_each(|joint| *joint = [Fp::ZERO, Fp::ONE, Fp::ZERO, Fp::ZERO]);
+        let still = columns(&mut point);
+        let values: Vec<Fp> = moving.iter().zip(&still).map(|(a, b)| *a - *b).collect();
+        for (column, terms) in &relations {
+            let sum = terms.iter().fold(Fp::ZERO, |sum, (k, factor)| sum + *factor * values[*k]);
+            if sum != values[*column] {
+                return Err(Unproven);
+            }
+        }
+        kept.push(dependence.kept.iter().map(|k| values[*k]).collect());
+    }
+    if rank(kept) == dependence.kept.len() { Ok(()) } else { Err(Unproven) }
+}
+
+/// A random pose and motion, with random sizes where they are variables.
+struct Point<'a> {
+    arm: &'a Arm,
+    field: &'a ConstantField,
+    /// Sine, cosine, position and velocity of each joint.
+    joints: Vec<[Fp; 4]>,
+    /// a, d and rotor ratio of each joint, where they are variables.
+    sizes: Option<Vec<[Fp; 3]>>,
+}
+
+impl<'a> Point<'a> {
+    fn draw(arm: &'a Arm, field: &'a ConstantField, sizes: Sizes, draws: &mut Draws) -> Self {
+        let joint = |draws: &mut Draws| {
+            let (sin, cos) = draws.element().circle_point();
+            [sin, cos, draws.element(), draws.element()]
+        };
+        let joints = arm.joints.iter().map(|_| joint(draws)).collect();
+        let three = |draws: &mut Draws| [draws.element(), draws.element(), draws.element()];
+        let sizes = (sizes == Sizes::Variables).then(|| arm.joints.iter().map(|_| three(draws)).collect());
+        Point { arm, field, joints, sizes }
+    }
+
+    fn size(&self, joint: usize, which: usize, value: Option<&Rational>) -> Fp {
+        match (&self.sizes, value) {
+            (Some(sizes), _) => sizes[joint][which],
+            // A number with the prime in its denominator fails the certificate.
+            (None, value) => value.and_then(Fp::from_rational).unwrap_or(Fp::ZERO),
+        }
+    }
+}
+
+impl Source<Fp> for Point<'_> {
+    fn joint_trig(&mut self, joint: usize) -> (Fp, Fp) {
+        debug_assert_eq!(self.arm.joints[joint].kind, JointKind::Revolute);
+        let [sin, cos, ..] = self.joints[joint];
+        (sin, cos)
+    }
+    fn position(&mut self, joint: usize) -> Fp {
+        self.joints[joint][2]
+    }
+    fn speed(&mut self, joint: usize) -> Fp {
+        self.joints[joint][3]
+    }
+    fn a(&mut self, joint: usize) -> Fp {
+        self.size(joint, 0, Some(&self.arm.joints[joint].a))
+    }
+    fn d(&mut self, joint: usize) -> Fp {
+        self.size(joint, 1, Some(&self.arm.joints[joint].d))
+    }
+    fn ratio(&mut self, joint: usize) -> Fp {
+        self.size(joint, 2, self.arm.joints[joint].rotor_ratio.as_ref())
+    }
+    fn gravity(&mut self, axis: usize) -> Fp {
+        Fp::from_rational(&self.arm.gravity[axis]).unwrap_or(Fp::ZERO)
+    }
+    fn symbol(&mut self, index: usize, sine: bool) -> Fp {
+        self.field.modular_symbol(index, sine)
+    }
+}
