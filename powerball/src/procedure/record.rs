@@ -4,7 +4,7 @@
 //! dies at, the file can be read up to there.
 
 use super::approach;
-use crate::bus::driver::{ControlMode, Phase, Profile, Rejection};
+use crate::bus::driver::{ControlMode, Phase, Profile, Rejection, check_path};
 use crate::bus::transport::{ArmError, Bus, Master, Moment};
 use crate::identification::motion::Motion;
 use serde::Serialize;
@@ -89,7 +89,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         master.wait_for(Phase::Ready, PATIENCE)?;
         master.driver_mut().enable().map_err(ArmError::from)?;
         master.wait_for(Phase::Running, PATIENCE)?;
-        let target = master.driver().positions();
+        let target = master.driver().setpoints();
         Ok(Recorder { master, target })
     }
 
@@ -263,6 +263,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
                 (1.0 / period).round()
             ));
         }
+        fits(self.master.driver().profile(), motion)?;
         let far = motion.q.iter().zip(&self.target).fold(0.0f64, |far, (a, b)| far.max((a - b).abs()));
         if far > 1e-3 {
             return wrong(format!("the motion begins {far:.4} rad from where the arm is; go there first"));
@@ -293,6 +294,16 @@ pub fn way<const N: usize>(
     approach(from, to, &speed, &acceleration, profile.period_seconds(), least)
 }
 
+/// Whether the driver will take every set-point of a motion, from rest to rest.
+fn fits<const N: usize>(profile: &Profile<N>, motion: &Motion) -> Result<(), RecordError> {
+    let rows = motion.samples().filter_map(|[q, ..]| <[f64; N]>::try_from(q).ok());
+    check_path(profile, rows).map_err(|(k, why)| {
+        let end = if k >= motion.len() { ", where it must end at rest" } else { "" };
+        let time = k as f64 * motion.period;
+        RecordError::Motion(format!("sample {k}, at {time:.3} s{end}: {why}"))
+    })
+}
+
 fn header<const N: usize>(with_references: bool) -> String {
     let mut out = String::from("t");
     let names: &[&str] = if with_references { &["q", "tau", "ref"] } else { &["q", "tau"] };
@@ -319,6 +330,9 @@ pub fn record<B: Bus, const N: usize>(
 ) -> Result<Record, RecordError> {
     if let Some(why) = barred(motion) {
         return Err(RecordError::Barred(format!("on the trajectory {why}")));
+    }
+    if motion.dof() == N {
+        fits(master.driver().profile(), motion)?;
     }
     let mut recorder = Recorder::enable(master)?;
     let done = recorder.approach_and_record(motion, barred, log);

@@ -250,6 +250,8 @@ pub(crate) struct World {
     backlog: VecDeque<(Micros, Event)>,
     cycle: u64,
     phase: f64,
+    base: [f64; 6],
+    dropped: u64,
     holding: bool,
 }
 
@@ -278,6 +280,8 @@ impl World {
             backlog: VecDeque::new(),
             cycle: 0,
             phase: 0.0,
+            base: START,
+            dropped: 0,
             holding: false,
         }
     }
@@ -332,12 +336,22 @@ impl World {
         if self.driver.phase() != Phase::Running || cycles == self.cycle {
             return;
         }
+        // The first cycle after this one was not running: from where the joints are held.
+        if cycles != self.cycle + 1 {
+            (self.base, self.phase) = (self.driver.setpoints(), 0.0);
+        }
         self.cycle = cycles;
-        self.phase += 0.005;
+        // What came too late for its slot is given again.
+        let dropped = self.driver.counters().dropped;
+        if std::mem::replace(&mut self.dropped, dropped) == dropped {
+            self.phase += 0.005;
+        }
         let (wave, now) = ((2.0 * self.phase).sin(), self.now());
         let mut targets = match self.driver.control() {
             ControlMode::ProfilePosition => START.map(|q| q + 0.05 * (self.phase / 0.2).floor().sin()),
-            ControlMode::InterpolatedPosition => START.map(|q| q + 0.05 * (2.0 * self.phase).sin()),
+            ControlMode::InterpolatedPosition => {
+                self.base.map(|q| q + 0.05 * (1.0 - (2.0 * self.phase).cos()))
+            }
             ControlMode::Velocity => [0.15 * wave; 6],
             ControlMode::Current => [0.05 * wave; 6],
         };

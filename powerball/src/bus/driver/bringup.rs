@@ -344,6 +344,7 @@ impl<const N: usize> Driver<N> {
             }
             self.release_watch();
             (self.fresh, self.rejection, self.streaming) = (false, None, false);
+            self.pending = false;
             (self.rejected_run, self.starved_run) = (0, 0);
             self.enter(Phase::Running);
         }

@@ -8,6 +8,7 @@ use crate::bus::canopen::emcy::{Emcy, vendor_text};
 use crate::bus::canopen::pdo::MappingError;
 use crate::bus::canopen::{NodeId, Object};
 use crate::bus::cia402::{Mode, State, Statusword};
+use crate::controller::JointNumber;
 use core::fmt;
 
 /// What a statusword gives as the reason that a transition did not happen.
@@ -120,8 +121,8 @@ pub enum Cause {
     /// twice: the dimension factor 0x604C means something else than the profile says, or the joint is
     /// blocked.
     WrongVelocityScale(NodeId, f64),
-    /// A joint (from 0) moves faster than it may.
-    Overspeed(usize),
+    /// A joint moves faster than it may.
+    Overspeed(JointNumber),
     /// The CAN controller is off the bus.
     BusOff,
     /// The transport's queue is full.
@@ -262,7 +263,7 @@ impl fmt::Display for Cause {
                         free the joint"
                 )
             }
-            Cause::Overspeed(joint) => write!(f, "joint {} moves faster than it may", joint + 1),
+            Cause::Overspeed(joint) => write!(f, "joint {joint} moves faster than it may"),
             Cause::BusOff => f.write_str("CAN controller off the bus"),
             Cause::TransmitQueueFull => f.write_str("transmit queue full"),
             Cause::NoBoot(_) => f.write_str("no boot-up message: is it powered, and the bit rate right?"),

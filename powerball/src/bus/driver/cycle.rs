@@ -7,6 +7,7 @@ use super::{Cause, ControlMode, Driver, Phase, Rejection, Transmit};
 use crate::bus::canopen::sync::Tick;
 use crate::bus::canopen::{Micros, cob};
 use crate::bus::cia402::{Command, Controlword, State};
+use crate::controller::JointNumber;
 
 impl<const N: usize> Driver<N> {
     /// The set-points to act with the next SYNC, in rad, rad/s or A by the mode. Called again before the
@@ -22,6 +23,7 @@ impl<const N: usize> Driver<N> {
         match checked {
             Ok(()) => {
                 self.fresh = true;
+                self.pending = true;
                 self.streaming = true;
             }
             Err(rejection) => self.rejection = Some(rejection),
@@ -36,16 +38,16 @@ impl<const N: usize> Driver<N> {
         {
             Guard {
                 mode: self.control,
-                joint: j,
+                joint: JointNumber::from_index(j),
                 profile,
                 reactions: &self.profile.reactions,
                 period,
-                last: joint.demand.last(),
+                demand: &joint.demand,
                 position: joint.position,
             }
             .check(*value)?;
             if joint.raw(self.control, *value).cut {
-                return Err(Rejection::Saturated(j));
+                return Err(Rejection::Saturated(JointNumber::from_index(j)));
             }
         }
         for (joint, value) in self.joints.iter_mut().zip(setpoints) {
@@ -184,8 +186,25 @@ impl<const N: usize> Driver<N> {
         }
     }
 
+    /// A cycle without new set-points, or with rejected ones: the joints go on as they went, within their limits. To
+    /// stand still at once would be an acceleration that no joint has.
+    fn go_on(&mut self) {
+        let period = self.profile.period_seconds();
+        for (profile, joint) in self.profile.joints.iter().zip(&mut self.joints) {
+            let next = joint.demand.next(period, profile.velocity, profile.acceleration);
+            let [low, high] = profile.position;
+            let last = joint.demand.last();
+            joint.target = next.clamp(low.min(last), high.max(last));
+        }
+    }
+
     /// One receive PDO a joint.
     pub(super) fn send_setpoints(&mut self, tx: &mut impl Transmit) {
+        let came = core::mem::take(&mut self.pending);
+        let interpolated = self.control == ControlMode::InterpolatedPosition;
+        if self.phase == Phase::Running && interpolated && self.streaming && !came {
+            self.go_on();
+        }
         for j in 0..N {
             self.send_joint(j, tx);
         }

@@ -1,23 +1,27 @@
-//! What a set-point must be to leave for the arm.
+//! What a set-point must be to leave for the arm, and a whole path before the arm moves.
 
-use super::profile::{ControlMode, JointProfile, Reactions};
+use super::demand::Demand;
+use super::profile::{ControlMode, JointProfile, Profile, Reactions};
+use crate::controller::JointNumber;
 use core::fmt;
 
-/// Why a set-point was rejected; joints count from 0.
+/// Why a set-point was rejected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rejection {
     /// Joint's value is NaN or infinite.
-    NotFinite(usize),
+    NotFinite(JointNumber),
     /// Joint, position (asked for, or reached before it can stop) and the limit that it would pass, rad.
-    Position(usize, f64, f64),
+    Position(JointNumber, f64, f64),
     /// Joint, speed and greatest speed, rad/s.
-    Velocity(usize, f64, f64),
+    Velocity(JointNumber, f64, f64),
     /// Joint, current and greatest current, A.
-    Current(usize, f64, f64),
+    Current(JointNumber, f64, f64),
     /// Joint, change since the last set-point and the greatest change, in the mode's unit.
-    Jump(usize, f64, f64),
+    Jump(JointNumber, f64, f64),
+    /// Joint, acceleration of its set-points and the greatest one, rad/s².
+    Acceleration(JointNumber, f64, f64),
     /// Joint whose value the drive's type cannot hold: it would be cut.
-    Saturated(usize),
+    Saturated(JointNumber),
     /// The arm does not follow set-points now.
     NotRunning,
 }
@@ -25,21 +29,24 @@ pub enum Rejection {
 impl fmt::Display for Rejection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Rejection::NotFinite(j) => write!(f, "joint {}: the set-point is not a number", j + 1),
+            Rejection::NotFinite(j) => write!(f, "joint {j}: the set-point is not a number"),
             Rejection::Position(j, q, limit) => {
-                write!(f, "joint {}: position {q:.4} rad beyond the limit {limit:.4} rad", j + 1)
+                write!(f, "joint {j}: position {q:.4} rad beyond the limit {limit:.4} rad")
             }
             Rejection::Velocity(j, v, limit) => {
-                write!(f, "joint {}: {v:.4} rad/s is more than the greatest speed {limit:.4} rad/s", j + 1)
+                write!(f, "joint {j}: {v:.4} rad/s is more than the greatest speed {limit:.4} rad/s")
             }
             Rejection::Current(j, i, limit) => {
-                write!(f, "joint {}: {i:.3} A is more than the greatest current {limit:.3} A", j + 1)
+                write!(f, "joint {j}: {i:.3} A is more than the greatest current {limit:.3} A")
             }
             Rejection::Jump(j, step, limit) => {
-                write!(f, "joint {}: a step of {step:.5} in one cycle, {limit:.5} can be", j + 1)
+                write!(f, "joint {j}: a step of {step:.5} in one cycle, {limit:.5} can be")
+            }
+            Rejection::Acceleration(j, a, limit) => {
+                write!(f, "joint {j}: its set-points accelerate by {a:.2} rad/s², {limit:.2} rad/s² can be")
             }
             Rejection::Saturated(j) => {
-                write!(f, "joint {}: the drive's number type cannot hold the set-point", j + 1)
+                write!(f, "joint {j}: the drive's number type cannot hold the set-point")
             }
             Rejection::NotRunning => f.write_str("the arm does not follow set-points now"),
         }
@@ -52,13 +59,13 @@ impl core::error::Error for Rejection {}
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Guard<'a> {
     pub(super) mode: ControlMode,
-    pub(super) joint: usize,
+    pub(super) joint: JointNumber,
     pub(super) profile: &'a JointProfile,
     pub(super) reactions: &'a Reactions,
     /// SYNC period, s.
     pub(super) period: f64,
-    /// The last set-point that left.
-    pub(super) last: f64,
+    /// The set-points that left.
+    pub(super) demand: &'a Demand,
     /// Measured position, rad.
     pub(super) position: f64,
 }
@@ -74,7 +81,8 @@ impl Guard<'_> {
             ControlMode::ProfilePosition => self.inside(value),
             ControlMode::InterpolatedPosition => {
                 self.inside(value)?;
-                self.step(value, limits.velocity * self.period * self.reactions.step_factor)
+                self.step(value, limits.velocity * self.period * self.reactions.step_factor)?;
+                self.accelerate(value)
             }
             ControlMode::Velocity => {
                 if value.abs() > limits.velocity {
@@ -117,10 +125,56 @@ impl Guard<'_> {
         }
     }
 
+    /// The second difference of positions. What two counts of the encoder make of it is rounding.
+    fn accelerate(&self, value: f64) -> Result<(), Rejection> {
+        let rounding = 2.0 / (self.profile.units.counts_per_radian.abs() * self.period * self.period);
+        let limit = self.profile.acceleration * self.reactions.step_factor + rounding;
+        let velocity = (value - self.demand.last()) / self.period;
+        let acceleration = (velocity - self.demand.velocity(self.period)) / self.period;
+        if acceleration.abs() > limit {
+            return Err(Rejection::Acceleration(self.joint, acceleration, limit));
+        }
+        Ok(())
+    }
+
     fn step(&self, value: f64, limit: f64) -> Result<(), Rejection> {
-        let step = value - self.last;
+        let step = value - self.demand.last();
         if step.abs() > limit { Err(Rejection::Jump(self.joint, step, limit)) } else { Ok(()) }
     }
+}
+
+/// Whether the driver will take a whole path in interpolated position mode, sample by sample, from rest at its first
+/// sample to rest at its last: the same guard that each set-point passes when it leaves.
+///
+/// # Errors
+/// The first sample, from 0, that it will not take, and why. One past the last: it does not end at rest.
+pub fn check_path<const N: usize>(
+    profile: &Profile<N>,
+    path: impl IntoIterator<Item = [f64; N]>,
+) -> Result<(), (usize, Rejection)> {
+    let mut demands: Option<[Demand; N]> = None;
+    let mut check = |k: usize, sample: &[f64; N]| {
+        let demands = demands.get_or_insert_with(|| sample.map(Demand::at_rest));
+        for (j, ((joint, demand), value)) in profile.joints.iter().zip(&mut *demands).zip(sample).enumerate()
+        {
+            let number = JointNumber::from_index(j);
+            // No joint stands outside its limits before the arm moves: within them means strictly.
+            let position = 0.5 * (joint.position[0] + joint.position[1]);
+            let (mode, reactions) = (ControlMode::InterpolatedPosition, &profile.reactions);
+            let period = profile.period_seconds();
+            Guard { mode, joint: number, profile: joint, reactions, period, demand, position }
+                .check(*value)
+                .map_err(|rejection| (k, rejection))?;
+            demand.push(*value);
+        }
+        Ok(())
+    };
+    let (mut count, mut last) = (0, None);
+    for sample in path {
+        check(count, &sample)?;
+        (count, last) = (count + 1, Some(sample));
+    }
+    last.map_or(Ok(()), |last| check(count, &last))
 }
 
 #[cfg(test)]
@@ -128,26 +182,85 @@ mod tests {
     use super::super::lwa4p::LWA4P;
     use super::*;
 
+    const FIRST: JointNumber = JointNumber::from_index(0);
+
+    /// Of a joint that rested at `last`.
     fn guard(mode: ControlMode, last: f64, position: f64) -> Guard<'static> {
+        moving(mode, Box::leak(Box::new(Demand::at_rest(last))), position)
+    }
+
+    fn moving(mode: ControlMode, demand: &Demand, position: f64) -> Guard<'_> {
         let profile = &LWA4P.joints[0];
-        Guard { mode, joint: 0, profile, reactions: &LWA4P.reactions, period: 0.005, last, position }
+        Guard { mode, joint: FIRST, profile, reactions: &LWA4P.reactions, period: 0.005, demand, position }
     }
 
     #[test]
     fn not_a_number_never_leaves() {
         for mode in ControlMode::ALL {
             for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-                assert_eq!(guard(mode, 0.0, 0.0).check(value), Err(Rejection::NotFinite(0)));
+                assert_eq!(guard(mode, 0.0, 0.0).check(value), Err(Rejection::NotFinite(FIRST)));
             }
         }
     }
 
+    /// Set-points that have gone by so much each cycle for a while, the last one at 0.1.
+    fn run_up(step: f64) -> Demand {
+        let mut demand = Demand::at_rest(0.1);
+        (0..8).rev().for_each(|k| demand.push(0.1 - step * f64::from(k)));
+        demand
+    }
+
     #[test]
     fn interpolated_steps_end_at_the_greatest_speed() {
-        let guard = guard(ControlMode::InterpolatedPosition, 0.1, 0.1);
         let step = LWA4P.joints[0].velocity * 0.005;
+        let demand = run_up(step);
+        let guard = moving(ControlMode::InterpolatedPosition, &demand, 0.1);
         assert_eq!(guard.check(0.1 + step), Ok(()));
-        assert!(matches!(guard.check(0.1 + 1.1 * step), Err(Rejection::Jump(0, ..))));
+        assert!(matches!(guard.check(0.1 + 1.1 * step), Err(Rejection::Jump(FIRST, ..))));
+    }
+
+    /// ± 3 mrad a cycle is slow enough for every limit of the velocity, and 480 rad/s².
+    #[test]
+    fn interpolated_points_must_not_accelerate_too_much() {
+        let mode = ControlMode::InterpolatedPosition;
+        let bound = LWA4P.joints[0].acceleration;
+        let after = |step: f64, acceleration: f64| {
+            let demand = run_up(step);
+            moving(mode, &demand, 0.1).check(0.1 + step + acceleration * 0.005 * 0.005)
+        };
+        for step in [0.0, 0.003, -0.003] {
+            for sign in [1.0, -1.0] {
+                assert_eq!(after(step, sign * bound), Ok(()));
+                let much = after(step, sign * 1.5 * bound);
+                assert!(matches!(much, Err(Rejection::Acceleration(FIRST, ..))), "{much:?}");
+            }
+        }
+        assert!(matches!(guard(mode, 0.1, 0.1).check(0.103), Err(Rejection::Acceleration(..))));
+        let demand = run_up(0.003);
+        let back = moving(mode, &demand, 0.1).check(0.097);
+        assert!(
+            matches!(back, Err(Rejection::Acceleration(_, a, _)) if (a + 240.0).abs() < 1e-6),
+            "{back:?}"
+        );
+    }
+
+    #[test]
+    fn a_whole_path_is_checked_before_the_arm_moves() {
+        let swing = |amplitude: f64, steps: usize| {
+            (0..=steps).map(move |k| {
+                let w = core::f64::consts::TAU * k as f64 / 400.0;
+                [0.0, 0.0, amplitude * (1.0 - w.cos()), 0.0, 0.0, 0.0]
+            })
+        };
+        assert_eq!(check_path(&LWA4P, swing(0.4, 400)), Ok(()));
+        // π rad/s there, 9.9 A rad/s²: 4.36 are passed first; and a path that ends while it moves.
+        let third = JointNumber::from_index(2);
+        let (k, why) = check_path(&LWA4P, swing(0.6, 400)).unwrap_err();
+        assert!(matches!(why, Rejection::Acceleration(j, ..) if j == third) && k <= 2, "{k}: {why}");
+        let (k, why) = check_path(&LWA4P, swing(0.38, 100)).unwrap_err();
+        assert!(matches!(why, Rejection::Acceleration(j, ..) if j == third) && k == 101, "{k}: {why}");
+        let far = (0..3).map(|_| [0.0, 0.0, 2.8, 0.0, 0.0, 0.0]);
+        assert!(matches!(check_path(&LWA4P, far), Err((0, Rejection::Position(j, ..))) if j == third));
     }
 
     #[test]

@@ -74,7 +74,7 @@ mod watch;
 pub use budget::{Budget, Verdict};
 pub use cause::{Cause, Details, Refusal};
 pub use foreign::Foreign;
-pub use guard::Rejection;
+pub use guard::{Rejection, check_path};
 pub use joint::{Joint, JointCounters};
 pub use link::{BusEvent, QueueFull, Transmit};
 pub use profile::{ControlMode, JointProfile, Profile};
@@ -228,6 +228,8 @@ pub struct Driver<const N: usize> {
     slot_open: bool,
     /// New set-points came, or were rejected, since the last SYNC; whether they ever came.
     fresh: bool,
+    /// Set-points were taken that have not left.
+    pending: bool,
     rejection: Option<Rejection>,
     streaming: bool,
     rejected_run: u8,
@@ -269,6 +271,7 @@ impl<const N: usize> Driver<N> {
             diagnosis: None,
             slot_open: false,
             fresh: false,
+            pending: false,
             rejection: None,
             streaming: false,
             rejected_run: 0,
@@ -400,6 +403,11 @@ impl<const N: usize> Driver<N> {
     /// Positions, rad.
     pub fn positions(&self) -> [f64; N] {
         self.joints.map(|joint| joint.position)
+    }
+
+    /// The set-points that have left last, rad, rad/s or A: where new ones begin.
+    pub fn setpoints(&self) -> [f64; N] {
+        self.joints.map(|joint| joint.demand.last())
     }
 
     /// Counts.

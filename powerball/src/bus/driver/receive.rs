@@ -6,6 +6,7 @@ use crate::bus::canopen::client::SdoError;
 use crate::bus::canopen::emcy::Emcy;
 use crate::bus::canopen::{Cob, Frame, Micros, NodeId, nmt};
 use crate::bus::cia402::{State, objects};
+use crate::controller::JointNumber;
 
 /// A boot-up message that comes twice within this time is one.
 const BOOT_ECHO: Micros = 20_000;
@@ -128,7 +129,7 @@ impl<const N: usize> Driver<N> {
         joint.overspeed_run = joint.overspeed_run.saturating_add(1);
         if joint.overspeed_run >= reactions.missing_cycles {
             joint.overspeed_run = 0;
-            self.trip(Cause::Overspeed(j), tx);
+            self.trip(Cause::Overspeed(JointNumber::from_index(j)), tx);
         }
     }
 
