@@ -22,7 +22,6 @@ pub enum Trajectory {
     /// None was looked for.
     NotDesigned {},
     /// None could be found.
-    #[allow(missing_docs)]
     None {
         /// Always `None`: null in explained.json, beside the reason.
         trajectory: Option<&'static str>,

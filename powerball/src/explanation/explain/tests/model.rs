@@ -49,7 +49,8 @@ fn a_base_model_beside_what_is_known_does_as_well_as_the_whole() {
     }
 }
 
-/// The door joins the clocks of logs and takes out what is known, and what is known comes back into the model.
+/// The door joins the clocks of logs and takes out what is known, and what is known comes back into the
+/// model.
 #[test]
 fn the_door_needs_nothing_prepared() {
     let body = RigidBody::new(&arm()).unwrap();
