@@ -5,7 +5,7 @@
 use dyngen::Arm;
 use dyngen::base::SetKind;
 use dyngen::base::sets::Sets;
-use dyngen::dynamics::elements::angle_symbols;
+use dyngen::lagrangian::elements::angle_symbols;
 use powerball_workspace::{arm, arm_text, paper_arm_with_ratios, parse};
 
 fn sets(arm: &Arm) -> Sets {
