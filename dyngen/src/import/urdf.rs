@@ -127,7 +127,9 @@ fn robot(document: &Document<'_>) -> Result<Robot, String> {
     }
     let mut reader = Reader { document, errors: Vec::new() };
     let mut robot = Robot { name: root.attribute("name").unwrap_or("").to_string(), ..Robot::default() };
-    for node in root.children().filter(Node::is_element) {
+    // An element of another namespace, <drake:joint>, is none of the robot's.
+    let own = |node: &Node<'_, '_>| node.tag_name().namespace() == root.tag_name().namespace();
+    for node in root.children().filter(|node| node.is_element() && own(node)) {
         match node.tag_name().name() {
             "link" => robot.links.extend(reader.link(node)),
             // In a <gazebo> or <transmission> a joint is something else; here it is one of the robot's.
@@ -246,5 +248,7 @@ impl<'d, 'i> Reader<'d, 'i> {
 
 /// The first element of that name below another.
 fn child<'d, 'i>(node: Node<'d, 'i>, name: &str) -> Option<Node<'d, 'i>> {
-    node.children().find(|n| n.is_element() && n.tag_name().name() == name)
+    let namespace = node.tag_name().namespace();
+    node.children()
+        .find(|n| n.is_element() && n.tag_name().name() == name && n.tag_name().namespace() == namespace)
 }
