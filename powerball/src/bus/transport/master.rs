@@ -201,7 +201,17 @@ impl<B: Bus, const N: usize> Master<B, N> {
         let until = self.bus.now() + 300_000;
         while self.step(until)? != Moment::Over {}
         match self.driver.cause() {
-            Some(cause) => Err(ArmError::Stopped(*cause, self.driver.details().to_string())),
+            Some(cause) => {
+                let cause = *cause;
+                let others = self.driver.notes().filter(|note| note.cause != cause);
+                let told = self.driver.details().to_string();
+                let told: Vec<String> = (!told.is_empty())
+                    .then_some(told)
+                    .into_iter()
+                    .chain(others.map(|note| format!("also {}", note.cause)))
+                    .collect();
+                Err(ArmError::Stopped(cause, told.join("; ")))
+            }
             None => Ok(()),
         }
     }
