@@ -245,7 +245,8 @@ impl<B: Bus, const N: usize> Master<B, N> {
     /// The drives need not watch this master any more: it leaves in order, and none of them takes its silence for
     /// an emergency. A node that does not answer is left as it is.
     fn disarm_watch(&mut self) {
-        let silent = matches!(self.driver.cause(), Some(Cause::BusOff));
+        // Off the bus nobody hears it, and where another master was heard the nodes are that one's.
+        let silent = matches!(self.driver.cause(), Some(Cause::BusOff | Cause::OtherMaster(_)));
         if self.driver.phase() == Phase::Idle || silent {
             return;
         }
