@@ -52,6 +52,7 @@ fn exit_codes_tell_refusals_from_wrong_use() {
         (&["bus", "move", "--joint", "2", "--to", "2.5"], 2, "-1.920 to 1.920"),
         (&["virtual-arm", "--bus", "virtual"], 2, "udp:239.74.163.2:43113"),
         (&["virtual-arm", "--bus", "udp:239.74.163.2:43190", "--effect", "ghosts"], 2, "load_friction"),
+        (&["bus", "watch", "--every", "1e300"], 2, "--every"),
         (&["record", "--trajectory", "no.csv", "--out", "x.csv"], 2, "no.csv"),
     ] {
         let run = powerball(arguments);
@@ -94,12 +95,14 @@ fn a_trajectory_is_recorded() {
     }
     std::fs::write(&path, &text).unwrap();
     let (path, out) = (path.to_str().unwrap(), out.to_str().unwrap());
-    let run = json(&powerball(&["record", "--trajectory", path, "--out", out, "--json"]));
+    let run = json(&powerball(&["record", "--trajectory", path, "--out", out, "--json", "--force"]));
     assert_eq!((run["record"]["samples"].as_u64(), run["record"]["missing"].as_u64()), (Some(401), Some(0)));
+    let again = powerball(&["record", "--trajectory", path, "--out", out]);
+    assert!(again.status.code() == Some(2) && complaint(&again).contains("--force"), "{}", complaint(&again));
     let log = std::fs::read_to_string(out).unwrap();
     assert!(log.starts_with("t,q1,q2,q3,q4,q5,q6,tau1,") && log.lines().count() == 402);
     std::fs::write(path, text.replace("0.005000", "0.007000")).unwrap();
-    let uneven = powerball(&["record", "--trajectory", path, "--out", out]);
+    let uneven = powerball(&["record", "--trajectory", path, "--out", out, "--force"]);
     assert!(
         uneven.status.code() == Some(2) && complaint(&uneven).contains("evenly"),
         "{}",
@@ -125,7 +128,7 @@ fn what_would_touch_is_not_recorded() {
             text += &format!("{t:.6},0,{q},0,0,0,0\n");
         }
         std::fs::write(path, text).unwrap();
-        let arguments = ["record", "--trajectory", path, "--out", out, "--arm", arm, "--json"];
+        let arguments = ["record", "--trajectory", path, "--out", out, "--arm", arm, "--json", "--force"];
         let at = |floor: &'static str| powerball(&[&arguments[..], &["--floor", floor]].concat());
         (at("0.1"), at("none"))
     };

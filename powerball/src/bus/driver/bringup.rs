@@ -46,6 +46,11 @@ impl<const N: usize> Driver<N> {
             return;
         }
         if self.bring_up.resets >= RESETS {
+            for j in missing + 1..N {
+                if self.joints.get(j).is_some_and(|joint| joint.booted.is_none()) {
+                    self.note(Cause::NoBoot(self.node(j)));
+                }
+            }
             self.trip(Cause::NoBoot(self.node(missing)), tx);
             return;
         }

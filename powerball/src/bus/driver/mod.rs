@@ -433,6 +433,10 @@ impl<const N: usize> Driver<N> {
         if self.phase == Phase::Idle || self.silent {
             return soon;
         }
+        // Neither SYNC nor heartbeat leaves, and neither is due.
+        if self.phase == Phase::Listening {
+            return soon.min(self.since.saturating_add(self.profile.reactions.listen_time)).max(self.now);
+        }
         let slot = self.slot_open.then(|| self.slot());
         let scripted = matches!(self.phase, Phase::Identify | Phase::Configure | Phase::Verify);
         let steps = self

@@ -109,8 +109,12 @@ impl<const N: usize> Driver<N> {
             Phase::Boot | Phase::Identify | Phase::Configure | Phase::Verify => {
                 self.give_up(Phase::Faulted, tx)
             }
-            // Nothing was sent yet, and nothing is.
-            Phase::Listening | Phase::Starting | Phase::Ready | Phase::Resetting => self.fault(),
+            // Nothing was sent yet, and nothing is: not even a heartbeat.
+            Phase::Listening => {
+                self.silent = true;
+                self.fault();
+            }
+            Phase::Starting | Phase::Ready | Phase::Resetting => self.fault(),
             Phase::Idle | Phase::Stopping | Phase::Faulted => {}
         }
     }

@@ -2,7 +2,7 @@
 
 use super::{Bus, BusError, Event};
 use crate::bus::canopen::client::{Client, SdoError, Value};
-use crate::bus::canopen::{Frame, Micros, NodeId, Object};
+use crate::bus::canopen::{Cob, Frame, Micros, NodeId, Object};
 use std::fmt;
 
 /// For each answer of a node, µs.
@@ -70,6 +70,66 @@ pub(super) fn write_within(
     let mut client = Client::new(node, timeout);
     let first = client.write(object, value, bus.now());
     run(bus, node, client, first).map(|_| ())
+}
+
+/// Writes one value to an object of several nodes: the requests leave one behind the other, before any answer is
+/// awaited, so that a dead node keeps none of the others waiting. Gives each node's answer, in their order.
+pub fn write_all(
+    bus: &mut dyn Bus,
+    nodes: &[NodeId],
+    object: Object,
+    value: Value,
+) -> Vec<Result<(), TransferError>> {
+    let begin = |client: &mut Client, now: Micros| client.write(object, value, now);
+    run_all(bus, nodes, object, begin).into_iter().map(|answer| answer.map(|_| ())).collect()
+}
+
+/// Reads one object of several nodes, in the same way.
+pub fn read_all(bus: &mut dyn Bus, nodes: &[NodeId], object: Object) -> Vec<Result<Value, TransferError>> {
+    run_all(bus, nodes, object, |client, now| client.read(object, now))
+}
+
+fn run_all(
+    bus: &mut dyn Bus,
+    nodes: &[NodeId],
+    object: Object,
+    begin: impl Fn(&mut Client, Micros) -> Frame,
+) -> Vec<Result<Value, TransferError>> {
+    type Answer = Option<Result<Value, TransferError>>;
+    let mut running: Vec<(Client, Answer)> = Vec::new();
+    for node in nodes {
+        let mut client = Client::new(*node, TIMEOUT);
+        let sent = bus.send(&begin(&mut client, bus.now()));
+        running.push((client, sent.err().map(|e| Err(e.into()))));
+    }
+    while running.iter().any(|(_, answer)| answer.is_none()) {
+        let event = bus.receive(bus.now() + TIMEOUT / 10);
+        let now = bus.now();
+        for ((client, answer), node) in running.iter_mut().zip(nodes).filter(|((_, a), _)| a.is_none()) {
+            let step = match &event {
+                Ok(Some((at, Event::Frame(frame)))) if Cob::of(frame) == Some(Cob::SdoResponse(*node)) => {
+                    client.receive(frame, *at)
+                }
+                Ok(Some((_, Event::BusOff))) => {
+                    *answer = Some(Err(BusError::Off.into()));
+                    continue;
+                }
+                Err(gone) => {
+                    *answer = Some(Err(gone.clone().into()));
+                    continue;
+                }
+                _ => client.poll(now),
+            };
+            if let Some(Err(e)) = step.send.map(|frame| bus.send(&frame)) {
+                *answer = Some(Err(e.into()));
+            }
+            if let Some(done) = step.done {
+                let node = *node;
+                *answer = Some(done.map_err(|error| TransferError::Node { node, object, error }));
+            }
+        }
+    }
+    running.into_iter().filter_map(|(_, answer)| answer).collect()
 }
 
 fn run(bus: &mut dyn Bus, node: NodeId, mut client: Client, first: Frame) -> Result<Value, TransferError> {

@@ -201,7 +201,17 @@ impl<B: Bus, const N: usize> Master<B, N> {
         let until = self.bus.now() + 300_000;
         while self.step(until)? != Moment::Over {}
         match self.driver.cause() {
-            Some(cause) => Err(ArmError::Stopped(*cause, self.driver.details().to_string())),
+            Some(cause) => {
+                let cause = *cause;
+                let others = self.driver.notes().filter(|note| note.cause != cause);
+                let told = self.driver.details().to_string();
+                let told: Vec<String> = (!told.is_empty())
+                    .then_some(told)
+                    .into_iter()
+                    .chain(others.map(|note| format!("also {}", note.cause)))
+                    .collect();
+                Err(ArmError::Stopped(cause, told.join("; ")))
+            }
             None => Ok(()),
         }
     }
@@ -235,7 +245,8 @@ impl<B: Bus, const N: usize> Master<B, N> {
     /// The drives need not watch this master any more: it leaves in order, and none of them takes its silence for
     /// an emergency. A node that does not answer is left as it is.
     fn disarm_watch(&mut self) {
-        let silent = matches!(self.driver.cause(), Some(Cause::BusOff));
+        // Off the bus nobody hears it, and where another master was heard the nodes are that one's.
+        let silent = matches!(self.driver.cause(), Some(Cause::BusOff | Cause::OtherMaster(_)));
         if self.driver.phase() == Phase::Idle || silent {
             return;
         }
@@ -317,7 +328,10 @@ mod tests {
         drop(moving(&mut bus));
         rests(&bus);
         // Long after the drives would have missed its heartbeat.
-        while bus.receive(bus.now() + 1_000_000).unwrap().is_some() {}
+        let until = bus.now() + 1_000_000;
+        while bus.now() < until {
+            bus.receive(until).unwrap();
+        }
         rests(&bus);
     }
 

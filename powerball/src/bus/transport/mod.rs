@@ -147,7 +147,7 @@ pub fn open(url: &BusUrl) -> Result<Box<dyn Bus>, BusError> {
         #[cfg(unix)]
         BusUrl::Slcan(device) => Ok(Box::new(Slcan::open(device)?)),
         #[cfg(unix)]
-        BusUrl::Udp(group) => Ok(Box::new(UdpMulticast::open(*group)?)),
+        BusUrl::Udp(group, interface) => Ok(Box::new(UdpMulticast::open_on(*group, *interface)?)),
         #[allow(unreachable_patterns)]
         other => Err(BusError::Io(format!("{other}: this build has no such bus"))),
     }

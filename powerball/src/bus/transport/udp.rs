@@ -1,4 +1,7 @@
 //! python-can's `udp_multicast`: each frame is a datagram to a multicast group that stays on this machine.
+//!
+//! Nobody who speaks here is asked who he is. So only datagrams to the group are taken, and, unless an interface is named,
+//! only those whose sender is this machine itself.
 
 use super::{Bus, BusError, Clock, Event, msgpack, readable};
 use crate::bus::canopen::{Frame, Micros};
@@ -14,6 +17,10 @@ pub struct UdpMulticast {
     speaker: UdpSocket,
     group: SocketAddr,
     own_port: u16,
+    /// Others than this machine may speak.
+    open: bool,
+    /// The last sender that was looked at, and whether it is this machine.
+    sender: Option<(IpAddr, bool)>,
     clock: Clock,
 }
 
@@ -23,6 +30,15 @@ impl UdpMulticast {
     /// # Errors
     /// Where the system has no route to the group.
     pub fn open(group: SocketAddr) -> Result<Self, BusError> {
+        UdpMulticast::open_on(group, None)
+    }
+
+    /// Joins a multicast group on the network of an interface, which is named by its own IPv4 address. Its datagrams
+    /// reach that network (hop limit 1), and whoever is on it can speak: fence it.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open), and where this machine has no such address.
+    pub fn open_on(group: SocketAddr, interface: Option<IpAddr>) -> Result<Self, BusError> {
         let failed = |what: &'static str| {
             move |e: std::io::Error| {
                 let hint = "without a network: ip link set lo up; ip route add 239.0.0.0/8 dev lo";
@@ -33,19 +49,26 @@ impl UdpMulticast {
             IpAddr::V4(_) => (Domain::IPV4, Ipv4Addr::UNSPECIFIED.into()),
             IpAddr::V6(_) => (Domain::IPV6, Ipv6Addr::UNSPECIFIED.into()),
         };
-        let socket = |port: u16| -> std::io::Result<Socket> {
+        let socket = |address: SocketAddr| -> std::io::Result<Socket> {
             let socket = Socket::new(domain, Type::DGRAM, Some(Protocol::UDP))?;
             socket.set_reuse_address(true)?;
-            socket.bind(&SockAddr::from(SocketAddr::new(any, port)))?;
+            socket.bind(&SockAddr::from(address))?;
             Ok(socket)
         };
-        let listener = socket(group.port()).map_err(failed("cannot listen"))?;
-        let speaker = socket(0).map_err(failed("cannot speak"))?;
+        // Bound to the group: what is sent to this machine's own addresses is not taken.
+        let listener = socket(group).map_err(failed("cannot listen"))?;
+        let speaker = socket(SocketAddr::new(any, 0)).map_err(failed("cannot speak"))?;
+        let on = match interface {
+            Some(IpAddr::V4(own)) => own,
+            _ => Ipv4Addr::UNSPECIFIED,
+        };
+        let hops = u32::from(interface.is_some());
         // A hop limit of 0 keeps the frames on this machine.
         match group.ip() {
             IpAddr::V4(ip) => {
-                listener.join_multicast_v4(&ip, &Ipv4Addr::UNSPECIFIED).map_err(failed("cannot join"))?;
-                speaker.set_multicast_ttl_v4(0).map_err(failed("cannot set the hop limit"))?;
+                listener.join_multicast_v4(&ip, &on).map_err(failed("cannot join"))?;
+                speaker.set_multicast_if_v4(&on).map_err(failed("has no such interface"))?;
+                speaker.set_multicast_ttl_v4(hops).map_err(failed("cannot set the hop limit"))?;
                 speaker.set_multicast_loop_v4(true).map_err(failed("cannot loop back"))?;
             }
             IpAddr::V6(ip) => {
@@ -57,7 +80,29 @@ impl UdpMulticast {
         listener.set_nonblocking(true).map_err(failed("cannot listen"))?;
         let speaker = UdpSocket::from(speaker);
         let own_port = speaker.local_addr().map_err(failed("has no address"))?.port();
-        Ok(UdpMulticast { listener: listener.into(), speaker, group, own_port, clock: Clock::start() })
+        let (listener, clock) = (listener.into(), Clock::start());
+        Ok(UdpMulticast {
+            listener,
+            speaker,
+            group,
+            own_port,
+            open: interface.is_some(),
+            sender: None,
+            clock,
+        })
+    }
+
+    /// Whether a datagram of `from` is taken. An address is this machine's where a socket can be bound to it.
+    fn takes(&mut self, from: IpAddr) -> bool {
+        if self.open || from.is_loopback() {
+            return true;
+        }
+        if let Some((_, own)) = self.sender.filter(|(known, _)| *known == from) {
+            return own;
+        }
+        let own = UdpSocket::bind(SocketAddr::new(from, 0)).is_ok();
+        self.sender = Some((from, own));
+        own
     }
 }
 
@@ -80,6 +125,7 @@ impl Bus for UdpMulticast {
         loop {
             match self.listener.recv_from(&mut buffer) {
                 Ok((_, from)) if from.port() == self.own_port => {}
+                Ok((_, from)) if !self.takes(from.ip()) => {}
                 Ok((len, _)) => {
                     if let Some(frame) = buffer.get(..len).and_then(msgpack::decode) {
                         return Ok(Some((self.now(), Event::Frame(frame))));
@@ -104,6 +150,20 @@ impl Bus for UdpMulticast {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_this_machine_is_heard_unless_an_interface_is_named() {
+        let Ok(mut bus) = UdpMulticast::open("239.74.163.9:43198".parse().unwrap()) else {
+            println!("skipped: this machine has no route to 239.0.0.0/8");
+            return;
+        };
+        let own = [IpAddr::from([127, 0, 0, 1]), IpAddr::from([127, 1, 2, 3])];
+        // TEST-NET-3: nobody's address.
+        let other = IpAddr::from([203, 0, 113, 7]);
+        assert!(own.iter().all(|from| bus.takes(*from)) && !bus.takes(other) && !bus.takes(other));
+        bus.open = true;
+        assert!(bus.takes(other));
+    }
 
     #[test]
     fn two_doors_to_one_group_hear_each_other_and_not_themselves() {

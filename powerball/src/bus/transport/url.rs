@@ -1,7 +1,7 @@
 //! Buses by name, as users give them.
 
 use std::fmt;
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -14,8 +14,9 @@ pub enum BusUrl {
     SocketCan(String),
     /// A serial adapter that speaks slcan, at 500 kbit/s.
     Slcan(PathBuf),
-    /// A multicast group and port of python-can's `udp_multicast`.
-    Udp(SocketAddr),
+    /// A multicast group and port of python-can's `udp_multicast`: of this machine alone, or on the network of an
+    /// interface, named by its own address.
+    Udp(SocketAddr, Option<IpAddr>),
 }
 
 /// A text that names no bus.
@@ -55,14 +56,25 @@ impl FromStr for BusUrl {
             ("socketcan", name) => Ok(BusUrl::SocketCan(name.to_string())),
             ("slcan", "") => Err(wrong("the serial device is missing")),
             ("slcan", path) => Ok(BusUrl::Slcan(PathBuf::from(path))),
-            ("udp", group) => match group.parse::<SocketAddr>() {
-                Ok(address) if address.ip().is_multicast() => Ok(BusUrl::Udp(address)),
-                Ok(_) => Err(wrong("the address is no multicast group (224.0.0.0 to 239.255.255.255)")),
-                Err(_) => Err(wrong("udp needs an address and a port")),
+            ("udp", rest) => match group_of(rest) {
+                Some((group, interface)) if group.ip().is_multicast() => Ok(BusUrl::Udp(group, interface)),
+                Some(_) => Err(wrong("the address is no multicast group (224.0.0.0 to 239.255.255.255)")),
+                None => Err(wrong("udp needs an address and a port, and after @ an interface's own address")),
             },
             _ => Err(wrong("its first word is unknown")),
         }
     }
+}
+
+/// `239.74.163.2:43113`, or with `@` the own address of the interface behind it, of the same family.
+fn group_of(text: &str) -> Option<(SocketAddr, Option<IpAddr>)> {
+    let (group, interface) = match text.split_once('@') {
+        Some((group, interface)) => (group, Some(interface.parse::<IpAddr>().ok()?)),
+        None => (text, None),
+    };
+    let group: SocketAddr = group.parse().ok()?;
+    // Interfaces of IPv6 have numbers and no addresses here.
+    interface.is_none_or(|ip| ip.is_ipv4() && group.is_ipv4()).then_some((group, interface))
 }
 
 impl fmt::Display for BusUrl {
@@ -71,7 +83,8 @@ impl fmt::Display for BusUrl {
             BusUrl::Virtual => f.write_str("virtual"),
             BusUrl::SocketCan(interface) => write!(f, "socketcan:{interface}"),
             BusUrl::Slcan(device) => write!(f, "slcan:{}", device.display()),
-            BusUrl::Udp(group) => write!(f, "udp:{group}"),
+            BusUrl::Udp(group, None) => write!(f, "udp:{group}"),
+            BusUrl::Udp(group, Some(interface)) => write!(f, "udp:{group}@{interface}"),
         }
     }
 }
@@ -87,6 +100,7 @@ mod tests {
             "socketcan:can0",
             "slcan:/dev/ttyACM0",
             "udp:239.74.163.2:43113",
+            "udp:239.74.163.2:43113@192.168.1.5",
             "udp:[ff15:7079:7468:6f6e:6465:6d6f:6d63:6173]:43113",
         ] {
             assert_eq!(text.parse::<BusUrl>().unwrap().to_string(), text);
@@ -103,6 +117,8 @@ mod tests {
             "slcan:",
             "udp:239.74.163.2",
             "udp:192.168.0.1:43113",
+            "udp:239.74.163.2:43113@eth0",
+            "udp:239.74.163.2:43113@[ff15::1]",
             "socketcan:a_very_long_name0",
         ] {
             let error = text.parse::<BusUrl>().unwrap_err().to_string();

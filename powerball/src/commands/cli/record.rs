@@ -36,6 +36,9 @@ pub(crate) struct RecordCommand {
     /// Where the log is written: Parquet where the name ends in .parquet, CSV else.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// Write over a log that is there already.
+    #[arg(long)]
+    force: bool,
     /// The arm file: its geometry and limits, for the floor and the links.
     #[arg(long, value_name = "ARM.toml")]
     arm: Option<PathBuf>,
@@ -54,6 +57,12 @@ impl RecordCommand {
             .map_err(|e| Failure::Unusable(format!("{name}: cannot be read: {e}")))?;
         let motion = Motion::from_csv(&text, LWA4P.joints.len())
             .map_err(|why| Failure::Unusable(format!("{name}: {why}")))?;
+        if self.out.is_file() && !self.force {
+            return Err(Failure::Unusable(format!(
+                "{}: is there already; --force writes over it",
+                self.out.display()
+            )));
+        }
         let constraints = self.arm.as_ref().map(|file| self.constraints(file)).transpose()?;
         let barred = |motion: &Motion| constraints.as_ref().and_then(|c| c.broken(motion));
         let master = master(&self.place)?;

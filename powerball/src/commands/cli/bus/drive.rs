@@ -2,8 +2,8 @@
 
 use super::super::output;
 use super::{Failure, Where, master, refused};
-use crate::bus::canopen::nmt;
-use crate::bus::cia402::{Command, Controlword};
+use crate::bus::canopen::{NodeId, nmt};
+use crate::bus::cia402::{Command, Controlword, Statusword};
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::driver::{ControlMode, Phase};
 use crate::bus::transport::{ArmError, Bus, BusUrl, Master, Moment};
@@ -116,38 +116,53 @@ fn list(values: &[f64]) -> String {
 impl Stop {
     pub(crate) fn run(self) -> Result<(), Failure> {
         use crate::bus::canopen::client::Value;
-        use crate::bus::cia402::objects::CONTROLWORD;
+        use crate::bus::cia402::objects::{CONTROLWORD, STATUSWORD};
         use crate::bus::transport::blocking;
         let mut bus = self.place.open()?;
-        let (mut stopped, mut silent) = (Vec::new(), Vec::new());
-        // All drives are told to stop before any is asked whether it does: leaving "operational" stops their
-        // set-points.
+        let nodes: Vec<NodeId> = LWA4P.joints.iter().map(|joint| joint.node).collect();
+        // In one frame for all of them: leaving "operational" ends the set-points of whoever gives them. Then the
+        // stop, to all drives before any answer is awaited.
+        bus.send(&nmt::Command::EnterPreOperational.frame(None)).map_err(refused)?;
         let words = [
             (Controlword::command(Command::QuickStop), 400_000),
             (Controlword::command(Command::QuickStop).with(Controlword::HALT), 100_000),
-            (Controlword::command(Command::DisableVoltage), 0),
+            (Controlword::command(Command::DisableVoltage), 50_000),
         ];
-        bus.send(&nmt::Command::EnterPreOperational.frame(None)).map_err(refused)?;
         for (word, pause) in words {
-            (stopped, silent) = (Vec::new(), Vec::new());
-            for joint in &LWA4P.joints {
-                match blocking::write(&mut *bus, joint.node, CONTROLWORD, Value::number(i64::from(word.0), 2))
-                {
-                    Ok(()) => stopped.push(joint.node.raw()),
-                    Err(e) => silent.push(e.to_string()),
-                }
-            }
+            blocking::write_all(&mut *bus, &nodes, CONTROLWORD, Value::number(i64::from(word.0), 2));
             super::wait(&mut *bus, pause)?;
         }
-        if self.place.json {
-            output::print(
-                &json!({ "bus": self.place.bus.to_string(), "stopped": stopped, "silent": silent })
-                    .to_string(),
-            );
-        } else {
-            output::print(&format!("stopped: nodes {stopped:?}"));
+        let answers = blocking::read_all(&mut *bus, &nodes, STATUSWORD);
+        let (mut states, mut stopped, mut failed) = (Vec::new(), Vec::new(), Vec::new());
+        for (node, answer) in nodes.iter().zip(answers) {
+            match answer {
+                Ok(value) => {
+                    let status = Statusword(value.unsigned().unwrap_or(0) as u16);
+                    states.push((node.raw(), status.state()));
+                    if status.state().has_torque() {
+                        failed.push(format!("node {node}: still has torque, statusword {status:?}"));
+                    } else {
+                        stopped.push(node.raw());
+                    }
+                }
+                Err(e) => failed.push(e.to_string()),
+            }
         }
-        if silent.is_empty() { Ok(()) } else { Err(Failure::Refused(silent.join("\n"))) }
+        if self.place.json {
+            let states: Vec<_> = states
+                .iter()
+                .map(|(node, state)| json!({ "node": node, "state": state.to_string() }))
+                .collect();
+            let result = json!({
+                "bus": self.place.bus.to_string(), "stopped": stopped, "silent": failed, "states": states,
+            });
+            output::print(&result.to_string());
+        } else {
+            let states: Vec<String> =
+                states.iter().map(|(node, state)| format!("node {node}: {state}")).collect();
+            output::print(&format!("stopped: nodes {stopped:?}\n{}", states.join("\n")));
+        }
+        if failed.is_empty() { Ok(()) } else { Err(Failure::Refused(failed.join("\n"))) }
     }
 }
 
@@ -187,6 +202,13 @@ impl Move {
         recorder.go(&to, self.speed, 0.3).map_err(arm)?;
         let at = recorder.master().driver().positions();
         let master = recorder.finish().map_err(arm)?;
+        let off = (at[index] - to[index]).abs();
+        if off > LWA4P.joints[index].following_error {
+            return Err(Failure::Refused(format!(
+                "joint {} is at {:.4} rad and not at {:.4} rad: is it blocked?",
+                self.joint, at[index], to[index]
+            )));
+        }
         if self.place.json {
             let result = json!({
                 "bus": self.place.bus.to_string(), "joint": self.joint, "from": from[index], "to": to[index],

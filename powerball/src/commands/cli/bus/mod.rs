@@ -79,6 +79,11 @@ impl Where {
     /// Opens the bus; the built-in arm's drives have booted.
     pub(crate) fn open(&self) -> Result<Box<dyn Bus>, Failure> {
         if self.bus != BusUrl::Virtual {
+            if let BusUrl::Udp(_, Some(interface)) = self.bus {
+                eprintln!(
+                    "powerball: whoever reaches {interface}'s network can read this bus and move the arm"
+                );
+            }
             return transport::open(&self.bus).map_err(|e| Failure::Unusable(e.to_string()));
         }
         virtual_bus(virtual_arm([0.0; 6], 1, None, false)?)
@@ -90,7 +95,7 @@ impl Where {
     /// late SYNC. The driver then bears what it would not on a real bus; it counts all the same.
     pub(crate) fn driver(&self, bus: Box<dyn Bus>) -> Result<Master<Box<dyn Bus>, 6>, Failure> {
         let mut profile = LWA4P;
-        if matches!(self.bus, BusUrl::Udp(_)) {
+        if matches!(self.bus, BusUrl::Udp(..)) {
             let reactions = &mut profile.reactions;
             (reactions.late_limit, reactions.skipped_limit, reactions.missing_cycles) = (u8::MAX, 20, 20);
         }

@@ -156,8 +156,11 @@ impl Show {
 
 impl Watch {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        if !(self.every.is_finite() && self.every > 0.0) {
-            return Err(Failure::Unusable("--every must be above 0".to_string()));
+        // Beyond a day it is a mistake, and beyond what a clock holds.
+        if !(self.every > 0.0 && self.every <= 86_400.0) {
+            return Err(Failure::Unusable(
+                "--every is a number of seconds above 0, at most 86400".to_string(),
+            ));
         }
         let mut bus = self.what.place.open()?;
         let period = Duration::from_secs_f64(self.every);
