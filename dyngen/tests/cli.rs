@@ -325,3 +325,37 @@ fn a_model_is_a_file_of_values() {
     let wrong = dyngen::Values::parse(r#"{"parameters": [{"value": 1.0}]}"#, "model.json").unwrap_err();
     assert!(wrong.to_string().contains("an entry without a name"), "{wrong}");
 }
+
+/// Files are replaced only on purpose, and the original never; a result that is no number ends with an error.
+#[test]
+fn nothing_is_lost_and_no_nan_is_printed() {
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("force");
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = |name: &str| folder.join(name).display().to_string();
+    let (urdf, arm, values) = (path("one.urdf"), path("one.toml"), path("one.values.json"));
+    let text = "<robot name=\"one\"><link name=\"base\"/><link name=\"l\"/><joint name=\"j\" \
+                type=\"continuous\"><parent link=\"base\"/><child link=\"l\"/></joint></robot>";
+    std::fs::write(&urdf, text).unwrap();
+    let import = |extra: &[&str]| dyngen(&[&["import", &urdf, "-o", &arm], extra].concat());
+    assert!(import(&[]).status.success());
+    assert!(!folder.join("one.values.json").exists(), "no inertia, no values");
+    std::fs::write(&arm, format!("{}# mine\n", std::fs::read_to_string(&arm).unwrap())).unwrap();
+    let again = import(&[]);
+    assert_eq!(again.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&again.stderr).contains("--force"));
+    assert!(std::fs::read_to_string(&arm).unwrap().contains("# mine"));
+    assert!(import(&["--force"]).status.success());
+    assert!(!std::fs::read_to_string(&arm).unwrap().contains("# mine"));
+    assert_eq!(dyngen(&["import", &urdf, "-o", &urdf, "--force"]).status.code(), Some(2));
+    assert_eq!(std::fs::read_to_string(&urdf).unwrap(), text);
+
+    std::fs::write(&values, "{\"mx1\": 0, \"my1\": 0, \"Izz1\": 0}").unwrap();
+    let states = path("states.csv");
+    std::fs::write(&states, "q1,dq1,tau1\n0.1,0,1\n").unwrap();
+    let eval = ["eval", &arm, "--function", "forward_dynamics", "--states", &states, "--values", &values];
+    let eval = dyngen(&eval);
+    let message = String::from_utf8_lossy(&eval.stderr).to_string();
+    assert_eq!((eval.status.code(), eval.stdout.len()), (Some(1), 0), "{message}");
+    assert!(message.contains("states.csv:2") && message.contains("singular"), "{message}");
+}

@@ -1,8 +1,10 @@
-//! Both halves of a dependence of columns, certified at random points of the prime field by the Lagrangian itself.
+//! Both halves of a dependence of columns, certified at random points of the prime field by the Lagrangian
+//! itself.
 //!
-//! That the kept columns are independent is certain where a minor of their values does not vanish modulo the prime.
-//! That a relation holds is as certain as a proof of a function is: a wrong one is a polynomial that is not zero
-//! and vanishes at a random point with probability below 2⁻⁵⁴; as many points are taken as there are columns.
+//! That the kept columns are independent is certain where a minor of their values does not vanish modulo the
+//! prime. That a relation holds is as certain as a proof of a function is: a wrong one is a polynomial that
+//! is not zero and vanishes at a random point with probability below 2⁻⁵⁴; as many points are taken as there
+//! are columns.
 
 use super::coefficients::Sizes;
 use crate::arm::{Arm, JointKind};
@@ -19,8 +21,8 @@ const MORE: usize = 4;
 
 /// Certifies a dependence of the columns of the parameters that the arm keeps.
 ///
-/// # Errors
-/// [`Unproven`] where a kept column depends on others, a relation does not hold, or the prime divides a number.
+/// # Errors [`Unproven`] where a kept column depends on others, a relation does not hold, or the prime
+/// divides a number.
 pub(super) fn certify(
     arm: &Arm,
     symbols: &AngleSymbols,

@@ -1,15 +1,15 @@
-//! The Lagrangian's exact coefficients without the expanded Lagrangian: rows that span the row space of the matrix
-//! with one row for each function of the motion and one column for each parameter.
+//! The Lagrangian's exact coefficients without the expanded Lagrangian: rows that span the row space of the
+//! matrix with one row for each function of the motion and one column for each parameter.
 //!
-//! A linear functional on functions of all joints' motions is a sum of products of functionals, one for each joint.
-//! What the columns of link i are under the functionals of the joints up to i is determined by what 32 monomials of
-//! the link's motion (velocities, their products, gravity, height) are. Their values span a space that a step from
-//! link to link maps on, whatever number of joints follows. Take for each joint one functional that keeps constants,
-//! the mean over its turn at rest, and otherwise such as vanish on constants. Then the last joint whose functional
-//! vanishes on constants sorts the rows into blocks: its own link's columns span at most eleven dimensions, and the
-//! links behind it see what the mean makes of them. So the rank is a sum over the joints, and the work grows with
-//! the number of joints, not with the number of terms. That the rows say the truth is certified in
-//! [`super::certificate`].
+//! A linear functional on functions of all joints' motions is a sum of products of functionals, one for each
+//! joint. What the columns of link i are under the functionals of the joints up to i is determined by what 32
+//! monomials of the link's motion (velocities, their products, gravity, height) are. Their values span a
+//! space that a step from link to link maps on, whatever number of joints follows. Take for each joint one
+//! functional that keeps constants, the mean over its turn at rest, and otherwise such as vanish on
+//! constants. Then the last joint whose functional vanishes on constants sorts the rows into blocks: its own
+//! link's columns span at most eleven dimensions, and the links behind it see what the mean makes of them. So
+//! the rank is a sum over the joints, and the work grows with the number of joints, not with the number of
+//! terms. That the rows say the truth is certified in [`super::certificate`].
 
 use super::preference::Preference;
 use crate::arm::Arm;
@@ -114,7 +114,8 @@ impl Functional {
 
 /// What a link's own joint adds to the rows.
 struct Link<'a, 'f> {
-    /// A basis of the values that its columns take under functionals that vanish on constants, in reduced form.
+    /// A basis of the values that its columns take under functionals that vanish on constants, in reduced
+    /// form.
     pivots: Vec<Values>,
     step: Step<'a, 'f>,
 }
@@ -133,11 +134,12 @@ struct Steps<'f> {
     columns: Vec<Values>,
 }
 
-/// One step: each of the next motion's monomials, and the rotor's column, in monomials of the motion before and of
-/// the joint.
+/// One step: each of the next motion's monomials, and the rotor's column, in monomials of the motion before
+/// and of the joint.
 struct Step<'a, 'f> {
     steps: &'a Steps<'f>,
-    /// For each monomial of the next motion, then for the rotor: (monomial before, monomial of the joint, factor).
+    /// For each monomial of the next motion, then for the rotor: (monomial before, monomial of the joint,
+    /// factor).
     terms: Vec<Vec<(usize, Monomial, Numerator)>>,
 }
 
@@ -305,8 +307,8 @@ impl<'f> Steps<'f> {
         columns
     }
 
-    /// Values of a motion's monomials under which a link's column is one and its others are zero; a rotor's column
-    /// is no function of the motion.
+    /// Values of a motion's monomials under which a link's column is one and its others are zero; a rotor's
+    /// column is no function of the motion.
     fn lifted(&self, column: usize) -> Values {
         // Gravity and height occur in one column each, and a column of an inertia is one monomial.
         let terms = self.columns.get(column).map_or(&[][..], Vec::as_slice);
@@ -321,8 +323,8 @@ impl<'f> Steps<'f> {
 
     /// A basis in reduced form of the space that some values span, in the order of preference.
     ///
-    /// Where the space holds a unit vector, which a reduction modulo the prime shows, it is taken as it is, so that
-    /// no fraction is made of it.
+    /// Where the space holds a unit vector, which a reduction modulo the prime shows, it is taken as it is,
+    /// so that no fraction is made of it.
     fn basis(&self, values: Vec<Values>, order: Vec<usize>) -> Result<Vec<Values>, Unproven> {
         let rows: Vec<SparseRow> = values
             .iter()
@@ -357,7 +359,8 @@ impl<'f> Steps<'f> {
     /// The rows: for each joint its link's basis, and what the means of the joints behind make of it.
     fn rows(&self, links: &[Link<'_, 'f>]) -> Result<Vec<SparseRow>, Unproven> {
         let n = links.len();
-        // For each column of a link, what stands in the links behind it, without what those links' own rows remove.
+        // For each column of a link, what stands in the links behind it, without what those links' own rows
+        // remove.
         let mut behind: Vec<Values> = vec![Vec::new(); LINK];
         let mut rows: Vec<SparseRow> = Vec::new();
         for joint in (0..n).rev() {

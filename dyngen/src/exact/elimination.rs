@@ -119,11 +119,10 @@ fn independent_rows(
     Ok(chosen)
 }
 
-/// The columns whose unit vector lies in the space that the rows span, modulo the prime; the space has one for
-/// every vector of its reduced form that has a single entry.
+/// The columns whose unit vector lies in the space that the rows span, modulo the prime; the space has one
+/// for every vector of its reduced form that has a single entry.
 ///
-/// # Errors
-/// [`Unproven`] where the prime divides a denominator.
+/// # Errors [`Unproven`] where the prime divides a denominator.
 pub fn unit_vectors(
     field: &ConstantField,
     rows: &[SparseRow],

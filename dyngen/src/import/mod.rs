@@ -51,7 +51,8 @@ pub struct Imported {
     pub arm: Arm,
     /// The arm file.
     pub text: String,
-    /// The values of all parameters that the arm keeps, in order, SI units; none where no link has an inertia.
+    /// The values of all parameters that the arm keeps, in order, SI units; none where no link has an
+    /// inertia.
     pub values: Vec<(Parameter, f64)>,
     /// Frame 0 in the root link's frame: a homogeneous transform, row by row, m.
     pub base: [[f64; 4]; 4],

@@ -1,5 +1,5 @@
-//! A URDF's links and joints as values, read as tolerantly as ROS tools read them: only what an arm needs is looked
-//! at, in whatever company it stands.
+//! A URDF's links and joints as values, read as tolerantly as ROS tools read them: only what an arm needs is
+//! looked at, in whatever company it stands.
 
 use roxmltree::{Document, Error, Node, ParsingOptions};
 
