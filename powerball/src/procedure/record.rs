@@ -263,12 +263,11 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
                 (1.0 / period).round()
             ));
         }
-        fits(self.master.driver().profile(), motion)?;
         let far = motion.q.iter().zip(&self.target).fold(0.0f64, |far, (a, b)| far.max((a - b).abs()));
         if far > 1e-3 {
             return wrong(format!("the motion begins {far:.4} rad from where the arm is; go there first"));
         }
-        Ok(())
+        fits(self.master.driver().profile(), motion)
     }
 
     /// Stops the arm: brakes closed, torque off.

@@ -109,12 +109,12 @@ impl Fault {
             Fault::NoVoltage => wire(world, Wire::Status { set: 0, clear: Statusword::VOLTAGE_ENABLED }),
             Fault::NotRemote => wire(world, Wire::Status { set: 0, clear: Statusword::REMOTE }),
             Fault::InternalLimit => wire(world, Wire::Status { set: Statusword::INTERNAL_LIMIT, clear: 0 }),
-            Fault::TwoNodes => wire(world, Wire::Duplicate { frames: u32::MAX }),
+            Fault::TwoNodes => wire(world, Wire::Twice),
             Fault::OtherSync => world.bus.peer_mut().foreign = Some(cob::SYNC),
             Fault::OtherSetpoints => {
                 world.bus.peer_mut().foreign = Frame::from_raw(Cob::Rpdo(1, VICTIM).id(), &[0; 6])
             }
-            Fault::PositionJump => wire(world, Wire::Shift { by: 5000, frames: 1 }),
+            Fault::PositionJump => wire(world, Wire::Shift { by: 5000, frames: 12 }),
         }
     }
 

@@ -50,6 +50,8 @@ pub(crate) enum Wire {
         by: i32,
         frames: u32,
     },
+    /// Its first transmit PDO comes twice: more would be too much for the bus.
+    Twice,
     /// The position stays as it is in the first frame.
     Freeze(Option<i32>),
     /// Its server refuses this object.
@@ -134,6 +136,7 @@ impl Faulty {
                 bytes[4] = *mode;
                 self.out.extend(Frame::from_raw(frame.raw_id(), &bytes));
             }
+            Wire::Twice if frame.raw_id() == Cob::Tpdo(1, VICTIM).id() => self.out.extend([frame, frame]),
             wire @ (Wire::Status { .. } | Wire::Shift { .. } | Wire::Freeze(_))
                 if frame.raw_id() == Cob::Tpdo(1, VICTIM).id() && frame.bytes().len() == 8 =>
             {
