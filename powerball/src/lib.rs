@@ -58,9 +58,9 @@ pub mod report;
 #[cfg(feature = "virtual-arm")]
 pub mod virtual_arm;
 
+#[cfg(feature = "explain")]
+pub use explanation::{ExplainError, ExplainOptions, Explained, Rule, explain};
 #[cfg(feature = "identify")]
 pub use identification::{Identified, IdentifyError, IdentifyOptions, Source, identify};
 #[cfg(feature = "identify")]
 pub use logs::log::{Arrays, Log};
-#[cfg(feature = "explain")]
-pub use explanation::{ExplainError, ExplainOptions, Explained, Rule, explain};

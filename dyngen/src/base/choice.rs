@@ -5,8 +5,8 @@
 //! counted in it. Functions of parameter values do not depend on the choice: they sum the parameters up in
 //! their own way.
 
+use super::plain::full_set;
 use super::preference::Preference;
-use super::sets::full_set;
 use crate::arm::Arm;
 use crate::dynamics::build::{self, Subject};
 use crate::dynamics::chain::Origins;

@@ -14,9 +14,9 @@
 use super::preference::Preference;
 use crate::arm::Arm;
 use crate::exact::algebra::Algebra;
-use crate::exact::constant::{Constant, ConstantField, Numerator};
+use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{self, SparseRow, Unproven};
-use crate::exact::polynomial::{Monomial, Polynomial, PolynomialRing, Square};
+use crate::exact::polynomial::{Monomial, Numerator, Polynomial, PolynomialRing, Square};
 use crate::exact::rational::{self, Rational};
 use crate::exact::symbols::AngleSymbols;
 use crate::lagrangian::elements::{ArmElements, JointElements, Source};

@@ -3,9 +3,9 @@
 use super::coefficients::{self, Sizes};
 use crate::arm::{Arm, JointKind};
 use crate::exact::algebra::Algebra;
-use crate::exact::constant::{ConstantField, Numerator};
+use crate::exact::constant::ConstantField;
 use crate::exact::elimination::SparseRow;
-use crate::exact::polynomial::{Monomial, Polynomial, PolynomialRing, Square};
+use crate::exact::polynomial::{Monomial, Numerator, Polynomial, PolynomialRing, Square};
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::lagrangian::elements::{ArmElements, Source};

@@ -5,6 +5,7 @@ pub mod choice;
 pub mod coefficients;
 #[cfg(test)]
 mod expanded;
+mod plain;
 pub mod preference;
 mod published;
 pub mod sets;

@@ -1,6 +1,6 @@
 //! A published parameter set, checked: exact or not, and what it loses.
 
-use super::sets::{combination_text, unexamined};
+use super::plain::{combination_text, unexamined};
 use crate::arm::{Arm, Parameter};
 use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{self, Dependence, Unproven};

@@ -3,15 +3,17 @@
 use super::certificate;
 use super::choice::{self, Candidate};
 use super::coefficients::{self, Sizes};
+use super::plain::{full_set, named_combination_text, unexamined};
 use super::preference::Preference;
 use super::published;
-use crate::arm::sum::sum_text;
 use crate::arm::{Arm, Parameter};
 use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{self, Dependence, SparseRow, Unproven};
 use crate::exact::prime::Draws;
 use crate::exact::symbols::AngleSymbols;
 use crate::parameters::{Combination, ParameterSet, SetKind, SetParameter, minimal_coordinates};
+
+pub use super::plain::combination_text;
 
 /// How well the torques determine a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,20 +109,6 @@ impl Sets {
     }
 }
 
-pub(super) fn full_set(arm: &Arm, field: &ConstantField) -> ParameterSet {
-    let one = field.rational(crate::exact::rational::integer(1));
-    let parameters = arm
-        .kept_parameters()
-        .into_iter()
-        .map(|p| SetParameter {
-            name: p.to_string(),
-            terms: vec![(p, one.clone())],
-            carriers: vec![(p, one.clone())],
-        })
-        .collect();
-    unexamined(SetKind::Full, parameters)
-}
-
 pub(super) fn base_set(
     kind: SetKind,
     arm: &Arm,
@@ -150,30 +138,6 @@ pub(super) fn base_set(
     }
     parameters.sort_by_key(|p| p.carriers[0].0);
     unexamined(kind, parameters)
-}
-
-pub(super) fn unexamined(kind: SetKind, parameters: Vec<SetParameter>) -> ParameterSet {
-    ParameterSet { kind, parameters, rank: 0, relations: Vec::new(), exact: true, lost: Vec::new() }
-}
-
-/// The text of a combination: `Ixx2 - Iyy2 + 49/400*m3`; coefficients with symbols stand in parentheses.
-pub fn combination_text(field: &ConstantField, terms: &[(Parameter, Constant)]) -> String {
-    named_combination_text(field, terms.iter().map(|(p, c)| (p.to_string(), c)))
-}
-
-fn named_combination_text<'a>(
-    field: &ConstantField,
-    terms: impl IntoIterator<Item = (String, &'a Constant)>,
-) -> String {
-    let one = crate::exact::rational::integer(1);
-    let terms: Vec<(String, crate::exact::rational::Rational)> = terms
-        .into_iter()
-        .map(|(name, c)| match c.as_rational() {
-            Some(value) => (name, value),
-            None => (format!("({})*{name}", field.text(c)), one.clone()),
-        })
-        .collect();
-    sum_text(terms.iter().map(|(name, value)| (name, value)))
 }
 
 /// The rank of a set's columns and the relations among them, each as `name = combination of names`.

@@ -1,6 +1,6 @@
 //! What functions take of joint positions: sines and cosines, all angles of a function at once.
 
-use super::code::{lane_name, used};
+use super::lanes::{lane_name, used};
 use crate::arm::{Arm, JointKind};
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::build::trig_offset;

@@ -1,6 +1,7 @@
 //! One function as tokens: straight-line code, one `let` for each node.
 
 use super::angles::{positions, trig_of, uses_positions};
+use super::lanes::{lane_name, used};
 use super::{docs, signs};
 use crate::dynamics::function::{Argument, Size};
 use crate::dynamics::{Function, FunctionGraph};
@@ -65,20 +66,6 @@ pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) ->
 /// Whether the result is a number for every arm: where it is a vector, one joint makes it a vector of one.
 pub(super) fn is_number(built: &FunctionGraph) -> bool {
     matches!(built.function, Function::KineticEnergy | Function::PotentialEnergy)
-}
-
-/// The inputs that a function reads.
-pub(super) fn used(built: &FunctionGraph, needed: &[usize]) -> BTreeSet<Input> {
-    let inputs = needed.iter().filter_map(|n| match built.graph.nodes()[*n] {
-        Node::Input(input) => Some(input),
-        _ => None,
-    });
-    inputs.collect()
-}
-
-/// The name of an argument's value at a joint.
-pub(super) fn lane_name(argument: Argument, joint: usize) -> Ident {
-    format_ident!("{}{}", argument.name(), joint + 1)
 }
 
 /// The inputs that an argument other than q brings.

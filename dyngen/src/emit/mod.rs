@@ -7,6 +7,7 @@ mod batch;
 mod code;
 mod docs;
 mod friction;
+mod lanes;
 mod signs;
 mod tests;
 #[cfg(test)]

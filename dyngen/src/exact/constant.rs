@@ -5,15 +5,12 @@
 
 use super::algebra::Algebra;
 use super::gcd;
-use super::polynomial::{Monomial, Polynomial, PolynomialRing, Square};
+use super::polynomial::{Monomial, Numerator, Polynomial, PolynomialRing, Square};
 use super::prime::{Draws, Fp};
 use super::rational::{self, Rational};
 use super::symbols::{AngleSymbols, SymbolKind};
 use num_traits::{One, Signed, Zero};
 use std::collections::BTreeMap;
-
-/// A polynomial in the symbols.
-pub type Numerator = Polynomial<Rational>;
 
 /// A coefficient and the powers of symbols it multiplies: (symbol, its sine?, exponent).
 pub type Factors = (Rational, Vec<(usize, bool, u8)>);

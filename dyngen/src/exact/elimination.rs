@@ -4,7 +4,8 @@
 //! the others by relations in the constants themselves, checked on every row. No tolerance appears.
 
 use super::algebra::Algebra;
-use super::constant::{Constant, ConstantField, Numerator};
+use super::constant::{Constant, ConstantField};
+use super::polynomial::Numerator;
 use super::prime::Fp;
 use std::collections::BTreeMap;
 use std::fmt;

@@ -4,8 +4,7 @@
 //! domain.
 
 use super::algebra::Algebra;
-use super::constant::Numerator;
-use super::polynomial::{Monomial, PolynomialRing};
+use super::polynomial::{Monomial, Numerator, PolynomialRing};
 use super::rational::Rational;
 use num_traits::One;
 

@@ -4,12 +4,16 @@
 //! equal as functions exactly when their normal forms are equal, because 1, s, c, sc, c², … are independent.
 
 use super::algebra::Algebra;
+use super::rational::Rational;
 use num_traits::{One, Zero};
 use std::ops::{Add, Mul, Neg};
 
 const WORDS: usize = 11;
 /// How many variables a ring may have.
 pub const VARIABLES: usize = WORDS * 8;
+
+/// A polynomial with rational coefficients.
+pub type Numerator = Polynomial<Rational>;
 
 /// A product of powers; one byte holds an exponent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]

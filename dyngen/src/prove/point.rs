@@ -1,6 +1,5 @@
 //! A random point: a pose of the arm, rates, and values of its parameters, modulo the prime.
 
-use super::state::State;
 use crate::arm::{Arm, JointKind, Parameter};
 use crate::base::Sets;
 use crate::dynamics::FunctionGraph;
@@ -91,16 +90,6 @@ impl<'a> Point<'a> {
 
     pub(super) fn dof(&self) -> usize {
         self.arm.dof()
-    }
-
-    /// A motion at this pose.
-    pub(super) fn state<'p>(
-        &'p self,
-        speeds: &'p [Fp],
-        accelerations: &'p [Fp],
-        gravity: bool,
-    ) -> State<'p, 'a> {
-        State { point: self, speeds, accelerations, gravity }
     }
 
     /// Sine and cosine of q + theta: by the addition theorem where theta is a multiple of pi/2; the input

@@ -24,6 +24,18 @@ fn half() -> Fp {
     Fp::from_integer(2).inverse().unwrap_or(Fp::ONE)
 }
 
+impl<'a> Point<'a> {
+    /// A motion at this pose.
+    pub(super) fn state<'p>(
+        &'p self,
+        speeds: &'p [Fp],
+        accelerations: &'p [Fp],
+        gravity: bool,
+    ) -> State<'p, 'a> {
+        State { point: self, speeds, accelerations, gravity }
+    }
+}
+
 impl<'p, 'a> State<'p, 'a> {
     fn dof(&self) -> usize {
         self.point.dof()

@@ -2,7 +2,7 @@
 
 use super::budget::worst_bits;
 use super::cause::Hindrance;
-use super::joint::Progress;
+use super::progress::Progress;
 use super::script::{Write, configuration, questions};
 use super::{Cause, Driver, Phase, Transmit};
 use crate::bus::canopen::client::{SdoError, Value};

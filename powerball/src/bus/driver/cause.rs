@@ -1,8 +1,8 @@
 //! Why the arm was stopped, or may not start: typed, with the node and what was seen.
 
+use super::control_mode::ControlMode;
 use super::foreign::Foreign;
-use super::guard::Rejection;
-use super::profile::ControlMode;
+use super::rejection::Rejection;
 use crate::bus::canopen::client::SdoError;
 use crate::bus::canopen::emcy::{Emcy, vendor_text};
 use crate::bus::canopen::pdo::MappingError;

@@ -1,7 +1,9 @@
 //! One joint while the driver runs: what its drive says, and what it is told.
 
+use super::control_mode::ControlMode;
 use super::demand::Demand;
-use super::profile::{ControlMode, JointProfile, ModeProfile};
+use super::profile::{JointProfile, ModeProfile};
+use super::progress::Progress;
 use super::units::{JointUnits, Saturated, to_i16};
 use super::watch::Watched;
 use crate::bus::canopen::client::Client;
@@ -23,22 +25,6 @@ pub struct JointCounters {
     pub malformed: u64,
     /// Emergencies, beyond the first of each kind not told one by one.
     pub emergencies: u64,
-}
-
-/// How far a joint is on its way to "operation enabled".
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Progress {
-    /// Its turn has not come.
-    Waiting,
-    /// Through the drive's states; in `state` until `deadline`.
-    Walking { state: State, deadline: Micros },
-    /// Enabled; the extended status was read `reads` times, next at `next`. From the second read on the brake
-    /// is open.
-    Commutating { reads: u8, next: Micros },
-    /// Commutated just now: the supply recovers.
-    Settling { until: Micros },
-    /// Enabled and commutated, halted until all are.
-    Done,
 }
 
 /// What is known of one joint.

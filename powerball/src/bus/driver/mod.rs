@@ -54,6 +54,7 @@
 mod bringup;
 pub mod budget;
 pub mod cause;
+mod control_mode;
 mod cycle;
 mod demand;
 pub mod dictionary;
@@ -65,7 +66,9 @@ mod joint;
 mod link;
 pub mod lwa4p;
 pub mod profile;
+mod progress;
 mod receive;
+mod rejection;
 mod script;
 mod stop;
 pub mod units;
@@ -73,11 +76,13 @@ mod watch;
 
 pub use budget::{Budget, Verdict};
 pub use cause::{Cause, Details, Refusal};
+pub use control_mode::ControlMode;
 pub use foreign::Foreign;
-pub use guard::{Rejection, check_path};
+pub use guard::check_path;
 pub use joint::{Joint, JointCounters};
 pub use link::{BusEvent, QueueFull, Transmit};
-pub use profile::{ControlMode, JointProfile, Profile};
+pub use profile::{JointProfile, Profile};
+pub use rejection::Rejection;
 
 use crate::bus::canopen::sync::{HeartbeatProducer, SyncProducer};
 use crate::bus::canopen::{Frame, Micros, NodeId};
@@ -326,7 +331,7 @@ impl<const N: usize> Driver<N> {
     pub fn enable(&mut self) -> Result<(), Refusal> {
         match self.phase {
             Phase::Ready => {
-                self.joints.iter_mut().for_each(|joint| joint.progress = joint::Progress::Waiting);
+                self.joints.iter_mut().for_each(|joint| joint.progress = progress::Progress::Waiting);
                 self.enter(Phase::Enabling);
                 Ok(())
             }

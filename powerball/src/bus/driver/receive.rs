@@ -1,6 +1,6 @@
 //! Frames from the arm: stored, and judged by what the phase expects.
 
-use super::joint::Progress;
+use super::progress::Progress;
 use super::{Cause, Driver, Phase, Transmit};
 use crate::bus::canopen::client::SdoError;
 use crate::bus::canopen::emcy::Emcy;

@@ -1,6 +1,7 @@
 //! What is read from and written to each drive before it may move, as lists without memory of their own.
 
-use super::profile::{ControlMode, ModeProfile, Profile};
+use super::control_mode::ControlMode;
+use super::profile::{ModeProfile, Profile};
 use crate::bus::canopen::client::Value;
 use crate::bus::canopen::objects::{
     CONSUMER_HEARTBEAT, PRODUCER_HEARTBEAT, PRODUCT_CODE, REVISION, SERIAL_NUMBER, VENDOR_ID, rpdo_mapping,

@@ -2,7 +2,7 @@
 
 use super::Folds;
 use super::normal_equations::{Products, add_products, zeros};
-use super::vary::{FRICTION, Layout};
+use super::rows::{FRICTION, Layout};
 use crate::logs::parallel;
 use crate::logs::regression::{Column, Data};
 use faer::linalg::matmul::matmul;

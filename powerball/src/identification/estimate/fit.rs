@@ -2,10 +2,11 @@
 
 use super::design::{Design, Gram, runs};
 use super::folds::Folds;
-use super::friction_shape::{self, Trials};
+use super::friction_shape;
 use super::normal_equations::Products;
 use super::normal_equations::dot;
-use super::vary::{FRICTION, Layout, Rows, Scatter, Start, vary};
+use super::rows::{FRICTION, Layout, Rows, Scatter, Trials};
+use super::vary::{Start, vary};
 use crate::logs::parallel;
 use crate::logs::regression::{Column, Data, RigidBody};
 use faer::Mat;

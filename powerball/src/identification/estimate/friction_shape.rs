@@ -1,7 +1,7 @@
 //! The steepnesses γ2, γ4 of Eq. 16: columns for given shapes, and a search that needs no start.
 
+use super::rows::{FRICTION, Rows, Trials};
 use super::solve::Solver;
-use super::vary::{FRICTION, Rows};
 use crate::logs::regression::Data;
 use crate::logs::summary::{NODES, Steepness};
 use faer::Mat;
@@ -44,17 +44,6 @@ pub(super) fn range(top: f64) -> (f64, f64) {
 #[must_use]
 pub(super) fn first((low, high): (f64, f64)) -> [f64; 2] {
     [high / 10.0, low * 20.0]
-}
-
-/// Cross products of trial columns on one joint, by trial.
-#[derive(Debug)]
-pub(super) struct Trials {
-    /// With the columns of all rows, columns × trials.
-    pub cross: Mat<f64>,
-    /// With each other.
-    pub square: Mat<f64>,
-    /// With the torque.
-    pub score: Vec<f64>,
 }
 
 /// The pair of steepnesses that leaves the least on one joint, all else refitted, levels ≥ 0. Where `present`

@@ -20,6 +20,7 @@ mod normal_equations;
 mod ratio;
 mod reduced;
 mod robust;
+mod rows;
 mod solve;
 mod stream;
 mod torque_metric;
@@ -45,10 +46,10 @@ pub use noise::noise_floor;
 pub(crate) use ratio::over_blocks;
 pub use reduced::{FrictionLaw, Solution, solve_reduced};
 pub use robust::{Robust, solve_robust};
+pub use rows::Layout;
 pub use solve::{Solver, bounded};
 pub use stream::{States, Stream, StreamFit};
 pub use torque_metric::TorqueMetric;
-pub use vary::Layout;
 pub use verdict::{JointVerdict, verdicts};
 
 #[cfg(test)]

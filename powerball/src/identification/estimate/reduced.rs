@@ -1,8 +1,8 @@
 //! The fit of reduced logs.
 
-use super::friction_shape::Trials;
 use super::normal_equations::{Products, add_columns, dot, zeros};
-use super::vary::{FRICTION, Layout, Rows, Scatter, vary};
+use super::rows::{FRICTION, Layout, Rows, Scatter, Trials};
+use super::vary::vary;
 use crate::logs::summary::{
     Columns, Identity, NODES, OCTAVES, SLOW, Steepness, Summary, SummaryError, Triangle,
 };

@@ -1,7 +1,7 @@
 //! A model along logs, for people to look at: torques, motion, friction, and what repeats with positions.
 
+use super::by_band::by_band;
 use super::error::IdentifyError;
-use super::judge::by_band;
 use crate::controller::friction::TanhFriction;
 use crate::identification::estimate::{BaseModel, TorqueCurve, curves, noise_floor};
 use crate::identification::mounting::Mounting;

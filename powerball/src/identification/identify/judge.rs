@@ -1,31 +1,13 @@
 //! What a model leaves of the validation set, each joint in the band in which it was fitted.
 
 use super::along::Along;
+use super::by_band::by_band;
 use super::error::IdentifyError;
 use super::gather::{Gathered, Mounted};
 use super::options::IdentifyOptions;
 use crate::identification::estimate::{BaseModel, Spread, spread};
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, DataOptions, RigidBody};
-use crate::logs::summary::BANDS;
-
-/// Logs prepared in every band that a joint has, widest first, with the joints of that band, from 0.
-pub(crate) fn by_band<'a>(
-    body: &'a RigidBody,
-    logs: &[Log],
-    joint_bands: &[f64],
-    options: &DataOptions,
-) -> Result<Vec<(Vec<usize>, Data<'a>)>, IdentifyError> {
-    let members =
-        |band: f64| -> Vec<usize> { (0..joint_bands.len()).filter(|j| joint_bands[*j] == band).collect() };
-    let with = |band: f64| DataOptions { cutoff: band, ..options.clone() };
-    BANDS
-        .iter()
-        .map(|band| (members(*band), *band))
-        .filter(|(members, _)| !members.is_empty())
-        .map(|(members, band)| Ok((members, Data::new(body, logs, &with(band))?)))
-        .collect()
-}
 
 /// What the model leaves of the logs to judge by; `None` where there are none.
 pub(super) fn validate(

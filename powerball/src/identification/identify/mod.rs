@@ -4,6 +4,7 @@
 //! fit leaves of each mounting; `judge` what the model leaves of other logs; `along` what a page shows of it.
 
 mod along;
+mod by_band;
 mod by_mounting;
 mod error;
 mod fit;
@@ -14,11 +15,11 @@ mod options;
 mod result;
 
 pub use along::{Along, JointAlong, LogFacts};
+pub(crate) use by_band::by_band;
 pub use by_mounting::MountedFit;
 pub use error::IdentifyError;
 pub(crate) use gather::Gathering;
 pub(crate) use in_memory::{InMemory, one_mounting};
-pub(crate) use judge::by_band;
 pub use options::{Estimator, IdentifyOptions};
 pub use result::Identified;
 

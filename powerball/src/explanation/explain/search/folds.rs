@@ -1,59 +1,11 @@
 //! Held-out gains: the base is fitted once without each fold, a candidate then costs a small solve.
 
+use super::fold_base::{FoldBase, times};
 use super::screen::{Screen, Trial};
 use crate::controller::JointNumber;
 use crate::identification::estimate::{Fit, Folds, Solver, runs};
 use crate::logs::vector::dot;
 use faer::Mat;
-
-/// The base model fitted without one fold.
-#[derive(Debug)]
-pub(crate) struct FoldBase {
-    held: Vec<usize>,
-    left_out: Vec<usize>,
-    /// Over what is fitted.
-    solver: Solver,
-    theta: Vec<f64>,
-    /// Over what is held.
-    gram: Mat<f64>,
-    /// (y − Aθ)'A over what is held.
-    slope: Vec<f64>,
-    /// Weighted squared error of what is held, by joint.
-    error: Vec<f64>,
-}
-
-impl FoldBase {
-    /// Fits the base without each fold.
-    #[must_use]
-    pub(crate) fn all(fit: &Fit, folds: &Folds, local: bool) -> Vec<FoldBase> {
-        let (held, left_out) = folds.folds(local);
-        held.iter()
-            .zip(left_out)
-            .map(|(held, left_out)| {
-                let (gram, right, _) = fit.gram.sum(&fit.weights, |c| !left_out.contains(&c));
-                let solver = Solver::new(&gram, |c| fit.free[c]);
-                let theta = solver.solve(&right);
-                let (gram, right, _) = fit.gram.sum(&fit.weights, |c| held.contains(&c));
-                let slope = (0..theta.len()).map(|i| right[i] - times(&gram, i, &theta)).collect();
-                let error = (0..fit.design.dof())
-                    .map(|j| {
-                        let mut own = vec![0.0; fit.design.dof()];
-                        own[j] = fit.weights[j];
-                        let (gram, right, square) = fit.gram.sum(&own, |c| held.contains(&c));
-                        let quadratic: f64 =
-                            (0..theta.len()).map(|i| theta[i] * times(&gram, i, &theta)).sum();
-                        square - 2.0 * dot(&theta, &right) + quadratic
-                    })
-                    .collect();
-                FoldBase { held: held.clone(), left_out: left_out.clone(), solver, theta, gram, slope, error }
-            })
-            .collect()
-    }
-}
-
-fn times(gram: &Mat<f64>, column: usize, x: &[f64]) -> f64 {
-    gram.col_as_slice(column).iter().zip(x).map(|(g, v)| g * v).sum()
-}
 
 /// A candidate's weighted cross products in one cell, all joints together.
 #[derive(Clone, Debug)]

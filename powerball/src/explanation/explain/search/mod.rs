@@ -9,6 +9,7 @@
 
 mod elimination;
 mod evidence;
+mod fold_base;
 mod folds;
 mod groups;
 mod refinement;

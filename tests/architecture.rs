@@ -1,0 +1,201 @@
+//! ARCHITECTURE.md is true: every folder that it lists is there, every folder of the sources is listed, code uses what
+//! stands further up and nothing that stands further down, and files do not use each other in a circle.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The crates whose order the page gives.
+const CRATES: [&str; 2] = ["dyngen", "powerball"];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Places of a crate's sources in the order of the page: `logs/log` for the row of `powerball/src/logs/log/`, `model` for
+/// that of `dyngen/src/model.rs`. One row may name several; they stand in the order in which it names them.
+fn order(page: &str, name: &str) -> Vec<String> {
+    let rows = page.lines().filter(|line| line.starts_with('|'));
+    let cells = rows.filter_map(|line| line.split('|').nth(1));
+    let named = cells.flat_map(|cell| cell.split('`').skip(1).step_by(2));
+    let start = format!("{name}/src/");
+    let place = |path: &str| path.trim_end_matches('/').trim_end_matches(".rs").to_string();
+    named.filter_map(|path| path.strip_prefix(&start)).map(place).collect()
+}
+
+/// All source files below a folder.
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(sources(&path));
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+/// A file's module path below the crate, `["logs", "log", "read"]`; nothing for tests, whose use of other rooms is free.
+fn module(source: &Path, file: &Path) -> Option<Vec<String>> {
+    let inside = file.strip_prefix(source).unwrap().with_extension("");
+    let mut parts: Vec<String> = inside.iter().map(|p| p.to_string_lossy().into_owned()).collect();
+    if parts.last().is_some_and(|p| p == "mod") {
+        parts.pop();
+    }
+    let free = |p: &String| p == "tests" || p == "lib" || p == "main";
+    (!parts.iter().any(free)).then_some(parts)
+}
+
+/// The code of a file without comments and without its unit tests.
+fn code(file: &Path) -> String {
+    let text = fs::read_to_string(file).unwrap();
+    let text = text.split("\nmod tests {").next().unwrap_or_default();
+    text.lines().filter(|line| !line.trim_start().starts_with("//")).map(|line| format!("{line}\n")).collect()
+}
+
+/// Every path that begins with `start` (`crate`, `super`), as its segments after that; groups in braces are followed.
+fn paths(code: &str, start: &str) -> Vec<Vec<String>> {
+    let mut found = Vec::new();
+    for (at, _) in code.match_indices(&format!("{start}::")) {
+        let before = code[..at].chars().next_back();
+        if before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':') {
+            continue;
+        }
+        tree(&code[at + start.len() + 2..], &mut Vec::new(), &mut found);
+    }
+    found
+}
+
+/// Reads what follows `a::`; returns how much of it was read.
+fn tree(text: &str, prefix: &mut Vec<String>, found: &mut Vec<Vec<String>>) -> usize {
+    if !text.starts_with('{') {
+        let name: String = text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+        prefix.push(name.clone());
+        let rest = &text[name.len()..];
+        let used = match rest.strip_prefix("::") {
+            Some(more) => name.len() + 2 + tree(more, prefix, found),
+            None => {
+                found.push(prefix.clone());
+                name.len()
+            }
+        };
+        prefix.pop();
+        return used;
+    }
+    let mut at = 1;
+    loop {
+        let skipped = text[at..].find(|c: char| !c.is_whitespace() && c != ',').unwrap_or(0);
+        at += skipped;
+        if text[at..].starts_with('}') || at >= text.len() {
+            return at + 1;
+        }
+        let used = tree(&text[at..], prefix, found);
+        at += used;
+        // `as name` and whatever else stands before the next comma at this depth.
+        at += text[at..].find([',', '}']).unwrap_or(text.len() - at);
+    }
+}
+
+/// The place in the list that a module belongs to: the longest that it lies in.
+fn place(order: &[String], module: &[String]) -> Option<usize> {
+    (1..=module.len()).rev().find_map(|n| order.iter().position(|place| *place == module[..n].join("/")))
+}
+
+#[test]
+fn code_uses_what_stands_above_it_on_the_page() {
+    let page = fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
+    let mut wrong = BTreeSet::new();
+    for name in CRATES {
+        let source = root().join(name).join("src");
+        let order = order(&page, name);
+        assert!(order.len() > 5, "ARCHITECTURE.md lists {order:?} of {name}");
+        for place in &order {
+            let there = source.join(place).is_dir() || source.join(format!("{place}.rs")).is_file();
+            assert!(there, "ARCHITECTURE.md names {name}/src/{place}, which is not there");
+        }
+        for file in sources(&source) {
+            let Some(own) = module(&source, &file) else { continue };
+            let shown = file.strip_prefix(root()).unwrap().display().to_string();
+            let Some(here) = place(&order, &own) else {
+                // A room's own `mod.rs` only says what lives in it.
+                let room = order.iter().any(|place| place.starts_with(&format!("{}/", own.join("/"))));
+                if !room {
+                    wrong.insert(format!("{shown} has no row in ARCHITECTURE.md"));
+                }
+                continue;
+            };
+            for path in paths(&code(&file), "crate") {
+                if let Some(there) = place(&order, &path).filter(|there| *there > here) {
+                    let (a, b) = (&order[here], &order[there]);
+                    wrong.insert(format!(
+                        "{shown}: {a} uses {b} ({}), which stands below it",
+                        path.join("::")
+                    ));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.into_iter().collect::<Vec<_>>().join("\n"));
+}
+
+type Arrows = BTreeMap<Vec<String>, BTreeSet<Vec<String>>>;
+
+/// Whether a way along the arrows leads from one file to another.
+fn reaches(arrows: &Arrows, from: &Vec<String>, goal: &Vec<String>) -> bool {
+    let (mut seen, mut open) = (BTreeSet::new(), vec![from]);
+    while let Some(next) = open.pop() {
+        if next == goal {
+            return true;
+        }
+        if seen.insert(next) {
+            open.extend(arrows.get(next).into_iter().flatten());
+        }
+    }
+    false
+}
+
+#[test]
+fn files_do_not_use_each_other_in_a_circle() {
+    let mut circles = Vec::new();
+    for name in CRATES {
+        let source = root().join(name).join("src");
+        let mut arrows = Arrows::new();
+        let files: Vec<(Vec<String>, PathBuf)> =
+            sources(&source).into_iter().filter_map(|f| Some((module(&source, &f)?, f))).collect();
+        // A folder's `mod.rs` says what lives in it: arrows to and from it are those of the folder.
+        let leaf = |path: &[String]| {
+            let own = |(m, f): &&(Vec<String>, PathBuf)| path.starts_with(m) && !f.ends_with("mod.rs");
+            files.iter().filter(own).map(|(m, _)| m).max_by_key(|m| m.len()).cloned()
+        };
+        for (own, file) in files.iter().filter(|(_, f)| !f.ends_with("mod.rs")) {
+            let code = code(file);
+            let absolute = paths(&code, "crate");
+            let parent = own[..own.len() - 1].to_vec();
+            let relative = paths(&code, "super").into_iter().filter_map(|path| {
+                let up = path.iter().take_while(|p| *p == "super").count();
+                let from = parent.get(..parent.len().checked_sub(up)?)?;
+                Some(from.iter().chain(&path[up..]).cloned().collect())
+            });
+            let used = absolute.into_iter().chain(relative).filter_map(|path: Vec<String>| leaf(&path));
+            arrows.entry(own.clone()).or_default().extend(used.filter(|other| other != own));
+        }
+        for (from, to) in &arrows {
+            for to in to.iter().filter(|to| reaches(&arrows, to, from)) {
+                circles.push(format!("{name}: {} uses {}", from.join("::"), to.join("::")));
+            }
+        }
+    }
+    assert!(circles.is_empty(), "each of these arrows is part of a circle:\n{}", circles.join("\n"));
+}
+
+#[test]
+fn paths_are_read_as_the_compiler_reads_them() {
+    let code = "use crate::a::{self, b::{C, d}, e as f};\nlet x = crate::g::h(1); xcrate::no::no; $crate::y;";
+    let found: Vec<String> = paths(code, "crate").iter().map(|p| p.join("::")).collect();
+    assert_eq!(found, ["a::self", "a::b::C", "a::b::d", "a::e", "g::h", "y"]);
+}
