@@ -2,7 +2,7 @@
 //! compiles for.
 
 use super::angles::TrigOfLane;
-use super::{code, docs};
+use super::{code, docs, lanes};
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;
 use crate::model::Model;
@@ -57,10 +57,10 @@ fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
         }
     });
     let lanes =
-        |argument: &Argument| (0..built.joints).map(|i| code::lane_name(*argument, i)).collect::<Vec<_>>();
+        |argument: &Argument| (0..built.joints).map(|i| lanes::lane_name(*argument, i)).collect::<Vec<_>>();
     let moving: Vec<&Argument> = arguments.iter().filter(|a| **a != Argument::Parameters).collect();
     let TrigOfLane { lines, turning, read } = TrigOfLane::new(model, built);
-    let angles: Vec<Ident> = turning.iter().map(|i| code::lane_name(Argument::Positions, *i)).collect();
+    let angles: Vec<Ident> = turning.iter().map(|i| lanes::lane_name(Argument::Positions, *i)).collect();
     let prepared =
         arguments.contains(&Argument::Parameters).then(|| quote!(let parameters = &parameters.prepared();));
     let taken = moving.iter().map(|argument| {

@@ -1,7 +1,7 @@
 //! One function as tokens: straight-line code, one `let` for each node.
 
 use super::angles::{positions, trig_of, uses_positions};
-use super::lanes::{lane_name, used};
+use super::lanes::used;
 use super::{docs, signs};
 use crate::dynamics::function::{Argument, Size};
 use crate::dynamics::{Function, FunctionGraph};

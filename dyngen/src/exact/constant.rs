@@ -5,7 +5,7 @@
 
 use super::algebra::Algebra;
 use super::gcd;
-use super::polynomial::{Monomial, Numerator, Polynomial, PolynomialRing, Square};
+use super::polynomial::{Monomial, Numerator, PolynomialRing, Square};
 use super::prime::{Draws, Fp};
 use super::rational::{self, Rational};
 use super::symbols::{AngleSymbols, SymbolKind};

@@ -60,6 +60,10 @@ impl<const N: usize> Driver<N> {
     /// A command of network management to each node of the arm, and to no other device on the bus; whether all
     /// of them could be queued.
     pub(super) fn manage(&mut self, command: nmt::Command, tx: &mut impl Transmit) -> bool {
-        (0..N).fold(true, |sent, j| self.send(command.frame(Some(self.node(j))), tx) && sent)
+        let mut all = true;
+        for j in 0..N {
+            all &= self.send(command.frame(Some(self.node(j))), tx);
+        }
+        all
     }
 }

@@ -1,10 +1,9 @@
 //! The steepnesses γ2, γ4 of Eq. 16: columns for given shapes, and a search that needs no start.
 
-use super::rows::{FRICTION, Rows, Trials};
+use super::rows::{FRICTION, Rows};
 use super::solve::Solver;
 use crate::logs::regression::Data;
 use crate::logs::summary::{NODES, Steepness};
-use faer::Mat;
 
 /// Steepnesses tried for each level. A steep level that is off by a grid's step leaves an error at which a
 /// second steep one is worth more than the bend that is there, and from two steep levels no descent finds the

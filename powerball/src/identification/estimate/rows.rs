@@ -1,6 +1,7 @@
 //! Rows of a regression whose friction steepnesses are free, whatever they are kept in.
 
 use super::normal_equations::Products;
+use crate::logs::regression::Data;
 use faer::Mat;
 
 /// Friction columns of a joint: two saturating levels, the viscous one, and the two tangents of the shapes.

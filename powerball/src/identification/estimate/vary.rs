@@ -5,10 +5,8 @@
 //! fitted alike.
 
 use super::friction_shape;
-use super::normal_equations::Products;
 use super::rows::{Layout, Rows, Scatter};
 use super::solve::{Solver, bounded};
-use crate::logs::regression::Data;
 use faer::Mat;
 
 /// What a fit starts from where a similar one has been made.

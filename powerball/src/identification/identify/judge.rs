@@ -6,8 +6,7 @@ use super::error::IdentifyError;
 use super::gather::{Gathered, Mounted};
 use super::options::IdentifyOptions;
 use crate::identification::estimate::{BaseModel, Spread, spread};
-use crate::logs::log::Log;
-use crate::logs::regression::{Data, DataOptions, RigidBody};
+use crate::logs::regression::DataOptions;
 
 /// What the model leaves of the logs to judge by; `None` where there are none.
 pub(super) fn validate(

@@ -3,7 +3,7 @@
 use super::fold_base::{FoldBase, times};
 use super::screen::{Screen, Trial};
 use crate::controller::JointNumber;
-use crate::identification::estimate::{Fit, Folds, Solver, runs};
+use crate::identification::estimate::{Folds, Solver, runs};
 use crate::logs::vector::dot;
 use faer::Mat;
 
