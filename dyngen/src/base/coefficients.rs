@@ -9,7 +9,7 @@
 //! constants. Then the last joint whose functional vanishes on constants sorts the rows into blocks: its own
 //! link's columns span at most eleven dimensions, and the links behind it see what the mean makes of them. So
 //! the rank is a sum over the joints, and the work grows with the number of joints, not with the number of
-//! terms. That the rows say the truth is certified in [`super::certificate`].
+//! terms. That the rows say the truth is certified in `certificate.rs`.
 
 use super::preference::Preference;
 use crate::arm::Arm;

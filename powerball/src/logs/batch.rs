@@ -5,9 +5,10 @@
 //! x86-64 they use vectors of two; inside a [`Work`] they use what the processor has (AVX2, AVX-512, NEON).
 //! The results stay the same, to the bit.
 //!
-//! ```
-//! use powerball::batch::{self, Work};
-//! use powerball::model::minimal::{self as arm, JOINTS, PARAMETERS};
+#![cfg_attr(feature = "lwa4p", doc = "```")]
+#![cfg_attr(not(feature = "lwa4p"), doc = "```ignore")]
+//! use powerball::logs::batch::{self, Work};
+//! use powerball::controller::model::minimal::{self as arm, JOINTS, PARAMETERS};
 //! use nalgebra::SVector;
 //!
 //! /// Eight samples of each joint.

@@ -194,7 +194,7 @@ impl<const N: usize> Driver<N> {
             let next = joint.demand.next(period, profile.velocity, profile.acceleration);
             let [low, high] = profile.position;
             let last = joint.demand.last();
-            joint.target = next.clamp(low.min(last), high.max(last));
+            joint.target = next.max(low.min(last)).min(high.max(last));
         }
     }
 

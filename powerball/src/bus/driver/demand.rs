@@ -39,8 +39,9 @@ impl Demand {
     pub(super) fn next(&self, period: f64, velocity: f64, acceleration: f64) -> f64 {
         let v = self.velocity(period);
         let before = (self.points[1] - self.points[2]) / period;
-        let change = (v - before).clamp(-acceleration * period, acceleration * period);
-        let next = (v + change).clamp(-velocity, velocity);
+        // Not `clamp`, which panics where a bound is no number.
+        let change = (v - before).max(-acceleration * period).min(acceleration * period);
+        let next = (v + change).max(-velocity).min(velocity);
         self.points[0] + if next * v < 0.0 { 0.0 } else { next * period }
     }
 
@@ -49,7 +50,7 @@ impl Demand {
     pub(super) fn error(&self, actual: f64) -> f64 {
         let low = self.points.iter().copied().fold(f64::INFINITY, f64::min);
         let high = self.points.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        actual - actual.clamp(low, high)
+        actual - actual.max(low).min(high)
     }
 }
 

@@ -7,6 +7,9 @@ use super::{Cause, ControlMode, Driver, Phase, Transmit};
 use crate::bus::canopen::{Micros, NodeId};
 use crate::bus::cia402::{State, Statusword};
 
+/// A joint that is off by less than this share of what may be keeps up with its set-points.
+const BEHIND: f64 = 0.2;
+
 /// What the watch remembers of one joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Watched {
@@ -177,12 +180,24 @@ impl<const N: usize> Driver<N> {
 
     fn torque_at_its_limit(&mut self, j: usize) -> Option<Cause> {
         let (reactions, now, control) = (self.profile.reactions, self.now, self.control);
+        let running = self.phase == Phase::Running;
         let (profile, joint) = (self.profile.joints.get(j)?, self.joints.get_mut(j)?);
         // Where the caller asks for currents, the greatest is his to ask.
         let limit = joint.current_limit.unwrap_or(profile.current);
         let strained =
             control != ControlMode::Current && joint.current.abs() >= reactions.current_limit_part * limit;
-        if !strained {
+        // A drive may work at its limit as long as the joint goes where it is told.
+        let keeps_up = running
+            && match control {
+                ControlMode::InterpolatedPosition => {
+                    joint.demand.error(joint.position).abs() < BEHIND * profile.following_error
+                }
+                ControlMode::Velocity => {
+                    joint.demand.error(joint.velocity).abs() < BEHIND * profile.velocity_error
+                }
+                ControlMode::ProfilePosition | ControlMode::Current => false,
+            };
+        if !strained || keeps_up {
             joint.watched.strained = None;
             return None;
         }

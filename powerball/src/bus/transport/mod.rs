@@ -7,6 +7,7 @@ pub mod blocking;
 mod interrupt;
 mod master;
 mod memory;
+#[cfg(unix)]
 mod msgpack;
 #[cfg(unix)]
 mod slcan;
@@ -29,6 +30,7 @@ pub use url::{BusUrl, UrlError};
 
 use crate::bus::canopen::{Frame, Micros};
 use std::fmt;
+#[cfg(unix)]
 use std::time::{Duration, Instant};
 
 /// What comes from a bus.
@@ -67,6 +69,7 @@ impl fmt::Display for BusError {
 
 impl std::error::Error for BusError {}
 
+#[cfg(unix)]
 impl BusError {
     /// What was tried, and what the system said.
     fn io(what: impl fmt::Display, error: impl fmt::Display) -> BusError {
@@ -154,9 +157,11 @@ pub fn open(url: &BusUrl) -> Result<Box<dyn Bus>, BusError> {
 }
 
 /// The clock of a bus in real time.
+#[cfg(unix)]
 #[derive(Clone, Copy, Debug)]
 struct Clock(Instant);
 
+#[cfg(unix)]
 impl Clock {
     fn start() -> Clock {
         Clock(Instant::now())

@@ -11,7 +11,7 @@ use nalgebra::{RealField, SMatrix, SVector};
 ///
 /// ```
 /// use nalgebra::Vector2;
-/// use powerball::online::SquareRoot;
+/// use powerball::controller::online::SquareRoot;
 ///
 /// let mut line = SquareRoot::<f64, 2>::new(1e-9);
 /// for x in [0.0, 1.0, 2.0, 3.0] {
