@@ -10,6 +10,7 @@ mod progress;
 pub mod regression;
 pub mod signal;
 pub mod summary;
+#[cfg(feature = "explain")]
 pub(crate) mod vector;
 
 pub use progress::Progress;

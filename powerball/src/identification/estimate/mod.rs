@@ -29,6 +29,7 @@ mod verdict;
 
 pub use band::{InBand, reduce_in_bands, solve_in_band};
 pub use base_model::BaseModel;
+#[cfg(feature = "explain")]
 pub(crate) use base_model::in_set_of;
 pub use consistent::{Consistent, nearest};
 pub use consistent_fit::{ConsistentFit, ConsistentReport, consistent_fit};
@@ -38,6 +39,7 @@ pub use errors::{StandardErrors, standard_errors};
 pub use estimates::{Estimates, JointFriction, ParameterEstimate, Spread, estimates, spread, spread_of};
 pub use exchanged::exchanged;
 pub use fit::{Fit, Term, fit, friction_columns};
+#[cfg(feature = "explain")]
 pub(crate) use fit::{MEAN_OVER, variance_inflation};
 pub use folds::Folds;
 pub use instrumental::solve_instrumental;
