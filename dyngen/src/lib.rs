@@ -1,4 +1,7 @@
 //! From a DH table, declared symmetries and a rotor model to the arm's dynamics.
+//!
+//! "The paper" is *Modeling and dynamic parameter identification of the SCHUNK Powerball robotic arm*; equations
+//! and tables that are cited by number are its own.
 
 pub mod arm;
 pub mod base;

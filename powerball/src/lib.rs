@@ -38,6 +38,40 @@
 //! println!("{}", serde_json::to_string_pretty(&model)?);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! # From logs to an explanation
+//!
+#![cfg_attr(feature = "explain", doc = "```no_run")]
+#![cfg_attr(not(feature = "explain"), doc = "```ignore")]
+//! use powerball::{ExplainOptions, explain, logs::log::read_logs};
+//! let arm = dyngen::Arm::read("arm.toml".as_ref())?;
+//! let (logs, _findings) = read_logs(&["a.csv", "b.csv", "c.csv"], &arm)?;
+//! let (validate, _findings) = read_logs(&["another_path.csv"], &arm)?;
+//! let explained = explain(&arm, &logs, &validate, &ExplainOptions::default())?;
+//! for found in &explained.effects {
+//!     println!("{} on joints {:?}", found.effect, found.joints);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # A model in a control step
+//!
+//! Of the LWA 4P here; `powerball generate` writes the same for any arm, with every effect that was named.
+//!
+#![cfg_attr(feature = "lwa4p", doc = "```")]
+#![cfg_attr(not(feature = "lwa4p"), doc = "```ignore")]
+//! use powerball::controller::friction::{TABLE_2, TanhFriction};
+//! use powerball::controller::model::minimal::{PARAMETERS, inverse_dynamics};
+//! # let parameters = nalgebra::SVector::<f64, PARAMETERS>::from_element(0.1);
+//! # let [q, dq, ddq] = [0.3, 0.1, 0.0].map(nalgebra::SVector::<f64, 6>::from_element);
+//! let friction = TABLE_2.map(TanhFriction::new);
+//! // In the loop: no allocation, no panic.
+//! let mut torque = inverse_dynamics(&q, &dq, &ddq, &parameters);
+//! for (j, friction) in friction.iter().enumerate() {
+//!     torque[j] += friction.torque(dq[j]);
+//! }
+//! # assert!(torque.iter().all(|t| t.is_finite()));
+//! ```
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
 #[cfg(feature = "driver")]
