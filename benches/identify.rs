@@ -1,9 +1,9 @@
 //! A million samples of six joints identified from memory: this project's stream, beside numpy with Pinocchio
 //! in the same run.
 //!
-//! `cargo bench --bench identify` (`PYTHON=…` names an interpreter that has both; without one only the stream
-//! is timed); `-- --write docs/performance.md` writes how the stream grows with the length of a log into the
-//! page.
+//! `cargo bench -p powerball-workspace --bench identify` (`PYTHON=…` names an interpreter that has both;
+//! without one only the stream is timed); `-- --write docs/performance.md` writes how the stream grows with
+//! the length of a log into the page.
 
 #![allow(clippy::unwrap_used, missing_docs)]
 

@@ -2,8 +2,8 @@
 //! symbols, run, and compared with the host to the bit.
 //!
 //! Sizes, stack and instruction counts do not depend on the machine. `firmware/costs.txt` holds them, and
-//! none may grow. `POWERBALL_BLESS=1 cargo test --release --test firmware` writes it, and the table in
-//! `docs/performance.md`, anew.
+//! none may grow. `POWERBALL_BLESS=1 cargo test --release -p powerball-workspace --test firmware` writes it,
+//! and the table in `docs/performance.md`, anew.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -16,7 +16,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 const TARGET: &str = "thumbv7em-none-eabihf";
-const BLESS: &str = "POWERBALL_BLESS=1 cargo test --release --test firmware";
+const BLESS: &str = "POWERBALL_BLESS=1 cargo test --release -p powerball-workspace --test firmware";
 
 /// What is missing to run this, if anything.
 fn missing() -> Option<String> {
