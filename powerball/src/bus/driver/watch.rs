@@ -197,16 +197,13 @@ impl<const N: usize> Driver<N> {
                 }
                 ControlMode::ProfilePosition | ControlMode::Current => false,
             };
-        if !strained || keeps_up {
+        if !strained {
             joint.watched.strained = None;
             return None;
         }
         let since = *joint.watched.strained.get_or_insert(now);
         let node: NodeId = profile.node;
-        (now.saturating_sub(since) >= reactions.current_limit_time).then_some(Cause::TorqueLimit(
-            node,
-            joint.current,
-            limit,
-        ))
+        let long = now.saturating_sub(since) >= reactions.current_limit_time;
+        (long && !keeps_up).then_some(Cause::TorqueLimit(node, joint.current, limit))
     }
 }
