@@ -24,6 +24,18 @@ pub struct Rule {
     /// No fold may lose more than this share of its squared error.
     pub worst_fold: f64,
 
+    /// What lowers the squared error of its joints by this share, on the validation set and the other way
+    /// round, needs no folds: a tenth of the rms.
+    pub large_gain: f64,
+    /// … where either way adds the same: their correlation.
+    pub alike: f64,
+    /// Blocks that count as independent last so many autocorrelation times of what is left …
+    pub block_memories: f64,
+    /// … but not less, s …
+    pub shortest_block: f64,
+    /// … and not more, s.
+    pub longest_block: f64,
+
     /// Share of the time-shift surrogates whose score a candidate must exceed.
     pub surrogate_level: f64,
     /// Surrogates that a step asks.
@@ -128,6 +140,11 @@ impl Default for Rule {
             least_gain: 0.02,
             folds_that_must_gain: 0.8,
             worst_fold: -0.05,
+            large_gain: 0.19,
+            alike: 0.5,
+            block_memories: 3.0,
+            shortest_block: 0.5,
+            longest_block: 2.0,
             surrogate_level: 0.99,
             step_surrogates: 60,
             final_surrogates: 200,

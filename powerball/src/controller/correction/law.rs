@@ -102,6 +102,35 @@ pub enum Law<T> {
         /// k, from 0.
         other: usize,
     },
+    /// tanh(γ·(a·q̇ + b·q̇ₖ)): Coulomb friction of a motor that turns with two joints.
+    SumDirection {
+        /// k, from 0.
+        other: usize,
+        /// a: how far the motor turns with this joint.
+        own: T,
+        /// b: how far it turns with the other one.
+        theirs: T,
+        /// γ, s/rad.
+        steepness: T,
+    },
+    /// a·q̇ + b·q̇ₖ: its viscous friction.
+    SumSpeed {
+        /// k, from 0.
+        other: usize,
+        /// a.
+        own: T,
+        /// b.
+        theirs: T,
+    },
+    /// a·q̈ + b·q̈ₖ: its rotor's inertia.
+    SumAcceleration {
+        /// k, from 0.
+        other: usize,
+        /// a.
+        own: T,
+        /// b.
+        theirs: T,
+    },
     /// τ of the rigid arm with friction: a factor between current and torque.
     Torque,
     /// τ·|τ|/s: a factor that changes with the torque.
@@ -228,6 +257,13 @@ impl<T: RealField + Copy> Law<T> {
             Law::OtherDirection { other, steepness } => (steepness * of(now.dq, other)).tanh(),
             Law::OtherSpeed { other } => of(now.dq, other),
             Law::OtherAcceleration { other } => of(now.ddq, other),
+            Law::SumDirection { other, own, theirs, steepness } => {
+                (steepness * (own * dq + theirs * of(now.dq, other))).tanh()
+            }
+            Law::SumSpeed { other, own, theirs } => own * dq + theirs * of(now.dq, other),
+            Law::SumAcceleration { other, own, theirs } => {
+                own * of(now.ddq, joint) + theirs * of(now.ddq, other)
+            }
             Law::Torque => torque(),
             Law::TorqueMagnitude { scale } => torque() * torque().abs() / scale,
             Law::TorqueSquare { scale } => {

@@ -1,8 +1,10 @@
 //! Friction that differs with the direction, or a constant torque: an offset of the current looks the same.
 
 use super::{Axis, Candidate, Class, Context, Effect, Found};
+use crate::controller::JointNumber;
 use crate::controller::correction::Law;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// τ = c, τ = d·|q̇|, or both.
 pub(super) struct Asymmetry;
@@ -28,6 +30,19 @@ pub struct Figures {
 }
 
 impl Effect for Asymmetry {
+    /// Every torque sensor has a zero.
+    fn beside(&self, context: &Context<'_>) -> Vec<Candidate> {
+        context.moving_joints().map(|j| Candidate::on(j, Settings::Constant, 1)).collect()
+    }
+
+    /// A constant torque and one in proportion to |q̇| may both be there.
+    fn excludes(&self, a: &Candidate, b: &Candidate) -> bool {
+        let which = |c: &Candidate| Settings::of(c).copied();
+        let pair = [which(a), which(b)];
+        let apart = pair.contains(&Some(Settings::Constant)) && pair.contains(&Some(Settings::Viscous));
+        a.joints == b.joints && !apart
+    }
+
     fn name(&self) -> &'static str {
         "asymmetry"
     }
@@ -61,7 +76,14 @@ impl Effect for Asymmetry {
             (_, [torque, viscous, ..]) => (*torque, *viscous),
             (_, []) => (0.0, 0.0),
         };
-        let (torque, viscous) = found.iter().map(both).unzip();
+        // A joint's two parts may have been found one after the other.
+        let mut by_joint: BTreeMap<JointNumber, (f64, f64)> = BTreeMap::new();
+        for f in found {
+            let (torque, viscous) = both(f);
+            let sum = by_joint.entry(f.candidate.joints[0]).or_default();
+            *sum = (sum.0 + torque, sum.1 + viscous);
+        }
+        let (torque, viscous) = by_joint.into_values().unzip();
         Figures { torque, viscous }.into()
     }
 }

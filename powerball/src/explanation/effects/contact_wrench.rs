@@ -130,7 +130,7 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     if columns.len() < 3 {
         return None;
     }
-    let (gram, _, _) = fit.gram.sum(&fit.weights, |_| true);
+    let (gram, _, _) = fit.gram.fitted(&fit.weights, |_| true);
     let solver = Solver::new(&gram, |c| fit.free[c]);
     let steps = data.blocks_of(GRID);
     let mut before = vec![Sums::zero(fit.design.size, 3)];

@@ -1,5 +1,6 @@
 //! What an effect may look at: the data, the model fitted so far, and what it leaves.
 
+use super::Placed;
 use crate::controller::JointNumber;
 use crate::controller::correction::{Instant, Law, Memory};
 use crate::controller::friction::TanhFriction;
@@ -99,6 +100,19 @@ impl<'a> Context<'a> {
     #[must_use]
     pub fn top_speed(&self, joint: JointNumber) -> f64 {
         self.fit.top_speed[joint.index()]
+    }
+
+    /// The column of laws that share a coefficient, each at a joint of its own.
+    pub fn placed_column(&self, laws: &[Placed]) -> Column {
+        let mut parts = Vec::with_capacity(laws.len());
+        for (joint, law, share) in laws {
+            let mut column = self.law_column(*joint, *law);
+            if *share != 1.0 {
+                column.parts.iter_mut().flat_map(|(_, values)| values).for_each(|v| *v *= share);
+            }
+            parts.extend(column.parts);
+        }
+        Column { parts }
     }
 
     /// The column of a law at a joint: the law along the recordings.

@@ -1,6 +1,7 @@
 //! What is asked of an effect.
 
 use super::{Axis, Candidate, Context, Figures, Found, Window};
+use crate::controller::JointNumber;
 use crate::controller::correction::Law;
 use crate::explanation::rule::Rule;
 use crate::logs::regression::{Column, Data};
@@ -33,10 +34,13 @@ impl Class {
     }
 }
 
+/// A law at a joint, and how much of the column's coefficient it has there.
+pub type Placed = (JointNumber, Law<f64>, f64);
+
 /// What an effect is in a model of the arm.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Part {
-    /// Torques: its laws with their coefficients.
+    /// Torques: its laws with their coefficients (see [`Effect::placed_laws`]).
     Laws,
     /// A rigid arm with another value of a parameter that was taken for zero.
     Parameter(Parameter, f64),
@@ -102,6 +106,12 @@ pub trait Effect: Sync {
 
     // How it is looked for.
 
+    /// What is in the model from the start, so that no other effect is judged without it: what every
+    /// arm may have, as the zero of a torque sensor. It is named at the end, where it is needed.
+    fn beside(&self, _context: &Context<'_>) -> Vec<Candidate> {
+        Vec::new()
+    }
+
     /// The ways in which it could show in these data, worth a look each.
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate>;
 
@@ -116,10 +126,16 @@ pub trait Effect: Sync {
         Vec::new()
     }
 
+    /// By column the laws that share its coefficient: those of [`laws`](Self::laws), or those of a torque
+    /// that several joints feel.
+    fn placed_laws(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Vec<Placed>> {
+        let laws = self.laws(context, candidate);
+        laws.into_iter().map(|law| vec![(candidate.joints[0], law, 1.0)]).collect()
+    }
+
     /// The columns of a candidate on the context's data; the same on every data set.
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        let laws = self.laws(context, candidate);
-        laws.into_iter().map(|law| context.law_column(candidate.joints[0], law)).collect()
+        self.placed_laws(context, candidate).iter().map(|laws| context.placed_column(laws)).collect()
     }
 
     /// Whether no coefficient may be negative (friction dissipates).

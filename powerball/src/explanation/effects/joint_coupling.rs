@@ -1,6 +1,8 @@
-//! One joint's motion that loads another: shared bearings, cables, belts through a joint.
+//! One joint's motion that loads another: shared bearings, cables, belts through a joint, and motors that
+//! turn with two joints.
 
-use super::{Axis, Candidate, Class, Context, Effect, Found};
+use super::candidate::scaled;
+use super::{Axis, Candidate, Class, Context, Effect, Found, Placed};
 use crate::controller::JointNumber;
 use crate::controller::correction::Law;
 use crate::controller::friction::TanhFriction;
@@ -8,6 +10,10 @@ use serde::Serialize;
 
 /// On joint i: c·tanh(γ·q̇ₖ) (cross-joint Coulomb friction), c·q̇ₖ or c·q̈ₖ of another joint k; or a friction
 /// of k's own steepnesses with levels of its own, c₁·tanh(γ₂·q̇ₖ) + c₂·tanh(γ₄·q̇ₖ) + c₃·q̇ₖ (Eq. 16).
+///
+/// Or joint i's motor turns with both (a wrist, a parallelogram, a belt through a joint): its position is
+/// θ = qᵢ + ρ·qₖ, its torque τ = c·tanh(γ·θ̇) + v·θ̇ + I·θ̈, with c, v, I ≥ 0; joint i feels τ, joint k ρ·τ
+/// (virtual work).
 pub(super) struct JointCoupling;
 
 /// Whose motion is felt, and how.
@@ -33,6 +39,21 @@ pub enum Kind {
         /// γ₂ and γ₄ of the joint, where their levels are not zero, s/rad.
         steepness: Vec<f64>,
     },
+    /// As a motor that turns with both joints.
+    Transmission(Drive),
+}
+
+/// A motor that turns with two joints.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drive {
+    /// ρ: how far it turns with the other joint.
+    pub ratio: f64,
+    /// γ of its Coulomb friction, s/rad.
+    pub steepness: f64,
+    /// Whether it has viscous friction.
+    pub viscous: bool,
+    /// Whether its rotor's inertia is felt.
+    pub inertia: bool,
 }
 
 impl Kind {
@@ -44,23 +65,50 @@ impl Kind {
             Kind::Viscous => "viscous",
             Kind::Inertial => "inertial",
             Kind::Friction { .. } => "friction",
+            Kind::Transmission(_) => "transmission",
         }
     }
 }
 
 /// Kinds that there are.
 const KINDS: usize = 4;
+/// Ratios that are tried of a motor that turns with two joints.
+const RATIOS: [f64; 2] = [1.0, -1.0];
+/// A motor whose viscous friction and rotor are felt, or one of them.
+const DRIVES: [(bool, bool); 3] = [(true, true), (false, true), (true, false)];
 
 /// What it is, one entry a pair of joints.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// The coefficient of the law in SI units; of a friction its share in that of the other joint at that
-    /// joint's top velocity.
+    /// joint's top velocity; of a transmission its Coulomb friction, N·m.
     pub coefficient: Vec<f64>,
     /// The joint whose motion is felt.
     pub from_joint: Vec<JointNumber>,
     /// How it is felt: [`Kind::name`].
     pub law: Vec<&'static str>,
+    /// The motors that turn with two joints.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub transmissions: Vec<Transmission>,
+}
+
+/// A motor that turns with two joints, as found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Transmission {
+    /// The joint whose motor it is.
+    pub motor: JointNumber,
+    /// The joint with which it turns too.
+    pub with: JointNumber,
+    /// How far it turns with that one.
+    pub ratio: f64,
+    /// Its Coulomb friction, N·m.
+    pub coulomb: f64,
+    /// Its viscous friction, N·m·s/rad.
+    pub viscous: f64,
+    /// Its rotor's inertia beyond that of the arm file's rotors, at the joint, kg·m².
+    pub inertia: f64,
+    /// The block for the arm file.
+    pub arm_file: String,
 }
 
 impl Effect for JointCoupling {
@@ -74,7 +122,9 @@ impl Effect for JointCoupling {
 
     /// A joint may feel several others.
     fn excludes(&self, a: &Candidate, b: &Candidate) -> bool {
-        a.joints == b.joints && from(a) == from(b)
+        let (mut one, mut other) = (a.joints.clone(), b.joints.clone());
+        (one.sort_unstable(), other.sort_unstable());
+        one == other && (one.len() > 1 || from(a) == from(b))
     }
 
     fn shown_by(&self, candidate: &Candidate) -> Axis {
@@ -95,9 +145,56 @@ impl Effect for JointCoupling {
                 if !steepness.is_empty() {
                     on(Kind::Friction { steepness });
                 }
+                let steepness = context.steepness(i);
+                let drives = RATIOS.into_iter().flat_map(|ratio| {
+                    DRIVES.map(|(viscous, inertia)| Drive { ratio, steepness, viscous, inertia })
+                });
+                candidates.extend(drives.map(|drive| {
+                    let settings = Settings { from: k, kind: Kind::Transmission(drive) };
+                    Candidate::on_all(vec![i, k], settings, options * RATIOS.len())
+                }));
             }
         }
         candidates
+    }
+
+    fn neighbours(&self, candidate: &Candidate, share: f64) -> Vec<Candidate> {
+        let Some(Settings { from, kind: Kind::Transmission(drive) }) = Settings::of(candidate) else {
+            return Vec::new();
+        };
+        let at = |ratio: f64, steepness: f64| {
+            let steepness = scaled(drive.steepness, steepness, share);
+            let drive = Drive { ratio: scaled(drive.ratio, ratio, share), steepness, ..*drive };
+            candidate.with(Settings { from: *from, kind: Kind::Transmission(drive) })
+        };
+        let ratios = [0.5, 0.8, 1.25, 2.0].map(|f| at(f, 1.0));
+        ratios.into_iter().chain([0.25, 0.5, 2.0, 4.0].map(|f| at(1.0, f))).collect()
+    }
+
+    /// A motor's friction dissipates and its rotor has inertia.
+    fn admissible(&self, candidate: &Candidate, coefficients: &[f64]) -> bool {
+        candidate.joints.len() == 1 || coefficients.iter().all(|c| *c >= 0.0)
+    }
+
+    fn placed_laws(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Vec<Placed>> {
+        let Some(Settings { from, kind: Kind::Transmission(drive) }) = Settings::of(candidate) else {
+            let laws = self.laws(context, candidate);
+            return laws.into_iter().map(|law| vec![(candidate.joints[0], law, 1.0)]).collect();
+        };
+        let (motor, Drive { ratio, steepness, viscous, inertia }) = (candidate.joints[0], *drive);
+        // θ seen from either joint.
+        let both = |law: &dyn Fn(usize, f64, f64) -> Law<f64>| {
+            vec![(motor, law(from.index(), 1.0, ratio), 1.0), (*from, law(motor.index(), ratio, 1.0), ratio)]
+        };
+        let mut columns =
+            vec![both(&|other, own, theirs| Law::SumDirection { other, own, theirs, steepness })];
+        if viscous {
+            columns.push(both(&|other, own, theirs| Law::SumSpeed { other, own, theirs }));
+        }
+        if inertia {
+            columns.push(both(&|other, own, theirs| Law::SumAcceleration { other, own, theirs }));
+        }
+        columns
     }
 
     fn laws(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
@@ -111,13 +208,22 @@ impl Effect for JointCoupling {
                 let level = |steepness: &f64| Law::OtherDirection { other, steepness: *steepness };
                 steepness.iter().map(level).chain([Law::OtherSpeed { other }]).collect()
             }
+            Kind::Transmission(_) => Vec::new(),
         }
     }
 
     fn figures(&self, context: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
-        let mut figures = Figures { coefficient: Vec::new(), from_joint: Vec::new(), law: Vec::new() };
+        let mut figures = Figures {
+            coefficient: Vec::new(),
+            from_joint: Vec::new(),
+            law: Vec::new(),
+            transmissions: Vec::new(),
+        };
         for f in found {
             let Some(Settings { from, kind }) = Settings::of(f.candidate) else { continue };
+            if let Kind::Transmission(drive) = kind {
+                figures.transmissions.push(transmission(f, *from, drive));
+            }
             figures.coefficient.push(coefficient(context, *from, kind, f.coefficients));
             figures.from_joint.push(*from);
             figures.law.push(kind.name());
@@ -138,3 +244,27 @@ fn coefficient(context: &Context<'_>, from: JointNumber, kind: &Kind, coefficien
     let felt: f64 = levels.chain([velocity]).zip(coefficients).map(|(x, c)| c * x).sum();
     felt / TanhFriction::new(context.fit.friction(from.index())).torque(velocity)
 }
+
+/// A motor that was found, with its block for the arm file.
+fn transmission(found: &Found<'_>, with: JointNumber, drive: &Drive) -> Transmission {
+    let motor = found.candidate.joints[0];
+    let mut more = found.coefficients.iter().skip(1).copied();
+    let viscous = if drive.viscous { more.next().unwrap_or(0.0) } else { 0.0 };
+    let inertia = if drive.inertia { more.next().unwrap_or(0.0) } else { 0.0 };
+    // A ratio of teeth: the nearest one with small numbers.
+    let near = |bottom: i64| (drive.ratio * bottom as f64).round() / bottom as f64;
+    let ratio = (1..=MOST_TEETH).map(near).find(|r| (r - drive.ratio).abs() < SAME_RATIO * drive.ratio.abs());
+    let ratio = ratio.unwrap_or(drive.ratio);
+    let (joints, matrix) = match motor < with {
+        true => ([motor, with], format!("[[1, {ratio}], [0, 1]]")),
+        false => ([with, motor], format!("[[1, 0], [{ratio}, 1]]")),
+    };
+    let [first, second] = joints;
+    let arm_file = format!("[[transmission]]\njoints = [{first}, {second}]\nmatrix = {matrix}");
+    Transmission { motor, with, ratio, coulomb: found.coefficients[0], viscous, inertia, arm_file }
+}
+
+/// Ratios of up to so many teeth are tried for the arm file.
+const MOST_TEETH: i64 = 12;
+/// A ratio that is found this near to one of teeth is that one.
+const SAME_RATIO: f64 = 0.04;

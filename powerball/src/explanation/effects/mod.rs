@@ -42,7 +42,7 @@ pub use by_joint::ByJoint;
 pub use candidate::{Candidate, Found, Window};
 pub use context::Context;
 pub(crate) use context::{PASSES, SOFT, each_instant, move_link};
-pub use effect::{Class, Effect, Part};
+pub use effect::{Class, Effect, Part, Placed};
 
 /// Makes of the list of effects what must know all of them: [`Settings`], [`Figures`] and [`all`].
 macro_rules! library {

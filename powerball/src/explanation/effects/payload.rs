@@ -195,7 +195,7 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     if columns.is_empty() {
         return None;
     }
-    let (gram, _, _) = fit.gram.sum(&fit.weights, |_| true);
+    let (gram, _, _) = fit.gram.fitted(&fit.weights, |_| true);
     let solver = Solver::new(&gram, |c| fit.free[c]);
     let mut starts: Vec<(usize, f64, Sums)> = Vec::new();
     let empty = || Sums::zero(fit.design.size, 4);

@@ -25,8 +25,9 @@ pub struct Figures {
     pub delay: ByJoint,
 }
 
-/// Starting values, s; the coefficient makes each a third to three times as long.
-const DELAYS: [f64; 7] = [0.000_8, 0.003, 0.008, 0.02, -0.000_8, -0.003, -0.01];
+/// Starting values, s; the coefficient makes each a third to three times as long. Filters and gateways make
+/// torque late by a tenth of a second and more.
+const DELAYS: [f64; 9] = [0.000_8, 0.003, 0.008, 0.02, 0.06, 0.12, -0.000_8, -0.003, -0.01];
 
 impl Effect for TimeDelay {
     fn name(&self) -> &'static str {

@@ -41,7 +41,7 @@ use comparison::{History, withhold};
 use findings::Findings;
 use model::Model;
 use prepare::{Begun, Inertia, prepare};
-use step::{Outcome, Proposed, accept, propose};
+use step::{Outcome, Proposed, accept, propose, settle_beside};
 
 /// Explains what the base model of an arm that is derived already lacks on `logs`, judged on `validate`. The
 /// logs are taken as they are: their clocks are joined already, and what is known is taken out of them.
@@ -66,7 +66,7 @@ pub fn explain_body(
 
 /// Adds one effect after the other until nothing passes and nothing is taken back.
 fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
-    let (mut model, mut history) = (Model::new(base), History::default());
+    let (mut model, mut history) = (Model::beside(base, &study), History::default());
     for number in 0..study.rule().most_steps {
         study.say(&format!("step {}: screening candidates", number + 1));
         let Proposed { refused, outcome } = propose(&study, &model, number);
@@ -90,6 +90,8 @@ fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
         }
     }
     while withhold(&study, &mut model, &mut history).is_some() {}
+    study.say("judging the zeros of the torques");
+    history.steps.extend(settle_beside(&study, &mut model));
     study.say("refining settings");
     search::refine(&study, &mut model);
     study.say("asking time-shift surrogates");

@@ -1,7 +1,7 @@
 //! The base model with what was accepted: what a step changes.
 
 use super::study::Study;
-use crate::explanation::effects::{Candidate, Context, Effect};
+use crate::explanation::effects::{self, Candidate, Context, Effect};
 use crate::explanation::rule::Rule;
 use crate::identification::estimate::{Fit, Folds, Term, fit};
 use crate::logs::regression::{Column, Data};
@@ -18,8 +18,8 @@ pub(super) struct Accepted {
     pub(super) fold_gain: f64,
     /// Squared error that fell when it was accepted, by joint, (N·m)² summed over rows.
     pub(super) explained: Vec<f64>,
-    /// The step that accepted it.
-    pub(super) step: usize,
+    /// The step that accepted it; none where it is in the model from the start (see [`Effect::beside`]).
+    pub(super) step: Option<usize>,
 }
 
 /// The model in the making.
@@ -44,6 +44,42 @@ impl Model {
     /// The base model alone.
     pub(super) fn new(base: Fit) -> Model {
         Model { accepted: Vec::new(), given_up: Vec::new(), fit: base }
+    }
+
+    /// The base model with what every effect is to be judged beside.
+    pub(super) fn beside(base: Fit, study: &Study<'_>) -> Model {
+        let mut model = Model::new(base);
+        // Joints that are fitted apart have an offset already.
+        if study.data.joints_apart {
+            return model;
+        }
+        let candidates: Vec<Candidate> =
+            effects::all().iter().flat_map(|e| e.beside(&model.context(study))).collect();
+        model.accepted = candidates
+            .into_iter()
+            .map(|candidate| Accepted {
+                columns: candidate.effect().columns(&model.context(study), &candidate).len(),
+                candidate,
+                p_value: 1.0,
+                fold_gain: 0.0,
+                explained: Vec::new(),
+                step: None,
+            })
+            .collect();
+        // Its friction was fitted without them: it is looked for anew.
+        let terms = model.terms(&model.context(study), None);
+        model.fit = fit(&study.data, &study.folds, &terms, None);
+        model
+    }
+
+    /// The terms of what was accepted on some data, of all or of all but one.
+    pub(super) fn terms(&self, context: &Context<'_>, without: Option<usize>) -> Vec<Term> {
+        let term = |(_, a): (usize, &Accepted)| {
+            let non_negative = a.effect().non_negative();
+            let columns = a.effect().columns(context, &a.candidate).into_iter();
+            columns.map(move |column| Term { column, non_negative }).collect::<Vec<_>>()
+        };
+        self.accepted.iter().enumerate().filter(|(k, _)| Some(*k) != without).flat_map(term).collect()
     }
 
     /// The model seen on the logs that it was fitted to.

@@ -3,11 +3,14 @@
 use super::comparison::{Comparison, Question, Step, compare};
 use super::model::{Accepted, Model};
 use super::named::Rival;
-use super::search::{Group, Member, Screen, Tester, Trial, Validation, eliminate, groups, surrogates};
+use super::search::{
+    Group, Member, Screen, Tester, Trial, Validation, eliminate, groups, is_beside, keep_needed, surrogates,
+};
 use super::study::Study;
 use crate::controller::JointNumber;
-use crate::explanation::effects::{Candidate, Context, Effect};
+use crate::explanation::effects::{Candidate, Context, Effect, Placed};
 use crate::identification::estimate::{Design, Fit, friction_columns, spread};
+use std::sync::OnceLock;
 
 /// What a step found, before anything is changed.
 pub(super) struct Proposed {
@@ -49,7 +52,15 @@ pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize) -> Propos
         Design::new(&study.validation, &friction_columns(&study.validation, &model.fit.shapes), &columns);
     let validation = Validation { data: &study.validation, design, residual: residual.clone() };
     let there = Context::new(&study.validation, &model.fit, &residual, study.rule());
-    let tester = Tester { study, screen: &screen, tests, validation: &validation, there: &there };
+    let tester = Tester {
+        study,
+        screen: &screen,
+        tests,
+        validation: &validation,
+        there: &there,
+        model,
+        swapped: OnceLock::new(),
+    };
     let best = most_promising(&mut groups, &tester);
     let refused = refused(&groups);
     let Some(best) = best else {
@@ -151,19 +162,20 @@ pub(super) fn accept(study: &Study<'_>, model: &mut Model, choice: Choice, numbe
     let square_before = squares(&model.fit);
     let added: Vec<Candidate> = members.iter().map(|m| m.candidate.clone()).collect();
     let first = model.accepted.len();
+    let count = members.iter().filter(|m| m.evidence.is_some()).count();
     for member in members {
         let Some(evidence) = member.evidence else { continue };
-        let mut gains = evidence.fold_gains;
-        gains.sort_by(f64::total_cmp);
         model.accepted.push(Accepted {
             columns: member.trial.columns.len(),
             candidate: member.candidate,
             p_value: (evidence.p_value * tested).min(1.0),
-            fold_gain: gains.get(gains.len() / 2).copied().unwrap_or(0.0),
+            fold_gain: evidence.median_gain(),
             explained: Vec::new(),
-            step: number,
+            step: Some(number),
         });
     }
+    drop_covered(study, model, first);
+    let first = model.accepted.len() - count;
     model.refit(study);
     let fell = square_before.iter().zip(squares(&model.fit)).map(|(b, a)| (b - a).max(0.0));
     let fell: Vec<f64> = fell.collect();
@@ -174,4 +186,64 @@ pub(super) fn accept(study: &Study<'_>, model: &mut Model, choice: Choice, numbe
     model.given_up.extend(gone);
     let after = spread(&study.validation, &model.residual_on_validation(study)).rms;
     Step { number, effect, square_before, comparison, question, before, after }
+}
+
+/// Takes out what was in the model from the start and is a part of what was accepted from `first` on: a
+/// spring at rest elsewhere has the torque sensor's zero in it.
+fn drop_covered(study: &Study<'_>, model: &mut Model, first: usize) {
+    let context = model.context(study);
+    let laws = |a: &Accepted| a.effect().placed_laws(&context, &a.candidate);
+    let new: Vec<Vec<Placed>> = model.accepted[first..].iter().flat_map(laws).collect();
+    let covered = |a: &Accepted| is_beside(a) && laws(a).iter().all(|column| new.contains(column));
+    let kept: Vec<bool> = model.accepted.iter().map(|a| !covered(a)).collect();
+    let mut kept = kept.into_iter();
+    model.accepted.retain(|_| kept.next().unwrap_or(true));
+}
+
+/// Once everything else is known: what was in the model from the start goes out where it is not needed and
+/// gets its name where it is. Returns the step of each name.
+pub(super) fn settle_beside(study: &Study<'_>, model: &mut Model) -> Vec<Step> {
+    keep_needed(study, model);
+    let mut effects: Vec<&'static dyn Effect> = Vec::new();
+    for a in model.accepted.iter().filter(|a| is_beside(a)) {
+        if !effects.contains(&a.effect()) {
+            effects.push(a.effect());
+        }
+    }
+    let numbers = study.rule().most_steps..;
+    effects
+        .into_iter()
+        .zip(numbers)
+        .map(|(effect, number)| name_beside(study, model, effect, number))
+        .collect()
+}
+
+fn name_beside(study: &Study<'_>, model: &mut Model, effect: &'static dyn Effect, number: usize) -> Step {
+    let own = |a: &Accepted| is_beside(a) && a.effect() == effect;
+    let which: Vec<usize> = (0..model.accepted.len()).filter(|k| own(&model.accepted[*k])).collect();
+    let after = spread(&study.validation, &model.residual_on_validation(study)).rms;
+    let fitted: Vec<Accepted> = model.accepted.clone();
+    model.accepted.retain(|a| !own(a));
+    model.refit(study);
+    let context = model.context(study);
+    let screen = Screen::new(&context);
+    let (mut groups, _) = groups(study, model, &screen);
+    groups.retain(|g| g.effect != effect);
+    let member = |k: &usize| {
+        let candidate = fitted[*k].candidate.clone();
+        let trial = screen.try_candidate(&candidate)?;
+        Some(Member { candidate, trial, evidence: None, refusal: None, judged: true })
+    };
+    let members: Vec<Member> = which.iter().filter_map(member).collect();
+    let mut joints: Vec<JointNumber> =
+        which.iter().flat_map(|k| fitted[*k].candidate.joints.clone()).collect();
+    joints.sort_unstable();
+    groups.push(Group { effect, members });
+    let comparison = compare(&screen, &groups, groups.len() - 1, &joints);
+    let before = spread(&study.validation, &model.residual_on_validation(study)).rms;
+    let square_before = model.fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect();
+    model.accepted = fitted;
+    which.iter().for_each(|k| model.accepted[*k].step = Some(number));
+    model.refit(study);
+    Step { number, effect, square_before, comparison, question: None, before, after }
 }

@@ -95,6 +95,25 @@ enum LawEntry {
         #[serde(with = "from_one")]
         other: usize,
     },
+    SumDirection {
+        #[serde(with = "from_one")]
+        other: usize,
+        own: f64,
+        theirs: f64,
+        steepness: f64,
+    },
+    SumSpeed {
+        #[serde(with = "from_one")]
+        other: usize,
+        own: f64,
+        theirs: f64,
+    },
+    SumAcceleration {
+        #[serde(with = "from_one")]
+        other: usize,
+        own: f64,
+        theirs: f64,
+    },
     Torque,
     TorqueMagnitude {
         scale: f64,
@@ -171,6 +190,9 @@ impl TorqueModel {
             let other = match term.law {
                 Law::OtherDirection { other, .. }
                 | Law::OtherSpeed { other }
+                | Law::SumDirection { other, .. }
+                | Law::SumSpeed { other, .. }
+                | Law::SumAcceleration { other, .. }
                 | Law::OtherAcceleration { other } => other,
                 _ => 0,
             };

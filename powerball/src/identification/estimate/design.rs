@@ -13,7 +13,7 @@ use std::ops::Range;
 ///
 /// Global order: the minimal set (one after the other for each joint, where [`Data::joints_apart`]),
 /// `FRICTION` columns a joint, the terms' columns.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Design {
     /// Joint by joint: columns, column-major.
     joints: Vec<Local>,
@@ -27,7 +27,7 @@ pub struct Design {
     pub set: usize,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Local {
     rows: usize,
     values: Vec<f64>,
@@ -144,6 +144,8 @@ pub struct Gram {
     parts: Vec<Vec<Products>>,
     globals: Vec<Vec<usize>>,
     size: usize,
+    /// By column the precision with which it is known before anything is measured.
+    prior: Vec<f64>,
 }
 
 impl Gram {
@@ -168,7 +170,21 @@ impl Gram {
             }
             cells
         });
-        Gram { parts, globals: design.joints.iter().map(|l| l.global.clone()).collect(), size: design.size }
+        let globals: Vec<Vec<usize>> = design.joints.iter().map(|l| l.global.clone()).collect();
+        let prior = prior(&parts, &globals, design);
+        Gram { parts, globals, size: design.size, prior }
+    }
+
+    /// As [`sum`](Self::sum), with what is known beforehand of an arm: none of its parameters alone makes more
+    /// torque on a joint than was measured there. What logs determine does not move by that; what
+    /// they hardly determine stays where a real arm may be, and the model does not run away on other paths.
+    #[must_use]
+    pub fn fitted(&self, weights: &[f64], wanted: impl Fn(usize) -> bool) -> (Mat<f64>, Vec<f64>, f64) {
+        let (mut gram, right, square) = self.sum(weights, wanted);
+        for (c, precision) in self.prior.iter().enumerate() {
+            gram[(c, c)] += precision;
+        }
+        (gram, right, square)
     }
 
     /// Σ w A'A, Σ w A'y and Σ w y'y over the cells for which `wanted` holds.
@@ -182,6 +198,22 @@ impl Gram {
         }
         sum
     }
+}
+
+/// By column 1/s², where s is the value at which it alone would make as much torque on some joint as was
+/// measured there.
+fn prior(parts: &[Vec<Products>], globals: &[Vec<usize>], design: &Design) -> Vec<f64> {
+    let mut prior = vec![0.0f64; design.size];
+    for (cells, global) in parts.iter().zip(globals) {
+        let measured: f64 = cells.iter().map(|(_, _, square)| square).sum();
+        for (local, g) in global.iter().enumerate() {
+            let alone: f64 = cells.iter().map(|(gram, _, _)| gram[(local, local)]).sum();
+            if measured > 0.0 {
+                prior[*g] = prior[*g].max(alone / measured);
+            }
+        }
+    }
+    prior
 }
 
 /// The row ranges of a joint by cell, neighbouring blocks of one cell joined.

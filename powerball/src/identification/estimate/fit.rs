@@ -94,6 +94,7 @@ impl Fit {
 /// Fits the base model with the given terms; `start` saves the search for shapes and weights.
 #[must_use]
 pub fn fit(data: &Data<'_>, folds: &Folds, terms: &[Term], start: Option<&Fit>) -> Fit {
+
     let rows = InMemory { data, folds, extra: terms.iter().map(|t| t.column.clone()).collect() };
     let layout = rows.layout();
     let non_negative: Vec<usize> =
@@ -149,7 +150,7 @@ impl Rows for InMemory<'_> {
     }
 
     fn products(&self, (_, gram): &(Design, Gram), weights: &[f64]) -> Products {
-        gram.sum(weights, |_| true)
+        gram.fitted(weights, |_| true)
     }
 
     fn trials(&self, (design, _): &(Design, Gram), joint: usize, steep: &[f64]) -> Trials {

@@ -32,14 +32,14 @@ fn octaves(signal: &[f64]) -> [Vec<f64>; OCTAVES] {
 /// itself is not its own.)
 pub(crate) fn inconstant(study: &Study<'_>, model: &Model) -> Option<usize> {
     let rule = study.rule();
-    let (gram, _, _) = model.fit.gram.sum(&model.fit.weights, |_| true);
+    let (gram, _, _) = model.fit.gram.fitted(&model.fit.weights, |_| true);
     let sizes: Vec<ByOctave> =
         model.places().into_iter().map(|own| by_octave(study, model, &gram, own)).collect();
     let missing = |(change, error): &(f64, f64)| {
         let least = rule.least_missing.max(rule.missing_errors * error);
         (least..2.0 - rule.least_missing).contains(&-change)
     };
-    let judged = |a: &usize| !model.accepted[*a].effect().abrupt();
+    let judged = |a: &usize| model.accepted[*a].step.is_some() && !model.accepted[*a].effect().abrupt();
     (0..sizes.len()).rev().filter(judged).find(|a| sizes[*a].iter().any(missing))
 }
 

@@ -23,7 +23,7 @@ pub(crate) fn withhold(study: &Study<'_>, model: &mut Model, history: &mut Histo
         (vec![model.accepted.remove(a)], "what it says of some pace of motion is not there")
     } else {
         let step = history.steps.iter().rev().find(|s| is_weak(study, model, s))?.number;
-        let taken = model.accepted.extract_if(.., |a| a.step == step).collect();
+        let taken = model.accepted.extract_if(.., |a| a.step == Some(step)).collect();
         (taken, "others fit as well and much is left")
     };
     let Accepted { step, .. } = *taken.first()?;
@@ -32,7 +32,7 @@ pub(crate) fn withhold(study: &Study<'_>, model: &mut Model, history: &mut Histo
     let joints: Vec<JointNumber> = taken.iter().flat_map(|a| a.candidate.joints.clone()).collect();
     model.accepted.retain(|a| a.step <= step || !a.candidate.is_on(&joints));
     model.given_up.extend(taken.into_iter().map(|a| a.candidate));
-    let stands = |s: &Step| model.accepted.iter().any(|a| a.step == s.number);
+    let stands = |s: &Step| model.accepted.iter().any(|a| a.step == Some(s.number));
     let gone = history.steps.extract_if(.., |s| !stands(s));
     history.questions.extend(gone.filter_map(|s| s.question).map(Question::withheld));
     model.refit(study);
@@ -42,7 +42,7 @@ pub(crate) fn withhold(study: &Study<'_>, model: &mut Model, history: &mut Histo
 /// Whether a step's name is not told apart from others and leaves much.
 fn is_weak(study: &Study<'_>, model: &Model, step: &Step) -> bool {
     step.comparison.apart < study.rule().least_margin
-        && model.accepted.iter().any(|a| a.step == step.number)
+        && model.accepted.iter().any(|a| a.step == Some(step.number))
         && share_left(study, model, step) > study.rule().much_left
 }
 

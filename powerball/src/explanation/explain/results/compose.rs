@@ -105,12 +105,14 @@ fn parts(study: &Study<'_>, found: &Model, held: Option<&Held>) -> Parts {
         let part = effect.part(&context, candidate, &coefficients);
         match part {
             Part::Laws => {
-                let joint = candidate.joints[0].index();
-                let laws = effect.laws(&context, candidate).into_iter().zip(coefficients);
-                parts.additions.terms.extend(laws.map(|(law, coefficient)| NamedTerm {
-                    effect: effect.name().to_string(),
-                    term: Term { joint, coefficient, law },
-                }));
+                for (laws, coefficient) in
+                    effect.placed_laws(&context, candidate).into_iter().zip(coefficients)
+                {
+                    parts.additions.terms.extend(laws.into_iter().map(|(joint, law, share)| NamedTerm {
+                        effect: effect.name().to_string(),
+                        term: Term { joint: joint.index(), coefficient: coefficient * share, law },
+                    }));
+                }
             }
             Part::Parameter(parameter, value) => {
                 parts.additions.arm_changes.not_zero.push(parameter.to_string());

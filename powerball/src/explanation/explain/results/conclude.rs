@@ -67,7 +67,9 @@ fn named_effects(
     left: &dyn Fn(&[JointNumber]) -> f64,
 ) -> Vec<NamedEffect> {
     let mut order: Vec<&'static dyn Effect> = Vec::new();
-    for effect in model.accepted.iter().map(Accepted::effect) {
+    let mut accepted: Vec<&Accepted> = model.accepted.iter().collect();
+    accepted.sort_by_key(|a| a.step);
+    for effect in accepted.into_iter().map(Accepted::effect) {
         if !order.contains(&effect) {
             order.push(effect);
         }
@@ -83,7 +85,10 @@ fn named_effect(
     left: &dyn Fn(&[JointNumber]) -> f64,
 ) -> Option<NamedEffect> {
     let coefficients = model.coefficients();
-    let own = || model.accepted.iter().zip(&coefficients).filter(|(a, _)| a.effect() == effect);
+    let mut own: Vec<(&Accepted, &Vec<f64>)> =
+        model.accepted.iter().zip(&coefficients).filter(|(a, _)| a.effect() == effect).collect();
+    own.sort_by_key(|(a, _)| a.candidate.joints.clone());
+    let own = || own.iter().copied();
     let found: Vec<Found<'_>> =
         own().map(|(a, c)| Found { candidate: &a.candidate, coefficients: c }).collect();
     let mut joints: Vec<JointNumber> = found.iter().flat_map(|f| f.candidate.joints.clone()).collect();

@@ -1,6 +1,7 @@
 //! What these logs cannot show, and what to record instead.
 
 use super::super::findings::Findings;
+use crate::identification::estimate::Solver;
 
 /// Said where joints were taken apart.
 const PER_JOINT: &str = "the logs repeat one path, and joints by themselves predict the held-out logs \
@@ -24,8 +25,11 @@ pub(crate) fn doubts(findings: &Findings<'_>) -> Vec<String> {
             doubts.push(note.clone());
         }
     }
+    // What is known beforehand of an arm is no measurement.
+    let (gram, _, _) = fit.gram.sum(&fit.weights, |_| true);
+    let measured = Solver::new(&gram, |c| fit.free[c]);
     let is_seen =
-        |c: usize| fit.free[..fit.design.inertial].iter().skip(c).step_by(fit.design.set).any(|free| *free);
+        |c: usize| measured.kept().iter().any(|k| *k < fit.design.inertial && k % fit.design.set == c);
     let names = study.data.body.names().iter().enumerate();
     let unseen: Vec<&str> = names.filter(|(c, _)| !is_seen(*c)).map(|(_, name)| name.as_str()).collect();
     if !unseen.is_empty() {

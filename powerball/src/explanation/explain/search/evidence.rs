@@ -6,7 +6,7 @@ use crate::controller::JointNumber;
 use crate::explanation::effects::Candidate;
 use crate::identification::estimate::distribution::f_tail;
 use crate::identification::estimate::{Design, Folds, MEAN_OVER, Solver, variance_inflation};
-use crate::logs::regression::{Column, Data};
+use crate::logs::regression::{Block, Column, Data};
 use crate::logs::vector::dot;
 use faer::Mat;
 
@@ -21,6 +21,15 @@ pub(crate) struct Evidence {
     pub(crate) fold_gains: Vec<f64>,
     /// The same on the validation set: the median over its logs.
     pub(crate) validation_gain: f64,
+}
+
+impl Evidence {
+    /// The median of the held-out gains over folds.
+    pub(crate) fn median_gain(&self) -> f64 {
+        let mut gains = self.fold_gains.clone();
+        gains.sort_by(f64::total_cmp);
+        gains.get(gains.len() / 2).copied().unwrap_or(0.0)
+    }
 }
 
 /// Where a candidate acts.
@@ -72,7 +81,10 @@ pub(crate) fn evidence(
         Extent::Short(seconds) => (by_chance(screen, trial, seconds), event_gains(screen, trial)),
         _ => {
             let local = extent != Extent::Everywhere;
-            (wald(screen, trial), fold_gains(screen, trial, joints, folds, local))
+            (
+                wald(screen, trial, &screen.context.data.blocks),
+                fold_gains(screen, trial, joints, folds, local),
+            )
         }
     };
     Evidence {
@@ -86,15 +98,15 @@ pub(crate) fn evidence(
 
 /// The Wald test of the coefficients with blocks as clusters: within a block residuals may depend on each
 /// other.
-pub(crate) fn wald(screen: &Screen<'_>, trial: &Trial) -> f64 {
-    let (data, fit) = (screen.context.data, screen.context.fit);
+pub(crate) fn wald(screen: &Screen<'_>, trial: &Trial, blocks: &[Block]) -> f64 {
+    let fit = screen.context.fit;
     let k = trial.columns.len();
     let columns = screen.residualised(trial);
     let mut square = Mat::<f64>::zeros(k, k);
     let mut meat = Mat::<f64>::zeros(k, k);
     let after = left(screen, trial, &columns);
     let mut clusters = 0.0;
-    for block in &data.blocks {
+    for block in blocks {
         let mut score = vec![0.0; k];
         let mut touched = false;
         for (j, rows) in block.rows.iter().enumerate() {
@@ -138,7 +150,7 @@ pub(crate) fn wald(screen: &Screen<'_>, trial: &Trial) -> f64 {
 }
 
 /// What a trial leaves, given its columns with the base's shares taken out.
-fn left(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
+pub(super) fn left(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
     let of = |(columns, residual): (&Vec<Vec<f64>>, &Vec<f64>)| {
         let mut e = residual.clone();
         for (column, theta) in columns.iter().zip(&trial.theta) {

@@ -21,15 +21,15 @@ pub(crate) struct FoldBase {
 }
 
 impl FoldBase {
-    /// Fits the base without each fold.
+    /// Fits the columns of a model that are `free` without each fold.
     #[must_use]
-    pub(crate) fn all(fit: &Fit, folds: &Folds, local: bool) -> Vec<FoldBase> {
+    pub(crate) fn all(fit: &Fit, free: &[bool], folds: &Folds, local: bool) -> Vec<FoldBase> {
         let (held, left_out) = folds.folds(local);
         held.iter()
             .zip(left_out)
             .map(|(held, left_out)| {
-                let (gram, right, _) = fit.gram.sum(&fit.weights, |c| !left_out.contains(&c));
-                let solver = Solver::new(&gram, |c| fit.free[c]);
+                let (gram, right, _) = fit.gram.fitted(&fit.weights, |c| !left_out.contains(&c));
+                let solver = Solver::new(&gram, |c| free[c]);
                 let theta = solver.solve(&right);
                 let (gram, right, _) = fit.gram.sum(&fit.weights, |c| held.contains(&c));
                 let slope = (0..theta.len()).map(|i| right[i] - times(&gram, i, &theta)).collect();

@@ -3,12 +3,14 @@
 
 use super::super::model::{Accepted, Model};
 use super::super::study::Study;
+use super::both_ways::Swapped;
 use super::evidence::{Evidence, Extent, Validation, evidence};
 use super::refusal::refusal;
 use super::screen::{Screen, Trial};
 use crate::controller::JointNumber;
 use crate::explanation::effects::{self, Candidate, Context, Effect};
 use crate::logs::parallel;
+use std::sync::OnceLock;
 
 /// A candidate group: one effect's best candidates.
 #[derive(Debug)]
@@ -226,6 +228,10 @@ pub(crate) struct Tester<'t> {
     pub(crate) validation: &'t Validation<'t>,
     /// The model seen on the validation set.
     pub(crate) there: &'t Context<'t>,
+    /// The model that is judged.
+    pub(crate) model: &'t Model,
+    /// The same fitted to the validation set, once it is asked for.
+    pub(crate) swapped: OnceLock<Swapped>,
 }
 
 impl Tester<'_> {
@@ -250,9 +256,48 @@ impl Tester<'_> {
         });
         for (m, evidence) in open.into_iter().zip(found) {
             let member = &mut group.members[m];
-            let local = !member.candidate.windows.is_empty();
-            member.refusal = refusal(self.study.rule(), &evidence, self.tests, local);
+            let mut evidence = evidence;
+            member.refusal = self.judge(&member.candidate, &member.trial, &mut evidence);
             member.evidence = Some(evidence);
         }
+    }
+
+    fn judge(&self, candidate: &Candidate, trial: &Trial, evidence: &mut Evidence) -> Option<String> {
+        let swap = || Swapped::new(self.study, self.model, None);
+        let Tester { study, screen, tests, swapped, .. } = self;
+        Judge { study, screen, tests: *tests, swapped, swap: &swap }.judge(candidate, trial, evidence)
+    }
+}
+
+/// Who decides on the evidence for a candidate.
+pub(crate) struct Judge<'j> {
+    pub(crate) study: &'j Study<'j>,
+    pub(crate) screen: &'j Screen<'j>,
+    /// What was tried in all.
+    pub(crate) tests: f64,
+    /// The model without the candidate, fitted to the validation set …
+    pub(crate) swapped: &'j OnceLock<Swapped>,
+    /// … and how it is fitted, once it is asked for.
+    pub(crate) swap: &'j (dyn Fn() -> Swapped + Sync),
+}
+
+impl Judge<'_> {
+    /// Why a candidate is refused: neither many blocks and folds nor both ways round speak for it.
+    pub(crate) fn judge(
+        &self,
+        candidate: &Candidate,
+        trial: &Trial,
+        evidence: &mut Evidence,
+    ) -> Option<String> {
+        let (rule, local) = (self.study.rule(), !candidate.windows.is_empty());
+        let refusal = refusal(rule, evidence, self.tests, local)?;
+        if local || evidence.score < rule.least_score || evidence.validation_gain < rule.large_gain {
+            return Some(refusal);
+        }
+        let swapped = self.swapped.get_or_init(self.swap);
+        let both = swapped.ask(self.study, self.screen, (candidate, trial, evidence.validation_gain));
+        let Some(both) = both.filter(|both| both.is_enough(rule, self.tests)) else { return Some(refusal) };
+        evidence.p_value = both.p_value;
+        None
     }
 }

@@ -7,6 +7,8 @@
 //! model is moved to where everything together fits best (`refinement`), and what later additions made
 //! unneeded goes out again (`elimination`).
 
+mod beside;
+mod both_ways;
 mod elimination;
 mod evidence;
 mod fold_base;
@@ -17,6 +19,7 @@ mod refusal;
 mod screen;
 mod surrogates;
 
+pub(super) use beside::{is_beside, keep_needed};
 pub(super) use elimination::eliminate;
 pub(super) use evidence::{Extent, Validation, evidence, validation_gain};
 pub(super) use groups::{Group, Member, Tester, groups};

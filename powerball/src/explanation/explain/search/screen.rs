@@ -18,6 +18,8 @@ pub(crate) struct Screen<'c> {
     pub(crate) context: &'c Context<'c>,
     /// The base's normal equations over its free columns, shape tangents among them.
     pub(crate) solver: Solver,
+    /// The columns of the model that are refitted.
+    free: Vec<bool>,
     /// A'r: zero but for bounds and unfinished shapes.
     slope: Vec<f64>,
     /// The base fitted without each fold: whole logs, stretches.
@@ -55,20 +57,23 @@ impl<'c> Screen<'c> {
     #[must_use]
     pub(crate) fn without(context: &'c Context<'c>, columns: Range<usize>) -> Screen<'c> {
         let fit = context.fit;
-        let (gram, _, _) = fit.gram.sum(&fit.weights, |_| true);
-        let solver = Solver::new(&gram, |c| fit.free[c] && !columns.contains(&c));
+        let (gram, _, _) = fit.gram.fitted(&fit.weights, |_| true);
+        let free: Vec<bool> =
+            fit.free.iter().enumerate().map(|(c, free)| *free && !columns.contains(&c)).collect();
+        let solver = Solver::new(&gram, |c| free[c]);
         let mut slope = vec![0.0; fit.design.size];
         for (j, residual) in context.residual.iter().enumerate() {
             for (g, value) in fit.design.cross(j, &(0..residual.len()), &[residual.as_slice()]) {
                 slope[g] += fit.weights[j] * value[0];
             }
         }
-        Screen { context, solver, slope, folds: [OnceLock::new(), OnceLock::new()] }
+        Screen { context, solver, free, slope, folds: [OnceLock::new(), OnceLock::new()] }
     }
 
     /// The base fitted without each fold (see [`Folds::folds`]).
     pub(crate) fn folds(&self, folds: &Folds, local: bool) -> &[FoldBase] {
-        self.folds[usize::from(local)].get_or_init(|| FoldBase::all(self.context.fit, folds, local))
+        self.folds[usize::from(local)]
+            .get_or_init(|| FoldBase::all(self.context.fit, &self.free, folds, local))
     }
 
     /// Tries a candidate; `None` where it has no usable column or is physically impossible.
