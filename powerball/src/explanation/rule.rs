@@ -116,6 +116,11 @@ pub struct Rule {
     /// The correction of what has no name stays within so many rms of what is left.
     pub correction_bound: f64,
 
+    /// A joint is explained where no more than this share of its torque's rms is left on the validation set.
+    pub explained_share: f64,
+    /// Where more than this share is left a model predicts next to nothing.
+    pub nothing_share: f64,
+
     /// Below this time of motion a reader is warned that the folds are too short to tell much, s.
     pub least_time: f64,
     /// A share of accepted surrogates above this is no chance: the residuals are not what the tests take them
@@ -172,6 +177,8 @@ impl Default for Rule {
             coloured: 2.0,
             least_share: 0.02,
             correction_bound: 2.0,
+            explained_share: 0.1,
+            nothing_share: 0.9,
             least_time: 30.0,
             many_accepted: 0.05,
             decision_level: 0.01,

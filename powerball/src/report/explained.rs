@@ -2,17 +2,41 @@
 
 use crate::controller::JointNumber;
 use crate::explanation::effects::Figures;
-use crate::explanation::explain::{Explained, NamedEffect, Shown, TorqueCurve};
+use crate::explanation::explain::{Explained, NamedEffect, Shown, State, TorqueCurve};
 use crate::report::{BarPairs, Figure, Ink, Page, Panel, Series, Table, Tone, number};
 use serde_json::Value;
 
 /// Adds everything that an explanation says to a page: errors, effects with their evidence, torques over
 /// time, what stays, and what was found in the logs.
 pub fn add_to_page(page: &mut Page, explained: &Explained) {
+    verdict(page, explained);
     errors(page, explained);
     effects(page, explained);
     torques(page, explained);
     rest(page, explained);
+}
+
+/// How far each joint is explained.
+fn verdict(page: &mut Page, explained: &Explained) {
+    page.heading("How far the torque is explained");
+    let mut table = Table::new(["joint", "verdict", "torque left", "what to think of and to do"]);
+    for v in &explained.verdict {
+        let left = if v.left.is_nan() { String::new() } else { percent(v.left) };
+        table.push([v.joint.to_string(), v.state.to_string(), left, v.advice.clone()]);
+    }
+    page.table(&table);
+}
+
+/// What is said where no effect was named: never more than the logs show.
+#[must_use]
+pub fn nothing_named(explained: &Explained) -> &'static str {
+    if explained.verdict.iter().all(|v| v.state == State::Explained) {
+        "No effect was named: little is left of the torques, and these logs do not show that the model lacks \
+         anything."
+    } else {
+        "No effect was named, but much is left on some joints (see the verdict): the model lacks something \
+         there that these logs do not tell."
+    }
 }
 
 fn errors(page: &mut Page, explained: &Explained) {
@@ -65,9 +89,7 @@ pub fn error_bars(explained: &Explained) -> BarPairs {
 fn effects(page: &mut Page, explained: &Explained) {
     page.heading("What the model lacked");
     if explained.effects.is_empty() {
-        page.paragraph(
-            "No effect was accepted: these logs do not show that the model lacks anything with a name.",
-        );
+        page.paragraph(nothing_named(explained));
     } else {
         let mut table = Table::new([
             "effect",

@@ -8,7 +8,7 @@ use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::{Bus, BusUrl};
 use crate::controller::JointNumber;
 use crate::explanation::experiment::{self, TRAJECTORY};
-use crate::explanation::explain::{Change, Explained, FalsePositives, NamedEffect, Unattributed};
+use crate::explanation::explain::{Change, Explained, FalsePositives, NamedEffect, Unattributed, Verdict};
 use crate::explanation::torque_model::TorqueModel;
 use crate::explanation::{ExplainError, ExplainOptions, Prepared, explain_body};
 use crate::identification::motion::Motion;
@@ -16,7 +16,7 @@ use crate::logs;
 use crate::logs::log::{Log, read_logs};
 use crate::procedure::{RecordError, record};
 use crate::report::Page;
-use crate::report::explained::add_to_page;
+use crate::report::explained::{add_to_page, nothing_named};
 use crate::virtual_arm::Undeclared;
 use clap::Args;
 use dyngen::Arm;
@@ -223,15 +223,13 @@ pub(super) fn open_in_words(explained: &Explained) -> String {
 }
 
 fn summary(explained: &Explained) -> String {
-    let mut text = String::new();
+    let mut text = verdict_in_words(explained);
     for warning in &explained.warnings {
         text.push_str(&format!("note: {warning}\n"));
     }
     text.push_str(&errors_in_words(explained));
     if explained.effects.is_empty() {
-        text.push_str(
-            "\nNo effect was accepted: these logs do not show that the model lacks anything with a name.\n",
-        );
+        text.push_str(&format!("\n{}\n", nothing_named(explained)));
     }
     for effect in &explained.effects {
         text.push_str(&effect_in_words(effect));
@@ -243,6 +241,17 @@ fn summary(explained: &Explained) -> String {
     let FalsePositives { accepted, surrogates, .. } = &explained.false_positives;
     text.push_str(&format!("\n{accepted} of {surrogates} time-shift surrogates were accepted"));
     text
+}
+
+/// How far each joint is explained, one line a joint.
+fn verdict_in_words(explained: &Explained) -> String {
+    let line = |v: &Verdict| {
+        let left = if v.left.is_nan() { String::new() } else { format!(", {:.1} % left", 100.0 * v.left) };
+        let advice = if v.advice.is_empty() { String::new() } else { format!(": {}", v.advice) };
+        format!("joint {} {}{left}{advice}\n", v.joint, v.state)
+    };
+    let lines: String = explained.verdict.iter().map(line).collect();
+    lines + "\n"
 }
 
 fn errors_in_words(explained: &Explained) -> String {

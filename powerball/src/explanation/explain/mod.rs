@@ -30,8 +30,8 @@ mod study;
 pub use comparison::{Hypothesis, Open};
 pub use named::{FalsePositives, NamedEffect, Rival, Spreads};
 pub use results::{
-    Change, Correction, Curve, Experiment, Explained, NextExperiment, Shown, TorqueCurve, Trajectory,
-    Unattributed, curves,
+    Change, Correction, Curve, Experiment, Explained, NextExperiment, Shown, State, TorqueCurve, Trajectory,
+    Unattributed, Verdict, curves,
 };
 
 use crate::explanation::options::{ExplainError, ExplainOptions};

@@ -94,7 +94,6 @@ impl Fit {
 /// Fits the base model with the given terms; `start` saves the search for shapes and weights.
 #[must_use]
 pub fn fit(data: &Data<'_>, folds: &Folds, terms: &[Term], start: Option<&Fit>) -> Fit {
-
     let rows = InMemory { data, folds, extra: terms.iter().map(|t| t.column.clone()).collect() };
     let layout = rows.layout();
     let non_negative: Vec<usize> =

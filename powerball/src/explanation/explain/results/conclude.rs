@@ -13,6 +13,7 @@ use super::explained::{Change, Explained};
 use super::next::NextExperiment;
 use super::shown::shown;
 use super::unattributed::unattributed;
+use super::verdict::verdict;
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Effect, Found};
 use crate::explanation::options::{ExplainError, RuledOut};
@@ -35,9 +36,11 @@ pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainE
     let left = |joints: &[JointNumber]| leftover(&before.errors.fit.rms, &after.fit.rms, &floor, joints);
     let mut named: Vec<NamedEffect> = held.map(|held| held.named.clone()).into_iter().collect();
     named.extend(named_effects(study, model, &history.steps, &left));
-    let (unattributed, unexplained) = unattributed(study, model, history, &held_out, &floor, &after);
+    let (unattributed, unexplained, dependencies) =
+        unattributed(study, model, history, &held_out, &floor, &after);
     let open = open(study, model, history, unattributed.is_some());
     Ok(Explained {
+        verdict: verdict(study, &named, &after.validate, &floor, &dependencies),
         arm: study.data.body.arm().name.clone(),
         held_out_change: changes(&study.validation, &before.residual, &held_out),
         before: before.errors.clone(),

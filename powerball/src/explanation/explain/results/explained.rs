@@ -6,6 +6,7 @@ use super::curves::TorqueCurve;
 use super::next::{Experiment, NextExperiment};
 use super::shown::Shown;
 use super::unattributed::Unattributed;
+use super::verdict::Verdict;
 use crate::controller::JointNumber;
 use crate::explanation::torque_model::TorqueModel;
 use serde::Serialize;
@@ -14,6 +15,8 @@ use std::sync::Arc;
 /// The result of the residual loop.
 #[derive(Clone, Debug, Serialize)]
 pub struct Explained {
+    /// How far each joint's torque is explained: the first thing to read.
+    pub verdict: Vec<Verdict>,
     /// The arm's name.
     pub arm: String,
     /// Errors of the base model.

@@ -2,7 +2,8 @@
 //!
 //! `conclude` makes the result ([`Explained`]): `compose` the model of what was accepted and what that
 //! leaves, `unattributed` and `dependencies` what stays without a name and what it depends on, `correction`
-//! the curves that take a part of it off, `doubts` what a reader must know, `curves` and `shown` the figures,
+//! the curves that take a part of it off, `doubts` what a reader must know, `verdict` how far each
+//! joint is explained, `curves` and `shown` the figures,
 //! `next` what an experiment would decide. JSON is made of these types by whoever writes it, and nothing here
 //! reads it.
 
@@ -16,6 +17,7 @@ mod explained;
 mod next;
 mod shown;
 mod unattributed;
+mod verdict;
 
 pub(super) use conclude::conclude;
 pub use correction::{Correction, Curve};
@@ -24,3 +26,4 @@ pub use explained::{Change, Explained};
 pub use next::{Experiment, NextExperiment, Trajectory};
 pub use shown::Shown;
 pub use unattributed::Unattributed;
+pub use verdict::{State, Verdict};

@@ -28,6 +28,17 @@ pub struct Unattributed {
     pub correction: Option<Vec<Correction>>,
 }
 
+/// The signals that each joint's residual depends on.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Dependencies(Vec<(usize, Vec<(String, f64)>)>);
+
+impl Dependencies {
+    /// Those of a joint, the strongest first, with the share of its variance.
+    pub(crate) fn of(&self, joint: usize) -> &[(String, f64)] {
+        self.0.iter().find(|(j, _)| *j == joint).map_or(&[], |(_, list)| list.as_slice())
+    }
+}
+
 /// The joints whose residual still depends on something, and what is to be said of those where more than
 /// noise is left that depends on nothing.
 pub(crate) fn unattributed(
@@ -37,7 +48,7 @@ pub(crate) fn unattributed(
     held_out: &[Vec<f64>],
     floor: &[f64],
     after: &Spreads,
-) -> (Option<Unattributed>, Option<String>) {
+) -> (Option<Unattributed>, Option<String>, Dependencies) {
     let (rule, context) = (study.rule(), model.context(study));
     let rms = &after.fit.rms;
     let is_left =
@@ -49,6 +60,7 @@ pub(crate) fn unattributed(
         let of = |(j, list): (&usize, &Vec<(String, f64)>)| correct(&context, &there, &study.folds, *j, list);
         candidates.iter().zip(&found).filter_map(of).collect()
     });
+    let dependencies = Dependencies(candidates.iter().copied().zip(found.iter().cloned()).collect());
     let mut signals: Vec<(String, f64)> = Vec::new();
     let (mut joints, mut nothing) = (Vec::new(), Vec::new());
     for (j, list) in candidates.iter().zip(found) {
@@ -79,5 +91,5 @@ pub(crate) fn unattributed(
             nothing.join(", ")
         )
     });
-    (unattributed, unexplained)
+    (unattributed, unexplained, dependencies)
 }

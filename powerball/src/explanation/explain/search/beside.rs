@@ -3,50 +3,62 @@
 use super::super::model::{Accepted, Model};
 use super::super::study::Study;
 use super::both_ways::Swapped;
-use super::evidence::{Extent, Validation, evidence};
-use super::groups::{Judge, Member};
+use super::evidence::{Evidence, Extent, Validation, evidence, log_change};
 use super::screen::Screen;
 use crate::explanation::effects::Context;
 use crate::identification::estimate::{Design, friction_columns};
-use std::sync::OnceLock;
 
-/// Takes out of the model what was in it from the start and is not needed, the weakest first, each judged
-/// with everything else in the model.
+/// What speaks for a part of the model, everything else refitted.
+struct Needed {
+    /// Its place among what was accepted.
+    place: usize,
+    evidence: Evidence,
+    /// By how much the logarithm of the squared error rises without it on logs that took no part in the fit,
+    /// mean over joints: fitted to the logs, and fitted to the validation set.
+    rise: [f64; 2],
+}
+
+impl Needed {
+    /// The lesser rise of both ways round, after those of what went out before.
+    fn rise_after(&self, before: [f64; 2]) -> f64 {
+        (self.rise[0] + before[0]).min(self.rise[1] + before[1])
+    }
+}
+
+/// Takes out of the model what was in it from the start and is not needed, the least needed first, each
+/// judged with everything else in the model. Needed is what the fitted logs demand. Where a model fits badly
+/// its residual is slow and demands little by itself; what goes out must then not raise the errors of logs
+/// that took no part in the fit, both ways round and all that went out together.
 pub(crate) fn keep_needed(study: &Study<'_>, model: &mut Model) {
+    let rule = study.rule();
+    let mut risen = [0.0; 2];
     loop {
         let beside: Vec<usize> =
             (0..model.accepted.len()).filter(|k| is_beside(&model.accepted[*k])).collect();
-        let judged: Vec<(usize, Option<Member>)> =
-            beside.iter().map(|k| (*k, judged(study, model, *k, beside.len() as f64))).collect();
-        let score = |m: &Option<Member>| m.as_ref().map_or(f64::NEG_INFINITY, |m| m.trial.score);
-        let least = study.rule().least_score;
-        let refused = judged.iter().filter(|(_, m)| m.as_ref().is_none_or(|m| m.trial.score < least));
-        if std::env::var("DBG").is_ok() {
-            for (k, m) in &judged {
-                if let Some(m) = m {
-                    let e = m.evidence.as_ref().unwrap();
-                    eprintln!(
-                        "{k} {:?} score {:.1} folds {:.2?} val {:.3} p {:.2e} {:?}",
-                        m.candidate.joints,
-                        m.trial.score,
-                        e.fold_gains,
-                        e.validation_gain,
-                        e.p_value,
-                        m.refusal
-                    );
-                }
+        let mut found: Vec<Needed> = Vec::new();
+        let mut useless = None;
+        for &place in &beside {
+            match needed(study, model, place) {
+                Some(needed) => found.push(needed),
+                // It cannot be told from the rest.
+                None => useless = Some(place),
             }
-            eprintln!();
         }
-        let Some((weakest, _)) = refused.min_by(|a, b| score(&a.1).total_cmp(&score(&b.1))) else {
-            for (k, member) in judged {
-                let Some(found) = member.and_then(|m| m.evidence) else { continue };
-                model.accepted[k].p_value = (found.p_value * beside.len() as f64).min(1.0);
-                model.accepted[k].fold_gain = found.median_gain();
+        let dispensable =
+            |n: &&Needed| n.evidence.score < rule.least_score && n.rise_after(risen) < rule.least_gain;
+        let least = found.iter().filter(dispensable);
+        let least = least.min_by(|a, b| a.rise_after(risen).total_cmp(&b.rise_after(risen)));
+        if let (None, Some(least)) = (useless, least) {
+            risen = [0, 1].map(|way| risen[way] + least.rise[way]);
+        }
+        let Some(out) = useless.or(least.map(|n| n.place)) else {
+            for Needed { place, evidence, .. } in found {
+                model.accepted[place].p_value = (evidence.p_value * beside.len() as f64).min(1.0);
+                model.accepted[place].fold_gain = evidence.median_gain();
             }
             return;
         };
-        model.accepted.remove(*weakest);
+        model.accepted.remove(out);
         model.refit(study);
     }
 }
@@ -56,11 +68,9 @@ pub(crate) fn is_beside(accepted: &Accepted) -> bool {
     accepted.step.is_none()
 }
 
-/// What speaks for a part of the model, everything else refitted; `None` where it cannot be told from the
-/// rest.
-fn judged(study: &Study<'_>, model: &Model, k: usize, tests: f64) -> Option<Member> {
-    let (candidate, own) = (&model.accepted[k].candidate, model.places()[k].clone());
-    let coefficients = &model.coefficients()[k];
+fn needed(study: &Study<'_>, model: &Model, place: usize) -> Option<Needed> {
+    let (candidate, own) = (&model.accepted[place].candidate, model.places()[place].clone());
+    let coefficients = &model.coefficients()[place];
     let effect = candidate.effect();
     let mut residual = model.fit.residual.clone();
     let columns = effect.columns(&model.context(study), candidate);
@@ -77,9 +87,13 @@ fn judged(study: &Study<'_>, model: &Model, k: usize, tests: f64) -> Option<Memb
         Design::new(&study.validation, &friction_columns(&study.validation, &model.fit.shapes), &all);
     let validation = Validation { data: &study.validation, design, residual: there };
     let set = Some((&validation, columns.as_slice()));
-    let mut found = evidence(&screen, &trial, &candidate.joints, &study.folds, Extent::Everywhere, set);
-    let without = || Swapped::new(study, model, Some(k));
-    let judge = Judge { study, screen: &screen, tests, swapped: &OnceLock::new(), swap: &without };
-    let refusal = judge.judge(candidate, &trial, &mut found);
-    Some(Member { candidate: candidate.clone(), trial, evidence: Some(found), refusal, judged: true })
+    let mut evidence = evidence(&screen, &trial, &candidate.joints, &study.folds, Extent::Everywhere, set);
+    let swapped = Swapped::new(study, model, Some(place));
+    let back = swapped.ask(study, &screen, (candidate, &trial, evidence.validation_gain));
+    let mut rise = [-log_change(&screen, &trial, &validation, &columns), 0.0];
+    if let Some(back) = back {
+        evidence.p_value = evidence.p_value.min(back.p_value);
+        rise[1] = -back.log_change;
+    }
+    Some(Needed { place, evidence, rise })
 }

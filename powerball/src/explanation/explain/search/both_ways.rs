@@ -8,7 +8,7 @@
 
 use super::super::model::Model;
 use super::super::study::Study;
-use super::evidence::{Validation, left, validation_gain, wald};
+use super::evidence::{Validation, left, log_change, validation_gain, wald};
 use super::screen::{Screen, Trial};
 use crate::explanation::effects::{Candidate, Context};
 use crate::identification::estimate::{Design, Fit, Folds, fit, friction_columns};
@@ -35,6 +35,8 @@ pub(crate) struct BothWays {
     pub(crate) p_value: f64,
     /// The correlation of what either way adds.
     pub(crate) alike: f64,
+    /// By how much the logarithm of the squared error changes on the logs, mean over joints.
+    pub(crate) log_change: f64,
 }
 
 impl Swapped {
@@ -73,6 +75,7 @@ impl Swapped {
             // Fisher: −2 ln(p·q) is χ² with four degrees of freedom.
             p_value: (product * (1.0 - product.ln())).min(1.0),
             alike: alike(screen, trial, &swapped.theta),
+            log_change: log_change(&back, &swapped, &judged, &columns),
         })
     }
 }
@@ -129,9 +132,6 @@ fn alike(screen: &Screen<'_>, trial: &Trial, other: &[f64]) -> f64 {
 impl BothWays {
     /// Whether it is enough; `tests` counts what was tried.
     pub(crate) fn is_enough(&self, rule: &crate::explanation::rule::Rule, tests: f64) -> bool {
-        if std::env::var("DBG").is_ok() {
-            eprintln!("   {self:?}");
-        }
         self.gain >= rule.large_gain && self.p_value * tests <= rule.family_wise && self.alike >= rule.alike
     }
 }

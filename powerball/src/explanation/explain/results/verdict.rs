@@ -1,0 +1,137 @@
+//! The first line of every answer: how much of each joint's torque is explained, and what to do about the rest.
+
+use super::super::named::NamedEffect;
+use super::super::study::Study;
+use super::unattributed::Dependencies;
+use crate::controller::JointNumber;
+use crate::explanation::rule::Rule;
+use crate::identification::estimate::Spread;
+use serde::Serialize;
+use std::fmt;
+
+/// How far a joint's torque is explained on the validation set.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Verdict {
+    /// The joint.
+    pub joint: JointNumber,
+    /// How far.
+    pub state: State,
+    /// rms of what is left over rms of the measured torque; not a number where the joint does not move.
+    pub left: f64,
+    /// What the rest depends on, the likely kinds, and what to record or check; empty where nothing is left.
+    pub advice: String,
+}
+
+/// How far a torque is explained.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum State {
+    /// What is left is little, or noise.
+    #[serde(rename = "explained")]
+    Explained,
+    /// Effects were named, and much is left beside them.
+    #[serde(rename = "named in part")]
+    InPart,
+    /// Much is left, and nothing was named.
+    #[serde(rename = "not explained")]
+    Not,
+}
+
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            State::Explained => "explained",
+            State::InPart => "named in part",
+            State::Not => "not explained",
+        })
+    }
+}
+
+/// The verdict on every joint.
+pub(crate) fn verdict(
+    study: &Study<'_>,
+    named: &[NamedEffect],
+    after: &Spread,
+    floor: &[f64],
+    dependencies: &Dependencies,
+) -> Vec<Verdict> {
+    let of = |j: usize| {
+        let joint = JointNumber::from_index(j);
+        let (left, rms) = (after.relative[j], after.rms[j]);
+        if study.validation.joints[j].is_empty() {
+            let advice = "it does not move in the logs to judge on, or its torque says nothing there: record a \
+                motion that moves it";
+            return Verdict { joint, state: State::Not, left: f64::NAN, advice: advice.to_string() };
+        }
+        let state = if is_explained(study.rule(), left, rms, floor[j]) {
+            State::Explained
+        } else if named.iter().any(|e| e.joints.contains(&joint)) {
+            State::InPart
+        } else {
+            State::Not
+        };
+        let advice = match state {
+            State::Explained => String::new(),
+            _ => advice(study, j, left, rms / floor[j], dependencies),
+        };
+        Verdict { joint, state, left, advice }
+    };
+    (0..study.validation.dof()).map(of).collect()
+}
+
+/// Little is left of the torque, or hardly more than measurement noise.
+fn is_explained(rule: &Rule, left: f64, rms: f64, floor: f64) -> bool {
+    left <= rule.explained_share || rms <= rule.above_floor * floor
+}
+
+/// What to think of and to do where much is left.
+fn advice(study: &Study<'_>, j: usize, left: f64, over_noise: f64, dependencies: &Dependencies) -> String {
+    let mut parts: Vec<String> = Vec::new();
+    if left > study.rule().nothing_share {
+        parts.push(
+            "the model predicts next to nothing of this torque on other paths: check the column's sign, unit \
+             and order, that the arm file is this arm's, and that the logs excite it"
+                .to_string(),
+        );
+    }
+    match dependencies.of(j) {
+        [] if over_noise < 3.0 => parts.push("what is left is little more than noise".to_string()),
+        [] => parts.push(
+            "what is left depends on no signal of the logs: slow noise of the sensor, something that comes and \
+             goes, or a model whose parameters these logs do not hold"
+                .to_string(),
+        ),
+        signals => {
+            let names: Vec<&str> = signals.iter().take(3).map(|(name, _)| name.as_str()).collect();
+            parts.push(format!("what is left depends on {}: {}", names.join(", "), kind(signals, j)));
+        }
+    }
+    let seconds: f64 = study.data.recordings.iter().map(|r| r.len() as f64 / r.rate).sum();
+    if seconds < study.rule().least_time {
+        parts.push(format!(
+            "the logs to fit hold {seconds:.0} s: record several exciting paths of 20 s (powerball excite)"
+        ));
+    }
+    parts.join("; ")
+}
+
+/// What makes a torque that depends on a signal, most of all.
+fn kind(signals: &[(String, f64)], j: usize) -> String {
+    let Some((name, _)) = signals.first() else { return String::new() };
+    let split = name.find(|c: char| c.is_ascii_digit()).unwrap_or(name.len());
+    let (what, number) = name.split_at(split);
+    let own = number.parse() == Ok(j + 1);
+    match (what, own) {
+        ("q", true) => "a spring, a cable, a ripple of the gear, or an encoder's zero".to_string(),
+        ("q", false) => {
+            format!("a hose or a linkage with joint {number}, or the load of the links behind it")
+        }
+        ("dq", true) => "friction of another law than Eq. 16".to_string(),
+        ("dq", false) => format!("a drive, a cable or a bearing that joint {number} moves too"),
+        ("ddq", true) => "a rotor's inertia, a delay, or a gear that gives way".to_string(),
+        ("ddq", false) => {
+            format!("a rotor that joint {number} turns too, or an inertia that is not in the model")
+        }
+        ("tau", _) => "friction that grows with load, or a torque constant".to_string(),
+        _ => "warming, a load that was taken up, or an outside force: it changes with time".to_string(),
+    }
+}
