@@ -170,7 +170,7 @@ impl<'a> Context<'a> {
         let rows = &data.joints[joint];
         let mut times = Vec::with_capacity(rows.len());
         for (r, recording) in data.recordings.iter().enumerate() {
-            let kept = data.band.kept(recording.len());
+            let kept = rows.band.kept(recording.len());
             times.extend(
                 rows.kept[r]
                     .iter()

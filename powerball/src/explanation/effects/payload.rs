@@ -260,13 +260,12 @@ fn gain(sums: &Sums, solver: &Solver) -> f64 {
 pub(super) fn block_start(context: &Context<'_>, block: &Block) -> Option<f64> {
     let data = context.data;
     let recording = &data.recordings[block.recording];
-    let kept = data.band.kept(recording.len());
     (0..data.dof())
         .filter(|j| !block.rows[*j].is_empty())
         .map(|j| {
             let joint = &data.joints[j];
             let k = joint.kept[block.recording][block.rows[j].start - joint.rows[block.recording].start];
-            recording.start + kept[k] as f64 / recording.rate
+            recording.start + joint.band.kept(recording.len())[k] as f64 / recording.rate
         })
         .min_by(f64::total_cmp)
 }

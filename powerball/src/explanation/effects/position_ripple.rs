@@ -124,7 +124,7 @@ fn scan(context: &Context<'_>, joint: usize) -> Vec<f64> {
     let mut positions = Vec::with_capacity(rows.len());
     for (r, recording) in data.recordings.iter().enumerate() {
         let q: Vec<f64> = recording.position(joint).collect();
-        let kept = data.band.kept(recording.len());
+        let kept = rows.band.kept(recording.len());
         positions.extend(rows.kept[r].iter().map(|k| q[kept[*k]]));
     }
     let (low, high) = positions.iter().fold((f64::MAX, f64::MIN), |(l, h), q| (l.min(*q), h.max(*q)));

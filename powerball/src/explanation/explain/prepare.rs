@@ -4,9 +4,10 @@ use super::named::Spreads;
 use super::special::{Clock, Held, held_in_validation, repeats, settle};
 use super::study::Study;
 use crate::explanation::options::{ExplainError, ExplainOptions};
-use crate::identification::estimate::{Fit, Folds, fit, spread};
+use crate::identification::estimate::{Fit, Folds, bands_of, fit, spread};
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, RigidBody};
+use crate::logs::summary::BANDS;
 
 /// Whose inertial parameters are fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,8 +46,7 @@ pub(super) fn prepare<'a>(
     inertia: Inertia,
 ) -> Result<Begun<'a>, ExplainError> {
     let rule = &options.rule;
-    let mut data = Data::new(body, logs, &options.data).map_err(ExplainError::Fit)?;
-    let mut validation = Data::new(body, validate, &options.data).map_err(ExplainError::Validate)?;
+    let (mut data, mut validation) = in_own_bands(body, (logs, validate), options)?;
     data.take_apart(inertia == Inertia::PerJoint);
     validation.take_apart(inertia == Inertia::PerJoint);
     options.progress.say("fitting the base model");
@@ -64,3 +64,49 @@ pub(super) fn prepare<'a>(
     let study = Study { data, validation, folds, one_path, options };
     Ok(Begun { study, base, beforehand: Beforehand { errors, residual, held, clock } })
 }
+
+/// The logs as rows, each joint in the band in which they speak of it.
+///
+/// A joint of whose torque much is left, and whose model lies below what it leaves in the upper octaves, would
+/// be judged there on the noise of positions that were differentiated twice: whatever attenuates the model
+/// helps. It is taken in the band below those octaves.
+fn in_own_bands<'a>(
+    body: &'a RigidBody,
+    (logs, validate): (&[Log], &[Log]),
+    options: &ExplainOptions<'_>,
+) -> Result<(Data<'a>, Data<'a>), ExplainError> {
+    let data = Data::new(body, logs, &options.data).map_err(ExplainError::Fit)?;
+    let validation = Data::new(body, validate, &options.data).map_err(ExplainError::Validate)?;
+    if options.data.cutoff != BANDS[0] {
+        return Ok((data, validation));
+    }
+    let fit = fit(&data, &Folds::new(&data), &[], None);
+    let left = spread(&data, &fit.residual).relative;
+    let much = |(j, band): (usize, usize)| if left[j] > options.rule.explained_share { band } else { 0 };
+    let mut which: Vec<usize> = bands_of(&data, &fit).into_iter().enumerate().map(much).collect();
+    if which.iter().all(|band| *band == 0) {
+        return Ok((data, validation));
+    }
+    let narrower = |logs: &[Log]| -> Option<Vec<Data<'a>>> {
+        let bands = Data::in_bands(body, logs, &options.data, BANDS.len(), |_| {}).ok()?;
+        Some(bands.into_iter().skip(1).map_while(Result::ok).collect())
+    };
+    let (Some(fitted), Some(judged)) = (narrower(logs), narrower(validate)) else {
+        return Ok((data, validation));
+    };
+    // What is too short for a narrower band stays in the wider one.
+    let enough =
+        |j: usize, k: usize| fitted[k - 1].joints[j].len() >= LEAST && judged[k - 1].joints[j].len() >= LEAST;
+    let most = fitted.len().min(judged.len());
+    for (j, band) in which.iter_mut().enumerate() {
+        *band = (*band).min(most);
+        while *band > 0 && !enough(j, *band) {
+            *band -= 1;
+        }
+    }
+    let block = options.data.block;
+    Ok((data.with_narrower(&fitted, &which, block), validation.with_narrower(&judged, &which, block)))
+}
+
+/// Rows of a joint in a narrower band, at least.
+const LEAST: usize = 50;

@@ -8,7 +8,7 @@
 //! theirs.
 
 use super::design::Design;
-use super::fit::friction_columns;
+use super::fit::{Fit, friction_columns};
 use super::reduced::{FrictionLaw, Solution, solve_reduced};
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, DataError, DataOptions, RigidBody};
@@ -30,13 +30,20 @@ pub fn solve_in_band(reduced: &Bands, law: FrictionLaw) -> InBand {
     // A log that is too short for a band must not fall out of the fit.
     let whole = |narrower: &&Summary| narrower.logs.len() == reduced.widest().logs.len();
     let narrower = reduced.all()[1..].iter().take_while(whole).count();
-    let quiet = |[model, left]: &&[f64; 2]| model < left;
-    let bands: Vec<usize> = reduced
-        .spectrum()
-        .iter()
-        .map(|octaves| octaves[..narrower].iter().take_while(quiet).count())
-        .collect();
+    let bands: Vec<usize> =
+        reduced.spectrum().iter().map(|octaves| quiet_octaves(&octaves[..narrower])).collect();
     InBand { solution: solve_reduced(&reduced.of_joints(&bands), law), bands }
+}
+
+/// How many octaves below the widest band hold less of a model than of what it leaves.
+fn quiet_octaves(octaves: &[[f64; 2]]) -> usize {
+    octaves.iter().take_while(|[model, left]| model < left).count()
+}
+
+/// Which of [`BANDS`] a fit of the widest asks for, by joint.
+#[must_use]
+pub fn bands_of(data: &Data<'_>, fit: &Fit) -> Vec<usize> {
+    spectrum(data, &fit.shapes, &fit.theta).iter().map(|octaves| quiet_octaves(octaves)).collect()
 }
 
 /// Reduces one log in all bands, and takes the spectrum of its first part. Also gives what was left out of
@@ -56,18 +63,18 @@ pub fn reduce_in_bands(
     // Some minutes say where a spectrum sinks.
     let first = parts(log).into_iter().find_map(|part| Data::new(body, &[part], &widest).ok());
     if let Some(data) = first {
-        bands.set_spectrum(&spectrum(&data, &own));
+        bands.set_spectrum(&spectrum(&data, &own.shapes, &own.theta));
     }
     Ok((bands, notes))
 }
 
 /// By joint and octave between neighbouring bands: the power of the model's torque, and of what it leaves.
-fn spectrum(data: &Data<'_>, model: &Solution) -> Vec<Powers> {
-    let design = Design::new(data, &friction_columns(data, &model.shapes), &[]);
+fn spectrum(data: &Data<'_>, shapes: &[[f64; 2]], theta: &[f64]) -> Vec<Powers> {
+    let design = Design::new(data, &friction_columns(data, shapes), &[]);
     let rate = data.rate() / data.band.decimation as f64;
     let of_joint = |j: usize| {
         let rows = &data.joints[j];
-        let predicted = design.predict(j, &model.theta);
+        let predicted = design.predict(j, theta);
         let left: Vec<f64> = rows.torque.iter().zip(&predicted).map(|(y, p)| y - p).collect();
         let mut sums = Powers::default();
         for run in rows.runs() {

@@ -45,7 +45,7 @@ pub fn curves(data: &Data<'_>, before: &[Vec<f64>], after: &[Vec<f64>]) -> Vec<T
             let (mut t, mut breaks) = (Vec::with_capacity(rows.len()), Vec::new());
             let mut start = 0.0;
             for (recording, kept) in data.recordings.iter().zip(&rows.kept) {
-                let sample = data.band.kept(recording.len());
+                let sample = rows.band.kept(recording.len());
                 for (i, k) in kept.iter().enumerate() {
                     if i == 0 || kept[i - 1] + 1 != *k {
                         breaks.push(t.len());

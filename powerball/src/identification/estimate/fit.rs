@@ -155,9 +155,7 @@ impl Rows for InMemory<'_> {
     fn trials(&self, (design, _): &(Design, Gram), joint: usize, steep: &[f64]) -> Trials {
         let rows_of = &self.data.joints[joint];
         let trial: Vec<Vec<f64>> = parallel::map(steep, |g| {
-            rows_of.column(&self.data.band, &self.data.recordings, |_, r| {
-                r.speed(joint).map(|v| (g * v).tanh()).collect()
-            })
+            rows_of.column(&self.data.recordings, |_, r| r.speed(joint).map(|v| (g * v).tanh()).collect())
         });
         let columns: Vec<&[f64]> = trial.iter().map(Vec::as_slice).collect();
         let grid = steep.len();
@@ -220,7 +218,7 @@ pub(crate) const MEAN_OVER: f64 = 1.0;
 ///
 /// Coloured residuals tell less than their number of samples; this is by how much.
 pub(crate) fn variance_inflation(data: &Data<'_>, joint: usize, residual: &[f64], seconds: f64) -> f64 {
-    let per_second = data.rate() / data.band.decimation as f64;
+    let per_second = data.rate() / data.joints[joint].band.decimation as f64;
     let length = ((seconds * per_second).round() as usize).max(1);
     let (mut sum, mut count, mut square) = (0.0, 0usize, 0.0);
     for rows in &data.joints[joint].rows {

@@ -27,7 +27,7 @@ mod torque_metric;
 mod vary;
 mod verdict;
 
-pub use band::{InBand, reduce_in_bands, solve_in_band};
+pub use band::{InBand, bands_of, reduce_in_bands, solve_in_band};
 pub use base_model::BaseModel;
 #[cfg(feature = "explain")]
 pub(crate) use base_model::in_set_of;

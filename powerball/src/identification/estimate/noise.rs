@@ -12,10 +12,11 @@ use crate::logs::signal::Band;
 #[must_use]
 pub fn noise_floor(data: &Data<'_>) -> Vec<f64> {
     let rate = data.rate();
-    let (band, wider) = (&data.band, Band::new(2.0 * data.band.cutoff, rate));
-    let (share, between) = (band.white_share(rate), band.white_share_between(&wider, rate));
     (0..data.dof())
         .map(|j| {
+            let band = &data.joints[j].band;
+            let wider = Band::new(2.0 * band.cutoff, rate);
+            let (share, between) = (band.white_share(rate), band.white_share_between(&wider, rate));
             let torques = || data.recordings.iter().map(|r| r.torque[j].as_slice());
             let differences = torques().flat_map(|tau| tau.windows(3)).map(|w| w[0] - 2.0 * w[1] + w[2]);
             // Second differences of white noise have six times its variance.

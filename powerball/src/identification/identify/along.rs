@@ -138,7 +138,7 @@ fn motion(data: &Data<'_>) -> Option<f64> {
 /// Positions and velocities of a joint's rows.
 fn rows(data: &Data<'_>, j: usize) -> (Vec<f64>, Vec<f64>) {
     let at = data.recordings.iter().zip(&data.joints[j].kept).flat_map(|(recording, kept)| {
-        let sample = data.band.kept(recording.len());
+        let sample = data.joints[j].band.kept(recording.len());
         kept.iter().map(move |k| (recording, sample[*k])).collect::<Vec<_>>()
     });
     at.map(|(r, k)| (r.q[k * data.dof() + j], r.v[k * data.dof() + j])).unzip()

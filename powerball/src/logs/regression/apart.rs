@@ -25,7 +25,7 @@ impl Data<'_> {
         let joints: Vec<usize> = (0..self.dof()).collect();
         let added = parallel::map(&joints, |&j| {
             let column = |signal: &dyn Fn(usize) -> Vec<f64>| {
-                self.joints[j].column(&self.band, &self.recordings, |r, _| signal(r))
+                self.joints[j].column(&self.recordings, |r, _| signal(r))
             };
             let offset = column(&|r| vec![1.0; self.recordings[r].len()]);
             let slope = column(&|r| self.recordings[r].position(j).collect());

@@ -203,9 +203,7 @@ impl<'a> Data<'a> {
     pub fn seen_otherwise(&self, correct: impl FnMut(&mut Recording)) -> Data<'a> {
         let mut recordings = self.recordings.clone();
         recordings.iter_mut().for_each(correct);
-        let kept = self.joints.iter().map(|j| j.kept.clone()).collect();
-        let bands = std::slice::from_ref(&self.band);
-        let joints = joint_rows(self.body, &recordings, bands, vec![kept]).pop().unwrap_or_default();
+        let joints = self.rows_of(&recordings);
         Data {
             body: self.body,
             recordings,
@@ -223,6 +221,49 @@ impl<'a> Data<'a> {
             force: OnceLock::new(),
             declared_zero: OnceLock::new(),
         }
+    }
+
+    /// The rows of other signals, every joint in its own band.
+    fn rows_of(&self, recordings: &[Recording]) -> Vec<JointRows> {
+        let mut joints: Vec<JointRows> = Vec::new();
+        let mut done: Vec<f64> = Vec::new();
+        for band in self.joints.iter().map(|joint| &joint.band) {
+            if done.contains(&band.cutoff) {
+                continue;
+            }
+            done.push(band.cutoff);
+            let here = |joint: &JointRows| joint.band.cutoff == band.cutoff;
+            let kept = |joint: &JointRows| match here(joint) {
+                true => joint.kept.clone(),
+                false => vec![Vec::new(); recordings.len()],
+            };
+            let kept = vec![self.joints.iter().map(kept).collect()];
+            let rows =
+                joint_rows(self.body, recordings, std::slice::from_ref(band), kept).pop().unwrap_or_default();
+            if joints.is_empty() {
+                joints = rows;
+                continue;
+            }
+            for ((to, from), own) in joints.iter_mut().zip(rows).zip(&self.joints) {
+                if here(own) {
+                    *to = from;
+                }
+            }
+        }
+        joints
+    }
+
+    /// The same logs with some joints in narrower bands: `narrower` are the bands after this one, each of half
+    /// the cutoff of the one before, and `which` says by joint which of them, 0 for this one.
+    #[must_use]
+    pub fn with_narrower(mut self, narrower: &[Data<'_>], which: &[usize], block: f64) -> Data<'a> {
+        for (j, which) in which.iter().enumerate() {
+            if let Some(from) = which.checked_sub(1).and_then(|k| narrower.get(k)) {
+                self.joints[j] = from.joints[j].clone();
+            }
+        }
+        self.blocks = blocks_of(&self.recordings, &self.joints, &self.band, block);
+        self
     }
 
     /// Joints.
@@ -304,7 +345,7 @@ impl<'a> Data<'a> {
         joint: usize,
         signal: impl FnMut(usize, &'s Recording) -> Vec<f64>,
     ) -> Column {
-        Column::on(joint, self.joints[joint].column(&self.band, &self.recordings, signal))
+        Column::on(joint, self.joints[joint].column(&self.recordings, signal))
     }
 
     /// A column from full-rate signals with n values a sample, one for each joint.
@@ -315,7 +356,7 @@ impl<'a> Data<'a> {
             let signal = |r: usize, _: &Recording| -> Vec<f64> {
                 signals[r].iter().skip(j).step_by(n).copied().collect()
             };
-            (j, self.joints[j].column(&self.band, &self.recordings, signal))
+            (j, self.joints[j].column(&self.recordings, signal))
         };
         Column { parts: parallel::map(&(0..n).collect::<Vec<_>>(), |j| part(*j)) }
     }
@@ -392,17 +433,26 @@ fn joint_rows(
     kept: Vec<Vec<Vec<Vec<usize>>>>,
 ) -> Vec<Vec<JointRows>> {
     let (n, p) = (body.dof(), body.names().len());
-    let empty = |kept: Vec<Vec<usize>>| {
+    let empty = |band: &Band, kept: Vec<Vec<usize>>| {
         let mut rows = Vec::new();
         let mut end = 0;
         for k in &kept {
             rows.push(end..end + k.len());
             end += k.len();
         }
-        JointRows { torque: Vec::with_capacity(end), inertial: vec![Vec::with_capacity(end); p], kept, rows }
+        JointRows {
+            torque: Vec::with_capacity(end),
+            inertial: vec![Vec::with_capacity(end); p],
+            kept,
+            rows,
+            band: band.clone(),
+        }
     };
-    let mut all: Vec<Vec<JointRows>> =
-        kept.into_iter().map(|joints| joints.into_iter().map(empty).collect()).collect();
+    let mut all: Vec<Vec<JointRows>> = kept
+        .into_iter()
+        .zip(bands)
+        .map(|(joints, band)| joints.into_iter().map(|k| empty(band, k)).collect())
+        .collect();
     let Some(narrowest) = bands.last() else { return all };
     for (r, recording) in recordings.iter().enumerate() {
         let y = body.regressor(&recording.q, &recording.v, &recording.a);
@@ -442,10 +492,11 @@ fn blocks_of(recordings: &[Recording], joints: &[JointRows], band: &Band, length
         // Blocks of equal length, as near to the wanted one as the recording allows.
         let count = ((kept.len() as f64 / per_second / length).round() as usize).max(1);
         for b in 0..count {
-            let (from, to) = (kept.len() * b / count, kept.len() * (b + 1) / count);
             let rows: Vec<_> = joints
                 .iter()
                 .map(|joint| {
+                    let kept = joint.band.kept(recording.len()).len();
+                    let (from, to) = (kept * b / count, kept * (b + 1) / count);
                     let base = joint.rows[r].start;
                     let below = |limit: usize| joint.kept[r].partition_point(|k| *k < limit);
                     base + below(from)..base + below(to)

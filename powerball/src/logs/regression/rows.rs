@@ -27,6 +27,8 @@ pub struct JointRows {
     pub kept: Vec<Vec<usize>>,
     /// By recording: its rows.
     pub rows: Vec<Range<usize>>,
+    /// The band that its torque and columns have passed.
+    pub band: Band,
 }
 
 impl JointRows {
@@ -62,7 +64,6 @@ impl JointRows {
     #[must_use]
     pub fn column<'r>(
         &self,
-        band: &Band,
         recordings: &'r [Recording],
         mut signal: impl FnMut(usize, &'r Recording) -> Vec<f64>,
     ) -> Vec<f64> {
@@ -71,7 +72,7 @@ impl JointRows {
             if self.kept[r].is_empty() {
                 continue;
             }
-            let passed = band.pass(&signal(r, recording));
+            let passed = self.band.pass(&signal(r, recording));
             column.extend(self.kept[r].iter().map(|k| passed[*k]));
         }
         column

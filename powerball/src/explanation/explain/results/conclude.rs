@@ -47,6 +47,7 @@ pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainE
         noise_floor: floor,
         effects: named,
         band: [0.0, study.data.band.cutoff],
+        bands: study.data.joints.iter().map(|joint| joint.band.cutoff).collect(),
         effective_samples: effective_samples(&study.data, &model.fit.residual),
         unattributed,
         next_experiment: open.as_ref().map(|open| NextExperiment::not_designed(open.names())),

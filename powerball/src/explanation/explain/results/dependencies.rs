@@ -51,7 +51,7 @@ pub(crate) fn signals(context: &Context<'_>, joint: usize) -> Vec<(String, Vec<f
         let mut out = Vec::with_capacity(rows.len());
         for (r, recording) in data.recordings.iter().enumerate() {
             let values = values(r);
-            let kept = data.band.kept(recording.len());
+            let kept = rows.band.kept(recording.len());
             out.extend(rows.kept[r].iter().map(|k| values[kept[*k]]));
         }
         out

@@ -29,8 +29,10 @@ pub struct Explained {
     pub noise_floor: Vec<f64>,
     /// Accepted effects in the order in which they were added.
     pub effects: Vec<NamedEffect>,
-    /// Band of all errors here, Hz.
+    /// Band of all errors here, Hz: the widest, where joints have their own.
     pub band: [f64; 2],
+    /// The upper end of each joint's band, Hz.
+    pub bands: Vec<f64>,
     /// Samples that the residuals are worth, all joints together.
     pub effective_samples: usize,
     /// What no candidate explains.

@@ -156,7 +156,7 @@ fn rows(context: &Context<'_>, joint: usize, signal: impl Fn(usize) -> Vec<f64>)
     let (data, rows) = (context.data, &context.data.joints[joint]);
     let mut out = Vec::with_capacity(rows.len());
     for (r, recording) in data.recordings.iter().enumerate() {
-        let (values, kept) = (signal(r), data.band.kept(recording.len()));
+        let (values, kept) = (signal(r), rows.band.kept(recording.len()));
         out.extend(rows.kept[r].iter().map(|k| values[kept[*k]]));
     }
     out

@@ -25,7 +25,7 @@ impl Needed {
     }
 }
 
-/// Takes out of the model what was in it from the start and is not needed, the least needed first, each
+/// Takes out of the model what was in it from the start and is not needed, what the logs demand least first, each
 /// judged with everything else in the model. Needed is what the fitted logs demand. Where a model fits badly
 /// its residual is slow and demands little by itself; what goes out must then not raise the errors of logs
 /// that took no part in the fit, both ways round and all that went out together.
@@ -47,7 +47,7 @@ pub(crate) fn keep_needed(study: &Study<'_>, model: &mut Model) {
         let dispensable =
             |n: &&Needed| n.evidence.score < rule.least_score && n.rise_after(risen) < rule.least_gain;
         let least = found.iter().filter(dispensable);
-        let least = least.min_by(|a, b| a.rise_after(risen).total_cmp(&b.rise_after(risen)));
+        let least = least.min_by(|a, b| a.evidence.score.total_cmp(&b.evidence.score));
         if let (None, Some(least)) = (useless, least) {
             risen = [0, 1].map(|way| risen[way] + least.rise[way]);
         }

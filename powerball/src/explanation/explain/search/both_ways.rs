@@ -94,7 +94,7 @@ fn by_blocks(screen: &Screen<'_>, trial: &Trial, candidate: &Candidate) -> f64 {
 /// The autocorrelation time of a joint's residual, s: twice the sum of its autocorrelation up to where that
 /// first vanishes.
 fn memory(data: &Data<'_>, joint: usize, residual: &[f64]) -> f64 {
-    let per_second = data.rate() / data.band.decimation as f64;
+    let per_second = data.rate() / data.joints[joint].band.decimation as f64;
     let at = |lag: usize| -> f64 {
         let of = |rows: &std::ops::Range<usize>| {
             let r = &residual[rows.clone()];
