@@ -117,3 +117,36 @@ fn no_text_makes_it_panic() {
     assert!(errors(&many).iter().any(|e| e.contains("1 to 16")), "{:?}", errors(&many));
     assert!(!errors(&"a".repeat(2 << 20)).is_empty());
 }
+
+const COUPLED: &str = "\n[[transmission]]\njoints = [1, 2]\nmatrix = [[1, 0], [0.5, 1]]\n";
+
+#[test]
+fn a_wrong_transmission_is_told_with_its_place() {
+    let text = format!("{GOOD}{COUPLED}");
+    assert!(errors(&text).is_empty());
+    let base = GOOD.lines().count() + 1;
+    for (from, to, (line, column), words) in [
+        ("[[1, 0], [0.5, 1]]", "[[1, 2], [0.5, 1]]", (3, 10), "singular"),
+        ("[[1, 0], [0.5, 1]]", "[[1, 0], [0.5]]", (3, 10), "2 lists of 2 numbers"),
+        ("[[1, 0], [0.5, 1]]", "[[1, 0], [\"x\", 1]]", (3, 20), "not a number"),
+        ("[[1, 0], [0.5, 1]]", "[[1, 0], [true, 1]]", (3, 20), "finite number"),
+        ("joints = [1, 2]", "joints = [1, 3]", (2, 14), "no joint of this arm"),
+        ("joints = [1, 2]", "joints = [1, 1]", (2, 14), "twice"),
+        ("joints = [1, 2]", "joints = [1]", (2, 10), "two or more"),
+        ("joints = [1, 2]", "joint = [1, 2]", (2, 1), "unknown key"),
+        (
+            "0.5, 1]]\n",
+            "0.5, 1]]\n[[transmission]]\njoints = [2, 1]\nmatrix = [[1, 0], [1, 1]]\n",
+            (4, 1),
+            "already",
+        ),
+    ] {
+        assert!(text.contains(from));
+        let found = errors(&text.replace(from, to));
+        let place = format!("arm.toml:{}:{column}: ", base + line);
+        assert!(
+            found.iter().any(|e| e.starts_with(&place) && e.contains(words)),
+            "{place} {words}: {found:#?}"
+        );
+    }
+}

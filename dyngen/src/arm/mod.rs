@@ -3,12 +3,17 @@
 pub mod parameter;
 mod read;
 pub mod sum;
+mod table;
+pub mod transmission;
 
 use crate::diagnostic::Diagnostics;
 pub use crate::exact::angle::Angle;
-use crate::exact::rational::Rational;
+use crate::exact::rational::{self, Rational};
+use num_traits::{One, Zero};
 pub use parameter::{Parameter, ParameterKind};
+use std::fmt;
 use std::path::Path;
+pub use transmission::Transmission;
 
 /// The most joints an arm may have.
 pub const MAX_JOINTS: usize = 16;
@@ -79,7 +84,7 @@ pub struct Tool {
 }
 
 /// A serial arm.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct Arm {
     /// The arm's name.
     pub name: String,
@@ -93,6 +98,26 @@ pub struct Arm {
     pub tool: Option<Tool>,
     /// A published parameter set, empty where the file has none.
     pub groupings: Vec<Grouping>,
+    /// Motors that turn with several joints, empty where each turns with its own.
+    pub transmissions: Vec<Transmission>,
+}
+
+/// What the file does not say is left out: generated files state a hash of this text, which does not change with
+/// what arm files can say since.
+impl fmt::Debug for Arm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut text = f.debug_struct("Arm");
+        text.field("name", &self.name)
+            .field("convention", &self.convention)
+            .field("gravity", &self.gravity)
+            .field("joints", &self.joints)
+            .field("tool", &self.tool)
+            .field("groupings", &self.groupings);
+        if !self.transmissions.is_empty() {
+            text.field("transmissions", &self.transmissions);
+        }
+        text.finish()
+    }
 }
 
 impl Arm {
@@ -135,6 +160,43 @@ impl Arm {
         self.joints.get(parameter.link).is_some_and(|joint| match parameter.kind {
             ParameterKind::Im => joint.rotor_ratio.is_some(),
             kind => !joint.zero.contains(&kind),
+        })
+    }
+
+    /// The matrix of the motors' velocities, n × n by rows: motor i turns at Σ_j M_ij q̇_j on the joint's side of
+    /// its gear (before the gear ratio); rad/s or m/s. Torques go the other way: τ = Mᵀ·τ_motors.
+    ///
+    /// The identity where the file has no `[[transmission]]`. Rotors are in the model already; friction sits on
+    /// these velocities as well, and whoever adds it takes them from here.
+    pub fn motor_velocity_matrix(&self) -> Vec<Vec<Rational>> {
+        let n = self.dof();
+        let unit = |i: usize, j: usize| if i == j { Rational::one() } else { Rational::zero() };
+        let mut matrix: Vec<Vec<Rational>> = (0..n).map(|i| (0..n).map(|j| unit(i, j)).collect()).collect();
+        for block in &self.transmissions {
+            for (motor, row) in block.joints.iter().zip(&block.matrix) {
+                for (joint, factor) in block.joints.iter().zip(row) {
+                    matrix[*motor][*joint] = factor.clone();
+                }
+            }
+        }
+        matrix
+    }
+
+    /// [`Arm::motor_velocity_matrix`] in numbers.
+    pub fn motor_velocity_matrix_f64(&self) -> Vec<Vec<f64>> {
+        let number = |row: Vec<Rational>| row.iter().map(rational::to_f64).collect();
+        self.motor_velocity_matrix().into_iter().map(number).collect()
+    }
+
+    /// The joints that a motor turns with and by how much, where that is not its own joint alone, by one.
+    pub fn coupled_motor(&self, motor: usize) -> Option<Vec<(usize, Rational)>> {
+        self.transmissions.iter().find_map(|block| {
+            let row = &block.matrix[block.joints.iter().position(|joint| *joint == motor)?];
+            let entries = block.joints.iter().copied().zip(row.iter().cloned());
+            let mut entries: Vec<(usize, Rational)> =
+                entries.filter(|(_, factor)| !factor.is_zero()).collect();
+            entries.sort_by_key(|(joint, _)| *joint);
+            (entries != [(motor, Rational::one())]).then_some(entries)
         })
     }
 

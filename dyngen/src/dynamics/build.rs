@@ -267,6 +267,9 @@ impl Source<Expr> for Inputs<'_> {
     fn ratio(&mut self, joint: usize) -> Expr {
         self.arm.joints[joint].rotor_ratio.as_ref().map_or(Expr::ZERO, |k| self.b.constant(k))
     }
+    fn coupling(&mut self, factor: &Rational) -> Expr {
+        self.b.constant(factor)
+    }
     fn gravity(&mut self, axis: usize) -> Expr {
         self.b.constant(&self.arm.gravity[axis])
     }

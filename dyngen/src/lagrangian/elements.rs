@@ -29,6 +29,8 @@ pub struct JointElements<V> {
     pub shift: V,
     /// Joint speed q̇.
     pub speed: V,
+    /// Speed of the joint's motor on the joint's side of its gear: q̇ unless a transmission couples it.
+    pub motor_speed: V,
     /// Link length a.
     pub a: V,
     /// Sine of the twist.
@@ -117,6 +119,8 @@ pub trait Source<V> {
     fn d(&mut self, joint: usize) -> V;
     /// Gear ratio.
     fn ratio(&mut self, joint: usize) -> V;
+    /// How fast a motor turns with a joint, an entry of the transmission's matrix; a constant of the arm.
+    fn coupling(&mut self, factor: &Rational) -> V;
     /// Component of gravity; asked for only where it is not zero.
     fn gravity(&mut self, axis: usize) -> V;
     /// Sine or cosine of an angle symbol.
@@ -147,17 +151,29 @@ impl<V: Clone> ArmElements<V> {
                 }
             };
             let (sin_alpha, cos_alpha) = symbols.sin_cos(&joint.alpha);
+            let speed = source.speed(i);
             joints.push(JointElements {
                 kind: joint.kind,
                 sin,
                 cos,
                 shift,
-                speed: source.speed(i),
+                speed: speed.clone(),
+                motor_speed: speed,
                 a: if joint.a.is_zero() { algebra.integer(0) } else { source.a(i) },
                 sin_alpha: constant(algebra, sin_alpha, &mut |m, s| source.symbol(m, s)),
                 cos_alpha: constant(algebra, cos_alpha, &mut |m, s| source.symbol(m, s)),
                 ratio: joint.rotor_ratio.is_some().then(|| source.ratio(i)),
             });
+        }
+        for motor in 0..joints.len() {
+            if let Some(row) = arm.coupled_motor(motor) {
+                let term = |(joint, factor): &(usize, Rational)| {
+                    algebra.mul(&source.coupling(factor), &joints[*joint].speed)
+                };
+                let terms: Vec<V> = row.iter().map(term).collect();
+                joints[motor].motor_speed =
+                    terms.iter().fold(algebra.integer(0), |sum, term| algebra.add(&sum, term));
+            }
         }
         let gravity = std::array::from_fn(|axis| {
             if arm.gravity[axis].is_zero() { algebra.integer(0) } else { source.gravity(axis) }

@@ -165,6 +165,9 @@ impl Source<Series> for SeriesSource<'_, '_> {
     fn ratio(&mut self, _: usize) -> Series {
         [Fp::ZERO; 3]
     }
+    fn coupling(&mut self, _: &Rational) -> Series {
+        [Fp::ZERO; 3]
+    }
     fn gravity(&mut self, _: usize) -> Series {
         [Fp::ZERO; 3]
     }
