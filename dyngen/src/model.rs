@@ -8,7 +8,7 @@ use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::elimination::Unproven;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
-use crate::lagrangian::elements::angle_symbols;
+use crate::lagrangian::elements::{angle_symbols, has_joint_symbols};
 use crate::optimize::{PASSES, Pass};
 use crate::parameters::span::Sum;
 use crate::parameters::{Combination, ParameterSet, SetKind};
@@ -179,7 +179,7 @@ impl Model {
                 Regrouping::new(&self.arm, &self.symbols, &self.sets.field, &self.sets.minimal, set, order)
             };
             // With symbols eliminations are slow, and two rules must do.
-            let orders = Order::all().step_by(if self.symbols.angles.is_empty() { 1 } else { Order::RULES });
+            let orders = Order::all().step_by(if has_joint_symbols(&self.arm) { Order::RULES } else { 1 });
             orders.map(of).collect()
         });
         let built = build::build(function, &subject, set, regroupings, baked, passes);

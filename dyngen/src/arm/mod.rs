@@ -37,8 +37,10 @@ pub enum JointKind {
 }
 
 /// One row of the DH table with what else is known of the joint and its link.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct Joint {
+    /// Its name, where the file gives one: as in the URDF, and in the logs of others.
+    pub name: Option<String>,
     /// Revolute or prismatic.
     pub kind: JointKind,
     /// Link length, m.
@@ -65,6 +67,29 @@ pub struct Joint {
     pub torque_constant: Option<f64>,
 }
 
+/// What the file does not say is left out, as for [`Arm`].
+impl fmt::Debug for Joint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut text = f.debug_struct("Joint");
+        if let Some(name) = &self.name {
+            text.field("name", name);
+        }
+        text.field("kind", &self.kind)
+            .field("a", &self.a)
+            .field("alpha", &self.alpha)
+            .field("d", &self.d)
+            .field("theta", &self.theta)
+            .field("zero", &self.zero)
+            .field("rotor_ratio", &self.rotor_ratio)
+            .field("position", &self.position)
+            .field("velocity", &self.velocity)
+            .field("acceleration", &self.acceleration)
+            .field("torque", &self.torque)
+            .field("torque_constant", &self.torque_constant)
+            .finish()
+    }
+}
+
 /// One entry of a published parameter set: a name and the exact sum of parameters it stands for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grouping {
@@ -74,9 +99,9 @@ pub struct Grouping {
     pub terms: Vec<(Parameter, Rational)>,
 }
 
-/// A tool's frame in the last link's frame: where forward kinematics and the Jacobian look.
+/// Where a frame stands in another, as a URDF says it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tool {
+pub struct Placement {
     /// Its origin, m.
     pub xyz: [Rational; 3],
     /// Roll, pitch and yaw: R = Rz(yaw)·Ry(pitch)·Rx(roll).
@@ -90,12 +115,16 @@ pub struct Arm {
     pub name: String,
     /// The convention of the DH table.
     pub convention: Convention,
-    /// Gravity in the base frame, m/s².
+    /// Gravity in frame 0, m/s².
     pub gravity: [Rational; 3],
     /// The joints from the base outwards, 1 to [`MAX_JOINTS`].
     pub joints: Vec<Joint>,
-    /// The tool's frame, where it is another than the last link's. It has no inertia of its own.
-    pub tool: Option<Tool>,
+    /// Frame 0 in the robot's root link, where it is another. Kinematics is then that of the root link; gravity and
+    /// dynamics are those of frame 0.
+    pub base: Option<Placement>,
+    /// The tool's frame in the last link's, where it is another: where forward kinematics and the Jacobian look. It
+    /// has no inertia of its own.
+    pub tool: Option<Placement>,
     /// A published parameter set, empty where the file has none.
     pub groupings: Vec<Grouping>,
     /// Motors that turn with several joints, empty where each turns with its own.
@@ -113,6 +142,9 @@ impl fmt::Debug for Arm {
             .field("joints", &self.joints)
             .field("tool", &self.tool)
             .field("groupings", &self.groupings);
+        if let Some(base) = &self.base {
+            text.field("base", base);
+        }
         if !self.transmissions.is_empty() {
             text.field("transmissions", &self.transmissions);
         }
@@ -143,6 +175,17 @@ impl Arm {
     /// The number of joints.
     pub fn dof(&self) -> usize {
         self.joints.len()
+    }
+
+    /// The joints' names in order: where the file gives none, the joint's number from 1, as logs have it.
+    pub fn joint_names(&self) -> Vec<String> {
+        let name = |(i, joint): (usize, &Joint)| joint.name.clone().unwrap_or_else(|| (i + 1).to_string());
+        self.joints.iter().enumerate().map(name).collect()
+    }
+
+    /// Whether the file names a joint.
+    pub fn has_joint_names(&self) -> bool {
+        self.joints.iter().any(|joint| joint.name.is_some())
     }
 
     /// The parameters that the declared symmetries and missing rotors leave, in order: the set `full`.
@@ -209,7 +252,22 @@ impl Arm {
                     notes.push(format!("joint {}: {key} = {text}", i + 1));
                 }
             }
+            if let Some([low, high]) =
+                joint.position.filter(|p| joint.kind == JointKind::Revolute && degrees(p))
+            {
+                notes.push(format!(
+                    "joint {}: position = [{low}, {high}] is in rad; as degrees that would be [{:.4}, {:.4}]",
+                    i + 1,
+                    low.to_radians(),
+                    high.to_radians()
+                ));
+            }
         }
         notes
     }
+}
+
+/// Whether a joint's limits look as if they were degrees: whole numbers beyond what a joint turns.
+fn degrees(position: &[f64; 2]) -> bool {
+    position.iter().all(|x| x.fract() == 0.0) && position.iter().any(|x| x.abs() >= 30.0)
 }

@@ -2,7 +2,7 @@
 
 use super::table::{Reader, Table, Value, describe};
 use super::{
-    Angle, Arm, Convention, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind, Tool, sum,
+    Angle, Arm, Convention, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind, Placement, sum,
     transmission,
 };
 use crate::diagnostic::{Collector, Diagnostics};
@@ -10,9 +10,11 @@ use crate::exact::rational::{self, Rational};
 use num_traits::{Signed, Zero};
 use toml::de::DeTable;
 
-const ARM_KEYS: [&str; 7] = ["name", "convention", "gravity", "joint", "tool", "grouping", "transmission"];
-const TOOL_KEYS: [&str; 2] = ["xyz", "rpy"];
-const JOINT_KEYS: [&str; 12] = [
+const ARM_KEYS: [&str; 8] =
+    ["name", "convention", "gravity", "joint", "base", "tool", "grouping", "transmission"];
+const PLACEMENT_KEYS: [&str; 2] = ["xyz", "rpy"];
+const JOINT_KEYS: [&str; 13] = [
+    "name",
     "kind",
     "a",
     "alpha",
@@ -66,7 +68,9 @@ impl Reader<'_> {
         }
         let dof = joint_tables.len();
         let joints: Vec<Option<Joint>> = joint_tables.iter().map(|t| self.joint(t)).collect();
-        let tool = self.optional(&top, "tool", Self::tool);
+        self.same_names(&joint_tables);
+        let base = self.optional(&top, "base", |r, v| r.placement(v, "base", "the root link"));
+        let tool = self.optional(&top, "tool", |r, v| r.placement(v, "tool", "the last frame"));
         let transmission_tables = self.tables(&top, "transmission");
         let transmissions = transmission::read(self, &transmission_tables, dof);
         let grouping_tables = self.tables(&top, "grouping");
@@ -89,6 +93,7 @@ impl Reader<'_> {
             convention: convention?,
             gravity: gravity?,
             joints: joints.into_iter().collect::<Option<_>>()?,
+            base: base?,
             tool: tool?,
             groupings: groupings.into_iter().collect::<Option<_>>()?,
             transmissions: transmissions?,
@@ -98,6 +103,7 @@ impl Reader<'_> {
     fn joint(&mut self, t: &Table<'_, '_>) -> Option<Joint> {
         self.unknown_keys(t, &JOINT_KEYS);
         let place = t.place.clone();
+        let name = self.optional(t, "name", |r, v| r.text(v, &format!("{place}: name")));
         let kind = self.required(t, "kind").and_then(|v| match v.get_ref().as_str() {
             Some("revolute") => Some(JointKind::Revolute),
             Some("prismatic") => Some(JointKind::Prismatic),
@@ -145,6 +151,7 @@ impl Reader<'_> {
         let torque = limit("torque", "N·m or N");
         let torque_constant = limit("torque_constant", "N·m/A or N/A");
         Some(Joint {
+            name: name?,
             kind: kind?,
             a: a?,
             alpha: alpha?,
@@ -251,25 +258,41 @@ impl Reader<'_> {
         Some([x?, y?, z?])
     }
 
-    fn tool(&mut self, v: &Value<'_>) -> Option<Tool> {
+    /// Names say which joint is meant, so no two joints have one.
+    fn same_names(&mut self, joints: &[Table<'_, '_>]) {
+        let name =
+            |t: &Table<'_, '_>| t.table.get("name").and_then(|v| v.get_ref().as_str().map(str::to_string));
+        for (i, t) in joints.iter().enumerate() {
+            let Some(own) = name(t) else { continue };
+            if let Some(first) = joints[..i].iter().position(|other| name(other).as_ref() == Some(&own)) {
+                let span = t.table.get("name").map_or(t.span.clone(), toml::Spanned::span);
+                let message = format!("{}: the name '{own}' is already that of joint {}", t.place, first + 1);
+                self.errors.error(span, message);
+            }
+        }
+    }
+
+    /// A frame's place in another, whose name is `within`.
+    fn placement(&mut self, v: &Value<'_>, name: &str, within: &str) -> Option<Placement> {
         let Some(table) = v.get_ref().as_table() else {
-            self.errors.error(v.span(), format!("tool must be a table: write [tool], found {}", describe(v)));
+            let message = format!("{name} must be a table: write [{name}], found {}", describe(v));
+            self.errors.error(v.span(), message);
             return None;
         };
-        let t = Table { table, span: v.span(), place: "tool".to_string() };
-        self.unknown_keys(&t, &TOOL_KEYS);
+        let t = Table { table, span: v.span(), place: name.to_string() };
+        self.unknown_keys(&t, &PLACEMENT_KEYS);
         let xyz = self.optional(&t, "xyz", |r, v| {
-            let [x, y, z] = r.three(v, "tool: xyz must be three numbers in m in the last frame")?;
-            let [x, y, z] = [x, y, z].map(|c| r.number(c, "tool: xyz", "m"));
+            let [x, y, z] = r.three(v, &format!("{name}: xyz must be three numbers in m in {within}"))?;
+            let [x, y, z] = [x, y, z].map(|c| r.number(c, &format!("{name}: xyz"), "m"));
             Some([x?, y?, z?])
         });
         let rpy = self.optional(&t, "rpy", |r, v| {
-            let [x, y, z] = r.three(v, "tool: rpy must be three angles, roll, pitch and yaw")?;
-            let [x, y, z] = [x, y, z].map(|c| r.angle(c, "tool: rpy"));
+            let [x, y, z] = r.three(v, &format!("{name}: rpy must be three angles, roll, pitch and yaw"))?;
+            let [x, y, z] = [x, y, z].map(|c| r.angle(c, &format!("{name}: rpy")));
             Some([x?, y?, z?])
         });
         let straight = || Angle::PiMultiple(Rational::zero());
-        Some(Tool {
+        Some(Placement {
             xyz: xyz?.unwrap_or_else(|| std::array::from_fn(|_| Rational::zero())),
             rpy: rpy?.unwrap_or_else(|| std::array::from_fn(|_| straight())),
         })

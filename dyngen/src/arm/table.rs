@@ -7,6 +7,9 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+/// A turn, as it may be rounded, rad.
+const LARGEST_ANGLE: f64 = 6.2832;
+
 pub(super) type Value<'i> = Spanned<DeValue<'i>>;
 
 /// Reads a file and collects what is wrong with it.
@@ -32,13 +35,28 @@ impl Reader<'_> {
         None
     }
 
+    /// An angle in rad: more than a turn as a number is degrees.
     pub(super) fn angle(&mut self, v: &Value<'_>, quantity: &str) -> Option<Angle> {
-        if let Some(text) = v.get_ref().as_str() {
-            return Angle::parse(text)
-                .map_err(|e| self.errors.error(v.span(), format!("{quantity}: {e}")))
-                .ok();
+        let angle = match v.get_ref().as_str() {
+            Some(text) => {
+                Angle::parse(text).map_err(|e| self.errors.error(v.span(), format!("{quantity}: {e}"))).ok()
+            }
+            None => self.number(v, quantity, "rad, or text such as \"pi/2\"").map(Angle::from_radians),
+        }?;
+        if let Angle::Radians(number) = &angle
+            && angle.radians().abs() > LARGEST_ANGLE
+        {
+            let exact = Angle::PiMultiple(number / rational::integer(180));
+            self.errors.error(
+                v.span(),
+                format!(
+                    "{quantity} = {} rad is more than a turn: if degrees are meant, write \"{exact}\"",
+                    rational::to_f64(number)
+                ),
+            );
+            return None;
         }
-        self.number(v, quantity, "rad, or text such as \"pi/2\"").map(Angle::from_radians)
+        Some(angle)
     }
 
     pub(super) fn number(&mut self, v: &Value<'_>, quantity: &str, unit: &str) -> Option<Rational> {

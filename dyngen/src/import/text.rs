@@ -21,18 +21,7 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
         let _ = writeln!(text, "# {}", plain(&line));
     };
     comment(format!("Imported by dyngen from {file}: link '{}' to link '{}'.", chain.root, chain.tip));
-    comment(format!("Frame 0 in link '{}': {}.", chain.root, pose_text(&frames.base)));
-    comment(format!(
-        "Link '{}' in frame {}: {}.",
-        chain.tip,
-        frames.links.len(),
-        pose_text(&tip(chain, frames))
-    ));
-    comment(
-        "An arm file has no place for frame 0's pose: gravity is turned into it. Friction and meshes are \
-            left out."
-            .to_string(),
-    );
+    comment("Gravity is that of frame 0. Friction and meshes are left out.".to_string());
     chain.notes.iter().for_each(|note| comment(format!("Note: {note}.")));
     let convention = match options.convention {
         Convention::Standard => "standard",
@@ -44,7 +33,7 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
     let _ = write!(
         text,
         "name = \"{}\"\nconvention = \"{convention}\"\ngravity = [{}]\n",
-        plain(name).replace('\\', "\\\\").replace('"', "\\\""),
+        quoted(name),
         gravity.join(", ")
     );
     for (joint, row) in chain.joints.iter().zip(&frames.rows) {
@@ -55,10 +44,10 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
         };
         let _ = write!(
             text,
-            "\n# joint '{}', links {}\n[[joint]]\nkind = \"{kind}\"\na = {}\nalpha = {}\nd = {}\ntheta = \
+            "\n# links {}\n[[joint]]\nname = \"{}\"\nkind = \"{kind}\"\na = {}\nalpha = {}\nd = {}\ntheta = \
                 {}\n",
-            plain(&joint.name),
             plain(&joint.links.iter().map(|l| format!("'{l}'")).collect::<Vec<_>>().join(", ")),
+            quoted(&joint.name),
             length(row.a),
             angle(row.alpha),
             length(row.d),
@@ -73,19 +62,26 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
             }
         }
     }
-    let tip = tip(chain, frames);
-    if pose_text(&tip) != SAME {
-        let xyz: Vec<String> = tip.origin.iter().map(|x| length(*x)).collect();
-        let rpy = tip.rpy().map(|turn| angle(turn, options.angle_tolerance));
-        let _ = write!(
-            text,
-            "\n# link '{}'\n[tool]\nxyz = [{}]\nrpy = [{}]\n",
-            plain(&chain.tip),
-            xyz.join(", "),
-            rpy.join(", ")
-        );
-    }
+    placement(&mut text, &format!("frame 0 in link '{}'", chain.root), "base", &frames.base, options);
+    placement(
+        &mut text,
+        &format!("link '{}' in the last frame", chain.tip),
+        "tool",
+        &tip(chain, frames),
+        options,
+    );
     text
+}
+
+/// The table of a fixed frame, where it is another than the one it stands in.
+fn placement(text: &mut String, what: &str, table: &str, pose: &Pose, options: &Options) {
+    let xyz: Vec<String> = pose.origin.iter().map(|x| length(*x)).collect();
+    let rpy = pose.rpy().map(|turn| angle(turn, options.angle_tolerance));
+    if xyz.iter().chain(&rpy).any(|number| number != "0") {
+        let (xyz, rpy) = (xyz.join(", "), rpy.join(", "));
+        // A String takes every write.
+        let _ = write!(text, "\n# {}\n[{table}]\nxyz = [{xyz}]\nrpy = [{rpy}]\n", plain(what));
+    }
 }
 
 /// The tip link's frame in the last frame.
@@ -157,17 +153,9 @@ fn angle(value: f64, tolerance: f64) -> String {
     }
 }
 
-/// What is said of a pose that is none.
-const SAME: &str = "the same";
-
-/// A pose as a URDF would say it.
-fn pose_text(pose: &Pose) -> String {
-    let list = |values: &[f64]| values.iter().map(|x| length(*x)).collect::<Vec<_>>().join(", ");
-    let (origin, rpy) = (list(pose.origin.as_slice()), list(&pose.rpy()));
-    if origin == "0, 0, 0" && rpy == "0, 0, 0" {
-        return SAME.to_string();
-    }
-    format!("xyz = [{origin}] m, rpy = [{rpy}] rad")
+/// A name between the quotation marks of TOML.
+fn quoted(name: &str) -> String {
+    plain(name).replace('\\', "\\\\").replace('"', "\\\"")
 }
 
 /// Names as they may stand in a comment or a text.
