@@ -249,14 +249,36 @@ fn rounded_right_angles_need_a_word() {
         "<origin xyz=\"0 0.1 0\" rpy=\"1.5708 0 0\"/><axis xyz=\"0 -1 0\"/>",
     );
     assert_ne!(rounded, PUMA);
-    let Err(ImportError::Refused(reasons)) = imported(&rounded, None) else { panic!("accepted") };
+    let exact = Options { exact: true, ..Options::default() };
+    let Err(ImportError::Refused(reasons)) = import::urdf(&rounded, "robot.urdf", &exact) else {
+        panic!("accepted")
+    };
     assert!(
         reasons[0].contains("--angle-tolerance") && reasons[0].contains("'bend' and 'turn'"),
         "{reasons:?}"
     );
-    let loose = Options { angle_tolerance: 1e-4, ..Options::default() };
+    let loose = Options { angle_tolerance: 1e-4, exact: true, ..Options::default() };
     let arm = import::urdf(&rounded, "robot.urdf", &loose).unwrap().arm;
     assert!(arm.joints.iter().all(|j| j.alpha.quarter_turns().is_some()), "{arm:?}");
+}
+
+/// The last joint sits 0.1 m off the axes that the rounding tilts by pi/2 − 1.5708 = 3.67e-6 rad, and a length is
+/// a residue.
+#[test]
+fn rounded_numbers_are_taken_as_meant_and_said() {
+    let place = "<origin rpy=\"1.5707963267948966 0 0\"/><axis xyz=\"0 0 -2\"/>";
+    let rounded = "<origin xyz=\"3e-8 0.1 0\" rpy=\"1.5708 0 0\"/><axis xyz=\"0 -1 -4e-8\"/>";
+    let rounded = PUMA.replace(place, rounded);
+    let found = imported(&rounded, None).unwrap();
+    let turn = found.arm.joints.last().unwrap();
+    assert_eq!(turn.alpha.quarter_turns(), Some(2));
+    let said =
+        |words: &str| assert!(found.notes.iter().any(|n| n.contains(words)), "{words}: {:#?}", found.notes);
+    said("joint 'turn': roll 1.5708 is pi/2, 0.00000003 of its origin is 0, -0.00000004 of its axis is 0");
+    // 1.5708 − pi/2 is 3.67e-6 rad; an axis that is off by 4e-8 rad puts half a turn off by twice that.
+    said("mm and 3.75e-3 mrad over the joints' ranges");
+    let whole = imported(PUMA, None).unwrap();
+    assert!(!whole.notes.iter().any(|n| n.contains("rounded")), "{:?}", whole.notes);
 }
 
 /// Reasons of a refusal; an unreadable text is none.

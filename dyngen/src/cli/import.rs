@@ -29,6 +29,9 @@ pub(super) struct Args {
     /// Where frame i sits: on joint i (modified) or at the far end of link i (standard).
     #[arg(long, value_enum, default_value = "modified")]
     convention: Frames,
+    /// Keep every digit: do not take rounded numbers such as 1.5708 for what they were rounded from.
+    #[arg(long)]
+    exact: bool,
     /// Angles this close to a multiple of pi/12 are taken for it, rad.
     #[arg(long, value_name = "RAD", default_value = "1e-9", value_parser = tolerance)]
     angle_tolerance: f64,
@@ -65,6 +68,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         tip: args.tip.clone(),
         convention,
         angle_tolerance: args.angle_tolerance,
+        exact: args.exact,
     };
     let imported = import::urdf(&text, &file, &options).map_err(|e| match e {
         ImportError::Unreadable(_) => Failure::input(e),

@@ -15,6 +15,8 @@ pub(super) struct Chain {
     /// The tip link's frame.
     pub(super) tip_pose: Pose,
     pub(super) joints: Vec<ChainJoint>,
+    /// The robot's joints from root to tip, those that do not move too.
+    pub(super) path: Vec<usize>,
     pub(super) notes: Vec<String>,
 }
 
@@ -121,6 +123,7 @@ pub(super) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<Strin
         tip: robot.links[tip].name.clone(),
         tip_pose: pose,
         joints,
+        path,
         notes,
     })
 }

@@ -4,7 +4,7 @@
 use roxmltree::{Document, Error, Node, ParsingOptions};
 
 /// The links and joints of a robot.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Robot {
     pub(super) name: String,
     pub(super) links: Vec<Link>,
@@ -12,7 +12,7 @@ pub(super) struct Robot {
 }
 
 /// A link, with zeros where it has no `<inertial>`.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Link {
     pub(super) name: String,
     /// In the file, from 1.
@@ -26,7 +26,7 @@ pub(super) struct Link {
 }
 
 /// A joint between two links.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Joint {
     pub(super) name: String,
     /// In the file, from 1.
