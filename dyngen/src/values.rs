@@ -95,6 +95,16 @@ impl Values {
         Err(Diagnostics(wrong.into_iter().map(diagnostic).collect()))
     }
 
+    /// The names that have values.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.by_name.keys().map(String::as_str)
+    }
+
+    /// The value of a name.
+    pub(crate) fn get(&self, name: &str) -> Option<f64> {
+        self.by_name.get(name).copied()
+    }
+
     /// Values that are there already; `file` names them in errors.
     pub fn named<'n>(values: impl IntoIterator<Item = (&'n str, f64)>, file: &str) -> Values {
         let by_name = values.into_iter().map(|(name, value)| (name.to_string(), value)).collect();

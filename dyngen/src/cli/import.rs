@@ -43,7 +43,7 @@ enum Frames {
     Standard,
 }
 
-fn lock(text: &str) -> Result<(String, f64), String> {
+pub(super) fn lock(text: &str) -> Result<(String, f64), String> {
     let (joint, value) = text.rsplit_once('=').ok_or("must be JOINT=VALUE, such as finger=0.02")?;
     let number = value.parse().ok().filter(|x: &f64| x.is_finite());
     Ok((joint.to_string(), number.ok_or_else(|| format!("'{value}' is no number of rad or m"))?))
@@ -91,7 +91,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
 }
 
 /// Edited files are not lost by accident, and the original is never written over.
-fn refuse_to_replace(path: &Path, original: &Path, force: bool) -> Result<(), Failure> {
+pub(super) fn refuse_to_replace(path: &Path, original: &Path, force: bool) -> Result<(), Failure> {
     let place = path.display();
     if same_file(path, original) {
         return Err(Failure::input(format!("{place} is the file that is imported: choose another -o")));
@@ -105,7 +105,7 @@ fn refuse_to_replace(path: &Path, original: &Path, force: bool) -> Result<(), Fa
 }
 
 /// Writes all files or none: each is complete on the disk before the first takes its name.
-fn write(files: &[(&Path, &str)]) -> Result<(), Failure> {
+pub(super) fn write(files: &[(&Path, &str)]) -> Result<(), Failure> {
     let partial = |path: &Path| {
         let mut name = path.as_os_str().to_os_string();
         name.push(".partial");

@@ -3,6 +3,7 @@
 mod check;
 mod describe;
 mod eval;
+mod export;
 mod generate;
 mod import;
 mod inspect;
@@ -31,6 +32,8 @@ enum Command {
     Generate(generate::Args),
     /// Makes an arm file, with inertial values beside it, from a serial chain of a URDF.
     Import(import::Args),
+    /// Writes identified values into a copy of the file that an arm was imported from.
+    Export(export::Args),
     /// Shows a function's expressions after a pass of the optimiser, with what each pass costs.
     Inspect(inspect::Args),
     /// Evaluates a function at the states of a CSV file.
@@ -87,6 +90,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Describe(args) => describe::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Import(args) => import::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Check(args) => check::run(&args),

@@ -8,47 +8,49 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::collections::BTreeMap;
 
 /// A serial arm at q = 0, everything in the root link's frame.
-pub(super) struct Chain {
-    pub(super) name: String,
-    pub(super) root: String,
-    pub(super) tip: String,
+pub(crate) struct Chain {
+    pub(crate) name: String,
+    pub(crate) root: String,
+    pub(crate) tip: String,
     /// The tip link's frame.
-    pub(super) tip_pose: Pose,
-    pub(super) joints: Vec<ChainJoint>,
+    pub(crate) tip_pose: Pose,
+    pub(crate) joints: Vec<ChainJoint>,
     /// The robot's joints from root to tip, those that do not move too.
-    pub(super) path: Vec<usize>,
-    pub(super) notes: Vec<String>,
+    pub(crate) path: Vec<usize>,
+    pub(crate) notes: Vec<String>,
 }
 
 /// A joint that moves, with the body behind it.
-pub(super) struct ChainJoint {
-    pub(super) name: String,
-    pub(super) kind: JointKind,
+pub(crate) struct ChainJoint {
+    pub(crate) name: String,
+    pub(crate) kind: JointKind,
     /// A point on the axis, m.
-    pub(super) point: Vector3<f64>,
+    pub(crate) point: Vector3<f64>,
     /// The direction of the axis, of length 1.
-    pub(super) direction: Vector3<f64>,
-    pub(super) position: Option<[f64; 2]>,
-    pub(super) velocity: Option<f64>,
-    pub(super) torque: Option<f64>,
+    pub(crate) direction: Vector3<f64>,
+    pub(crate) position: Option<[f64; 2]>,
+    pub(crate) velocity: Option<f64>,
+    pub(crate) torque: Option<f64>,
     /// The links that move as one behind the joint.
-    pub(super) links: Vec<String>,
+    pub(crate) links: Vec<String>,
+    /// The frame of each of them.
+    pub(crate) poses: Vec<Pose>,
     /// Those of them that have mass.
-    pub(super) masses: Vec<Mass>,
+    pub(crate) masses: Vec<Mass>,
 }
 
 /// The inertia of one link.
-pub(super) struct Mass {
+pub(crate) struct Mass {
     /// kg
-    pub(super) mass: f64,
+    pub(crate) mass: f64,
     /// Centre of mass, m.
-    pub(super) centre: Vector3<f64>,
+    pub(crate) centre: Vector3<f64>,
     /// Inertia tensor about the centre of mass, kg·m².
-    pub(super) inertia: Matrix3<f64>,
+    pub(crate) inertia: Matrix3<f64>,
 }
 
 /// Reads the chain, or says every reason why there is none.
-pub(super) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<String>> {
+pub(crate) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<String>> {
     let mut tree = Tree::new(robot)?;
     tree.locked = locked(robot, options)?;
     if let Some(name) = &options.base {
@@ -350,6 +352,7 @@ impl Walk<'_> {
             velocity: (velocity > 0.0 && usable(velocity)).then_some(velocity),
             torque: (effort > 0.0 && usable(effort)).then_some(effort),
             links: Vec::new(),
+            poses: Vec::new(),
             masses: Vec::new(),
         });
         (pose, true)
@@ -416,6 +419,7 @@ impl Walk<'_> {
         let frame = self.origin(&link.origin, pose, &format!("{place}: inertial"));
         if let Some(joint) = self.joints.last_mut() {
             joint.links.push(link.name.clone());
+            joint.poses.push(*pose);
             if let Some(reason) = impossible(mass, &tensor) {
                 self.notes.push(format!("{place}: {reason}"));
             }

@@ -8,12 +8,12 @@
 //!
 //! Joint positions keep their meaning: q of the arm file is the URDF's q, for position limits too.
 
-mod chain;
+pub(crate) mod chain;
 mod frames;
-mod pose;
+pub(crate) mod pose;
 mod rounding;
 mod text;
-mod urdf;
+pub(crate) mod urdf;
 
 use crate::arm::{Arm, Convention, Parameter};
 use std::fmt;

@@ -5,50 +5,50 @@ use roxmltree::{Document, Error, Node, ParsingOptions};
 
 /// The links and joints of a robot.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Robot {
-    pub(super) name: String,
-    pub(super) links: Vec<Link>,
-    pub(super) joints: Vec<Joint>,
+pub(crate) struct Robot {
+    pub(crate) name: String,
+    pub(crate) links: Vec<Link>,
+    pub(crate) joints: Vec<Joint>,
 }
 
 /// A link, with zeros where it has no `<inertial>`.
 #[derive(Clone, Debug)]
-pub(super) struct Link {
-    pub(super) name: String,
+pub(crate) struct Link {
+    pub(crate) name: String,
     /// In the file, from 1.
-    pub(super) line: u32,
+    pub(crate) line: u32,
     /// Of the centre of mass and the axes of the inertia tensor in the link's frame.
-    pub(super) origin: Origin,
+    pub(crate) origin: Origin,
     /// kg
-    pub(super) mass: f64,
+    pub(crate) mass: f64,
     /// ixx, ixy, ixz, iyy, iyz, izz, kg·m²
-    pub(super) inertia: [f64; 6],
+    pub(crate) inertia: [f64; 6],
 }
 
 /// A joint between two links.
 #[derive(Clone, Debug)]
-pub(super) struct Joint {
-    pub(super) name: String,
+pub(crate) struct Joint {
+    pub(crate) name: String,
     /// In the file, from 1.
-    pub(super) line: u32,
-    pub(super) kind: String,
-    pub(super) parent: String,
-    pub(super) child: String,
-    pub(super) origin: Origin,
-    pub(super) axis: [f64; 3],
-    pub(super) lower: f64,
-    pub(super) upper: f64,
-    pub(super) effort: f64,
-    pub(super) velocity: f64,
+    pub(crate) line: u32,
+    pub(crate) kind: String,
+    pub(crate) parent: String,
+    pub(crate) child: String,
+    pub(crate) origin: Origin,
+    pub(crate) axis: [f64; 3],
+    pub(crate) lower: f64,
+    pub(crate) upper: f64,
+    pub(crate) effort: f64,
+    pub(crate) velocity: f64,
     /// The joint whose position it follows.
-    pub(super) mimic: Option<String>,
+    pub(crate) mimic: Option<String>,
 }
 
 /// A pose: m, and roll, pitch, yaw in rad.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Origin {
-    pub(super) xyz: [f64; 3],
-    pub(super) rpy: [f64; 3],
+pub(crate) struct Origin {
+    pub(crate) xyz: [f64; 3],
+    pub(crate) rpy: [f64; 3],
 }
 
 /// A larger file is no robot.
@@ -59,7 +59,7 @@ const DEEPEST: usize = 100;
 const PREFIXES: usize = 20;
 
 /// Reads a URDF, or says what is wrong with it, one line for each error.
-pub(super) fn read(text: &str) -> Result<Robot, String> {
+pub(crate) fn read(text: &str) -> Result<Robot, String> {
     if text.len() > LARGEST_FILE {
         return Err("larger than 64 MiB".to_string());
     }
