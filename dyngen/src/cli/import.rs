@@ -9,7 +9,7 @@ use std::process::ExitCode;
 #[derive(clap::Args)]
 #[command(after_help = "Example: dyngen import robot.urdf --tip tool0 -o arm.toml")]
 pub(super) struct Args {
-    /// The URDF file (xacro has to be run before).
+    /// The URDF file (xacro has to be run before), or a MuJoCo model.
     urdf: PathBuf,
     /// The link that stands still; the root where it is left out.
     #[arg(long, value_name = "LINK")]
@@ -70,7 +70,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         angle_tolerance: args.angle_tolerance,
         exact: args.exact,
     };
-    let imported = import::urdf(&text, &file, &options).map_err(|e| match e {
+    let imported = import::any(&text, &file, &options).map_err(|e| match e {
         ImportError::Unreadable(_) => Failure::input(e),
         ImportError::Refused(_) => Failure::refused(e),
     })?;

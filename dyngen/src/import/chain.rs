@@ -2,15 +2,20 @@
 
 use super::Options;
 use super::pose::Pose;
-use super::urdf::{Joint, Link, Origin, Robot};
+use super::urdf::{Joint, Link, Motor, Origin, Robot};
 use crate::arm::{JointKind, MAX_JOINTS};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::collections::BTreeMap;
+
+/// Downwards in a URDF's root link, m/s².
+const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
 
 /// A serial arm at q = 0, everything in the root link's frame.
 pub(crate) struct Chain {
     pub(crate) name: String,
     pub(crate) root: String,
+    /// In the root link, m/s².
+    pub(crate) gravity: Vector3<f64>,
     pub(crate) tip: String,
     /// The tip link's frame.
     pub(crate) tip_pose: Pose,
@@ -31,6 +36,8 @@ pub(crate) struct ChainJoint {
     pub(crate) position: Option<[f64; 2]>,
     pub(crate) velocity: Option<f64>,
     pub(crate) torque: Option<f64>,
+    /// What the file says of its drive.
+    pub(crate) motor: Option<Motor>,
     /// The links that move as one behind the joint.
     pub(crate) links: Vec<String>,
     /// The frame of each of them.
@@ -122,6 +129,7 @@ pub(crate) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<Strin
     Ok(Chain {
         name: robot.name.clone(),
         root: robot.links[tree.root].name.clone(),
+        gravity: robot.gravity.map_or(GRAVITY, Vector3::from),
         tip: robot.links[tip].name.clone(),
         tip_pose: pose,
         joints,
@@ -351,6 +359,7 @@ impl Walk<'_> {
             position: (bounded && lower < upper).then_some([lower, upper]),
             velocity: (velocity > 0.0 && usable(velocity)).then_some(velocity),
             torque: (effort > 0.0 && usable(effort)).then_some(effort),
+            motor: joint.motor,
             links: Vec::new(),
             poses: Vec::new(),
             masses: Vec::new(),
@@ -408,6 +417,7 @@ impl Walk<'_> {
         if self.joints.is_empty() {
             return;
         }
+        self.notes.extend(link.note.clone());
         let place = format!("line {}: link '{}'", link.line, link.name);
         let (mass, [xx, xy, xz, yy, yz, zz]) = (link.mass, link.inertia);
         let tensor = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);

@@ -10,6 +10,8 @@
 
 pub(crate) mod chain;
 mod frames;
+mod mjcf;
+mod orientation;
 pub(crate) mod pose;
 mod rounding;
 mod text;
@@ -99,14 +101,37 @@ impl std::error::Error for ImportError {}
 /// # Errors
 /// What is wrong, or why this is no arm, with the names of links and joints.
 pub fn urdf(text: &str, file: &str, options: &Options) -> Result<Imported, ImportError> {
+    imported(urdf::read(text).map_err(|e| unreadable("a URDF", file, &e))?, file, options)
+}
+
+/// The serial arm of a MuJoCo model (MJCF); `file` names the text in errors.
+///
+/// An armature becomes a rotor with the gear ratio of the joint's actuator, or 100 where the file has none. MuJoCo
+/// leaves out that a rotor turns with the link that carries it: k·Im, a hundredth of the armature then.
+///
+/// # Errors
+/// As [`urdf`].
+pub fn mjcf(text: &str, file: &str, options: &Options) -> Result<Imported, ImportError> {
+    imported(mjcf::read(text).map_err(|e| unreadable("a MuJoCo model", file, &e))?, file, options)
+}
+
+/// The serial arm of a URDF or of a MuJoCo model, whichever the text is.
+///
+/// # Errors
+/// As [`urdf`].
+pub fn any(text: &str, file: &str, options: &Options) -> Result<Imported, ImportError> {
+    if mjcf::is_mjcf(text) { mjcf(text, file, options) } else { urdf(text, file, options) }
+}
+
+fn unreadable(what: &str, file: &str, reasons: &str) -> ImportError {
+    let lines: Vec<String> = reasons.lines().map(|line| format!("{file}: not {what}: {line}")).collect();
+    ImportError::Unreadable(lines.join("\n"))
+}
+
+fn imported(robot: urdf::Robot, file: &str, options: &Options) -> Result<Imported, ImportError> {
     let refused = |reasons: Vec<String>| {
         ImportError::Refused(reasons.into_iter().map(|reason| format!("{file}: {reason}")).collect())
     };
-    let unreadable = |e: String| {
-        let lines: Vec<String> = e.lines().map(|line| format!("{file}: not a URDF: {line}")).collect();
-        ImportError::Unreadable(lines.join("\n"))
-    };
-    let robot = urdf::read(text).map_err(unreadable)?;
     let mut chain = chain::chain(&robot, options).map_err(refused)?;
     if !options.exact {
         chain = meant(&robot, chain, options).map_err(refused)?;

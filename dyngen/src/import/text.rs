@@ -10,8 +10,8 @@ use crate::exact::rational;
 use nalgebra::{Matrix3, Vector3};
 use std::fmt::Write;
 
-/// Downwards in a URDF's root link, m/s².
-const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+/// A gear ratio for rotors of which only the inertia on the joint's side is known.
+const RATIO: f64 = 100.0;
 
 /// The arm file, with comments that say where everything comes from and what an arm file cannot hold.
 pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Options) -> String {
@@ -28,7 +28,7 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
         Convention::Modified => "modified",
     };
     let name = if chain.name.trim().is_empty() { "robot" } else { &chain.name };
-    let gravity = frames.base.rotation.transpose() * GRAVITY;
+    let gravity = frames.base.rotation.transpose() * chain.gravity;
     let gravity: Vec<String> = gravity.iter().map(|g| length(*g)).collect();
     let _ = write!(
         text,
@@ -53,6 +53,18 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
             length(row.d),
             angle(row.theta),
         );
+        if let Some(motor) = joint.motor {
+            if let Some(ratio) = ratio(joint) {
+                let _ = writeln!(text, "rotor_ratio = {ratio:?}  # armature {:?}", motor.armature);
+            }
+            if motor.damping != 0.0 || motor.friction != 0.0 {
+                let (damping, friction) = (motor.damping, motor.friction);
+                let _ = writeln!(
+                    text,
+                    "# damping {damping:?} N·m·s/rad, frictionloss {friction:?} N·m (or N·s/m, N)"
+                );
+            }
+        }
         if let Some([lower, upper]) = joint.position {
             let _ = writeln!(text, "position = [{lower:?}, {upper:?}]");
         }
@@ -89,15 +101,23 @@ fn tip(chain: &Chain, frames: &Frames) -> Pose {
     frames.links.last().unwrap_or(&frames.base).see(&chain.tip_pose)
 }
 
-/// The ten inertial parameters of every link in its new frame.
+/// The gear ratio of a joint whose rotor has an inertia: its actuator's, or one that is usual.
+fn ratio(joint: &ChainJoint) -> Option<f64> {
+    let motor = joint.motor.filter(|motor| motor.armature != 0.0)?;
+    Some(motor.gear.unwrap_or(RATIO))
+}
+
+/// The inertial parameters of every link in its new frame.
 pub(super) fn values(chain: &Chain, frames: &Frames) -> Vec<(Parameter, f64)> {
     let links = chain.joints.iter().zip(&frames.links).enumerate();
     links
         .flat_map(|(link, (joint, frame))| {
             let values = link_values(joint, frame).map(|x| if x == 0.0 { 0.0 } else { x });
+            let armature = joint.motor.map_or(0.0, |motor| motor.armature);
+            let rotor = ratio(joint).map(|ratio| armature / (ratio * ratio));
             ParameterKind::ALL
                 .into_iter()
-                .zip(values)
+                .zip(values.into_iter().chain(rotor))
                 .map(move |(kind, value)| (Parameter { link, kind }, value))
         })
         .collect()

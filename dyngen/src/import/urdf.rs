@@ -9,6 +9,8 @@ pub(crate) struct Robot {
     pub(crate) name: String,
     pub(crate) links: Vec<Link>,
     pub(crate) joints: Vec<Joint>,
+    /// Gravity in the root link, where the file says it, m/s².
+    pub(crate) gravity: Option<[f64; 3]>,
 }
 
 /// A link, with zeros where it has no `<inertial>`.
@@ -23,6 +25,8 @@ pub(crate) struct Link {
     pub(crate) mass: f64,
     /// ixx, ixy, ixz, iyy, iyz, izz, kg·m²
     pub(crate) inertia: [f64; 6],
+    /// What may surprise, where it takes part in the dynamics.
+    pub(crate) note: Option<String>,
 }
 
 /// A joint between two links.
@@ -42,6 +46,21 @@ pub(crate) struct Joint {
     pub(crate) velocity: f64,
     /// The joint whose position it follows.
     pub(crate) mimic: Option<String>,
+    /// What a MuJoCo model says of its drive.
+    pub(crate) motor: Option<Motor>,
+}
+
+/// A joint's drive in a MuJoCo model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Motor {
+    /// Inertia of the rotor on the joint's side of the gear, kg·m² or kg.
+    pub(crate) armature: f64,
+    /// N·m·s/rad or N·s/m
+    pub(crate) damping: f64,
+    /// N·m or N
+    pub(crate) friction: f64,
+    /// Gear ratio of the joint's actuator, where it has one.
+    pub(crate) gear: Option<f64>,
 }
 
 /// A pose: m, and roll, pitch, yaw in rad.
@@ -95,7 +114,7 @@ fn declared(text: &str, prefix: &str) -> Option<String> {
 }
 
 /// XML readers follow nesting by recursion.
-fn nested(text: &str) -> Result<(), String> {
+pub(crate) fn nested(text: &str) -> Result<(), String> {
     let mut depth = 0usize;
     for piece in text.split('<').skip(1) {
         let tag = piece.split('>').next().unwrap_or("");
@@ -165,7 +184,7 @@ impl<'d, 'i> Reader<'d, 'i> {
         let tensor = inertial.and_then(|i| child(i, "inertia"));
         let inertia = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
             .map(|key| tensor.map_or(0.0, |t| self.number(t, key, &place)));
-        Some(Link { name, line: self.line(node), origin, mass, inertia })
+        Some(Link { name, line: self.line(node), origin, mass, inertia, note: None })
     }
 
     fn joint(&mut self, node: Node<'d, 'i>) -> Option<Joint> {
@@ -201,6 +220,7 @@ impl<'d, 'i> Reader<'d, 'i> {
             effort,
             velocity,
             mimic,
+            motor: None,
             name,
         })
     }
