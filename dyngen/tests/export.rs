@@ -118,3 +118,34 @@ fn what_cannot_be_written_is_refused() {
     moved.joints[2].a += dyngen::exact::rational::parse_rational("0.02").unwrap();
     assert!(refusal(PUMA, &moved).contains("another arm"), "{}", refusal(PUMA, &moved));
 }
+
+const MIXED: &str = include_str!("mjcf/arm.xml");
+
+/// Bodies with two joints have none between them; ranges are in the file's degrees.
+#[test]
+fn a_mujoco_model_is_written_and_read_again() {
+    let exact = Options { exact: true, ..Options::default() };
+    let before = import::mjcf(MIXED, "arm.xml", &exact).unwrap();
+    let values = scaled(&before);
+    let known = Known::read(&before.arm, (&values, "v.json"), Some((&friction(4), "f.json"))).unwrap();
+    let mut arm = before.arm.clone();
+    arm.joints[1].position = Some([-0.5, 1.25]);
+    let new = export::mjcf(MIXED, "arm.xml", &arm, &known, &Options::default()).unwrap();
+    let after = import::mjcf(&new.text, "arm.xml", &exact).unwrap();
+    let position = after.arm.joints[1].position.unwrap();
+    assert!((position[0] + 0.5).abs() < 1e-12 && (position[1] - 1.25).abs() < 1e-12, "{position:?}");
+    for ((p, old), (q, new)) in before.values.iter().zip(&after.values) {
+        assert_eq!(p, q);
+        let expected = old * (1.5 + 0.25 * p.link as f64);
+        assert!((new - expected).abs() < 1e-11 * expected.abs().max(1.0), "{p}: {new} {expected}");
+    }
+    for words in ["frictionloss=\"3.25\"", "armature=\"0.011", "standard errors: damping 3.000e-2"] {
+        assert!(new.text.contains(words), "{words}\n{}", new.text);
+    }
+    let mut between = before.values.clone();
+    between.iter_mut().find(|(p, _)| p.to_string() == "m1").unwrap().1 = 1.0;
+    let known =
+        Known::read(&arm, (&scaled(&Imported { values: between, ..before }), "v.json"), None).unwrap();
+    let refusal = export::mjcf(MIXED, "arm.xml", &arm, &known, &Options::default()).unwrap_err().to_string();
+    assert!(refusal.contains("'pan'") && refusal.contains("1.5 kg"), "{refusal}");
+}

@@ -48,6 +48,7 @@ pub(super) struct Args {
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Format {
     Urdf,
+    Mjcf,
 }
 
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
@@ -71,6 +72,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let file = name(&args.original);
     let exported = match args.to {
         Format::Urdf => export::urdf(&text, &file, &arm, &known, &options),
+        Format::Mjcf => export::mjcf(&text, &file, &arm, &known, &options),
     };
     let exported = exported.map_err(|e| match e {
         ImportError::Unreadable(_) => Failure::input(e),

@@ -1,5 +1,6 @@
 //! A text with some places replaced and all other bytes as they were.
 
+use roxmltree::Node;
 use std::ops::Range;
 
 /// Replacements in one text, in any order; places must not overlap.
@@ -10,6 +11,11 @@ impl Edits {
     /// Puts text in the place of a range; an empty range inserts.
     pub(super) fn replace(&mut self, place: Range<usize>, text: impl Into<String>) {
         self.0.push((place, text.into()));
+    }
+
+    /// Puts text before a place.
+    pub(super) fn insert(&mut self, at: usize, text: impl Into<String>) {
+        self.replace(at..at, text);
     }
 
     /// The text with all replacements.
@@ -41,4 +47,14 @@ pub(super) fn comment(words: &str) -> String {
         words = words.replace("--", "- -");
     }
     format!("<!-- {} -->", words.trim_end_matches('-'))
+}
+
+/// The shortest text that is the number.
+pub(super) fn shortest(x: f64) -> String {
+    if x == 0.0 { "0".to_string() } else { format!("{x:?}") }
+}
+
+/// The first element of that name below another.
+pub(super) fn child<'d, 't>(node: Node<'d, 't>, name: &str) -> Option<Node<'d, 't>> {
+    node.children().find(|n| n.is_element() && n.tag_name().name() == name)
 }

@@ -3,7 +3,10 @@
 mod body;
 mod edit;
 mod known;
+mod mjcf;
+mod share;
 mod urdf;
 
 pub use known::{Friction, Known};
+pub use mjcf::mjcf;
 pub use urdf::{Exported, urdf};

@@ -1,19 +1,15 @@
 //! Identified values in a copy of a URDF: inertials, damping, friction and limits; every other byte stays.
 
-use super::body::{Body, apart, frames};
-use super::edit::{Edits, comment, indentation};
+use super::body::Body;
+use super::edit::{Edits, child, comment, indentation, shortest};
 use super::known::{Friction, Known};
+use super::share;
 use crate::arm::{Arm, Joint};
-use crate::import::chain::{self, Chain, ChainJoint};
-use crate::import::pose::Pose;
-use crate::import::urdf::{Robot, read};
+use crate::import::chain;
+use crate::import::urdf::read;
 use crate::import::{ImportError, Options};
-use nalgebra::Matrix3;
 use roxmltree::{Document, Node, ParsingOptions};
 use std::fmt::Write;
-
-/// How far the arm's axes may be from the file's, m and rad: what taking rounded numbers as meant makes.
-const APART: f64 = 5e-3;
 
 /// A robot description with identified values.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,14 +36,9 @@ pub fn urdf(
         ImportError::Refused(reasons.into_iter().map(|reason| format!("{file}: {reason}")).collect())
     };
     let robot = read(text).map_err(|e| ImportError::Unreadable(format!("{file}: not a URDF: {e}")))?;
-    let mut options = Options { exact: true, ..options.clone() };
-    if options.tip.is_none() {
-        // The arm ends with its last joint, whatever else the robot has.
-        let last = arm.joints.last().and_then(|joint| joint.name.as_ref());
-        options.tip = robot.joints.iter().find(|j| Some(&j.name) == last).map(|joint| joint.child.clone());
-    }
+    let options = share::options(&robot, arm, options);
     let chain = chain::chain(&robot, &options).map_err(refused)?;
-    same_arm(arm, &chain).map_err(|reason| refused(vec![reason]))?;
+    let shares = share::shares(arm, &chain, &robot, known, &|_| true).map_err(|e| refused(vec![e]))?;
     let parsing = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, parsing).map_err(|e| {
         ImportError::Unreadable(format!(
@@ -56,16 +47,17 @@ pub fn urdf(
         ))
     })?;
     let mut writer = Writer { text, document: &document, edits: Edits::default(), notes: Vec::new() };
-    let (links, _) = frames(arm);
-    for (i, (joint, frame)) in chain.joints.iter().zip(&links).enumerate() {
-        let body = Body::of_parameters(&known.values[11 * i..][..10]);
-        // From the arm's frame to the root link's.
-        let back = Pose {
-            rotation: frame.rotation.transpose(),
-            origin: -(frame.rotation.transpose() * frame.origin),
-        };
-        writer.body(joint, &body.seen_from(&back), &robot, &known.words[i]);
-        writer.joint(&joint.name, &arm.joints[i], known.friction.as_ref().map(|f| f[i]));
+    for (i, share) in shares.into_iter().enumerate() {
+        writer.inertial(&share.link, &share.body, &known.words[i]);
+        for other in &share.emptied {
+            let inertial = writer.element("link", other).and_then(|l| child(l, "inertial"));
+            if let Some(inertial) = inertial {
+                let what = comment(&format!("dyngen: its inertia is part of link '{}'", share.link));
+                writer.edits.replace(inertial.range(), what);
+            }
+        }
+        writer.notes.extend(share.note);
+        writer.joint(&chain.joints[i].name, &arm.joints[i], known.friction.as_ref().map(|f| f[i]));
     }
     if (0..arm.dof()).any(|i| known.values[11 * i + 10] != 0.0) {
         let what = "rotor inertias are left out: a URDF has no place for them".to_string();
@@ -73,32 +65,6 @@ pub fn urdf(
     }
     let Writer { edits, notes, .. } = writer;
     Ok(Exported { text: edits.apply(text), notes })
-}
-
-/// The joints' names and axes must be the arm's.
-fn same_arm(arm: &Arm, chain: &Chain) -> Result<(), String> {
-    let names: Vec<&str> = chain.joints.iter().map(|joint| joint.name.as_str()).collect();
-    if names.len() != arm.dof() || arm.has_joint_names() && arm.joint_names() != names {
-        return Err(format!(
-            "its joints are {}, those of the arm {}: give --base, --tip and --lock as they were given to the import",
-            names.join(", "),
-            arm.joint_names().join(", ")
-        ));
-    }
-    let (_, axes) = frames(arm);
-    for (joint, axis) in chain.joints.iter().zip(&axes) {
-        let (distance, angle) = apart(axis, joint.kind, &joint.point, &joint.direction);
-        if distance > APART || angle > APART {
-            return Err(format!(
-                "joint '{}': its axis lies {:.3} mm and {:.3} mrad from that of the arm file, which is another arm or was \
-                 imported with another --base",
-                joint.name,
-                1e3 * distance,
-                1e3 * angle
-            ));
-        }
-    }
-    Ok(())
 }
 
 struct Writer<'t, 'd> {
@@ -113,40 +79,6 @@ impl<'t, 'd> Writer<'t, 'd> {
     fn element(&self, kind: &str, name: &str) -> Option<Node<'d, 't>> {
         let root = self.document.root_element();
         root.children().find(|n| n.tag_name().name() == kind && n.attribute("name") == Some(name))
-    }
-
-    /// Writes a body, given in the root link's frame, on the links that move as one behind a joint.
-    fn body(&mut self, joint: &ChainJoint, body: &Body, robot: &Robot, words: &[String]) {
-        let (Some(name), Some(pose)) = (joint.links.first(), joint.poses.first()) else { return };
-        // What is fixed to the first link keeps its own inertia, where that leaves the first one a body's.
-        let others = joint.links.iter().zip(&joint.poses).skip(1).map(|(name, pose)| {
-            let link = robot.links.iter().find(|link| link.name == *name);
-            link.map_or(Body::of_parameters(&[0.0; 10]), |link| {
-                let [xx, xy, xz, yy, yz, zz] = link.inertia;
-                let tensor = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-                let at = pose.then(&Pose::of(&link.origin, 1e-12));
-                let inertia = at.rotation * tensor * at.rotation.transpose();
-                Body::about_centre(link.mass, at.origin, &inertia)
-            })
-        });
-        let rest = others.fold(*body, |rest, other| rest.less(&other));
-        let own = if joint.links.len() == 1 || rest.is_possible() {
-            rest
-        } else {
-            for other in &joint.links[1..] {
-                let Some(inertial) = self.element("link", other).and_then(|l| child(l, "inertial")) else {
-                    continue;
-                };
-                let what = comment(&format!("dyngen: its inertia is part of link '{name}'"));
-                self.edits.replace(inertial.range(), what);
-            }
-            self.notes.push(format!(
-                "link '{name}' has the whole inertia of {}: with theirs left on them it would be that of no body",
-                joint.links.join(", ")
-            ));
-            *body
-        };
-        self.inertial(name, &own.seen_from(pose), words);
     }
 
     fn inertial(&mut self, name: &str, body: &Body, words: &[String]) {
@@ -251,14 +183,4 @@ impl<'t, 'd> Writer<'t, 'd> {
             }
         }
     }
-}
-
-/// The shortest text that is the number.
-fn shortest(x: f64) -> String {
-    if x == 0.0 { "0".to_string() } else { format!("{x:?}") }
-}
-
-/// The first element of that name below another.
-fn child<'d, 't>(node: Node<'d, 't>, name: &str) -> Option<Node<'d, 't>> {
-    node.children().find(|n| n.is_element() && n.tag_name().name() == name)
 }

@@ -27,7 +27,7 @@ pub(super) fn is_mjcf(text: &str) -> bool {
 }
 
 /// Reads a model, or says what is wrong with it, one line for each error.
-pub(super) fn read(text: &str) -> Result<Robot, String> {
+pub(crate) fn read(text: &str) -> Result<Robot, String> {
     nested(text)?;
     let document = Document::parse(text).map_err(|e| format!("line {}: {e}", e.pos().row))?;
     let root = document.root_element();
@@ -44,6 +44,12 @@ pub(super) fn read(text: &str) -> Result<Robot, String> {
     };
     reader.model(root);
     if reader.errors.is_empty() { Ok(reader.robot) } else { Err(reader.errors.join("\n")) }
+}
+
+/// Whether a model's angles are radians, not degrees.
+pub(crate) fn angles_are_radians(document: &Document<'_>) -> bool {
+    let compilers = elements(document.root_element()).filter(|n| n.has_tag_name("compiler"));
+    compilers.filter_map(|n| n.attribute("angle")).last() == Some("radian")
 }
 
 /// What `<compiler>` says of numbers.
@@ -134,6 +140,9 @@ impl<'d, 'i> Reader<'d, 'i> {
             if node.attribute(key).and_then(|x| x.trim().parse::<f64>().ok()).is_some_and(|x| x > 0.0) {
                 self.error(node, format!("compiler: {key} changes masses: save the compiled model first"));
             }
+        }
+        if node.attribute("inertiafromgeom") == Some("true") {
+            self.error(node, "compiler: inertiafromgeom sets inertials aside: save the compiled model first");
         }
         if node.attribute("coordinate") == Some("global") {
             self.error(node, "compiler: global coordinates are not read: save the compiled model first");

@@ -10,7 +10,7 @@
 
 pub(crate) mod chain;
 mod frames;
-mod mjcf;
+pub(crate) mod mjcf;
 mod orientation;
 pub(crate) mod pose;
 mod rounding;
