@@ -7,11 +7,13 @@
 
 MuJoCo loads each URDF of the folder (without shapes), saves it as its own format, dyngen imports that (--exact), and inverse
 dynamics is compared with mj_inverse over 20 random states, relative to the largest torque there; files of the second folder
-are taken as they are. Damping, friction, contacts and armature are switched off in MuJoCo. The exit code is 1 where a
+are taken as they are. Then every link's parameters are scaled, exported into the model, and compared again with what MuJoCo
+makes of the new file. Damping, friction, contacts and armature are switched off in MuJoCo. The exit code is 1 where a
 difference is above 1e-6: MuJoCo saves six digits unless it is told otherwise.
 """
 
 import argparse
+import json
 import pathlib
 import re
 import sys
@@ -84,12 +86,26 @@ def check(dyngen, file, tip, folder):
     head = ",".join(f"{x}{i + 1}" for x in ("q", "dq", "ddq") for i in range(n))
     np.savetxt(states_file, states, delimiter=",", header=head, comments="", fmt="%.17g")
     command = [dyngen, "eval", arm, "--function", "inverse_dynamics", "--states", states_file, "--values", values]
-    output = run(command)[0]
-    if output is None:
-        return "not evaluated"
-    found = np.array([line.split(",") for line in output.decode().split()[1:]], dtype=float)
-    expected = torques(file, joints, states)
-    return np.abs(found - expected).max() / max(np.abs(expected).max(), 1e-300)
+
+    def difference(model):
+        output = run(command)[0]
+        if output is None:
+            return "not evaluated"
+        found = np.array([line.split(",") for line in output.decode().split()[1:]], dtype=float)
+        expected = torques(model, joints, states)
+        return np.abs(found - expected).max() / max(np.abs(expected).max(), 1e-300)
+
+    before = difference(file)
+    scaled = json.loads(values.read_text())
+    for name in scaled:
+        scaled[name] *= 1 + int("".join(c for c in name if c.isdigit())) / 32
+    values.write_text(json.dumps(scaled))
+    new = folder / "new.xml"
+    export = [dyngen, "export", file, "--arm", arm, "--values", values, "--to", "mjcf", "--force", "-o", new]
+    if run(export)[0] is None:
+        return before if isinstance(before, str) else "not exported"
+    after = difference(new)
+    return before if isinstance(before, str) else after if isinstance(after, str) else max(before, after)
 
 
 def main():
