@@ -88,8 +88,9 @@ impl Model {
         Ok(Model { arm, symbols, sets, regroupings: Default::default() })
     }
 
-    /// An arm of which only kinematics is asked: no parameter set is derived but `full`, so that it is there at once,
-    /// whatever the arm's angles. Functions other than those of [`Function::is_kinematic`] are not to be had.
+    /// An arm of which only kinematics is asked: no parameter set is derived but `full`, so that it is there
+    /// at once, whatever the arm's angles. Functions other than those of [`Function::is_kinematic`] are not
+    /// to be had.
     pub fn kinematic(arm: Arm) -> Model {
         let symbols = angle_symbols(&arm);
         let sets = Sets::underived(&arm, &symbols);

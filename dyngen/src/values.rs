@@ -25,8 +25,8 @@ impl Values {
     /// Reads a file.
     ///
     /// # Errors
-    /// Where the file cannot be read, is no JSON object, holds a key twice, or anything but finite numbers: all
-    /// of these at once.
+    /// Where the file cannot be read, is no JSON object, holds a key twice, or anything but finite numbers:
+    /// all of these at once.
     pub fn read(path: &Path) -> Result<Values, Diagnostics> {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path)

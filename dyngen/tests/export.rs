@@ -29,8 +29,8 @@ fn scaled(imported: &Imported) -> String {
 fn friction(joints: usize) -> String {
     let one = |j: usize| {
         format!(
-            "{{\"joint\": {}, \"gamma1\": {}, \"gamma2\": 200, \"gamma3\": 0.25, \"gamma4\": 5, \"gamma5\": 1.5, \
-             \"std\": [0.01, null, 0.02, null, 0.03]}}",
+            "{{\"joint\": {}, \"gamma1\": {}, \"gamma2\": 200, \"gamma3\": 0.25, \"gamma4\": 5, \"gamma5\": \
+             1.5, \"std\": [0.01, null, 0.02, null, 0.03]}}",
             j + 1,
             j as f64
         )

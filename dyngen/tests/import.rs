@@ -262,8 +262,8 @@ fn rounded_right_angles_need_a_word() {
     assert!(arm.joints.iter().all(|j| j.alpha.quarter_turns().is_some()), "{arm:?}");
 }
 
-/// The last joint sits 0.1 m off the axes that the rounding tilts by pi/2 − 1.5708 = 3.67e-6 rad, and a length is
-/// a residue.
+/// The last joint sits 0.1 m off the axes that the rounding tilts by pi/2 − 1.5708 = 3.67e-6 rad, and a
+/// length is a residue.
 #[test]
 fn rounded_numbers_are_taken_as_meant_and_said() {
     let place = "<origin rpy=\"1.5707963267948966 0 0\"/><axis xyz=\"0 0 -2\"/>";

@@ -8,8 +8,8 @@ use dyngen::{Evaluator, Function, Model, Samples, SetKind};
 
 const ARM: &str = include_str!("mjcf/arm.xml");
 
-/// From MuJoCo 4.0.0 with armature, damping, friction and constraints switched off: q, q̇, q̈, mj_inverse, and place
-/// and rotation of the body `hand`.
+/// From MuJoCo 4.0.0 with armature, damping, friction and constraints switched off: q, q̇, q̈, mj_inverse,
+/// and place and rotation of the body `hand`.
 type Known = ([f64; 4], [f64; 4], [f64; 4], [f64; 4], [f64; 3], [f64; 9]);
 const MUJOCO: [Known; 2] = [
     (

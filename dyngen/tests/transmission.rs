@@ -1,5 +1,5 @@
-//! Motors that turn with several joints: every function is proven, and the torque is what finite differences of the
-//! energy give, from numeric transforms that share nothing with the generator.
+//! Motors that turn with several joints: every function is proven, and the torque is what finite differences
+//! of the energy give, from numeric transforms that share nothing with the generator.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -9,8 +9,8 @@ use dyngen::{Arm, Evaluator, Function, Model, Samples, SetKind};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// A wrist whose last motor turns with the joint before, a shoulder whose two motors work on parallel axes, and axes
-/// that point both ways.
+/// A wrist whose last motor turns with the joint before, a shoulder whose two motors work on parallel axes,
+/// and axes that point both ways.
 const WRIST: &str = r#"
 name = "wrist"
 convention = "standard"

@@ -119,11 +119,11 @@ pub struct Arm {
     pub gravity: [Rational; 3],
     /// The joints from the base outwards, 1 to [`MAX_JOINTS`].
     pub joints: Vec<Joint>,
-    /// Frame 0 in the robot's root link, where it is another. Kinematics is then that of the root link; gravity and
-    /// dynamics are those of frame 0.
+    /// Frame 0 in the robot's root link, where it is another. Kinematics is then that of the root link;
+    /// gravity and dynamics are those of frame 0.
     pub base: Option<Placement>,
-    /// The tool's frame in the last link's, where it is another: where forward kinematics and the Jacobian look. It
-    /// has no inertia of its own.
+    /// The tool's frame in the last link's, where it is another: where forward kinematics and the Jacobian
+    /// look. It has no inertia of its own.
     pub tool: Option<Placement>,
     /// A published parameter set, empty where the file has none.
     pub groupings: Vec<Grouping>,
@@ -131,8 +131,8 @@ pub struct Arm {
     pub transmissions: Vec<Transmission>,
 }
 
-/// What the file does not say is left out: generated files state a hash of this text, which does not change with
-/// what arm files can say since.
+/// What the file does not say is left out: generated files state a hash of this text, which does not change
+/// with what arm files can say since.
 impl fmt::Debug for Arm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut text = f.debug_struct("Arm");
@@ -206,11 +206,11 @@ impl Arm {
         })
     }
 
-    /// The matrix of the motors' velocities, n × n by rows: motor i turns at Σ_j M_ij q̇_j on the joint's side of
-    /// its gear (before the gear ratio); rad/s or m/s. Torques go the other way: τ = Mᵀ·τ_motors.
+    /// The matrix of the motors' velocities, n × n by rows: motor i turns at Σ_j M_ij q̇_j on the joint's
+    /// side of its gear (before the gear ratio); rad/s or m/s. Torques go the other way: τ = Mᵀ·τ_motors.
     ///
-    /// The identity where the file has no `[[transmission]]`. Rotors are in the model already; friction sits on
-    /// these velocities as well, and whoever adds it takes them from here.
+    /// The identity where the file has no `[[transmission]]`. Rotors are in the model already; friction sits
+    /// on these velocities as well, and whoever adds it takes them from here.
     pub fn motor_velocity_matrix(&self) -> Vec<Vec<Rational>> {
         let n = self.dof();
         let unit = |i: usize, j: usize| if i == j { Rational::one() } else { Rational::zero() };

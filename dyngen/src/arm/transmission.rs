@@ -10,8 +10,8 @@ use toml::de::DeValue;
 pub const MAX_COUPLED: usize = 6;
 const KEYS: [&str; 2] = ["joints", "matrix"];
 
-/// A drive train that couples some joints: the motor of the block's k-th joint turns, on the joint's side of its
-/// gear, by the sum over the block's joints of `matrix[k][j]`·q_j.
+/// A drive train that couples some joints: the motor of the block's k-th joint turns, on the joint's side of
+/// its gear, by the sum over the block's joints of `matrix[k][j]`·q_j.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transmission {
     /// Its joints, from 0, in the order of the matrix.
@@ -60,8 +60,8 @@ fn block(reader: &mut Reader<'_>, t: &Table<'_, '_>, dof: usize) -> Option<Trans
     let rows = rows(reader, &matrix, &t.place, joints.len())?;
     if determinant(rows.clone()).is_zero() {
         let message = format!(
-            "{}: the matrix is singular: a motion of the joints would turn no motor. Each row says how one motor \
-             turns with the joints",
+            "{}: the matrix is singular: a motion of the joints would turn no motor. Each row says how one \
+             motor turns with the joints",
             t.place
         );
         reader.errors.error(matrix.span(), message);
@@ -109,8 +109,8 @@ fn rows(reader: &mut Reader<'_>, v: &Value<'_>, place: &str, count: usize) -> Op
     let square = |row: &&Value<'_>| row.get_ref().as_array().is_some_and(|a| a.iter().count() == count);
     if lists.len() != count || !lists.iter().all(square) {
         let message = format!(
-            "{place}: matrix must be {count} lists of {count} numbers, a row for each motor and a column for each \
-             joint, found {}",
+            "{place}: matrix must be {count} lists of {count} numbers, a row for each motor and a column \
+             for each joint, found {}",
             describe(v)
         );
         reader.errors.error(v.span(), message);

@@ -7,9 +7,10 @@
 //! space that a step from link to link maps on, whatever number of joints follows. Take for each joint one
 //! functional that keeps constants, the mean over its turn at rest, and otherwise such as vanish on
 //! constants. Then the last joint whose functional vanishes on constants sorts the rows into blocks: its own
-//! link's columns span at most eleven dimensions (and five for each motor that turns with several joints), and the links behind it see what the mean makes of them. So
-//! the rank is a sum over the joints, and the work grows with the number of joints, not with the number of
-//! terms. That the rows say the truth is certified in `certificate.rs`.
+//! link's columns span at most eleven dimensions (and five for each motor that turns with several joints),
+//! and the links behind it see what the mean makes of them. So the rank is a sum over the joints, and the
+//! work grows with the number of joints, not with the number of terms. That the rows say the truth is
+//! certified in `certificate.rs`.
 
 use super::preference::Preference;
 pub use super::steps::Sizes;

@@ -1,9 +1,10 @@
 //! Rotors of motors that turn with several joints, along the chain.
 //!
-//! With μ = Σ mⱼ q̇ⱼ the motor's velocity, ω the angular velocity of the link that carries it about its axis and k its
-//! ratio, twice its energy for a unit of inertia is 2 k μ ω + k² μ². That is whole only at the last of its joints. Up
-//! to the motor's own joint μ is carried, and its products with the link's angular velocity; from there on the energy
-//! so far, which a further joint changes by (rate)·mⱼ q̇ⱼ + (square)·(mⱼ q̇ⱼ)².
+//! With μ = Σ mⱼ q̇ⱼ the motor's velocity, ω the angular velocity of the link that carries it about its axis
+//! and k its ratio, twice its energy for a unit of inertia is 2 k μ ω + k² μ². That is whole only at the last
+//! of its joints. Up to the motor's own joint μ is carried, and its products with the link's angular
+//! velocity; from there on the energy so far, which a further joint changes by (rate)·mⱼ q̇ⱼ + (square)·(mⱼ
+//! q̇ⱼ)².
 
 use crate::arm::Arm;
 use crate::exact::algebra::Algebra;
@@ -48,7 +49,8 @@ impl CoupledMotor {
         (0..arm.dof()).filter_map(of).collect()
     }
 
-    /// What a joint makes of what was carried to it, where the link before it turns at `omega` about its axis.
+    /// What a joint makes of what was carried to it, where the link before it turns at `omega` about its
+    /// axis.
     pub(super) fn step(
         &self,
         ring: &PolynomialRing<Rational>,

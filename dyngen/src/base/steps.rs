@@ -72,8 +72,8 @@ pub(super) struct Steps<'f> {
     columns: Vec<Values>,
     /// Motors that turn with several joints.
     coupled: Vec<CoupledMotor>,
-    /// For each of them the monomials of which its rotor's energy will be made. They are columns of a link beside
-    /// its own eleven; the first of five is the energy so far.
+    /// For each of them the monomials of which its rotor's energy will be made. They are columns of a link
+    /// beside its own eleven; the first of five is the energy so far.
     pending: Vec<usize>,
 }
 
@@ -264,8 +264,8 @@ impl<'f> Steps<'f> {
         found
     }
 
-    /// A link's columns for the values of the motion's monomials: the inertial ones, the rotor's, and those of
-    /// which coupled motors' are made.
+    /// A link's columns for the values of the motion's monomials: the inertial ones, the rotor's, and those
+    /// of which coupled motors' are made.
     pub(super) fn columns(&self, motion: &Values, rotor: &Constant) -> Values {
         let mut columns: Values = Vec::with_capacity(LINK);
         for (k, column) in self.columns.iter().enumerate() {

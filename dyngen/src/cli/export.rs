@@ -10,8 +10,8 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example: dyngen export robot.urdf --arm arm.toml --values identified.json --friction identified.json \
-                        --to urdf -o identified.urdf"
+    after_help = "Example: dyngen export robot.urdf --arm arm.toml --values identified.json --friction \
+    identified.json --to urdf -o identified.urdf"
 )]
 pub(super) struct Args {
     /// The robot description that the arm was imported from.

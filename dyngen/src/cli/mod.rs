@@ -124,8 +124,8 @@ fn model(path: &Path) -> Result<Model, Failure> {
     let general = arm.joints.iter().filter(|joint| joint.alpha.quarter_turns().is_none()).count();
     if arm.convention == Convention::Standard && general >= SLOW_TWISTS {
         eprintln!(
-            "{}: note: {general} twists that are no right angles in the standard convention: its exact sums may take \
-             minutes; the modified convention takes seconds",
+            "{}: note: {general} twists that are no right angles in the standard convention: its exact sums \
+             may take minutes; the modified convention takes seconds",
             path.display()
         );
     }

@@ -129,8 +129,8 @@ fn carried_by(b: &Builder, chain: &Chain, s: usize, k: usize, moment: Expr) -> V
     felt
 }
 
-/// Adds to a matrix over the joints what a rotor brings whose motor turns with several of them, with m its row of
-/// the transmission's matrix: m·rowᵀ + column·mᵀ for the joints that carry it, and own·m·mᵀ.
+/// Adds to a matrix over the joints what a rotor brings whose motor turns with several of them, with m its
+/// row of the transmission's matrix: m·rowᵀ + column·mᵀ for the joints that carry it, and own·m·mᵀ.
 pub fn add_coupled(
     b: &Builder,
     member: &Member,

@@ -45,8 +45,8 @@ pub struct StageMotion {
     pub accelerations: Vec<Expr>,
     /// Its links.
     pub links: Vec<LinkMotion>,
-    /// For each of its joints the velocity, reference velocity and acceleration of the motor about the stage's z,
-    /// where that turns with several joints.
+    /// For each of its joints the velocity, reference velocity and acceleration of the motor about the
+    /// stage's z, where that turns with several joints.
     coupled: Vec<Option<[Expr; 3]>>,
 }
 

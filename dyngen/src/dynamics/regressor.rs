@@ -305,8 +305,8 @@ fn tensor_moment(b: &Builder, tensor: &[Vector; 3], motion: &LinkMotion) -> Vect
 }
 
 /// The torques of a unit of a rotor's inertia: on its own joint k·(k q̈ + z·α of the link before), and on
-/// that link the rate of the rotor's own angular momentum, k·(q̈ z + q̇ ω×z). Where the motor turns with several
-/// joints its velocity stands for q̇, and its torque acts on each of them.
+/// that link the rate of the rotor's own angular momentum, k·(q̈ z + q̇ ω×z). Where the motor turns with
+/// several joints its velocity stands for q̇, and its torque acts on each of them.
 fn rotor_column(
     b: &Builder,
     chain: &Chain,

@@ -113,7 +113,8 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     let joint_names = model.arm().has_joint_names().then(|| {
         let names = model.arm().joint_names();
         quote! {
-            /// The joints' names, in the order of q; where the arm file gives none, the joint's number from 1.
+            /// The joints' names, in the order of q; where the arm file gives none, the joint's number from
+            /// 1.
             pub const JOINT_NAMES: [&str; JOINTS] = [#(#names),*];
         }
     });

@@ -1,4 +1,5 @@
-//! A link's body in other axes: from the arm's parameters to mass, centre and inertia where a description wants them.
+//! A link's body in other axes: from the arm's parameters to mass, centre and inertia where a description
+//! wants them.
 
 use crate::arm::{Arm, Convention, JointKind, Placement};
 use crate::exact::rational::to_f64;

@@ -46,8 +46,9 @@ impl Known {
         let unknown: Vec<&str> = given.names().filter(|n| !is_of(arm, n)).collect();
         if !unknown.is_empty() {
             return Err(format!(
-                "{file}: {} are sums of parameters, of which no single link's follow: take the identified.json of \
-                 `powerball identify`, which has a body for each link, or a values file with every parameter of the arm",
+                "{file}: {} are sums of parameters, of which no single link's follow: take the \
+                 identified.json of `powerball identify`, which has a body for each link, or a values file \
+                 with every parameter of the arm",
                 unknown.join(", ")
             ));
         }
@@ -69,8 +70,8 @@ impl Known {
             let least = pseudo_inertia(&ten).symmetric_eigenvalues().min();
             if least < -ROUNDING * scale {
                 return Err(format!(
-                    "{file}: link {}: no body has these parameters (its pseudo-inertia has the eigenvalue {least:.3e}): \
-                     `dyngen check` says why",
+                    "{file}: link {}: no body has these parameters (its pseudo-inertia has the eigenvalue \
+                     {least:.3e}): `dyngen check` says why",
                     link + 1
                 ));
             }

@@ -1,5 +1,5 @@
-//! Identified values in a copy of a MuJoCo model: inertials, damping, frictionloss, armature and ranges; every other
-//! byte stays.
+//! Identified values in a copy of a MuJoCo model: inertials, damping, frictionloss, armature and ranges;
+//! every other byte stays.
 
 use super::body::Body;
 use super::edit::{Edits, child, comment, indentation, shortest};
@@ -13,8 +13,8 @@ use crate::import::mjcf::{angles_are_radians, read};
 use crate::import::{ImportError, Options};
 use roxmltree::{Document, Node};
 
-/// Writes what is known of an arm into a copy of the MuJoCo model that it was imported from; `file` names it in errors,
-/// and `options` say base, tip and locked joints as they did for the import.
+/// Writes what is known of an arm into a copy of the MuJoCo model that it was imported from; `file` names it
+/// in errors, and `options` say base, tip and locked joints as they did for the import.
 ///
 /// # Errors
 /// Where the file is no model of this arm, or has no body for a link that has mass.

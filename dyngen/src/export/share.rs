@@ -102,7 +102,8 @@ fn same_arm(arm: &Arm, chain: &Chain) -> Result<(), String> {
     let names: Vec<&str> = chain.joints.iter().map(|joint| joint.name.as_str()).collect();
     if names.len() != arm.dof() || arm.has_joint_names() && arm.joint_names() != names {
         return Err(format!(
-            "its joints are {}, those of the arm {}: give --base, --tip and --lock as they were given to the import",
+            "its joints are {}, those of the arm {}: give --base, --tip and --lock as they were given to \
+             the import",
             names.join(", "),
             arm.joint_names().join(", ")
         ));
@@ -112,8 +113,8 @@ fn same_arm(arm: &Arm, chain: &Chain) -> Result<(), String> {
         let (distance, angle) = apart(axis, joint.kind, &joint.point, &joint.direction);
         if distance > APART || angle > APART {
             return Err(format!(
-                "joint '{}': its axis lies {:.3} mm and {:.3} mrad from that of the arm file, which is another arm or was \
-                 imported with another --base",
+                "joint '{}': its axis lies {:.3} mm and {:.3} mrad from that of the arm file, which is \
+                 another arm or was imported with another --base",
                 joint.name,
                 1e3 * distance,
                 1e3 * angle

@@ -20,8 +20,8 @@ pub struct Exported {
     pub notes: Vec<String>,
 }
 
-/// Writes what is known of an arm into a copy of the URDF that it was imported from; `file` names it in errors, and
-/// `options` say base, tip and locked joints as they did for the import.
+/// Writes what is known of an arm into a copy of the URDF that it was imported from; `file` names it in
+/// errors, and `options` say base, tip and locked joints as they did for the import.
 ///
 /// # Errors
 /// Where the file is no URDF of this arm: the joints' names and axes must be those of the arm.
@@ -92,8 +92,9 @@ impl<'t, 'd> Writer<'t, 'd> {
         let mut lines = vec![format!("{margin}  {}", comment("identified by dyngen"))];
         lines.extend(words.iter().map(|line| format!("{margin}  {}", comment(line))));
         let new = format!(
-            "<inertial>\n{}\n{margin}  <origin xyz=\"{} {} {}\" rpy=\"0 0 0\"/>\n{margin}  <mass value=\"{}\"/>\n{margin}  \
-             <inertia ixx=\"{}\" ixy=\"{}\" ixz=\"{}\" iyy=\"{}\" iyz=\"{}\" izz=\"{}\"/>\n{margin}</inertial>",
+            "<inertial>\n{}\n{margin}  <origin xyz=\"{} {} {}\" rpy=\"0 0 0\"/>\n{margin}  <mass \
+             value=\"{}\"/>\n{margin}  <inertia ixx=\"{}\" ixy=\"{}\" ixz=\"{}\" iyy=\"{}\" iyz=\"{}\" \
+             izz=\"{}\"/>\n{margin}</inertial>",
             lines.join("\n"),
             shortest(centre[0]),
             shortest(centre[1]),

@@ -288,8 +288,7 @@ impl<'r> Tree<'r> {
                     ends.dedup();
                     return Err(format!(
                         "the robot is a tree: the joints {} all move on link '{}'; choose the end of the arm \
-                            with \
-                         --tip, such as {}",
+                            with --tip, such as {}",
                         joints.join(", "),
                         self.robot.links[body].name,
                         ends.join(", ")
@@ -399,8 +398,8 @@ impl Walk<'_> {
                     rigid.push((self.tree.child(*j), pose));
                 } else if !self.path.contains(j) {
                     self.notes.push(format!(
-                        "left out: joint '{}' on link '{}', with all that it carries: {} kg (--lock {}=0 keeps it \
-                         at a position)",
+                        "left out: joint '{}' on link '{}', with all that it carries: {} kg (--lock {}=0 \
+                         keeps it at a position)",
                         joint.name,
                         self.tree.robot.links[at].name,
                         self.tree.mass_below(self.tree.child(*j)),
@@ -467,8 +466,8 @@ fn impossible(mass: f64, tensor: &Matrix3<f64>) -> Option<String> {
     }
     (most > least + middle + rounding).then(|| {
         format!(
-            "its inertia is that of no body: the principal moment {most:.3e} exceeds the sum of the other two, \
-             {:.3e}",
+            "its inertia is that of no body: the principal moment {most:.3e} exceeds the sum of the other \
+             two, {:.3e}",
             least + middle
         )
     })

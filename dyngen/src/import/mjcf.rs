@@ -1,8 +1,8 @@
 //! A MuJoCo model's bodies and joints as the links and joints of a robot.
 //!
-//! A body is a link; a body with several joints gets a link without mass between each two. Where a joint does not sit
-//! at the body's origin, a fixed joint leads back from it. What MuJoCo says of `compiler`, `default` classes and
-//! orientations: mujoco.readthedocs.io, XMLreference and modeling.
+//! A body is a link; a body with several joints gets a link without mass between each two. Where a joint does
+//! not sit at the body's origin, a fixed joint leads back from it. What MuJoCo says of `compiler`, `default`
+//! classes and orientations: mujoco.readthedocs.io, XMLreference and modeling.
 
 use super::orientation::{Angles, turn};
 use super::pose::Pose;
@@ -89,8 +89,8 @@ impl<'d, 'i> Reader<'d, 'i> {
             self.error(
                 node,
                 format!(
-                    "<{name}> is not followed: save the compiled model first, with mujoco.mj_saveLastXML or `compile \
-                     model.xml whole.xml`"
+                    "<{name}> is not followed: save the compiled model first, with mujoco.mj_saveLastXML or \
+                     `compile model.xml whole.xml`"
                 ),
             );
         }
@@ -200,7 +200,8 @@ impl<'d, 'i> Reader<'d, 'i> {
         self.children(node, &name, &Pose::identity(), &class);
     }
 
-    /// Adds a joint of a body that lies at `at` in the link `parent`; gives the body's place in the link behind it.
+    /// Adds a joint of a body that lies at `at` in the link `parent`; gives the body's place in the link
+    /// behind it.
     fn joint(
         &mut self,
         node: Node<'d, 'i>,
@@ -283,8 +284,8 @@ impl<'d, 'i> Reader<'d, 'i> {
             let shapes = elements(node).any(|n| n.has_tag_name("geom"));
             let note = shapes.then(|| {
                 format!(
-                    "line {line}: body '{name}' has no <inertial>: MuJoCo takes its mass from geoms, here it has none \
-                     (mujoco.mj_saveLastXML writes inertials)"
+                    "line {line}: body '{name}' has no <inertial>: MuJoCo takes its mass from geoms, here \
+                     it has none (mujoco.mj_saveLastXML writes inertials)"
                 )
             });
             return Link { note, ..massless(name, line) };

@@ -106,8 +106,9 @@ pub fn urdf(text: &str, file: &str, options: &Options) -> Result<Imported, Impor
 
 /// The serial arm of a MuJoCo model (MJCF); `file` names the text in errors.
 ///
-/// An armature becomes a rotor with the gear ratio of the joint's actuator, or 100 where the file has none. MuJoCo
-/// leaves out that a rotor turns with the link that carries it: k·Im, a hundredth of the armature then.
+/// An armature becomes a rotor with the gear ratio of the joint's actuator, or 100 where the file has none.
+/// MuJoCo leaves out that a rotor turns with the link that carries it: k·Im, a hundredth of the armature
+/// then.
 ///
 /// # Errors
 /// As [`urdf`].
@@ -154,8 +155,8 @@ fn meant(robot: &urdf::Robot, written: chain::Chain, options: &Options) -> Resul
         let (distance, turn) = rounding::difference(&written, &chain);
         chain.notes.extend(moved.into_iter().map(|joint| format!("taken as meant: {joint}")));
         chain.notes.push(format!(
-            "these numbers are rounded; taken as meant they move the tip by at most {} mm and {} mrad over the joints' \
-             ranges (--exact keeps every digit)",
+            "these numbers are rounded; taken as meant they move the tip by at most {} mm and {} mrad over \
+             the joints' ranges (--exact keeps every digit)",
             short(1e3 * distance),
             short(1e3 * turn)
         ));

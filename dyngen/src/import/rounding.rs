@@ -1,9 +1,9 @@
 //! Numbers of a URDF that are rounded: 1.5708 for pi/2, 3e-8 m for nothing.
 //!
-//! Taken by the letter they make axes almost parallel and almost meet: parameters are then identifiable by residues
-//! alone, and common normals lie far away. The nearest arm with angles that are multiples of pi/12 and lengths that
-//! are zero is what was meant, where each number that moves is one that writing it out rounds to the one that stands
-//! there, or is off by less than any arm is made or measured to.
+//! Taken by the letter they make axes almost parallel and almost meet: parameters are then identifiable by
+//! residues alone, and common normals lie far away. The nearest arm with angles that are multiples of pi/12
+//! and lengths that are zero is what was meant, where each number that moves is one that writing it out
+//! rounds to the one that stands there, or is off by less than any arm is made or measured to.
 
 use super::chain::{Chain, ChainJoint};
 use super::pose::Pose;
@@ -24,7 +24,8 @@ const DECIMALS: [i32; 3] = [2, 3, 4];
 /// Poses at which two arms are compared.
 const POSES: usize = 500;
 
-/// The robot with the rounded numbers of some joints as they were meant, and what was moved: a line for each joint.
+/// The robot with the rounded numbers of some joints as they were meant, and what was moved: a line for each
+/// joint.
 pub(super) fn nearest(robot: &Robot, joints: &[usize]) -> (Robot, Vec<String>) {
     let mut nearest = robot.clone();
     let mut moved = Vec::new();
@@ -84,8 +85,8 @@ fn decimals(x: f64) -> i32 {
     text.split_once('.').map_or(0, |(_, after)| after.len() as i32)
 }
 
-/// The largest distance, m, and turn, rad, between the tips of two chains at the same positions of their joints, over
-/// poses in the joints' ranges.
+/// The largest distance, m, and turn, rad, between the tips of two chains at the same positions of their
+/// joints, over poses in the joints' ranges.
 pub(super) fn difference(one: &Chain, other: &Chain) -> (f64, f64) {
     let mut draws = Draws::new(0x726f_756e_64);
     let (mut distance, mut turn) = (0.0f64, 0.0f64);
@@ -109,7 +110,8 @@ fn within(joint: &ChainJoint, draws: &mut Draws) -> f64 {
     low + (high - low) * (draws.element().residue() as f64 / (1u64 << 61) as f64)
 }
 
-/// The tip link's pose in the root link's frame: each joint turns or shifts all that was placed at q = 0 behind it.
+/// The tip link's pose in the root link's frame: each joint turns or shifts all that was placed at q = 0
+/// behind it.
 fn tip(chain: &Chain, q: &[f64]) -> Pose {
     chain.joints.iter().zip(q).rev().fold(chain.tip_pose, |pose, (joint, q)| match joint.kind {
         JointKind::Revolute => {

@@ -102,7 +102,8 @@ fn advance<A: Algebra>(alg: &A, joint: &JointElements<A::Value>, state: &mut Mot
     *moved = alg.add(moved, &joint.speed);
 }
 
-/// 2·(k q̇ (z·ω) + ½ k² q̇²), the rotor's terms of Eq. 5, with the motor's speed for q̇; zero without a rotor.
+/// 2·(k q̇ (z·ω) + ½ k² q̇²), the rotor's terms of Eq. 5, with the motor's speed for q̇; zero without a
+/// rotor.
 fn rotor_column<A: Algebra>(alg: &A, joint: &JointElements<A::Value>, omega_z: &A::Value) -> A::Value {
     let Some(ratio) = &joint.ratio else { return alg.integer(0) };
     let spin = alg.mul(ratio, &joint.motor_speed);
