@@ -2,7 +2,7 @@
 
 use super::{Failure, same_file};
 use dyngen::arm::Convention;
-use dyngen::import::{self, ImportError, Options};
+use dyngen::import::{self, Options};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -70,10 +70,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         angle_tolerance: args.angle_tolerance,
         exact: args.exact,
     };
-    let imported = import::any(&text, &file, &options).map_err(|e| match e {
-        ImportError::Unreadable(_) => Failure::input(e),
-        ImportError::Refused(_) => Failure::refused(e),
-    })?;
+    let imported = import::any(&text, &file, &options).map_err(Failure::input)?;
     for note in imported.notes.iter().chain(&imported.arm.notes()) {
         eprintln!("{file}: note: {note}");
     }
