@@ -8,7 +8,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// A turn, as it may be rounded, rad.
-const LARGEST_ANGLE: f64 = 6.2832;
+const LARGEST_ANGLE: f64 = std::f64::consts::TAU * 1.00001;
 
 pub(super) type Value<'i> = Spanned<DeValue<'i>>;
 

@@ -88,7 +88,7 @@ fn decimals(x: f64) -> i32 {
 /// The largest distance, m, and turn, rad, between the tips of two chains at the same positions of their
 /// joints, over poses in the joints' ranges.
 pub(super) fn difference(one: &Chain, other: &Chain) -> (f64, f64) {
-    let mut draws = Draws::new(0x726f_756e_64);
+    let mut draws = Draws::new(0x0072_6f75_6e64);
     let (mut distance, mut turn) = (0.0f64, 0.0f64);
     for _ in 0..POSES {
         let q: Vec<f64> = one.joints.iter().map(|joint| within(joint, &mut draws)).collect();
@@ -129,20 +129,24 @@ mod tests {
     #[test]
     fn an_angle_is_what_writing_it_rounds_to() {
         for (written, meant) in [
-            (1.5708, "pi/2"),
-            (1.571, "pi/2"),
-            (1.57, "pi/2"),
-            (-3.14159, "-pi"),
-            (1.570796, "pi/2"),
-            (1.57079, "pi/2"),
-            (0.7854, "pi/4"),
-            (0.785, "pi/4"),
-            (-0.5236, "-pi/6"),
-            (1.5707963705062866, "pi/2"),
-            (4.3e-8, "0"),
-            (1.3089969389957472, "5*pi/12"),
+            ("1.5708", "pi/2"),
+            ("1.571", "pi/2"),
+            ("1.57", "pi/2"),
+            ("-3.14159", "-pi"),
+            ("1.570796", "pi/2"),
+            ("1.57079", "pi/2"),
+            ("0.7854", "pi/4"),
+            ("0.785", "pi/4"),
+            ("-0.5236", "-pi/6"),
+            ("1.5707963705062866", "pi/2"),
+            ("4.3e-8", "0"),
+            ("1.3089969389957472", "5*pi/12"),
         ] {
-            assert_eq!(meant_angle(written).map(|(_, text)| text).as_deref(), Some(meant), "{written}");
+            assert_eq!(
+                meant_angle(written.parse().unwrap()).map(|(_, text)| text).as_deref(),
+                Some(meant),
+                "{written}"
+            );
         }
         for general in
             [0.0, 0.5, 0.52, 0.26, 1.5, 1.6, 1.58, 1.5718, 1.5706, 1.3e-5, -1.2217, 0.279310074519612]
