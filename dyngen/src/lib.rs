@@ -12,6 +12,8 @@ pub mod dynamics;
 pub mod emit;
 mod evaluator;
 pub mod exact;
+#[cfg(feature = "urdf")]
+pub mod export;
 pub mod graph;
 #[cfg(feature = "urdf")]
 pub mod import;

@@ -3,12 +3,13 @@
 use crate::arm::{Arm, Parameter};
 use crate::base::Sets;
 use crate::dynamics::build::{self, Subject};
+use crate::dynamics::function::Kind;
 use crate::dynamics::regroup::{Order, Regrouping};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::elimination::Unproven;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
-use crate::lagrangian::elements::angle_symbols;
+use crate::lagrangian::elements::{angle_symbols, has_joint_symbols};
 use crate::optimize::{PASSES, Pass};
 use crate::parameters::span::Sum;
 use crate::parameters::{Combination, ParameterSet, SetKind};
@@ -85,6 +86,15 @@ impl Model {
         let symbols = angle_symbols(&arm);
         let sets = Sets::derive(&arm, &symbols)?;
         Ok(Model { arm, symbols, sets, regroupings: Default::default() })
+    }
+
+    /// An arm of which only kinematics is asked: no parameter set is derived but `full`, so that it is there
+    /// at once, whatever the arm's angles. Functions other than those of [`Function::is_kinematic`] are not
+    /// to be had.
+    pub fn kinematic(arm: Arm) -> Model {
+        let symbols = angle_symbols(&arm);
+        let sets = Sets::underived(&arm, &symbols);
+        Model { arm, symbols, sets, regroupings: Default::default() }
     }
 
     /// The arm.
@@ -174,14 +184,26 @@ impl Model {
             field: &self.sets.field,
             minimal: &self.sets.minimal,
         };
-        let regroupings = self.regroupings[kind as usize].get_or_init(|| {
-            let of = |order| {
-                Regrouping::new(&self.arm, &self.symbols, &self.sets.field, &self.sets.minimal, set, order)
-            };
-            // With symbols eliminations are slow, and two rules must do.
-            let orders = Order::all().step_by(if self.symbols.angles.is_empty() { 1 } else { Order::RULES });
-            orders.map(of).collect()
-        });
+        let regroupings = || {
+            self.regroupings[kind as usize].get_or_init(|| {
+                let of = |order| {
+                    Regrouping::new(
+                        &self.arm,
+                        &self.symbols,
+                        &self.sets.field,
+                        &self.sets.minimal,
+                        set,
+                        order,
+                    )
+                };
+                // With symbols eliminations are slow, and two rules must do.
+                let orders =
+                    Order::all().step_by(if has_joint_symbols(&self.arm) { Order::RULES } else { 1 });
+                orders.map(of).collect()
+            })
+        };
+        // Only recursions over bodies sum parameters up.
+        let regroupings = if function.kind() == Kind::Dynamics { &regroupings()[..] } else { &[] };
         let built = build::build(function, &subject, set, regroupings, baked, passes);
         prove::prove(&self.arm, &self.symbols, &self.sets, set, &built, baked)?;
         Ok(built)

@@ -9,8 +9,10 @@ use crate::model::Model;
 use crate::parameters::span::{Sum, combinations};
 use crate::parameters::{ParameterSet, SetKind};
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+
+mod twice;
 
 /// Named values, as a file gives them.
 #[derive(Clone, Debug)]
@@ -23,8 +25,8 @@ impl Values {
     /// Reads a file.
     ///
     /// # Errors
-    /// Where the file cannot be read, is no JSON object, or holds anything but finite numbers: all of these
-    /// at once.
+    /// Where the file cannot be read, is no JSON object, holds a key twice, or anything but finite numbers:
+    /// all of these at once.
     pub fn read(path: &Path) -> Result<Values, Diagnostics> {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path)
@@ -52,11 +54,23 @@ impl Values {
                 "values must be one object {\"parameter\": number, …}",
             ));
         };
+        let twice = twice::keys(text);
+        if !twice.is_empty() {
+            let diagnostic =
+                |(line, column, message)| Diagnostic { file: file.to_string(), line, column, message };
+            return Err(Diagnostics(twice.into_iter().map(diagnostic).collect()));
+        }
         let (mut by_name, mut wrong) = (BTreeMap::new(), Vec::new());
         let mut given: Vec<(&str, &Value)> = Vec::new();
         match object.get("parameters").and_then(Value::as_array) {
             // What `powerball identify` and `explain` write; its other keys are not the rigid arm's.
             Some(list) => {
+                let mut seen = BTreeSet::new();
+                for name in list.iter().filter_map(|entry| entry["name"].as_str()) {
+                    if !seen.insert(name) {
+                        wrong.push(format!("'{name}' has two values: which one is meant?"));
+                    }
+                }
                 for entry in list {
                     match entry["name"].as_str() {
                         Some(name) => given.push((name, &entry["value"])),
@@ -79,6 +93,16 @@ impl Values {
         }
         let diagnostic = |message| Diagnostic { file: file.to_string(), line: 0, column: 0, message };
         Err(Diagnostics(wrong.into_iter().map(diagnostic).collect()))
+    }
+
+    /// The names that have values.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.by_name.keys().map(String::as_str)
+    }
+
+    /// The value of a name.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        self.by_name.get(name).copied()
     }
 
     /// Values that are there already; `file` names them in errors.

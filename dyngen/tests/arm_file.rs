@@ -117,3 +117,95 @@ fn no_text_makes_it_panic() {
     assert!(errors(&many).iter().any(|e| e.contains("1 to 16")), "{:?}", errors(&many));
     assert!(!errors(&"a".repeat(2 << 20)).is_empty());
 }
+
+const COUPLED: &str = "\n[[transmission]]\njoints = [1, 2]\nmatrix = [[1, 0], [0.5, 1]]\n";
+
+#[test]
+fn a_wrong_transmission_is_told_with_its_place() {
+    let text = format!("{GOOD}{COUPLED}");
+    assert!(errors(&text).is_empty());
+    let base = GOOD.lines().count() + 1;
+    for (from, to, (line, column), words) in [
+        ("[[1, 0], [0.5, 1]]", "[[1, 2], [0.5, 1]]", (3, 10), "singular"),
+        ("[[1, 0], [0.5, 1]]", "[[1, 0], [0.5]]", (3, 10), "2 lists of 2 numbers"),
+        ("[[1, 0], [0.5, 1]]", "[[1, 0], [\"x\", 1]]", (3, 20), "not a number"),
+        ("[[1, 0], [0.5, 1]]", "[[1, 0], [true, 1]]", (3, 20), "finite number"),
+        ("joints = [1, 2]", "joints = [1, 3]", (2, 14), "no joint of this arm"),
+        ("joints = [1, 2]", "joints = [1, 1]", (2, 14), "twice"),
+        ("joints = [1, 2]", "joints = [1]", (2, 10), "two or more"),
+        ("joints = [1, 2]", "joint = [1, 2]", (2, 1), "unknown key"),
+        (
+            "0.5, 1]]\n",
+            "0.5, 1]]\n[[transmission]]\njoints = [2, 1]\nmatrix = [[1, 0], [1, 1]]\n",
+            (4, 1),
+            "already",
+        ),
+    ] {
+        assert!(text.contains(from));
+        let found = errors(&text.replace(from, to));
+        let place = format!("arm.toml:{}:{column}: ", base + line);
+        assert!(
+            found.iter().any(|e| e.starts_with(&place) && e.contains(words)),
+            "{place} {words}: {found:#?}"
+        );
+    }
+}
+
+#[test]
+fn names_and_degrees_are_told() {
+    let named = |one: &str, two: &str| {
+        let name = |text: &str, kind: &str, name: &str| {
+            text.replacen(kind, &format!("name = \"{name}\"\n{kind}"), 1)
+        };
+        name(&name(GOOD, "kind = \"revolute\"", one), "kind = \"prismatic\"", two)
+    };
+    let arm = Arm::parse(&named("pan", "lift"), "arm.toml").unwrap();
+    assert_eq!(arm.joint_names(), ["pan", "lift"]);
+    let found = errors(&named("pan", "pan"));
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(
+        found[0].starts_with("arm.toml:18:8: ") && found[0].contains("'pan' is already that of joint 1"),
+        "{found:?}"
+    );
+    assert_eq!(Arm::parse(GOOD, "arm.toml").unwrap().joint_names(), ["1", "2"]);
+
+    assert_error("\"pi/2\"", "90", "8:9", &["joint 1", "alpha = 90 rad", "\"pi/2\""]);
+    assert_error("\"-pi/2\"", "\"-45\"", "10:9", &["joint 1", "theta = -45 rad", "\"-pi/4\""]);
+    let wide = GOOD.replace("[-1.5, 1.5]", "[-170, 170]");
+    let notes = Arm::parse(&wide, "arm.toml").unwrap().notes();
+    assert!(notes.iter().any(|n| n.contains("[-170, 170] is in rad") && n.contains("2.9671")), "{notes:?}");
+    assert!(Arm::parse(GOOD, "arm.toml").unwrap().notes().is_empty());
+}
+
+#[test]
+fn frame_0_stands_where_the_file_says() {
+    use dyngen::{Evaluator, Function, Model, SetKind};
+    let at = |base: &str, function| {
+        let model = Model::derive(Arm::parse(&format!("{GOOD}{base}"), "arm.toml").unwrap()).unwrap();
+        let evaluator = Evaluator::new(&model, function, SetKind::Minimal).unwrap();
+        let mut out = vec![0.0; evaluator.outputs()];
+        evaluator.evaluate(
+            &[0.3, 0.4],
+            &[0.5, 0.6],
+            &[0.7, 0.8],
+            &vec![1.0; 20][..model.set(SetKind::Minimal).unwrap().parameters.len()],
+            &mut out,
+        );
+        out
+    };
+    let base = "\n[base]\nxyz = [1, 2, 3]\nrpy = [0, 0, \"pi/2\"]\n";
+    let (own, moved) = (at("", Function::ForwardKinematics), at(base, Function::ForwardKinematics));
+    for j in 0..4 {
+        // Rz(pi/2): x' = -y, y' = x.
+        let shift = if j == 3 { [1.0, 2.0, 3.0] } else { [0.0; 3] };
+        let expected = [shift[0] - own[4 + j], shift[1] + own[j], shift[2] + own[8 + j]];
+        for i in 0..3 {
+            assert!((moved[4 * i + j] - expected[i]).abs() < 1e-12, "{moved:?} {own:?}");
+        }
+    }
+    assert_eq!(at("", Function::InverseDynamics), at(base, Function::InverseDynamics));
+    let (own, moved) = (at("", Function::Jacobian), at(base, Function::Jacobian));
+    for j in 0..2 {
+        assert!((moved[j] + own[2 + j]).abs() < 1e-12 && (moved[2 + j] - own[j]).abs() < 1e-12);
+    }
+}

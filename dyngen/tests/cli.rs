@@ -338,6 +338,9 @@ fn nothing_is_lost_and_no_nan_is_printed() {
                 type=\"continuous\"><parent link=\"base\"/><child link=\"l\"/></joint></robot>";
     std::fs::write(&urdf, text).unwrap();
     let import = |extra: &[&str]| dyngen(&[&["import", &urdf, "-o", &arm], extra].concat());
+    let no_tip = import(&["--tip", "nowhere"]);
+    assert_eq!(no_tip.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&no_tip.stderr).contains("'nowhere'"));
     assert!(import(&[]).status.success());
     assert!(!folder.join("one.values.json").exists(), "no inertia, no values");
     std::fs::write(&arm, format!("{}# mine\n", std::fs::read_to_string(&arm).unwrap())).unwrap();

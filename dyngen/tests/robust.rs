@@ -4,6 +4,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use dyngen::export::{self, Known};
 use dyngen::{Arm, Model, Values, import};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -124,6 +125,30 @@ fn damaged_urdfs_are_imported_or_refused_with_reasons() {
         }
     }
     assert!(read > 0);
+}
+
+#[test]
+fn damaged_mujoco_models_are_imported_written_or_refused_with_reasons() {
+    const MJCF: &str = include_str!("mjcf/arm.xml");
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let good = import::mjcf(MJCF, "", &import::Options::default()).unwrap();
+    let known = Known::read(&good.arm, (&good.values_json(), "values.json"), None).unwrap();
+    let (mut read, mut written) = (0, 0);
+    for _ in 0..mutants(1000) {
+        let text = damaged(MJCF, &mut rng);
+        match import::mjcf(&text, "arm.xml", &import::Options::default()) {
+            Ok(imported) => {
+                read += 1;
+                assert!(imported.values.iter().all(|(_, value)| value.is_finite()), "{text}");
+            }
+            Err(e) => assert!(e.to_string().starts_with("arm.xml: "), "{e}\n{text}"),
+        }
+        match export::mjcf(&text, "arm.xml", &good.arm, &known, &import::Options::default()) {
+            Ok(_) => written += 1,
+            Err(e) => assert!(e.to_string().starts_with("arm.xml: "), "{e}\n{text}"),
+        }
+    }
+    assert!(read > 0 && written > 0);
 }
 
 #[test]

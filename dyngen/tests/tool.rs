@@ -71,3 +71,34 @@ fn what_is_wrong_with_a_tool_is_said_at_its_place() {
         assert!(message.contains(part), "{part} is missing in:\n{message}");
     }
 }
+
+/// Eight general twists in the standard convention, whose parameter sets would take minutes.
+#[test]
+fn kinematics_needs_no_parameter_sets() {
+    let arm = |joints: usize| {
+        let mut text = "name = \"k\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\n".to_string();
+        for i in 1..=joints {
+            text +=
+                &format!("[[joint]]\nkind = \"revolute\"\na = 0.{i}\nalpha = 0.{i}1\nd = 0.2\ntheta = 0.1\n");
+        }
+        dyngen::Arm::parse(&text, "k.toml").unwrap()
+    };
+    let at = |model: &Model, function, kind| {
+        let evaluator = Evaluator::new(model, function, kind).unwrap();
+        let mut out = vec![0.0; evaluator.outputs()];
+        let (q, dq) =
+            ([0.3, -0.7, 1.1, 0.2, 0.5, -0.4, 0.9, -1.3], [1.0, 0.5, -0.25, 2.0, 1.0, 1.0, 1.0, 1.0]);
+        let n = model.arm().dof();
+        let none = vec![0.0; model.set(kind).unwrap().parameters.len()];
+        evaluator.evaluate(&q[..n], &dq[..n], &[], &none, &mut out);
+        out
+    };
+    for function in [Function::ForwardKinematics, Function::Jacobian, Function::JacobianRateTimesSpeed] {
+        assert!(function.is_kinematic());
+        let derived = Model::derive(arm(2)).unwrap();
+        let alone = at(&Model::kinematic(arm(2)), function, SetKind::Full);
+        assert_eq!(alone, at(&derived, function, SetKind::Minimal), "{function}");
+        assert!(at(&Model::kinematic(arm(8)), function, SetKind::Full).iter().all(|x| x.is_finite()));
+    }
+    assert!(Function::ALL.iter().filter(|f| f.is_kinematic()).count() == 3);
+}

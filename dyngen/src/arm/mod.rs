@@ -3,12 +3,17 @@
 pub mod parameter;
 mod read;
 pub mod sum;
+mod table;
+pub mod transmission;
 
 use crate::diagnostic::Diagnostics;
 pub use crate::exact::angle::Angle;
-use crate::exact::rational::Rational;
+use crate::exact::rational::{self, Rational};
+use num_traits::{One, Zero};
 pub use parameter::{Parameter, ParameterKind};
+use std::fmt;
 use std::path::Path;
+pub use transmission::Transmission;
 
 /// The most joints an arm may have.
 pub const MAX_JOINTS: usize = 16;
@@ -32,8 +37,10 @@ pub enum JointKind {
 }
 
 /// One row of the DH table with what else is known of the joint and its link.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct Joint {
+    /// Its name, where the file gives one: as in the URDF, and in the logs of others.
+    pub name: Option<String>,
     /// Revolute or prismatic.
     pub kind: JointKind,
     /// Link length, m.
@@ -60,6 +67,29 @@ pub struct Joint {
     pub torque_constant: Option<f64>,
 }
 
+/// What the file does not say is left out, as for [`Arm`].
+impl fmt::Debug for Joint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut text = f.debug_struct("Joint");
+        if let Some(name) = &self.name {
+            text.field("name", name);
+        }
+        text.field("kind", &self.kind)
+            .field("a", &self.a)
+            .field("alpha", &self.alpha)
+            .field("d", &self.d)
+            .field("theta", &self.theta)
+            .field("zero", &self.zero)
+            .field("rotor_ratio", &self.rotor_ratio)
+            .field("position", &self.position)
+            .field("velocity", &self.velocity)
+            .field("acceleration", &self.acceleration)
+            .field("torque", &self.torque)
+            .field("torque_constant", &self.torque_constant)
+            .finish()
+    }
+}
+
 /// One entry of a published parameter set: a name and the exact sum of parameters it stands for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grouping {
@@ -69,9 +99,9 @@ pub struct Grouping {
     pub terms: Vec<(Parameter, Rational)>,
 }
 
-/// A tool's frame in the last link's frame: where forward kinematics and the Jacobian look.
+/// Where a frame stands in another, as a URDF says it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tool {
+pub struct Placement {
     /// Its origin, m.
     pub xyz: [Rational; 3],
     /// Roll, pitch and yaw: R = Rz(yaw)·Ry(pitch)·Rx(roll).
@@ -79,20 +109,47 @@ pub struct Tool {
 }
 
 /// A serial arm.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct Arm {
     /// The arm's name.
     pub name: String,
     /// The convention of the DH table.
     pub convention: Convention,
-    /// Gravity in the base frame, m/s².
+    /// Gravity in frame 0, m/s².
     pub gravity: [Rational; 3],
     /// The joints from the base outwards, 1 to [`MAX_JOINTS`].
     pub joints: Vec<Joint>,
-    /// The tool's frame, where it is another than the last link's. It has no inertia of its own.
-    pub tool: Option<Tool>,
+    /// Frame 0 in the robot's root link, where it is another. Kinematics is then that of the root link;
+    /// gravity and dynamics are those of frame 0.
+    pub base: Option<Placement>,
+    /// The tool's frame in the last link's, where it is another: where forward kinematics and the Jacobian
+    /// look. It has no inertia of its own.
+    pub tool: Option<Placement>,
     /// A published parameter set, empty where the file has none.
     pub groupings: Vec<Grouping>,
+    /// Motors that turn with several joints, empty where each turns with its own.
+    pub transmissions: Vec<Transmission>,
+}
+
+/// What the file does not say is left out: generated files state a hash of this text, which does not change
+/// with what arm files can say since.
+impl fmt::Debug for Arm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut text = f.debug_struct("Arm");
+        text.field("name", &self.name)
+            .field("convention", &self.convention)
+            .field("gravity", &self.gravity)
+            .field("joints", &self.joints)
+            .field("tool", &self.tool)
+            .field("groupings", &self.groupings);
+        if let Some(base) = &self.base {
+            text.field("base", base);
+        }
+        if !self.transmissions.is_empty() {
+            text.field("transmissions", &self.transmissions);
+        }
+        text.finish()
+    }
 }
 
 impl Arm {
@@ -120,6 +177,17 @@ impl Arm {
         self.joints.len()
     }
 
+    /// The joints' names in order: where the file gives none, the joint's number from 1, as logs have it.
+    pub fn joint_names(&self) -> Vec<String> {
+        let name = |(i, joint): (usize, &Joint)| joint.name.clone().unwrap_or_else(|| (i + 1).to_string());
+        self.joints.iter().enumerate().map(name).collect()
+    }
+
+    /// Whether the file names a joint.
+    pub fn has_joint_names(&self) -> bool {
+        self.joints.iter().any(|joint| joint.name.is_some())
+    }
+
     /// The parameters that the declared symmetries and missing rotors leave, in order: the set `full`.
     pub fn kept_parameters(&self) -> Vec<Parameter> {
         self.all_parameters().into_iter().filter(|p| self.keeps(*p)).collect()
@@ -138,6 +206,43 @@ impl Arm {
         })
     }
 
+    /// The matrix of the motors' velocities, n × n by rows: motor i turns at Σ_j M_ij q̇_j on the joint's
+    /// side of its gear (before the gear ratio); rad/s or m/s. Torques go the other way: τ = Mᵀ·τ_motors.
+    ///
+    /// The identity where the file has no `[[transmission]]`. Rotors are in the model already; friction sits
+    /// on these velocities as well, and whoever adds it takes them from here.
+    pub fn motor_velocity_matrix(&self) -> Vec<Vec<Rational>> {
+        let n = self.dof();
+        let unit = |i: usize, j: usize| if i == j { Rational::one() } else { Rational::zero() };
+        let mut matrix: Vec<Vec<Rational>> = (0..n).map(|i| (0..n).map(|j| unit(i, j)).collect()).collect();
+        for block in &self.transmissions {
+            for (motor, row) in block.joints.iter().zip(&block.matrix) {
+                for (joint, factor) in block.joints.iter().zip(row) {
+                    matrix[*motor][*joint] = factor.clone();
+                }
+            }
+        }
+        matrix
+    }
+
+    /// [`Arm::motor_velocity_matrix`] in numbers.
+    pub fn motor_velocity_matrix_f64(&self) -> Vec<Vec<f64>> {
+        let number = |row: Vec<Rational>| row.iter().map(rational::to_f64).collect();
+        self.motor_velocity_matrix().into_iter().map(number).collect()
+    }
+
+    /// The joints that a motor turns with and by how much, where that is not its own joint alone, by one.
+    pub fn coupled_motor(&self, motor: usize) -> Option<Vec<(usize, Rational)>> {
+        self.transmissions.iter().find_map(|block| {
+            let row = &block.matrix[block.joints.iter().position(|joint| *joint == motor)?];
+            let entries = block.joints.iter().copied().zip(row.iter().cloned());
+            let mut entries: Vec<(usize, Rational)> =
+                entries.filter(|(_, factor)| !factor.is_zero()).collect();
+            entries.sort_by_key(|(joint, _)| *joint);
+            (entries != [(motor, Rational::one())]).then_some(entries)
+        })
+    }
+
     /// Things about the file that are no errors but that its author may not have meant.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
@@ -147,7 +252,22 @@ impl Arm {
                     notes.push(format!("joint {}: {key} = {text}", i + 1));
                 }
             }
+            if let Some([low, high]) =
+                joint.position.filter(|p| joint.kind == JointKind::Revolute && degrees(p))
+            {
+                notes.push(format!(
+                    "joint {}: position = [{low}, {high}] is in rad; as degrees that would be [{:.4}, {:.4}]",
+                    i + 1,
+                    low.to_radians(),
+                    high.to_radians()
+                ));
+            }
         }
         notes
     }
+}
+
+/// Whether a joint's limits look as if they were degrees: whole numbers beyond what a joint turns.
+fn degrees(position: &[f64; 2]) -> bool {
+    position.iter().all(|x| x.fract() == 0.0) && position.iter().any(|x| x.abs() >= 30.0)
 }

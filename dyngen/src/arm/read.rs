@@ -1,20 +1,20 @@
 //! From TOML to [`Arm`]: the typed description, or every error with its place.
 
+use super::table::{Reader, Table, Value, describe};
 use super::{
-    Angle, Arm, Convention, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind, Tool, sum,
+    Angle, Arm, Convention, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind, Placement, sum,
+    transmission,
 };
 use crate::diagnostic::{Collector, Diagnostics};
 use crate::exact::rational::{self, Rational};
 use num_traits::{Signed, Zero};
-use std::ops::Range;
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
 
-type Value<'i> = Spanned<DeValue<'i>>;
-
-const ARM_KEYS: [&str; 6] = ["name", "convention", "gravity", "joint", "tool", "grouping"];
-const TOOL_KEYS: [&str; 2] = ["xyz", "rpy"];
-const JOINT_KEYS: [&str; 12] = [
+const ARM_KEYS: [&str; 8] =
+    ["name", "convention", "gravity", "joint", "base", "tool", "grouping", "transmission"];
+const PLACEMENT_KEYS: [&str; 2] = ["xyz", "rpy"];
+const JOINT_KEYS: [&str; 13] = [
+    "name",
     "kind",
     "a",
     "alpha",
@@ -47,18 +47,7 @@ pub(super) fn parse(text: &str, file: &str) -> Result<Arm, Diagnostics> {
     reader.errors.finish(arm)
 }
 
-struct Reader<'t> {
-    errors: Collector<'t>,
-}
-
-/// A table with the words that name it in an error.
-struct Table<'d, 'i> {
-    table: &'d DeTable<'i>,
-    span: Range<usize>,
-    place: String,
-}
-
-impl<'t> Reader<'t> {
+impl Reader<'_> {
     fn arm(&mut self, document: &DeTable<'_>) -> Option<Arm> {
         let top = Table { table: document, span: 0..0, place: "arm".to_string() };
         self.unknown_keys(&top, &ARM_KEYS);
@@ -79,7 +68,11 @@ impl<'t> Reader<'t> {
         }
         let dof = joint_tables.len();
         let joints: Vec<Option<Joint>> = joint_tables.iter().map(|t| self.joint(t)).collect();
-        let tool = self.optional(&top, "tool", Self::tool);
+        self.same_names(&joint_tables);
+        let base = self.optional(&top, "base", |r, v| r.placement(v, "base", "the root link"));
+        let tool = self.optional(&top, "tool", |r, v| r.placement(v, "tool", "the last frame"));
+        let transmission_tables = self.tables(&top, "transmission");
+        let transmissions = transmission::read(self, &transmission_tables, dof);
         let grouping_tables = self.tables(&top, "grouping");
         let mut groupings: Vec<Option<Grouping>> = Vec::new();
         for table in &grouping_tables {
@@ -100,14 +93,17 @@ impl<'t> Reader<'t> {
             convention: convention?,
             gravity: gravity?,
             joints: joints.into_iter().collect::<Option<_>>()?,
+            base: base?,
             tool: tool?,
             groupings: groupings.into_iter().collect::<Option<_>>()?,
+            transmissions: transmissions?,
         })
     }
 
     fn joint(&mut self, t: &Table<'_, '_>) -> Option<Joint> {
         self.unknown_keys(t, &JOINT_KEYS);
         let place = t.place.clone();
+        let name = self.optional(t, "name", |r, v| r.text(v, &format!("{place}: name")));
         let kind = self.required(t, "kind").and_then(|v| match v.get_ref().as_str() {
             Some("revolute") => Some(JointKind::Revolute),
             Some("prismatic") => Some(JointKind::Prismatic),
@@ -155,6 +151,7 @@ impl<'t> Reader<'t> {
         let torque = limit("torque", "N·m or N");
         let torque_constant = limit("torque_constant", "N·m/A or N/A");
         Some(Joint {
+            name: name?,
             kind: kind?,
             a: a?,
             alpha: alpha?,
@@ -261,38 +258,44 @@ impl<'t> Reader<'t> {
         Some([x?, y?, z?])
     }
 
-    fn tool(&mut self, v: &Value<'_>) -> Option<Tool> {
+    /// Names say which joint is meant, so no two joints have one.
+    fn same_names(&mut self, joints: &[Table<'_, '_>]) {
+        let name =
+            |t: &Table<'_, '_>| t.table.get("name").and_then(|v| v.get_ref().as_str().map(str::to_string));
+        for (i, t) in joints.iter().enumerate() {
+            let Some(own) = name(t) else { continue };
+            if let Some(first) = joints[..i].iter().position(|other| name(other).as_ref() == Some(&own)) {
+                let span = t.table.get("name").map_or(t.span.clone(), toml::Spanned::span);
+                let message = format!("{}: the name '{own}' is already that of joint {}", t.place, first + 1);
+                self.errors.error(span, message);
+            }
+        }
+    }
+
+    /// A frame's place in another, whose name is `within`.
+    fn placement(&mut self, v: &Value<'_>, name: &str, within: &str) -> Option<Placement> {
         let Some(table) = v.get_ref().as_table() else {
-            self.errors.error(v.span(), format!("tool must be a table: write [tool], found {}", describe(v)));
+            let message = format!("{name} must be a table: write [{name}], found {}", describe(v));
+            self.errors.error(v.span(), message);
             return None;
         };
-        let t = Table { table, span: v.span(), place: "tool".to_string() };
-        self.unknown_keys(&t, &TOOL_KEYS);
+        let t = Table { table, span: v.span(), place: name.to_string() };
+        self.unknown_keys(&t, &PLACEMENT_KEYS);
         let xyz = self.optional(&t, "xyz", |r, v| {
-            let [x, y, z] = r.three(v, "tool: xyz must be three numbers in m in the last frame")?;
-            let [x, y, z] = [x, y, z].map(|c| r.number(c, "tool: xyz", "m"));
+            let [x, y, z] = r.three(v, &format!("{name}: xyz must be three numbers in m in {within}"))?;
+            let [x, y, z] = [x, y, z].map(|c| r.number(c, &format!("{name}: xyz"), "m"));
             Some([x?, y?, z?])
         });
         let rpy = self.optional(&t, "rpy", |r, v| {
-            let [x, y, z] = r.three(v, "tool: rpy must be three angles, roll, pitch and yaw")?;
-            let [x, y, z] = [x, y, z].map(|c| r.angle(c, "tool: rpy"));
+            let [x, y, z] = r.three(v, &format!("{name}: rpy must be three angles, roll, pitch and yaw"))?;
+            let [x, y, z] = [x, y, z].map(|c| r.angle(c, &format!("{name}: rpy")));
             Some([x?, y?, z?])
         });
         let straight = || Angle::PiMultiple(Rational::zero());
-        Some(Tool {
+        Some(Placement {
             xyz: xyz?.unwrap_or_else(|| std::array::from_fn(|_| Rational::zero())),
             rpy: rpy?.unwrap_or_else(|| std::array::from_fn(|_| straight())),
         })
-    }
-
-    /// The three items of a list, or an error that starts with `what`.
-    fn three<'d, 'i>(&mut self, v: &'d Value<'i>, what: &str) -> Option<[&'d Value<'i>; 3]> {
-        let list = v.get_ref().as_array().map(|a| a.iter().collect::<Vec<_>>()).unwrap_or_default();
-        if let [x, y, z] = list[..] {
-            return Some([x, y, z]);
-        }
-        self.errors.error(v.span(), format!("{what}, found {}", describe(v)));
-        None
     }
 
     fn position(&mut self, v: &Value<'_>, place: &str) -> Option<[f64; 2]> {
@@ -315,92 +318,6 @@ impl<'t> Reader<'t> {
         }
         Some([low, high])
     }
-
-    fn angle(&mut self, v: &Value<'_>, quantity: &str) -> Option<Angle> {
-        if let Some(text) = v.get_ref().as_str() {
-            return Angle::parse(text)
-                .map_err(|e| self.errors.error(v.span(), format!("{quantity}: {e}")))
-                .ok();
-        }
-        self.number(v, quantity, "rad, or text such as \"pi/2\"").map(Angle::from_radians)
-    }
-
-    fn number(&mut self, v: &Value<'_>, quantity: &str, unit: &str) -> Option<Rational> {
-        let parsed = match v.get_ref() {
-            DeValue::Integer(i) if i.radix() == 10 => rational::parse_rational(i.as_str()),
-            DeValue::Float(f) => rational::parse_rational(f.as_str()),
-            _ => Err(format!("found {}", describe(v))),
-        };
-        parsed
-            .map_err(|e| {
-                self.errors.error(v.span(), format!("{quantity} must be a finite number ({unit}): {e}"))
-            })
-            .ok()
-    }
-
-    fn text(&mut self, v: &Value<'_>, quantity: &str) -> Option<String> {
-        match v.get_ref().as_str() {
-            Some(text) if !text.trim().is_empty() => Some(text.to_string()),
-            _ => {
-                self.errors.error(
-                    v.span(),
-                    format!("{quantity} must be text that is not empty, found {}", describe(v)),
-                );
-                None
-            }
-        }
-    }
-
-    fn required<'d, 'i>(&mut self, t: &Table<'d, 'i>, key: &str) -> Option<&'d Value<'i>> {
-        let value = t.table.get(key);
-        if value.is_none() {
-            self.errors.error(t.span.clone(), format!("{}: the key '{key}' is missing", t.place));
-        }
-        value
-    }
-
-    /// `Some(None)` where the key is absent, `None` where its value is wrong.
-    fn optional<T>(
-        &mut self,
-        t: &Table<'_, '_>,
-        key: &str,
-        read: impl FnOnce(&mut Self, &Value<'_>) -> Option<T>,
-    ) -> Option<Option<T>> {
-        match t.table.get(key) {
-            Some(value) => read(self, value).map(Some),
-            None => Some(None),
-        }
-    }
-
-    fn tables<'d, 'i>(&mut self, t: &Table<'d, 'i>, key: &str) -> Vec<Table<'d, 'i>> {
-        let Some(value) = t.table.get(key) else { return Vec::new() };
-        let Some(list) = value.get_ref().as_array() else {
-            self.errors.error(value.span(), format!("{key} must be a list of tables: write [[{key}]]"));
-            return Vec::new();
-        };
-        let mut tables = Vec::new();
-        for (i, item) in list.iter().enumerate() {
-            match item.get_ref().as_table() {
-                Some(table) => {
-                    tables.push(Table { table, span: item.span(), place: format!("{key} {}", i + 1) })
-                }
-                None => self
-                    .errors
-                    .error(item.span(), format!("{key} {} must be a table: write [[{key}]]", i + 1)),
-            }
-        }
-        tables
-    }
-
-    fn unknown_keys(&mut self, t: &Table<'_, '_>, known: &[&str]) {
-        for (key, _) in t.table.iter() {
-            if !known.contains(&key.get_ref().as_ref()) {
-                let message =
-                    format!("{}: unknown key '{}': known are {}", t.place, key.get_ref(), known.join(", "));
-                self.errors.error(key.span(), message);
-            }
-        }
-    }
 }
 
 fn unusable(parameter: Parameter, dof: usize, joints: &[Option<Joint>]) -> Option<String> {
@@ -415,14 +332,4 @@ fn unusable(parameter: Parameter, dof: usize, joints: &[Option<Joint>]) -> Optio
             .then(|| "is a rotor inertia, but its joint has no rotor_ratio".to_string());
     }
     joint.zero.contains(&parameter.kind).then(|| "is declared zero by its joint".to_string())
-}
-
-fn describe(v: &Value<'_>) -> String {
-    match v.get_ref() {
-        DeValue::String(s) => format!("\"{s}\""),
-        DeValue::Integer(i) => i.to_string(),
-        DeValue::Float(f) => f.to_string(),
-        DeValue::Array(a) => format!("a list of {}", a.iter().count()),
-        other => format!("a value of type {}", other.type_str()),
-    }
 }

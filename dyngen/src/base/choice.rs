@@ -16,6 +16,7 @@ use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{Dependence, Unproven};
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::Expr;
+use crate::lagrangian::elements::has_joint_symbols;
 use crate::optimize::PASSES;
 
 /// A rule that was tried, with what the regressor costs for it.
@@ -45,7 +46,7 @@ pub fn cheapest(
     let [first, others @ ..] = Preference::ALL;
     let start = eliminate(first)?;
     let all = AllColumns::build(&Subject { arm, symbols, field, minimal: &start });
-    let search = symbols.angles.is_empty();
+    let search = !has_joint_symbols(arm);
     let (mut best, candidate) = all.improved(field, start, first, search);
     let mut candidates = vec![candidate];
     let others = if search { &others[..] } else { &[] };

@@ -22,6 +22,7 @@ enum Variable {
     A(usize),
     D(usize),
     Ratio(usize),
+    Coupling(usize),
     Gravity(usize),
     Symbol(usize, bool),
 }
@@ -30,6 +31,8 @@ enum Variable {
 #[derive(Clone, Debug)]
 pub(super) struct LagrangianPolynomials {
     variables: Vec<Variable>,
+    /// The entries of transmissions' matrices, by the index in [`Variable::Coupling`].
+    couplings: Vec<Rational>,
     columns: Vec<(usize, Polynomial<i64>)>,
 }
 
@@ -37,6 +40,7 @@ pub(super) struct LagrangianPolynomials {
 struct Variables<'r> {
     ring: &'r PolynomialRing<i64>,
     variables: &'r [Variable],
+    couplings: &'r [Rational],
     /// First variable of each joint's q.
     joints: &'r [usize],
 }
@@ -70,6 +74,10 @@ impl Source<Polynomial<i64>> for Variables<'_> {
     fn ratio(&mut self, joint: usize) -> Polynomial<i64> {
         self.of(Variable::Ratio(joint))
     }
+    fn coupling(&mut self, factor: &Rational) -> Polynomial<i64> {
+        let place = self.couplings.iter().position(|c| c == factor);
+        self.of(Variable::Coupling(place.unwrap_or_default()))
+    }
     fn gravity(&mut self, axis: usize) -> Polynomial<i64> {
         self.of(Variable::Gravity(axis))
     }
@@ -101,6 +109,9 @@ impl LagrangianPolynomials {
         for i in 0..arm.dof() {
             variables.extend([Variable::A(i), Variable::D(i), Variable::Ratio(i)]);
         }
+        let rows = (0..arm.dof()).filter_map(|motor| arm.coupled_motor(motor));
+        let couplings: Vec<Rational> = rows.flatten().map(|(_, factor)| factor).collect();
+        variables.extend((0..couplings.len()).map(Variable::Coupling));
         variables.extend([0, 1, 2].map(Variable::Gravity));
         squares.resize(variables.len(), Square::Free);
         for index in 0..symbols.angles.len() {
@@ -109,14 +120,15 @@ impl LagrangianPolynomials {
             variables.extend([Variable::Symbol(index, true), Variable::Symbol(index, false)]);
         }
         let ring = PolynomialRing::new(squares);
-        let mut source = Variables { ring: &ring, variables: &variables, joints: &joints };
+        let mut source =
+            Variables { ring: &ring, variables: &variables, couplings: &couplings, joints: &joints };
         let elements = ArmElements::build(&ring, arm, symbols, &mut source);
         let all = arm.all_parameters();
         let columns = (all.into_iter().zip(twice_lagrangian(&ring, &elements)))
             .filter(|(_, column)| !ring.is_zero(column))
             .map(|(p, column)| (p.index(), column))
             .collect();
-        LagrangianPolynomials { variables, columns }
+        LagrangianPolynomials { variables, couplings, columns }
     }
 
     /// The rows: for each function of q and q̇ (and of the sizes, where they are variables) its coefficient
@@ -164,7 +176,7 @@ impl LagrangianPolynomials {
         let (mut function, mut constants) = (*monomial, Monomial::default());
         for (v, exponent) in monomial.powers() {
             let constant = match self.variables[v] {
-                Variable::Gravity(_) | Variable::Symbol(..) => true,
+                Variable::Coupling(_) | Variable::Gravity(_) | Variable::Symbol(..) => true,
                 Variable::A(_) | Variable::D(_) | Variable::Ratio(_) => sizes == Sizes::Numbers,
                 _ => false,
             };
@@ -183,6 +195,7 @@ impl LagrangianPolynomials {
         for (v, exponent) in constants.powers() {
             let number = |value: &Rational| ring.constant(value.clone());
             let value = match self.variables[v] {
+                Variable::Coupling(i) => number(&self.couplings[i]),
                 Variable::Gravity(axis) => number(&arm.gravity[axis]),
                 Variable::Symbol(index, sine) => field.symbol(index, sine).clone(),
                 Variable::A(i) => number(&arm.joints[i].a),
@@ -230,7 +243,8 @@ fn the_rows_span_those_of_the_expanded_lagrangian() {
             ["standard", "modified"][pick(2)],
             ["[0, 0, -9.81]", "[0, 0, 0]", "[1.5, 0, -3]", "[0, 2, 0]"][pick(4)]
         );
-        for _ in 0..1 + pick(3) {
+        let joints = 1 + pick(3);
+        for _ in 0..joints {
             text += &format!(
                 "[[joint]]\nkind = \"{}\"\na = {}\nalpha = {}\nd = {}\ntheta = {}\n{}{}",
                 ["revolute", "revolute", "prismatic"][pick(3)],
@@ -241,6 +255,25 @@ fn the_rows_span_those_of_the_expanded_lagrangian() {
                 ["", "rotor_ratio = 50\n"][pick(2)],
                 ["", "zero = [\"my\", \"Ixy\"]\n"][pick(2)],
             );
+        }
+        if joints == 3 {
+            let (blocks, matrices) = match pick(2) {
+                0 => (
+                    ["[1, 2]", "[3, 1]", "[3, 2]"],
+                    ["[[1, 0], [1, 1]]", "[[1, 1], [0, 1]]", "[[0, 1], [1, 0]]", "[[2, \"1/3\"], [-1, 1]]"],
+                ),
+                _ => (
+                    ["[1, 2, 3]", "[3, 1, 2]", "[2, 1, 3]"],
+                    [
+                        "[[1, 0, 0], [1, 1, 0], [0, -1, 1]]",
+                        "[[0, 1, 0], [0, 0, 1], [1, 0, 0]]",
+                        "[[1, 1, 1], [0, 2, 1], [0, 0, 1]]",
+                        "[[1, 0, 0], [0, 3, 0], [0, 0, -1]]",
+                    ],
+                ),
+            };
+            let (block, matrix) = (blocks[pick(3)], matrices[pick(4)]);
+            text += &format!("[[transmission]]\njoints = {block}\nmatrix = {matrix}\n");
         }
         texts.push(text);
     }

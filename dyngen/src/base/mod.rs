@@ -3,12 +3,14 @@
 mod certificate;
 pub mod choice;
 pub mod coefficients;
+mod coupled;
 #[cfg(test)]
 mod expanded;
 mod plain;
 pub mod preference;
 mod published;
 pub mod sets;
+mod steps;
 pub mod symmetry;
 
 pub use crate::parameters::{ParameterSet, SetKind, SetParameter, span};

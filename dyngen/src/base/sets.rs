@@ -37,6 +37,9 @@ impl Class {
     }
 }
 
+/// Of the values of general angles modulo the prime; any fixed seed keeps the choice reproducible.
+const SEED: u64 = 0x6479_6e67_656e;
+
 /// All sets of an arm, in its field of constants.
 #[derive(Clone, Debug)]
 pub struct Sets {
@@ -58,8 +61,7 @@ impl Sets {
     /// # Errors
     /// [`Unproven`] where a number of the arm is a multiple of the proof's prime.
     pub fn derive(arm: &Arm, symbols: &AngleSymbols) -> Result<Sets, Unproven> {
-        // The values of general angles modulo the prime; any fixed seed keeps the choice reproducible.
-        let field = ConstantField::new(symbols, &mut Draws::new(0x6479_6e67_656e));
+        let field = ConstantField::new(symbols, &mut Draws::new(SEED));
         let columns = arm.dof() * 11;
         let eliminate = |rows: &[SparseRow], preference: Preference| {
             let order: Vec<usize> = preference.order(arm).iter().map(|p| p.index()).collect();
@@ -86,6 +88,14 @@ impl Sets {
             (set.rank, set.relations) = (rank, relations);
         }
         Ok(Sets { field, sets, minimal, rows, candidates })
+    }
+
+    /// The set `full` alone, and nothing known of how columns depend: enough for what takes no parameters.
+    pub(crate) fn underived(arm: &Arm, symbols: &AngleSymbols) -> Sets {
+        let field = ConstantField::new(symbols, &mut Draws::new(SEED));
+        let minimal = Dependence { kept: Vec::new(), coordinates: vec![Vec::new(); arm.dof() * 11] };
+        let sets = vec![full_set(arm, &field)];
+        Sets { field, sets, minimal, rows: Vec::new(), candidates: Vec::new() }
     }
 
     /// The set of that kind, if the arm has it.

@@ -1,7 +1,7 @@
 //! `dyngen describe`.
 
 use super::{Failure, model, print};
-use dyngen::arm::{Convention, JointKind};
+use dyngen::arm::{Convention, JointKind, Placement, Transmission};
 use dyngen::base::choice;
 use dyngen::base::sets::{Class, combination_text};
 use dyngen::base::symmetry::{self, Removed, Symmetry};
@@ -69,6 +69,8 @@ fn json_text(model: &Model, operations: &[(&str, Operations)], symmetries: &[Sym
     json!({
         "arm": arm.name,
         "joints": arm.dof(),
+        "joint_names": arm.joint_names(),
+        "transmissions": arm.transmissions.iter().map(transmission_json).collect::<Vec<_>>(),
         "parameters": names,
         "sets": sets,
         "unidentifiable": of_class(Class::Unidentifiable),
@@ -79,6 +81,16 @@ fn json_text(model: &Model, operations: &[(&str, Operations)], symmetries: &[Sym
         "symmetries": symmetries.iter().map(|s| symmetry_json(model, s)).collect::<Vec<_>>(),
         "notes": arm.notes(),
     })
+}
+
+/// Joints from 1; the matrix as exact text.
+fn transmission_json(block: &Transmission) -> Value {
+    let joints: Vec<usize> = block.joints.iter().map(|j| j + 1).collect();
+    json!({"joints": joints, "matrix": exact_rows(block)})
+}
+
+fn exact_rows(block: &Transmission) -> Vec<Vec<String>> {
+    block.matrix.iter().map(|row| row.iter().map(rational::to_text).collect()).collect()
 }
 
 fn symmetry_json(model: &Model, symmetry: &Symmetry) -> Value {
@@ -137,10 +149,23 @@ fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetr
         arm.dof(),
         gravity.join(", ")
     );
+    // Names where the file has some.
+    let names = arm.joint_names();
+    let width = match arm.has_joint_names() {
+        true => names.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(4) + 2,
+        false => 0,
+    };
     let _ = writeln!(
         t,
-        "  {:>2}  {:<9}  {:>8}  {:>8}  {:>8}  {:>8}  {:>6}  declared zero",
-        "i", "kind", "a [m]", "alpha", "d [m]", "theta", "rotor"
+        "  {:>2}  {:<width$}{:<9}  {:>8}  {:>8}  {:>8}  {:>8}  {:>6}  declared zero",
+        "i",
+        if width > 0 { "name" } else { "" },
+        "kind",
+        "a [m]",
+        "alpha",
+        "d [m]",
+        "theta",
+        "rotor"
     );
     for (i, joint) in arm.joints.iter().enumerate() {
         let kind = match joint.kind {
@@ -153,12 +178,25 @@ fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetr
         let (alpha, theta) = (joint.alpha.to_string(), joint.theta.to_string());
         let _ = writeln!(
             t,
-            "  {:>2}  {kind:<9}  {:>8}  {alpha:>8}  {:>8}  {theta:>8}  {rotor:>6}  {}",
+            "  {:>2}  {:<width$}{kind:<9}  {:>8}  {alpha:>8}  {:>8}  {theta:>8}  {rotor:>6}  {}",
             i + 1,
+            if width > 0 { names[i].as_str() } else { "" },
             number(&joint.a),
             number(&joint.d),
             zero.join(" ")
         );
+    }
+    for (name, frame) in
+        [("base: frame 0 in the root link", &arm.base), ("tool: in the last frame", &arm.tool)]
+    {
+        if let Some(frame) = frame {
+            let _ = writeln!(t, "  {name}: {}", placement_text(frame));
+        }
+    }
+    for block in &arm.transmissions {
+        let rows: Vec<String> = exact_rows(block).iter().map(|row| format!("[{}]", row.join(", "))).collect();
+        let joints: Vec<String> = block.joints.iter().map(|j| (j + 1).to_string()).collect();
+        let _ = writeln!(t, "  motors {0} = [{1}] · joints {0}", joints.join(", "), rows.join(", "));
     }
     let kept = arm.kept_parameters();
     let _ = writeln!(t, "\n{} of {} parameters are kept:", kept.len(), arm.all_parameters().len());
@@ -191,6 +229,12 @@ fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetr
         let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", function, o.mul, o.add, o.div, o.sin_cos);
     }
     t
+}
+
+fn placement_text(frame: &Placement) -> String {
+    let xyz: Vec<String> = frame.xyz.iter().map(|x| rational::to_f64(x).to_string()).collect();
+    let rpy: Vec<String> = frame.rpy.iter().map(ToString::to_string).collect();
+    format!("xyz = [{}] m, rpy = [{}] rad", xyz.join(", "), rpy.join(", "))
 }
 
 fn symmetry_table(t: &mut String, model: &Model, symmetries: &[Symmetry]) {

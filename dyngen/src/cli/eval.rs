@@ -1,8 +1,8 @@
 //! `dyngen eval`.
 
-use super::{Failure, Set, generate, model, print};
+use super::{Failure, Set, arm, generate, model, print};
 use dyngen::dynamics::function::Argument;
-use dyngen::{Evaluator, Function, Samples, Values};
+use dyngen::{Evaluator, Function, Model, Samples, SetKind, Values};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -31,9 +31,12 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
-    let model = model(&args.arm)?;
-    let set = model.set(args.parameters.into()).map_err(Failure::refused)?;
     let function = args.function;
+    let (model, kind) = match function.is_kinematic() {
+        true => (Model::kinematic(arm(&args.arm)?), SetKind::Full),
+        false => (model(&args.arm)?, args.parameters.into()),
+    };
+    let set = model.set(kind).map_err(Failure::refused)?;
     let parameters = match (&args.values, function.takes(Argument::Parameters)) {
         (Some(path), true) => {
             Values::read(path).and_then(|v| v.of_set(&model, set)).map_err(Failure::input)?

@@ -2,14 +2,14 @@
 
 use super::{Failure, same_file};
 use dyngen::arm::Convention;
-use dyngen::import::{self, ImportError, Options};
+use dyngen::import::{self, Options};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example: dyngen import robot.urdf --tip tool0 -o arm.toml")]
 pub(super) struct Args {
-    /// The URDF file (xacro has to be run before).
+    /// The URDF file (xacro has to be run before), or a MuJoCo model.
     urdf: PathBuf,
     /// The link that stands still; the root where it is left out.
     #[arg(long, value_name = "LINK")]
@@ -29,6 +29,9 @@ pub(super) struct Args {
     /// Where frame i sits: on joint i (modified) or at the far end of link i (standard).
     #[arg(long, value_enum, default_value = "modified")]
     convention: Frames,
+    /// Keep every digit: do not take rounded numbers such as 1.5708 for what they were rounded from.
+    #[arg(long)]
+    exact: bool,
     /// Angles this close to a multiple of pi/12 are taken for it, rad.
     #[arg(long, value_name = "RAD", default_value = "1e-9", value_parser = tolerance)]
     angle_tolerance: f64,
@@ -40,7 +43,7 @@ enum Frames {
     Standard,
 }
 
-fn lock(text: &str) -> Result<(String, f64), String> {
+pub(super) fn lock(text: &str) -> Result<(String, f64), String> {
     let (joint, value) = text.rsplit_once('=').ok_or("must be JOINT=VALUE, such as finger=0.02")?;
     let number = value.parse().ok().filter(|x: &f64| x.is_finite());
     Ok((joint.to_string(), number.ok_or_else(|| format!("'{value}' is no number of rad or m"))?))
@@ -65,11 +68,9 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         tip: args.tip.clone(),
         convention,
         angle_tolerance: args.angle_tolerance,
+        exact: args.exact,
     };
-    let imported = import::urdf(&text, &file, &options).map_err(|e| match e {
-        ImportError::Unreadable(_) => Failure::input(e),
-        ImportError::Refused(_) => Failure::refused(e),
-    })?;
+    let imported = import::any(&text, &file, &options).map_err(Failure::input)?;
     for note in imported.notes.iter().chain(&imported.arm.notes()) {
         eprintln!("{file}: note: {note}");
     }
@@ -87,7 +88,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
 }
 
 /// Edited files are not lost by accident, and the original is never written over.
-fn refuse_to_replace(path: &Path, original: &Path, force: bool) -> Result<(), Failure> {
+pub(super) fn refuse_to_replace(path: &Path, original: &Path, force: bool) -> Result<(), Failure> {
     let place = path.display();
     if same_file(path, original) {
         return Err(Failure::input(format!("{place} is the file that is imported: choose another -o")));
@@ -101,7 +102,7 @@ fn refuse_to_replace(path: &Path, original: &Path, force: bool) -> Result<(), Fa
 }
 
 /// Writes all files or none: each is complete on the disk before the first takes its name.
-fn write(files: &[(&Path, &str)]) -> Result<(), Failure> {
+pub(super) fn write(files: &[(&Path, &str)]) -> Result<(), Failure> {
     let partial = |path: &Path| {
         let mut name = path.as_os_str().to_os_string();
         name.push(".partial");

@@ -3,14 +3,17 @@
 mod check;
 mod describe;
 mod eval;
+mod export;
 mod generate;
 mod import;
 mod inspect;
 
 use clap::{Parser, Subcommand, ValueEnum};
+use dyngen::arm::Convention;
 use dyngen::base::SetKind;
 use dyngen::{Arm, Model};
 use std::fmt::Display;
+use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -31,6 +34,8 @@ enum Command {
     Generate(generate::Args),
     /// Makes an arm file, with inertial values beside it, from a serial chain of a URDF.
     Import(import::Args),
+    /// Writes identified values into a copy of the file that an arm was imported from.
+    Export(export::Args),
     /// Shows a function's expressions after a pass of the optimiser, with what each pass costs.
     Inspect(inspect::Args),
     /// Evaluates a function at the states of a CSV file.
@@ -38,6 +43,9 @@ enum Command {
     /// Says whether a real arm can have given parameter values, and shows the pose where not.
     Check(check::Args),
 }
+
+/// General twists from which on a table in the standard convention is slow.
+const SLOW_TWISTS: usize = 4;
 
 /// A parameter set on the command line.
 #[derive(Clone, Copy, ValueEnum)]
@@ -87,6 +95,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Describe(args) => describe::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Import(args) => import::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Check(args) => check::run(&args),
@@ -100,13 +109,36 @@ pub(crate) fn main() -> ExitCode {
     }
 }
 
-/// Reads an arm and derives its model; what its author may not have meant goes to standard error.
-fn model(path: &Path) -> Result<Model, Failure> {
+/// Reads an arm; what its author may not have meant goes to standard error.
+fn arm(path: &Path) -> Result<Arm, Failure> {
     let arm = Arm::read(path).map_err(Failure::input)?;
     for note in arm.notes() {
         eprintln!("{}: note: {note}", path.display());
     }
-    Model::derive(arm).map_err(Failure::refused)
+    Ok(arm)
+}
+
+/// Reads an arm and derives its model; what that may cost is said where a person waits for it.
+fn model(path: &Path) -> Result<Model, Failure> {
+    let arm = arm(path)?;
+    let general = arm.joints.iter().filter(|joint| joint.alpha.quarter_turns().is_none()).count();
+    if arm.convention == Convention::Standard && general >= SLOW_TWISTS {
+        eprintln!(
+            "{}: note: {general} twists that are no right angles in the standard convention: its exact sums \
+             may take minutes; the modified convention takes seconds",
+            path.display()
+        );
+    }
+    let watched = std::io::stderr().is_terminal();
+    if watched {
+        eprint!("deriving the parameter sets: {} joints, {general} general twists …", arm.dof());
+    }
+    let model = Model::derive(arm);
+    if watched {
+        // The line is gone when its work is done.
+        eprint!("\r\x1b[K");
+    }
+    model.map_err(Failure::refused)
 }
 
 /// Whether two paths lead to one file that is there.

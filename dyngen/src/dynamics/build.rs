@@ -6,7 +6,7 @@ use super::motion;
 use super::regroup::Regrouping;
 use super::stage::{Chain, Form};
 use super::{composite, coriolis, energy, forward, inverse, momentum, pose, regressor};
-use crate::arm::Arm;
+use crate::arm::{Arm, Placement};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
 use crate::exact::elimination::Dependence;
@@ -14,7 +14,7 @@ use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::differentiate::{self, Direction};
 use crate::graph::{Builder, Expr, Graph, Input, JointSum, Operations, Preparation};
-use crate::lagrangian::elements::{ArmElements, Source, ToolElements};
+use crate::lagrangian::elements::{ArmElements, PlacementElements, Source};
 use crate::optimize::{self, COMPARED, Pass};
 use crate::parameters::ParameterSet;
 
@@ -179,8 +179,11 @@ pub fn build_in(
             (0..n).map(|j| differentiate::derivative(&b, &torques, direction(j))).collect();
         (0..n * n).map(|k| columns[k % n][k / n]).collect()
     };
-    let tool =
-        || ToolElements::build(&b, arm, symbols, |x| b.constant(x), |index, sine| b.symbol(index, sine));
+    let placed = |frame: &Option<Placement>| {
+        let symbol = |index, sine| b.symbol(index, sine);
+        PlacementElements::build(&b, frame.as_ref(), symbols, |x| b.constant(x), symbol)
+    };
+    let ends = || pose::Ends { base: placed(&arm.base), tool: placed(&arm.tool) };
     let outputs = match function {
         Function::InverseDynamics => torque(&input(Input::Acceleration), true),
         Function::InverseDynamicsWithoutGravity => torque(&input(Input::Acceleration), false),
@@ -203,8 +206,8 @@ pub fn build_in(
             let right: Vec<Expr> = input(Input::Torque).iter().zip(&bias).map(|(t, c)| b.sub(t, c)).collect();
             forward::solve_symmetric(&b, &composite::mass_matrix(&b, &chain, &bodies), &right)
         }
-        Function::ForwardKinematics => pose::forward_kinematics(&b, &elements, &tool()),
-        Function::Jacobian => pose::jacobian(&b, &elements, &tool()),
+        Function::ForwardKinematics => pose::forward_kinematics(&b, &elements, &ends()),
+        Function::Jacobian => pose::jacobian(&b, &elements, &ends()),
         Function::JacobianRateTimesSpeed => {
             let drive = motion::Drive {
                 speeds: speeds.clone(),
@@ -213,7 +216,7 @@ pub fn build_in(
                 gravity: false,
             };
             let straight = Chain::build(&b, arm, &elements, Form { last_in_frame_before: false, ..form });
-            pose::jacobian_rate_times_speed(&b, &elements, &straight, &geometry[n - 1], &tool(), &drive)
+            pose::jacobian_rate_times_speed(&b, &elements, &straight, &geometry[n - 1], &ends(), &drive)
         }
         Function::KineticEnergy => vec![momentum::kinetic_energy(&b, &chain, &bodies, &speeds)],
         Function::PotentialEnergy => {
@@ -266,6 +269,9 @@ impl Source<Expr> for Inputs<'_> {
     }
     fn ratio(&mut self, joint: usize) -> Expr {
         self.arm.joints[joint].rotor_ratio.as_ref().map_or(Expr::ZERO, |k| self.b.constant(k))
+    }
+    fn coupling(&mut self, factor: &Rational) -> Expr {
+        self.b.constant(factor)
     }
     fn gravity(&mut self, axis: usize) -> Expr {
         self.b.constant(&self.arm.gravity[axis])

@@ -3,7 +3,7 @@
 use super::body::Vector;
 use super::moments::Moments;
 use super::regroup::LinkBody;
-use super::stage::{Chain, STRAIGHT, SinCos, Stage, back_z, plus};
+use super::stage::{Chain, Member, STRAIGHT, SinCos, Stage, back_z, plus};
 use super::wrench::{Wrench, lever};
 use crate::arm::JointKind;
 use crate::exact::algebra::Algebra;
@@ -74,6 +74,7 @@ pub fn z_cross(p: &Vector) -> Vector {
 pub fn mass_matrix(b: &Builder, chain: &Chain, bodies: &[LinkBody]) -> Vec<Expr> {
     let n = chain.dof();
     let mut matrix = vec![Expr::ZERO; n * n];
+    let mut coupled = Vec::new();
     let mut outer = Moments::none(b);
     for (s, stage) in chain.stages.iter().enumerate().rev() {
         let mut columns = Vec::new();
@@ -86,7 +87,11 @@ pub fn mass_matrix(b: &Builder, chain: &Chain, bodies: &[LinkBody]) -> Vec<Expr>
         for (k, member) in stage.members.iter().enumerate().rev() {
             column = column.plus(b, &columns[k]);
             let mut carried = column;
-            if let Some(ratio) = member.ratio {
+            if let (Some(_), Some(ratio)) = (&member.coupled, member.ratio) {
+                let rotor = b.mul(&ratio, &bodies[member.joint].rotor);
+                let own = b.mul(&ratio, &rotor);
+                coupled.push((member, own, carried_by(b, chain, s, k, rotor)));
+            } else if let Some(ratio) = member.ratio {
                 let rotor = b.mul(&ratio, &bodies[member.joint].rotor);
                 let diagonal = &mut matrix[member.joint * n + member.joint];
                 *diagonal = b.add(diagonal, &b.mul(&ratio, &rotor));
@@ -102,7 +107,48 @@ pub fn mass_matrix(b: &Builder, chain: &Chain, bodies: &[LinkBody]) -> Vec<Expr>
         }
         outer = before.turned_back_x(b, &stage.twist.0, &stage.twist.1);
     }
-    mirrored(chain, matrix)
+    let mut matrix = mirrored(chain, matrix);
+    for (member, own, carried) in &coupled {
+        add_coupled(b, member, *own, (carried, carried), &mut matrix);
+    }
+    matrix
+}
+
+/// What the joints feel of a moment about the z of a stage on the link before its k-th joint.
+fn carried_by(b: &Builder, chain: &Chain, s: usize, k: usize, moment: Expr) -> Vec<Expr> {
+    let mut felt = vec![Expr::ZERO; chain.dof()];
+    let (stage, inner) = (&chain.stages[s], &chain.stages[..s]);
+    let wrench = Wrench { force: super::body::ZERO, moment: [Expr::ZERO, Expr::ZERO, moment] };
+    project_inwards(b, inner, chain.form.link_to_link, stage, wrench, |joint, value| felt[joint] = value);
+    for member in &stage.members[..k] {
+        felt[member.joint] = moment;
+    }
+    for member in chain.stages.iter().flat_map(|stage| &stage.members).filter(|m| m.reversed) {
+        felt[member.joint] = -felt[member.joint];
+    }
+    felt
+}
+
+/// Adds to a matrix over the joints what a rotor brings whose motor turns with several of them, with m its
+/// row of the transmission's matrix: m·rowᵀ + column·mᵀ for the joints that carry it, and own·m·mᵀ.
+pub fn add_coupled(
+    b: &Builder,
+    member: &Member,
+    own: Expr,
+    (row, column): (&[Expr], &[Expr]),
+    matrix: &mut [Expr],
+) {
+    let n = row.len();
+    let mut add = |i: usize, j: usize, term: Expr| matrix[i * n + j] = b.add(&matrix[i * n + j], &term);
+    for (i, factor) in member.coupled.iter().flatten() {
+        for j in 0..n {
+            add(*i, j, b.mul(factor, &row[j]));
+            add(j, *i, b.mul(factor, &column[j]));
+        }
+        for (j, other) in member.coupled.iter().flatten() {
+            add(*i, *j, b.mul(&b.mul(factor, other), &own));
+        }
+    }
 }
 
 /// The lower triangle from the upper one, with the signs of the axes in the arm's file.

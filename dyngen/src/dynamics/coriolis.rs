@@ -8,9 +8,9 @@
 //! at its reach p.
 
 use super::body::{Vector, ZERO};
-use super::composite::{pieces, unit_momentum, with_mass, z_cross};
+use super::composite::{add_coupled, pieces, unit_momentum, with_mass, z_cross};
 use super::moments::Moments;
-use super::motion::{Drive, StageMotion, motions, own_rate};
+use super::motion::{Drive, StageMotion, motions};
 use super::regroup::LinkBody;
 use super::spin::turned_tensor;
 use super::stage::{Chain, STRAIGHT, Stage, back_x, back_z, plus, scaled};
@@ -51,6 +51,7 @@ pub fn coriolis_matrix(b: &Builder, chain: &Chain, bodies: &[LinkBody], speeds: 
     };
     let motions = motions(b, chain, &drive);
     let mut matrix = vec![Expr::ZERO; n * n];
+    let mut coupled = Vec::new();
     let mut outer = Moving::none(b);
     for (s, (stage, motion)) in chain.stages.iter().zip(&motions).enumerate().rev() {
         let (shares, own, mut before) = match stage.kind {
@@ -69,8 +70,11 @@ pub fn coriolis_matrix(b: &Builder, chain: &Chain, bodies: &[LinkBody], speeds: 
             let mut carried = share;
             if let Some(ratio) = member.ratio {
                 let rotor = b.mul(&ratio, &body.rotor);
-                carried.add_wheel(b, rotor, motion);
-                before.add_wheel(b, rotor, own_rate(b, &motion.speeds, k));
+                match member.coupled {
+                    Some(_) => coupled.push((s, member, rotor)),
+                    None => carried.add_wheel(b, rotor, motion),
+                }
+                before.add_wheel(b, rotor, motion.motor_rates(b, k).0);
             }
             let inner = (&chain.stages[..s], &motions[..s]);
             project(b, inner, chain.form.link_to_link, stage, carried, |j, upper, lower| {
@@ -87,7 +91,20 @@ pub fn coriolis_matrix(b: &Builder, chain: &Chain, bodies: &[LinkBody], speeds: 
     let reversed: Vec<bool> =
         chain.stages.iter().flat_map(|s| s.members.iter().map(|m| m.reversed)).collect();
     let signed = |k: usize| if reversed[k / n] == reversed[k % n] { matrix[k] } else { -matrix[k] };
-    (0..n * n).map(signed).collect()
+    let mut matrix: Vec<Expr> = (0..n * n).map(signed).collect();
+    for (s, member, rotor) in coupled {
+        // About the chain's z, which the joints of its own stage do not turn.
+        let mut wheel = Share::NONE;
+        wheel.add_wheel(b, rotor, &motions[s]);
+        let (mut row, mut column) = (vec![Expr::ZERO; n], vec![Expr::ZERO; n]);
+        let inner = (&chain.stages[..s], &motions[..s]);
+        project(b, inner, chain.form.link_to_link, &chain.stages[s], wheel, |j, upper, lower| {
+            let sign = |x: Expr| if reversed[j] { -x } else { x };
+            (column[j], row[j]) = (sign(upper), sign(lower));
+        });
+        add_coupled(b, member, Expr::ZERO, (&row, &column), &mut matrix);
+    }
+    matrix
 }
 
 /// The stage's own entries for its joints from those for its links: a joint moves its link and all after it.

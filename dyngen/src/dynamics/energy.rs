@@ -32,7 +32,9 @@ pub fn potential_regressor(
     field: &ConstantField,
 ) -> Vec<Expr> {
     let mut still = elements.clone();
-    still.joints.iter_mut().for_each(|joint| joint.speed = Expr::ZERO);
+    for joint in &mut still.joints {
+        (joint.speed, joint.motor_speed) = (Expr::ZERO, Expr::ZERO);
+    }
     of_set(b, arm, &still, set, field, true)
 }
 

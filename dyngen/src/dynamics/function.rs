@@ -118,7 +118,7 @@ impl Argument {
 
 /// What the cost of a function depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     /// On the form of the recursion and on how it sums the parameters up.
     Dynamics,
     /// On the form of the recursion.
@@ -441,7 +441,12 @@ impl Function {
         self.row().arguments
     }
 
-    pub(super) fn kind(self) -> Kind {
+    /// Whether it depends on kinematics alone, on no parameter.
+    pub fn is_kinematic(self) -> bool {
+        matches!(self, Function::ForwardKinematics | Function::Jacobian | Function::JacobianRateTimesSpeed)
+    }
+
+    pub(crate) fn kind(self) -> Kind {
         self.row().kind
     }
 

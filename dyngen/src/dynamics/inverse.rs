@@ -1,7 +1,7 @@
 //! Inverse dynamics by the Newton–Euler recursion along the chain.
 
 use super::body::Vector;
-use super::motion::{Drive, LinkMotion, StageMotion, axis_rate, motions, own_rate};
+use super::motion::{Drive, LinkMotion, StageMotion, axis_rate, motions};
 use super::regroup::LinkBody;
 use super::stage::{Chain, Stage, back_z, plus, scaled};
 use super::wrench::{Wrench, lever};
@@ -43,6 +43,7 @@ pub fn newton_euler(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: &Dri
     let motions = motions(b, chain, drive);
     let mut felt = Vec::with_capacity(chain.stages.len());
     let mut torques = vec![Expr::ZERO; chain.dof()];
+    let mut of_coupled = torques.clone();
     let mut outer = Wrench::NONE;
     for (stage, motion) in chain.stages.iter().zip(&motions).rev() {
         let (own, mut before) = match stage.kind {
@@ -58,15 +59,19 @@ pub fn newton_euler(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: &Dri
             let mut torque = b.add(&sum, &wheels);
             if let Some(ratio) = member.ratio {
                 let rotor = b.mul(&ratio, &body.rotor);
-                let ddq = own_rate(b, &motion.accelerations, k);
+                let ddq = motion.motor_acceleration(b, k);
                 let inner = k.checked_sub(1).map_or(Expr::ZERO, |inner| motion.accelerations[inner]);
                 let turning = b.add(&b.mul(&ratio, &ddq), &b.add(&alpha, &inner));
-                torque = b.add(&torque, &b.mul(&rotor, &turning));
+                let of_motor = b.mul(&rotor, &turning);
+                match member.coupled {
+                    Some(_) => member.add_coupled_torque(b, of_motor, &mut of_coupled),
+                    None => torque = b.add(&torque, &of_motor),
+                }
                 // It turns the link before: within the stage that is what the inner coordinates feel.
                 let carrier = if stage.kind == JointKind::Revolute { &mut sum } else { &mut spin };
                 *carrier = b.add(carrier, &b.mul(&rotor, &ddq));
-                let rates = (own_rate(b, &motion.speeds, k), own_rate(b, &motion.reference, k));
-                let turned = axis_rate(b, &motion.before, rates.0, rates.1);
+                let (speed, reference) = motion.motor_rates(b, k);
+                let turned = axis_rate(b, &motion.before, speed, reference);
                 before.moment = plus(b, &before.moment, &scaled(b, rotor, &turned));
             }
             if body.flywheel != Expr::ZERO {
@@ -88,6 +93,7 @@ pub fn newton_euler(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: &Dri
         felt.push(own);
     }
     felt.reverse();
+    let torques = torques.iter().zip(&of_coupled).map(|(own, coupled)| b.add(own, coupled)).collect();
     Passes { torques, motions, felt }
 }
 

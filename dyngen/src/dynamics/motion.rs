@@ -2,7 +2,7 @@
 
 use super::body::{Vector, ZERO};
 use super::spin::Spin;
-use super::stage::{Chain, Stage, back_z, plus, scaled};
+use super::stage::{Chain, Member, Stage, back_z, plus, scaled};
 use crate::arm::JointKind;
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
@@ -45,6 +45,27 @@ pub struct StageMotion {
     pub accelerations: Vec<Expr>,
     /// Its links.
     pub links: Vec<LinkMotion>,
+    /// For each of its joints the velocity, reference velocity and acceleration of the motor about the
+    /// stage's z, where that turns with several joints.
+    coupled: Vec<Option<[Expr; 3]>>,
+}
+
+impl StageMotion {
+    /// The velocity and reference velocity of a joint's motor about the stage's z.
+    pub fn motor_rates(&self, b: &Builder, k: usize) -> (Expr, Expr) {
+        match self.coupled[k] {
+            Some([speed, reference, _]) => (speed, reference),
+            None => (own_rate(b, &self.speeds, k), own_rate(b, &self.reference, k)),
+        }
+    }
+
+    /// The acceleration of a joint's motor about the stage's z.
+    pub fn motor_acceleration(&self, b: &Builder, k: usize) -> Expr {
+        match self.coupled[k] {
+            Some([_, _, acceleration]) => acceleration,
+            None => own_rate(b, &self.accelerations, k),
+        }
+    }
 }
 
 /// Runs from the base to the last link.
@@ -59,7 +80,12 @@ pub fn motions(b: &Builder, chain: &Chain, drive: &Drive) -> Vec<StageMotion> {
         let speeds = stage.coordinates(b, &drive.speeds);
         let reference = stage.coordinates(b, &drive.reference);
         let accelerations = stage.coordinates(b, &drive.accelerations);
-        let mut motion = StageMotion { before, speeds, reference, accelerations, links: Vec::new() };
+        let of_motor = |member: &Member| {
+            let rate = |rates: &[Expr]| member.coupled_rate(b, rates);
+            Some([rate(&drive.speeds)?, rate(&drive.reference)?, rate(&drive.accelerations)?])
+        };
+        let coupled = stage.members.iter().map(of_motor).collect();
+        let mut motion = StageMotion { before, speeds, reference, accelerations, links: Vec::new(), coupled };
         motion.links = match stage.kind {
             JointKind::Revolute => revolute(b, stage, &motion, acceleration, chain.form.link_to_link),
             JointKind::Prismatic => vec![prismatic(b, stage, &motion, acceleration)],
@@ -135,7 +161,7 @@ pub fn axis_rate(b: &Builder, before: &Spin, speed: Expr, reference: Expr) -> Ve
 }
 
 /// A joint's own rate from the rates of its stage's coordinates.
-pub fn own_rate(b: &Builder, coordinates: &[Expr], k: usize) -> Expr {
+fn own_rate(b: &Builder, coordinates: &[Expr], k: usize) -> Expr {
     let inner = k.checked_sub(1).map_or(Expr::ZERO, |inner| coordinates[inner]);
     b.sub(&coordinates[k], &inner)
 }

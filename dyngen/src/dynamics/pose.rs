@@ -8,7 +8,7 @@ use super::stage::{Chain, back_x, plus, scaled};
 use crate::arm::{Convention, JointKind};
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
-use crate::lagrangian::elements::{ArmElements, JointElements, ToolElements, turn_x};
+use crate::lagrangian::elements::{ArmElements, JointElements, PlacementElements, turn_x};
 
 /// A frame in the base: its axes as columns, and its origin.
 #[derive(Clone, Copy, Debug)]
@@ -38,12 +38,12 @@ impl Pose {
         Pose { axes: [x, y, z], origin: moved(b, &self.origin, joint.shift, &z) }
     }
 
-    /// The tool's frame, from the last link's: a shift, then Rz(yaw)·Ry(pitch)·Rx(roll).
-    fn tool(&self, b: &Builder, tool: &ToolElements<Expr>) -> Pose {
+    /// A frame that is placed in this one: a shift, then Rz(yaw)·Ry(pitch)·Rx(roll).
+    fn placed(&self, b: &Builder, frame: &PlacementElements<Expr>) -> Pose {
         let shifted = |origin: Vector, (axis, length): (&Vector, &Expr)| moved(b, &origin, *length, axis);
-        let origin = self.axes.iter().zip(&tool.origin).fold(self.origin, shifted);
+        let origin = self.axes.iter().zip(&frame.origin).fold(self.origin, shifted);
         let [x, y, z] = self.axes;
-        let [(sr, cr), (sp, cp), (sy, cy)] = &tool.rpy;
+        let [(sr, cr), (sp, cp), (sy, cy)] = &frame.rpy;
         let (x, y) = turned(b, sy, cy, &x, &y);
         let (z, x) = turned(b, sp, cp, &z, &x);
         let (y, z) = turned(b, sr, cr, &y, &z);
@@ -62,9 +62,24 @@ fn moved(b: &Builder, origin: &Vector, length: Expr, axis: &Vector) -> Vector {
     plus(b, origin, &scaled(b, length, axis))
 }
 
+/// The fixed frames at both ends of the chain.
+#[derive(Clone, Debug)]
+pub struct Ends {
+    /// Frame 0 in the root link's.
+    pub base: PlacementElements<Expr>,
+    /// The tool's in the last link's.
+    pub tool: PlacementElements<Expr>,
+}
+
+/// The frame of every joint before its screw about z, and the tool's.
+fn poses(b: &Builder, arm: &ArmElements<Expr>, ends: &Ends) -> (Vec<Pose>, Pose) {
+    let (joints, last) = links(b, arm, &ends.base);
+    (joints, last.placed(b, &ends.tool))
+}
+
 /// The frame of every joint before its screw about z, and of the last link.
-fn poses(b: &Builder, arm: &ArmElements<Expr>) -> (Vec<Pose>, Pose) {
-    let mut state = Pose::BASE;
+fn links(b: &Builder, arm: &ArmElements<Expr>, base: &PlacementElements<Expr>) -> (Vec<Pose>, Pose) {
+    let mut state = Pose::BASE.placed(b, base);
     let mut joints = Vec::with_capacity(arm.joints.len());
     for joint in &arm.joints {
         if arm.convention == Convention::Modified {
@@ -79,9 +94,9 @@ fn poses(b: &Builder, arm: &ArmElements<Expr>) -> (Vec<Pose>, Pose) {
     (joints, state)
 }
 
-/// The homogeneous transform of the tool's frame to the base, row-major 4 × 4.
-pub fn forward_kinematics(b: &Builder, arm: &ArmElements<Expr>, tool: &ToolElements<Expr>) -> Vec<Expr> {
-    let last = poses(b, arm).1.tool(b, tool);
+/// The homogeneous transform of the tool's frame to the base (the root link's frame), row-major 4 × 4.
+pub fn forward_kinematics(b: &Builder, arm: &ArmElements<Expr>, ends: &Ends) -> Vec<Expr> {
+    let last = poses(b, arm, ends).1;
     let mut rows = Vec::with_capacity(16);
     for i in 0..3 {
         rows.extend([last.axes[0][i], last.axes[1][i], last.axes[2][i], last.origin[i]]);
@@ -92,9 +107,8 @@ pub fn forward_kinematics(b: &Builder, arm: &ArmElements<Expr>, tool: &ToolEleme
 
 /// The geometric Jacobian, row-major 6 × n: velocity of the tool's origin above its angular velocity, in base
 /// axes.
-pub fn jacobian(b: &Builder, arm: &ArmElements<Expr>, tool: &ToolElements<Expr>) -> Vec<Expr> {
-    let (joints, last) = poses(b, arm);
-    let last = last.tool(b, tool);
+pub fn jacobian(b: &Builder, arm: &ArmElements<Expr>, ends: &Ends) -> Vec<Expr> {
+    let (joints, last) = poses(b, arm, ends);
     let n = joints.len();
     let mut rows = vec![Expr::ZERO; 6 * n];
     for (j, (pose, joint)) in joints.iter().zip(&arm.joints).enumerate() {
@@ -120,10 +134,10 @@ pub fn jacobian_rate_times_speed(
     arm: &ArmElements<Expr>,
     chain: &Chain,
     link: &LinkGeometry<Expr>,
-    tool: &ToolElements<Expr>,
+    ends: &Ends,
     drive: &Drive,
 ) -> Vec<Expr> {
-    let (_, last) = poses(b, arm);
+    let (_, last) = links(b, arm, &ends.base);
     let motions = motions(b, chain, drive);
     let Some(motion) = motions.last().and_then(|stage| stage.links.last()) else {
         return vec![Expr::ZERO; 6];
@@ -134,7 +148,7 @@ pub fn jacobian_rate_times_speed(
         std::array::from_fn(|i| b.dot(&[last.axes[0][i], last.axes[1][i], last.axes[2][i]], &v))
     };
     // The link's own spin carries the tool's origin along.
-    let place = plus(b, &link.file_origin, &back_x(b, link.file_turn, &tool.origin));
+    let place = plus(b, &link.file_origin, &back_x(b, link.file_turn, &ends.tool.origin));
     let acceleration = plus(b, &motion.acceleration, &motion.spin.times(b, &place));
     let turning = std::array::from_fn(|axis| motion.spin.alpha(b, axis));
     [to_base(&acceleration), to_base(&turning)].concat()

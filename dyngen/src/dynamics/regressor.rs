@@ -3,7 +3,7 @@
 use super::body::{Vector, ZERO};
 use super::chain::LinkGeometry;
 use super::inverse::entry_wrench;
-use super::motion::{Drive, LinkMotion, StageMotion, axis_rate, motions, own_rate};
+use super::motion::{Drive, LinkMotion, StageMotion, axis_rate, motions};
 use super::spin::{Spin, turned_tensor};
 use super::stage::{Chain, STRAIGHT, SinCos, Stage, back_x, back_z, plus, scaled};
 use super::wrench::Wrench;
@@ -305,7 +305,8 @@ fn tensor_moment(b: &Builder, tensor: &[Vector; 3], motion: &LinkMotion) -> Vect
 }
 
 /// The torques of a unit of a rotor's inertia: on its own joint k·(k q̈ + z·α of the link before), and on
-/// that link the rate of the rotor's own angular momentum, k·(q̈ z + q̇ ω×z).
+/// that link the rate of the rotor's own angular momentum, k·(q̈ z + q̇ ω×z). Where the motor turns with
+/// several joints its velocity stands for q̇, and its torque acts on each of them.
 fn rotor_column(
     b: &Builder,
     chain: &Chain,
@@ -317,8 +318,8 @@ fn rotor_column(
     let Some((s, k)) = place(&chain.stages, joint) else { return coordinates };
     let (stage, motion) = (&chain.stages[s], &motions[s]);
     let Some(ratio) = stage.members[k].ratio else { return coordinates };
-    let ddq = own_rate(b, &motion.accelerations, k);
-    let [speed, reference] = [&motion.speeds, &motion.reference].map(|rates| own_rate(b, rates, k));
+    let ddq = motion.motor_acceleration(b, k);
+    let (speed, reference) = motion.motor_rates(b, k);
     let mut moment = scaled(b, ratio, &axis_rate(b, &motion.before, speed, reference));
     moment[2] = b.mul(&ratio, &ddq);
     for (j, axis) in before[s].iter().enumerate() {
@@ -332,7 +333,10 @@ fn rotor_column(
     }
     let mut torques = of_joints(b, chain, &coordinates);
     let own = b.mul(&ratio, &b.add(&b.mul(&ratio, &ddq), &alpha));
-    torques[joint] = if stage.members[k].reversed { -own } else { own };
+    match stage.members[k].coupled {
+        Some(_) => stage.members[k].add_coupled_torque(b, own, &mut torques),
+        None => torques[joint] = if stage.members[k].reversed { -own } else { own },
+    }
     torques
 }
 

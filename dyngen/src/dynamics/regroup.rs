@@ -146,6 +146,9 @@ impl Source<Constant> for Constants<'_> {
     fn ratio(&mut self, _: usize) -> Constant {
         self.field.integer(1)
     }
+    fn coupling(&mut self, factor: &Rational) -> Constant {
+        self.number(factor)
+    }
     fn gravity(&mut self, axis: usize) -> Constant {
         self.number(&self.arm.gravity[axis])
     }

@@ -4,6 +4,7 @@ use super::body::{Vector, ZERO};
 use super::chain::{self, LinkGeometry, Origins};
 use crate::arm::{Arm, JointKind};
 use crate::exact::algebra::Algebra;
+use crate::exact::rational::Rational;
 use crate::graph::{Builder, Expr, Input, JointSum};
 use crate::lagrangian::elements::ArmElements;
 
@@ -58,6 +59,8 @@ pub struct Member {
     pub reach: Vector,
     /// Gear ratio of its rotor.
     pub ratio: Option<Expr>,
+    /// Where its motor turns with several joints: how fast about the chain's z for a unit of each joint's velocity.
+    pub coupled: Option<Vec<(usize, Expr)>>,
 }
 
 /// Joints with parallel axes, or one prismatic joint.
@@ -135,7 +138,11 @@ fn stage(
             };
             let step = if i == first { angle } else { sum_of_angles(b, arm, links, i..i + 1) };
             let LinkGeometry { reversed, reach, .. } = links[i];
-            Member { joint: i, reversed, angle, step, reach, ratio: elements.joints[i].ratio }
+            let about_z = |(joint, factor): (usize, Rational)| {
+                (joint, b.constant(&if reversed { -factor } else { factor }))
+            };
+            let coupled = arm.coupled_motor(i).map(|row| row.into_iter().map(about_z).collect());
+            Member { joint: i, reversed, angle, step, reach, ratio: elements.joints[i].ratio, coupled }
         })
         .collect();
     let shift = match kind {
@@ -171,6 +178,21 @@ fn sum_of_angles(
         2 => (-s, -c),
         3 => (-c, s),
         _ => (s, c),
+    }
+}
+
+impl Member {
+    /// How fast its motor turns about the chain's z, for rates of the joints, where it turns with several.
+    pub fn coupled_rate(&self, b: &Builder, of_joint: &[Expr]) -> Option<Expr> {
+        let row = self.coupled.as_ref()?;
+        Some(row.iter().fold(Expr::ZERO, |sum, (j, factor)| b.add(&sum, &b.mul(factor, &of_joint[*j]))))
+    }
+
+    /// Adds to the joints' torques what a torque of its motor about the chain's z makes of them.
+    pub fn add_coupled_torque(&self, b: &Builder, torque: Expr, torques: &mut [Expr]) {
+        for (joint, factor) in self.coupled.iter().flatten() {
+            torques[*joint] = b.add(&torques[*joint], &b.mul(factor, &torque));
+        }
     }
 }
 

@@ -110,12 +110,22 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     }
     let friction = friction::items(&options.friction, model.arm().dof());
     let tests = if options.tests { tests::module(model, options)? } else { quote!() };
+    let joint_names = model.arm().has_joint_names().then(|| {
+        let names = model.arm().joint_names();
+        quote! {
+            /// The joints' names, in the order of q; where the arm file gives none, the joint's number from
+            /// 1.
+            pub const JOINT_NAMES: [&str; JOINTS] = [#(#names),*];
+        }
+    });
     let names_doc = docs::lines(&docs::parameters(set));
     Ok(quote! {
         use nalgebra::{ArrayStorage, SMatrix, SVector, SimdRealField};
 
         /// Number of joints.
         pub const JOINTS: usize = #n;
+
+        #joint_names
 
         /// Number of parameters.
         pub const PARAMETERS: usize = #p;

@@ -2,51 +2,62 @@
 
 use super::Options;
 use super::pose::Pose;
-use super::urdf::{Joint, Link, Origin, Robot};
+use super::urdf::{Joint, Link, Motor, Origin, Robot};
 use crate::arm::{JointKind, MAX_JOINTS};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::collections::BTreeMap;
 
+/// Downwards in a URDF's root link, m/s².
+const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+
 /// A serial arm at q = 0, everything in the root link's frame.
-pub(super) struct Chain {
-    pub(super) name: String,
-    pub(super) root: String,
-    pub(super) tip: String,
+pub(crate) struct Chain {
+    pub(crate) name: String,
+    pub(crate) root: String,
+    /// In the root link, m/s².
+    pub(crate) gravity: Vector3<f64>,
+    pub(crate) tip: String,
     /// The tip link's frame.
-    pub(super) tip_pose: Pose,
-    pub(super) joints: Vec<ChainJoint>,
-    pub(super) notes: Vec<String>,
+    pub(crate) tip_pose: Pose,
+    pub(crate) joints: Vec<ChainJoint>,
+    /// The robot's joints from root to tip, those that do not move too.
+    pub(crate) path: Vec<usize>,
+    pub(crate) notes: Vec<String>,
 }
 
 /// A joint that moves, with the body behind it.
-pub(super) struct ChainJoint {
-    pub(super) name: String,
-    pub(super) kind: JointKind,
+pub(crate) struct ChainJoint {
+    pub(crate) name: String,
+    pub(crate) kind: JointKind,
     /// A point on the axis, m.
-    pub(super) point: Vector3<f64>,
+    pub(crate) point: Vector3<f64>,
     /// The direction of the axis, of length 1.
-    pub(super) direction: Vector3<f64>,
-    pub(super) position: Option<[f64; 2]>,
-    pub(super) velocity: Option<f64>,
-    pub(super) torque: Option<f64>,
+    pub(crate) direction: Vector3<f64>,
+    pub(crate) position: Option<[f64; 2]>,
+    pub(crate) velocity: Option<f64>,
+    pub(crate) torque: Option<f64>,
+    /// What the file says of its drive.
+    pub(crate) motor: Option<Motor>,
     /// The links that move as one behind the joint.
-    pub(super) links: Vec<String>,
+    pub(crate) links: Vec<String>,
+    /// The frame of each of them.
+    pub(crate) poses: Vec<Pose>,
     /// Those of them that have mass.
-    pub(super) masses: Vec<Mass>,
+    pub(crate) masses: Vec<Mass>,
 }
 
 /// The inertia of one link.
-pub(super) struct Mass {
+pub(crate) struct Mass {
     /// kg
-    pub(super) mass: f64,
+    pub(crate) mass: f64,
     /// Centre of mass, m.
-    pub(super) centre: Vector3<f64>,
+    pub(crate) centre: Vector3<f64>,
     /// Inertia tensor about the centre of mass, kg·m².
-    pub(super) inertia: Matrix3<f64>,
+    pub(crate) inertia: Matrix3<f64>,
 }
 
 /// Reads the chain, or says every reason why there is none.
-pub(super) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<String>> {
+pub(crate) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<String>> {
     let mut tree = Tree::new(robot)?;
     tree.locked = locked(robot, options)?;
     if let Some(name) = &options.base {
@@ -118,9 +129,11 @@ pub(super) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<Strin
     Ok(Chain {
         name: robot.name.clone(),
         root: robot.links[tree.root].name.clone(),
+        gravity: robot.gravity.map_or(GRAVITY, Vector3::from),
         tip: robot.links[tip].name.clone(),
         tip_pose: pose,
         joints,
+        path,
         notes,
     })
 }
@@ -275,8 +288,7 @@ impl<'r> Tree<'r> {
                     ends.dedup();
                     return Err(format!(
                         "the robot is a tree: the joints {} all move on link '{}'; choose the end of the arm \
-                            with \
-                         --tip, such as {}",
+                            with --tip, such as {}",
                         joints.join(", "),
                         self.robot.links[body].name,
                         ends.join(", ")
@@ -346,7 +358,9 @@ impl Walk<'_> {
             position: (bounded && lower < upper).then_some([lower, upper]),
             velocity: (velocity > 0.0 && usable(velocity)).then_some(velocity),
             torque: (effort > 0.0 && usable(effort)).then_some(effort),
+            motor: joint.motor,
             links: Vec::new(),
+            poses: Vec::new(),
             masses: Vec::new(),
         });
         (pose, true)
@@ -384,8 +398,8 @@ impl Walk<'_> {
                     rigid.push((self.tree.child(*j), pose));
                 } else if !self.path.contains(j) {
                     self.notes.push(format!(
-                        "left out: joint '{}' on link '{}', with all that it carries: {} kg (--lock {}=0 keeps it \
-                         at a position)",
+                        "left out: joint '{}' on link '{}', with all that it carries: {} kg (--lock {}=0 \
+                         keeps it at a position)",
                         joint.name,
                         self.tree.robot.links[at].name,
                         self.tree.mass_below(self.tree.child(*j)),
@@ -402,6 +416,7 @@ impl Walk<'_> {
         if self.joints.is_empty() {
             return;
         }
+        self.notes.extend(link.note.clone());
         let place = format!("line {}: link '{}'", link.line, link.name);
         let (mass, [xx, xy, xz, yy, yz, zz]) = (link.mass, link.inertia);
         let tensor = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
@@ -413,6 +428,7 @@ impl Walk<'_> {
         let frame = self.origin(&link.origin, pose, &format!("{place}: inertial"));
         if let Some(joint) = self.joints.last_mut() {
             joint.links.push(link.name.clone());
+            joint.poses.push(*pose);
             if let Some(reason) = impossible(mass, &tensor) {
                 self.notes.push(format!("{place}: {reason}"));
             }
@@ -450,8 +466,8 @@ fn impossible(mass: f64, tensor: &Matrix3<f64>) -> Option<String> {
     }
     (most > least + middle + rounding).then(|| {
         format!(
-            "its inertia is that of no body: the principal moment {most:.3e} exceeds the sum of the other two, \
-             {:.3e}",
+            "its inertia is that of no body: the principal moment {most:.3e} exceeds the sum of the other \
+             two, {:.3e}",
             least + middle
         )
     })

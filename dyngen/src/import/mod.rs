@@ -2,16 +2,20 @@
 //!
 //! 1. `chain`: from the tree of links to one chain: fixed joints merged, everything at q = 0 in the root
 //!    link's frame.
-//! 2. `frames`: Denavit–Hartenberg frames on the joint axes, by their common normals.
-//! 3. `text`: the arm file, with the bodies' inertia moved into the new frames.
+//! 2. `rounding`: the nearest arm with right angles and without residues of lengths.
+//! 3. `frames`: Denavit–Hartenberg frames on the joint axes, by their common normals.
+//! 4. `text`: the arm file, with the bodies' inertia moved into the new frames.
 //!
 //! Joint positions keep their meaning: q of the arm file is the URDF's q, for position limits too.
 
-mod chain;
+pub(crate) mod chain;
 mod frames;
-mod pose;
+pub(crate) mod mjcf;
+mod orientation;
+pub(crate) mod pose;
+mod rounding;
 mod text;
-mod urdf;
+pub(crate) mod urdf;
 
 use crate::arm::{Arm, Convention, Parameter};
 use std::fmt;
@@ -29,10 +33,12 @@ pub struct Options {
     pub convention: Convention,
     /// Angles this close to a multiple of pi/12 are taken for it, rad.
     pub angle_tolerance: f64,
+    /// Whether every digit counts: else numbers that are rounded are taken for what they were rounded from.
+    pub exact: bool,
 }
 
 impl Default for Options {
-    /// The whole chain, modified convention, 1e-9 rad.
+    /// The whole chain, modified convention, 1e-9 rad, rounded numbers as they were meant.
     fn default() -> Self {
         Options {
             base: None,
@@ -40,6 +46,7 @@ impl Default for Options {
             tip: None,
             convention: Convention::Modified,
             angle_tolerance: 1e-9,
+            exact: false,
         }
     }
 }
@@ -94,15 +101,42 @@ impl std::error::Error for ImportError {}
 /// # Errors
 /// What is wrong, or why this is no arm, with the names of links and joints.
 pub fn urdf(text: &str, file: &str, options: &Options) -> Result<Imported, ImportError> {
+    imported(urdf::read(text).map_err(|e| unreadable("a URDF", file, &e))?, file, options)
+}
+
+/// The serial arm of a MuJoCo model (MJCF); `file` names the text in errors.
+///
+/// An armature becomes a rotor with the gear ratio of the joint's actuator, or 100 where the file has none.
+/// MuJoCo leaves out that a rotor turns with the link that carries it: k·Im, a hundredth of the armature
+/// then.
+///
+/// # Errors
+/// As [`urdf`].
+pub fn mjcf(text: &str, file: &str, options: &Options) -> Result<Imported, ImportError> {
+    imported(mjcf::read(text).map_err(|e| unreadable("a MuJoCo model", file, &e))?, file, options)
+}
+
+/// The serial arm of a URDF or of a MuJoCo model, whichever the text is.
+///
+/// # Errors
+/// As [`urdf`].
+pub fn any(text: &str, file: &str, options: &Options) -> Result<Imported, ImportError> {
+    if mjcf::is_mjcf(text) { mjcf(text, file, options) } else { urdf(text, file, options) }
+}
+
+fn unreadable(what: &str, file: &str, reasons: &str) -> ImportError {
+    let lines: Vec<String> = reasons.lines().map(|line| format!("{file}: not {what}: {line}")).collect();
+    ImportError::Unreadable(lines.join("\n"))
+}
+
+fn imported(robot: urdf::Robot, file: &str, options: &Options) -> Result<Imported, ImportError> {
     let refused = |reasons: Vec<String>| {
         ImportError::Refused(reasons.into_iter().map(|reason| format!("{file}: {reason}")).collect())
     };
-    let unreadable = |e: String| {
-        let lines: Vec<String> = e.lines().map(|line| format!("{file}: not a URDF: {line}")).collect();
-        ImportError::Unreadable(lines.join("\n"))
-    };
-    let robot = urdf::read(text).map_err(unreadable)?;
-    let chain = chain::chain(&robot, options).map_err(refused)?;
+    let mut chain = chain::chain(&robot, options).map_err(refused)?;
+    if !options.exact {
+        chain = meant(&robot, chain, options).map_err(refused)?;
+    }
     let frames = frames::place(&chain, options).map_err(|reason| refused(vec![reason]))?;
     let text = text::arm_file(&chain, &frames, file, options);
     let arm = Arm::parse(&text, file)
@@ -111,4 +145,26 @@ pub fn urdf(text: &str, file: &str, options: &Options) -> Result<Imported, Impor
     let heavy = chain.joints.iter().any(|joint| !joint.masses.is_empty());
     let values = if heavy { text::values(&chain, &frames) } else { Vec::new() };
     Ok(Imported { arm, text, values, base, notes: chain.notes })
+}
+
+/// The chain with rounded numbers taken for what they were rounded from, which its notes say.
+fn meant(robot: &urdf::Robot, written: chain::Chain, options: &Options) -> Result<chain::Chain, Vec<String>> {
+    let (nearest, moved) = rounding::nearest(robot, &written.path);
+    let mut chain = chain::chain(&nearest, options)?;
+    if !moved.is_empty() {
+        let (distance, turn) = rounding::difference(&written, &chain);
+        chain.notes.extend(moved.into_iter().map(|joint| format!("taken as meant: {joint}")));
+        chain.notes.push(format!(
+            "these numbers are rounded; taken as meant they move the tip by at most {} mm and {} mrad over \
+             the joints' ranges (--exact keeps every digit)",
+            short(1e3 * distance),
+            short(1e3 * turn)
+        ));
+    }
+    Ok(chain)
+}
+
+/// A size to three digits.
+fn short(x: f64) -> String {
+    if x == 0.0 || x >= 0.01 { format!("{x:.3}") } else { format!("{x:.2e}") }
 }

@@ -10,8 +10,8 @@ use crate::exact::rational;
 use nalgebra::{Matrix3, Vector3};
 use std::fmt::Write;
 
-/// Downwards in a URDF's root link, m/s².
-const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+/// A gear ratio for rotors of which only the inertia on the joint's side is known.
+const RATIO: f64 = 100.0;
 
 /// The arm file, with comments that say where everything comes from and what an arm file cannot hold.
 pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Options) -> String {
@@ -21,30 +21,19 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
         let _ = writeln!(text, "# {}", plain(&line));
     };
     comment(format!("Imported by dyngen from {file}: link '{}' to link '{}'.", chain.root, chain.tip));
-    comment(format!("Frame 0 in link '{}': {}.", chain.root, pose_text(&frames.base)));
-    comment(format!(
-        "Link '{}' in frame {}: {}.",
-        chain.tip,
-        frames.links.len(),
-        pose_text(&tip(chain, frames))
-    ));
-    comment(
-        "An arm file has no place for frame 0's pose: gravity is turned into it. Friction and meshes are \
-            left out."
-            .to_string(),
-    );
+    comment("Gravity is that of frame 0. Friction and meshes are left out.".to_string());
     chain.notes.iter().for_each(|note| comment(format!("Note: {note}.")));
     let convention = match options.convention {
         Convention::Standard => "standard",
         Convention::Modified => "modified",
     };
     let name = if chain.name.trim().is_empty() { "robot" } else { &chain.name };
-    let gravity = frames.base.rotation.transpose() * GRAVITY;
+    let gravity = frames.base.rotation.transpose() * chain.gravity;
     let gravity: Vec<String> = gravity.iter().map(|g| length(*g)).collect();
     let _ = write!(
         text,
         "name = \"{}\"\nconvention = \"{convention}\"\ngravity = [{}]\n",
-        plain(name).replace('\\', "\\\\").replace('"', "\\\""),
+        quoted(name),
         gravity.join(", ")
     );
     for (joint, row) in chain.joints.iter().zip(&frames.rows) {
@@ -55,15 +44,27 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
         };
         let _ = write!(
             text,
-            "\n# joint '{}', links {}\n[[joint]]\nkind = \"{kind}\"\na = {}\nalpha = {}\nd = {}\ntheta = \
+            "\n# links {}\n[[joint]]\nname = \"{}\"\nkind = \"{kind}\"\na = {}\nalpha = {}\nd = {}\ntheta = \
                 {}\n",
-            plain(&joint.name),
             plain(&joint.links.iter().map(|l| format!("'{l}'")).collect::<Vec<_>>().join(", ")),
+            quoted(&joint.name),
             length(row.a),
             angle(row.alpha),
             length(row.d),
             angle(row.theta),
         );
+        if let Some(motor) = joint.motor {
+            if let Some(ratio) = ratio(joint) {
+                let _ = writeln!(text, "rotor_ratio = {ratio:?}  # armature {:?}", motor.armature);
+            }
+            if motor.damping != 0.0 || motor.friction != 0.0 {
+                let (damping, friction) = (motor.damping, motor.friction);
+                let _ = writeln!(
+                    text,
+                    "# damping {damping:?} N·m·s/rad, frictionloss {friction:?} N·m (or N·s/m, N)"
+                );
+            }
+        }
         if let Some([lower, upper]) = joint.position {
             let _ = writeln!(text, "position = [{lower:?}, {upper:?}]");
         }
@@ -73,19 +74,26 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
             }
         }
     }
-    let tip = tip(chain, frames);
-    if pose_text(&tip) != SAME {
-        let xyz: Vec<String> = tip.origin.iter().map(|x| length(*x)).collect();
-        let rpy = tip.rpy().map(|turn| angle(turn, options.angle_tolerance));
-        let _ = write!(
-            text,
-            "\n# link '{}'\n[tool]\nxyz = [{}]\nrpy = [{}]\n",
-            plain(&chain.tip),
-            xyz.join(", "),
-            rpy.join(", ")
-        );
-    }
+    placement(&mut text, &format!("frame 0 in link '{}'", chain.root), "base", &frames.base, options);
+    placement(
+        &mut text,
+        &format!("link '{}' in the last frame", chain.tip),
+        "tool",
+        &tip(chain, frames),
+        options,
+    );
     text
+}
+
+/// The table of a fixed frame, where it is another than the one it stands in.
+fn placement(text: &mut String, what: &str, table: &str, pose: &Pose, options: &Options) {
+    let xyz: Vec<String> = pose.origin.iter().map(|x| length(*x)).collect();
+    let rpy = pose.rpy().map(|turn| angle(turn, options.angle_tolerance));
+    if xyz.iter().chain(&rpy).any(|number| number != "0") {
+        let (xyz, rpy) = (xyz.join(", "), rpy.join(", "));
+        // A String takes every write.
+        let _ = write!(text, "\n# {}\n[{table}]\nxyz = [{xyz}]\nrpy = [{rpy}]\n", plain(what));
+    }
 }
 
 /// The tip link's frame in the last frame.
@@ -93,15 +101,23 @@ fn tip(chain: &Chain, frames: &Frames) -> Pose {
     frames.links.last().unwrap_or(&frames.base).see(&chain.tip_pose)
 }
 
-/// The ten inertial parameters of every link in its new frame.
+/// The gear ratio of a joint whose rotor has an inertia: its actuator's, or one that is usual.
+fn ratio(joint: &ChainJoint) -> Option<f64> {
+    let motor = joint.motor.filter(|motor| motor.armature != 0.0)?;
+    Some(motor.gear.unwrap_or(RATIO))
+}
+
+/// The inertial parameters of every link in its new frame.
 pub(super) fn values(chain: &Chain, frames: &Frames) -> Vec<(Parameter, f64)> {
     let links = chain.joints.iter().zip(&frames.links).enumerate();
     links
         .flat_map(|(link, (joint, frame))| {
             let values = link_values(joint, frame).map(|x| if x == 0.0 { 0.0 } else { x });
+            let armature = joint.motor.map_or(0.0, |motor| motor.armature);
+            let rotor = ratio(joint).map(|ratio| armature / (ratio * ratio));
             ParameterKind::ALL
                 .into_iter()
-                .zip(values)
+                .zip(values.into_iter().chain(rotor))
                 .map(move |(kind, value)| (Parameter { link, kind }, value))
         })
         .collect()
@@ -157,17 +173,9 @@ fn angle(value: f64, tolerance: f64) -> String {
     }
 }
 
-/// What is said of a pose that is none.
-const SAME: &str = "the same";
-
-/// A pose as a URDF would say it.
-fn pose_text(pose: &Pose) -> String {
-    let list = |values: &[f64]| values.iter().map(|x| length(*x)).collect::<Vec<_>>().join(", ");
-    let (origin, rpy) = (list(pose.origin.as_slice()), list(&pose.rpy()));
-    if origin == "0, 0, 0" && rpy == "0, 0, 0" {
-        return SAME.to_string();
-    }
-    format!("xyz = [{origin}] m, rpy = [{rpy}] rad")
+/// A name between the quotation marks of TOML.
+fn quoted(name: &str) -> String {
+    plain(name).replace('\\', "\\\\").replace('"', "\\\"")
 }
 
 /// Names as they may stand in a comment or a text.

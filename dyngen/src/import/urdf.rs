@@ -4,51 +4,70 @@
 use roxmltree::{Document, Error, Node, ParsingOptions};
 
 /// The links and joints of a robot.
-#[derive(Debug, Default)]
-pub(super) struct Robot {
-    pub(super) name: String,
-    pub(super) links: Vec<Link>,
-    pub(super) joints: Vec<Joint>,
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Robot {
+    pub(crate) name: String,
+    pub(crate) links: Vec<Link>,
+    pub(crate) joints: Vec<Joint>,
+    /// Gravity in the root link, where the file says it, m/s².
+    pub(crate) gravity: Option<[f64; 3]>,
 }
 
 /// A link, with zeros where it has no `<inertial>`.
-#[derive(Debug)]
-pub(super) struct Link {
-    pub(super) name: String,
+#[derive(Clone, Debug)]
+pub(crate) struct Link {
+    pub(crate) name: String,
     /// In the file, from 1.
-    pub(super) line: u32,
+    pub(crate) line: u32,
     /// Of the centre of mass and the axes of the inertia tensor in the link's frame.
-    pub(super) origin: Origin,
+    pub(crate) origin: Origin,
     /// kg
-    pub(super) mass: f64,
+    pub(crate) mass: f64,
     /// ixx, ixy, ixz, iyy, iyz, izz, kg·m²
-    pub(super) inertia: [f64; 6],
+    pub(crate) inertia: [f64; 6],
+    /// What may surprise, where it takes part in the dynamics.
+    pub(crate) note: Option<String>,
 }
 
 /// A joint between two links.
-#[derive(Debug)]
-pub(super) struct Joint {
-    pub(super) name: String,
+#[derive(Clone, Debug)]
+pub(crate) struct Joint {
+    pub(crate) name: String,
     /// In the file, from 1.
-    pub(super) line: u32,
-    pub(super) kind: String,
-    pub(super) parent: String,
-    pub(super) child: String,
-    pub(super) origin: Origin,
-    pub(super) axis: [f64; 3],
-    pub(super) lower: f64,
-    pub(super) upper: f64,
-    pub(super) effort: f64,
-    pub(super) velocity: f64,
+    pub(crate) line: u32,
+    pub(crate) kind: String,
+    pub(crate) parent: String,
+    pub(crate) child: String,
+    pub(crate) origin: Origin,
+    pub(crate) axis: [f64; 3],
+    pub(crate) lower: f64,
+    pub(crate) upper: f64,
+    pub(crate) effort: f64,
+    pub(crate) velocity: f64,
     /// The joint whose position it follows.
-    pub(super) mimic: Option<String>,
+    pub(crate) mimic: Option<String>,
+    /// What a MuJoCo model says of its drive.
+    pub(crate) motor: Option<Motor>,
+}
+
+/// A joint's drive in a MuJoCo model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Motor {
+    /// Inertia of the rotor on the joint's side of the gear, kg·m² or kg.
+    pub(crate) armature: f64,
+    /// N·m·s/rad or N·s/m
+    pub(crate) damping: f64,
+    /// N·m or N
+    pub(crate) friction: f64,
+    /// Gear ratio of the joint's actuator, where it has one.
+    pub(crate) gear: Option<f64>,
 }
 
 /// A pose: m, and roll, pitch, yaw in rad.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Origin {
-    pub(super) xyz: [f64; 3],
-    pub(super) rpy: [f64; 3],
+pub(crate) struct Origin {
+    pub(crate) xyz: [f64; 3],
+    pub(crate) rpy: [f64; 3],
 }
 
 /// A larger file is no robot.
@@ -59,7 +78,7 @@ const DEEPEST: usize = 100;
 const PREFIXES: usize = 20;
 
 /// Reads a URDF, or says what is wrong with it, one line for each error.
-pub(super) fn read(text: &str) -> Result<Robot, String> {
+pub(crate) fn read(text: &str) -> Result<Robot, String> {
     if text.len() > LARGEST_FILE {
         return Err("larger than 64 MiB".to_string());
     }
@@ -95,7 +114,7 @@ fn declared(text: &str, prefix: &str) -> Option<String> {
 }
 
 /// XML readers follow nesting by recursion.
-fn nested(text: &str) -> Result<(), String> {
+pub(crate) fn nested(text: &str) -> Result<(), String> {
     let mut depth = 0usize;
     for piece in text.split('<').skip(1) {
         let tag = piece.split('>').next().unwrap_or("");
@@ -165,7 +184,7 @@ impl<'d, 'i> Reader<'d, 'i> {
         let tensor = inertial.and_then(|i| child(i, "inertia"));
         let inertia = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
             .map(|key| tensor.map_or(0.0, |t| self.number(t, key, &place)));
-        Some(Link { name, line: self.line(node), origin, mass, inertia })
+        Some(Link { name, line: self.line(node), origin, mass, inertia, note: None })
     }
 
     fn joint(&mut self, node: Node<'d, 'i>) -> Option<Joint> {
@@ -201,6 +220,7 @@ impl<'d, 'i> Reader<'d, 'i> {
             effort,
             velocity,
             mimic,
+            motor: None,
             name,
         })
     }

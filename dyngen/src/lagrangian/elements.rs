@@ -1,19 +1,28 @@
 //! The quantities of an arm's kinematics as elements of an algebra.
 
-use crate::arm::{Angle, Arm, Convention, JointKind};
+use crate::arm::{Angle, Arm, Convention, JointKind, Placement};
 use crate::exact::algebra::Algebra;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::{AngleSymbols, Trig};
 use num_traits::Zero;
 
 /// The arm's angles whose sine and cosine are no rationals: twists, the fixed angles of prismatic joints, and
-/// the tool's.
+/// those of the tool and the base.
 pub fn angle_symbols(arm: &Arm) -> AngleSymbols {
-    let of_joints = arm.joints.iter().flat_map(|joint| {
+    let fixed = arm.tool.iter().chain(&arm.base).flat_map(|frame| &frame.rpy);
+    AngleSymbols::collect(joint_angles(arm).chain(fixed))
+}
+
+/// Whether such angles are among the joints', so that they take part in the dynamics.
+pub fn has_joint_symbols(arm: &Arm) -> bool {
+    !AngleSymbols::collect(joint_angles(arm)).angles.is_empty()
+}
+
+fn joint_angles(arm: &Arm) -> impl Iterator<Item = &Angle> {
+    arm.joints.iter().flat_map(|joint| {
         let fixed = (joint.kind == JointKind::Prismatic).then_some(&joint.theta);
         std::iter::once(&joint.alpha).chain(fixed)
-    });
-    AngleSymbols::collect(of_joints.chain(arm.tool.iter().flat_map(|tool| &tool.rpy)))
+    })
 }
 
 /// One joint's quantities.
@@ -29,6 +38,8 @@ pub struct JointElements<V> {
     pub shift: V,
     /// Joint speed q̇.
     pub speed: V,
+    /// Speed of the joint's motor on the joint's side of its gear: q̇ unless a transmission couples it.
+    pub motor_speed: V,
     /// Link length a.
     pub a: V,
     /// Sine of the twist.
@@ -50,27 +61,27 @@ pub struct ArmElements<V> {
     pub joints: Vec<JointElements<V>>,
 }
 
-/// The tool's frame in the last link's.
+/// The place of a frame in another: the tool's in the last link's, frame 0's in the root link's.
 #[derive(Clone, Debug)]
-pub struct ToolElements<V> {
+pub struct PlacementElements<V> {
     /// Its origin.
     pub origin: [V; 3],
     /// Sine and cosine of roll, pitch and yaw.
     pub rpy: [(V, V); 3],
 }
 
-impl<V: Clone> ToolElements<V> {
-    /// Builds the elements of an arm's tool; without a tool those of the last link's own frame.
+impl<V: Clone> PlacementElements<V> {
+    /// Builds the elements of a placement; without one those of the same frame.
     pub fn build<A: Algebra<Value = V>>(
         algebra: &A,
-        arm: &Arm,
+        placement: Option<&Placement>,
         symbols: &AngleSymbols,
         length: impl Fn(&Rational) -> V,
         symbol: impl Fn(usize, bool) -> V,
     ) -> Self {
-        let Some(tool) = &arm.tool else {
+        let Some(placement) = placement else {
             let (zero, one) = (algebra.integer(0), algebra.integer(1));
-            return ToolElements {
+            return PlacementElements {
                 origin: std::array::from_fn(|_| zero.clone()),
                 rpy: std::array::from_fn(|_| (zero.clone(), one.clone())),
             };
@@ -83,7 +94,8 @@ impl<V: Clone> ToolElements<V> {
                 constant(algebra, cos, &mut |i, s| symbol(i, s)),
             )
         };
-        ToolElements { origin: tool.xyz.each_ref().map(length), rpy: tool.rpy.each_ref().map(turn) }
+        let (origin, rpy) = (placement.xyz.each_ref().map(length), placement.rpy.each_ref().map(turn));
+        PlacementElements { origin, rpy }
     }
 }
 
@@ -117,6 +129,8 @@ pub trait Source<V> {
     fn d(&mut self, joint: usize) -> V;
     /// Gear ratio.
     fn ratio(&mut self, joint: usize) -> V;
+    /// How fast a motor turns with a joint, an entry of the transmission's matrix; a constant of the arm.
+    fn coupling(&mut self, factor: &Rational) -> V;
     /// Component of gravity; asked for only where it is not zero.
     fn gravity(&mut self, axis: usize) -> V;
     /// Sine or cosine of an angle symbol.
@@ -147,17 +161,29 @@ impl<V: Clone> ArmElements<V> {
                 }
             };
             let (sin_alpha, cos_alpha) = symbols.sin_cos(&joint.alpha);
+            let speed = source.speed(i);
             joints.push(JointElements {
                 kind: joint.kind,
                 sin,
                 cos,
                 shift,
-                speed: source.speed(i),
+                speed: speed.clone(),
+                motor_speed: speed,
                 a: if joint.a.is_zero() { algebra.integer(0) } else { source.a(i) },
                 sin_alpha: constant(algebra, sin_alpha, &mut |m, s| source.symbol(m, s)),
                 cos_alpha: constant(algebra, cos_alpha, &mut |m, s| source.symbol(m, s)),
                 ratio: joint.rotor_ratio.is_some().then(|| source.ratio(i)),
             });
+        }
+        for motor in 0..joints.len() {
+            if let Some(row) = arm.coupled_motor(motor) {
+                let term = |(joint, factor): &(usize, Rational)| {
+                    algebra.mul(&source.coupling(factor), &joints[*joint].speed)
+                };
+                let terms: Vec<V> = row.iter().map(term).collect();
+                joints[motor].motor_speed =
+                    terms.iter().fold(algebra.integer(0), |sum, term| algebra.add(&sum, term));
+            }
         }
         let gravity = std::array::from_fn(|axis| {
             if arm.gravity[axis].is_zero() { algebra.integer(0) } else { source.gravity(axis) }

@@ -35,30 +35,40 @@ pub fn twice_lagrangian<A: Algebra>(alg: &A, arm: &ArmElements<A::Value>) -> Vec
     };
     let mut columns = Vec::with_capacity(arm.joints.len() * ParameterKind::ALL.len());
     for joint in &arm.joints {
-        let rotor = step(alg, arm.convention, joint, &mut state);
+        let axis = step(alg, arm.convention, joint, &mut state);
         columns.extend(link_columns(alg, &state));
-        columns.push(rotor);
+        columns.push(axis.rotor);
     }
     columns
 }
 
-/// From the motion of a link to that of the next one; returns the column of the rotor between them.
+/// What happens on a joint's axis in the link before it.
+#[derive(Clone, Debug)]
+pub struct Axis<V> {
+    /// The link's angular velocity about it.
+    pub omega: V,
+    /// The column of the rotor there.
+    pub rotor: V,
+}
+
+/// From the motion of a link to that of the next one; returns what happens on the axis between them.
 pub fn step<A: Algebra>(
     alg: &A,
     convention: Convention,
     joint: &JointElements<A::Value>,
     state: &mut Motion<A::Value>,
-) -> A::Value {
+) -> Axis<A::Value> {
     if convention == Convention::Modified {
         twist(alg, joint, state);
     }
     // Before it turns, z is the joint axis in axes that are fixed in the link before.
-    let rotor = rotor_column(alg, joint, &state.omega[2]);
+    let omega = state.omega[2].clone();
+    let rotor = rotor_column(alg, joint, &omega);
     advance(alg, joint, state);
     if convention == Convention::Standard {
         twist(alg, joint, state);
     }
-    rotor
+    Axis { omega, rotor }
 }
 
 /// Rx(α) Tx(a).
@@ -92,10 +102,11 @@ fn advance<A: Algebra>(alg: &A, joint: &JointElements<A::Value>, state: &mut Mot
     *moved = alg.add(moved, &joint.speed);
 }
 
-/// 2·(k q̇ (z·ω) + ½ k² q̇²), the rotor's terms of Eq. 5; zero without a rotor.
+/// 2·(k q̇ (z·ω) + ½ k² q̇²), the rotor's terms of Eq. 5, with the motor's speed for q̇; zero without a
+/// rotor.
 fn rotor_column<A: Algebra>(alg: &A, joint: &JointElements<A::Value>, omega_z: &A::Value) -> A::Value {
     let Some(ratio) = &joint.ratio else { return alg.integer(0) };
-    let spin = alg.mul(ratio, &joint.speed);
+    let spin = alg.mul(ratio, &joint.motor_speed);
     let coupling = alg.mul(&alg.integer(2), omega_z);
     alg.mul(&spin, &alg.add(&coupling, &spin))
 }

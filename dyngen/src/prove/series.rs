@@ -1,11 +1,11 @@
 //! The pose as a power series in time, modulo the prime: what kinematics is proven against.
 
 use super::point::Point;
-use crate::arm::Convention;
+use crate::arm::{Convention, Placement};
 use crate::exact::algebra::Algebra;
 use crate::exact::prime::Fp;
 use crate::exact::rational::Rational;
-use crate::lagrangian::elements::{ArmElements, Source, ToolElements};
+use crate::lagrangian::elements::{ArmElements, PlacementElements, Source};
 
 /// x₀ + x₁ t + x₂ t²
 type Series = [Fp; 3];
@@ -42,6 +42,23 @@ fn times(a: Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
 }
 
+/// The transforms that lead to a placed frame, in order; none without one.
+fn fixed(point: &Point<'_>, placement: &Option<Placement>) -> Vec<Matrix> {
+    let Some(placement) = placement else { return Vec::new() };
+    let alg = SeriesAlgebra;
+    let (zero, one) = (alg.integer(0), alg.integer(1));
+    let symbol = |index, sine| [point.sets.field.modular_symbol(index, sine), Fp::ZERO, Fp::ZERO];
+    let frame = PlacementElements::build(&alg, Some(placement), point.symbols, number, symbol);
+    let [x, y, z] = frame.origin;
+    let [(sr, cr), (sp, cp), (sy, cy)] = frame.rpy;
+    let last = [zero, zero, zero, one];
+    let shift = [[one, zero, zero, x], [zero, one, zero, y], [zero, zero, one, z], last];
+    let yaw = [[cy, alg.neg(&sy), zero, zero], [sy, cy, zero, zero], [zero, zero, one, zero], last];
+    let pitch = [[cp, zero, sp, zero], [zero, one, zero, zero], [alg.neg(&sp), zero, cp, zero], last];
+    let roll = [[one, zero, zero, zero], [zero, cr, alg.neg(&sr), zero], [zero, sr, cr, zero], last];
+    vec![shift, yaw, pitch, roll]
+}
+
 /// The tool frame's transform along a motion of constant joint speeds.
 pub(super) struct PoseSeries(Matrix);
 
@@ -51,8 +68,8 @@ impl PoseSeries {
         let elements =
             ArmElements::build(&alg, point.arm, point.symbols, &mut SeriesSource { point, speeds });
         let (zero, one) = (alg.integer(0), alg.integer(1));
-        let mut pose: Matrix =
-            std::array::from_fn(|i| std::array::from_fn(|j| if i == j { one } else { zero }));
+        let same: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { one } else { zero }));
+        let mut pose = fixed(point, &point.arm.base).iter().fold(same, times);
         for joint in &elements.joints {
             let (s, c, sa, ca) = (joint.sin, joint.cos, joint.sin_alpha, joint.cos_alpha);
             let about_z = [
@@ -75,34 +92,7 @@ impl PoseSeries {
                 pose = times(pose, &step);
             }
         }
-        let source = SeriesSource { point, speeds };
-        let length = |x: &Rational| source.number(x);
-        let tool = ToolElements::build(&alg, point.arm, point.symbols, length, |index, sine| {
-            [point.sets.field.modular_symbol(index, sine), Fp::ZERO, Fp::ZERO]
-        });
-        let [x, y, z] = tool.origin;
-        let [(sr, cr), (sp, cp), (sy, cy)] = tool.rpy;
-        let shift =
-            [[one, zero, zero, x], [zero, one, zero, y], [zero, zero, one, z], [zero, zero, zero, one]];
-        let yaw = [
-            [cy, alg.neg(&sy), zero, zero],
-            [sy, cy, zero, zero],
-            [zero, zero, one, zero],
-            [zero, zero, zero, one],
-        ];
-        let pitch = [
-            [cp, zero, sp, zero],
-            [zero, one, zero, zero],
-            [alg.neg(&sp), zero, cp, zero],
-            [zero, zero, zero, one],
-        ];
-        let roll = [
-            [one, zero, zero, zero],
-            [zero, cr, alg.neg(&sr), zero],
-            [zero, sr, cr, zero],
-            [zero, zero, zero, one],
-        ];
-        PoseSeries([shift, yaw, pitch, roll].iter().fold(pose, times))
+        PoseSeries(fixed(point, &point.arm.tool).iter().fold(pose, times))
     }
 
     /// The transform itself, row-major.
@@ -138,10 +128,8 @@ struct SeriesSource<'p, 'a> {
     speeds: &'p [Fp],
 }
 
-impl SeriesSource<'_, '_> {
-    fn number(&self, value: &Rational) -> Series {
-        [Fp::from_rational(value).unwrap_or(Fp::ZERO), Fp::ZERO, Fp::ZERO]
-    }
+fn number(value: &Rational) -> Series {
+    [Fp::from_rational(value).unwrap_or(Fp::ZERO), Fp::ZERO, Fp::ZERO]
 }
 
 impl Source<Series> for SeriesSource<'_, '_> {
@@ -157,12 +145,15 @@ impl Source<Series> for SeriesSource<'_, '_> {
         [self.speeds[joint], Fp::ZERO, Fp::ZERO]
     }
     fn a(&mut self, joint: usize) -> Series {
-        self.number(&self.point.arm.joints[joint].a)
+        number(&self.point.arm.joints[joint].a)
     }
     fn d(&mut self, joint: usize) -> Series {
-        self.number(&self.point.arm.joints[joint].d)
+        number(&self.point.arm.joints[joint].d)
     }
     fn ratio(&mut self, _: usize) -> Series {
+        [Fp::ZERO; 3]
+    }
+    fn coupling(&mut self, _: &Rational) -> Series {
         [Fp::ZERO; 3]
     }
     fn gravity(&mut self, _: usize) -> Series {

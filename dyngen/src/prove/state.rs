@@ -125,6 +125,9 @@ impl Source<Jet> for JetSource<'_, '_> {
         let ratio = self.state.point.arm.joints[joint].rotor_ratio.clone();
         ratio.map_or(Jet::constant(Fp::ZERO), |k| self.number(&k))
     }
+    fn coupling(&mut self, factor: &Rational) -> Jet {
+        self.number(factor)
+    }
     fn gravity(&mut self, axis: usize) -> Jet {
         match self.state.gravity {
             true => self.number(&self.state.point.arm.gravity[axis]),
@@ -179,6 +182,9 @@ impl Source<(Jet, Jet)> for DualSource<'_, '_> {
     }
     fn ratio(&mut self, joint: usize) -> (Jet, Jet) {
         Self::fixed(self.inner.ratio(joint))
+    }
+    fn coupling(&mut self, factor: &Rational) -> (Jet, Jet) {
+        Self::fixed(self.inner.coupling(factor))
     }
     fn gravity(&mut self, axis: usize) -> (Jet, Jet) {
         Self::fixed(self.inner.gravity(axis))

@@ -1,0 +1,169 @@
+#!/usr/bin/env python3
+"""Arms of public URDFs through dyngen, against Pinocchio: writes the table of docs/arms.md.
+
+    pip install pin numpy          # Pinocchio 4 from PyPI
+    cargo build --release -p dyngen
+    python3 benches/arms.py --dyngen target/release/dyngen --urdf FOLDER > docs/arms.md
+
+FOLDER holds URDF files. Of each the longest chain of joints that move on their own is taken. Time and memory are those
+of one `dyngen describe` process, which derives the sets, and builds and proves every function. The error is the largest
+difference of inverse dynamics over 20 random states, relative to the largest torque there, between `dyngen eval` on
+the arm as the file says it (--exact) and Pinocchio on the file.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pinocchio as pin
+
+MOVING = ("revolute", "continuous", "prismatic")
+STATES = 20
+LIMIT = 120  # seconds for one process
+
+
+def longest_chain(path):
+    """Names of the joints and the tip of the longest chain that an arm file can hold."""
+    try:
+        root = ET.parse(path).getroot()
+    except ET.ParseError:
+        return None
+    above = {}
+    for joint in root.findall("joint"):
+        if joint.get("type") and joint.find("child") is not None and joint.find("parent") is not None:
+            above[joint.find("child").get("link")] = joint
+    parents = {joint.find("parent").get("link") for joint in above.values()}
+    best = None
+    for link in (link.get("name") for link in root.findall("link")):
+        if link in parents:
+            continue
+        names, at, seen = [], link, set()
+        while at in above and at not in seen:
+            seen.add(at)
+            joint = above[at]
+            if joint.get("type") in MOVING and joint.find("mimic") is None:
+                names.append(joint.get("name"))
+            elif joint.get("type") != "fixed":
+                names = []
+                break
+            at = joint.find("parent").get("link")
+        if 0 < len(names) <= 16 and (best is None or len(names) > len(best[0])):
+            best = (names[::-1], link)
+    return best
+
+
+def run(command):
+    """Output, seconds and peak memory in MB of a process; no output where it fails or takes too long."""
+    start = time.monotonic()
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, preexec_fn=limited)
+    output = process.stdout.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    return (output if status == 0 else None), time.monotonic() - start, usage.ru_maxrss / 1024
+
+
+def limited():
+    """A process that takes too long, or too much memory, ends."""
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT))
+    resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+
+
+def torques(path, joints, states):
+    """Pinocchio's inverse dynamics of the chain; what hangs on other joints is massless, as for dyngen."""
+    model = pin.buildModelFromUrdf(str(path))
+    ids = [model.getJointId(name) for name in joints]
+    for j in range(1, model.njoints):
+        if j not in ids:
+            model.inertias[j] = pin.Inertia.Zero()
+    data = model.createData()
+    found = []
+    for state in states:
+        q, v, a = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv)
+        for j, (x, dx, ddx) in zip(ids, zip(*np.split(state, 3))):
+            joint = model.joints[j]
+            q[joint.idx_q : joint.idx_q + joint.nq] = (np.cos(x), np.sin(x)) if joint.nq == 2 else x
+            v[joint.idx_v], a[joint.idx_v] = dx, ddx
+        tau = pin.rnea(model, data, q, v, a)
+        found.append([tau[model.joints[j].idx_v] for j in ids])
+    return np.array(found)
+
+
+def error(dyngen, path, joints, tip, folder):
+    """Of inverse dynamics; none where the file has no inertia or Pinocchio does not read it."""
+    arm, values, file = folder / "exact.toml", folder / "exact.values.json", folder / "states.csv"
+    values.unlink(missing_ok=True)
+    if run([dyngen, "import", path, "--tip", tip, "--exact", "--force", "-o", arm])[0] is None:
+        return None
+    if not values.exists():
+        return None
+    n = len(joints)
+    states = np.random.default_rng(1).uniform(-1.5, 1.5, (STATES, 3 * n))
+    head = ",".join(f"{x}{i + 1}" for x in ("q", "dq", "ddq") for i in range(n))
+    np.savetxt(file, states, delimiter=",", header=head, comments="", fmt="%.17g")
+    command = [dyngen, "eval", arm, "--function", "inverse_dynamics", "--states", file, "--values", values]
+    output = run(command)[0]
+    try:
+        expected = torques(path, joints, states)
+    except ValueError:
+        return None
+    if output is None:
+        return None
+    found = np.array([line.split(",") for line in output.decode().split()[1:]], dtype=float)
+    return np.abs(found - expected).max() / max(np.abs(expected).max(), 1e-300)
+
+
+def row(dyngen, path, folder):
+    chain = longest_chain(path)
+    if chain is None:
+        return None
+    joints, tip = chain
+    arm = folder / "arm.toml"
+    if run([dyngen, "import", path, "--tip", tip, "--force", "-o", arm])[0] is None:
+        return (path.stem, len(joints), None)
+    output, seconds, memory = run([dyngen, "describe", arm, "--json"])
+    if output is None:
+        return (path.stem, len(joints), None)
+    sets = json.loads(output)["sets"]
+    return (path.stem, len(joints), (sets["minimal"]["count"], seconds, memory, error(dyngen, path, joints, tip, folder)))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--dyngen", required=True, help="the program")
+    parser.add_argument("--urdf", required=True, type=pathlib.Path, help="a folder of URDF files")
+    parser.add_argument("--joints", type=int, default=1, help="only chains of at least so many joints")
+    options = parser.parse_args()
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for path in sorted(options.urdf.glob("*.urdf")):
+            chain = longest_chain(path)
+            if chain is not None and len(chain[0]) >= options.joints:
+                rows.append(row(options.dyngen, path, pathlib.Path(folder)))
+                print(rows[-1], file=sys.stderr)
+    done = [r for r in rows if r[2]]
+    print("# Arms of public URDFs\n")
+    print(f"{len(done)} of {len(rows)} chains of at least {options.joints} joints are imported, derived and proven.")
+    print("Written by `benches/arms.py`, which says what it needs and how each column is measured: time and memory are those")
+    print("of one `dyngen describe` process on two shared cores. No error stands where a file has no inertia, or Pinocchio does")
+    print("not read it.\n")
+    print("| file | joints | minimal set | time [s] | memory [MB] | error against Pinocchio |")
+    print("|---|---|---|---|---|---|")
+    for name, joints, found in rows:
+        if found is None:
+            print(f"| {name} | {joints} | not an arm | | | |")
+            continue
+        count, seconds, memory, wrong = found
+        text = "" if wrong is None else f"{wrong:.0e}"
+        print(f"| {name} | {joints} | {count} | {seconds:.1f} | {memory:.0f} | {text} |")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,129 @@
+//! What was identified, from the files that say it: every link's parameters, what is known of them, friction.
+
+use crate::arm::sum::parse_sum;
+use crate::arm::{Arm, Parameter, ParameterKind};
+use crate::consistency::pseudo_inertia;
+use crate::values::Values;
+use serde_json::Value;
+
+/// Rounding error that an eigenvalue of a pseudo-inertia is allowed, relative to its largest entry.
+const ROUNDING: f64 = 1e-10;
+
+/// A joint's friction in the two terms that URDF and MJCF have, with standard errors where they are known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Friction {
+    /// N·m·s/rad or N·s/m
+    pub viscous: f64,
+    /// N·m or N: what saturating terms come to.
+    pub coulomb: f64,
+    /// Standard errors of both; that of a sum of terms is the sum of theirs, which it is at most.
+    pub std: [Option<f64>; 2],
+}
+
+/// What is to be written into a robot description.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Known {
+    /// Eleven parameters a link in the order of [`Arm::all_parameters`].
+    pub values: Vec<f64>,
+    /// For each link what is known of its parameters, in words: sums with values and standard errors.
+    pub words: Vec<Vec<String>>,
+    /// By joint.
+    pub friction: Option<Vec<Friction>>,
+}
+
+impl Known {
+    /// From a values file and, where there is one, a file with friction, by their texts and names.
+    ///
+    /// # Errors
+    /// What the files lack: each link needs all its parameters, and they must be those of a body.
+    pub fn read(arm: &Arm, values: (&str, &str), friction: Option<(&str, &str)>) -> Result<Known, String> {
+        let (text, file) = values;
+        // Text that is no JSON, and keys that stand twice, are told as for any values file.
+        let json: Value = serde_json::from_str(text).map_err(|e| format!("{file}: not valid JSON: {e}"))?;
+        let consistent = json.get("consistent").and_then(|c| c.get("parameters")).map(Value::to_string);
+        let given = Values::parse(consistent.as_deref().unwrap_or(text), file).map_err(|e| e.to_string())?;
+        let kept = arm.kept_parameters();
+        let unknown: Vec<&str> = given.names().filter(|n| !is_of(arm, n)).collect();
+        if !unknown.is_empty() {
+            return Err(format!(
+                "{file}: {} are sums of parameters, of which no single link's follow: take the \
+                 identified.json of `powerball identify`, which has a body for each link, or a values file \
+                 with every parameter of the arm",
+                unknown.join(", ")
+            ));
+        }
+        let mut all = vec![0.0; arm.all_parameters().len()];
+        let mut missing = Vec::new();
+        for parameter in &kept {
+            match given.get(&parameter.to_string()) {
+                Some(value) => all[parameter.index()] = value,
+                None if parameter.kind == ParameterKind::Im => {}
+                None => missing.push(parameter.to_string()),
+            }
+        }
+        if !missing.is_empty() {
+            return Err(format!("{file}: no value for {}", missing.join(", ")));
+        }
+        for link in 0..arm.dof() {
+            let ten: [f64; 10] = std::array::from_fn(|k| all[11 * link + k]);
+            let scale = ten.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+            let least = pseudo_inertia(&ten).symmetric_eigenvalues().min();
+            if least < -ROUNDING * scale {
+                return Err(format!(
+                    "{file}: link {}: no body has these parameters (its pseudo-inertia has the eigenvalue \
+                     {least:.3e}): `dyngen check` says why",
+                    link + 1
+                ));
+            }
+        }
+        let words = words(arm, &json);
+        let friction = friction.map(|(text, file)| read_friction(arm, text, file)).transpose()?;
+        Ok(Known { values: all, words, friction })
+    }
+}
+
+fn is_of(arm: &Arm, name: &str) -> bool {
+    Parameter::parse(name).is_some_and(|p| p.link < arm.dof())
+}
+
+/// The sums that an identification lists, with their errors, at each link whose parameters they hold.
+fn words(arm: &Arm, json: &Value) -> Vec<Vec<String>> {
+    let mut words = vec![Vec::new(); arm.dof()];
+    for entry in json.get("parameters").and_then(Value::as_array).into_iter().flatten() {
+        let (Some(name), Some(value)) = (entry["name"].as_str(), entry["value"].as_f64()) else { continue };
+        let links = match parse_sum(name) {
+            // The sum's first term is its own; others only add to it.
+            Ok(terms) => terms.first().map(|(p, _)| p.link).filter(|link| *link < arm.dof()),
+            Err(_) => None,
+        };
+        if let Some(link) = links {
+            let std = entry["std"].as_f64().map_or("not determined".to_string(), |s| format!("± {s:.3e}"));
+            words[link].push(format!("{name} = {value:.6e} {std}"));
+        }
+    }
+    words
+}
+
+/// Eq. 16 of the paper, γ1 tanh(γ2 q̇) + γ3 tanh(γ4 q̇) + γ5 q̇: its saturating terms come to γ1 + γ3.
+fn read_friction(arm: &Arm, text: &str, file: &str) -> Result<Vec<Friction>, String> {
+    let wrong = |what: String| format!("{file}: {what}");
+    let json: Value = serde_json::from_str(text).map_err(|e| wrong(format!("not valid JSON: {e}")))?;
+    let list = json.get("friction").and_then(Value::as_array);
+    let list = list.ok_or_else(|| wrong("it has no list 'friction'".to_string()))?;
+    let of_joint = |joint: usize| -> Result<Friction, String> {
+        let entry = list.iter().find(|e| e["joint"].as_u64() == Some(joint as u64 + 1));
+        let number = |key: &str| entry.and_then(|e| e[key].as_f64()).filter(|x| x.is_finite());
+        let (Some(first), Some(second), Some(viscous)) =
+            (number("gamma1"), number("gamma3"), number("gamma5"))
+        else {
+            return Err(wrong(format!("no gamma1, gamma3 and gamma5 for joint {}", joint + 1)));
+        };
+        if first + second < 0.0 || viscous < 0.0 {
+            return Err(wrong(format!("the friction of joint {} is negative", joint + 1)));
+        }
+        let std = |k: usize| entry.and_then(|e| e["std"][k].as_f64());
+        let coulomb_std = std(0).map(|s| s + std(2).unwrap_or(0.0));
+        Ok(Friction { viscous, coulomb: first + second, std: [std(4), coulomb_std] })
+    };
+    (0..arm.dof()).map(of_joint).collect()
+}

@@ -1,0 +1,137 @@
+//! Identified values in a copy of a MuJoCo model: inertials, damping, frictionloss, armature and ranges;
+//! every other byte stays.
+
+use super::body::Body;
+use super::edit::{Edits, child, comment, indentation, shortest};
+use super::known::{Friction, Known};
+use super::share::{self, Share};
+use super::urdf::Exported;
+use crate::arm::{Arm, Joint, JointKind};
+use crate::exact::rational::to_f64;
+use crate::import::chain;
+use crate::import::mjcf::{angles_are_radians, read};
+use crate::import::{ImportError, Options};
+use roxmltree::{Document, Node};
+
+/// Writes what is known of an arm into a copy of the MuJoCo model that it was imported from; `file` names it
+/// in errors, and `options` say base, tip and locked joints as they did for the import.
+///
+/// # Errors
+/// Where the file is no model of this arm, or has no body for a link that has mass.
+pub fn mjcf(
+    text: &str,
+    file: &str,
+    arm: &Arm,
+    known: &Known,
+    options: &Options,
+) -> Result<Exported, ImportError> {
+    let refused = |reasons: Vec<String>| {
+        ImportError::Refused(reasons.into_iter().map(|reason| format!("{file}: {reason}")).collect())
+    };
+    let unreadable = |e: String| ImportError::Unreadable(format!("{file}: not a MuJoCo model: {e}"));
+    let robot = read(text).map_err(unreadable)?;
+    let options = share::options(&robot, arm, options);
+    let chain = chain::chain(&robot, &options).map_err(refused)?;
+    let document = Document::parse(text).map_err(|e| unreadable(e.to_string()))?;
+    let mut writer = Writer { text, document: &document, edits: Edits::default() };
+    let lines = |name: &str| robot.links.iter().find(|link| link.name == name).map_or(0, |link| link.line);
+    let holds = |name: &str| writer.element("body", name, lines(name)).is_some();
+    let shares = share::shares(arm, &chain, &robot, known, &holds).map_err(|e| refused(vec![e]))?;
+    let degrees = !angles_are_radians(&document);
+    let mut notes = Vec::new();
+    for (i, Share { link, body, emptied, note }) in shares.into_iter().enumerate() {
+        writer.inertial(&link, lines(&link), &body, &known.words[i]);
+        let none = Body::of_parameters(&[0.0; 10]);
+        for other in &emptied {
+            writer.inertial(other, lines(other), &none, &[format!("its inertia is part of body '{link}'")]);
+        }
+        notes.extend(note);
+        let joint = &chain.joints[i];
+        let line = robot.joints.iter().find(|j| j.name == joint.name).map_or(0, |j| j.line);
+        let rotor = known.values[11 * i + 10];
+        let armature = arm.joints[i].rotor_ratio.as_ref().map(|k| to_f64(k).powi(2) * rotor);
+        let friction = known.friction.as_ref().map(|f| f[i]);
+        let old = (joint.position, degrees);
+        writer.joint((&joint.name, line), &arm.joints[i], friction, armature, old);
+    }
+    Ok(Exported { text: writer.edits.apply(text), notes })
+}
+
+struct Writer<'t, 'd> {
+    text: &'t str,
+    document: &'d Document<'t>,
+    edits: Edits,
+}
+
+impl<'t, 'd> Writer<'t, 'd> {
+    /// The element of that kind and name, or without a name in that line.
+    fn element(&self, kind: &str, name: &str, line: u32) -> Option<Node<'d, 't>> {
+        let place = |n: &Node<'d, 't>| self.document.text_pos_at(n.range().start).row;
+        let world = child(self.document.root_element(), "worldbody")?;
+        let mut all = world.descendants().filter(|n| n.has_tag_name(kind));
+        all.clone().find(|n| n.attribute("name") == Some(name)).or_else(|| {
+            all.find(|n| n.attribute("name").is_none() && place(n) == line && name.contains(" in line "))
+        })
+    }
+
+    fn inertial(&mut self, name: &str, line: u32, body: &Body, words: &[String]) {
+        let Some(node) = self.element("body", name, line) else { return };
+        let old = child(node, "inertial");
+        let at = old.map_or(node.range().start, |inertial| inertial.range().start);
+        let margin = indentation(self.text, at);
+        let margin = if old.is_some() { margin.to_string() } else { format!("{margin}  ") };
+        let (centre, t) = body.centre();
+        let comments: String = words.iter().map(|line| format!("{}\n{margin}", comment(line))).collect();
+        let list = |values: &[f64]| values.iter().map(|x| shortest(*x)).collect::<Vec<_>>().join(" ");
+        let new = format!(
+            "{}\n{margin}{comments}<inertial pos=\"{}\" mass=\"{}\" fullinertia=\"{}\"/>",
+            comment("identified by dyngen"),
+            list(centre.as_slice()),
+            shortest(body.mass),
+            list(&[t[(0, 0)], t[(1, 1)], t[(2, 2)], t[(0, 1)], t[(0, 2)], t[(1, 2)]])
+        );
+        match (old, node.first_child()) {
+            (Some(old), _) => self.edits.replace(old.range(), new),
+            // A body that moves has a joint in it.
+            (None, Some(first)) => self.edits.insert(first.range().start, format!("\n{margin}{new}")),
+            (None, None) => {}
+        }
+    }
+
+    fn joint(
+        &mut self,
+        (name, line): (&str, u32),
+        joint: &Joint,
+        friction: Option<Friction>,
+        armature: Option<f64>,
+        (old, degrees): (Option<[f64; 2]>, bool),
+    ) {
+        let Some(node) = self.element("joint", name, line) else { return };
+        if let Some(friction) = friction {
+            let error = |k: usize| friction.std[k].map_or("unknown".to_string(), |s| format!("{s:.3e}"));
+            let words = format!("dyngen: standard errors: damping {}, frictionloss {}", error(0), error(1));
+            self.edits.insert(node.range().start, comment(&words));
+            self.attribute(node, "damping", shortest(friction.viscous));
+            self.attribute(node, "frictionloss", shortest(friction.coulomb));
+        }
+        if let Some(armature) = armature {
+            self.attribute(node, "armature", shortest(armature));
+        }
+        let unit =
+            if degrees && joint.kind == JointKind::Revolute { 180.0 / std::f64::consts::PI } else { 1.0 };
+        if let Some([low, high]) = joint.position.filter(|p| Some(*p) != old) {
+            self.attribute(node, "range", format!("{} {}", shortest(low * unit), shortest(high * unit)));
+        }
+    }
+
+    /// Gives an element an attribute; others stay.
+    fn attribute(&mut self, node: Node<'d, 't>, key: &str, value: String) {
+        match node.attribute_node(key) {
+            Some(attribute) => self.edits.replace(attribute.range_value(), value),
+            None => {
+                let start = node.range().start + 1 + node.tag_name().name().len();
+                self.edits.insert(start, format!(" {key}=\"{value}\""));
+            }
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Which link of a robot description gets which body: those that move as one are one link of the arm.
+
+use super::body::{Body, apart, frames};
+use super::known::Known;
+use crate::arm::Arm;
+use crate::import::Options;
+use crate::import::chain::{Chain, ChainJoint};
+use crate::import::pose::Pose;
+use crate::import::urdf::Robot;
+use nalgebra::Matrix3;
+
+/// How far the arm's axes may be from the file's, m and rad: what taking rounded numbers as meant makes.
+const APART: f64 = 5e-3;
+
+/// What one link of the description gets.
+pub(super) struct Share {
+    pub(super) link: String,
+    /// In the link's frame.
+    pub(super) body: Body,
+    /// Links that are fixed to it whose inertia is in it.
+    pub(super) emptied: Vec<String>,
+    pub(super) note: Option<String>,
+}
+
+/// How the original is read: by the letter, and to the arm's last joint where no tip is given.
+pub(super) fn options(robot: &Robot, arm: &Arm, options: &Options) -> Options {
+    let mut options = Options { exact: true, ..options.clone() };
+    if options.tip.is_none() {
+        let last = arm.joints.last().and_then(|joint| joint.name.as_ref());
+        options.tip = robot.joints.iter().find(|j| Some(&j.name) == last).map(|joint| joint.child.clone());
+    }
+    options
+}
+
+/// The share of a link behind each joint; `holds` says whether a link of the description can hold an inertia.
+pub(super) fn shares(
+    arm: &Arm,
+    chain: &Chain,
+    robot: &Robot,
+    known: &Known,
+    holds: &dyn Fn(&str) -> bool,
+) -> Result<Vec<Share>, String> {
+    same_arm(arm, chain)?;
+    let (links, _) = frames(arm);
+    let each = chain.joints.iter().zip(&links).enumerate();
+    each.map(|(i, (joint, frame))| {
+        // From the arm's frame to the root link's.
+        let back = frame.rotation.transpose();
+        let back = Pose { rotation: back, origin: -(back * frame.origin) };
+        let body = Body::of_parameters(&known.values[11 * i..][..10]).seen_from(&back);
+        share(joint, &body, robot, holds)
+    })
+    .collect()
+}
+
+/// What is fixed to the first link keeps its own inertia, where that leaves the first one a body's.
+fn share(
+    joint: &ChainJoint,
+    body: &Body,
+    robot: &Robot,
+    holds: &dyn Fn(&str) -> bool,
+) -> Result<Share, String> {
+    let all = || joint.links.iter().zip(&joint.poses).filter(|(name, _)| holds(name));
+    let Some((name, pose)) = all().next() else {
+        if body.mass == 0.0 && body.tensor.iter().all(|x| *x == 0.0) {
+            let link = joint.links.first().cloned().unwrap_or_default();
+            return Ok(Share { link, body: *body, emptied: Vec::new(), note: None });
+        }
+        return Err(format!(
+            "joint '{}' and the one after it share a body: there is no place for the {} kg between them",
+            joint.name, body.mass
+        ));
+    };
+    let others: Vec<&String> = all().skip(1).map(|(name, _)| name).collect();
+    let rest = all().skip(1).fold(*body, |rest, (name, pose)| rest.less(&own(robot, name, pose)));
+    let link = name.clone();
+    if others.is_empty() || rest.is_possible() {
+        return Ok(Share { link, body: rest.seen_from(pose), emptied: Vec::new(), note: None });
+    }
+    let note = format!(
+        "link '{name}' has the whole inertia of {}: with theirs left on them it would be that of no body",
+        joint.links.join(", ")
+    );
+    let emptied = others.into_iter().cloned().collect();
+    Ok(Share { link, body: body.seen_from(pose), emptied, note: Some(note) })
+}
+
+/// The inertia that the description gives a link, in the root link's frame.
+fn own(robot: &Robot, name: &str, pose: &Pose) -> Body {
+    let link = robot.links.iter().find(|link| link.name == *name);
+    link.map_or(Body::of_parameters(&[0.0; 10]), |link| {
+        let [xx, xy, xz, yy, yz, zz] = link.inertia;
+        let tensor = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        let at = pose.then(&Pose::of(&link.origin, 1e-12));
+        let inertia = at.rotation * tensor * at.rotation.transpose();
+        Body::about_centre(link.mass, at.origin, &inertia)
+    })
+}
+
+/// The joints' names and axes must be the arm's.
+fn same_arm(arm: &Arm, chain: &Chain) -> Result<(), String> {
+    let names: Vec<&str> = chain.joints.iter().map(|joint| joint.name.as_str()).collect();
+    if names.len() != arm.dof() || arm.has_joint_names() && arm.joint_names() != names {
+        return Err(format!(
+            "its joints are {}, those of the arm {}: give --base, --tip and --lock as they were given to \
+             the import",
+            names.join(", "),
+            arm.joint_names().join(", ")
+        ));
+    }
+    let (_, axes) = frames(arm);
+    for (joint, axis) in chain.joints.iter().zip(&axes) {
+        let (distance, angle) = apart(axis, joint.kind, &joint.point, &joint.direction);
+        if distance > APART || angle > APART {
+            return Err(format!(
+                "joint '{}': its axis lies {:.3} mm and {:.3} mrad from that of the arm file, which is \
+                 another arm or was imported with another --base",
+                joint.name,
+                1e3 * distance,
+                1e3 * angle
+            ));
+        }
+    }
+    Ok(())
+}

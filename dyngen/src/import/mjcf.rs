@@ -1,0 +1,363 @@
+//! A MuJoCo model's bodies and joints as the links and joints of a robot.
+//!
+//! A body is a link; a body with several joints gets a link without mass between each two. Where a joint does
+//! not sit at the body's origin, a fixed joint leads back from it. What MuJoCo says of `compiler`, `default`
+//! classes and orientations: mujoco.readthedocs.io, XMLreference and modeling.
+
+use super::orientation::{Angles, turn};
+use super::pose::Pose;
+use super::urdf::{Joint, Link, Motor, Origin, Robot, nested};
+use nalgebra::{Matrix3, Vector3};
+use roxmltree::{Document, Node, ParsingOptions};
+use std::collections::BTreeMap;
+
+/// What the body that stands still is called in MuJoCo.
+const WORLD: &str = "world";
+/// Elements of which MuJoCo makes bodies when it compiles.
+const UNREADABLE: [&str; 5] = ["include", "attach", "replicate", "composite", "flexcomp"];
+
+/// Whether a text looks like a MuJoCo model.
+pub(super) fn is_mjcf(text: &str) -> bool {
+    let parsed =
+        Document::parse_with_options(text, ParsingOptions { allow_dtd: true, ..ParsingOptions::default() });
+    match parsed {
+        Ok(document) => document.root_element().has_tag_name("mujoco"),
+        Err(_) => text.contains("<mujoco") && !text.contains("<robot"),
+    }
+}
+
+/// Reads a model, or says what is wrong with it, one line for each error.
+pub(crate) fn read(text: &str) -> Result<Robot, String> {
+    nested(text)?;
+    let document = Document::parse(text).map_err(|e| format!("line {}: {e}", e.pos().row))?;
+    let root = document.root_element();
+    if !root.has_tag_name("mujoco") {
+        return Err(format!("its root element is <{}>, not <mujoco>", root.tag_name().name()));
+    }
+    let mut reader = Reader {
+        document: &document,
+        compiler: Compiler::default(),
+        classes: BTreeMap::new(),
+        gears: BTreeMap::new(),
+        robot: Robot { name: root.attribute("model").unwrap_or("").to_string(), ..Robot::default() },
+        errors: Vec::new(),
+    };
+    reader.model(root);
+    if reader.errors.is_empty() { Ok(reader.robot) } else { Err(reader.errors.join("\n")) }
+}
+
+/// Whether a model's angles are radians, not degrees.
+pub(crate) fn angles_are_radians(document: &Document<'_>) -> bool {
+    let compilers = elements(document.root_element()).filter(|n| n.has_tag_name("compiler"));
+    compilers.filter_map(|n| n.attribute("angle")).last() == Some("radian")
+}
+
+/// What `<compiler>` says of numbers.
+#[derive(Default)]
+struct Compiler {
+    angles: Angles,
+    /// Whether a joint with a range is limited without saying so; it is unless this is set.
+    no_auto_limits: bool,
+}
+
+struct Reader<'d, 'i> {
+    document: &'d Document<'i>,
+    compiler: Compiler,
+    /// Attributes of joints by class, with those of the classes around.
+    classes: BTreeMap<String, BTreeMap<String, String>>,
+    /// Gear of the actuator of a joint.
+    gears: BTreeMap<String, f64>,
+    robot: Robot,
+    errors: Vec<String>,
+}
+
+impl<'d, 'i> Reader<'d, 'i> {
+    fn line(&self, node: Node<'d, 'i>) -> u32 {
+        self.document.text_pos_at(node.range().start).row
+    }
+
+    fn error(&mut self, node: Node<'d, 'i>, message: impl std::fmt::Display) {
+        let line = self.line(node);
+        self.errors.push(format!("line {line}: {message}"));
+    }
+
+    fn model(&mut self, root: Node<'d, 'i>) {
+        let sections = |name: &'static str| elements(root).filter(move |n| n.has_tag_name(name));
+        for node in root.descendants().filter(|n| n.is_element() && UNREADABLE.contains(&n.tag_name().name()))
+        {
+            let name = node.tag_name().name();
+            self.error(
+                node,
+                format!(
+                    "<{name}> is not followed: save the compiled model first, with mujoco.mj_saveLastXML or \
+                     `compile model.xml whole.xml`"
+                ),
+            );
+        }
+        for node in sections("compiler") {
+            self.compiler(node);
+        }
+        self.robot.gravity = Some([0.0, 0.0, -9.81]);
+        for node in sections("option") {
+            if let Some(g) = self.numbers::<3>(node, "gravity") {
+                self.robot.gravity = Some(g);
+            }
+        }
+        for node in sections("default") {
+            self.class(node, "main", &BTreeMap::new());
+        }
+        for node in sections("actuator").flat_map(elements) {
+            if let (Some(joint), Some(gear)) = (node.attribute("joint"), node.attribute("gear")) {
+                let first = gear.split_whitespace().next().and_then(|g| g.parse::<f64>().ok());
+                self.gears.extend(first.filter(|g| g.abs() > 1.0).map(|g| (joint.to_string(), g.abs())));
+            }
+        }
+        self.robot.links.push(massless(WORLD, 1));
+        for node in sections("worldbody") {
+            self.children(node, WORLD, &Pose::identity(), "main");
+        }
+    }
+
+    fn compiler(&mut self, node: Node<'d, 'i>) {
+        match node.attribute("angle") {
+            Some("radian") => self.compiler.angles.radian = true,
+            Some("degree") | None => {}
+            Some(other) => {
+                self.error(node, format!("compiler: angle must be degree or radian, found '{other}'"))
+            }
+        }
+        if let Some(order) = node.attribute("eulerseq") {
+            let known = order.len() == 3 && order.chars().all(|c| "xyzXYZ".contains(c));
+            match known {
+                true => self.compiler.angles.order = order.to_string(),
+                false => {
+                    self.error(node, format!("compiler: eulerseq '{order}' is no sequence of three axes"))
+                }
+            }
+        }
+        self.compiler.no_auto_limits |= node.attribute("autolimits") == Some("false");
+        for key in ["settotalmass", "boundmass", "boundinertia"] {
+            if node.attribute(key).and_then(|x| x.trim().parse::<f64>().ok()).is_some_and(|x| x > 0.0) {
+                self.error(node, format!("compiler: {key} changes masses: save the compiled model first"));
+            }
+        }
+        if node.attribute("inertiafromgeom") == Some("true") {
+            self.error(node, "compiler: inertiafromgeom sets inertials aside: save the compiled model first");
+        }
+        if node.attribute("coordinate") == Some("global") {
+            self.error(node, "compiler: global coordinates are not read: save the compiled model first");
+        }
+    }
+
+    fn class(&mut self, node: Node<'d, 'i>, name: &str, around: &BTreeMap<String, String>) {
+        let name = node.attribute("class").unwrap_or(name);
+        let mut own = around.clone();
+        for joint in elements(node).filter(|n| n.has_tag_name("joint")) {
+            own.extend(joint.attributes().map(|a| (a.name().to_string(), a.value().to_string())));
+        }
+        self.classes.insert(name.to_string(), own.clone());
+        for inner in elements(node).filter(|n| n.has_tag_name("default")) {
+            self.class(inner, "main", &own);
+        }
+    }
+
+    /// The bodies of a body, or of a frame in it, which lies at `pose` in the body.
+    fn children(&mut self, node: Node<'d, 'i>, parent: &str, pose: &Pose, class: &str) {
+        for child in elements(node) {
+            match child.tag_name().name() {
+                "body" => self.body(child, parent, pose, class),
+                "frame" => {
+                    let inner = pose.then(&self.pose(child));
+                    let class = child.attribute("childclass").unwrap_or(class).to_string();
+                    self.children(child, parent, &inner, &class);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn body(&mut self, node: Node<'d, 'i>, parent: &str, pose: &Pose, class: &str) {
+        let line = self.line(node);
+        let name = match node.attribute("name") {
+            Some(name) => name.to_string(),
+            None => format!("body in line {line}"),
+        };
+        let class = node.attribute("childclass").unwrap_or(class).to_string();
+        // Where the next joint, or the body, sits in the link that it hangs on.
+        let mut at = pose.then(&self.pose(node));
+        let mut parent = parent.to_string();
+        let joints: Vec<Node<'d, 'i>> =
+            elements(node).filter(|n| n.has_tag_name("joint") || n.has_tag_name("freejoint")).collect();
+        for (k, joint) in joints.iter().enumerate() {
+            let link = format!("{name}, joint {}", k + 1);
+            at = self.joint(*joint, &parent, &link, &at, &class, &name);
+            self.robot.links.push(massless(&link, line));
+            parent = link;
+        }
+        self.robot.joints.push(fixed(&parent, &name, &at, line));
+        let link = self.inertial(node, &name, line);
+        self.robot.links.push(link);
+        self.children(node, &name, &Pose::identity(), &class);
+    }
+
+    /// Adds a joint of a body that lies at `at` in the link `parent`; gives the body's place in the link
+    /// behind it.
+    fn joint(
+        &mut self,
+        node: Node<'d, 'i>,
+        parent: &str,
+        child: &str,
+        at: &Pose,
+        class: &str,
+        body: &str,
+    ) -> Pose {
+        let line = self.line(node);
+        let name = match node.attribute("name") {
+            Some(name) => name.to_string(),
+            None => format!("{body}, joint in line {line}"),
+        };
+        let class = node.attribute("class").unwrap_or(class);
+        let mut all = self.classes.get(class).cloned().unwrap_or_default();
+        all.extend(node.attributes().map(|a| (a.name().to_string(), a.value().to_string())));
+        let place = format!("joint '{name}'");
+        let mut list = |key: &str, count: usize| -> Option<Vec<f64>> {
+            let text = all.get(key)?;
+            let numbers: Option<Vec<f64>> = text.split_whitespace().map(|t| t.parse().ok()).collect();
+            let found = numbers.filter(|n| n.len() == count && n.iter().all(|x| x.is_finite()));
+            if found.is_none() {
+                self.errors
+                    .push(format!("line {line}: {place}: {key} must be {count} numbers, found '{text}'"));
+            }
+            found
+        };
+        let three = |v: Option<Vec<f64>>, missing: [f64; 3]| v.map_or(missing, |v| [v[0], v[1], v[2]]);
+        let axis = three(list("axis", 3), [0.0, 0.0, 1.0]);
+        let point = Vector3::from(three(list("pos", 3), [0.0; 3]));
+        let range = list("range", 2);
+        let mut number = |key: &str| list(key, 1).map_or(0.0, |v| v[0]);
+        let (armature, damping, loss, reference) =
+            (number("armature"), number("damping"), number("frictionloss"), number("ref"));
+        let force = list("actuatorfrcrange", 2);
+        if reference != 0.0 {
+            self.error(
+                node,
+                format!("{place}: ref = {reference}: its position must be 0 where the model is drawn"),
+            );
+        }
+        let free = node.has_tag_name("freejoint");
+        let kind = match all.get("type").map(String::as_str) {
+            _ if free => "floating",
+            None | Some("hinge") => "revolute",
+            Some("slide") => "prismatic",
+            Some("free") => "floating",
+            Some(other) => other,
+        };
+        let limited = match all.get("limited").map(String::as_str) {
+            Some("true") => true,
+            Some("false") => false,
+            _ => !self.compiler.no_auto_limits,
+        };
+        let unit = if kind == "revolute" { self.compiler.angles.unit() } else { 1.0 };
+        let range = range.filter(|r| limited && r[0] < r[1]).map(|r| [r[0] * unit, r[1] * unit]);
+        let motor = Motor { armature, damping, friction: loss, gear: self.gears.get(&name).copied() };
+        let joint_at = Pose { origin: at.point(point), ..*at };
+        self.robot.joints.push(Joint {
+            name,
+            line,
+            kind: if kind == "revolute" && range.is_none() { "continuous" } else { kind }.to_string(),
+            parent: parent.to_string(),
+            child: child.to_string(),
+            origin: origin(&joint_at),
+            axis,
+            lower: range.map_or(0.0, |r| r[0]),
+            upper: range.map_or(0.0, |r| r[1]),
+            effort: force.map_or(0.0, |f| f[0].abs().min(f[1].abs())),
+            velocity: 0.0,
+            mimic: None,
+            motor: Some(motor),
+        });
+        Pose { rotation: Matrix3::identity(), origin: -point }
+    }
+
+    fn inertial(&mut self, node: Node<'d, 'i>, name: &str, line: u32) -> Link {
+        let Some(inertial) = elements(node).find(|n| n.has_tag_name("inertial")) else {
+            let shapes = elements(node).any(|n| n.has_tag_name("geom"));
+            let note = shapes.then(|| {
+                format!(
+                    "line {line}: body '{name}' has no <inertial>: MuJoCo takes its mass from geoms, here \
+                     it has none (mujoco.mj_saveLastXML writes inertials)"
+                )
+            });
+            return Link { note, ..massless(name, line) };
+        };
+        let pose = self.pose(inertial);
+        let [mass] = self.numbers::<1>(inertial, "mass").unwrap_or([0.0]);
+        let full = self.numbers::<6>(inertial, "fullinertia");
+        let [xx, yy, zz, xy, xz, yz] = full.unwrap_or_else(|| {
+            let [x, y, z] = self.numbers::<3>(inertial, "diaginertia").unwrap_or([0.0; 3]);
+            [x, y, z, 0.0, 0.0, 0.0]
+        });
+        Link {
+            name: name.to_string(),
+            line,
+            origin: origin(&pose),
+            mass,
+            inertia: [xx, xy, xz, yy, yz, zz],
+            note: None,
+        }
+    }
+
+    /// pos with quat, axisangle, euler, xyaxes or zaxis.
+    fn pose(&mut self, node: Node<'d, 'i>) -> Pose {
+        let place = Vector3::from(self.numbers::<3>(node, "pos").unwrap_or([0.0; 3]));
+        match turn(node, &self.compiler.angles) {
+            Ok(rotation) => Pose { rotation, origin: place },
+            Err(message) => {
+                self.error(node, message);
+                Pose { rotation: Matrix3::identity(), origin: place }
+            }
+        }
+    }
+
+    fn numbers<const N: usize>(&mut self, node: Node<'d, 'i>, key: &str) -> Option<[f64; N]> {
+        let text = node.attribute(key)?;
+        let numbers: Option<Vec<f64>> = text.split_whitespace().map(|t| t.parse().ok()).collect();
+        let finite = numbers.filter(|n| n.iter().all(|x| x.is_finite()));
+        let found = finite.and_then(|n| <[f64; N]>::try_from(n).ok());
+        if found.is_none() {
+            let element = node.tag_name().name();
+            self.error(node, format!("{key} of <{element}> must be {N} numbers, found '{text}'"));
+        }
+        found
+    }
+}
+
+fn elements<'d, 'i>(node: Node<'d, 'i>) -> impl Iterator<Item = Node<'d, 'i>> {
+    node.children().filter(|n| n.is_element())
+}
+
+fn massless(name: &str, line: u32) -> Link {
+    Link { name: name.to_string(), line, origin: Origin::default(), mass: 0.0, inertia: [0.0; 6], note: None }
+}
+
+fn fixed(parent: &str, child: &str, at: &Pose, line: u32) -> Joint {
+    Joint {
+        name: format!("{child}, fixed"),
+        line,
+        kind: "fixed".to_string(),
+        parent: parent.to_string(),
+        child: child.to_string(),
+        origin: origin(at),
+        axis: [1.0, 0.0, 0.0],
+        lower: 0.0,
+        upper: 0.0,
+        effort: 0.0,
+        velocity: 0.0,
+        mimic: None,
+        motor: None,
+    }
+}
+
+fn origin(pose: &Pose) -> Origin {
+    Origin { xyz: pose.origin.into(), rpy: pose.rpy() }
+}

@@ -1,0 +1,157 @@
+//! Numbers of a URDF that are rounded: 1.5708 for pi/2, 3e-8 m for nothing.
+//!
+//! Taken by the letter they make axes almost parallel and almost meet: parameters are then identifiable by
+//! residues alone, and common normals lie far away. The nearest arm with angles that are multiples of pi/12
+//! and lengths that are zero is what was meant, where each number that moves is one that writing it out
+//! rounds to the one that stands there, or is off by less than any arm is made or measured to.
+
+use super::chain::{Chain, ChainJoint};
+use super::pose::Pose;
+use super::urdf::{Joint, Robot};
+use crate::arm::JointKind;
+use crate::exact::angle::Angle;
+use crate::exact::prime::Draws;
+use crate::exact::rational;
+use nalgebra::{Rotation3, Vector3};
+use std::f64::consts::PI;
+
+/// What is smaller is residue of a calculation: m, rad, or a share of an axis.
+const RESIDUE: f64 = 1e-6;
+/// What is smaller is said nowhere: double precision makes it.
+const SILENT: f64 = 1e-12;
+/// Decimals with which a multiple of pi/2, of pi/6 or pi/4, and of pi/12 is recognised.
+const DECIMALS: [i32; 3] = [2, 3, 4];
+/// Poses at which two arms are compared.
+const POSES: usize = 500;
+
+/// The robot with the rounded numbers of some joints as they were meant, and what was moved: a line for each
+/// joint.
+pub(super) fn nearest(robot: &Robot, joints: &[usize]) -> (Robot, Vec<String>) {
+    let mut nearest = robot.clone();
+    let mut moved = Vec::new();
+    for index in joints {
+        let joint: &mut Joint = &mut nearest.joints[*index];
+        let mut changes = Vec::new();
+        for (axis, angle) in ["roll", "pitch", "yaw"].iter().zip(&mut joint.origin.rpy) {
+            if let Some((multiple, text)) = meant_angle(*angle) {
+                if (*angle - multiple).abs() > SILENT {
+                    changes.push(format!("{axis} {angle} is {text}"));
+                }
+                *angle = multiple;
+            }
+        }
+        let length = Vector3::from(joint.axis).norm();
+        let shares = joint.axis.iter_mut().map(|x| (x, length, "axis"));
+        for (x, unit, what) in joint.origin.xyz.iter_mut().map(|x| (x, 1.0, "origin")).chain(shares) {
+            if *x != 0.0 && x.abs() <= RESIDUE * unit {
+                if x.abs() > SILENT * unit {
+                    changes.push(format!("{x} of its {what} is 0"));
+                }
+                *x = 0.0;
+            }
+        }
+        if !changes.is_empty() {
+            moved.push(format!("joint '{}': {}", joint.name, changes.join(", ")));
+        }
+    }
+    (nearest, moved)
+}
+
+/// The multiple of pi/12 that an angle was rounded from, and its name.
+fn meant_angle(angle: f64) -> Option<(f64, String)> {
+    let count = (angle / (PI / 12.0)).round();
+    if count.abs() > 48.0 || angle == 0.0 {
+        return None;
+    }
+    let meant = count * PI / 12.0;
+    let kind = match count as i64 {
+        k if k % 6 == 0 => 0,
+        k if k % 2 == 0 || k % 3 == 0 => 1,
+        _ => 2,
+    };
+    let digits = decimals(angle);
+    let unit = 10f64.powi(digits);
+    let written = |x: f64| (x - angle * unit).abs() < 1e-3;
+    let rounded = count != 0.0
+        && (DECIMALS[kind]..15).contains(&digits)
+        && (written((meant * unit).round()) || written((meant * unit).trunc()));
+    let text = Angle::PiMultiple(rational::integer(count as i64) / rational::integer(12)).to_string();
+    (rounded || (angle - meant).abs() <= RESIDUE).then_some((meant, text))
+}
+
+/// Decimals of the shortest text that is the number.
+fn decimals(x: f64) -> i32 {
+    let text = format!("{x}");
+    text.split_once('.').map_or(0, |(_, after)| after.len() as i32)
+}
+
+/// The largest distance, m, and turn, rad, between the tips of two chains at the same positions of their
+/// joints, over poses in the joints' ranges.
+pub(super) fn difference(one: &Chain, other: &Chain) -> (f64, f64) {
+    let mut draws = Draws::new(0x0072_6f75_6e64);
+    let (mut distance, mut turn) = (0.0f64, 0.0f64);
+    for _ in 0..POSES {
+        let q: Vec<f64> = one.joints.iter().map(|joint| within(joint, &mut draws)).collect();
+        let [a, b] = [one, other].map(|chain| tip(chain, &q));
+        distance = distance.max((a.origin - b.origin).norm());
+        // Of a small rotation the sine of its angle, from the part that is skew.
+        let r = a.rotation.transpose() * b.rotation;
+        let skew = Vector3::new(r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]);
+        turn = turn.max((skew.norm() / 2.0).min(1.0).asin());
+    }
+    (distance, turn)
+}
+
+fn within(joint: &ChainJoint, draws: &mut Draws) -> f64 {
+    let [low, high] = joint.position.unwrap_or(match joint.kind {
+        JointKind::Revolute => [-PI, PI],
+        JointKind::Prismatic => [-0.5, 0.5],
+    });
+    low + (high - low) * (draws.element().residue() as f64 / (1u64 << 61) as f64)
+}
+
+/// The tip link's pose in the root link's frame: each joint turns or shifts all that was placed at q = 0
+/// behind it.
+fn tip(chain: &Chain, q: &[f64]) -> Pose {
+    chain.joints.iter().zip(q).rev().fold(chain.tip_pose, |pose, (joint, q)| match joint.kind {
+        JointKind::Revolute => {
+            let turn = Rotation3::new(joint.direction * *q).into_inner();
+            Pose { rotation: turn * pose.rotation, origin: joint.point + turn * (pose.origin - joint.point) }
+        }
+        JointKind::Prismatic => Pose { origin: pose.origin + joint.direction * *q, ..pose },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_angle_is_what_writing_it_rounds_to() {
+        for (written, meant) in [
+            ("1.5708", "pi/2"),
+            ("1.571", "pi/2"),
+            ("1.57", "pi/2"),
+            ("-3.14159", "-pi"),
+            ("1.570796", "pi/2"),
+            ("1.57079", "pi/2"),
+            ("0.7854", "pi/4"),
+            ("0.785", "pi/4"),
+            ("-0.5236", "-pi/6"),
+            ("1.5707963705062866", "pi/2"),
+            ("4.3e-8", "0"),
+            ("1.3089969389957472", "5*pi/12"),
+        ] {
+            assert_eq!(
+                meant_angle(written.parse().unwrap()).map(|(_, text)| text).as_deref(),
+                Some(meant),
+                "{written}"
+            );
+        }
+        for general in
+            [0.0, 0.5, 0.52, 0.26, 1.5, 1.6, 1.58, 1.5718, 1.5706, 1.3e-5, -1.2217, 0.279310074519612]
+        {
+            assert_eq!(meant_angle(general), None, "{general}");
+        }
+    }
+}

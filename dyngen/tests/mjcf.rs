@@ -1,0 +1,138 @@
+//! A MuJoCo model is the same arm: against MuJoCo's own numbers.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use dyngen::arm::{JointKind, Parameter};
+use dyngen::import::{self, ImportError, Imported, Options};
+use dyngen::{Evaluator, Function, Model, Samples, SetKind};
+
+const ARM: &str = include_str!("mjcf/arm.xml");
+
+/// From MuJoCo 4.0.0 with armature, damping, friction and constraints switched off: q, q̇, q̈, mj_inverse,
+/// and place and rotation of the body `hand`.
+type Known = ([f64; 4], [f64; 4], [f64; 4], [f64; 4], [f64; 3], [f64; 9]);
+const MUJOCO: [Known; 2] = [
+    (
+        [0.3, -0.4, 0.1, 0.7],
+        [0.5, 0.6, -0.7, 0.8],
+        [1.0, -2.0, 3.0, -4.0],
+        [0.6357696686606338, -1.8598990088056877, 29.387820534543494, 0.01314084992074798],
+        [0.20813249634726183, -0.17433482046895704, 0.9624484693411899],
+        [
+            -0.9691378023252967,
+            -0.23708028318331412,
+            -0.06756374345618903,
+            0.23137172050836627,
+            -0.9693500925145263,
+            0.08262883934243297,
+            -0.08508258960029715,
+            0.06444639220157118,
+            0.9942874913620853,
+        ],
+    ),
+    (
+        [-1.2, 0.9, 0.3, -2.0],
+        [1.0, -1.5, 0.5, 2.0],
+        [0.5, 0.25, -1.0, 3.0],
+        [4.128297172979657, -13.796488312999687, -6.903673936833764, 0.019763094525654334],
+        [0.5601090937390436, -0.5624169745929478, 0.40089930694427933],
+        [
+            -0.12035520143371778,
+            0.54923646273739,
+            0.8269546139224142,
+            -0.04762047896169702,
+            0.8288567576947641,
+            -0.5574305025805298,
+            -0.9915880775157133,
+            -0.1064696352179488,
+            -0.07360231861326874,
+        ],
+    ),
+];
+
+fn imported(text: &str) -> Result<Imported, ImportError> {
+    import::any(text, "arm.xml", &Options::default())
+}
+
+#[test]
+fn torque_and_pose_are_those_of_mujoco() {
+    let imported = imported(ARM).unwrap();
+    assert_eq!(imported.arm.joint_names(), ["pan", "lift", "stroke", "turn"]);
+    let model = Model::derive(imported.arm.clone()).unwrap();
+    let mut all = vec![0.0; model.arm().all_parameters().len()];
+    for (p, value) in imported.values.iter().filter(|(p, _)| p.kind.name() != "Im") {
+        all[p.index()] = *value;
+    }
+    let parameters = model.set_values(model.set(SetKind::Minimal).unwrap(), &all);
+    let torque = Evaluator::new(&model, Function::InverseDynamics, SetKind::Minimal).unwrap();
+    let pose = Evaluator::new(&model, Function::ForwardKinematics, SetKind::Minimal).unwrap();
+    for (q, dq, ddq, expected, place, rotation) in &MUJOCO {
+        let samples = Samples { q, dq, ddq, parameters: &parameters, ..Samples::default() };
+        let (mut tau, mut hand) = ([0.0; 4], [0.0; 16]);
+        torque.run(&samples, &mut tau);
+        pose.run(&samples, &mut hand);
+        for (a, b) in tau.iter().zip(expected) {
+            assert!((a - b).abs() < 1e-10 * 30.0, "{tau:?} {expected:?}");
+        }
+        for i in 0..3 {
+            assert!((hand[4 * i + 3] - place[i]).abs() < 1e-10, "{hand:?} {place:?}");
+            for j in 0..3 {
+                assert!((hand[4 * i + j] - rotation[3 * i + j]).abs() < 1e-10, "{hand:?} {rotation:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn drives_and_ranges_are_kept() {
+    let imported = imported(ARM).unwrap();
+    let joints = &imported.arm.joints;
+    let ratio = |j: usize| joints[j].rotor_ratio.as_ref().map(dyngen::exact::rational::to_f64);
+    // The class `fast` has no armature, the actuator of `turn` a gear.
+    assert_eq!([0, 1, 2, 3].map(ratio), [Some(100.0), None, Some(100.0), Some(50.0)]);
+    let value =
+        |name: &str| imported.values.iter().find(|(p, _)| Parameter::parse(name) == Some(*p)).unwrap().1;
+    assert!((value("Im1") * 1e4 - 0.02).abs() < 1e-15 && (value("Im4") * 2500.0 - 0.005).abs() < 1e-15);
+    assert_eq!(joints[2].kind, JointKind::Prismatic);
+    assert_eq!(joints[2].position, Some([0.0, 0.4]));
+    let degrees = |x: f64| x.to_radians();
+    let range = joints[0].position.unwrap();
+    assert!((range[0] - degrees(-90.0)).abs() < 1e-12 && (range[1] - degrees(100.0)).abs() < 1e-12);
+    assert_eq!(joints[3].position, None);
+    assert!(imported.text.contains("# damping 0.5 N·m·s/rad, frictionloss 2.0 N·m"), "{}", imported.text);
+    let geoms = ARM.replace(
+        "<inertial pos=\"0.02 0 0.03\" mass=\"0.8\" diaginertia=\"0.002 0.003 0.004\"/>",
+        "<geom size=\"1\"/>",
+    );
+    assert_ne!(geoms, ARM);
+    let notes = self::imported(&geoms).unwrap().notes;
+    assert!(notes.iter().any(|n| n.contains("'hand' has no <inertial>")), "{notes:?}");
+}
+
+#[test]
+fn what_is_not_read_is_told_with_its_line() {
+    let error = |from: &str, to: &str| {
+        assert!(ARM.contains(from), "{from}");
+        imported(&ARM.replacen(from, to, 1)).unwrap_err().to_string()
+    };
+    for (from, to, words) in [
+        ("<light pos=\"0 0 3\"/>", "<include file=\"x.xml\"/>", "line 16: <include> is not followed"),
+        ("angle=\"degree\"", "angle=\"grad\"", "line 4: compiler: angle"),
+        ("eulerseq=\"zyx\"", "eulerseq=\"zy\"", "line 4: compiler: eulerseq 'zy'"),
+        ("euler=\"10 0 20\"", "euler=\"10 0\"", "euler of <body> must be 3 numbers"),
+        ("axisangle=\"1 1 0 30\"", "axisangle=\"0 0 0 30\"", "axisangle has no direction"),
+        ("<joint name=\"pan\"/>", "<joint name=\"pan\" ref=\"5\"/>", "joint 'pan': ref = 5"),
+        ("<joint name=\"pan\"/>", "<joint name=\"pan\" type=\"ball\"/>", "joint 'pan' is ball"),
+        ("<joint name=\"pan\"/>", "<freejoint name=\"pan\"/>", "joint 'pan' is floating"),
+        (
+            "<joint name=\"pan\"/>",
+            "<joint name=\"pan\" axis=\"1 x 0\"/>",
+            "joint 'pan': axis must be 3 numbers",
+        ),
+        ("mass=\"0.8\"", "mass=\"heavy\"", "mass of <inertial> must be 1 numbers"),
+        ("</mujoco>", "", "not a MuJoCo model: line"),
+    ] {
+        let message = error(from, to);
+        assert!(message.contains(words) && message.starts_with("arm.xml: "), "{words}: {message}");
+    }
+}
