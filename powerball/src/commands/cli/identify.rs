@@ -1,6 +1,7 @@
 //! `powerball identify`: from logs to identified.json.
 
 use super::identify_page::page;
+use super::inputs::MapArgument;
 use super::mounted::MountedLogs;
 use super::{Failure, output};
 use crate::explanation::torque_model::{Additions, ModelFile};
@@ -28,6 +29,8 @@ pub(crate) struct Identify {
     arm: PathBuf,
     #[command(flatten)]
     logs: MountedLogs,
+    #[command(flatten)]
+    map: MapArgument,
     /// What is known already: model.json of `powerball explain` for the same arm file. Inertial set and
     /// friction are fitted beside its effects, which stay as they are. Logs of one mounting alone, no
     /// summaries.
@@ -103,7 +106,8 @@ impl Identify {
             ..IdentifyOptions::default()
         };
         output::make_folder(&self.out)?;
-        let identified = identify(&arm, &self.logs.log, &self.logs.validate, &options)?;
+        let logs = self.logs.mapped(self.map.read()?);
+        let identified = identify(&arm, &logs.log, &logs.validate, &options)?;
         let known = known.as_ref().map(|known| &known.model.additions);
         let text = output::json(&Written { identified: &identified, known })?;
         output::write(&self.out, "identified.json", text.as_bytes())?;

@@ -11,6 +11,7 @@ mod generate;
 mod identify;
 mod identify_page;
 mod inputs;
+mod log;
 mod mounted;
 mod output;
 mod profile;
@@ -48,6 +49,8 @@ enum Command {
     Friction(friction::Friction),
     /// Make an arm's constant tables for the bus driver from its drives' DCF and one TOML.
     Profile(profile::ProfileCommand),
+    /// Show what is in log files and what they are taken to be.
+    Log(log::LogCommand),
     /// Search an exciting trajectory within the arm's limits and write it.
     Excite(excite::Excite),
     /// Fit the minimal inertial set and the friction of every joint to logs.
@@ -92,6 +95,7 @@ pub fn main() -> ExitCode {
         Command::WarmUp(command) => command.run(),
         Command::Friction(command) => command.run(),
         Command::Profile(command) => command.run(),
+        Command::Log(command) => command.run(),
         Command::Excite(command) => command.run(),
         Command::Identify(command) => command.run(),
         Command::Consistent(command) => command.run(),

@@ -92,7 +92,7 @@ fn recover(path: &Path, lines: &Path) -> io::Result<Option<PathBuf>> {
 /// Lines of CSV to a Parquet file, whole or not at all; the number of rows. Without rows there is no file.
 fn convert(lines: &Path, target: &Path) -> io::Result<usize> {
     let part = with_more(target, &format!(".{}.part", std::process::id()));
-    let written = super::columnar::from_csv(File::open(lines)?, File::create(&part)?);
+    let written = crate::logs::tables::columnar::from_csv(File::open(lines)?, File::create(&part)?);
     match written {
         Ok(rows) if rows > 0 => fs::rename(&part, target).map(|()| rows),
         other => {

@@ -1,4 +1,4 @@
-use super::read::parse;
+use super::columns::Asked;
 use super::*;
 use dyngen::Arm;
 use std::fmt::Write as _;
@@ -49,6 +49,11 @@ fn text(header: &str, mut line: impl FnMut(usize, Vec<String>) -> Option<String>
 }
 
 const HEADER: &str = "t,q1,q2,tau1,tau2";
+
+fn parse(bytes: &[u8], file: &str, arm: &Arm, findings: &mut Vec<Finding>) -> Result<Log, LogError> {
+    let asked = Asked { arm, map: &ColumnMap::default(), file, header: None };
+    super::read::parse(bytes, asked, findings)
+}
 
 fn read(text: &str) -> (Result<Log, LogError>, Vec<Finding>) {
     let mut findings = Vec::new();
