@@ -109,7 +109,10 @@ pub(super) fn group(names: &[String], key: &str, asked: Asked<'_>) -> Result<Gro
             at(&format!("{stem}{}", j + 1)).or(by_name).or(alone)
         };
         let missing = || match joints.get(j).filter(|_| named) {
-            Some(joint) => format!("{}.{joint}", stems[0]),
+            Some(joint) => {
+                let used = |stem: &&&str| names.iter().any(|name| name.starts_with(&format!("{stem}.")));
+                format!("{}.{joint}", stems.iter().find(used).unwrap_or(&stems[0]))
+            }
             None => format!("{}{}", stems[0], j + 1),
         };
         stems.iter().find_map(one).ok_or_else(missing)

@@ -63,7 +63,7 @@ pub struct InspectedTable {
     pub gaps: usize,
     /// The longest step, s.
     pub longest_step: Option<f64>,
-    /// Steps that do not rise.
+    /// Steps that do not rise; of messages those that run back, as publishers that share a topic may speak at once.
     pub not_rising: usize,
     /// The names of its joints, or their numbers, in the order of its columns.
     pub joints: Vec<String>,
@@ -221,7 +221,7 @@ fn table(table: &Table, map: &ColumnMap) -> InspectedTable {
         rate: step.map(|step| 1.0 / step),
         gaps: step.map_or(0, |step| steps().filter(|s| *s > GAP_STEPS * step).count()),
         longest_step: steps().reduce(f64::max),
-        not_rising: steps().filter(|s| *s <= 0.0).count(),
+        not_rising: steps().filter(|s| *s < 0.0 || (*s == 0.0 && table.received.is_empty())).count(),
         joints,
         columns,
     }

@@ -62,16 +62,18 @@ pub(crate) fn clock(table: &Table, wanted: Clock) -> (&[f64], &'static str, Opti
 /// Why the stamps of headers are no clock.
 fn implausible(stamps: &[f64], received: &[f64]) -> Option<String> {
     let set: Vec<f64> = stamps.iter().copied().filter(|s| s.is_finite()).collect();
-    let rising = set.windows(2).filter(|w| w[1] > w[0]).count() + 1;
+    // Publishers that share a topic may speak at the same instant.
+    let rising = set.windows(2).filter(|w| w[1] >= w[0]).count() + 1;
     let enough = |count: usize| count as f64 >= MOST_STAMPS * stamps.len() as f64;
-    if set.is_empty() {
+    // Headers that nobody fills are zero.
+    if set.iter().all(|stamp| *stamp == 0.0) {
         return Some("messages carry no time stamp".into());
     }
     if !enough(set.len()) {
         return Some(format!("only {} of {} messages carry a time stamp", set.len(), stamps.len()));
     }
     if !enough(rising) {
-        return Some(format!("only {rising} of {} time stamps rise", stamps.len()));
+        return Some(format!("{} of {} time stamps run back", set.len() - rising, stamps.len()));
     }
     let span = |t: &[f64]| t.last().unwrap_or(&0.0) - t.first().unwrap_or(&0.0);
     let (own, other) = (span(&set), span(received));

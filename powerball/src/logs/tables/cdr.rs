@@ -82,15 +82,14 @@ impl<'a> Cdr<'a> {
         (0..self.count()?).map(|_| each(self)).collect()
     }
 
-    /// `std_msgs/Header`: its time stamp, s; none where it was left at zero.
-    pub(super) fn header(&mut self) -> Result<Option<f64>, String> {
+    /// `std_msgs/Header`: its time stamp, s.
+    pub(super) fn header(&mut self) -> Result<f64, String> {
         if self.is_ros1() {
             self.u32()?;
         }
         let seconds = self.take().map(i32::from_le_bytes)?;
         let nanoseconds = self.u32()?;
         self.string()?;
-        let set = seconds != 0 || nanoseconds != 0;
-        Ok(set.then(|| f64::from(seconds) + 1e-9 * f64::from(nanoseconds)))
+        Ok(f64::from(seconds) + 1e-9 * f64::from(nanoseconds))
     }
 }

@@ -93,7 +93,7 @@ type Values = (Option<f64>, Vec<(String, f64)>);
 
 /// `sensor_msgs/JointState`: position, velocity and effort, each empty or one a name.
 fn joint_state(mut message: Cdr<'_>) -> Result<Values, String> {
-    let stamp = message.header()?;
+    let stamp = Some(message.header()?);
     let names = message.strings()?;
     let mut values = Vec::new();
     for quantity in ["position", "velocity", "effort"] {
@@ -109,7 +109,7 @@ fn joint_state(mut message: Cdr<'_>) -> Result<Values, String> {
 
 /// `control_msgs/DynamicJointState`: by joint, values with a name each.
 fn dynamic_joint_state(mut message: Cdr<'_>) -> Result<Values, String> {
-    let stamp = message.header()?;
+    let stamp = Some(message.header()?);
     let joints = message.strings()?;
     let interfaces = message.list(|m| Ok((m.strings()?, m.numbers()?)))?;
     let mut values = Vec::new();
