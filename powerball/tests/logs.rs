@@ -140,7 +140,10 @@ fn the_command_says_what_is_in_a_file() {
     let bag = data("bag.db3").display().to_string();
     let shown = &json(&powerball(&["log", &bag, "--json"]))["files"][0];
     let (states, camera) = (&shown["tables"][0], &shown["tables"][1]);
-    assert_eq!((&states["name"], &states["type"]), (&"/joint_states".into(), &"sensor_msgs/msg/JointState".into()));
+    assert_eq!(
+        (&states["name"], &states["type"]),
+        (&"/joint_states".into(), &"sensor_msgs/msg/JointState".into())
+    );
     assert_eq!(states["joints"], serde_json::json!(["shoulder", "elbow", "finger"]));
     assert_eq!((&states["samples"], &camera["samples"]), (&132.into(), &3.into()));
     assert_eq!(states["clock"], "header");
@@ -148,7 +151,10 @@ fn the_command_says_what_is_in_a_file() {
     // Sentences for people carry the same.
     let text = powerball(&["log", &bag]);
     let text = String::from_utf8_lossy(&text.stdout).into_owned();
-    assert!(text.contains("joints: shoulder, elbow, finger") && text.contains("position.elbow: q of elbow"), "{text}");
+    assert!(
+        text.contains("joints: shoulder, elbow, finger") && text.contains("position.elbow: q of elbow"),
+        "{text}"
+    );
     // Two topics in time, and what is no file of logs.
     let two = data("two_topics.mcap").display().to_string();
     let shown = json(&powerball(&["log", &two, "--json"]));

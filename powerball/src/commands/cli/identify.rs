@@ -15,8 +15,9 @@ use std::path::PathBuf;
 
 /// Fit the minimal inertial set and the friction of every joint (Eq. 16) to logs.
 ///
-/// Writes identified.json and report.html, and consistent.json: the nearest parameters that a real arm can
-/// have, as values for `dyngen generate --values`.
+/// Writes identified.json and report.html; consistent.json: the nearest parameters that a real arm can have, as
+/// values for `dyngen generate --values`; covariance.json: how well all of it is known together, for
+/// `powerball compare`.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Examples:\n  powerball identify --arm arm.toml --log a.csv b.csv --validate c.csv --out \
@@ -111,6 +112,8 @@ impl Identify {
         let known = known.as_ref().map(|known| &known.model.additions);
         let text = output::json(&Written { identified: &identified, known })?;
         output::write(&self.out, "identified.json", text.as_bytes())?;
+        let uncertainty = serde_json::to_vec(&identified.uncertainty).unwrap_or_default();
+        output::write(&self.out, "covariance.json", &uncertainty)?;
         let values = output::json(&identified.consistent.parameters)?;
         output::write(&self.out, "consistent.json", values.as_bytes())?;
         output::write(&self.out, "report.html", page(&identified).to_html().as_bytes())?;

@@ -44,7 +44,8 @@ impl MapArgument {
     /// The map of all that was said.
     pub(crate) fn read(&self) -> Result<ColumnMap, Failure> {
         // Lines first: in a file they might fall into a table that it opened.
-        let (lines, files): (Vec<&String>, Vec<&String>) = self.map.iter().partition(|said| said.contains('='));
+        let (lines, files): (Vec<&String>, Vec<&String>) =
+            self.map.iter().partition(|said| said.contains('='));
         let mut text = lines.iter().map(|line| format!("{line}\n")).collect::<String>();
         for file in &files {
             let read = std::fs::read_to_string(file);
@@ -107,7 +108,8 @@ pub(crate) fn recorded(
     }
     progress.say("reading logs");
     let files: Vec<&PathBuf> = inputs.log.iter().chain(validate).collect();
-    let (mut logs, findings) = read_logs_as(&files, arm, &inputs.map.read()?).map_err(|e| Failure::Unusable(e.to_string()))?;
+    let (mut logs, findings) =
+        read_logs_as(&files, arm, &inputs.map.read()?).map_err(|e| Failure::Unusable(e.to_string()))?;
     warnings.extend(findings.iter().map(ToString::to_string));
     common_clock(&mut logs);
     let validate = logs.split_off(inputs.log.len());

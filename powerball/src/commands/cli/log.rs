@@ -42,7 +42,8 @@ impl LogCommand {
         let unusable = |e: &dyn std::fmt::Display| Failure::Unusable(e.to_string());
         let arm = self.arm.as_deref().map(Arm::read).transpose().map_err(|e| unusable(&e))?;
         let map = self.map.read()?;
-        let inspected = self.files.iter().map(|file| inspect(file, &map, arm.as_ref()).map_err(|e| unusable(&e)));
+        let inspected =
+            self.files.iter().map(|file| inspect(file, &map, arm.as_ref()).map_err(|e| unusable(&e)));
         let files = inspected.collect::<Result<Vec<_>, _>>()?;
         let refused: Vec<String> = files.iter().flat_map(|file| file.refused.clone()).collect();
         if self.json {

@@ -1,6 +1,7 @@
 //! The `powerball` command: one file a subcommand.
 
 mod bus;
+mod compare;
 mod consistent;
 mod demo;
 mod excite;
@@ -61,6 +62,8 @@ enum Command {
     Summarize(summarize::Summarize),
     /// Judge an identified model on logs that it has not seen.
     Verify(verify::Verify),
+    /// Compare two fits: what truly differs, what it means in torque, and why.
+    Compare(compare::Compare),
     /// Find, name and add what the model lacks on logs; judged on another path.
     Explain(explain::Explain),
     /// Write a model with its effects as one Rust file for a controller.
@@ -101,6 +104,7 @@ pub fn main() -> ExitCode {
         Command::Consistent(command) => command.run(),
         Command::Summarize(command) => command.run(),
         Command::Verify(command) => command.run(),
+        Command::Compare(command) => command.run(),
         Command::Explain(command) => command.run(),
         Command::Generate(command) => command.run(),
     };

@@ -35,7 +35,10 @@ pub(super) struct Group {
 }
 
 impl Group {
-    fn values<'a>(&'a self, number: &'a impl Fn(usize) -> Option<f64>) -> impl Iterator<Item = Option<f64>> + 'a {
+    fn values<'a>(
+        &'a self,
+        number: &'a impl Fn(usize) -> Option<f64>,
+    ) -> impl Iterator<Item = Option<f64>> + 'a {
         self.at.iter().zip(&self.factor).map(move |(k, factor)| Some(number(*k)? * factor))
     }
 }
@@ -52,7 +55,9 @@ fn logged_joints(names: &[String], map: &ColumnMap) -> Vec<String> {
     if let Some(ByJoint::All(stem)) = &map.q.column {
         stems = vec![stem];
     }
-    let joint = |name: &String| stems.iter().find_map(|s| name.strip_prefix(s)?.strip_prefix('.').map(str::to_string));
+    let joint = |name: &String| {
+        stems.iter().find_map(|s| name.strip_prefix(s)?.strip_prefix('.').map(str::to_string))
+    };
     names.iter().filter_map(joint).collect()
 }
 
@@ -68,12 +73,10 @@ pub(super) fn meaning(name: &str, map: &ColumnMap) -> Option<(&'static str, Opti
     }
     for (key, _) in NAMES {
         let stems = match &map.of(key).column {
-            Some(ByJoint::Each(columns)) => {
-                match columns.iter().position(|own| own == name) {
-                    Some(j) => return Some((key, Some((j + 1).to_string()))),
-                    None => continue,
-                }
-            }
+            Some(ByJoint::Each(columns)) => match columns.iter().position(|own| own == name) {
+                Some(j) => return Some((key, Some((j + 1).to_string()))),
+                None => continue,
+            },
             Some(ByJoint::All(stem)) => vec![stem.as_str()],
             None => stems(key),
         };
@@ -288,7 +291,10 @@ fn misfits(asked: Asked<'_>) -> Vec<(String, String)> {
     }
     for (key, mapped) in asked.map.quantities().into_iter().filter(|(key, _)| *key != "t") {
         if let Some(list) = mapped.misfit(n) {
-            misfits.push((format!("{key}.{list}"), format!("the map's list must have one entry for each of {n} joints")));
+            misfits.push((
+                format!("{key}.{list}"),
+                format!("the map's list must have one entry for each of {n} joints"),
+            ));
         }
     }
     misfits

@@ -109,8 +109,12 @@ const VELOCITIES: &[Unit] = &[
     (&["rpm", "turn/min"], TURN / 60.0),
     (&["mrad/s", "mm/s"], 1e-3),
 ];
-const TORQUES: &[Unit] =
-    &[(&["N·m", "Nm", "N*m", "N"], 1.0), (&["mN·m", "mNm"], 1e-3), (&["N·cm", "Ncm"], 1e-2), (&["kN·m", "kN"], 1e3)];
+const TORQUES: &[Unit] = &[
+    (&["N·m", "Nm", "N*m", "N"], 1.0),
+    (&["mN·m", "mNm"], 1e-3),
+    (&["N·cm", "Ncm"], 1e-2),
+    (&["kN·m", "kN"], 1e3),
+];
 const CURRENTS: &[Unit] = &[(&["A"], 1.0), (&["mA"], 1e-3)];
 const TEMPERATURES: &[Unit] = &[(&["°C", "C", "degC"], 1.0)];
 
@@ -120,7 +124,8 @@ impl ColumnMap {
     /// # Errors
     /// What is wrong with it and where.
     pub fn parse(text: &str, name: &str) -> Result<ColumnMap, String> {
-        let map: ColumnMap = toml::from_str(text).map_err(|e| format!("{name}: {}", e.to_string().trim_end()))?;
+        let map: ColumnMap =
+            toml::from_str(text).map_err(|e| format!("{name}: {}", e.to_string().trim_end()))?;
         for (key, mapped) in map.quantities() {
             mapped.check(key).map_err(|reason| format!("{name}: {reason}"))?;
         }
@@ -187,7 +192,8 @@ impl Mapped {
         };
         for unit in self.unit.iter().flat_map(list) {
             if factor(key, &unit).is_none() {
-                let known: Vec<&str> = units(key).iter().flat_map(|(names, _)| names.iter().copied()).collect();
+                let known: Vec<&str> =
+                    units(key).iter().flat_map(|(names, _)| names.iter().copied()).collect();
                 return Err(match known.is_empty() {
                     true => format!("{key}.unit: its unit is not needed: leave it out"),
                     false => format!("{key}.unit: `{unit}` is unknown; known are {}", known.join(", ")),

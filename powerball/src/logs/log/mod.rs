@@ -20,10 +20,10 @@ mod signs;
 mod speeds;
 mod topics;
 
+pub use crate::logs::tables::{Finding, LogError};
 pub use arrays::{Arrays, Sample};
 pub use clock::common_clock;
 use doubts::{Doubts, Severity};
-pub use crate::logs::tables::{Finding, LogError};
 pub use file::LogFile;
 pub use inspect::{Aligned, Inspected, InspectedColumn, InspectedTable, TakenAs, inspect};
 pub use map::{ByJoint, Clock, ColumnMap, Mapped};

@@ -79,7 +79,9 @@ fn implausible(stamps: &[f64], received: &[f64]) -> Option<String> {
     let (own, other) = (span(&set), span(received));
     // Where all were received at once, the file was made from another one.
     if other > 0.0 && (own - other).abs() > (SPAN * other).max(SPAN_SECONDS) {
-        return Some(format!("time stamps span {own:.3} s, and the messages were received within {other:.3} s"));
+        return Some(format!(
+            "time stamps span {own:.3} s, and the messages were received within {other:.3} s"
+        ));
     }
     None
 }
@@ -119,7 +121,8 @@ pub(super) fn log(tables: &[Table], asked: Asked<'_>, findings: &mut Vec<Finding
 
 /// Whether a table has its time among its columns.
 fn columns_have_time(table: &Table, map: &ColumnMap) -> bool {
-    let mapped = map.t.column.as_ref().and_then(|by| by.of(0)).is_some_and(|name| table.column(name).is_some());
+    let mapped =
+        map.t.column.as_ref().and_then(|by| by.of(0)).is_some_and(|name| table.column(name).is_some());
     let own = ["t", "time", "timestamp"].iter().any(|name| table.column(name).is_some());
     let stamped = table.stamps.iter().any(|s| s.is_finite());
     mapped || (own && !stamped && map.clock == Clock::Auto) || table.received.is_empty()
@@ -140,13 +143,19 @@ fn choose<'a>(tables: &'a [Table], asked: Asked<'_>) -> Result<(&'a Table, &'a T
     let said = |key: &str| asked.map.of(key).topic.as_ref().or(asked.map.topic.as_ref());
     let named = |topic: &String| match tables.iter().find(|t| t.name == *topic) {
         Some(table) => Ok(table),
-        None => Err(LogError::of_file(asked.file, "topic", format!("{topic} is not there; there are: {}", shown()))),
+        None => Err(LogError::of_file(
+            asked.file,
+            "topic",
+            format!("{topic} is not there; there are: {}", shown()),
+        )),
     };
     let positions = said("q").map(named).transpose()?;
     let torques = said("tau").or(said("i")).map(named).transpose()?;
     match (positions, torques) {
         (Some(q), Some(tau)) => return Ok((q, tau)),
-        (Some(table), None) | (None, Some(table)) if has(table, "q") && torque(table) => return Ok((table, table)),
+        (Some(table), None) | (None, Some(table)) if has(table, "q") && torque(table) => {
+            return Ok((table, table));
+        }
         _ => {}
     }
     let only = |of: &dyn Fn(&Table) -> bool| -> Vec<&'a Table> { tables.iter().filter(|t| of(t)).collect() };
@@ -214,7 +223,8 @@ fn join(
     (joined.stamps, joined.received) = (base.clone(), base.clone());
     for key in ["q", "dq", "tau", "i", "temp", "motor"] {
         let at_home = if matches!(key, "q" | "dq") { positions } else { torques };
-        let said = asked.map.of(key).topic.as_ref().and_then(|topic| tables.iter().find(|t| t.name == *topic));
+        let said =
+            asked.map.of(key).topic.as_ref().and_then(|topic| tables.iter().find(|t| t.name == *topic));
         let table = said.unwrap_or(at_home);
         let Ok(group) = columns::group(&table.names(), key, asked) else { continue };
         let (times, own) = time(table);
@@ -232,7 +242,11 @@ fn join(
         }
     }
     if joined.columns.is_empty() || joined.line.is_empty() {
-        return Err(LogError::of_file(asked.file, "topics", "nothing of this arm is left once topics are joined"));
+        return Err(LogError::of_file(
+            asked.file,
+            "topics",
+            "nothing of this arm is left once topics are joined",
+        ));
     }
     Ok(joined)
 }
@@ -246,7 +260,10 @@ fn told(positions: &Table, torques: &Table, base: &[f64], times: &[f64]) -> Stri
             1e3 * a.largest
         )
     });
-    format!("torques of {} with positions of {}, interpolated to their times: they {lies}", torques.name, positions.name)
+    format!(
+        "torques of {} with positions of {}, interpolated to their times: they {lies}",
+        torques.name, positions.name
+    )
 }
 
 /// Values at other times, by cubic interpolation between samples that are near each other.

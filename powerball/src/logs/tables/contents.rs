@@ -97,7 +97,8 @@ pub fn read_contents(path: &Path) -> Result<Contents, LogError> {
     };
     for table in &tables {
         if let Some((count, reason)) = &table.unreadable {
-            let message = format!("{count} messages could not be read (the first: {reason}) and were left out");
+            let message =
+                format!("{count} messages could not be read (the first: {reason}) and were left out");
             notes.push(Finding::of_file(&file, &table.name, message));
         }
     }
@@ -129,7 +130,8 @@ fn rosbag_tables(path: &Path, file: &str, notes: &mut Vec<Finding>) -> Result<Ve
 #[cfg(feature = "npz")]
 fn npz_tables(path: &Path, file: &str, notes: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
     let read = std::fs::read(path).and_then(|bytes| super::npz::read(&bytes));
-    let (table, left_out) = read.map_err(|e| LogError::of_file(file, "npz", format!("cannot be read: {e}")))?;
+    let (table, left_out) =
+        read.map_err(|e| LogError::of_file(file, "npz", format!("cannot be read: {e}")))?;
     notes.extend(left_out.map(|note| Finding::of_file(file, "arrays", note)));
     Ok(vec![table])
 }

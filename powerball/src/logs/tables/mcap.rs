@@ -56,7 +56,8 @@ pub(super) fn read(file: File) -> io::Result<(Vec<Table>, Option<String>)> {
             }
         }
     }
-    let torn = "the file ends before its end is marked: the recording was interrupted; it was read up to there";
+    let torn =
+        "the file ends before its end is marked: the recording was interrupted; it was read up to there";
     Ok((records.topics.tables(), Some(torn.into())))
 }
 
@@ -122,7 +123,11 @@ fn decompress(compression: &str, stored: &[u8], size: u64) -> io::Result<Vec<u8>
         "lz4" => {
             lz4_flex::frame::FrameDecoder::new(stored).take(size + 1).read_to_end(&mut out)?;
         }
-        other => return Err(io::Error::other(format!("a chunk is compressed by {other}, which nobody knows here"))),
+        other => {
+            return Err(io::Error::other(format!(
+                "a chunk is compressed by {other}, which nobody knows here"
+            )));
+        }
     }
     if out.len() as u64 == size { Ok(out) } else { Err(torn()) }
 }

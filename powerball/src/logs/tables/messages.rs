@@ -49,7 +49,9 @@ impl Topics {
         let same = |t: &&mut Topic| t.table.name == name && t.table.kind == shown && t.ros1 == ros1;
         match self.topics.iter_mut().find(same) {
             Some(topic) => topic.ids.push(id),
-            None => self.topics.push(Topic { ids: vec![id], kind: read, ros1, table: Table::new(name, shown) }),
+            None => {
+                self.topics.push(Topic { ids: vec![id], kind: read, ros1, table: Table::new(name, shown) })
+            }
         }
     }
 
@@ -133,7 +135,8 @@ fn json(message: &[u8]) -> Result<Values, String> {
     for (key, value) in fields.iter().filter(|(key, _)| *key != "header" && *key != "timestamp") {
         match (&names, value) {
             (Some(names), Value::Array(of)) if of.len() == names.len() => {
-                let named = names.iter().zip(of).filter_map(|(n, v)| Some((format!("{key}.{n}"), v.as_f64()?)));
+                let named =
+                    names.iter().zip(of).filter_map(|(n, v)| Some((format!("{key}.{n}"), v.as_f64()?)));
                 values.extend(named);
             }
             _ => flatten(key, value, &mut values),

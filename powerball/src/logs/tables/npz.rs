@@ -51,7 +51,8 @@ pub(super) fn read(bytes: &[u8]) -> io::Result<(Table, Option<String>)> {
             // Joint by joint: a row of the array is a column of the log.
             [k, n] if n == samples => (k, array.columns_first),
             _ => {
-                left_out.push(format!("{} (its shape is {:?}, of {samples} samples)", array.name, array.shape));
+                left_out
+                    .push(format!("{} (its shape is {:?}, of {samples} samples)", array.name, array.shape));
                 continue;
             }
         };
@@ -113,7 +114,9 @@ fn entries(bytes: &[u8]) -> io::Result<Vec<(String, Vec<u8>)>> {
                 flate2::read::DeflateDecoder::new(stored).take(size as u64 + 1).read_to_end(&mut out)?;
                 out
             }
-            other => return Err(io::Error::other(format!("an array is compressed by method {other} of ZIP"))),
+            other => {
+                return Err(io::Error::other(format!("an array is compressed by method {other} of ZIP")));
+            }
         };
         if content.len() != size || size as u64 > LARGEST {
             return Err(torn("an array"));
@@ -140,7 +143,8 @@ fn array(name: &str, bytes: &[u8]) -> Result<Array, String> {
         Ok::<&str, String>(rest.trim_start_matches([':', ' ']))
     };
     let descr = after("descr")?;
-    let descr = descr.strip_prefix('\'').and_then(|d| d.split('\'').next()).ok_or("is an array of records")?;
+    let descr =
+        descr.strip_prefix('\'').and_then(|d| d.split('\'').next()).ok_or("is an array of records")?;
     let columns_first = after("fortran_order")?.starts_with("True");
     let shape = after("shape")?.strip_prefix('(').and_then(|s| s.split(')').next()).ok_or("has no shape")?;
     let shape: Vec<usize> = shape.split(',').filter_map(|n| n.trim().parse().ok()).collect();

@@ -12,7 +12,8 @@ pub(super) fn read(file: File) -> io::Result<Vec<Table>> {
     let tables = database.tables()?;
     let root = |name: &str| {
         let found = tables.iter().find(|(table, _)| table == name).map(|(_, root)| *root);
-        found.ok_or_else(|| io::Error::other(format!("an SQLite file without the table {name} is no rosbag2")))
+        found
+            .ok_or_else(|| io::Error::other(format!("an SQLite file without the table {name} is no rosbag2")))
     };
     let mut topics = Topics::default();
     database.scan(root("topics")?, &mut |row| {

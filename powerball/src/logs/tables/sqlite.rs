@@ -86,7 +86,8 @@ impl Database {
         left: &mut u64,
         each: &mut dyn FnMut(&Row<'_>) -> io::Result<()>,
     ) -> io::Result<()> {
-        *left = left.checked_sub(1).filter(|_| depth < DEEPEST).ok_or_else(|| torn("its pages form a circle"))?;
+        *left =
+            left.checked_sub(1).filter(|_| depth < DEEPEST).ok_or_else(|| torn("its pages form a circle"))?;
         let page = self.read(number)?;
         // The first page begins with the file's own head.
         let head = if number == 1 { 100 } else { 0 };
