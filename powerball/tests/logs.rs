@@ -4,11 +4,17 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use dyngen::Arm;
-use powerball::Log;
+use powerball::controller::friction::{TABLE_2, TanhFriction};
+use powerball::identification::chain::Chain;
+use powerball::identification::excite::{Fourier, Harmonics};
 use powerball::logs::log::{ColumnMap, Finding, LogError};
+use powerball::logs::tables::{JointState, McapWriter, read_contents};
+use powerball::virtual_arm::{Body, Dynamics, Plant, Sensors};
+use powerball::{CompareOptions, IdentifyOptions, Log, Side, Source, compare, identify};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::Arc;
 
 const JOINTS: &str = "joints = [\"shoulder\", \"elbow\"]\n";
 
@@ -124,6 +130,134 @@ fn torn_files_end_with_an_error_or_with_what_was_whole() {
     let (log, findings) = Log::read_as(&file, &arm(), &map).unwrap();
     assert!(log.t.len() > 20 && log.t.len() < 120);
     assert!(findings.iter().any(|f| f.message.contains("interrupted")), "{findings:?}");
+}
+
+/// Three joints under gravity: a log of it, and the same as a bag whose messages name joints by the alphabet.
+#[test]
+fn a_bag_in_the_order_of_the_alphabet_is_identified_in_the_order_of_the_chain() {
+    let joint = |alpha: &str, a: f64| {
+        format!(
+            "[[joint]]\nkind = \"revolute\"\na = {a}\nalpha = {alpha}\nd = 0.1\ntheta = 0\nvelocity = 2\n"
+        )
+    };
+    let joints = [joint("\"pi/2\"", 0.0), joint("0", 0.4), joint("0", 0.3)].concat();
+    let text = format!("name = \"three\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\n{joints}");
+    let arm = Arm::parse(&text, "three.toml").unwrap();
+    let link = |mass| Body::even_box(mass, [-0.15, 0.01, 0.02], [0.3, 0.05, 0.06], 0.0);
+    let dynamics = Dynamics::new(Chain::new(&arm), vec![link(3.0), link(2.0), link(1.0)]).unwrap();
+    let sensors = Sensors {
+        rate: 200.0,
+        encoder_step: 1e-5,
+        white: vec![0.05; 3],
+        coloured: vec![0.02; 3],
+        colour_time: 0.5,
+    };
+    let friction = TABLE_2[..3].iter().map(|gamma| TanhFriction::new(*gamma)).collect();
+    let plant = Plant::new(dynamics, friction, sensors);
+    let harmonics = |j: usize| Harmonics {
+        middle: 0.1 * j as f64,
+        a: vec![0.3, -0.2 + 0.1 * j as f64, 0.1],
+        b: vec![0.1 * j as f64, 0.2, -0.15],
+    };
+    let path = Fourier {
+        fundamental: std::f64::consts::TAU / 10.0,
+        periods: 2,
+        ramp: 1.0,
+        joints: (0..3).map(harmonics).collect(),
+    };
+    let recording = plant.record(&path.sample(200.0), 0.0, 7);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("alphabet");
+    std::fs::create_dir_all(&folder).unwrap();
+    let (csv, bag) = (folder.join("log.csv"), folder.join("log.mcap"));
+    std::fs::write(&csv, recording.to_csv()).unwrap();
+    // The chain is shoulder, elbow, hand; the bag says elbow, hand, shoulder.
+    let order = [1, 2, 0];
+    let names = ["elbow", "hand", "shoulder"].map(String::from);
+    let mut writer = McapWriter::new(Vec::new()).unwrap();
+    let states = writer.joint_states("/joint_states").unwrap();
+    for (k, t) in recording.t.iter().enumerate() {
+        let of = |values: &[f64]| order.map(|j| values[3 * k + j]);
+        let (position, effort) = (of(&recording.q), of(&recording.tau));
+        let state = JointState { position: &position, velocity: &[], effort: &effort };
+        writer.state(states, 1000.0 + t, &names, &state).unwrap();
+    }
+    std::fs::write(&bag, writer.finish().unwrap()).unwrap();
+
+    let map = ColumnMap::parse("joints = [\"shoulder\", \"elbow\", \"hand\"]", "map").unwrap();
+    let options = IdentifyOptions::default();
+    let of_csv = identify(&arm, [Source::file(&csv)], [], &options).unwrap();
+    let of_bag = identify(&arm, [Source::file(&bag).mapped(Arc::new(map))], [], &options).unwrap();
+    for (a, b) in of_csv.parameters.iter().zip(&of_bag.parameters) {
+        // CSV has fewer digits.
+        assert!((a.value - b.value).abs() < 0.02 * a.std.unwrap(), "{}: {} and {}", a.name, a.value, b.value);
+    }
+    assert!(of_bag.fit.relative.iter().all(|left| *left < 0.1), "{:?}", of_bag.fit);
+
+    // Two fits of the same arm, and the same as results in folders.
+    let compared =
+        compare(&Side::of("a", &of_csv), &Side::of("b", &of_bag), &CompareOptions::default()).unwrap();
+    assert!(!compared.differ, "{}", compared.sentence);
+    let arm_file = folder.join("arm.toml");
+    std::fs::write(&arm_file, text).unwrap();
+    let shown = |path: &Path| path.display().to_string();
+    let (arm_file, csv, bag) = (shown(&arm_file), shown(&csv), shown(&bag));
+    let [a, b, out] = ["a", "b", "compared"].map(|name| shown(&folder.join(name)));
+    let chain = "joints = [\"shoulder\", \"elbow\", \"hand\"]";
+    for (log, out) in [(&csv, &a), (&bag, &b)] {
+        let done = powerball(&["identify", "--arm", &arm_file, "--log", log, "--map", chain, "--out", out]);
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    }
+    let done = json(&powerball(&["compare", &a, &b, "--out", &out, "--json"]));
+    assert_eq!(done["differ"], false);
+    for key in ["parameters", "friction", "torque_difference"] {
+        assert!(!done[key].as_array().unwrap().is_empty(), "{key}");
+    }
+    assert!(done["sentence"].as_str().unwrap().starts_with("Same arm"));
+    assert!(folder.join("compared/report.html").is_file());
+
+    // What a model predicts goes out beside what was measured.
+    let (model, torque) = (shown(&folder.join("a/identified.json")), shown(&folder.join("torque.mcap")));
+    let done =
+        powerball(&["log", &csv, "--arm", &arm_file, "--model", &model, "--to", "mcap", "-o", &torque]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let tables = read_contents(Path::new(&torque)).unwrap().tables;
+    let of = |name: &str| tables[1].column(name).unwrap();
+    assert_eq!((tables[0].name.as_str(), tables[1].name.as_str()), ("/joint_states", "/torque/joint1"));
+    for ((measured, predicted), left) in of("measured").iter().zip(of("predicted")).zip(of("residual")) {
+        assert!((measured - predicted - left).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn logs_go_out_in_every_format_and_come_back() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("logs_out");
+    std::fs::create_dir_all(&folder).unwrap();
+    let (log, _) = read("dynamic.mcap", JOINTS).unwrap();
+    for name in ["log.csv", "log.parquet", "log.mcap"] {
+        let file = folder.join(name);
+        log.write(&file).unwrap();
+        let (back, _) = Log::read(&file, &arm()).unwrap();
+        assert!(differs(&back, &log) < 5e-7, "{name}: {}", differs(&back, &log));
+        // Temperatures are no joint states.
+        assert_eq!(back.temperature.is_some(), name != "log.mcap");
+    }
+}
+
+#[test]
+fn torques_on_the_motors_side_are_kept_beside() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("logs_motor");
+    std::fs::create_dir_all(&folder).unwrap();
+    let text = std::fs::read_to_string(data("log.csv")).unwrap();
+    let mut lines: Vec<String> = text.lines().map(|line| format!("{line},{}", line)).collect();
+    lines[0] = "t,q1,q2,dq1,dq2,tau1,tau2,time2,q.x,q.y,motor2,motor1,f1,f2".into();
+    let file = folder.join("motor.csv");
+    std::fs::write(&file, lines.join("\n")).unwrap();
+    let (log, findings) = Log::read(&file, &arm()).unwrap();
+    let motor = log.motor.unwrap();
+    let dq2 = log.t.iter().map(|t| -3.0 * (3.0 * t).sin());
+    assert!(motor[0].iter().zip(dq2).all(|(motor, dq2)| (motor - dq2).abs() < 1e-9));
+    let told = findings.iter().map(ToString::to_string).collect::<String>();
+    assert!(told.contains("motor: kept beside the torques"), "{told}");
 }
 
 fn powerball(arguments: &[&str]) -> Output {

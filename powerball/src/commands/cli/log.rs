@@ -1,9 +1,9 @@
 //! `powerball log`: what is in a file and what it is taken to be.
 
 use super::inputs::MapArgument;
-use super::{Failure, output};
+use super::{Failure, log_out, output};
 use crate::logs::log::{Inspected, InspectedTable, inspect};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use dyngen::Arm;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -15,7 +15,8 @@ use std::path::PathBuf;
 #[derive(Args, Debug)]
 #[command(
     after_help = "Examples:\n  powerball log recording.mcap\n  powerball log bag_0.db3 --arm arm.toml --map \
-        'joints = [\"shoulder_pan_joint\", \"shoulder_lift_joint\"]'"
+        'joints = [\"shoulder_pan_joint\", \"shoulder_lift_joint\"]'\n  powerball log run.csv --arm arm.toml --model \
+        result/identified.json --to mcap -o run.mcap"
 )]
 pub(crate) struct LogCommand {
     /// The files.
@@ -26,9 +27,27 @@ pub(crate) struct LogCommand {
     /// The arm file (TOML) whose logs they are.
     #[arg(long, value_name = "ARM.toml")]
     arm: Option<PathBuf>,
+    /// Write the log that was found as another file, in SI units and under plain names; needs --arm.
+    #[arg(long, value_enum, value_name = "FORMAT", requires_all = ["arm", "out"])]
+    to: Option<Target>,
+    /// The file to write.
+    #[arg(short, long, value_name = "OUT", requires = "to")]
+    out: Option<PathBuf>,
+    /// A model, identified.json or model.json: an MCAP then has measured, predicted and residual torque of each joint
+    /// beside each other, in the band of the fit.
+    #[arg(long, value_name = "FILE.json", requires = "to")]
+    model: Option<PathBuf>,
     /// Print what was found as one JSON object on standard output.
     #[arg(long)]
     json: bool,
+}
+
+/// Formats that are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Target {
+    Mcap,
+    Parquet,
+    Csv,
 }
 
 /// What was found.
@@ -45,6 +64,7 @@ impl LogCommand {
         let inspected =
             self.files.iter().map(|file| inspect(file, &map, arm.as_ref()).map_err(|e| unusable(&e)));
         let files = inspected.collect::<Result<Vec<_>, _>>()?;
+        self.write(&files, arm.as_ref())?;
         let refused: Vec<String> = files.iter().flat_map(|file| file.refused.clone()).collect();
         if self.json {
             output::print(&output::json(&Written { files })?);
@@ -52,6 +72,34 @@ impl LogCommand {
             files.iter().for_each(|file| output::print(&text(file)));
         }
         if refused.is_empty() { Ok(()) } else { Err(Failure::Refused(refused.join("\n"))) }
+    }
+
+    /// The log as another file, where that is asked for.
+    fn write(&self, files: &[Inspected], arm: Option<&Arm>) -> Result<(), Failure> {
+        let (Some(to), Some(out), Some(arm)) = (self.to, &self.out, arm) else { return Ok(()) };
+        let unusable = |what: &str| Err(Failure::Unusable(format!("{}: {what}", out.display())));
+        let [file] = files else { return unusable("holds one log: give one file") };
+        let ending = out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        match to {
+            Target::Mcap if ending != "mcap" => {
+                return unusable("--to mcap writes a file that ends in .mcap");
+            }
+            Target::Parquet if ending != "parquet" => {
+                return unusable("--to parquet writes one that ends in .parquet");
+            }
+            Target::Csv if ["mcap", "parquet"].contains(&ending.as_str()) => {
+                return unusable("--to csv writes a file that ends in .csv");
+            }
+            Target::Parquet | Target::Csv if self.model.is_some() => {
+                return unusable("with --model an MCAP is written: --to mcap");
+            }
+            _ => {}
+        }
+        match &file.log {
+            Some(log) => log_out::write(log, arm, self.model.as_deref(), out),
+            // Why it is none is told below.
+            None => Ok(()),
+        }
     }
 }
 

@@ -13,6 +13,7 @@ mod identify;
 mod identify_page;
 mod inputs;
 mod log;
+mod log_out;
 mod mounted;
 mod output;
 mod profile;

@@ -107,7 +107,11 @@ pub(super) fn group(names: &[String], key: &str, asked: Asked<'_>) -> Result<Gro
             return at(&name).ok_or(name);
         }
         let one = |stem: &&str| {
-            let by_name = joints.get(j).and_then(|joint| at(&format!("{stem}.{joint}")));
+            let by_name = match joints.get(j) {
+                Some(joint) => at(&format!("{stem}.{joint}")),
+                // Names that are numbers say which joint they mean.
+                None => at(&format!("{stem}.joint{}", j + 1)).or_else(|| at(&format!("{stem}.{}", j + 1))),
+            };
             let alone = if n == 1 { at(stem) } else { None };
             at(&format!("{stem}{}", j + 1)).or(by_name).or(alone)
         };

@@ -19,6 +19,7 @@ mod samples;
 mod signs;
 mod speeds;
 mod topics;
+mod write;
 
 pub use crate::logs::tables::{Finding, LogError};
 pub use arrays::{Arrays, Sample};

@@ -292,6 +292,7 @@ fn a_clock_that_runs_on_is_common_and_others_follow_each_other() {
         q: vec![],
         torque: vec![],
         temperature: None,
+        motor: None,
         pieces: vec![],
         clock: 0.0,
     };

@@ -93,3 +93,46 @@ impl<'a> Cdr<'a> {
         Ok(f64::from(seconds) + 1e-9 * f64::from(nanoseconds))
     }
 }
+
+/// A message of ROS 2 while it is written, little end first.
+#[cfg(feature = "mcap")]
+pub(super) struct CdrWriter(Vec<u8>);
+
+#[cfg(feature = "mcap")]
+impl CdrWriter {
+    /// Begins with `std_msgs/Header` of a time, s.
+    pub(super) fn header(t: f64) -> CdrWriter {
+        let mut message = CdrWriter(Vec::new());
+        let nanoseconds = (1e9 * t).round() as i64;
+        message.put((nanoseconds.div_euclid(1_000_000_000) as i32).to_le_bytes());
+        message.put((nanoseconds.rem_euclid(1_000_000_000) as u32).to_le_bytes());
+        message.string("");
+        message
+    }
+
+    fn put<const N: usize>(&mut self, bytes: [u8; N]) {
+        self.0.resize(self.0.len().next_multiple_of(N), 0);
+        self.0.extend_from_slice(&bytes);
+    }
+
+    fn string(&mut self, value: &str) {
+        self.put((value.len() as u32 + 1).to_le_bytes());
+        self.0.extend_from_slice(value.as_bytes());
+        self.0.push(0);
+    }
+
+    pub(super) fn strings(&mut self, values: &[String]) {
+        self.put((values.len() as u32).to_le_bytes());
+        values.iter().for_each(|value| self.string(value));
+    }
+
+    pub(super) fn numbers(&mut self, values: &[f64]) {
+        self.put((values.len() as u32).to_le_bytes());
+        values.iter().for_each(|value| self.put(value.to_le_bytes()));
+    }
+
+    /// The bytes, after the two that say how they are encoded and two of options.
+    pub(super) fn done(self) -> Vec<u8> {
+        [vec![0, 1, 0, 0], self.0].concat()
+    }
+}

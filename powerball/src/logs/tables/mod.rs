@@ -7,6 +7,8 @@ mod contents;
 mod finding;
 #[cfg(feature = "mcap")]
 mod mcap;
+#[cfg(feature = "mcap")]
+mod mcap_out;
 #[cfg(any(feature = "mcap", feature = "rosbag"))]
 mod messages;
 #[cfg(feature = "npz")]
@@ -22,5 +24,9 @@ mod zstd_pages;
 
 pub use contents::{Contents, Format, read_contents};
 pub use finding::{Finding, LogError};
+#[cfg(feature = "mcap")]
+pub(crate) use mcap_out::from_csv as mcap_from_csv;
+#[cfg(feature = "mcap")]
+pub use mcap_out::{Channel, JointState, McapWriter};
 pub(crate) use table::Rows;
 pub use table::{Column, Table};
