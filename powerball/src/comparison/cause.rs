@@ -1,6 +1,7 @@
 //! What would explain that two fits differ, and all of it in a sentence.
 
 use super::differences::Differences;
+use super::result::Cause;
 use super::side::Side;
 use crate::identification::estimate::Solver;
 use crate::identification::estimate::distribution::f_tail;
@@ -8,42 +9,9 @@ use dyngen::arm::sum::parse_sum;
 use dyngen::arm::{Parameter, ParameterKind};
 use dyngen::exact::rational::to_f64;
 use faer::Mat;
-use serde::Serialize;
 
 /// A payload that leaves less than this share of the inertial difference unexplained is one, however small the errors.
 const PAYLOAD_LEAVES: f64 = 0.05;
-
-/// One reason for a difference.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(tag = "cause", rename_all = "snake_case")]
-pub enum Cause {
-    /// Another payload on the last link.
-    Payload {
-        /// How much heavier `b` is, kg, and its standard error, where the logs tell it.
-        mass: Option<[f64; 2]>,
-    },
-    /// Inertial parameters differ, and not as a payload on the last link would make them.
-    Inertia {
-        /// Which.
-        parameters: Vec<String>,
-    },
-    /// Friction changed.
-    Friction {
-        /// Joint, from 1.
-        joint: usize,
-        /// Relative change, from and to.
-        change: [f64; 2],
-    },
-    /// The zero of a torque sensor or a constant torque changed.
-    SensorZero {
-        /// Joint, from 1.
-        joint: usize,
-        /// N·m or N, from and to.
-        change: [f64; 2],
-    },
-    /// Friction differs on most joints and nothing else does: another unit of the same kind, or another temperature.
-    AnotherUnit,
-}
 
 /// What explains the differences, the inertial ones first; empty where there is none.
 pub(super) fn causes(a: &Side, b: &Side, found: &Differences) -> Vec<Cause> {

@@ -260,12 +260,13 @@ fn other_covariance(a: &Side, b: &Side, place: &[usize], i: usize, k: usize) -> 
 
 /// The difference of two friction curves in the columns of `a`'s: by least squares over the velocities of its logs.
 fn curve_in_columns(a: &Side, b: &Side, joint: usize) -> Vec<f64> {
-    const POINTS: usize = 60;
+    const POINTS: usize = 100;
     let Some(rms) = a.velocity(joint) else { return vec![0.0; 5] };
     let f = &a.friction[joint];
-    // Velocities are about normal: points beyond three times the rms weigh nothing.
-    let velocity = |k: usize| 3.0 * rms * (k as f64 + 0.5) / POINTS as f64;
-    let weight = |v: f64| (-0.25 * (v / rms).powi(2)).exp();
+    // Velocities are about normal. Points are even in ln q̇, as steep levels bend where it is slowest: each stands for a
+    // stretch of velocities that grows with its own.
+    let velocity = |k: usize| 3.0 * rms * (1e-4f64).powf(k as f64 / (POINTS - 1) as f64);
+    let weight = |v: f64| (v / rms).sqrt() * (-0.25 * (v / rms).powi(2)).exp();
     let rows = Mat::from_fn(POINTS, 5, |k, c| {
         weight(velocity(k)) * friction_row([f.gamma2, f.gamma4], velocity(k))[c]
     });

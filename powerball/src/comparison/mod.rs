@@ -10,10 +10,9 @@ mod differences;
 mod result;
 mod side;
 
-pub use cause::Cause;
 pub use result::{
-    CompareError, CompareOptions, Comparison, ConstantDifference, FrictionDifference, ParameterDifference,
-    TorqueDifference,
+    Cause, CompareError, CompareOptions, Comparison, ConstantDifference, FrictionDifference,
+    ParameterDifference, TorqueDifference,
 };
 pub use side::Side;
 

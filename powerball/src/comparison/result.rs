@@ -1,6 +1,5 @@
 //! What a comparison is told and what it gives.
 
-use super::cause::Cause;
 use serde::Serialize;
 use std::fmt;
 
@@ -120,6 +119,38 @@ pub struct TorqueDifference {
     pub expected: f64,
     /// rms of the difference over the rms of the measured torque.
     pub relative: f64,
+}
+
+/// One reason for a difference.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "cause", rename_all = "snake_case")]
+pub enum Cause {
+    /// Another payload on the last link.
+    Payload {
+        /// How much heavier `b` is, kg, and its standard error, where the logs tell it.
+        mass: Option<[f64; 2]>,
+    },
+    /// Inertial parameters differ, and not as a payload on the last link would make them.
+    Inertia {
+        /// Which.
+        parameters: Vec<String>,
+    },
+    /// Friction changed.
+    Friction {
+        /// Joint, from 1.
+        joint: usize,
+        /// Relative change, from and to.
+        change: [f64; 2],
+    },
+    /// The zero of a torque sensor or a constant torque changed.
+    SensorZero {
+        /// Joint, from 1.
+        joint: usize,
+        /// N·m or N, from and to.
+        change: [f64; 2],
+    },
+    /// Friction differs on most joints and nothing else does: another unit of the same kind, or another temperature.
+    AnotherUnit,
 }
 
 /// Why two fits cannot be compared.

@@ -47,7 +47,10 @@ pub(crate) struct Compare {
 
 impl From<CompareError> for Failure {
     fn from(e: CompareError) -> Self {
-        Failure::Unusable(e.to_string())
+        match e {
+            CompareError::Different(_) | CompareError::NoErrors(_) => Failure::Refused(e.to_string()),
+            CompareError::Unreadable(_) | CompareError::Setting(_) => Failure::Unusable(e.to_string()),
+        }
     }
 }
 

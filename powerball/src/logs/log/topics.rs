@@ -107,7 +107,10 @@ pub(super) fn log(tables: &[Table], asked: Asked<'_>, findings: &mut Vec<Finding
         }
     };
     let mut samples = Samples::new(Asked { map: &map, ..asked }, called, findings);
-    let names: Vec<String> = time.map(|_| "t".to_string()).into_iter().chain(names).collect();
+    // A message may have a `t` of its own beside the time that counts.
+    let other = |name: String| if time.is_some() && name == "t" { "t of the message".into() } else { name };
+    let names: Vec<String> =
+        time.map(|_| "t".to_string()).into_iter().chain(names.into_iter().map(other)).collect();
     samples.begin(&names)?;
     let shift = usize::from(time.is_some());
     for (k, line) in table.line.iter().enumerate() {

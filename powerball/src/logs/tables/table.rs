@@ -58,6 +58,7 @@ impl Table {
     }
 
     /// Adds a message; its values may come in any order and may be of some columns only.
+    #[cfg(any(feature = "mcap", feature = "rosbag"))]
     pub(crate) fn push(&mut self, received: f64, stamp: Option<f64>, values: &[(String, f64)]) {
         let row = self.line.len();
         self.line.push(row + 1);
@@ -78,6 +79,7 @@ impl Table {
     }
 
     /// Every column as long as there are samples.
+    #[cfg(any(feature = "mcap", feature = "rosbag"))]
     pub(crate) fn fill(&mut self) {
         let rows = self.line.len();
         self.columns.iter_mut().for_each(|c| c.values.resize(rows, f64::NAN));
