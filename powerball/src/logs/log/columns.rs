@@ -25,8 +25,8 @@ const NAMES: [(&str, &[&str]); 6] = [
     ("temp", &["temp", "temperature"]),
     ("motor", &["motor"]),
 ];
-/// Names of the time; the first is that of this project's own logs.
-const TIMES: [&str; 3] = ["t", "time", "timestamp"];
+/// Names of the time; the first is that of this project's own logs. Lines with a header have that one alone.
+pub(super) const TIMES: [&str; 3] = ["t", "time", "timestamp"];
 
 /// The columns of one quantity by joint, and what each is to be multiplied with.
 pub(super) struct Group {
@@ -166,9 +166,11 @@ impl Columns {
                 errors.push(finding(name, "the header names this column twice: remove one".into()));
             }
         }
-        let t = time(names, asked.map);
+        let t = time(names, asked);
         if t.is_none() {
-            errors.push(finding("t", "the header has no column t (time in s)".into()));
+            let message =
+                "the header has no column t (time in s); if it has another name: --map 't.column = \"NAME\"'";
+            errors.push(finding("t", message.into()));
         }
         let q = group(names, "q", asked);
         if let Err(missing) = &q {
@@ -261,13 +263,14 @@ impl Columns {
     }
 }
 
-fn time(names: &[String], map: &ColumnMap) -> Option<Group> {
+fn time(names: &[String], asked: Asked<'_>) -> Option<Group> {
     let at = |name: &str| names.iter().position(|own| own == name);
-    let found = match map.t.column.as_ref().and_then(|by| by.of(0)) {
+    let known = if asked.header.is_some() { &TIMES[..1] } else { &TIMES[..] };
+    let found = match asked.map.t.column.as_ref().and_then(|by| by.of(0)) {
         Some(name) => at(name),
-        None => TIMES.iter().find_map(|name| at(name)),
+        None => known.iter().find_map(|name| at(name)),
     };
-    found.map(|at| Group { at: vec![at], factor: vec![map.t.factor("t", 0)] })
+    found.map(|at| Group { at: vec![at], factor: vec![asked.map.t.factor("t", 0)] })
 }
 
 /// N·m/A by joint.

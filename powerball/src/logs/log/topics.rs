@@ -126,7 +126,7 @@ pub(super) fn log(tables: &[Table], asked: Asked<'_>, findings: &mut Vec<Finding
 fn columns_have_time(table: &Table, map: &ColumnMap) -> bool {
     let mapped =
         map.t.column.as_ref().and_then(|by| by.of(0)).is_some_and(|name| table.column(name).is_some());
-    let own = ["t", "time", "timestamp"].iter().any(|name| table.column(name).is_some());
+    let own = columns::TIMES.iter().any(|name| table.column(name).is_some());
     let stamped = table.stamps.iter().any(|s| s.is_finite());
     mapped || (own && !stamped && map.clock == Clock::Auto) || table.received.is_empty()
 }
