@@ -1,8 +1,7 @@
 //! What would explain that two fits differ, and all of it in a sentence.
 
-use super::differences::Differences;
+use super::differences::{Differences, Inertia};
 use super::result::Cause;
-use super::side::Side;
 use crate::identification::estimate::Solver;
 use crate::identification::estimate::distribution::f_tail;
 use dyngen::arm::sum::parse_sum;
@@ -14,12 +13,12 @@ use faer::Mat;
 const PAYLOAD_LEAVES: f64 = 0.05;
 
 /// What explains the differences, the inertial ones first; empty where there is none.
-pub(super) fn causes(a: &Side, b: &Side, found: &Differences) -> Vec<Cause> {
+pub(super) fn causes(joints: usize, found: &Differences) -> Vec<Cause> {
     let mut causes = Vec::new();
     let inertial: Vec<String> =
         found.parameters.iter().filter(|p| p.differs).map(|p| p.name.clone()).collect();
     if !inertial.is_empty() {
-        causes.push(payload(a, b, found).unwrap_or(Cause::Inertia { parameters: inertial.clone() }));
+        causes.push(payload(joints, found).unwrap_or(Cause::Inertia { parameters: inertial.clone() }));
     }
     for f in found.friction.iter().filter(|f| f.differs) {
         causes.push(Cause::Friction { joint: f.joint, change: f.change });
@@ -27,8 +26,8 @@ pub(super) fn causes(a: &Side, b: &Side, found: &Differences) -> Vec<Cause> {
     for c in found.constants.iter().filter(|c| c.differs) {
         causes.push(Cause::SensorZero { joint: c.joint, change: c.interval });
     }
-    let joints = found.friction.iter().filter(|f| f.differs).count();
-    if inertial.is_empty() && joints >= 3 && 2 * joints > found.friction.len() {
+    let changed = found.friction.iter().filter(|f| f.differs).count();
+    if inertial.is_empty() && changed >= 3 && 2 * changed > found.friction.len() {
         causes.push(Cause::AnotherUnit);
     }
     causes
@@ -36,19 +35,15 @@ pub(super) fn causes(a: &Side, b: &Side, found: &Differences) -> Vec<Cause> {
 
 /// Whether ten inertial parameters of the last link explain all that differs: generalised least squares over the
 /// minimal set, whose parameters say in their names what they are sums of.
-fn payload(a: &Side, b: &Side, found: &Differences) -> Option<Cause> {
-    let place = |side: &Side, name: &str| side.parameters.iter().position(|p| p.name == name);
-    let compared: Vec<(usize, usize)> =
-        found.parameters.iter().filter_map(|p| Some((place(a, &p.name)?, place(b, &p.name)?))).collect();
+fn payload(joints: usize, found: &Differences) -> Option<Cause> {
     let sums: Vec<Vec<(Parameter, f64)>> = found
         .parameters
         .iter()
         .map(|p| Some(parse_sum(&p.name).ok()?.into_iter().map(|(p, c)| (p, to_f64(&c))).collect()))
         .collect::<Option<_>>()?;
-    let last = a.friction.len().checked_sub(1)?;
+    let last = joints.checked_sub(1)?;
     let kinds: Vec<ParameterKind> =
         ParameterKind::ALL.iter().copied().filter(|kind| *kind != ParameterKind::Im).collect();
-    let size = compared.len();
     let columns: Vec<Vec<f64>> = kinds
         .iter()
         .map(|kind| {
@@ -58,24 +53,17 @@ fn payload(a: &Side, b: &Side, found: &Differences) -> Option<Cause> {
             sums.iter().map(|sum| sum.iter().map(own).sum()).collect()
         })
         .collect();
-    let covariance = Mat::from_fn(size, size, |i, k| {
-        a.covariance(compared[i].0, compared[k].0) + b.covariance(compared[i].1, compared[k].1)
-    });
-    let weights = Solver::new(&covariance, |_| true);
     let inner = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
-    let difference: Vec<f64> = found.parameters.iter().map(|p| p.difference).collect();
+    let Inertia { difference, weights, freedom } = &found.inertia;
     let weighted: Vec<Vec<f64>> = columns.iter().map(|column| weights.solve(column)).collect();
     let gram = Mat::from_fn(kinds.len(), kinds.len(), |i, k| inner(&columns[i], &weighted[k]));
-    let right: Vec<f64> = weighted.iter().map(|column| inner(column, &difference)).collect();
+    let right: Vec<f64> = weighted.iter().map(|column| inner(column, difference)).collect();
     let solver = Solver::new(&gram, |_| true);
     let load = solver.solve(&right);
-    let all = inner(&difference, &weights.solve(&difference));
+    let all = inner(difference, &weights.solve(difference));
     let left = all - inner(&load, &right);
     let free = weights.kept().len().checked_sub(solver.kept().len()).filter(|free| *free > 0)? as f64;
-    let freedom = (0..size)
-        .filter_map(|i| Some(a.freedom(compared[i].0)?.min(b.freedom(compared[i].1)?)))
-        .fold(f64::INFINITY, f64::min);
-    if left > PAYLOAD_LEAVES * all && f_tail(left / free, free, freedom) < found.level {
+    if left > PAYLOAD_LEAVES * all && f_tail(left / free, free, *freedom) < found.level {
         return None;
     }
     let mass = kinds.iter().position(|kind| *kind == ParameterKind::M)?;
@@ -91,7 +79,7 @@ pub(super) fn sentence(found: &Differences, causes: &[Cause]) -> String {
         let widest = widest.filter(|w| w.is_finite()).fold(0.0, f64::max);
         return format!(
             "Same arm, as far as these fits can tell: none of {} numbers differs (level {} %); a change of friction by \
-                more than {:.0} % would have been seen on every joint.",
+                more than {:.1} % would have been seen on every joint.",
             found.comparisons,
             100.0 * found.level,
             100.0 * widest

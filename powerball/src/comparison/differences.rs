@@ -6,7 +6,7 @@ use super::result::{
 };
 use super::side::Side;
 use crate::identification::estimate::distribution::{f_tail, t_critical};
-use crate::identification::estimate::{Uncertainty, friction_row};
+use crate::identification::estimate::{Solver, Uncertainty, friction_row};
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 
@@ -21,10 +21,46 @@ pub(super) struct Differences {
     pub level: f64,
     pub comparisons: usize,
     pub parameters: Vec<ParameterDifference>,
+    pub inertia: Inertia,
     pub friction: Vec<FrictionDifference>,
     pub constants: Vec<ConstantDifference>,
     pub torque: Vec<TorqueDifference>,
     pub warnings: Vec<String>,
+}
+
+/// The differences of the minimal set together.
+pub(super) struct Inertia {
+    /// b − a, in the order of the compared parameters.
+    pub difference: Vec<f64>,
+    /// The factor of their covariance.
+    pub weights: Solver,
+    /// Degrees of freedom of the least known.
+    pub freedom: f64,
+}
+
+impl Inertia {
+    fn new(a: &Side, b: &Side, compared: &[(usize, usize, Difference)]) -> Inertia {
+        let covariance = Mat::from_fn(compared.len(), compared.len(), |i, k| {
+            a.covariance(compared[i].0, compared[k].0) + b.covariance(compared[i].1, compared[k].1)
+        });
+        Inertia {
+            difference: compared.iter().map(|(_, _, d)| d.value).collect(),
+            weights: Solver::new(&covariance, |_| true),
+            freedom: compared.iter().map(|(_, _, d)| d.freedom).fold(f64::INFINITY, f64::min),
+        }
+    }
+
+    /// How often equal arms would differ so in all of them (Hotelling's T²); 0 where they are too many to tell.
+    fn p_value(&self) -> f64 {
+        let count = self.weights.kept().len() as f64;
+        let left = self.freedom - count + 1.0;
+        if count == 0.0 || left <= 0.0 {
+            return 0.0;
+        }
+        let square: f64 =
+            self.difference.iter().zip(self.weights.solve(&self.difference)).map(|(d, w)| d * w).sum();
+        f_tail(square * left / (count * self.freedom), count, left)
+    }
 }
 
 /// A difference with its variance.
@@ -91,6 +127,8 @@ impl Differences {
         }
         // Bonferroni: each interval misses with an equal share of the level.
         let p = level / comparisons as f64;
+        let inertia = Inertia::new(a, b, &parameters);
+        let together = inertia.p_value();
         let parameters = parameters.into_iter().map(|(k, other, d)| ParameterDifference {
             name: a.parameters[k].name.clone(),
             a: a.parameters[k].value,
@@ -98,7 +136,8 @@ impl Differences {
             difference: d.value,
             interval: d.interval(p),
             p_value: d.p_value(),
-            differs: d.p_value() < p,
+            // One of twenty that is far off by itself is noise where all together are not.
+            differs: d.p_value() < p && together < level,
         });
         let constants = constants.into_iter().map(|(j, own, other)| {
             let d = Difference::of(own, other);
@@ -118,6 +157,7 @@ impl Differences {
             level,
             comparisons,
             parameters: parameters.collect(),
+            inertia,
             friction: friction.into_iter().map(|(j, rows)| curve(j, &rows, p)).collect(),
             constants: constants.collect(),
             torque: torque(a, b, &place),

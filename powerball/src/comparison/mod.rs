@@ -24,9 +24,10 @@ use differences::Differences;
 /// [`CompareError`]: fits of other arms or parameter sets, or without standard errors.
 pub fn compare(a: &Side, b: &Side, options: &CompareOptions) -> Result<Comparison, CompareError> {
     let differences = Differences::new(a, b, options)?;
-    let causes = cause::causes(a, b, &differences);
+    let causes = cause::causes(a.friction.len(), &differences);
     let sentence = cause::sentence(&differences, &causes);
-    let Differences { level, comparisons, parameters, friction, constants, torque, warnings } = differences;
+    let Differences { level, comparisons, parameters, friction, constants, torque, warnings, .. } =
+        differences;
     let differ = parameters.iter().any(|p| p.differs)
         || friction.iter().any(|f| f.differs)
         || constants.iter().any(|c| c.differs);
