@@ -226,7 +226,7 @@ fn curve(joint: usize, rows: &[AtVelocity], p: f64) -> FrictionDifference {
     let of = |what: &dyn Fn(&AtVelocity) -> f64| rows.iter().map(what).collect::<Vec<f64>>();
     let surest = rows.iter().min_by(|x, y| x.3.p_value().total_cmp(&y.3.p_value()));
     let change = surest.map_or([0.0; 2], |(_, a, _, d)| match a.abs() {
-        zero if zero == 0.0 => [f64::NEG_INFINITY, f64::INFINITY],
+        0.0 => [f64::NEG_INFINITY, f64::INFINITY],
         size => d.interval(p).map(|end| end / size),
     });
     let p_value = surest.map_or(1.0, |(_, _, _, d)| d.p_value());

@@ -94,7 +94,7 @@ impl Made {
             .map(|m| m.1)
     }
 
-    fn from_csv(self, lines: File, out: File) -> io::Result<usize> {
+    fn convert(self, lines: File, out: File) -> io::Result<usize> {
         match self {
             Made::Parquet => crate::logs::tables::columnar::from_csv(lines, out),
             #[cfg(feature = "mcap")]
@@ -128,7 +128,7 @@ fn recover(path: &Path, lines: &Path) -> io::Result<Option<PathBuf>> {
 fn convert(lines: &Path, target: &Path) -> io::Result<usize> {
     let part = with_more(target, &format!(".{}.part", std::process::id()));
     let made = Made::of(target).unwrap_or(Made::Parquet);
-    let written = made.from_csv(File::open(lines)?, File::create(&part)?);
+    let written = made.convert(File::open(lines)?, File::create(&part)?);
     match written {
         Ok(rows) if rows > 0 => fs::rename(&part, target).map(|()| rows),
         other => {

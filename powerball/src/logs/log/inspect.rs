@@ -272,12 +272,14 @@ fn aligned(tables: &[Table], map: &ColumnMap) -> Vec<Aligned> {
         .filter(of_joints)
         .filter_map(|t| Some((t.name.as_str(), rising(time(t, map)?.0))))
         .collect();
-    let pairs = timed.iter().enumerate().flat_map(|(k, a)| timed[k + 1..].iter().map(move |b| (a, b)));
-    let one = |(a, b): (&(&str, Vec<f64>), &(&str, Vec<f64>))| {
-        let alignment = alignment(&a.1, &b.1)?;
-        Some(Aligned { a: a.0.into(), b: b.0.into(), alignment })
-    };
-    pairs.filter_map(one).collect()
+    let mut pairs = Vec::new();
+    for (k, (a, ta)) in timed.iter().enumerate() {
+        for (b, tb) in &timed[k + 1..] {
+            let pair = |alignment| Aligned { a: a.to_string(), b: b.to_string(), alignment };
+            pairs.extend(alignment(ta, tb).map(pair));
+        }
+    }
+    pairs
 }
 
 fn rising(mut t: Vec<f64>) -> Vec<f64> {
