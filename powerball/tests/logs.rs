@@ -1,5 +1,5 @@
-//! Logs in the formats of others, written by the formats' own writers (tests/logs_data/make.py): each comes to the
-//! numbers of the CSV, joints by their names.
+//! Logs in the formats of others, written by the formats' own writers (tests/logs_data/make.py): each comes
+//! to the numbers of the CSV, joints by their names.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 

@@ -9,7 +9,8 @@ use dyngen::arm::{Parameter, ParameterKind};
 use dyngen::exact::rational::to_f64;
 use faer::Mat;
 
-/// A payload that leaves less than this share of the inertial difference unexplained is one, however small the errors.
+/// A payload that leaves less than this share of the inertial difference unexplained is one, however small
+/// the errors.
 const PAYLOAD_LEAVES: f64 = 0.05;
 
 /// What explains the differences, the inertial ones first; empty where there is none.
@@ -33,8 +34,8 @@ pub(super) fn causes(joints: usize, found: &Differences) -> Vec<Cause> {
     causes
 }
 
-/// Whether ten inertial parameters of the last link explain all that differs: generalised least squares over the
-/// minimal set, whose parameters say in their names what they are sums of.
+/// Whether ten inertial parameters of the last link explain all that differs: generalised least squares over
+/// the minimal set, whose parameters say in their names what they are sums of.
 fn payload(joints: usize, found: &Differences) -> Option<Cause> {
     let sums: Vec<Vec<(Parameter, f64)>> = found
         .parameters
@@ -78,7 +79,8 @@ pub(super) fn sentence(found: &Differences, causes: &[Cause]) -> String {
         let widest = found.friction.iter().map(|f| f.change[0].abs().max(f.change[1].abs()));
         let widest = widest.filter(|w| w.is_finite()).fold(0.0, f64::max);
         return format!(
-            "Same arm, as far as these fits can tell: none of {} numbers differs (level {} %); a change of friction by \
+            "Same arm, as far as these fits can tell: none of {} numbers differs (level {} %); a change of \
+                friction by \
                 more than {:.1} % would have been seen on every joint.",
             found.comparisons,
             100.0 * found.level,
@@ -97,7 +99,10 @@ fn in_words(cause: &Cause) -> String {
     match cause {
         Cause::Payload { mass: Some([mass, std]) } => {
             let which = if *mass >= 0.0 { "heavier" } else { "lighter" };
-            format!("another payload: the last link is {:.3} kg {which} (standard error {std:.3} kg)", mass.abs())
+            format!(
+                "another payload: the last link is {:.3} kg {which} (standard error {std:.3} kg)",
+                mass.abs()
+            )
         }
         Cause::Payload { mass: None } => {
             "another payload: the last link differs; these logs do not tell its mass".into()
@@ -109,15 +114,22 @@ fn in_words(cause: &Cause) -> String {
         Cause::Friction { joint, change: [low, high] } => {
             let percent = |x: f64| 100.0 * x;
             match (percent(*low), percent(*high)) {
-                (low, high) if low > 0.0 => format!("friction changed on joint {joint} by {low:.1} to {high:.1} %"),
+                (low, high) if low > 0.0 => format!(
+                    "friction changed on joint {joint} by {low:.1} to \
+                    {high:.1} %"
+                ),
                 (low, high) => format!("friction changed on joint {joint} by {high:.1} to {low:.1} %"),
             }
         }
         Cause::SensorZero { joint, change: [low, high] } => {
-            format!("another sensor zero on joint {joint}: a constant torque of {low:.3} to {high:.3} N·m came in")
+            format!(
+                "another sensor zero on joint {joint}: a constant torque of {low:.3} to {high:.3} N·m \
+                came in"
+            )
         }
         Cause::AnotherUnit => {
-            "friction differs on most joints and inertia on none: another unit of the same kind, or the same one at another \
+            "friction differs on most joints and inertia on none: another unit of the same kind, or the same \
+                one at another \
                 temperature"
                 .into()
         }

@@ -10,8 +10,8 @@ use crate::identification::estimate::{Solver, Uncertainty, friction_row};
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 
-/// Friction is compared at these shares of the rms velocity: where it breaks loose, where it bends, and where the joint
-/// is as fast as it gets.
+/// Friction is compared at these shares of the rms velocity: where it breaks loose, where it bends, and where
+/// the joint is as fast as it gets.
 const VELOCITIES: [f64; 5] = [0.1, 0.3, 0.7, 1.2, 1.8];
 /// rad/s, where the logs' velocities are not known.
 const ORDINARY: f64 = 0.5;
@@ -50,7 +50,8 @@ impl Inertia {
         }
     }
 
-    /// How often equal arms would differ so in all of them (Hotelling's T²); 0 where they are too many to tell.
+    /// How often equal arms would differ so in all of them (Hotelling's T²); 0 where they are too many to
+    /// tell.
     fn p_value(&self) -> f64 {
         let count = self.weights.kept().len() as f64;
         let left = self.freedom - count + 1.0;
@@ -109,7 +110,8 @@ impl Differences {
         let mut warnings = Vec::new();
         for side in [a, b].into_iter().filter(|side| side.uncertainty.is_none()) {
             warnings.push(format!(
-                "{}: there is no covariance.json beside it: standard errors count one by one, so less is seen; identify \
+                "{}: there is no covariance.json beside it: standard errors count one by one, so less is \
+                    seen; identify \
                     again to have it",
                 side.name
             ));
@@ -179,7 +181,8 @@ fn same_set(a: &Side, b: &Side) -> Result<Vec<usize>, CompareError> {
             let names =
                 |side: &Side| side.parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>().join("; ");
             Err(CompareError::Different(format!(
-                "{} is of {} with {} joints and the parameters {}; {} is of {} with {} joints and {}: only fits of one arm \
+                "{} is of {} with {} joints and the parameters {}; {} is of {} with {} joints and {}: only \
+                    fits of one arm \
                     file and one mounting can be compared",
                 a.name,
                 a.arm,
@@ -286,7 +289,8 @@ fn covariance(all: &Uncertainty, i: usize, k: usize) -> f64 {
     if all.freedom[i] > 0.0 && all.freedom[k] > 0.0 { all.covariance(i, k) } else { 0.0 }
 }
 
-/// The covariance of `b` in the order of `a`. Where its law has no constant torque, or nothing is known, that of `a`.
+/// The covariance of `b` in the order of `a`. Where its law has no constant torque, or nothing is known, that
+/// of `a`.
 fn other_covariance(a: &Side, b: &Side, place: &[usize], i: usize, k: usize) -> f64 {
     let Some(own) = &a.uncertainty else { return 0.0 };
     match &b.uncertainty {
@@ -298,13 +302,14 @@ fn other_covariance(a: &Side, b: &Side, place: &[usize], i: usize, k: usize) -> 
     }
 }
 
-/// The difference of two friction curves in the columns of `a`'s: by least squares over the velocities of its logs.
+/// The difference of two friction curves in the columns of `a`'s: by least squares over the velocities of its
+/// logs.
 fn curve_in_columns(a: &Side, b: &Side, joint: usize) -> Vec<f64> {
     const POINTS: usize = 100;
     let Some(rms) = a.velocity(joint) else { return vec![0.0; 5] };
     let f = &a.friction[joint];
-    // Velocities are about normal. Points are even in ln q̇, as steep levels bend where it is slowest: each stands for a
-    // stretch of velocities that grows with its own.
+    // Velocities are about normal. Points are even in ln q̇, as steep levels bend where it is slowest: each
+    // stands for a stretch of velocities that grows with its own.
     let velocity = |k: usize| 3.0 * rms * (1e-4f64).powf(k as f64 / (POINTS - 1) as f64);
     let weight = |v: f64| (v / rms).sqrt() * (-0.25 * (v / rms).powi(2)).exp();
     let rows = Mat::from_fn(POINTS, 5, |k, c| {

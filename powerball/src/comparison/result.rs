@@ -16,7 +16,8 @@ impl Default for CompareOptions {
     }
 }
 
-/// Two fits side by side; as JSON it is `comparison.json`. Differences are `b` less `a`; intervals hold all at once.
+/// Two fits side by side; as JSON it is `comparison.json`. Differences are `b` less `a`; intervals hold all
+/// at once.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// The one.
@@ -149,7 +150,8 @@ pub enum Cause {
         /// N·m or N, from and to.
         change: [f64; 2],
     },
-    /// Friction differs on most joints and nothing else does: another unit of the same kind, or another temperature.
+    /// Friction differs on most joints and nothing else does: another unit of the same kind, or another
+    /// temperature.
     AnotherUnit,
 }
 

@@ -48,7 +48,8 @@ impl Side {
         }
     }
 
-    /// Reads the result of `powerball identify`: its folder, or `identified.json` in it, or another model of that form.
+    /// Reads the result of `powerball identify`: its folder, or `identified.json` in it, or another model of
+    /// that form.
     ///
     /// # Errors
     /// [`CompareError::Unreadable`].

@@ -1,7 +1,7 @@
 //! From log files to rows of the regression.
 //!
-//! [`tables`] reads files, [`log`] finds an arm's signals in them and doubts them, [`signal`] filters and differentiates, [`regression`] makes rows,
-//! [`summary`] keeps of them what a fit needs.
+//! [`tables`] reads files, [`log`] finds an arm's signals in them and doubts them, [`signal`] filters and
+//! differentiates, [`regression`] makes rows, [`summary`] keeps of them what a fit needs.
 
 pub mod batch;
 pub mod log;

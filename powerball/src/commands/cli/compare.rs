@@ -17,13 +17,12 @@ use std::sync::Arc;
 /// Writes comparison.json and report.html. Intervals hold all at once: equal arms are called different in the
 /// share of comparisons that --level says. Differences are B less A.
 #[derive(Args, Debug)]
-#[command(
-    after_help = "Examples:\n  powerball compare monday/ friday/ --out compared\n  powerball compare unit_1.csv \
-        unit_2.csv --arm arm.toml --out compared"
-)]
+#[command(after_help = "Examples:\n  powerball compare monday/ friday/ --out compared\n  powerball compare \
+        unit_1.csv \
+        unit_2.csv --arm arm.toml --out compared")]
 pub(crate) struct Compare {
-    /// The one: the folder of a result of `powerball identify` or its identified.json; or, with --arm, a log or a
-    /// summary.
+    /// The one: the folder of a result of `powerball identify` or its identified.json; or, with --arm, a log
+    /// or a summary.
     #[arg(value_name = "A")]
     a: PathBuf,
     /// The other.
@@ -72,7 +71,8 @@ impl Compare {
         output::print(&compared.sentence);
         for t in &compared.torque_difference {
             output::print(&format!(
-                "joint {}: {:.4} N·m along the logs of A, {:.1} % of the torque; the errors of both alone make {:.4} N·m",
+                "joint {}: {:.4} N·m along the logs of A, {:.1} % of the torque; the errors of both alone \
+                    make {:.4} N·m",
                 t.joint,
                 t.rms,
                 100.0 * t.relative,
@@ -90,7 +90,8 @@ impl Compare {
         let shown = path.display().to_string();
         let Some(arm) = arm else {
             return Err(Failure::Unusable(format!(
-                "{shown}: is no result of `powerball identify`; for a log or a summary give its arm with --arm"
+                "{shown}: is no result of `powerball identify`; for a log or a summary give its arm with \
+                    --arm"
             )));
         };
         let terminal = output::Progress::new();
@@ -110,7 +111,8 @@ fn is_json(path: &Path) -> bool {
 fn page(compared: &Comparison) -> Page {
     let mut page = Page::new(format!("Two fits of {}", compared.arm));
     page.lead(&format!(
-        "A: {}. B: {}. Differences are B less A; the intervals of all {} numbers hold at once, and equal arms are called \
+        "A: {}. B: {}. Differences are B less A; the intervals of all {} numbers hold at once, and equal \
+            arms are called \
             different in {} % of comparisons.",
         compared.a,
         compared.b,

@@ -15,8 +15,8 @@ use std::path::PathBuf;
 
 /// Fit the minimal inertial set and the friction of every joint (Eq. 16) to logs.
 ///
-/// Writes identified.json and report.html; consistent.json: the nearest parameters that a real arm can have, as
-/// values for `dyngen generate --values`; covariance.json: how well all of it is known together, for
+/// Writes identified.json and report.html; consistent.json: the nearest parameters that a real arm can have,
+/// as values for `dyngen generate --values`; covariance.json: how well all of it is known together, for
 /// `powerball compare`.
 #[derive(Args, Debug)]
 #[command(

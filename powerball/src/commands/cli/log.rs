@@ -10,8 +10,8 @@ use std::path::PathBuf;
 
 /// Show what is in log files and what they are taken to be: topics, columns, units, rates, gaps, doubts.
 ///
-/// CSV, Parquet, MCAP, rosbag2 (`.db3`) and npz. With an arm also the log that `identify` would read. Exit code 1
-/// where a file is no log of that arm.
+/// CSV, Parquet, MCAP, rosbag2 (`.db3`) and npz. With an arm also the log that `identify` would read. Exit
+/// code 1 where a file is no log of that arm.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Examples:\n  powerball log recording.mcap\n  powerball log bag_0.db3 --arm arm.toml --map \
@@ -33,8 +33,8 @@ pub(crate) struct LogCommand {
     /// The file to write.
     #[arg(short, long, value_name = "OUT", requires = "to")]
     out: Option<PathBuf>,
-    /// A model, identified.json or model.json: an MCAP then has measured, predicted and residual torque of each joint
-    /// beside each other, in the band of the fit.
+    /// A model, identified.json or model.json: an MCAP then has measured, predicted and residual torque of
+    /// each joint beside each other, in the band of the fit.
     #[arg(long, value_name = "FILE.json", requires = "to")]
     model: Option<PathBuf>,
     /// Print what was found as one JSON object on standard output.

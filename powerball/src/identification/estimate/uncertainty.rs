@@ -1,5 +1,5 @@
-//! How well a fit is known, all coefficients together, and what they weigh along its logs: what a comparison of two
-//! fits needs beside their values.
+//! How well a fit is known, all coefficients together, and what they weigh along its logs: what a comparison
+//! of two fits needs beside their values.
 
 use super::distribution::freedom_of;
 use super::errors::StandardErrors;
@@ -8,8 +8,9 @@ use super::reduced::Solution;
 use super::rows::FRICTION;
 use serde::{Deserialize, Serialize};
 
-/// The covariance of a fit's coefficients. Their order: the minimal set; five a joint, which are the levels γ1 and γ3,
-/// γ5, and the tangents γ1·Δln γ2 and γ3·Δln γ4; a constant torque a joint where the friction law has one.
+/// The covariance of a fit's coefficients. Their order: the minimal set; five a joint, which are the levels
+/// γ1 and γ3, γ5, and the tangents γ1·Δln γ2 and γ3·Δln γ4; a constant torque a joint where the friction law
+/// has one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Uncertainty {
     /// The names of the minimal set.
@@ -18,8 +19,8 @@ pub struct Uncertainty {
     pub joints: usize,
     /// Lower triangle by rows, SI units.
     pub covariance: Vec<Vec<f64>>,
-    /// Degrees of freedom of each coefficient's standard error; 0 where the logs do not determine it, or where it is at
-    /// its bound.
+    /// Degrees of freedom of each coefficient's standard error; 0 where the logs do not determine it, or
+    /// where it is at its bound.
     pub freedom: Vec<f64>,
     /// By joint: the fitted logs in the eyes of the model.
     pub path: Vec<Path>,
@@ -87,8 +88,8 @@ impl Uncertainty {
     }
 }
 
-/// Eq. 16's columns of a joint at one velocity, and those of the tangents of its steepnesses: what the coefficients of
-/// [`Uncertainty`] are multiplied with, free of units but for γ5's.
+/// Eq. 16's columns of a joint at one velocity, and those of the tangents of its steepnesses: what the
+/// coefficients of [`Uncertainty`] are multiplied with, free of units but for γ5's.
 #[must_use]
 pub fn friction_row([gamma2, gamma4]: [f64; 2], velocity: f64) -> [f64; FRICTION] {
     let saturating = |gamma: f64| (gamma * velocity).tanh();

@@ -16,7 +16,8 @@ pub(super) struct Asked<'a> {
     pub header: Option<usize>,
 }
 
-/// The quantities with the names that columns have for them: those of this project's own logs, then those of ROS.
+/// The quantities with the names that columns have for them: those of this project's own logs, then those of
+/// ROS.
 const NAMES: [(&str, &[&str]); 6] = [
     ("q", &["q", "position"]),
     ("dq", &["dq", "velocity"]),
@@ -232,8 +233,8 @@ impl Columns {
         [&self.t, &self.q, &self.torque].into_iter().chain(optional)
     }
 
-    /// t, q, effort, temperature, motor, dq in a row; one of the last three that is no number does not spoil the
-    /// sample.
+    /// t, q, effort, temperature, motor, dq in a row; one of the last three that is no number does not spoil
+    /// the sample.
     pub(super) fn sample(&self, number: &impl Fn(usize) -> Option<f64>) -> Option<Vec<f64>> {
         let mut values = Vec::new();
         for group in [&self.t, &self.q, &self.torque] {
@@ -282,7 +283,8 @@ fn constants(arm: &Arm) -> Result<Vec<f64>, String> {
         return Ok(arm.joints.iter().filter_map(|j| j.torque_constant).collect());
     }
     Err(format!(
-        "the log holds currents, but the arm file gives no torque_constant (N·m/A at the joint) for joint {}: add it \
+        "the log holds currents, but the arm file gives no torque_constant (N·m/A at the joint) for joint \
+            {}: add it \
             there, or log tau1 … tau{n}",
         without.join(", ")
     ))
@@ -314,13 +316,15 @@ fn missing_positions(names: &[String], missing: &[String], asked: Asked<'_>) -> 
     }
     if own.is_empty() {
         return format!(
-            "the log's joints are {}, and nothing says which of the arm's they are: give each [[joint]] of the arm \
+            "the log's joints are {}, and nothing says which of the arm's they are: give each [[joint]] of \
+                the arm \
                 file its name, or name them in chain order with --map 'joints = [\"…\", …]'",
             logged.join(", ")
         );
     }
     format!(
-        "the log's joints are {}, the arm's are {}; missing: {}. Give the joints the names that the log has, in the arm \
+        "the log's joints are {}, the arm's are {}; missing: {}. Give the joints the names that the log has, \
+            in the arm \
             file or with --map 'joints = [\"…\", …]' in chain order",
         logged.join(", "),
         own.join(", "),

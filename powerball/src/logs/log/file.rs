@@ -20,9 +20,9 @@ pub struct LogFile {
 }
 
 impl LogFile {
-    /// Begins a log at `path`: Parquet or MCAP where its name ends in `.parquet` or `.mcap`, CSV else. What was there before
-    /// stays until the first line is written. Also gives the file that took up what an earlier log of this
-    /// name left when its program died.
+    /// Begins a log at `path`: Parquet or MCAP where its name ends in `.parquet` or `.mcap`, CSV else. What
+    /// was there before stays until the first line is written. Also gives the file that took up what an
+    /// earlier log of this name left when its program died.
     ///
     /// # Errors
     /// What the file system says, and a format that this build does not have.
@@ -124,7 +124,8 @@ fn recover(path: &Path, lines: &Path) -> io::Result<Option<PathBuf>> {
     Ok((rows > 0).then_some(target))
 }
 
-/// Lines of CSV to a file of the target's format, whole or not at all; the number of rows. Without rows there is no file.
+/// Lines of CSV to a file of the target's format, whole or not at all; the number of rows. Without rows there
+/// is no file.
 fn convert(lines: &Path, target: &Path) -> io::Result<usize> {
     let part = with_more(target, &format!(".{}.part", std::process::id()));
     let made = Made::of(target).unwrap_or(Made::Parquet);

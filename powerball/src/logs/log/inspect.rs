@@ -63,7 +63,8 @@ pub struct InspectedTable {
     pub gaps: usize,
     /// The longest step, s.
     pub longest_step: Option<f64>,
-    /// Steps that do not rise; of messages those that run back, as publishers that share a topic may speak at once.
+    /// Steps that do not rise; of messages those that run back, as publishers that share a topic may speak at
+    /// once.
     pub not_rising: usize,
     /// The names of its joints, or their numbers, in the order of its columns.
     pub joints: Vec<String>,

@@ -18,8 +18,8 @@ use std::path::Path;
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ColumnMap {
-    /// The names that the log has for the arm's joints, in the order of the arm file; empty where they are those of
-    /// the arm file.
+    /// The names that the log has for the arm's joints, in the order of the arm file; empty where they are
+    /// those of the arm file.
     pub joints: Vec<String>,
     /// The topic with all that is not said to be elsewhere.
     pub topic: Option<String>,
@@ -58,7 +58,8 @@ pub enum Clock {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mapped {
-    /// One name: the columns are `name1` … or `name.joint` …. A list: the column of each joint in chain order.
+    /// One name: the columns are `name1` … or `name.joint` …. A list: the column of each joint in chain
+    /// order.
     pub column: Option<ByJoint<String>>,
     /// The topic that has it.
     pub topic: Option<String>,

@@ -1,8 +1,8 @@
 //! Logs of joint positions and torques: read, checked, and every doubt about them said.
 //!
 //! Files ([`Log::read`]: CSV, Parquet, MCAP, rosbag2, npz), arrays ([`Log::from_arrays`]) and samples
-//! ([`Log::from_samples`]) come to columns by name, and these pass the same checks. A [`ColumnMap`] says what names do
-//! not.
+//! ([`Log::from_samples`]) come to columns by name, and these pass the same checks. A [`ColumnMap`] says what
+//! names do not.
 
 mod arrays;
 mod check;
@@ -44,8 +44,8 @@ pub struct Log {
     pub torque: Vec<Vec<f64>>,
     /// Joint temperatures by joint, °C, where they were logged.
     pub temperature: Option<Vec<Vec<f64>>>,
-    /// Torques on the motors' side of the gears by joint (n × N, as `torque`), where they were logged. Unit, sign and
-    /// ratio are whatever the drives say; not a number where a sample has none.
+    /// Torques on the motors' side of the gears by joint (n × N, as `torque`), where they were logged. Unit,
+    /// sign and ratio are whatever the drives say; not a number where a sample has none.
     pub motor: Option<Vec<Vec<f64>>>,
     /// Index ranges without a gap.
     pub pieces: Vec<std::ops::Range<usize>>,

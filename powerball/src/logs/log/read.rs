@@ -84,7 +84,8 @@ pub(super) fn parse(bytes: &[u8], asked: Asked<'_>, findings: &mut Vec<Finding>)
 }
 
 impl Log {
-    /// Reads a log of an arm from a file, CSV, Parquet, MCAP, rosbag2 (`.db3`) or npz, with what is odd about it.
+    /// Reads a log of an arm from a file, CSV, Parquet, MCAP, rosbag2 (`.db3`) or npz, with what is odd about
+    /// it.
     ///
     /// # Errors
     /// Why the log cannot be used: no such file, missing columns, no torque constant, units that cannot be

@@ -358,7 +358,8 @@ fn parquet_says_the_same_as_csv() {
     assert!(torn.unwrap_err().to_string().contains("torn.parquet: Parquet: cannot be read"));
 }
 
-/// What pyarrow wrote (`tests/data/README.md`), in both versions of data pages, with a dictionary and a missing value.
+/// What pyarrow wrote (`tests/data/README.md`), in both versions of data pages, with a dictionary and a
+/// missing value.
 #[cfg(feature = "parquet")]
 #[test]
 fn columns_compressed_with_zstandard_are_read() {

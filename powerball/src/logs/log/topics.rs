@@ -1,4 +1,5 @@
-//! A log from the tables of a file: which topic has what, whose clock counts, and how topics are joined in time.
+//! A log from the tables of a file: which topic has what, whose clock counts, and how topics are joined in
+//! time.
 
 use super::columns::{self, Asked};
 use super::map::{Clock, ColumnMap};
@@ -9,8 +10,8 @@ use crate::logs::tables::{Rows, Table};
 
 /// Header stamps count where at least this share of them is there and rises.
 const MOST_STAMPS: f64 = 0.95;
-/// And where they span what the times of receipt span, within this share and this many seconds: a header that always
-/// says when the program began is no clock.
+/// And where they span what the times of receipt span, within this share and this many seconds: a header that
+/// always says when the program began is no clock.
 const SPAN: f64 = 0.1;
 const SPAN_SECONDS: f64 = 0.5;
 /// A value of another topic counts between two of its samples that are at most this many of its steps apart.
@@ -174,7 +175,8 @@ fn choose<'a>(tables: &'a [Table], asked: Asked<'_>) -> Result<(&'a Table, &'a T
                 }
                 let names: Vec<&str> = several.iter().map(|t| t.name.as_str()).collect();
                 let message = format!(
-                    "{} hold positions and torques of this arm: say which one counts with --map 'topic = \"{}\"'",
+                    "{} hold positions and torques of this arm: say which one counts with --map 'topic = \
+                        \"{}\"'",
                     names.join(", "),
                     names[0]
                 );
@@ -195,8 +197,8 @@ fn choose<'a>(tables: &'a [Table], asked: Asked<'_>) -> Result<(&'a Table, &'a T
     }
 }
 
-/// Positions brought to the times of the torques: they are the smoother ones, and what stands between two of their
-/// samples is known best. Columns take their plain names, `q1` and so on.
+/// Positions brought to the times of the torques: they are the smoother ones, and what stands between two of
+/// their samples is known best. Columns take their plain names, `q1` and so on.
 fn join(
     positions: &Table,
     torques: &Table,

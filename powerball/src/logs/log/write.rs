@@ -5,8 +5,8 @@ use std::io::{self, Write};
 use std::path::Path;
 
 impl Log {
-    /// Writes the log: CSV, or Parquet or MCAP where the name of the file ends so. Temperatures and motors' torques that
-    /// are there go with it; velocities do not, as they are not kept.
+    /// Writes the log: CSV, or Parquet or MCAP where the name of the file ends so. Temperatures and motors'
+    /// torques that are there go with it; velocities do not, as they are not kept.
     ///
     /// # Errors
     /// What the file system says.

@@ -67,8 +67,8 @@ fn shown(path: &Path) -> String {
     path.display().to_string()
 }
 
-/// Reads all tables of a file. Of a bag the numbers of joint states and of JSON messages come into memory, one message
-/// after the other; pictures and the like stay on the disk.
+/// Reads all tables of a file. Of a bag the numbers of joint states and of JSON messages come into memory,
+/// one message after the other; pictures and the like stay on the disk.
 ///
 /// # Errors
 /// Where the file cannot be read, is torn, or is of a format that this build does not have.
@@ -120,7 +120,8 @@ fn rosbag_tables(path: &Path, file: &str, notes: &mut Vec<Finding>) -> Result<Ve
     let mut waiting = path.as_os_str().to_owned();
     waiting.push("-wal");
     if std::fs::metadata(&waiting).is_ok_and(|m| m.len() > 0) {
-        let message = "its last messages are still in the file beside it that ends in -wal, and were not read: \
+        let message = "its last messages are still in the file beside it that ends in -wal, and were not \
+            read: \
             `sqlite3 FILE vacuum` brings them in";
         notes.push(Finding::of_file(file, "rosbag2", message));
     }

@@ -7,8 +7,8 @@ use std::fmt;
 pub struct Finding {
     /// The file.
     pub file: String,
-    /// Line in the file, message of its topic, or number of the sample of a log from memory, from 1; `None` where
-    /// the whole log is meant.
+    /// Line in the file, message of its topic, or number of the sample of a log from memory, from 1; `None`
+    /// where the whole log is meant.
     pub line: Option<usize>,
     /// The column or quantity.
     pub quantity: String,

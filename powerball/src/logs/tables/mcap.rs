@@ -1,5 +1,6 @@
-//! MCAP files, the default storage of rosbag2 (<https://mcap.dev/spec>): records one after the other, some of them in
-//! compressed chunks. The index at the end is not needed, so that a recording whose program died can be read.
+//! MCAP files, the default storage of rosbag2 (<https://mcap.dev/spec>): records one after the other, some of
+//! them in compressed chunks. The index at the end is not needed, so that a recording whose program died can
+//! be read.
 //!
 //! The crate `mcap` would bring fifteen others, among them C libraries for the compression.
 

@@ -1,6 +1,7 @@
 //! Recordings as MCAP, which Foxglove and rerun open: joint states in ROS's message, all else as JSON.
 //!
-//! Records stand one after the other, without chunks and index, so that a file can be read up to where its writer died.
+//! Records stand one after the other, without chunks and index, so that a file can be read up to where its
+//! writer died.
 
 use super::cdr::CdrWriter;
 use super::mcap::{CHANNEL, DATA_END, FOOTER, MAGIC, MESSAGE, SCHEMA};
@@ -150,8 +151,9 @@ fn text(value: &str) -> Vec<u8> {
     [&(value.len() as u32).to_le_bytes()[..], value.as_bytes()].concat()
 }
 
-/// CSV lines of numbers as MCAP: `q`, `dq` and `tau` of joints 1 to n are `/joint_states`, other columns `/log`; the
-/// number of lines. Lines that are torn or hold anything else are left out. A time that begins below 0 is moved there.
+/// CSV lines of numbers as MCAP: `q`, `dq` and `tau` of joints 1 to n are `/joint_states`, other columns
+/// `/log`; the number of lines. Lines that are torn or hold anything else are left out. A time that begins
+/// below 0 is moved there.
 pub(crate) fn from_csv(csv: impl Read, out: impl Write) -> io::Result<usize> {
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(csv);
     let names: Vec<String> = reader.headers()?.iter().map(str::to_string).collect();

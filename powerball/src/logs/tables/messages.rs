@@ -121,8 +121,8 @@ fn dynamic_joint_state(mut message: Cdr<'_>) -> Result<Values, String> {
     Ok((stamp, values))
 }
 
-/// A JSON object: its numbers, by their path. The elements of an array are counted from 1: `q` of three values is
-/// `q1`, `q2`, `q3`. A `name` array beside arrays of as many values names them, as in a JointState.
+/// A JSON object: its numbers, by their path. The elements of an array are counted from 1: `q` of three
+/// values is `q1`, `q2`, `q3`. A `name` array beside arrays of as many values names them, as in a JointState.
 fn json(message: &[u8]) -> Result<Values, String> {
     let message: Value = serde_json::from_slice(message).map_err(|e| format!("is no JSON: {e}"))?;
     let Value::Object(fields) = &message else { return Err("is no JSON object".into()) };

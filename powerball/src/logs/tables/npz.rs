@@ -1,7 +1,7 @@
 //! Archives of NumPy arrays (`.npz`, `numpy.savez` and `savez_compressed`): a ZIP of `.npy` files.
 //!
-//! An array of N numbers is a column of its name, one of N × k numbers is k columns `name1` … `namek`. An array of k
-//! texts (`joints`, `names`) names the columns of N × k arrays: `q.shoulder`.
+//! An array of N numbers is a column of its name, one of N × k numbers is k columns `name1` … `namek`. An
+//! array of k texts (`joints`, `names`) names the columns of N × k arrays: `q.shoulder`.
 
 use super::table::{Column, Table};
 use std::io::{self, Read};

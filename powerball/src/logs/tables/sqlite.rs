@@ -1,9 +1,9 @@
 //! The tables of an SQLite file, read from beginning to end.
 //!
-//! rosbag2 writes such files. What is needed of them is a scan of two tables, which is a walk over a B-tree of pages
-//! (<https://sqlite.org/fileformat2.html>, chapters 1.3, 1.6, 2.1 and 2.3): no query, no index, no lock. That is this
-//! file; the library itself would bring a C compiler and a megabyte. One page is in memory at a time, and a long value
-//! is read only where it is asked for.
+//! rosbag2 writes such files. What is needed of them is a scan of two tables, which is a walk over a B-tree
+//! of pages (<https://sqlite.org/fileformat2.html>, chapters 1.3, 1.6, 2.1 and 2.3): no query, no index, no
+//! lock. That is this file; the library itself would bring a C compiler and a megabyte. One page is in memory
+//! at a time, and a long value is read only where it is asked for.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};

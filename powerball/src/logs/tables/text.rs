@@ -3,7 +3,8 @@
 use super::table::Rows;
 use super::{Finding, LogError};
 
-/// Hands the lines of a CSV file over; whether the last one is torn. Unreadable lines are named in `findings`.
+/// Hands the lines of a CSV file over; whether the last one is torn. Unreadable lines are named in
+/// `findings`.
 pub(crate) fn read(
     bytes: &[u8],
     file: &str,
