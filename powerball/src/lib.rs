@@ -10,6 +10,7 @@
 //! | [`bus`] | `driver`; `bus` adds the ways to a bus | no; yes | CANopen, CiA 402, the arm's driver |
 //! | [`logs`] | `identify` | yes | log files, signals, rows of the regression, summaries |
 //! | [`identification`] | `identify` | yes | from rows to parameters, and the paths that excite them |
+//! | [`comparison`] | `identify` | yes | two fits side by side: what truly differs |
 //! | [`explanation`] | `explain` | yes | from what a model leaves to named effects, and to the model with them |
 //! | [`virtual_arm`] | `virtual-arm` | yes | an arm to try all of it on |
 //! | [`procedure`] | `procedure` | yes | the paper's steps on a bus |
@@ -78,6 +79,8 @@
 pub mod bus;
 #[cfg(feature = "cli")]
 pub mod commands;
+#[cfg(feature = "identify")]
+pub mod comparison;
 pub mod controller;
 #[cfg(feature = "explain")]
 pub mod explanation;
@@ -92,6 +95,8 @@ pub mod report;
 #[cfg(feature = "virtual-arm")]
 pub mod virtual_arm;
 
+#[cfg(feature = "identify")]
+pub use comparison::{CompareOptions, Comparison, Side, compare};
 #[cfg(feature = "explain")]
 pub use explanation::{ExplainError, ExplainOptions, Explained, Rule, explain};
 #[cfg(feature = "identify")]

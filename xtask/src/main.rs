@@ -1,5 +1,6 @@
 //! Studies that take longer than tests may.
 
+mod compare;
 mod held_out;
 mod stories;
 mod study;
@@ -20,6 +21,8 @@ enum Command {
     Study(study::Arguments),
     /// What the base model leaves of each log when it is fitted to the others
     HeldOut(held_out::Arguments),
+    /// How often `compare` calls equal arms different, and sees what changed
+    Compare(compare::Arguments),
     /// What `explain` finds in the measured logs, case by case, as a page with figures
     Stories(stories::Arguments),
 }
@@ -28,6 +31,7 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Study(arguments) => study::run(&arguments),
         Command::HeldOut(arguments) => held_out::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
         Command::Stories(arguments) => stories::run(&arguments),
     };
     match done {

@@ -1,11 +1,12 @@
 //! What an identification takes: logs and summaries of logs, in memory or in files, each with its mounting.
 
 use super::mounting::Mounting;
-use crate::logs::log::Log;
+use crate::logs::log::{ColumnMap, Log};
 use crate::logs::summary::{Bands, Summary};
 use std::borrow::Cow;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A log, or the sufficient statistics of logs, and how the base stood for it.
 ///
@@ -17,6 +18,8 @@ pub struct Source<'a> {
     pub input: Input<'a>,
     /// How the base stood. Nothing said is as the arm file says, or as the summary itself does.
     pub mounting: Option<Mounting>,
+    /// How the columns of a file are read.
+    pub map: Arc<ColumnMap>,
 }
 
 /// A log or its sufficient statistics.
@@ -31,7 +34,7 @@ pub enum Input<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// A file: CSV, Parquet or a summary.
+    /// A file: CSV, Parquet, MCAP, rosbag2, npz or a summary.
     #[must_use]
     pub fn file(path: impl Into<PathBuf>) -> Source<'a> {
         Source::from(path.into())
@@ -41,6 +44,12 @@ impl<'a> Source<'a> {
     #[must_use]
     pub fn mounted(self, mounting: Mounting) -> Source<'a> {
         Source { mounting: Some(mounting), ..self }
+    }
+
+    /// The same, its columns read so.
+    #[must_use]
+    pub fn mapped(self, map: Arc<ColumnMap>) -> Source<'a> {
+        Source { map, ..self }
     }
 
     /// What messages call it: the file, or the log's own name.
@@ -87,7 +96,7 @@ pub(super) fn read_summary(file: &Path) -> Result<Option<Bands>, String> {
 
 impl<'a> From<Input<'a>> for Source<'a> {
     fn from(input: Input<'a>) -> Self {
-        Source { input, mounting: None }
+        Source { input, mounting: None, map: Arc::default() }
     }
 }
 
@@ -134,6 +143,6 @@ impl<'a> From<&'a Source<'_>> for Source<'a> {
             Input::Summary(bands) => Input::Summary(Cow::Borrowed(bands.as_ref())),
             Input::File(path) => Input::File(Cow::Borrowed(path.as_ref())),
         };
-        Source { input, mounting: source.mounting }
+        Source { input, mounting: source.mounting, map: Arc::clone(&source.map) }
     }
 }

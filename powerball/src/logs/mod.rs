@@ -1,7 +1,7 @@
 //! From log files to rows of the regression.
 //!
-//! [`log`] reads files and doubts them, [`signal`] filters and differentiates, [`regression`] makes rows,
-//! [`summary`] keeps of them what a fit needs.
+//! [`tables`] reads files, [`log`] finds an arm's signals in them and doubts them, [`signal`] filters and
+//! differentiates, [`regression`] makes rows, [`summary`] keeps of them what a fit needs.
 
 pub mod batch;
 pub mod log;
@@ -10,6 +10,7 @@ mod progress;
 pub mod regression;
 pub mod signal;
 pub mod summary;
+pub mod tables;
 #[cfg(feature = "explain")]
 pub(crate) mod vector;
 

@@ -171,6 +171,7 @@ impl Recording {
             q: by_joint(&self.q),
             torque: by_joint(&self.tau),
             temperature: None,
+            motor: None,
             pieces: std::iter::once(0..self.t.len()).collect(),
             clock: 0.0,
             t: self.t.clone(),

@@ -1,6 +1,7 @@
 //! `powerball identify`: from logs to identified.json.
 
 use super::identify_page::page;
+use super::inputs::MapArgument;
 use super::mounted::MountedLogs;
 use super::{Failure, output};
 use crate::explanation::torque_model::{Additions, ModelFile};
@@ -14,8 +15,9 @@ use std::path::PathBuf;
 
 /// Fit the minimal inertial set and the friction of every joint (Eq. 16) to logs.
 ///
-/// Writes identified.json and report.html, and consistent.json: the nearest parameters that a real arm can
-/// have, as values for `dyngen generate --values`.
+/// Writes identified.json and report.html; consistent.json: the nearest parameters that a real arm can have,
+/// as values for `dyngen generate --values`; covariance.json: how well all of it is known together, for
+/// `powerball compare`.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Examples:\n  powerball identify --arm arm.toml --log a.csv b.csv --validate c.csv --out \
@@ -28,6 +30,8 @@ pub(crate) struct Identify {
     arm: PathBuf,
     #[command(flatten)]
     logs: MountedLogs,
+    #[command(flatten)]
+    map: MapArgument,
     /// What is known already: model.json of `powerball explain` for the same arm file. Inertial set and
     /// friction are fitted beside its effects, which stay as they are. Logs of one mounting alone, no
     /// summaries.
@@ -103,10 +107,13 @@ impl Identify {
             ..IdentifyOptions::default()
         };
         output::make_folder(&self.out)?;
-        let identified = identify(&arm, &self.logs.log, &self.logs.validate, &options)?;
+        let logs = self.logs.mapped(self.map.read()?);
+        let identified = identify(&arm, &logs.log, &logs.validate, &options)?;
         let known = known.as_ref().map(|known| &known.model.additions);
         let text = output::json(&Written { identified: &identified, known })?;
         output::write(&self.out, "identified.json", text.as_bytes())?;
+        let uncertainty = serde_json::to_vec(&identified.uncertainty).unwrap_or_default();
+        output::write(&self.out, "covariance.json", &uncertainty)?;
         let values = output::json(&identified.consistent.parameters)?;
         output::write(&self.out, "consistent.json", values.as_bytes())?;
         output::write(&self.out, "report.html", page(&identified).to_html().as_bytes())?;

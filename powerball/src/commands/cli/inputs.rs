@@ -5,7 +5,7 @@ use super::output::{self, Progress};
 use crate::explanation::torque_model::{ModelFile, TorqueModel};
 use crate::identification::KnownModel;
 use crate::identification::mounting::Mounting;
-use crate::logs::log::{Log, common_clock, read_logs};
+use crate::logs::log::{ColumnMap, Log, common_clock, read_logs_as};
 use crate::logs::regression::RigidBody;
 use clap::Args;
 use dyngen::Arm;
@@ -17,15 +17,46 @@ pub(crate) struct Inputs {
     /// The arm file (TOML).
     #[arg(long, value_name = "ARM.toml")]
     pub arm: PathBuf,
-    /// Logs to fit (CSV: t, q1…, tau1… or i1…); several, in the order in which they were recorded.
+    /// Logs to fit (CSV, Parquet, MCAP, rosbag2 or npz: t, q1…, tau1… or i1…); several, in the order in which
+    /// they were recorded.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     pub log: Vec<PathBuf>,
+    #[command(flatten)]
+    pub map: MapArgument,
     /// Folder for the results; made if missing.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Print the result as one JSON object on standard output.
     #[arg(long)]
     pub json: bool,
+}
+
+/// How the columns of logs are read.
+#[derive(Args, Clone, Debug, Default)]
+pub(crate) struct MapArgument {
+    /// Which column is what, where names do not say it: a TOML file, or a line of it such as
+    /// 'joints = ["a", "b"]', 'topic = "/joint_states"' or 'tau.sign = -1'. May be repeated.
+    #[arg(long, value_name = "MAP.toml")]
+    map: Vec<String>,
+}
+
+impl MapArgument {
+    /// The map of all that was said.
+    pub(crate) fn read(&self) -> Result<ColumnMap, Failure> {
+        // Lines first: in a file they might fall into a table that it opened.
+        let (lines, files): (Vec<&String>, Vec<&String>) =
+            self.map.iter().partition(|said| said.contains('='));
+        let mut text = lines.iter().map(|line| format!("{line}\n")).collect::<String>();
+        for file in &files {
+            let read = std::fs::read_to_string(file);
+            text.push_str(&read.map_err(|e| Failure::Unusable(format!("{file}: cannot be read: {e}")))?);
+        }
+        let name = match (lines.as_slice(), files.as_slice()) {
+            ([], [file]) => file.as_str(),
+            _ => "--map",
+        };
+        ColumnMap::parse(&text, name).map_err(Failure::Unusable)
+    }
 }
 
 /// An arm with what is known of it beforehand.
@@ -77,7 +108,8 @@ pub(crate) fn recorded(
     }
     progress.say("reading logs");
     let files: Vec<&PathBuf> = inputs.log.iter().chain(validate).collect();
-    let (mut logs, findings) = read_logs(&files, arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+    let (mut logs, findings) =
+        read_logs_as(&files, arm, &inputs.map.read()?).map_err(|e| Failure::Unusable(e.to_string()))?;
     warnings.extend(findings.iter().map(ToString::to_string));
     common_clock(&mut logs);
     let validate = logs.split_off(inputs.log.len());

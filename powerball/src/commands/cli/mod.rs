@@ -1,6 +1,7 @@
 //! The `powerball` command: one file a subcommand.
 
 mod bus;
+mod compare;
 mod consistent;
 mod demo;
 mod excite;
@@ -11,6 +12,8 @@ mod generate;
 mod identify;
 mod identify_page;
 mod inputs;
+mod log;
+mod log_out;
 mod mounted;
 mod output;
 mod profile;
@@ -48,6 +51,8 @@ enum Command {
     Friction(friction::Friction),
     /// Make an arm's constant tables for the bus driver from its drives' DCF and one TOML.
     Profile(profile::ProfileCommand),
+    /// Show what is in log files and what they are taken to be.
+    Log(log::LogCommand),
     /// Search an exciting trajectory within the arm's limits and write it.
     Excite(excite::Excite),
     /// Fit the minimal inertial set and the friction of every joint to logs.
@@ -58,6 +63,8 @@ enum Command {
     Summarize(summarize::Summarize),
     /// Judge an identified model on logs that it has not seen.
     Verify(verify::Verify),
+    /// Compare two fits: what truly differs, what it means in torque, and why.
+    Compare(compare::Compare),
     /// Find, name and add what the model lacks on logs; judged on another path.
     Explain(explain::Explain),
     /// Write a model with its effects as one Rust file for a controller.
@@ -92,11 +99,13 @@ pub fn main() -> ExitCode {
         Command::WarmUp(command) => command.run(),
         Command::Friction(command) => command.run(),
         Command::Profile(command) => command.run(),
+        Command::Log(command) => command.run(),
         Command::Excite(command) => command.run(),
         Command::Identify(command) => command.run(),
         Command::Consistent(command) => command.run(),
         Command::Summarize(command) => command.run(),
         Command::Verify(command) => command.run(),
+        Command::Compare(command) => command.run(),
         Command::Explain(command) => command.run(),
         Command::Generate(command) => command.run(),
     };

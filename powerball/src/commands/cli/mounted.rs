@@ -2,8 +2,10 @@
 
 use crate::identification::Source;
 use crate::identification::mounting::Mounting;
+use crate::logs::log::ColumnMap;
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Logs to fit and to judge by. A mounting on the command line counts for the files after it.
 #[derive(Clone, Debug)]
@@ -12,10 +14,20 @@ pub(crate) struct MountedLogs {
     pub validate: Vec<Source<'static>>,
 }
 
+impl MountedLogs {
+    /// The same, the columns of all read so.
+    pub(crate) fn mapped(self, map: ColumnMap) -> MountedLogs {
+        let map = Arc::new(map);
+        let mapped = |of: Vec<Source<'static>>| of.into_iter().map(|s| s.mapped(Arc::clone(&map))).collect();
+        MountedLogs { log: mapped(self.log), validate: mapped(self.validate) }
+    }
+}
+
 /// As they stand on the command line.
 #[derive(Args, Debug)]
 struct Options {
-    /// Logs to fit (CSV or Parquet: t, q1…, tau1… or i1…), or their summaries from `powerball summarize`.
+    /// Logs to fit (CSV, Parquet, MCAP, rosbag2 or npz: t, q1…, tau1… or i1…), or their summaries from
+    /// `powerball summarize`.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     log: Vec<PathBuf>,
     /// Logs on which the fit is judged, on another path.

@@ -18,9 +18,9 @@ use std::path::{Path, PathBuf};
 ///
 /// The log has t, q1…q6 (rad), tau1…tau6 (N·m, as good as the profile's calibration) and ref1…ref6 (rad, the
 /// set-points). Each line is written whole: whatever happens, the log can be read up to there. A log whose
-/// name ends in .parquet is written as lines beside it, NAME.parquet.csv, and becomes Parquet when it ends;
-/// lines that a program left which died are put into NAME.interrupted-1.parquet by the next recording of that
-/// name.
+/// name ends in .parquet or .mcap is written as lines beside it, NAME.parquet.csv, and becomes that when it
+/// ends; lines that a program left which died are put into NAME.interrupted-1.parquet by the next recording
+/// of that name.
 ///
 /// With --arm neither the way to where the trajectory begins, each joint straight there from where the arm
 /// stands, nor the trajectory may touch the floor or another link, as capsules in the way of `powerball
@@ -33,7 +33,7 @@ pub(crate) struct RecordCommand {
     /// The trajectory: CSV with t, q1…q6 (rad), as `powerball excite` writes it at the arm's rate.
     #[arg(long, value_name = "FILE")]
     trajectory: PathBuf,
-    /// Where the log is written: Parquet where the name ends in .parquet, CSV else.
+    /// Where the log is written: Parquet or MCAP where the name ends in .parquet or .mcap, CSV else.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Write over a log that is there already.

@@ -1,5 +1,6 @@
 //! `powerball summarize`: a log as the sufficient statistics of its fit, R factors.
 
+use super::inputs::MapArgument;
 use super::{Failure, output};
 use crate::identification::mounting::Mounting;
 use crate::identification::{Source, Summarized, summarize};
@@ -10,6 +11,7 @@ use clap::Args;
 use dyngen::Arm;
 use serde::Serialize;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Reduce logs to triangular factors, which `powerball identify` takes in place of the logs.
 ///
@@ -26,9 +28,11 @@ pub(crate) struct Summarize {
     /// The arm file (TOML).
     #[arg(long, value_name = "ARM.toml")]
     arm: PathBuf,
-    /// Logs (CSV or Parquet), or summaries to join.
+    /// Logs (CSV, Parquet, MCAP, rosbag2 or npz), or summaries to join.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     log: Vec<PathBuf>,
+    #[command(flatten)]
+    map: MapArgument,
     /// How the base stood for these logs: `filed`, ROLL,PITCH in degrees from there, or gravity in its frame
     /// as X,Y,Z in m/s². Logs of another mounting go into a summary of their own, and `identify` joins them.
     #[arg(long, value_name = "MOUNTING", allow_hyphen_values = true)]
@@ -64,7 +68,11 @@ impl Summarize {
         let arm = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
         let terminal = output::Progress::new();
         let say = |what: &str| terminal.say(what);
-        let source = |file: &PathBuf| Source { mounting: self.mounting, ..Source::file(file) };
+        let map = Arc::new(self.map.read()?);
+        let source = |file: &PathBuf| {
+            let source = Source { mounting: self.mounting, ..Source::file(file) };
+            source.mapped(Arc::clone(&map))
+        };
         let Summarized { mounting, bands, warnings } =
             summarize(&arm, self.log.iter().map(source), &DataOptions::default(), Progress::to(&say))?;
         let bytes = bands.to_bytes();

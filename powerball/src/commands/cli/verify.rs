@@ -12,6 +12,7 @@ use clap::Args;
 use dyngen::Arm;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Judge an identified model on logs that it has not seen (Fig. 8): errors with intervals, against the noise
 /// floor.
@@ -50,7 +51,9 @@ impl Verify {
             progress: Progress::to(&say),
             ..VerifyOptions::default()
         };
-        let logs = self.inputs.log.iter().map(|file| Source::file(file).mounted(self.mounting));
+        let map = Arc::new(self.inputs.map.read()?);
+        let source = |file| Source::file(file).mounted(self.mounting).mapped(Arc::clone(&map));
+        let logs = self.inputs.log.iter().map(source);
         let verified = verify(&arm, &model, logs, &options)?;
         output::make_folder(&self.inputs.out)?;
         let text = output::json(&verified)?;

@@ -238,6 +238,7 @@ fn log_of(motion: &Motion) -> Log {
         torque: q.clone(),
         q,
         temperature: None,
+        motor: None,
         pieces: std::iter::once(0..motion.len()).collect(),
         clock: 0.0,
     }

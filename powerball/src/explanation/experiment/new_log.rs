@@ -49,6 +49,7 @@ mod tests {
             q: vec![vec![0.0; 1000]],
             torque: vec![vec![0.0; 1000]],
             temperature: None,
+            motor: None,
             pieces: vec![0..400, 420..1000],
             clock,
         };

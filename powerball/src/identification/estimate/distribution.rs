@@ -22,6 +22,34 @@ pub fn t_quantile_975(d: f64) -> f64 {
     high
 }
 
+/// What |t| of Student's t with `d` degrees of freedom exceeds with probability `p`, down to 1e-12.
+#[must_use]
+pub fn t_critical(p: f64, d: f64) -> f64 {
+    let (mut low, mut high) = (0.0f64, 1e12f64);
+    for _ in 0..120 {
+        // Halves the exponent first: the tails of few degrees of freedom are long.
+        let middle = if high > 2.0 * low + 1.0 {
+            ((low + 1.0) * (high + 1.0)).sqrt() - 1.0
+        } else {
+            0.5 * (low + high)
+        };
+        if f_tail(middle * middle, 1.0, d) > p { low = middle } else { high = middle }
+    }
+    high
+}
+
+/// The degrees of freedom whose 97.5 % quantile of Student's t it is.
+#[must_use]
+pub fn freedom_of(quantile: f64) -> f64 {
+    // The quantile falls as the freedom grows.
+    let (mut low, mut high) = (1.0f64, 65_535.0f64);
+    for _ in 0..60 {
+        let middle = (low * high).sqrt();
+        if t_quantile_975(middle) > quantile { low = middle } else { high = middle }
+    }
+    (low * high).sqrt()
+}
+
 /// The regularised incomplete beta function I_x(a, b), by its continued fraction (modified Lentz).
 fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
     if x <= 0.0 {
@@ -93,7 +121,11 @@ mod tests {
         for (d, t) in [(1.0, 12.7062047364), (4.0, 2.7764451052), (30.0, 2.0422724563), (200.0, 1.9718962236)]
         {
             approx::assert_relative_eq!(t_quantile_975(d), t, max_relative = 1e-8);
+            approx::assert_relative_eq!(freedom_of(t), d, max_relative = 1e-5);
+            approx::assert_relative_eq!(t_critical(0.05, d), t, max_relative = 1e-8);
         }
+        // By numerical integration of the density.
+        approx::assert_relative_eq!(t_critical(2e-5, 40.0), 4.835023895055, max_relative = 1e-8);
         assert_eq!(f_tail(-1.0, 1.0, 5.0), 1.0);
         assert_eq!(f_tail(f64::NAN, 1.0, 5.0), 1.0);
     }

@@ -27,6 +27,8 @@ pub struct StandardErrors {
     pub std: Vec<Option<f64>>,
     /// Half the width of a 95 % interval in standard errors: Student's t with the degrees of freedom of each.
     pub quantile: Vec<f64>,
+    /// The covariance of all coefficients; 0 where one is not determined.
+    pub covariance: Mat<f64>,
 }
 
 /// One joint's rows of one octave.
@@ -80,7 +82,12 @@ pub fn standard_errors(solution: &Solution) -> StandardErrors {
         let freedom = if doubt > 0.0 { variance * variance / doubt } else { f64::from(u16::MAX) };
         (std[c], quantile[c]) = (Some(variance.sqrt()), t_quantile_975(freedom.max(1.0)));
     }
-    StandardErrors { std, quantile }
+    let mut covariance = Mat::<f64>::zeros(size, size);
+    for (group, (power, _)) in groups.iter().zip(&powers) {
+        let weight = group.weight * group.weight * power;
+        covariance += faer::Scale(weight) * (&group.turned * &inverse);
+    }
+    StandardErrors { std, quantile, covariance }
 }
 
 /// λ and its degrees of freedom by group.

@@ -16,12 +16,7 @@ pub(super) fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f6
     let column = |f: &dyn Fn(f64) -> f64| {
         data.joints[joint].column(&data.recordings, |_, r| r.speed(joint).map(f).collect())
     };
-    let tangent = |g: f64| {
-        move |v: f64| {
-            let t = (g * v).tanh();
-            g * v * (1.0 - t * t)
-        }
-    };
+    let tangent = |g: f64| move |v: f64| tangent(g, v);
     let [g2, g4] = shape;
     [
         column(&|v| (g2 * v).tanh()),
@@ -30,6 +25,13 @@ pub(super) fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f6
         column(&tangent(g2)),
         column(&tangent(g4)),
     ]
+}
+
+/// ∂ tanh(γ·q̇) / ∂ ln γ.
+#[must_use]
+pub(super) fn tangent(g: f64, v: f64) -> f64 {
+    let t = (g * v).tanh();
+    g * v * (1.0 - t * t)
 }
 
 /// The steepnesses that make sense for a joint whose fast velocity is `top`, s/rad: from straight over its

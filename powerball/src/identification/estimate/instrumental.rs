@@ -66,6 +66,7 @@ pub fn solve_instrumental(
     free.iter().enumerate().for_each(|(i, c)| theta[*c] = found[(i, 0)]);
     let (mut std, mut quantile) = (vec![None; layout.size()], vec![0.0; layout.size()]);
     let mut sums = vec![(0.0, 0.0); size];
+    let mut covariance = Mat::<f64>::zeros(layout.size(), layout.size());
     for (level, weight) in weighted(&levels, &start.weights).filter(|(l, _)| l.part.rows > 0) {
         let (za, _) = level.moments(&place, size);
         let taken: f64 = {
@@ -79,6 +80,9 @@ pub fn solve_instrumental(
             let share = weight * weight * power * spread[(i, i)].max(0.0);
             *variance += share;
             *doubt += share * share / freedom;
+        }
+        for (i, k) in (0..size).flat_map(|i| (0..size).map(move |k| (i, k))) {
+            covariance[(free[i], free[k])] += weight * weight * power * spread[(i, k)];
         }
     }
     for (c, (variance, doubt)) in free.iter().zip(&sums) {
@@ -95,7 +99,7 @@ pub fn solve_instrumental(
         free: (0..layout.size()).map(|c| place[c].is_some()).collect(),
         parts: levels.into_iter().map(|j| j.into_iter().map(|l| l.part).collect()).collect(),
     };
-    Ok((solution, StandardErrors { std, quantile }))
+    Ok((solution, StandardErrors { std, quantile, covariance }))
 }
 
 /// By joint, where it moves: the model's columns by their index, and the rows [Z A y].

@@ -24,6 +24,7 @@ mod rows;
 mod solve;
 mod stream;
 mod torque_metric;
+mod uncertainty;
 mod vary;
 mod verdict;
 
@@ -52,6 +53,7 @@ pub use rows::Layout;
 pub use solve::{Solver, bounded};
 pub use stream::{States, Stream, StreamFit};
 pub use torque_metric::TorqueMetric;
+pub use uncertainty::{Path, Uncertainty, friction_row};
 pub use verdict::{JointVerdict, verdicts};
 
 #[cfg(test)]

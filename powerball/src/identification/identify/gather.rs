@@ -6,7 +6,7 @@ use crate::identification::estimate::{Together, reduce_in_bands};
 use crate::identification::mounting::Mounting;
 use crate::identification::source::{Input, Source, read_summary};
 use crate::logs::Progress;
-use crate::logs::log::{Log, LogError, read_log};
+use crate::logs::log::{ColumnMap, Log, LogError, read_log_as};
 use crate::logs::regression::{DataOptions, FEWEST_ROWS, RigidBody, rest_note, silent_joints};
 use crate::logs::summary::{Bands, Octaves, Summary};
 use dyngen::Arm;
@@ -178,15 +178,21 @@ impl<'a> Gathering<'a> {
         match &source.input {
             Input::Log(log) => self.take_log(&source.name(), log.as_ref().clone(), said),
             Input::Summary(summary) => self.take_summary(&source.name(), summary, said),
-            Input::File(path) => self.take_file(&source.name(), path, said),
+            Input::File(path) => self.take_file(&source.name(), path, &source.map, said),
         }
     }
 
-    fn take_file(&mut self, name: &str, path: &Path, said: Option<Mounting>) -> Result<(), IdentifyError> {
+    fn take_file(
+        &mut self,
+        name: &str,
+        path: &Path,
+        map: &ColumnMap,
+        said: Option<Mounting>,
+    ) -> Result<(), IdentifyError> {
         self.progress.say(&format!("reading {name}"));
         match read_summary(path) {
             Ok(Some(summary)) => self.take_summary(name, &summary, said),
-            Ok(None) => self.take_samples(name, path, said),
+            Ok(None) => self.take_samples(name, path, map, said),
             Err(reason) => {
                 self.unusable.push(format!("{name}: {reason}"));
                 Ok(())
@@ -194,9 +200,15 @@ impl<'a> Gathering<'a> {
         }
     }
 
-    fn take_samples(&mut self, name: &str, path: &Path, said: Option<Mounting>) -> Result<(), IdentifyError> {
+    fn take_samples(
+        &mut self,
+        name: &str,
+        path: &Path,
+        map: &ColumnMap,
+        said: Option<Mounting>,
+    ) -> Result<(), IdentifyError> {
         let mut findings = Vec::new();
-        match read_log(path, self.arm, &mut findings) {
+        match read_log_as(path, self.arm, map, &mut findings) {
             Err(LogError(reasons)) => {
                 self.unusable.extend(reasons.iter().map(ToString::to_string));
                 Ok(())

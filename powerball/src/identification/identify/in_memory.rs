@@ -5,7 +5,7 @@ use crate::identification::known::KnownModel;
 use crate::identification::mounting::Mounting;
 use crate::identification::source::{Input, Source};
 use crate::logs::Progress;
-use crate::logs::log::{Log, LogError, common_clock, read_log};
+use crate::logs::log::{Log, LogError, common_clock, read_log_as};
 use crate::logs::regression::RigidBody;
 use dyngen::Arm;
 
@@ -83,7 +83,7 @@ fn samples(source: &Source<'_>, arm: &Arm, warnings: &mut Vec<String>) -> Result
         }
         Input::File(path) => {
             let mut findings = Vec::new();
-            let read = read_log(path, arm, &mut findings);
+            let read = read_log_as(path, arm, &source.map, &mut findings);
             warnings.extend(findings.iter().map(ToString::to_string));
             read.map_err(|LogError(reasons)| reasons.iter().map(ToString::to_string).collect())
         }

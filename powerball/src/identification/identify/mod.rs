@@ -23,7 +23,7 @@ pub(crate) use in_memory::{InMemory, one_mounting};
 pub use options::{Estimator, IdentifyOptions};
 pub use result::Identified;
 
-use super::estimate::{BaseModel, consistent_fit, estimates, spread_of};
+use super::estimate::{BaseModel, Uncertainty, consistent_fit, estimates, spread_of};
 use super::source::Source;
 use crate::logs::summary::BANDS;
 use dyngen::{Arm, SetKind};
@@ -159,6 +159,7 @@ fn conclude(
         band_reason: result::band_reason(&fitted.bands, along.motion),
         warnings,
         along,
+        uncertainty: Uncertainty::of(body.names(), solution, &fitted.errors),
         described: body.filed(),
     })
 }

@@ -4,7 +4,7 @@ use super::along::Along;
 use super::by_mounting::MountedFit;
 use crate::controller::JointNumber;
 use crate::identification::estimate::{
-    BaseModel, ConsistentReport, JointFriction, ParameterEstimate, Spread,
+    BaseModel, ConsistentReport, JointFriction, ParameterEstimate, Spread, Uncertainty,
 };
 use crate::logs::summary::BANDS;
 use dyngen::Arm;
@@ -44,6 +44,9 @@ pub struct Identified {
     /// The model along the validation set, or along the fitted logs where there is none.
     #[serde(skip)]
     pub along: Along,
+    /// How well all of it is known together: `covariance.json`.
+    #[serde(skip)]
+    pub uncertainty: Uncertainty,
     /// The arm as it was identified: that of the file, with what a known model changes of it.
     #[serde(skip)]
     pub described: Arm,

@@ -1,8 +1,10 @@
 //! Logs from memory: they pass the same checks as those from files.
 
-use super::columns::Columns;
+use super::columns::Asked;
+use super::map::ColumnMap;
 use super::samples::Samples;
 use super::{Finding, Log, LogError};
+use crate::logs::tables::Rows;
 use dyngen::Arm;
 
 /// The signals of a log in memory, each by joint: as many values as times.
@@ -23,6 +25,8 @@ pub struct Arrays<'a> {
     pub velocity: &'a [Vec<f64>],
     /// Temperatures, °C.
     pub temperature: &'a [Vec<f64>],
+    /// Torques on the motors' side of the gears, in any unit: kept beside the torques.
+    pub motor: &'a [Vec<f64>],
 }
 
 /// One sample of a log: its time, and by joint the quantities of [`Arrays`], empty where they were not
@@ -41,10 +45,12 @@ pub struct Sample<'a> {
     pub velocity: &'a [f64],
     /// Temperatures, °C.
     pub temperature: &'a [f64],
+    /// Torques on the motors' side of the gears, in any unit.
+    pub motor: &'a [f64],
 }
 
 /// The prefixes of column names in a file, in the order of the fields above.
-const PREFIXES: [&str; 5] = ["q", "tau", "i", "dq", "temp"];
+const PREFIXES: [&str; 6] = ["q", "tau", "i", "dq", "temp", "motor"];
 
 impl Log {
     /// A log of an arm from signals in memory, with what is odd about it. `name` stands in messages where a
@@ -53,7 +59,8 @@ impl Log {
     /// # Errors
     /// Why the log cannot be used: signals of unlike length, missing joints, units that cannot be right.
     pub fn from_arrays(name: &str, arm: &Arm, arrays: &Arrays<'_>) -> Result<(Log, Vec<Finding>), LogError> {
-        let groups = [arrays.q, arrays.torque, arrays.current, arrays.velocity, arrays.temperature];
+        let groups =
+            [arrays.q, arrays.torque, arrays.current, arrays.velocity, arrays.temperature, arrays.motor];
         let by_joint = PREFIXES.iter().zip(groups).flat_map(|(prefix, group)| {
             group.iter().enumerate().map(move |(j, signal)| (format!("{prefix}{}", j + 1), signal.as_slice()))
         });
@@ -75,7 +82,8 @@ impl Log {
         let mut t = Vec::new();
         let mut signals: [Vec<Vec<f64>>; PREFIXES.len()] = Default::default();
         for sample in samples {
-            let groups = [sample.q, sample.torque, sample.current, sample.velocity, sample.temperature];
+            let groups =
+                [sample.q, sample.torque, sample.current, sample.velocity, sample.temperature, sample.motor];
             for (signals, values) in signals.iter_mut().zip(groups) {
                 if t.is_empty() {
                     signals.resize(values.len(), Vec::new());
@@ -85,8 +93,8 @@ impl Log {
             }
             t.push(sample.t);
         }
-        let [q, torque, current, velocity, temperature] = &signals;
-        Log::from_arrays(name, arm, &Arrays { t: &t, q, torque, current, velocity, temperature })
+        let [q, torque, current, velocity, temperature, motor] = &signals;
+        Log::from_arrays(name, arm, &Arrays { t: &t, q, torque, current, velocity, temperature, motor })
     }
 
     /// The same from columns named as in a file: `t`, `q1` …, `tau1` … or `i1` …, `dq1` …, `temp1` ….
@@ -113,12 +121,13 @@ impl Log {
         }
         let names: Vec<String> = columns.iter().map(|(column, _)| column.clone()).collect();
         let mut findings = Vec::new();
-        let found = Columns::find(&names, arm, name, &mut findings)?;
-        let mut samples = Samples::new(found, arm, "sample");
+        let asked = Asked { arm, map: &ColumnMap::default(), file: name, header: Some(1) };
+        let mut samples = Samples::new(asked, "sample", &mut findings);
+        samples.begin(&names)?;
         for k in 0..times {
-            samples.take(k + 1, &names, |column| columns.get(column)?.1.get(k).copied());
+            samples.row(k + 1, &|column| columns.get(column)?.1.get(k).copied());
         }
-        let log = samples.finish(name, arm, &mut findings)?;
+        let log = samples.finish(false)?;
         Ok((log, findings))
     }
 }

@@ -132,7 +132,16 @@ pub(super) fn into_log(
         }
     };
     let temperature = raw.temperature.filter(|t| t.iter().flatten().all(|v| v.is_finite()));
-    Ok(Log { file: file.to_string(), t: raw.t, q: raw.q, torque, temperature, pieces, clock: 0.0 })
+    Ok(Log {
+        file: file.to_string(),
+        t: raw.t,
+        q: raw.q,
+        torque,
+        temperature,
+        motor: raw.motor,
+        pieces,
+        clock: 0.0,
+    })
 }
 
 /// A clock that changes its pace: the mean step of the last third of the samples against the first.

@@ -1,114 +1,225 @@
 //! A log's quantities found by the names of its columns.
 
+use super::map::{ByJoint, ColumnMap};
 use super::raw::Effort;
 use super::{Finding, LogError};
 use dyngen::Arm;
 use std::collections::HashMap;
 
+/// Whose log it is, and what is known of it beforehand.
+#[derive(Clone, Copy)]
+pub(super) struct Asked<'a> {
+    pub arm: &'a Arm,
+    pub map: &'a ColumnMap,
+    pub file: &'a str,
+    /// The line of the header, where the file has one.
+    pub header: Option<usize>,
+}
+
+/// The quantities with the names that columns have for them: those of this project's own logs, then those of
+/// ROS.
+const NAMES: [(&str, &[&str]); 6] = [
+    ("q", &["q", "position"]),
+    ("dq", &["dq", "velocity"]),
+    ("tau", &["tau", "effort"]),
+    ("i", &["i", "current"]),
+    ("temp", &["temp", "temperature"]),
+    ("motor", &["motor"]),
+];
+/// Names of the time; the first is that of this project's own logs. Lines with a header have that one alone.
+pub(super) const TIMES: [&str; 3] = ["t", "time", "timestamp"];
+
+/// The columns of one quantity by joint, and what each is to be multiplied with.
+pub(super) struct Group {
+    pub at: Vec<usize>,
+    factor: Vec<f64>,
+}
+
+impl Group {
+    fn values<'a>(
+        &'a self,
+        number: &'a impl Fn(usize) -> Option<f64>,
+    ) -> impl Iterator<Item = Option<f64>> + 'a {
+        self.at.iter().zip(&self.factor).map(move |(k, factor)| Some(number(*k)? * factor))
+    }
+}
+
+/// The names of the arm's joints as its logs have them, in chain order.
+fn joint_names(asked: Asked<'_>) -> Vec<String> {
+    // An arm file that names its joints is asked here, where the map says nothing.
+    asked.map.joints.clone()
+}
+
+/// Names of joints that columns carry: `a` of `q.a` or `position.a`.
+fn logged_joints(names: &[String], map: &ColumnMap) -> Vec<String> {
+    let mut stems: Vec<&str> = stems("q");
+    if let Some(ByJoint::All(stem)) = &map.q.column {
+        stems = vec![stem];
+    }
+    let joint = |name: &String| {
+        stems.iter().find_map(|s| name.strip_prefix(s)?.strip_prefix('.').map(str::to_string))
+    };
+    names.iter().filter_map(joint).collect()
+}
+
+fn stems(key: &str) -> Vec<&'static str> {
+    NAMES.iter().filter(|(own, _)| *own == key).flat_map(|(_, stems)| stems.iter().copied()).collect()
+}
+
+/// What a column is taken to be by its name, and the joint that the name says.
+pub(super) fn meaning(name: &str, map: &ColumnMap) -> Option<(&'static str, Option<String>)> {
+    let own = map.t.column.as_ref().and_then(|by| by.of(0)).map(String::as_str);
+    if own.map_or(TIMES.contains(&name), |own| own == name) {
+        return Some(("t", None));
+    }
+    for (key, _) in NAMES {
+        let stems = match &map.of(key).column {
+            Some(ByJoint::Each(columns)) => match columns.iter().position(|own| own == name) {
+                Some(j) => return Some((key, Some((j + 1).to_string()))),
+                None => continue,
+            },
+            Some(ByJoint::All(stem)) => vec![stem.as_str()],
+            None => stems(key),
+        };
+        for rest in stems.iter().filter_map(|stem| name.strip_prefix(stem)) {
+            let number = !rest.is_empty() && rest.bytes().all(|b| b.is_ascii_digit());
+            let joint = rest.strip_prefix('.').or(number.then_some(rest));
+            if let Some(joint) = joint {
+                return Some((key, Some(joint.to_string())));
+            }
+        }
+    }
+    None
+}
+
+/// The columns of a quantity; an error is the names of those that are missing.
+pub(super) fn group(names: &[String], key: &str, asked: Asked<'_>) -> Result<Group, Vec<String>> {
+    let (n, mapped) = (asked.arm.dof(), asked.map.of(key));
+    let joints = joint_names(asked);
+    let named = !logged_joints(names, asked.map).is_empty();
+    let stems = match &mapped.column {
+        Some(ByJoint::All(stem)) => vec![stem.as_str()],
+        _ => stems(key),
+    };
+    let at = |name: &str| names.iter().position(|own| own == name);
+    let column = |j: usize| -> Result<usize, String> {
+        if let Some(ByJoint::Each(columns)) = &mapped.column {
+            let name = columns.get(j).cloned().unwrap_or_default();
+            return at(&name).ok_or(name);
+        }
+        let one = |stem: &&str| {
+            let by_name = match joints.get(j) {
+                Some(joint) => at(&format!("{stem}.{joint}")),
+                // Names that are numbers say which joint they mean.
+                None => at(&format!("{stem}.joint{}", j + 1)).or_else(|| at(&format!("{stem}.{}", j + 1))),
+            };
+            let alone = if n == 1 { at(stem) } else { None };
+            at(&format!("{stem}{}", j + 1)).or(by_name).or(alone)
+        };
+        let missing = || match joints.get(j).filter(|_| named) {
+            Some(joint) => {
+                let used = |stem: &&&str| names.iter().any(|name| name.starts_with(&format!("{stem}.")));
+                format!("{}.{joint}", stems.iter().find(used).unwrap_or(&stems[0]))
+            }
+            None => format!("{}{}", stems[0], j + 1),
+        };
+        stems.iter().find_map(one).ok_or_else(missing)
+    };
+    let found: Vec<Result<usize, String>> = (0..n).map(column).collect();
+    let missing: Vec<String> = found.iter().filter_map(|c| c.clone().err()).collect();
+    if !missing.is_empty() {
+        return Err(missing);
+    }
+    let factor = (0..n).map(|j| mapped.factor(key, j)).collect();
+    Ok(Group { at: found.into_iter().flatten().collect(), factor })
+}
+
 /// Where a log's quantities stand among its columns.
 pub(super) struct Columns {
-    t: usize,
-    q: Vec<usize>,
-    effort_at: Vec<usize>,
+    t: Group,
+    q: Group,
+    torque: Group,
     pub(super) effort: Effort,
-    pub(super) temperature: Option<Vec<usize>>,
+    pub(super) temperature: Option<Group>,
     /// dq, used for checks alone.
-    dq: Option<Vec<usize>>,
+    dq: Option<Group>,
+    pub(super) motor: Option<Group>,
 }
 
 impl Columns {
     /// Finds them by their names; columns that are not needed are named in `findings`.
     pub(super) fn find(
         names: &[String],
-        arm: &Arm,
-        file: &str,
+        asked: Asked<'_>,
         findings: &mut Vec<Finding>,
     ) -> Result<Columns, LogError> {
-        let n = arm.dof();
-        let mut errors = Vec::new();
+        let n = asked.arm.dof();
         let finding = |quantity: &str, message: String| Finding {
-            file: file.to_string(),
-            line: Some(1),
+            file: asked.file.to_string(),
+            line: asked.header,
             quantity: quantity.to_string(),
             message,
         };
-        let mut at: HashMap<&str, usize> = HashMap::new();
+        let mut errors = misfits(asked).into_iter().map(|(key, m)| finding(&key, m)).collect::<Vec<_>>();
+        let mut seen: HashMap<&str, usize> = HashMap::new();
         for (index, name) in names.iter().enumerate() {
-            if at.insert(name, index).is_some() {
+            if seen.insert(name, index).is_some() {
                 errors.push(finding(name, "the header names this column twice: remove one".into()));
             }
         }
-        let group = |prefix: &str| -> (Vec<Option<usize>>, Vec<String>) {
-            let found: Vec<Option<usize>> =
-                (1..=n).map(|j| at.get(format!("{prefix}{j}").as_str()).copied()).collect();
-            let missing =
-                (1..=n).filter(|j| found[j - 1].is_none()).map(|j| format!("{prefix}{j}")).collect();
-            (found, missing)
-        };
-        let all = |found: Vec<Option<usize>>| found.into_iter().collect::<Option<Vec<usize>>>();
-        let t = at.get("t").copied();
+        let t = time(names, asked);
         if t.is_none() {
-            errors.push(finding("t", "the header has no column t (time in s)".into()));
+            let message =
+                "the header has no column t (time in s); if it has another name: --map 't.column = \"NAME\"'";
+            errors.push(finding("t", message.into()));
         }
-        let (q, q_missing) = group("q");
-        if !q_missing.is_empty() {
-            errors.push(finding("q", format!("the arm has {n} joints; missing: {}", q_missing.join(", "))));
+        let q = group(names, "q", asked);
+        if let Err(missing) = &q {
+            errors.push(finding("q", missing_positions(names, missing, asked)));
         }
-        let (tau, tau_missing) = group("tau");
-        let (current, current_missing) = group("i");
-        let (mut effort, mut effort_at) = (Effort::Torque, Vec::new());
-        if let Some(tau) = all(tau) {
-            effort_at = tau;
-        } else if let Some(current) = all(current) {
-            effort_at = current;
-            let without: Vec<String> = (1..=n)
-                .filter(|j| arm.joints[j - 1].torque_constant.is_none())
-                .map(|j| j.to_string())
-                .collect();
-            if without.is_empty() {
-                effort = Effort::Current(arm.joints.iter().filter_map(|j| j.torque_constant).collect());
-            } else {
+        let (mut effort, mut torque) = (Effort::Torque, None);
+        match (group(names, "tau", asked), group(names, "i", asked)) {
+            (Ok(tau), _) => torque = Some(tau),
+            (Err(_), Ok(current)) => match constants(asked.arm) {
+                Ok(constants) => {
+                    effort = Effort::Current(constants);
+                    torque = Some(current);
+                }
+                Err(reason) => errors.push(finding("i", reason)),
+            },
+            // Where the joints' names are not the arm's, that has been said.
+            (Err(_), Err(_)) if q.is_err() && !logged_joints(names, asked.map).is_empty() => {}
+            (Err(tau), Err(current)) => {
+                let missing = if tau.len() <= current.len() { tau } else { current };
                 errors.push(finding(
-                    "i",
+                    "tau",
                     format!(
-                        "the log holds currents, but the arm file gives no \
-                    torque_constant (N·m/A at the joint) for joint {}: add it there, or log tau1 … \
-                    tau{n}",
-                        without.join(", ")
+                        "a log needs tau1 … tau{n} [N·m] or i1 … i{n} [A] for each of \
+                the {n} joints; missing: {}",
+                        missing.join(", ")
                     ),
                 ));
             }
-        } else {
-            let missing =
-                if tau_missing.len() <= current_missing.len() { tau_missing } else { current_missing };
-            errors.push(finding(
-                "tau",
-                format!(
-                    "a log needs tau1 … tau{n} [N·m] or i1 … i{n} [A] for each of \
-                the {n} joints; missing: {}",
-                    missing.join(", ")
-                ),
-            ));
         }
-        if !errors.is_empty() {
+        let (Some(t), Ok(q), Some(torque), []) = (t, q, torque, errors.as_slice()) else {
             return Err(LogError(errors));
-        }
-        let (temperature, _) = group("temp");
-        let (dq, _) = group("dq");
-        let columns = Columns {
-            t: t.unwrap_or(0),
-            q: all(q).unwrap_or_default(),
-            effort_at,
-            effort,
-            temperature: all(temperature),
-            dq: all(dq),
         };
-        let used: Vec<usize> = std::iter::once(columns.t)
-            .chain(columns.q.iter().copied())
-            .chain(columns.effort_at.iter().copied())
-            .chain(columns.temperature.iter().flatten().copied())
-            .chain(columns.dq.iter().flatten().copied())
-            .collect();
+        let optional = |key: &str| group(names, key, asked).ok();
+        let columns = Columns {
+            t,
+            q,
+            torque,
+            effort,
+            temperature: optional("temp"),
+            dq: optional("dq"),
+            motor: optional("motor"),
+        };
+        if let Some(motor) = &columns.motor {
+            let shown: Vec<&str> = motor.at.iter().map(|k| names[*k].as_str()).collect();
+            let message = format!("kept beside the torques, and no part of the fit: {}", shown.join(", "));
+            findings.push(finding("motor", message));
+        }
+        let used: Vec<usize> = columns.groups().flat_map(|group| group.at.iter().copied()).collect();
         let out: Vec<&str> =
             (0..names.len()).filter(|k| !used.contains(k)).map(|k| names[k].as_str()).collect();
         if !out.is_empty() {
@@ -117,28 +228,106 @@ impl Columns {
         Ok(columns)
     }
 
-    /// t, q, effort, temperature, dq in a row; a temperature or dq that is no number does not spoil the
-    /// sample.
+    fn groups(&self) -> impl Iterator<Item = &Group> {
+        let optional = [&self.temperature, &self.dq, &self.motor].into_iter().flatten();
+        [&self.t, &self.q, &self.torque].into_iter().chain(optional)
+    }
+
+    /// t, q, effort, temperature, motor, dq in a row; one of the last three that is no number does not spoil
+    /// the sample.
     pub(super) fn sample(&self, number: &impl Fn(usize) -> Option<f64>) -> Option<Vec<f64>> {
-        let mut values = vec![number(self.t)?];
-        for &k in self.q.iter().chain(&self.effort_at) {
-            values.push(number(k)?);
-        }
-        for group in [&self.temperature, &self.dq] {
-            for k in group.iter().flatten() {
-                values.push(number(*k).unwrap_or(f64::NAN));
+        let mut values = Vec::new();
+        for group in [&self.t, &self.q, &self.torque] {
+            for value in group.values(number) {
+                values.push(value?);
             }
+        }
+        for group in [&self.temperature, &self.motor, &self.dq].into_iter().flatten() {
+            values.extend(group.values(number).map(|value| value.unwrap_or(f64::NAN)));
         }
         Some(values)
     }
 
+    /// Whether a sample holds anything of this arm.
+    pub(super) fn touches(&self, number: &impl Fn(usize) -> Option<f64>) -> bool {
+        [&self.q, &self.torque].into_iter().flat_map(|group| &group.at).any(|k| number(*k).is_some())
+    }
+
     /// The first needed column that holds no number.
     pub(super) fn culprit(&self, number: &impl Fn(usize) -> Option<f64>, names: &[String]) -> String {
-        std::iter::once(&self.t)
-            .chain(&self.q)
-            .chain(&self.effort_at)
+        [&self.t, &self.q, &self.torque]
+            .into_iter()
+            .flat_map(|group| &group.at)
             .find(|k| number(**k).is_none())
             .and_then(|k| names.get(*k).cloned())
             .unwrap_or_else(|| "line".into())
     }
+}
+
+fn time(names: &[String], asked: Asked<'_>) -> Option<Group> {
+    let at = |name: &str| names.iter().position(|own| own == name);
+    let known = if asked.header.is_some() { &TIMES[..1] } else { &TIMES[..] };
+    let found = match asked.map.t.column.as_ref().and_then(|by| by.of(0)) {
+        Some(name) => at(name),
+        None => known.iter().find_map(|name| at(name)),
+    };
+    found.map(|at| Group { at: vec![at], factor: vec![asked.map.t.factor("t", 0)] })
+}
+
+/// N·m/A by joint.
+fn constants(arm: &Arm) -> Result<Vec<f64>, String> {
+    let n = arm.dof();
+    let lacks = |j: &usize| arm.joints[j - 1].torque_constant.is_none();
+    let without: Vec<String> = (1..=n).filter(lacks).map(|j| j.to_string()).collect();
+    if without.is_empty() {
+        return Ok(arm.joints.iter().filter_map(|j| j.torque_constant).collect());
+    }
+    Err(format!(
+        "the log holds currents, but the arm file gives no torque_constant (N·m/A at the joint) for joint \
+            {}: add it \
+            there, or log tau1 … tau{n}",
+        without.join(", ")
+    ))
+}
+
+/// Lists of the map that are not of as many joints as the arm has.
+fn misfits(asked: Asked<'_>) -> Vec<(String, String)> {
+    let n = asked.arm.dof();
+    let mut misfits = Vec::new();
+    if !asked.map.joints.is_empty() && asked.map.joints.len() != n {
+        let message = format!("the map names {} joints, the arm has {n}", asked.map.joints.len());
+        misfits.push(("joints".to_string(), message));
+    }
+    for (key, mapped) in asked.map.quantities().into_iter().filter(|(key, _)| *key != "t") {
+        if let Some(list) = mapped.misfit(n) {
+            misfits.push((
+                format!("{key}.{list}"),
+                format!("the map's list must have one entry for each of {n} joints"),
+            ));
+        }
+    }
+    misfits
+}
+
+fn missing_positions(names: &[String], missing: &[String], asked: Asked<'_>) -> String {
+    let (logged, own) = (logged_joints(names, asked.map), joint_names(asked));
+    if logged.is_empty() {
+        return format!("the arm has {} joints; missing: {}", asked.arm.dof(), missing.join(", "));
+    }
+    if own.is_empty() {
+        return format!(
+            "the log's joints are {}, and nothing says which of the arm's they are: give each [[joint]] of \
+                the arm \
+                file its name, or name them in chain order with --map 'joints = [\"…\", …]'",
+            logged.join(", ")
+        );
+    }
+    format!(
+        "the log's joints are {}, the arm's are {}; missing: {}. Give the joints the names that the log has, \
+            in the arm \
+            file or with --map 'joints = [\"…\", …]' in chain order",
+        logged.join(", "),
+        own.join(", "),
+        missing.join(", ")
+    )
 }

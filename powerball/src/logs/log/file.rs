@@ -3,7 +3,7 @@
 //! Lines of CSV need nothing after them. A Parquet file is none before its last bytes, so it is made of such
 //! lines: they are written to `NAME.parquet.csv`, and closing the log makes `NAME.parquet` of them, whole or
 //! not at all. Where a program died before that, the lines are still there, a log like any other; the next
-//! log of that name puts them into a Parquet file of their own first.
+//! log of that name puts them into a Parquet file of their own first. So it is with MCAP.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
@@ -20,19 +20,26 @@ pub struct LogFile {
 }
 
 impl LogFile {
-    /// Begins a log at `path`: Parquet where its name ends in `.parquet`, CSV else. What was there before
-    /// stays until the first line is written. Also gives the file that took up what an earlier log of this
-    /// name left when its program died.
+    /// Begins a log at `path`: Parquet or MCAP where its name ends in `.parquet` or `.mcap`, CSV else. What
+    /// was there before stays until the first line is written. Also gives the file that took up what an
+    /// earlier log of this name left when its program died.
     ///
     /// # Errors
-    /// What the file system says, and Parquet in a build without it.
+    /// What the file system says, and a format that this build does not have.
     pub fn create(path: &Path) -> io::Result<(LogFile, Option<PathBuf>)> {
-        let columnar = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet"));
-        if columnar && !cfg!(feature = "parquet") {
-            return Err(io::Error::other("this build writes CSV alone: enable the feature `parquet`"));
+        let made = Made::of(path);
+        let absent = match made {
+            Some(Made::Parquet) if !cfg!(feature = "parquet") => Some("parquet"),
+            Some(Made::Mcap) if !cfg!(feature = "mcap") => Some("mcap"),
+            _ => None,
+        };
+        if let Some(feature) = absent {
+            return Err(io::Error::other(format!(
+                "this build does not write it: enable the feature `{feature}`"
+            )));
         }
-        let lines = if columnar { with_more(path, ".csv") } else { path.to_path_buf() };
-        let recovered = if columnar { recover(path, &lines)? } else { None };
+        let lines = if made.is_some() { with_more(path, ".csv") } else { path.to_path_buf() };
+        let recovered = if made.is_some() { recover(path, &lines)? } else { None };
         let file = OpenOptions::new().create(true).append(true).open(&lines)?;
         Ok((LogFile { path: path.to_path_buf(), lines, file, begun: false }, recovered))
     }
@@ -71,28 +78,58 @@ impl Write for LogFile {
     }
 }
 
+/// What is made of lines when a log ends.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Made {
+    Parquet,
+    Mcap,
+}
+
+impl Made {
+    fn of(path: &Path) -> Option<Made> {
+        let ending = path.extension()?.to_string_lossy().to_lowercase();
+        [("parquet", Made::Parquet), ("mcap", Made::Mcap)]
+            .into_iter()
+            .find(|(own, _)| *own == ending)
+            .map(|m| m.1)
+    }
+
+    fn convert(self, lines: File, out: File) -> io::Result<usize> {
+        match self {
+            Made::Parquet => crate::logs::tables::columnar::from_csv(lines, out),
+            #[cfg(feature = "mcap")]
+            Made::Mcap => crate::logs::tables::mcap_from_csv(lines, io::BufWriter::new(out)),
+            #[cfg(not(feature = "mcap"))]
+            Made::Mcap => Err(io::Error::other("this build does not write it: enable the feature `mcap`")),
+        }
+    }
+}
+
 fn with_more(path: &Path, more: &str) -> PathBuf {
     let mut name: OsString = path.as_os_str().to_owned();
     name.push(more);
     PathBuf::from(name)
 }
 
-/// Lines that a dead program left become a Parquet file under a name that is still free.
+/// Lines that a dead program left become a file of the format under a name that is still free.
 fn recover(path: &Path, lines: &Path) -> io::Result<Option<PathBuf>> {
     if !lines.exists() {
         return Ok(None);
     }
-    let free = (1..).map(|k| path.with_extension(format!("interrupted-{k}.parquet"))).find(|p| !p.exists());
+    let ending = path.extension().unwrap_or_default().to_string_lossy().into_owned();
+    let free = (1..).map(|k| path.with_extension(format!("interrupted-{k}.{ending}"))).find(|p| !p.exists());
     let Some(target) = free else { return Ok(None) };
     let rows = convert(lines, &target)?;
     fs::remove_file(lines)?;
     Ok((rows > 0).then_some(target))
 }
 
-/// Lines of CSV to a Parquet file, whole or not at all; the number of rows. Without rows there is no file.
+/// Lines of CSV to a file of the target's format, whole or not at all; the number of rows. Without rows there
+/// is no file.
 fn convert(lines: &Path, target: &Path) -> io::Result<usize> {
     let part = with_more(target, &format!(".{}.part", std::process::id()));
-    let written = super::columnar::from_csv(File::open(lines)?, File::create(&part)?);
+    let made = Made::of(target).unwrap_or(Made::Parquet);
+    let written = made.convert(File::open(lines)?, File::create(&part)?);
     match written {
         Ok(rows) if rows > 0 => fs::rename(&part, target).map(|()| rows),
         other => {

@@ -1,31 +1,35 @@
 //! Logs of joint positions and torques: read, checked, and every doubt about them said.
 //!
-//! Files ([`Log::read`]: CSV or Parquet), arrays ([`Log::from_arrays`]) and samples ([`Log::from_samples`])
-//! come to columns by name, and these pass the same checks.
+//! Files ([`Log::read`]: CSV, Parquet, MCAP, rosbag2, npz), arrays ([`Log::from_arrays`]) and samples
+//! ([`Log::from_samples`]) come to columns by name, and these pass the same checks. A [`ColumnMap`] says what
+//! names do not.
 
 mod arrays;
 mod check;
 mod clock;
-mod columnar;
 mod columns;
 mod doubts;
 mod file;
+mod inspect;
 mod levels;
+mod map;
 mod raw;
 mod read;
 mod samples;
 mod signs;
 mod speeds;
-mod text;
-#[cfg(feature = "parquet")]
-mod zstd_pages;
+mod topics;
+mod write;
 
+pub use crate::logs::tables::{Finding, LogError};
 pub use arrays::{Arrays, Sample};
 pub use clock::common_clock;
 use doubts::{Doubts, Severity};
 pub use file::LogFile;
-pub use read::{read_log, read_logs};
-use std::fmt;
+pub use inspect::{Aligned, Inspected, InspectedColumn, InspectedTable, TakenAs, inspect};
+pub use map::{ByJoint, Clock, ColumnMap, Mapped};
+pub use read::{read_log, read_log_as, read_logs, read_logs_as};
+pub use topics::{Alignment, alignment};
 
 /// One recording as it was logged, after its faults were taken out.
 #[derive(Clone, Debug)]
@@ -40,52 +44,14 @@ pub struct Log {
     pub torque: Vec<Vec<f64>>,
     /// Joint temperatures by joint, °C, where they were logged.
     pub temperature: Option<Vec<Vec<f64>>>,
+    /// Torques on the motors' side of the gears by joint (n × N, as `torque`), where they were logged. Unit,
+    /// sign and ratio are whatever the drives say; not a number where a sample has none.
+    pub motor: Option<Vec<Vec<f64>>>,
     /// Index ranges without a gap.
     pub pieces: Vec<std::ops::Range<usize>>,
     /// Seconds to add to `t` for a clock that runs through all logs (see [`common_clock`]).
     pub clock: f64,
 }
-
-/// Something about a log that its user should know.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Finding {
-    /// The file.
-    pub file: String,
-    /// Line in the file, or number of the sample of a log from memory, from 1; `None` where the whole log is
-    /// meant.
-    pub line: Option<usize>,
-    /// The column or quantity.
-    pub quantity: String,
-    /// What was found, what was done about it, what to do.
-    pub message: String,
-}
-
-impl fmt::Display for Finding {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.line {
-            Some(line) => write!(f, "{}:{line}: {}: {}", self.file, self.quantity, self.message),
-            None => write!(f, "{}: {}: {}", self.file, self.quantity, self.message),
-        }
-    }
-}
-
-/// Why logs cannot be used at all: every reason at once.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LogError(pub Vec<Finding>);
-
-impl fmt::Display for LogError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, finding) in self.0.iter().enumerate() {
-            if i > 0 {
-                writeln!(f)?;
-            }
-            write!(f, "{finding}")?;
-        }
-        Ok(())
-    }
-}
-
-impl std::error::Error for LogError {}
 
 #[cfg(test)]
 mod tests;

@@ -16,10 +16,11 @@ pub(super) struct Raw {
     pub(super) effort: Vec<Vec<f64>>,
     pub(super) temperature: Option<Vec<Vec<f64>>>,
     pub(super) dq: Vec<Vec<f64>>,
+    pub(super) motor: Option<Vec<Vec<f64>>>,
 }
 
 impl Raw {
-    pub(super) fn new(dof: usize, temperature: bool) -> Raw {
+    pub(super) fn new(dof: usize, temperature: bool, motor: bool) -> Raw {
         let empty = || vec![Vec::new(); dof];
         Raw {
             line: Vec::new(),
@@ -28,6 +29,7 @@ impl Raw {
             effort: empty(),
             temperature: temperature.then(empty),
             dq: empty(),
+            motor: motor.then(empty),
         }
     }
 
@@ -38,7 +40,9 @@ impl Raw {
         for joint in self.q.iter_mut().chain(&mut self.effort) {
             joint.extend(values.next());
         }
-        for joint in self.temperature.iter_mut().flatten().chain(&mut self.dq) {
+        // Last what says by being empty that it is not there.
+        let motor = self.motor.iter_mut().flatten();
+        for joint in self.temperature.iter_mut().flatten().chain(motor).chain(&mut self.dq) {
             joint.extend(values.next());
         }
     }
@@ -52,7 +56,8 @@ impl Raw {
         };
         filter(&mut self.t);
         self.q.iter_mut().chain(&mut self.effort).for_each(filter);
-        self.temperature.iter_mut().flatten().chain(&mut self.dq).for_each(filter);
+        let motor = self.motor.iter_mut().flatten();
+        self.temperature.iter_mut().flatten().chain(&mut self.dq).chain(motor).for_each(filter);
         let mut k = keep.iter();
         self.line.retain(|_| *k.next().unwrap_or(&true));
     }

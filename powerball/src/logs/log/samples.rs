@@ -1,46 +1,41 @@
 //! The samples of a log while it is read, by whatever reader.
 
 use super::check;
-use super::columns::Columns;
+use super::columns::{Asked, Columns};
 use super::raw::Raw;
 use super::{Finding, Log, LogError};
-use dyngen::Arm;
+use crate::logs::tables::Rows;
 
 /// More samples without a number than this share make a log unusable.
 const MOST_BAD_LINES: f64 = 0.2;
 
 /// The samples of a log while it is read, and how many of its lines are none.
-pub(super) struct Samples {
-    columns: Columns,
-    /// What a sample is called: "line" or "sample".
+pub(super) struct Samples<'a> {
+    asked: Asked<'a>,
+    findings: &'a mut Vec<Finding>,
+    /// What a sample is called: "line", "sample" or "message".
     called: &'static str,
-    raw: Raw,
-    pub(super) total: usize,
-    pub(super) bad: usize,
+    names: Vec<String>,
+    found: Option<(Columns, Raw)>,
+    total: usize,
+    bad: usize,
     first_bad: Option<(usize, String)>,
 }
 
-impl Samples {
-    pub(super) fn new(columns: Columns, arm: &Arm, called: &'static str) -> Samples {
-        let raw = Raw::new(arm.dof(), columns.temperature.is_some());
-        Samples { columns, called, raw, total: 0, bad: 0, first_bad: None }
+impl<'a> Samples<'a> {
+    pub(super) fn new(asked: Asked<'a>, called: &'static str, findings: &'a mut Vec<Finding>) -> Samples<'a> {
+        Samples { asked, findings, called, names: Vec::new(), found: None, total: 0, bad: 0, first_bad: None }
     }
 
-    /// Takes a line; `field` gives the number in a column, where there is one.
-    pub(super) fn take(&mut self, line: usize, names: &[String], field: impl Fn(usize) -> Option<f64>) {
-        let field = |k: usize| field(k).filter(|v: &f64| v.is_finite());
-        self.total += 1;
-        match self.columns.sample(&field) {
-            Some(values) => self.raw.push(line, &values),
-            None => {
-                self.bad += 1;
-                self.first_bad.get_or_insert_with(|| (line, self.columns.culprit(&field, names)));
-            }
+    /// The log of what was taken; `torn` where the last line is.
+    pub(super) fn finish(mut self, torn: bool) -> Result<Log, LogError> {
+        let file = self.asked.file;
+        if torn && self.total > 0 {
+            let message =
+                "the last line is torn (fewer or more fields than the header); it was left out".to_string();
+            self.findings.push(Finding::of_file(file, "last line", message));
+            self.bad -= 1;
         }
-    }
-
-    /// The log of what was taken.
-    pub(super) fn finish(self, file: &str, arm: &Arm, findings: &mut Vec<Finding>) -> Result<Log, LogError> {
         let (bad, total, called) = (self.bad, self.total, self.called);
         if let Some((line, culprit)) = self.first_bad.filter(|_| bad > 0) {
             let finding = |message: String| Finding {
@@ -55,11 +50,42 @@ impl Samples {
                         again or leave it out"
                 ))]));
             }
-            findings.push(finding(format!(
+            self.findings.push(finding(format!(
                 "{bad} of {total} {called}s hold no finite number in every needed column (the first is this \
                     one) and were left out; short holes are filled by interpolation, long ones split the log"
             )));
         }
-        check::into_log(self.raw, &self.columns.effort, file, arm, findings)
+        let Some((columns, raw)) = self.found else {
+            return Err(LogError::of_file(file, "samples", "there are none"));
+        };
+        check::into_log(raw, &columns.effort, file, self.asked.arm, self.findings)
+    }
+}
+
+impl Rows for Samples<'_> {
+    fn begin(&mut self, names: &[String]) -> Result<(), LogError> {
+        let columns = Columns::find(names, self.asked, self.findings)?;
+        let raw = Raw::new(self.asked.arm.dof(), columns.temperature.is_some(), columns.motor.is_some());
+        self.found = Some((columns, raw));
+        self.names = names.to_vec();
+        Ok(())
+    }
+
+    fn row(&mut self, line: usize, number: &dyn Fn(usize) -> Option<f64>) {
+        let Some((columns, raw)) = &mut self.found else { return };
+        let field = |k: usize| number(k).filter(|v: &f64| v.is_finite());
+        // Others, such as a gripper, may publish on the same topic.
+        if self.called == "message" && !columns.touches(&field) {
+            return;
+        }
+        self.total += 1;
+        match columns.sample(&field) {
+            Some(values) => raw.push(line, &values),
+            None => {
+                self.bad += 1;
+                let names = &self.names;
+                self.first_bad.get_or_insert_with(|| (line, columns.culprit(&field, names)));
+            }
+        }
     }
 }

@@ -1,4 +1,4 @@
-use super::read::parse;
+use super::columns::Asked;
 use super::*;
 use dyngen::Arm;
 use std::fmt::Write as _;
@@ -49,6 +49,11 @@ fn text(header: &str, mut line: impl FnMut(usize, Vec<String>) -> Option<String>
 }
 
 const HEADER: &str = "t,q1,q2,tau1,tau2";
+
+fn parse(bytes: &[u8], file: &str, arm: &Arm, findings: &mut Vec<Finding>) -> Result<Log, LogError> {
+    let asked = Asked { arm, map: &ColumnMap::default(), file, header: None };
+    super::read::parse(bytes, asked, findings)
+}
 
 fn read(text: &str) -> (Result<Log, LogError>, Vec<Finding>) {
     let mut findings = Vec::new();
@@ -287,6 +292,7 @@ fn a_clock_that_runs_on_is_common_and_others_follow_each_other() {
         q: vec![],
         torque: vec![],
         temperature: None,
+        motor: None,
         pieces: vec![],
         clock: 0.0,
     };
@@ -352,7 +358,8 @@ fn parquet_says_the_same_as_csv() {
     assert!(torn.unwrap_err().to_string().contains("torn.parquet: Parquet: cannot be read"));
 }
 
-/// What pyarrow wrote (`tests/data/README.md`), in both versions of data pages, with a dictionary and a missing value.
+/// What pyarrow wrote (`tests/data/README.md`), in both versions of data pages, with a dictionary and a
+/// missing value.
 #[cfg(feature = "parquet")]
 #[test]
 fn columns_compressed_with_zstandard_are_read() {

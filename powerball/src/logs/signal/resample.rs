@@ -27,23 +27,27 @@ pub fn median_step(t: &[f64]) -> Option<f64> {
 /// nearest samples (linear at the ends): smooth signals such as positions keep their second derivative.
 #[must_use]
 pub fn cubic(t: &[f64], x: &[f64], start: f64, step: f64, count: usize) -> Vec<f64> {
-    onto_grid(t, start, step, count, |i, at| {
-        let linear = || x[i] + (x[i + 1] - x[i]) * (at - t[i]) / (t[i + 1] - t[i]);
-        if i == 0 || i + 2 >= t.len() {
-            return linear();
-        }
-        let mut sum = 0.0;
-        for j in i - 1..=i + 2 {
-            let mut weight = 1.0;
-            for m in i - 1..=i + 2 {
-                if m != j {
-                    weight *= (at - t[m]) / (t[j] - t[m]);
-                }
+    onto_grid(t, start, step, count, |i, at| cubic_at(t, x, i, at))
+}
+
+/// The same at one time between samples `i` and `i + 1`.
+#[must_use]
+pub fn cubic_at(t: &[f64], x: &[f64], i: usize, at: f64) -> f64 {
+    let linear = || x[i] + (x[i + 1] - x[i]) * (at - t[i]) / (t[i + 1] - t[i]);
+    if i == 0 || i + 2 >= t.len() {
+        return linear();
+    }
+    let mut sum = 0.0;
+    for j in i - 1..=i + 2 {
+        let mut weight = 1.0;
+        for m in i - 1..=i + 2 {
+            if m != j {
+                weight *= (at - t[m]) / (t[j] - t[m]);
             }
-            sum += weight * x[j];
         }
-        sum
-    })
+        sum += weight * x[j];
+    }
+    sum
 }
 
 /// Values `x` at rising times `t` onto the grid `start + k·step`, by straight lines: noisy signals such as

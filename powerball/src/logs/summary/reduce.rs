@@ -189,6 +189,7 @@ fn part(log: &Log, range: std::ops::Range<usize>) -> Log {
         q: cut(&log.q),
         torque: cut(&log.torque),
         temperature: log.temperature.as_ref().map(cut),
+        motor: log.motor.as_ref().map(cut),
         pieces: std::iter::once(0..range.len()).collect(),
         clock: log.clock,
     }

@@ -373,6 +373,7 @@ pub(super) fn record(
             q: q_log,
             torque: tau_log,
             temperature: None,
+            motor: None,
             clock: 0.0,
         });
     }

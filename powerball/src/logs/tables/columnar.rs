@@ -1,18 +1,11 @@
 //! The same columns in Parquet.
 
-use super::{Finding, Log, LogError};
-use dyngen::Arm;
+use super::table::Rows;
+use super::{Finding, LogError};
 
-/// Reads a log from the bytes of a Parquet file. Rows take the place of lines in findings.
+/// Hands the rows of a Parquet file over. They take the place of lines in findings.
 #[cfg(feature = "parquet")]
-pub(super) fn parse(
-    bytes: &[u8],
-    file: &str,
-    arm: &Arm,
-    findings: &mut Vec<Finding>,
-) -> Result<Log, LogError> {
-    use super::columns::Columns;
-    use super::samples::Samples;
+pub(crate) fn read(bytes: &[u8], file: &str, rows: &mut impl Rows) -> Result<(), LogError> {
     use super::zstd_pages::RowGroup;
     use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 
@@ -28,7 +21,7 @@ pub(super) fn parse(
     let reader = SerializedFileReader::new(bytes.clone()).map_err(|e| unreadable(None, &e))?;
     let schema = reader.metadata().file_metadata().schema();
     let names: Vec<String> = schema.get_fields().iter().map(|field| field.name().to_string()).collect();
-    let mut samples = Samples::new(Columns::find(&names, arm, file, findings)?, arm, "line");
+    rows.begin(&names)?;
     let mut count = 0;
     for group in 0..reader.num_row_groups() {
         let inner = reader.get_row_group(group).map_err(|e| unreadable(Some(count + 1), &e))?;
@@ -37,15 +30,15 @@ pub(super) fn parse(
             count += 1;
             let row = row.map_err(|e| unreadable(Some(count), &e))?;
             let values: Vec<Option<f64>> = row.get_column_iter().map(|(_, field)| number(field)).collect();
-            samples.take(count, &names, |column| values.get(column).copied().flatten());
+            rows.row(count, &|column| values.get(column).copied().flatten());
         }
     }
-    samples.finish(file, arm, findings)
+    Ok(())
 }
 
-/// Reads a log from the bytes of a Parquet file.
+/// Hands the rows of a Parquet file over.
 #[cfg(not(feature = "parquet"))]
-pub(super) fn parse(_: &[u8], file: &str, _: &Arm, _: &mut Vec<Finding>) -> Result<Log, LogError> {
+pub(crate) fn read(_: &[u8], file: &str, _: &mut impl Rows) -> Result<(), LogError> {
     Err(LogError(vec![Finding {
         file: file.to_string(),
         line: None,
@@ -79,7 +72,7 @@ const GROUP: usize = 65_536;
 /// CSV lines of numbers as Parquet columns of doubles, a row group at a time; the number of rows. Lines that
 /// are torn or hold anything else are left out.
 #[cfg(feature = "parquet")]
-pub(super) fn from_csv(csv: impl std::io::Read, out: impl std::io::Write + Send) -> std::io::Result<usize> {
+pub(crate) fn from_csv(csv: impl std::io::Read, out: impl std::io::Write + Send) -> std::io::Result<usize> {
     use parquet::data_type::DoubleType;
     use parquet::errors::ParquetError;
     use parquet::file::properties::WriterProperties;
@@ -136,6 +129,6 @@ pub(super) fn from_csv(csv: impl std::io::Read, out: impl std::io::Write + Send)
 
 /// CSV lines as Parquet columns.
 #[cfg(not(feature = "parquet"))]
-pub(super) fn from_csv(_: impl std::io::Read, _: impl std::io::Write + Send) -> std::io::Result<usize> {
+pub(crate) fn from_csv(_: impl std::io::Read, _: impl std::io::Write + Send) -> std::io::Result<usize> {
     Err(std::io::Error::other("this build writes CSV alone: enable the feature `parquet`"))
 }

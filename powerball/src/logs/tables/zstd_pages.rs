@@ -1,8 +1,9 @@
 //! Pages of Parquet columns that are compressed with Zstandard, which polars and LeRobot write.
 //!
-//! The crate `parquet` can read them with a C library only, which takes as long to build as half of the rest and stops
-//! builds for other systems. Its traits let the pages come from elsewhere: here their headers (Thrift's compact protocol,
-//! parquet.thrift of the format's specification) are read, and `ruzstd` takes the bytes out.
+//! The crate `parquet` can read them with a C library only, which takes as long to build as half of the rest
+//! and stops builds for other systems. Its traits let the pages come from elsewhere: here their headers
+//! (Thrift's compact protocol, parquet.thrift of the format's specification) are read, and `ruzstd` takes the
+//! bytes out.
 
 use bytes::Bytes;
 use parquet::basic::{Compression, Encoding};
@@ -51,7 +52,8 @@ impl RowGroupReader for RowGroup<'_> {
 }
 
 impl<'a> RowGroup<'a> {
-    /// The row group, once it is sure that its columns lie within the file: `parquet` panics where they do not.
+    /// The row group, once it is sure that its columns lie within the file: `parquet` panics where they do
+    /// not.
     pub(super) fn new(inner: Box<dyn RowGroupReader + 'a>, file: &Bytes) -> Result<Self> {
         for column in inner.metadata().columns() {
             bytes_of(column, file.len())?;

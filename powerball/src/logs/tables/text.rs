@@ -1,17 +1,16 @@
 //! Logs as CSV with a header line.
 
-use super::columns::Columns;
-use super::samples::Samples;
-use super::{Finding, Log, LogError};
-use dyngen::Arm;
+use super::table::Rows;
+use super::{Finding, LogError};
 
-/// Reads a log from the bytes of a CSV file.
-pub(super) fn parse(
+/// Hands the lines of a CSV file over; whether the last one is torn. Unreadable lines are named in
+/// `findings`.
+pub(crate) fn read(
     bytes: &[u8],
     file: &str,
-    arm: &Arm,
+    rows: &mut impl Rows,
     findings: &mut Vec<Finding>,
-) -> Result<Log, LogError> {
+) -> Result<bool, LogError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let error = |line: Option<usize>, quantity: &str, message: String| Finding {
         file: file.to_string(),
@@ -25,7 +24,7 @@ pub(super) fn parse(
         .map_err(|e| LogError(vec![error(Some(1), "header", format!("cannot be read: {e}"))]))?
         .clone();
     let names: Vec<String> = header.iter().map(|h| String::from_utf8_lossy(h).into_owned()).collect();
-    let mut samples = Samples::new(Columns::find(&names, arm, file, findings)?, arm, "line");
+    rows.begin(&names)?;
     let mut record = csv::ByteRecord::new();
     let mut last_torn = false;
     loop {
@@ -40,17 +39,11 @@ pub(super) fn parse(
         }
         let line = record.position().map_or(line, |p| p.line() as usize);
         last_torn = record.len() != names.len();
-        samples.take(line, &names, |k| {
+        rows.row(line, &|k| {
             // A torn line's last number may be cut off too.
             let field = record.get(k).filter(|_| !last_torn)?;
             std::str::from_utf8(field).ok()?.parse().ok()
         });
     }
-    if last_torn && samples.total > 0 {
-        let message =
-            "the last line is torn (fewer or more fields than the header); it was left out".to_string();
-        findings.push(error(None, "last line", message));
-        samples.bad -= 1;
-    }
-    samples.finish(file, arm, findings)
+    Ok(last_torn)
 }

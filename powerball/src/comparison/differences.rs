@@ -1,0 +1,331 @@
+//! Number by number: what differs, and how surely.
+
+use super::result::{
+    CompareError, CompareOptions, ConstantDifference, FrictionDifference, ParameterDifference,
+    TorqueDifference,
+};
+use super::side::Side;
+use crate::identification::estimate::distribution::{f_tail, t_critical};
+use crate::identification::estimate::{Solver, Uncertainty, friction_row};
+use faer::Mat;
+use faer::linalg::solvers::SolveLstsq;
+
+/// Friction is compared at these shares of the rms velocity: where it breaks loose, where it bends, and where
+/// the joint is as fast as it gets.
+const VELOCITIES: [f64; 5] = [0.1, 0.3, 0.7, 1.2, 1.8];
+/// rad/s, where the logs' velocities are not known.
+const ORDINARY: f64 = 0.5;
+
+/// All differences, `b` less `a`.
+pub(super) struct Differences {
+    pub level: f64,
+    pub comparisons: usize,
+    pub parameters: Vec<ParameterDifference>,
+    pub inertia: Inertia,
+    pub friction: Vec<FrictionDifference>,
+    pub constants: Vec<ConstantDifference>,
+    pub torque: Vec<TorqueDifference>,
+    pub warnings: Vec<String>,
+}
+
+/// The differences of the minimal set together.
+pub(super) struct Inertia {
+    /// b − a, in the order of the compared parameters.
+    pub difference: Vec<f64>,
+    /// The factor of their covariance.
+    pub weights: Solver,
+    /// Degrees of freedom of the least known.
+    pub freedom: f64,
+}
+
+impl Inertia {
+    fn new(a: &Side, b: &Side, compared: &[(usize, usize, Difference)]) -> Inertia {
+        let covariance = Mat::from_fn(compared.len(), compared.len(), |i, k| {
+            a.covariance(compared[i].0, compared[k].0) + b.covariance(compared[i].1, compared[k].1)
+        });
+        Inertia {
+            difference: compared.iter().map(|(_, _, d)| d.value).collect(),
+            weights: Solver::new(&covariance, |_| true),
+            freedom: compared.iter().map(|(_, _, d)| d.freedom).fold(f64::INFINITY, f64::min),
+        }
+    }
+
+    /// How often equal arms would differ so in all of them (Hotelling's T²); 0 where they are too many to
+    /// tell.
+    fn p_value(&self) -> f64 {
+        let count = self.weights.kept().len() as f64;
+        let left = self.freedom - count + 1.0;
+        if count == 0.0 || left <= 0.0 {
+            return 0.0;
+        }
+        let square: f64 =
+            self.difference.iter().zip(self.weights.solve(&self.difference)).map(|(d, w)| d * w).sum();
+        f_tail(square * left / (count * self.freedom), count, left)
+    }
+}
+
+/// A difference with its variance.
+#[derive(Clone, Copy)]
+struct Difference {
+    value: f64,
+    variance: f64,
+    freedom: f64,
+}
+
+impl Difference {
+    /// Of two independent values, each with its variance and degrees of freedom (Welch and Satterthwaite).
+    fn of(a: (f64, f64, f64), b: (f64, f64, f64)) -> Difference {
+        let variance = a.1 + b.1;
+        let doubt = a.1 * a.1 / a.2 + b.1 * b.1 / b.2;
+        let freedom = if doubt > 0.0 { variance * variance / doubt } else { a.2.min(b.2) };
+        Difference { value: b.0 - a.0, variance, freedom }
+    }
+
+    /// How often equal arms would differ so.
+    fn p_value(self) -> f64 {
+        if self.variance > 0.0 {
+            f_tail(self.value * self.value / self.variance, 1.0, self.freedom)
+        } else {
+            1.0
+        }
+    }
+
+    /// Half the width of an interval that misses the truth with probability `p`.
+    fn half(self, p: f64) -> f64 {
+        t_critical(p, self.freedom) * self.variance.sqrt()
+    }
+
+    fn interval(self, p: f64) -> [f64; 2] {
+        [self.value - self.half(p), self.value + self.half(p)]
+    }
+}
+
+impl Differences {
+    pub(super) fn new(a: &Side, b: &Side, options: &CompareOptions) -> Result<Differences, CompareError> {
+        let level = options.level;
+        if !(level > 0.0 && level < 1.0) {
+            return Err(CompareError::Setting("--level must lie between 0 and 1".into()));
+        }
+        let place = same_set(a, b)?;
+        let mut warnings = Vec::new();
+        for side in [a, b].into_iter().filter(|side| side.uncertainty.is_none()) {
+            warnings.push(format!(
+                "{}: there is no covariance.json beside it: standard errors count one by one, so less is \
+                    seen; identify \
+                    again to have it",
+                side.name
+            ));
+        }
+        let parameters = parameters(a, b, &place);
+        let friction = friction(a, b);
+        let constant = |j: usize| Some((j, a.constant(j)?, b.constant(j)?));
+        let constants: Vec<(usize, _, _)> = (0..a.friction.len()).filter_map(constant).collect();
+        let comparisons =
+            parameters.len() + friction.iter().map(|(_, rows)| rows.len()).sum::<usize>() + constants.len();
+        if comparisons == 0 {
+            let message =
+                format!("{} and {} have no standard errors in common: identify again", a.name, b.name);
+            return Err(CompareError::NoErrors(message));
+        }
+        // Bonferroni: each interval misses with an equal share of the level.
+        let p = level / comparisons as f64;
+        let inertia = Inertia::new(a, b, &parameters);
+        let together = inertia.p_value();
+        let parameters = parameters.into_iter().map(|(k, other, d)| ParameterDifference {
+            name: a.parameters[k].name.clone(),
+            a: a.parameters[k].value,
+            b: b.parameters[other].value,
+            difference: d.value,
+            interval: d.interval(p),
+            p_value: d.p_value(),
+            // One of twenty that is far off by itself is noise where all together are not.
+            differs: d.p_value() < p && together < level,
+        });
+        let constants = constants.into_iter().map(|(j, own, other)| {
+            let d = Difference::of(own, other);
+            let [a, b] = [own.0, other.0];
+            let (interval, p_value) = (d.interval(p), d.p_value());
+            ConstantDifference {
+                joint: j + 1,
+                a,
+                b,
+                difference: d.value,
+                interval,
+                p_value,
+                differs: p_value < p,
+            }
+        });
+        Ok(Differences {
+            level,
+            comparisons,
+            parameters: parameters.collect(),
+            inertia,
+            friction: friction.into_iter().map(|(j, rows)| curve(j, &rows, p)).collect(),
+            constants: constants.collect(),
+            torque: torque(a, b, &place),
+            warnings,
+        })
+    }
+}
+
+/// The place in `b` of every parameter of `a`.
+fn same_set(a: &Side, b: &Side) -> Result<Vec<usize>, CompareError> {
+    let find = |p: &crate::identification::estimate::ParameterEstimate| {
+        b.parameters.iter().position(|other| other.name == p.name)
+    };
+    let place: Option<Vec<usize>> = a.parameters.iter().map(find).collect();
+    let joints = a.friction.len() == b.friction.len();
+    match place.filter(|place| joints && place.len() == b.parameters.len()) {
+        Some(place) => Ok(place),
+        None => {
+            let names =
+                |side: &Side| side.parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>().join("; ");
+            Err(CompareError::Different(format!(
+                "{} is of {} with {} joints and the parameters {}; {} is of {} with {} joints and {}: only \
+                    fits of one arm \
+                    file and one mounting can be compared",
+                a.name,
+                a.arm,
+                a.friction.len(),
+                names(a),
+                b.name,
+                b.arm,
+                b.friction.len(),
+                names(b)
+            )))
+        }
+    }
+}
+
+fn parameters(a: &Side, b: &Side, place: &[usize]) -> Vec<(usize, usize, Difference)> {
+    let one = |(k, other): (usize, &usize)| {
+        let own = (a.parameters[k].value, a.covariance(k, k), a.freedom(k)?);
+        let theirs = (b.parameters[*other].value, b.covariance(*other, *other), b.freedom(*other)?);
+        Some((k, *other, Difference::of(own, theirs)))
+    };
+    place.iter().enumerate().filter_map(one).collect()
+}
+
+/// A velocity, both frictions there and their difference.
+type AtVelocity = (f64, f64, f64, Difference);
+
+fn friction(a: &Side, b: &Side) -> Vec<(usize, Vec<AtVelocity>)> {
+    let known = |j: &usize| a.knows_friction(*j) && b.knows_friction(*j);
+    let rows = |j: usize| {
+        let top = match (a.velocity(j), b.velocity(j)) {
+            (Some(a), Some(b)) => a.min(b),
+            (one, other) => one.or(other).unwrap_or(ORDINARY),
+        };
+        let at = |share: f64| {
+            let (own, other) = (a.friction_at(j, share * top), b.friction_at(j, share * top));
+            (share * top, own.0, other.0, Difference::of(own, other))
+        };
+        (j, VELOCITIES.map(at).to_vec())
+    };
+    (0..a.friction.len()).filter(known).map(rows).collect()
+}
+
+fn curve(joint: usize, rows: &[AtVelocity], p: f64) -> FrictionDifference {
+    let of = |what: &dyn Fn(&AtVelocity) -> f64| rows.iter().map(what).collect::<Vec<f64>>();
+    let surest = rows.iter().min_by(|x, y| x.3.p_value().total_cmp(&y.3.p_value()));
+    let change = surest.map_or([0.0; 2], |(_, a, _, d)| match a.abs() {
+        0.0 => [f64::NEG_INFINITY, f64::INFINITY],
+        size => d.interval(p).map(|end| end / size),
+    });
+    let p_value = surest.map_or(1.0, |(_, _, _, d)| d.p_value());
+    FrictionDifference {
+        joint: joint + 1,
+        velocities: of(&|r| r.0),
+        a: of(&|r| r.1),
+        b: of(&|r| r.2),
+        difference: of(&|r| r.3.value),
+        interval: rows.iter().map(|r| r.3.interval(p)).collect(),
+        change,
+        p_value,
+        differs: p_value < p,
+    }
+}
+
+/// What the difference is in torque along the logs of `a`; nothing where these are not known.
+fn torque(a: &Side, b: &Side, place: &[usize]) -> Vec<TorqueDifference> {
+    let Some(all) = &a.uncertainty else { return Vec::new() };
+    let mut change = vec![0.0; all.freedom.len()];
+    for (k, other) in place.iter().enumerate() {
+        change[k] = b.parameters[*other].value - a.parameters[k].value;
+    }
+    for j in 0..a.friction.len() {
+        for (k, part) in curve_in_columns(a, b, j).into_iter().enumerate() {
+            change[all.friction(j, k)] = part;
+        }
+        let constant = |side: &Side| side.friction[j].offset.unwrap_or(0.0);
+        if let Some(at) = all.constant(j) {
+            change[at] = constant(b) - constant(a);
+        }
+    }
+    (0..a.friction.len())
+        .map(|j| {
+            let path = &all.path[j];
+            let products = |value: &dyn Fn(usize, usize) -> f64| -> f64 {
+                let entries = path.products.iter().enumerate();
+                let row = |(i, row): (usize, &Vec<f64>)| -> f64 {
+                    let term = |(k, product): (usize, &f64)| {
+                        let twice = if i == k { 1.0 } else { 2.0 };
+                        twice * product * value(path.columns[i], path.columns[k])
+                    };
+                    row.iter().enumerate().map(term).sum()
+                };
+                entries.map(row).sum::<f64>().max(0.0)
+            };
+            let rms = products(&|i, k| change[i] * change[k]).sqrt();
+            let expected =
+                products(&|i, k| covariance(all, i, k) + other_covariance(a, b, place, i, k)).sqrt();
+            let relative = if path.torque > 0.0 { rms / path.torque.sqrt() } else { 0.0 };
+            TorqueDifference { joint: j + 1, rms, expected, relative }
+        })
+        .collect()
+}
+
+fn covariance(all: &Uncertainty, i: usize, k: usize) -> f64 {
+    if all.freedom[i] > 0.0 && all.freedom[k] > 0.0 { all.covariance(i, k) } else { 0.0 }
+}
+
+/// The covariance of `b` in the order of `a`. Where its law has no constant torque, or nothing is known, that
+/// of `a`.
+fn other_covariance(a: &Side, b: &Side, place: &[usize], i: usize, k: usize) -> f64 {
+    let Some(own) = &a.uncertainty else { return 0.0 };
+    match &b.uncertainty {
+        Some(other) if other.freedom.len() == own.freedom.len() => {
+            let at = |c: usize| place.get(c).copied().unwrap_or(c);
+            covariance(other, at(i), at(k))
+        }
+        _ => covariance(own, i, k),
+    }
+}
+
+/// The difference of two friction curves in the columns of `a`'s: by least squares over the velocities of its
+/// logs.
+fn curve_in_columns(a: &Side, b: &Side, joint: usize) -> Vec<f64> {
+    const POINTS: usize = 100;
+    let Some(rms) = a.velocity(joint) else { return vec![0.0; 5] };
+    let f = &a.friction[joint];
+    // Velocities are about normal. Points are even in ln q̇, as steep levels bend where it is slowest: each
+    // stands for a stretch of velocities that grows with its own.
+    let velocity = |k: usize| 3.0 * rms * (1e-4f64).powf(k as f64 / (POINTS - 1) as f64);
+    let weight = |v: f64| (v / rms).sqrt() * (-0.25 * (v / rms).powi(2)).exp();
+    let rows = Mat::from_fn(POINTS, 5, |k, c| {
+        weight(velocity(k)) * friction_row([f.gamma2, f.gamma4], velocity(k))[c]
+    });
+    let right = Mat::from_fn(POINTS, 1, |k, _| {
+        let v = velocity(k);
+        weight(v) * (b.friction_at(joint, v).0 - a.friction_at(joint, v).0)
+    });
+    // Two levels of one steepness are one column: a trace of a ridge decides.
+    let size = 1e-7 * (0..POINTS).map(|k| rows[(k, 2)].powi(2)).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+    let ridged = Mat::from_fn(POINTS + 5, 5, |k, c| match k.checked_sub(POINTS) {
+        None => rows[(k, c)],
+        Some(own) => f64::from(u8::from(own == c)) * size,
+    });
+    let right = Mat::from_fn(POINTS + 5, 1, |k, _| if k < POINTS { right[(k, 0)] } else { 0.0 });
+    let found = ridged.qr().solve_lstsq(&right);
+    (0..5).map(|c| found[(c, 0)]).map(|x| if x.is_finite() { x } else { 0.0 }).collect()
+}

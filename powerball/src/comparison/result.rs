@@ -1,0 +1,182 @@
+//! What a comparison is told and what it gives.
+
+use serde::Serialize;
+use std::fmt;
+
+/// All settings of [`compare`](super::compare).
+#[derive(Clone, Debug)]
+pub struct CompareOptions {
+    /// In which share of comparisons equal arms may be called different.
+    pub level: f64,
+}
+
+impl Default for CompareOptions {
+    fn default() -> Self {
+        CompareOptions { level: 0.01 }
+    }
+}
+
+/// Two fits side by side; as JSON it is `comparison.json`. Differences are `b` less `a`; intervals hold all
+/// at once.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// The one.
+    pub a: String,
+    /// The other.
+    pub b: String,
+    /// The arm's name.
+    pub arm: String,
+    /// Whether they differ beyond what their errors explain.
+    pub differ: bool,
+    /// In which share of comparisons equal arms are called different.
+    pub level: f64,
+    /// How many numbers were compared.
+    pub comparisons: usize,
+    /// The minimal set, as far as both determine it.
+    pub parameters: Vec<ParameterDifference>,
+    /// Friction curves, joint by joint.
+    pub friction: Vec<FrictionDifference>,
+    /// Constant torques, where both laws have them.
+    pub constants: Vec<ConstantDifference>,
+    /// What all of it means in torque along the logs of `a`, joint by joint.
+    pub torque_difference: Vec<TorqueDifference>,
+    /// What would explain it.
+    pub causes: Vec<Cause>,
+    /// All of it in words.
+    pub sentence: String,
+    /// What is to be said of the fits.
+    pub warnings: Vec<String>,
+}
+
+/// One parameter of the minimal set.
+#[derive(Clone, Debug, Serialize)]
+pub struct ParameterDifference {
+    /// Its name: the sum it stands for.
+    pub name: String,
+    /// Its value in `a`, SI units.
+    pub a: f64,
+    /// In `b`.
+    pub b: f64,
+    /// b − a.
+    pub difference: f64,
+    /// Where the difference lies.
+    pub interval: [f64; 2],
+    /// How often equal arms would differ so in this parameter.
+    pub p_value: f64,
+    /// Whether it differs.
+    pub differs: bool,
+}
+
+/// The friction of one joint.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrictionDifference {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// Velocities at which the curves are compared, rad/s or m/s: shares of the rms velocity of the logs.
+    pub velocities: Vec<f64>,
+    /// Friction there in `a`, N·m or N.
+    pub a: Vec<f64>,
+    /// In `b`.
+    pub b: Vec<f64>,
+    /// b − a.
+    pub difference: Vec<f64>,
+    /// Where the differences lie.
+    pub interval: Vec<[f64; 2]>,
+    /// Where (b − a)/a lies, at the velocity at which the difference is surest.
+    pub change: [f64; 2],
+    /// How often equal arms would differ so at one velocity, the smallest.
+    pub p_value: f64,
+    /// Whether it differs.
+    pub differs: bool,
+}
+
+/// The constant torque of one joint.
+#[derive(Clone, Debug, Serialize)]
+pub struct ConstantDifference {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// Its constant torque in `a`, N·m or N.
+    pub a: f64,
+    /// In `b`.
+    pub b: f64,
+    /// b − a.
+    pub difference: f64,
+    /// Where the difference lies.
+    pub interval: [f64; 2],
+    /// How often equal arms would differ so in it.
+    pub p_value: f64,
+    /// Whether it differs.
+    pub differs: bool,
+}
+
+/// What the difference of two models is in the torque of one joint, along the logs of `a`.
+#[derive(Clone, Debug, Serialize)]
+pub struct TorqueDifference {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// rms of the difference, N·m or N.
+    pub rms: f64,
+    /// What the errors of both fits alone would make of it.
+    pub expected: f64,
+    /// rms of the difference over the rms of the measured torque.
+    pub relative: f64,
+}
+
+/// One reason for a difference.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "cause", rename_all = "snake_case")]
+pub enum Cause {
+    /// Another payload on the last link.
+    Payload {
+        /// How much heavier `b` is, kg, and its standard error, where the logs tell it.
+        mass: Option<[f64; 2]>,
+    },
+    /// Inertial parameters differ, and not as a payload on the last link would make them.
+    Inertia {
+        /// Which.
+        parameters: Vec<String>,
+    },
+    /// Friction changed.
+    Friction {
+        /// Joint, from 1.
+        joint: usize,
+        /// Relative change, from and to.
+        change: [f64; 2],
+    },
+    /// The zero of a torque sensor or a constant torque changed.
+    SensorZero {
+        /// Joint, from 1.
+        joint: usize,
+        /// N·m or N, from and to.
+        change: [f64; 2],
+    },
+    /// Friction differs on most joints and nothing else does: another unit of the same kind, or another
+    /// temperature.
+    AnotherUnit,
+}
+
+/// Why two fits cannot be compared.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum CompareError {
+    /// A file cannot be read or is no fit.
+    Unreadable(String),
+    /// They are of different arms or parameter sets.
+    Different(String),
+    /// Nothing of them has standard errors.
+    NoErrors(String),
+    /// A setting out of its range.
+    Setting(String),
+}
+
+impl fmt::Display for CompareError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            CompareError::Unreadable(why)
+            | CompareError::Different(why)
+            | CompareError::NoErrors(why)
+            | CompareError::Setting(why) => f.write_str(why),
+        }
+    }
+}
+
+impl std::error::Error for CompareError {}

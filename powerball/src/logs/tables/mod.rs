@@ -1,0 +1,32 @@
+//! What is in a file: tables of named columns, whatever the format, before anybody says what they mean.
+
+#[cfg(any(feature = "mcap", feature = "rosbag"))]
+mod cdr;
+pub(crate) mod columnar;
+mod contents;
+mod finding;
+#[cfg(feature = "mcap")]
+mod mcap;
+#[cfg(feature = "mcap")]
+mod mcap_out;
+#[cfg(any(feature = "mcap", feature = "rosbag"))]
+mod messages;
+#[cfg(feature = "npz")]
+mod npz;
+#[cfg(feature = "rosbag")]
+mod rosbag;
+#[cfg(feature = "rosbag")]
+mod sqlite;
+mod table;
+pub(crate) mod text;
+#[cfg(feature = "parquet")]
+mod zstd_pages;
+
+pub use contents::{Contents, Format, read_contents};
+pub use finding::{Finding, LogError};
+#[cfg(feature = "mcap")]
+pub(crate) use mcap_out::from_csv as mcap_from_csv;
+#[cfg(feature = "mcap")]
+pub use mcap_out::{Channel, JointState, McapWriter};
+pub(crate) use table::Rows;
+pub use table::{Column, Table};

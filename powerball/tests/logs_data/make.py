@@ -1,0 +1,187 @@
+"""Makes the logs of this folder, each with the writer of its format: sqlite3, the package mcap, numpy.
+
+    pip install mcap numpy lz4 zstandard && python make.py
+
+All hold the same 120 samples of two joints at 100 Hz. `shoulder` is the first of the chain; messages name the joints in
+the order of the alphabet, every third one the other way round. A gripper publishes on the same topic.
+"""
+
+import json
+import math
+import os
+import sqlite3
+import struct
+
+import numpy
+from mcap.writer import CompressionType, Writer
+
+SAMPLES, STEP, START = 120, 0.01, 1_700_000_000
+CHAIN = ["shoulder", "elbow"]
+
+
+def sample(k):
+    t = STEP * k
+    position = [math.sin(2 * t), math.cos(3 * t)]
+    velocity = [2 * math.cos(2 * t), -3 * math.sin(3 * t)]
+    return position, velocity, [5 + math.sin(7 * t), math.cos(5 * t)]
+
+
+def order(k):
+    return [0, 1] if k % 3 == 0 else [1, 0]
+
+
+class Cdr:
+    def __init__(self, little=True):
+        self.bytes, self.sign = bytearray(), "<" if little else ">"
+        self.head = bytes([0, 1 if little else 0, 0, 0])
+
+    def put(self, kind, value):
+        size = struct.calcsize(kind)
+        self.bytes += bytes(-len(self.bytes) % size) + struct.pack(self.sign + kind, value)
+
+    def text(self, value):
+        data = value.encode() + b"\0"
+        self.put("I", len(data))
+        self.bytes += data
+
+    def list(self, values, each):
+        self.put("I", len(values))
+        for value in values:
+            each(value)
+
+    def header(self, k):
+        self.put("i", START + k // 100)
+        self.put("I", k % 100 * 10_000_000)
+        self.text("world")
+
+    def done(self):
+        return self.head + bytes(self.bytes)
+
+
+def joint_state(k, names, columns, little=True):
+    m = Cdr(little)
+    m.header(k)
+    m.list(names, m.text)
+    for column in columns:
+        m.list(column, lambda v: m.put("d", v))
+    return m.done()
+
+
+def arm(k, little=True):
+    o = order(k)
+    return joint_state(k, [CHAIN[j] for j in o], [[c[j] for j in o] for c in sample(k)], little)
+
+
+def gripper(k):
+    return joint_state(k, ["finger"], [[0.01], [0.0], []])
+
+
+def dynamic(k):
+    m = Cdr()
+    m.header(k)
+    o, (q, dq, tau) = order(k), sample(k)
+    m.list([CHAIN[j] for j in o], m.text)
+
+    def interface(j):
+        m.list(["position", "effort", "temperature"], m.text)
+        m.list([q[j], tau[j], 30.0 + j], lambda v: m.put("d", v))
+
+    m.list(o, interface)
+    return m.done()
+
+
+def received(k):
+    # 3 ms after it was stamped, and now and then late.
+    return int(1e9 * START) + 10_000_000 * k + 3_000_000 + (2_000_000 if k % 7 == 0 else 0)
+
+
+def rosbag():
+    if os.path.exists("bag.db3"):
+        os.remove("bag.db3")
+    db = sqlite3.connect("bag.db3")
+    db.executescript(
+        "PRAGMA page_size = 512;"
+        "CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,"
+        "serialization_format TEXT NOT NULL,offered_qos_profiles TEXT NOT NULL);"
+        "CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,"
+        "timestamp INTEGER NOT NULL, data BLOB NOT NULL);"
+        "CREATE INDEX timestamp_idx ON messages (timestamp ASC);"
+    )
+    for id, name, kind in [
+        (1, "/joint_states", "sensor_msgs/msg/JointState"),
+        (2, "/camera", "sensor_msgs/msg/Image"),
+    ]:
+        db.execute("INSERT INTO topics VALUES (?,?,?,'cdr','')", (id, name, kind))
+    put = "INSERT INTO messages(topic_id, timestamp, data) VALUES (?,?,?)"
+    for k in range(SAMPLES):
+        # Long frame names would do as well: some rows are longer than a page of 512 bytes.
+        db.execute(put, (1, received(k), arm(k, little=k % 2 == 0)))
+        if k % 10 == 0:
+            db.execute(put, (1, received(k), gripper(k)))
+        if k % 40 == 0:
+            db.execute(put, (2, received(k), bytes(3000)))
+    db.commit()
+    db.close()
+
+
+def mcap(name, compression, topics):
+    with open(name, "wb") as out:
+        writer = Writer(out, compression=compression, chunk_size=8192)
+        writer.start()
+        channels = {}
+        for topic, (kind, encoding, _) in topics.items():
+            schema = writer.register_schema(kind, "ros2msg" if encoding == "cdr" else "jsonschema", b"{}")
+            channels[topic] = writer.register_channel(topic, encoding, schema)
+        for k in range(SAMPLES):
+            for topic, (_, _, make) in topics.items():
+                if topic == "/drives" and k % 2:
+                    continue
+                data = make(k)
+                writer.add_message(channels[topic], log_time=received(k), publish_time=received(k), data=data)
+                if topic == "/joint_states" and k % 10 == 0:
+                    data = gripper(k)
+                    writer.add_message(channels[topic], log_time=received(k), publish_time=received(k), data=data)
+        writer.finish()
+
+
+def as_json(k):
+    q, dq, tau = sample(k)
+    return json.dumps({"timestamp": START + STEP * k, "q": q, "dq": dq, "tau": [1000 * v for v in tau]}).encode()
+
+
+def only(columns):
+    def make(k):
+        return joint_state(k, CHAIN, [c if keep else [] for c, keep in zip(sample(k), columns)])
+
+    return make
+
+
+state = ("sensor_msgs/msg/JointState", "cdr")
+rosbag()
+mcap("joint_state.mcap", CompressionType.ZSTD, {"/joint_states": (*state, arm)})
+mcap(
+    "dynamic.mcap",
+    CompressionType.LZ4,
+    {"/dynamic_joint_states": ("control_msgs/msg/DynamicJointState", "cdr", dynamic)},
+)
+mcap("json.mcap", CompressionType.NONE, {"/arm": ("Arm", "json", as_json)})
+mcap(
+    "two_topics.mcap",
+    CompressionType.ZSTD,
+    {"/encoders": (*state, only([1, 1, 0])), "/drives": (*state, only([0, 0, 1]))},
+)
+t = [STEP * k for k in range(SAMPLES)]
+q, dq, tau = (numpy.array([sample(k)[i] for k in range(SAMPLES)]) for i in range(3))
+numpy.savez("stored.npz", t=t, q=q, dq=dq, tau=tau)
+numpy.savez_compressed(
+    "packed.npz",
+    time=numpy.array(t, dtype=">f8"),
+    q=numpy.asfortranarray(q[:, ::-1]),
+    tau=tau[:, ::-1].T.copy(),
+    joints=numpy.array(CHAIN[::-1]),
+    comment=numpy.array("no number"),
+)
+with open("log.csv", "w") as out:
+    out.write("t,q1,q2,dq1,dq2,tau1,tau2\n")
+    for k in range(SAMPLES):
+        out.write(",".join(repr(v) for v in [STEP * k, *sum(map(list, sample(k)), [])]) + "\n")
