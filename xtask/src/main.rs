@@ -1,5 +1,6 @@
 //! Studies that take longer than tests may.
 
+mod conventions;
 mod held_out;
 mod stories;
 mod study;
@@ -16,6 +17,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// What the columns of logs are taken to be
+    Conventions(conventions::Arguments),
     /// How often `explain` gives the right name, where the truth is known
     Study(study::Arguments),
     /// What the base model leaves of each log when it is fitted to the others
@@ -26,6 +29,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
+        Command::Conventions(arguments) => conventions::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::HeldOut(arguments) => held_out::run(&arguments),
         Command::Stories(arguments) => stories::run(&arguments),

@@ -39,6 +39,7 @@ pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainE
     let open = open(study, model, history, unattributed.is_some());
     Ok(Explained {
         arm: study.data.body.arm().name.clone(),
+        conventions: None,
         held_out_change: changes(&study.validation, &before.residual, &held_out),
         before: before.errors.clone(),
         noise_floor: floor,

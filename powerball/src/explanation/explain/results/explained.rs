@@ -8,6 +8,7 @@ use super::shown::Shown;
 use super::unattributed::Unattributed;
 use crate::controller::JointNumber;
 use crate::explanation::torque_model::TorqueModel;
+use crate::identification::conventions::Conventions;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -16,6 +17,8 @@ use std::sync::Arc;
 pub struct Explained {
     /// The arm's name.
     pub arm: String,
+    /// What the columns of the logs are, where they were asked.
+    pub conventions: Option<Conventions>,
     /// Errors of the base model.
     pub before: Spreads,
     /// Errors with all accepted effects.
