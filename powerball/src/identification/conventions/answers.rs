@@ -157,6 +157,7 @@ pub(super) struct Facts<'a> {
     pub(super) sign: Common,
     pub(super) unit: &'a Unit,
     pub(super) size: Size,
+    pub(super) scale: Scale,
     pub(super) gravity: Option<GravityIs>,
     pub(super) side: Option<Side>,
     pub(super) friction_share: Option<f64>,
@@ -258,7 +259,7 @@ fn size(facts: &Facts<'_>) -> Answer {
         ),
         (None, None) => "these logs show neither weight nor inertia".to_string(),
     };
-    match (facts.unit, facts.size.scale()) {
+    match (facts.unit, facts.scale) {
         (Unit::Milli, _) => plain(
             "torque unit",
             Some(false),
@@ -290,6 +291,13 @@ fn gravity(facts: &Facts<'_>) -> Answer {
             "gravity",
             Some(true),
             "Torques hold what gravity asks for: without it the model fits clearly worse.".into(),
+        ),
+        Some(GravityIs::TakenOut) if facts.size.is_weightless() => plain(
+            "gravity",
+            Some(false),
+            "Gravity was taken out of the torques, or something balances it: they hold the inertia of an arm \
+                and hardly any weight; set gravity = [0, 0, 0] in the arm file."
+                .into(),
         ),
         Some(GravityIs::TakenOut) => {
             plain("gravity", Some(true), "Torques hold nothing of gravity, as the arm file says.".into())

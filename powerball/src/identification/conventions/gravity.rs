@@ -28,6 +28,17 @@ pub(super) fn weight(rows: &Rows<'_>, theta: &[f64]) -> (Vec<f64>, f64) {
     ((0..n).map(rms).collect(), largest)
 }
 
+/// Whether gravity acts on any joint of the arm where it was.
+pub(super) fn acts(rows: &Rows<'_>) -> bool {
+    let (n, body) = (rows.dof(), rows.data.body);
+    let of_g = 1e-3 * body.gravity().iter().map(|x| x * x).sum::<f64>().sqrt();
+    rows.data.recordings.iter().any(|recording| {
+        let q: Vec<f64> = recording.q.iter().take(n).copied().collect();
+        let still = vec![0.0; n];
+        of_g > 0.0 && body.regressor(&q, &still, &still).iter().any(|y| y.abs() > of_g)
+    })
+}
+
 /// The joints on which gravity acts, by a fit to torques that it was taken out of.
 pub(super) fn acts_on(rows: &Rows<'_>, theta: &[f64], power: &[f64]) -> Vec<usize> {
     let (rms, _) = weight(rows, theta);

@@ -75,7 +75,9 @@ fn told(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventions
     let read = &found.read;
     let sign = sign::common(&found.judged, &found.energies);
     let size = Size::of(found);
-    let unit = unit::unit(found, &size);
+    let gravity = if size.is_weightless() { Some(GravityIs::TakenOut) } else { gravity_is(asked, found) };
+    let scale = size.scale(gravity);
+    let unit = unit::unit(found, scale);
     let good = found.is_good();
     let share = side::least_share(&found.rows, &read.torques, &found.judged, &found.energies);
     let share = share.filter(|_| good && sign != Common::NotTold);
@@ -83,7 +85,8 @@ fn told(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventions
         sign,
         unit: &unit,
         size,
-        gravity: gravity_is(asked, found),
+        scale,
+        gravity,
         side: share.and_then(side::side),
         friction_share: share,
         kind,

@@ -7,8 +7,9 @@
 
 use super::change::FACTOR;
 use super::factors::median;
-use super::gravity::weight;
+use super::gravity::{acts, weight};
 use super::search::Found;
+use super::told::GravityIs;
 use dyngen::Arm;
 use dyngen::exact::rational::to_f64;
 
@@ -18,10 +19,10 @@ const HEAVIEST: f64 = 100.0;
 const HEAVIEST_INERTIA: f64 = 300.0;
 /// Both below these are no arm's either.
 const LIGHTEST: [f64; 2] = [0.2, 0.02];
-/// Torques that stay below this share of every joint's limit are too small, where inertia is below
-/// [`LIGHT`] too.
-const IDLE: f64 = 0.03;
-const LIGHT: f64 = 0.1;
+/// Torques that stay below this share of every joint's limit are too small, where they carry the arm's weight.
+const IDLE: f64 = 0.02;
+/// Weight below this share of inertia is no weight: arms have once to thirty times as much.
+const WEIGHTLESS: f64 = 0.15;
 /// Factors agree with numbers of the arm file within this.
 const AGREE: f64 = 1.2;
 
@@ -74,17 +75,26 @@ impl Size {
         let speed = squares.0 / squares.1.max(1) as f64;
         let inertia = 2.0 * found.energies[0].kinetic(fit).value.abs() / speed;
         Size {
-            weight: if g > 0.0 { over(largest / g / reach.powi(4)) } else { None },
+            weight: if acts(rows) { over(largest / g / reach.powi(4)) } else { None },
             inertia: over(inertia / reach.powi(5)),
             of_limit: of_limit(found, arm),
         }
     }
 
-    pub(super) fn scale(&self) -> Scale {
+    /// Whether the torques carry no weight, though they move an arm.
+    pub(super) fn is_weightless(&self) -> bool {
+        matches!((self.weight, self.inertia), (Some(weight), Some(inertia)) if weight < WEIGHTLESS * inertia)
+    }
+
+    /// What the size of the torques says, with what is known of gravity in them.
+    pub(super) fn scale(&self, gravity: Option<GravityIs>) -> Scale {
         let (Some(inertia), weight) = (self.inertia, self.weight) else { return Scale::NotTold };
-        let heavy = weight.map_or(inertia > HEAVIEST_INERTIA, |weight| (weight * inertia).sqrt() > HEAVIEST);
+        let heavy = match weight.filter(|_| !self.is_weightless()) {
+            Some(weight) => (weight * inertia).sqrt() > HEAVIEST,
+            None => inertia > HEAVIEST_INERTIA,
+        };
         let light = weight.is_some_and(|weight| weight < LIGHTEST[0] && inertia < LIGHTEST[1]);
-        let idle = self.of_limit.is_some_and(|share| share < IDLE && inertia < LIGHT);
+        let idle = gravity == Some(GravityIs::Included) && self.of_limit.is_some_and(|share| share < IDLE);
         match (heavy, light || idle) {
             (true, _) => Scale::TooLarge,
             (_, true) => Scale::TooSmall,
@@ -113,7 +123,7 @@ fn of_limit(found: &Found<'_>, arm: &Arm) -> Option<f64> {
 }
 
 /// The unit by size and by the factors that were found.
-pub(super) fn unit(found: &Found<'_>, size: &Size) -> Unit {
+pub(super) fn unit(found: &Found<'_>, scale: Scale) -> Unit {
     let arm = found.rows.data.body.arm();
     let gains: Vec<f64> = found.read.torques.gain.iter().map(|g| g.abs()).collect();
     let filed = |of: &dyn Fn(usize) -> Option<f64>| {
@@ -128,7 +138,6 @@ pub(super) fn unit(found: &Found<'_>, size: &Size) -> Unit {
             apart.iter().all(|x| (x - common).abs() < AGREE.ln())
         })
     };
-    let scale = size.scale();
     if found.read.torques.is_scaled() {
         if agree(&ratios) {
             return ratios.map_or(Unit::NotTold, Unit::BeforeGear);
