@@ -20,7 +20,7 @@ const HEAVIEST_INERTIA: f64 = 300.0;
 /// Both below these are no arm's either.
 const LIGHTEST: [f64; 2] = [0.2, 0.02];
 /// Torques that stay below this share of every joint's limit are too small, where they carry the arm's weight.
-const IDLE: f64 = 0.02;
+const IDLE: f64 = 0.03;
 /// Weight below this share of inertia is no weight: arms have once to thirty times as much.
 const WEIGHTLESS: f64 = 0.15;
 /// Factors agree with numbers of the arm file within this.
