@@ -126,7 +126,7 @@ fn spoils<'a>(arm: &'a Arm, body: &'a RigidBody, parameters: &'a [f64]) -> Vec<(
         ),
         (
             "gravity taken out".into(),
-            Box::new(|log| {
+            Box::new(move |log| {
                 let still = vec![0.0; n];
                 for k in 0..log.t.len() {
                     let q: Vec<f64> = log.q.iter().map(|q| q[k]).collect();
