@@ -35,6 +35,7 @@ fn every_path_that_a_page_names_exists() {
         "docs/dyngen.md",
         "docs/estimation.md",
         "docs/performance.md",
+        "docs/conventions.md",
         "docs/explain.md",
         "docs/model.md",
     ] {

@@ -1,6 +1,7 @@
 //! Studies that take longer than tests may.
 
 mod compare;
+mod conventions;
 mod held_out;
 mod stories;
 mod study;
@@ -17,6 +18,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// What the columns of logs are taken to be
+    Conventions(conventions::Arguments),
     /// How often `explain` gives the right name, where the truth is known
     Study(study::Arguments),
     /// What the base model leaves of each log when it is fitted to the others
@@ -29,6 +32,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
+        Command::Conventions(arguments) => conventions::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::HeldOut(arguments) => held_out::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),

@@ -3,6 +3,7 @@
 use super::explain::{Explained, explain_body};
 use super::options::{ExplainError, ExplainOptions};
 use super::torque_model::TorqueModel;
+use crate::identification::conventions::{Conventions, conventions};
 use crate::logs::log::{Log, common_clock};
 use crate::logs::regression::RigidBody;
 use dyngen::Arm;
@@ -39,6 +40,8 @@ pub struct Prepared {
     pub logs: Vec<Log>,
     /// The validation set, on the common clock.
     pub validate: Vec<Log>,
+    /// What the columns of all of them are.
+    pub conventions: Conventions,
     known: Option<TorqueModel>,
 }
 
@@ -64,7 +67,9 @@ impl Prepared {
         };
         let known = options.known.clone().map(checked).transpose().map_err(ExplainError::Known)?;
         let validate = all.split_off(logs.len());
-        let mut prepared = Prepared { body, logs: Vec::new(), validate: Vec::new(), known };
+        options.progress.say("asking what the columns are");
+        let conventions = conventions(&body, &all, &validate);
+        let mut prepared = Prepared { body, logs: Vec::new(), validate: Vec::new(), conventions, known };
         (prepared.logs, prepared.validate) = (prepared.without_known(all), prepared.without_known(validate));
         Ok(prepared)
     }
@@ -78,9 +83,10 @@ impl Prepared {
         logs
     }
 
-    /// An explanation whose model holds what was known too.
+    /// An explanation with what the columns are, whose model holds what was known too.
     #[must_use]
     pub fn with_known(&self, mut explained: Explained) -> Explained {
+        explained.conventions = Some(self.conventions.clone());
         if let Some(known) = &self.known {
             explained.model.additions = known.additions.and(&explained.model.additions);
         }

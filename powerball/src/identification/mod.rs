@@ -3,6 +3,7 @@
 //! [`identify`] is the whole way from logs to a model; [`estimate`] holds its fits.
 
 pub mod chain;
+pub mod conventions;
 pub mod estimate;
 pub mod excite;
 mod identify;

@@ -3,12 +3,16 @@
 use crate::controller::JointNumber;
 use crate::explanation::effects::Figures;
 use crate::explanation::explain::{Explained, NamedEffect, Shown, State, TorqueCurve};
+use crate::report::conventions;
 use crate::report::{BarPairs, Figure, Ink, Page, Panel, Series, Table, Tone, number};
 use serde_json::Value;
 
-/// Adds everything that an explanation says to a page: errors, effects with their evidence, torques over
+/// Adds everything that an explanation says to a page: what the columns are, errors, effects with their evidence, torques over
 /// time, what stays, and what was found in the logs.
 pub fn add_to_page(page: &mut Page, explained: &Explained) {
+    if let Some(told) = &explained.conventions {
+        conventions::add_to_page(page, told);
+    }
     verdict(page, explained);
     errors(page, explained);
     effects(page, explained);

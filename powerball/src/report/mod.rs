@@ -21,6 +21,7 @@
 
 mod axis;
 mod bars;
+pub mod conventions;
 mod decimate;
 pub mod explained;
 mod figure;

@@ -223,7 +223,9 @@ pub(super) fn open_in_words(explained: &Explained) -> String {
 }
 
 fn summary(explained: &Explained) -> String {
-    let mut text = verdict_in_words(explained);
+    let told = explained.conventions.as_ref().map(|told| format!("{}\n", told.verdict()));
+    let mut text = told.unwrap_or_default();
+    text.push_str(&verdict_in_words(explained));
     for warning in &explained.warnings {
         text.push_str(&format!("note: {warning}\n"));
     }

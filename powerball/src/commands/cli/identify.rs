@@ -121,6 +121,9 @@ impl Identify {
             output::print(&text);
             return Ok(());
         }
+        if let Some(conventions) = &identified.conventions {
+            output::print(&conventions.verdict());
+        }
         for warning in &identified.warnings {
             output::print(&format!("note: {warning}"));
         }

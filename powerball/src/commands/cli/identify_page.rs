@@ -5,6 +5,7 @@ use crate::controller::friction::TanhFriction;
 use crate::identification::estimate::TorqueCurve;
 use crate::identification::{Along, Identified, JointAlong};
 use crate::logs::signal::turns::Turns;
+use crate::report::conventions;
 use crate::report::{Figure, Ink, Page, Panel, Series, Table, Tone, number};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
@@ -24,6 +25,9 @@ pub(super) fn page(result: &Identified) -> Page {
             own up to {high} Hz. Standard errors hold for residuals that depend on each other within blocks \
             of two seconds."
     ));
+    if let Some(told) = &result.conventions {
+        conventions::add_to_page(&mut page, told);
+    }
     verdict(&mut page, result);
     page.paragraph(&format!("The {}.", result.band_reason));
     page.heading("Errors");

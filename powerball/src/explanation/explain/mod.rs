@@ -13,9 +13,10 @@
 //! | `search` | candidates screened and tested; settings refined; backward elimination |
 //! | `comparison` | **whether a name is given**, what stays open, what is taken back |
 //! | `special` | what is special of some logs: one path, another running time, something held |
-//! | `prepare`, `step` | the base model, and one step of the loop |
+//! | `prepare`, `begin`, `step` | the base model, what the search begins with, and one step of the loop |
 //! | `findings`, `results` | what was found; the model, the report and its figures |
 
+mod begin;
 mod comparison;
 mod findings;
 mod model;
@@ -37,9 +38,9 @@ pub use results::{
 use crate::explanation::options::{ExplainError, ExplainOptions};
 use crate::logs::log::Log;
 use crate::logs::regression::RigidBody;
+use begin::begin;
 use comparison::{History, withhold};
 use findings::Findings;
-use model::Model;
 use prepare::{Begun, Inertia, prepare};
 use step::{Outcome, Proposed, accept, propose, settle_beside};
 
@@ -66,7 +67,7 @@ pub fn explain_body(
 
 /// Adds one effect after the other until nothing passes and nothing is taken back.
 fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
-    let (mut model, mut history) = (Model::beside(base, &study), History::default());
+    let (mut model, mut history) = (begin(base, &study), History::default());
     for number in 0..study.rule().most_steps {
         study.say(&format!("step {}: screening candidates", number + 1));
         let Proposed { refused, outcome } = propose(&study, &model, number);

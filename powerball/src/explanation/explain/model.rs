@@ -46,30 +46,27 @@ impl Model {
         Model { accepted: Vec::new(), given_up: Vec::new(), fit: base }
     }
 
-    /// The base model with what every effect is to be judged beside.
-    pub(super) fn beside(base: Fit, study: &Study<'_>) -> Model {
-        let mut model = Model::new(base);
-        // Joints that are fitted apart have an offset already.
-        if study.data.joints_apart {
-            return model;
-        }
-        let candidates: Vec<Candidate> =
-            effects::all().iter().flat_map(|e| e.beside(&model.context(study))).collect();
-        model.accepted = candidates
-            .into_iter()
-            .map(|candidate| Accepted {
-                columns: candidate.effect().columns(&model.context(study), &candidate).len(),
+    /// The base model with what every arm may have (see [`Effect::beside`]). Its friction is looked for anew.
+    pub(super) fn beside(&self, study: &Study<'_>) -> Model {
+        let context = self.context(study);
+        let mut terms: Vec<Term> = Vec::new();
+        let accepted = |candidate: Candidate| {
+            let effect = candidate.effect();
+            let (columns, non_negative) = (effect.columns(&context, &candidate), effect.non_negative());
+            let count = columns.len();
+            terms.extend(columns.into_iter().map(|column| Term { column, non_negative }));
+            Accepted {
                 candidate,
+                columns: count,
                 p_value: 1.0,
                 fold_gain: 0.0,
                 explained: Vec::new(),
                 step: None,
-            })
-            .collect();
-        // Its friction was fitted without them: it is looked for anew.
-        let terms = model.terms(&model.context(study), None);
-        model.fit = fit(&study.data, &study.folds, &terms, None);
-        model
+            }
+        };
+        let candidates = effects::all().iter().flat_map(|effect| effect.beside(&context));
+        let accepted: Vec<Accepted> = candidates.map(accepted).collect();
+        Model { accepted, given_up: Vec::new(), fit: fit(&study.data, &study.folds, &terms, None) }
     }
 
     /// The terms of what was accepted on some data, of all or of all but one.

@@ -2,6 +2,7 @@
 
 use super::error::IdentifyError;
 use crate::controller::JointNumber;
+use crate::identification::conventions::{Conventions, conventions};
 use crate::identification::estimate::{Together, reduce_in_bands};
 use crate::identification::mounting::Mounting;
 use crate::identification::source::{Input, Source, read_summary};
@@ -57,6 +58,8 @@ pub(crate) struct Gathered {
     pub together: Option<Together>,
     /// What is to be said of the logs.
     pub warnings: Vec<String>,
+    /// What the columns are, where they were asked before something was taken out of them.
+    pub conventions: Option<Conventions>,
 }
 
 impl Gathered {
@@ -65,7 +68,8 @@ impl Gathered {
         warnings: Vec<String>,
         progress: Progress<'_>,
     ) -> Result<Gathered, IdentifyError> {
-        let mut gathered = Gathered { mounted, elsewhere: Vec::new(), together: None, warnings };
+        let mut gathered =
+            Gathered { mounted, elsewhere: Vec::new(), together: None, warnings, conventions: None };
         if let [_, _, ..] = gathered.mounted.as_slice() {
             progress.say("deriving and proving what the mountings determine together");
             let parts: Vec<(&RigidBody, &Bands)> =
@@ -95,6 +99,13 @@ impl Gathered {
             }
         }
         Ok(())
+    }
+
+    /// What the columns of the first mounting's logs are; `None` where there are summaries alone.
+    pub(crate) fn conventions(&self, progress: Progress<'_>) -> Option<Conventions> {
+        let Mounted { body, logs, held_out, .. } = self.mounted.iter().find(|m| !m.logs.is_empty())?;
+        progress.say("asking what the columns are");
+        Some(conventions(body, logs, held_out))
     }
 
     /// The mountings of which there are logs to judge by.

@@ -23,6 +23,7 @@ pub(crate) use in_memory::{InMemory, one_mounting};
 pub use options::{Estimator, IdentifyOptions};
 pub use result::Identified;
 
+use super::conventions::conventions;
 use super::estimate::{BaseModel, Uncertainty, consistent_fit, estimates, spread_of};
 use super::source::Source;
 use crate::logs::summary::BANDS;
@@ -67,10 +68,12 @@ pub fn identify<'a, S: Into<Source<'a>>>(
     let validate: Vec<Source<'a>> = validate.into_iter().map(Into::into).collect();
     let mut gathered = gather_logs(arm, &logs, &validate, options)?;
     let mut warnings = std::mem::take(&mut gathered.warnings);
+    let conventions = gathered.conventions.take().or_else(|| gathered.conventions(options.progress));
     options.progress.say("fitting");
     let fitted = fit(&gathered, options, &mut warnings)?;
     let mountings = by_mounting::fits(&gathered, &fitted, options, &mut warnings)?;
-    conclude(&gathered, &fitted, mountings, options, warnings)
+    let identified = conclude(&gathered, &fitted, mountings, options, warnings)?;
+    Ok(Identified { conventions, ..identified })
 }
 
 /// The sufficient statistics of the logs to fit, and the logs to judge by; without what is known already.
@@ -88,6 +91,8 @@ fn gather_logs(
         Some(known) => {
             let mounting = one_mounting(logs.iter().chain(validate), "--model takes")?;
             let mut read = InMemory::read(arm, known, [logs, validate], mounting, options.progress)?;
+            options.progress.say("asking what the columns are");
+            let told = conventions(&read.body, &read.fit, &read.validate);
             read.known.take_out(&read.body, &mut read.fit);
             read.known.take_out(&read.body, &mut read.validate);
             let fit: Vec<Source<'_>> =
@@ -100,6 +105,8 @@ fn gather_logs(
             for log in read.validate {
                 gathered.hold_out(log, mounting, &options.data)?;
             }
+            // What is known of the arm is still in the torques that were asked.
+            gathered.conventions = Some(told);
             gathered
         }
         None => {
@@ -146,6 +153,7 @@ fn conclude(
     options.progress.say("looking for the nearest real arm");
     Ok(Identified {
         arm: model.arm,
+        conventions: None,
         set: SetKind::Minimal.to_string(),
         parameters: found.parameters,
         friction: found.friction,

@@ -3,6 +3,7 @@
 use super::along::Along;
 use super::by_mounting::MountedFit;
 use crate::controller::JointNumber;
+use crate::identification::conventions::Conventions;
 use crate::identification::estimate::{
     BaseModel, ConsistentReport, JointFriction, ParameterEstimate, Spread, Uncertainty,
 };
@@ -15,6 +16,8 @@ use serde::Serialize;
 pub struct Identified {
     /// The arm's name.
     pub arm: String,
+    /// What the columns of the logs are; `None` where only summaries were given, which hold no samples.
+    pub conventions: Option<Conventions>,
     /// The parameter set: "minimal".
     pub set: String,
     /// The set's values with their standard errors.

@@ -46,8 +46,11 @@ impl Group {
 
 /// The names of the arm's joints as its logs have them, in chain order.
 fn joint_names(asked: Asked<'_>) -> Vec<String> {
-    // An arm file that names its joints is asked here, where the map says nothing.
-    asked.map.joints.clone()
+    if !asked.map.joints.is_empty() {
+        return asked.map.joints.clone();
+    }
+    // Names of some joints only do not say which columns the others have.
+    asked.arm.joints.iter().map(|joint| joint.name.clone()).collect::<Option<_>>().unwrap_or_default()
 }
 
 /// Names of joints that columns carry: `a` of `q.a` or `position.a`.

@@ -9,6 +9,7 @@ use super::unattributed::Unattributed;
 use super::verdict::Verdict;
 use crate::controller::JointNumber;
 use crate::explanation::torque_model::TorqueModel;
+use crate::identification::conventions::Conventions;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -19,6 +20,8 @@ pub struct Explained {
     pub verdict: Vec<Verdict>,
     /// The arm's name.
     pub arm: String,
+    /// What the columns of the logs are, where they were asked.
+    pub conventions: Option<Conventions>,
     /// Errors of the base model.
     pub before: Spreads,
     /// Errors with all accepted effects.

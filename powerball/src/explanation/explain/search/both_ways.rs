@@ -52,6 +52,11 @@ impl Swapped {
         Swapped { fit, design, residual }
     }
 
+    /// What it leaves on the logs that the model was fitted to, by joint and row, N·m.
+    pub(crate) fn residual(&self) -> &[Vec<f64>] {
+        &self.residual
+    }
+
     /// Asks about a candidate that was tried on the logs; `forward` is what the validation set gained by it.
     pub(crate) fn ask(
         &self,

@@ -20,6 +20,7 @@ mod screen;
 mod surrogates;
 
 pub(super) use beside::{is_beside, keep_needed};
+pub(super) use both_ways::Swapped;
 pub(super) use elimination::eliminate;
 pub(super) use evidence::{Extent, Validation, evidence, validation_gain};
 pub(super) use groups::{Group, Member, Tester, groups};

@@ -1,0 +1,352 @@
+//! What was found, in words.
+
+use super::change::Change;
+use super::search::{Found, Step};
+use super::sign::Common;
+use super::told::{Answer, GravityIs, Kind, Side};
+use super::unit::{Scale, Size, Unit};
+use crate::controller::JointNumber;
+
+/// `joint 2`, `joints 2 and 5`.
+fn joints(list: &[usize]) -> String {
+    let names: Vec<String> = list.iter().map(|j| JointNumber::from_index(*j).to_string()).collect();
+    match names.as_slice() {
+        [] => String::new(),
+        [one] => format!("joint {one}"),
+        [all @ .., last] => format!("joints {} and {last}", all.join(", ")),
+    }
+}
+
+fn percent(shares: &[f64]) -> Vec<Option<f64>> {
+    let of = |x: &f64| x.is_finite().then(|| (1000.0 * x).round() / 10.0);
+    shares.iter().map(of).collect()
+}
+
+/// Where the error falls most: `held-out error of joint 2 falls from 57 to 1.2 % of its torque`.
+fn falls(step: &Step) -> String {
+    let ratio = |j: &usize| step.after[*j] / step.before[*j];
+    let moving = (0..step.before.len()).filter(|j| ratio(j).is_finite());
+    let mut by_fall: Vec<usize> = moving.collect();
+    by_fall.sort_by(|a, b| ratio(a).total_cmp(&ratio(b)));
+    let one = |j: &usize| {
+        format!(
+            "{:.1} to {:.1} % on joint {}",
+            100.0 * step.before[*j],
+            100.0 * step.after[*j],
+            JointNumber::from_index(*j)
+        )
+    };
+    let text: Vec<String> = by_fall.iter().take(3).map(one).collect();
+    format!("the held-out error falls from {} of the torque", text.join(", "))
+}
+
+/// The answer that a change of the reading is.
+fn of_step(step: &Step, unit: &Unit) -> Answer {
+    let why = falls(step);
+    let (question, sentence) = match &step.change {
+        Change::TorqueReversed(list) => {
+            let them = joints(list);
+            let also = match step.rival {
+                Some(_) => ", or the sign of its position: these logs do not tell which",
+                None => "",
+            };
+            (
+                "torque sign",
+                format!(
+                    "The torque of {them} has the wrong sign{also}: friction would drive it otherwise, and \
+                        {why}."
+                ),
+            )
+        }
+        Change::PositionReversed(j) => {
+            let also = match step.rival {
+                Some(_) => ", or the sign of its torque: these logs do not tell which",
+                None => "",
+            };
+            (
+                "position sign",
+                format!(
+                    "The position of {} has the wrong sign{also}: with the other one {why}.",
+                    joints(&[*j])
+                ),
+            )
+        }
+        Change::AxisReversed(j) => (
+            "position sign",
+            format!(
+                "Position and torque of {} count against the axis of the arm file: with the other sign of \
+                    both {why}.",
+                joints(&[*j])
+            ),
+        ),
+        Change::TorquesExchanged(a, b) => (
+            "joint order",
+            format!("The torque columns of {} are exchanged: the other way round {why}.", joints(&[*a, *b])),
+        ),
+        Change::PositionsExchanged(a, b) => (
+            "joint order",
+            format!(
+                "The position columns of {} are exchanged: the other way round {why}.",
+                joints(&[*a, *b])
+            ),
+        ),
+        Change::JointsExchanged(a, b) => (
+            "joint order",
+            format!(
+                "Positions and torques of {} are exchanged: the other way round {why}.",
+                joints(&[*a, *b])
+            ),
+        ),
+        Change::Late(by) => {
+            let (by, word) = (1000.0 * by.abs(), if *by > 0.0 { "late" } else { "early" });
+            (
+                "delay",
+                format!(
+                    "The torque columns are about {by:.0} ms {word} beside the positions: without that {why}."
+                ),
+            )
+        }
+        Change::GravityOut(list) => (
+            "gravity",
+            format!(
+                "Gravity was taken out of the torques of {}: without it in the model {why}; set gravity = \
+                    [0, 0, 0] in the arm file.",
+                joints(list)
+            ),
+        ),
+        Change::Degrees => ("position unit", format!("Positions are in degrees: taken so {why}.")),
+        Change::Factors(factors) => {
+            let list: Vec<String> = factors.iter().map(|f| format!("{f:.2}")).collect();
+            let list = list.join(", ");
+            let what = match unit {
+                Unit::BeforeGear(_) => {
+                    "The torque columns are before the gear: the factors that one body asks for are those \
+                        of rotor_ratio"
+                }
+                Unit::Ampere(Some(_)) => {
+                    "The torque columns are currents: the factors that one body asks for are those of \
+                        torque_constant"
+                }
+                Unit::Ampere(None) => {
+                    "Each torque column has a unit of its own (currents, counts or % of rated): one body \
+                        asks for other factors by joint"
+                }
+                _ => {
+                    "Some torque columns are in another unit than most: one body asks for other factors by \
+                        joint"
+                }
+            };
+            ("torque unit", format!("{what} ({list}), and {why}."))
+        }
+    };
+    Answer {
+        question,
+        as_said: Some(false),
+        as_it_is: percent(&step.before),
+        as_it_would_be: percent(&step.after),
+        sentence,
+    }
+}
+
+fn plain(question: &'static str, as_said: Option<bool>, sentence: String) -> Answer {
+    Answer { question, as_said, as_it_is: Vec::new(), as_it_would_be: Vec::new(), sentence }
+}
+
+/// What is known beside the steps.
+pub(super) struct Facts<'a> {
+    pub(super) sign: Common,
+    pub(super) unit: &'a Unit,
+    pub(super) size: Size,
+    pub(super) scale: Scale,
+    pub(super) gravity: Option<GravityIs>,
+    pub(super) side: Option<Side>,
+    pub(super) friction_share: Option<f64>,
+    pub(super) kind: Option<Kind>,
+    pub(super) delay_would_show: bool,
+    /// Whether the fit is good enough to judge by.
+    pub(super) good: bool,
+}
+
+/// All answers, in the order in which they are read.
+pub(super) fn answers(found: &Found<'_>, facts: &Facts<'_>) -> Vec<Answer> {
+    let mut all: Vec<Answer> = found.steps.iter().map(|step| of_step(step, facts.unit)).collect();
+    let asked = |all: &[Answer], question: &str| all.iter().any(|a| a.question == question);
+    all.insert(0, common_sign(found, facts));
+    if !asked(&all, "torque unit") {
+        all.push(size(facts));
+    }
+    if !asked(&all, "gravity") {
+        all.push(gravity(facts));
+    }
+    for (question, good, open) in [
+        (
+            "joint order",
+            "No exchange of columns lowers the held-out error.",
+            "No exchange of columns mends the fit, which is poor.",
+        ),
+        (
+            "position sign",
+            "No other sign of a position lowers the held-out error.",
+            "No other sign of a position mends the fit, which is poor.",
+        ),
+        (
+            "position unit",
+            "Angles in radians fit.",
+            "Whether angles are in radians is not told: the fit is poor.",
+        ),
+    ] {
+        if !asked(&all, question) {
+            let (said, text) = if facts.good { (Some(true), good) } else { (None, open) };
+            all.push(plain(question, said, text.into()));
+        }
+    }
+    if !asked(&all, "delay") {
+        all.push(match facts.delay_would_show {
+            true => plain(
+                "delay",
+                Some(true),
+                "Torques and positions are in step: 40 ms either way fit worse.".into(),
+            ),
+            false => plain("delay", None, "A delay of 40 ms would not show in these logs.".into()),
+        });
+    }
+    all.push(side(facts));
+    all.push(kind(facts));
+    all
+}
+
+fn common_sign(found: &Found<'_>, facts: &Facts<'_>) -> Answer {
+    let mean = |of: &dyn Fn(usize) -> f64| 0.5 * (of(0) + of(1));
+    let power = mean(&|part| found.energies[part].all_friction(&found.judged.fits[part]).value);
+    let energy = mean(&|part| found.energies[part].kinetic(&found.judged.fits[part]).value);
+    let figures = format!("friction takes {power:.3} W on average and the energy of motion is {energy:.3} J");
+    match facts.sign {
+        Common::AsSaid => plain(
+            "torque sign",
+            Some(true),
+            format!("Torques are positive in the direction of q: {figures}."),
+        ),
+        Common::Reversed => plain(
+            "torque sign",
+            Some(false),
+            format!(
+                "All torques have the wrong sign (a reaction torque?): as they stand {figures}, and neither \
+                    can be negative."
+            ),
+        ),
+        Common::NotTold => plain(
+            "torque sign",
+            None,
+            format!(
+                "The common sign of the torques is not told by these logs: {figures}, which is not sure or \
+                    not of one sign."
+            ),
+        ),
+    }
+}
+
+fn size(facts: &Facts<'_>) -> Answer {
+    let limit = facts.size.of_limit.map_or(String::new(), |share| {
+        format!("; they reach {:.1} % of a joint's limit at most", 100.0 * share)
+    });
+    let figure = match (facts.size.weight, facts.size.inertia) {
+        (Some(weight), _) => format!(
+            "the weight that they carry is {weight:.2e} kg for a metre of reach cubed, where arms have 0.2 \
+                to 20{limit}"
+        ),
+        (None, Some(inertia)) => format!(
+            "their inertia is {inertia:.2e} kg for a metre of reach cubed, where arms have 0.04 to 20{limit}"
+        ),
+        (None, None) => "these logs show neither weight nor inertia".to_string(),
+    };
+    match (facts.unit, facts.scale) {
+        (Unit::Milli, _) => plain(
+            "torque unit",
+            Some(false),
+            format!("Torques are too large for an arm of this size: {figure}; mN·m look like this."),
+        ),
+        (Unit::GearOrAmpere, _) => plain(
+            "torque unit",
+            Some(false),
+            format!(
+                "Torques are too small for an arm of this size: {figure}; torques before the gear (then each \
+                    is to be multiplied by its rotor_ratio), currents (by its torque constant) or counts look \
+                    like this."
+            ),
+        ),
+        (_, Scale::NotTold) => plain(
+            "torque unit",
+            None,
+            format!("The unit of the torques is not told by these logs: {figure}."),
+        ),
+        _ => {
+            plain("torque unit", Some(true), format!("Torques in N·m give an arm of usual weight: {figure}."))
+        }
+    }
+}
+
+fn gravity(facts: &Facts<'_>) -> Answer {
+    match facts.gravity {
+        Some(GravityIs::Included) => plain(
+            "gravity",
+            Some(true),
+            "Torques hold what gravity asks for: without it the model fits clearly worse.".into(),
+        ),
+        Some(GravityIs::TakenOut) if facts.size.is_weightless() => plain(
+            "gravity",
+            Some(false),
+            "Gravity was taken out of the torques, or something balances it: they hold the inertia of an arm \
+                and hardly any weight; set gravity = [0, 0, 0] in the arm file."
+                .into(),
+        ),
+        Some(GravityIs::TakenOut) => {
+            plain("gravity", Some(true), "Torques hold nothing of gravity, as the arm file says.".into())
+        }
+        None => plain("gravity", None, "Whether torques hold gravity is not told by these logs.".into()),
+    }
+}
+
+fn side(facts: &Facts<'_>) -> Answer {
+    let share = facts.friction_share.map_or(String::new(), |s| {
+        format!(": friction takes {:.0} % of the power of the joint that has the least of it", 100.0 * s)
+    });
+    match facts.side {
+        Some(Side::Link) => plain(
+            "side",
+            Some(true),
+            format!("Torques are on the link side of the gears (or there are none){share}."),
+        ),
+        Some(Side::Motor) => plain(
+            "side",
+            Some(true),
+            format!("Torques are on the motor side, with the friction of motor and gear in them{share}."),
+        ),
+        None => plain("side", None, format!("The side of the gears is not told by these logs{share}.")),
+    }
+}
+
+fn kind(facts: &Facts<'_>) -> Answer {
+    match facts.kind {
+        Some(Kind::Commanded) => plain(
+            "kind",
+            Some(false),
+            "Torques are commands, not measurements: two logs repeat them bit by bit while the positions \
+                differ. What the drives delivered is not known."
+                .into(),
+        ),
+        Some(Kind::Measured) => plain(
+            "kind",
+            Some(true),
+            "Torques were measured: they have noise that \
+            positions do not share."
+                .into(),
+        ),
+        None => plain(
+            "kind",
+            None,
+            "Whether torques were measured or commanded is not told by these \
+            logs."
+                .into(),
+        ),
+    }
+}

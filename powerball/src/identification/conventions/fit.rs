@@ -1,0 +1,199 @@
+//! A reading judged: the shared rigid arm and textbook friction, fitted to one part of the logs and judged by
+//! the other, both ways round.
+
+use super::reading::Torques;
+use super::rows::{FRICTION, Rows};
+use crate::identification::estimate::Solver;
+use faer::Mat;
+
+/// Joints count by what the fit leaves of them, not below this share of their torque.
+const FLOOR: f64 = 0.03;
+/// Passes of that weighting.
+const PASSES: usize = 4;
+/// Steps of a fit with a factor by joint, and how hard each factor is held back.
+const STEPS: usize = 20;
+const HELD: f64 = 3e-3;
+
+/// The sums of a joint's rows in a part with a reading of its torque.
+struct Sums {
+    right: Vec<f64>,
+    square: f64,
+    rows: f64,
+}
+
+/// A fit to one part.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    /// All coefficients.
+    pub(super) theta: Vec<f64>,
+    /// The normal equations with their weights.
+    pub(super) solver: Solver,
+}
+
+/// What a reading leaves.
+#[derive(Clone, Debug)]
+pub(super) struct Judged {
+    /// By part that is judged and joint: mean square of what is left over that of the torque; NaN for a joint
+    /// that does not move.
+    pub(super) left: [Vec<f64>; 2],
+    /// Mean square of the torque by joint, both parts together.
+    pub(super) power: Vec<f64>,
+    /// By part that is fitted.
+    pub(super) fits: [Fit; 2],
+}
+
+impl Judged {
+    /// The held-out error of a joint as a share of its torque, both parts together.
+    pub(super) fn share(&self, joint: usize) -> f64 {
+        (0.5 * (self.left[0][joint] + self.left[1][joint])).sqrt()
+    }
+}
+
+/// Judges a reading; `ridge` holds parameters back that a part hardly determines, as a share of each column's
+/// squares.
+pub(super) fn judge(rows: &Rows<'_>, read: &Torques, ridge: f64) -> Judged {
+    let sums: Vec<[Sums; 2]> =
+        (0..rows.dof()).map(|joint| [0, 1].map(|part| sums(rows, read, joint, part))).collect();
+    let fits = [0, 1].map(|part| fit(rows, &sums, part, ridge));
+    // Part 0 is judged by the fit to part 1, and the other way round.
+    let left = [0, 1].map(|part| {
+        let judged = |joint: usize| {
+            if !rows.moves(joint) {
+                return f64::NAN;
+            }
+            let of = &sums[joint][part];
+            squares(rows, of, joint, part, &fits[1 - part].theta) / of.square.max(f64::MIN_POSITIVE)
+        };
+        (0..rows.dof()).map(judged).collect()
+    });
+    let power = |of: &[Sums; 2]| {
+        let total = |f: fn(&Sums) -> f64| of.iter().map(f).sum::<f64>();
+        total(|s| s.square) / total(|s| s.rows).max(1.0)
+    };
+    Judged { left, power: sums.iter().map(power).collect(), fits }
+}
+
+fn sums(rows: &Rows<'_>, read: &Torques, joint: usize, part: usize) -> Sums {
+    let torque = rows.torque(read, joint, part);
+    let dot = |x: &Vec<f64>| x.iter().zip(&torque).map(|(x, y)| x * y).sum::<f64>();
+    let columns = &rows.joints[joint][part].columns;
+    Sums { right: columns.iter().map(dot).collect(), square: dot(&torque), rows: torque.len() as f64 }
+}
+
+/// The sum of squares that coefficients leave of a joint's rows.
+fn squares(rows: &Rows<'_>, sums: &Sums, joint: usize, part: usize, theta: &[f64]) -> f64 {
+    let (places, gram) = (&rows.places[joint], &rows.joints[joint][part].gram);
+    let mut square = sums.square;
+    for (i, at) in places.iter().enumerate() {
+        let inner: f64 = places.iter().enumerate().map(|(k, to)| gram[(k, i)] * theta[*to]).sum();
+        square += theta[*at] * (inner - 2.0 * sums.right[i]);
+    }
+    square.max(0.0)
+}
+
+fn fit(rows: &Rows<'_>, sums: &[[Sums; 2]], part: usize, ridge: f64) -> Fit {
+    let (n, size, inertial) = (rows.dof(), rows.size(), rows.inertial());
+    let power = |joint: usize| sums[joint][part].square / sums[joint][part].rows.max(1.0);
+    let mut variance: Vec<f64> = (0..n).map(power).collect();
+    let mut fitted = (vec![0.0; size], Solver::new(&Mat::zeros(size, size), |_| false));
+    for _ in 0..PASSES {
+        let (mut gram, mut right) = (Mat::<f64>::zeros(size, size), vec![0.0; size]);
+        for joint in (0..n).filter(|j| variance[*j] > 0.0 && rows.moves(*j)) {
+            let (places, own) = (&rows.places[joint], &rows.joints[joint][part].gram);
+            let weight = 1.0 / variance[joint];
+            for (i, at) in places.iter().enumerate() {
+                right[*at] += weight * sums[joint][part].right[i];
+                places.iter().enumerate().for_each(|(k, to)| gram[(*to, *at)] += weight * own[(k, i)]);
+            }
+        }
+        (0..inertial).for_each(|c| gram[(c, c)] *= 1.0 + ridge);
+        let solver = Solver::new(&gram, |_| true);
+        fitted = (solver.solve(&right), solver);
+        for (joint, variance) in variance.iter_mut().enumerate() {
+            let of = &sums[joint][part];
+            let left = squares(rows, of, joint, part, &fitted.0) / of.rows.max(1.0);
+            *variance = left.max(FLOOR * FLOOR * power(joint));
+        }
+    }
+    let (theta, solver) = fitted;
+    Fit { theta, solver }
+}
+
+/// The factors κ by joint with which the inertial torque of one body comes nearest to every joint's torque in
+/// a part, friction beside it: Gauss–Newton steps for body and factors together, factors held back where nothing
+/// determines them.
+pub(super) fn factors_of_body(rows: &Rows<'_>, read: &Torques, part: usize, ridge: f64) -> Vec<f64> {
+    let (n, size, inertial) = (rows.dof(), rows.size(), rows.inertial());
+    let sums: Vec<[Sums; 2]> = (0..n).map(|joint| [0, 1].map(|part| sums(rows, read, joint, part))).collect();
+    let mut theta = fit(rows, &sums, part, ridge).theta;
+    let power = |joint: usize| sums[joint][part].square / sums[joint][part].rows.max(1.0);
+    let mut variance: Vec<f64> = (0..n).map(power).collect();
+    let mut kappa = vec![1.0; n];
+    for step in 0..STEPS {
+        let (mut gram, mut right) = (Mat::<f64>::zeros(size + n, size + n), vec![0.0; size + n]);
+        for joint in (0..n).filter(|j| variance[*j] > 0.0 && rows.moves(*j)) {
+            let (places, own) = (&rows.places[joint], &rows.joints[joint][part].gram);
+            let (weight, to_body) = (1.0 / variance[joint], places.len() - FRICTION);
+            let of = |i: usize| if i < to_body { kappa[joint] } else { 1.0 };
+            // The torque of the body as it is so far is the column of the factor.
+            let column = |i: usize| (0..to_body).map(|k| own[(k, i)] * theta[places[k]]).sum::<f64>();
+            let mut square = 0.0;
+            for (i, at) in places.iter().enumerate() {
+                right[*at] += weight * of(i) * sums[joint][part].right[i];
+                for (k, to) in places.iter().enumerate() {
+                    gram[(*to, *at)] += weight * of(i) * of(k) * own[(k, i)];
+                }
+                let with = column(i);
+                gram[(size + joint, *at)] += weight * of(i) * with;
+                gram[(*at, size + joint)] += weight * of(i) * with;
+                if i < to_body {
+                    square += with * theta[*at];
+                    right[size + joint] += weight * sums[joint][part].right[i] * theta[*at];
+                }
+            }
+            gram[(size + joint, size + joint)] += weight * square * (1.0 + HELD);
+            right[size + joint] += weight * square * HELD * (1.0 - kappa[joint]);
+        }
+        (0..inertial).for_each(|c| gram[(c, c)] *= 1.0 + ridge);
+        let solved = Solver::new(&gram, |_| true).solve(&right);
+        theta.copy_from_slice(&solved[..size]);
+        for (joint, kappa) in kappa.iter_mut().enumerate() {
+            let next = *kappa + solved[size + joint];
+            *kappa = if next.is_finite() { next.clamp(0.6 * *kappa, 1.6 * *kappa) } else { *kappa };
+        }
+        // A factor common to all is the body's.
+        let mean = (kappa.iter().map(|k| k.ln()).sum::<f64>() / n as f64).exp();
+        kappa.iter_mut().for_each(|k| *k /= mean);
+        theta[..inertial].iter_mut().for_each(|x| *x *= mean);
+        // At first all joints count alike: one with another factor would be passed over.
+        for (joint, variance) in variance.iter_mut().enumerate().filter(|_| 2 * step > STEPS) {
+            let of = &sums[joint][part];
+            let mut own = theta.clone();
+            own[..inertial].iter_mut().for_each(|x| *x *= kappa[joint]);
+            let (left, rows_count) = (squares(rows, of, joint, part, &own), of.rows.max(1.0));
+            *variance = (left / rows_count).max(FLOOR * FLOOR * of.square / rows_count);
+        }
+    }
+    kappa
+}
+
+/// The fit of one joint by itself, over both parts: its own inertial parameters, nothing shared.
+pub(super) fn apart(rows: &Rows<'_>, read: &Torques, joint: usize, part: usize) -> Fit {
+    let sums = sums(rows, read, joint, part);
+    let (places, own) = (&rows.places[joint], &rows.joints[joint][part].gram);
+    let size = rows.size();
+    let solve = |weight: f64| {
+        let (mut gram, mut right) = (Mat::<f64>::zeros(size, size), vec![0.0; size]);
+        for (i, at) in places.iter().enumerate() {
+            right[*at] = weight * sums.right[i];
+            places.iter().enumerate().for_each(|(k, to)| gram[(*to, *at)] = weight * own[(k, i)]);
+        }
+        let solver = Solver::new(&gram, |_| true);
+        (solver.solve(&right), solver)
+    };
+    let (theta, _) = solve(1.0);
+    let left = squares(rows, &sums, joint, part, &theta) / sums.rows.max(1.0);
+    let variance = left.max(FLOOR * FLOOR * sums.square / sums.rows.max(1.0)).max(f64::MIN_POSITIVE);
+    let (theta, solver) = solve(1.0 / variance);
+    Fit { theta, solver }
+}

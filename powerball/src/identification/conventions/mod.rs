@@ -1,0 +1,156 @@
+//! What the columns of a log are: signs, units, order, side of the gear, gravity, delay. Told, never changed.
+//!
+//! Every answer is judged against its alternatives: by the held-out error of one rigid arm with textbook
+//! friction, fitted to one part of the logs and judged by the other, both ways round; and by what cannot be
+//! negative, the energy of motion and the power that friction takes. Only what lowers squared errors to half
+//! both ways round, or has a physical sign that is sure in both parts, is told as other than it is said to be.
+//!
+//! | | |
+//! |---|---|
+//! | `told`, `answers`, `mend` | what is told, its words, the column map |
+//! | `thin`, `reading`, `rows`, `fit` | logs made small; a way to read columns; its rows; what it leaves |
+//! | `physics`, `sign` | energies; the sign of the torques |
+//! | `factors`, `unit` | a factor by joint; the unit of all |
+//! | `gravity`, `side`, `delay`, `kind` | one question each |
+//! | `asked`, `change`, `search` | the logs asked; one change of the reading; the best reading |
+
+mod answers;
+mod asked;
+mod change;
+mod delay;
+mod factors;
+mod fit;
+mod gravity;
+mod kind;
+mod mend;
+mod physics;
+mod reading;
+mod rows;
+mod search;
+mod side;
+mod sign;
+mod thin;
+mod told;
+mod unit;
+
+pub use told::{Answer, Conventions, GravityIs, Kind, PerJoint, PositionColumns, Side, TorqueColumns};
+
+use crate::controller::JointNumber;
+use crate::logs::log::Log;
+use crate::logs::regression::RigidBody;
+use answers::{Facts, answers};
+use asked::Asked;
+use search::{Found, gravity_is, search};
+use sign::Common;
+use unit::{Size, Unit};
+
+/// What the columns of some logs of an arm are. `validate` are logs of another path, if there are any; without
+/// them the halves of each log judge each other.
+///
+/// Nothing is changed by it, and nothing fails: where the logs hold too little, that is told.
+#[must_use]
+pub fn conventions(body: &RigidBody, logs: &[Log], validate: &[Log]) -> Conventions {
+    let asked = Asked::new(body, logs, validate);
+    let found = match search(&asked) {
+        Ok(found) => found,
+        Err(why) => return not_told(&why.to_string()),
+    };
+    let all: Vec<&Log> = logs.iter().chain(validate).collect();
+    told(&asked, &found, kind::kind(&all))
+}
+
+fn not_told(why: &str) -> Conventions {
+    let sentence = format!("What the columns are is not told by these logs: {why}.");
+    let answer = Answer {
+        question: "columns",
+        as_said: None,
+        as_it_is: Vec::new(),
+        as_it_would_be: Vec::new(),
+        sentence: sentence.clone(),
+    };
+    Conventions { evidence: sentence, answers: vec![answer], ..Conventions::default() }
+}
+
+fn told(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventions {
+    let read = &found.read;
+    let sign = sign::common(&found.judged, &found.energies);
+    let size = Size::of(found);
+    let gravity = if size.is_weightless() { Some(GravityIs::TakenOut) } else { gravity_is(asked, found) };
+    let scale = size.scale(gravity);
+    let unit = unit::unit(found, scale);
+    let good = found.is_good();
+    let share = side::least_share(&found.rows, &read.torques, &found.judged, &found.energies);
+    let share = share.filter(|_| good && sign != Common::NotTold);
+    let facts = Facts {
+        sign,
+        unit: &unit,
+        size,
+        scale,
+        gravity,
+        side: share.and_then(side::side),
+        friction_share: share,
+        kind,
+        delay_would_show: good && delay::would_show(&found.rows, &read.torques, found.ridge, &found.judged),
+        good,
+    };
+    let answers = answers(found, &facts);
+    let sentences: Vec<&str> = answers.iter().map(|a| a.sentence.as_str()).collect();
+    Conventions {
+        torque: torque_columns(found, &facts),
+        positions: position_columns(found, good),
+        evidence: sentences.join(" "),
+        mend: mend::mend(read, sign, &unit),
+        answers,
+    }
+}
+
+fn torque_columns(found: &Found<'_>, facts: &Facts<'_>) -> TorqueColumns {
+    let read = &found.read.torques;
+    let all: i8 = if facts.sign == Common::Reversed { -1 } else { 1 };
+    let signs: Vec<i8> = read.gain.iter().map(|g| if *g < 0.0 { -all } else { all }).collect();
+    let sign = match signs.iter().all(|s| *s == signs[0]) {
+        true => PerJoint::All(signs[0]),
+        false => PerJoint::Each(signs),
+    };
+    // A tenth of a millisecond is more than is known.
+    let late = (1e4 * read.late.first().copied().unwrap_or(0.0)).round() / 1e4;
+    let unit = match facts.unit {
+        Unit::NewtonMetre | Unit::OfItsOwn(_) => Some("N·m"),
+        Unit::Milli => Some("mN·m"),
+        Unit::BeforeGear(_) => Some("N·m before the gear"),
+        Unit::Ampere(Some(_)) => Some("A"),
+        Unit::Ampere(None) => Some("A, counts or % of rated"),
+        Unit::GearOrAmpere => Some("N·m before the gear, or A"),
+        Unit::NotTold => None,
+    };
+    TorqueColumns {
+        sign: (facts.sign != Common::NotTold).then_some(sign),
+        unit: unit.map(str::to_string),
+        side: facts.side,
+        gravity: facts.gravity,
+        kind: facts.kind,
+        delay: (late != 0.0 || facts.delay_would_show).then_some(PerJoint::All(late)),
+        order: order(&read.column),
+        factor: read.is_scaled().then(|| read.gain.iter().map(|g| g.abs()).collect()),
+    }
+}
+
+fn position_columns(found: &Found<'_>, good: bool) -> PositionColumns {
+    let read = &found.read.positions;
+    let told = good || !read.is_plain();
+    let unit = if read.scale == 1.0 { "rad" } else { "deg" };
+    PositionColumns {
+        sign: told.then(|| read.sign.iter().map(|s| if *s < 0.0 { -1 } else { 1 }).collect()),
+        unit: told.then(|| unit.to_string()),
+        order: order(&read.column),
+    }
+}
+
+/// The columns by joint, where some are not their joint's own.
+fn order(columns: &[usize]) -> Option<Vec<JointNumber>> {
+    let own = columns.iter().enumerate().all(|(joint, column)| joint == *column);
+    (!own).then(|| columns.iter().map(|c| JointNumber::from_index(*c)).collect())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,160 @@
+//! One thing wrong with the columns of a sound log, and what is told of it.
+
+use super::{Conventions, GravityIs, Kind, PerJoint, Side, conventions};
+use crate::identification::excite::{Fourier, Harmonics};
+use crate::logs::log::Log;
+use crate::logs::regression::RigidBody;
+use crate::virtual_arm::lwa4p;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::sync::LazyLock;
+
+/// The virtual arm and six logs of it; the last two are of another path than those that are fitted.
+static SOUND: LazyLock<(RigidBody, Vec<Log>)> = LazyLock::new(|| {
+    let body = RigidBody::new(&lwa4p::arm().unwrap()).unwrap();
+    let plant = lwa4p::plant().unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let log = |k: u64| {
+        let mut draw = |scale: f64| (0..5).map(|_| scale * rng.random_range(-1.0..1.0)).collect();
+        let joints = (0..6).map(|_| Harmonics { middle: 0.0, a: draw(0.25), b: draw(0.25) }).collect();
+        let path = Fourier { fundamental: std::f64::consts::TAU / 10.0, periods: 1, ramp: 1.0, joints };
+        plant.record(&path.sample(plant.sensors().rate), 0.0, k).log(format!("log {k}"))
+    };
+    (body, (0..6).map(log).collect())
+});
+
+/// What is told of the logs after something was done to them.
+fn told(spoil: impl Fn(&mut Log)) -> Conventions {
+    let (body, logs) = &*SOUND;
+    let logs: Vec<Log> = logs
+        .iter()
+        .map(|log| {
+            let mut log = log.clone();
+            spoil(&mut log);
+            log
+        })
+        .collect();
+    let (fit, validate) = logs.split_at(4);
+    conventions(body, fit, validate)
+}
+
+fn scale(columns: &mut [Vec<f64>], by: f64) {
+    columns.iter_mut().flatten().for_each(|x| *x *= by);
+}
+
+#[test]
+fn sound_columns_are_told_as_they_are_said_to_be() {
+    let told = told(|_| ());
+    assert!(!told.differ(), "{}", told.evidence);
+    assert_eq!(told.mend, None);
+    assert_eq!(told.torque.sign, Some(PerJoint::All(1)));
+    assert_eq!(told.torque.unit.as_deref(), Some("N·m"));
+    assert_eq!(told.torque.gravity, Some(GravityIs::Included));
+    assert_eq!(told.torque.side, Some(Side::Motor));
+    assert_eq!(told.torque.delay, Some(PerJoint::All(0.0)));
+    assert_eq!(told.positions.sign, Some(vec![1; 6]));
+    assert_eq!(told.positions.unit.as_deref(), Some("rad"));
+    let json = serde_json::to_value(&told).unwrap();
+    assert_eq!(json["torque"]["sign"], 1);
+    assert_eq!(json["mend"], serde_json::Value::Null);
+}
+
+#[test]
+fn reversed_signs_are_told() {
+    let all = told(|log| scale(&mut log.torque, -1.0));
+    assert_eq!(all.torque.sign, Some(PerJoint::All(-1)), "{}", all.evidence);
+    assert_eq!(all.mend.as_deref(), Some("tau = { column = \"tau*\", sign = -1 }"));
+    let one = told(|log| scale(&mut log.torque[2..3], -1.0));
+    assert_eq!(one.torque.sign, Some(PerJoint::Each(vec![1, 1, -1, 1, 1, 1])), "{}", one.evidence);
+    assert_eq!(one.mend.as_deref(), Some("tau3 = { column = \"tau3\", sign = -1 }"));
+    let position = told(|log| scale(&mut log.q[1..2], -1.0));
+    assert_eq!(position.positions.sign, Some(vec![1, -1, 1, 1, 1, 1]), "{}", position.evidence);
+    assert_eq!(position.torque.sign, Some(PerJoint::All(1)));
+    assert_eq!(position.mend.as_deref(), Some("q2 = { column = \"q2\", sign = -1 }"));
+}
+
+#[test]
+fn other_units_are_told() {
+    let milli = told(|log| scale(&mut log.torque, 1000.0));
+    assert_eq!(milli.torque.unit.as_deref(), Some("mN·m"), "{}", milli.evidence);
+    assert_eq!(milli.mend.as_deref(), Some("tau = { column = \"tau*\", unit = \"mN·m\" }"));
+    let degrees = told(|log| scale(&mut log.q, 1f64.to_degrees()));
+    assert_eq!(degrees.positions.unit.as_deref(), Some("deg"), "{}", degrees.evidence);
+    assert_eq!(degrees.mend.as_deref(), Some("q = { column = \"q*\", unit = \"deg\" }"));
+    let small = told(|log| scale(&mut log.torque, 0.01));
+    assert_eq!(small.torque.unit.as_deref(), Some("N·m before the gear, or A"), "{}", small.evidence);
+    assert_eq!(small.mend, None);
+    let ampere = told(|log| {
+        let constants = [24.0, 24.0, 18.0, 12.0, 9.0, 9.0];
+        log.torque.iter_mut().zip(constants).for_each(|(x, k)| x.iter_mut().for_each(|x| *x /= k));
+    });
+    assert_ne!(ampere.torque.unit.as_deref(), Some("N·m"), "{}", ampere.evidence);
+    assert_eq!(ampere.mend, None);
+}
+
+#[test]
+fn exchanged_columns_are_told() {
+    let torques = told(|log| log.torque.swap(1, 2));
+    let order = |list: &Option<Vec<crate::controller::JointNumber>>| -> Vec<usize> {
+        list.iter().flatten().map(|j| j.number()).collect()
+    };
+    assert_eq!(order(&torques.torque.order), [1, 3, 2, 4, 5, 6], "{}", torques.evidence);
+    assert_eq!(torques.positions.order, None);
+    assert_eq!(torques.mend.as_deref(), Some("tau2 = { column = \"tau3\" }\ntau3 = { column = \"tau2\" }"));
+    let positions = told(|log| log.q.swap(3, 4));
+    assert_eq!(order(&positions.positions.order), [1, 2, 3, 5, 4, 6], "{}", positions.evidence);
+    assert_eq!(positions.torque.order, None);
+}
+
+/// The torque of the virtual arm's own numeric dynamics at rest is taken out.
+#[test]
+fn gravity_that_was_taken_out_is_told() {
+    let plant = lwa4p::plant().unwrap();
+    let told = told(|log| {
+        for k in 0..log.t.len() {
+            let q: Vec<f64> = log.q.iter().map(|q| q[k]).collect();
+            let gravity = plant.dynamics().gravity(&q);
+            log.torque.iter_mut().zip(gravity).for_each(|(x, g)| x[k] -= g);
+        }
+    });
+    assert_eq!(told.torque.gravity, Some(GravityIs::TakenOut), "{}", told.evidence);
+    assert_eq!(told.torque.unit.as_deref(), Some("N·m"));
+}
+
+#[test]
+fn late_torques_are_told_with_their_delay() {
+    for by in [0.03, 0.08, 0.15] {
+        let told = told(|log| {
+            let step = log.t[1] - log.t[0];
+            let samples = (by / step).round() as usize;
+            for x in &mut log.torque {
+                let first = x[0];
+                x.rotate_right(samples);
+                x[..samples].fill(first);
+            }
+        });
+        let Some(PerJoint::All(delay)) = told.torque.delay else { panic!("{}", told.evidence) };
+        approx::assert_abs_diff_eq!(delay, by, epsilon = 0.006);
+    }
+}
+
+/// Two recordings never measure the same noise.
+#[test]
+fn torques_that_repeat_bit_by_bit_were_commanded() {
+    let (body, logs) = &*SOUND;
+    let mut again = logs[1].clone();
+    again.torque = logs[0].torque.clone();
+    let told = conventions(body, &[logs[0].clone(), again], &[]);
+    assert_eq!(told.torque.kind, Some(Kind::Commanded));
+}
+
+/// Too little to ask is told, not guessed.
+#[test]
+fn logs_that_are_too_short_tell_nothing() {
+    let (body, logs) = &*SOUND;
+    let mut short = logs[0].clone();
+    short.pieces = vec![0..40];
+    let told = conventions(body, &[short], &[]);
+    assert_eq!(told.torque, super::TorqueColumns::default());
+    assert!(!told.differ() && told.evidence.contains("not told"));
+}

@@ -1,0 +1,146 @@
+//! What is told of a log's columns: the `conventions` of identified.json and explained.json.
+
+use crate::controller::JointNumber;
+use serde::Serialize;
+
+/// What the torque and position columns of some logs are. Nothing was changed by it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Conventions {
+    /// The torque columns.
+    pub torque: TorqueColumns,
+    /// The position columns.
+    pub positions: PositionColumns,
+    /// Why, in words.
+    pub evidence: String,
+    /// The column map that would set the columns right, TOML for `--map`; `None` where they are as they
+    /// should be, or where it is not known how to.
+    pub mend: Option<String>,
+    /// What was asked, one after another.
+    pub answers: Vec<Answer>,
+}
+
+/// What torque columns are. `None` is: these logs do not tell.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct TorqueColumns {
+    /// 1 where torques are positive in the direction of q, −1 where they are reversed; by joint where the
+    /// joints differ.
+    pub sign: Option<PerJoint<i8>>,
+    /// The unit.
+    pub unit: Option<String>,
+    /// The side of the gear on which they are measured: with the friction of motor and gear, or without.
+    pub side: Option<Side>,
+    /// Whether they hold what gravity asks for.
+    pub gravity: Option<GravityIs>,
+    /// Whether they are measured or commanded.
+    pub kind: Option<Kind>,
+    /// How late they are, s.
+    pub delay: Option<PerJoint<f64>>,
+    /// By joint: the column that holds its torque, where that is not its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub order: Option<Vec<JointNumber>>,
+    /// By joint: the factor that its column needs beside the others, where they differ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub factor: Option<Vec<f64>>,
+}
+
+/// What position columns are. `None` is: these logs do not tell.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct PositionColumns {
+    /// By joint: 1, or −1 where the column counts against the arm file's axis.
+    pub sign: Option<Vec<i8>>,
+    /// The unit of angles.
+    pub unit: Option<String>,
+    /// By joint: the column that holds its position, where that is not its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub order: Option<Vec<JointNumber>>,
+}
+
+/// One value for all joints, or one for each.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum PerJoint<T> {
+    /// The same for all.
+    All(T),
+    /// By joint.
+    Each(Vec<T>),
+}
+
+/// A side of the gear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// Behind gear and bearings: hardly any friction is in it.
+    Link,
+    /// At the motor: friction is in it.
+    Motor,
+}
+
+/// Whether torques hold what gravity asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum GravityIs {
+    /// They do.
+    #[serde(rename = "included")]
+    Included,
+    /// It was taken out of them.
+    #[serde(rename = "taken out")]
+    TakenOut,
+}
+
+/// How torques came about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// By a sensor or a current.
+    Measured,
+    /// A controller's output.
+    Commanded,
+}
+
+/// One answer.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Answer {
+    /// What was asked.
+    pub question: &'static str,
+    /// Whether the columns are as they should be; `None` where these logs do not tell.
+    pub as_said: Option<bool>,
+    /// Held-out error by joint as the columns are said to be, % of the torque; empty where that is not the
+    /// evidence.
+    pub as_it_is: Vec<Option<f64>>,
+    /// The same as they are taken to be here.
+    pub as_it_would_be: Vec<Option<f64>>,
+    /// The answer with its evidence.
+    pub sentence: String,
+}
+
+impl Conventions {
+    /// Whether some column is surely not what it is said to be.
+    #[must_use]
+    pub fn differ(&self) -> bool {
+        self.answers.iter().any(|answer| answer.as_said == Some(false))
+    }
+
+    /// The line that comes first: what is wrong with the columns, or that they are as they should be.
+    #[must_use]
+    pub fn verdict(&self) -> String {
+        let wrong: Vec<&str> =
+            (self.answers.iter()).filter(|a| a.as_said == Some(false)).map(|a| a.sentence.as_str()).collect();
+        if !wrong.is_empty() {
+            let mend = self
+                .mend
+                .as_ref()
+                .map_or(String::new(), |mend| format!(" A column map (--map) that sets this right:\n{mend}"));
+            let wrong = wrong.join(" ");
+            return format!(
+                "The columns are not what they are said to be. {wrong} Nothing was changed.{mend}"
+            );
+        }
+        let open: Vec<&str> =
+            self.answers.iter().filter(|a| a.as_said.is_none()).map(|a| a.question).collect();
+        let told = "The columns are taken as they are said to be; nothing in these logs speaks clearly \
+            against it";
+        match open.is_empty() {
+            true => format!("{told}."),
+            false => format!("{told}. Not told by these logs: {}.", open.join(", ")),
+        }
+    }
+}
