@@ -78,6 +78,10 @@ pub struct Rule {
     /// [`family_wise`](Self::family_wise) over eight octaves.
     pub missing_errors: f64,
 
+    /// A name is taken back where without its effect the squared error on the validation set is smaller by this
+    /// share, on its joints.
+    pub harm: f64,
+
     /// A setting is refined for more than chance gains by one more coefficient, in units of χ².
     pub refinement_gain: f64,
 
@@ -164,6 +168,7 @@ impl Default for Rule {
             much_left: 0.35,
             least_missing: 0.5,
             missing_errors: 3.2,
+            harm: 0.1,
             refinement_gain: 1.0,
             same_path: 0.9,
             few_cycles: 5.0,

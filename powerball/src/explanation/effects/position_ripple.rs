@@ -58,10 +58,7 @@ impl Effect for PositionRipple {
 
     /// A ripple of many cycles along the path resembles nothing else.
     fn is_function_of_path(&self, candidate: &Candidate, data: &Data<'_>, rule: &Rule) -> bool {
-        let positions = || data.recordings.iter().flat_map(|r| r.position(candidate.joints[0].index()));
-        let (low, high) =
-            positions().fold((f64::MAX, f64::MIN), |(l, h): (f64, f64), q| (l.min(q), h.max(q)));
-        order(candidate) * (high - low) / TAU < rule.few_cycles
+        cycles(data, candidate.joints[0], order(candidate)) < rule.few_cycles
     }
 
     fn excludes(&self, a: &Candidate, b: &Candidate) -> bool {
@@ -71,7 +68,7 @@ impl Effect for PositionRipple {
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
         let mut candidates = Vec::new();
         for j in context.moving_joints() {
-            for k in 2..=SMALL_ORDERS {
+            for k in (2..=SMALL_ORDERS).filter(|k| cycles(context.data, j, *k as f64) >= 1.0) {
                 candidates.push(Candidate::on(j, Settings { order: k as f64 }, SMALL_ORDERS));
             }
             // Orders of the motor and of twice the motor (a wave generator has two lobes).
@@ -114,6 +111,13 @@ impl Effect for PositionRipple {
 
 fn order(candidate: &Candidate) -> f64 {
     Settings::of(candidate).map_or(f64::NAN, |settings| settings.order)
+}
+
+/// Cycles of an order along a joint's travel: of less than one nobody can say that it repeats.
+fn cycles(data: &Data<'_>, joint: JointNumber, order: f64) -> f64 {
+    let positions = data.recordings.iter().flat_map(|r| r.position(joint.index()));
+    let (low, high) = positions.fold((f64::MAX, f64::MIN), |(l, h): (f64, f64), q| (l.min(q), h.max(q)));
+    order * (high - low) / TAU
 }
 
 /// The orders above [`SMALL_ORDERS`] at which the residual, sorted by position, oscillates most.

@@ -17,7 +17,10 @@ pub(super) fn begin<'a>(base: Fit, study: &Study<'a>) -> Model {
     if is_plainly_better(&with, &plain, study) { with } else { plain }
 }
 
-/// Whether most joints are predicted much better than by another model, on logs that took no part in the fit,
+/// Joints that count as several.
+const SEVERAL: usize = 2;
+
+/// Whether several joints are predicted much better than by another model, on logs that took no part in the fit,
 /// both ways round.
 fn is_plainly_better(model: &Model, other: &Model, study: &Study<'_>) -> bool {
     let square =
@@ -30,5 +33,6 @@ fn is_plainly_better(model: &Model, other: &Model, study: &Study<'_>) -> bool {
     let moving: Vec<usize> = (0..study.data.dof()).filter(|j| theirs[*j] > 0.0).collect();
     let least = 1.0 - study.rule().large_gain;
     let better = |j: &&usize| ours[**j] < least * theirs[**j] && back[**j] < least * their_back[**j];
-    2 * moving.iter().filter(better).count() >= moving.len().max(1)
+    // One joint alone is looked at like any other effect.
+    moving.iter().filter(better).count() >= SEVERAL.min(moving.len()).max(1)
 }

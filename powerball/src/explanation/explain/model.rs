@@ -69,6 +69,18 @@ impl Model {
         Model { accepted, given_up: Vec::new(), fit: fit(&study.data, &study.folds, &terms, None) }
     }
 
+    /// The model without one of what was accepted, fitted.
+    pub(super) fn without(&self, study: &Study<'_>, k: usize) -> Model {
+        let mut accepted = self.accepted.clone();
+        accepted.remove(k);
+        let mut candidates: Vec<Candidate> = accepted.iter().map(|a| a.candidate.clone()).collect();
+        let fit = refitted(&study.data, &study.folds, &mut candidates, &self.fit, study.rule());
+        for (a, candidate) in accepted.iter_mut().zip(candidates) {
+            a.candidate = candidate;
+        }
+        Model { accepted, given_up: Vec::new(), fit }
+    }
+
     /// The terms of what was accepted on some data, of all or of all but one.
     pub(super) fn terms(&self, context: &Context<'_>, without: Option<usize>) -> Vec<Term> {
         let term = |(_, a): (usize, &Accepted)| {

@@ -21,6 +21,8 @@ pub(crate) struct Withheld {
 pub(crate) fn withhold(study: &Study<'_>, model: &mut Model, history: &mut History) -> Option<Withheld> {
     let (taken, why) = if let Some(a) = inconstant(study, model) {
         (vec![model.accepted.remove(a)], "what it says of some pace of motion is not there")
+    } else if let Some(a) = harmful(study, model) {
+        (vec![model.accepted.remove(a)], "with it the error on the logs to judge on is larger")
     } else {
         let step = history.steps.iter().rev().find(|s| is_weak(study, model, s))?.number;
         let taken = model.accepted.extract_if(.., |a| a.step == Some(step)).collect();
@@ -37,6 +39,21 @@ pub(crate) fn withhold(study: &Study<'_>, model: &mut Model, history: &mut Histo
     history.questions.extend(gone.filter_map(|s| s.question).map(Question::withheld));
     model.refit(study);
     Some(Withheld { effect, why })
+}
+
+/// The accepted effect without which the logs to judge on are predicted clearly better on its joints.
+fn harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
+    let error = |model: &Model, joints: &[JointNumber]| -> f64 {
+        let left = model.residual_on_validation(study);
+        let square = |j: &JointNumber| left[j.index()].iter().map(|e| e * e).sum::<f64>();
+        joints.iter().map(square).filter(|s| *s > 0.0).map(f64::ln).sum::<f64>() / joints.len() as f64
+    };
+    let found = (0..model.accepted.len()).rev().filter(|k| model.accepted[*k].step.is_some());
+    found.into_iter().find(|k| {
+        let joints = &model.accepted[*k].candidate.joints;
+        let without = model.without(study, *k);
+        error(&without, joints) < error(model, joints) - study.rule().harm
+    })
 }
 
 /// Whether a step's name is not told apart from others and leaves much.
