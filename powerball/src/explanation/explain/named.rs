@@ -35,6 +35,8 @@ pub struct NamedEffect {
     /// Logs it is in, where it is in some only.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub logs: Vec<String>,
+    /// How often such a name is right, by docs/study.md (see [`Rule::right`](crate::Rule::right)).
+    pub probability: f64,
     /// Its penalised gain over that of the next best name on the same joints.
     pub margin: f64,
     /// Share of the residual's excess over the noise floor that stays on its joints after all effects.

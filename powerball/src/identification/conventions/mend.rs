@@ -15,32 +15,6 @@ struct Column {
     shift: f64,
 }
 
-impl Column {
-    fn is_plain(&self, joint: usize) -> bool {
-        self.from == joint && self.only_moved()
-    }
-
-    fn only_moved(&self) -> bool {
-        !self.reversed && self.scale == 1.0 && self.unit.is_none() && self.shift == 0.0
-    }
-
-    /// `{ column = "tau2", sign = -1 }`.
-    fn text(&self, name: &str) -> String {
-        let mut parts = vec![format!("column = \"{name}\"")];
-        if self.reversed {
-            parts.push("sign = -1".into());
-        }
-        if self.scale != 1.0 {
-            parts.push(format!("scale = {}", short(self.scale)));
-        }
-        parts.extend(self.unit.map(|unit| format!("unit = \"{unit}\"")));
-        if self.shift != 0.0 {
-            parts.push(format!("shift = {}", short(self.shift)));
-        }
-        format!("{{ {} }}", parts.join(", "))
-    }
-}
-
 /// Four digits are more than is known.
 fn short(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
@@ -68,22 +42,34 @@ pub(super) fn mend(read: &Reading, sign: Common, unit: &Unit) -> Option<String> 
         unit: (read.positions.scale != 1.0).then_some("deg"),
         shift: 0.0,
     };
-    let mut lines = block("tau", &(0..n).map(torque).collect::<Vec<Column>>());
-    lines.extend(block("q", &(0..n).map(position).collect::<Vec<Column>>()));
+    let lines = [
+        block("tau", &(0..n).map(torque).collect::<Vec<Column>>()),
+        block("q", &(0..n).map(position).collect::<Vec<Column>>()),
+    ];
+    let lines: Vec<String> = lines.into_iter().flatten().collect();
     (!lines.is_empty()).then(|| lines.join("\n"))
 }
 
-/// One line for all columns where they are alike, else one for each that is to be changed.
-fn block(name: &str, columns: &[Column]) -> Vec<String> {
-    let alike =
-        columns.iter().enumerate().all(|(joint, c)| Column { from: joint, ..columns[0].clone() } == *c);
-    match columns.first().filter(|c| alike && !c.only_moved()) {
-        Some(column) => vec![format!("{name} = {}", column.text(&format!("{name}*")))],
-        None => {
-            let line = |(joint, c): (usize, &Column)| {
-                format!("{name}{} = {}", joint + 1, c.text(&format!("{name}{}", c.from + 1)))
-            };
-            columns.iter().enumerate().filter(|(joint, c)| !c.is_plain(*joint)).map(line).collect()
+/// One line for a quantity: what is the same for all joints once, else one value a joint; nothing where all
+/// columns are as they should be.
+fn block(name: &str, columns: &[Column]) -> Option<String> {
+    let mut parts = Vec::new();
+    let mut add = |key: &str, plain: &str, of: &dyn Fn(&Column) -> String| {
+        let values: Vec<String> = columns.iter().map(of).collect();
+        match values.first() {
+            Some(first) if values.iter().all(|v| v == first) => {
+                parts.extend((first != plain).then(|| format!("{key} = {first}")));
+            }
+            _ => parts.push(format!("{key} = [{}]", values.join(", "))),
         }
+    };
+    if columns.iter().enumerate().any(|(joint, c)| c.from != joint) {
+        add("column", "", &|c| format!("\"{name}{}\"", c.from + 1));
     }
+    add("sign", "1", &|c| if c.reversed { "-1".into() } else { "1".into() });
+    add("scale", "1", &|c| short(c.scale).to_string());
+    let own = if name == "q" { "rad" } else { "N·m" };
+    add("unit", &format!("\"{own}\""), &|c| format!("\"{}\"", c.unit.unwrap_or(own)));
+    add("shift", "0", &|c| short(c.shift).to_string());
+    (!parts.is_empty()).then(|| format!("{name} = {{ {} }}", parts.join(", ")))
 }

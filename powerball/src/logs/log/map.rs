@@ -69,6 +69,9 @@ pub struct Mapped {
     pub sign: Option<ByJoint<f64>>,
     /// What the column is to be multiplied with, beside unit and sign.
     pub scale: Option<ByJoint<f64>>,
+    /// What is to be added to the column's time stamps, s: of torques and currents that are late it is
+    /// negative.
+    pub shift: Option<ByJoint<f64>>,
 }
 
 /// A value for all joints, or one for each in the order of the arm file.
@@ -210,7 +213,17 @@ impl Mapped {
                 return Err(format!("{key}.sign: {sign} is neither 1 nor -1; other factors are its `scale`"));
             }
         }
+        if self.shift.is_some() && !["tau", "i"].contains(&key) {
+            return Err(format!(
+                "{key}.shift: only `tau` and `i` can be shifted in time, against the positions"
+            ));
+        }
         Ok(())
+    }
+
+    /// The shift of a joint's column, s.
+    pub(super) fn shift_of(&self, joint: usize) -> f64 {
+        self.shift.as_ref().and_then(|by| by.of(joint)).copied().unwrap_or(0.0)
     }
 
     /// What the column of a joint is to be multiplied with.
@@ -228,6 +241,7 @@ impl Mapped {
             ("unit", fits(self.unit.as_ref().map(|by| by.fits(joints)))),
             ("sign", fits(self.sign.as_ref().map(|by| by.fits(joints)))),
             ("scale", fits(self.scale.as_ref().map(|by| by.fits(joints)))),
+            ("shift", fits(self.shift.as_ref().map(|by| by.fits(joints)))),
         ]
         .into_iter()
         .find(|(_, fits)| !fits)

@@ -16,6 +16,7 @@ mod map;
 mod raw;
 mod read;
 mod samples;
+mod shift;
 mod signs;
 mod speeds;
 mod topics;

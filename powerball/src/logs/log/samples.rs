@@ -2,7 +2,7 @@
 
 use super::check;
 use super::columns::{Asked, Columns};
-use super::raw::Raw;
+use super::raw::{Effort, Raw};
 use super::{Finding, Log, LogError};
 use crate::logs::tables::Rows;
 
@@ -58,7 +58,11 @@ impl<'a> Samples<'a> {
         let Some((columns, raw)) = self.found else {
             return Err(LogError::of_file(file, "samples", "there are none"));
         };
-        check::into_log(raw, &columns.effort, file, self.asked.arm, self.findings)
+        let log = check::into_log(raw, &columns.effort, file, self.asked.arm, self.findings)?;
+        Ok(log.shifted(match columns.effort {
+            Effort::Torque => &self.asked.map.tau,
+            Effort::Current(_) => &self.asked.map.i,
+        }))
     }
 }
 

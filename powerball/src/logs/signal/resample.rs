@@ -57,6 +57,17 @@ pub fn linear(t: &[f64], x: &[f64], start: f64, step: f64, count: usize) -> Vec<
     onto_grid(t, start, step, count, |i, at| x[i] + (x[i + 1] - x[i]) * (at - t[i]) / (t[i + 1] - t[i]))
 }
 
+/// Values `x` at rising times `t` at one time, by linear interpolation; the first or last value beyond them.
+#[must_use]
+pub fn linear_at(t: &[f64], x: &[f64], at: f64) -> f64 {
+    let above = t.partition_point(|t| *t <= at);
+    match (above.checked_sub(1), x.get(above)) {
+        (Some(i), Some(next)) => x[i] + (next - x[i]) * (at - t[i]) / (t[above] - t[i]),
+        (Some(i), None) => x[i],
+        (None, _) => x.first().copied().unwrap_or(0.0),
+    }
+}
+
 fn onto_grid(t: &[f64], start: f64, step: f64, count: usize, value: impl Fn(usize, f64) -> f64) -> Vec<f64> {
     let Some(last) = t.len().checked_sub(2) else { return vec![0.0; count] };
     let mut i = 0;

@@ -12,11 +12,12 @@ use super::doubts::doubts;
 use super::explained::{Change, Explained};
 use super::next::NextExperiment;
 use super::shown::shown;
-use super::unattributed::unattributed;
+use super::unattributed::{Unattributed, unattributed};
 use super::verdict::verdict;
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Effect, Found};
 use crate::explanation::options::{ExplainError, RuledOut};
+use crate::explanation::rule::Rule;
 use crate::identification::estimate::{noise_floor, over_blocks, spread};
 use crate::logs::regression::Data;
 use std::ops::Range;
@@ -38,6 +39,9 @@ pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainE
     named.extend(named_effects(study, model, &history.steps, &left));
     let (unattributed, unexplained, dependencies) =
         unattributed(study, model, history, &held_out, &floor, &after);
+    for effect in &mut named {
+        effect.probability = probability(study.rule(), effect, unattributed.as_ref());
+    }
     let open = open(study, model, history, unattributed.is_some());
     Ok(Explained {
         verdict: verdict(study, &named, &after.validate, &floor, &dependencies),
@@ -116,12 +120,26 @@ fn named_effect(
         p_value: own().map(|(a, _)| a.p_value).fold(0.0, f64::max),
         held_out_gain: own().map(|(a, _)| a.fold_gain).collect(),
         logs,
+        // What is left is known only when all names are.
+        probability: f64::NAN,
         margin: first.comparison.margin,
         leftover: left(&joints),
         class: effect.class().name().to_string(),
         rivals: rivals(&study.options.ruled_out, &first.comparison, effect.name()),
         joints,
     })
+}
+
+/// How often such a name is right.
+fn probability(rule: &Rule, effect: &NamedEffect, rest: Option<&Unattributed>) -> f64 {
+    let is_left = |j: &JointNumber| rest.is_some_and(|rest| rest.joints.contains(j));
+    if effect.margin < rule.least_margin {
+        rule.right_with_twin
+    } else if effect.joints.iter().any(is_left) {
+        rule.right_beside_rest
+    } else {
+        rule.right
+    }
 }
 
 /// The next best names, and what an experiment has ruled out on the same joints.

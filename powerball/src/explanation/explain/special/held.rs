@@ -79,6 +79,7 @@ pub(crate) fn held_in_validation(
     let found = Found { candidate: &candidate, coefficients: &coefficients };
     fold_gains.sort_by(f64::total_cmp);
     let named = NamedEffect {
+        probability: options.rule.right,
         effect: effect.name().to_string(),
         joints: candidate.joints.clone(),
         figures: effect.figures(&context, &[found]),
