@@ -123,7 +123,8 @@ impl Effect for JointCoupling {
     /// A joint may feel several others.
     fn excludes(&self, a: &Candidate, b: &Candidate) -> bool {
         let (mut one, mut other) = (a.joints.clone(), b.joints.clone());
-        (one.sort_unstable(), other.sort_unstable());
+        one.sort_unstable();
+        other.sort_unstable();
         one == other && (one.len() > 1 || from(a) == from(b))
     }
 

@@ -156,7 +156,7 @@ fn torques_that_repeat_bit_by_bit_were_commanded() {
 fn logs_that_are_too_short_tell_nothing() {
     let (body, logs) = &*SOUND;
     let mut short = logs[0].clone();
-    short.pieces = vec![0..40];
+    short.pieces = std::iter::once(0..40).collect();
     let told = conventions(body, &[short], &[]);
     assert_eq!(told.torque, super::TorqueColumns::default());
     assert!(!told.differ() && told.evidence.contains("not told"));

@@ -69,7 +69,7 @@ fn of_stretch(log: &Log, piece: Range<usize>, wanted: f64) -> Option<Log> {
         q: log.q.iter().map(|q| small(cubic(t, &q[piece.clone()], start, step, count))).collect(),
         torque: log.torque.iter().map(|x| small(linear(t, &x[piece.clone()], start, step, count))).collect(),
         temperature: None,
-        pieces: vec![0..samples],
+        pieces: std::iter::once(0..samples).collect(),
         clock: log.clock,
     })
 }
