@@ -10,7 +10,7 @@ use crate::evaluator::Evaluator;
 use crate::exact::prime::Draws;
 use crate::model::{Error, Model};
 use crate::parameters::{ParameterSet, SetKind, SetParameter};
-use nalgebra::{Matrix4, SMatrix};
+use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3};
 
 /// Poses that are drawn before the worst of them are refined.
 const POSES: usize = 512;
@@ -158,6 +158,25 @@ fn impossible_links(arm: &Arm, set: &ParameterSet, values: &[f64]) -> Vec<String
         }
     }
     reasons
+}
+
+/// The ten inertial parameters of a body, in order, from its mass, its first moment and its inertia about the
+/// frame's origin. Products of inertia are the negative elements off the diagonal (Eq. 8).
+#[must_use]
+pub fn parameters_of_body(mass: f64, moment: &Vector3<f64>, tensor: &Matrix3<f64>) -> [f64; 10] {
+    let t = tensor;
+    [
+        mass,
+        moment[0],
+        moment[1],
+        moment[2],
+        t[(0, 0)],
+        -t[(0, 1)],
+        -t[(0, 2)],
+        t[(1, 1)],
+        -t[(1, 2)],
+        t[(2, 2)],
+    ]
 }
 
 /// The pseudo-inertia of a link from its ten inertial parameters, in order: [Σ s; sᵀ m] with the second

@@ -2,6 +2,7 @@
 //! wants them.
 
 use crate::arm::{Arm, Convention, JointKind, Placement};
+use crate::consistency::{parameters_of_body, pseudo_inertia};
 use crate::exact::rational::to_f64;
 use crate::import::pose::Pose;
 use nalgebra::{Matrix3, Vector3};
@@ -63,20 +64,8 @@ impl Body {
 
     /// Whether a distribution of mass has it.
     pub(super) fn is_possible(&self) -> bool {
-        let t = &self.tensor;
-        let v = [
-            self.mass,
-            self.moment[0],
-            self.moment[1],
-            self.moment[2],
-            t[(0, 0)],
-            -t[(0, 1)],
-            -t[(0, 2)],
-            t[(1, 1)],
-            -t[(1, 2)],
-            t[(2, 2)],
-        ];
-        self.mass > 0.0 && crate::consistency::pseudo_inertia(&v).symmetric_eigenvalues().min() >= 0.0
+        let v = parameters_of_body(self.mass, &self.moment, &self.tensor);
+        self.mass > 0.0 && pseudo_inertia(&v).symmetric_eigenvalues().min() >= 0.0
     }
 }
 

@@ -25,9 +25,7 @@ pub fn mjcf(
     known: &Known,
     options: &Options,
 ) -> Result<Exported, ImportError> {
-    let refused = |reasons: Vec<String>| {
-        ImportError::Refused(reasons.into_iter().map(|reason| format!("{file}: {reason}")).collect())
-    };
+    let refused = |reasons| ImportError::refused(file, reasons);
     let unreadable = |e: String| ImportError::Unreadable(format!("{file}: not a MuJoCo model: {e}"));
     let robot = read(text).map_err(unreadable)?;
     let options = share::options(&robot, arm, options);

@@ -32,9 +32,7 @@ pub fn urdf(
     known: &Known,
     options: &Options,
 ) -> Result<Exported, ImportError> {
-    let refused = |reasons: Vec<String>| {
-        ImportError::Refused(reasons.into_iter().map(|reason| format!("{file}: {reason}")).collect())
-    };
+    let refused = |reasons| ImportError::refused(file, reasons);
     let robot = read(text).map_err(|e| ImportError::Unreadable(format!("{file}: not a URDF: {e}")))?;
     let options = share::options(&robot, arm, options);
     let chain = chain::chain(&robot, &options).map_err(refused)?;

@@ -85,6 +85,13 @@ pub enum ImportError {
     Refused(Vec<String>),
 }
 
+impl ImportError {
+    /// A refusal whose reasons name the file.
+    pub(crate) fn refused(file: &str, reasons: Vec<String>) -> ImportError {
+        ImportError::Refused(reasons.into_iter().map(|reason| format!("{file}: {reason}")).collect())
+    }
+}
+
 impl fmt::Display for ImportError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -130,9 +137,7 @@ fn unreadable(what: &str, file: &str, reasons: &str) -> ImportError {
 }
 
 fn imported(robot: urdf::Robot, file: &str, options: &Options) -> Result<Imported, ImportError> {
-    let refused = |reasons: Vec<String>| {
-        ImportError::Refused(reasons.into_iter().map(|reason| format!("{file}: {reason}")).collect())
-    };
+    let refused = |reasons| ImportError::refused(file, reasons);
     let mut chain = chain::chain(&robot, options).map_err(refused)?;
     if !options.exact {
         chain = meant(&robot, chain, options).map_err(refused)?;

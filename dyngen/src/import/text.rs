@@ -5,6 +5,7 @@ use super::chain::{Chain, ChainJoint};
 use super::frames::Frames;
 use super::pose::{Pose, twelfths};
 use crate::arm::{Convention, JointKind, Parameter, ParameterKind};
+use crate::consistency::parameters_of_body;
 use crate::exact::angle::Angle;
 use crate::exact::rational;
 use nalgebra::{Matrix3, Vector3};
@@ -134,20 +135,7 @@ fn link_values(joint: &ChainJoint, frame: &Pose) -> [f64; 10] {
         tensor += back * body.inertia * frame.rotation
             + (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * body.mass;
     }
-    let t = &tensor;
-    // Products of inertia are the negative elements off the diagonal (Eq. 8).
-    [
-        mass,
-        moment[0],
-        moment[1],
-        moment[2],
-        t[(0, 0)],
-        -t[(0, 1)],
-        -t[(0, 2)],
-        t[(1, 1)],
-        -t[(1, 2)],
-        t[(2, 2)],
-    ]
+    parameters_of_body(mass, &moment, &tensor)
 }
 
 /// A length to 1e-12 m, as a decimal.

@@ -29,6 +29,9 @@ pub struct Rule {
     pub large_gain: f64,
     /// … where either way adds the same: their correlation.
     pub alike: f64,
+    /// The zeros of torque sensors are in the model from the start where so many joints gain
+    /// [`large_gain`](Self::large_gain) by them, both ways round: one joint alone is an effect like any other.
+    pub joints_with_zeros: usize,
     /// Blocks that count as independent last so many autocorrelation times of what is left …
     pub block_memories: f64,
     /// … but not less, s …
@@ -160,6 +163,7 @@ impl Default for Rule {
             worst_fold: -0.05,
             large_gain: 0.19,
             alike: 0.5,
+            joints_with_zeros: 2,
             block_memories: 3.0,
             shortest_block: 0.5,
             longest_block: 2.0,

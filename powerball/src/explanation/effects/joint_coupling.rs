@@ -252,20 +252,60 @@ fn transmission(found: &Found<'_>, with: JointNumber, drive: &Drive) -> Transmis
     let mut more = found.coefficients.iter().skip(1).copied();
     let viscous = if drive.viscous { more.next().unwrap_or(0.0) } else { 0.0 };
     let inertia = if drive.inertia { more.next().unwrap_or(0.0) } else { 0.0 };
-    // A ratio of teeth: the nearest one with small numbers.
-    let near = |bottom: i64| (drive.ratio * bottom as f64).round() / bottom as f64;
-    let ratio = (1..=MOST_TEETH).map(near).find(|r| (r - drive.ratio).abs() < SAME_RATIO * drive.ratio.abs());
-    let ratio = ratio.unwrap_or(drive.ratio);
+    let (ratio, exact) = of_teeth(drive.ratio);
+    let arm_file = block(motor, with, &exact);
+    Transmission { motor, with, ratio, coulomb: found.coefficients[0], viscous, inertia, arm_file }
+}
+
+/// The nearest ratio of few teeth, and as it stands in an arm file; the ratio itself where none is near.
+fn of_teeth(ratio: f64) -> (f64, String) {
+    for bottom in 1..=MOST_TEETH {
+        let top = (ratio * f64::from(bottom)).round();
+        let near = top / f64::from(bottom);
+        if (near - ratio).abs() < SAME_RATIO * ratio.abs() {
+            return (near, if bottom == 1 { top.to_string() } else { format!("\"{top}/{bottom}\"") });
+        }
+    }
+    (ratio, format!("{ratio:.4}"))
+}
+
+/// `[[transmission]]` of an arm file: motor positions = matrix · joint positions.
+fn block(motor: JointNumber, with: JointNumber, ratio: &str) -> String {
     let (joints, matrix) = match motor < with {
         true => ([motor, with], format!("[[1, {ratio}], [0, 1]]")),
         false => ([with, motor], format!("[[1, 0], [{ratio}, 1]]")),
     };
     let [first, second] = joints;
-    let arm_file = format!("[[transmission]]\njoints = [{first}, {second}]\nmatrix = {matrix}");
-    Transmission { motor, with, ratio, coulomb: found.coefficients[0], viscous, inertia, arm_file }
+    format!("[[transmission]]\njoints = [{first}, {second}]\nmatrix = {matrix}")
 }
 
 /// Ratios of up to so many teeth are tried for the arm file.
-const MOST_TEETH: i64 = 12;
+const MOST_TEETH: u32 = 12;
 /// A ratio that is found this near to one of teeth is that one.
 const SAME_RATIO: f64 = 0.04;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The arm file's reader takes the block, and its matrix is the motor's: θ = qᵢ + ρ·qₖ.
+    #[test]
+    fn the_block_is_what_an_arm_file_takes() {
+        let joint =
+            "[[joint]]\nkind = \"revolute\"\na = 0.3\nalpha = 0\nd = 0\ntheta = 0\nrotor_ratio = 100\n";
+        let head = "name = \"x\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n";
+        for (motor, with, found, ratio) in
+            [(2, 1, 1.01, 1.0), (0, 2, -0.66, -2.0 / 3.0), (1, 0, 0.7071, 0.7071)]
+        {
+            let (near, exact) = of_teeth(found);
+            approx::assert_relative_eq!(near, ratio, max_relative = 0.03);
+            let block = block(JointNumber::from_index(motor), JointNumber::from_index(with), &exact);
+            let text = format!("{head}{}{block}\n", joint.repeat(3));
+            let arm = dyngen::Arm::parse(&text, "x.toml").unwrap();
+            let matrix = arm.motor_velocity_matrix_f64();
+            assert_eq!(matrix[motor][motor], 1.0);
+            approx::assert_relative_eq!(matrix[motor][with], near, max_relative = 1e-4);
+            assert_eq!(matrix[with][motor], 0.0);
+        }
+    }
+}

@@ -17,11 +17,8 @@ pub(super) fn begin<'a>(base: Fit, study: &Study<'a>) -> Model {
     if is_plainly_better(&with, &plain, study) { with } else { plain }
 }
 
-/// Joints that count as several.
-const SEVERAL: usize = 2;
-
-/// Whether several joints are predicted much better than by another model, on logs that took no part in the fit,
-/// both ways round.
+/// Whether several joints are predicted much better than by another model, on logs that took no part in the
+/// fit, both ways round.
 fn is_plainly_better(model: &Model, other: &Model, study: &Study<'_>) -> bool {
     let square =
         |left: &[Vec<f64>]| -> Vec<f64> { left.iter().map(|r| r.iter().map(|e| e * e).sum()).collect() };
@@ -34,5 +31,5 @@ fn is_plainly_better(model: &Model, other: &Model, study: &Study<'_>) -> bool {
     let least = 1.0 - study.rule().large_gain;
     let better = |j: &&usize| ours[**j] < least * theirs[**j] && back[**j] < least * their_back[**j];
     // One joint alone is looked at like any other effect.
-    moving.iter().filter(better).count() >= SEVERAL.min(moving.len()).max(1)
+    moving.iter().filter(better).count() >= study.rule().joints_with_zeros.min(moving.len()).max(1)
 }

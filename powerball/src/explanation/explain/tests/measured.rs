@@ -2,7 +2,7 @@
 
 use super::figures;
 use crate::explanation::ExplainOptions;
-use crate::explanation::explain::{Explained, explain_body};
+use crate::explanation::explain::{Explained, State, explain_body};
 use crate::logs::log::{common_clock, read_logs};
 use crate::logs::regression::RigidBody;
 use dyngen::Arm;
@@ -39,6 +39,10 @@ fn explained(arm: &str, fit: &[String], validate: &[String]) -> Option<Explained
 fn joints(explained: &Explained, name: &str) -> Vec<usize> {
     let effect = explained.effects.iter().find(|e| e.effect == name);
     effect.map_or_else(Vec::new, |e| e.joints.iter().map(|j| j.number()).collect())
+}
+
+fn figures_of(explained: &Explained, name: &str) -> serde_json::Value {
+    figures(explained.effects.iter().find(|e| e.effect == name).unwrap())
 }
 
 #[test]
@@ -97,5 +101,38 @@ fn repeats_of_a_schunk_arm_warm_and_joint_4_ripples() {
         for change in &explained.held_out_change {
             assert!(change.interval[0] <= 0.0, "the held-out error surely rises: {change:?}");
         }
+    }
+}
+
+/// Motor 6 of this arm turns with joint 5 too; each half of the run is 4.5 s long.
+#[test]
+fn the_coupled_wrist_of_the_tx40_is_found_in_either_half() {
+    for [fit, validate] in [["fit", "validate"], ["validate", "fit"]] {
+        let Some(explained) = explained("tx40", &[fit.to_string()], &[validate.to_string()]) else { return };
+        assert_eq!(joints(&explained, "joint_coupling"), [5, 6]);
+        let figures = figures_of(&explained, "joint_coupling");
+        let motor = &figures["transmissions"][0];
+        assert_eq!((motor["motor"].as_u64(), motor["with"].as_u64()), (Some(6), Some(5)), "{figures}");
+        let ratio = motor["ratio"].as_f64().unwrap();
+        assert!((0.8..1.25).contains(&ratio), "{figures}");
+        let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
+        assert!(after[4] < 0.3 * before[4] && after[5] < 0.4 * before[5], "{before:?} {after:?}");
+        assert!(explained.verdict[4].left < 0.4 && explained.verdict[4].state != State::Not);
+    }
+}
+
+/// Every torque sensor of this arm has a zero of its own, up to 2.5 N·m, and its base is spoilt by them.
+#[test]
+fn the_zeros_of_the_kinova_are_found_both_ways_round() {
+    let logs = |which: &[usize]| which.iter().map(|k| format!("trajectory_{k}")).collect::<Vec<_>>();
+    let (odd, even) = (logs(&[1, 3, 5]), logs(&[2, 4]));
+    for (fit, validate) in [(&odd, &even), (&even, &odd)] {
+        let Some(explained) = explained("kinova_in_step", fit, validate) else { return };
+        assert_eq!(joints(&explained, "asymmetry"), [1, 2, 3, 4, 5, 6, 7]);
+        let torque = figures_of(&explained, "asymmetry")["torque"][3].as_f64().unwrap();
+        assert!((-2.8..-2.2).contains(&torque), "{torque}");
+        let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
+        let fell = before.iter().zip(after).filter(|(b, a)| **a < 0.5 * **b).count();
+        assert!(fell == 7, "{before:?} {after:?}");
     }
 }
