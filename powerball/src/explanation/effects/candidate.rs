@@ -24,6 +24,12 @@ impl Window {
         let offset = data.recordings.iter().find(|r| r.log == log).map_or(0.0, |r| r.clock - r.start);
         Window { log: data.logs[log].clone(), from, to, offset }
     }
+
+    /// Whether another one of the same log has a part of its time.
+    #[must_use]
+    pub fn overlaps(&self, other: &Window) -> bool {
+        self.log == other.log && self.from < other.to && other.from < self.to
+    }
 }
 
 /// An effect on some joints with the settings of its search.

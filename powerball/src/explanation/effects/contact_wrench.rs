@@ -1,11 +1,11 @@
 //! An outside force on the last link during some time: a touch, a push, a thing leaned on.
 
-use super::candidate::Window;
-use super::payload::{all_joints, block_start, mask};
+use super::payload::all_joints;
 use super::window_sums::{Sums, explained};
+use super::windows::{best_run, by_log, cut, window};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
 use crate::identification::estimate::Solver;
-use crate::logs::regression::{Block, Column};
+use crate::logs::regression::Column;
 use serde::Serialize;
 use std::ops::Range;
 
@@ -54,8 +54,9 @@ impl Effect for ContactWrench {
         Axis::Time
     }
 
+    /// One force at a time.
     fn excludes(&self, a: &Candidate, b: &Candidate) -> bool {
-        a.windows.iter().any(|w| b.windows.contains(w))
+        a.windows.iter().any(|w| b.windows.iter().any(|other| w.overlaps(other)))
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
@@ -63,16 +64,7 @@ impl Effect for ContactWrench {
     }
 
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        let masks: Vec<Vec<f64>> =
-            (0..context.data.dof()).map(|j| mask(context, j, &candidate.windows)).collect();
-        let cut = |column: &Column| Column {
-            parts: column
-                .parts
-                .iter()
-                .map(|(j, values)| (*j, values.iter().zip(&masks[*j]).map(|(v, m)| v * m).collect()))
-                .collect(),
-        };
-        context.data.force_columns().iter().map(cut).collect()
+        cut(context, context.data.force_columns(), &candidate.windows)
     }
 
     fn part(&self, _: &Context<'_>, _: &Candidate, _: &[f64]) -> Part {
@@ -181,52 +173,8 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     Some(Candidate { joints: all_joints(data), settings: Settings.into(), windows, searched })
 }
 
-/// The steps of each log.
-fn by_log(steps: &[Block]) -> Vec<Range<usize>> {
-    (steps.chunk_by(|a, b| a.log == b.log))
-        .scan(0, |end, steps| {
-            *end += steps.len();
-            Some(*end - steps.len()..*end)
-        })
-        .collect()
-}
-
-/// The window of some steps of a log.
-fn window(
-    context: &Context<'_>,
-    steps: &[Block],
-    log: &Range<usize>,
-    found: &Range<usize>,
-) -> Option<Window> {
-    let data = context.data;
-    let from = block_start(context, &steps[found.start])?;
-    // To the last row before the next step begins.
-    let to = match found.end < log.end {
-        true => block_start(context, &steps[found.end])? - 0.5 / data.rate(),
-        false => end_of_log(context, steps[found.start].log),
-    };
-    Some(Window::new(data, steps[found.start].log, from, to))
-}
-
-/// The steps in a row that together explain most.
-fn best_run(explains: &[(f64, f64)]) -> Range<usize> {
-    let (mut best, mut run) = ((0.0, 0..0), (0.0, 0..0));
-    for (k, (less, _)) in explains.iter().enumerate() {
-        run = if run.0 > 0.0 { (run.0 + less, run.1.start..k + 1) } else { (*less, k..k + 1) };
-        if run.0 > best.0 {
-            best = run.clone();
-        }
-    }
-    best.1
-}
-
 /// Where a log's longer windows lie.
 fn inner(log: &Range<usize>) -> Range<usize> {
     let clear = log.len().div_ceil(CLEAR);
     log.start + clear..log.end.saturating_sub(clear).max(log.start + clear)
-}
-
-fn end_of_log(context: &Context<'_>, log: usize) -> f64 {
-    let end = |r: &crate::logs::regression::Recording| r.start + r.len() as f64 / r.rate;
-    context.data.recordings.iter().filter(|r| r.log == log).map(end).fold(0.0, f64::max)
 }

@@ -36,6 +36,7 @@ pub mod time_delay;
 pub mod torque_constant;
 pub mod velocity_nonlinearity;
 mod window_sums;
+mod windows;
 
 pub use axis::Axis;
 pub use by_joint::ByJoint;
@@ -43,6 +44,7 @@ pub use candidate::{Candidate, Found, Window};
 pub use context::Context;
 pub(crate) use context::{PASSES, SOFT, each_instant, move_link};
 pub use effect::{Class, Effect, Part, Placed};
+pub(crate) use windows::mask;
 
 /// Makes of the list of effects what must know all of them: [`Settings`], [`Figures`] and [`all`].
 macro_rules! library {

@@ -1,12 +1,14 @@
-//! A body held by the last link, from the start of a log or from some time on.
+//! A body held by the last link, from the start of a log or from some time on, to its end or to some time.
 
 use super::window_sums::{Sums, explained};
+use super::windows::{best_run, by_log, cut, lasting_window};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part, Window};
 use crate::controller::JointNumber;
 use crate::identification::estimate::Solver;
 use crate::logs::regression::{Block, Column, Data};
 use dyngen::arm::ParameterKind;
 use serde::Serialize;
+use std::ops::{Range, RangeInclusive};
 
 /// Mass and first moment in the last frame as four columns; the inertia is that of a point mass at the centre
 /// of mass last estimated, so a few rounds make it consistent.
@@ -27,12 +29,26 @@ pub struct Settings {
 pub struct Figures {
     /// Its centre in the last frame, m.
     pub com: [f64; 3],
+    /// Until when, one for each log that has it, in the log's own t, s: null where it stays to the end; nothing
+    /// where it does in all.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub end_time: Vec<Option<f64>>,
     /// Its mass, kg.
     pub mass: f64,
     /// From when on, one for each log that has it, in the log's own t, s.
     pub start_time: Vec<f64>,
 }
 
+/// A body is held for steps of this, s …
+const GRID: f64 = 0.5;
+/// … whose ends are then looked for on a grid of this, s …
+const FINE: f64 = 0.1;
+/// … at least so many of them: what is there for less is a push.
+const SHORTEST: usize = 8;
+/// Parts of a log at which it is picked up and put down are looked for first.
+const COARSE: usize = 24;
+/// What an end within a log must explain beyond the same run to the log's end, in units of χ².
+const END: f64 = 10.0;
 /// A centre of mass farther than this from the flange, m, is no payload.
 const REACH: f64 = 1.0;
 /// A rigid body's inertial parameters: all of a link's but its rotor's.
@@ -68,17 +84,7 @@ impl Effect for Payload {
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
         let Some(settings) = Settings::of(candidate) else { return Vec::new() };
         let columns = payload_columns(context, settings.com);
-        let n = context.data.dof();
-        let windows = self.windows(context, candidate);
-        let masks: Vec<Vec<f64>> = (0..n).map(|j| mask(context, j, &windows)).collect();
-        let cut = |column: &Column| Column {
-            parts: column
-                .parts
-                .iter()
-                .map(|(j, values)| (*j, values.iter().zip(&masks[*j]).map(|(v, m)| v * m).collect()))
-                .collect(),
-        };
-        columns.iter().map(cut).collect()
+        cut(context, &columns, &self.windows(context, candidate))
     }
 
     /// A payload that stays is also in logs that were not fitted, where their `t` and that of the logs with
@@ -117,22 +123,33 @@ impl Effect for Payload {
 
     /// A payload may have been taken off before another log, or held again in it. What the clocks say is
     /// overruled by a log that clearly says otherwise, as a log among the fitted ones would.
+    /// Each log is asked by itself when it has the body: in all of it as it is taken to have, or from some
+    /// time to another.
     fn seen_in(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
         let (data, another_log) = (context.data, context.rule.another_log);
         let taken = self.windows(context, candidate);
         let (mut seen, settings) = (candidate.clone(), *Settings::of(candidate)?);
         seen.windows.retain(|w| !data.logs.contains(&w.log));
-        for log in 0..data.logs.len() {
-            let start = data.recordings.iter().find(|r| r.log == log).map_or(0.0, |r| r.start);
-            let all = Window::new(data, log, start, f64::INFINITY);
-            let was = taken.iter().any(|w| w.log == all.log);
-            let columns = self.columns(context, &Candidate { windows: vec![all.clone()], ..seen.clone() });
-            let explains: f64 =
-                explained(context, &columns, c, &data.blocks).iter().map(|(less, _)| less).sum();
-            let is = if was { explains > -another_log } else { explains > another_log };
-            if is {
-                seen.windows.push(all);
-            } else if was {
+        let steps = data.blocks_of(FINE);
+        let explains = explained(context, &payload_columns(context, settings.com), c, &steps);
+        for log in by_log(&steps) {
+            let run = best_run(&explains[log.clone()]);
+            let run = log.start + run.start..log.start + run.end;
+            let sum =
+                |steps: &Range<usize>| explains[steps.clone()].iter().map(|(less, _)| less).sum::<f64>();
+            let was = taken.iter().any(|w| w.log == data.logs[steps[log.start].log]);
+            let all = sum(&log) + if was { another_log } else { -another_log };
+            // A beginning and an end are searched for: they must explain more than the best of all runs by chance.
+            let part = sum(&run) - another_log - 4.0 * (log.len() as f64).ln();
+            let held = if run.len() as f64 * FINE >= SHORTEST as f64 * GRID && part > all.max(0.0) {
+                run
+            } else {
+                log.clone()
+            };
+            if held != log || all > 0.0 {
+                seen.windows.push(lasting_window(context, &steps, &log, &held)?);
+            }
+            if was && (held != log || all <= 0.0) {
                 seen.settings = Settings { stays: false, ..settings }.into();
             }
         }
@@ -140,9 +157,16 @@ impl Effect for Payload {
     }
 
     fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
-        let c = found[0].coefficients;
-        let start_time = found[0].candidate.windows.iter().map(|w| w.from).collect();
-        Figures { com: centre(c), mass: c[0], start_time }.into()
+        let (c, windows) = (found[0].coefficients, &found[0].candidate.windows);
+        let ends = windows.iter().any(|w| w.to.is_finite());
+        let end = |w: &Window| w.to.is_finite().then_some(w.to);
+        Figures {
+            com: centre(c),
+            end_time: if ends { windows.iter().map(end).collect() } else { Vec::new() },
+            mass: c[0],
+            start_time: windows.iter().map(|w| w.from).collect(),
+        }
+        .into()
     }
 }
 
@@ -180,15 +204,7 @@ fn payload_columns(context: &Context<'_>, com: Option<[f64; 3]>) -> Vec<Column> 
         .collect()
 }
 
-/// 1 in the windows, 0 elsewhere, by row; without windows 1 everywhere.
-pub(super) fn mask(context: &Context<'_>, joint: usize, windows: &[Window]) -> Vec<f64> {
-    let inside = |(log, t): &(usize, f64)| {
-        windows.iter().any(|w| w.log == context.data.logs[*log] && *t >= w.from && *t <= w.to)
-    };
-    context.row_times(joint).iter().map(|at| if inside(at) { 1.0 } else { 0.0 }).collect()
-}
-
-/// The start in each log that explains most, then the logs that share the payload.
+/// When each log has it, as explains most, and which logs share it.
 fn search(context: &Context<'_>) -> Option<Candidate> {
     let (data, fit) = (context.data, context.fit);
     let columns = payload_columns(context, None);
@@ -196,76 +212,152 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
         return None;
     }
     let (gram, _, _) = fit.gram.fitted(&fit.weights, |_| true);
-    let solver = Solver::new(&gram, |c| fit.free[c]);
-    let mut starts: Vec<(usize, f64, Sums)> = Vec::new();
-    let empty = || Sums::zero(fit.design.size, 4);
-    let mut tail = empty();
-    for (b, block) in data.blocks.iter().enumerate().rev() {
-        if data.blocks.get(b + 1).is_none_or(|next| next.log != block.log) {
-            tail = empty();
+    let steps = data.blocks_of(GRID);
+    let mut held = Search::new(context, &columns, &steps, Solver::new(&gram, |c| fit.free[c]));
+    let mut open = by_log(&steps);
+    let mut chosen: Vec<(Range<usize>, Range<usize>)> = Vec::new();
+    // The log that shows it best, then every other one that explains more with it.
+    while let Some((place, (gain, run))) = (open.iter().enumerate())
+        .map(|(place, log)| (place, held.best(log)))
+        .max_by(|(_, a), (_, b)| a.0.total_cmp(&b.0))
+    {
+        let least = if chosen.is_empty() { 0.0 } else { held.explained + context.rule.another_log };
+        if gain <= least {
+            break;
         }
-        tail.add(&Sums::of_block(context, &columns, block), 1.0);
-        let recording = &data.recordings[block.recording];
-        let time = block_start(context, block).unwrap_or(recording.start);
-        let first_of_log = b == 0 || data.blocks[b - 1].log != block.log;
-        let time = if first_of_log { recording.start } else { time };
-        starts.push((block.log, time, tail.clone()));
+        held.take(gain, &run);
+        chosen.push((open.swap_remove(place), run));
     }
-    let searched = starts.len() as f64;
-    let gains: Vec<f64> = starts.iter().map(|(_, _, t)| gain(t, &solver)).collect();
-    let best =
-        (0..starts.len()).max_by(|a, b| gains[*a].total_cmp(&gains[*b])).filter(|b| gains[*b] > 0.0)?;
-    let mut chosen = vec![best];
-    let mut total = starts[best].2.clone();
-    let mut explained = gains[best];
-    loop {
-        let with = |s: usize| {
-            let mut sum = total.clone();
-            sum.add(&starts[s].2, 1.0);
-            sum
-        };
-        let others = (0..starts.len()).filter(|s| chosen.iter().all(|c| starts[*c].0 != starts[*s].0));
-        let next = others.map(|s| (s, gain(&with(s), &solver))).max_by(|a, b| a.1.total_cmp(&b.1));
-        match next {
-            Some((s, gain)) if gain > explained + context.rule.another_log => {
-                total = with(s);
-                explained = gain;
-                chosen.push(s);
-            }
-            _ => break,
-        }
-    }
-    chosen.sort_by_key(|s| starts[*s].0);
-    let windows: Vec<Window> =
-        chosen.iter().map(|s| Window::new(data, starts[*s].0, starts[*s].1, f64::INFINITY)).collect();
-    let first = windows.iter().map(|w| w.from + w.offset).fold(f64::INFINITY, f64::min);
-    let has = |log: usize| windows.iter().any(|w| w.log == data.logs[log]);
-    let stays = data.recordings.iter().filter(|r| r.clock >= first).all(|r| has(r.log));
+    chosen.sort_by_key(|(log, _)| log.start);
+    let windows = held.windows(context, &columns, &chosen)?;
+    let first = windows.iter().map(|w| w.from + w.offset).min_by(f64::total_cmp)?;
+    let keeps = |log: usize| windows.iter().any(|w| w.log == data.logs[log] && w.to.is_infinite());
+    let ends = windows.iter().any(|w| w.to.is_finite());
+    let stays = !ends && data.recordings.iter().filter(|r| r.clock >= first).all(|r| keeps(r.log));
     let settings = Settings { com: None, stays }.into();
-    Some(Candidate { joints: all_joints(data), settings, windows, searched })
+    Some(Candidate { joints: all_joints(data), settings, windows, searched: held.searched })
+}
+
+/// The search for when logs hold a body.
+struct Search {
+    /// Sums of all steps before each.
+    before: Vec<Sums>,
+    solver: Solver,
+    /// The sums of what was found, and what it explains with which coefficients.
+    found: Sums,
+    coefficients: Vec<f64>,
+    explained: f64,
+    searched: f64,
+}
+
+impl Search {
+    fn new(context: &Context<'_>, columns: &[Column], steps: &[Block], solver: Solver) -> Search {
+        let empty = Sums::zero(context.fit.design.size, columns.len());
+        let mut before = vec![empty.clone()];
+        for step in steps {
+            let mut sum = before[before.len() - 1].clone();
+            sum.add(&Sums::of_block(context, columns, step), 1.0);
+            before.push(sum);
+        }
+        Search { before, solver, found: empty, coefficients: Vec::new(), explained: 0.0, searched: 0.0 }
+    }
+
+    /// What was found and a run of steps, summed.
+    fn with(&self, run: &Range<usize>) -> Sums {
+        let mut sum = self.found.clone();
+        sum.add(&self.before[run.end], 1.0);
+        sum.add(&self.before[run.start], -1.0);
+        sum
+    }
+
+    /// What that explains with a positive mass.
+    fn gain(&mut self, run: &Range<usize>) -> f64 {
+        self.searched += 1.0;
+        let (gain, x) = self.with(run).gain(&self.solver);
+        if x[0] > 0.0 { gain } else { 0.0 }
+    }
+
+    fn take(&mut self, gain: f64, run: &Range<usize>) {
+        (self.found, self.explained) = (self.with(run), gain);
+        self.coefficients = self.found.gain(&self.solver).1;
+    }
+
+    /// The run of a log that explains most beside what was found: on a coarse grid first, then its ends are
+    /// moved. A body is held to the end of a log rather than put down shortly before.
+    fn best(&mut self, log: &Range<usize>) -> (f64, Range<usize>) {
+        let coarse = log.len().div_ceil(COARSE).max(1);
+        let mut best = (0.0, log.clone());
+        let consider = |own: &mut Search, run: Range<usize>, best: &mut (f64, Range<usize>)| {
+            let gain = own.gain(&run);
+            // An end is one more thing that was searched for.
+            let to_the_end = |run: &Range<usize>| if run.end == log.end { END } else { 0.0 };
+            if gain + to_the_end(&run) > best.0 + to_the_end(&best.1) {
+                *best = (gain, run);
+            }
+        };
+        for start in log.clone().step_by(coarse) {
+            for end in (start + SHORTEST..log.end).step_by(coarse).chain([log.end]) {
+                consider(self, start..end, &mut best);
+            }
+        }
+        let near = |at: usize| (at + 1).saturating_sub(coarse).max(log.start)..(at + coarse).min(log.end + 1);
+        for _ in 0..2 {
+            for start in near(best.1.start).filter(|s| *s < log.end) {
+                let run = start..best.1.end;
+                if run.len() >= SHORTEST.min(log.len()) {
+                    consider(self, run, &mut best);
+                }
+            }
+            for end in near(best.1.end) {
+                let run = best.1.start..end;
+                if run.len() >= SHORTEST {
+                    consider(self, run, &mut best);
+                }
+            }
+        }
+        best
+    }
+
+    /// The windows of runs of steps, with their ends moved by at most a step each: the body is known now, so
+    /// that a row more or less can be told.
+    fn windows(
+        &self,
+        context: &Context<'_>,
+        columns: &[Column],
+        chosen: &[(Range<usize>, Range<usize>)],
+    ) -> Option<Vec<Window>> {
+        let fine = context.data.blocks_of(FINE);
+        let less = explained(context, columns, &self.coefficients, &fine);
+        let logs = by_log(&fine);
+        let all = by_log(&context.data.blocks_of(GRID));
+        let window = |(log, run): &(Range<usize>, Range<usize>)| {
+            let fine_log = &logs[all.iter().position(|l| l == log)?];
+            let per_step = fine_log.len() as f64 / log.len() as f64;
+            let at = |step: usize| fine_log.start + ((step - log.start) as f64 * per_step).round() as usize;
+            let reach = per_step.ceil() as usize;
+            let near =
+                |at: usize| at.saturating_sub(reach).max(fine_log.start)..=(at + reach).min(fine_log.end);
+            let [start, end] = [at(run.start), at(run.end)];
+            let middle = start.midpoint(end);
+            let sum = |steps: Range<usize>| less[steps].iter().map(|(less, _)| less).sum::<f64>();
+            let best = |among: RangeInclusive<usize>, sum: &dyn Fn(usize) -> f64| {
+                among.max_by(|a, b| sum(*a).total_cmp(&sum(*b)))
+            };
+            let start = match run.start == log.start {
+                true => fine_log.start,
+                false => best(near(start), &|s| sum(s.min(middle)..middle))?,
+            };
+            let end = match run.end == log.end {
+                true => fine_log.end,
+                false => best(near(end), &|e| sum(middle..e.max(middle)))?,
+            };
+            lasting_window(context, &fine, fine_log, &(start..end))
+        };
+        chosen.iter().map(window).collect()
+    }
 }
 
 /// Every joint of the arm.
 pub(super) fn all_joints(data: &Data<'_>) -> Vec<JointNumber> {
     (0..data.dof()).map(JointNumber::from_index).collect()
-}
-
-/// What a payload with positive mass explains over some rows.
-fn gain(sums: &Sums, solver: &Solver) -> f64 {
-    let (gain, x) = sums.gain(solver);
-    if x[0] > 0.0 { gain } else { 0.0 }
-}
-
-/// The time of the first row of a block in its log's own t.
-pub(super) fn block_start(context: &Context<'_>, block: &Block) -> Option<f64> {
-    let data = context.data;
-    let recording = &data.recordings[block.recording];
-    (0..data.dof())
-        .filter(|j| !block.rows[*j].is_empty())
-        .map(|j| {
-            let joint = &data.joints[j];
-            let k = joint.kept[block.recording][block.rows[j].start - joint.rows[block.recording].start];
-            recording.start + joint.band.kept(recording.len())[k] as f64 / recording.rate
-        })
-        .min_by(f64::total_cmp)
 }

@@ -1,8 +1,9 @@
 //! Which name a residual gets, and why the others do not.
 
 use super::super::named::Rival;
-use super::super::search::{Group, Screen};
+use super::super::search::{Extent, Group, Member, Screen};
 use crate::controller::JointNumber;
+use crate::explanation::effects::{Window, mask};
 use crate::explanation::rule::Rule;
 use crate::logs::vector::dot;
 
@@ -36,9 +37,10 @@ pub(crate) fn compare(
 ) -> Comparison {
     let rule = screen.context.rule;
     let own = groups[chosen].score_on(joints);
+    let score = |f: usize| groups[f].score_on(joints) * share_at_stake(screen, [&groups[chosen], &groups[f]]);
     let mut others: Vec<(usize, f64)> = (0..groups.len())
         .filter(|f| *f != chosen)
-        .map(|f| (f, groups[f].score_on(joints)))
+        .map(|f| (f, score(f)))
         .filter(|(_, score)| *score > 0.0)
         .collect();
     others.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -77,6 +79,43 @@ pub(crate) fn compare(
         .filter(|(_, score)| own / score < rule.least_margin)
         .map(|(f, _)| groups[*f].name().to_string());
     Comparison { margin, rivals, twin, apart, joints: joints.to_vec() }
+}
+
+/// The share of a rival's score that speaks against a choice.
+///
+/// An event is compared with what lasts over its own time only, whichever of the two was chosen: what lasts
+/// explains all logs, and that says nothing of whether something happened in one of them.
+fn share_at_stake(screen: &Screen<'_>, [own, rival]: [&Group; 2]) -> f64 {
+    match [event(own), event(rival)] {
+        [Some(windows), None] => share_within(screen, rival, &windows),
+        [None, Some(windows)] => share_within(screen, own, &windows),
+        _ => 1.0,
+    }
+}
+
+/// The windows of a group of events that are short.
+fn event(group: &Group) -> Option<Vec<Window>> {
+    let short = |m: &&Member| matches!(Extent::of(&m.candidate), Extent::Short(_));
+    let windows: Vec<Window> =
+        group.members.iter().filter(short).flat_map(|m| m.candidate.windows.clone()).collect();
+    (!windows.is_empty()).then_some(windows)
+}
+
+/// The share of what a group explains that it explains in some windows.
+fn share_within(screen: &Screen<'_>, group: &Group, windows: &[Window]) -> f64 {
+    let context = screen.context;
+    let joints: Vec<JointNumber> = group.members.iter().flat_map(|m| m.candidate.joints.clone()).collect();
+    let (mut inside, mut all) = (0.0, 0.0);
+    for (j, explained) in explained(screen, group, &joints).iter().enumerate() {
+        let weight = context.fit.weights[j].sqrt();
+        let within = mask(context, j, windows);
+        for ((e, r), m) in explained.iter().zip(&context.residual[j]).zip(&within) {
+            let less = e * (2.0 * weight * r - e);
+            inside += less * m;
+            all += less;
+        }
+    }
+    if all > 0.0 { (inside / all).clamp(0.0, 1.0) } else { 0.0 }
 }
 
 /// What a group's members on the given joints explain of each joint's residual, in standard deviations.

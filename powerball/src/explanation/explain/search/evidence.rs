@@ -46,12 +46,10 @@ pub(crate) enum Extent {
 impl Extent {
     /// That of a candidate.
     pub(crate) fn of(candidate: &Candidate) -> Extent {
-        let windows = &candidate.windows;
-        let lasting = windows.iter().map(|w| w.to - w.from).filter(|seconds| seconds.is_finite());
-        match lasting.reduce(f64::max) {
-            Some(seconds) => Extent::Short(seconds),
-            None if windows.is_empty() => Extent::Everywhere,
-            None => Extent::SomeLogs,
+        match candidate.windows.iter().map(|w| w.to - w.from).reduce(f64::max) {
+            None => Extent::Everywhere,
+            Some(seconds) if seconds.is_finite() => Extent::Short(seconds),
+            Some(_) => Extent::SomeLogs,
         }
     }
 }
@@ -179,10 +177,13 @@ fn by_chance(screen: &Screen<'_>, trial: &Trial, seconds: f64) -> f64 {
     f_tail(trial.gain / slower.max(1.0) / used.max(1.0), used, 100.0)
 }
 
-/// Parts into which an event's own rows are cut.
+/// Parts into which an event's own rows are dealt.
 const EVENT_PARTS: usize = 5;
 
-/// Held-out gains of a short event: each part of its rows is predicted from the other parts.
+/// Held-out gains of a short event: it happens once, so that each part of its rows is predicted from the
+/// others. Rows are dealt to the parts in turn: a part in one piece would ask whether the noise of a fifth of
+/// the event is smaller than the event, while what tells an event from slow noise is what its log holds
+/// elsewhere ([`by_chance`]).
 fn event_gains(screen: &Screen<'_>, trial: &Trial) -> Vec<f64> {
     let fit = screen.context.fit;
     let columns = screen.residualised(trial);
@@ -195,7 +196,7 @@ fn event_gains(screen: &Screen<'_>, trial: &Trial) -> Vec<f64> {
             .filter(|i| trial.columns.iter().any(|c| c.at(j).is_some_and(|v| v[*i] != 0.0)))
             .collect();
         for (n, i) in rows.iter().enumerate() {
-            let (gram, right, square) = &mut parts[n * EVENT_PARTS / rows.len()];
+            let (gram, right, square) = &mut parts[n % EVENT_PARTS];
             for a in 0..k {
                 for b in 0..k {
                     gram[(a, b)] += w * columns[j][a][*i] * columns[j][b][*i];

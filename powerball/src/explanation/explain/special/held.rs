@@ -107,7 +107,7 @@ fn look(rule: &Rule, pooled: &Pooled<'_>, validate: &[Log]) -> Option<Seen> {
         .flat_map(|effect| effect.candidates(&context))
         .filter_map(|c| Some((screen.try_candidate(&c)?, c)))
         .max_by(|a, b| a.0.score.total_cmp(&b.0.score))?;
-    let found = evidence(&screen, &trial, &candidate.joints, &pooled.folds, Extent::SomeLogs, None);
+    let found = evidence(&screen, &trial, &candidate.joints, &pooled.folds, Extent::of(&candidate), None);
     let tests = candidate.searched.max(1.0);
     let new = |name: &String| validate.iter().any(|log| log.file == *name);
     let elsewhere = candidate.windows.iter().any(|w| !new(&w.log));

@@ -67,9 +67,14 @@ fn explained(arm: (Arm, Plant), effect: Effect, listed: &[usize]) -> Explained {
 
 /// The same with several effects, each in logs of its own.
 fn explained_of((arm, usual): (Arm, Plant), effects: &[(Effect, &[usize])]) -> Explained {
+    explained_logs(&arm, recorded(&arm, &usual, effects))
+}
+
+/// The logs of an arm with several effects, each in logs of its own.
+fn recorded(arm: &Arm, usual: &Plant, effects: &[(Effect, &[usize])]) -> Vec<Log> {
     const SEED: u64 = 7;
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-    let mut logs: Vec<Log> = (0..LOGS)
+    (0..LOGS)
         .map(|k| {
             let joints = (arm.joints.iter())
                 .map(|joint| {
@@ -84,10 +89,13 @@ fn explained_of((arm, usual): (Arm, Plant), effects: &[(Effect, &[usize])]) -> E
             let plant = here.fold(usual.clone(), |plant, (effect, _)| plant.with(effect.clone()));
             plant.record(&path.sample(200.0), 0.0, SEED + k as u64).log(format!("log{k}"))
         })
-        .collect();
+        .collect()
+}
+
+fn explained_logs(arm: &Arm, mut logs: Vec<Log>) -> Explained {
     common_clock(&mut logs);
     let (fit, validate) = logs.split_at(FITTED);
-    let body = RigidBody::new(&arm).unwrap();
+    let body = RigidBody::new(arm).unwrap();
     explain_body(&body, fit, validate, &ExplainOptions::default()).unwrap()
 }
 
@@ -184,6 +192,51 @@ fn a_payload_is_found_with_the_instant_at_which_it_was_taken_up() {
     approx::assert_relative_eq!(parameters["start_time"][0].as_f64().unwrap(), START, epsilon = 0.15);
     approx::assert_relative_eq!(parameters["mass"].as_f64().unwrap(), PAYLOAD, max_relative = 0.05);
     at_the_floor(&explained);
+}
+
+#[test]
+fn every_log_says_by_itself_when_a_payload_is_taken_up() {
+    let payload = |start| Effect::Payload { mass: PAYLOAD, centre: [0.05, 0.02, 0.0], start };
+    // In a log to judge on only, and in one of each at other times.
+    let cases: [&[(usize, f64)]; 2] = [&[(5, 7.3)], &[(1, 4.0), (4, 12.2)]];
+    for truth in cases {
+        let (arm, plant) = planar();
+        let effects: Vec<(Effect, [usize; 1])> =
+            truth.iter().map(|(log, start)| (payload(*start), [*log])).collect();
+        let listed: Vec<(Effect, &[usize])> =
+            effects.iter().map(|(e, l)| (e.clone(), l.as_slice())).collect();
+        let explained = explained_of((arm, plant), &listed);
+        assert_eq!(names(&explained), ["payload"], "{truth:?}");
+        let parameters = figures(&explained.effects[0]);
+        assert!(parameters.get("end_time").is_none());
+        for (k, (log, start)) in truth.iter().enumerate() {
+            assert_eq!(explained.effects[0].logs[k], format!("log{log}"));
+            approx::assert_relative_eq!(parameters["start_time"][k].as_f64().unwrap(), start, epsilon = 0.15);
+        }
+        approx::assert_relative_eq!(parameters["mass"].as_f64().unwrap(), PAYLOAD, max_relative = 0.05);
+        at_the_floor(&explained);
+    }
+}
+
+#[test]
+fn a_payload_that_is_put_down_is_there_until_then() {
+    const DOWN: f64 = 13.1;
+    let payload = Effect::Payload { mass: PAYLOAD, centre: [0.05, 0.02, 0.0], start: 0.0 };
+    for which in [1, 5] {
+        let (arm, plant) = planar();
+        let mut logs = recorded(&arm, &plant, &[]);
+        let with = recorded(&arm, &plant, &[(payload.clone(), &[which])]).swap_remove(which);
+        let held = with.t.iter().filter(|t| **t < DOWN).count();
+        for (torque, with) in logs[which].torque.iter_mut().zip(&with.torque) {
+            torque[..held].copy_from_slice(&with[..held]);
+        }
+        let explained = explained_logs(&arm, logs);
+        assert_eq!(names(&explained), ["payload"], "log{which}");
+        let parameters = figures(&explained.effects[0]);
+        approx::assert_relative_eq!(parameters["end_time"][0].as_f64().unwrap(), DOWN, epsilon = 0.15);
+        approx::assert_relative_eq!(parameters["mass"].as_f64().unwrap(), PAYLOAD, max_relative = 0.05);
+        at_the_floor(&explained);
+    }
 }
 
 #[test]
