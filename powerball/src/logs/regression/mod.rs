@@ -2,6 +2,7 @@
 
 mod apart;
 mod hidden;
+mod kept;
 #[cfg(test)]
 pub(crate) mod newton_euler;
 mod prepare;
@@ -9,6 +10,7 @@ mod recording;
 mod rest_notes;
 mod rigid;
 mod rows;
+mod saturated;
 mod silent;
 
 pub use prepare::{Data, DataError, DataOptions, column_in_bands};

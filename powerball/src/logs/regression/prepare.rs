@@ -1,7 +1,8 @@
 //! Logs of an arm into rows: even grid, derivatives, band, rest removed, blocks laid out.
 
+use super::kept::kept_samples;
 use super::rest_notes::{FEWEST_ROWS, notes};
-use super::silent::{dead, silent_joints};
+use super::silent::silent_joints;
 use super::{Block, Column, JointRows, Recording, RigidBody};
 use crate::logs::log::Log;
 use crate::logs::parallel;
@@ -155,22 +156,8 @@ impl<'a> Data<'a> {
             .collect();
         let top_speed: Vec<f64> = (0..n).map(|j| top_speed(&recordings, j)).collect();
         let silent = silent_joints(body.arm(), logs);
-        let mut kept = keep_moving(&recordings, &bands, &rest_speed, n);
-        for j in 0..n {
-            for (r, recording) in recordings.iter().enumerate() {
-                let is_dead = dead(recording, j);
-                if is_dead || silent[j].is_some() {
-                    kept.iter_mut().for_each(|kept| kept[j][r].clear());
-                }
-                if is_dead && silent[j].is_none() {
-                    left_out.push(format!(
-                        "{}: the torque of joint {} never changes: the joint was left out of this log",
-                        logs[recording.log].file,
-                        j + 1
-                    ));
-                }
-            }
-        }
+        let (kept, without) = kept_samples(logs, &recordings, &bands, &rest_speed, &silent);
+        left_out.extend(without);
         let joints = joint_rows(body, &recordings, &bands, kept);
         let logs: Vec<String> = logs.iter().map(|log| log.file.clone()).collect();
         let of_band = |(band, joints): (Band, Vec<JointRows>)| {
@@ -402,27 +389,6 @@ fn top_speed(recordings: &[Recording], joint: usize) -> f64 {
     let at = (speeds.len() * 95 / 100).min(speeds.len() - 1);
     let (_, top, _) = speeds.select_nth_unstable_by(at, f64::total_cmp);
     top.max(1e-3)
-}
-
-/// By band, joint and recording: which of the band's kept samples are rows.
-fn keep_moving(
-    recordings: &[Recording],
-    bands: &[Band],
-    limit: &[f64],
-    n: usize,
-) -> Vec<Vec<Vec<Vec<usize>>>> {
-    let mut all = vec![vec![Vec::with_capacity(recordings.len()); n]; bands.len()];
-    for j in 0..n {
-        for r in recordings {
-            let moving = rest::moving(&r.speed(j).collect::<Vec<_>>(), r.rate, limit[j]);
-            for (of_band, band) in all.iter_mut().zip(bands) {
-                // A joint that never moves has the limit 0 and is never below it.
-                let kept = if limit[j] < 1e-5 { Vec::new() } else { band.kept(r.len()) };
-                of_band[j].push((0..kept.len()).filter(|k| moving[kept[*k]]).collect());
-            }
-        }
-    }
-    all
 }
 
 /// The rows by band and joint; the bands are each half of the one before.

@@ -1,0 +1,98 @@
+//! Windows of logs: which rows are in them, and steps of time of which they are made.
+
+use super::{Context, Window};
+use crate::logs::regression::{Block, Column, Recording};
+use std::ops::Range;
+
+/// 1 in the windows, 0 elsewhere, by row.
+pub(crate) fn mask(context: &Context<'_>, joint: usize, windows: &[Window]) -> Vec<f64> {
+    let inside = |(log, t): &(usize, f64)| {
+        windows.iter().any(|w| w.log == context.data.logs[*log] && *t >= w.from && *t <= w.to)
+    };
+    context.row_times(joint).iter().map(|at| if inside(at) { 1.0 } else { 0.0 }).collect()
+}
+
+/// Columns that are there in the windows only.
+pub(super) fn cut(context: &Context<'_>, columns: &[Column], windows: &[Window]) -> Vec<Column> {
+    let masks: Vec<Vec<f64>> = (0..context.data.dof()).map(|j| mask(context, j, windows)).collect();
+    let part = |(j, values): &(usize, Vec<f64>)| {
+        (*j, values.iter().zip(&masks[*j]).map(|(value, m)| value * m).collect())
+    };
+    columns.iter().map(|column| Column { parts: column.parts.iter().map(part).collect() }).collect()
+}
+
+/// The steps of each log.
+pub(super) fn by_log(steps: &[Block]) -> Vec<Range<usize>> {
+    (steps.chunk_by(|a, b| a.log == b.log))
+        .scan(0, |end, steps| {
+            *end += steps.len();
+            Some(*end - steps.len()..*end)
+        })
+        .collect()
+}
+
+/// The window of some steps of a log.
+pub(super) fn window(
+    context: &Context<'_>,
+    steps: &[Block],
+    log: &Range<usize>,
+    found: &Range<usize>,
+) -> Option<Window> {
+    let data = context.data;
+    let from = step_start(context, &steps[found.start])?;
+    // To the last row before the next step begins.
+    let to = match found.end < log.end {
+        true => step_start(context, &steps[found.end])? - 0.5 / data.rate(),
+        false => end_of_log(context, steps[found.start].log),
+    };
+    Some(Window::new(data, steps[found.start].log, from, to))
+}
+
+/// The same of what is there before a log begins where it is there at its first step, and goes on after it
+/// where it is there at its last.
+pub(super) fn lasting_window(
+    context: &Context<'_>,
+    steps: &[Block],
+    log: &Range<usize>,
+    found: &Range<usize>,
+) -> Option<Window> {
+    let mut window = window(context, steps, log, found)?;
+    if found.start == log.start {
+        window.from = context.data.recordings[steps[log.start].recording].start;
+    }
+    if found.end == log.end {
+        window.to = f64::INFINITY;
+    }
+    Some(window)
+}
+
+/// The steps in a row that together explain most.
+pub(super) fn best_run(explains: &[(f64, f64)]) -> Range<usize> {
+    let (mut best, mut run) = ((0.0, 0..0), (0.0, 0..0));
+    for (k, (less, _)) in explains.iter().enumerate() {
+        run = if run.0 > 0.0 { (run.0 + less, run.1.start..k + 1) } else { (*less, k..k + 1) };
+        if run.0 > best.0 {
+            best = run.clone();
+        }
+    }
+    best.1
+}
+
+/// The time of the first row of a step in its log's own t.
+fn step_start(context: &Context<'_>, step: &Block) -> Option<f64> {
+    let data = context.data;
+    let recording = &data.recordings[step.recording];
+    (0..data.dof())
+        .filter(|j| !step.rows[*j].is_empty())
+        .map(|j| {
+            let joint = &data.joints[j];
+            let k = joint.kept[step.recording][step.rows[j].start - joint.rows[step.recording].start];
+            recording.start + joint.band.kept(recording.len())[k] as f64 / recording.rate
+        })
+        .min_by(f64::total_cmp)
+}
+
+fn end_of_log(context: &Context<'_>, log: usize) -> f64 {
+    let end = |r: &Recording| r.start + r.len() as f64 / r.rate;
+    context.data.recordings.iter().filter(|r| r.log == log).map(end).fold(0.0, f64::max)
+}
