@@ -22,6 +22,8 @@ enum Command {
     Conventions(conventions::Arguments),
     /// How often `explain` gives the right name, where the truth is known
     Study(study::Arguments),
+    /// Logs with known truth as files, and the score of any program that explains them
+    Benchmark(study::BenchmarkArguments),
     /// What the base model leaves of each log when it is fitted to the others
     HeldOut(held_out::Arguments),
     /// How often `compare` calls equal arms different, and sees what changed
@@ -34,6 +36,7 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Conventions(arguments) => conventions::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
+        Command::Benchmark(arguments) => study::benchmark(&arguments),
         Command::HeldOut(arguments) => held_out::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Stories(arguments) => stories::run(&arguments),

@@ -18,6 +18,8 @@ pub(super) const LARGEST_FACTOR: f64 = 4.0;
 /// An arm and a plant like it.
 pub(super) struct Drawn {
     pub(super) arm: Arm,
+    /// Its arm file.
+    pub(super) text: String,
     pub(super) plant: Plant,
     /// Links whose plane x = 0 is declared a plane of symmetry, from 0.
     symmetric: Vec<usize>,
@@ -84,7 +86,7 @@ impl Drawn {
             white,
             colour_time: 0.15,
         };
-        Ok(Drawn { arm, plant: Plant::new(dynamics, friction, sensors), symmetric })
+        Ok(Drawn { arm, text, plant: Plant::new(dynamics, friction, sensors), symmetric })
     }
 
     /// An effect of that name at any joint; `None` where the arm has no place for it.

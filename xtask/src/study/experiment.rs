@@ -17,6 +17,7 @@ use powerball::virtual_arm::{Plant, PlantEffect as Effect, lwa4p};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
+use std::path::Path;
 use std::time::Instant;
 
 /// Paths of a session: those to fit, then those held out. Periods, s.
@@ -80,6 +81,23 @@ struct Session {
     seed: u64,
 }
 
+/// What a case's logs are made of.
+struct Recorded {
+    session: Session,
+    truths: Vec<Truth>,
+    sizes: Vec<f64>,
+}
+
+/// What is in logs that were written.
+pub(super) struct Written {
+    /// Each truth in words.
+    pub(super) words: Vec<String>,
+    /// Its visible size.
+    pub(super) sizes: Vec<f64>,
+    /// Held-out errors without it, by joint, N·m.
+    pub(super) clean: Vec<f64>,
+}
+
 impl Bench {
     pub(super) fn new() -> Result<Bench, String> {
         let arm = lwa4p::arm().map_err(|e| e.to_string())?;
@@ -92,31 +110,27 @@ impl Bench {
         Ok(Bench { model, body, plant, drawn })
     }
 
+    /// The bench of a case: another one where the arm is drawn by lot.
+    fn drawn(case: &Case) -> Result<Option<Bench>, String> {
+        if !case.table.draws_arms() {
+            return Ok(None);
+        }
+        let drawn = Drawn::new(&mut case.rng())?;
+        Bench::of(drawn.arm.clone(), drawn.plant.clone(), Some(drawn)).map(Some)
+    }
+
     /// Runs a case of simulated logs; `None` where no truth of its kind can be seen on the arm that was
     /// drawn.
     pub(super) fn run(&self, case: &Case) -> Result<Option<Outcome>, String> {
-        let mut rng = case.rng();
-        if case.table.draws_arms() && self.drawn.is_none() {
-            let drawn = Drawn::new(&mut rng)?;
-            return Bench::of(drawn.arm.clone(), drawn.plant.clone(), Some(drawn))?.run(case);
-        }
-        let mut session = self.session(case, &mut rng)?;
-        if case.table == Table::Misfit {
-            session.misfit = Some(self.misfit(&session, &mut rng)?);
-        }
-        let mut truths = Vec::new();
-        let mut sizes = Vec::new();
-        for (kind, size) in case.kinds.iter().zip(&case.sizes) {
-            let Some((truth, reached)) = self.truth(&session, kind, *size, &mut rng)? else {
-                return Ok(None);
-            };
-            truths.push(truth);
-            sizes.push(reached);
-        }
+        let drawn = Bench::drawn(case)?;
+        drawn.as_ref().unwrap_or(self).run_here(case)
+    }
+
+    fn run_here(&self, case: &Case) -> Result<Option<Outcome>, String> {
+        let Some(Recorded { session, truths, sizes }) = self.recorded(case)? else { return Ok(None) };
         let logs = session.logs(&truths, true);
         let (to_fit, held_out) = logs.split_at(FIT.len());
         let start = Instant::now();
-        let options = DataOptions::default();
         let explained = explain_body(&self.body, to_fit, held_out, &ExplainOptions::default())
             .map_err(|e| e.to_string())?;
         let (explained, settled) = if case.table == Table::Alike {
@@ -127,12 +141,60 @@ impl Bench {
             (explained, None)
         };
         let seconds = start.elapsed().as_secs_f64();
-        let clean = session.logs(&[], true);
-        let clean = self.errors(&clean[..FIT.len()], &clean[FIT.len()..], &options)?;
+        let clean = self.clean_errors(&session)?;
         let over = explained.after.validate.rms.iter().zip(&clean).map(|(a, c)| a / c).fold(0.0, f64::max);
         let words = truths.iter().map(Truth::words).collect();
         let outcome = Outcome::new(case, words, sizes, &explained, &[], over, seconds);
         Ok(Some(Outcome { settled, ..outcome }))
+    }
+
+    /// What a case's logs are made of; `None` where no truth of its kind can be seen on the arm that was drawn.
+    fn recorded(&self, case: &Case) -> Result<Option<Recorded>, String> {
+        let mut rng = case.rng();
+        let mut session = self.session(case, &mut rng)?;
+        if case.table == Table::Misfit {
+            session.misfit = Some(self.misfit(&session, &mut rng)?);
+        }
+        let (mut truths, mut sizes) = (Vec::new(), Vec::new());
+        for (kind, size) in case.kinds.iter().zip(&case.sizes) {
+            let Some((truth, reached)) = self.truth(&session, kind, *size, &mut rng)? else {
+                return Ok(None);
+            };
+            truths.push(truth);
+            sizes.push(reached);
+        }
+        Ok(Some(Recorded { session, truths, sizes }))
+    }
+
+    /// Held-out errors of the base model where nothing is missing, by joint, N·m.
+    fn clean_errors(&self, session: &Session) -> Result<Vec<f64>, String> {
+        let clean = session.logs(&[], true);
+        self.errors(&clean[..FIT.len()], &clean[FIT.len()..], &DataOptions::default())
+    }
+
+    /// Writes a case as files: the arm, logs to fit and logs to judge on. Returns what is in them; `None` as
+    /// for [`Bench::run`].
+    pub(super) fn write(&self, case: &Case, folder: &Path) -> Result<Option<Written>, String> {
+        let drawn = Bench::drawn(case)?;
+        drawn.as_ref().unwrap_or(self).write_here(case, folder)
+    }
+
+    fn write_here(&self, case: &Case, folder: &Path) -> Result<Option<Written>, String> {
+        let Some(Recorded { session, truths, sizes }) = self.recorded(case)? else { return Ok(None) };
+        let failed = |path: &Path, e: std::io::Error| format!("{}: {e}", path.display());
+        std::fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
+        let arm = folder.join("arm.toml");
+        let text = self.drawn.as_ref().map_or(lwa4p::ARM_FILE, |drawn| &drawn.text);
+        std::fs::write(&arm, text).map_err(|e| failed(&arm, e))?;
+        for (k, mut log) in session.logs(&truths, true).into_iter().enumerate() {
+            let kind = if k < FIT.len() { "fit" } else { "validate" };
+            let path = folder.join(format!("{kind}{k}.csv"));
+            let clock = log.clock;
+            log.t.iter_mut().for_each(|t| *t += clock);
+            log.write(&path).map_err(|e| failed(&path, e))?;
+        }
+        let words = truths.iter().map(Truth::words).collect();
+        Ok(Some(Written { words, sizes, clean: self.clean_errors(&session)? }))
     }
 
     fn session(&self, case: &Case, rng: &mut ChaCha8Rng) -> Result<Session, String> {

@@ -14,7 +14,13 @@ pub(super) struct Named {
     pub(super) alike: Vec<String>,
     pub(super) margin: f64,
     pub(super) leftover: f64,
+    /// How probable it is said to be.
+    #[serde(default)]
+    pub(super) probability: Option<f64>,
 }
+
+/// What a rival says where it fits as well.
+pub(super) const AS_WELL: &str = "fits as well";
 
 /// One case and what came of it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -78,7 +84,8 @@ impl Outcome {
         self.named.iter().filter(|n| !self.names_truth(n)).count()
     }
 
-    fn names_truth(&self, named: &Named) -> bool {
+    /// Whether a name is of something that is there, or of its class.
+    pub(super) fn names_truth(&self, named: &Named) -> bool {
         self.truth.iter().any(|t| named.effect == *t || named.alike.contains(t))
     }
 
@@ -120,11 +127,12 @@ pub(super) fn named(explained: &Explained) -> Vec<Named> {
             alike: e
                 .rivals
                 .iter()
-                .filter(|r| r.why_not.starts_with("fits as well"))
+                .filter(|r| r.why_not.starts_with(AS_WELL))
                 .map(|r| r.effect.clone())
                 .collect(),
             margin: e.margin,
             leftover: e.leftover,
+            probability: Some(e.probability),
         })
         .collect()
 }

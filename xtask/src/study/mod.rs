@@ -5,13 +5,16 @@
 
 mod alike;
 mod arms;
+mod benchmark;
 mod case;
 mod experiment;
 mod judge;
 mod law;
 mod measured;
 mod page;
+mod reliability;
 
+pub(crate) use benchmark::{Arguments as BenchmarkArguments, run as benchmark};
 use case::{Case, Table};
 use judge::Outcome;
 use std::collections::HashSet;

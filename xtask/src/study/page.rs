@@ -32,6 +32,15 @@ pub(super) fn tables(outcomes: &[Outcome]) -> String {
     if !alike.is_empty() {
         let _ = writeln!(out, "\n### {}\n\n{}", capital(Table::Alike.words()), super::alike::table(&alike));
     }
+    let stated = |o: &&Outcome| o.named.iter().any(|n| n.probability.is_some());
+    let stated: Vec<&Outcome> = outcomes.iter().filter(stated).collect();
+    if !stated.is_empty() {
+        let _ = writeln!(
+            out,
+            "\n### Whether names are right as often as is said\n\n{}",
+            super::reliability::table(&stated)
+        );
+    }
     for table in Table::all().into_iter().filter(|table| *table != Table::Alike) {
         let mut kinds: BTreeMap<String, Vec<&Outcome>> = BTreeMap::new();
         for outcome in outcomes.iter().filter(|o| o.table == table.name() && o.truth.len() == 1) {
