@@ -4,7 +4,13 @@
 
 mod arm;
 mod evaluate;
+mod explain;
 mod failure;
+mod identify;
+mod logs;
+mod motion;
+mod session;
+mod source;
 mod work;
 
 use pyo3::prelude::*;
@@ -16,4 +22,14 @@ mod _core {
     use super::arm::Arm;
     #[pymodule_export]
     use super::evaluate::functions;
+    #[pymodule_export]
+    use super::explain::{Explained, explain};
+    #[pymodule_export]
+    use super::identify::{ComparedSide, Identified, Written, compare, identify, verify};
+    #[pymodule_export]
+    use super::motion::{Excited, Trajectory, excite, write_whole};
+    #[pymodule_export]
+    use super::session::{virtual_effects, virtual_session};
+    #[pymodule_export]
+    use super::source::{export_imported, generate, generate_model};
 }

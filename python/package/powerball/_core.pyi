@@ -1,6 +1,6 @@
 """The compiled part: plain values in and out. Use the package's own classes."""
 
-from typing import Dict, List, Optional, Tuple
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,3 +57,82 @@ class Arm:
     def evaluate(
         self, name: str, set: str, states: List[Tuple[str, _Array]], parameters: Optional[_Array]
     ) -> _Array: ...
+
+_Tell = Optional[Callable[[str], object]]
+_Text = Tuple[str, str]
+
+class Identified:
+    def json(self) -> str: ...
+    def save(self, folder: str) -> None: ...
+    def side(self, name: str) -> ComparedSide: ...
+
+class Written:
+    def json(self) -> str: ...
+    def save(self, folder: str) -> None: ...
+
+class ComparedSide:
+    @staticmethod
+    def read(path: str) -> ComparedSide: ...
+
+class Explained:
+    def json(self) -> str: ...
+    def model_json(self) -> str: ...
+    def trajectory(self) -> Optional[Trajectory]: ...
+    def save(self, folder: str) -> None: ...
+
+class Trajectory:
+    def arrays(self) -> Tuple[_Array, _Array, _Array, _Array]: ...
+    def csv(self) -> str: ...
+
+class Excited:
+    def json(self) -> str: ...
+    def page(self) -> str: ...
+    def trajectories(self) -> List[Trajectory]: ...
+
+def identify(
+    arm: Arm,
+    log: Sequence[Any],
+    validate: Sequence[Any],
+    map: List[str],
+    model: Optional[_Text],
+    friction: str,
+    estimator: str,
+    progress: _Tell,
+) -> Identified: ...
+def verify(
+    arm: Arm,
+    model: _Text,
+    log: Sequence[Any],
+    map: List[str],
+    tolerance: float,
+    progress: _Tell,
+) -> Written: ...
+def compare(a: ComparedSide, b: ComparedSide, level: float) -> Written: ...
+def explain(
+    arm: Arm,
+    log: Sequence[Any],
+    validate: Sequence[Any],
+    map: List[str],
+    model: Optional[_Text],
+    correct_unattributed: bool,
+    progress: _Tell,
+) -> Explained: ...
+def excite(arm: Arm, asked: Any, progress: _Tell) -> Excited: ...
+def write_whole(path: Any, text: str) -> None: ...
+def generate(
+    arm: Arm,
+    parameters: str,
+    names: Optional[List[str]],
+    values: Optional[_Array],
+    friction: List[str],
+    batch: bool,
+    tests: bool,
+) -> str: ...
+def generate_model(
+    arm: Arm, model: _Text, scalar: str, names: Optional[List[str]]
+) -> Tuple[str, List[str]]: ...
+def export_imported(arm: Arm, values: _Text, friction: Optional[_Text]) -> Tuple[str, List[str]]: ...
+def virtual_effects() -> List[str]: ...
+def virtual_session(
+    folder: str, seed: int, effect: Optional[str], progress: _Tell
+) -> Tuple[str, List[str], List[str], Tuple[str, List[int], str]]: ...

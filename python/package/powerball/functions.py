@@ -81,7 +81,8 @@ class Functions:
     def slotine_li_regressor(
         self, q: ArrayLike, dq: ArrayLike, dqr: ArrayLike, ddqr: ArrayLike, *, parameters: str = "minimal"
     ) -> Array:
-        """Regressor of Slotine and Li: Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g, with C of Christoffel symbols.
+        """Regressor of Slotine and Li: Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g, with C of Christoffel
+        symbols.
 
         Returns: (n, p) for one sample, (N, n, p) for N.
         """

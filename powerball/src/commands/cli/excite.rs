@@ -4,7 +4,8 @@ use super::{Failure, output};
 use crate::controller::JointNumber;
 pub(super) use crate::identification::excite::{CLEARANCE, FloorAt, RADIUS, surroundings};
 use crate::identification::excite::{
-    Collision, Criterion, Error, ExciteOptions, Excited, MassSource, Mounting, Settings, excite,
+    Collision, Criterion, Error, ExciteOptions, Excited, MassSource, Mounting, SEARCH, Settings, excite,
+    searches,
 };
 use crate::logs::Progress;
 use crate::report::excited::{self, page, peaks};
@@ -13,10 +14,6 @@ use dyngen::{Arm, SetKind};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-
-/// Evaluations of one search, after which it hardly gains: more of them make more searches, each from starts
-/// of its own.
-const SEARCH: usize = 12_000;
 
 /// A parameter set on the command line.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -198,7 +195,7 @@ impl Excite {
                 Goal::Volume => Criterion::Volume,
             },
             evaluations: self.evaluations,
-            searches: (self.evaluations / SEARCH).max(1),
+            searches: searches(self.evaluations),
             seed: self.seed,
         }
     }
