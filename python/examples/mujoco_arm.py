@@ -20,7 +20,7 @@ RATE = 500.0
 
 
 def fourier_path(model: mujoco.MjModel, seed: int, period: float = 10.0, periods: int = 2):
-    """Times (N,), positions, velocities and accelerations (N, n) of a Fourier path within the joints' ranges."""
+    """Times (N,), positions, velocities and accelerations (N, n) of a path in the joints' ranges."""
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, period * periods, 1.0 / RATE)
     middle, half = model.jnt_range.mean(axis=1), np.ptp(model.jnt_range, axis=1) / 2

@@ -25,7 +25,7 @@ pub(crate) struct Origin {
 }
 
 /// An arm: its file, and what was derived of it so far.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "powerball._core")]
 pub(crate) struct Arm {
     pub(crate) arm: dyngen::Arm,
     pub(crate) origin: Option<Origin>,

@@ -20,7 +20,7 @@ enum Why {
 }
 
 /// The result of an explanation.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "powerball._core")]
 pub(crate) struct Explained {
     files: Files,
     model: String,

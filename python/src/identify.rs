@@ -26,7 +26,7 @@ fn failure(e: IdentifyError) -> PyErr {
 }
 
 /// The result of an identification.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "powerball._core")]
 pub(crate) struct Identified {
     side: Side,
     files: Files,
@@ -129,7 +129,7 @@ pub(crate) fn verify(
 }
 
 /// A result that is there as its files.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "powerball._core")]
 pub(crate) struct Written(Files);
 
 #[pymethods]
@@ -144,7 +144,7 @@ impl Written {
 }
 
 /// One of two fits that are compared.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "powerball._core")]
 pub(crate) struct ComparedSide(Side);
 
 #[pymethods]

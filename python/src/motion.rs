@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 
 /// Samples of a motion from rest to rest.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "powerball._core")]
 #[derive(Clone)]
 pub(crate) struct Trajectory(pub(crate) Motion);
 
@@ -42,7 +42,7 @@ impl Trajectory {
 }
 
 /// Exciting trajectories.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "powerball._core")]
 pub(crate) struct Excited {
     json: String,
     page: String,

@@ -1,6 +1,6 @@
 """The compiled part: plain values in and out. Use the package's own classes."""
 
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +9,11 @@ _Array = NDArray[np.float64]
 _Limit = Optional[float]
 _Limits = Tuple[Optional[List[float]], _Limit, _Limit, _Limit, _Limit]
 
+__all__: List[str]
+
 def functions() -> List[Tuple[str, List[str], str, str]]: ...
 
+@final
 class Arm:
     @staticmethod
     def parse(text: str, file: str) -> Arm: ...
@@ -61,29 +64,35 @@ class Arm:
 _Tell = Optional[Callable[[str], object]]
 _Text = Tuple[str, str]
 
+@final
 class Identified:
     def json(self) -> str: ...
     def save(self, folder: str) -> None: ...
     def side(self, name: str) -> ComparedSide: ...
 
+@final
 class Written:
     def json(self) -> str: ...
     def save(self, folder: str) -> None: ...
 
+@final
 class ComparedSide:
     @staticmethod
     def read(path: str) -> ComparedSide: ...
 
+@final
 class Explained:
     def json(self) -> str: ...
     def model_json(self) -> str: ...
     def trajectory(self) -> Optional[Trajectory]: ...
     def save(self, folder: str) -> None: ...
 
+@final
 class Trajectory:
     def arrays(self) -> Tuple[_Array, _Array, _Array, _Array]: ...
     def csv(self) -> str: ...
 
+@final
 class Excited:
     def json(self) -> str: ...
     def page(self) -> str: ...
