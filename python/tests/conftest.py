@@ -1,5 +1,6 @@
 """What the tests share: files of the repository, public robot descriptions, the commands."""
 
+import importlib
 import json
 import os
 import subprocess
@@ -13,15 +14,23 @@ ROOT = Path(__file__).resolve().parents[2]
 #: The folder of measured logs and public robot descriptions.
 DATA = Path(os.environ.get("POWERBALL_DATA", ROOT.parent / "shared" / "data"))
 BINARIES = Path(os.environ.get("POWERBALL_BIN", ROOT / "target" / "release"))
+#: In CI nothing that can be installed may be missing.
+REQUIRE_ALL = "REQUIRE_ALL" in os.environ
+
+
+def need(module):
+    """A module that some tests need."""
+    if REQUIRE_ALL:
+        return importlib.import_module(module)
+    return pytest.importorskip(module, reason=f"{module} is not installed")
 
 
 def command(name, *arguments):
-    """Runs one of the commands; its standard output, and its exit code."""
+    """Runs one of the commands."""
     path = BINARIES / name
-    if not path.exists():
+    if not path.exists() and not REQUIRE_ALL:
         pytest.skip(f"{path} is not built: cargo build --release")
-    done = subprocess.run([path, *map(str, arguments)], capture_output=True, text=True)
-    return done
+    return subprocess.run([path, *map(str, arguments)], capture_output=True, text=True)
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import powerball as pb
-from conftest import ROOT, command
+from conftest import ROOT, command, need
 from powerball import _core
 
 PUMA = ROOT / "dyngen" / "tests" / "urdf" / "puma.urdf"
@@ -21,7 +21,7 @@ def urdf_text(path):
 
 
 def pinocchio(text):
-    pin = pytest.importorskip("pinocchio", reason="pip install pin")
+    pin = need("pinocchio")
     model = pin.buildModelFromXML(text)
     return pin, model, model.createData()
 

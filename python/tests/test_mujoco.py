@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import powerball as pb
-from conftest import ROOT
+from conftest import ROOT, need
 
-mujoco = pytest.importorskip("mujoco", reason="pip install mujoco")
+mujoco = need("mujoco")
 sys.path.insert(0, str(ROOT / "python" / "examples"))
 import mujoco_arm as example  # noqa: E402
 

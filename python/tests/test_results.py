@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import powerball as pb
-from conftest import command, load
+from conftest import command, load, need
 
 
 @pytest.fixture(scope="session")
@@ -57,7 +57,7 @@ def test_what_an_identification_tells(identified, arm, rng):
 
 
 def test_frames_dicts_and_arrays_are_the_same_log(session, arm):
-    pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
+    pandas, polars = need("pandas"), need("polars")
     columns = table(session.log[0])
     expected = pb.identify(arm, session.log[0]).values
     stacked = {key: np.stack([columns[f"{key}{j}"] for j in range(1, 7)], axis=1) for key in ("q", "tau")}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import powerball as pb
-from conftest import ROOT
+from conftest import ROOT, need
 
 PUMA = ROOT / "dyngen" / "tests" / "urdf" / "puma.urdf"
 LWA4P = ROOT / "powerball" / "lwa4p.toml"
@@ -48,7 +48,7 @@ def test_an_exception_of_the_progress_function_ends_it():
 
 
 def test_progress_with_tqdm_and_without(capsys):
-    pytest.importorskip("tqdm")
+    need("tqdm")
     arm = pb.Arm.from_toml(LWA4P)
     pb.excite(arm, evaluations=100, progress=True)
     assert "searching" in capsys.readouterr().err
