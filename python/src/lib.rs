@@ -27,6 +27,8 @@ mod _core {
     #[pymodule_export]
     use super::identify::{ComparedSide, Identified, Written, compare, identify, verify};
     #[pymodule_export]
+    use super::logs::{inspect, read_log};
+    #[pymodule_export]
     use super::motion::{Excited, Trajectory, excite, write_whole};
     #[pymodule_export]
     use super::session::{virtual_effects, virtual_session};

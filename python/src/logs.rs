@@ -1,10 +1,11 @@
 //! Logs as Python gives them: files, or columns in memory.
 
+use crate::arm::Arm;
 use crate::failure::{input, value};
-use numpy::PyReadonlyArray1;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use powerball::Log;
-use powerball::identification::{Input, Source};
-use powerball::logs::log::ColumnMap;
+use powerball::identification::{Input, Recorded, Source};
+use powerball::logs::log::{ColumnMap, inspect as look};
 use pyo3::prelude::*;
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -66,4 +67,49 @@ fn in_memory(arm: &dyngen::Arm, given: &Given<'_>, map: &ColumnMap) -> PyResult<
     let read = Log::from_columns_as(&given.name, arm, &columns, map);
     let words = |found: Vec<powerball::logs::log::Finding>| found.iter().map(ToString::to_string).collect();
     Ok(read.map(|(log, found)| (log, words(found))).map_err(|e| e.to_string()))
+}
+
+/// Times (N,), positions and torques (N, n), temperatures (N, n) where there are any, and what was found.
+type Samples<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Option<Bound<'py, PyArray2<f64>>>,
+    Vec<String>,
+);
+
+/// A log as the fits read it: its faults taken out, in SI units.
+#[pyfunction]
+pub(crate) fn read_log<'py>(
+    py: Python<'py>,
+    arm: &Arm,
+    log: Given<'py>,
+    map: Vec<String>,
+) -> PyResult<Samples<'py>> {
+    let map = column_map(&map)?;
+    let Taken { sources, mut findings } = taken(&arm.arm, &[log], &map)?;
+    let read = py.detach(|| Recorded::read(&arm.arm, &sources, &[])).map_err(input)?;
+    findings.extend(read.warnings);
+    let Some(log) = read.fit.into_iter().next() else { return Err(input("there is no log")) };
+    let table = |by_joint: &[Vec<f64>]| {
+        let rows = (0..log.t.len()).flat_map(|k| by_joint.iter().map(move |joint| joint[k]));
+        PyArray1::from_vec(py, rows.collect()).reshape([log.t.len(), by_joint.len()])
+    };
+    let temperature = log.temperature.as_deref().map(table).transpose()?;
+    let t = PyArray1::from_slice(py, &log.t);
+    Ok((t, table(&log.q)?, table(&log.torque)?, temperature, findings))
+}
+
+/// What is in a file and what it is taken to be, as JSON.
+#[pyfunction]
+#[pyo3(signature = (file, map, arm))]
+pub(crate) fn inspect(
+    py: Python<'_>,
+    file: PathBuf,
+    map: Vec<String>,
+    arm: Option<&Arm>,
+) -> PyResult<String> {
+    let map = column_map(&map)?;
+    let found = py.detach(|| look(&file, &map, arm.map(|arm| &arm.arm))).map_err(input)?;
+    powerball::report::files::json(&found).map_err(input)
 }

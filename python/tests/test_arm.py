@@ -1,6 +1,7 @@
 """Arms from files and texts, and what is known of them."""
 
 import json
+import pickle
 
 import numpy as np
 import pytest
@@ -55,6 +56,12 @@ def test_a_mujoco_model():
     arm = pb.Arm.from_mjcf(MJCF)
     assert arm.dof > 1 and arm.values
     assert pb.Arm.from_mjcf(MJCF.read_text()).values == arm.values
+
+
+def test_an_arm_goes_to_other_processes():
+    for arm in (pb.Arm.from_urdf(PUMA, tip="forearm"), pb.Arm.from_toml(LWA4P)):
+        copy = pickle.loads(pickle.dumps(arm))
+        assert copy.text == arm.text and copy.values == arm.values and copy.notes == arm.notes
 
 
 def test_errors_have_the_commands_words(tmp_path):

@@ -70,6 +70,21 @@ def test_frames_dicts_and_arrays_are_the_same_log(session, arm):
         np.testing.assert_allclose(list(values.values()), list(expected.values()), rtol=1e-9, atol=1e-12)
 
 
+def test_a_log_is_read_and_inspected(session, arm, tmp_path):
+    recording = pb.read_log(arm, session.log[0])
+    columns = table(session.log[0])
+    assert recording.q.shape == recording.tau.shape == (len(recording.t), 6)
+    np.testing.assert_array_equal(recording.q[:, 2], columns["q3"])
+    values, expected = (list(pb.identify(arm, log).values.values()) for log in (recording, columns))
+    np.testing.assert_allclose(values, expected, rtol=1e-9)
+    done = command("powerball", "log", session.log[0], "--arm", session.arm_file, "--json")
+    assert {"files": [pb.inspect(session.log[0], arm=arm)]} == json.loads(done.stdout)
+    wrong = tmp_path / "wrong.csv"
+    wrong.write_text("t,q1\n0,0\n1,0\n")
+    with pytest.raises(pb.InputError, match=r"wrong.csv"):
+        pb.read_log(arm, wrong)
+
+
 def test_columns_that_are_no_numbers_are_told(session, arm):
     log = {**table(session.log[0]), "operator": np.array(["somebody"] * len(table(session.log[0])["t"]))}
     found = pb.identify(arm, log)

@@ -25,6 +25,7 @@ from .identification import (
     identify,
     verify,
 )
+from .reading import Recording, inspect, read_log
 from .source import export, generate
 from .virtual import Session, Truth, virtual_effects, virtual_session
 
@@ -45,6 +46,7 @@ __all__ = [
     "Mounted",
     "ParameterEstimate",
     "ParameterSet",
+    "Recording",
     "RefusedError",
     "Session",
     "SetParameter",
@@ -59,6 +61,8 @@ __all__ = [
     "export",
     "generate",
     "identify",
+    "inspect",
+    "read_log",
     "verify",
     "virtual_effects",
     "virtual_session",

@@ -69,7 +69,7 @@ def given(logs: Optional[Logs], argument: str) -> List[Given]:
     """All logs of an argument, one or several, in order."""
     if logs is None:
         return []
-    one = isinstance(logs, (str, os.PathLike, Mapping, Log, Mounted)) or _is_table(logs)
+    one = isinstance(logs, (str, os.PathLike, Mapping, Mounted)) or _is_table(logs) or _is_samples(logs)
     several: List[Any] = [logs] if one else list(cast(Iterable[Any], logs))
     return [_given(log, f"{argument}[{k}]", None) for k, log in enumerate(several)]
 
@@ -80,15 +80,20 @@ def _is_table(log: Any) -> bool:
     )
 
 
+def _is_samples(log: Any) -> bool:
+    """A ``Log``, or what has its attributes."""
+    return all(hasattr(log, key) for key in ("t", "q", "tau"))
+
+
 def _given(log: Any, name: str, mounting: Optional[str]) -> Given:
     if isinstance(log, Mounted):
         return _given(log.log, name, log.mounting)
     if isinstance(log, (str, os.PathLike)):
         return Given(os.fspath(log), os.fspath(log), mounting=mounting)
-    if isinstance(log, Log):
+    if _is_samples(log):
         kept = ("t", "q", "tau", "i", "dq", "temp", "motor")
-        quantities = {key: getattr(log, key) for key in kept if getattr(log, key) is not None}
-        return Given(None, log.name or name, _columns(quantities, name), mounting)
+        quantities = {key: getattr(log, key) for key in kept if getattr(log, key, None) is not None}
+        return Given(None, getattr(log, "name", None) or name, _columns(quantities, name), mounting)
     if isinstance(log, Mapping):
         return Given(None, name, _columns(log, name), mounting)
     if isinstance(log, np.ndarray) and log.dtype.names is not None:

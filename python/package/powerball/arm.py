@@ -98,8 +98,10 @@ class Arm(Functions):
     Made by :meth:`from_toml`, :meth:`from_urdf` or :meth:`from_mjcf`.
     """
 
-    def __init__(self, core: _core.Arm) -> None:
+    def __init__(self, core: _core.Arm, made: Tuple[str, Tuple[Any, ...]]) -> None:
         self._core = core
+        # By which function of the compiled part and of what: copies in other processes are made anew.
+        self._made = made
         self._sets: Optional[Dict[str, ParameterSet]] = None
         self._own_values: Dict[str, Array] = {}
 
@@ -110,7 +112,7 @@ class Arm(Functions):
         Raises: ``InputError`` with every error of the file at once, each with line and column.
         """
         text, file = _text(source, "=")
-        return cls(_core.Arm.parse(text, file))
+        return _made("parse", (text, file))
 
     @classmethod
     def from_urdf(
@@ -161,9 +163,8 @@ class Arm(Functions):
     ) -> Arm:
         text, file = _text(source, "<")
         locked = [(joint, float(at)) for joint, at in (lock or {}).items()]
-        return cls(
-            _core.Arm.import_from(text, file, mjcf, base, tip, locked, exact, convention, angle_tolerance)
-        )
+        made = (text, file, mjcf, base, tip, locked, exact, convention, angle_tolerance)
+        return _made("import_from", made)
 
     @property
     def name(self) -> str:
@@ -275,8 +276,15 @@ class Arm(Functions):
         array = self.set_values(values, parameters=parameters) if takes_values else None
         return self._core.evaluate(name, parameters, given, array)
 
+    def __reduce__(self) -> Tuple[Any, ...]:
+        return _made, self._made
+
     def __repr__(self) -> str:
         return f"<Arm {self.name}: {self.dof} joints, {len(self.parameters)} parameters>"
+
+
+def _made(function: str, arguments: Tuple[Any, ...]) -> Arm:
+    return Arm(getattr(_core.Arm, function)(*arguments), (function, arguments))
 
 
 _TAKES_VALUES = {name for name, arguments, _, _ in _core.functions() if "parameters" in arguments}
