@@ -9,7 +9,29 @@ _Array = NDArray[np.float64]
 _Limit = Optional[float]
 _Limits = Tuple[Optional[List[float]], _Limit, _Limit, _Limit, _Limit]
 
-__all__: List[str]
+__all__ = [
+    "Arm",
+    "ComparedSide",
+    "Excited",
+    "Explained",
+    "Identified",
+    "Trajectory",
+    "Written",
+    "compare",
+    "excite",
+    "explain",
+    "export_imported",
+    "functions",
+    "generate",
+    "generate_model",
+    "identify",
+    "inspect",
+    "read_log",
+    "verify",
+    "virtual_effects",
+    "virtual_session",
+    "write_whole",
+]
 
 def functions() -> List[Tuple[str, List[str], str, str]]: ...
 
