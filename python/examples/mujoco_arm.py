@@ -7,6 +7,7 @@ Needs: pip install powerball mujoco
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -54,21 +55,25 @@ def record(model: mujoco.MjModel, seed: int) -> pb.Log:
     return pb.Log(t, q, tau=torques(model, q, dq, ddq) + noise, name=f"path {seed}")
 
 
+def as_delivered(text: str) -> str:
+    """The model as makers give it: no friction, a guess of the armatures, masses that are off."""
+    text = re.sub(r'damping="[^"]*" frictionloss="[^"]*" armature="[^"]*"', 'armature="0.2"', text)
+    return re.sub(r'mass="([^"]*)"', lambda m: f'mass="{0.8 * float(m[1]):.3f}"', text)
+
+
 def main(path: Path, new: Path) -> None:
+    """Identifies the arm of a file that knows neither friction nor masses, and writes the file anew."""
     model = mujoco.MjModel.from_xml_path(str(path))
-    arm = pb.Arm.from_mjcf(path)
+    arm = pb.Arm.from_mjcf(as_delivered(path.read_text()))
     identified = pb.identify(arm, [record(model, seed) for seed in range(4)], record(model, 9), progress=True)
     print(identified)
     pb.export(arm, identified, output=new)
     again = mujoco.MjModel.from_xml_path(str(new))
-    print("joint   damping         frictionloss    armature")
+    keys = ("dof_damping", "dof_frictionloss", "dof_armature")
+    print("joint  in the plant → identified:", ", ".join(keys))
     for j in range(model.nv):
-        pairs = [
-            getattr(m, key)[j]
-            for key in ("dof_damping", "dof_frictionloss", "dof_armature")
-            for m in (model, again)
-        ]
-        print("{:5d}   {:.3f} → {:.3f}   {:.3f} → {:.3f}   {:.3f} → {:.3f}".format(j + 1, *pairs))
+        pairs = [f"{getattr(model, key)[j]:.3f} → {getattr(again, key)[j]:.3f}" for key in keys]
+        print(f"{j + 1:5d}  " + "   ".join(pairs))
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import mujoco_arm as example  # noqa: E402
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
     model = mujoco.MjModel.from_xml_path(str(example.MODEL))
-    arm = pb.Arm.from_mjcf(example.MODEL)
+    arm = pb.Arm.from_mjcf(example.as_delivered(example.MODEL.read_text()))
     logs = [example.record(model, seed) for seed in range(4)]
     identified = pb.identify(arm, logs, example.record(model, 9))
     new = tmp_path_factory.mktemp("mujoco") / "identified.xml"

@@ -85,6 +85,20 @@ def test_a_log_is_read_and_inspected(session, arm, tmp_path):
         pb.read_log(arm, wrong)
 
 
+def test_time_stamps_and_summaries(session, arm, tmp_path):
+    columns = table(session.log[0])
+    stamps = np.datetime64("2026-01-02T03:04:05") + (columns["t"] * 1e9).astype("timedelta64[ns]")
+    recording = pb.read_log(arm, {**columns, "t": stamps})
+    np.testing.assert_allclose(np.diff(recording.t), np.diff(columns["t"]), atol=1e-6)
+    summary = tmp_path / "log.summary"
+    command(
+        "powerball",
+        *("summarize", "--arm", session.arm_file, "--log", session.log[0], "--out", summary),
+    )
+    values, expected = (list(pb.identify(arm, log).values.values()) for log in (summary, session.log[0]))
+    np.testing.assert_allclose(values, expected, rtol=1e-9)
+
+
 def test_columns_that_are_no_numbers_are_told(session, arm):
     log = {**table(session.log[0]), "operator": np.array(["somebody"] * len(table(session.log[0])["t"]))}
     found = pb.identify(arm, log)
