@@ -17,6 +17,7 @@ fn paths(page: &str) -> Vec<String> {
         "benches/",
         "firmware/",
         ".ci/",
+        "python/",
     ];
     let named = code.filter(|w| first_folders.iter().any(|f| w.starts_with(f)) && !w.contains(' '));
     let links = page.split("](").skip(1).filter_map(|rest| rest.split(')').next());
@@ -38,6 +39,7 @@ fn every_path_that_a_page_names_exists() {
         "docs/conventions.md",
         "docs/explain.md",
         "docs/model.md",
+        "docs/python.md",
     ] {
         let text = std::fs::read_to_string(root().join(page)).unwrap_or_else(|e| panic!("{page}: {e}"));
         let folder = root().join(page).parent().unwrap().to_path_buf();

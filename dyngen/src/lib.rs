@@ -7,6 +7,7 @@ pub mod arm;
 pub mod base;
 mod config;
 pub mod consistency;
+pub mod describe;
 pub mod diagnostic;
 pub mod dynamics;
 pub mod emit;

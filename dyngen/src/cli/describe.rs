@@ -1,15 +1,15 @@
 //! `dyngen describe`.
 
 use super::{Failure, model, print};
-use dyngen::arm::{Convention, JointKind, Placement, Transmission};
+use dyngen::Model;
+use dyngen::arm::{Convention, JointKind, Placement};
 use dyngen::base::choice;
 use dyngen::base::sets::{Class, combination_text};
-use dyngen::base::symmetry::{self, Removed, Symmetry};
+use dyngen::base::symmetry::{Removed, Symmetry};
 use dyngen::base::{ParameterSet, SetKind};
+use dyngen::describe::{Description, exact_rows};
 use dyngen::exact::rational;
-use dyngen::graph::{Operations, Preparation};
-use dyngen::{Function, Model};
-use serde_json::{Map, Value, json};
+use dyngen::graph::Operations;
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -26,111 +26,13 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let model = model(&args.arm)?;
-    let mut preparation = Preparation::default();
-    let mut operations: Vec<(&str, Operations)> = Function::ALL
-        .into_iter()
-        .map(|function| {
-            let built = model.function(function, SetKind::Minimal).map_err(Failure::refused)?;
-            let built = built.without_preparation(&mut preparation);
-            Ok((function.name(), built.operations()))
-        })
-        .collect::<Result<_, Failure>>()?;
-    // What every function together needs of the parameters alone.
-    operations.push(("prepare", preparation.operations()));
-    let symmetries = symmetry::symmetries(model.arm(), model.sets()).map_err(Failure::refused)?;
+    let description = Description::of(&model).map_err(Failure::refused)?;
     let text = match args.json {
-        true => format!("{}\n", json_text(&model, &operations, &symmetries)),
-        false => table(&model, &operations, &symmetries),
+        true => format!("{}\n", description.json(&model)),
+        false => table(&model, &description.operations, &description.symmetries),
     };
     print(&text)?;
     Ok(ExitCode::SUCCESS)
-}
-
-fn json_text(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetry]) -> Value {
-    let arm = model.arm();
-    let kept = arm.kept_parameters();
-    let names: Vec<String> = kept.iter().map(ToString::to_string).collect();
-    let of_class = |class: Class| -> Vec<String> {
-        kept.iter().filter(|p| model.sets().class(**p) == class).map(ToString::to_string).collect()
-    };
-    let mut sets = Map::new();
-    for set in &model.sets().sets {
-        sets.insert(set.kind.name().to_string(), set_json(model, set));
-    }
-    let operations: Map<String, Value> = operations
-        .iter()
-        .map(|(f, o)| {
-            ((*f).to_string(), json!({"mul": o.mul, "add": o.add, "div": o.div, "sin_cos": o.sin_cos}))
-        })
-        .collect();
-    let choice: Vec<Value> = (model.sets().candidates.iter())
-        .map(|c| json!({"rule": c.preference.to_string(), "operations": c.operations}))
-        .collect();
-    json!({
-        "arm": arm.name,
-        "joints": arm.dof(),
-        "joint_names": arm.joint_names(),
-        "transmissions": arm.transmissions.iter().map(transmission_json).collect::<Vec<_>>(),
-        "parameters": names,
-        "sets": sets,
-        "unidentifiable": of_class(Class::Unidentifiable),
-        "identifiable_alone": of_class(Class::Alone),
-        "identifiable_in_combination": of_class(Class::InCombination),
-        "operations": operations,
-        "choice": choice,
-        "symmetries": symmetries.iter().map(|s| symmetry_json(model, s)).collect::<Vec<_>>(),
-        "notes": arm.notes(),
-    })
-}
-
-/// Joints from 1; the matrix as exact text.
-fn transmission_json(block: &Transmission) -> Value {
-    let joints: Vec<usize> = block.joints.iter().map(|j| j + 1).collect();
-    json!({"joints": joints, "matrix": exact_rows(block)})
-}
-
-fn exact_rows(block: &Transmission) -> Vec<Vec<String>> {
-    block.matrix.iter().map(|row| row.iter().map(rational::to_text).collect()).collect()
-}
-
-fn symmetry_json(model: &Model, symmetry: &Symmetry) -> Value {
-    let (removed, equals) = match &symmetry.removed {
-        Removed::Nothing => ("nothing", None),
-        Removed::BaseParameter => ("base parameter", None),
-        Removed::Term(terms) => ("term", Some(combination_text(&model.sets().field, terms))),
-    };
-    json!({"parameter": symmetry.parameter.to_string(), "removed": removed, "equals": equals})
-}
-
-fn set_json(model: &Model, set: &ParameterSet) -> Value {
-    let field = &model.sets().field;
-    let parameters: Vec<Value> = set
-        .parameters
-        .iter()
-        .map(|p| {
-            let terms: Vec<Value> = p
-                .terms
-                .iter()
-                .map(|(q, c)| {
-                    let coefficient = field.text(c);
-                    json!({"parameter": q.to_string(), "coefficient": coefficient, "value": field.value(c)})
-                })
-                .collect();
-            json!({"name": p.name, "terms": terms})
-        })
-        .collect();
-    let mut object = json!({
-        "count": set.parameters.len(),
-        "rank": set.rank,
-        "exact": set.exact,
-        "relations": set.relations,
-        "parameters": parameters,
-    });
-    if !set.exact {
-        object["lost"] =
-            set.lost.iter().map(|(p, why)| json!({"parameter": p.to_string(), "why": why})).collect();
-    }
-    object
 }
 
 fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetry]) -> String {

@@ -92,13 +92,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
 /// Why a result is no number: nothing of it is printed.
 fn not_finite(states: &States, function: Function, row: usize) -> Failure {
     let line = states.rows.get(row).map_or(0, |(line, _)| *line);
-    let solves = matches!(function, Function::ForwardDynamics | Function::MassMatrixInverse);
-    let why = if solves {
-        "the mass matrix B(q) is singular there with these parameter values; `dyngen check` says which link \
-         cannot be real"
-    } else {
-        "the state or a parameter value is too large"
-    };
+    let why = function.why_not_finite();
     Failure::refused(format!("{}:{line}: {function} is not finite: {why}", states.file))
 }
 

@@ -450,6 +450,16 @@ impl Function {
         self.row().kind
     }
 
+    /// Why its result can be no number where states and parameter values are finite, in words.
+    pub fn why_not_finite(self) -> &'static str {
+        if matches!(self, ForwardDynamics | MassMatrixInverse) {
+            "the mass matrix B(q) is singular there with these parameter values; `dyngen check` says which \
+             link cannot be real"
+        } else {
+            "the state or a parameter value is too large"
+        }
+    }
+
     /// Whether it takes an argument.
     pub fn takes(self, argument: Argument) -> bool {
         self.arguments().contains(&argument)

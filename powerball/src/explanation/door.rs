@@ -1,9 +1,11 @@
 //! The door: from an arm and logs to an explanation.
 
+use super::experiment::propose;
 use super::explain::{Explained, explain_body};
 use super::options::{ExplainError, ExplainOptions};
 use super::torque_model::TorqueModel;
 use crate::identification::conventions::{Conventions, conventions};
+use crate::identification::motion::Motion;
 use crate::logs::log::{Log, common_clock};
 use crate::logs::regression::RigidBody;
 use dyngen::Arm;
@@ -72,6 +74,20 @@ impl Prepared {
         let mut prepared = Prepared { body, logs: Vec::new(), validate: Vec::new(), conventions, known };
         (prepared.logs, prepared.validate) = (prepared.without_known(all), prepared.without_known(validate));
         Ok(prepared)
+    }
+
+    /// The explanation of the logs, and the trajectory that tells apart what they leave open, where there is
+    /// one.
+    ///
+    /// # Errors
+    /// [`ExplainError`] as [`explain`].
+    pub fn explained(
+        &self,
+        options: &ExplainOptions<'_>,
+    ) -> Result<(Explained, Option<Motion>), ExplainError> {
+        let mut explained = explain_body(&self.body, &self.logs, &self.validate, options)?;
+        let motion = propose(&self.body, &mut explained, options);
+        Ok((explained, motion))
     }
 
     /// Other logs of the same arm, without what is known.

@@ -16,7 +16,8 @@ mod summarize;
 mod verify;
 
 pub use identify::{
-    Along, Estimator, Identified, IdentifyError, IdentifyOptions, JointAlong, LogFacts, MountedFit, identify,
+    Along, Estimator, Identified, IdentifyError, IdentifyOptions, JointAlong, LogFacts, MountedFit, Recorded,
+    identify,
 };
 pub use known::KnownModel;
 pub use nearest::{NearestArm, NearestError, ValueChange, nearest_arm};

@@ -4,8 +4,19 @@ use crate::controller::JointNumber;
 use crate::explanation::effects::Figures;
 use crate::explanation::explain::{Explained, NamedEffect, Shown, State, TorqueCurve};
 use crate::report::conventions;
-use crate::report::{BarPairs, Figure, Ink, Page, Panel, Series, Table, Tone, number};
+use crate::report::{BarPairs, Figure, Files, Ink, Page, Panel, Series, Table, Tone, number};
 use serde_json::Value;
+
+/// explained.json, model.json and report.html.
+///
+/// # Errors
+/// A result that is no JSON.
+pub fn files(explained: &Explained) -> Result<Files, String> {
+    let mut page = Page::new(format!("What the model of {} lacks", explained.arm));
+    add_to_page(&mut page, explained);
+    let files = Files::default().json("explained.json", explained)?.json("model.json", &explained.model)?;
+    Ok(files.with("report.html", page.to_html()))
+}
 
 /// Adds everything that an explanation says to a page: what the columns are, errors, effects with their evidence, torques over
 /// time, what stays, and what was found in the logs.

@@ -21,16 +21,22 @@
 
 mod axis;
 mod bars;
+pub mod compared;
 pub mod conventions;
 mod decimate;
+pub mod excited;
 pub mod explained;
 mod figure;
+pub mod files;
+pub mod identified;
 mod page;
 mod table;
+pub mod verified;
 
 pub use axis::number;
 pub use bars::BarPairs;
 pub use figure::{Figure, Ink, Mark, Panel, Series};
+pub use files::Files;
 pub use page::{Page, Tone};
 pub use table::Table;
 

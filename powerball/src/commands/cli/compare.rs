@@ -2,10 +2,10 @@
 
 use super::inputs::MapArgument;
 use super::{Failure, output};
-use crate::comparison::{CompareError, CompareOptions, Comparison, FrictionDifference, Side, compare};
+use crate::comparison::{CompareError, CompareOptions, Side, compare};
 use crate::identification::{IdentifyOptions, Source, identify};
 use crate::logs::Progress;
-use crate::report::{Figure, Ink, Page, Panel, Series, Table, Tone, number};
+use crate::report;
 use clap::Args;
 use dyngen::Arm;
 use std::io::Read;
@@ -59,12 +59,10 @@ impl Compare {
             self.arm.as_deref().map(Arm::read).transpose().map_err(|e| Failure::Unusable(e.to_string()))?;
         let [a, b] = [self.side(&self.a, arm.as_ref())?, self.side(&self.b, arm.as_ref())?];
         let compared = compare(&a, &b, &CompareOptions { level: self.level })?;
-        output::make_folder(&self.out)?;
-        let text = output::json(&compared)?;
-        output::write(&self.out, "comparison.json", text.as_bytes())?;
-        output::write(&self.out, "report.html", page(&compared).to_html().as_bytes())?;
+        let files = report::compared::files(&compared).map_err(Failure::Refused)?;
+        files.write(&self.out).map_err(Failure::Unusable)?;
         if self.json {
-            output::print(&text);
+            output::print(&files.first());
             return Ok(());
         }
         compared.warnings.iter().for_each(|warning| output::print(&format!("note: {warning}")));
@@ -106,62 +104,4 @@ fn is_json(path: &Path) -> bool {
     let mut head = Vec::new();
     let read = std::fs::File::open(path).and_then(|file| file.take(64).read_to_end(&mut head));
     read.is_ok() && head.trim_ascii_start().starts_with(b"{")
-}
-
-fn page(compared: &Comparison) -> Page {
-    let mut page = Page::new(format!("Two fits of {}", compared.arm));
-    page.lead(&format!(
-        "A: {}. B: {}. Differences are B less A; the intervals of all {} numbers hold at once, and equal \
-            arms are called \
-            different in {} % of comparisons.",
-        compared.a,
-        compared.b,
-        compared.comparisons,
-        100.0 * compared.level
-    ));
-    page.note(if compared.differ { Tone::Bad } else { Tone::Good }, &compared.sentence);
-    compared.warnings.iter().for_each(|warning| {
-        page.note(Tone::Plain, warning);
-    });
-    page.heading("Torque");
-    page.paragraph(
-        "What the difference means along the logs of A, and what the errors of both fits alone would make.",
-    );
-    let mut table = Table::new(["joint", "difference, rms [N·m]", "of the torque", "errors alone [N·m]"]);
-    for t in &compared.torque_difference {
-        let share = format!("{:.2} %", 100.0 * t.relative);
-        table.push([t.joint.to_string(), number(t.rms), share, number(t.expected)]);
-    }
-    page.table(&table);
-    page.heading("Friction");
-    for f in &compared.friction {
-        page.figure(&friction_figure(f), "");
-    }
-    page.heading("Inertial parameters");
-    let mut table = Table::new(["parameter", "A", "B", "difference", "interval", "differs"]);
-    for p in &compared.parameters {
-        table.push([
-            p.name.clone(),
-            number(p.a),
-            number(p.b),
-            number(p.difference),
-            format!("{} to {}", number(p.interval[0]), number(p.interval[1])),
-            if p.differs { "yes".to_string() } else { String::new() },
-        ]);
-    }
-    page.table(&table);
-    page
-}
-
-fn friction_figure(f: &FrictionDifference) -> Figure {
-    let title = format!("Joint {}{}", f.joint, if f.differs { ": friction differs" } else { "" });
-    let at = |values: &[f64]| f.velocities.iter().copied().zip(values.iter().copied()).collect::<Vec<_>>();
-    let end = |k: usize| f.interval.iter().map(|interval| interval[k]).collect::<Vec<f64>>();
-    let curves = Panel::new("friction [N·m]").line("A", Ink::Blue, at(&f.a)).line("B", Ink::Orange, at(&f.b));
-    let difference = Panel::new("B − A [N·m]")
-        .height(0.6)
-        .line("difference", Ink::Green, at(&f.difference))
-        .series(Series::dashed("its interval", Ink::Grey, at(&end(0))))
-        .series(Series::dashed("", Ink::Grey, at(&end(1))));
-    Figure::new(title, "velocity [rad/s]").panel(curves).panel(difference)
 }

@@ -1,24 +1,19 @@
 //! `powerball excite`: from an arm file to trajectories.
 
-use super::excite_page::page;
 use super::{Failure, output};
 use crate::controller::JointNumber;
 pub(super) use crate::identification::excite::{CLEARANCE, FloorAt, RADIUS, surroundings};
 use crate::identification::excite::{
-    Collision, Criterion, Error, ExciteOptions, Excited, Figures, Fourier, MassSource, Mounting, Settings,
-    Trajectory, excite,
+    Collision, Criterion, Error, ExciteOptions, Excited, MassSource, Mounting, SEARCH, Settings, excite,
+    searches,
 };
-use crate::identification::motion::Motion;
 use crate::logs::Progress;
+use crate::report::excited::{self, page, peaks};
 use clap::{Args, ValueEnum};
 use dyngen::{Arm, SetKind};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-
-/// Evaluations of one search, after which it hardly gains: more of them make more searches, each from starts
-/// of its own.
-const SEARCH: usize = 12_000;
 
 /// A parameter set on the command line.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -200,7 +195,7 @@ impl Excite {
                 Goal::Volume => Criterion::Volume,
             },
             evaluations: self.evaluations,
-            searches: (self.evaluations / SEARCH).max(1),
+            searches: searches(self.evaluations),
             seed: self.seed,
         }
     }
@@ -241,37 +236,10 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 }
 
 fn in_json(told: &Excited, files: &[PathBuf]) -> Value {
-    let figures = |f: &Figures| json!({"condition": f.condition, "least_singular_value": f.least, "mean_singular_value": f.mean});
-    let trajectory = |((trajectory, file), path): ((&Trajectory, &PathBuf), &Fourier)| {
-        let torque = trajectory.tightest.torque.as_ref();
-        let joints: Vec<Value> = peaks(&trajectory.motion)
-            .iter()
-            .zip(&path.joints)
-            .enumerate()
-            .map(|(i, ([low, high, speed, acceleration], series))| {
-                json!({"position": [low, high], "velocity": speed, "acceleration": acceleration,
-                    "torque": torque.map(|t| t[i]),
-                    "middle": series.middle, "a": series.a, "b": series.b})
-            })
-            .collect();
-        let nearest = trajectory.tightest.nearest.map(
-            |(near, time)| json!({"distance": near.distance, "between": near.contact.to_string(), "time": time}),
-        );
-        json!({"out": file, "mounting": trajectory.mounting.to_string(), "samples": trajectory.motion.len(),
-            "duration": trajectory.motion.duration(), "fundamental": path.fundamental, "nearest": nearest, "joints": joints})
-    };
-    let mut object = json!({
-        "parameters": told.parameters.0, "rank": told.parameters.1,
-        "figures": figures(&told.found.figures), "random_start": figures(&told.found.usual),
-        "conditions": {"raw": told.conditions.raw, "normalised": told.conditions.normalised},
-        "assumed": told.assumed,
-    });
-    let mut list: Vec<Value> =
-        told.trajectories.iter().zip(files).zip(&told.found.paths).map(trajectory).collect();
-    if let ([Value::Object(only)], Value::Object(object)) = (list.as_mut_slice(), &mut object) {
-        object.append(only);
-    } else {
-        object["trajectories"] = list.into();
+    let mut object = excited::json(told);
+    match object.get_mut("trajectories").and_then(Value::as_array_mut) {
+        Some(list) => list.iter_mut().zip(files).for_each(|(entry, file)| entry["out"] = json!(file)),
+        None => object["out"] = json!(files.first()),
     }
     object
 }
@@ -333,18 +301,4 @@ fn in_words(told: &Excited, files: &[PathBuf]) -> String {
         let _ = writeln!(out, "assumed: {line}");
     });
     out
-}
-
-/// Lowest and highest position, largest velocity and acceleration of each joint.
-fn peaks(motion: &Motion) -> Vec<[f64; 4]> {
-    let mut peaks = vec![[f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0]; motion.dof()];
-    for [q, dq, ddq] in motion.samples() {
-        for (i, [low, high, speed, acceleration]) in peaks.iter_mut().enumerate() {
-            *low = low.min(q[i]);
-            *high = high.max(q[i]);
-            *speed = speed.max(dq[i].abs());
-            *acceleration = acceleration.max(ddq[i].abs());
-        }
-    }
-    peaks
 }

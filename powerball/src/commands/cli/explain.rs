@@ -10,13 +10,13 @@ use crate::controller::JointNumber;
 use crate::explanation::experiment::{self, TRAJECTORY};
 use crate::explanation::explain::{Change, Explained, FalsePositives, NamedEffect, Unattributed, Verdict};
 use crate::explanation::torque_model::TorqueModel;
-use crate::explanation::{ExplainError, ExplainOptions, Prepared, explain_body};
+use crate::explanation::{ExplainError, ExplainOptions, Prepared};
 use crate::identification::motion::Motion;
 use crate::logs;
 use crate::logs::log::{Log, read_logs};
 use crate::procedure::{RecordError, record};
-use crate::report::Page;
-use crate::report::explained::{add_to_page, nothing_named};
+use crate::report;
+use crate::report::explained::nothing_named;
 use crate::virtual_arm::Undeclared;
 use clap::Args;
 use dyngen::Arm;
@@ -84,9 +84,8 @@ impl Explain {
         };
         let refused = |e| self.failure(&e);
         let prepared = Prepared::new(&arm, &recorded.fit, &recorded.validate, &options).map_err(refused)?;
-        let mut explained =
-            explain_body(&prepared.body, &prepared.logs, &prepared.validate, &options).map_err(refused)?;
-        let motion = self.proposed(&prepared, &mut explained, &options)?;
+        let (mut explained, motion) = prepared.explained(&options).map_err(refused)?;
+        self.write_trajectory(motion.as_ref())?;
         match (experiment, motion) {
             (Some((bus, note)), Some(motion)) => {
                 progress.say("recording the experiment");
@@ -98,7 +97,8 @@ impl Explain {
                         experiment::learn(&prepared.body, old, new, &explained, &options).map_err(refused)?;
                 }
                 // What is still open may ask for another experiment.
-                self.proposed(&prepared, &mut explained, &options)?;
+                let next = experiment::propose(&prepared.body, &mut explained, &options);
+                self.write_trajectory(next.as_ref())?;
             }
             (Some(_), None) => recorded.warnings.push(NOTHING_OPEN.to_string()),
             (None, _) => {}
@@ -107,30 +107,17 @@ impl Explain {
         self.write(&prepared.with_known(explained))
     }
 
-    /// The trajectory of the experiment that an explanation asks for, written.
-    fn proposed(
-        &self,
-        prepared: &Prepared,
-        explained: &mut Explained,
-        options: &ExplainOptions<'_>,
-    ) -> Result<Option<Motion>, Failure> {
-        let motion = experiment::propose(&prepared.body, explained, options);
-        if let Some(motion) = &motion {
-            output::write(&self.inputs.out, TRAJECTORY, motion.to_csv().as_bytes())?;
-        }
-        Ok(motion)
+    /// Writes the trajectory of the experiment that an explanation asks for.
+    fn write_trajectory(&self, motion: Option<&Motion>) -> Result<(), Failure> {
+        let Some(motion) = motion else { return Ok(()) };
+        output::write(&self.inputs.out, TRAJECTORY, motion.to_csv().as_bytes())
     }
 
     /// Writes and prints the result.
     fn write(&self, explained: &Explained) -> Result<(), Failure> {
-        let text = output::json(explained)?;
-        output::write(&self.inputs.out, "explained.json", text.as_bytes())?;
-        let model = output::json(&explained.model)?;
-        output::write(&self.inputs.out, "model.json", model.as_bytes())?;
-        let mut page = Page::new(format!("What the model of {} lacks", explained.arm));
-        add_to_page(&mut page, explained);
-        output::write(&self.inputs.out, "report.html", page.to_html().as_bytes())?;
-        output::print(&if self.inputs.json { text } else { summary(explained) });
+        let files = report::explained::files(explained).map_err(Failure::Refused)?;
+        files.write(&self.inputs.out).map_err(Failure::Unusable)?;
+        output::print(&if self.inputs.json { files.first() } else { summary(explained) });
         Ok(())
     }
 

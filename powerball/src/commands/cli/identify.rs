@@ -1,16 +1,15 @@
 //! `powerball identify`: from logs to identified.json.
 
-use super::identify_page::page;
 use super::inputs::MapArgument;
 use super::mounted::MountedLogs;
 use super::{Failure, output};
-use crate::explanation::torque_model::{Additions, ModelFile};
+use crate::explanation::torque_model::ModelFile;
 use crate::identification::estimate::FrictionLaw;
-use crate::identification::{Estimator, Identified, IdentifyOptions, KnownModel, identify};
+use crate::identification::{Estimator, IdentifyOptions, KnownModel, identify};
 use crate::logs::Progress;
+use crate::report;
 use clap::{Args, ValueEnum};
 use dyngen::Arm;
-use serde::Serialize;
 use std::path::PathBuf;
 
 /// Fit the minimal inertial set and the friction of every joint (Eq. 16) to logs.
@@ -75,16 +74,6 @@ enum EstimatorName {
     Instrumental,
 }
 
-/// identified.json, with what was known already.
-#[derive(Serialize)]
-struct Written<'a> {
-    #[serde(flatten)]
-    identified: &'a Identified,
-    /// As in model.json, where a model was given.
-    #[serde(flatten)]
-    known: Option<&'a Additions>,
-}
-
 impl Identify {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let arm = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
@@ -110,15 +99,10 @@ impl Identify {
         let logs = self.logs.mapped(self.map.read()?);
         let identified = identify(&arm, &logs.log, &logs.validate, &options)?;
         let known = known.as_ref().map(|known| &known.model.additions);
-        let text = output::json(&Written { identified: &identified, known })?;
-        output::write(&self.out, "identified.json", text.as_bytes())?;
-        let uncertainty = serde_json::to_vec(&identified.uncertainty).unwrap_or_default();
-        output::write(&self.out, "covariance.json", &uncertainty)?;
-        let values = output::json(&identified.consistent.parameters)?;
-        output::write(&self.out, "consistent.json", values.as_bytes())?;
-        output::write(&self.out, "report.html", page(&identified).to_html().as_bytes())?;
+        let files = report::identified::files(&identified, known).map_err(Failure::Refused)?;
+        files.write(&self.out).map_err(Failure::Unusable)?;
         if self.json {
-            output::print(&text);
+            output::print(&files.first());
             return Ok(());
         }
         if let Some(conventions) = &identified.conventions {

@@ -3,13 +3,14 @@
 use super::Failure;
 use super::output::{self, Progress};
 use crate::explanation::torque_model::{ModelFile, TorqueModel};
-use crate::identification::KnownModel;
 use crate::identification::mounting::Mounting;
-use crate::logs::log::{ColumnMap, Log, common_clock, read_logs_as};
+use crate::identification::{KnownModel, Recorded, Source};
+use crate::logs::log::ColumnMap;
 use crate::logs::regression::RigidBody;
 use clap::Args;
 use dyngen::Arm;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Arm and logs.
 #[derive(Args, Debug)]
@@ -43,19 +44,7 @@ pub(crate) struct MapArgument {
 impl MapArgument {
     /// The map of all that was said.
     pub(crate) fn read(&self) -> Result<ColumnMap, Failure> {
-        // Lines first: in a file they might fall into a table that it opened.
-        let (lines, files): (Vec<&String>, Vec<&String>) =
-            self.map.iter().partition(|said| said.contains('='));
-        let mut text = lines.iter().map(|line| format!("{line}\n")).collect::<String>();
-        for file in &files {
-            let read = std::fs::read_to_string(file);
-            text.push_str(&read.map_err(|e| Failure::Unusable(format!("{file}: cannot be read: {e}")))?);
-        }
-        let name = match (lines.as_slice(), files.as_slice()) {
-            ([], [file]) => file.as_str(),
-            _ => "--map",
-        };
-        ColumnMap::parse(&text, name).map_err(Failure::Unusable)
+        ColumnMap::said(&self.map).map_err(Failure::Unusable)
     }
 }
 
@@ -83,13 +72,6 @@ impl Known {
     }
 }
 
-/// The logs of a command, on a common clock, and what was found in them and in the arm file.
-pub(crate) struct Recorded {
-    pub fit: Vec<Log>,
-    pub validate: Vec<Log>,
-    pub warnings: Vec<String>,
-}
-
 /// Reads the logs and makes the folder of the results.
 pub(crate) fn recorded(
     inputs: &Inputs,
@@ -97,29 +79,13 @@ pub(crate) fn recorded(
     arm: &Arm,
     progress: &Progress,
 ) -> Result<Recorded, Failure> {
-    let mut warnings = arm.notes();
-    for file in validate {
-        if inputs.log.iter().any(|log| same_file(log, file)) {
-            let name = file.display();
-            return Err(Failure::Unusable(format!(
-                "{name} is given to --log and --validate: a log cannot judge its own fit"
-            )));
-        }
-    }
     progress.say("reading logs");
-    let files: Vec<&PathBuf> = inputs.log.iter().chain(validate).collect();
-    let (mut logs, findings) =
-        read_logs_as(&files, arm, &inputs.map.read()?).map_err(|e| Failure::Unusable(e.to_string()))?;
-    warnings.extend(findings.iter().map(ToString::to_string));
-    common_clock(&mut logs);
-    let validate = logs.split_off(inputs.log.len());
+    let map = Arc::new(inputs.map.read()?);
+    let sources = |files: &[PathBuf]| -> Vec<Source<'static>> {
+        files.iter().map(|file| Source::file(file).mapped(Arc::clone(&map))).collect()
+    };
+    let mut read = Recorded::read(arm, &sources(&inputs.log), &sources(validate))?;
+    read.warnings.splice(0..0, arm.notes());
     output::make_folder(&inputs.out)?;
-    Ok(Recorded { fit: logs, validate, warnings })
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    match (a.canonicalize(), b.canonicalize()) {
-        (Ok(a), Ok(b)) => a == b,
-        _ => a == b,
-    }
+    Ok(read)
 }

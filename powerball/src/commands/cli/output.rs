@@ -3,6 +3,7 @@
 use super::Failure;
 use crate::controller::JointNumber;
 use crate::identification::estimate::Spread;
+use crate::report::files;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 
@@ -23,8 +24,7 @@ impl Progress {
 
 /// Makes a folder for results, where it is missing.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
-    let failure = |e| Failure::Unusable(format!("{}: cannot be made: {e}", folder.display()));
-    std::fs::create_dir_all(folder).map_err(failure)
+    files::make_folder(folder).map_err(Failure::Unusable)
 }
 
 /// Writes a file of a folder whole or not at all: a reader never sees half of it.
@@ -34,24 +34,12 @@ pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failu
 
 /// The same for a path.
 pub(crate) fn write_file(target: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let name = target.file_name().unwrap_or_default().to_string_lossy();
-    let part = target.with_file_name(format!(".{name}.{}.part", std::process::id()));
-    let failure =
-        |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", target.display()));
-    let done = std::fs::File::create(&part).and_then(|mut file| {
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        std::fs::rename(&part, target)
-    });
-    done.map_err(|e| {
-        let _ = std::fs::remove_file(&part);
-        failure(e)
-    })
+    files::write_whole(target, bytes).map_err(Failure::Unusable)
 }
 
 /// Serialises a result.
 pub(crate) fn json(value: &impl serde::Serialize) -> Result<String, Failure> {
-    serde_json::to_string_pretty(value).map_err(|e| Failure::Refused(format!("the result is no JSON: {e}")))
+    files::json(value).map_err(Failure::Refused)
 }
 
 /// Prints to standard output; a closed pipe is no error.

@@ -1,17 +1,15 @@
 //! `powerball verify`: an identified model on another trajectory.
 
-use super::identify_page::torque_figure;
 use super::inputs::Inputs;
 use super::{Failure, output};
 use crate::explanation::torque_model::ModelFile;
 use crate::identification::mounting::Mounting;
-use crate::identification::{Source, Verified, VerifyOptions, verify};
+use crate::identification::{Source, VerifyOptions, verify};
 use crate::logs::Progress;
-use crate::report::{Page, Table, Tone, number};
+use crate::report;
 use clap::Args;
 use dyngen::Arm;
-use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Judge an identified model on logs that it has not seen (Fig. 8): errors with intervals, against the noise
@@ -47,7 +45,7 @@ impl Verify {
         let say = |what: &str| terminal.say(what);
         let options = VerifyOptions {
             tolerance: self.tolerance,
-            joint_bands: joint_bands(&self.model),
+            joint_bands: model.joint_bands.clone(),
             progress: Progress::to(&say),
             ..VerifyOptions::default()
         };
@@ -55,12 +53,10 @@ impl Verify {
         let source = |file| Source::file(file).mounted(self.mounting).mapped(Arc::clone(&map));
         let logs = self.inputs.log.iter().map(source);
         let verified = verify(&arm, &model, logs, &options)?;
-        output::make_folder(&self.inputs.out)?;
-        let text = output::json(&verified)?;
-        output::write(&self.inputs.out, "verified.json", text.as_bytes())?;
-        output::write(&self.inputs.out, "report.html", page(&verified).to_html().as_bytes())?;
+        let files = report::verified::files(&verified).map_err(Failure::Refused)?;
+        files.write(&self.inputs.out).map_err(Failure::Unusable)?;
         if self.inputs.json {
-            output::print(&text);
+            output::print(&files.first());
         } else {
             for j in &verified.joints {
                 output::print(&format!(
@@ -86,42 +82,4 @@ impl Verify {
             self.inputs.out.join("report.html").display()
         )))
     }
-}
-
-/// The joints' bands of an identified.json; none where the file says nothing of them.
-fn joint_bands(model: &Path) -> Vec<f64> {
-    let said: Option<Value> = std::fs::read_to_string(model).ok().and_then(|t| serde_json::from_str(&t).ok());
-    let bands = said.as_ref().and_then(|json| json.get("joint_bands")?.as_array());
-    bands.map_or(Vec::new(), |bands| bands.iter().map(|band| band.as_f64().unwrap_or(0.0)).collect())
-}
-
-fn page(verified: &Verified) -> Page {
-    let mut page = Page::new(format!("Torque model of {}, verified", verified.arm));
-    page.lead(
-        "A model on logs that it has not seen: measured against predicted torque, 95 % intervals of \
-        the error from blocks that count as independent.",
-    );
-    let percent = 100.0 * verified.tolerance;
-    match verified.within_tolerance {
-        true => {
-            page.note(Tone::Good, &format!("Every joint that moves is within {percent} % of its torque."))
-        }
-        false => page.note(Tone::Bad, &format!("Not every joint is within {percent} % of its torque.")),
-    };
-    let mut table =
-        Table::new(["joint", "error [N·m]", "interval [N·m]", "of the torque", "noise alone [N·m]"]);
-    for j in &verified.joints {
-        table.push([
-            j.joint.to_string(),
-            number(j.rms),
-            format!("{} to {}", number(j.interval[0]), number(j.interval[1])),
-            format!("{:.1} %", 100.0 * j.relative),
-            number(j.noise_floor),
-        ]);
-    }
-    page.table(&table);
-    for (joint, curve) in verified.curves.iter().enumerate().filter(|(_, c)| !c.t.is_empty()) {
-        page.figure(&torque_figure(joint, curve), "");
-    }
-    page
 }

@@ -1,11 +1,13 @@
 //! A model of an arm as what the next identification or verification knows.
 
+use super::file::read_text;
 use super::{FileError, TorqueModel};
 use crate::identification::KnownModel;
 use crate::identification::mounting::Mounting;
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, RigidBody};
 use dyngen::Arm;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// A model from a file, which errors name.
@@ -15,6 +17,8 @@ pub struct ModelFile {
     pub model: TorqueModel,
     /// Its file.
     pub file: PathBuf,
+    /// The end of each joint's band, Hz, where it is an identified.json.
+    pub joint_bands: Vec<f64>,
 }
 
 impl ModelFile {
@@ -23,7 +27,19 @@ impl ModelFile {
     /// # Errors
     /// As [`TorqueModel::read`].
     pub fn read(file: &Path) -> Result<ModelFile, FileError> {
-        Ok(ModelFile { model: TorqueModel::read(file)?, file: file.to_path_buf() })
+        ModelFile::parse(&read_text(file)?, file)
+    }
+
+    /// The same from the text of a file, which `file` names in errors.
+    ///
+    /// # Errors
+    /// As [`TorqueModel::parse`].
+    pub fn parse(text: &str, file: &Path) -> Result<ModelFile, FileError> {
+        let model = TorqueModel::parse(text, file)?;
+        let said: Option<Value> = serde_json::from_str(text).ok();
+        let bands = said.as_ref().and_then(|json| json.get("joint_bands")?.as_array());
+        let bands = bands.map(|bands| bands.iter().map(|band| band.as_f64().unwrap_or(0.0)).collect());
+        Ok(ModelFile { model, file: file.to_path_buf(), joint_bands: bands.unwrap_or_default() })
     }
 
     /// The model with its parameters and joints in the order of a body's.
@@ -49,7 +65,7 @@ impl KnownModel for ModelFile {
 
     fn in_set_of(&self, body: &RigidBody) -> Result<Box<dyn KnownModel>, String> {
         let model = self.clone().checked(body).map_err(|e| e.to_string())?;
-        Ok(Box::new(ModelFile { model, file: self.file.clone() }))
+        Ok(Box::new(ModelFile { model, ..self.clone() }))
     }
 
     fn take_out(&self, body: &RigidBody, logs: &mut [Log]) {

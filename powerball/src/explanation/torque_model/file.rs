@@ -143,15 +143,27 @@ mod from_one {
     }
 }
 
+/// The text of a model's file.
+pub(super) fn read_text(path: &Path) -> Result<String, FileError> {
+    std::fs::read_to_string(path).map_err(|e| FileError(format!("{}: cannot be read: {e}", path.display())))
+}
+
 impl TorqueModel {
     /// Reads a model: `model.json` or `identified.json`.
     ///
     /// # Errors
     /// [`FileError`] where the file cannot be read or is no model.
     pub fn read(path: &Path) -> Result<TorqueModel, FileError> {
+        TorqueModel::parse(&read_text(path)?, path)
+    }
+
+    /// The same from the text of a file, which `path` names in errors.
+    ///
+    /// # Errors
+    /// [`FileError`] where it is no model.
+    pub fn parse(text: &str, path: &Path) -> Result<TorqueModel, FileError> {
         let wrong = |what: String| FileError(format!("{}: {what}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
-        let json: Value = serde_json::from_str(&text).map_err(|e| wrong(format!("is no JSON: {e}")))?;
+        let json: Value = serde_json::from_str(text).map_err(|e| wrong(format!("is no JSON: {e}")))?;
         for key in ["parameters", "friction"] {
             if !json[key].is_array() {
                 return Err(wrong(format!("has no list '{key}': it is no model.json or identified.json")));

@@ -20,7 +20,7 @@ pub use fourier::{Fourier, Harmonics};
 pub use limits::{JointLimits, Limits, MissingLimits};
 pub use load::{Load, Masses};
 pub use objective::{Conditions, Criterion, Figures, Objective};
-pub use search::{Excitation, Settings, Task, optimise, optimise_all, search, search_all};
+pub use search::{Excitation, SEARCH, Settings, Task, optimise, optimise_all, search, search_all, searches};
 pub use shape::{Contact, Floor, Nearness, Shape};
 pub use surroundings::{CLEARANCE, FloorAt, RADIUS, surroundings};
 pub use trajectories::{Collision, ExciteOptions, Excited, MassSource, Trajectory, excite};

@@ -44,6 +44,16 @@ pub struct Settings {
     pub seed: u64,
 }
 
+/// Evaluations of one search, after which it hardly gains: more of them make more searches, each from starts
+/// of its own.
+pub const SEARCH: usize = 12_000;
+
+/// How many searches share so many evaluations.
+#[must_use]
+pub fn searches(evaluations: usize) -> usize {
+    (evaluations / SEARCH).max(1)
+}
+
 impl Default for Settings {
     /// The paper's N = 4 and ω_f = 2π/10.
     fn default() -> Self {

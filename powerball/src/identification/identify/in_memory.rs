@@ -1,11 +1,12 @@
 //! Arm and logs of one mounting, read at once: what a known model is applied to.
 
 use super::error::IdentifyError;
+use super::recorded::{Recorded, samples};
 use crate::identification::known::KnownModel;
 use crate::identification::mounting::Mounting;
-use crate::identification::source::{Input, Source};
+use crate::identification::source::Source;
 use crate::logs::Progress;
-use crate::logs::log::{Log, LogError, common_clock, read_log_as};
+use crate::logs::log::Log;
 use crate::logs::regression::RigidBody;
 use dyngen::Arm;
 
@@ -55,38 +56,12 @@ impl InMemory {
         let mounted = mounting.of(&arm).map_err(IdentifyError::Mounting)?;
         let mut warnings = mounted.notes();
         progress.say("reading logs");
-        let (mut logs, mut unusable) = (Vec::new(), Vec::new());
-        for source in fit.iter().chain(validate) {
-            match samples(source, &arm, &mut warnings) {
-                Ok(log) => logs.push(log),
-                Err(reasons) => unusable.extend(reasons),
-            }
-        }
-        if !unusable.is_empty() {
-            return Err(IdentifyError::Unusable(unusable));
-        }
-        common_clock(&mut logs);
-        let validate = logs.split_off(fit.len());
+        let Recorded { fit, validate, warnings: found } = Recorded::read(&arm, fit, validate)?;
+        warnings.extend(found);
         progress.say("deriving and proving the arm's dynamics");
         let body = RigidBody::mounted(&mounted, &arm)?;
         let known = known.in_set_of(&body).map_err(IdentifyError::Known)?;
-        Ok(InMemory { arm, body, fit: logs, validate, known, warnings })
-    }
-}
-
-/// The samples of a source; what is odd about a file is added to `warnings`.
-fn samples(source: &Source<'_>, arm: &Arm, warnings: &mut Vec<String>) -> Result<Log, Vec<String>> {
-    match &source.input {
-        Input::Log(log) => Ok(log.as_ref().clone()),
-        Input::Summary(_) => {
-            Err(vec![format!("{}: single samples are needed: give the log itself", source.name())])
-        }
-        Input::File(path) => {
-            let mut findings = Vec::new();
-            let read = read_log_as(path, arm, &source.map, &mut findings);
-            warnings.extend(findings.iter().map(ToString::to_string));
-            read.map_err(|LogError(reasons)| reasons.iter().map(ToString::to_string).collect())
-        }
+        Ok(InMemory { arm, body, fit, validate, known, warnings })
     }
 }
 

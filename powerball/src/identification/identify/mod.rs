@@ -12,6 +12,7 @@ mod gather;
 mod in_memory;
 mod judge;
 mod options;
+mod recorded;
 mod result;
 
 pub use along::{Along, JointAlong, LogFacts};
@@ -21,6 +22,7 @@ pub use error::IdentifyError;
 pub(crate) use gather::Gathering;
 pub(crate) use in_memory::{InMemory, one_mounting};
 pub use options::{Estimator, IdentifyOptions};
+pub use recorded::Recorded;
 pub use result::Identified;
 
 use super::conventions::conventions;
@@ -83,9 +85,7 @@ fn gather_logs(
     validate: &[Source<'_>],
     options: &IdentifyOptions<'_>,
 ) -> Result<Gathered, IdentifyError> {
-    if let Some(both) = validate.iter().find(|file| logs.iter().any(|log| log.same_file(file))) {
-        return Err(IdentifyError::JudgesItself(both.name()));
-    }
+    recorded::apart(logs, validate)?;
     let needs_samples = options.estimator.needs_samples();
     let mut gathered = match options.known {
         Some(known) => {

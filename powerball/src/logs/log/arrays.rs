@@ -106,6 +106,19 @@ impl Log {
         arm: &Arm,
         columns: &[(String, &[f64])],
     ) -> Result<(Log, Vec<Finding>), LogError> {
+        Log::from_columns_as(name, arm, columns, &ColumnMap::default())
+    }
+
+    /// The same with what a map says of the columns.
+    ///
+    /// # Errors
+    /// As [`Log::from_arrays`].
+    pub fn from_columns_as(
+        name: &str,
+        arm: &Arm,
+        columns: &[(String, &[f64])],
+        map: &ColumnMap,
+    ) -> Result<(Log, Vec<Finding>), LogError> {
         let times = columns.iter().find(|(column, _)| column == "t").map_or(0, |(_, t)| t.len());
         let unlike = columns.iter().filter(|(_, values)| values.len() != times);
         let unlike: Vec<Finding> = unlike
@@ -121,7 +134,7 @@ impl Log {
         }
         let names: Vec<String> = columns.iter().map(|(column, _)| column.clone()).collect();
         let mut findings = Vec::new();
-        let asked = Asked { arm, map: &ColumnMap::default(), file: name, header: Some(1) };
+        let asked = Asked { arm, map, file: name, header: Some(1) };
         let mut samples = Samples::new(asked, "sample", &mut findings);
         samples.begin(&names)?;
         for k in 0..times {

@@ -136,6 +136,25 @@ impl ColumnMap {
         Ok(map)
     }
 
+    /// The map of all that was said: files, and lines of one such as `tau.sign = -1`.
+    ///
+    /// # Errors
+    /// As [`ColumnMap::parse`], and a file that cannot be read.
+    pub fn said(said: &[String]) -> Result<ColumnMap, String> {
+        // Lines first: in a file they might fall into a table that it opened.
+        let (lines, files): (Vec<&String>, Vec<&String>) = said.iter().partition(|said| said.contains('='));
+        let mut text = lines.iter().map(|line| format!("{line}\n")).collect::<String>();
+        for file in &files {
+            let read = std::fs::read_to_string(file).map_err(|e| format!("{file}: cannot be read: {e}"))?;
+            text.push_str(&read);
+        }
+        let name = match (lines.as_slice(), files.as_slice()) {
+            ([], [file]) => file.as_str(),
+            _ => "--map",
+        };
+        ColumnMap::parse(&text, name)
+    }
+
     /// Reads a map from a file.
     ///
     /// # Errors

@@ -1,11 +1,15 @@
-//! The page of an excitation: what the arm will do, and how it keeps its limits.
+//! An excitation as JSON and as a page: what the arm will do, and how it keeps its limits.
 
-use crate::identification::excite::{Excited, Trajectory};
+use crate::identification::excite::{Excited, Figures, Fourier, Trajectory};
+use crate::identification::motion::Motion;
 use crate::report::{Figure, Ink, Page, Panel, Series, Table, number};
+use serde_json::{Value, json};
 
 const INKS: [Ink; 6] = [Ink::Blue, Ink::Orange, Ink::Green, Ink::Purple, Ink::Sky, Ink::Grey];
 
-pub(super) fn page(told: &Excited) -> Page {
+/// The page.
+#[must_use]
+pub fn page(told: &Excited) -> Page {
     let mut page = Page::new(format!("Exciting trajectory of {}", told.arm));
     let (good, usual) = (&told.found.figures, &told.found.usual);
     page.lead(
@@ -79,4 +83,56 @@ fn distances(trajectory: &Trajectory) -> Option<Figure> {
         vec![(0.0, space.clearance), (end, space.clearance)],
     ));
     Some(Figure::new("Room", "time [s]").panel(panel))
+}
+
+/// One JSON object of all that is told; the list `trajectories` where there are several.
+#[must_use]
+pub fn json(told: &Excited) -> Value {
+    let figures = |f: &Figures| json!({"condition": f.condition, "least_singular_value": f.least, "mean_singular_value": f.mean});
+    let trajectory = |(trajectory, path): (&Trajectory, &Fourier)| {
+        let torque = trajectory.tightest.torque.as_ref();
+        let joints: Vec<Value> = peaks(&trajectory.motion)
+            .iter()
+            .zip(&path.joints)
+            .enumerate()
+            .map(|(i, ([low, high, speed, acceleration], series))| {
+                json!({"position": [low, high], "velocity": speed, "acceleration": acceleration,
+                    "torque": torque.map(|t| t[i]),
+                    "middle": series.middle, "a": series.a, "b": series.b})
+            })
+            .collect();
+        let nearest = trajectory.tightest.nearest.map(
+            |(near, time)| json!({"distance": near.distance, "between": near.contact.to_string(), "time": time}),
+        );
+        json!({"mounting": trajectory.mounting.to_string(), "samples": trajectory.motion.len(),
+            "duration": trajectory.motion.duration(), "fundamental": path.fundamental, "nearest": nearest, "joints": joints})
+    };
+    let mut object = json!({
+        "parameters": told.parameters.0, "rank": told.parameters.1,
+        "figures": figures(&told.found.figures), "random_start": figures(&told.found.usual),
+        "conditions": {"raw": told.conditions.raw, "normalised": told.conditions.normalised},
+        "assumed": told.assumed,
+    });
+    let mut list: Vec<Value> = told.trajectories.iter().zip(&told.found.paths).map(trajectory).collect();
+    if let ([Value::Object(only)], Value::Object(object)) = (list.as_mut_slice(), &mut object) {
+        object.append(only);
+    } else {
+        object["trajectories"] = list.into();
+    }
+    object
+}
+
+/// Lowest and highest position, largest velocity and acceleration of each joint.
+#[must_use]
+pub fn peaks(motion: &Motion) -> Vec<[f64; 4]> {
+    let mut peaks = vec![[f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0]; motion.dof()];
+    for [q, dq, ddq] in motion.samples() {
+        for (i, [low, high, speed, acceleration]) in peaks.iter_mut().enumerate() {
+            *low = low.min(q[i]);
+            *high = high.max(q[i]);
+            *speed = speed.max(dq[i].abs());
+            *acceleration = acceleration.max(ddq[i].abs());
+        }
+    }
+    peaks
 }

@@ -1,22 +1,48 @@
-//! report.html of an identification: the one page that a lab prints.
+//! The files of an identification; its page is the one that a lab prints.
 
 use crate::controller::JointNumber;
 use crate::controller::friction::TanhFriction;
+use crate::explanation::torque_model::Additions;
 use crate::identification::estimate::TorqueCurve;
 use crate::identification::{Along, Identified, JointAlong};
 use crate::logs::signal::turns::Turns;
 use crate::report::conventions;
-use crate::report::{Figure, Ink, Page, Panel, Series, Table, Tone, number};
+use crate::report::{Figure, Files, Ink, Page, Panel, Series, Table, Tone, number};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 use dyngen::exact::rational::to_f64;
+use serde::Serialize;
 
 const INKS: [Ink; 6] = [Ink::Blue, Ink::Orange, Ink::Green, Ink::Purple, Ink::Sky, Ink::Grey];
 /// Within this share of its torque a joint is well predicted.
 const GOOD: f64 = 0.1;
 
+/// identified.json, with what was known already.
+#[derive(Serialize)]
+struct Written<'a> {
+    #[serde(flatten)]
+    identified: &'a Identified,
+    /// As in model.json, where a model was given.
+    #[serde(flatten)]
+    known: Option<&'a Additions>,
+}
+
+/// identified.json, covariance.json, consistent.json and report.html; `known` is what was known already.
+///
+/// # Errors
+/// A result that is no JSON.
+pub fn files(identified: &Identified, known: Option<&Additions>) -> Result<Files, String> {
+    let uncertainty = serde_json::to_vec(&identified.uncertainty).unwrap_or_default();
+    let files = Files::default()
+        .json("identified.json", &Written { identified, known })?
+        .with("covariance.json", uncertainty)
+        .json("consistent.json", &identified.consistent.parameters)?;
+    Ok(files.with("report.html", page(identified).to_html()))
+}
+
 /// The page; what is shown is of the held-out logs where there are any, else of the fitted ones.
-pub(super) fn page(result: &Identified) -> Page {
+#[must_use]
+pub fn page(result: &Identified) -> Page {
     let (arm, shown, held_out) = (&result.described, &result.along, result.validate.is_some());
     let mut page = Page::new(format!("Torque model of {}", result.arm));
     let [_, high] = result.band;

@@ -1,0 +1,130 @@
+//! What is known of an arm, as `dyngen describe --json` prints it.
+
+use crate::arm::Transmission;
+use crate::base::sets::{Class, combination_text};
+use crate::base::symmetry::{self, Removed, Symmetry};
+use crate::dynamics::Function;
+use crate::exact::rational;
+use crate::graph::{Operations, Preparation};
+use crate::model::{Error, Model};
+use crate::parameters::{ParameterSet, SetKind};
+use serde_json::{Map, Value, json};
+
+/// What is known of an arm beside its sets: what its functions cost and what its symmetries removed.
+#[derive(Clone, Debug)]
+pub struct Description {
+    /// What each function costs with the minimal set as arguments; last, as `prepare`, what all of them
+    /// together need of the parameters alone.
+    pub operations: Vec<(&'static str, Operations)>,
+    /// What each declared symmetry removed.
+    pub symmetries: Vec<Symmetry>,
+}
+
+impl Description {
+    /// Builds and proves every function to count its operations.
+    ///
+    /// # Errors
+    /// As [`Model::function`].
+    pub fn of(model: &Model) -> Result<Description, Error> {
+        let mut preparation = Preparation::default();
+        let mut operations = Vec::new();
+        for function in Function::ALL {
+            let built = model.function(function, SetKind::Minimal)?.without_preparation(&mut preparation);
+            operations.push((function.name(), built.operations()));
+        }
+        operations.push(("prepare", preparation.operations()));
+        Ok(Description { operations, symmetries: symmetry::symmetries(model.arm(), model.sets())? })
+    }
+
+    /// One JSON object of all that is known of a model's arm.
+    pub fn json(&self, model: &Model) -> Value {
+        let arm = model.arm();
+        let kept = arm.kept_parameters();
+        let names: Vec<String> = kept.iter().map(ToString::to_string).collect();
+        let of_class = |class: Class| -> Vec<String> {
+            kept.iter().filter(|p| model.sets().class(**p) == class).map(ToString::to_string).collect()
+        };
+        let operations: Map<String, Value> = self
+            .operations
+            .iter()
+            .map(|(f, o)| {
+                ((*f).to_string(), json!({"mul": o.mul, "add": o.add, "div": o.div, "sin_cos": o.sin_cos}))
+            })
+            .collect();
+        let choice: Vec<Value> = (model.sets().candidates.iter())
+            .map(|c| json!({"rule": c.preference.to_string(), "operations": c.operations}))
+            .collect();
+        json!({
+            "arm": arm.name,
+            "joints": arm.dof(),
+            "joint_names": arm.joint_names(),
+            "transmissions": arm.transmissions.iter().map(transmission_json).collect::<Vec<_>>(),
+            "parameters": names,
+            "sets": sets_json(model),
+            "unidentifiable": of_class(Class::Unidentifiable),
+            "identifiable_alone": of_class(Class::Alone),
+            "identifiable_in_combination": of_class(Class::InCombination),
+            "operations": operations,
+            "choice": choice,
+            "symmetries": self.symmetries.iter().map(|s| symmetry_json(model, s)).collect::<Vec<_>>(),
+            "notes": arm.notes(),
+        })
+    }
+}
+
+/// The sets of a model by name, each with its parameters and the sums that they stand for.
+pub fn sets_json(model: &Model) -> Value {
+    let of = |set: &ParameterSet| (set.kind.name().to_string(), set_json(model, set));
+    Value::Object(model.sets().sets.iter().map(of).collect())
+}
+
+/// Joints from 1; the matrix as exact text.
+fn transmission_json(block: &Transmission) -> Value {
+    let joints: Vec<usize> = block.joints.iter().map(|j| j + 1).collect();
+    json!({"joints": joints, "matrix": exact_rows(block)})
+}
+
+/// The matrix of a transmission as exact text.
+pub fn exact_rows(block: &Transmission) -> Vec<Vec<String>> {
+    block.matrix.iter().map(|row| row.iter().map(rational::to_text).collect()).collect()
+}
+
+fn symmetry_json(model: &Model, symmetry: &Symmetry) -> Value {
+    let (removed, equals) = match &symmetry.removed {
+        Removed::Nothing => ("nothing", None),
+        Removed::BaseParameter => ("base parameter", None),
+        Removed::Term(terms) => ("term", Some(combination_text(&model.sets().field, terms))),
+    };
+    json!({"parameter": symmetry.parameter.to_string(), "removed": removed, "equals": equals})
+}
+
+fn set_json(model: &Model, set: &ParameterSet) -> Value {
+    let field = &model.sets().field;
+    let parameters: Vec<Value> = set
+        .parameters
+        .iter()
+        .map(|p| {
+            let terms: Vec<Value> = p
+                .terms
+                .iter()
+                .map(|(q, c)| {
+                    let coefficient = field.text(c);
+                    json!({"parameter": q.to_string(), "coefficient": coefficient, "value": field.value(c)})
+                })
+                .collect();
+            json!({"name": p.name, "terms": terms})
+        })
+        .collect();
+    let mut object = json!({
+        "count": set.parameters.len(),
+        "rank": set.rank,
+        "exact": set.exact,
+        "relations": set.relations,
+        "parameters": parameters,
+    });
+    if !set.exact {
+        object["lost"] =
+            set.lost.iter().map(|(p, why)| json!({"parameter": p.to_string(), "why": why})).collect();
+    }
+    object
+}

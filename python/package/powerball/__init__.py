@@ -1,0 +1,69 @@
+"""Torque models of robot arms: exact dynamics, identification from logs, and the name of what a model lacks.
+
+import powerball as pb
+
+arm = pb.Arm.from_urdf("arm.urdf", tip="tool0")
+tau = arm.inverse_dynamics(q, dq, ddq)                    # (n,) or (N, n), proven equal to the Lagrangian
+model = pb.identify(arm, ["a.csv", "b.mcap"], ["c.csv"])  # files, frames, dicts of arrays
+why = pb.explain(arm, ["a.csv", "b.mcap"], ["c.csv"])     # what the model lacks, by name
+"""
+
+from ._errors import Error, InputError, RefusedError
+from ._logs import Log, Mounted
+from ._result import Spread
+from .arm import Arm, Check, Limits, ParameterSet, SetParameter
+from .excitation import Excited, excite
+from .explanation import Effect, Explained, Trajectory, Verdict, explain
+from .identification import (
+    Compared,
+    Identified,
+    JointFriction,
+    JointVerdict,
+    ParameterEstimate,
+    Verified,
+    compare,
+    identify,
+    verify,
+)
+from .reading import Recording, inspect, read_log
+from .source import export, generate
+from .virtual import Session, Truth, virtual_effects, virtual_session
+
+__all__ = [
+    "Arm",
+    "Check",
+    "Compared",
+    "Effect",
+    "Error",
+    "Excited",
+    "Explained",
+    "Identified",
+    "InputError",
+    "JointFriction",
+    "JointVerdict",
+    "Limits",
+    "Log",
+    "Mounted",
+    "ParameterEstimate",
+    "ParameterSet",
+    "Recording",
+    "RefusedError",
+    "Session",
+    "SetParameter",
+    "Spread",
+    "Trajectory",
+    "Truth",
+    "Verdict",
+    "Verified",
+    "compare",
+    "excite",
+    "explain",
+    "export",
+    "generate",
+    "identify",
+    "inspect",
+    "read_log",
+    "verify",
+    "virtual_effects",
+    "virtual_session",
+]

@@ -1,0 +1,84 @@
+"""What all results share: their JSON, a table for notebooks, their files."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+from dataclasses import dataclass
+from typing import Any, Dict, List, Optional, Sequence
+
+import numpy as np
+
+from ._arrays import Array, PathLike
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Errors of a model on logs, joint by joint."""
+
+    #: rms, (n,), N·m or N.
+    rms: Array
+    #: rms of the error over rms of the measured torque, (n,).
+    relative: Array
+    #: Samples they are of.
+    samples: int
+
+
+def spread(told: Optional[Dict[str, Any]]) -> Optional[Spread]:
+    """A spread of its JSON."""
+    if told is None:
+        return None
+    return Spread(numbers(told["rms"]), numbers(told["relative"]), int(told["samples"]))
+
+
+def numbers(values: Sequence[Optional[float]]) -> Array:
+    """An array of a JSON list; NaN where it has no number."""
+    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+
+
+class Result:
+    """A result: attributes for what is asked most, ``to_dict()`` for all of it."""
+
+    def __init__(self, core: Any) -> None:
+        self._core = core
+        self._told: Dict[str, Any] = json.loads(core.json())
+
+    def to_dict(self) -> Dict[str, Any]:
+        """The result as the command's ``--json`` prints it."""
+        told: Dict[str, Any] = json.loads(self._core.json())
+        return told
+
+    def save(self, directory: PathLike) -> None:
+        """Writes the files that the command writes into its ``--out``, a folder that is made if missing."""
+        self._core.save(os.fspath(directory))
+
+    @property
+    def warnings(self) -> List[str]:
+        """What is to be said of the logs, the arm file and the fit."""
+        return list(self._told.get("warnings", []))
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """A table in HTML."""
+
+    def cells(row: Sequence[Any], tag: str) -> str:
+        return "<tr>" + "".join(f"<{tag}>{html.escape(str(cell))}</{tag}>" for cell in row) + "</tr>"
+
+    return f"<table>{cells(head, 'th')}{''.join(cells(row, 'td') for row in rows)}</table>"
+
+
+def paragraph(text: str, strong: bool = False) -> str:
+    """A paragraph in HTML."""
+    inner = html.escape(text)
+    return f"<p><b>{inner}</b></p>" if strong else f"<p>{inner}</p>"
+
+
+def error_rows(columns: Sequence[Optional[Spread]]) -> List[List[str]]:
+    """One row a joint: error and share of the torque for each spread that is there."""
+    there = [column for column in columns if column is not None]
+    rows = []
+    for j in range(len(there[0].rms) if there else 0):
+        cells = [f"{s.rms[j]:.4f} N·m, {100 * s.relative[j]:.1f} %" for s in there]
+        rows.append([str(j + 1), *cells])
+    return rows

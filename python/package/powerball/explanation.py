@@ -1,0 +1,224 @@
+"""From what a model leaves to named effects: ``explain``."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Dict, List, Optional, Tuple
+
+from . import _core
+from ._arrays import Array
+from ._logs import Logs, given
+from ._model import Model, optional_model
+from ._progress import Progress, listener
+from ._result import Result, Spread, numbers, paragraph, spread, table
+from .arm import Arm
+from .identification import Map, said
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect that the model lacks, with its evidence."""
+
+    #: Its name, as docs/explain.md lists them.
+    effect: str
+    #: Its joints, from 1.
+    joints: List[int]
+    #: Its physical reading, SI units.
+    parameters: Dict[str, Any]
+    #: Held-out error of its joints without and with it, N·m.
+    rms_before: Array
+    rms_after: Array
+    #: Probability of as much by chance, over all joints and candidates tried.
+    p_value: float
+    #: How often such a name is right.
+    probability: float
+    #: Its gain over that of the next best name.
+    margin: float
+    #: Share of the residual's excess over the noise floor that stays on its joints.
+    leftover: float
+    #: Logs it is in, where it is in some only.
+    logs: List[str]
+    #: Names that were considered and not given, and why.
+    rivals: List[Tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How far a joint's torque is explained."""
+
+    #: From 1.
+    joint: int
+    #: "explained", "named in part" or "not explained".
+    state: str
+    #: Share of the torque's rms on the validation logs that is left; NaN where the joint does not move.
+    left: float
+    #: What to think of and to do.
+    advice: str
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Samples of a motion from rest to rest."""
+
+    #: (N,), s.
+    t: Array
+    #: (N, n), rad or m; and its derivatives.
+    q: Array
+    dq: Array
+    ddq: Array
+    #: As the commands read it: t, q1 …, dq1 …, ddq1 ….
+    csv: str
+
+    def save(self, path: Any) -> None:
+        """Writes it as CSV for ``powerball record``."""
+        _core.write_whole(path, self.csv)
+
+
+def trajectory(core: _core.Trajectory) -> Trajectory:
+    """A trajectory of the compiled part's."""
+    return Trajectory(*core.arrays(), core.csv())
+
+
+class Explained(Result):
+    """What a model lacks on logs, judged on logs of another path."""
+
+    @property
+    def verdict(self) -> List[Verdict]:
+        """How far each joint's torque is explained: the first thing to read."""
+
+        def of(entry: Dict[str, Any]) -> Verdict:
+            left = math.nan if entry["left"] is None else entry["left"]
+            return Verdict(entry["joint"], entry["state"], left, entry["advice"])
+
+        return [of(entry) for entry in self._told["verdict"]]
+
+    @property
+    def effects(self) -> List[Effect]:
+        """Named effects in the order in which they were added; empty where the model lacks nothing."""
+
+        def of(entry: Dict[str, Any]) -> Effect:
+            return Effect(
+                effect=entry["effect"],
+                joints=list(entry["joints"]),
+                parameters=entry["parameters"],
+                rms_before=numbers(entry["rms_before"]),
+                rms_after=numbers(entry["rms_after"]),
+                p_value=entry["p_value"],
+                probability=entry["probability"],
+                margin=entry["margin"],
+                leftover=entry["leftover"],
+                logs=entry.get("logs", []),
+                rivals=[(rival["effect"], rival["why_not"]) for rival in entry["rivals"]],
+            )
+
+        return [of(entry) for entry in self._told["effects"]]
+
+    @property
+    def before(self) -> Spread:
+        """Errors of the base model on the validation logs."""
+        return self._spread("before", "validate")
+
+    @property
+    def after(self) -> Spread:
+        """Errors with all effects on the validation logs."""
+        return self._spread("after", "validate")
+
+    def _spread(self, when: str, of: str) -> Spread:
+        found = spread(self._told[when][of])
+        assert found is not None
+        return found
+
+    @property
+    def noise_floor(self) -> Array:
+        """What white measurement noise alone would leave, (n,), N·m."""
+        return numbers(self._told["noise_floor"])
+
+    @property
+    def unattributed(self) -> Optional[Dict[str, Any]]:
+        """What stays without a name, and the signals that it depends on."""
+        told: Optional[Dict[str, Any]] = self._told["unattributed"]
+        return told
+
+    @property
+    def next_experiment(self) -> Optional[Dict[str, Any]]:
+        """What to record to tell names apart that these logs leave open."""
+        told: Optional[Dict[str, Any]] = self._told["next_experiment"]
+        return told
+
+    @property
+    def next_trajectory(self) -> Optional[Trajectory]:
+        """The path to record for it."""
+        core = self._core.trajectory()
+        return None if core is None else trajectory(core)
+
+    @property
+    def conventions(self) -> Optional[Dict[str, Any]]:
+        """What the columns of the logs are: signs, units, gravity, delay; and the map that mends them."""
+        told: Optional[Dict[str, Any]] = self._told.get("conventions")
+        return told
+
+    def model_json(self) -> str:
+        """model.json: the model with everything that was named, for ``verify`` and ``generate``."""
+        return str(self._core.model_json())
+
+    def __repr__(self) -> str:
+        named = ", ".join(f"{e.effect} on {_joints(e.joints)}" for e in self.effects) or "no effect"
+        return f"<Explained {self._told['arm']}: {named}>"
+
+    def _repr_html_(self) -> str:
+        effects = [
+            [e.effect, _joints(e.joints), _figures(e.parameters), f"{100 * e.probability:.0f} %"]
+            for e in self.effects
+        ]
+        named = table(["effect", "joints", "parameters", "probability"], effects) if effects else ""
+        rows = [
+            [v.joint, v.state, f"{b:.4f} N·m", f"{a:.4f} N·m", v.advice]
+            for v, b, a in zip(self.verdict, self.before.rms, self.after.rms)
+        ]
+        lead = paragraph(named and "What the model lacks" or "No effect was named.", strong=True)
+        return lead + named + table(["joint", "verdict", "base model", "with effects", "advice"], rows)
+
+
+def _joints(joints: List[int]) -> str:
+    return "joint " + ", ".join(map(str, joints)) if joints else "the arm"
+
+
+def _figures(parameters: Dict[str, Any]) -> str:
+    def short(value: Any) -> str:
+        if isinstance(value, float):
+            return f"{value:.4g}"
+        return "[" + ", ".join(map(short, value)) + "]" if isinstance(value, list) else str(value)
+
+    return ", ".join(f"{name} {short(value)}" for name, value in parameters.items())
+
+
+def explain(
+    arm: Arm,
+    log: Logs,
+    validate: Logs,
+    *,
+    map: Optional[Map] = None,
+    model: Optional[Model] = None,
+    correct_unattributed: bool = False,
+    progress: Progress = False,
+) -> Explained:
+    """Finds, names and adds what the model lacks on logs; every addition is judged on logs of another path.
+
+    Logs as for :func:`identify`, in the order in which they were recorded. ``model`` is what is known
+    already: it is taken out of the logs as it stands, and what is found comes to it. ``correct_unattributed``
+    fits a bounded curve to what stays without a name, kept where errors fall that it was not fitted to.
+
+    Raises: ``InputError`` where logs cannot be used, ``RefusedError`` where they hold too little.
+    """
+    with listener(progress) as tell:
+        core = _core.explain(
+            arm._core,
+            given(log, "log"),
+            given(validate, "validate"),
+            said(map),
+            optional_model(model),
+            correct_unattributed,
+            tell,
+        )
+    return Explained(core)

@@ -1,0 +1,95 @@
+//! `explain`.
+
+use crate::arm::Arm;
+use crate::failure::{input, refused};
+use crate::identify::{ModelText, model_file};
+use crate::logs::{Given, column_map, taken};
+use crate::motion::Trajectory;
+use crate::work;
+use powerball::ExplainOptions;
+use powerball::explanation::{ExplainError, Prepared};
+use powerball::identification::{IdentifyError, Recorded};
+use powerball::report::{self, Files};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+/// Why there is no explanation.
+enum Why {
+    Logs(IdentifyError),
+    Explain(ExplainError),
+}
+
+/// The result of an explanation.
+#[pyclass(frozen, module = "powerball._core")]
+pub(crate) struct Explained {
+    files: Files,
+    model: String,
+    trajectory: Option<Trajectory>,
+}
+
+#[pymethods]
+impl Explained {
+    /// explained.json.
+    fn json(&self) -> String {
+        self.files.first()
+    }
+
+    /// model.json.
+    fn model_json(&self) -> String {
+        self.model.clone()
+    }
+
+    /// The path that tells apart what these logs leave open.
+    fn trajectory(&self) -> Option<Trajectory> {
+        self.trajectory.clone()
+    }
+
+    /// The files that the command writes.
+    fn save(&self, folder: PathBuf) -> PyResult<()> {
+        self.files.write(&folder).map_err(input)
+    }
+}
+
+/// Explains what the base model of an arm lacks on logs.
+#[pyfunction]
+#[pyo3(signature = (arm, log, validate, map, model, correct_unattributed, progress))]
+pub(crate) fn explain(
+    py: Python<'_>,
+    arm: &Arm,
+    log: Vec<Given<'_>>,
+    validate: Vec<Given<'_>>,
+    map: Vec<String>,
+    model: Option<ModelText>,
+    correct_unattributed: bool,
+    progress: Option<Bound<'_, PyAny>>,
+) -> PyResult<Explained> {
+    let (arm, map) = (arm.arm.clone(), column_map(&map)?);
+    let (logs, validate) = (taken(&arm, &log, &map)?, taken(&arm, &validate, &map)?);
+    let name = model.as_ref().map(|(_, name)| name.clone());
+    let known = model.as_ref().map(model_file).transpose()?.map(|file| file.model);
+    let done = work::run(py, progress.as_ref(), move |progress| -> Result<_, Why> {
+        progress.say("reading logs");
+        let recorded = Recorded::read(&arm, &logs.sources, &validate.sources).map_err(Why::Logs)?;
+        let options = ExplainOptions { known, correct_unattributed, progress, ..ExplainOptions::default() };
+        let prepared =
+            Prepared::new(&arm, &recorded.fit, &recorded.validate, &options).map_err(Why::Explain)?;
+        let (mut explained, motion) = prepared.explained(&options).map_err(Why::Explain)?;
+        let found = logs.findings.into_iter().chain(validate.findings).chain(recorded.warnings);
+        explained.warnings.splice(0..0, arm.notes().into_iter().chain(found));
+        Ok((prepared.with_known(explained), motion))
+    })?;
+    let (explained, motion) = done.map_err(|why| match (why, name) {
+        (Why::Logs(e), _) if e.is_input() => input(e),
+        (Why::Logs(e), _) => refused(e),
+        (Why::Explain(e @ (ExplainError::Changes(_) | ExplainError::Known(_))), Some(name)) => {
+            input(format!("{name}: {e}"))
+        }
+        (Why::Explain(e), _) => refused(e),
+    })?;
+    let mut files = report::explained::files(&explained).map_err(refused)?;
+    if let Some(motion) = &motion {
+        files = files.with(powerball::explanation::experiment::TRAJECTORY, motion.to_csv());
+    }
+    let model = report::files::json(&explained.model).map_err(refused)?;
+    Ok(Explained { files, model, trajectory: motion.map(Trajectory) })
+}
