@@ -295,7 +295,7 @@ mod tests {
             "[[joint]]\nkind = \"revolute\"\na = 0.3\nalpha = 0\nd = 0\ntheta = 0\nrotor_ratio = 100\n";
         let head = "name = \"x\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n";
         for (motor, with, found, ratio) in
-            [(2, 1, 1.01, 1.0), (0, 2, -0.66, -2.0 / 3.0), (1, 0, 0.7071, 0.7071)]
+            [(2, 1, 1.01, 1.0), (0, 2, -0.66, -2.0 / 3.0), (1, 0, 0.7073, 0.7073)]
         {
             let (near, exact) = of_teeth(found);
             approx::assert_relative_eq!(near, ratio, max_relative = 0.03);
