@@ -21,9 +21,9 @@ pub const MAX_JOINTS: usize = 16;
 /// Which Denavit–Hartenberg convention the table follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Convention {
-    /// Frame i at the far end of link i: T = Rz(theta) Tz(d) Tx(a) Rx(alpha).
+    /// Frame i at the far end of link i: T = Rz(theta) Tz(d) Tx(a) Ty(b) Rx(alpha).
     Standard,
-    /// Craig's: frame i on joint i: T = Rx(alpha) Tx(a) Rz(theta) Tz(d).
+    /// Craig's: frame i on joint i: T = Tx(a) Ty(b) Rx(alpha) Rz(theta) Tz(d).
     Modified,
 }
 
@@ -45,6 +45,9 @@ pub struct Joint {
     pub kind: JointKind,
     /// Link length, m.
     pub a: Rational,
+    /// What a row shifts along y beside `a`, before the twist, m: zero in a table of four numbers a row. Where
+    /// axes are almost parallel, whose common normal is far away, it lets frames stay near the arm.
+    pub b: Rational,
     /// Link twist.
     pub alpha: Angle,
     /// Link offset, m; the constant added to q of a prismatic joint.
@@ -75,8 +78,11 @@ impl fmt::Debug for Joint {
             text.field("name", name);
         }
         text.field("kind", &self.kind)
-            .field("a", &self.a)
-            .field("alpha", &self.alpha)
+            .field("a", &self.a);
+        if !self.b.is_zero() {
+            text.field("b", &self.b);
+        }
+        text.field("alpha", &self.alpha)
             .field("d", &self.d)
             .field("theta", &self.theta)
             .field("zero", &self.zero)

@@ -36,8 +36,9 @@ const SPEED: usize = MOTION + 3;
 const A: usize = MOTION + 4;
 const D: usize = MOTION + 5;
 const RATIO: usize = MOTION + 6;
+const B: usize = MOTION + 7;
 /// Of the motion and the joint; those that coupled motors add to the motion follow.
-const VARIABLES: usize = MOTION + 7;
+const VARIABLES: usize = MOTION + 8;
 
 /// A functional's values on the monomials of a motion, or on a link's columns; zeros left out.
 pub(super) type Values = Vec<(usize, Constant)>;
@@ -116,6 +117,9 @@ impl Source<Numerator> for Quantities<'_> {
     }
     fn a(&mut self, joint: usize) -> Numerator {
         self.size(A, &self.arm.joints[joint].a)
+    }
+    fn b(&mut self, joint: usize) -> Numerator {
+        self.size(B, &self.arm.joints[joint].b)
     }
     fn d(&mut self, joint: usize) -> Numerator {
         self.size(D, &self.arm.joints[joint].d)

@@ -140,6 +140,9 @@ impl Source<Constant> for Constants<'_> {
     fn a(&mut self, joint: usize) -> Constant {
         self.number(&self.arm.joints[joint].a)
     }
+    fn b(&mut self, joint: usize) -> Constant {
+        self.number(&self.arm.joints[joint].b)
+    }
     fn d(&mut self, joint: usize) -> Constant {
         self.number(&self.arm.joints[joint].d)
     }

@@ -10,6 +10,7 @@ pub struct Row {
     standard: bool,
     revolute: bool,
     a: f64,
+    b: f64,
     sin_cos_alpha: (f64, f64),
     d: f64,
     theta: f64,
@@ -22,6 +23,7 @@ impl Row {
             standard: convention == Convention::Standard,
             revolute: joint.kind == JointKind::Revolute,
             a: joint.a.to_f64().unwrap_or(f64::NAN),
+            b: joint.b.to_f64().unwrap_or(f64::NAN),
             sin_cos_alpha: joint.alpha.sin_cos(),
             d: joint.d.to_f64().unwrap_or(f64::NAN),
             theta: joint.theta.radians(),
@@ -47,10 +49,10 @@ impl Row {
         let (sa, ca) = self.sin_cos_alpha;
         if self.standard {
             let rotation = Matrix3::new(ct, -st * ca, st * sa, st, ct * ca, -ct * sa, 0.0, sa, ca);
-            (rotation, Vector3::new(self.a * ct, self.a * st, d))
+            (rotation, Vector3::new(self.a * ct - self.b * st, self.a * st + self.b * ct, d))
         } else {
             let rotation = Matrix3::new(ct, -st, 0.0, st * ca, ct * ca, -sa, st * sa, ct * sa, ca);
-            (rotation, Vector3::new(self.a, -d * sa, d * ca))
+            (rotation, Vector3::new(self.a, self.b - d * sa, d * ca))
         }
     }
 

@@ -22,7 +22,7 @@ pub(crate) fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3])
         };
         let twist = *Rotation3::from_axis_angle(&Vector3::x_axis(), joint.alpha.radians()).matrix();
         let turn = *Rotation3::from_axis_angle(&Vector3::z_axis(), theta).matrix();
-        let shift = Vector3::new(number(&joint.a), 0.0, 0.0);
+        let shift = Vector3::new(number(&joint.a), number(&joint.b), 0.0);
         let along = Vector3::new(0.0, 0.0, d);
         // The joint's axis and a point on it are fixed in link i − 1.
         let (axis, point, r_next, p_next) = match arm.convention {
