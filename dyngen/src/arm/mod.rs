@@ -237,6 +237,20 @@ impl Arm {
         self.motor_velocity_matrix().into_iter().map(number).collect()
     }
 
+    /// The chain of a standard table in the modified convention, with frame i on joint i and every parameter
+    /// kept: the same axes and the same motion, but its links' parameters are told in other frames. It has no
+    /// tool.
+    pub(crate) fn on_joints(&self) -> Arm {
+        let mut arm = Arm { convention: Convention::Modified, tool: None, ..self.clone() };
+        let flat = || (Rational::zero(), Rational::zero(), Angle::PiMultiple(Rational::zero()));
+        let rows = self.joints.iter().map(|joint| (joint.a.clone(), joint.b.clone(), joint.alpha.clone()));
+        for (joint, row) in arm.joints.iter_mut().zip(std::iter::once(flat()).chain(rows)) {
+            (joint.a, joint.b, joint.alpha) = row;
+            joint.zero = Vec::new();
+        }
+        arm
+    }
+
     /// The joints that a motor turns with and by how much, where that is not its own joint alone, by one.
     pub fn coupled_motor(&self, motor: usize) -> Option<Vec<(usize, Rational)>> {
         self.transmissions.iter().find_map(|block| {
