@@ -1,6 +1,6 @@
 //! `dyngen describe`.
 
-use super::{Failure, model, print};
+use super::{Failure, Progress, model, print};
 use dyngen::arm::{Convention, JointKind, Placement, Transmission};
 use dyngen::base::choice;
 use dyngen::base::sets::{Class, combination_text};
@@ -26,10 +26,12 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let model = model(&args.arm)?;
+    let progress = Progress::new(model.arm());
     let mut preparation = Preparation::default();
     let mut operations: Vec<(&str, Operations)> = Function::ALL
         .into_iter()
         .map(|function| {
+            progress.say(&format!("proving {function}"));
             let built = model.function(function, SetKind::Minimal).map_err(Failure::refused)?;
             let built = built.without_preparation(&mut preparation);
             Ok((function.name(), built.operations()))
@@ -37,6 +39,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         .collect::<Result<_, Failure>>()?;
     // What every function together needs of the parameters alone.
     operations.push(("prepare", preparation.operations()));
+    drop(progress);
     let symmetries = symmetry::symmetries(model.arm(), model.sets()).map_err(Failure::refused)?;
     let text = match args.json {
         true => format!("{}\n", json_text(&model, &operations, &symmetries)),

@@ -44,9 +44,6 @@ enum Command {
     Check(check::Args),
 }
 
-/// General twists from which on a table in the standard convention is slow.
-const SLOW_TWISTS: usize = 4;
-
 /// A parameter set on the command line.
 #[derive(Clone, Copy, ValueEnum)]
 enum Set {
@@ -118,27 +115,45 @@ fn arm(path: &Path) -> Result<Arm, Failure> {
     Ok(arm)
 }
 
-/// Reads an arm and derives its model; what that may cost is said where a person waits for it.
+/// Reads an arm and derives its model; what that costs is said where a person waits for it.
 fn model(path: &Path) -> Result<Model, Failure> {
     let arm = arm(path)?;
-    let general = arm.joints.iter().filter(|joint| joint.alpha.quarter_turns().is_none()).count();
-    if arm.convention == Convention::Standard && general >= SLOW_TWISTS {
-        eprintln!(
-            "{}: note: {general} twists that are no right angles in the standard convention: its exact sums \
-             may take minutes; the modified convention takes seconds",
-            path.display()
-        );
+    let progress = Progress::new(&arm);
+    progress.say("deriving the parameter sets");
+    Model::derive(arm).map_err(Failure::refused)
+}
+
+/// A line on standard error that says what is being done, where a person looks at it.
+struct Progress {
+    /// What the arm is and how long it may take; none where nobody looks.
+    what: Option<String>,
+}
+
+impl Progress {
+    fn new(arm: &Arm) -> Progress {
+        let n = arm.dof();
+        let general = arm.joints.iter().filter(|joint| joint.alpha.quarter_turns().is_none()).count();
+        // Of arms of 2 to 15 joints; standard tables with many general twists need fractions.
+        let fractions = if arm.convention == Convention::Standard && general > 7 { 5.0 } else { 1.0 };
+        let seconds = 0.012 * (n * n) as f64 * (1.0 + general as f64 / 9.0) * fractions;
+        let what = format!("{n} joints, {general} general twists, about {:.0} s", seconds.ceil());
+        Progress { what: std::io::stderr().is_terminal().then_some(what) }
     }
-    let watched = std::io::stderr().is_terminal();
-    if watched {
-        eprint!("deriving the parameter sets: {} joints, {general} general twists …", arm.dof());
+
+    fn say(&self, step: &str) {
+        if let Some(what) = &self.what {
+            eprint!("\r\x1b[K{what}: {step} …");
+        }
     }
-    let model = Model::derive(arm);
-    if watched {
-        // The line is gone when its work is done.
-        eprint!("\r\x1b[K");
+}
+
+/// The line is gone when its work is done.
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if self.what.is_some() {
+            eprint!("\r\x1b[K");
+        }
     }
-    model.map_err(Failure::refused)
 }
 
 /// Whether two paths lead to one file that is there.
