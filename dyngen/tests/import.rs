@@ -289,6 +289,29 @@ fn refusal(text: &str, tip: Option<&str>) -> String {
     }
 }
 
+/// A follower on the chain is a joint of the arm, and the note says how torques go together; what follows a joint
+/// that is held is held where the ratio takes it.
+#[test]
+fn a_joint_that_follows_another_is_coupled_or_held_with_it() {
+    let text = ODD.replacen(
+        "<joint name=\"three\" type=\"prismatic\">",
+        "<joint name=\"three\" type=\"prismatic\"><mimic joint=\"two\" multiplier=\"-1.5\" offset=\"0.1\"/>",
+        1,
+    );
+    assert_ne!(text, ODD, "the test itself is wrong");
+    let plain = imported(ODD, None).unwrap();
+    let coupled = imported(&text, None).unwrap();
+    assert_eq!(plain.arm.dof(), coupled.arm.dof());
+    assert!(coupled.notes.iter().any(|n| n.contains("q(three) = -1.5·q(two) + 0.1")), "{:?}", coupled.notes);
+    let held = |text: &str, lock: &[(&str, f64)]| {
+        let lock = lock.iter().map(|(name, value)| (name.to_string(), *value)).collect();
+        let options = Options { lock, ..Options::default() };
+        dyngen::import::urdf(text, "arm.urdf", &options).unwrap().values
+    };
+    let (leader, both) = (held(&text, &[("two", 0.2)]), held(ODD, &[("two", 0.2), ("three", -1.5 * 0.2 + 0.1)]));
+    assert_eq!(leader, both);
+}
+
 #[test]
 fn what_is_no_serial_arm_is_refused_by_name() {
     let odd = |from: &str, to: &str| {

@@ -44,10 +44,19 @@ pub(crate) struct Joint {
     pub(crate) upper: f64,
     pub(crate) effort: f64,
     pub(crate) velocity: f64,
-    /// The joint whose position it follows.
-    pub(crate) mimic: Option<String>,
+    /// The joint that it follows.
+    pub(crate) mimic: Option<Mimic>,
     /// What a MuJoCo model says of its drive.
     pub(crate) motor: Option<Motor>,
+}
+
+/// What a joint follows: its position is ratio · the other's + offset.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Mimic {
+    pub(crate) joint: String,
+    pub(crate) ratio: f64,
+    /// rad or m
+    pub(crate) offset: f64,
 }
 
 /// A joint's drive in a MuJoCo model.
@@ -207,7 +216,11 @@ impl<'d, 'i> Reader<'d, 'i> {
         let limit = child(node, "limit");
         let [lower, upper, effort, velocity] = ["lower", "upper", "effort", "velocity"]
             .map(|key| limit.map_or(0.0, |l| self.number(l, key, &place)));
-        let mimic = child(node, "mimic").map(|m| m.attribute("joint").unwrap_or("").to_string());
+        let mimic = child(node, "mimic").map(|m| Mimic {
+            joint: m.attribute("joint").unwrap_or("").to_string(),
+            ratio: if m.has_attribute("multiplier") { self.number(m, "multiplier", &place) } else { 1.0 },
+            offset: self.number(m, "offset", &place),
+        });
         Some(Joint {
             line: self.line(node),
             kind: kind.trim().to_string(),
