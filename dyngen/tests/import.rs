@@ -308,7 +308,8 @@ fn a_joint_that_follows_another_is_coupled_or_held_with_it() {
         let options = Options { lock, ..Options::default() };
         dyngen::import::urdf(text, "arm.urdf", &options).unwrap().values
     };
-    let (leader, both) = (held(&text, &[("two", 0.2)]), held(ODD, &[("two", 0.2), ("three", -1.5 * 0.2 + 0.1)]));
+    let (leader, both) =
+        (held(&text, &[("two", 0.2)]), held(ODD, &[("two", 0.2), ("three", -1.5 * 0.2 + 0.1)]));
     assert_eq!(leader, both);
 }
 

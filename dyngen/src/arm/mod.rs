@@ -77,8 +77,7 @@ impl fmt::Debug for Joint {
         if let Some(name) = &self.name {
             text.field("name", name);
         }
-        text.field("kind", &self.kind)
-            .field("a", &self.a);
+        text.field("kind", &self.kind).field("a", &self.a);
         if !self.b.is_zero() {
             text.field("b", &self.b);
         }

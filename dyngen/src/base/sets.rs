@@ -197,7 +197,8 @@ fn relations(
     let dependence = elimination::dependence_of_columns(field, &coordinates, minimal.kept.len())?;
     let kept = &dependence.kept;
     let others = (0..coordinates.len()).filter(|column| !kept.contains(column));
-    let texts = others.map(|column| text(column, &dependence.coordinates[column], &|position| kept[position]));
+    let texts =
+        others.map(|column| text(column, &dependence.coordinates[column], &|position| kept[position]));
     Ok((kept.len(), texts.collect()))
 }
 

@@ -173,7 +173,8 @@ impl<'f> Steps<'f> {
         let place: BTreeMap<Monomial, usize> =
             motion.iter().enumerate().map(|(i, p)| (monomial(p), i)).collect();
         let (body, columns) = (Vec::new(), Vec::new());
-        let mut steps = Steps { field, ring, first, elements, motion, place, body, columns, coupled, pending };
+        let mut steps =
+            Steps { field, ring, first, elements, motion, place, body, columns, coupled, pending };
         let of = |motion: &Motion<Numerator>| -> Vec<Values> {
             let value = |(place, _, factor)| (place, field.whole(factor));
             let column = |p: &Numerator| steps.split(p).into_iter().map(value).collect();
@@ -322,7 +323,8 @@ impl<'f> Steps<'f> {
             // Gravity and height occur in one column each, and a column of an inertia is one monomial.
             let terms = self.body.get(column).map_or(&[][..], Vec::as_slice);
             let only = terms.iter().find(|(m, _)| terms.len() == 1 || (GRAVITY..=HEIGHT).contains(m));
-            let Some((m, value)) = only.and_then(|(m, factor)| Some((m, self.field.div(&one, factor)?))) else {
+            let Some((m, value)) = only.and_then(|(m, factor)| Some((m, self.field.div(&one, factor)?)))
+            else {
                 return Vec::new();
             };
             let of = |(k, terms): (usize, &Vec<(usize, Monomial, Numerator)>)| {

@@ -1,5 +1,7 @@
 //! `dyngen describe`.
 
+use super::digits::Digits;
+use super::weak::{self, Weak};
 use super::{Failure, Progress, model, print};
 use dyngen::arm::{Convention, JointKind, Placement, Transmission};
 use dyngen::base::choice;
@@ -22,6 +24,9 @@ pub(super) struct Args {
     /// One JSON object on standard output.
     #[arg(long)]
     json: bool,
+    /// Every digit of every number, in place of six; the JSON object has them all.
+    #[arg(long)]
+    exact: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
@@ -39,17 +44,28 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         .collect::<Result<_, Failure>>()?;
     // What every function together needs of the parameters alone.
     operations.push(("prepare", preparation.operations()));
+    progress.say("parameters that hardly show");
+    let weak = weak::weak(&model).map_err(Failure::refused)?;
     drop(progress);
     let symmetries = symmetry::symmetries(model.arm(), model.sets()).map_err(Failure::refused)?;
     let text = match args.json {
-        true => format!("{}\n", json_text(&model, &operations, &symmetries)),
-        false => table(&model, &operations, &symmetries),
+        true => format!("{}\n", json_text(&model, &operations, &symmetries, &weak)),
+        false => {
+            let digits = if args.exact { Digits::All } else { Digits::Six };
+            table(&model, &operations, &symmetries, &weak, digits)
+        }
     };
     print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn json_text(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetry]) -> Value {
+fn json_text(
+    model: &Model,
+    operations: &[(&str, Operations)],
+    symmetries: &[Symmetry],
+    weak: &[Weak],
+) -> Value {
+    let hardly = |w: &Weak| json!({"singular_value": w.singular_value, "parameters": w.parameters});
     let arm = model.arm();
     let kept = arm.kept_parameters();
     let names: Vec<String> = kept.iter().map(ToString::to_string).collect();
@@ -79,6 +95,7 @@ fn json_text(model: &Model, operations: &[(&str, Operations)], symmetries: &[Sym
         "unidentifiable": of_class(Class::Unidentifiable),
         "identifiable_alone": of_class(Class::Alone),
         "identifiable_in_combination": of_class(Class::InCombination),
+        "hardly_identifiable": weak.iter().map(hardly).collect::<Vec<_>>(),
         "operations": operations,
         "choice": choice,
         "symmetries": symmetries.iter().map(|s| symmetry_json(model, s)).collect::<Vec<_>>(),
@@ -136,10 +153,16 @@ fn set_json(model: &Model, set: &ParameterSet) -> Value {
     object
 }
 
-fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetry]) -> String {
+fn table(
+    model: &Model,
+    operations: &[(&str, Operations)],
+    symmetries: &[Symmetry],
+    weak: &[Weak],
+    digits: Digits,
+) -> String {
     let arm = model.arm();
     let mut t = String::new();
-    let gravity: Vec<String> = arm.gravity.iter().map(|g| rational::to_f64(g).to_string()).collect();
+    let gravity: Vec<String> = arm.gravity.iter().map(|g| digits.number(rational::to_f64(g))).collect();
     let convention = match arm.convention {
         Convention::Standard => "standard",
         Convention::Modified => "modified",
@@ -158,9 +181,11 @@ fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetr
         true => names.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(4) + 2,
         false => 0,
     };
+    let offsets = arm.joints.iter().any(|joint| rational::to_f64(&joint.b) != 0.0);
+    let beside_title = if offsets { format!("  {:>8}", "b [m]") } else { String::new() };
     let _ = writeln!(
         t,
-        "  {:>2}  {:<width$}{:<9}  {:>8}  {:>8}  {:>8}  {:>8}  {:>6}  declared zero",
+        "  {:>2}  {:<width$}{:<9}  {:>8}{beside_title}  {:>8}  {:>8}  {:>8}  {:>6}  declared zero",
         "i",
         if width > 0 { "name" } else { "" },
         "kind",
@@ -175,13 +200,14 @@ fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetr
             JointKind::Revolute => "revolute",
             JointKind::Prismatic => "prismatic",
         };
-        let number = |r: &rational::Rational| rational::to_f64(r).to_string();
+        let number = |r: &rational::Rational| digits.number(rational::to_f64(r));
+        let beside = if offsets { format!("  {:>8}", number(&joint.b)) } else { String::new() };
         let rotor = joint.rotor_ratio.as_ref().map_or("-".to_string(), number);
         let zero: Vec<&str> = joint.zero.iter().map(|k| k.name()).collect();
-        let (alpha, theta) = (joint.alpha.to_string(), joint.theta.to_string());
+        let (alpha, theta) = (digits.angle(&joint.alpha), digits.angle(&joint.theta));
         let _ = writeln!(
             t,
-            "  {:>2}  {:<width$}{kind:<9}  {:>8}  {alpha:>8}  {:>8}  {theta:>8}  {rotor:>6}  {}",
+            "  {:>2}  {:<width$}{kind:<9}  {:>8}{beside}  {alpha:>8}  {:>8}  {theta:>8}  {rotor:>6}  {}",
             i + 1,
             if width > 0 { names[i].as_str() } else { "" },
             number(&joint.a),
@@ -193,7 +219,7 @@ fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetr
         [("base: frame 0 in the root link", &arm.base), ("tool: in the last frame", &arm.tool)]
     {
         if let Some(frame) = frame {
-            let _ = writeln!(t, "  {name}: {}", placement_text(frame));
+            let _ = writeln!(t, "  {name}: {}", placement_text(frame, digits));
         }
     }
     for block in &arm.transmissions {
@@ -210,10 +236,20 @@ fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetr
     }
     if !symmetries.is_empty() {
         let _ = writeln!(t, "\nwhat each declared symmetry removed:");
-        symmetry_table(&mut t, model, symmetries);
+        symmetry_table(&mut t, model, symmetries, digits);
+    }
+    if !weak.is_empty() {
+        let _ = writeln!(
+            t,
+            "\nhardly identifiable, through residues of the file's numbers alone (an angle such as 1.5708, or axes \
+             that almost\nmeet), with the singular value of the scaled regressor:"
+        );
+        for w in weak {
+            let _ = writeln!(t, "  {:.1e}: sums of {}", w.singular_value, w.parameters.join(" "));
+        }
     }
     for set in model.sets().sets.iter().filter(|s| s.kind != SetKind::Full) {
-        set_table(&mut t, set);
+        set_table(&mut t, model, set, digits);
     }
     let candidates = &model.sets().candidates;
     if let Some(chosen) = choice::chosen(candidates) {
@@ -234,13 +270,13 @@ fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetr
     t
 }
 
-fn placement_text(frame: &Placement) -> String {
-    let xyz: Vec<String> = frame.xyz.iter().map(|x| rational::to_f64(x).to_string()).collect();
-    let rpy: Vec<String> = frame.rpy.iter().map(ToString::to_string).collect();
+fn placement_text(frame: &Placement, digits: Digits) -> String {
+    let xyz: Vec<String> = frame.xyz.iter().map(|x| digits.number(rational::to_f64(x))).collect();
+    let rpy: Vec<String> = frame.rpy.iter().map(|angle| digits.angle(angle)).collect();
     format!("xyz = [{}] m, rpy = [{}] rad", xyz.join(", "), rpy.join(", "))
 }
 
-fn symmetry_table(t: &mut String, model: &Model, symmetries: &[Symmetry]) {
+fn symmetry_table(t: &mut String, model: &Model, symmetries: &[Symmetry], digits: Digits) {
     let names = |wanted: fn(&Removed) -> bool| -> Vec<String> {
         let some = symmetries.iter().filter(|s| wanted(&s.removed));
         some.map(|s| s.parameter.to_string()).collect()
@@ -254,13 +290,14 @@ fn symmetry_table(t: &mut String, model: &Model, symmetries: &[Symmetry]) {
     }
     for symmetry in symmetries {
         if let Removed::Term(terms) = &symmetry.removed {
-            let sum = combination_text(&model.sets().field, terms);
+            let field = &model.sets().field;
+            let sum = digits.sum(field, terms, &combination_text(field, terms));
             let _ = writeln!(t, "  {:<30}  a term that acts as {sum}", symmetry.parameter.to_string());
         }
     }
 }
 
-fn set_table(t: &mut String, set: &ParameterSet) {
+fn set_table(t: &mut String, model: &Model, set: &ParameterSet, digits: Digits) {
     let meaning = match set.kind {
         SetKind::Minimal => "exact for the numbers in the file",
         SetKind::Symbolic => "exact for every length and ratio",
@@ -280,7 +317,7 @@ fn set_table(t: &mut String, set: &ParameterSet) {
         let text = if set.kind == SetKind::Published && p.name != sum {
             format!("{} = {sum}", p.name)
         } else {
-            p.name.clone()
+            digits.sum(&model.sets().field, &p.terms, &p.name)
         };
         let _ = writeln!(t, "  {:>2}  {text}", i + 1);
     }
@@ -293,7 +330,7 @@ fn set_table(t: &mut String, set: &ParameterSet) {
     if !set.relations.is_empty() {
         let _ = writeln!(t, "  relations that hold between its columns for the numbers in the file:");
         set.relations.iter().for_each(|r| {
-            let _ = writeln!(t, "    {r}");
+            let _ = writeln!(t, "    {}", digits.text(r));
         });
     }
 }

@@ -2,11 +2,13 @@
 
 mod check;
 mod describe;
+mod digits;
 mod eval;
 mod export;
 mod generate;
 mod import;
 mod inspect;
+mod weak;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use dyngen::arm::Convention;

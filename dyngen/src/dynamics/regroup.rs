@@ -273,8 +273,7 @@ impl Regrouping {
     ) -> Regrouping {
         let map = Map::new(arm, symbols, field, order.origins);
         // The chain's frames are those of both tables: moments in them lead from one to the other.
-        let on_joints =
-            known.on_joints.map(|(chain, d)| (Map::new(chain, symbols, field, order.origins), d));
+        let on_joints = known.on_joints.map(|(chain, d)| (Map::new(chain, symbols, field, order.origins), d));
         let height = known.on_joints.map_or(known.minimal, |(_, d)| d).kept.len();
         let coordinates_of = |sum: &Combination| match &on_joints {
             None => minimal_coordinates(field, known.minimal, sum),

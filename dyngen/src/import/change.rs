@@ -42,7 +42,8 @@ impl Change {
                 for j in 0..q.len() {
                     let share = (m[i][j] - n[i][j]).abs() / (m[i][i] * m[j][j]).sqrt();
                     // Joints that move no mass say nothing.
-                    change.inertia = if share.is_finite() { change.inertia.max(share) } else { change.inertia };
+                    change.inertia =
+                        if share.is_finite() { change.inertia.max(share) } else { change.inertia };
                 }
             }
         }

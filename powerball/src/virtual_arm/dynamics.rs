@@ -170,8 +170,7 @@ impl Dynamics {
             // share in the rotor's own equation of motion, times k, comes onto the joints that turn it.
             let spin = row.ratio() * body.rotor;
             if spin != 0.0 {
-                let (rate, change) =
-                    (self.chain.motor_rate(i, pass.dq), self.chain.motor_rate(i, pass.ddq));
+                let (rate, change) = (self.chain.motor_rate(i, pass.dq), self.chain.motor_rate(i, pass.ddq));
                 if i > 0 {
                     moment[i - 1] += spin * (change * z + rate * w.cross(&z));
                 }
