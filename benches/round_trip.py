@@ -144,9 +144,13 @@ def main():
     parser.add_argument("--urdf", required=True, type=pathlib.Path, help="a folder of URDF files")
     parser.add_argument("--sample", type=int, help="how many of them")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--joints", type=int, default=1, help="only chains of at least so many joints")
     options = parser.parse_args()
     start = time.monotonic()
-    paths = [path for path in sorted(options.urdf.glob("*.urdf")) if longest_chain(path)]
+    chains = ((path, longest_chain(path)) for path in sorted(options.urdf.glob("*.urdf")))
+    paths = [path for path, chain in chains if chain and len(chain[0]) >= options.joints]
+    # A xacro that was not expanded is another robot, which import says.
+    paths = [path for path in paths if "<xacro:" not in path.read_text(errors="replace")]
     if options.sample:
         random.Random(options.seed).shuffle(paths)
     worst, arms, expected = 0.0, [], []

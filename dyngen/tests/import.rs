@@ -203,6 +203,26 @@ fn skew_axes_on_a_tilted_base() {
     check(ODD, None, &["one", "two", "three"], "c");
 }
 
+/// Three axes that calibration made almost parallel: their common normals are tens of metres away, the frames are
+/// not, and the arm is the same.
+#[test]
+fn almost_parallel_axes_have_their_frames_near_the_arm() {
+    let elbow = "<origin xyz=\"0.4318 0 -0.0934\"/>";
+    let shoulder = "<origin xyz=\"0 0.2435 0\" rpy=\"-1.5707963267948966 0 0\"/>";
+    let text = PUMA
+        .replacen(elbow, "<origin xyz=\"0.4318 0.0007 -0.0934\" rpy=\"0.0007 -0.0043 0.3\"/>", 1)
+        .replacen(shoulder, "<origin xyz=\"0 0.2435 0\" rpy=\"0.0021 3.1311 0.01\"/>", 1);
+    assert!(PUMA.contains(elbow) && PUMA.contains(shoulder), "the test itself is wrong");
+    check(&text, None, &["waist", "shoulder", "elbow", "roll", "bend", "turn"], "flange");
+    for convention in [Convention::Modified, Convention::Standard] {
+        let arm = import::urdf(&text, "test.urdf", &options(None, convention)).unwrap().arm;
+        assert!(arm.joints.iter().any(|joint| to_f64(&joint.b) != 0.0), "{convention:?}");
+        for length in arm.joints.iter().flat_map(|joint| [&joint.a, &joint.b, &joint.d]) {
+            assert!(to_f64(length).abs() < 0.8, "{convention:?}: {}", to_f64(length));
+        }
+    }
+}
+
 #[test]
 fn fixed_joints_become_part_of_what_they_are_fixed_to() {
     check(FIXED, Some("hand"), &["pan", "tilt"], "hand");

@@ -106,13 +106,24 @@ pub(crate) fn read(text: &str) -> Result<Robot, String> {
                 text = declared(&text, &prefix)
                     .ok_or_else(|| format!("line {}: unknown prefix '{prefix}'", at.row))?;
             }
-            Err(e) => return Err(format!("line {}: {e}", e.pos().row)),
+            Err(e) => return Err(broken(&text, &e)),
         }
     }
     Err("its elements have too many prefixes without a namespace".to_string())
 }
 
 const FROM_THE_WEB: &str = ", not a robot: download the raw file";
+
+/// Why a text is no XML, with the line.
+pub(crate) fn broken(text: &str, error: &Error) -> String {
+    match error {
+        // The reader says the first line of what was never closed.
+        Error::UnexpectedEndOfStream | Error::UnclosedRootNode => {
+            format!("line {}: the file ends within an element: is it all there?", text.lines().count())
+        }
+        e => format!("line {}: {e}", e.pos().row),
+    }
+}
 
 /// The text with a namespace for a prefix in its first element.
 fn declared(text: &str, prefix: &str) -> Option<String> {
