@@ -69,7 +69,8 @@ impl Sets {
         let columns = arm.dof() * 11;
         let eliminate_of = |arm: &Arm, rows: &[SparseRow], preference: Preference| {
             let order: Vec<usize> = preference.order(arm).iter().map(|p| p.index()).collect();
-            elimination::dependence(&field, rows, columns, &order)
+            // What is found is certified by the Lagrangian itself below.
+            elimination::unchecked(&field, rows, columns, &order)
         };
         let eliminate = |rows: &[SparseRow], preference: Preference| eliminate_of(arm, rows, preference);
         let all = |sizes| coefficients::all_rows(arm, symbols, &field, sizes);
@@ -98,6 +99,7 @@ impl Sets {
                 let rows = coefficients::all_rows(&chain, symbols, &field, Sizes::Numbers)?;
                 let kept = coefficients::kept(&chain, &rows);
                 let dependence = eliminate_of(&chain, &kept, Preference::ALL[0])?;
+                certificate::certify(&chain, symbols, &field, Sizes::Numbers, &dependence)?;
                 Some((chain, dependence))
             }
             false => None,

@@ -11,7 +11,6 @@ mod inspect;
 mod weak;
 
 use clap::{Parser, Subcommand, ValueEnum};
-use dyngen::arm::Convention;
 use dyngen::base::SetKind;
 use dyngen::{Arm, Model};
 use std::fmt::Display;
@@ -135,9 +134,8 @@ impl Progress {
     fn new(arm: &Arm) -> Progress {
         let n = arm.dof();
         let general = arm.joints.iter().filter(|joint| joint.alpha.quarter_turns().is_none()).count();
-        // Of arms of 2 to 15 joints; standard tables with many general twists need fractions.
-        let fractions = if arm.convention == Convention::Standard && general > 7 { 5.0 } else { 1.0 };
-        let seconds = 0.012 * (n * n) as f64 * (1.0 + general as f64 / 9.0) * fractions;
+        // Of arms of 2 to 16 joints in both conventions.
+        let seconds = 0.012 * (n * n) as f64 * (1.0 + general as f64 / 9.0);
         let what = format!("{n} joints, {general} general twists, about {:.0} s", seconds.ceil());
         Progress { what: std::io::stderr().is_terminal().then_some(what) }
     }
