@@ -5,7 +5,7 @@
     cargo build --release -p dyngen
     python3 benches/arms.py --dyngen target/release/dyngen --urdf FOLDER > docs/arms.md
 
-FOLDER holds URDF files. Of each the longest chain of joints that move on their own is taken. Time and memory are those
+FOLDER holds URDF files. Of each the longest chain of joints that move on their own is taken. Time (the processor's) and memory are those
 of one `dyngen describe` process, which derives the sets, and builds and proves every function. The error is the largest
 difference of inverse dynamics over 20 random states, relative to the largest torque there, between `dyngen eval` on
 the arm as the file says it (--exact) and Pinocchio on the file.
@@ -18,7 +18,6 @@ import pathlib
 import subprocess
 import sys
 import tempfile
-import time
 import xml.etree.ElementTree as ET
 
 import numpy as np
@@ -61,11 +60,10 @@ def longest_chain(path):
 
 def run(command):
     """Output, seconds and peak memory in MB of a process; no output where it fails or takes too long."""
-    start = time.monotonic()
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, preexec_fn=limited)
     output = process.stdout.read()
     _, status, usage = os.wait4(process.pid, 0)
-    return (output if status == 0 else None), time.monotonic() - start, usage.ru_maxrss / 1024
+    return (output if status == 0 else None), usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
 
 
 def limited():
@@ -152,7 +150,7 @@ def main():
     print("# Arms of public URDFs\n")
     print(f"{len(done)} of {len(rows)} chains of at least {options.joints} joints are imported, derived and proven.")
     print("Written by `benches/arms.py`, which says what it needs and how each column is measured: time and memory are those")
-    print("of one `dyngen describe` process on two shared cores. No error stands where a file has no inertia, or Pinocchio does")
+    print("of one `dyngen describe` process, the processor's time. No error stands where a file has no inertia, or Pinocchio does")
     print("not read it.\n")
     print("| file | joints | minimal set | time [s] | memory [MB] | error against Pinocchio |")
     print("|---|---|---|---|---|---|")

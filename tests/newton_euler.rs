@@ -202,6 +202,29 @@ fn evaluated_functions_agree_with_high_gear_ratios() {
     check_evaluator("stanford k = 50", stanford);
 }
 
+/// Motors that turn with several joints, tables that go along y too, both conventions, sliding joints.
+#[test]
+fn evaluated_functions_agree_with_transmissions_and_offsets_along_y() {
+    use dyngen::arm::Transmission;
+    use dyngen::exact::rational::{integer, parse_rational};
+    let matrix = |rows: &[&[&str]]| -> Vec<Vec<_>> {
+        rows.iter().map(|row| row.iter().map(|x| parse_rational(x).unwrap()).collect()).collect()
+    };
+    for name in ["puma560", "stanford"] {
+        let mut coupled = arm(name);
+        coupled.joints.iter_mut().for_each(|j| j.rotor_ratio = Some(integer(20)));
+        let wrist = Transmission { joints: vec![4, 5], matrix: matrix(&[&["1", "0"], &["1", "1"]]) };
+        let shoulder = Transmission {
+            joints: vec![2, 0, 1],
+            matrix: matrix(&[&["1", "0", "-1"], &["0", "1", "1/3"], &["0", "0", "2"]]),
+        };
+        coupled.transmissions = vec![wrist, shoulder];
+        coupled.joints[1].b = parse_rational("0.07").unwrap();
+        coupled.joints[3].b = parse_rational("-0.11").unwrap();
+        check_evaluator(&format!("{name}, coupled"), coupled);
+    }
+}
+
 /// Compiled code agrees with the numeric Newton–Euler, and where that has no such function with the
 /// evaluator.
 #[test]

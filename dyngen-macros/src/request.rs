@@ -193,7 +193,11 @@ impl Request {
                 return Err(error);
             }
         };
-        let model = Model::derive(arm).map_err(|e| Error::new(span, e))?;
+        let model = match &self.values {
+            Some(_) => Model::derive(arm),
+            None => self.options.model(arm),
+        };
+        let model = model.map_err(|e| Error::new(span, e))?;
         if let Some(path) = &self.values {
             let set = model.set(self.options.parameters).map_err(|e| Error::new(span, e))?;
             let text = read(path, &mut watched)?;

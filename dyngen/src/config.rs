@@ -112,8 +112,12 @@ impl Config {
     /// Everything that is wrong with the arm file, or what could not be proven.
     pub fn source(&self) -> Result<String, GenerateError> {
         let arm = Arm::read(&self.arm).map_err(GenerateError::Arm)?;
-        let model = Model::derive(arm).map_err(GenerateError::Model)?;
         let mut options = self.options.clone();
+        let model = match self.values {
+            Some(_) => Model::derive(arm),
+            None => options.model(arm),
+        };
+        let model = model.map_err(GenerateError::Model)?;
         if let Some(file) = &self.values {
             let set = model.set(options.parameters).map_err(GenerateError::Model)?;
             let values = Values::read(file).and_then(|v| v.of_set(&model, set));

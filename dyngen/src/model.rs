@@ -4,7 +4,7 @@ use crate::arm::{Arm, Parameter};
 use crate::base::Sets;
 use crate::dynamics::build::{self, Subject};
 use crate::dynamics::function::Kind;
-use crate::dynamics::regroup::{Order, Regrouping};
+use crate::dynamics::regroup::{Known, Order, Regrouping};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::elimination::Unproven;
 use crate::exact::rational::Rational;
@@ -191,7 +191,7 @@ impl Model {
                         &self.arm,
                         &self.symbols,
                         &self.sets.field,
-                        &self.sets.minimal,
+                        Known { minimal: &self.sets.minimal, on_joints: self.sets.on_joints.as_ref() },
                         set,
                         order,
                     )

@@ -203,6 +203,26 @@ fn skew_axes_on_a_tilted_base() {
     check(ODD, None, &["one", "two", "three"], "c");
 }
 
+/// Three axes that calibration made almost parallel: their common normals are tens of metres away, the frames are
+/// not, and the arm is the same.
+#[test]
+fn almost_parallel_axes_have_their_frames_near_the_arm() {
+    let elbow = "<origin xyz=\"0.4318 0 -0.0934\"/>";
+    let shoulder = "<origin xyz=\"0 0.2435 0\" rpy=\"-1.5707963267948966 0 0\"/>";
+    let text = PUMA
+        .replacen(elbow, "<origin xyz=\"0.4318 0.0007 -0.0934\" rpy=\"0.0007 -0.0043 0.3\"/>", 1)
+        .replacen(shoulder, "<origin xyz=\"0 0.2435 0\" rpy=\"0.0021 3.1311 0.01\"/>", 1);
+    assert!(PUMA.contains(elbow) && PUMA.contains(shoulder), "the test itself is wrong");
+    check(&text, None, &["waist", "shoulder", "elbow", "roll", "bend", "turn"], "flange");
+    for convention in [Convention::Modified, Convention::Standard] {
+        let arm = import::urdf(&text, "test.urdf", &options(None, convention)).unwrap().arm;
+        assert!(arm.joints.iter().any(|joint| to_f64(&joint.b) != 0.0), "{convention:?}");
+        for length in arm.joints.iter().flat_map(|joint| [&joint.a, &joint.b, &joint.d]) {
+            assert!(to_f64(length).abs() < 0.8, "{convention:?}: {}", to_f64(length));
+        }
+    }
+}
+
 #[test]
 fn fixed_joints_become_part_of_what_they_are_fixed_to() {
     check(FIXED, Some("hand"), &["pan", "tilt"], "hand");
@@ -250,13 +270,11 @@ fn rounded_right_angles_need_a_word() {
     );
     assert_ne!(rounded, PUMA);
     let exact = Options { exact: true, ..Options::default() };
-    let Err(ImportError::Refused(reasons)) = import::urdf(&rounded, "robot.urdf", &exact) else {
-        panic!("accepted")
-    };
-    assert!(
-        reasons[0].contains("--angle-tolerance") && reasons[0].contains("'bend' and 'turn'"),
-        "{reasons:?}"
-    );
+    // To the letter: frames near the arm, though the common normal is 27 km away.
+    let letter = import::urdf(&rounded, "robot.urdf", &exact).unwrap().arm;
+    assert!(letter.joints[5].alpha.quarter_turns().is_none(), "{letter:?}");
+    let lengths = letter.joints.iter().flat_map(|j| [&j.a, &j.b, &j.d]);
+    assert!(lengths.map(to_f64).all(|x| x.abs() < 1.0), "{letter:?}");
     let loose = Options { angle_tolerance: 1e-4, exact: true, ..Options::default() };
     let arm = import::urdf(&rounded, "robot.urdf", &loose).unwrap().arm;
     assert!(arm.joints.iter().all(|j| j.alpha.quarter_turns().is_some()), "{arm:?}");
@@ -287,6 +305,30 @@ fn refusal(text: &str, tip: Option<&str>) -> String {
         Err(ImportError::Refused(reasons)) => reasons.join("\n"),
         other => panic!("{other:?}"),
     }
+}
+
+/// A follower on the chain is a joint of the arm, and the note says how torques go together; what follows a joint
+/// that is held is held where the ratio takes it.
+#[test]
+fn a_joint_that_follows_another_is_coupled_or_held_with_it() {
+    let text = ODD.replacen(
+        "<joint name=\"three\" type=\"prismatic\">",
+        "<joint name=\"three\" type=\"prismatic\"><mimic joint=\"two\" multiplier=\"-1.5\" offset=\"0.1\"/>",
+        1,
+    );
+    assert_ne!(text, ODD, "the test itself is wrong");
+    let plain = imported(ODD, None).unwrap();
+    let coupled = imported(&text, None).unwrap();
+    assert_eq!(plain.arm.dof(), coupled.arm.dof());
+    assert!(coupled.notes.iter().any(|n| n.contains("q(three) = -1.5·q(two) + 0.1")), "{:?}", coupled.notes);
+    let held = |text: &str, lock: &[(&str, f64)]| {
+        let lock = lock.iter().map(|(name, value)| (name.to_string(), *value)).collect();
+        let options = Options { lock, ..Options::default() };
+        dyngen::import::urdf(text, "arm.urdf", &options).unwrap().values
+    };
+    let (leader, both) =
+        (held(&text, &[("two", 0.2)]), held(ODD, &[("two", 0.2), ("three", -1.5 * 0.2 + 0.1)]));
+    assert_eq!(leader, both);
 }
 
 #[test]

@@ -21,9 +21,9 @@ pub const MAX_JOINTS: usize = 16;
 /// Which Denavit–Hartenberg convention the table follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Convention {
-    /// Frame i at the far end of link i: T = Rz(theta) Tz(d) Tx(a) Rx(alpha).
+    /// Frame i at the far end of link i: T = Rz(theta) Tz(d) Tx(a) Ty(b) Rx(alpha).
     Standard,
-    /// Craig's: frame i on joint i: T = Rx(alpha) Tx(a) Rz(theta) Tz(d).
+    /// Craig's: frame i on joint i: T = Tx(a) Ty(b) Rx(alpha) Rz(theta) Tz(d).
     Modified,
 }
 
@@ -45,6 +45,9 @@ pub struct Joint {
     pub kind: JointKind,
     /// Link length, m.
     pub a: Rational,
+    /// What a row shifts along y beside `a`, before the twist, m: zero in a table of four numbers a row. Where
+    /// axes are almost parallel, whose common normal is far away, it lets frames stay near the arm.
+    pub b: Rational,
     /// Link twist.
     pub alpha: Angle,
     /// Link offset, m; the constant added to q of a prismatic joint.
@@ -74,9 +77,11 @@ impl fmt::Debug for Joint {
         if let Some(name) = &self.name {
             text.field("name", name);
         }
-        text.field("kind", &self.kind)
-            .field("a", &self.a)
-            .field("alpha", &self.alpha)
+        text.field("kind", &self.kind).field("a", &self.a);
+        if !self.b.is_zero() {
+            text.field("b", &self.b);
+        }
+        text.field("alpha", &self.alpha)
             .field("d", &self.d)
             .field("theta", &self.theta)
             .field("zero", &self.zero)
@@ -229,6 +234,20 @@ impl Arm {
     pub fn motor_velocity_matrix_f64(&self) -> Vec<Vec<f64>> {
         let number = |row: Vec<Rational>| row.iter().map(rational::to_f64).collect();
         self.motor_velocity_matrix().into_iter().map(number).collect()
+    }
+
+    /// The chain of a standard table in the modified convention, with frame i on joint i and every parameter
+    /// kept: the same axes and the same motion, but its links' parameters are told in other frames. It has no
+    /// tool.
+    pub(crate) fn on_joints(&self) -> Arm {
+        let mut arm = Arm { convention: Convention::Modified, tool: None, ..self.clone() };
+        let flat = || (Rational::zero(), Rational::zero(), Angle::PiMultiple(Rational::zero()));
+        let rows = self.joints.iter().map(|joint| (joint.a.clone(), joint.b.clone(), joint.alpha.clone()));
+        for (joint, row) in arm.joints.iter_mut().zip(std::iter::once(flat()).chain(rows)) {
+            (joint.a, joint.b, joint.alpha) = row;
+            joint.zero = Vec::new();
+        }
+        arm
     }
 
     /// The joints that a motor turns with and by how much, where that is not its own joint alone, by one.

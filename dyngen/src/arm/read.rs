@@ -13,10 +13,11 @@ use toml::de::DeTable;
 const ARM_KEYS: [&str; 8] =
     ["name", "convention", "gravity", "joint", "base", "tool", "grouping", "transmission"];
 const PLACEMENT_KEYS: [&str; 2] = ["xyz", "rpy"];
-const JOINT_KEYS: [&str; 13] = [
+const JOINT_KEYS: [&str; 14] = [
     "name",
     "kind",
     "a",
+    "b",
     "alpha",
     "d",
     "theta",
@@ -117,6 +118,7 @@ impl Reader<'_> {
             }
         });
         let a = self.required(t, "a").and_then(|v| self.number(v, &format!("{place}: a"), "m"));
+        let b = self.optional(t, "b", |r, v| r.number(v, &format!("{place}: b"), "m"));
         let alpha = self.required(t, "alpha").and_then(|v| self.angle(v, &format!("{place}: alpha")));
         let d = self.required(t, "d").and_then(|v| self.number(v, &format!("{place}: d"), "m"));
         let theta = self.required(t, "theta").and_then(|v| self.angle(v, &format!("{place}: theta")));
@@ -154,6 +156,7 @@ impl Reader<'_> {
             name: name?,
             kind: kind?,
             a: a?,
+            b: b?.unwrap_or_else(Rational::zero),
             alpha: alpha?,
             d: d?,
             theta: theta?,

@@ -69,8 +69,8 @@ struct Point<'a> {
     field: &'a ConstantField,
     /// Sine, cosine, position and velocity of each joint.
     joints: Vec<[Fp; 4]>,
-    /// a, d and rotor ratio of each joint, where they are variables.
-    sizes: Option<Vec<[Fp; 3]>>,
+    /// a, d, rotor ratio and b of each joint, where they are variables.
+    sizes: Option<Vec<[Fp; 4]>>,
 }
 
 impl<'a> Point<'a> {
@@ -80,8 +80,8 @@ impl<'a> Point<'a> {
             [sin, cos, draws.element(), draws.element()]
         };
         let joints = arm.joints.iter().map(|_| joint(draws)).collect();
-        let three = |draws: &mut Draws| [draws.element(), draws.element(), draws.element()];
-        let sizes = (sizes == Sizes::Variables).then(|| arm.joints.iter().map(|_| three(draws)).collect());
+        let four = |draws: &mut Draws| std::array::from_fn(|_| draws.element());
+        let sizes = (sizes == Sizes::Variables).then(|| arm.joints.iter().map(|_| four(draws)).collect());
         Point { arm, field, joints, sizes }
     }
 
@@ -108,6 +108,9 @@ impl Source<Fp> for Point<'_> {
     }
     fn a(&mut self, joint: usize) -> Fp {
         self.size(joint, 0, Some(&self.arm.joints[joint].a))
+    }
+    fn b(&mut self, joint: usize) -> Fp {
+        self.size(joint, 3, Some(&self.arm.joints[joint].b))
     }
     fn d(&mut self, joint: usize) -> Fp {
         self.size(joint, 1, Some(&self.arm.joints[joint].d))

@@ -53,7 +53,7 @@ pub fn all_rows(
             for (functional, (image, rotor)) in step.images(values) {
                 let new_motion = functional.moves || moves;
                 if new_motion && !(functional.is_mean()) {
-                    own.push(chain.columns(&image, &rotor));
+                    own.push(chain.columns(joint, &image, &rotor));
                 }
                 if new_motion { next.1.push(image) } else { next.0.push(image) }
             }
@@ -130,11 +130,12 @@ impl<'f> Steps<'f> {
             if joint == 0 {
                 break;
             }
-            behind = (0..self.width())
-                .map(|column| {
-                    let images = link.step.images(&self.lifted(column));
+            let lifted = self.lifted(joint - 1);
+            behind = (lifted.iter())
+                .map(|lifted| {
+                    let images = link.step.images(lifted);
                     let mean = images.into_iter().find(|(functional, _)| functional.is_mean());
-                    let values = mean.map(|(_, (image, rotor))| self.columns(&image, &rotor));
+                    let values = mean.map(|(_, (image, rotor))| self.columns(joint, &image, &rotor));
                     let reduced = self.without_pivots(values.unwrap_or_default(), &link.pivots);
                     self.continued(&reduced, &behind, joint)
                 })

@@ -20,6 +20,7 @@ enum Variable {
     Position,
     Speed,
     A(usize),
+    B(usize),
     D(usize),
     Ratio(usize),
     Coupling(usize),
@@ -68,6 +69,9 @@ impl Source<Polynomial<i64>> for Variables<'_> {
     fn a(&mut self, joint: usize) -> Polynomial<i64> {
         self.of(Variable::A(joint))
     }
+    fn b(&mut self, joint: usize) -> Polynomial<i64> {
+        self.of(Variable::B(joint))
+    }
     fn d(&mut self, joint: usize) -> Polynomial<i64> {
         self.of(Variable::D(joint))
     }
@@ -107,7 +111,7 @@ impl LagrangianPolynomials {
             squares.resize(variables.len(), Square::Free);
         }
         for i in 0..arm.dof() {
-            variables.extend([Variable::A(i), Variable::D(i), Variable::Ratio(i)]);
+            variables.extend([Variable::A(i), Variable::B(i), Variable::D(i), Variable::Ratio(i)]);
         }
         let rows = (0..arm.dof()).filter_map(|motor| arm.coupled_motor(motor));
         let couplings: Vec<Rational> = rows.flatten().map(|(_, factor)| factor).collect();
@@ -177,7 +181,9 @@ impl LagrangianPolynomials {
         for (v, exponent) in monomial.powers() {
             let constant = match self.variables[v] {
                 Variable::Coupling(_) | Variable::Gravity(_) | Variable::Symbol(..) => true,
-                Variable::A(_) | Variable::D(_) | Variable::Ratio(_) => sizes == Sizes::Numbers,
+                Variable::A(_) | Variable::B(_) | Variable::D(_) | Variable::Ratio(_) => {
+                    sizes == Sizes::Numbers
+                }
                 _ => false,
             };
             if constant {
@@ -199,6 +205,7 @@ impl LagrangianPolynomials {
                 Variable::Gravity(axis) => number(&arm.gravity[axis]),
                 Variable::Symbol(index, sine) => field.symbol(index, sine).clone(),
                 Variable::A(i) => number(&arm.joints[i].a),
+                Variable::B(i) => number(&arm.joints[i].b),
                 Variable::D(i) => number(&arm.joints[i].d),
                 Variable::Ratio(i) => arm.joints[i].rotor_ratio.as_ref().map_or(ring.integer(1), number),
                 _ => continue,
@@ -246,7 +253,7 @@ fn the_rows_span_those_of_the_expanded_lagrangian() {
         let joints = 1 + pick(3);
         for _ in 0..joints {
             text += &format!(
-                "[[joint]]\nkind = \"{}\"\na = {}\nalpha = {}\nd = {}\ntheta = {}\n{}{}",
+                "[[joint]]\nkind = \"{}\"\na = {}\nalpha = {}\nd = {}\ntheta = {}\n{}{}{}",
                 ["revolute", "revolute", "prismatic"][pick(3)],
                 ["0", "0", "0.3", "-0.45"][pick(4)],
                 ["0", "\"pi\"", "\"pi/2\"", "\"-pi/2\"", "\"pi/4\"", "\"pi/6\"", "0.3", "1.1"][pick(8)],
@@ -254,6 +261,7 @@ fn the_rows_span_those_of_the_expanded_lagrangian() {
                 ["0", "\"pi/2\"", "0.4"][pick(3)],
                 ["", "rotor_ratio = 50\n"][pick(2)],
                 ["", "zero = [\"my\", \"Ixy\"]\n"][pick(2)],
+                ["", "b = 0.15\n", ""][pick(3)],
             );
         }
         if joints == 3 {

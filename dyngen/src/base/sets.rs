@@ -6,11 +6,12 @@ use super::coefficients::{self, Sizes};
 use super::plain::{full_set, named_combination_text, unexamined};
 use super::preference::Preference;
 use super::published;
-use crate::arm::{Arm, Parameter};
+use crate::arm::{Arm, Convention, Parameter};
 use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{self, Dependence, SparseRow, Unproven};
 use crate::exact::prime::Draws;
 use crate::exact::symbols::AngleSymbols;
+use crate::lagrangian::elements::has_joint_symbols;
 use crate::parameters::{Combination, ParameterSet, SetKind, SetParameter, minimal_coordinates};
 
 pub use super::plain::combination_text;
@@ -49,6 +50,9 @@ pub struct Sets {
     pub sets: Vec<ParameterSet>,
     /// The dependence of the columns for the numbers in the file.
     pub minimal: Dependence,
+    /// Of a standard table with general twists the chain with frames on its joints and the dependence of its
+    /// columns, which need no fractions.
+    pub on_joints: Option<(Arm, Dependence)>,
     /// Rows that span those of the Lagrangian for all the arm's parameters, those declared zero too.
     pub(super) rows: Vec<SparseRow>,
     /// The rules that were tried for the choice of the minimal set's columns.
@@ -63,10 +67,12 @@ impl Sets {
     pub fn derive(arm: &Arm, symbols: &AngleSymbols) -> Result<Sets, Unproven> {
         let field = ConstantField::new(symbols, &mut Draws::new(SEED));
         let columns = arm.dof() * 11;
-        let eliminate = |rows: &[SparseRow], preference: Preference| {
+        let eliminate_of = |arm: &Arm, rows: &[SparseRow], preference: Preference| {
             let order: Vec<usize> = preference.order(arm).iter().map(|p| p.index()).collect();
-            elimination::dependence(&field, rows, columns, &order)
+            // What is found is certified by the Lagrangian itself below.
+            elimination::unchecked(&field, rows, columns, &order)
         };
+        let eliminate = |rows: &[SparseRow], preference: Preference| eliminate_of(arm, rows, preference);
         let all = |sizes| coefficients::all_rows(arm, symbols, &field, sizes);
         let rows = all(Sizes::Numbers)?;
         let kept = coefficients::kept(arm, &rows);
@@ -87,7 +93,18 @@ impl Sets {
             let (rank, relations) = relations(&field, &minimal, &set.parameters)?;
             (set.rank, set.relations) = (rank, relations);
         }
-        Ok(Sets { field, sets, minimal, rows, candidates })
+        let on_joints = match arm.convention == Convention::Standard && has_joint_symbols(arm) {
+            true => {
+                let chain = arm.on_joints();
+                let rows = coefficients::all_rows(&chain, symbols, &field, Sizes::Numbers)?;
+                let kept = coefficients::kept(&chain, &rows);
+                let dependence = eliminate_of(&chain, &kept, Preference::ALL[0])?;
+                certificate::certify(&chain, symbols, &field, Sizes::Numbers, &dependence)?;
+                Some((chain, dependence))
+            }
+            false => None,
+        };
+        Ok(Sets { field, sets, minimal, on_joints, rows, candidates })
     }
 
     /// The set `full` alone, and nothing known of how columns depend: enough for what takes no parameters.
@@ -95,7 +112,7 @@ impl Sets {
         let field = ConstantField::new(symbols, &mut Draws::new(SEED));
         let minimal = Dependence { kept: Vec::new(), coordinates: vec![Vec::new(); arm.dof() * 11] };
         let sets = vec![full_set(arm, &field)];
-        Sets { field, sets, minimal, rows: Vec::new(), candidates: Vec::new() }
+        Sets { field, sets, minimal, on_joints: None, rows: Vec::new(), candidates: Vec::new() }
     }
 
     /// The set of that kind, if the arm has it.
@@ -156,21 +173,35 @@ fn relations(
     minimal: &Dependence,
     parameters: &[SetParameter],
 ) -> Result<(usize, Vec<String>), Unproven> {
-    // The rows of this small matrix are the minimal columns, its columns the set's parameters. Denominators
-    // would not survive as polynomials, so the coordinates are cleared of them column by column.
     let coordinates: Vec<Vec<(usize, Constant)>> =
         parameters.iter().map(|p| minimal_coordinates(field, minimal, &p.carriers)).collect();
-    let dependence = elimination::dependence_of_columns(field, &coordinates, minimal.kept.len())?;
-    let mut texts = Vec::new();
-    for (column, parameter) in parameters.iter().enumerate() {
-        if dependence.kept.contains(&column) {
-            continue;
+    let text = |column: usize, terms: &[(usize, Constant)], carrier: &dyn Fn(usize) -> usize| {
+        let sum = terms.iter().map(|(position, c)| (parameters[carrier(*position)].name.clone(), c));
+        format!("{} = {}", quoted(&parameters[column].name), quoted_sum(field, sum))
+    };
+    // Where each of the minimal columns is one of the set's, its coordinates are the relations.
+    let one = field.rational(crate::exact::rational::integer(1));
+    let mut own: Vec<Option<usize>> = vec![None; minimal.kept.len()];
+    for (column, terms) in coordinates.iter().enumerate() {
+        if let [(position, factor)] = &terms[..]
+            && *factor == one
+        {
+            own[*position].get_or_insert(column);
         }
-        let terms = dependence.coordinates[column].iter();
-        let sum = terms.map(|(position, c)| (parameters[dependence.kept[*position]].name.clone(), c));
-        texts.push(format!("{} = {}", quoted(&parameter.name), quoted_sum(field, sum)));
     }
-    Ok((dependence.kept.len(), texts))
+    if let Some(own) = own.into_iter().collect::<Option<Vec<usize>>>() {
+        let others = (0..coordinates.len()).filter(|column| !own.contains(column));
+        let texts = others.map(|column| text(column, &coordinates[column], &|position| own[position]));
+        return Ok((own.len(), texts.collect()));
+    }
+    // The rows of this small matrix are the minimal columns, its columns the set's parameters. Denominators
+    // would not survive as polynomials, so the coordinates are cleared of them column by column.
+    let dependence = elimination::dependence_of_columns(field, &coordinates, minimal.kept.len())?;
+    let kept = &dependence.kept;
+    let others = (0..coordinates.len()).filter(|column| !kept.contains(column));
+    let texts =
+        others.map(|column| text(column, &dependence.coordinates[column], &|position| kept[position]));
+    Ok((kept.len(), texts.collect()))
 }
 
 fn quoted_sum<'a>(field: &ConstantField, terms: impl IntoIterator<Item = (String, &'a Constant)>) -> String {

@@ -1,14 +1,18 @@
 //! What one joint makes of functionals of the motion before it: the step from link to link on a motion's
 //! monomials.
+//!
+//! A motion is told in axes whose z is the link's own joint axis, in the standard convention too: there the
+//! twist behind the joint is only in the link's columns and in the next step. Else every monomial would be
+//! mixed by it, and elimination makes fractions of that.
 
 use super::coupled::{CARRIED, Carried, CoupledMotor};
-use crate::arm::Arm;
+use crate::arm::{Arm, Convention};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::polynomial::{Monomial, Numerator, Polynomial, PolynomialRing, Square};
 use crate::exact::rational::{self, Rational};
 use crate::exact::symbols::AngleSymbols;
-use crate::lagrangian::elements::{ArmElements, JointElements, Source};
+use crate::lagrangian::elements::{ArmElements, JointElements, Source, turn_x};
 use crate::lagrangian::{Motion, link_columns, step};
 use std::collections::BTreeMap;
 
@@ -36,8 +40,9 @@ const SPEED: usize = MOTION + 3;
 const A: usize = MOTION + 4;
 const D: usize = MOTION + 5;
 const RATIO: usize = MOTION + 6;
+const B: usize = MOTION + 7;
 /// Of the motion and the joint; those that coupled motors add to the motion follow.
-const VARIABLES: usize = MOTION + 7;
+const VARIABLES: usize = MOTION + 8;
 
 /// A functional's values on the monomials of a motion, or on a link's columns; zeros left out.
 pub(super) type Values = Vec<(usize, Constant)>;
@@ -68,8 +73,10 @@ pub(super) struct Steps<'f> {
     /// The monomials of a motion, and the place of each.
     motion: Vec<Numerator>,
     place: BTreeMap<Monomial, usize>,
-    /// A link's ten inertial columns: for each the motion's monomials in it.
-    columns: Vec<Values>,
+    /// A body's ten inertial columns: for each the motion's monomials in it, the motion told in the body's axes.
+    body: Vec<Values>,
+    /// The same for each link, the motion told as all are.
+    columns: Vec<Vec<Values>>,
     /// Motors that turn with several joints.
     coupled: Vec<CoupledMotor>,
     /// For each of them the monomials of which its rotor's energy will be made. They are columns of a link
@@ -117,6 +124,9 @@ impl Source<Numerator> for Quantities<'_> {
     fn a(&mut self, joint: usize) -> Numerator {
         self.size(A, &self.arm.joints[joint].a)
     }
+    fn b(&mut self, joint: usize) -> Numerator {
+        self.size(B, &self.arm.joints[joint].b)
+    }
     fn d(&mut self, joint: usize) -> Numerator {
         self.size(D, &self.arm.joints[joint].d)
     }
@@ -162,14 +172,31 @@ impl<'f> Steps<'f> {
         let monomial = |p: &Numerator| p.terms()[0].0;
         let place: BTreeMap<Monomial, usize> =
             motion.iter().enumerate().map(|(i, p)| (monomial(p), i)).collect();
-        let columns = Vec::new();
-        let mut steps = Steps { field, ring, first, elements, motion, place, columns, coupled, pending };
-        let columns = link_columns(&steps.ring, &steps.variables());
-        let of = |column: &Numerator| -> Values {
-            column.terms().iter().map(|(m, c)| (steps.place[m], field.rational(c.clone()))).collect()
+        let (body, columns) = (Vec::new(), Vec::new());
+        let mut steps =
+            Steps { field, ring, first, elements, motion, place, body, columns, coupled, pending };
+        let of = |motion: &Motion<Numerator>| -> Vec<Values> {
+            let value = |(place, _, factor)| (place, field.whole(factor));
+            let column = |p: &Numerator| steps.split(p).into_iter().map(value).collect();
+            link_columns(&steps.ring, motion).iter().map(column).collect()
         };
-        steps.columns = columns.iter().map(of).collect();
+        let columns = (0..arm.dof()).map(|joint| of(&steps.turned(joint, false))).collect();
+        (steps.body, steps.columns) = (of(&steps.variables()), columns);
         steps
+    }
+
+    /// A motion's variables in the axes behind a joint's twist where the convention puts one there, or, told in
+    /// those, back in the axes before it.
+    fn turned(&self, joint: usize, back: bool) -> Motion<Numerator> {
+        let mut motion = self.variables();
+        if self.elements.convention == Convention::Standard {
+            let JointElements { sin_alpha, cos_alpha, .. } = &self.elements.joints[joint];
+            let sin = if back { self.ring.neg(sin_alpha) } else { sin_alpha.clone() };
+            for v in [&mut motion.omega, &mut motion.velocity, &mut motion.gravity] {
+                *v = turn_x(&self.ring, &sin, cos_alpha, v);
+            }
+        }
+        motion
     }
 
     /// A motion whose quantities are the ring's variables.
@@ -192,11 +219,13 @@ impl<'f> Steps<'f> {
 
     pub(super) fn step(&self, joint: usize) -> Step<'_, 'f> {
         let ring = &self.ring;
-        let mut motion = self.variables();
-        let elements: &JointElements<Numerator> = &self.elements.joints[joint];
-        let axis = step(ring, self.elements.convention, elements, &mut motion);
-        let Motion { omega, velocity, gravity, height } = motion;
-        let next: Vec<Numerator> = omega.into_iter().chain(velocity).chain(gravity).chain([height]).collect();
+        let mut motion = joint.checked_sub(1).map_or(self.variables(), |before| self.turned(before, false));
+        let mut elements: JointElements<Numerator> = self.elements.joints[joint].clone();
+        if self.elements.convention == Convention::Standard {
+            (elements.sin_alpha, elements.cos_alpha) = (ring.integer(0), ring.integer(1));
+        }
+        let axis = step(ring, self.elements.convention, &elements, &mut motion);
+        let next = listed(motion);
         let ratio = elements.ratio.clone().unwrap_or(ring.integer(0));
         let carry = |(r, motor): (usize, &CoupledMotor)| {
             let drive = (&axis.omega, &elements.speed, &ratio);
@@ -208,12 +237,7 @@ impl<'f> Steps<'f> {
             v if v < MOTION => &next[v],
             v => &carried[v - VARIABLES],
         };
-        let image = |monomial: &Numerator| {
-            let powers = monomial.terms()[0].0;
-            powers.powers().fold(ring.integer(1), |product, (variable, exponent)| {
-                (0..exponent).fold(product, |p, _| ring.mul(&p, after(variable)))
-            })
-        };
+        let image = |monomial: &Numerator| image(ring, monomial, &after);
         // The rotor of a coupled motor is carried.
         let is_carried = self.coupled.iter().any(|motor| motor.motor == joint);
         let rotor = if is_carried { ring.integer(0) } else { axis.rotor };
@@ -266,9 +290,9 @@ impl<'f> Steps<'f> {
 
     /// A link's columns for the values of the motion's monomials: the inertial ones, the rotor's, and those
     /// of which coupled motors' are made.
-    pub(super) fn columns(&self, motion: &Values, rotor: &Constant) -> Values {
+    pub(super) fn columns(&self, joint: usize, motion: &Values, rotor: &Constant) -> Values {
         let mut columns: Values = Vec::with_capacity(LINK);
-        for (k, column) in self.columns.iter().enumerate() {
+        for (k, column) in self.columns[joint].iter().enumerate() {
             let sum = combination(self.field, column, |m| find(motion, m));
             if !sum.is_zero() {
                 columns.push((k, sum));
@@ -282,17 +306,34 @@ impl<'f> Steps<'f> {
         columns
     }
 
-    /// Values of a motion's monomials under which a link's column is one and its others are zero; a rotor's
-    /// column is no function of the motion.
-    pub(super) fn lifted(&self, column: usize) -> Values {
-        if let Some(place) = column.checked_sub(LINK) {
-            return vec![(self.pending[place], self.field.rational(rational::integer(1)))];
-        }
-        // Gravity and height occur in one column each, and a column of an inertia is one monomial.
-        let terms = self.columns.get(column).map_or(&[][..], Vec::as_slice);
-        let own = terms.iter().find(|(m, _)| terms.len() == 1 || (GRAVITY..=HEIGHT).contains(m));
+    /// For each column of a link, values of a motion's monomials under which it is one and the link's others
+    /// are zero; a rotor's column is no function of the motion.
+    pub(super) fn lifted(&self, joint: usize) -> Vec<Values> {
         let one = self.field.rational(rational::integer(1));
-        own.and_then(|(m, factor)| Some((*m, self.field.div(&one, factor)?))).into_iter().collect()
+        let before = listed(self.turned(joint, true));
+        let own = |variable: usize| &before[variable - self.first];
+        // What each monomial is in the body's axes; those of coupled motors are told in no others.
+        let carried = self.pending.first().copied().unwrap_or(self.motion.len());
+        let in_body: Vec<_> =
+            self.motion[..carried].iter().map(|m| self.split(&image(&self.ring, m, &own))).collect();
+        let lift = |column: usize| -> Values {
+            if let Some(place) = column.checked_sub(LINK) {
+                return vec![(self.pending[place], one.clone())];
+            }
+            // Gravity and height occur in one column each, and a column of an inertia is one monomial.
+            let terms = self.body.get(column).map_or(&[][..], Vec::as_slice);
+            let only = terms.iter().find(|(m, _)| terms.len() == 1 || (GRAVITY..=HEIGHT).contains(m));
+            let Some((m, value)) = only.and_then(|(m, factor)| Some((m, self.field.div(&one, factor)?)))
+            else {
+                return Vec::new();
+            };
+            let of = |(k, terms): (usize, &Vec<(usize, Monomial, Numerator)>)| {
+                let (_, _, factor) = terms.iter().find(|(place, ..)| place == m)?;
+                Some((k, self.field.mul(&self.field.whole(factor.clone()), &value)))
+            };
+            in_body.iter().enumerate().filter_map(of).collect()
+        };
+        (0..self.width()).map(lift).collect()
     }
 
     /// Columns of a link: its eleven and those of which coupled motors' are made.
@@ -338,6 +379,24 @@ impl Step<'_, '_> {
         }
         images
     }
+}
+
+/// A motion's quantities in the order of their variables.
+fn listed(motion: Motion<Numerator>) -> Vec<Numerator> {
+    let Motion { omega, velocity, gravity, height } = motion;
+    omega.into_iter().chain(velocity).chain(gravity).chain([height]).collect()
+}
+
+/// A monomial with something else in place of its variables.
+fn image<'v>(
+    ring: &PolynomialRing<Rational>,
+    monomial: &Numerator,
+    of: &impl Fn(usize) -> &'v Numerator,
+) -> Numerator {
+    let powers = monomial.terms()[0].0;
+    powers.powers().fold(ring.integer(1), |product, (variable, exponent)| {
+        (0..exponent).fold(product, |p, _| ring.mul(&p, of(variable)))
+    })
 }
 
 /// The variables of a coupled motor.

@@ -1,6 +1,7 @@
 //! `dyngen describe`.
 
-use super::{Failure, model, print};
+use super::digits::Digits;
+use super::{Failure, Progress, model, print};
 use dyngen::Model;
 use dyngen::arm::{Convention, JointKind, Placement};
 use dyngen::base::choice;
@@ -9,7 +10,6 @@ use dyngen::base::symmetry::{Removed, Symmetry};
 use dyngen::base::{ParameterSet, SetKind};
 use dyngen::describe::{Description, exact_rows};
 use dyngen::exact::rational;
-use dyngen::graph::Operations;
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -22,23 +22,31 @@ pub(super) struct Args {
     /// One JSON object on standard output.
     #[arg(long)]
     json: bool,
+    /// Every digit of every number, in place of six; the JSON object has them all.
+    #[arg(long)]
+    exact: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let model = model(&args.arm)?;
-    let description = Description::of(&model).map_err(Failure::refused)?;
+    let progress = Progress::new(model.arm());
+    let description =
+        Description::with_progress(&model, |what| progress.say(what)).map_err(Failure::refused)?;
+    drop(progress);
+    let digits = if args.exact { Digits::All } else { Digits::Six };
     let text = match args.json {
         true => format!("{}\n", description.json(&model)),
-        false => table(&model, &description.operations, &description.symmetries),
+        false => table(&model, &description, digits),
     };
     print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetry]) -> String {
+fn table(model: &Model, description: &Description, digits: Digits) -> String {
+    let Description { operations, symmetries, weak } = description;
     let arm = model.arm();
     let mut t = String::new();
-    let gravity: Vec<String> = arm.gravity.iter().map(|g| rational::to_f64(g).to_string()).collect();
+    let gravity: Vec<String> = arm.gravity.iter().map(|g| digits.number(rational::to_f64(g))).collect();
     let convention = match arm.convention {
         Convention::Standard => "standard",
         Convention::Modified => "modified",
@@ -57,9 +65,11 @@ fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetr
         true => names.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(4) + 2,
         false => 0,
     };
+    let offsets = arm.joints.iter().any(|joint| rational::to_f64(&joint.b) != 0.0);
+    let beside_title = if offsets { format!("  {:>8}", "b [m]") } else { String::new() };
     let _ = writeln!(
         t,
-        "  {:>2}  {:<width$}{:<9}  {:>8}  {:>8}  {:>8}  {:>8}  {:>6}  declared zero",
+        "  {:>2}  {:<width$}{:<9}  {:>8}{beside_title}  {:>8}  {:>8}  {:>8}  {:>6}  declared zero",
         "i",
         if width > 0 { "name" } else { "" },
         "kind",
@@ -74,13 +84,14 @@ fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetr
             JointKind::Revolute => "revolute",
             JointKind::Prismatic => "prismatic",
         };
-        let number = |r: &rational::Rational| rational::to_f64(r).to_string();
+        let number = |r: &rational::Rational| digits.number(rational::to_f64(r));
+        let beside = if offsets { format!("  {:>8}", number(&joint.b)) } else { String::new() };
         let rotor = joint.rotor_ratio.as_ref().map_or("-".to_string(), number);
         let zero: Vec<&str> = joint.zero.iter().map(|k| k.name()).collect();
-        let (alpha, theta) = (joint.alpha.to_string(), joint.theta.to_string());
+        let (alpha, theta) = (digits.angle(&joint.alpha), digits.angle(&joint.theta));
         let _ = writeln!(
             t,
-            "  {:>2}  {:<width$}{kind:<9}  {:>8}  {alpha:>8}  {:>8}  {theta:>8}  {rotor:>6}  {}",
+            "  {:>2}  {:<width$}{kind:<9}  {:>8}{beside}  {alpha:>8}  {:>8}  {theta:>8}  {rotor:>6}  {}",
             i + 1,
             if width > 0 { names[i].as_str() } else { "" },
             number(&joint.a),
@@ -92,7 +103,7 @@ fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetr
         [("base: frame 0 in the root link", &arm.base), ("tool: in the last frame", &arm.tool)]
     {
         if let Some(frame) = frame {
-            let _ = writeln!(t, "  {name}: {}", placement_text(frame));
+            let _ = writeln!(t, "  {name}: {}", placement_text(frame, digits));
         }
     }
     for block in &arm.transmissions {
@@ -109,10 +120,20 @@ fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetr
     }
     if !symmetries.is_empty() {
         let _ = writeln!(t, "\nwhat each declared symmetry removed:");
-        symmetry_table(&mut t, model, symmetries);
+        symmetry_table(&mut t, model, symmetries, digits);
+    }
+    if !weak.is_empty() {
+        let _ = writeln!(
+            t,
+            "\nhardly identifiable, through residues of the file's numbers alone (an angle such as 1.5708, or axes \
+             that almost\nmeet), with the singular value of the scaled regressor:"
+        );
+        for w in weak {
+            let _ = writeln!(t, "  {:.1e}: sums of {}", w.singular_value, w.parameters.join(" "));
+        }
     }
     for set in model.sets().sets.iter().filter(|s| s.kind != SetKind::Full) {
-        set_table(&mut t, set);
+        set_table(&mut t, model, set, digits);
     }
     let candidates = &model.sets().candidates;
     if let Some(chosen) = choice::chosen(candidates) {
@@ -133,13 +154,13 @@ fn table(model: &Model, operations: &[(&str, Operations)], symmetries: &[Symmetr
     t
 }
 
-fn placement_text(frame: &Placement) -> String {
-    let xyz: Vec<String> = frame.xyz.iter().map(|x| rational::to_f64(x).to_string()).collect();
-    let rpy: Vec<String> = frame.rpy.iter().map(ToString::to_string).collect();
+fn placement_text(frame: &Placement, digits: Digits) -> String {
+    let xyz: Vec<String> = frame.xyz.iter().map(|x| digits.number(rational::to_f64(x))).collect();
+    let rpy: Vec<String> = frame.rpy.iter().map(|angle| digits.angle(angle)).collect();
     format!("xyz = [{}] m, rpy = [{}] rad", xyz.join(", "), rpy.join(", "))
 }
 
-fn symmetry_table(t: &mut String, model: &Model, symmetries: &[Symmetry]) {
+fn symmetry_table(t: &mut String, model: &Model, symmetries: &[Symmetry], digits: Digits) {
     let names = |wanted: fn(&Removed) -> bool| -> Vec<String> {
         let some = symmetries.iter().filter(|s| wanted(&s.removed));
         some.map(|s| s.parameter.to_string()).collect()
@@ -153,13 +174,14 @@ fn symmetry_table(t: &mut String, model: &Model, symmetries: &[Symmetry]) {
     }
     for symmetry in symmetries {
         if let Removed::Term(terms) = &symmetry.removed {
-            let sum = combination_text(&model.sets().field, terms);
+            let field = &model.sets().field;
+            let sum = digits.sum(field, terms, &combination_text(field, terms));
             let _ = writeln!(t, "  {:<30}  a term that acts as {sum}", symmetry.parameter.to_string());
         }
     }
 }
 
-fn set_table(t: &mut String, set: &ParameterSet) {
+fn set_table(t: &mut String, model: &Model, set: &ParameterSet, digits: Digits) {
     let meaning = match set.kind {
         SetKind::Minimal => "exact for the numbers in the file",
         SetKind::Symbolic => "exact for every length and ratio",
@@ -179,7 +201,7 @@ fn set_table(t: &mut String, set: &ParameterSet) {
         let text = if set.kind == SetKind::Published && p.name != sum {
             format!("{} = {sum}", p.name)
         } else {
-            p.name.clone()
+            digits.sum(&model.sets().field, &p.terms, &p.name)
         };
         let _ = writeln!(t, "  {:>2}  {text}", i + 1);
     }
@@ -192,7 +214,7 @@ fn set_table(t: &mut String, set: &ParameterSet) {
     if !set.relations.is_empty() {
         let _ = writeln!(t, "  relations that hold between its columns for the numbers in the file:");
         set.relations.iter().for_each(|r| {
-            let _ = writeln!(t, "    {r}");
+            let _ = writeln!(t, "    {}", digits.text(r));
         });
     }
 }

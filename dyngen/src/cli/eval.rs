@@ -48,10 +48,10 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         }
         _ => Vec::new(),
     };
-    let n = model.arm().dof();
     let states = States::read(&args.states)?;
+    let names = model.arm().joint_names();
     let columns = |argument: Argument| match function.takes(argument) {
-        true => states.columns(argument.name(), n),
+        true => states.columns(argument.name(), &names),
         false => Ok(Vec::new()),
     };
     let (q, dq, ddq) =
@@ -140,10 +140,14 @@ impl States {
         Ok(States { file, header, rows })
     }
 
-    /// The columns name1 … of every row, one row after another.
-    fn columns(&self, name: &str, n: usize) -> Result<Vec<f64>, Failure> {
-        let places: Vec<Option<usize>> =
-            (1..=n).map(|i| self.header.iter().position(|h| *h == format!("{name}{i}"))).collect();
+    /// The columns name1 … of every row, one row after another; a joint's number or its name may say which.
+    fn columns(&self, name: &str, joints: &[String]) -> Result<Vec<f64>, Failure> {
+        let n = joints.len();
+        let place = |i: usize| {
+            let titles = [format!("{name}{i}"), format!("{name}.{}", joints[i - 1])];
+            self.header.iter().position(|h| titles.contains(h))
+        };
+        let places: Vec<Option<usize>> = (1..=n).map(place).collect();
         let missing: Vec<String> =
             (1..=n).filter(|i| places[i - 1].is_none()).map(|i| format!("{name}{i}")).collect();
         if !missing.is_empty() {

@@ -1,7 +1,7 @@
 //! `dyngen generate`.
 
-use super::{Failure, Set, same_file};
-use dyngen::{Config, FrictionTerm, Function, GenerateError};
+use super::{Failure, Progress, Set, same_file};
+use dyngen::{Arm, Config, FrictionTerm, Function, GenerateError};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -66,6 +66,9 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
             return Err(Failure::input(format!("{file} is an input: choose another -o")));
         }
     }
+    // What is wrong with the arm file is told below.
+    let progress = Arm::read(&args.arm).ok().map(|arm| Progress::new(&arm));
+    progress.iter().for_each(|p| p.say("deriving, proving and writing"));
     if !args.check {
         config.write(&args.output).map_err(failure)?;
         return Ok(ExitCode::SUCCESS);

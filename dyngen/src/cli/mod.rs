@@ -2,6 +2,7 @@
 
 mod check;
 mod describe;
+mod digits;
 mod eval;
 mod export;
 mod generate;
@@ -9,7 +10,6 @@ mod import;
 mod inspect;
 
 use clap::{Parser, Subcommand, ValueEnum};
-use dyngen::arm::Convention;
 use dyngen::base::SetKind;
 use dyngen::{Arm, Model};
 use std::fmt::Display;
@@ -43,9 +43,6 @@ enum Command {
     /// Says whether a real arm can have given parameter values, and shows the pose where not.
     Check(check::Args),
 }
-
-/// General twists from which on a table in the standard convention is slow.
-const SLOW_TWISTS: usize = 4;
 
 /// A parameter set on the command line.
 #[derive(Clone, Copy, ValueEnum)]
@@ -118,27 +115,44 @@ fn arm(path: &Path) -> Result<Arm, Failure> {
     Ok(arm)
 }
 
-/// Reads an arm and derives its model; what that may cost is said where a person waits for it.
+/// Reads an arm and derives its model; what that costs is said where a person waits for it.
 fn model(path: &Path) -> Result<Model, Failure> {
     let arm = arm(path)?;
-    let general = arm.joints.iter().filter(|joint| joint.alpha.quarter_turns().is_none()).count();
-    if arm.convention == Convention::Standard && general >= SLOW_TWISTS {
-        eprintln!(
-            "{}: note: {general} twists that are no right angles in the standard convention: its exact sums \
-             may take minutes; the modified convention takes seconds",
-            path.display()
-        );
+    let progress = Progress::new(&arm);
+    progress.say("deriving the parameter sets");
+    Model::derive(arm).map_err(Failure::refused)
+}
+
+/// A line on standard error that says what is being done, where a person looks at it.
+struct Progress {
+    /// What the arm is and how long it may take; none where nobody looks.
+    what: Option<String>,
+}
+
+impl Progress {
+    fn new(arm: &Arm) -> Progress {
+        let n = arm.dof();
+        let general = arm.joints.iter().filter(|joint| joint.alpha.quarter_turns().is_none()).count();
+        // Of arms of 2 to 16 joints in both conventions.
+        let seconds = 0.012 * (n * n) as f64 * (1.0 + general as f64 / 9.0);
+        let what = format!("{n} joints, {general} general twists, about {:.0} s", seconds.ceil());
+        Progress { what: std::io::stderr().is_terminal().then_some(what) }
     }
-    let watched = std::io::stderr().is_terminal();
-    if watched {
-        eprint!("deriving the parameter sets: {} joints, {general} general twists …", arm.dof());
+
+    fn say(&self, step: &str) {
+        if let Some(what) = &self.what {
+            eprint!("\r\x1b[K{what}: {step} …");
+        }
     }
-    let model = Model::derive(arm);
-    if watched {
-        // The line is gone when its work is done.
-        eprint!("\r\x1b[K");
+}
+
+/// The line is gone when its work is done.
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if self.what.is_some() {
+            eprint!("\r\x1b[K");
+        }
     }
-    model.map_err(Failure::refused)
 }
 
 /// Whether two paths lead to one file that is there.

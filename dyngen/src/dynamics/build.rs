@@ -264,6 +264,9 @@ impl Source<Expr> for Inputs<'_> {
     fn a(&mut self, joint: usize) -> Expr {
         self.b.constant(&self.arm.joints[joint].a)
     }
+    fn b(&mut self, joint: usize) -> Expr {
+        self.b.constant(&self.arm.joints[joint].b)
+    }
     fn d(&mut self, joint: usize) -> Expr {
         self.b.constant(&self.arm.joints[joint].d)
     }

@@ -91,7 +91,7 @@ fn slid(arm: &Arm, origins: Origins) -> Vec<bool> {
     let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
     // What it costs to reach the next origin: along the common normal, along this axis, along the next one.
     let cost = |i: usize, here: bool, next: bool| -> usize {
-        let normal = !length(arm, i).is_zero();
+        let normal = lengths(arm, i).iter().any(|length| !length.is_zero());
         let along = revolute(i) && !arm.joints[i].d.is_zero() && !here;
         let along_next = i + 1 < arm.dof() && revolute(i + 1) && !arm.joints[i + 1].d.is_zero() && next;
         let lengths = [normal, along, along_next].iter().filter(|x| **x).count();
@@ -122,13 +122,14 @@ fn slid(arm: &Arm, origins: Origins) -> Vec<bool> {
     slid
 }
 
-/// Length of the common normal from a joint's axis to the next.
-fn length(arm: &Arm, joint: usize) -> &crate::exact::rational::Rational {
-    match arm.convention {
-        Convention::Standard => &arm.joints[joint].a,
+/// From a joint's axis to the next: the length of the common normal, and the offset beside it.
+fn lengths(arm: &Arm, joint: usize) -> [&crate::exact::rational::Rational; 2] {
+    let row = match arm.convention {
+        Convention::Standard => &arm.joints[joint],
         // The tip beyond the last axis has no length.
-        Convention::Modified => &arm.joints[(joint + 1).min(arm.dof() - 1)].a,
-    }
+        Convention::Modified => &arm.joints[(joint + 1).min(arm.dof() - 1)],
+    };
+    [&row.a, &row.b]
 }
 
 /// Where an origin lies on its axis if two places cost the same: nearer to the link before or to the next.
@@ -166,27 +167,28 @@ pub fn geometry<A: Algebra>(
     let rest = |i: usize| if is_revolute(i) && !slid[i] { signed(i, &joint(i).shift) } else { zero.clone() };
     (0..n)
         .map(|i| {
-            let normal = match arm.convention {
-                Convention::Standard => joint(i).a.clone(),
-                Convention::Modified if i + 1 < n => joint(i + 1).a.clone(),
-                Convention::Modified => zero.clone(),
+            let (normal, beside) = match arm.convention {
+                Convention::Standard => (joint(i).a.clone(), signed(i, &joint(i).b)),
+                Convention::Modified if i + 1 < n => (joint(i + 1).a.clone(), signed(i, &joint(i + 1).b)),
+                Convention::Modified => (zero.clone(), zero.clone()),
             };
-            let mut reach = [normal, zero.clone(), rest(i)];
+            let mut reach = [normal, beside, rest(i)];
             if i + 1 < n && slid[i + 1] {
                 let (s, c) = twist(i + 1);
                 let d = signed(i + 1, &joint(i + 1).shift);
                 reach[1] = alg.sub(&reach[1], &alg.mul(&s, &d));
                 reach[2] = alg.add(&reach[2], &alg.mul(&c, &d));
             }
-            let (file_length, file_turn) = match arm.convention {
-                Convention::Standard => (joint(i).a.clone(), trig(joint(i))),
-                Convention::Modified => (zero.clone(), (zero.clone(), one.clone())),
+            let (lengths, file_turn) = match arm.convention {
+                Convention::Standard => ([joint(i).a.clone(), signed(i, &joint(i).b)], trig(joint(i))),
+                Convention::Modified => ([zero.clone(), zero.clone()], (zero.clone(), one.clone())),
             };
+            let [file_length, file_beside] = lengths;
             LinkGeometry {
                 reversed: reversed[i],
                 twist: twist(i),
                 reach,
-                file_origin: [file_length, zero.clone(), rest(i)],
+                file_origin: [file_length, file_beside, rest(i)],
                 file_turn: turned(reversed[i], file_turn),
             }
         })

@@ -24,11 +24,12 @@ impl Pose {
         Pose { axes: [[I, O, O], [O, I, O], [O, O, I]], origin: [O, O, O] }
     };
 
-    /// After Rx(α) Tx(a).
+    /// After Tx(a) Ty(b) Rx(α).
     fn about_x(&self, b: &Builder, joint: &JointElements<Expr>) -> Pose {
         let [x, y, z] = self.axes;
+        let origin = moved(b, &moved(b, &self.origin, joint.a, &x), joint.b, &y);
         let (y, z) = turned(b, &joint.sin_alpha, &joint.cos_alpha, &y, &z);
-        Pose { axes: [x, y, z], origin: moved(b, &self.origin, joint.a, &x) }
+        Pose { axes: [x, y, z], origin }
     }
 
     /// After Rz(θ) Tz(d).

@@ -140,6 +140,9 @@ impl Source<Constant> for Constants<'_> {
     fn a(&mut self, joint: usize) -> Constant {
         self.number(&self.arm.joints[joint].a)
     }
+    fn b(&mut self, joint: usize) -> Constant {
+        self.number(&self.arm.joints[joint].b)
+    }
     fn d(&mut self, joint: usize) -> Constant {
         self.number(&self.arm.joints[joint].d)
     }
@@ -248,18 +251,44 @@ impl<'a> Map<'a> {
     }
 }
 
+/// What is known exactly of how an arm's columns depend.
+#[derive(Clone, Copy, Debug)]
+pub struct Known<'a> {
+    /// Those of its own parameters.
+    pub minimal: &'a Dependence,
+    /// Those of the same chain with frames on its joints, where that needs fewer fractions.
+    pub on_joints: Option<&'a (Arm, Dependence)>,
+}
+
 impl Regrouping {
-    /// The sums of a set under a rule. Without `minimal`, or where the elimination is not certified, the
-    /// set's parameters as they are.
+    /// The sums of a set under a rule. Where the elimination is not certified, the set's parameters as they
+    /// are.
     pub fn new(
         arm: &Arm,
         symbols: &AngleSymbols,
         field: &ConstantField,
-        minimal: &Dependence,
+        known: Known<'_>,
         set: &ParameterSet,
         order: Order,
     ) -> Regrouping {
         let map = Map::new(arm, symbols, field, order.origins);
+        // The chain's frames are those of both tables: moments in them lead from one to the other.
+        let on_joints = known.on_joints.map(|(chain, d)| (Map::new(chain, symbols, field, order.origins), d));
+        let height = known.on_joints.map_or(known.minimal, |(_, d)| d).kept.len();
+        let coordinates_of = |sum: &Combination| match &on_joints {
+            None => minimal_coordinates(field, known.minimal, sum),
+            Some((chain, dependence)) => {
+                let told = |(p, factor): &(Parameter, Constant)| -> Combination {
+                    if p.kind == ParameterKind::Im {
+                        return vec![(*p, factor.clone())];
+                    }
+                    let there = chain.of_moments(p.link, &map.of_parameter(*p));
+                    there.into_iter().map(|(q, c)| (q, field.mul(&c, factor))).collect()
+                };
+                let sum: Combination = sum.iter().flat_map(told).collect();
+                minimal_coordinates(field, dependence, &sum)
+            }
+        };
         let n = arm.dof();
         let mut before_stage = vec![None; n];
         let mut stage_of = vec![0; n];
@@ -282,12 +311,12 @@ impl Regrouping {
             .iter()
             .map(|c| {
                 let sum = map.parameters(*c, &before_stage, set);
-                sum.iter().all(|(p, _)| arm.keeps(*p)).then(|| minimal_coordinates(field, minimal, &sum))
+                sum.iter().all(|(p, _)| arm.keeps(*p)).then(|| coordinates_of(&sum))
             })
             .collect();
         let (columns, coordinates): (Vec<Column>, Vec<_>) =
             columns.into_iter().zip(coordinates).filter_map(|(c, x)| Some((c, x?))).unzip();
-        let dependence = elimination::dependence_of_columns(field, &coordinates, minimal.kept.len());
+        let dependence = elimination::dependence_of_columns(field, &coordinates, height);
         let Ok(dependence) = dependence else {
             let one = |p: usize| vec![(p, field.integer(1))];
             return Regrouping { order, columns: given.enumerate().map(|(p, c)| (c, one(p))).collect() };

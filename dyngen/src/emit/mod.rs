@@ -15,6 +15,7 @@ mod trigonometry;
 
 pub use friction::FrictionTerm;
 
+use crate::arm::Arm;
 use crate::dynamics::function::Argument;
 use crate::dynamics::{Function, FunctionGraph};
 use crate::graph::Preparation;
@@ -51,6 +52,22 @@ impl Default for Options {
             batch: false,
             tests: false,
         }
+    }
+}
+
+impl Options {
+    /// The model that the wished functions need. Where all of them are kinematic no parameter set is derived, and
+    /// the set of the file is `full`.
+    ///
+    /// # Errors
+    /// As [`Model::derive`].
+    pub fn model(&mut self, arm: Arm) -> Result<Model, Error> {
+        let kinematic = !self.functions.is_empty() && self.functions.iter().all(|f| f.is_kinematic());
+        if kinematic && self.values.is_none() && !self.tests {
+            self.parameters = SetKind::Full;
+            return Ok(Model::kinematic(arm));
+        }
+        Model::derive(arm)
     }
 }
 

@@ -51,6 +51,22 @@ pub fn dependence(
     columns: usize,
     preference: &[usize],
 ) -> Result<Dependence, Unproven> {
+    let dependence = unchecked(field, rows, columns, preference)?;
+    let relations = relations(field, &dependence);
+    if rows.iter().all(|row| holds(field, row, &relations)) { Ok(dependence) } else { Err(Unproven) }
+}
+
+/// As [`dependence`], but that the relations hold on every row is left to the caller's proof: where coefficients
+/// are fractions of many symbols, what clears their denominators is long.
+///
+/// # Errors
+/// [`Unproven`] where the prime divides a denominator of the matrix.
+pub fn unchecked(
+    field: &ConstantField,
+    rows: &[SparseRow],
+    columns: usize,
+    preference: &[usize],
+) -> Result<Dependence, Unproven> {
     let mut place = vec![usize::MAX; columns];
     for (i, column) in preference.iter().enumerate() {
         place[*column] = i;
@@ -67,9 +83,7 @@ pub fn dependence(
             coordinates[preference[*p]].push((position, coefficient.clone()));
         }
     }
-    let dependence = Dependence { kept, coordinates };
-    let relations = relations(field, &dependence);
-    if rows.iter().all(|row| holds(field, row, &relations)) { Ok(dependence) } else { Err(Unproven) }
+    Ok(Dependence { kept, coordinates })
 }
 
 /// The dependence of columns that are given as sparse columns of constants, in their own order of preference.

@@ -87,7 +87,8 @@ pub(super) fn frames(arm: &Arm) -> (Vec<Pose>, Vec<Pose>) {
             }
         };
         let z = Pose { rotation: turn(joint.theta.radians(), 2), origin: Vector3::z() * to_f64(&joint.d) };
-        let x = Pose { rotation: turn(joint.alpha.radians(), 0), origin: Vector3::x() * to_f64(&joint.a) };
+        let across = Vector3::new(to_f64(&joint.a), to_f64(&joint.b), 0.0);
+        let x = Pose { rotation: turn(joint.alpha.radians(), 0), origin: across };
         if arm.convention == Convention::Modified {
             pose = pose.then(&x);
         }

@@ -2,7 +2,7 @@
 
 use super::Options;
 use super::pose::Pose;
-use super::urdf::{Joint, Link, Motor, Origin, Robot};
+use super::urdf::{Joint, Link, Mimic, Motor, Origin, Robot};
 use crate::arm::{JointKind, MAX_JOINTS};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::collections::BTreeMap;
@@ -150,6 +150,16 @@ fn locked(robot: &Robot, options: &Options) -> Result<BTreeMap<usize, f64>, Vec<
             }
             Some(_) => wrong.push(format!("joint '{name}' cannot be held at {value}")),
             None => wrong.push(format!("there is no joint '{name}' to be held at {value}")),
+        }
+    }
+    // What follows a joint that is held is held as well.
+    for _ in &robot.joints {
+        for (index, joint) in robot.joints.iter().enumerate().filter(|(_, joint)| joint.kind != "fixed") {
+            let Some(mimic) = &joint.mimic else { continue };
+            let leader = robot.joints.iter().position(|j| j.name == mimic.joint);
+            if let Some(value) = leader.and_then(|leader| locked.get(&leader).copied()) {
+                locked.entry(index).or_insert(mimic.ratio * value + mimic.offset);
+            }
         }
     }
     if wrong.is_empty() { Ok(locked) } else { Err(wrong) }
@@ -330,9 +340,7 @@ impl Walk<'_> {
         let pose = self.origin(&joint.origin, parent, &format!("joint '{name}'"));
         let Some(kind) = kind else { return (pose, false) };
         if let Some(mimic) = &joint.mimic {
-            self.refused.push(format!(
-                "joint '{name}' mimics joint '{mimic}': joints of an arm file move on their own"
-            ));
+            self.follows(joint, mimic);
         }
         let axis = Vector3::from(joint.axis);
         let length = axis.norm();
@@ -364,6 +372,22 @@ impl Walk<'_> {
             masses: Vec::new(),
         });
         (pose, true)
+    }
+
+    /// A joint that follows another one of the chain: both are joints of the arm, and it is said how their
+    /// torques go together.
+    fn follows(&mut self, joint: &Joint, Mimic { joint: leader, ratio, offset }: &Mimic) {
+        let name = &joint.name;
+        if self.path.iter().any(|j| self.tree.robot.joints[*j].name == *leader) {
+            self.notes.push(format!(
+                "joint '{name}' follows joint '{leader}': q({name}) = {ratio}·q({leader}) + {offset}. Both are \
+                 joints of the arm; the torque of the drive at '{leader}' is tau({leader}) + {ratio}·tau({name})"
+            ));
+        } else {
+            self.refused.push(format!(
+                "joint '{name}' mimics joint '{leader}', which is not on the chain: --lock {leader}=0 holds both"
+            ));
+        }
     }
 
     /// The pose behind a joint that is fixed, or held at a position.

@@ -4,6 +4,10 @@
 //! x axis of frame k. Joint k turns from normal k−1 to normal k: `theta` and `d`. The two conventions differ
 //! only in which axis a frame sits on, and so in which normal belongs to a row. J. Denavit, R. Hartenberg, J.
 //! Appl. Mech. 22 (1955) 215; J. J. Craig, Introduction to Robotics, 3rd ed., §3.4.
+//!
+//! Axes that are almost parallel have their common normal far away, and a small change of an axis moves it by
+//! metres (S. Hayati, IEEE CDC 1983). There only the normal's direction is taken: the origin of the far axis is
+//! where it meets the plane across the near one, and a row goes to it by `a` and `b`, along x and y.
 
 use super::Options;
 use super::chain::{Chain, ChainJoint};
@@ -13,13 +17,17 @@ use nalgebra::Vector3;
 
 /// Lengths below this are zero: it is how finely lengths are written, m.
 const SMALLEST_LENGTH: f64 = 1e-12;
-/// Axes that are almost parallel meet far away. Beyond this, m, rounding eats the inertia's digits.
+/// Beyond this, m, rounding eats the inertia's digits.
 const LARGEST_LENGTH: f64 = 100.0;
+/// Sine of the angle below which axes count as almost parallel: above it a common normal is at most ten times
+/// as far away as the axes are from each other.
+const ALMOST_PARALLEL: f64 = 0.1;
 
-/// A row of the table at q = 0: a, d in m, alpha, theta in rad.
+/// A row of the table at q = 0: a, b, d in m, alpha, theta in rad.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row {
     pub(super) a: f64,
+    pub(super) b: f64,
     pub(super) alpha: f64,
     pub(super) d: f64,
     pub(super) theta: f64,
@@ -32,14 +40,17 @@ pub(super) struct Frames {
     pub(super) rows: Vec<Row>,
 }
 
-/// The common normal of two axes.
+/// The way from one axis to the next: along their common normal, or beside it where that is far away.
 #[derive(Clone, Copy)]
 struct Normal {
+    /// Of the common normal.
     direction: Vector3<f64>,
-    /// Where it meets the nearer and the farther axis.
+    /// Where the way leaves the nearer axis and meets the farther one.
     foot: Vector3<f64>,
     head: Vector3<f64>,
+    /// Its part along the normal, and the one across normal and nearer axis.
     a: f64,
+    b: f64,
     alpha: f64,
 }
 
@@ -54,11 +65,8 @@ pub(super) fn place(chain: &Chain, options: &Options) -> Result<Frames, String> 
         let farthest = normal.a.max(away[0]).max(away[1]);
         if farthest.is_nan() || farthest > LARGEST_LENGTH {
             return Err(format!(
-                "the axes of joints '{}' and '{}' are almost but not quite parallel, or far apart: their \
-                    common normal \
-                 is {farthest:.0} m away. Where an angle such as 1.5708 stands for pi/2, --angle-tolerance \
-                 1e-4 takes \
-                 it so",
+                "the axes of joints '{}' and '{}' are {farthest:.0} m apart, or their common normal is as far \
+                 from their origins: is a length in mm?",
                 near.name, far.name
             ));
         }
@@ -66,7 +74,7 @@ pub(super) fn place(chain: &Chain, options: &Options) -> Result<Frames, String> 
     }
     // Behind the last joint nothing asks for a direction: the one that makes theta and d zero.
     let Normal { direction, head, .. } = normals[normals.len() - 1];
-    normals.push(Normal { direction, foot: head, head, a: 0.0, alpha: 0.0 });
+    normals.push(Normal { direction, foot: head, head, a: 0.0, b: 0.0, alpha: 0.0 });
 
     let (mut links, mut rows) = (Vec::new(), Vec::new());
     for (k, joint) in joints.iter().enumerate() {
@@ -79,7 +87,7 @@ pub(super) fn place(chain: &Chain, options: &Options) -> Result<Frames, String> 
             Convention::Modified => (before, joint),
             Convention::Standard => (after, joints.get(k + 1).unwrap_or(joint)),
         };
-        rows.push(Row { a: sized.a, alpha: sized.alpha, d, theta });
+        rows.push(Row { a: sized.a, b: sized.b, alpha: sized.alpha, d, theta });
         links.push(match options.convention {
             Convention::Modified => Pose::from_axes(z, after.direction, after.foot),
             Convention::Standard => Pose::from_axes(next.direction, after.direction, after.head),
@@ -97,7 +105,8 @@ fn base(first: &ChainJoint) -> Normal {
     let least = axes.iter().min_by(|a, b| a.dot(&z).abs().total_cmp(&b.dot(&z).abs()));
     let x = square.or(least).copied().unwrap_or(Vector3::x());
     let origin = first.point - z * z.dot(&first.point);
-    Normal { direction: (x - z * z.dot(&x)).normalize(), foot: origin, head: origin, a: 0.0, alpha: 0.0 }
+    let direction = (x - z * z.dot(&x)).normalize();
+    Normal { direction, foot: origin, head: origin, a: 0.0, b: 0.0, alpha: 0.0 }
 }
 
 fn common(near: &ChainJoint, far: &ChainJoint, before: &Normal, tolerance: f64) -> Normal {
@@ -112,20 +121,25 @@ fn common(near: &ChainJoint, far: &ChainJoint, before: &Normal, tolerance: f64) 
         let a = way.norm();
         let alpha = if cosine > 0.0 { 0.0 } else { std::f64::consts::PI };
         return if a > SMALLEST_LENGTH {
-            Normal { direction: way / a, foot, head: foot + way, a, alpha }
+            Normal { direction: way / a, foot, head: foot + way, a, b: 0.0, alpha }
         } else {
-            Normal { direction: before.direction, foot, head: foot, a: 0.0, alpha }
+            Normal { direction: before.direction, foot, head: foot, a: 0.0, b: 0.0, alpha }
         };
+    }
+    // Of two opposite directions the one that needs the smaller turn.
+    let (turn, quarter) = (before.direction.dot(&cross), before.direction.cross(&cross).dot(&z));
+    let towards = if turn.abs() > 1e-9 * sine { turn > 0.0 } else { quarter > 0.0 };
+    if sine < ALMOST_PARALLEL {
+        let direction = if towards { cross / sine } else { -cross / sine };
+        let foot = before.head;
+        let head = far.point + next * (z.dot(&(foot - far.point)) / cosine);
+        let (a, b) = (direction.dot(&(head - foot)), z.cross(&direction).dot(&(head - foot)));
+        return Normal { direction, foot, head, a, b, alpha: cross.dot(&direction).atan2(cosine) };
     }
     let way = far.point - near.point;
     let distance = way.dot(&cross) / sine;
     // Between skew axes x points outwards; where they meet, to the side that needs the smaller turn.
-    let (turn, quarter) = (before.direction.dot(&cross), before.direction.cross(&cross).dot(&z));
-    let forwards = match () {
-        () if distance.abs() > SMALLEST_LENGTH => distance > 0.0,
-        () if turn.abs() > 1e-9 * sine => turn > 0.0,
-        () => quarter > 0.0,
-    };
+    let forwards = if distance.abs() > SMALLEST_LENGTH { distance > 0.0 } else { towards };
     let direction = if forwards { cross / sine } else { -cross / sine };
     let squared = sine * sine;
     Normal {
@@ -133,6 +147,7 @@ fn common(near: &ChainJoint, far: &ChainJoint, before: &Normal, tolerance: f64) 
         foot: near.point + z * (way.cross(&next).dot(&cross) / squared),
         head: far.point + next * (way.cross(&z).dot(&cross) / squared),
         a: distance.abs(),
+        b: 0.0,
         alpha: cross.dot(&direction).atan2(cosine),
     }
 }

@@ -6,7 +6,7 @@
 
 use super::orientation::{Angles, turn};
 use super::pose::Pose;
-use super::urdf::{Joint, Link, Motor, Origin, Robot, nested};
+use super::urdf::{Joint, Link, Motor, Origin, Robot, broken, nested};
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ pub(super) fn is_mjcf(text: &str) -> bool {
 /// Reads a model, or says what is wrong with it, one line for each error.
 pub(crate) fn read(text: &str) -> Result<Robot, String> {
     nested(text)?;
-    let document = Document::parse(text).map_err(|e| format!("line {}: {e}", e.pos().row))?;
+    let document = Document::parse(text).map_err(|e| broken(text, &e))?;
     let root = document.root_element();
     if !root.has_tag_name("mujoco") {
         return Err(format!("its root element is <{}>, not <mujoco>", root.tag_name().name()));

@@ -3,12 +3,14 @@
 //! 1. `chain`: from the tree of links to one chain: fixed joints merged, everything at q = 0 in the root
 //!    link's frame.
 //! 2. `rounding`: the nearest arm with right angles and without residues of lengths.
+//!    `change`: what that does to the tip and to the mass matrix.
 //! 3. `frames`: Denavit–Hartenberg frames on the joint axes, by their common normals.
 //! 4. `text`: the arm file, with the bodies' inertia moved into the new frames.
 //!
 //! Joint positions keep their meaning: q of the arm file is the URDF's q, for position limits too.
 
 pub(crate) mod chain;
+mod change;
 mod frames;
 pub(crate) mod mjcf;
 mod orientation;
@@ -18,6 +20,7 @@ mod text;
 pub(crate) mod urdf;
 
 use crate::arm::{Arm, Convention, Parameter};
+use change::Change;
 use std::fmt;
 
 /// How to read a URDF.
@@ -142,6 +145,13 @@ fn imported(robot: urdf::Robot, file: &str, options: &Options) -> Result<Importe
     if !options.exact {
         chain = meant(&robot, chain, options).map_err(refused)?;
     }
+    if options.exact {
+        let snapped = rounding::snapped(&robot, &chain.path, options.angle_tolerance);
+        let said = snapped.into_iter().map(|joint| {
+            format!("within {:e} rad: {joint} (--angle-tolerance 0 keeps it)", options.angle_tolerance)
+        });
+        chain.notes.extend(said);
+    }
     let frames = frames::place(&chain, options).map_err(|reason| refused(vec![reason]))?;
     let text = text::arm_file(&chain, &frames, file, options);
     let arm = Arm::parse(&text, file)
@@ -157,13 +167,14 @@ fn meant(robot: &urdf::Robot, written: chain::Chain, options: &Options) -> Resul
     let (nearest, moved) = rounding::nearest(robot, &written.path);
     let mut chain = chain::chain(&nearest, options)?;
     if !moved.is_empty() {
-        let (distance, turn) = rounding::difference(&written, &chain);
+        let Change { distance, turn, inertia } = Change::between(&written, &chain);
         chain.notes.extend(moved.into_iter().map(|joint| format!("taken as meant: {joint}")));
         chain.notes.push(format!(
             "these numbers are rounded; taken as meant they move the tip by at most {} mm and {} mrad over \
-             the joints' ranges (--exact keeps every digit)",
+             the joints' ranges and change M by at most {} % of √(M_ii M_jj) (--exact keeps every digit)",
             short(1e3 * distance),
-            short(1e3 * turn)
+            short(1e3 * turn),
+            short(100.0 * inertia)
         ));
     }
     Ok(chain)

@@ -5,14 +5,11 @@
 //! and lengths that are zero is what was meant, where each number that moves is one that writing it out
 //! rounds to the one that stands there, or is off by less than any arm is made or measured to.
 
-use super::chain::{Chain, ChainJoint};
-use super::pose::Pose;
+use super::pose::twelfths;
 use super::urdf::{Joint, Robot};
-use crate::arm::JointKind;
 use crate::exact::angle::Angle;
-use crate::exact::prime::Draws;
 use crate::exact::rational;
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Vector3;
 use std::f64::consts::PI;
 
 /// What is smaller is residue of a calculation: m, rad, or a share of an axis.
@@ -21,8 +18,6 @@ const RESIDUE: f64 = 1e-6;
 const SILENT: f64 = 1e-12;
 /// Decimals with which a multiple of pi/2, of pi/6 or pi/4, and of pi/12 is recognised.
 const DECIMALS: [i32; 3] = [2, 3, 4];
-/// Poses at which two arms are compared.
-const POSES: usize = 500;
 
 /// The robot with the rounded numbers of some joints as they were meant, and what was moved: a line for each
 /// joint.
@@ -75,7 +70,7 @@ fn meant_angle(angle: f64) -> Option<(f64, String)> {
     let rounded = count != 0.0
         && (DECIMALS[kind]..15).contains(&digits)
         && (written((meant * unit).round()) || written((meant * unit).trunc()));
-    let text = Angle::PiMultiple(rational::integer(count as i64) / rational::integer(12)).to_string();
+    let text = multiple_text(count as i64);
     (rounded || (angle - meant).abs() <= RESIDUE).then_some((meant, text))
 }
 
@@ -85,41 +80,27 @@ fn decimals(x: f64) -> i32 {
     text.split_once('.').map_or(0, |(_, after)| after.len() as i32)
 }
 
-/// The largest distance, m, and turn, rad, between the tips of two chains at the same positions of their
-/// joints, over poses in the joints' ranges.
-pub(super) fn difference(one: &Chain, other: &Chain) -> (f64, f64) {
-    let mut draws = Draws::new(0x0072_6f75_6e64);
-    let (mut distance, mut turn) = (0.0f64, 0.0f64);
-    for _ in 0..POSES {
-        let q: Vec<f64> = one.joints.iter().map(|joint| within(joint, &mut draws)).collect();
-        let [a, b] = [one, other].map(|chain| tip(chain, &q));
-        distance = distance.max((a.origin - b.origin).norm());
-        // Of a small rotation the sine of its angle, from the part that is skew.
-        let r = a.rotation.transpose() * b.rotation;
-        let skew = Vector3::new(r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]);
-        turn = turn.max((skew.norm() / 2.0).min(1.0).asin());
-    }
-    (distance, turn)
-}
-
-fn within(joint: &ChainJoint, draws: &mut Draws) -> f64 {
-    let [low, high] = joint.position.unwrap_or(match joint.kind {
-        JointKind::Revolute => [-PI, PI],
-        JointKind::Prismatic => [-0.5, 0.5],
-    });
-    low + (high - low) * (draws.element().residue() as f64 / (1u64 << 61) as f64)
-}
-
-/// The tip link's pose in the root link's frame: each joint turns or shifts all that was placed at q = 0
-/// behind it.
-fn tip(chain: &Chain, q: &[f64]) -> Pose {
-    chain.joints.iter().zip(q).rev().fold(chain.tip_pose, |pose, (joint, q)| match joint.kind {
-        JointKind::Revolute => {
-            let turn = Rotation3::new(joint.direction * *q).into_inner();
-            Pose { rotation: turn * pose.rotation, origin: joint.point + turn * (pose.origin - joint.point) }
+/// What angles within a tolerance of a multiple of pi/12 are taken for, a line for each joint.
+pub(super) fn snapped(robot: &Robot, joints: &[usize], tolerance: f64) -> Vec<String> {
+    let mut said = Vec::new();
+    for joint in joints.iter().map(|index| &robot.joints[*index]) {
+        let angles = ["roll", "pitch", "yaw"].iter().zip(&joint.origin.rpy);
+        let change = |(axis, angle): (&&str, &f64)| {
+            let count = twelfths(*angle, tolerance)?;
+            let moved = (angle - count as f64 * PI / 12.0).abs() > SILENT;
+            moved.then(|| format!("{axis} {angle} is {}", multiple_text(count)))
+        };
+        let changes: Vec<String> = angles.filter_map(change).collect();
+        if !changes.is_empty() {
+            said.push(format!("joint '{}': {}", joint.name, changes.join(", ")));
         }
-        JointKind::Prismatic => Pose { origin: pose.origin + joint.direction * *q, ..pose },
-    })
+    }
+    said
+}
+
+/// A multiple of pi/12 by its name.
+fn multiple_text(count: i64) -> String {
+    Angle::PiMultiple(rational::integer(count) / rational::integer(12)).to_string()
 }
 
 #[cfg(test)]

@@ -43,10 +43,14 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
             JointKind::Revolute => "revolute",
             JointKind::Prismatic => "prismatic",
         };
+        let beside = match length(row.b).as_str() {
+            "0" => String::new(),
+            b => format!("b = {b}\n"),
+        };
         let _ = write!(
             text,
-            "\n# links {}\n[[joint]]\nname = \"{}\"\nkind = \"{kind}\"\na = {}\nalpha = {}\nd = {}\ntheta = \
-                {}\n",
+            "\n# links {}\n[[joint]]\nname = \"{}\"\nkind = \"{kind}\"\na = {}\n{beside}alpha = {}\nd = \
+             {}\ntheta = {}\n",
             plain(&joint.links.iter().map(|l| format!("'{l}'")).collect::<Vec<_>>().join(", ")),
             quoted(&joint.name),
             length(row.a),

@@ -44,10 +44,19 @@ pub(crate) struct Joint {
     pub(crate) upper: f64,
     pub(crate) effort: f64,
     pub(crate) velocity: f64,
-    /// The joint whose position it follows.
-    pub(crate) mimic: Option<String>,
+    /// The joint that it follows.
+    pub(crate) mimic: Option<Mimic>,
     /// What a MuJoCo model says of its drive.
     pub(crate) motor: Option<Motor>,
+}
+
+/// What a joint follows: its position is ratio · the other's + offset.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Mimic {
+    pub(crate) joint: String,
+    pub(crate) ratio: f64,
+    /// rad or m
+    pub(crate) offset: f64,
 }
 
 /// A joint's drive in a MuJoCo model.
@@ -97,13 +106,24 @@ pub(crate) fn read(text: &str) -> Result<Robot, String> {
                 text = declared(&text, &prefix)
                     .ok_or_else(|| format!("line {}: unknown prefix '{prefix}'", at.row))?;
             }
-            Err(e) => return Err(format!("line {}: {e}", e.pos().row)),
+            Err(e) => return Err(broken(&text, &e)),
         }
     }
     Err("its elements have too many prefixes without a namespace".to_string())
 }
 
 const FROM_THE_WEB: &str = ", not a robot: download the raw file";
+
+/// Why a text is no XML, with the line.
+pub(crate) fn broken(text: &str, error: &Error) -> String {
+    match error {
+        // The reader says the first line of what was never closed.
+        Error::UnexpectedEndOfStream | Error::UnclosedRootNode => {
+            format!("line {}: the file ends within an element: is it all there?", text.lines().count())
+        }
+        e => format!("line {}: {e}", e.pos().row),
+    }
+}
 
 /// The text with a namespace for a prefix in its first element.
 fn declared(text: &str, prefix: &str) -> Option<String> {
@@ -207,7 +227,11 @@ impl<'d, 'i> Reader<'d, 'i> {
         let limit = child(node, "limit");
         let [lower, upper, effort, velocity] = ["lower", "upper", "effort", "velocity"]
             .map(|key| limit.map_or(0.0, |l| self.number(l, key, &place)));
-        let mimic = child(node, "mimic").map(|m| m.attribute("joint").unwrap_or("").to_string());
+        let mimic = child(node, "mimic").map(|m| Mimic {
+            joint: m.attribute("joint").unwrap_or("").to_string(),
+            ratio: if m.has_attribute("multiplier") { self.number(m, "multiplier", &place) } else { 1.0 },
+            offset: self.number(m, "offset", &place),
+        });
         Some(Joint {
             line: self.line(node),
             kind: kind.trim().to_string(),

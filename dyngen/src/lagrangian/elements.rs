@@ -42,6 +42,8 @@ pub struct JointElements<V> {
     pub motor_speed: V,
     /// Link length a.
     pub a: V,
+    /// Offset b beside it, along y.
+    pub b: V,
     /// Sine of the twist.
     pub sin_alpha: V,
     /// Cosine of the twist.
@@ -125,6 +127,8 @@ pub trait Source<V> {
     fn speed(&mut self, joint: usize) -> V;
     /// Link length; asked for only where it is not zero.
     fn a(&mut self, joint: usize) -> V;
+    /// Offset along y beside it; asked for only where it is not zero.
+    fn b(&mut self, joint: usize) -> V;
     /// Link offset; asked for only where it is not zero.
     fn d(&mut self, joint: usize) -> V;
     /// Gear ratio.
@@ -170,6 +174,7 @@ impl<V: Clone> ArmElements<V> {
                 speed: speed.clone(),
                 motor_speed: speed,
                 a: if joint.a.is_zero() { algebra.integer(0) } else { source.a(i) },
+                b: if joint.b.is_zero() { algebra.integer(0) } else { source.b(i) },
                 sin_alpha: constant(algebra, sin_alpha, &mut |m, s| source.symbol(m, s)),
                 cos_alpha: constant(algebra, cos_alpha, &mut |m, s| source.symbol(m, s)),
                 ratio: joint.rotor_ratio.is_some().then(|| source.ratio(i)),

@@ -71,13 +71,19 @@ pub fn step<A: Algebra>(
     Axis { omega, rotor }
 }
 
-/// Rx(α) Tx(a).
+/// Tx(a) Ty(b) Rx(α).
 fn twist<A: Algebra>(alg: &A, joint: &JointElements<A::Value>, state: &mut Motion<A::Value>) {
     if !alg.is_zero(&joint.a) {
         let [_, wy, wz] = &state.omega;
         state.velocity[1] = alg.add(&state.velocity[1], &alg.mul(&joint.a, wz));
         state.velocity[2] = alg.sub(&state.velocity[2], &alg.mul(&joint.a, wy));
         state.height = alg.add(&state.height, &alg.mul(&joint.a, &state.gravity[0]));
+    }
+    if !alg.is_zero(&joint.b) {
+        let [wx, _, wz] = &state.omega;
+        state.velocity[0] = alg.sub(&state.velocity[0], &alg.mul(&joint.b, wz));
+        state.velocity[2] = alg.add(&state.velocity[2], &alg.mul(&joint.b, wx));
+        state.height = alg.add(&state.height, &alg.mul(&joint.b, &state.gravity[1]));
     }
     for v in [&mut state.omega, &mut state.velocity, &mut state.gravity] {
         *v = turn_x(alg, &joint.sin_alpha, &joint.cos_alpha, v);

@@ -80,7 +80,7 @@ impl PoseSeries {
             ];
             let about_x = [
                 [one, zero, zero, joint.a],
-                [zero, ca, alg.neg(&sa), zero],
+                [zero, ca, alg.neg(&sa), joint.b],
                 [zero, sa, ca, zero],
                 [zero, zero, zero, one],
             ];
@@ -146,6 +146,9 @@ impl Source<Series> for SeriesSource<'_, '_> {
     }
     fn a(&mut self, joint: usize) -> Series {
         number(&self.point.arm.joints[joint].a)
+    }
+    fn b(&mut self, joint: usize) -> Series {
+        number(&self.point.arm.joints[joint].b)
     }
     fn d(&mut self, joint: usize) -> Series {
         number(&self.point.arm.joints[joint].d)

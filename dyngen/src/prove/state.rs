@@ -118,6 +118,9 @@ impl Source<Jet> for JetSource<'_, '_> {
     fn a(&mut self, joint: usize) -> Jet {
         self.number(&self.state.point.arm.joints[joint].a)
     }
+    fn b(&mut self, joint: usize) -> Jet {
+        self.number(&self.state.point.arm.joints[joint].b)
+    }
     fn d(&mut self, joint: usize) -> Jet {
         self.number(&self.state.point.arm.joints[joint].d)
     }
@@ -176,6 +179,9 @@ impl Source<(Jet, Jet)> for DualSource<'_, '_> {
     }
     fn a(&mut self, joint: usize) -> (Jet, Jet) {
         Self::fixed(self.inner.a(joint))
+    }
+    fn b(&mut self, joint: usize) -> (Jet, Jet) {
+        Self::fixed(self.inner.b(joint))
     }
     fn d(&mut self, joint: usize) -> (Jet, Jet) {
         Self::fixed(self.inner.d(joint))

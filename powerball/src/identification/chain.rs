@@ -10,6 +10,7 @@ pub struct Row {
     standard: bool,
     revolute: bool,
     a: f64,
+    b: f64,
     sin_cos_alpha: (f64, f64),
     d: f64,
     theta: f64,
@@ -22,6 +23,7 @@ impl Row {
             standard: convention == Convention::Standard,
             revolute: joint.kind == JointKind::Revolute,
             a: joint.a.to_f64().unwrap_or(f64::NAN),
+            b: joint.b.to_f64().unwrap_or(f64::NAN),
             sin_cos_alpha: joint.alpha.sin_cos(),
             d: joint.d.to_f64().unwrap_or(f64::NAN),
             theta: joint.theta.radians(),
@@ -47,10 +49,10 @@ impl Row {
         let (sa, ca) = self.sin_cos_alpha;
         if self.standard {
             let rotation = Matrix3::new(ct, -st * ca, st * sa, st, ct * ca, -ct * sa, 0.0, sa, ca);
-            (rotation, Vector3::new(self.a * ct, self.a * st, d))
+            (rotation, Vector3::new(self.a * ct - self.b * st, self.a * st + self.b * ct, d))
         } else {
             let rotation = Matrix3::new(ct, -st, 0.0, st * ca, ct * ca, -sa, st * sa, ct * sa, ca);
-            (rotation, Vector3::new(self.a, -d * sa, d * ca))
+            (rotation, Vector3::new(self.a, self.b - d * sa, d * ca))
         }
     }
 
@@ -77,6 +79,8 @@ impl Row {
 #[derive(Clone, Debug)]
 pub struct Chain {
     rows: Vec<Row>,
+    /// Motor velocities = matrix · joint velocities, by rows, where a motor turns with several joints.
+    motors: Option<Vec<Vec<f64>>>,
     /// Gravity in the base frame, m/s².
     pub gravity: Vector3<f64>,
 }
@@ -86,6 +90,7 @@ impl Chain {
     pub fn new(arm: &Arm) -> Self {
         Chain {
             rows: arm.joints.iter().map(|joint| Row::new(joint, arm.convention)).collect(),
+            motors: (!arm.transmissions.is_empty()).then(|| arm.motor_velocity_matrix_f64()),
             gravity: Vector3::from_iterator(arm.gravity.iter().map(|g| g.to_f64().unwrap_or(f64::NAN))),
         }
     }
@@ -93,6 +98,24 @@ impl Chain {
     /// The joints from the base outwards.
     pub fn rows(&self) -> &[Row] {
         &self.rows
+    }
+
+    /// The velocity, or acceleration, of a joint's motor on the joint's side of its gear, for those of all joints.
+    pub fn motor_rate(&self, motor: usize, rates: &[f64]) -> f64 {
+        match &self.motors {
+            None => rates[motor],
+            Some(matrix) => matrix[motor].iter().zip(rates).map(|(m, rate)| m * rate).sum(),
+        }
+    }
+
+    /// Adds to the joints' torques what a motor's torque on the joint's side of its gear is at them.
+    pub fn add_motor_torque(&self, motor: usize, torque: f64, torques: &mut [f64]) {
+        match &self.motors {
+            None => torques[motor] += torque,
+            Some(matrix) => {
+                torques.iter_mut().zip(&matrix[motor]).for_each(|(sum, factor)| *sum += factor * torque)
+            }
+        }
     }
 
     /// The number of joints.

@@ -168,7 +168,7 @@ fn of_arm(page: &mut Page, arm: &Arm) {
     let mut table = Table::new([
         "joint",
         "kind",
-        "a [m]",
+        if arm.joints.iter().any(|joint| to_f64(&joint.b) != 0.0) { "a, b [m]" } else { "a [m]" },
         "alpha [rad]",
         "d [m]",
         "theta [rad]",
@@ -182,7 +182,10 @@ fn of_arm(page: &mut Page, arm: &Arm) {
         table.push([
             JointNumber::from_index(j).to_string(),
             if joint.kind == JointKind::Revolute { "revolute" } else { "prismatic" }.to_string(),
-            number(to_f64(&joint.a)),
+            match to_f64(&joint.b) {
+                0.0 => number(to_f64(&joint.a)),
+                b => format!("{}, {}", number(to_f64(&joint.a)), number(b)),
+            },
             number(joint.alpha.radians()),
             number(to_f64(&joint.d)),
             number(joint.theta.radians()),

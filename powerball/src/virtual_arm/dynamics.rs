@@ -164,14 +164,19 @@ impl Dynamics {
             let (r, p) = row.pose(pass.q[i]);
             let (z, dq, ddq) = (row.axis(), pass.dq[i], pass.ddq[i]);
 
-            // Rotor i sits on link i−1 and spins about the joint's axis with the angular momentum k·Im·q̇·z
-            // more than link i−1 gives it. Its rate of change is a moment on link i−1 (frame i−1 here), and
-            // its share in the rotor's own equation of motion, times k, comes onto the joint.
+            // Rotor i sits on link i−1 and spins about the joint's axis with the angular momentum k·Im·μ·z
+            // more than link i−1 gives it, μ its motor's velocity before the gear: q̇, or what a transmission
+            // makes of several joints' q̇. Its rate of change is a moment on link i−1 (frame i−1 here), and its
+            // share in the rotor's own equation of motion, times k, comes onto the joints that turn it.
             let spin = row.ratio() * body.rotor;
-            if i > 0 {
-                moment[i - 1] += spin * (ddq * z + dq * w.cross(&z));
+            if spin != 0.0 {
+                let (rate, change) = (self.chain.motor_rate(i, pass.dq), self.chain.motor_rate(i, pass.ddq));
+                if i > 0 {
+                    moment[i - 1] += spin * (change * z + rate * w.cross(&z));
+                }
+                let torque = row.ratio() * spin * change + spin * z.dot(&dw);
+                self.chain.add_motor_torque(i, torque, &mut tau);
             }
-            tau[i] += row.ratio() * spin * ddq + spin * z.dot(&dw);
 
             // Link i, still expressed in frame i−1.
             let turning = if row.is_revolute() { z * dq } else { Vector3::zeros() };

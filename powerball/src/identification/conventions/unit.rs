@@ -105,7 +105,7 @@ impl Size {
 
 /// The lengths of the links together, m.
 fn reach(arm: &Arm) -> f64 {
-    arm.joints.iter().map(|j| to_f64(&j.a).hypot(to_f64(&j.d))).sum()
+    arm.joints.iter().map(|j| to_f64(&j.a).hypot(to_f64(&j.b)).hypot(to_f64(&j.d))).sum()
 }
 
 /// The largest share of its limit that a joint's torque reaches in all but one of a hundred rows.

@@ -10,9 +10,9 @@ use super::capsule::Segment;
 use super::limits::JointLimits;
 use crate::identification::chain::Chain;
 use dyngen::Arm;
-use dyngen::arm::{Convention, JointKind};
+use dyngen::arm::{Convention, Joint, JointKind};
 use dyngen::exact::rational::to_f64;
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fmt;
@@ -64,7 +64,7 @@ struct Part {
 pub struct Shape {
     chain: Chain,
     modified: bool,
-    a: Vec<f64>,
+    across: Vec<Vector3<f64>>,
     tool: Option<Vector3<f64>>,
     radius: f64,
     parts: Vec<Part>,
@@ -83,6 +83,11 @@ pub struct Floor {
     moving: Vec<bool>,
 }
 
+/// What a joint's row goes across its axes, a and b, m.
+fn normal(joint: &Joint) -> Vector3<f64> {
+    Vector3::new(to_f64(&joint.a), to_f64(&joint.b), 0.0)
+}
+
 impl Shape {
     /// The capsules of an arm, of one radius (m). Parts that touch in every pose within the limits are not
     /// looked at again: see [`Shape::always_touching`].
@@ -91,7 +96,7 @@ impl Shape {
         let modified = arm.convention == Convention::Modified;
         let mut parts = Vec::new();
         for (i, joint) in arm.joints.iter().enumerate() {
-            let (along_a, along_d) = (to_f64(&joint.a) != 0.0, to_f64(&joint.d) != 0.0);
+            let (along_a, along_d) = (normal(joint).norm() != 0.0, to_f64(&joint.d) != 0.0);
             let along_d = along_d || joint.kind == JointKind::Prismatic;
             // Modified rows go along a first, and that part is rigid with the link before.
             let (first, second) = if modified { (along_a, along_d) } else { (along_d, along_a) };
@@ -106,12 +111,17 @@ impl Shape {
         if tool.is_some_and(|tool| tool.norm() > 0.0) {
             parts.push(Part { vertex: 2 * arm.dof(), link: arm.dof() });
         }
-        let a = arm.joints.iter().map(|joint| to_f64(&joint.a)).collect();
+        // x of frame i is that after Rx(alpha) too (standard), x of frame i − 1 that before it (modified).
+        let across = |joint: &Joint| match modified {
+            true => normal(joint),
+            false => Rotation3::from_axis_angle(&Vector3::x_axis(), -joint.alpha.radians()) * normal(joint),
+        };
+        let across = arm.joints.iter().map(across).collect();
         let all = (0..parts.len()).flat_map(|k| (k + 1..parts.len()).map(move |l| (k, l))).collect();
         let mut shape = Shape {
             chain: Chain::new(arm),
             modified,
-            a,
+            across,
             tool,
             radius,
             parts,
@@ -173,12 +183,10 @@ impl Shape {
         let mut vertices = Vec::with_capacity(2 * poses.len() + 2);
         vertices.push(Vector3::zeros());
         let mut before = (nalgebra::Matrix3::identity(), Vector3::zeros());
-        for ((rotation, origin), a) in poses.iter().zip(&self.a) {
-            // x of frame i is that after Rx(alpha) too (standard), x of frame i − 1 that before it
-            // (modified).
+        for ((rotation, origin), across) in poses.iter().zip(&self.across) {
             vertices.push(match self.modified {
-                true => before.1 + before.0 * Vector3::new(*a, 0.0, 0.0),
-                false => origin - rotation * Vector3::new(*a, 0.0, 0.0),
+                true => before.1 + before.0 * across,
+                false => origin - rotation * across,
             });
             vertices.push(*origin);
             before = (*rotation, *origin);

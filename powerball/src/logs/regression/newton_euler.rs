@@ -8,6 +8,8 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 /// base frame.
 pub(crate) fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec<f64> {
     let n = arm.dof();
+    let motors = arm.motor_velocity_matrix_f64();
+    let rate = |motor: usize, of: &[f64]| -> f64 { motors[motor].iter().zip(of).map(|(m, x)| m * x).sum() };
     let number = dyngen::exact::rational::to_f64;
     let mut y = vec![0.0; n * 11 * n];
     let (mut axes, mut points) = (Vec::new(), Vec::new());
@@ -22,7 +24,7 @@ pub(crate) fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3])
         };
         let twist = *Rotation3::from_axis_angle(&Vector3::x_axis(), joint.alpha.radians()).matrix();
         let turn = *Rotation3::from_axis_angle(&Vector3::z_axis(), theta).matrix();
-        let shift = Vector3::new(number(&joint.a), 0.0, 0.0);
+        let shift = Vector3::new(number(&joint.a), number(&joint.b), 0.0);
         let along = Vector3::new(0.0, 0.0, d);
         // The joint's axis and a point on it are fixed in link i − 1.
         let (axis, point, r_next, p_next) = match arm.convention {
@@ -38,8 +40,11 @@ pub(crate) fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3])
         };
         if let Some(ratio) = &joint.rotor_ratio {
             let (k, column) = (number(ratio), 11 * i + 10);
-            y[i * 11 * n + column] += k * k * a[i] + k * axis.dot(&dw);
-            let moment = axis * (k * a[i]) + w.cross(&axis) * (k * v[i]);
+            let (speed, change) = (rate(i, v), rate(i, a));
+            for (j, factor) in motors[i].iter().enumerate() {
+                y[j * 11 * n + column] += factor * (k * k * change + k * axis.dot(&dw));
+            }
+            let moment = axis * (k * change) + w.cross(&axis) * (k * speed);
             for j in 0..i {
                 if arm.joints[j].kind == JointKind::Revolute {
                     let z: Vector3<f64> = axes[j];

@@ -67,7 +67,11 @@ impl Summary {
     #[must_use]
     pub fn new(body: &RigidBody, options: &DataOptions) -> Summary {
         let arm = body.filed();
-        let described = format!("{:?} {:?} {:?} {:?}", arm.convention, arm.gravity, arm.joints, arm.tool);
+        let mut described = format!("{:?} {:?} {:?} {:?}", arm.convention, arm.gravity, arm.joints, arm.tool);
+        // Without transmissions the hash is that of summaries that were written before there were any.
+        if !arm.transmissions.is_empty() {
+            described += &format!(" {:?}", arm.transmissions);
+        }
         let identity = Identity {
             arm: arm.name.clone(),
             hash: fnv(described.as_bytes()),

@@ -1,5 +1,9 @@
 //! What is known of an arm, as `dyngen describe --json` prints it.
 
+mod weak;
+
+pub use weak::Weak;
+
 use crate::arm::Transmission;
 use crate::base::sets::{Class, combination_text};
 use crate::base::symmetry::{self, Removed, Symmetry};
@@ -18,6 +22,8 @@ pub struct Description {
     pub operations: Vec<(&'static str, Operations)>,
     /// What each declared symmetry removed.
     pub symmetries: Vec<Symmetry>,
+    /// Sums of the minimal set that torques hardly show, the weakest first.
+    pub weak: Vec<Weak>,
 }
 
 impl Description {
@@ -26,14 +32,25 @@ impl Description {
     /// # Errors
     /// As [`Model::function`].
     pub fn of(model: &Model) -> Result<Description, Error> {
+        Description::with_progress(model, |_| {})
+    }
+
+    /// The same, where somebody wants to know what is being done.
+    ///
+    /// # Errors
+    /// As [`Model::function`].
+    pub fn with_progress(model: &Model, say: impl Fn(&str)) -> Result<Description, Error> {
         let mut preparation = Preparation::default();
         let mut operations = Vec::new();
         for function in Function::ALL {
+            say(&format!("proving {function}"));
             let built = model.function(function, SetKind::Minimal)?.without_preparation(&mut preparation);
             operations.push((function.name(), built.operations()));
         }
         operations.push(("prepare", preparation.operations()));
-        Ok(Description { operations, symmetries: symmetry::symmetries(model.arm(), model.sets())? })
+        say("parameters that hardly show");
+        let weak = weak::weak(model)?;
+        Ok(Description { operations, symmetries: symmetry::symmetries(model.arm(), model.sets())?, weak })
     }
 
     /// One JSON object of all that is known of a model's arm.
@@ -44,6 +61,7 @@ impl Description {
         let of_class = |class: Class| -> Vec<String> {
             kept.iter().filter(|p| model.sets().class(**p) == class).map(ToString::to_string).collect()
         };
+        let hardly = |w: &Weak| json!({"singular_value": w.singular_value, "parameters": w.parameters});
         let operations: Map<String, Value> = self
             .operations
             .iter()
@@ -64,6 +82,7 @@ impl Description {
             "unidentifiable": of_class(Class::Unidentifiable),
             "identifiable_alone": of_class(Class::Alone),
             "identifiable_in_combination": of_class(Class::InCombination),
+            "hardly_identifiable": self.weak.iter().map(hardly).collect::<Vec<_>>(),
             "operations": operations,
             "choice": choice,
             "symmetries": self.symmetries.iter().map(|s| symmetry_json(model, s)).collect::<Vec<_>>(),

@@ -1,0 +1,104 @@
+//! How far two chains with the same joints are apart: their tips and their mass matrices.
+
+use super::chain::{Chain, ChainJoint};
+use super::pose::Pose;
+use crate::arm::JointKind;
+use crate::exact::prime::Draws;
+use nalgebra::{Rotation3, Vector3};
+use std::f64::consts::PI;
+
+/// Poses at which two arms are compared.
+const POSES: usize = 500;
+
+/// The largest differences over poses in the joints' ranges.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Change {
+    /// Between the tips, m.
+    pub(super) distance: f64,
+    /// Between the tips' axes, rad.
+    pub(super) turn: f64,
+    /// Of an element of the mass matrix M, relative to √(M_ii M_jj).
+    pub(super) inertia: f64,
+}
+
+impl Change {
+    /// Between two chains at the same positions of their joints.
+    pub(super) fn between(one: &Chain, other: &Chain) -> Change {
+        let mut draws = Draws::new(0x0072_6f75_6e64);
+        let mut change = Change::default();
+        for _ in 0..POSES {
+            let q: Vec<f64> = one.joints.iter().map(|joint| within(joint, &mut draws)).collect();
+            let [(a, m), (b, n)] = [one, other].map(|chain| {
+                let moved = displacements(chain, &q);
+                let tip = moved.last().map_or(chain.tip_pose, |last| last.then(&chain.tip_pose));
+                (tip, mass_matrix(chain, &moved))
+            });
+            change.distance = change.distance.max((a.origin - b.origin).norm());
+            // Of a small rotation the sine of its angle, from the part that is skew.
+            let r = a.rotation.transpose() * b.rotation;
+            let skew = Vector3::new(r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]);
+            change.turn = change.turn.max((skew.norm() / 2.0).min(1.0).asin());
+            for i in 0..q.len() {
+                for j in 0..q.len() {
+                    let share = (m[i][j] - n[i][j]).abs() / (m[i][i] * m[j][j]).sqrt();
+                    // Joints that move no mass say nothing.
+                    change.inertia =
+                        if share.is_finite() { change.inertia.max(share) } else { change.inertia };
+                }
+            }
+        }
+        change
+    }
+}
+
+fn within(joint: &ChainJoint, draws: &mut Draws) -> f64 {
+    let [low, high] = joint.position.unwrap_or(match joint.kind {
+        JointKind::Revolute => [-PI, PI],
+        JointKind::Prismatic => [-0.5, 0.5],
+    });
+    low + (high - low) * (draws.element().residue() as f64 / (1u64 << 61) as f64)
+}
+
+/// Where each joint has taken what stood behind it at q = 0, in the root link's frame.
+fn displacements(chain: &Chain, q: &[f64]) -> Vec<Pose> {
+    let mut moved = Pose::identity();
+    let step = |(joint, q): (&ChainJoint, &f64)| {
+        let own = match joint.kind {
+            JointKind::Revolute => {
+                let rotation = Rotation3::new(joint.direction * *q).into_inner();
+                Pose { rotation, origin: joint.point - rotation * joint.point }
+            }
+            JointKind::Prismatic => Pose { origin: joint.direction * *q, ..Pose::identity() },
+        };
+        moved = moved.then(&own);
+        moved
+    };
+    chain.joints.iter().zip(q).map(step).collect()
+}
+
+/// The mass matrix: Σ over bodies of m·vᵢ·vⱼ + ωᵢᵀ·I·ωⱼ, with the velocities that unit joint velocities give.
+fn mass_matrix(chain: &Chain, moved: &[Pose]) -> Vec<Vec<f64>> {
+    let n = chain.joints.len();
+    let mut matrix = vec![vec![0.0; n]; n];
+    // A joint's axis is carried by the joints before it, and does not move when it turns itself.
+    let axes: Vec<(Vector3<f64>, Vector3<f64>)> = (chain.joints.iter().zip(moved))
+        .map(|(joint, pose)| (pose.rotation * joint.direction, pose.point(joint.point)))
+        .collect();
+    for (k, (link, pose)) in chain.joints.iter().zip(moved).enumerate() {
+        for body in &link.masses {
+            let centre = pose.point(body.centre);
+            let inertia = pose.rotation * body.inertia * pose.rotation.transpose();
+            let motion = |j: usize| match chain.joints[j].kind {
+                JointKind::Revolute => (axes[j].0.cross(&(centre - axes[j].1)), axes[j].0),
+                JointKind::Prismatic => (axes[j].0, Vector3::zeros()),
+            };
+            let motions: Vec<_> = (0..=k).map(motion).collect();
+            for (i, (v, w)) in motions.iter().enumerate() {
+                for (j, (other_v, other_w)) in motions.iter().enumerate() {
+                    matrix[i][j] += body.mass * v.dot(other_v) + w.dot(&(inertia * other_w));
+                }
+            }
+        }
+    }
+    matrix
+}
