@@ -2,6 +2,7 @@
 
 mod approach;
 pub mod constant_speed;
+pub mod envelope;
 pub mod friction;
 pub mod gravity_free;
 pub mod laws;
@@ -11,4 +12,5 @@ pub mod settling;
 pub mod warm_up;
 
 pub use approach::approach;
+pub use envelope::Envelope;
 pub use record::{Record, RecordError, Recorder, record, way};

@@ -3,8 +3,8 @@
 //! Every line of a log is written whole, by one call, when its cycle is over: whatever moment the program
 //! dies at, the file can be read up to there.
 
-use super::approach;
-use crate::bus::driver::{ControlMode, Phase, Profile, Rejection, check_path};
+use super::{Envelope, approach};
+use crate::bus::driver::{ControlMode, Phase, Profile, Rejection};
 use crate::bus::transport::{ArmError, Bus, Master, Moment};
 use crate::identification::motion::Motion;
 use serde::Serialize;
@@ -75,22 +75,46 @@ impl<E: Into<ArmError>> From<E> for RecordError {
 #[derive(Debug)]
 pub struct Recorder<B: Bus, const N: usize> {
     master: Master<B, N>,
+    /// What every motion must keep.
+    envelope: Envelope<N>,
     /// The set-point that is held.
     target: [f64; N],
 }
 
 impl<B: Bus, const N: usize> Recorder<B, N> {
-    /// Brings an arm up, enables it, and holds it where it is.
+    /// Brings an arm up: where it is is known then, its brakes are closed. No motion leaves `envelope`.
     ///
     /// # Errors
     /// Where driver, arm or bus refuse.
-    pub fn enable(mut master: Master<B, N>) -> Result<Self, RecordError> {
+    pub fn bring_up(mut master: Master<B, N>, envelope: Envelope<N>) -> Result<Self, RecordError> {
+        if let Some(guard) = envelope.torque_guard() {
+            master.driver_mut().guard_torque(guard);
+        }
         master.driver_mut().start(ControlMode::InterpolatedPosition, false).map_err(ArmError::from)?;
         master.wait_for(Phase::Ready, PATIENCE)?;
-        master.driver_mut().enable().map_err(ArmError::from)?;
-        master.wait_for(Phase::Running, PATIENCE)?;
-        let target = master.driver().setpoints();
-        Ok(Recorder { master, target })
+        let target = master.driver().positions();
+        Ok(Recorder { master, envelope, target })
+    }
+
+    /// Enables the arm and holds it where it is.
+    ///
+    /// # Errors
+    /// Where driver, arm or bus refuse.
+    pub fn release(&mut self) -> Result<(), RecordError> {
+        self.master.driver_mut().enable().map_err(ArmError::from)?;
+        self.master.wait_for(Phase::Running, PATIENCE)?;
+        self.target = self.master.driver().setpoints();
+        Ok(())
+    }
+
+    /// Both: brings an arm up, enables it, and holds it where it is.
+    ///
+    /// # Errors
+    /// Where driver, arm or bus refuse.
+    pub fn enable(master: Master<B, N>, envelope: Envelope<N>) -> Result<Self, RecordError> {
+        let mut recorder = Recorder::bring_up(master, envelope)?;
+        recorder.release()?;
+        Ok(recorder)
     }
 
     /// The arm.
@@ -154,13 +178,33 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         }
     }
 
-    /// Goes to a position and holds it: at a share of each joint's speed and acceleration, in `least` s at
-    /// least.
+    /// The way to a position, each joint straight there: at a share of its speed and acceleration, in `least` s at
+    /// least. It was looked at as a whole.
     ///
     /// # Errors
-    /// As [`record`](Self::record).
+    /// [`RecordError::Barred`] where the arm must not go it.
+    pub fn way_to(&self, to: &[f64; N], share: f64, least: f64) -> Result<Motion, RecordError> {
+        let profile = self.master.driver().profile();
+        let motion = way(profile, &self.target, to, share, least);
+        self.envelope.check(profile, &motion).map_err(|e| match e {
+            RecordError::Motion(why) | RecordError::Barred(why) => {
+                let to: Vec<String> = to.iter().map(|q| format!("{q:.3}")).collect();
+                let to = to.join(", ");
+                RecordError::Barred(format!(
+                    "on the straight way to ({to}) rad {why}: move the arm nearer to there first"
+                ))
+            }
+            other => other,
+        })?;
+        Ok(motion)
+    }
+
+    /// Goes that way and holds the position.
+    ///
+    /// # Errors
+    /// As [`way_to`](Self::way_to) and [`record`](Self::record).
     pub fn go(&mut self, to: &[f64; N], share: f64, least: f64) -> Result<(), RecordError> {
-        let motion = way(self.master.driver().profile(), &self.target, to, share, least);
+        let motion = self.way_to(to, share, least)?;
         self.follow(&motion, |_, _| Ok(()))
     }
 
@@ -224,21 +268,8 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         Ok(record)
     }
 
-    fn approach_and_record(
-        &mut self,
-        motion: &Motion,
-        barred: impl Fn(&Motion) -> Option<String>,
-        log: &mut impl Write,
-    ) -> Result<Record, RecordError> {
-        let begin: Option<[f64; N]> = motion.samples().next().and_then(|[q, ..]| q.try_into().ok());
-        if let Some(begin) = begin {
-            let way = way(self.master.driver().profile(), &self.target, &begin, APPROACH, 1.0);
-            if let Some(why) = barred(&way) {
-                return Err(RecordError::Barred(format!(
-                    "on the straight way to where the trajectory begins {why}: move the arm nearer to there \
-                        first"
-                )));
-            }
+    fn approach_and_record(&mut self, motion: &Motion, log: &mut impl Write) -> Result<Record, RecordError> {
+        if let Some(begin) = beginning(motion) {
             self.go(&begin, APPROACH, 1.0)?;
         }
         self.record(motion, 0.0, true, log)
@@ -267,7 +298,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         if far > 1e-3 {
             return wrong(format!("the motion begins {far:.4} rad from where the arm is; go there first"));
         }
-        fits(self.master.driver().profile(), motion)
+        self.envelope.check(self.master.driver().profile(), motion)
     }
 
     /// Stops the arm: brakes closed, torque off.
@@ -293,14 +324,9 @@ pub fn way<const N: usize>(
     approach(from, to, &speed, &acceleration, profile.period_seconds(), least)
 }
 
-/// Whether the driver will take every set-point of a motion, from rest to rest.
-fn fits<const N: usize>(profile: &Profile<N>, motion: &Motion) -> Result<(), RecordError> {
-    let rows = motion.samples().filter_map(|[q, ..]| <[f64; N]>::try_from(q).ok());
-    check_path(profile, rows).map_err(|(k, why)| {
-        let end = if k >= motion.len() { ", where it must end at rest" } else { "" };
-        let time = k as f64 * motion.period;
-        RecordError::Motion(format!("sample {k}, at {time:.3} s{end}: {why}"))
-    })
+/// Where a motion begins, if it is one of `N` joints.
+fn beginning<const N: usize>(motion: &Motion) -> Option<[f64; N]> {
+    motion.samples().next().and_then(|[q, ..]| q.try_into().ok())
 }
 
 fn header<const N: usize>(with_references: bool) -> String {
@@ -316,25 +342,29 @@ fn header<const N: usize>(with_references: bool) -> String {
 }
 
 /// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its speed, follows the
-/// motion, writes the log, and stops. `barred` says of the way to there, and then of the motion, why the arm
-/// must not go it.
+/// motion, writes the log, and stops. The motion is looked at before anything is sent, the way to where it begins
+/// before the arm is enabled.
 ///
 /// # Errors
 /// As [`Recorder::enable`] and [`Recorder::record`], and [`RecordError::Barred`]; the arm has not moved then.
 pub fn record<B: Bus, const N: usize>(
     master: Master<B, N>,
     motion: &Motion,
-    barred: impl Fn(&Motion) -> Option<String>,
+    envelope: Envelope<N>,
     log: &mut impl Write,
 ) -> Result<Record, RecordError> {
-    if let Some(why) = barred(motion) {
-        return Err(RecordError::Barred(format!("on the trajectory {why}")));
-    }
     if motion.dof() == N {
-        fits(master.driver().profile(), motion)?;
+        envelope.check(master.driver().profile(), motion).map_err(|e| match e {
+            RecordError::Barred(why) => RecordError::Barred(format!("on the trajectory {why}")),
+            other => other,
+        })?;
     }
-    let mut recorder = Recorder::enable(master)?;
-    let done = recorder.approach_and_record(motion, barred, log);
+    let mut recorder = Recorder::bring_up(master, envelope)?;
+    if let Some(begin) = beginning(motion) {
+        recorder.way_to(&begin, APPROACH, 1.0)?;
+    }
+    recorder.release()?;
+    let done = recorder.approach_and_record(motion, log);
     // Also where the recording failed, the arm is stopped; why it failed is what is told.
     let stopped = recorder.finish();
     let done = done?;
@@ -359,6 +389,11 @@ mod tests {
         Master::new(Driver::new(LWA4P).unwrap(), Memory::new(arm, LWA4P.bitrate))
     }
 
+    /// No surroundings: the joints' limits alone.
+    fn open() -> Envelope<6> {
+        Envelope::new(|_| None)
+    }
+
     /// Every joint swings, from rest to rest.
     fn swing(seconds: f64) -> Motion {
         let mut motion = Motion::new(6, 0.005);
@@ -376,7 +411,7 @@ mod tests {
     #[test]
     fn a_motion_is_followed_and_logged_without_a_gap() {
         let (motion, mut log) = (swing(6.0), Vec::new());
-        let mut recorder = Recorder::enable(arm()).unwrap();
+        let mut recorder = Recorder::enable(arm(), open()).unwrap();
         recorder.go(&START, 0.25, 1.0).unwrap();
         let record = recorder.record(&motion, 10.0, true, &mut log).unwrap();
         assert_eq!((record.samples, record.missing, record.late, record.dropped), (motion.len(), 0, 0, 0));
@@ -400,7 +435,7 @@ mod tests {
     #[test]
     fn a_log_ends_with_a_whole_line_where_the_arm_is_stopped() {
         let (motion, mut log) = (swing(6.0), Vec::new());
-        let mut recorder = Recorder::enable(arm()).unwrap();
+        let mut recorder = Recorder::enable(arm(), open()).unwrap();
         recorder.go(&START, 0.25, 1.0).unwrap();
         let mut lines = 0;
         let failed = recorder.follow(&motion, |_, master| {
@@ -427,18 +462,20 @@ mod tests {
         let mut log = Vec::new();
         // The way alone ends at joint 2 being lower than the trajectory gets.
         let begin = motion.q[1];
-        let barred = |m: &Motion| (highest(m) <= begin + 1e-6).then(|| "it is barred".to_string());
-        let refused = record(arm(), &motion, barred, &mut log).unwrap_err().to_string();
-        assert!(refused.contains("way to where the trajectory begins it is barred"), "{refused}");
-        let refused = record(arm(), &motion, |_| Some("it is barred".into()), &mut log).unwrap_err();
+        let barred = move |m: &Motion| (highest(m) <= begin + 1e-6).then(|| "it is barred".to_string());
+        let refused = record(arm(), &motion, Envelope::new(barred), &mut log).unwrap_err().to_string();
+        assert!(refused.contains("on the straight way to (0.100, 0.400, "), "{refused}");
+        assert!(refused.contains("rad it is barred: move the arm nearer"), "{refused}");
+        let everything = Envelope::new(|_: &Motion| Some("it is barred".into()));
+        let refused = record(arm(), &motion, everything, &mut log).unwrap_err();
         assert!(refused.to_string().starts_with("on the trajectory"), "{refused}");
         assert!(log.is_empty());
-        assert_eq!(record(arm(), &motion, |_| None, &mut log).unwrap().samples, motion.len());
+        assert_eq!(record(arm(), &motion, open(), &mut log).unwrap().samples, motion.len());
     }
 
     #[test]
     fn what_does_not_fit_is_refused_before_anything_moves() {
-        let mut recorder = Recorder::enable(arm()).unwrap();
+        let mut recorder = Recorder::enable(arm(), open()).unwrap();
         let mut refused = |motion: Motion| match recorder.record(&motion, 0.0, false, &mut Vec::new()) {
             Err(RecordError::Motion(what)) => what,
             other => panic!("{other:?}"),

@@ -3,7 +3,7 @@
 use super::excite_page::page;
 use super::{Failure, output};
 use crate::controller::JointNumber;
-pub(super) use crate::identification::excite::{CLEARANCE, FloorAt, RADIUS, surroundings};
+pub(super) use crate::identification::excite::{CLEARANCE, FloorAt, RADIUS};
 use crate::identification::excite::{
     Collision, Criterion, Error, ExciteOptions, Excited, Figures, Fourier, MassSource, Mounting, Settings,
     Trajectory, excite,
