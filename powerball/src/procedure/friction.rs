@@ -4,7 +4,7 @@
 use super::constant_speed::{self, Bounds, Plan};
 use super::gravity_free::{self, GravityFree};
 use super::laws::{Point, Rated, choose};
-use super::{RecordError, Recorder, resume};
+use super::{Columns, RecordError, Recorder, resume};
 use crate::bus::transport::Bus;
 use crate::identification::mounting::Mounting;
 use crate::logs::log::{LogError, read_log};
@@ -130,7 +130,7 @@ pub fn run<B: Bus, const N: usize>(
         recorder.go(&start, 0.25, 1.0)?;
     }
     let mut log = File::create(&path).map_err(|e| FrictionError::Write(path.clone(), e))?;
-    recorder.record(&experiment.plan.motion, 0.0, false, &mut log)?;
+    recorder.record(&experiment.plan.motion, 0.0, Columns::Torques, &mut log)?;
     Ok(())
 }
 

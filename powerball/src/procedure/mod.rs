@@ -1,16 +1,20 @@
 //! The paper's procedure (§II.C, §III): what is done with an arm, and what its records say.
 
 mod approach;
+pub mod behind;
 pub mod constant_speed;
 pub mod envelope;
 pub mod friction;
 pub mod gravity_free;
 pub mod laws;
+pub mod log_line;
 pub mod record;
 pub mod resume;
 pub mod settling;
 pub mod warm_up;
 
 pub use approach::approach;
+pub use behind::Behind;
 pub use envelope::Envelope;
+pub use log_line::Columns;
 pub use record::{Record, RecordError, Recorder, record, way};

@@ -3,12 +3,12 @@
 //! Every line of a log is written whole, by one call, when its cycle is over: whatever moment the program
 //! dies at, the file can be read up to there.
 
-use super::{Envelope, approach};
+use super::{Columns, Envelope, approach};
 use crate::bus::driver::{ControlMode, Phase, Profile, Rejection};
 use crate::bus::transport::{ArmError, Bus, Master, Moment};
 use crate::identification::motion::Motion;
 use serde::Serialize;
-use std::fmt::{self, Write as _};
+use std::fmt;
 use std::io::{self, Write};
 
 /// Share of the joints' speeds and accelerations on the way to where a motion begins.
@@ -127,18 +127,18 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         &mut self.master
     }
 
-    /// Follows a motion, with `each` called for every cycle: the cycle's number and that of the sample that
-    /// was given in it, and the master, `None` where process data is missing.
+    /// Follows a motion, with `each` called for every cycle: the number of the sample that was given in it, and the
+    /// master, `None` where process data is missing.
     ///
     /// Where set-points came too late for their slot, the sample is given again and the motion is a cycle
     /// longer: a joint is never asked to catch up.
     fn follow(
         &mut self,
         motion: &Motion,
-        mut each: impl FnMut([usize; 2], Option<&Master<B, N>>) -> Result<(), RecordError>,
+        mut each: impl FnMut(usize, Option<&Master<B, N>>) -> Result<(), RecordError>,
     ) -> Result<(), RecordError> {
-        let (mut next, mut cycle) = (0usize, 0usize);
-        let mut waiting: Option<[usize; 2]> = None;
+        let mut next = 0usize;
+        let mut waiting: Option<usize> = None;
         let mut dropped = self.master.driver().counters().dropped;
         loop {
             let until = self.master.bus().now() + 100_000;
@@ -159,18 +159,18 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
                     let q = motion.q.get(sample * N..(sample + 1) * N);
                     if let Some(q) = q {
                         self.target.copy_from_slice(q);
-                        waiting = Some([cycle, sample]);
+                        waiting = Some(sample);
                     }
                     let target = self.target;
                     self.master.driver_mut().set(&target).map_err(RecordError::Rejected)?;
                     if q.is_none() {
                         return Ok(());
                     }
-                    (next, cycle) = (sample + 1, cycle + 1);
+                    next = sample + 1;
                 }
                 Moment::Data => {
-                    if let Some(numbers) = waiting.take() {
-                        each(numbers, Some(&self.master))?;
+                    if let Some(sample) = waiting.take() {
+                        each(sample, Some(&self.master))?;
                     }
                 }
                 _ => {}
@@ -208,8 +208,8 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         self.follow(&motion, |_, _| Ok(()))
     }
 
-    /// Follows a motion that begins where the arm is, and writes the log: `t` in s from `start` on, `q1…qn`
-    /// in rad, `tau1…taun` in N·m, and `ref1…refn`, the set-points, where `with_references`.
+    /// Follows a motion that begins where the arm is, and writes the log with these columns: `t` in s is `start`, and
+    /// the time since the first of its SYNCs, as the bus's clock measured it.
     ///
     /// # Errors
     /// Where the motion does not fit the arm, the arm is stopped, or the log cannot be written. The log ends
@@ -218,37 +218,26 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         &mut self,
         motion: &Motion,
         start: f64,
-        with_references: bool,
+        columns: Columns,
         log: &mut impl Write,
     ) -> Result<Record, RecordError> {
         self.check(motion)?;
         let counters = *self.master.driver().counters();
         let mut record =
             Record { following_max: vec![0.0; N], following_rms: vec![0.0; N], ..Record::default() };
-        log.write_all(header::<N>(with_references).as_bytes()).map_err(RecordError::Write)?;
+        log.write_all(columns.header(N).as_bytes()).map_err(RecordError::Write)?;
         let rows: Vec<&[f64]> = motion.samples().map(|[q, ..]| q).collect();
         let mut line = String::new();
-        self.follow(motion, |[cycle, k], master| {
+        let mut first = None;
+        self.follow(motion, |k, master| {
             let Some(master) = master else {
                 record.missing += 1;
                 return Ok(());
             };
-            let joints = master.driver().joints();
-            line.clear();
-            // A SYNC that was left out took its time all the same.
-            let skipped = master.driver().counters().skipped - counters.skipped;
-            let _ = write!(line, "{:.4}", start + (cycle as u64 + skipped) as f64 * motion.period);
-            // A digit finer than the encoders' step.
-            for joint in joints {
-                let _ = write!(line, ",{:.7}", joint.position);
-            }
-            for joint in joints {
-                let _ = write!(line, ",{:.4}", joint.torque);
-            }
-            for q in rows[k].iter().filter(|_| with_references) {
-                let _ = write!(line, ",{q:.7}");
-            }
-            line.push('\n');
+            let driver = master.driver();
+            let joints = driver.joints();
+            let since = driver.synced_at() - *first.get_or_insert(driver.synced_at());
+            columns.line(&mut line, start + since as f64 * 1e-6, driver, rows[k], &counters);
             log.write_all(line.as_bytes()).map_err(RecordError::Write)?;
             record.samples += 1;
             for (i, joint) in joints.iter().enumerate() {
@@ -272,7 +261,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         if let Some(begin) = beginning(motion) {
             self.go(&begin, APPROACH, 1.0)?;
         }
-        self.record(motion, 0.0, true, log)
+        self.record(motion, 0.0, Columns::Everything, log)
     }
 
     fn check(&self, motion: &Motion) -> Result<(), RecordError> {
@@ -327,18 +316,6 @@ pub fn way<const N: usize>(
 /// Where a motion begins, if it is one of `N` joints.
 fn beginning<const N: usize>(motion: &Motion) -> Option<[f64; N]> {
     motion.samples().next().and_then(|[q, ..]| q.try_into().ok())
-}
-
-fn header<const N: usize>(with_references: bool) -> String {
-    let mut out = String::from("t");
-    let names: &[&str] = if with_references { &["q", "tau", "ref"] } else { &["q", "tau"] };
-    for name in names {
-        for joint in 1..=N {
-            let _ = write!(out, ",{name}{joint}");
-        }
-    }
-    out.push('\n');
-    out
 }
 
 /// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its speed, follows the
@@ -413,7 +390,7 @@ mod tests {
         let (motion, mut log) = (swing(6.0), Vec::new());
         let mut recorder = Recorder::enable(arm(), open()).unwrap();
         recorder.go(&START, 0.25, 1.0).unwrap();
-        let record = recorder.record(&motion, 10.0, true, &mut log).unwrap();
+        let record = recorder.record(&motion, 10.0, Columns::Everything, &mut log).unwrap();
         assert_eq!((record.samples, record.missing, record.late, record.dropped), (motion.len(), 0, 0, 0));
         // Two and a half cycles of delay at 1 rad/s, and the servo.
         assert!(record.following_max.iter().all(|e| *e < 0.03), "{record:?}");
@@ -424,8 +401,18 @@ mod tests {
         assert!(
             rows.iter()
                 .enumerate()
-                .all(|(k, row)| { row.len() == 19 && (row[0] - 10.0 - 0.005 * k as f64).abs() < 1e-9 })
+                .all(|(k, row)| { row.len() == 40 && (row[0] - 10.0 - 0.005 * k as f64).abs() < 1e-9 })
         );
+        // What the drives say and when: their own velocities, "operation enabled", within the cycle.
+        for (pair, sample) in rows.windows(3).zip(&motion.q.chunks(6).collect::<Vec<_>>()[1..]) {
+            let row = &pair[1];
+            assert!((0..6).all(|j| (row[13 + j] - sample[j]).abs() < 1e-6));
+            let differences = (0..6).map(|j| (pair[2][1 + j] - pair[0][1 + j]) / 0.01);
+            assert!(differences.zip(&row[19..25]).all(|(v, dq)| (v - dq).abs() < 0.05), "{row:?}");
+            assert!(row[25..31].iter().all(|status| *status as u16 & 0x6F == 0x27));
+            assert!(row[31..37].iter().all(|answer| (1e-4..5e-3).contains(answer)), "{row:?}");
+            assert_eq!(row[37..], [0.0; 3]);
+        }
         let master = recorder.finish().unwrap();
         let arm = master.bus().peer();
         assert!(arm.nodes().iter().all(|node| node.brake_closed()));
@@ -445,7 +432,7 @@ mod tests {
         assert!(failed.is_ok() && lines == motion.len());
         recorder.go(&START, 0.25, 1.0).unwrap();
         recorder.master_mut().bus_mut().peer_mut().fault(NodeId::clamped(5), Fault::Silent(true));
-        let failed = recorder.record(&motion, 0.0, false, &mut log).unwrap_err();
+        let failed = recorder.record(&motion, 0.0, Columns::Torques, &mut log).unwrap_err();
         let RecordError::Arm(ArmError::Stopped(cause, _)) = &failed else { panic!("{failed}") };
         // The first cause, or the graver one that follows from the same silence.
         assert!(matches!(cause, Cause::DataMissing(_) | Cause::HeartbeatLost(_)), "{cause:?}");
@@ -476,10 +463,11 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_refused_before_anything_moves() {
         let mut recorder = Recorder::enable(arm(), open()).unwrap();
-        let mut refused = |motion: Motion| match recorder.record(&motion, 0.0, false, &mut Vec::new()) {
-            Err(RecordError::Motion(what)) => what,
-            other => panic!("{other:?}"),
-        };
+        let mut refused =
+            |motion: Motion| match recorder.record(&motion, 0.0, Columns::Torques, &mut Vec::new()) {
+                Err(RecordError::Motion(what)) => what,
+                other => panic!("{other:?}"),
+            };
         let mut slow = swing(1.0);
         slow.period = 0.01;
         assert!(refused(slow).contains("sample it at 200 Hz"));

@@ -1,7 +1,7 @@
 //! Warming an arm up (§II.C): every joint swings until the torque that friction takes no longer changes.
 
 use super::settling::{Cycle, Exponential, Trend, cycles, exponential, trend};
-use super::{RecordError, Recorder};
+use super::{Columns, RecordError, Recorder};
 use crate::bus::driver::Profile;
 use crate::bus::transport::Bus;
 use crate::identification::motion::Motion;
@@ -172,7 +172,7 @@ pub fn warm_up<B: Bus, const N: usize>(
     let mut seconds = start;
     loop {
         let mut text = Vec::new();
-        recorder.record(&motion, seconds, false, &mut text)?;
+        recorder.record(&motion, seconds, Columns::Torques, &mut text)?;
         let text = String::from_utf8_lossy(&text);
         // The header is written once.
         let mut lines = text.split_inclusive('\n').skip(usize::from(seconds > 0.0));

@@ -39,7 +39,10 @@ impl<const N: usize> Driver<N> {
             return;
         }
         let Some(missing) = self.joints.iter().position(|joint| joint.booted.is_none()) else {
-            self.enter_script(Phase::Identify, tx);
+            // Nodes go there by themselves after their boot-up; some (python-canopen's) repeat it until they are told.
+            if self.manage(nmt::Command::EnterPreOperational, tx) {
+                self.enter_script(Phase::Identify, tx);
+            }
             return;
         };
         if self.elapsed() < self.profile.reactions.boot_timeout {

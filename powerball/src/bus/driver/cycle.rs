@@ -81,6 +81,7 @@ impl<const N: usize> Driver<N> {
             self.counters.dropped += u64::from(core::mem::take(&mut self.slot_open));
             self.judge_cycle(tick, tx);
             self.send(cob::SYNC, tx);
+            self.synced_at = self.now;
             self.counters.cycles += 1;
             self.slot_open = true;
             self.fresh = false;

@@ -227,6 +227,7 @@ pub struct Driver<const N: usize> {
     joints: [Joint; N],
     torque_guard: Option<TorqueGuard<N>>,
     sync: SyncProducer,
+    synced_at: Micros,
     heartbeat: HeartbeatProducer,
     bring_up: BringUp,
     stop: StopStage,
@@ -273,6 +274,7 @@ impl<const N: usize> Driver<N> {
             joints: profile.joints.map(|joint| Joint::new(&joint, lost, reactions.sdo_timeout)),
             torque_guard: None,
             sync: SyncProducer::new(profile.sync_period),
+            synced_at: 0,
             heartbeat: HeartbeatProducer::new(profile.master_heartbeat),
             bring_up: BringUp::default(),
             stop: StopStage::Quick,
@@ -427,6 +429,11 @@ impl<const N: usize> Driver<N> {
     /// Counts.
     pub fn counters(&self) -> &Counters {
         &self.counters
+    }
+
+    /// When the last SYNC left, on the clock that the driver is told, µs.
+    pub fn synced_at(&self) -> Micros {
+        self.synced_at
     }
 
     /// What was told, oldest first; the last 16.

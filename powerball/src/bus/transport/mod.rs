@@ -9,6 +9,8 @@ mod master;
 mod memory;
 #[cfg(unix)]
 mod msgpack;
+#[cfg(target_os = "linux")]
+pub mod realtime;
 #[cfg(unix)]
 mod slcan;
 #[cfg(all(target_os = "linux", feature = "socketcan"))]

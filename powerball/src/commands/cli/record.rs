@@ -8,15 +8,16 @@ use crate::bus::driver::lwa4p::LWA4P;
 use crate::identification::motion::Motion;
 use crate::identification::mounting::Mounting;
 use crate::logs::log::LogFile;
-use crate::procedure::{RecordError, record};
+use crate::procedure::{Behind, RecordError, record};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
 
 /// Bring the arm up, go to where a trajectory begins, follow it at 200 Hz, and log it.
 ///
-/// The log has t, q1…q6 (rad), tau1…tau6 (N·m, as good as the profile's calibration) and ref1…ref6 (rad, the
-/// set-points). Each line is written whole: whatever happens, the log can be read up to there. A log whose
+/// The log has t (s, the measured time of each SYNC), q1…q6 (rad), tau1…tau6 (N·m, as good as the profile's
+/// calibration), ref1…ref6 (rad, the set-points), dq1…dq6 (rad/s, the drives' own), status1…status6 (statuswords),
+/// answer1…answer6 (s from SYNC to the joint's data), and late, skipped, dropped (counts since it began). Each line is written whole: whatever happens, the log can be read up to there. A log whose
 /// name ends in .parquet or .mcap is written as lines beside it, NAME.parquet.csv, and becomes that when it
 /// ends; lines that a program left which died are put into NAME.interrupted-1.parquet by the next recording
 /// of that name.
@@ -64,14 +65,16 @@ impl RecordCommand {
         let master = master(&self.place)?;
         let unwritable =
             |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", self.out.display()));
-        let (mut log, recovered) = LogFile::create(&self.out).map_err(unwritable)?;
+        let (log, recovered) = LogFile::create(&self.out).map_err(unwritable)?;
         if let Some(file) = &recovered {
             let file = file.display();
             eprintln!("powerball: an earlier recording was broken off: its lines are now in {file}");
         }
+        let mut log = Behind::new(log);
         let done = record(master, &motion, envelope, &mut log);
         // A recording that failed is closed too: what was recorded counts. Why it failed is what is told.
-        let closed = log.close();
+        let (log, written) = log.close();
+        let closed = written.and_then(|()| log.map_or(Ok(()), LogFile::close));
         let done = done.map_err(|e| match e {
             RecordError::Motion(what) => Failure::Unusable(format!("{name}: {what}")),
             other => Failure::Refused(other.to_string()),

@@ -99,6 +99,12 @@ impl Where {
             let reactions = &mut profile.reactions;
             (reactions.late_limit, reactions.skipped_limit, reactions.missing_cycles) = (u8::MAX, 20, 20);
         }
+        #[cfg(target_os = "linux")]
+        if self.bus != BusUrl::Virtual
+            && let Err(why) = transport::realtime::claim()
+        {
+            eprintln!("powerball: {why}; SYNCs may be late");
+        }
         let signals = |e| Failure::Unusable(format!("cannot listen to signals: {e}"));
         let interrupt = Interrupt::install().map_err(signals)?;
         Ok(Master::new(Driver::new(profile).map_err(refused)?, bus).with_interrupt(interrupt))
