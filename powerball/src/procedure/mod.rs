@@ -11,6 +11,7 @@ pub mod log_line;
 pub mod record;
 pub mod resume;
 pub mod settling;
+mod told;
 pub mod warm_up;
 
 pub use approach::approach;
@@ -18,3 +19,4 @@ pub use behind::Behind;
 pub use envelope::Envelope;
 pub use log_line::Columns;
 pub use record::{Record, RecordError, Recorder, record, way};
+pub use told::Told;

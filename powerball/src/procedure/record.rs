@@ -3,7 +3,7 @@
 //! Every line of a log is written whole, by one call, when its cycle is over: whatever moment the program
 //! dies at, the file can be read up to there.
 
-use super::{Columns, Envelope, approach};
+use super::{Columns, Envelope, Told, approach};
 use crate::bus::driver::{ControlMode, Phase, Profile, Rejection};
 use crate::bus::transport::{ArmError, Bus, Master, Moment};
 use crate::identification::motion::Motion;
@@ -72,16 +72,35 @@ impl<E: Into<ArmError>> From<E> for RecordError {
 }
 
 /// An arm that is enabled in interpolated position mode and holds its position between motions.
-#[derive(Debug)]
 pub struct Recorder<B: Bus, const N: usize> {
     master: Master<B, N>,
     /// What every motion must keep.
     envelope: Envelope<N>,
     /// The set-point that is held.
     target: [f64; N],
+    told: Box<dyn FnMut(&Told)>,
+}
+
+/// Cycles between two words on how far a motion has come: half a second.
+const TELL: usize = 100;
+
+impl<B: Bus, const N: usize> fmt::Debug for Recorder<B, N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Recorder")
+            .field("master", &self.master)
+            .field("target", &self.target)
+            .finish_non_exhaustive()
+    }
 }
 
 impl<B: Bus, const N: usize> Recorder<B, N> {
+    /// Tells `told` twice a second how far a motion has come.
+    #[must_use]
+    pub fn telling(mut self, told: impl FnMut(&Told) + 'static) -> Self {
+        self.told = Box::new(told);
+        self
+    }
+
     /// Brings an arm up: where it is is known then, its brakes are closed. No motion leaves `envelope`.
     ///
     /// # Errors
@@ -93,7 +112,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         master.driver_mut().start(ControlMode::InterpolatedPosition, false).map_err(ArmError::from)?;
         master.wait_for(Phase::Ready, PATIENCE)?;
         let target = master.driver().positions();
-        Ok(Recorder { master, envelope, target })
+        Ok(Recorder { master, envelope, target, told: Box::new(|_| ()) })
     }
 
     /// Enables the arm and holds it where it is.
@@ -171,10 +190,27 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
                 Moment::Data => {
                     if let Some(sample) = waiting.take() {
                         each(sample, Some(&self.master))?;
+                        if sample % TELL == 0 {
+                            let told = self.how_far(sample, motion.len());
+                            (self.told)(&told);
+                        }
                     }
                 }
                 _ => {}
             }
+        }
+    }
+
+    fn how_far(&self, sample: usize, all: usize) -> Told {
+        let driver = self.master.driver();
+        let position = driver.positions();
+        let errors = position.iter().zip(driver.setpoints()).map(|(q, reference)| (q - reference).abs());
+        Told {
+            samples: [sample, all],
+            error: errors.fold(0.0, f64::max),
+            position: position.to_vec(),
+            late: driver.counters().late,
+            missing: driver.joints().iter().map(|joint| joint.counters.missing).sum(),
         }
     }
 
@@ -319,7 +355,7 @@ fn beginning<const N: usize>(motion: &Motion) -> Option<[f64; N]> {
 }
 
 /// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its speed, follows the
-/// motion, writes the log, and stops. The motion is looked at before anything is sent, the way to where it begins
+/// motion, writes the log, and stops; `told` hears how far it has come. The motion is looked at before anything is sent, the way to where it begins
 /// before the arm is enabled.
 ///
 /// # Errors
@@ -328,6 +364,7 @@ pub fn record<B: Bus, const N: usize>(
     master: Master<B, N>,
     motion: &Motion,
     envelope: Envelope<N>,
+    told: impl FnMut(&Told) + 'static,
     log: &mut impl Write,
 ) -> Result<Record, RecordError> {
     if motion.dof() == N {
@@ -336,7 +373,7 @@ pub fn record<B: Bus, const N: usize>(
             other => other,
         })?;
     }
-    let mut recorder = Recorder::bring_up(master, envelope)?;
+    let mut recorder = Recorder::bring_up(master, envelope)?.telling(told);
     if let Some(begin) = beginning(motion) {
         recorder.way_to(&begin, APPROACH, 1.0)?;
     }
@@ -450,14 +487,19 @@ mod tests {
         // The way alone ends at joint 2 being lower than the trajectory gets.
         let begin = motion.q[1];
         let barred = move |m: &Motion| (highest(m) <= begin + 1e-6).then(|| "it is barred".to_string());
-        let refused = record(arm(), &motion, Envelope::new(barred), &mut log).unwrap_err().to_string();
+        let refused =
+            record(arm(), &motion, Envelope::new(barred), |_| (), &mut log).unwrap_err().to_string();
         assert!(refused.contains("on the straight way to (0.100, 0.400, "), "{refused}");
         assert!(refused.contains("rad it is barred: move the arm nearer"), "{refused}");
         let everything = Envelope::new(|_: &Motion| Some("it is barred".into()));
-        let refused = record(arm(), &motion, everything, &mut log).unwrap_err();
+        let refused = record(arm(), &motion, everything, |_| (), &mut log).unwrap_err();
         assert!(refused.to_string().starts_with("on the trajectory"), "{refused}");
         assert!(log.is_empty());
-        assert_eq!(record(arm(), &motion, open(), &mut log).unwrap().samples, motion.len());
+        let (tell, heard) = std::sync::mpsc::channel();
+        let told = move |told: &Told| tell.send(told.to_string()).unwrap();
+        assert_eq!(record(arm(), &motion, open(), told, &mut log).unwrap().samples, motion.len());
+        let heard: Vec<String> = heard.iter().collect();
+        assert!(heard.iter().any(|line| line.starts_with(" 49 % of 1201 samples, at (0.")), "{heard:?}");
     }
 
     #[test]

@@ -205,7 +205,7 @@ impl Explain {
         let master = self.place().driver(bus)?;
         let mut log = std::fs::File::create(file)
             .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", file.display())))?;
-        record(master, motion, envelope, &mut log).map(|_| ()).map_err(|e| match e {
+        record(master, motion, envelope, output::live(), &mut log).map(|_| ()).map_err(|e| match e {
             RecordError::Write(_) => Failure::Unusable(e.to_string()),
             other => Failure::Refused(format!("the experiment was not recorded: {other}")),
         })

@@ -71,7 +71,7 @@ impl RecordCommand {
             eprintln!("powerball: an earlier recording was broken off: its lines are now in {file}");
         }
         let mut log = Behind::new(log);
-        let done = record(master, &motion, envelope, &mut log);
+        let done = record(master, &motion, envelope, output::live(), &mut log);
         // A recording that failed is closed too: what was recorded counts. Why it failed is what is told.
         let (log, written) = log.close();
         let closed = written.and_then(|()| log.map_or(Ok(()), LogFile::close));

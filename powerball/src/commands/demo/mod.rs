@@ -137,6 +137,6 @@ fn carry_out(session: &Session, motion: &Motion, file: &Path, seed: u64) -> Resu
     let driver = Driver::new(LWA4P).map_err(SessionError::Driver)?;
     let master = Master::new(driver, Memory::new(arm, LWA4P.bitrate));
     let mut log = std::fs::File::create(file).map_err(unwritten)?;
-    record(master, motion, Envelope::new(|_| None), &mut log).map_err(SessionError::Record)?;
+    record(master, motion, Envelope::new(|_| None), |_| (), &mut log).map_err(SessionError::Record)?;
     Ok(file.to_path_buf())
 }

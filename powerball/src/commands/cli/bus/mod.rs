@@ -67,7 +67,8 @@ impl BusCommand {
 /// What every command on a bus is told.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Where {
-    /// The bus: virtual, socketcan:can0, slcan:/dev/ttyACM0 or udp:239.74.163.2:43113.
+    /// The bus: virtual, socketcan:can0, slcan:/dev/ttyACM0, udp:239.74.163.2:43113 (this machine alone) or
+    /// udp:239.74.163.2:43113@eth0 (the network of that interface).
     #[arg(long, value_name = "URL", default_value = "virtual")]
     pub(crate) bus: BusUrl,
     /// Print the result as one JSON object on standard output.
@@ -79,9 +80,10 @@ impl Where {
     /// Opens the bus; the built-in arm's drives have booted.
     pub(crate) fn open(&self) -> Result<Box<dyn Bus>, Failure> {
         if self.bus != BusUrl::Virtual {
-            if let BusUrl::Udp(_, Some(interface)) = self.bus {
+            if let BusUrl::Udp(_, Some(interface)) = &self.bus {
                 eprintln!(
-                    "powerball: whoever reaches {interface}'s network can read this bus and move the arm"
+                    "powerball: whoever reaches the network of {interface} can read this bus and move the arm; \
+                        docs/transports.md says how to fence it"
                 );
             }
             return transport::open(&self.bus).map_err(|e| Failure::Unusable(e.to_string()));
