@@ -228,7 +228,6 @@ impl<const N: usize> Driver<N> {
             && let Err(SdoError::Aborted(code)) = number
             && !matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUB_INDEX)
         {
-            self.note(Cause::Sdo(node, object, SdoError::Aborted(code)));
             return Ok(());
         }
         let number = number.map_err(failed)?;
