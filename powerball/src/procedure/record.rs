@@ -3,13 +3,13 @@
 //! Every line of a log is written whole, by one call, when its cycle is over: whatever moment the program
 //! dies at, the file can be read up to there.
 
-use super::{Columns, Envelope, Told, approach};
-use crate::bus::driver::{ControlMode, Phase, Profile, Rejection};
+use super::{Columns, Envelope, RecordError, Told, approach};
+use crate::bus::driver::{ControlMode, Phase, Profile};
 use crate::bus::transport::{ArmError, Bus, Master, Moment};
 use crate::identification::motion::Motion;
 use serde::Serialize;
 use std::fmt;
-use std::io::{self, Write};
+use std::io::Write;
 
 /// Share of the joints' speeds and accelerations on the way to where a motion begins.
 const APPROACH: f64 = 0.25;
@@ -35,40 +35,6 @@ pub struct Record {
     pub following_max: Vec<f64>,
     /// Root mean square of the same, rad.
     pub following_rms: Vec<f64>,
-}
-
-/// Why a recording ended early, or did not begin.
-#[derive(Debug)]
-pub enum RecordError {
-    /// The arm.
-    Arm(ArmError),
-    /// A set-point was rejected.
-    Rejected(Rejection),
-    /// The motion does not fit the arm or its rate.
-    Motion(String),
-    /// The arm must not go where it would have to: why.
-    Barred(String),
-    /// The log could not be written.
-    Write(io::Error),
-}
-
-impl fmt::Display for RecordError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            RecordError::Arm(e) => e.fmt(f),
-            RecordError::Rejected(rejection) => write!(f, "the motion cannot be followed: {rejection}"),
-            RecordError::Motion(what) | RecordError::Barred(what) => f.write_str(what),
-            RecordError::Write(e) => write!(f, "the log cannot be written: {e}"),
-        }
-    }
-}
-
-impl std::error::Error for RecordError {}
-
-impl<E: Into<ArmError>> From<E> for RecordError {
-    fn from(e: E) -> Self {
-        RecordError::Arm(e.into())
-    }
 }
 
 /// An arm that is enabled in interpolated position mode and holds its position between motions.
