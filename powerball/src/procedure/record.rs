@@ -321,8 +321,8 @@ fn beginning<const N: usize>(motion: &Motion) -> Option<[f64; N]> {
 }
 
 /// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its speed, follows the
-/// motion, writes the log, and stops; `told` hears how far it has come. The motion is looked at before anything is sent, the way to where it begins
-/// before the arm is enabled.
+/// motion, writes the log, and stops; `told` hears how far it has come. The motion is looked at before anything
+/// is sent, the way to where it begins before the arm is enabled.
 ///
 /// # Errors
 /// As [`Recorder::enable`] and [`Recorder::record`], and [`RecordError::Barred`]; the arm has not moved then.

@@ -34,9 +34,9 @@ impl Demand {
         (self.points[0] - self.points[1]) / period
     }
 
-    /// Where positions go on to, for a cycle in which nothing new came: with the velocity and the acceleration that they
-    /// had, within the limits of both. Not back: what slows down comes to rest, and what rests stays. What could not come to rest any more
-    /// before the end of its range (`position`, rad) brakes.
+    /// Where positions go on to, for a cycle in which nothing new came: with the velocity and the acceleration that
+    /// they had, within the limits of both. Not back: what slows down comes to rest, and what rests stays. What
+    /// could not come to rest any more before the end of its range (`position`, rad) brakes.
     pub(super) fn next(&self, period: f64, position: [f64; 2], velocity: f64, acceleration: f64) -> f64 {
         let v = self.velocity(period);
         let before = (self.points[1] - self.points[2]) / period;
