@@ -11,10 +11,13 @@ use crate::identification::mounting::Mounting;
 use dyngen::{Arm, Model};
 use std::fmt;
 
+/// Says why the arm must not go along a motion.
+type Barred = Box<dyn Fn(&Motion) -> Option<String>>;
+
 /// What the motions of an arm of `N` joints must keep.
 pub struct Envelope<const N: usize> {
     /// Why the arm must not go along a motion, beside the limits of its joints.
-    barred: Box<dyn Fn(&Motion) -> Option<String>>,
+    barred: Barred,
     torque: Option<TorqueGuard<N>>,
 }
 

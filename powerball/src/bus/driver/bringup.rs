@@ -296,7 +296,7 @@ impl<const N: usize> Driver<N> {
         for joint in &mut self.joints {
             joint.heartbeat.beat(now);
             joint.watched = super::watch::Watched::default();
-            (joint.arrived, joint.owed, joint.missing_run, joint.overspeed_run) = (0, 0, 0, 0);
+            (joint.arrived, joint.missing_run, joint.overspeed_run) = (0, 0, 0);
             (joint.status, joint.mode, joint.nmt) = (None, None, None);
         }
         (self.late_run, self.good_run) = (0, 0);

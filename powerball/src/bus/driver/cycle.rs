@@ -9,9 +9,6 @@ use crate::bus::canopen::{Micros, cob};
 use crate::bus::cia402::{Command, Controlword, State};
 use crate::controller::JointNumber;
 
-/// So many late PDOs of a node are told from those of a second node with its id.
-const OWED: u8 = 40;
-
 impl<const N: usize> Driver<N> {
     /// The set-points to act with the next SYNC, in rad, rad/s or A by the mode. Called again before the
     /// slot, the last one counts.
@@ -110,8 +107,6 @@ impl<const N: usize> Driver<N> {
                 joint.missing_run = 0;
                 continue;
             }
-            let owed = joint.owed.saturating_add((all & !joint.arrived).count_ones() as u8);
-            joint.owed = owed.min(OWED);
             joint.counters.missing += u64::from(judged);
             joint.missing_run = joint.missing_run.saturating_add(1);
             // What is stopped already is told once.

@@ -67,8 +67,6 @@ pub struct Joint {
     /// Transmit PDOs that came since the last SYNC, by bit.
     pub(super) arrived: u8,
     pub(super) missing_run: u8,
-    /// Transmit PDOs that did not come in their cycle: they may come later, beside those of another one.
-    pub(super) owed: u8,
     /// Process data came twice in this cycle, and in how many cycles in a row.
     pub(super) duplicated: bool,
     pub(super) duplicate_run: u8,
@@ -117,7 +115,6 @@ impl Joint {
             heartbeat: HeartbeatConsumer::new(heartbeat_timeout),
             arrived: 0,
             missing_run: 0,
-            owed: 0,
             duplicated: false,
             duplicate_run: 0,
             overspeed_run: 0,
@@ -162,14 +159,8 @@ impl Joint {
         }
         let bit = 1 << (number - 1);
         if self.arrived & bit != 0 {
-            // What is only late comes once for each SYNC all the same; two nodes with one id send more than that.
-            match self.owed.checked_sub(1) {
-                Some(owed) => self.owed = owed,
-                None => {
-                    self.counters.duplicates += 1;
-                    self.duplicated = true;
-                }
-            }
+            self.counters.duplicates += 1;
+            self.duplicated = true;
         }
         self.arrived |= bit;
         true
