@@ -68,7 +68,7 @@ fn a_killed_recording_is_there_and_becomes_parquet_next_time() {
     };
     let record = arguments(&long);
     let record: Vec<&str> = record.iter().map(String::as_str).collect();
-    kill_when(&record, &lines, 300_000);
+    kill_when(&record, &lines, 700_000);
     // Right after the kill: every whole line is a sample, at the rate of the arm.
     let left = read(&lines);
     let whole = std::fs::read_to_string(&lines).unwrap().matches('\n').count() - 1;

@@ -1,5 +1,5 @@
-//! python-canopen as master of the virtual arm and as slave of `powerball bus`, over UDP multicast and over
-//! slcan.
+//! python-canopen as master of the virtual arm, as slave of `powerball bus`, over UDP multicast and over slcan, and
+//! as the arm that `powerball record` moves.
 //!
 //! `PYTHON` names the interpreter (python3 where it is not set). Where it lacks the packages the tests say so
 //! and pass, unless `REQUIRE_PYTHON` is set, as it is in `.ci/run`.
@@ -32,6 +32,12 @@ fn agree(kind: &str) {
 #[test]
 fn python_canopen_agrees_over_udp_multicast() {
     agree("udp");
+}
+
+/// Six of python-canopen's own slaves follow a whole trajectory, and a failure of one of them stops all.
+#[test]
+fn python_canopen_is_the_arm() {
+    agree("arm");
 }
 
 #[test]

@@ -6,5 +6,7 @@
 pub mod canopen;
 pub mod cia402;
 pub mod driver;
+#[cfg(all(test, feature = "bus", feature = "identify"))]
+mod mutated;
 #[cfg(feature = "bus")]
 pub mod transport;

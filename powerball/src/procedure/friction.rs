@@ -4,7 +4,7 @@
 use super::constant_speed::{self, Bounds, Plan};
 use super::gravity_free::{self, GravityFree};
 use super::laws::{Point, Rated, choose};
-use super::{RecordError, Recorder, resume};
+use super::{Columns, RecordError, Recorder, resume};
 use crate::bus::transport::Bus;
 use crate::identification::mounting::Mounting;
 use crate::logs::log::{LogError, read_log};
@@ -130,7 +130,7 @@ pub fn run<B: Bus, const N: usize>(
         recorder.go(&start, 0.25, 1.0)?;
     }
     let mut log = File::create(&path).map_err(|e| FrictionError::Write(path.clone(), e))?;
-    recorder.record(&experiment.plan.motion, 0.0, false, &mut log)?;
+    recorder.record(&experiment.plan.motion, 0.0, Columns::Torques, &mut log)?;
     Ok(())
 }
 
@@ -184,6 +184,7 @@ mod tests {
     use crate::bus::driver::lwa4p::LWA4P;
     use crate::bus::transport::{Master, Memory};
     use crate::controller::friction::{TABLE_2, TanhFriction};
+    use crate::procedure::Envelope;
     use crate::virtual_arm::{VirtualArm, lwa4p};
 
     /// Table 2's curves come back within 1 % of their range over the bus: encoder steps, current noise, servo
@@ -198,7 +199,9 @@ mod tests {
             let mut setup = lwa4p::setup([0.0; 6], 3).unwrap();
             setup.plant = lwa4p::mounted(mounting.gravity(model.arm())).unwrap();
             let bus = Memory::new(VirtualArm::new(setup).unwrap(), LWA4P.bitrate);
-            let mut recorder = Recorder::enable(Master::new(Driver::new(LWA4P).unwrap(), bus)).unwrap();
+            let mut recorder =
+                Recorder::enable(Master::new(Driver::new(LWA4P).unwrap(), bus), Envelope::new(|_| None))
+                    .unwrap();
             run(&mut recorder, &experiment, &folder).unwrap();
             let path = log_file(&folder, joint);
             assert!(is_complete(&path, &experiment));

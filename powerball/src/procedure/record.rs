@@ -3,13 +3,13 @@
 //! Every line of a log is written whole, by one call, when its cycle is over: whatever moment the program
 //! dies at, the file can be read up to there.
 
-use super::approach;
-use crate::bus::driver::{ControlMode, Phase, Profile, Rejection, check_path};
+use super::{Columns, Envelope, RecordError, Told, approach};
+use crate::bus::driver::{ControlMode, Phase, Profile};
 use crate::bus::transport::{ArmError, Bus, Master, Moment};
 use crate::identification::motion::Motion;
 use serde::Serialize;
-use std::fmt::{self, Write as _};
-use std::io::{self, Write};
+use std::fmt;
+use std::io::Write;
 
 /// Share of the joints' speeds and accelerations on the way to where a motion begins.
 const APPROACH: f64 = 0.25;
@@ -37,60 +37,69 @@ pub struct Record {
     pub following_rms: Vec<f64>,
 }
 
-/// Why a recording ended early, or did not begin.
-#[derive(Debug)]
-pub enum RecordError {
-    /// The arm.
-    Arm(ArmError),
-    /// A set-point was rejected.
-    Rejected(Rejection),
-    /// The motion does not fit the arm or its rate.
-    Motion(String),
-    /// The arm must not go where it would have to: why.
-    Barred(String),
-    /// The log could not be written.
-    Write(io::Error),
-}
-
-impl fmt::Display for RecordError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            RecordError::Arm(e) => e.fmt(f),
-            RecordError::Rejected(rejection) => write!(f, "the motion cannot be followed: {rejection}"),
-            RecordError::Motion(what) | RecordError::Barred(what) => f.write_str(what),
-            RecordError::Write(e) => write!(f, "the log cannot be written: {e}"),
-        }
-    }
-}
-
-impl std::error::Error for RecordError {}
-
-impl<E: Into<ArmError>> From<E> for RecordError {
-    fn from(e: E) -> Self {
-        RecordError::Arm(e.into())
-    }
-}
-
 /// An arm that is enabled in interpolated position mode and holds its position between motions.
-#[derive(Debug)]
 pub struct Recorder<B: Bus, const N: usize> {
     master: Master<B, N>,
+    /// What every motion must keep.
+    envelope: Envelope<N>,
     /// The set-point that is held.
     target: [f64; N],
+    told: Box<dyn FnMut(&Told)>,
+}
+
+/// Cycles between two words on how far a motion has come: half a second.
+const TELL: usize = 100;
+
+impl<B: Bus, const N: usize> fmt::Debug for Recorder<B, N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Recorder")
+            .field("master", &self.master)
+            .field("target", &self.target)
+            .finish_non_exhaustive()
+    }
 }
 
 impl<B: Bus, const N: usize> Recorder<B, N> {
-    /// Brings an arm up, enables it, and holds it where it is.
+    /// Tells `told` twice a second how far a motion has come.
+    #[must_use]
+    pub fn telling(mut self, told: impl FnMut(&Told) + 'static) -> Self {
+        self.told = Box::new(told);
+        self
+    }
+
+    /// Brings an arm up: where it is is known then, its brakes are closed. No motion leaves `envelope`.
     ///
     /// # Errors
     /// Where driver, arm or bus refuse.
-    pub fn enable(mut master: Master<B, N>) -> Result<Self, RecordError> {
+    pub fn bring_up(mut master: Master<B, N>, envelope: Envelope<N>) -> Result<Self, RecordError> {
+        if let Some(guard) = envelope.torque_guard() {
+            master.driver_mut().guard_torque(guard);
+        }
         master.driver_mut().start(ControlMode::InterpolatedPosition, false).map_err(ArmError::from)?;
         master.wait_for(Phase::Ready, PATIENCE)?;
-        master.driver_mut().enable().map_err(ArmError::from)?;
-        master.wait_for(Phase::Running, PATIENCE)?;
-        let target = master.driver().setpoints();
-        Ok(Recorder { master, target })
+        let target = master.driver().positions();
+        Ok(Recorder { master, envelope, target, told: Box::new(|_| ()) })
+    }
+
+    /// Enables the arm and holds it where it is.
+    ///
+    /// # Errors
+    /// Where driver, arm or bus refuse.
+    pub fn release(&mut self) -> Result<(), RecordError> {
+        self.master.driver_mut().enable().map_err(ArmError::from)?;
+        self.master.wait_for(Phase::Running, PATIENCE)?;
+        self.target = self.master.driver().setpoints();
+        Ok(())
+    }
+
+    /// Both: brings an arm up, enables it, and holds it where it is.
+    ///
+    /// # Errors
+    /// Where driver, arm or bus refuse.
+    pub fn enable(master: Master<B, N>, envelope: Envelope<N>) -> Result<Self, RecordError> {
+        let mut recorder = Recorder::bring_up(master, envelope)?;
+        recorder.release()?;
+        Ok(recorder)
     }
 
     /// The arm.
@@ -103,18 +112,18 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         &mut self.master
     }
 
-    /// Follows a motion, with `each` called for every cycle: the cycle's number and that of the sample that
-    /// was given in it, and the master, `None` where process data is missing.
+    /// Follows a motion, with `each` called for every cycle: the number of the sample that was given in it, and the
+    /// master, `None` where process data is missing.
     ///
     /// Where set-points came too late for their slot, the sample is given again and the motion is a cycle
     /// longer: a joint is never asked to catch up.
     fn follow(
         &mut self,
         motion: &Motion,
-        mut each: impl FnMut([usize; 2], Option<&Master<B, N>>) -> Result<(), RecordError>,
+        mut each: impl FnMut(usize, Option<&Master<B, N>>) -> Result<(), RecordError>,
     ) -> Result<(), RecordError> {
-        let (mut next, mut cycle) = (0usize, 0usize);
-        let mut waiting: Option<[usize; 2]> = None;
+        let mut next = 0usize;
+        let mut waiting: Option<usize> = None;
         let mut dropped = self.master.driver().counters().dropped;
         loop {
             let until = self.master.bus().now() + 100_000;
@@ -135,18 +144,22 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
                     let q = motion.q.get(sample * N..(sample + 1) * N);
                     if let Some(q) = q {
                         self.target.copy_from_slice(q);
-                        waiting = Some([cycle, sample]);
+                        waiting = Some(sample);
                     }
                     let target = self.target;
                     self.master.driver_mut().set(&target).map_err(RecordError::Rejected)?;
                     if q.is_none() {
                         return Ok(());
                     }
-                    (next, cycle) = (sample + 1, cycle + 1);
+                    next = sample + 1;
                 }
                 Moment::Data => {
-                    if let Some(numbers) = waiting.take() {
-                        each(numbers, Some(&self.master))?;
+                    if let Some(sample) = waiting.take() {
+                        each(sample, Some(&self.master))?;
+                        if sample % TELL == 0 {
+                            let told = self.how_far(sample, motion.len());
+                            (self.told)(&told);
+                        }
                     }
                 }
                 _ => {}
@@ -154,18 +167,51 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         }
     }
 
-    /// Goes to a position and holds it: at a share of each joint's speed and acceleration, in `least` s at
-    /// least.
+    fn how_far(&self, sample: usize, all: usize) -> Told {
+        let driver = self.master.driver();
+        let position = driver.positions();
+        let errors = position.iter().zip(driver.setpoints()).map(|(q, reference)| (q - reference).abs());
+        Told {
+            samples: [sample, all],
+            error: errors.fold(0.0, f64::max),
+            position: position.to_vec(),
+            late: driver.counters().late,
+            missing: driver.joints().iter().map(|joint| joint.counters.missing).sum(),
+        }
+    }
+
+    /// The way to a position, each joint straight there: at a share of its speed and acceleration, in `least` s at
+    /// least. It was looked at as a whole.
     ///
     /// # Errors
-    /// As [`record`](Self::record).
+    /// [`RecordError::Barred`] where the arm must not go it.
+    pub fn way_to(&self, to: &[f64; N], share: f64, least: f64) -> Result<Motion, RecordError> {
+        let profile = self.master.driver().profile();
+        let motion = way(profile, &self.target, to, share, least);
+        self.envelope.check(profile, &motion).map_err(|e| match e {
+            RecordError::Motion(why) | RecordError::Barred(why) => {
+                let to: Vec<String> = to.iter().map(|q| format!("{q:.3}")).collect();
+                let to = to.join(", ");
+                RecordError::Barred(format!(
+                    "on the straight way to ({to}) rad {why}: move the arm nearer to there first"
+                ))
+            }
+            other => other,
+        })?;
+        Ok(motion)
+    }
+
+    /// Goes that way and holds the position.
+    ///
+    /// # Errors
+    /// As [`way_to`](Self::way_to) and [`record`](Self::record).
     pub fn go(&mut self, to: &[f64; N], share: f64, least: f64) -> Result<(), RecordError> {
-        let motion = way(self.master.driver().profile(), &self.target, to, share, least);
+        let motion = self.way_to(to, share, least)?;
         self.follow(&motion, |_, _| Ok(()))
     }
 
-    /// Follows a motion that begins where the arm is, and writes the log: `t` in s from `start` on, `q1…qn`
-    /// in rad, `tau1…taun` in N·m, and `ref1…refn`, the set-points, where `with_references`.
+    /// Follows a motion that begins where the arm is, and writes the log with these columns: `t` in s is `start`, and
+    /// the time since the first of its SYNCs, as the bus's clock measured it.
     ///
     /// # Errors
     /// Where the motion does not fit the arm, the arm is stopped, or the log cannot be written. The log ends
@@ -174,37 +220,26 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         &mut self,
         motion: &Motion,
         start: f64,
-        with_references: bool,
+        columns: Columns,
         log: &mut impl Write,
     ) -> Result<Record, RecordError> {
         self.check(motion)?;
         let counters = *self.master.driver().counters();
         let mut record =
             Record { following_max: vec![0.0; N], following_rms: vec![0.0; N], ..Record::default() };
-        log.write_all(header::<N>(with_references).as_bytes()).map_err(RecordError::Write)?;
+        log.write_all(columns.header(N).as_bytes()).map_err(RecordError::Write)?;
         let rows: Vec<&[f64]> = motion.samples().map(|[q, ..]| q).collect();
         let mut line = String::new();
-        self.follow(motion, |[cycle, k], master| {
+        let mut first = None;
+        self.follow(motion, |k, master| {
             let Some(master) = master else {
                 record.missing += 1;
                 return Ok(());
             };
-            let joints = master.driver().joints();
-            line.clear();
-            // A SYNC that was left out took its time all the same.
-            let skipped = master.driver().counters().skipped - counters.skipped;
-            let _ = write!(line, "{:.4}", start + (cycle as u64 + skipped) as f64 * motion.period);
-            // A digit finer than the encoders' step.
-            for joint in joints {
-                let _ = write!(line, ",{:.7}", joint.position);
-            }
-            for joint in joints {
-                let _ = write!(line, ",{:.4}", joint.torque);
-            }
-            for q in rows[k].iter().filter(|_| with_references) {
-                let _ = write!(line, ",{q:.7}");
-            }
-            line.push('\n');
+            let driver = master.driver();
+            let joints = driver.joints();
+            let since = driver.synced_at() - *first.get_or_insert(driver.synced_at());
+            columns.line(&mut line, start + since as f64 * 1e-6, driver, rows[k], &counters);
             log.write_all(line.as_bytes()).map_err(RecordError::Write)?;
             record.samples += 1;
             for (i, joint) in joints.iter().enumerate() {
@@ -224,24 +259,11 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         Ok(record)
     }
 
-    fn approach_and_record(
-        &mut self,
-        motion: &Motion,
-        barred: impl Fn(&Motion) -> Option<String>,
-        log: &mut impl Write,
-    ) -> Result<Record, RecordError> {
-        let begin: Option<[f64; N]> = motion.samples().next().and_then(|[q, ..]| q.try_into().ok());
-        if let Some(begin) = begin {
-            let way = way(self.master.driver().profile(), &self.target, &begin, APPROACH, 1.0);
-            if let Some(why) = barred(&way) {
-                return Err(RecordError::Barred(format!(
-                    "on the straight way to where the trajectory begins {why}: move the arm nearer to there \
-                        first"
-                )));
-            }
+    fn approach_and_record(&mut self, motion: &Motion, log: &mut impl Write) -> Result<Record, RecordError> {
+        if let Some(begin) = beginning(motion) {
             self.go(&begin, APPROACH, 1.0)?;
         }
-        self.record(motion, 0.0, true, log)
+        self.record(motion, 0.0, Columns::Everything, log)
     }
 
     fn check(&self, motion: &Motion) -> Result<(), RecordError> {
@@ -267,7 +289,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         if far > 1e-3 {
             return wrong(format!("the motion begins {far:.4} rad from where the arm is; go there first"));
         }
-        fits(self.master.driver().profile(), motion)
+        self.envelope.check(self.master.driver().profile(), motion)
     }
 
     /// Stops the arm: brakes closed, torque off.
@@ -293,48 +315,36 @@ pub fn way<const N: usize>(
     approach(from, to, &speed, &acceleration, profile.period_seconds(), least)
 }
 
-/// Whether the driver will take every set-point of a motion, from rest to rest.
-fn fits<const N: usize>(profile: &Profile<N>, motion: &Motion) -> Result<(), RecordError> {
-    let rows = motion.samples().filter_map(|[q, ..]| <[f64; N]>::try_from(q).ok());
-    check_path(profile, rows).map_err(|(k, why)| {
-        let end = if k >= motion.len() { ", where it must end at rest" } else { "" };
-        let time = k as f64 * motion.period;
-        RecordError::Motion(format!("sample {k}, at {time:.3} s{end}: {why}"))
-    })
-}
-
-fn header<const N: usize>(with_references: bool) -> String {
-    let mut out = String::from("t");
-    let names: &[&str] = if with_references { &["q", "tau", "ref"] } else { &["q", "tau"] };
-    for name in names {
-        for joint in 1..=N {
-            let _ = write!(out, ",{name}{joint}");
-        }
-    }
-    out.push('\n');
-    out
+/// Where a motion begins, if it is one of `N` joints.
+fn beginning<const N: usize>(motion: &Motion) -> Option<[f64; N]> {
+    motion.samples().next().and_then(|[q, ..]| q.try_into().ok())
 }
 
 /// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its speed, follows the
-/// motion, writes the log, and stops. `barred` says of the way to there, and then of the motion, why the arm
-/// must not go it.
+/// motion, writes the log, and stops; `told` hears how far it has come. The motion is looked at before anything
+/// is sent, the way to where it begins before the arm is enabled.
 ///
 /// # Errors
 /// As [`Recorder::enable`] and [`Recorder::record`], and [`RecordError::Barred`]; the arm has not moved then.
 pub fn record<B: Bus, const N: usize>(
     master: Master<B, N>,
     motion: &Motion,
-    barred: impl Fn(&Motion) -> Option<String>,
+    envelope: Envelope<N>,
+    told: impl FnMut(&Told) + 'static,
     log: &mut impl Write,
 ) -> Result<Record, RecordError> {
-    if let Some(why) = barred(motion) {
-        return Err(RecordError::Barred(format!("on the trajectory {why}")));
-    }
     if motion.dof() == N {
-        fits(master.driver().profile(), motion)?;
+        envelope.check(master.driver().profile(), motion).map_err(|e| match e {
+            RecordError::Barred(why) => RecordError::Barred(format!("on the trajectory {why}")),
+            other => other,
+        })?;
     }
-    let mut recorder = Recorder::enable(master)?;
-    let done = recorder.approach_and_record(motion, barred, log);
+    let mut recorder = Recorder::bring_up(master, envelope)?.telling(told);
+    if let Some(begin) = beginning(motion) {
+        recorder.way_to(&begin, APPROACH, 1.0)?;
+    }
+    recorder.release()?;
+    let done = recorder.approach_and_record(motion, log);
     // Also where the recording failed, the arm is stopped; why it failed is what is told.
     let stopped = recorder.finish();
     let done = done?;
@@ -359,6 +369,11 @@ mod tests {
         Master::new(Driver::new(LWA4P).unwrap(), Memory::new(arm, LWA4P.bitrate))
     }
 
+    /// No surroundings: the joints' limits alone.
+    fn open() -> Envelope<6> {
+        Envelope::new(|_| None)
+    }
+
     /// Every joint swings, from rest to rest.
     fn swing(seconds: f64) -> Motion {
         let mut motion = Motion::new(6, 0.005);
@@ -376,9 +391,9 @@ mod tests {
     #[test]
     fn a_motion_is_followed_and_logged_without_a_gap() {
         let (motion, mut log) = (swing(6.0), Vec::new());
-        let mut recorder = Recorder::enable(arm()).unwrap();
+        let mut recorder = Recorder::enable(arm(), open()).unwrap();
         recorder.go(&START, 0.25, 1.0).unwrap();
-        let record = recorder.record(&motion, 10.0, true, &mut log).unwrap();
+        let record = recorder.record(&motion, 10.0, Columns::Everything, &mut log).unwrap();
         assert_eq!((record.samples, record.missing, record.late, record.dropped), (motion.len(), 0, 0, 0));
         // Two and a half cycles of delay at 1 rad/s, and the servo.
         assert!(record.following_max.iter().all(|e| *e < 0.03), "{record:?}");
@@ -389,8 +404,18 @@ mod tests {
         assert!(
             rows.iter()
                 .enumerate()
-                .all(|(k, row)| { row.len() == 19 && (row[0] - 10.0 - 0.005 * k as f64).abs() < 1e-9 })
+                .all(|(k, row)| { row.len() == 40 && (row[0] - 10.0 - 0.005 * k as f64).abs() < 1e-9 })
         );
+        // What the drives say and when: their own velocities, "operation enabled", within the cycle.
+        for (pair, sample) in rows.windows(3).zip(&motion.q.chunks(6).collect::<Vec<_>>()[1..]) {
+            let row = &pair[1];
+            assert!((0..6).all(|j| (row[13 + j] - sample[j]).abs() < 1e-6));
+            let differences = (0..6).map(|j| (pair[2][1 + j] - pair[0][1 + j]) / 0.01);
+            assert!(differences.zip(&row[19..25]).all(|(v, dq)| (v - dq).abs() < 0.05), "{row:?}");
+            assert!(row[25..31].iter().all(|status| *status as u16 & 0x6F == 0x27));
+            assert!(row[31..37].iter().all(|answer| (1e-4..5e-3).contains(answer)), "{row:?}");
+            assert_eq!(row[37..], [0.0; 3]);
+        }
         let master = recorder.finish().unwrap();
         let arm = master.bus().peer();
         assert!(arm.nodes().iter().all(|node| node.brake_closed()));
@@ -400,7 +425,7 @@ mod tests {
     #[test]
     fn a_log_ends_with_a_whole_line_where_the_arm_is_stopped() {
         let (motion, mut log) = (swing(6.0), Vec::new());
-        let mut recorder = Recorder::enable(arm()).unwrap();
+        let mut recorder = Recorder::enable(arm(), open()).unwrap();
         recorder.go(&START, 0.25, 1.0).unwrap();
         let mut lines = 0;
         let failed = recorder.follow(&motion, |_, master| {
@@ -410,7 +435,7 @@ mod tests {
         assert!(failed.is_ok() && lines == motion.len());
         recorder.go(&START, 0.25, 1.0).unwrap();
         recorder.master_mut().bus_mut().peer_mut().fault(NodeId::clamped(5), Fault::Silent(true));
-        let failed = recorder.record(&motion, 0.0, false, &mut log).unwrap_err();
+        let failed = recorder.record(&motion, 0.0, Columns::Torques, &mut log).unwrap_err();
         let RecordError::Arm(ArmError::Stopped(cause, _)) = &failed else { panic!("{failed}") };
         // The first cause, or the graver one that follows from the same silence.
         assert!(matches!(cause, Cause::DataMissing(_) | Cause::HeartbeatLost(_)), "{cause:?}");
@@ -427,22 +452,30 @@ mod tests {
         let mut log = Vec::new();
         // The way alone ends at joint 2 being lower than the trajectory gets.
         let begin = motion.q[1];
-        let barred = |m: &Motion| (highest(m) <= begin + 1e-6).then(|| "it is barred".to_string());
-        let refused = record(arm(), &motion, barred, &mut log).unwrap_err().to_string();
-        assert!(refused.contains("way to where the trajectory begins it is barred"), "{refused}");
-        let refused = record(arm(), &motion, |_| Some("it is barred".into()), &mut log).unwrap_err();
+        let barred = move |m: &Motion| (highest(m) <= begin + 1e-6).then(|| "it is barred".to_string());
+        let refused =
+            record(arm(), &motion, Envelope::new(barred), |_| (), &mut log).unwrap_err().to_string();
+        assert!(refused.contains("on the straight way to (0.100, 0.400, "), "{refused}");
+        assert!(refused.contains("rad it is barred: move the arm nearer"), "{refused}");
+        let everything = Envelope::new(|_: &Motion| Some("it is barred".into()));
+        let refused = record(arm(), &motion, everything, |_| (), &mut log).unwrap_err();
         assert!(refused.to_string().starts_with("on the trajectory"), "{refused}");
         assert!(log.is_empty());
-        assert_eq!(record(arm(), &motion, |_| None, &mut log).unwrap().samples, motion.len());
+        let (tell, heard) = std::sync::mpsc::channel();
+        let told = move |told: &Told| tell.send(told.to_string()).unwrap();
+        assert_eq!(record(arm(), &motion, open(), told, &mut log).unwrap().samples, motion.len());
+        let heard: Vec<String> = heard.iter().collect();
+        assert!(heard.iter().any(|line| line.starts_with(" 49 % of 1201 samples, at (0.")), "{heard:?}");
     }
 
     #[test]
     fn what_does_not_fit_is_refused_before_anything_moves() {
-        let mut recorder = Recorder::enable(arm()).unwrap();
-        let mut refused = |motion: Motion| match recorder.record(&motion, 0.0, false, &mut Vec::new()) {
-            Err(RecordError::Motion(what)) => what,
-            other => panic!("{other:?}"),
-        };
+        let mut recorder = Recorder::enable(arm(), open()).unwrap();
+        let mut refused =
+            |motion: Motion| match recorder.record(&motion, 0.0, Columns::Torques, &mut Vec::new()) {
+                Err(RecordError::Motion(what)) => what,
+                other => panic!("{other:?}"),
+            };
         let mut slow = swing(1.0);
         slow.period = 0.01;
         assert!(refused(slow).contains("sample it at 200 Hz"));

@@ -1,7 +1,7 @@
 //! Warming an arm up (§II.C): every joint swings until the torque that friction takes no longer changes.
 
 use super::settling::{Cycle, Exponential, Trend, cycles, exponential, trend};
-use super::{RecordError, Recorder};
+use super::{Columns, RecordError, Recorder};
 use crate::bus::driver::Profile;
 use crate::bus::transport::Bus;
 use crate::identification::motion::Motion;
@@ -172,7 +172,7 @@ pub fn warm_up<B: Bus, const N: usize>(
     let mut seconds = start;
     loop {
         let mut text = Vec::new();
-        recorder.record(&motion, seconds, false, &mut text)?;
+        recorder.record(&motion, seconds, Columns::Torques, &mut text)?;
         let text = String::from_utf8_lossy(&text);
         // The header is written once.
         let mut lines = text.split_inclusive('\n').skip(usize::from(seconds > 0.0));
@@ -222,6 +222,7 @@ mod tests {
     use crate::bus::driver::Driver;
     use crate::bus::driver::lwa4p::LWA4P;
     use crate::bus::transport::{Master, Memory};
+    use crate::procedure::Envelope;
     use crate::virtual_arm::{PlantEffect, VirtualArm, lwa4p};
 
     /// An arm whose viscous friction falls by a fifth with 60 s: it is called warm when little of that is
@@ -231,7 +232,8 @@ mod tests {
         let mut setup = lwa4p::setup([0.0; 6], 5).unwrap();
         setup.plant = setup.plant.with(PlantEffect::Temperature { change: -0.2, time_constant: 60.0 });
         let bus = Memory::new(VirtualArm::new(setup).unwrap(), LWA4P.bitrate);
-        let mut recorder = Recorder::enable(Master::new(Driver::new(LWA4P).unwrap(), bus)).unwrap();
+        let mut recorder =
+            Recorder::enable(Master::new(Driver::new(LWA4P).unwrap(), bus), Envelope::new(|_| None)).unwrap();
         let mut log = Vec::new();
         let settings = Settings { most: 600.0, ..Settings::default() };
         let seen = || Seen::new(swing(&LWA4P, &settings));

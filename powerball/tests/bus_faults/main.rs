@@ -7,6 +7,7 @@
 mod faults;
 mod motion;
 mod rules;
+mod walks;
 mod world;
 
 use faults::{Expected, Fault, Stage};

@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
 """python-canopen against powerball, both ways.
 
-    agree.py POWERBALL udp|slcan
+    agree.py POWERBALL udp|slcan|arm|reactions
 
-As master it drives the six slaves of `powerball virtual-arm`; as slave it answers `powerball bus`. Prints what was
-checked; exit code 1 with a trace where the two do not agree.
+As master it drives the six slaves of `powerball virtual-arm`; as slave it answers `powerball bus`. As an arm (`arm`, over
+UDP) its six nodes are recorded along a trajectory, and stopped when one of them fails; `reactions` prints after how long,
+for every failure. Prints what was checked; exit code 1 with a trace where the two do not agree.
 """
 
 import json
+import math
 import os
 import pty
 import random
@@ -15,6 +17,7 @@ import select
 import struct
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import tty
@@ -52,6 +55,10 @@ def dictionary():
         ("statusword", 0x6041, u16, "ro"),
         ("mode", 0x6060, i8, "rw"),
         ("mode display", 0x6061, i8, "ro"),
+        ("following error window", 0x6065, u32, "rw"),
+        ("greatest current", 0x6073, u16, "ro"),
+        ("rated current", 0x6075, u32, "ro"),
+        ("interpolation sub mode", 0x60C0, i16, "rw"),
         ("position", 0x6064, i32, "ro"),
         ("velocity demand", 0x606B, i32, "ro"),
         ("velocity", 0x606C, i32, "ro"),
@@ -64,6 +71,8 @@ def dictionary():
         made.add_object(variable(name, index, 0, kind, access))
     for name, index, members in [
         ("identity", 0x1018, [("count", 0, u8), ("vendor", 1, u32), ("product", 2, u32), ("revision", 3, u32), ("serial", 4, u32)]),
+        ("consumer heartbeat", 0x1016, [("count", 0, u8), ("master", 1, u32)]),
+        ("position limits", 0x607D, [("count", 0, u8), ("least", 1, i32), ("greatest", 2, i32)]),
         ("interpolation data", 0x60C1, [("count", 0, u8), ("point", 1, i32)]),
         ("interpolation period", 0x60C2, [("count", 0, u8), ("value", 1, u8), ("exponent", 2, i8)]),
     ]:
@@ -277,8 +286,210 @@ def answer_the_master(powerball, place, node):
     check("position in rad", abs(state["position"] - 1.0) < 1e-4, state)
 
 
+class Drive:
+    """One of six drives of python-canopen's own: LocalNode with its SDO server, NMT slave and heartbeat; the state
+    machine of CiA 402 and the PDOs as mapped are written here, without powerball. Its joint is where it is told to be."""
+
+    def __init__(self, arm, number):
+        self.arm, self.id = arm, number
+        self.state, self.mode, self.word, self.position, self.target = 0x40, 0, 0, 0, None
+        self.silent = self.stuck = False
+        self.set, self.clear, self.shift = 0, 0, 0
+        self.quick_stop = None
+        self.node = arm.network.create_node(number, dictionary())
+        for index, sub, data in [
+            (0x1000, 0, 0x00020192), (0x1001, 0, 0), (0x1017, 0, 0), (0x6041, 0, 0x0240), (0x6061, 0, 0), (0x6064, 0, 0),
+            (0x606C, 0, 0), (0x6077, 0, 0), (0x6073, 0, 1000), (0x6075, 0, 5000), (0x6502, 0, 0x43), (0x2050, 0, 3),
+            (0x1018, 0, 4), (0x1018, 1, 0x15E), (0x1018, 2, 1), (0x1018, 3, 1), (0x1018, 4, number),
+        ]:
+            object_ = self.node.sdo[index][sub] if sub or index == 0x1018 else self.node.sdo[index]
+            object_.raw = data
+        self.mapping = {}
+        self.node.add_write_callback(self.written)
+        arm.network.subscribe(0x200 + number, lambda cob, data, at: self.receive(bytes(data)))
+        arm.network.subscribe(0, self.manage)
+        self.node.nmt.state = "PRE-OPERATIONAL"
+
+    def manage(self, cob, data, at):
+        """python-canopen's slave does not boot by itself when it is reset."""
+        if data[0] in (0x81, 0x82) and data[1] in (0, self.id):
+            self.state, self.mode = 0x40, 0
+            self.node.nmt.state = "INITIALISING"
+            self.node.nmt.state = "PRE-OPERATIONAL"
+
+    def written(self, index, subindex, od, data):
+        number = int.from_bytes(data, "little")
+        if index == 0x6060:
+            self.mode = data[0]
+            self.node.data_store.setdefault(0x6061, {})[0] = bytes(data)
+        elif index == 0x6040:
+            self.control(number)
+        elif 0x1400 <= index < 0x1C00:
+            self.mapping[(index, subindex)] = number
+
+    def mapped(self, base):
+        """(index, sub, bytes) of the PDO whose parameters are at `base`, where it is switched on."""
+        if self.mapping.get((base, 1), 1 << 31) >> 31:
+            return []
+        entries = [self.mapping[(base + 0x200, k + 1)] for k in range(self.mapping.get((base + 0x200, 0), 0))]
+        return [(e >> 16, e >> 8 & 0xFF, (e & 0xFF) // 8) for e in entries]
+
+    def receive(self, data):
+        for index, sub, size in self.mapped(0x1400):
+            part, data = data[:size], data[size:]
+            if index == 0x6040:
+                self.control(int.from_bytes(part, "little"))
+            elif index == 0x60C1:
+                self.target = int.from_bytes(part, "little", signed=True)
+
+    def control(self, word):
+        risen, self.word = word & 0x80 and not self.word & 0x80, word
+        if word & 6 == 2:
+            self.quick_stop = self.quick_stop or time.monotonic()
+        if self.state == 0x08:
+            self.state = 0x40 if risen else 0x08
+        elif not word & 2:
+            self.state = 0x40
+        elif word & 6 == 2:
+            # The quick stop: at rest at once, and held until it is switched off.
+            if self.state == 0x27:
+                self.state = 0x07
+        elif self.state == 0x40 and word & 7 == 6:
+            self.state = 0x21
+        elif self.state == 0x21 and word & 7 == 7:
+            self.state = 0x23
+        elif self.state == 0x23 and word & 0xF == 0xF:
+            self.state = 0x27
+        elif self.state in (0x23, 0x27) and word & 7 == 6:
+            self.state = 0x21
+
+    def sync(self):
+        if self.silent or self.node.nmt.state != "OPERATIONAL":
+            return
+        follows = self.state == 0x27 and self.mode == 7 and self.word & 0x110 == 0x10
+        if follows and self.target is not None and not self.stuck:
+            self.position = self.target
+        ready = 0x10 if self.state not in (0x40, 0x08) else 0
+        status = (self.state | 0x0200 | ready | (0x1000 if follows else 0)) & ~self.clear | self.set
+        values = {0x6041: status, 0x6064: self.position + self.shift, 0x6061: self.mode}
+        for k in range(4):
+            mapped = self.mapped(0x1800 + k)
+            data = b"".join((values.get(i, 0) & (1 << 8 * size) - 1).to_bytes(size, "little") for i, _, size in mapped)
+            if mapped:
+                self.arm.network.send_message(0x180 + 0x100 * k + self.id, data)
+
+
+class PythonArm:
+    """Six drives on one bus."""
+
+    def __init__(self, place):
+        self.network = canopen.Network(place.bus())
+        self.network.connect()
+        self.drives = [Drive(self, number) for number in range(3, 9)]
+        self.network.subscribe(0x80, lambda cob, data, at: [drive.sync() for drive in self.drives])
+
+    def close(self):
+        for drive in self.drives:
+            drive.node.nmt.stop_heartbeat()
+        self.network.disconnect()
+
+
+def trajectory(folder, seconds):
+    """All joints swing by 0.2 rad, from rest to rest, once in 3 s."""
+    path = os.path.join(folder, "path.csv")
+    with open(path, "w") as file:
+        file.write("t,q1,q2,q3,q4,q5,q6\n")
+        for k in range(int(seconds / 0.005) + 1):
+            q = 0.1 * (1.0 - math.cos(2.0 * math.pi * k * 0.005 / 3.0))
+            file.write(f"{0.005 * k:.6f}," + ",".join([f"{q:.9f}"] * 6) + "\n")
+    return path
+
+
+def record(powerball, place, path, code, fail=None):
+    """Records a trajectory on an arm of python's; `fail` befalls node 5 while it moves. Gives the arm, what was told, and
+    after how many ms the others had heard the quick stop, where there was one."""
+    arm = PythonArm(place)
+    log = path.replace("path", "log")
+    command = [powerball, "record", "--trajectory", path, "--out", log, "--force", "--json", "--bus", place.url]
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        failed = None
+        if fail:
+            victim = arm.drives[2]
+            end = time.monotonic() + 20.0
+            while victim.position < 5000 and time.monotonic() < end:
+                time.sleep(0.002)
+            failed = time.monotonic()
+            fail(arm, victim)
+        out, told = run.communicate(timeout=60)
+        if run.returncode != code:
+            raise AssertionError(f"exit code {run.returncode}: {out} {told}")
+        stops = [drive.quick_stop for drive in arm.drives if not drive.silent]
+        took = (max(stops) - failed) * 1e3 if fail and all(stops) else None
+        at_rest = [drive.state not in (0x27, 0x07) for drive in arm.drives if not drive.silent]
+        if not all(at_rest):
+            raise AssertionError(f"not without torque: {at_rest}; {told}")
+        return arm, (json.loads(out) if code == 0 else told), took, log
+    finally:
+        run.kill()
+        run.wait()
+        arm.close()
+
+
+def emergency(arm, drive):
+    arm.network.send_message(0x80 + drive.id, bytes([0x22, 0x32, 5, 0, 0, 0, 0, 0]))
+    drive.state = 0x08
+
+
+def silent(arm, drive):
+    drive.silent = True
+    drive.node.nmt.stop_heartbeat()
+
+
+def put(name, value):
+    return lambda arm, drive: setattr(drive, name, value)
+
+
+FAILURES = [
+    ("emergency and fault", emergency, "emcy"),
+    ("node silent", silent, "node 5"),
+    ("position stands still", put("stuck", True), "node 5"),
+    ("position jumps by 6 degrees", put("shift", 6000), "jump"),
+    ("voltage bit lost", put("clear", 0x10), "voltage"),
+    ("remote bit lost", put("clear", 0x200), "obey"),
+    ("internal limit", put("set", 0x800), "limit"),
+    ("interpolation ended", put("clear", 0x1000), "interpol"),
+    ("following error bit", put("set", 0x2000), "following"),
+    ("boot-up message", lambda arm, drive: arm.network.send_message(0x700 + drive.id, b"\0"), "restarted"),
+]
+
+
+def python_is_the_arm(powerball, failures):
+    print("python-canopen as the arm of powerball record:")
+    with tempfile.TemporaryDirectory() as folder:
+        path = trajectory(folder, 3.0)
+        arm, result, _, log = record(powerball, Udp(), path, 0)
+        done = result["record"]
+        check("a whole trajectory is followed", done["samples"] + done["missing"] == 601, done)
+        check("with few cycles without data", done["missing"] < 120, done)
+        check("to its end", all(abs(drive.position) <= 2 for drive in arm.drives), [d.position for d in arm.drives])
+        with open(log) as file:
+            rows = [line.split(",") for line in file.read().splitlines()[1:]]
+        highest = max(float(row[1]) for row in rows)
+        check("the log has the motion", abs(highest - 0.2) < 2e-3, highest)
+        times = [float(row[0]) for row in rows]
+        check("and its time", all(b > a for a, b in zip(times, times[1:])) and 2.9 < times[-1] < 5.0, times[-1])
+        for name, fail, word in failures:
+            _, told, took, _ = record(powerball, Udp(), trajectory(folder, 12.0), 1, fail)
+            check(f"{name}: all drives hear the stop after {took:.0f} ms", took < 500.0, told)
+            check(f"  told: {told.strip()[:90]}", word in told.lower(), told)
+
+
 def main():
     powerball, kind = sys.argv[1:]
+    if kind in ("arm", "reactions"):
+        python_is_the_arm(powerball, FAILURES[:3] if kind == "arm" else FAILURES)
+        return
     for role in (python_is_master, python_is_slave):
         role(powerball, {"udp": Udp, "slcan": Slcan}[kind]())
     print(f"python-canopen {canopen.__version__} and powerball agree over {kind}")

@@ -39,7 +39,10 @@ impl<const N: usize> Driver<N> {
             return;
         }
         let Some(missing) = self.joints.iter().position(|joint| joint.booted.is_none()) else {
-            self.enter_script(Phase::Identify, tx);
+            // Nodes go there by themselves after their boot-up; some (python-canopen's) repeat it until they are told.
+            if self.manage(nmt::Command::EnterPreOperational, tx) {
+                self.enter_script(Phase::Identify, tx);
+            }
             return;
         };
         if self.elapsed() < self.profile.reactions.boot_timeout {
@@ -184,6 +187,7 @@ impl<const N: usize> Driver<N> {
         result: Result<Value, SdoError>,
     ) -> Result<(), Cause> {
         let node = self.node(j);
+        let target = self.mode_profile().setpoint;
         let failed = |error| Cause::Sdo(node, object, error);
         let number = result.and_then(|value| value.unsigned().ok_or(SdoError::Protocol(AbortCode::LENGTH)));
         let (Some(profile), Some(joint)) = (self.profile.joints.get(j), self.joints.get_mut(j)) else {
@@ -218,6 +222,13 @@ impl<const N: usize> Driver<N> {
                 Ok(_) | Err(SdoError::Aborted(_)) => Ok(()),
                 Err(error) => Err(failed(error)),
             };
+        }
+        // A target that is there and cannot be read: that it is followed is watched anyway.
+        if object == target
+            && let Err(SdoError::Aborted(code)) = number
+            && !matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUB_INDEX)
+        {
+            return Ok(());
         }
         let number = number.map_err(failed)?;
         match object {

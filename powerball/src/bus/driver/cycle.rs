@@ -50,6 +50,9 @@ impl<const N: usize> Driver<N> {
                 return Err(Rejection::Saturated(JointNumber::from_index(j)));
             }
         }
+        if let Some(guard) = &self.torque_guard {
+            guard.check(&self.profile, self.control, &self.joints, setpoints)?;
+        }
         for (joint, value) in self.joints.iter_mut().zip(setpoints) {
             joint.target = *value;
         }
@@ -78,6 +81,7 @@ impl<const N: usize> Driver<N> {
             self.counters.dropped += u64::from(core::mem::take(&mut self.slot_open));
             self.judge_cycle(tick, tx);
             self.send(cob::SYNC, tx);
+            self.synced_at = self.now;
             self.counters.cycles += 1;
             self.slot_open = true;
             self.fresh = false;
@@ -188,22 +192,33 @@ impl<const N: usize> Driver<N> {
 
     /// A cycle without new set-points, or with rejected ones: the joints go on as they went, within their limits. To
     /// stand still at once would be an acceleration that no joint has.
-    fn go_on(&mut self) {
+    ///
+    /// # Errors
+    /// Where that takes more torque than a joint has.
+    fn go_on(&mut self) -> Result<(), Rejection> {
         let period = self.profile.period_seconds();
-        for (profile, joint) in self.profile.joints.iter().zip(&mut self.joints) {
-            let next = joint.demand.next(period, profile.velocity, profile.acceleration);
-            let [low, high] = profile.position;
-            let last = joint.demand.last();
-            joint.target = next.max(low.min(last)).min(high.max(last));
+        let mut targets = [0.0; N];
+        for ((target, profile), joint) in targets.iter_mut().zip(&self.profile.joints).zip(&self.joints) {
+            let acceleration = profile.acceleration * self.profile.reactions.step_factor;
+            *target = joint.demand.next(period, profile.position, profile.velocity, acceleration);
         }
+        if let Some(guard) = &self.torque_guard {
+            guard.check(&self.profile, self.control, &self.joints, &targets)?;
+        }
+        for (joint, target) in self.joints.iter_mut().zip(targets) {
+            joint.target = target;
+        }
+        Ok(())
     }
 
     /// One receive PDO a joint.
     pub(super) fn send_setpoints(&mut self, tx: &mut impl Transmit) {
         let came = core::mem::take(&mut self.pending);
         let interpolated = self.control == ControlMode::InterpolatedPosition;
-        if self.phase == Phase::Running && interpolated && self.streaming && !came {
-            self.go_on();
+        let alone = self.phase == Phase::Running && interpolated && self.streaming && !came;
+        if alone && let Err(rejection) = self.go_on() {
+            self.trip(Cause::Setpoints(rejection), tx);
+            return;
         }
         for j in 0..N {
             self.send_joint(j, tx);

@@ -34,15 +34,24 @@ impl Demand {
         (self.points[0] - self.points[1]) / period
     }
 
-    /// Where positions go on to, for a cycle in which nothing new came: with the velocity and the acceleration that they
-    /// had, within the limits of both. Not back: what slows down comes to rest.
-    pub(super) fn next(&self, period: f64, velocity: f64, acceleration: f64) -> f64 {
+    /// Where positions go on to, for a cycle in which nothing new came: with the velocity and the acceleration that
+    /// they had, within the limits of both. Not back: what slows down comes to rest, and what rests stays. What
+    /// could not come to rest any more before the end of its range (`position`, rad) brakes.
+    pub(super) fn next(&self, period: f64, position: [f64; 2], velocity: f64, acceleration: f64) -> f64 {
         let v = self.velocity(period);
         let before = (self.points[1] - self.points[2]) / period;
+        let most = acceleration * period;
         // Not `clamp`, which panics where a bound is no number.
-        let change = (v - before).max(-acceleration * period).min(acceleration * period);
-        let next = (v + change).max(-velocity).min(velocity);
-        self.points[0] + if next * v < 0.0 { 0.0 } else { next * period }
+        let change = (v - before).max(-most).min(most);
+        let mut next = (v + change).max(-velocity).min(velocity);
+        let (last, [low, high]) = (self.points[0], position);
+        let rest = rest(last + next * period, next, acceleration);
+        if next > 0.0 && rest > high || next < 0.0 && rest < low {
+            next = v - v.max(-most).min(most);
+        }
+        let next = last + if next * v > 0.0 { next * period } else { 0.0 };
+        // Nothing outside its range goes further out.
+        next.max(low.min(last)).min(high.max(last))
     }
 
     /// How far `actual` is from where a drive with any delay up to [`KEPT`] cycles would be: from the range of the
@@ -54,9 +63,42 @@ impl Demand {
     }
 }
 
+/// Where a joint at `position` (rad) with `velocity` (rad/s) comes to rest that brakes with `acceleration` (rad/s²).
+pub(super) fn rest(position: f64, velocity: f64, acceleration: f64) -> f64 {
+    position + velocity * velocity.abs() / (2.0 * acceleration)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const WIDE: [f64; 2] = [-10.0, 10.0];
+
+    /// Without any new set-point a joint that is on its way to the end of its range comes to rest before it, and never
+    /// brakes harder than it may.
+    #[test]
+    fn what_goes_on_comes_to_rest_within_its_range() {
+        let (period, acceleration) = (0.005, 4.0);
+        for speed in [0.02, 0.3, 1.2] {
+            for side in [1.0, -1.0] {
+                let mut demand = Demand::at_rest(0.0);
+                let way = rest(0.0, speed, acceleration) + 0.01;
+                (0..KEPT).rev().for_each(|k| demand.push(side * (1.0 - way - speed * period * k as f64)));
+                let mut v = side * speed;
+                for _ in 0..400 {
+                    demand.push(demand.next(period, [-1.0, 1.0], 1.2, acceleration));
+                    let now = demand.velocity(period);
+                    assert!((now - v).abs() <= acceleration * period * (1.0 + 1e-6), "{v} {now}");
+                    v = now;
+                }
+                assert!(
+                    v.abs() < 1e-9 && (0.95..=1.0).contains(&(side * demand.last())),
+                    "{v} {}",
+                    demand.last()
+                );
+            }
+        }
+    }
 
     #[test]
     fn what_is_missed_goes_on_as_it_went() {
@@ -65,14 +107,14 @@ mod tests {
         let path = |k: i32| 0.5 * 2.0 * (period * f64::from(k)).powi(2);
         (1..=20).for_each(|k| demand.push(path(k)));
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
-        near(demand.next(period, 1.0, 4.0), path(21));
+        near(demand.next(period, WIDE, 1.0, 4.0), path(21));
         // Within both limits, and not back.
-        near(demand.next(period, 0.1, 4.0), path(20) + 0.1 * period);
-        near(demand.next(period, 1.0, 0.0), path(20) + demand.velocity(period) * period);
+        near(demand.next(period, WIDE, 0.1, 4.0), path(20) + 0.1 * period);
+        near(demand.next(period, WIDE, 1.0, 0.0), path(20) + demand.velocity(period) * period);
         let mut slowing = Demand::at_rest(0.0);
         [0.0001, 0.00011].into_iter().for_each(|q| slowing.push(q));
-        near(slowing.next(period, 1.0, 100.0), 0.00011);
-        near(Demand::at_rest(0.3).next(period, 1.0, 4.0), 0.3);
+        near(slowing.next(period, WIDE, 1.0, 100.0), 0.00011);
+        near(Demand::at_rest(0.3).next(period, WIDE, 1.0, 4.0), 0.3);
     }
 
     #[test]

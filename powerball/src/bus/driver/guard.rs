@@ -1,7 +1,7 @@
 //! What a set-point must be to leave for the arm, and a whole path before the arm moves.
 
 use super::control_mode::ControlMode;
-use super::demand::Demand;
+use super::demand::{Demand, rest};
 use super::profile::{JointProfile, Profile, Reactions};
 use super::rejection::Rejection;
 use crate::controller::JointNumber;
@@ -33,14 +33,15 @@ impl Guard<'_> {
             ControlMode::InterpolatedPosition => {
                 self.inside(value)?;
                 self.step(value, limits.velocity * self.period * self.reactions.step_factor)?;
-                self.accelerate(value)
+                self.accelerate(value)?;
+                self.stoppable(value)
             }
             ControlMode::Velocity => {
                 if value.abs() > limits.velocity {
                     return Err(Rejection::Velocity(j, value, limits.velocity));
                 }
                 // Where the joint would come to rest if it braked now; only what leads outwards is rejected.
-                self.outwards(value, self.position + value * value.abs() / (2.0 * limits.acceleration))?;
+                self.outwards(value, rest(self.position, value, limits.acceleration))?;
                 self.step(value, limits.acceleration * self.period * self.reactions.step_factor)
             }
             ControlMode::Current => {
@@ -78,14 +79,26 @@ impl Guard<'_> {
 
     /// The second difference of positions. What two counts of the encoder make of it is rounding.
     fn accelerate(&self, value: f64) -> Result<(), Rejection> {
-        let rounding = 2.0 / (self.profile.units.counts_per_radian.abs() * self.period * self.period);
-        let limit = self.profile.acceleration * self.reactions.step_factor + rounding;
+        let limit = self.profile.acceleration * self.reactions.step_factor + self.rounding() / self.period;
         let velocity = (value - self.demand.last()) / self.period;
         let acceleration = (velocity - self.demand.velocity(self.period)) / self.period;
         if acceleration.abs() > limit {
             return Err(Rejection::Acceleration(self.joint, acceleration, limit));
         }
         Ok(())
+    }
+
+    /// Velocity that the rounding of positions to counts can feign, rad/s.
+    fn rounding(&self) -> f64 {
+        2.0 / (self.profile.units.counts_per_radian.abs() * self.period)
+    }
+
+    /// After this point the joint can still come to rest within its range, whatever comes next, or nothing.
+    fn stoppable(&self, value: f64) -> Result<(), Rejection> {
+        let velocity = (value - self.demand.last()) / self.period;
+        let slower = (velocity.abs() - self.rounding()).max(0.0).copysign(velocity);
+        let limit = self.profile.acceleration * self.reactions.step_factor;
+        self.outwards(velocity, rest(value, slower, limit))
     }
 
     fn step(&self, value: f64, limit: f64) -> Result<(), Rejection> {
@@ -193,6 +206,21 @@ mod tests {
             matches!(back, Err(Rejection::Acceleration(_, a, _)) if (a + 240.0).abs() < 1e-6),
             "{back:?}"
         );
+    }
+
+    /// At full speed the way to rest is 0.17 rad: nearer to the end of the range such a point does not leave.
+    #[test]
+    fn interpolated_points_leave_room_to_come_to_rest() {
+        let joint = &LWA4P.joints[0];
+        let (v, high) = (joint.velocity, joint.position[1]);
+        let way = v * v / (2.0 * 1.05 * joint.acceleration);
+        let at = |q: f64| {
+            let mut demand = Demand::at_rest(q);
+            (1..8).rev().for_each(|k| demand.push(q - v * 0.005 * f64::from(k)));
+            moving(ControlMode::InterpolatedPosition, &demand, q).check(q)
+        };
+        assert_eq!(at(high - way), Ok(()));
+        assert!(matches!(at(high - 0.97 * way), Err(Rejection::Position(..))), "{:?}", at(high - 0.97 * way));
     }
 
     #[test]

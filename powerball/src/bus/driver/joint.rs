@@ -48,6 +48,8 @@ pub struct Joint {
     pub emergency: Option<Emcy>,
     /// 0x1018: vendor, product, revision, serial number, as far as the drive tells them.
     pub identity: [Option<u32>; 4],
+    /// When its last process data came, on the clock that the driver is told, µs.
+    pub answered_at: Micros,
     /// Counts.
     pub counters: JointCounters,
     /// Scales, with the rated current that the drive told.
@@ -100,6 +102,7 @@ impl Joint {
             nmt: None,
             emergency: None,
             identity: [None; 4],
+            answered_at: 0,
             counters: JointCounters::default(),
             units: profile.units,
             velocity_count: 1.0,

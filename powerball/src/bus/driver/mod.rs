@@ -40,7 +40,7 @@
 //! | two nodes with one id | process data twice in a cycle, 5 cycles in a row | stop, [`Cause::TwoNodes`], restart needed | 5 cycles |
 //! | bus-off | transport | queue discarded, silence (also of the heartbeat, so that the drives stop themselves), [`Cause::BusOff`], restart needed | at once |
 //! | transmit queue full | transport | queue discarded, stop, repeated until it could be queued | at once |
-//! | set-point NaN, jumping, outside the limits | before it leaves | rejected, the last one held, counted; 3 cycles in a row: stop, [`Cause::Setpoints`] | 3 cycles |
+//! | set-point NaN, jumping, outside the limits, more torque than a joint has | before it leaves | rejected, the last one held, counted; 3 cycles in a row: stop, [`Cause::Setpoints`] | 3 cycles |
 //! | no new set-point | in the slot | the last one held; 3 cycles in a row: stop, [`Cause::Starved`] (not in profile position) | 3 cycles |
 //! | velocities mean something else | way asked for and way gone, while the scale is not verified on hardware | stop, [`Cause::WrongVelocityScale`] | 0.1 rad |
 //! | joint not where or not as fast as told, stuck, jumping, beyond its limits, at its current limit | each cycle | stop, [`Cause::FollowingError`], [`Cause::VelocityError`], [`Cause::Stuck`], [`Cause::PositionJump`], [`Cause::PositionLimit`], [`Cause::TorqueLimit`] | [`profile::Reactions`] |
@@ -71,6 +71,7 @@ mod receive;
 mod rejection;
 mod script;
 mod stop;
+mod torque;
 pub mod units;
 mod watch;
 
@@ -83,6 +84,7 @@ pub use joint::{Joint, JointCounters};
 pub use link::{BusEvent, QueueFull, Transmit};
 pub use profile::{JointProfile, Profile};
 pub use rejection::Rejection;
+pub use torque::TorqueGuard;
 
 use crate::bus::canopen::sync::{HeartbeatProducer, SyncProducer};
 use crate::bus::canopen::{Frame, Micros, NodeId};
@@ -223,7 +225,9 @@ pub struct Driver<const N: usize> {
     details: Details,
     silent: bool,
     joints: [Joint; N],
+    torque_guard: Option<TorqueGuard<N>>,
     sync: SyncProducer,
+    synced_at: Micros,
     heartbeat: HeartbeatProducer,
     bring_up: BringUp,
     stop: StopStage,
@@ -268,7 +272,9 @@ impl<const N: usize> Driver<N> {
             details: Details::default(),
             silent: false,
             joints: profile.joints.map(|joint| Joint::new(&joint, lost, reactions.sdo_timeout)),
+            torque_guard: None,
             sync: SyncProducer::new(profile.sync_period),
+            synced_at: 0,
             heartbeat: HeartbeatProducer::new(profile.master_heartbeat),
             bring_up: BringUp::default(),
             stop: StopStage::Quick,
@@ -289,6 +295,11 @@ impl<const N: usize> Driver<N> {
             noted: 0,
             profile,
         })
+    }
+
+    /// From now on no set-point leaves for which the model of `guard` asks more torque of a joint than its profile allows.
+    pub fn guard_torque(&mut self, guard: TorqueGuard<N>) {
+        self.torque_guard = Some(guard);
     }
 
     /// Boots, identifies, configures and verifies all nodes for `control`; the driver is [`Phase::Ready`]
@@ -418,6 +429,11 @@ impl<const N: usize> Driver<N> {
     /// Counts.
     pub fn counters(&self) -> &Counters {
         &self.counters
+    }
+
+    /// When the last SYNC left, on the clock that the driver is told, µs.
+    pub fn synced_at(&self) -> Micros {
+        self.synced_at
     }
 
     /// What was told, oldest first; the last 16.

@@ -52,6 +52,8 @@ pub struct JointProfile {
     pub velocity: f64,
     /// Greatest acceleration, rad/s².
     pub acceleration: f64,
+    /// Greatest torque, N·m: what a model may ask of the joint ([`super::TorqueGuard`]); infinite where it is not known.
+    pub torque: f64,
     /// Greatest current, A.
     pub current: f64,
     /// Greatest following error, rad: beyond the delay with which a drive follows. Written to 0x6065 where the
@@ -266,9 +268,10 @@ impl<const N: usize> Profile<N> {
             ];
             if low.partial_cmp(&high) != Some(core::cmp::Ordering::Less)
                 || positive.iter().any(|value| !(value.is_finite() && *value > 0.0))
+                || joint.torque.partial_cmp(&0.0) != Some(core::cmp::Ordering::Greater)
             {
                 return wrong(
-                    "a joint's limits are no range, or its velocity, acceleration, current, greatest following or \
+                    "a joint's limits are no range, or its velocity, acceleration, torque, current, greatest following or \
                         velocity error or scale is not positive",
                 );
             }

@@ -59,9 +59,12 @@ impl<const N: usize> Driver<N> {
             self.counters.unexpected += 1;
             return;
         };
-        if !self.joints.get_mut(j).is_some_and(|joint| joint.update(number, &mapping, frame)) {
+        let now = self.now;
+        let Some(joint) = self.joints.get_mut(j) else { return };
+        if !joint.update(number, &mapping, frame) {
             return;
         }
+        joint.answered_at = now;
         if mapping.contains(objects::POSITION) {
             self.watch_position(j, tx);
         }

@@ -18,6 +18,8 @@ pub enum Rejection {
     Jump(JointNumber, f64, f64),
     /// Joint, acceleration of its set-points and the greatest one, rad/s².
     Acceleration(JointNumber, f64, f64),
+    /// Joint, torque that the arm's model asks for and the greatest one, N·m.
+    Torque(JointNumber, f64, f64),
     /// Joint whose value the drive's type cannot hold: it would be cut.
     Saturated(JointNumber),
     /// The arm does not follow set-points now.
@@ -42,6 +44,9 @@ impl fmt::Display for Rejection {
             }
             Rejection::Acceleration(j, a, limit) => {
                 write!(f, "joint {j}: its set-points accelerate by {a:.2} rad/s², {limit:.2} rad/s² can be")
+            }
+            Rejection::Torque(j, torque, limit) => {
+                write!(f, "joint {j}: the set-points take {torque:.1} N·m, {limit:.1} N·m can be")
             }
             Rejection::Saturated(j) => {
                 write!(f, "joint {j}: the drive's number type cannot hold the set-point")

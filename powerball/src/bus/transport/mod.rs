@@ -9,6 +9,8 @@ mod master;
 mod memory;
 #[cfg(unix)]
 mod msgpack;
+#[cfg(target_os = "linux")]
+pub mod realtime;
 #[cfg(unix)]
 mod slcan;
 #[cfg(all(target_os = "linux", feature = "socketcan"))]
@@ -26,7 +28,7 @@ pub use slcan::Slcan;
 pub use socketcan::SocketCan;
 #[cfg(unix)]
 pub use udp::UdpMulticast;
-pub use url::{BusUrl, UrlError};
+pub use url::{BusUrl, Interface, UrlError};
 
 use crate::bus::canopen::{Frame, Micros};
 use std::fmt;
@@ -150,7 +152,7 @@ pub fn open(url: &BusUrl) -> Result<Box<dyn Bus>, BusError> {
         #[cfg(unix)]
         BusUrl::Slcan(device) => Ok(Box::new(Slcan::open(device)?)),
         #[cfg(unix)]
-        BusUrl::Udp(group, interface) => Ok(Box::new(UdpMulticast::open_on(*group, *interface)?)),
+        BusUrl::Udp(group, interface) => Ok(Box::new(UdpMulticast::open_on(*group, interface.as_ref())?)),
         #[allow(unreachable_patterns)]
         other => Err(BusError::Io(format!("{other}: this build has no such bus"))),
     }

@@ -108,6 +108,33 @@ mod tests {
         \xaeis_extended_id\xc2\xafis_remote_frame\xc2\xaeis_error_frame\xc2\xa7channel\xc0\xa3dlc\x03\xa4data\xc4\
         \x03\x01\x02\x03\xa5is_fd\xc2\xaebitrate_switch\xc2\xb5error_state_indicator\xc2";
 
+    /// A datagram with bytes changed, lost and doubled: a frame or nothing, and a frame is one that can be sent on.
+    #[test]
+    fn mutated_datagrams_are_read_or_left() {
+        let mut state = 1u64;
+        let mut random = move |below: usize| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as usize % below
+        };
+        let mut read = 0;
+        for _ in 0..100_000 {
+            let mut bytes = PYTHON.to_vec();
+            for _ in 0..=random(4) {
+                let at = random(bytes.len());
+                match random(3) {
+                    0 => bytes[at] = random(256) as u8,
+                    1 => drop(bytes.remove(at)),
+                    _ => bytes.insert(at, random(256) as u8),
+                }
+            }
+            if let Some(frame) = decode(&bytes) {
+                read += 1;
+                assert_eq!(decode(&encode(&frame, 0.0)), Some(frame));
+            }
+        }
+        assert!(read > 1000, "{read}");
+    }
+
     #[test]
     fn the_bytes_are_pythons() {
         let frame = Frame::from_raw(0x123, &[1, 2, 3]).unwrap();

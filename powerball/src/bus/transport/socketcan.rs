@@ -6,6 +6,7 @@ use embedded_can::Frame as _;
 use socketcan::{CanFrame, CanSocket, Socket, SocketOptions};
 use std::fmt;
 use std::io::ErrorKind;
+use std::time::{Duration, SystemTime};
 
 /// Classes of error frames, as linux/can/error.h numbers them.
 const CONTROLLER: u32 = 0x004;
@@ -17,6 +18,9 @@ const PASSIVE: u8 = 0x30;
 const ENOBUFS: i32 = 105;
 /// The interface is down, which it is after bus-off without a restart.
 const ENETDOWN: i32 = 100;
+
+/// A frame that has waited for longer carries a stamp of a clock that was set meanwhile.
+const OLDEST: Duration = Duration::from_secs(1);
 
 /// A CAN interface of Linux, classic frames.
 pub struct SocketCan {
@@ -41,7 +45,16 @@ impl SocketCan {
         let socket = CanSocket::open(interface).map_err(failed)?;
         socket.set_nonblocking(true).map_err(failed)?;
         socket.set_error_filter(CONTROLLER | BUS_OFF | RESTARTED).map_err(failed)?;
+        socket.set_recv_timestamp(true).map_err(failed)?;
         Ok(SocketCan { socket, interface: interface.to_string(), clock: Clock::start() })
+    }
+
+    /// When the kernel received a frame, on this bus's clock. Its stamp is of the system's clock, which may be set: an
+    /// age that makes no sense is not believed.
+    fn at(&self, stamp: SystemTime) -> Micros {
+        let age = SystemTime::now().duration_since(stamp).unwrap_or_default();
+        let age = if age < OLDEST { age.as_micros() as Micros } else { 0 };
+        self.now().saturating_sub(age)
     }
 
     fn failed(&self, e: &std::io::Error) -> BusError {
@@ -81,18 +94,18 @@ impl Bus for SocketCan {
 
     fn receive(&mut self, until: Micros) -> Result<Option<(Micros, Event)>, BusError> {
         loop {
-            match self.socket.read_frame() {
-                Ok(CanFrame::Data(data)) => {
+            match self.socket.read_frame_with_timestamp() {
+                Ok((CanFrame::Data(data), stamp)) => {
                     if let Some(frame) = Frame::new(data.id(), data.data()) {
-                        return Ok(Some((self.now(), Event::Frame(frame))));
+                        return Ok(Some((self.at(stamp), Event::Frame(frame))));
                     }
                 }
-                Ok(CanFrame::Error(error)) => {
+                Ok((CanFrame::Error(error), _)) => {
                     if let Some(event) = event(error.error_bits(), error.data()) {
                         return Ok(Some((self.now(), event)));
                     }
                 }
-                Ok(CanFrame::Remote(_)) => {}
+                Ok((CanFrame::Remote(_), _)) => {}
                 Err(e) if e.kind() == ErrorKind::WouldBlock => {
                     let left = self.clock.left(until);
                     if left.is_zero() {

@@ -3,9 +3,9 @@
 //! Nobody who speaks here is asked who he is. So only datagrams to the group are taken, and, unless an interface is named,
 //! only those whose sender is this machine itself.
 
-use super::{Bus, BusError, Clock, Event, msgpack, readable};
+use super::{Bus, BusError, Clock, Event, Interface, msgpack, readable};
 use crate::bus::canopen::{Frame, Micros};
-use socket2::{Domain, Protocol, SockAddr, Socket, Type};
+use socket2::{Domain, InterfaceIndexOrAddress, Protocol, SockAddr, Socket, Type};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -33,12 +33,12 @@ impl UdpMulticast {
         UdpMulticast::open_on(group, None)
     }
 
-    /// Joins a multicast group on the network of an interface, which is named by its own IPv4 address. Its datagrams
-    /// reach that network (hop limit 1), and whoever is on it can speak: fence it.
+    /// Joins a multicast group on the network of an interface. Its datagrams reach that network (hop limit 1), and whoever
+    /// is on it can speak: fence it.
     ///
     /// # Errors
-    /// As [`open`](Self::open), and where this machine has no such address.
-    pub fn open_on(group: SocketAddr, interface: Option<IpAddr>) -> Result<Self, BusError> {
+    /// As [`open`](Self::open), and where this machine has no such interface.
+    pub fn open_on(group: SocketAddr, interface: Option<&Interface>) -> Result<Self, BusError> {
         let failed = |what: &'static str| {
             move |e: std::io::Error| {
                 let hint = "without a network: ip link set lo up; ip route add 239.0.0.0/8 dev lo";
@@ -58,22 +58,37 @@ impl UdpMulticast {
         // Bound to the group: what is sent to this machine's own addresses is not taken.
         let listener = socket(group).map_err(failed("cannot listen"))?;
         let speaker = socket(SocketAddr::new(any, 0)).map_err(failed("cannot speak"))?;
+        let hops = u32::from(interface.is_some());
         let on = match interface {
-            Some(IpAddr::V4(own)) => own,
+            Some(Interface::Address(own)) => *own,
             _ => Ipv4Addr::UNSPECIFIED,
         };
-        let hops = u32::from(interface.is_some());
+        // What is bound to a device speaks and hears there, whatever the routes say; 0 is any interface.
+        let index = match interface {
+            Some(Interface::Name(name)) => bind_device(name, &[&listener, &speaker]).map_err(|e| {
+                BusError::Io(format!(
+                    "udp:{group}@{name}: there is no such interface, or it is not allowed: {e}"
+                ))
+            })?,
+            _ => 0,
+        };
         // A hop limit of 0 keeps the frames on this machine.
         match group.ip() {
             IpAddr::V4(ip) => {
-                listener.join_multicast_v4(&ip, &on).map_err(failed("cannot join"))?;
-                speaker.set_multicast_if_v4(&on).map_err(failed("has no such interface"))?;
+                let place = match index {
+                    0 => InterfaceIndexOrAddress::Address(on),
+                    index => InterfaceIndexOrAddress::Index(index),
+                };
+                listener.join_multicast_v4_n(&ip, &place).map_err(failed("cannot join"))?;
+                if !on.is_unspecified() {
+                    speaker.set_multicast_if_v4(&on).map_err(failed("has no such interface"))?;
+                }
                 speaker.set_multicast_ttl_v4(hops).map_err(failed("cannot set the hop limit"))?;
                 speaker.set_multicast_loop_v4(true).map_err(failed("cannot loop back"))?;
             }
             IpAddr::V6(ip) => {
-                listener.join_multicast_v6(&ip, 0).map_err(failed("cannot join"))?;
-                speaker.set_multicast_hops_v6(0).map_err(failed("cannot set the hop limit"))?;
+                listener.join_multicast_v6(&ip, index).map_err(failed("cannot join"))?;
+                speaker.set_multicast_hops_v6(hops).map_err(failed("cannot set the hop limit"))?;
                 speaker.set_multicast_loop_v6(true).map_err(failed("cannot loop back"))?;
             }
         }
@@ -104,6 +119,22 @@ impl UdpMulticast {
         self.sender = Some((from, own));
         own
     }
+}
+
+/// Binds sockets to an interface by name; its index.
+#[cfg(target_os = "linux")]
+fn bind_device(name: &str, sockets: &[&Socket]) -> std::io::Result<u32> {
+    let mut index = 0;
+    for socket in sockets {
+        index = rustix::net::netdevice::name_to_index(socket, name)?;
+        socket.bind_device(Some(name.as_bytes()))?;
+    }
+    Ok(index)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn bind_device(_: &str, _: &[&Socket]) -> std::io::Result<u32> {
+    Err(std::io::Error::other("interfaces have names on Linux alone: give the interface's own address"))
 }
 
 impl Bus for UdpMulticast {
@@ -163,6 +194,27 @@ mod tests {
         assert!(own.iter().all(|from| bus.takes(*from)) && !bus.takes(other) && !bus.takes(other));
         bus.open = true;
         assert!(bus.takes(other));
+    }
+
+    /// By any interface's name that this machine can multicast on, both ways; a name that it has not is told.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn an_interface_is_found_by_its_name() {
+        let group: SocketAddr = "239.74.163.9:43197".parse().unwrap();
+        let open = |name: &str| UdpMulticast::open_on(group, Some(&Interface::Name(name.to_string())));
+        let told = open("nonet7").unwrap_err().to_string();
+        assert!(told.contains("@nonet7") && told.contains("no such interface"), "{told}");
+        let names = std::fs::read_dir("/sys/class/net").into_iter().flatten().flatten();
+        let met = names.filter_map(|name| name.file_name().into_string().ok()).any(|name| {
+            let (Ok(mut a), Ok(mut b)) = (open(&name), open(&name)) else { return false };
+            let frame = Frame::from_raw(0x203, &[1, 2, 3]).unwrap();
+            let until = b.now() + 200_000;
+            a.send(&frame).is_ok()
+                && b.receive(until).unwrap().map(|(_, event)| event) == Some(Event::Frame(frame))
+        });
+        if !met {
+            println!("skipped: this machine has no interface that carries multicast");
+        }
     }
 
     #[test]

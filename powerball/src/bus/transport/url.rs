@@ -1,7 +1,7 @@
 //! Buses by name, as users give them.
 
 use std::fmt;
-use std::net::{IpAddr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -15,9 +15,30 @@ pub enum BusUrl {
     /// A serial adapter that speaks slcan, at 500 kbit/s.
     Slcan(PathBuf),
     /// A multicast group and port of python-can's `udp_multicast`: of this machine alone, or on the network of an
-    /// interface, named by its own address.
-    Udp(SocketAddr, Option<IpAddr>),
+    /// interface.
+    Udp(SocketAddr, Option<Interface>),
 }
+
+/// A network interface of this machine.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Interface {
+    /// By its own address.
+    Address(Ipv4Addr),
+    /// By its name; Linux.
+    Name(String),
+}
+
+impl fmt::Display for Interface {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Interface::Address(address) => address.fmt(f),
+            Interface::Name(name) => f.write_str(name),
+        }
+    }
+}
+
+/// Longest name of an interface: IFNAMSIZ less its zero.
+const NAME: usize = 15;
 
 /// A text that names no bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,7 +52,8 @@ impl fmt::Display for UrlError {
         write!(
             f,
             "\"{}\" names no bus: {}. Buses are: virtual, socketcan:can0, slcan:/dev/ttyACM0, \
-                udp:239.74.163.2:43113",
+                udp:239.74.163.2:43113, \
+                udp:239.74.163.2:43113@eth0",
             self.text, self.why
         )
     }
@@ -49,8 +71,7 @@ impl FromStr for BusUrl {
             ("virtual", "") => Ok(BusUrl::Virtual),
             ("virtual", _) => Err(wrong("virtual takes nothing behind it")),
             ("socketcan", "") => Err(wrong("the interface is missing")),
-            // IFNAMSIZ less its zero.
-            ("socketcan", name) if name.len() > 15 => {
+            ("socketcan", name) if name.len() > NAME => {
                 Err(wrong("names of interfaces have at most 15 letters"))
             }
             ("socketcan", name) => Ok(BusUrl::SocketCan(name.to_string())),
@@ -59,22 +80,34 @@ impl FromStr for BusUrl {
             ("udp", rest) => match group_of(rest) {
                 Some((group, interface)) if group.ip().is_multicast() => Ok(BusUrl::Udp(group, interface)),
                 Some(_) => Err(wrong("the address is no multicast group (224.0.0.0 to 239.255.255.255)")),
-                None => Err(wrong("udp needs an address and a port, and after @ an interface's own address")),
+                None => Err(wrong(
+                    "udp needs an address and a port, and after @ an interface by its name or its own address",
+                )),
             },
             _ => Err(wrong("its first word is unknown")),
         }
     }
 }
 
-/// `239.74.163.2:43113`, or with `@` the own address of the interface behind it, of the same family.
-fn group_of(text: &str) -> Option<(SocketAddr, Option<IpAddr>)> {
+/// `239.74.163.2:43113`, or with `@` the name of the interface behind it, or its own address where the group is of IPv4.
+fn group_of(text: &str) -> Option<(SocketAddr, Option<Interface>)> {
     let (group, interface) = match text.split_once('@') {
-        Some((group, interface)) => (group, Some(interface.parse::<IpAddr>().ok()?)),
+        Some((group, interface)) => (group, Some(interface)),
         None => (text, None),
     };
     let group: SocketAddr = group.parse().ok()?;
-    // Interfaces of IPv6 have numbers and no addresses here.
-    interface.is_none_or(|ip| ip.is_ipv4() && group.is_ipv4()).then_some((group, interface))
+    let Some(text) = interface else { return Some((group, None)) };
+    let interface = match text.parse::<IpAddr>() {
+        Ok(IpAddr::V4(address)) if group.is_ipv4() => Interface::Address(address),
+        // Interfaces of IPv6 have names and numbers: which of its addresses is meant does not matter.
+        Ok(_) => return None,
+        Err(_) => {
+            let plain = |c: char| c.is_ascii_graphic() && !matches!(c, '/' | ':' | '[' | ']' | '@');
+            (1..=NAME).contains(&text.len()).then_some(())?;
+            text.chars().all(plain).then(|| Interface::Name(text.to_string()))?
+        }
+    };
+    Some((group, Some(interface)))
 }
 
 impl fmt::Display for BusUrl {
@@ -101,6 +134,8 @@ mod tests {
             "slcan:/dev/ttyACM0",
             "udp:239.74.163.2:43113",
             "udp:239.74.163.2:43113@192.168.1.5",
+            "udp:239.74.163.2:43113@eth0",
+            "udp:[ff15:7079:7468:6f6e:6465:6d6f:6d63:6173]:43113@eth0.7",
             "udp:[ff15:7079:7468:6f6e:6465:6d6f:6d63:6173]:43113",
         ] {
             assert_eq!(text.parse::<BusUrl>().unwrap().to_string(), text);
@@ -117,7 +152,10 @@ mod tests {
             "slcan:",
             "udp:239.74.163.2",
             "udp:192.168.0.1:43113",
-            "udp:239.74.163.2:43113@eth0",
+            "udp:239.74.163.2:43113@",
+            "udp:239.74.163.2:43113@a name",
+            "udp:239.74.163.2:43113@a_very_long_name0",
+            "udp:239.74.163.2:43113@fd00::2",
             "udp:239.74.163.2:43113@[ff15::1]",
             "socketcan:a_very_long_name0",
         ] {

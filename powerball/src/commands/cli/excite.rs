@@ -2,7 +2,7 @@
 
 use super::{Failure, output};
 use crate::controller::JointNumber;
-pub(super) use crate::identification::excite::{CLEARANCE, FloorAt, RADIUS, surroundings};
+pub(super) use crate::identification::excite::{CLEARANCE, FloorAt, RADIUS};
 use crate::identification::excite::{
     Collision, Criterion, Error, ExciteOptions, Excited, MassSource, Mounting, SEARCH, Settings, excite,
     searches,

@@ -12,9 +12,10 @@ use crate::explanation::explain::{Change, Explained, FalsePositives, NamedEffect
 use crate::explanation::torque_model::TorqueModel;
 use crate::explanation::{ExplainError, ExplainOptions, Prepared};
 use crate::identification::motion::Motion;
+use crate::identification::mounting::Mounting;
 use crate::logs;
 use crate::logs::log::{Log, read_logs};
-use crate::procedure::{RecordError, record};
+use crate::procedure::{Envelope, RecordError, record};
 use crate::report;
 use crate::report::explained::nothing_named;
 use crate::virtual_arm::Undeclared;
@@ -167,12 +168,12 @@ impl Explain {
         arm: &Arm,
     ) -> Result<(Vec<Log>, Vec<String>), Failure> {
         let file = self.inputs.out.join("experiment.csv");
-        self.record(motion, bus, &file)?;
+        self.record(motion, bus, arm, &file)?;
         let (new, findings) = read_logs(&[&file], arm).map_err(|e| Failure::Refused(e.to_string()))?;
         Ok((new, findings.iter().map(ToString::to_string).collect()))
     }
 
-    fn record(&self, motion: &Motion, bus: Box<dyn Bus>, file: &Path) -> Result<(), Failure> {
+    fn record(&self, motion: &Motion, bus: Box<dyn Bus>, arm: &Arm, file: &Path) -> Result<(), Failure> {
         if motion.dof() != LWA4P.joints.len() {
             return Err(Failure::Unusable(format!(
                 "--experiment: the driver's arm has {} joints, the arm file has {}; {TRAJECTORY} is written, \
@@ -182,10 +183,16 @@ impl Explain {
                 motion.dof()
             )));
         }
+        // Nothing stands around a simulated arm.
+        let envelope = match self.bus {
+            BusUrl::Virtual => Envelope::new(|_| None),
+            _ => Envelope::of(arm, &Mounting::Filed, None, None)
+                .map_err(|e| Failure::Unusable(format!("--experiment: {e}")))?,
+        };
         let master = self.place().driver(bus)?;
         let mut log = std::fs::File::create(file)
             .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", file.display())))?;
-        record(master, motion, |_| None, &mut log).map(|_| ()).map_err(|e| match e {
+        record(master, motion, envelope, output::live(), &mut log).map(|_| ()).map_err(|e| match e {
             RecordError::Write(_) => Failure::Unusable(e.to_string()),
             other => Failure::Refused(format!("the experiment was not recorded: {other}")),
         })

@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::bus::{Where, virtual_bus};
+use super::envelope::Surroundings;
 use super::output::{self, Progress};
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::{Bus, BusUrl};
@@ -14,7 +15,7 @@ use crate::procedure::{RecordError, Recorder};
 use crate::report::{Figure, Ink, Page, Panel, Series, Table, number};
 use crate::virtual_arm::{VirtualArm, lwa4p};
 use clap::Args;
-use dyngen::{Arm, Model};
+use dyngen::Model;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -28,9 +29,6 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:\n  powerball friction --out friction\n  \
     powerball friction --bus socketcan:can0 --mounting 0,90 --joints 2,3 --out friction")]
 pub(crate) struct Friction {
-    /// The arm file with limits; the built-in hardware arm where this is left out.
-    #[arg(long, value_name = "ARM.toml")]
-    arm: Option<PathBuf>,
     /// How the base stands, on a real arm: filed, ROLL,PITCH in degrees, or gravity in the base frame as
     /// X,Y,Z in m/s²; the virtual arm is mounted as each joint needs it.
     #[arg(long, default_value = "filed", allow_hyphen_values = true)]
@@ -42,17 +40,15 @@ pub(crate) struct Friction {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
+    surroundings: Surroundings,
+    #[command(flatten)]
     place: Where,
 }
 
 impl Friction {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let progress = Progress::new();
-        let arm = match &self.arm {
-            Some(path) => Arm::read(path),
-            None => lwa4p::arm(),
-        };
-        let arm = arm.map_err(|e| Failure::Unusable(e.to_string()))?;
+        let arm = self.surroundings.arm()?;
         let n = arm.dof();
         if n != LWA4P.joints.len() {
             return Err(Failure::Unusable(format!(
@@ -153,6 +149,12 @@ impl Friction {
             if open.is_empty() {
                 continue;
             }
+            let envelope = self.surroundings.envelope(model.arm(), &mounting)?;
+            for experiment in &open {
+                let wrong =
+                    |e: RecordError| Failure::Refused(format!("joint {}: {e}", experiment.plan.joint + 1));
+                envelope.check(&LWA4P, &experiment.plan.motion).map_err(wrong)?;
+            }
             let bus: Box<dyn Bus> = match self.place.bus {
                 BusUrl::Virtual => {
                     let broken = |e: String| Failure::Refused(format!("the built-in arm: {e}"));
@@ -165,7 +167,7 @@ impl Friction {
                 _ => self.place.open()?,
             };
             let refused = |e: RecordError| Failure::Refused(e.to_string());
-            let mut recorder = Recorder::enable(self.place.driver(bus)?).map_err(refused)?;
+            let mut recorder = Recorder::enable(self.place.driver(bus)?, envelope).map_err(refused)?;
             let mut done = Ok(());
             for experiment in open {
                 progress.say(&format!("joint {}, base {mounting}", experiment.plan.joint + 1));

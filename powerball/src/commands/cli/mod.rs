@@ -4,6 +4,7 @@ mod bus;
 mod compare;
 mod consistent;
 mod demo;
+mod envelope;
 mod excite;
 mod explain;
 mod friction;

@@ -22,6 +22,35 @@ impl Progress {
     }
 }
 
+/// A line on standard error, where a person looks at it, that is written over by the next one: how far a motion has
+/// come. A line feed ends it when nothing more is told.
+pub(crate) fn live<T: std::fmt::Display>() -> impl FnMut(&T) {
+    let mut line = Line { shown: std::io::stderr().is_terminal(), begun: false };
+    move |told| line.show(told)
+}
+
+struct Line {
+    shown: bool,
+    begun: bool,
+}
+
+impl Line {
+    fn show(&mut self, told: &impl std::fmt::Display) {
+        if self.shown {
+            self.begun = true;
+            let _ = write!(std::io::stderr(), "\r\x1b[K  {told}");
+        }
+    }
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        if self.begun {
+            let _ = writeln!(std::io::stderr());
+        }
+    }
+}
+
 /// Makes a folder for results, where it is missing.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
     files::make_folder(folder).map_err(Failure::Unusable)

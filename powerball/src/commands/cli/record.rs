@@ -2,29 +2,30 @@
 
 use super::Failure;
 use super::bus::{Where, master};
-use super::excite::{CLEARANCE, FloorAt, RADIUS, floor, surroundings};
+use super::envelope::Surroundings;
 use super::output;
 use crate::bus::driver::lwa4p::LWA4P;
-use crate::identification::excite::{Constraints, Limits, Mounting, Shape};
 use crate::identification::motion::Motion;
+use crate::identification::mounting::Mounting;
 use crate::logs::log::LogFile;
-use crate::procedure::{RecordError, record};
+use crate::procedure::{Behind, RecordError, record};
 use clap::Args;
-use dyngen::Arm;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Bring the arm up, go to where a trajectory begins, follow it at 200 Hz, and log it.
 ///
-/// The log has t, q1…q6 (rad), tau1…tau6 (N·m, as good as the profile's calibration) and ref1…ref6 (rad, the
-/// set-points). Each line is written whole: whatever happens, the log can be read up to there. A log whose
-/// name ends in .parquet or .mcap is written as lines beside it, NAME.parquet.csv, and becomes that when it
-/// ends; lines that a program left which died are put into NAME.interrupted-1.parquet by the next recording
+/// The log has t (s, the measured time of each SYNC), q1…q6 (rad), tau1…tau6 (N·m, as good as the profile's
+/// calibration), ref1…ref6 (rad, the set-points), dq1…dq6 (rad/s, the drives' own), status1…status6 (statuswords),
+/// answer1…answer6 (s from SYNC to the joint's data), and late, skipped, dropped (counts since it began).
+///
+/// Each line is written whole: whatever happens, the log can be read up to there. A log whose name ends in
+/// .parquet or .mcap is written as lines beside it, NAME.parquet.csv, and becomes that when it ends; lines that a program left which died are put into NAME.interrupted-1.parquet by the next recording
 /// of that name.
 ///
-/// With --arm neither the way to where the trajectory begins, each joint straight there from where the arm
-/// stands, nor the trajectory may touch the floor or another link, as capsules in the way of `powerball
-/// excite`. Without it nothing is looked at. THE ARM MOVES.
+/// Before the arm moves the trajectory is looked at as a whole, and so is the way to where it begins, each joint
+/// straight there from where the arm stands: limits of position, velocity, acceleration and torque, the floor, and
+/// the arm's links as capsules in the way of `powerball excite`. THE ARM MOVES.
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  powerball excite --arm powerball/lwa4p.toml --out path.csv\n  \
     powerball record --trajectory path.csv --out log.csv --arm powerball/lwa4p.toml --floor -0.2 --bus \
@@ -39,13 +40,11 @@ pub(crate) struct RecordCommand {
     /// Write over a log that is there already.
     #[arg(long)]
     force: bool,
-    /// The arm file: its geometry and limits, for the floor and the links.
-    #[arg(long, value_name = "ARM.toml")]
-    arm: Option<PathBuf>,
-    /// Height of the floor above the base frame's origin along the vertical, m, or `none`; as for `powerball
-    /// excite`.
-    #[arg(long, value_name = "Z", value_parser = floor, allow_hyphen_values = true, requires = "arm")]
-    floor: Option<FloorAt>,
+    /// How the base stands: filed, ROLL,PITCH in degrees, or gravity in the base frame as X,Y,Z in m/s².
+    #[arg(long, default_value = "filed", allow_hyphen_values = true)]
+    mounting: Mounting,
+    #[command(flatten)]
+    surroundings: Surroundings,
     #[command(flatten)]
     place: Where,
 }
@@ -63,19 +62,20 @@ impl RecordCommand {
                 self.out.display()
             )));
         }
-        let constraints = self.arm.as_ref().map(|file| self.constraints(file)).transpose()?;
-        let barred = |motion: &Motion| constraints.as_ref().and_then(|c| c.broken(motion));
+        let envelope = self.surroundings.envelope(&self.surroundings.arm()?, &self.mounting)?;
         let master = master(&self.place)?;
         let unwritable =
             |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", self.out.display()));
-        let (mut log, recovered) = LogFile::create(&self.out).map_err(unwritable)?;
+        let (log, recovered) = LogFile::create(&self.out).map_err(unwritable)?;
         if let Some(file) = &recovered {
             let file = file.display();
             eprintln!("powerball: an earlier recording was broken off: its lines are now in {file}");
         }
-        let done = record(master, &motion, barred, &mut log);
+        let mut log = Behind::new(log);
+        let done = record(master, &motion, envelope, output::live(), &mut log);
         // A recording that failed is closed too: what was recorded counts. Why it failed is what is told.
-        let closed = log.close();
+        let (log, written) = log.close();
+        let closed = written.and_then(|()| log.map_or(Ok(()), LogFile::close));
         let done = done.map_err(|e| match e {
             RecordError::Motion(what) => Failure::Unusable(format!("{name}: {what}")),
             other => Failure::Refused(other.to_string()),
@@ -98,18 +98,5 @@ impl RecordCommand {
             ));
         }
         Ok(())
-    }
-
-    /// What must not be touched.
-    fn constraints(&self, file: &Path) -> Result<Constraints, Failure> {
-        let arm = Arm::read(file).map_err(|e| Failure::Unusable(e.to_string()))?;
-        if arm.dof() != LWA4P.joints.len() {
-            let name = file.display();
-            return Err(Failure::Unusable(format!("{name}: has {} joints, the arm on the bus 6", arm.dof())));
-        }
-        let limits = Limits::of(&arm, 0.0).map_err(|e| Failure::Unusable(e.to_string()))?;
-        let shape = Shape::new(&arm, &limits.0, RADIUS);
-        let (space, _) = surroundings(&arm, &Mounting::Filed, &shape, self.floor, CLEARANCE, &limits);
-        Ok(Constraints { space: Some(space), ..Constraints::of(limits) })
     }
 }

@@ -2,9 +2,11 @@
 
 use super::Failure;
 use super::bus::{Where, virtual_bus};
+use super::envelope::Surroundings;
 use super::output::{self, Progress};
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::{Bus, BusUrl};
+use crate::identification::mounting::Mounting;
 use crate::procedure::warm_up::{Seen, Settings, Warmth, swing, warm_up};
 use crate::procedure::{RecordError, Recorder, resume};
 use crate::report::{Figure, Ink, Page, Panel, Series};
@@ -38,6 +40,11 @@ pub(crate) struct WarmUp {
     /// Longest time, s.
     #[arg(long, default_value_t = 3600.0)]
     most: f64,
+    /// How the base stands: filed, ROLL,PITCH in degrees, or gravity in the base frame as X,Y,Z in m/s².
+    #[arg(long, default_value = "filed", allow_hyphen_values = true)]
+    mounting: Mounting,
+    #[command(flatten)]
+    surroundings: Surroundings,
     #[command(flatten)]
     place: Where,
 }
@@ -59,6 +66,9 @@ impl WarmUp {
         std::fs::create_dir_all(&self.out)
             .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", self.out.display())))?;
         let progress = Progress::new();
+        let refused = |e: RecordError| Failure::Refused(e.to_string());
+        let envelope = self.surroundings.envelope(&self.surroundings.arm()?, &self.mounting)?;
+        envelope.check(&LWA4P, &swing(&LWA4P, &settings)).map_err(refused)?;
         let path = self.out.join("warm_up.csv");
         let unwritable =
             |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", path.display()));
@@ -88,8 +98,7 @@ impl WarmUp {
             }
             _ => self.place.open()?,
         };
-        let refused = |e: RecordError| Failure::Refused(e.to_string());
-        let mut recorder = Recorder::enable(self.place.driver(bus)?).map_err(refused)?;
+        let mut recorder = Recorder::enable(self.place.driver(bus)?, envelope).map_err(refused)?;
         let done = warm_up(&mut recorder, &settings, seen, start, &mut log, |seconds, change| {
             let change = change
                 .map_or("too early to say".to_string(), |c| format!("up to {:.1} % to come", 100.0 * c));

@@ -19,7 +19,7 @@ use crate::explanation::{ExplainError, ExplainOptions, Prepared, explain_body};
 use crate::identification::motion::Motion;
 use crate::logs::Progress;
 use crate::logs::log::{LogError, read_logs};
-use crate::procedure::record;
+use crate::procedure::{Envelope, record};
 use crate::virtual_arm::PlantEffect as Effect;
 use dyngen::Arm;
 use std::fmt;
@@ -137,6 +137,6 @@ fn carry_out(session: &Session, motion: &Motion, file: &Path, seed: u64) -> Resu
     let driver = Driver::new(LWA4P).map_err(SessionError::Driver)?;
     let master = Master::new(driver, Memory::new(arm, LWA4P.bitrate));
     let mut log = std::fs::File::create(file).map_err(unwritten)?;
-    record(master, motion, |_| None, &mut log).map_err(SessionError::Record)?;
+    record(master, motion, Envelope::new(|_| None), |_| (), &mut log).map_err(SessionError::Record)?;
     Ok(file.to_path_buf())
 }

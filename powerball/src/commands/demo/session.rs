@@ -7,7 +7,7 @@ use crate::bus::driver::{Driver, Refusal};
 use crate::bus::transport::{Master, Memory};
 use crate::identification::excite::{self, Settings};
 use crate::identification::motion::Motion;
-use crate::procedure::{RecordError, Recorder, way};
+use crate::procedure::{Columns, Envelope, RecordError, Recorder, way};
 use crate::virtual_arm::slave::Setup;
 use crate::virtual_arm::{Plant, PlantEffect as Effect, Undeclared, VirtualArm, lwa4p};
 use dyngen::{Model, SetKind};
@@ -156,7 +156,9 @@ impl Session {
             SessionError::Arm(dyngen::Diagnostics::whole_file("lwa4p.toml", "six joints are needed"))
         })?;
         let driver = Driver::new(LWA4P).map_err(SessionError::Driver)?;
-        let mut recorder = Recorder::enable(Master::new(driver, Memory::new(arm, LWA4P.bitrate)))?;
+        let bus = Memory::new(arm, LWA4P.bitrate);
+        // Nothing stands around a simulated arm.
+        let mut recorder = Recorder::enable(Master::new(driver, bus), Envelope::new(|_| None))?;
         recorder.go(&ends[0][0], SHARE, PAUSE)?;
         recorder.master_mut().bus_mut().peer_mut().set_age(0.0);
 
@@ -169,7 +171,7 @@ impl Session {
             }
             let unwritten = |e| SessionError::Write(path.clone(), e);
             let mut file = std::fs::File::create(&path).map_err(unwritten)?;
-            match recorder.record(&motions[k], starts[k], false, &mut file) {
+            match recorder.record(&motions[k], starts[k], Columns::Torques, &mut file) {
                 Err(RecordError::Write(e)) => return Err(unwritten(e)),
                 done => done?,
             };

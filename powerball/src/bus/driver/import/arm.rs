@@ -83,6 +83,9 @@ pub struct JointTable {
     pub velocity: f64,
     /// rad/s².
     pub acceleration: f64,
+    /// Greatest torque, N·m; not guarded where it is left out.
+    #[serde(default = "unlimited")]
+    pub torque: f64,
     /// N·m at the rated current.
     pub rated_torque: f64,
     /// Whether `rated_torque` was measured on this arm.
@@ -110,6 +113,10 @@ pub struct JointTable {
     pub revision: Option<u32>,
     /// 0x1018:4, where it is known.
     pub serial: Option<u32>,
+}
+
+fn unlimited() -> f64 {
+    f64::INFINITY
 }
 
 fn following_error() -> f64 {

@@ -152,6 +152,10 @@ fn joint_source(joint: &JointTable) -> String {
         ("position", format!("{:?}", joint.position)),
         ("velocity", format!("{:?}", joint.velocity)),
         ("acceleration", format!("{:?}", joint.acceleration)),
+        (
+            "torque",
+            if joint.torque.is_finite() { format!("{:?}", joint.torque) } else { "f64::INFINITY".into() },
+        ),
         ("current", format!("{:?}", joint.current)),
         ("following_error", format!("{:?}", joint.following_error)),
         ("velocity_error", format!("{:?}", joint.velocity_error)),

@@ -1,5 +1,6 @@
 //! `powerball bus enable`, `stop` and `move`.
 
+use super::super::envelope::Surroundings;
 use super::super::output;
 use super::{Failure, Where, master, refused};
 use crate::bus::canopen::{NodeId, nmt};
@@ -7,6 +8,7 @@ use crate::bus::cia402::{Command, Controlword, Statusword};
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::driver::{ControlMode, Phase};
 use crate::bus::transport::{ArmError, Bus, BusUrl, Master, Moment};
+use crate::identification::mounting::Mounting;
 use crate::procedure::{RecordError, Recorder};
 use clap::Args;
 use serde_json::json;
@@ -42,7 +44,8 @@ pub(crate) struct Stop {
 
 /// Move one joint slowly to a position, and let go again.
 ///
-/// As `enable`, and the joint goes to `--to` (or by `--by`) at `--speed` in interpolated position mode.
+/// As `enable`, and the joint goes to `--to` (or by `--by`) at `--speed` in interpolated position mode. Before the
+/// brakes open the way is looked at as `powerball record` does: limits, torque, floor, links.
 #[derive(Args, Debug)]
 #[command(after_help = "Example: powerball bus move --joint 6 --by 0.1 --speed 0.1 --bus socketcan:can0")]
 pub(crate) struct Move {
@@ -66,6 +69,11 @@ pub(crate) struct Move {
     /// Share of the joint's greatest speed and acceleration, 0.01 to 0.5.
     #[arg(long, default_value_t = 0.1)]
     speed: f64,
+    /// How the base stands: filed, ROLL,PITCH in degrees, or gravity in the base frame as X,Y,Z in m/s².
+    #[arg(long, default_value = "filed", allow_hyphen_values = true)]
+    mounting: Mounting,
+    #[command(flatten)]
+    surroundings: Surroundings,
 }
 
 impl Enable {
@@ -187,16 +195,19 @@ impl Move {
             return Err(Failure::Unusable("--by needs a number of rad".to_string()));
         }
         let arm = |e: RecordError| refused(e);
-        let mut recorder = Recorder::enable(master(&self.place)?).map_err(arm)?;
+        let envelope = self.surroundings.envelope(&self.surroundings.arm()?, &self.mounting)?;
+        let mut recorder =
+            Recorder::bring_up(master(&self.place)?, envelope).map_err(arm)?.telling(output::live());
         let from = recorder.master().driver().positions();
         let mut to = from;
         to[index] = self.to.unwrap_or(from[index] + self.by.unwrap_or(0.0));
         if !allowed(to[index]) {
-            recorder.finish().map_err(arm)?;
             return Err(Failure::Refused(match wrong(to[index]) {
                 Failure::Unusable(why) | Failure::Refused(why) => why,
             }));
         }
+        recorder.way_to(&to, self.speed, 1.0).map_err(arm)?;
+        recorder.release().map_err(arm)?;
         recorder.go(&to, self.speed, 1.0).map_err(arm)?;
         // Until the drives' interpolation has caught up.
         recorder.go(&to, self.speed, 0.3).map_err(arm)?;

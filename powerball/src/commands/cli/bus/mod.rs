@@ -67,7 +67,8 @@ impl BusCommand {
 /// What every command on a bus is told.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Where {
-    /// The bus: virtual, socketcan:can0, slcan:/dev/ttyACM0 or udp:239.74.163.2:43113.
+    /// The bus: virtual, socketcan:can0, slcan:/dev/ttyACM0, udp:239.74.163.2:43113 (this machine alone) or
+    /// udp:239.74.163.2:43113@eth0 (the network of that interface).
     #[arg(long, value_name = "URL", default_value = "virtual")]
     pub(crate) bus: BusUrl,
     /// Print the result as one JSON object on standard output.
@@ -79,9 +80,10 @@ impl Where {
     /// Opens the bus; the built-in arm's drives have booted.
     pub(crate) fn open(&self) -> Result<Box<dyn Bus>, Failure> {
         if self.bus != BusUrl::Virtual {
-            if let BusUrl::Udp(_, Some(interface)) = self.bus {
+            if let BusUrl::Udp(_, Some(interface)) = &self.bus {
                 eprintln!(
-                    "powerball: whoever reaches {interface}'s network can read this bus and move the arm"
+                    "powerball: whoever reaches the network of {interface} can read this bus and move the arm; \
+                        docs/transports.md says how to fence it"
                 );
             }
             return transport::open(&self.bus).map_err(|e| Failure::Unusable(e.to_string()));
@@ -98,6 +100,14 @@ impl Where {
         if matches!(self.bus, BusUrl::Udp(..)) {
             let reactions = &mut profile.reactions;
             (reactions.late_limit, reactions.skipped_limit, reactions.missing_cycles) = (u8::MAX, 20, 20);
+            // A process that catches up answers two SYNCs in one cycle; two nodes with one id do so always.
+            reactions.duplicate_cycles = 40;
+        }
+        #[cfg(target_os = "linux")]
+        if self.bus != BusUrl::Virtual
+            && let Err(why) = transport::realtime::claim()
+        {
+            eprintln!("powerball: {why}; SYNCs may be late");
         }
         let signals = |e| Failure::Unusable(format!("cannot listen to signals: {e}"));
         let interrupt = Interrupt::install().map_err(signals)?;

@@ -1,0 +1,63 @@
+//! What a line of a recording says of its cycle.
+
+use crate::bus::canopen::Micros;
+use crate::bus::driver::{Counters, Driver};
+use std::fmt::Write as _;
+
+/// Which columns a recording has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Columns {
+    /// `t`, `q1…qn` (rad) and `tau1…taun` (N·m).
+    Torques,
+    /// Besides, all that was told and heard: `ref1…refn`, the set-points (rad); `dq1…dqn`, as the drives tell it
+    /// (rad/s); `status1…statusn`, the statuswords; `answer1…answern`, from SYNC to the joint's data (s); and `late`,
+    /// `skipped`, `dropped`, how many SYNCs and set-points were so since the recording began.
+    Everything,
+}
+
+impl Columns {
+    /// The first line of a log of `n` joints.
+    pub(super) fn header(self, n: usize) -> String {
+        let (joint, once): (&[&str], &[&str]) = match self {
+            Columns::Torques => (&["q", "tau"], &[]),
+            Columns::Everything => {
+                (&["q", "tau", "ref", "dq", "status", "answer"], &["late", "skipped", "dropped"])
+            }
+        };
+        let numbered = joint.iter().flat_map(|name| (1..=n).map(move |j| format!("{name}{j}")));
+        let names = ["t".to_string()].into_iter().chain(numbered).chain(once.iter().map(ToString::to_string));
+        names.collect::<Vec<_>>().join(",") + "\n"
+    }
+
+    /// The line of the present cycle at `t`, s, in which `reference` (rad) was given; counts from `begin` on.
+    pub(super) fn line<const N: usize>(
+        self,
+        line: &mut String,
+        t: f64,
+        driver: &Driver<N>,
+        reference: &[f64],
+        begin: &Counters,
+    ) {
+        let joints = driver.joints();
+        line.clear();
+        // Writing to a string cannot fail.
+        let _ = write!(line, "{t:.6}");
+        let mut cell = |value: std::fmt::Arguments<'_>| {
+            let _ = write!(line, ",{value}");
+        };
+        // A digit finer than the encoders' step.
+        joints.iter().for_each(|joint| cell(format_args!("{:.7}", joint.position)));
+        joints.iter().for_each(|joint| cell(format_args!("{:.4}", joint.torque)));
+        if self == Columns::Everything {
+            reference.iter().for_each(|q| cell(format_args!("{q:.7}")));
+            joints.iter().for_each(|joint| cell(format_args!("{:.6}", joint.velocity)));
+            joints.iter().for_each(|joint| cell(format_args!("{}", joint.status.map_or(0, |s| s.0))));
+            let since = |at: Micros| at.saturating_sub(driver.synced_at()) as f64 * 1e-6;
+            joints.iter().for_each(|joint| cell(format_args!("{:.6}", since(joint.answered_at))));
+            let now = driver.counters();
+            let counts = [now.late - begin.late, now.skipped - begin.skipped, now.dropped - begin.dropped];
+            counts.iter().for_each(|count| cell(format_args!("{count}")));
+        }
+        line.push('\n');
+    }
+}

@@ -1,0 +1,224 @@
+//! The driver behind a C ABI, for a hardware interface of ros2_control: `include/powerball.h` says what each function
+//! does, `docs/ros2_control.md` how it is used. [`Arm`] is the same in Rust.
+//!
+//! Everything here is unsafe in the one way that C is: a pointer is what its caller says it is.
+
+mod arm;
+
+pub use arm::{Arm, JOINTS, State};
+
+use std::ffi::{CStr, c_char, c_int};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// It is done.
+pub const OK: c_int = 0;
+/// It is not done; [`powerball_message`] says why.
+pub const ERROR: c_int = 1;
+/// After an error: the drives must be configured anew.
+pub const CONFIGURE: c_int = 2;
+
+/// Room for a message, its closing zero included: messages are kept without allocating.
+const MESSAGE: usize = 512;
+
+/// An arm and what went wrong last.
+#[derive(Debug)]
+pub struct Handle {
+    arm: Arm,
+    message: [u8; MESSAGE],
+}
+
+/// Writes as much of `text` as fits, whole letters, and a zero.
+fn put(text: &str, room: &mut [u8]) {
+    let Some(most) = room.len().checked_sub(1) else { return };
+    let end = (0..=most.min(text.len())).rev().find(|end| text.is_char_boundary(*end)).unwrap_or(0);
+    let (bytes, rest) = room.split_at_mut(end);
+    bytes.copy_from_slice(&text.as_bytes()[..end]);
+    rest.iter_mut().take(1).for_each(|byte| *byte = 0);
+}
+
+/// Does something with the arm; a panic is an error and does not reach the caller's language.
+///
+/// # Safety
+/// `handle` is null or comes from [`powerball_open`], was not closed, and nobody else uses it now.
+unsafe fn with(handle: *mut Handle, act: impl FnOnce(&mut Arm) -> Result<c_int, String>) -> c_int {
+    // SAFETY: the caller's promise.
+    let Some(handle) = (unsafe { handle.as_mut() }) else { return ERROR };
+    let arm = &mut handle.arm;
+    match catch_unwind(AssertUnwindSafe(|| act(arm))) {
+        Ok(Ok(code)) => code,
+        Ok(Err(why)) => {
+            put(&why, &mut handle.message);
+            ERROR
+        }
+        Err(_) => {
+            put("the driver has panicked: a mistake in it", &mut handle.message);
+            ERROR
+        }
+    }
+}
+
+/// Opens a bus by its name; null where that fails, with the reason in `why`.
+///
+/// # Safety
+/// `url` is a text that ends with zero; `why` is null or has room for `room` bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn powerball_open(url: *const c_char, why: *mut c_char, room: usize) -> *mut Handle {
+    let opened = if url.is_null() {
+        Err("no bus is named".to_string())
+    } else {
+        // SAFETY: the caller's promise; it is not null.
+        let url = unsafe { CStr::from_ptr(url) };
+        catch_unwind(|| Arm::open(&url.to_string_lossy()))
+            .unwrap_or_else(|_| Err("the driver has panicked: a mistake in it".to_string()))
+    };
+    match opened {
+        Ok(arm) => Box::into_raw(Box::new(Handle { arm, message: [0; MESSAGE] })),
+        Err(text) => {
+            if !why.is_null() && room > 0 {
+                // SAFETY: the caller's promise; it is not null.
+                put(&text, unsafe { std::slice::from_raw_parts_mut(why.cast::<u8>(), room) });
+            }
+            std::ptr::null_mut()
+        }
+    }
+}
+
+/// Stops the arm where it moves, and closes the bus.
+///
+/// # Safety
+/// `handle` is null or comes from [`powerball_open`] and is never used again.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn powerball_close(handle: *mut Handle) {
+    if !handle.is_null() {
+        // SAFETY: the caller's promise: it was made by `Box::into_raw` and is given back once.
+        let handle = unsafe { Box::from_raw(handle) };
+        let _ = catch_unwind(AssertUnwindSafe(|| drop(handle)));
+    }
+}
+
+/// See [`Arm::configure`].
+///
+/// # Safety
+/// `handle` is null or an open arm's that nobody else uses now.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn powerball_configure(handle: *mut Handle) -> c_int {
+    // SAFETY: the caller's promise.
+    unsafe { with(handle, |arm| arm.configure().map(|()| OK)) }
+}
+
+/// See [`Arm::activate`].
+///
+/// # Safety
+/// `handle` is null or an open arm's that nobody else uses now.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn powerball_activate(handle: *mut Handle) -> c_int {
+    // SAFETY: the caller's promise.
+    unsafe { with(handle, |arm| arm.activate().map(|()| OK)) }
+}
+
+/// See [`Arm::read`].
+///
+/// # Safety
+/// `handle` is null or an open arm's that nobody else uses now; each of the others is null or has room for
+/// [`JOINTS`] numbers.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn powerball_read(
+    handle: *mut Handle,
+    position: *mut f64,
+    velocity: *mut f64,
+    effort: *mut f64,
+) -> c_int {
+    let mut state = State::default();
+    // SAFETY: the caller's promise.
+    let code = unsafe { with(handle, |arm| arm.read().map(|read| state = read).map(|()| OK)) };
+    if code == OK {
+        for (values, out) in [(state.position, position), (state.velocity, velocity), (state.effort, effort)]
+        {
+            if !out.is_null() {
+                // SAFETY: the caller's promise; it is not null, and `values` is a copy of its own.
+                unsafe { std::ptr::copy_nonoverlapping(values.as_ptr(), out, JOINTS) };
+            }
+        }
+    }
+    code
+}
+
+/// See [`Arm::write`].
+///
+/// # Safety
+/// `handle` is null or an open arm's that nobody else uses now; `position` is null or has [`JOINTS`] numbers.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn powerball_write(handle: *mut Handle, position: *const f64) -> c_int {
+    if position.is_null() {
+        return ERROR;
+    }
+    // SAFETY: the caller's promise; it is not null.
+    let position = unsafe { position.cast::<[f64; JOINTS]>().read() };
+    // SAFETY: the caller's promise.
+    unsafe { with(handle, |arm| arm.write(&position).map(|()| OK)) }
+}
+
+/// See [`Arm::deactivate`].
+///
+/// # Safety
+/// `handle` is null or an open arm's that nobody else uses now.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn powerball_deactivate(handle: *mut Handle) -> c_int {
+    // SAFETY: the caller's promise.
+    unsafe { with(handle, |arm| arm.deactivate().map(|()| OK)) }
+}
+
+/// See [`Arm::on_error`]; [`OK`] where the arm may be activated again, [`CONFIGURE`] where it must be configured first.
+///
+/// # Safety
+/// `handle` is null or an open arm's that nobody else uses now.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn powerball_on_error(handle: *mut Handle) -> c_int {
+    // SAFETY: the caller's promise.
+    unsafe { with(handle, |arm| arm.on_error().map(|ready| if ready { OK } else { CONFIGURE })) }
+}
+
+/// Why the last call that gave [`ERROR`] did so; it stays until the next such call.
+///
+/// # Safety
+/// `handle` is null or an open arm's that nobody else uses now.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn powerball_message(handle: *const Handle) -> *const c_char {
+    // SAFETY: the caller's promise.
+    match unsafe { handle.as_ref() } {
+        Some(handle) => handle.message.as_ptr().cast(),
+        None => c"there is no arm".as_ptr(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_are_cut_at_whole_letters() {
+        let mut room = [7u8; 6];
+        put("N·m·s", &mut room);
+        assert_eq!(CStr::from_bytes_until_nul(&room).unwrap().to_str().unwrap(), "N·m");
+        put("", &mut room);
+        assert_eq!(room[0], 0);
+        put("x", &mut []);
+    }
+
+    #[test]
+    fn null_is_an_error_and_no_crash() {
+        let null = std::ptr::null_mut();
+        // SAFETY: null is allowed everywhere.
+        unsafe {
+            assert!(powerball_open(std::ptr::null(), std::ptr::null_mut(), 0).is_null());
+            assert_eq!(powerball_configure(null), ERROR);
+            assert_eq!(
+                powerball_read(null, std::ptr::null_mut(), std::ptr::null_mut(), std::ptr::null_mut()),
+                ERROR
+            );
+            assert_eq!(powerball_write(null, std::ptr::null()), ERROR);
+            assert!(!powerball_message(null).is_null());
+            powerball_close(null);
+        }
+    }
+}
