@@ -28,27 +28,35 @@ fn paths(page: &str) -> Vec<String> {
 #[test]
 fn every_path_that_a_page_names_exists() {
     let mut checked = 0;
-    for page in [
-        "README.md",
-        "ARCHITECTURE.md",
-        "docs/bus.md",
-        "docs/transports.md",
-        "docs/dyngen.md",
-        "docs/estimation.md",
-        "docs/performance.md",
-        "docs/conventions.md",
-        "docs/explain.md",
-        "docs/model.md",
-        "docs/python.md",
-    ] {
-        let text = std::fs::read_to_string(root().join(page)).unwrap_or_else(|e| panic!("{page}: {e}"));
-        let folder = root().join(page).parent().unwrap().to_path_buf();
+    let pages = pages().into_iter().map(|page| format!("docs/{page}"));
+    for page in ["README.md", "ARCHITECTURE.md"].map(String::from).into_iter().chain(pages) {
+        let text = std::fs::read_to_string(root().join(&page)).unwrap_or_else(|e| panic!("{page}: {e}"));
+        let folder = root().join(&page).parent().unwrap().to_path_buf();
         for path in paths(&text) {
             assert!(root().join(&path).exists() || folder.join(&path).exists(), "{page} names {path}");
             checked += 1;
         }
     }
     assert!(checked > 30, "only {checked} paths were found: the test reads nothing");
+}
+
+/// The pages of docs/.
+fn pages() -> Vec<String> {
+    let entries = std::fs::read_dir(root().join("docs")).unwrap();
+    let names = entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned());
+    names.filter(|name| name.ends_with(".md")).collect()
+}
+
+#[test]
+fn the_site_lists_every_page_once() {
+    let site = std::fs::read_to_string(root().join("mkdocs.yml")).unwrap();
+    let (_, nav) = site.split_once("\nnav:\n").unwrap();
+    let mut listed: Vec<&str> =
+        nav.lines().filter_map(|line| Some(line.split_once(": ")?.1.trim())).collect();
+    let mut pages = pages();
+    pages.sort();
+    listed.sort_unstable();
+    assert_eq!(listed, pages);
 }
 
 #[test]
