@@ -287,7 +287,11 @@ impl Search {
     fn best(&mut self, log: &Range<usize>) -> (f64, Range<usize>) {
         let coarse = log.len().div_ceil(COARSE).max(1);
         let mut best = (0.0, log.clone());
+        let shortest = SHORTEST.min(log.len());
         let consider = |own: &mut Search, run: Range<usize>, best: &mut (f64, Range<usize>)| {
+            if run.len() < shortest {
+                return;
+            }
             let gain = own.gain(&run);
             // An end is one more thing that was searched for.
             let to_the_end = |run: &Range<usize>| if run.end == log.end { END } else { 0.0 };
@@ -296,23 +300,17 @@ impl Search {
             }
         };
         for start in log.clone().step_by(coarse) {
-            for end in (start + SHORTEST..log.end).step_by(coarse).chain([log.end]) {
+            for end in (start + shortest..log.end).step_by(coarse).chain([log.end]) {
                 consider(self, start..end, &mut best);
             }
         }
         let near = |at: usize| (at + 1).saturating_sub(coarse).max(log.start)..(at + coarse).min(log.end + 1);
         for _ in 0..2 {
-            for start in near(best.1.start).filter(|s| *s < log.end) {
-                let run = start..best.1.end;
-                if run.len() >= SHORTEST.min(log.len()) {
-                    consider(self, run, &mut best);
-                }
+            for start in near(best.1.start) {
+                consider(self, start..best.1.end, &mut best);
             }
             for end in near(best.1.end) {
-                let run = best.1.start..end;
-                if run.len() >= SHORTEST {
-                    consider(self, run, &mut best);
-                }
+                consider(self, best.1.start..end, &mut best);
             }
         }
         best
@@ -329,12 +327,19 @@ impl Search {
         let fine = context.data.blocks_of(FINE);
         let less = explained(context, columns, &self.coefficients, &fine);
         let logs = by_log(&fine);
-        let all = by_log(&context.data.blocks_of(GRID));
+        let steps = context.data.blocks_of(GRID);
+        let all = by_log(&steps);
+        let reach = (GRID / FINE).ceil() as usize;
         let window = |(log, run): &(Range<usize>, Range<usize>)| {
             let fine_log = &logs[all.iter().position(|l| l == log)?];
-            let per_step = fine_log.len() as f64 / log.len() as f64;
-            let at = |step: usize| fine_log.start + ((step - log.start) as f64 * per_step).round() as usize;
-            let reach = per_step.ceil() as usize;
+            // Steps without rows are none, so that steps are not in proportion: rows are.
+            let before = |fine: &Block, step: &Block| {
+                fine.rows.iter().zip(&step.rows).any(|(fine, step)| fine.start < step.start)
+            };
+            let at = |step: usize| match step == log.end {
+                true => fine_log.end,
+                false => fine_log.start + fine[fine_log.clone()].partition_point(|f| before(f, &steps[step])),
+            };
             let near =
                 |at: usize| at.saturating_sub(reach).max(fine_log.start)..=(at + reach).min(fine_log.end);
             let [start, end] = [at(run.start), at(run.end)];
@@ -349,9 +354,9 @@ impl Search {
             };
             let end = match run.end == log.end {
                 true => fine_log.end,
-                false => best(near(end), &|e| sum(middle..e.max(middle)))?,
+                false => best(near(end), &|e| sum(middle..e.max(middle)))?.max(fine_log.start + 1),
             };
-            lasting_window(context, &fine, fine_log, &(start..end))
+            lasting_window(context, &fine, fine_log, &(start.min(end - 1)..end))
         };
         chosen.iter().map(window).collect()
     }

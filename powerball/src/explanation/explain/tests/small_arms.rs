@@ -240,6 +240,23 @@ fn a_payload_that_is_put_down_is_there_until_then() {
 }
 
 #[test]
+fn a_log_of_few_seconds_is_searched_as_well() {
+    let (arm, plant) = planar();
+    let payload = Effect::Payload { mass: PAYLOAD, centre: [0.05, 0.02, 0.0], start: 0.0 };
+    let mut logs = recorded(&arm, &plant, &[(payload, &[1, 3])]);
+    // Shorter than a payload that is put down again, of one step and of a few.
+    for (which, samples) in [(2, 230), (3, 640), (5, 700)] {
+        let log = &mut logs[which];
+        log.t.truncate(samples);
+        log.q.iter_mut().chain(&mut log.torque).for_each(|signal| signal.truncate(samples));
+        log.pieces = std::iter::once(0..samples).collect();
+    }
+    let explained = explained_logs(&arm, logs);
+    assert_eq!(names(&explained), ["payload"]);
+    assert_eq!(explained.effects[0].logs[0], "log1");
+}
+
+#[test]
 fn a_push_of_many_seconds_is_one_push() {
     let push = Effect::ContactWrench { force: [1.0, 2.0, 0.0], start: 4.0, length: 13.0, every: 1e3 };
     let explained = explained(planar(), push, &[2]);
