@@ -7,12 +7,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Whether this process was asked to end: Ctrl-C, SIGTERM, SIGHUP, SIGQUIT.
 ///
 /// While a [`Master`](super::Master) with it lives, such a signal stops the arm: quick stop, brakes, no torque. A
-/// second signal asks for the same again and does not skip it. Once the master is gone signals end the process as
-/// usual. A file-size limit (SIGXFSZ) is an error of the write, and no end of the process.
+/// second signal asks for the same again and does not skip it, nor what the process then does to end: its log is
+/// closed. Once the master is gone and no signal came, signals end the process as usual. A file-size limit (SIGXFSZ) is an error of the write, and no end of the process.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
     asked: Arc<AtomicBool>,
-    /// No arm is moved: a signal ends the process.
+    /// No arm is moved and none was stopped by a signal: a signal ends the process.
     idle: Arc<AtomicBool>,
 }
 
@@ -49,9 +49,9 @@ impl Interrupt {
         self.asked.load(Ordering::SeqCst)
     }
 
-    /// Whether an arm is moved from now on.
+    /// Whether an arm is moved from now on. A process that was asked to end closes its files without being asked twice.
     pub(super) fn guard(&self, moved: bool) {
-        self.idle.store(!moved, Ordering::SeqCst);
+        self.idle.store(!moved && !self.is_asked(), Ordering::SeqCst);
     }
 }
 
