@@ -27,6 +27,7 @@ pub mod explained;
 mod figure;
 mod page;
 mod table;
+pub mod transmission;
 
 pub use axis::number;
 pub use bars::BarPairs;
