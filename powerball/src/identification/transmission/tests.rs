@@ -45,26 +45,27 @@ static LOGS: LazyLock<(Arm, Vec<(Motion, Log)>)> = LazyLock::new(|| {
     (lwa4p::arm().unwrap(), (0..6).map(log).collect())
 });
 
-/// What is told of logs with the motors' torques of [`TRUTH`], `extra` N·m at the link on top for a joint, its
-/// speed and its load, and white noise of `noise` N·m on the link's torques.
-fn told(extra: impl Fn(usize, f64, f64) -> f64, noise: f64) -> Vec<JointTransmission> {
+/// What is told of logs with the motors' torques of [`TRUTH`], with what `extra` gives of a joint along a log on
+/// top, N·m at the link, and white noise of `noise` N·m on the link's torques.
+fn told(extra: impl Fn(usize, &Motion, &Log) -> Option<Vec<f64>>, noise: f64) -> Vec<JointTransmission> {
     let (arm, logs) = &*LOGS;
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let mut logs: Vec<Log> = logs
-        .iter()
-        .map(|(motion, log)| {
-            let mut motor = vec![Vec::new(); arm.dof()];
-            for (sample, [_, dq, ddq]) in motion.samples().enumerate() {
-                for (j, motor) in motor.iter_mut().enumerate() {
-                    let [k, rotor, viscous, coulomb, width, offset] = TRUTH[j];
-                    let load = log.torque[j][sample];
-                    let friction = viscous * dq[j] + coulomb * (dq[j] / width).tanh();
-                    motor.push(k * (load + rotor * ddq[j] + friction + offset + extra(j, dq[j], load)));
-                }
-            }
-            Log { motor: Some(motor), ..log.clone() }
-        })
-        .collect();
+    let of_joint = |j: usize, motion: &Motion, log: &Log| -> Vec<f64> {
+        let [k, rotor, viscous, coulomb, width, offset] = TRUTH[j];
+        let extra = extra(j, motion, log).unwrap_or_else(|| vec![0.0; log.t.len()]);
+        let samples = motion.samples().zip(&log.torque[j]).zip(extra);
+        samples
+            .map(|(([_, dq, ddq], load), extra)| {
+                let friction = viscous * dq[j] + coulomb * (dq[j] / width).tanh();
+                k * (load + rotor * ddq[j] + friction + offset + extra)
+            })
+            .collect()
+    };
+    let with_motor = |(motion, log): &(Motion, Log)| {
+        let motor = (0..arm.dof()).map(|j| of_joint(j, motion, log)).collect();
+        Log { motor: Some(motor), ..log.clone() }
+    };
+    let mut logs: Vec<Log> = logs.iter().map(with_motor).collect();
     for torque in logs.iter_mut().flat_map(|log| &mut log.torque).flatten() {
         let e: f64 = StandardNormal.sample(&mut rng);
         *torque += noise * e;
@@ -91,7 +92,7 @@ fn effects(all: &[JointTransmission]) -> Vec<(usize, &'static str)> {
 
 #[test]
 fn ratio_sign_friction_and_rotor_come_back() {
-    let all = told(|_, _, _| 0.0, 0.02);
+    let all = told(|_, _, _| None, 0.02);
     for (joint, [k, rotor, viscous, coulomb, _, offset]) in all.iter().zip(TRUTH).take(5) {
         let told = known(joint);
         let near = |found: f64, truth: f64, within: f64| (found - truth).abs() < within * truth.abs();
@@ -112,16 +113,17 @@ fn ratio_sign_friction_and_rotor_come_back() {
 /// smaller ratio.
 #[test]
 fn noise_of_the_link_torque_does_not_draw_the_ratio_to_zero() {
-    let all = told(|_, _, _| 0.0, 0.3);
+    let all = told(|_, _, _| None, 0.3);
     let told = known(&all[4]);
     assert!((told.ratio / TRUTH[4][0] - 1.0).abs() < 0.03, "{}", all[4].sentence());
 }
 
 #[test]
 fn load_friction_is_named_on_its_joint_alone() {
-    let load = |j: usize, dq: f64, torque: f64| match j {
-        1 => 0.08 * torque.abs() * (dq / TRUTH[1][4]).tanh(),
-        _ => 0.0,
+    let load = |j: usize, motion: &Motion, log: &Log| {
+        let samples = motion.samples().zip(&log.torque[1]);
+        let rubs = samples.map(|([_, dq, _], torque)| 0.08 * torque.abs() * (dq[1] / TRUTH[1][4]).tanh());
+        (j == 1).then(|| rubs.collect())
     };
     let all = told(load, 0.02);
     assert_eq!(effects(&all), [(2, "load_friction")]);
@@ -133,6 +135,37 @@ fn load_friction_is_named_on_its_joint_alone() {
     let json = serde_json::to_value(&all).unwrap();
     assert_eq!(json[1]["joint"], 2);
     assert_eq!(json[1]["effects"][0]["effect"], "load_friction");
+}
+
+#[test]
+fn presliding_and_a_delay_are_named_each_on_its_joint() {
+    let late = 2;
+    let extra = |j: usize, motion: &Motion, log: &Log| match j {
+        // Joint 3: the motor's torque comes two samples after the link's.
+        2 => {
+            let torque = &log.torque[2];
+            Some((0..torque.len()).map(|k| torque[k.saturating_sub(late)] - torque[k]).collect())
+        }
+        // Joint 4: 3 N·m that wind up over 5 mrad.
+        3 => {
+            let mut wound = 0.0;
+            let wind = |[_, dq, _]: [&[f64]; 3]| {
+                let side = f64::signum(dq[3]);
+                wound = side + (wound - side) * (-dq[3].abs() * motion.period / 0.005).exp();
+                3.0 * wound
+            };
+            Some(motion.samples().map(wind).collect())
+        }
+        _ => None,
+    };
+    let all = told(extra, 0.02);
+    assert_eq!(effects(&all), [(3, "time_delay"), (4, "hysteresis")]);
+    let delay = known(&all[2]).effects[0].parameters["delay"];
+    let truth = late as f64 * LOGS.1[0].0.period;
+    assert!((delay / truth - 1.0).abs() < 0.1, "{delay} s, not {truth} s");
+    let wound = &known(&all[3]).effects[0].parameters;
+    assert!((0.003..0.008).contains(&wound["distance"]), "{wound:?}");
+    assert!((wound["level"] / 3.0 - 1.0).abs() < 0.15, "{wound:?}");
 }
 
 #[test]
