@@ -83,8 +83,12 @@ impl Evidence {
 
     /// The logs that are fitted.
     pub(super) fn fitted(&self) -> Products {
-        let last = self.parts.len() - 1;
-        self.of(|part| !self.held_out || part != last)
+        self.of(|part| self.is_fitted(part))
+    }
+
+    /// Whether a part is not of the logs to judge on.
+    pub(super) fn is_fitted(&self, part: usize) -> bool {
+        !self.held_out || part + 1 != self.parts.len()
     }
 }
 

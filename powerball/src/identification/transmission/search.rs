@@ -12,7 +12,8 @@ use crate::identification::estimate::distribution::t_critical;
 const LEAST_GAIN: f64 = 0.1;
 /// What it takes away must be this share of the motor torque's rms: less no user would notice.
 const LEAST_SIZE: f64 = 0.01;
-/// It must leave the ratio as it is, to this share. What changes it stands for the link's torque itself.
+/// It may move the ratio by this share, or by what the ratio without it is uncertain by, twice its standard
+/// error: what moves it further stands for the link's torque itself.
 const SAME_RATIO: f64 = 0.2;
 /// Probability of so large a coefficient by chance, by blocks. They depend on each other a little, and some
 /// twenty settings are tried on each joint.
@@ -128,10 +129,15 @@ fn sure(evidence: &Evidence, fixed: &[Candidate], kind: Kind) -> Option<Candidat
     let whole = fit(&evidence.of(|_| true))?;
     let (last, error) = (whole.theta.last()?, *whole.standard_errors(evidence, |_| true).last()?);
     let fitted = fit(&evidence.fitted())?;
-    let without = Fit::best(&evidence.of(|_| true), evidence.noise, fixed, &[])?;
+    let moves = |with: &Fit, wanted: &dyn Fn(usize) -> bool| {
+        let without = Fit::best(&evidence.of(wanted), evidence.noise, fixed, &[])?;
+        let allowed =
+            (2.0 * without.standard_errors(evidence, wanted)[0]).max(SAME_RATIO * without.ratio().abs());
+        Some((with.ratio() - without.ratio()).abs() > allowed)
+    };
     let agrees = fitted.theta.last()? * last > 0.0
-        && (whole.ratio() / without.ratio() - 1.0).abs() < SAME_RATIO
-        && (fitted.ratio() / without.ratio() - 1.0).abs() < SAME_RATIO;
+        && !moves(&whole, &|_| true)?
+        && !moves(&fitted, &|part| evidence.is_fitted(part))?;
     let candidate = *fitted.effects.last()?;
     (agrees && last.abs() > error * critical(evidence, whole.columns.len())).then_some(candidate)
 }
@@ -147,7 +153,6 @@ pub(super) fn tell(
     let candidates: Vec<Candidate> = found.iter().map(|f| f.candidate).collect();
     let fitted = evidence.fitted();
     let with = Fit::best(&fitted, evidence.noise, &candidates, &[]).unwrap_or_else(|| base.clone());
-    let is_fitted = |part: usize| !evidence.held_out || part + 1 != evidence.parts.len();
     let effect = |(which, f): (usize, &Found)| TransmissionEffect {
         effect: f.candidate.kind.name(),
         parameters: f.candidate.figures(scales, with.effect(which)),
@@ -158,7 +163,7 @@ pub(super) fn tell(
         joint,
         unit,
         ratio: with.ratio(),
-        std: with.standard_errors(evidence, is_fitted)[0],
+        std: with.standard_errors(evidence, |part| evidence.is_fitted(part))[0],
         rotor_inertia: with.at_link(1),
         viscous: with.at_link(2),
         offset: with.at_link(3),

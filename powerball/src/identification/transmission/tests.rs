@@ -139,33 +139,34 @@ fn load_friction_is_named_on_its_joint_alone() {
 
 #[test]
 fn presliding_and_a_delay_are_named_each_on_its_joint() {
-    let late = 2;
+    let late = 10;
     let extra = |j: usize, motion: &Motion, log: &Log| match j {
-        // Joint 3: the motor's torque comes two samples after the link's.
+        // Joint 3: the motor's torque comes ten samples after the link's.
         2 => {
             let torque = &log.torque[2];
             Some((0..torque.len()).map(|k| torque[k.saturating_sub(late)] - torque[k]).collect())
         }
-        // Joint 4: 3 N·m that wind up over 5 mrad.
-        3 => {
+        // Joint 2: 4 N·m that wind up over 10 mrad.
+        1 => {
             let mut wound = 0.0;
             let wind = |[_, dq, _]: [&[f64]; 3]| {
-                let side = f64::signum(dq[3]);
-                wound = side + (wound - side) * (-dq[3].abs() * motion.period / 0.005).exp();
-                3.0 * wound
+                let side = f64::signum(dq[1]);
+                wound = side + (wound - side) * (-dq[1].abs() * motion.period / 0.01).exp();
+                4.0 * wound
             };
             Some(motion.samples().map(wind).collect())
         }
         _ => None,
     };
     let all = told(extra, 0.02);
-    assert_eq!(effects(&all), [(3, "time_delay"), (4, "hysteresis")]);
+    let said: Vec<String> = all.iter().map(JointTransmission::sentence).collect();
+    assert_eq!(effects(&all), [(2, "hysteresis"), (3, "time_delay")], "{said:#?}");
     let delay = known(&all[2]).effects[0].parameters["delay"];
     let truth = late as f64 * LOGS.1[0].0.period;
     assert!((delay / truth - 1.0).abs() < 0.1, "{delay} s, not {truth} s");
-    let wound = &known(&all[3]).effects[0].parameters;
-    assert!((0.003..0.008).contains(&wound["distance"]), "{wound:?}");
-    assert!((wound["level"] / 3.0 - 1.0).abs() < 0.15, "{wound:?}");
+    let wound = &known(&all[1]).effects[0].parameters;
+    assert!((0.006..0.016).contains(&wound["distance"]), "{wound:?}");
+    assert!((wound["level"] / 4.0 - 1.0).abs() < 0.15, "{wound:?}");
 }
 
 #[test]
