@@ -51,8 +51,8 @@ impl Scales {
     /// For a joint whose fast velocity is `top`, rad/s.
     pub(super) fn new(top: f64) -> Scales {
         Scales {
-            // From a step to a third of the speeds: friction that is sharper than what is tried would be taken
-            // for presliding.
+            // From a step to a third of the speeds: friction that is sharper than what is tried would be
+            // taken for presliding.
             widths: geometric(1e-3 * top, 0.3 * top, Column::WIDTHS),
             distances: geometric(1e-4, 0.02, Column::DISTANCES),
             bumps: geometric(0.02 * top, 0.3 * top, Column::BUMPS),
@@ -112,8 +112,8 @@ impl Column {
         }
     }
 
-    /// Whether its coefficient cannot be negative: inertia, and what takes power. Friction may grow slower than
-    /// in proportion to the speed, and either torque may be the later one.
+    /// Whether its coefficient cannot be negative: inertia, and what takes power. Friction may grow slower
+    /// than in proportion to the speed, and either torque may be the later one.
     pub(super) fn is_non_negative(self) -> bool {
         !matches!(self, Column::Motor | Column::Link | Column::Constant | Column::LinkRate | Column::Power(_))
     }

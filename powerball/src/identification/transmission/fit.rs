@@ -1,10 +1,11 @@
 //! Ratio and friction of a transmission from products of columns, with standard errors.
 //!
 //! Both torques are measured. Noise of the motor's, and what the law lacks, stand on the left of the equation
-//! and bias nothing. Noise of the link's torque stands in a column and would draw k towards zero. Its variance
-//! is known: it is seen above the band and between neighbouring samples. What it adds to the column's square is
-//! taken off (the corrected least squares of Fuller, *Measurement error models*, 1987, section 2.2). Total
-//! least squares would need the ratio of both noises, and would take what the law lacks for noise.
+//! and bias nothing. Noise of the link's torque stands in a column and would draw k towards zero. Its
+//! variance is known: it is seen above the band and between neighbouring samples. What it adds to the
+//! column's square is taken off (the corrected least squares of Fuller, *Measurement error models*, 1987,
+//! section 2.2). Total least squares would need the ratio of both noises, and would take what the law lacks
+//! for noise.
 
 use super::columns::Column;
 use super::effects::Candidate;
@@ -15,7 +16,8 @@ use faer::Mat;
 /// The law of a transmission with its coefficients.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
-    /// The link's torque, the acceleration, the speed, the constant and Coulomb friction; then what was added.
+    /// The link's torque, the acceleration, the speed, the constant and Coulomb friction; then what was
+    /// added.
     pub columns: Vec<Column>,
     /// In the motor's unit, the first one positive.
     pub theta: Vec<f64>,
@@ -91,8 +93,8 @@ impl Fit {
         left(products.of(Column::Motor, Column::Motor), &gram, &right, &self.theta)
     }
 
-    /// Standard errors of the coefficients, from blocks that count as independent; infinite where a coefficient
-    /// is at its bound.
+    /// Standard errors of the coefficients, from blocks that count as independent; infinite where a
+    /// coefficient is at its bound.
     pub(super) fn standard_errors(&self, evidence: &Evidence, wanted: impl Fn(usize) -> bool) -> Vec<f64> {
         let used: Vec<&Products> =
             evidence.blocks.iter().filter(|b| wanted(b.part)).map(|b| &b.products).collect();

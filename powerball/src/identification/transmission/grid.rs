@@ -84,8 +84,8 @@ impl Grid {
 }
 
 impl Motor {
-    /// Samples that hold no number are bridged by straight lines; what is nearer to one than the filter's reach
-    /// is not known.
+    /// Samples that hold no number are bridged by straight lines; what is nearer to one than the filter's
+    /// reach is not known.
     fn new(t: &[f64], torque: &[f64], recording: &Recording, reach: usize) -> Motor {
         let (step, count) = (1.0 / recording.rate, recording.len());
         let numbers = || t.iter().zip(torque).filter(|(_, x)| x.is_finite());

@@ -5,8 +5,8 @@
 //!
 //! motor = k·(τ + Iₘ·q̈ + F_v·q̇ + F_c·tanh(q̇/γ) + offset),
 //!
-//! with k in the motor's unit per N·m at the link: sign, ratio and constant in one. Effects are then looked for
-//! on each joint by itself.
+//! with k in the motor's unit per N·m at the link: sign, ratio and constant in one. Effects are then looked
+//! for on each joint by itself.
 //!
 //! | | |
 //! |---|---|
@@ -36,8 +36,8 @@ use dyngen::Arm;
 use dyngen::arm::JointKind;
 use grid::Grid;
 
-/// The transmission of each joint from the logs that hold both torques, judged on those of `validate`; without
-/// them parts of the logs judge each other. `None` where no log holds the motors' torques.
+/// The transmission of each joint from the logs that hold both torques, judged on those of `validate`;
+/// without them parts of the logs judge each other. `None` where no log holds the motors' torques.
 ///
 /// Nothing fails: of a joint whose transmission the logs do not tell it is said why.
 #[must_use]

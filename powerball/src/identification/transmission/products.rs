@@ -139,7 +139,8 @@ pub(super) fn evidence(arm: &Arm, grid: &Grid, joint: JointNumber) -> Result<(Ev
     if blocks.len() < FEWEST_BLOCKS || (0..grid.parts).any(|part| count(part) < FEWEST_BLOCKS / 3) {
         let seconds = BLOCK * blocks.len() as f64;
         return Err(format!(
-            "its logs with both torques hold {seconds:.1} s of motion, or one of them hardly any: record longer"
+            "its logs with both torques hold {seconds:.1} s of motion, or one of them hardly any: record \
+             longer"
         ));
     }
     let parts = (0..grid.parts)

@@ -20,7 +20,8 @@ const SAME_RATIO: f64 = 0.2;
 const LEVEL: f64 = 1e-4;
 /// Effects on one joint at most.
 const MOST: usize = 3;
-/// Another effect that leaves no more than so many times what the chosen one leaves could be there in its place.
+/// Another effect that leaves no more than so many times what the chosen one leaves could be there in its
+/// place.
 const AS_GOOD: f64 = 1.1;
 /// Where more of a motor's torque stays, it is not this joint's: less than half of its square is explained.
 const UNRELATED: f64 = 0.7;
@@ -52,8 +53,8 @@ pub(super) fn base(evidence: &Evidence, joint: JointNumber) -> Result<Fit, Strin
     let all = evidence.of(|_| true);
     if noise_share(&all, evidence.noise) > NOISE {
         return Err(format!(
-            "what tau{joint} says beyond friction and inertia hardly rises above its noise: let the joint carry a \
-             load that changes"
+            "what tau{joint} says beyond friction and inertia hardly rises above its noise: let the joint \
+             carry a load that changes"
         ));
     }
     let no_fit = || format!("motor{joint} and tau{joint} do not fit together: check both columns");
@@ -63,8 +64,8 @@ pub(super) fn base(evidence: &Evidence, joint: JointNumber) -> Result<Fit, Strin
     let sure = whole.standard_errors(evidence, |_| true)[0] * critical(evidence, whole.columns.len());
     if left > UNRELATED || whole.ratio().abs() < sure || fit.ratio() * whole.ratio() <= 0.0 {
         return Err(format!(
-            "motor{joint} does not follow tau{joint}: {:.0} % of it stays on logs that were not fitted, with the ratio, \
-             rotor and friction that fit best. Is it this joint's motor, and is it measured?",
+            "motor{joint} does not follow tau{joint}: {:.0} % of it stays on logs that were not fitted, with the \
+             ratio, rotor and friction that fit best. Is it this joint's motor, and is it measured?",
             100.0 * left
         ));
     }

@@ -45,8 +45,8 @@ static LOGS: LazyLock<(Arm, Vec<(Motion, Log)>)> = LazyLock::new(|| {
     (lwa4p::arm().unwrap(), (0..6).map(log).collect())
 });
 
-/// What is told of logs with the motors' torques of [`TRUTH`], with what `extra` gives of a joint along a log on
-/// top, N·m at the link, and white noise of `noise` N·m on the link's torques.
+/// What is told of logs with the motors' torques of [`TRUTH`], with what `extra` gives of a joint along a log
+/// on top, N·m at the link, and white noise of `noise` N·m on the link's torques.
 fn told(extra: impl Fn(usize, &Motion, &Log) -> Option<Vec<f64>>, noise: f64) -> Vec<JointTransmission> {
     let (arm, logs) = &*LOGS;
     let mut rng = ChaCha8Rng::seed_from_u64(3);
@@ -176,7 +176,8 @@ fn a_column_that_is_not_the_motor_is_refused_in_words() {
     let logs: Vec<Log> = logs
         .iter()
         .map(|(_, log)| {
-            // Joint 1: noise; 2: sound, with a hole; 3: its own speed; 4: nothing; 5: no number; 6: another one's.
+            // Joint 1: noise; 2: sound, with a hole; 3: its own speed; 4: nothing; 5: no number; 6: another
+            // one's.
             let mut motor = log.torque.clone();
             motor[0].iter_mut().for_each(|x| *x = rng.random_range(-1.0..1.0));
             motor[2] = log.q[2].windows(2).map(|q| q[1] - q[0]).chain([0.0]).collect();

@@ -48,8 +48,8 @@ pub struct Transmission {
     pub left: f64,
     /// The same with the effects.
     pub left_with: f64,
-    /// What was found beside friction and rotor, in the order in which it was found. Ratio, friction and rotor
-    /// are those beside these.
+    /// What was found beside friction and rotor, in the order in which it was found. Ratio, friction and
+    /// rotor are those beside these.
     pub effects: Vec<TransmissionEffect>,
 }
 
@@ -85,8 +85,9 @@ impl Transmission {
     fn sentence(&self) -> String {
         let Transmission { joint, ratio, unit, coulomb, viscous, left, left_with, .. } = self;
         let mut text = format!(
-            "transmission of joint {joint}: motor = {ratio:.4e} (±{:.1} %) per {unit} at the link, 1/{:.1}; Coulomb \
-             {coulomb:.3} {unit}, viscous {viscous:.3} {unit}·s, rotor {:.3}; {:.1} % of the motor's torque left",
+            "transmission of joint {joint}: motor = {ratio:.4e} (±{:.1} %) per {unit} at the link, 1/{:.1}; \
+             Coulomb {coulomb:.3} {unit}, viscous {viscous:.3} {unit}·s, rotor {:.3}; {:.1} % of the motor's \
+             torque left",
             100.0 * self.relative_std(),
             1.0 / ratio,
             self.rotor_inertia,
