@@ -6,6 +6,7 @@ use super::options::{ExplainError, ExplainOptions};
 use super::torque_model::TorqueModel;
 use crate::identification::conventions::{Conventions, conventions};
 use crate::identification::motion::Motion;
+use crate::identification::transmission::{JointTransmission, transmission};
 use crate::logs::log::{Log, common_clock};
 use crate::logs::regression::RigidBody;
 use dyngen::Arm;
@@ -44,6 +45,8 @@ pub struct Prepared {
     pub validate: Vec<Log>,
     /// What the columns of all of them are.
     pub conventions: Conventions,
+    /// What is between the motors' torques and the links', by joint, where logs hold both.
+    pub transmission: Option<Vec<JointTransmission>>,
     known: Option<TorqueModel>,
 }
 
@@ -71,7 +74,9 @@ impl Prepared {
         let validate = all.split_off(logs.len());
         options.progress.say("asking what the columns are");
         let conventions = conventions(&body, &all, &validate);
-        let mut prepared = Prepared { body, logs: Vec::new(), validate: Vec::new(), conventions, known };
+        let transmission = transmission(body.arm(), &all, &validate);
+        let (logs, held_out) = (Vec::new(), Vec::new());
+        let mut prepared = Prepared { body, logs, validate: held_out, conventions, transmission, known };
         (prepared.logs, prepared.validate) = (prepared.without_known(all), prepared.without_known(validate));
         Ok(prepared)
     }
@@ -99,10 +104,11 @@ impl Prepared {
         logs
     }
 
-    /// An explanation with what the columns are, whose model holds what was known too.
+    /// An explanation with what the columns and the transmissions are, whose model holds what was known too.
     #[must_use]
     pub fn with_known(&self, mut explained: Explained) -> Explained {
         explained.conventions = Some(self.conventions.clone());
+        explained.transmission.clone_from(&self.transmission);
         if let Some(known) = &self.known {
             explained.model.additions = known.additions.and(&explained.model.additions);
         }

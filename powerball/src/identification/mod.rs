@@ -13,6 +13,7 @@ pub mod mounting;
 mod nearest;
 mod source;
 mod summarize;
+pub mod transmission;
 mod verify;
 
 pub use identify::{
@@ -23,4 +24,5 @@ pub use known::KnownModel;
 pub use nearest::{NearestArm, NearestError, ValueChange, nearest_arm};
 pub use source::{Input, Source};
 pub use summarize::{Summarized, summarize};
+pub use transmission::{JointTransmission, transmission};
 pub use verify::{Verified, VerifyOptions, verify};

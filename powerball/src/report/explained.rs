@@ -3,8 +3,8 @@
 use crate::controller::JointNumber;
 use crate::explanation::effects::Figures;
 use crate::explanation::explain::{Explained, NamedEffect, Shown, State, TorqueCurve};
-use crate::report::conventions;
 use crate::report::{BarPairs, Figure, Files, Ink, Page, Panel, Series, Table, Tone, number};
+use crate::report::{conventions, transmission};
 use serde_json::Value;
 
 /// explained.json, model.json and report.html.
@@ -27,6 +27,9 @@ pub fn add_to_page(page: &mut Page, explained: &Explained) {
     verdict(page, explained);
     errors(page, explained);
     effects(page, explained);
+    if let Some(joints) = &explained.transmission {
+        transmission::add_to_page(page, joints);
+    }
     torques(page, explained);
     rest(page, explained);
 }

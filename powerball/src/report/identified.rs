@@ -6,8 +6,8 @@ use crate::explanation::torque_model::Additions;
 use crate::identification::estimate::TorqueCurve;
 use crate::identification::{Along, Identified, JointAlong};
 use crate::logs::signal::turns::Turns;
-use crate::report::conventions;
 use crate::report::{Figure, Files, Ink, Page, Panel, Series, Table, Tone, number};
+use crate::report::{conventions, transmission};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 use dyngen::exact::rational::to_f64;
@@ -78,6 +78,9 @@ pub fn page(result: &Identified) -> Page {
         ]);
     }
     page.table(&table);
+    if let Some(joints) = &result.transmission {
+        transmission::add_to_page(&mut page, joints);
+    }
     mountings(&mut page, result, shown);
     of_arm(&mut page, arm);
     of_logs(&mut page, result, shown, held_out);

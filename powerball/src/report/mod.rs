@@ -31,6 +31,7 @@ pub mod files;
 pub mod identified;
 mod page;
 mod table;
+pub mod transmission;
 pub mod verified;
 
 pub use axis::number;

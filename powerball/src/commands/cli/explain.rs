@@ -233,6 +233,9 @@ fn summary(explained: &Explained) -> String {
     if let Some(unattributed) = &explained.unattributed {
         text.push_str(&unattributed_in_words(unattributed));
     }
+    for joint in explained.transmission.iter().flatten() {
+        text.push_str(&format!("\n{}", joint.sentence()));
+    }
     text.push_str(&open_in_words(explained));
     let FalsePositives { accepted, surrogates, .. } = &explained.false_positives;
     text.push_str(&format!("\n{accepted} of {surrogates} time-shift surrogates were accepted"));

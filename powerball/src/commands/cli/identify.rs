@@ -115,6 +115,9 @@ impl Identify {
         columns.extend(identified.mountings.iter().map(|m| (m.mounting.as_str(), &m.fit)));
         columns.extend(identified.validate.as_ref().map(|s| ("held out", s)));
         output::print(&output::table(&columns));
+        for joint in identified.transmission.iter().flatten() {
+            output::print(&joint.sentence());
+        }
         Ok(())
     }
 }

@@ -46,6 +46,7 @@ pub use folds::Folds;
 pub use instrumental::solve_instrumental;
 pub use mountings::Together;
 pub use noise::noise_floor;
+pub(crate) use noise::noise_in_band;
 pub(crate) use ratio::over_blocks;
 pub use reduced::{FrictionLaw, Solution, solve_reduced};
 pub use robust::{Robust, solve_robust};

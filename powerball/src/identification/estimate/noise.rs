@@ -11,27 +11,29 @@ use crate::logs::signal::Band;
 /// is the lowest one that can be hoped for.
 #[must_use]
 pub fn noise_floor(data: &Data<'_>) -> Vec<f64> {
-    let rate = data.rate();
-    (0..data.dof())
-        .map(|j| {
-            let band = &data.joints[j].band;
-            let wider = Band::new(2.0 * band.cutoff, rate);
-            let (share, between) = (band.white_share(rate), band.white_share_between(&wider, rate));
-            let torques = || data.recordings.iter().map(|r| r.torque[j].as_slice());
-            let differences = torques().flat_map(|tau| tau.windows(3)).map(|w| w[0] - 2.0 * w[1] + w[2]);
-            // Second differences of white noise have six times its variance.
-            let fast = deviation(differences.collect()) / 6f64.sqrt();
-            if between < 1e-3 {
-                return fast * share;
-            }
-            let above = torques().flat_map(|tau| {
-                let (wide, narrow) = (wider.filtered(tau), band.filtered(tau));
-                let inner = band.trim..tau.len().saturating_sub(band.trim).max(band.trim);
-                inner.map(|k| wide[k] - narrow[k]).collect::<Vec<f64>>()
-            });
-            fast.min(deviation(above.collect()) / between) * share
-        })
-        .collect()
+    let of_joint = |j: usize| {
+        let torques: Vec<&[f64]> = data.recordings.iter().map(|r| r.torque[j].as_slice()).collect();
+        noise_in_band(&torques, &data.joints[j].band, data.rate())
+    };
+    (0..data.dof()).map(of_joint).collect()
+}
+
+/// The same for one joint's torques along recordings of `rate` Hz.
+pub(crate) fn noise_in_band(torques: &[&[f64]], band: &Band, rate: f64) -> f64 {
+    let wider = Band::new(2.0 * band.cutoff, rate);
+    let (share, between) = (band.white_share(rate), band.white_share_between(&wider, rate));
+    let differences = torques.iter().flat_map(|tau| tau.windows(3)).map(|w| w[0] - 2.0 * w[1] + w[2]);
+    // Second differences of white noise have six times its variance.
+    let fast = deviation(differences.collect()) / 6f64.sqrt();
+    if between < 1e-3 {
+        return fast * share;
+    }
+    let above = torques.iter().flat_map(|tau| {
+        let (wide, narrow) = (wider.filtered(tau), band.filtered(tau));
+        let inner = band.trim..tau.len().saturating_sub(band.trim).max(band.trim);
+        inner.map(|k| wide[k] - narrow[k]).collect::<Vec<f64>>()
+    });
+    fast.min(deviation(above.collect()) / between) * share
 }
 
 /// Standard deviation from the median of squares, which reversals and knocks do not move.

@@ -6,6 +6,7 @@ use crate::identification::conventions::{Conventions, conventions};
 use crate::identification::estimate::{Together, reduce_in_bands};
 use crate::identification::mounting::Mounting;
 use crate::identification::source::{Input, Source, read_summary};
+use crate::identification::transmission::{JointTransmission, transmission};
 use crate::logs::Progress;
 use crate::logs::log::{ColumnMap, Log, LogError, read_log_as};
 use crate::logs::regression::{DataOptions, FEWEST_ROWS, RigidBody, rest_note, silent_joints};
@@ -60,6 +61,8 @@ pub(crate) struct Gathered {
     pub warnings: Vec<String>,
     /// What the columns are, where they were asked before something was taken out of them.
     pub conventions: Option<Conventions>,
+    /// The transmissions, where they were asked before.
+    pub transmission: Option<Vec<JointTransmission>>,
 }
 
 impl Gathered {
@@ -68,8 +71,14 @@ impl Gathered {
         warnings: Vec<String>,
         progress: Progress<'_>,
     ) -> Result<Gathered, IdentifyError> {
-        let mut gathered =
-            Gathered { mounted, elsewhere: Vec::new(), together: None, warnings, conventions: None };
+        let mut gathered = Gathered {
+            mounted,
+            elsewhere: Vec::new(),
+            together: None,
+            warnings,
+            conventions: None,
+            transmission: None,
+        };
         if let [_, _, ..] = gathered.mounted.as_slice() {
             progress.say("deriving and proving what the mountings determine together");
             let parts: Vec<(&RigidBody, &Bands)> =
@@ -106,6 +115,17 @@ impl Gathered {
         let Mounted { body, logs, held_out, .. } = self.mounted.iter().find(|m| !m.logs.is_empty())?;
         progress.say("asking what the columns are");
         Some(conventions(body, logs, held_out))
+    }
+
+    /// What the logs that hold two torques say of the transmissions, however the base stood.
+    pub(crate) fn transmission(&self, progress: Progress<'_>) -> Option<Vec<JointTransmission>> {
+        let all = || self.mounted.iter().chain(&self.elsewhere);
+        let fitted: Vec<&Log> = all().flat_map(|m| &m.logs).collect();
+        let held_out: Vec<&Log> = all().flat_map(|m| &m.held_out).collect();
+        if fitted.iter().chain(&held_out).any(|log| log.motor.is_some()) {
+            progress.say("comparing the motors' torques with the links'");
+        }
+        transmission(self.body().arm(), fitted, held_out)
     }
 
     /// The mountings of which there are logs to judge by.

@@ -28,6 +28,7 @@ pub use result::Identified;
 use super::conventions::conventions;
 use super::estimate::{BaseModel, Uncertainty, consistent_fit, estimates, spread_of};
 use super::source::Source;
+use super::transmission::transmission;
 use crate::logs::summary::BANDS;
 use dyngen::{Arm, SetKind};
 use fit::{Fitted, fit};
@@ -71,11 +72,12 @@ pub fn identify<'a, S: Into<Source<'a>>>(
     let mut gathered = gather_logs(arm, &logs, &validate, options)?;
     let mut warnings = std::mem::take(&mut gathered.warnings);
     let conventions = gathered.conventions.take().or_else(|| gathered.conventions(options.progress));
+    let transmission = gathered.transmission.take().or_else(|| gathered.transmission(options.progress));
     options.progress.say("fitting");
     let fitted = fit(&gathered, options, &mut warnings)?;
     let mountings = by_mounting::fits(&gathered, &fitted, options, &mut warnings)?;
     let identified = conclude(&gathered, &fitted, mountings, options, warnings)?;
-    Ok(Identified { conventions, ..identified })
+    Ok(Identified { conventions, transmission, ..identified })
 }
 
 /// The sufficient statistics of the logs to fit, and the logs to judge by; without what is known already.
@@ -93,6 +95,7 @@ fn gather_logs(
             let mut read = InMemory::read(arm, known, [logs, validate], mounting, options.progress)?;
             options.progress.say("asking what the columns are");
             let told = conventions(&read.body, &read.fit, &read.validate);
+            let between = transmission(read.body.arm(), &read.fit, &read.validate);
             read.known.take_out(&read.body, &mut read.fit);
             read.known.take_out(&read.body, &mut read.validate);
             let fit: Vec<Source<'_>> =
@@ -107,6 +110,7 @@ fn gather_logs(
             }
             // What is known of the arm is still in the torques that were asked.
             gathered.conventions = Some(told);
+            gathered.transmission = between;
             gathered
         }
         None => {
@@ -154,6 +158,7 @@ fn conclude(
     Ok(Identified {
         arm: model.arm,
         conventions: None,
+        transmission: None,
         set: SetKind::Minimal.to_string(),
         parameters: found.parameters,
         friction: found.friction,

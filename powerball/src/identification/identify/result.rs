@@ -7,6 +7,7 @@ use crate::identification::conventions::Conventions;
 use crate::identification::estimate::{
     BaseModel, ConsistentReport, JointFriction, ParameterEstimate, Spread, Uncertainty,
 };
+use crate::identification::transmission::JointTransmission;
 use crate::logs::summary::BANDS;
 use dyngen::Arm;
 use serde::Serialize;
@@ -18,6 +19,9 @@ pub struct Identified {
     pub arm: String,
     /// What the columns of the logs are; `None` where only summaries were given, which hold no samples.
     pub conventions: Option<Conventions>,
+    /// What is between the motors' torques and the links', by joint, where logs hold both.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub transmission: Option<Vec<JointTransmission>>,
     /// The parameter set: "minimal".
     pub set: String,
     /// The set's values with their standard errors.

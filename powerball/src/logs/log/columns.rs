@@ -219,7 +219,10 @@ impl Columns {
         };
         if let Some(motor) = &columns.motor {
             let shown: Vec<&str> = motor.at.iter().map(|k| names[*k].as_str()).collect();
-            let message = format!("kept beside the torques, and no part of the fit: {}", shown.join(", "));
+            let message = format!(
+                "kept beside the torques, for the transmission of each joint, and no part of the arm's fit: {}",
+                shown.join(", ")
+            );
             findings.push(finding("motor", message));
         }
         let used: Vec<usize> = columns.groups().flat_map(|group| group.at.iter().copied()).collect();

@@ -6,21 +6,23 @@ use super::silent::dead;
 use crate::logs::log::Log;
 use crate::logs::signal::{Band, rest};
 
-/// By band, joint and recording the samples that are kept, counted in those of the band; and what was left out
-/// for another reason than rest, in words.
+/// By band, joint and recording: the samples that are kept, counted in those of the band.
+pub(super) type Kept = Vec<Vec<Vec<Vec<usize>>>>;
+
+/// The samples that are kept, and what was left out for another reason than rest, in words.
 pub(super) fn kept_samples(
     logs: &[Log],
     recordings: &[Recording],
     bands: &[Band],
     rest_speed: &[f64],
     silent: &[Option<String>],
-) -> (Vec<Vec<Vec<Vec<usize>>>>, Vec<String>) {
+) -> (Kept, Vec<String>) {
     let n = silent.len();
     let mut left_out = Vec::new();
     let mut kept = keep_moving(recordings, bands, rest_speed, n);
     for j in 0..n {
         let at_limit = saturated(logs, j);
-        let count = |kept: &[Vec<Vec<Vec<usize>>>]| -> usize { kept[0][j].iter().map(Vec::len).sum() };
+        let count = |kept: &Kept| -> usize { kept[0][j].iter().map(Vec::len).sum() };
         let moving = count(&kept);
         leave_out(&at_limit, recordings, bands, kept.iter_mut().map(|kept| &mut kept[j]));
         // A torque that stays while its joint rests is none.
@@ -45,12 +47,7 @@ pub(super) fn kept_samples(
 }
 
 /// By band, joint and recording: which of the band's kept samples are rows.
-fn keep_moving(
-    recordings: &[Recording],
-    bands: &[Band],
-    limit: &[f64],
-    n: usize,
-) -> Vec<Vec<Vec<Vec<usize>>>> {
+fn keep_moving(recordings: &[Recording], bands: &[Band], limit: &[f64], n: usize) -> Kept {
     let mut all = vec![vec![Vec::with_capacity(recordings.len()); n]; bands.len()];
     for j in 0..n {
         for r in recordings {

@@ -13,6 +13,7 @@ mod rows;
 mod saturated;
 mod silent;
 
+pub(crate) use prepare::top_speed;
 pub use prepare::{Data, DataError, DataOptions, column_in_bands};
 pub use recording::Recording;
 pub(crate) use rest_notes::{FEWEST_ROWS, rest_note};

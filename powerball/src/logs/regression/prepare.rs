@@ -381,8 +381,9 @@ pub fn column_in_bands(
     columns
 }
 
-fn top_speed(recordings: &[Recording], joint: usize) -> f64 {
-    let mut speeds: Vec<f64> = recordings.iter().flat_map(|r| r.speed(joint).map(f64::abs)).collect();
+/// The velocity that a joint exceeds in 5 % of its samples, rad/s, at least 1e-3.
+pub(crate) fn top_speed<'r>(recordings: impl IntoIterator<Item = &'r Recording>, joint: usize) -> f64 {
+    let mut speeds: Vec<f64> = recordings.into_iter().flat_map(|r| r.speed(joint).map(f64::abs)).collect();
     if speeds.is_empty() {
         return 1.0;
     }

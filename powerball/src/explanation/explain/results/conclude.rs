@@ -47,6 +47,7 @@ pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainE
         verdict: verdict(study, &named, &after.validate, &floor, &dependencies),
         arm: study.data.body.arm().name.clone(),
         conventions: None,
+        transmission: None,
         held_out_change: changes(&study.validation, &before.residual, &held_out),
         before: before.errors.clone(),
         noise_floor: floor,

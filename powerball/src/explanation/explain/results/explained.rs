@@ -10,6 +10,7 @@ use super::verdict::Verdict;
 use crate::controller::JointNumber;
 use crate::explanation::torque_model::TorqueModel;
 use crate::identification::conventions::Conventions;
+use crate::identification::transmission::JointTransmission;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -22,6 +23,10 @@ pub struct Explained {
     pub arm: String,
     /// What the columns of the logs are, where they were asked.
     pub conventions: Option<Conventions>,
+    /// What is between the motors' torques and the links', by joint, where logs hold both. Its effects are on
+    /// the motors' side: none of them is in `effects`, nor in the errors here.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub transmission: Option<Vec<JointTransmission>>,
     /// Errors of the base model.
     pub before: Spreads,
     /// Errors with all accepted effects.

@@ -1,0 +1,146 @@
+//! Ratio and friction of a transmission from products of columns, with standard errors.
+//!
+//! Both torques are measured. Noise of the motor's, and what the law lacks, stand on the left of the equation
+//! and bias nothing. Noise of the link's torque stands in a column and would draw k towards zero. Its
+//! variance is known: it is seen above the band and between neighbouring samples. What it adds to the
+//! column's square is taken off (the corrected least squares of Fuller, *Measurement error models*, 1987,
+//! section 2.2). Total least squares would need the ratio of both noises, and would take what the law lacks
+//! for noise.
+
+use super::columns::Column;
+use super::effects::Candidate;
+use super::products::{Evidence, Products};
+use crate::identification::estimate::{Solver, bounded};
+use faer::Mat;
+
+/// The law of a transmission with its coefficients.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    /// The link's torque, the acceleration, the speed, the constant and Coulomb friction; then what was
+    /// added.
+    pub columns: Vec<Column>,
+    /// In the motor's unit, the first one positive.
+    pub theta: Vec<f64>,
+    /// Which width.
+    pub width: usize,
+    /// What was added.
+    pub effects: Vec<Candidate>,
+    /// 1, or −1 where the motor counts against the link.
+    sign: f64,
+    /// Sum of squares that it leaves, less what noise of the link adds.
+    cost: f64,
+}
+
+/// The normal equations without the noise of the link's torque.
+fn normal(products: &Products, columns: &[Column], noise: f64) -> (Mat<f64>, Vec<f64>) {
+    let (mut gram, right) = products.normal(columns);
+    gram[(0, 0)] -= noise * products.rows;
+    (gram, right)
+}
+
+impl Fit {
+    /// Of the widths, and of `options` beside what is `fixed`, those that leave the least.
+    pub(super) fn best(
+        products: &Products,
+        noise: f64,
+        fixed: &[Candidate],
+        options: &[Candidate],
+    ) -> Option<Fit> {
+        let middle = columns(Column::WIDTHS / 2, &[]);
+        let (gram, right) = normal(products, &middle, noise);
+        let sign = if Solver::new(&gram, |_| true).solve(&right)[0] < 0.0 { -1.0 } else { 1.0 };
+        let lists: Vec<Vec<Candidate>> = match options {
+            [] => vec![fixed.to_vec()],
+            options => options.iter().map(|o| fixed.iter().copied().chain([*o]).collect()).collect(),
+        };
+        let widths = 0..Column::WIDTHS;
+        let fits = lists.iter().flat_map(|effects| {
+            widths.clone().map(|width| Fit::new(products, noise, sign, width, effects.clone()))
+        });
+        fits.filter(|fit| fit.cost.is_finite()).min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
+
+    fn new(products: &Products, noise: f64, sign: f64, width: usize, effects: Vec<Candidate>) -> Fit {
+        let columns = columns(width, &effects);
+        let (gram, mut right) = normal(products, &columns, noise);
+        right.iter_mut().for_each(|x| *x *= sign);
+        let bounds: Vec<usize> = (0..columns.len()).filter(|c| columns[*c].is_non_negative()).collect();
+        let (theta, _) = bounded(&gram, &right, |_| true, &bounds);
+        let square = products.of(Column::Motor, Column::Motor);
+        let cost = left(square, &gram, &right, &theta);
+        Fit { columns, theta, width, effects, sign, cost }
+    }
+
+    /// k.
+    pub(super) fn ratio(&self) -> f64 {
+        self.sign * self.theta[0]
+    }
+
+    /// A coefficient at the link.
+    pub(super) fn at_link(&self, place: usize) -> f64 {
+        self.theta[place] / self.theta[0]
+    }
+
+    /// The coefficient at the link of an effect.
+    pub(super) fn effect(&self, which: usize) -> f64 {
+        self.at_link(self.columns.len() - self.effects.len() + which)
+    }
+
+    /// Sum of squares that it leaves of some rows.
+    pub(super) fn left(&self, products: &Products) -> f64 {
+        let (gram, mut right) = products.normal(&self.columns);
+        right.iter_mut().for_each(|x| *x *= self.sign);
+        left(products.of(Column::Motor, Column::Motor), &gram, &right, &self.theta)
+    }
+
+    /// Standard errors of the coefficients, from blocks that count as independent; infinite where a
+    /// coefficient is at its bound.
+    pub(super) fn standard_errors(&self, evidence: &Evidence, wanted: impl Fn(usize) -> bool) -> Vec<f64> {
+        let used: Vec<&Products> =
+            evidence.blocks.iter().filter(|b| wanted(b.part)).map(|b| &b.products).collect();
+        let (gram, _) = normal(&Products::sum(used.iter().copied()), &self.columns, evidence.noise);
+        let free = |c: usize| !self.columns[c].is_non_negative() || self.theta[c] > 0.0;
+        let solver = Solver::new(&gram, free);
+        let size = self.columns.len();
+        let rows: Vec<Vec<f64>> = (0..size)
+            .map(|c| solver.solve(&(0..size).map(|k| f64::from(u8::from(k == c))).collect::<Vec<_>>()))
+            .collect();
+        let mut variance = vec![0.0; size];
+        for products in &used {
+            let (gram, right) = normal(products, &self.columns, evidence.noise);
+            let score: Vec<f64> = (0..size)
+                .map(|r| self.sign * right[r] - (0..size).map(|c| gram[(r, c)] * self.theta[c]).sum::<f64>())
+                .collect();
+            for (sum, row) in variance.iter_mut().zip(&rows) {
+                *sum += row.iter().zip(&score).map(|(a, b)| a * b).sum::<f64>().powi(2);
+            }
+        }
+        let count = used.len() as f64;
+        let spread = |(c, sum): (usize, f64)| match solver.kept().contains(&c) {
+            true => (sum * count / (count - 1.0)).sqrt(),
+            false => f64::INFINITY,
+        };
+        variance.into_iter().enumerate().map(spread).collect()
+    }
+}
+
+/// The columns of a law.
+fn columns(width: usize, effects: &[Candidate]) -> Vec<Column> {
+    let mut columns =
+        vec![Column::Link, Column::Acceleration, Column::Speed, Column::Constant, Column::Coulomb(width)];
+    columns.extend(effects.iter().map(|effect| effect.column(width)));
+    columns
+}
+
+fn left(square: f64, gram: &Mat<f64>, right: &[f64], theta: &[f64]) -> f64 {
+    let size = theta.len();
+    let predicted = |r: usize| (0..size).map(|c| gram[(r, c)] * theta[c]).sum::<f64>();
+    square + (0..size).map(|r| theta[r] * (predicted(r) - 2.0 * right[r])).sum::<f64>()
+}
+
+/// The share of the link torque's square, beyond what the other columns say, that is noise.
+pub(super) fn noise_share(products: &Products, noise: f64) -> f64 {
+    let (gram, _) = products.normal(&columns(Column::WIDTHS / 2, &[]));
+    // The first of the inverse's diagonal is one over what of the link's square the others do not say.
+    noise * products.rows * Solver::new(&gram, |_| true).inverse_diagonal()[0]
+}

@@ -1,0 +1,85 @@
+//! The transmission between two torques of one log: of a joint's motor, and on its link's side.
+//!
+//! Where a log holds both, their difference is the gear: ratio, rotor and friction, without any rigid model.
+//! By joint, in the band and with phases of rest left out as everywhere,
+//!
+//! motor = k·(τ + Iₘ·q̈ + F_v·q̇ + F_c·tanh(q̇/γ) + offset),
+//!
+//! with k in the motor's unit per N·m at the link: sign, ratio and constant in one. Effects are then looked
+//! for on each joint by itself.
+//!
+//! | | |
+//! |---|---|
+//! | `told` | what is told, and its words |
+//! | `effects` | what a transmission may hold beside friction and rotor |
+//! | `columns` | the signals that a motor's torque is compared with |
+//! | `grid`, `products` | logs on even grids; products of columns by block |
+//! | `fit` | ratio and friction from products; standard errors |
+//! | `search` | which effects are there, judged on logs that took no part in a fit |
+
+mod columns;
+mod effects;
+mod fit;
+mod grid;
+mod products;
+mod search;
+mod told;
+
+pub use effects::{Figures, TransmissionEffect};
+pub use told::{JointTransmission, Transmission, Unknown};
+
+use crate::controller::JointNumber;
+use crate::logs::log::Log;
+use crate::logs::parallel;
+use crate::logs::regression::silent_joints;
+use dyngen::Arm;
+use dyngen::arm::JointKind;
+use grid::Grid;
+
+/// The transmission of each joint from the logs that hold both torques, judged on those of `validate`;
+/// without them parts of the logs judge each other. `None` where no log holds the motors' torques.
+///
+/// Nothing fails: of a joint whose transmission the logs do not tell it is said why.
+#[must_use]
+pub fn transmission<'l>(
+    arm: &Arm,
+    logs: impl IntoIterator<Item = &'l Log>,
+    validate: impl IntoIterator<Item = &'l Log>,
+) -> Option<Vec<JointTransmission>> {
+    let has_both = |log: &&Log| log.motor.is_some();
+    let mut all: Vec<Log> = logs.into_iter().filter(has_both).cloned().collect();
+    let fitted = all.len();
+    all.extend(validate.into_iter().filter(has_both).cloned());
+    if all.is_empty() {
+        return None;
+    }
+    // Where only logs to judge on hold both, these are fitted.
+    let fitted = if fitted == 0 { all.len() } else { fitted };
+    let grid = Grid::new(&all, fitted);
+    let silent = silent_joints(arm, &all);
+    let joints: Vec<usize> = (0..arm.dof()).collect();
+    Some(parallel::map(&joints, |&j| {
+        let joint = JointNumber::from_index(j);
+        let found = match (&silent[j], &grid) {
+            (Some(why), _) => Err(why.clone()),
+            (None, Err(why)) => Err(why.clone()),
+            (None, Ok(grid)) => of_joint(arm, grid, joint),
+        };
+        match found {
+            Ok(told) => JointTransmission::Told(told),
+            Err(why_not) => JointTransmission::Unknown(Unknown { joint, why_not }),
+        }
+    }))
+}
+
+/// A joint's transmission, or why it is not told.
+fn of_joint(arm: &Arm, grid: &Grid, joint: JointNumber) -> Result<Transmission, String> {
+    let (evidence, scales) = products::evidence(arm, grid, joint)?;
+    let base = search::base(&evidence, joint)?;
+    let unit = if arm.joints[joint.index()].kind == JointKind::Prismatic { "N" } else { "N·m" };
+    let found = search::search(&evidence);
+    Ok(search::tell(&evidence, &scales, (joint, unit), &base, &found))
+}
+
+#[cfg(test)]
+mod tests;
