@@ -43,8 +43,10 @@ pub struct Figures {
 const GRID: f64 = 0.5;
 /// … whose ends are then looked for on a grid of this, s …
 const FINE: f64 = 0.1;
-/// … at least so many of them: what is there for less is a push.
-const SHORTEST: usize = 8;
+/// … at least so many of them where it is put down again, 8 s: what is there for less is a push …
+const SHORTEST: usize = 16;
+/// … and so many where the log ends with it.
+const LEAST: usize = 4;
 /// Parts of a log at which it is picked up and put down are looked for first.
 const COARSE: usize = 24;
 /// What an end within a log must explain beyond the same run to the log's end, in units of χ².
@@ -141,11 +143,7 @@ impl Effect for Payload {
             let all = sum(&log) + if was { another_log } else { -another_log };
             // A beginning and an end are searched for: they must explain more than the best of all runs by chance.
             let part = sum(&run) - another_log - 4.0 * (log.len() as f64).ln();
-            let held = if run.len() as f64 * FINE >= SHORTEST as f64 * GRID && part > all.max(0.0) {
-                run
-            } else {
-                log.clone()
-            };
+            let held = if long_enough(&run, &log, FINE) && part > all.max(0.0) { run } else { log.clone() };
             if held != log || all > 0.0 {
                 seen.windows.push(lasting_window(context, &steps, &log, &held)?);
             }
@@ -238,6 +236,12 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     Some(Candidate { joints: all_joints(data), settings, windows, searched: held.searched })
 }
 
+/// Whether a run of steps of so many seconds can be a body that is held.
+fn long_enough(run: &Range<usize>, log: &Range<usize>, step: f64) -> bool {
+    let least = if run.end == log.end { LEAST } else { SHORTEST };
+    run.len() as f64 * step >= least as f64 * GRID || run == log
+}
+
 /// The search for when logs hold a body.
 struct Search {
     /// Sums of all steps before each.
@@ -287,9 +291,8 @@ impl Search {
     fn best(&mut self, log: &Range<usize>) -> (f64, Range<usize>) {
         let coarse = log.len().div_ceil(COARSE).max(1);
         let mut best = (0.0, log.clone());
-        let shortest = SHORTEST.min(log.len());
         let consider = |own: &mut Search, run: Range<usize>, best: &mut (f64, Range<usize>)| {
-            if run.len() < shortest {
+            if !long_enough(&run, log, GRID) {
                 return;
             }
             let gain = own.gain(&run);
@@ -300,7 +303,7 @@ impl Search {
             }
         };
         for start in log.clone().step_by(coarse) {
-            for end in (start + shortest..log.end).step_by(coarse).chain([log.end]) {
+            for end in (start + SHORTEST..log.end).step_by(coarse).chain([log.end]) {
                 consider(self, start..end, &mut best);
             }
         }
