@@ -43,9 +43,9 @@ pub struct Figures {
 const GRID: f64 = 0.5;
 /// … whose ends are then looked for on a grid of this, s …
 const FINE: f64 = 0.1;
-/// … at least so many of them where it is put down again, 8 s: what is there for less is a push …
+/// … at least so many of them where it is taken up and put down again, 8 s: what is there for less is a push …
 const SHORTEST: usize = 16;
-/// … and so many where the log ends with it.
+/// … so many where the log ends with it, and twice as many where the log begins with it and does not.
 const LEAST: usize = 4;
 /// Parts of a log at which it is picked up and put down are looked for first.
 const COARSE: usize = 24;
@@ -238,7 +238,11 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
 
 /// Whether a run of steps of so many seconds can be a body that is held.
 fn long_enough(run: &Range<usize>, log: &Range<usize>, step: f64) -> bool {
-    let least = if run.end == log.end { LEAST } else { SHORTEST };
+    let least = match [run.start == log.start, run.end == log.end] {
+        [_, true] => LEAST,
+        [true, false] => 2 * LEAST,
+        [false, false] => SHORTEST,
+    };
     run.len() as f64 * step >= least as f64 * GRID || run == log
 }
 
@@ -303,7 +307,7 @@ impl Search {
             }
         };
         for start in log.clone().step_by(coarse) {
-            for end in (start + SHORTEST..log.end).step_by(coarse).chain([log.end]) {
+            for end in (start + 2 * LEAST..log.end).step_by(coarse).chain([log.end]) {
                 consider(self, start..end, &mut best);
             }
         }
