@@ -123,10 +123,9 @@ impl Effect for Payload {
         (c[0] > 0.0).then(|| candidate.with(Settings { com: Some(com()), ..*settings }))
     }
 
-    /// A payload may have been taken off before another log, or held again in it. What the clocks say is
-    /// overruled by a log that clearly says otherwise, as a log among the fitted ones would.
-    /// Each log is asked by itself when it has the body: in all of it as it is taken to have, or from some
-    /// time to another.
+    /// A payload may have been taken off before another log, or taken up and put down in it. Each log is asked by
+    /// itself; what the clocks say is overruled where it clearly says otherwise, as a log among the fitted ones
+    /// would.
     fn seen_in(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
         let (data, another_log) = (context.data, context.rule.another_log);
         let taken = self.windows(context, candidate);
