@@ -59,6 +59,16 @@ class Result:
         return list(self._told.get("warnings", []))
 
 
+class OfLogs(Result):
+    """A result that says what the columns of its logs are."""
+
+    @property
+    def conventions(self) -> Optional[Dict[str, Any]]:
+        """What the columns of the logs are: signs, units, gravity, delay; and the map that mends them."""
+        told: Optional[Dict[str, Any]] = self._told.get("conventions")
+        return told
+
+
 def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     """A table in HTML."""
 

@@ -11,7 +11,7 @@ from ._arrays import Array
 from ._logs import Logs, given
 from ._model import Model, optional_model
 from ._progress import Progress, listener
-from ._result import Result, Spread, numbers, paragraph, spread, table
+from ._result import OfLogs, Spread, numbers, paragraph, spread, table
 from .arm import Arm
 from .identification import Map, said
 
@@ -80,7 +80,7 @@ def trajectory(core: _core.Trajectory) -> Trajectory:
     return Trajectory(*core.arrays(), core.csv())
 
 
-class Explained(Result):
+class Explained(OfLogs):
     """What a model lacks on logs, judged on logs of another path."""
 
     @property
@@ -151,12 +151,6 @@ class Explained(Result):
         """The path to record for it."""
         core = self._core.trajectory()
         return None if core is None else trajectory(core)
-
-    @property
-    def conventions(self) -> Optional[Dict[str, Any]]:
-        """What the columns of the logs are: signs, units, gravity, delay; and the map that mends them."""
-        told: Optional[Dict[str, Any]] = self._told.get("conventions")
-        return told
 
     def model_json(self) -> str:
         """model.json: the model with everything that was named, for ``verify`` and ``generate``."""

@@ -13,7 +13,7 @@ from ._arrays import Array, PathLike
 from ._logs import LogLike, Logs, given
 from ._model import Model, model_text, optional_model
 from ._progress import Progress, listener
-from ._result import Result, Spread, error_rows, numbers, paragraph, spread, table
+from ._result import OfLogs, Result, Spread, error_rows, numbers, paragraph, spread, table
 from .arm import Arm
 
 #: How columns are read: a TOML file, lines of one such as 'tau.sign = -1', or several of both.
@@ -53,7 +53,7 @@ class JointFriction:
     offset: Optional[float]
 
 
-class Identified(Result):
+class Identified(OfLogs):
     """A model with its errors: the minimal inertial set and the friction of every joint."""
 
     @property
@@ -98,12 +98,6 @@ class Identified(Result):
     def consistent(self) -> Dict[str, float]:
         """The nearest values that a real arm can have, by the names of the arm's parameters."""
         return dict(self._told["consistent"]["parameters"])
-
-    @property
-    def conventions(self) -> Optional[Dict[str, Any]]:
-        """What the columns of the logs are: signs, units, gravity, delay; and the map that mends them."""
-        told: Optional[Dict[str, Any]] = self._told.get("conventions")
-        return told
 
     def model_json(self) -> str:
         """identified.json."""

@@ -4,6 +4,9 @@ use super::case::{Case, Table};
 use super::experiment::Bench;
 use super::judge::{AS_WELL, Named, Outcome};
 use super::{page, range};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::ops::Range;
@@ -31,7 +34,10 @@ pub(crate) struct Arguments {
 /// What is in a case.
 #[derive(Debug, Serialize, Deserialize)]
 struct Truth {
+    /// The folder, which says nothing.
     case: String,
+    /// The case of the study.
+    of: String,
     table: String,
     /// Names of effects, as the contract lists them, or of laws that are none of them.
     effects: Vec<String>,
@@ -98,11 +104,16 @@ fn write(arguments: &Arguments) -> Result<(), String> {
     }
     let bench = Bench::new()?;
     let mut truths = Vec::new();
-    for case in tables.into_iter().flat_map(|table| Case::all(table, Some(arguments.seeds.clone()))) {
-        let name = case.name().replace('/', "_");
+    let all = |table| Case::all(table, Some(arguments.seeds.clone()));
+    let mut cases: Vec<Case> = tables.into_iter().flat_map(all).collect();
+    // Neither a folder's name nor its place says what is in it.
+    cases.shuffle(&mut ChaCha8Rng::seed_from_u64(0));
+    for (number, case) in cases.into_iter().enumerate() {
+        let name = format!("case_{:04}", number + 1);
         let Some(written) = bench.write(&case, &arguments.dir.join(&name))? else { continue };
         println!("{name}");
         truths.push(Truth {
+            of: case.name(),
             case: name,
             table: case.table.name(),
             effects: case.kinds,
@@ -159,7 +170,7 @@ fn outcome(truth: Truth, answer: Answer) -> Outcome {
         .filter_map(|(after, clean)| Some(after.as_ref()? / clean))
         .fold(f64::NAN, f64::max);
     Outcome {
-        case: truth.case,
+        case: format!("{} {}", truth.case, truth.of),
         table: truth.table,
         truth: truth.effects,
         law: truth.words,
@@ -187,7 +198,8 @@ mod tests {
 
     fn truth(effects: &[&str]) -> Truth {
         Truth {
-            case: "single_spring_0".into(),
+            case: "case_0001".into(),
+            of: "single/spring/0".into(),
             table: "single".into(),
             effects: effects.iter().map(|e| (*e).to_string()).collect(),
             words: Vec::new(),

@@ -25,6 +25,14 @@ impl Window {
         Window { log: data.logs[log].clone(), from, to, offset }
     }
 
+    /// The ends of some, none where one goes on to its log's end; empty where all do.
+    #[must_use]
+    pub fn ends(windows: &[Window]) -> Vec<Option<f64>> {
+        let end = |w: &Window| w.to.is_finite().then_some(w.to);
+        let ends: Vec<Option<f64>> = windows.iter().map(end).collect();
+        if ends.iter().all(Option::is_none) { Vec::new() } else { ends }
+    }
+
     /// Whether another one of the same log has a part of its time.
     #[must_use]
     pub fn overlaps(&self, other: &Window) -> bool {

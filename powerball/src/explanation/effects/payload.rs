@@ -155,11 +155,9 @@ impl Effect for Payload {
 
     fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
         let (c, windows) = (found[0].coefficients, &found[0].candidate.windows);
-        let ends = windows.iter().any(|w| w.to.is_finite());
-        let end = |w: &Window| w.to.is_finite().then_some(w.to);
         Figures {
             com: centre(c),
-            end_time: if ends { windows.iter().map(end).collect() } else { Vec::new() },
+            end_time: Window::ends(windows),
             mass: c[0],
             start_time: windows.iter().map(|w| w.from).collect(),
         }

@@ -96,6 +96,9 @@ pub struct Payload {
     pub logs: Vec<String>,
     /// From when on, in each log's own t, s.
     pub start_time: Vec<f64>,
+    /// Until when, in each log's own t, s: null where it stays to the end; nothing where it does in all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub end_time: Vec<Option<f64>>,
 }
 
 impl Payload {

@@ -95,8 +95,13 @@ fn every_law_comes_back_from_the_file() {
     let mut written = model(&body, &every_law());
     written.additions.log_changes.delay = vec![0.0, 0.004, 0.0, 0.0, 0.0, 0.0];
     written.additions.arm_changes.not_zero = vec!["my3".into()];
-    written.additions.payloads =
-        vec![Payload { mass: 2.0, com: [0.0, 0.1, 0.2], logs: vec!["a.csv".into()], start_time: vec![1.0] }];
+    written.additions.payloads = vec![Payload {
+        mass: 2.0,
+        com: [0.0, 0.1, 0.2],
+        logs: vec!["a.csv".into(), "b.csv".into()],
+        start_time: vec![1.0, 2.0],
+        end_time: vec![Some(9.0), None],
+    }];
     let file = std::env::temp_dir().join(format!("powerball_model_{}.json", std::process::id()));
     std::fs::write(&file, serde_json::to_string_pretty(&written).unwrap()).unwrap();
     let read = TorqueModel::read(&file).unwrap();
@@ -162,8 +167,13 @@ fn putting_a_zero_right_does_not_change_the_torque() {
 fn a_payload_weighs_what_it_should() {
     let body = body();
     let mut loaded = model(&body, &[]);
-    loaded.additions.payloads =
-        vec![Payload { mass: 2.0, com: [0.1, 0.0, 0.05], logs: Vec::new(), start_time: Vec::new() }];
+    loaded.additions.payloads = vec![Payload {
+        mass: 2.0,
+        com: [0.1, 0.0, 0.05],
+        logs: Vec::new(),
+        start_time: Vec::new(),
+        end_time: Vec::new(),
+    }];
     let mut still = recording(6, 0.0);
     still.v.iter_mut().chain(&mut still.a).for_each(|x| *x = 0.0);
     let with = loaded.torque(&body, &still, &|_| true);

@@ -143,7 +143,8 @@ fn parts(study: &Study<'_>, found: &Model, held: Option<&Held>) -> Parts {
 fn payload(part: &Part, windows: &[Window]) -> Option<Payload> {
     let Part::Payload(mass, com) = *part else { return None };
     let logs = windows.iter().map(|w| w.log.clone()).collect();
-    Some(Payload { mass, com, logs, start_time: windows.iter().map(|w| w.from).collect() })
+    let start_time = windows.iter().map(|w| w.from).collect();
+    Some(Payload { mass, com, logs, start_time, end_time: Window::ends(windows) })
 }
 
 /// Takes the torque of some accepted effects out of residuals.
