@@ -12,7 +12,7 @@ mod support;
 use dyngen::exact::rational::to_f64;
 use powerball::controller::friction::{TABLE_2, TanhFriction};
 use powerball::identification::estimate::{States, Stream};
-use powerball::logs::regression::RigidBody;
+use powerball::logs::regression::RigidArm;
 use powerball_workspace::arm;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -27,7 +27,7 @@ const ROUNDS: usize = 3;
 const BLOCK: usize = 10_000;
 
 /// Seconds and peak memory of logs of several lengths, taken in blocks as a reader hands them on.
-fn growth(body: &RigidBody) {
+fn growth(body: &RigidArm) {
     let shapes: Vec<[f64; 2]> = TABLE_2.iter().map(|g| [g[1], g[3]]).collect();
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut draw = |scale: f64| -> Vec<f64> {
@@ -61,7 +61,7 @@ fn peak_memory() -> Option<f64> {
 
 fn main() {
     let arm = arm("arm");
-    let body = RigidBody::new(&arm).unwrap();
+    let body = RigidArm::new(&arm).unwrap();
     // First: the peak of memory never sinks again.
     growth(&body);
     let n = body.dof();

@@ -112,8 +112,8 @@ fn reference(arm: &Arm, all: &[f64], state: &State, function: Function) -> Optio
         }
         Function::MassMatrix => numeric.mass_matrix(q),
         Function::CoriolisMatrix => numeric.coriolis_matrix(q, dq),
-        Function::CoriolisTimesSpeed => minus(numeric.inverse(q, dq, &zeros), numeric.gravity(q)),
-        Function::CoriolisTransposeTimesSpeed => times(&transposed(numeric.coriolis_matrix(q, dq)), dq),
+        Function::CoriolisTimesVelocity => minus(numeric.inverse(q, dq, &zeros), numeric.gravity(q)),
+        Function::CoriolisTransposeTimesVelocity => times(&transposed(numeric.coriolis_matrix(q, dq)), dq),
         Function::Gravity => numeric.gravity(q),
         Function::ForwardDynamics => ddq.clone(),
         Function::KineticEnergy | Function::KineticEnergyRegressor => vec![numeric.kinetic_energy(q, dq)],
@@ -318,7 +318,7 @@ fn rates_and_derivatives_agree_with_differences() {
                 "{name}: \
             J̇·q̇"
             ),
-            &value(Function::JacobianRateTimesSpeed),
+            &value(Function::JacobianRateTimesVelocity),
             &product,
             DIFFERENCE,
         );
@@ -348,7 +348,7 @@ fn rates_and_derivatives_agree_with_differences() {
             let what = format!("{name}: ∂/∂q̇{}", j + 1);
             assert_close(
                 &what,
-                &column(Function::TorqueBySpeed),
+                &column(Function::TorqueByVelocity),
                 &difference(&plus, &minus, Function::InverseDynamics),
                 DIFFERENCE,
             );

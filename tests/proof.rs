@@ -162,7 +162,7 @@ fn the_graphs_obey_the_equation_of_motion_in_the_ring() {
                 let (s, c) = draws.element().circle_point();
                 angles.push((s, c));
                 drawn.insert(Input::Position(i), draws.element());
-                drawn.extend([Input::Speed(i), Input::Acceleration(i)].map(|x| (x, draws.element())));
+                drawn.extend([Input::Velocity(i), Input::Acceleration(i)].map(|x| (x, draws.element())));
             }
             let p = model.set(kind).unwrap().parameters.len();
             drawn.extend((0..p).map(|k| (Input::Parameter(k), draws.element())));
@@ -185,7 +185,7 @@ fn the_graphs_obey_the_equation_of_motion_in_the_ring() {
             let (gravity, torque) = (value(Function::Gravity), value(Function::InverseDynamics));
             for i in 0..n {
                 let sum = product(&mass, Input::Acceleration, i, n)
-                    + product(&coriolis, Input::Speed, i, n)
+                    + product(&coriolis, Input::Velocity, i, n)
                     + gravity[i];
                 assert_eq!(product(&y, Input::Parameter, i, p), sum, "{name} {kind}");
                 assert_eq!(torque[i], sum, "{name} {kind}");

@@ -90,7 +90,7 @@ fn dual_numbers_carry_the_derivatives() {
     let parameters: SVector<f64, { stanford_minimal::PARAMETERS }> = random(&mut rng);
     let constant = |v: &SVector<f64, 6>| v.map(Dual64::from_re);
     let by_position = stanford_minimal::torque_by_position(&q, &dq, &ddq, &parameters);
-    let by_speed = stanford_minimal::torque_by_speed(&q, &dq, &ddq, &parameters);
+    let by_velocity = stanford_minimal::torque_by_velocity(&q, &dq, &ddq, &parameters);
     for j in 0..6 {
         let seeded = |v: &SVector<f64, 6>| {
             let mut v = constant(v);
@@ -103,7 +103,7 @@ fn dual_numbers_carry_the_derivatives() {
         let (a, b) = (torque(&seeded(&q), &constant(&dq)), torque(&constant(&q), &seeded(&dq)));
         for i in 0..6 {
             assert!((a[i].eps - by_position[(i, j)]).abs() < 1e-11, "{i} {j}");
-            assert!((b[i].eps - by_speed[(i, j)]).abs() < 1e-11, "{i} {j}");
+            assert!((b[i].eps - by_velocity[(i, j)]).abs() < 1e-11, "{i} {j}");
         }
     }
 }

@@ -167,7 +167,7 @@ mod lagrangian {
             |f: &dyn Fn(f64) -> f64, h: f64| (8.0 * (f(h) - f(-h)) - (f(2.0 * h) - f(-2.0 * h))) / (12.0 * h);
         (0..n)
             .map(|i| {
-                // The kinetic energy is quadratic in the speeds: a step of 1 is exact.
+                // The kinetic energy is quadratic in the velocities: a step of 1 is exact.
                 let momentum = |s: f64| {
                     let at_q: Vec<f64> = (0..n).map(|k| q[k] + s * dq[k] + 0.5 * s * s * ddq[k]).collect();
                     let at_dq: Vec<f64> = (0..n).map(|k| dq[k] + s * ddq[k]).collect();

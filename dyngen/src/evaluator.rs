@@ -14,11 +14,11 @@ use crate::model::{Error, Model};
 pub struct Samples<'a> {
     /// Joint positions, rad or m.
     pub q: &'a [f64],
-    /// Joint speeds.
+    /// Joint velocities.
     pub dq: &'a [f64],
     /// Joint accelerations.
     pub ddq: &'a [f64],
-    /// Reference speeds q̇ᵣ of Slotine and Li.
+    /// Reference velocities q̇ᵣ of Slotine and Li.
     pub dqr: &'a [f64],
     /// Reference accelerations q̈ᵣ.
     pub ddqr: &'a [f64],
@@ -34,9 +34,9 @@ impl<'a> Samples<'a> {
     fn of(&self, argument: Argument) -> &'a [f64] {
         match argument {
             Argument::Positions => self.q,
-            Argument::Speeds => self.dq,
+            Argument::Velocities => self.dq,
             Argument::Accelerations => self.ddq,
-            Argument::ReferenceSpeeds => self.dqr,
+            Argument::ReferenceVelocities => self.dqr,
             Argument::ReferenceAccelerations => self.ddqr,
             Argument::Torques => self.tau,
             Argument::Errors => self.e,
@@ -151,9 +151,9 @@ impl Evaluator {
                         lane.iter_mut().for_each(|x| *x = x.cos());
                     }
                     Input::Position(i) => gather(Argument::Positions, i, lane),
-                    Input::Speed(i) => gather(Argument::Speeds, i, lane),
+                    Input::Velocity(i) => gather(Argument::Velocities, i, lane),
                     Input::Acceleration(i) => gather(Argument::Accelerations, i, lane),
-                    Input::ReferenceSpeed(i) => gather(Argument::ReferenceSpeeds, i, lane),
+                    Input::ReferenceVelocity(i) => gather(Argument::ReferenceVelocities, i, lane),
                     Input::ReferenceAcceleration(i) => gather(Argument::ReferenceAccelerations, i, lane),
                     Input::Torque(i) => gather(Argument::Torques, i, lane),
                     Input::Error(i) => gather(Argument::Errors, i, lane),

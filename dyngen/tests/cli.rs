@@ -199,7 +199,7 @@ fn check_finds_table_3_impossible_and_real_bodies_possible() {
         "{}",
         text(&out.stdout)
     );
-    // Triangle inequality broken in a parameter that no torque shows.
+    // RFactor inequality broken in a parameter that no torque shows.
     values.insert("Izz1".to_string(), 0.2.into());
     let bad = file("triangle.json", &Value::Object(values).to_string());
     let out = dyngen(&["check", &arm(), "--values", &bad]);

@@ -50,7 +50,7 @@ fn the_jacobian_and_its_rate_are_differences_of_the_pose() {
     let expected = [rate[(0, 3)], rate[(1, 3)], rate[(2, 3)], spin[(2, 1)], spin[(0, 2)], spin[(1, 0)]];
     assert!((twist - SVector::from(expected)).abs().max() < 1e-8);
     let drift = (jacobian(&ahead) - jacobian(&behind)) * dq / (2.0 * step);
-    let rate = run(&arm, Function::JacobianRateTimesSpeed, q.as_slice(), dq.as_slice());
+    let rate = run(&arm, Function::JacobianRateTimesVelocity, q.as_slice(), dq.as_slice());
     assert!((SVector::<f64, 6>::from_column_slice(&rate) - drift).abs().max() < 1e-8);
 }
 
@@ -93,7 +93,7 @@ fn kinematics_needs_no_parameter_sets() {
         evaluator.evaluate(&q[..n], &dq[..n], &[], &none, &mut out);
         out
     };
-    for function in [Function::ForwardKinematics, Function::Jacobian, Function::JacobianRateTimesSpeed] {
+    for function in [Function::ForwardKinematics, Function::Jacobian, Function::JacobianRateTimesVelocity] {
         assert!(function.is_kinematic());
         let derived = Model::derive(arm(2)).unwrap();
         let alone = at(&Model::kinematic(arm(2)), function, SetKind::Full);

@@ -160,8 +160,8 @@ fn torque(arm: &Arm, values: &[f64], q: &[f64], dq: &[f64], ddq: &[f64]) -> Vec<
         .map(|j| {
             let along = |t: f64| {
                 let later: Vec<f64> = (0..n).map(|k| q[k] + t * dq[k] + 0.5 * t * t * ddq[k]).collect();
-                let speeds: Vec<f64> = (0..n).map(|k| dq[k] + t * ddq[k]).collect();
-                momentum(&later, &speeds, j)
+                let velocities: Vec<f64> = (0..n).map(|k| dq[k] + t * ddq[k]).collect();
+                momentum(&later, &velocities, j)
             };
             let rate = (along(H) - along(-H)) / (2.0 * H);
             let by_position = (lagrangian(arm, values, &shifted(q, j, H), dq)

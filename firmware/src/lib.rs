@@ -12,7 +12,7 @@ pub mod arm {
     include!(concat!(env!("OUT_DIR"), "/arm.rs"));
 }
 
-/// Joint positions, speeds and accelerations; rad and s.
+/// Joint positions, velocities and accelerations; rad and s.
 pub const STATES: [[[f64; 6]; 3]; 4] = [
     [[0.3, -0.7, 1.1, 0.4, -1.2, 2.0], [0.5, -0.4, 0.3, 0.9, -0.8, 1.0], [1.0, 2.0, -1.5, 0.5, 3.0, -2.0]],
     [[-2.9, 1.8, -1.9, 2.9, 1.9, -2.9], [-1.2, 1.2, 1.1, -1.0, 0.9, -1.2], [4.0, -4.0, 3.0, -2.0, 1.0, 4.0]],

@@ -125,9 +125,9 @@ fn a_written_path_keeps_floor_links_and_torques() {
     assert_eq!(html.matches("<svg").count(), 3);
     // The same path again from the same seed is checked by the search's own tests; here, that the file is
     // what was told.
-    let speed = told["joints"][0]["velocity"].as_f64().unwrap();
+    let velocity = told["joints"][0]["velocity"].as_f64().unwrap();
     let largest = rows.iter().fold(0.0f64, |m, row| m.max(row[7].abs()));
-    assert!((speed - largest).abs() < 1e-8);
+    assert!((velocity - largest).abs() < 1e-8);
 }
 
 #[test]

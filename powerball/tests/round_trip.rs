@@ -5,7 +5,7 @@
 use powerball::commands::demo::Session;
 use powerball::explanation::{ExplainOptions, Explained, explain_body};
 use powerball::logs::log::{Log, common_clock, read_logs};
-use powerball::logs::regression::{Data, DataOptions, RigidBody};
+use powerball::logs::regression::{Data, DataOptions, RigidArm};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -136,7 +136,7 @@ fn the_controllers_torque_is_the_reports() {
         let folder = scratch(effect);
         let session = Session::record(&folder, seed, &[effect]).unwrap();
         let arm = dyngen::Arm::read(&session.arm_file).unwrap();
-        let body = RigidBody::new(&arm).unwrap();
+        let body = RigidArm::new(&arm).unwrap();
         let files: Vec<&PathBuf> = session.fit.iter().chain(&session.held_out).collect();
         let mut fit: Vec<Log> = read_logs(&files, &arm).unwrap().0;
         common_clock(&mut fit);

@@ -48,9 +48,9 @@ pub(crate) fn evaluate<'py>(
     };
     let samples = Samples {
         q: slice(Argument::Positions)?,
-        dq: slice(Argument::Speeds)?,
+        dq: slice(Argument::Velocities)?,
         ddq: slice(Argument::Accelerations)?,
-        dqr: slice(Argument::ReferenceSpeeds)?,
+        dqr: slice(Argument::ReferenceVelocities)?,
         ddqr: slice(Argument::ReferenceAccelerations)?,
         tau: slice(Argument::Torques)?,
         e: slice(Argument::Errors)?,

@@ -6,7 +6,7 @@ use crate::logs::{Given, column_map, taken};
 use crate::work;
 use powerball::comparison::{CompareError, CompareOptions};
 use powerball::explanation::torque_model::{Additions, ModelFile};
-use powerball::identification::estimate::FrictionLaw;
+use powerball::identification::estimate::FrictionKind;
 use powerball::identification::{Estimator, IdentifyError, KnownModel, VerifyOptions};
 use powerball::report::{self, Files};
 use powerball::{IdentifyOptions, Side};
@@ -65,8 +65,8 @@ pub(crate) fn identify(
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Identified> {
     let friction = match friction {
-        "symmetric" => FrictionLaw::Symmetric,
-        "asymmetric" => FrictionLaw::Asymmetric,
+        "symmetric" => FrictionKind::Symmetric,
+        "asymmetric" => FrictionKind::Asymmetric,
         _ => return Err(value(format!("friction must be 'symmetric' or 'asymmetric', not '{friction}'"))),
     };
     let estimator = match estimator {

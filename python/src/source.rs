@@ -12,7 +12,7 @@ use numpy::PyReadonlyArray1;
 use powerball::explanation::torque_model::{Scalar, SourceError};
 use powerball::identification::KnownModel;
 use powerball::identification::mounting::Mounting;
-use powerball::logs::regression::RigidBody;
+use powerball::logs::regression::RigidArm;
 use pyo3::prelude::*;
 
 fn functions(names: Option<Vec<String>>) -> PyResult<Option<Vec<Function>>> {
@@ -65,7 +65,7 @@ pub(crate) fn generate_model(
     let known = file.arm(&arm.arm, Mounting::Filed).map_err(input)?;
     let arm = arm.arm.clone();
     work::run(py, None, move |_| {
-        let body = RigidBody::new(&known).map_err(refused)?;
+        let body = RigidArm::new(&known).map_err(refused)?;
         let model = file.checked(&body).map_err(input)?;
         let source = model.source(&arm, scalar, &names).map_err(|e| match e {
             SourceError::Changes(_) => input(e),

@@ -55,7 +55,7 @@ def compare(text, rng):
     # Pinocchio's own C is another factor of the same torques; those are compared.
     coriolis = [pin.computeCoriolisMatrix(model, data, *s) @ s[1] for s in zip(q, dq)]
     close(np.einsum("kij,kj->ki", arm.coriolis_matrix(q, dq), dq), coriolis)
-    close(arm.coriolis_times_speed(q, dq), coriolis)
+    close(arm.coriolis_times_velocity(q, dq), coriolis)
     np.testing.assert_allclose(arm.forward_dynamics(q, dq, tau), ddq, rtol=0, atol=1e-8)
 
     def tip(s):

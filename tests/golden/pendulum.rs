@@ -93,7 +93,7 @@ impl<T: Copy> Parameters<T> for Prepared<T> {
 /// Joint torques of a motion: τ = B(q)·q̈ + C(q, q̇)·q̇ + g(q), without friction.
 ///
 /// * `q`: joint positions, rad (m where prismatic)
-/// * `dq`: joint speeds, rad/s
+/// * `dq`: joint velocities, rad/s
 /// * `ddq`: joint accelerations, rad/s²
 /// * `parameters`: the values of [`PARAMETER_NAMES`]
 ///
@@ -138,7 +138,7 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
 /// Regressor Y(q, q̇, q̈): τ = Y·π for the parameters of [`PARAMETER_NAMES`].
 ///
 /// * `q`: joint positions, rad (m where prismatic)
-/// * `dq`: joint speeds, rad/s
+/// * `dq`: joint velocities, rad/s
 /// * `ddq`: joint accelerations, rad/s²
 ///
 /// Returns Y, n × p.
@@ -211,7 +211,7 @@ pub fn mass_matrix_with<T: SimdRealField + Copy>(
 /// Coriolis matrix C(q, q̇) of Christoffel symbols: Ḃ − 2C is skew-symmetric.
 ///
 /// * `q`: joint positions, rad (m where prismatic)
-/// * `dq`: joint speeds, rad/s
+/// * `dq`: joint velocities, rad/s
 /// * `parameters`: the values of [`PARAMETER_NAMES`]
 ///
 /// Returns C, n × n.
@@ -280,7 +280,7 @@ pub fn gravity_with<T: SimdRealField + Copy>(
 /// Joint accelerations under joint torques: q̈ = B⁻¹·(τ − C·q̇ − g), without friction.
 ///
 /// * `q`: joint positions, rad (m where prismatic)
-/// * `dq`: joint speeds, rad/s
+/// * `dq`: joint velocities, rad/s
 /// * `tau`: joint torques, N·m (N where prismatic)
 /// * `parameters`: the values of [`PARAMETER_NAMES`]
 ///

@@ -4,10 +4,10 @@ use powerball::comparison::{Cause, CompareOptions, Side, compare};
 use powerball::controller::friction::{TABLE_2, TanhFriction};
 use powerball::identification::chain::Chain;
 use powerball::identification::estimate::{
-    FrictionLaw, Uncertainty, estimates, reduce_in_bands, solve_in_band, standard_errors,
+    FrictionKind, Uncertainty, estimates, reduce_in_bands, solve_in_band, standard_errors,
 };
 use powerball::identification::excite::{Fourier, Harmonics};
-use powerball::logs::regression::{DataOptions, RigidBody};
+use powerball::logs::regression::{DataOptions, RigidArm};
 use powerball::logs::summary::Bands;
 use powerball::virtual_arm::{Body, Dynamics, Plant, lwa4p};
 use rand::{RngExt, SeedableRng};
@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
 
 /// The virtual arm, recorded and fitted.
 struct Bench {
-    body: RigidBody,
+    body: RigidArm,
     logs: u64,
 }
 
@@ -51,7 +51,7 @@ impl Bench {
                 .map_err(|e| e.to_string())?;
             bands.merge(&one).map_err(|e| e.to_string())?;
         }
-        let solution = solve_in_band(&bands, FrictionLaw::Symmetric).solution;
+        let solution = solve_in_band(&bands, FrictionKind::Symmetric).solution;
         let errors = standard_errors(&solution);
         let found = estimates(self.body.names(), &solution, &errors);
         Ok(Side {
@@ -85,7 +85,7 @@ fn loaded(mass: f64) -> Vec<Body> {
 /// Prints how often each kind of pair was called different, and how often with the right cause alone.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let arm = lwa4p::arm().map_err(|e| e.to_string())?;
-    let bench = Bench { body: RigidBody::new(&arm).map_err(|e| e.to_string())?, logs: arguments.logs };
+    let bench = Bench { body: RigidArm::new(&arm).map_err(|e| e.to_string())?, logs: arguments.logs };
     let options = CompareOptions { level: arguments.level };
     let same = || viscous(0, 1.0);
     let mut rows = vec![("equal arms".to_string(), 0, 0)];

@@ -5,7 +5,7 @@ use dyngen::exact::rational::to_f64;
 use powerball::identification::conventions::{Conventions, conventions};
 use powerball::identification::excite::{Fourier, Harmonics};
 use powerball::logs::log::{Log, read_logs};
-use powerball::logs::regression::RigidBody;
+use powerball::logs::regression::RigidArm;
 use powerball::virtual_arm::lwa4p;
 use powerball::{IdentifyOptions, identify};
 use rand::{RngExt, SeedableRng};
@@ -46,7 +46,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
         }
         None => virtual_logs()?,
     };
-    let body = RigidBody::new(&arm).map_err(|e| e.to_string())?;
+    let body = RigidArm::new(&arm).map_err(|e| e.to_string())?;
     let weight = if arguments.plain { Vec::new() } else { parameters(&arm, &logs)? };
     println!("| made wrong | told | column map | s |\n|---|---|---|---|");
     let spoils = if arguments.plain { Vec::new() } else { spoils(&arm, &body, &weight) };
@@ -102,7 +102,7 @@ fn virtual_logs() -> Result<(Arm, Vec<Log>, Vec<Log>), String> {
 }
 
 /// All that is made wrong, one thing at a time.
-fn spoils<'a>(arm: &'a Arm, body: &'a RigidBody, parameters: &'a [f64]) -> Vec<(String, Spoil<'a>)> {
+fn spoils<'a>(arm: &'a Arm, body: &'a RigidArm, parameters: &'a [f64]) -> Vec<(String, Spoil<'a>)> {
     let n = arm.dof();
     let mut all: Vec<(String, Spoil<'a>)> = vec![
         ("all signs".into(), Box::new(|log| times(&mut log.torque, -1.0))),

@@ -4,11 +4,11 @@
 use dyngen::Arm;
 use faer::Mat;
 use powerball::identification::estimate::{
-    FrictionLaw, Solver, Spread, reduce_in_bands, solve_in_band, solve_reduced, spread_of,
+    FrictionKind, Solver, Spread, reduce_in_bands, solve_in_band, solve_reduced, spread_of,
 };
 use powerball::logs::log::read_logs;
-use powerball::logs::regression::{DataOptions, RigidBody};
-use powerball::logs::summary::{BANDS, Bands, Octaves, Powers, Summary, Triangle};
+use powerball::logs::regression::{DataOptions, RigidArm};
+use powerball::logs::summary::{BANDS, Bands, Octaves, Powers, RFactor, Summary};
 use std::path::PathBuf;
 
 /// Which logs, and how they are seen.
@@ -28,7 +28,7 @@ type Squares = Vec<(f64, f64)>;
 /// Prints what is left of each joint's torque: log by log, their mean, and all samples together.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let arm = Arm::read(&arguments.arm).map_err(|e| e.to_string())?;
-    let body = RigidBody::new(&arm).map_err(|e| e.to_string())?;
+    let body = RigidArm::new(&arm).map_err(|e| e.to_string())?;
     let (logs, _) = read_logs(&arguments.log, &arm).map_err(|e| e.to_string())?;
     let names: Vec<String> =
         logs.iter().map(|l| l.file.rsplit('/').next().unwrap_or_default().to_string()).collect();
@@ -47,12 +47,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
         for (_, other) in logs.iter().enumerate().filter(|(other, _)| *other != k) {
             others.merge(other).map_err(|e| e.to_string())?;
         }
-        let asked = solve_in_band(&others, FrictionLaw::Symmetric).bands;
+        let asked = solve_in_band(&others, FrictionKind::Symmetric).bands;
         told(&names[k], &others, &asked);
         let common = (0..BANDS.len()).map(|band| vec![band; arm.dof()]);
         for (bands, [base, rival]) in std::iter::once(asked).chain(common).zip(&mut tables) {
             let (others, held_out) = (others.of_joints(&bands), held_out.of_joints(&bands));
-            let solution = solve_reduced(&others, FrictionLaw::Symmetric);
+            let solution = solve_reduced(&others, FrictionKind::Symmetric);
             let there = solution.on(&held_out).map_err(|e| e.to_string())?;
             base.push(squares(&spread_of(&there, &there.theta), &held_out));
             rival.push(Plain::fit(&others).squares(&held_out));
@@ -123,7 +123,7 @@ impl Plain {
     fn fit(summary: &Summary) -> Plain {
         let (p, torque) = (summary.identity.parameters.len(), summary.columns().torque());
         let size = p + FRICTION * summary.joints.len();
-        let joints: Vec<Triangle> = summary.joints.iter().map(Octaves::total).collect();
+        let joints: Vec<RFactor> = summary.joints.iter().map(Octaves::total).collect();
         let mut plain = Plain { theta: vec![0.0; size] };
         for _ in 0..4 {
             let (mut gram, mut right) = (Mat::<f64>::zeros(size, size), vec![0.0; size]);

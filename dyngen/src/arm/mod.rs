@@ -60,7 +60,7 @@ pub struct Joint {
     pub rotor_ratio: Option<Rational>,
     /// Lower and upper limit, rad or m.
     pub position: Option<[f64; 2]>,
-    /// Largest speed, rad/s or m/s.
+    /// Largest velocity, rad/s or m/s.
     pub velocity: Option<f64>,
     /// Largest acceleration, rad/s² or m/s².
     pub acceleration: Option<f64>,

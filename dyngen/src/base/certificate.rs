@@ -103,7 +103,7 @@ impl Source<Fp> for Point<'_> {
     fn position(&mut self, joint: usize) -> Fp {
         self.joints[joint][2]
     }
-    fn speed(&mut self, joint: usize) -> Fp {
+    fn velocity(&mut self, joint: usize) -> Fp {
         self.joints[joint][3]
     }
     fn a(&mut self, joint: usize) -> Fp {

@@ -56,14 +56,14 @@ impl CoupledMotor {
         ring: &PolynomialRing<Rational>,
         joint: usize,
         before: &Carried<Numerator>,
-        (omega, speed, ratio): (&Numerator, &Numerator, &Numerator),
+        (omega, velocity, ratio): (&Numerator, &Numerator, &Numerator),
     ) -> Carried<Numerator> {
         let zero = || ring.integer(0);
         if joint > self.last {
             return Carried { velocity: zero(), energy: zero(), rate: zero(), square: zero() };
         }
         let factor = self.row.iter().find(|(j, _)| *j == joint).map(|(_, factor)| factor.clone());
-        let own = factor.map_or(zero(), |factor| ring.mul(&ring.constant(factor), speed));
+        let own = factor.map_or(zero(), |factor| ring.mul(&ring.constant(factor), velocity));
         let twice = |x: &Numerator| ring.add(x, x);
         if joint < self.motor {
             let velocity = ring.add(&before.velocity, &own);

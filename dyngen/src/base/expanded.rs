@@ -18,7 +18,7 @@ enum Variable {
     Sin,
     Cos,
     Position,
-    Speed,
+    Velocity,
     A(usize),
     B(usize),
     D(usize),
@@ -61,7 +61,7 @@ impl Source<Polynomial<i64>> for Variables<'_> {
     fn position(&mut self, joint: usize) -> Polynomial<i64> {
         self.ring.variable(self.joints[joint])
     }
-    fn speed(&mut self, joint: usize) -> Polynomial<i64> {
+    fn velocity(&mut self, joint: usize) -> Polynomial<i64> {
         let first = self.joints[joint];
         let width = if self.variables[first] == Variable::Position { 1 } else { 2 };
         self.ring.variable(first + width)
@@ -107,7 +107,7 @@ impl LagrangianPolynomials {
                 }
                 JointKind::Prismatic => variables.push(Variable::Position),
             }
-            variables.push(Variable::Speed);
+            variables.push(Variable::Velocity);
             squares.resize(variables.len(), Square::Free);
         }
         for i in 0..arm.dof() {
@@ -137,7 +137,7 @@ impl LagrangianPolynomials {
 
     /// The rows: for each function of q and q̇ (and of the sizes, where they are variables) its coefficient
     /// in the columns of the parameters that the arm keeps. Constants, which change no torque, are left out;
-    /// there are no total time derivatives, because every other term is of degree 0 or 2 in the speeds.
+    /// there are no total time derivatives, because every other term is of degree 0 or 2 in the velocities.
     pub(super) fn rows(&self, arm: &Arm, field: &ConstantField, sizes: Sizes) -> Vec<SparseRow> {
         let mut rows: BTreeMap<Monomial, BTreeMap<usize, Numerator>> = BTreeMap::new();
         // The same products of constants stand before many functions.
@@ -171,7 +171,10 @@ impl LagrangianPolynomials {
     /// Whether a function holds neither q nor q̇.
     fn is_constant(&self, function: &Monomial) -> bool {
         !function.powers().any(|(v, _)| {
-            matches!(self.variables[v], Variable::Sin | Variable::Cos | Variable::Position | Variable::Speed)
+            matches!(
+                self.variables[v],
+                Variable::Sin | Variable::Cos | Variable::Position | Variable::Velocity
+            )
         })
     }
 

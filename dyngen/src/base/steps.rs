@@ -118,7 +118,7 @@ impl Source<Numerator> for Quantities<'_> {
     fn position(&mut self, _: usize) -> Numerator {
         self.ring.variable(self.first + POSITION)
     }
-    fn speed(&mut self, _: usize) -> Numerator {
+    fn velocity(&mut self, _: usize) -> Numerator {
         self.ring.variable(self.first + SPEED)
     }
     fn a(&mut self, joint: usize) -> Numerator {
@@ -228,7 +228,7 @@ impl<'f> Steps<'f> {
         let next = listed(motion);
         let ratio = elements.ratio.clone().unwrap_or(ring.integer(0));
         let carry = |(r, motor): (usize, &CoupledMotor)| {
-            let drive = (&axis.omega, &elements.speed, &ratio);
+            let drive = (&axis.omega, &elements.velocity, &ratio);
             let after = motor.step(ring, joint, &carried(ring, self.first, r), drive);
             [after.velocity, after.energy, after.rate, after.square]
         };

@@ -55,8 +55,8 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         false => Ok(Vec::new()),
     };
     let (q, dq, ddq) =
-        (columns(Argument::Positions)?, columns(Argument::Speeds)?, columns(Argument::Accelerations)?);
-    let (dqr, ddqr) = (columns(Argument::ReferenceSpeeds)?, columns(Argument::ReferenceAccelerations)?);
+        (columns(Argument::Positions)?, columns(Argument::Velocities)?, columns(Argument::Accelerations)?);
+    let (dqr, ddqr) = (columns(Argument::ReferenceVelocities)?, columns(Argument::ReferenceAccelerations)?);
     let (tau, e) = (columns(Argument::Torques)?, columns(Argument::Errors)?);
     let samples = Samples {
         q: &q,

@@ -137,13 +137,13 @@ pub fn build_in(
     if let Some(last) = bodies.last_mut() {
         last.moments = last.moments.turned_back_z(&b, &chain.last_turn.0, &chain.last_turn.1);
     }
-    let speeds: Vec<Expr> = (0..n).map(|i| b.input(Input::Speed(i))).collect();
+    let velocities: Vec<Expr> = (0..n).map(|i| b.input(Input::Velocity(i))).collect();
     let input = |of: fn(usize) -> Input| -> Vec<Expr> { (0..n).map(|i| b.input(of(i))).collect() };
     let none = vec![Expr::ZERO; n];
     let torque = |accelerations: &[Expr], gravity: bool| {
         let drive = motion::Drive {
-            speeds: speeds.clone(),
-            reference: speeds.clone(),
+            velocities: velocities.clone(),
+            reference: velocities.clone(),
             accelerations: accelerations.to_vec(),
             gravity,
         };
@@ -155,14 +155,14 @@ pub fn build_in(
         regressor::regressor(&b, &chain, &columns, drive)
     };
     let motion = || motion::Drive {
-        speeds: speeds.clone(),
-        reference: speeds.clone(),
+        velocities: velocities.clone(),
+        reference: velocities.clone(),
         accelerations: input(Input::Acceleration),
         gravity: true,
     };
     let reference = || motion::Drive {
-        speeds: speeds.clone(),
-        reference: input(Input::ReferenceSpeed),
+        velocities: velocities.clone(),
+        reference: input(Input::ReferenceVelocity),
         accelerations: input(Input::ReferenceAcceleration),
         gravity: true,
     };
@@ -195,10 +195,10 @@ pub fn build_in(
         Function::MassMatrixInverse => {
             forward::inverse_symmetric(&b, &composite::mass_matrix(&b, &chain, &bodies), n)
         }
-        Function::CoriolisMatrix => coriolis::coriolis_matrix(&b, &chain, &bodies, &speeds),
-        Function::CoriolisTimesSpeed => torque(&none, false),
-        Function::CoriolisTransposeTimesSpeed => {
-            momentum::coriolis_transpose_times_speed(&b, &chain, &bodies, &speeds)
+        Function::CoriolisMatrix => coriolis::coriolis_matrix(&b, &chain, &bodies, &velocities),
+        Function::CoriolisTimesVelocity => torque(&none, false),
+        Function::CoriolisTransposeTimesVelocity => {
+            momentum::coriolis_transpose_times_velocity(&b, &chain, &bodies, &velocities)
         }
         Function::Gravity => composite::gravity(&b, &chain, &bodies),
         Function::ForwardDynamics => {
@@ -208,17 +208,17 @@ pub fn build_in(
         }
         Function::ForwardKinematics => pose::forward_kinematics(&b, &elements, &ends()),
         Function::Jacobian => pose::jacobian(&b, &elements, &ends()),
-        Function::JacobianRateTimesSpeed => {
+        Function::JacobianRateTimesVelocity => {
             let drive = motion::Drive {
-                speeds: speeds.clone(),
-                reference: speeds.clone(),
+                velocities: velocities.clone(),
+                reference: velocities.clone(),
                 accelerations: none,
                 gravity: false,
             };
             let straight = Chain::build(&b, arm, &elements, Form { last_in_frame_before: false, ..form });
-            pose::jacobian_rate_times_speed(&b, &elements, &straight, &geometry[n - 1], &ends(), &drive)
+            pose::jacobian_rate_times_velocity(&b, &elements, &straight, &geometry[n - 1], &ends(), &drive)
         }
-        Function::KineticEnergy => vec![momentum::kinetic_energy(&b, &chain, &bodies, &speeds)],
+        Function::KineticEnergy => vec![momentum::kinetic_energy(&b, &chain, &bodies, &velocities)],
         Function::PotentialEnergy => {
             let row = energy::potential_regressor(&b, arm, &elements, set, field);
             let term = |(i, column): (usize, &Expr)| b.mul(column, &value(i));
@@ -227,9 +227,9 @@ pub fn build_in(
         }
         Function::KineticEnergyRegressor => energy::kinetic_regressor(&b, arm, &elements, set, field),
         Function::PotentialEnergyRegressor => energy::potential_regressor(&b, arm, &elements, set, field),
-        Function::Momentum => momentum::momentum(&b, &chain, &bodies, &speeds),
+        Function::Momentum => momentum::momentum(&b, &chain, &bodies, &velocities),
         Function::TorqueByPosition => derivatives(Direction::Position),
-        Function::TorqueBySpeed => derivatives(Direction::Speed),
+        Function::TorqueByVelocity => derivatives(Direction::Velocity),
     };
     let parameters = set.parameters.len();
     let (graph, outputs) = optimize::optimize(b.finish(), outputs, field, passes);
@@ -258,8 +258,8 @@ impl Source<Expr> for Inputs<'_> {
     fn position(&mut self, joint: usize) -> Expr {
         self.b.input(Input::Position(joint))
     }
-    fn speed(&mut self, joint: usize) -> Expr {
-        self.b.input(Input::Speed(joint))
+    fn velocity(&mut self, joint: usize) -> Expr {
+        self.b.input(Input::Velocity(joint))
     }
     fn a(&mut self, joint: usize) -> Expr {
         self.b.constant(&self.arm.joints[joint].a)

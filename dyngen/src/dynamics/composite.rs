@@ -51,7 +51,7 @@ pub fn with_mass(b: &Builder, body: &Moments<Expr>, mass: Expr) -> Moments<Expr>
     Moments { mass: b.add(&body.mass, &mass), ..body.clone() }
 }
 
-/// The wrench of momentum for a unit speed about z: f = z×s, n = I z; or along z: f = m z, n = s×z.
+/// The wrench of momentum for a unit velocity about z: f = z×s, n = I z; or along z: f = m z, n = s×z.
 pub fn unit_momentum(b: &Builder, body: &Moments<Expr>, kind: JointKind) -> Wrench {
     let [sx, sy, _] = body.first;
     match kind {
@@ -201,7 +201,7 @@ fn revolute(
             columns[l] = columns[l].shifted(b, &piece.reach);
         }
         if k + 1 < count {
-            // What is beyond moves along: its first moment times that speed.
+            // What is beyond moves along: its first moment times that velocity.
             let [_, _, sz] = rest.first;
             for (i, p) in piece.reach.iter().take(2).enumerate() {
                 columns[k].moment[i] = b.sub(&columns[k].moment[i], &b.mul(&sz, p));

@@ -41,11 +41,11 @@ struct Share {
 }
 
 /// C(q, q̇), row-major n × n.
-pub fn coriolis_matrix(b: &Builder, chain: &Chain, bodies: &[LinkBody], speeds: &[Expr]) -> Vec<Expr> {
+pub fn coriolis_matrix(b: &Builder, chain: &Chain, bodies: &[LinkBody], velocities: &[Expr]) -> Vec<Expr> {
     let n = chain.dof();
     let drive = Drive {
-        speeds: speeds.to_vec(),
-        reference: speeds.to_vec(),
+        velocities: velocities.to_vec(),
+        reference: velocities.to_vec(),
         accelerations: vec![Expr::ZERO; n],
         gravity: false,
     };
@@ -65,7 +65,7 @@ pub fn coriolis_matrix(b: &Builder, chain: &Chain, bodies: &[LinkBody], speeds: 
             let body = &bodies[member.joint];
             let mut turning = shares[k];
             turning.add_wheel(b, body.flywheel, motion);
-            before.add_wheel(b, body.flywheel, motion.speeds[k]);
+            before.add_wheel(b, body.flywheel, motion.velocities[k]);
             share = share.plus(b, &turning);
             let mut carried = share;
             if let Some(ratio) = member.ratio {
@@ -191,7 +191,7 @@ fn seen_omega(b: &Builder, chain: &Chain, motion: &StageMotion, k: usize, count:
         return motion.links[k].spin.omega;
     }
     let [x, y, z] = motion.before.omega;
-    [x, y, b.add(&z, &motion.speeds[k])]
+    [x, y, b.add(&z, &motion.velocities[k])]
 }
 
 fn prismatic(
@@ -212,7 +212,7 @@ fn prismatic(
     let share = at_link.share(b, stage.kind, &axis_rate(&motion.before.omega));
     let shift = [Expr::ZERO, Expr::ZERO, stage.shift];
     let mut shift_rate = b.cross(&motion.before.omega, &shift);
-    shift_rate[2] = b.add(&shift_rate[2], &motion.speeds[0]);
+    shift_rate[2] = b.add(&shift_rate[2], &motion.velocities[0]);
     let own = vec![share.column.force[2]];
     (vec![share.shifted(b, &shift, &shift_rate)], own, at_link.shifted(b, &shift, &shift_rate))
 }
@@ -238,7 +238,7 @@ fn project(
                 false => motion.links[k].spin.omega,
                 true => {
                     let [x, y, z] = motion.before.omega;
-                    [x, y, b.add(&z, &motion.speeds[k])]
+                    [x, y, b.add(&z, &motion.velocities[k])]
                 }
             };
             let (rate, z_rate) = (b.cross(&omega, &reach), axis_rate(&omega));
@@ -268,7 +268,7 @@ fn project(
             JointKind::Prismatic => {
                 let shift = [Expr::ZERO, Expr::ZERO, stage.shift];
                 let mut rate = b.cross(&motion.before.omega, &shift);
-                rate[2] = b.add(&rate[2], &motion.speeds[0]);
+                rate[2] = b.add(&rate[2], &motion.velocities[0]);
                 share = share.shifted(b, &shift, &rate);
             }
         }
@@ -353,8 +353,8 @@ impl Moving {
 
     /// A wheel of inertia κ on the link before that turns about z: what ½κ q̇ [z×] adds to K is what pairs of
     /// joints further in get of it, ½κ q̇ᵢ zⱼ·(zₗ×zᵢ).
-    fn add_wheel(&mut self, b: &Builder, wheel: Expr, speed: Expr) {
-        let spin = b.mul(&half(b, wheel), &speed);
+    fn add_wheel(&mut self, b: &Builder, wheel: Expr, velocity: Expr) {
+        let spin = b.mul(&half(b, wheel), &velocity);
         self.spread[1][0] = b.add(&self.spread[1][0], &spin);
         self.spread[0][1] = b.sub(&self.spread[0][1], &spin);
     }

@@ -33,7 +33,7 @@ pub fn potential_regressor(
 ) -> Vec<Expr> {
     let mut still = elements.clone();
     for joint in &mut still.joints {
-        (joint.speed, joint.motor_speed) = (Expr::ZERO, Expr::ZERO);
+        (joint.velocity, joint.motor_velocity) = (Expr::ZERO, Expr::ZERO);
     }
     of_set(b, arm, &still, set, field, true)
 }

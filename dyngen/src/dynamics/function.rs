@@ -24,9 +24,9 @@ pub enum Function {
     /// C(q, q̇), n × n, of Christoffel symbols
     CoriolisMatrix,
     /// C·q̇
-    CoriolisTimesSpeed,
+    CoriolisTimesVelocity,
     /// Cᵀ·q̇
-    CoriolisTransposeTimesSpeed,
+    CoriolisTransposeTimesVelocity,
     /// g(q)
     Gravity,
     /// q̈(q, q̇, τ)
@@ -37,7 +37,7 @@ pub enum Function {
     /// Geometric Jacobian of the tool's frame, 6 × n
     Jacobian,
     /// J̇·q̇, 6 × 1
-    JacobianRateTimesSpeed,
+    JacobianRateTimesVelocity,
     /// T(q, q̇)
     KineticEnergy,
     /// U(q)
@@ -51,7 +51,7 @@ pub enum Function {
     /// ∂τ/∂q, n × n
     TorqueByPosition,
     /// ∂τ/∂q̇, n × n
-    TorqueBySpeed,
+    TorqueByVelocity,
 }
 
 /// A length of a result.
@@ -71,11 +71,11 @@ pub enum Argument {
     /// q
     Positions,
     /// q̇
-    Speeds,
+    Velocities,
     /// q̈
     Accelerations,
     /// q̇ᵣ
-    ReferenceSpeeds,
+    ReferenceVelocities,
     /// q̈ᵣ
     ReferenceAccelerations,
     /// τ
@@ -91,9 +91,9 @@ impl Argument {
     pub fn name(self) -> &'static str {
         match self {
             Argument::Positions => "q",
-            Argument::Speeds => "dq",
+            Argument::Velocities => "dq",
             Argument::Accelerations => "ddq",
-            Argument::ReferenceSpeeds => "dqr",
+            Argument::ReferenceVelocities => "dqr",
             Argument::ReferenceAccelerations => "ddqr",
             Argument::Torques => "tau",
             Argument::Errors => "e",
@@ -105,9 +105,9 @@ impl Argument {
     pub fn meaning(self) -> &'static str {
         match self {
             Argument::Positions => "joint positions, rad (m where prismatic)",
-            Argument::Speeds => "joint speeds, rad/s",
+            Argument::Velocities => "joint velocities, rad/s",
             Argument::Accelerations => "joint accelerations, rad/s²",
-            Argument::ReferenceSpeeds => "reference speeds q̇ᵣ, rad/s",
+            Argument::ReferenceVelocities => "reference velocities q̇ᵣ, rad/s",
             Argument::ReferenceAccelerations => "reference accelerations q̈ᵣ, rad/s²",
             Argument::Torques => "joint torques, N·m (N where prismatic)",
             Argument::Errors => "one number for each joint",
@@ -154,7 +154,7 @@ const TABLE: [Row; 23] = [
         name: "inverse_dynamics",
         letter: "tau",
         size: (Joints, Fixed(1)),
-        arguments: &[Positions, Speeds, Accelerations, Parameters],
+        arguments: &[Positions, Velocities, Accelerations, Parameters],
         kind: Kind::Dynamics,
         what: "Joint torques of a motion: τ = B(q)·q̈ + C(q, q̇)·q̇ + g(q), without friction.",
         returns: "Returns τ, N·m (N where prismatic).",
@@ -164,7 +164,7 @@ const TABLE: [Row; 23] = [
         name: "inverse_dynamics_without_gravity",
         letter: "tau",
         size: (Joints, Fixed(1)),
-        arguments: &[Positions, Speeds, Accelerations, Parameters],
+        arguments: &[Positions, Velocities, Accelerations, Parameters],
         kind: Kind::Dynamics,
         what: "Joint torques of a motion without gravity: B(q)·q̈ + C(q, q̇)·q̇.",
         returns: "Returns the torques, N·m.",
@@ -174,7 +174,7 @@ const TABLE: [Row; 23] = [
         name: "regressor",
         letter: "Y",
         size: (Joints, ByParameter),
-        arguments: &[Positions, Speeds, Accelerations],
+        arguments: &[Positions, Velocities, Accelerations],
         kind: Kind::Regressor,
         what: "Regressor Y(q, q̇, q̈): τ = Y·π for the parameters of [`PARAMETER_NAMES`].",
         returns: "Returns Y, n × p.",
@@ -184,7 +184,7 @@ const TABLE: [Row; 23] = [
         name: "regressor_transpose_times",
         letter: "Yte",
         size: (ByParameter, Fixed(1)),
-        arguments: &[Positions, Speeds, Accelerations, Errors],
+        arguments: &[Positions, Velocities, Accelerations, Errors],
         kind: Kind::Regressor,
         what: "Yᵀ(q, q̇, q̈)·e without Y itself.",
         returns: "Returns one number for each parameter.",
@@ -194,7 +194,7 @@ const TABLE: [Row; 23] = [
         name: "slotine_li_regressor",
         letter: "Y",
         size: (Joints, ByParameter),
-        arguments: &[Positions, Speeds, ReferenceSpeeds, ReferenceAccelerations],
+        arguments: &[Positions, Velocities, ReferenceVelocities, ReferenceAccelerations],
         kind: Kind::Regressor,
         what: "Regressor of Slotine and Li: Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g, \
             with C of Christoffel symbols.",
@@ -205,7 +205,7 @@ const TABLE: [Row; 23] = [
         name: "slotine_li_transpose_times",
         letter: "Yte",
         size: (ByParameter, Fixed(1)),
-        arguments: &[Positions, Speeds, ReferenceSpeeds, ReferenceAccelerations, Errors],
+        arguments: &[Positions, Velocities, ReferenceVelocities, ReferenceAccelerations, Errors],
         kind: Kind::Regressor,
         what: "Yᵀ(q, q̇, q̇ᵣ, q̈ᵣ)·e of Slotine and Li's regressor: the direction of their adaptation law.",
         returns: "Returns one number for each parameter.",
@@ -235,27 +235,27 @@ const TABLE: [Row; 23] = [
         name: "coriolis_matrix",
         letter: "C",
         size: (Joints, Joints),
-        arguments: &[Positions, Speeds, Parameters],
+        arguments: &[Positions, Velocities, Parameters],
         kind: Kind::Dynamics,
         what: "Coriolis matrix C(q, q̇) of Christoffel symbols: Ḃ − 2C is skew-symmetric.",
         returns: "Returns C, n × n.",
     },
     Row {
-        function: CoriolisTimesSpeed,
-        name: "coriolis_times_speed",
+        function: CoriolisTimesVelocity,
+        name: "coriolis_times_velocity",
         letter: "tau",
         size: (Joints, Fixed(1)),
-        arguments: &[Positions, Speeds, Parameters],
+        arguments: &[Positions, Velocities, Parameters],
         kind: Kind::Dynamics,
         what: "Coriolis and centrifugal torques C(q, q̇)·q̇.",
         returns: "Returns the torques, N·m.",
     },
     Row {
-        function: CoriolisTransposeTimesSpeed,
-        name: "coriolis_transpose_times_speed",
+        function: CoriolisTransposeTimesVelocity,
+        name: "coriolis_transpose_times_velocity",
         letter: "tau",
         size: (Joints, Fixed(1)),
-        arguments: &[Positions, Speeds, Parameters],
+        arguments: &[Positions, Velocities, Parameters],
         kind: Kind::Dynamics,
         what: "Cᵀ(q, q̇)·q̇ of the Christoffel matrix, which is ∂T/∂q: what a momentum observer integrates.",
         returns: "Returns the torques, N·m.",
@@ -275,7 +275,7 @@ const TABLE: [Row; 23] = [
         name: "forward_dynamics",
         letter: "ddq",
         size: (Joints, Fixed(1)),
-        arguments: &[Positions, Speeds, Torques, Parameters],
+        arguments: &[Positions, Velocities, Torques, Parameters],
         kind: Kind::Dynamics,
         what: "Joint accelerations under joint torques: q̈ = B⁻¹·(τ − C·q̇ − g), without friction.",
         returns: "Returns q̈; not finite where the parameters make B singular.",
@@ -302,11 +302,11 @@ const TABLE: [Row; 23] = [
         returns: "Returns 6 × n: velocity of the origin, m/s, above the angular velocity, rad/s.",
     },
     Row {
-        function: JacobianRateTimesSpeed,
-        name: "jacobian_rate_times_speed",
+        function: JacobianRateTimesVelocity,
+        name: "jacobian_rate_times_velocity",
         letter: "a",
         size: (Fixed(6), Fixed(1)),
-        arguments: &[Positions, Speeds],
+        arguments: &[Positions, Velocities],
         kind: Kind::Other,
         what: "J̇(q, q̇)·q̇ of the geometric Jacobian: acceleration of the tool's frame where q̈ = 0.",
         returns: "Returns six numbers: acceleration of the origin, m/s², \
@@ -317,7 +317,7 @@ const TABLE: [Row; 23] = [
         name: "kinetic_energy",
         letter: "T",
         size: (Fixed(1), Fixed(1)),
-        arguments: &[Positions, Speeds, Parameters],
+        arguments: &[Positions, Velocities, Parameters],
         kind: Kind::Dynamics,
         what: "Kinetic energy T = ½ q̇ᵀ·B·q̇.",
         returns: "Returns T, J.",
@@ -337,7 +337,7 @@ const TABLE: [Row; 23] = [
         name: "kinetic_energy_regressor",
         letter: "T",
         size: (Fixed(1), ByParameter),
-        arguments: &[Positions, Speeds],
+        arguments: &[Positions, Velocities],
         kind: Kind::Other,
         what: "Row of the kinetic energy: T = row·π.",
         returns: "Returns 1 × p.",
@@ -357,7 +357,7 @@ const TABLE: [Row; 23] = [
         name: "momentum",
         letter: "p",
         size: (Joints, Fixed(1)),
-        arguments: &[Positions, Speeds, Parameters],
+        arguments: &[Positions, Velocities, Parameters],
         kind: Kind::Dynamics,
         what: "Generalised momentum B(q)·q̇.",
         returns: "Returns the momenta, N·m·s.",
@@ -367,17 +367,17 @@ const TABLE: [Row; 23] = [
         name: "torque_by_position",
         letter: "dtau_dq",
         size: (Joints, Joints),
-        arguments: &[Positions, Speeds, Accelerations, Parameters],
+        arguments: &[Positions, Velocities, Accelerations, Parameters],
         kind: Kind::Dynamics,
         what: "∂τ/∂q of the inverse dynamics.",
         returns: "Returns n × n; column j is the derivative by q of joint j.",
     },
     Row {
-        function: TorqueBySpeed,
-        name: "torque_by_speed",
+        function: TorqueByVelocity,
+        name: "torque_by_velocity",
         letter: "dtau_ddq",
         size: (Joints, Joints),
-        arguments: &[Positions, Speeds, Accelerations, Parameters],
+        arguments: &[Positions, Velocities, Accelerations, Parameters],
         kind: Kind::Dynamics,
         what: "∂τ/∂q̇ of the inverse dynamics.",
         returns: "Returns n × n; column j is the derivative by q̇ of joint j.",
@@ -443,7 +443,7 @@ impl Function {
 
     /// Whether it depends on kinematics alone, on no parameter.
     pub fn is_kinematic(self) -> bool {
-        matches!(self, Function::ForwardKinematics | Function::Jacobian | Function::JacobianRateTimesSpeed)
+        matches!(self, Function::ForwardKinematics | Function::Jacobian | Function::JacobianRateTimesVelocity)
     }
 
     pub(crate) fn kind(self) -> Kind {

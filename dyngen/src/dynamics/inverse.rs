@@ -70,8 +70,8 @@ pub fn newton_euler(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: &Dri
                 // It turns the link before: within the stage that is what the inner coordinates feel.
                 let carrier = if stage.kind == JointKind::Revolute { &mut sum } else { &mut spin };
                 *carrier = b.add(carrier, &b.mul(&rotor, &ddq));
-                let (speed, reference) = motion.motor_rates(b, k);
-                let turned = axis_rate(b, &motion.before, speed, reference);
+                let (velocity, reference) = motion.motor_rates(b, k);
+                let turned = axis_rate(b, &motion.before, velocity, reference);
                 before.moment = plus(b, &before.moment, &scaled(b, rotor, &turned));
             }
             if body.flywheel != Expr::ZERO {
@@ -80,7 +80,7 @@ pub fn newton_euler(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: &Dri
                 wheels = b.add(&wheels, &turning);
                 torque = b.add(&torque, &turning);
                 spin = b.add(&spin, &b.mul(&wheel, &motion.accelerations[k]));
-                let turned = axis_rate(b, &motion.before, motion.speeds[k], motion.reference[k]);
+                let turned = axis_rate(b, &motion.before, motion.velocities[k], motion.reference[k]);
                 before.moment = plus(b, &before.moment, &scaled(b, wheel, &turned));
             }
             torques[member.joint] = if member.reversed { -torque } else { torque };

@@ -1,6 +1,6 @@
 //! Momentum, kinetic energy, and the velocity terms that momentum gives without a matrix.
 //!
-//! Of an arm at rest the Newton–Euler recursion makes of accelerations what momentum is of speeds: its
+//! Of an arm at rest the Newton–Euler recursion makes of accelerations what momentum is of velocities: its
 //! accelerations are then velocities, its wrenches momenta p and h.
 
 use super::body::Vector;
@@ -15,20 +15,20 @@ use crate::exact::algebra::Algebra;
 use crate::exact::rational::Rational;
 use crate::graph::{Builder, Expr};
 
-fn as_accelerations(speeds: &[Expr]) -> Drive {
-    let rest = vec![Expr::ZERO; speeds.len()];
-    Drive { speeds: rest.clone(), reference: rest, accelerations: speeds.to_vec(), gravity: false }
+fn as_accelerations(velocities: &[Expr]) -> Drive {
+    let rest = vec![Expr::ZERO; velocities.len()];
+    Drive { velocities: rest.clone(), reference: rest, accelerations: velocities.to_vec(), gravity: false }
 }
 
 /// The generalised momentum B·q̇ = ∂T/∂q̇.
-pub fn momentum(b: &Builder, chain: &Chain, bodies: &[LinkBody], speeds: &[Expr]) -> Vec<Expr> {
-    newton_euler(b, chain, bodies, &as_accelerations(speeds)).torques
+pub fn momentum(b: &Builder, chain: &Chain, bodies: &[LinkBody], velocities: &[Expr]) -> Vec<Expr> {
+    newton_euler(b, chain, bodies, &as_accelerations(velocities)).torques
 }
 
 /// T = ½ q̇ᵀ·B·q̇.
-pub fn kinetic_energy(b: &Builder, chain: &Chain, bodies: &[LinkBody], speeds: &[Expr]) -> Expr {
-    let momentum = momentum(b, chain, bodies, speeds);
-    let terms = speeds.iter().zip(&momentum).map(|(speed, p)| b.mul(speed, p));
+pub fn kinetic_energy(b: &Builder, chain: &Chain, bodies: &[LinkBody], velocities: &[Expr]) -> Expr {
+    let momentum = momentum(b, chain, bodies, velocities);
+    let terms = velocities.iter().zip(&momentum).map(|(velocity, p)| b.mul(velocity, p));
     let twice = terms.fold(Expr::ZERO, |sum, term| b.add(&sum, &term));
     b.mul(&b.constant(&Rational::new(1.into(), 2.into())), &twice)
 }
@@ -37,13 +37,13 @@ pub fn kinetic_energy(b: &Builder, chain: &Chain, bodies: &[LinkBody], speeds: &
 ///
 /// It is Σ m ẋ·J̇ over all points: for a coordinate that turns about z, −z·(ω×h + v×p); where it only
 /// displaces what is beyond by t = z×p, also ṫ times the momentum there.
-pub fn coriolis_transpose_times_speed(
+pub fn coriolis_transpose_times_velocity(
     b: &Builder,
     chain: &Chain,
     bodies: &[LinkBody],
-    speeds: &[Expr],
+    velocities: &[Expr],
 ) -> Vec<Expr> {
-    let passes = newton_euler(b, chain, bodies, &as_accelerations(speeds));
+    let passes = newton_euler(b, chain, bodies, &as_accelerations(velocities));
     let mut result = vec![Expr::ZERO; chain.dof()];
     let along_z = |u: &Vector, v: &Vector| b.sub(&b.mul(&u[0], &v[1]), &b.mul(&u[1], &v[0]));
     for ((stage, motion), felt) in chain.stages.iter().zip(&passes.motions).zip(&passes.felt) {
@@ -76,7 +76,7 @@ pub fn coriolis_transpose_times_speed(
     result
 }
 
-/// The angular velocity where speeds stand for accelerations.
+/// The angular velocity where velocities stand for accelerations.
 fn turning(b: &Builder, spin: &Spin) -> Vector {
     std::array::from_fn(|axis| spin.alpha(b, axis))
 }

@@ -11,9 +11,9 @@ use crate::lagrangian::elements::turn_z;
 /// What drives the recursion beside the joints' positions.
 #[derive(Clone, Debug)]
 pub struct Drive {
-    /// Speeds q̇.
-    pub speeds: Vec<Expr>,
-    /// Reference speeds q̇ᵣ: the speeds themselves, or those of Slotine and Li.
+    /// Velocities q̇.
+    pub velocities: Vec<Expr>,
+    /// Reference velocities q̇ᵣ: the velocities themselves, or those of Slotine and Li.
     pub reference: Vec<Expr>,
     /// Accelerations q̈, or reference accelerations q̈ᵣ.
     pub accelerations: Vec<Expr>,
@@ -37,9 +37,9 @@ pub struct LinkMotion {
 pub struct StageMotion {
     /// Before its joints: the link before, in axes whose z is the stage's.
     pub before: Spin,
-    /// Speeds of its coordinates.
-    pub speeds: Vec<Expr>,
-    /// Reference speeds of its coordinates.
+    /// Velocities of its coordinates.
+    pub velocities: Vec<Expr>,
+    /// Reference velocities of its coordinates.
     pub reference: Vec<Expr>,
     /// Accelerations of its coordinates.
     pub accelerations: Vec<Expr>,
@@ -54,8 +54,8 @@ impl StageMotion {
     /// The velocity and reference velocity of a joint's motor about the stage's z.
     pub fn motor_rates(&self, b: &Builder, k: usize) -> (Expr, Expr) {
         match self.coupled[k] {
-            Some([speed, reference, _]) => (speed, reference),
-            None => (own_rate(b, &self.speeds, k), own_rate(b, &self.reference, k)),
+            Some([velocity, reference, _]) => (velocity, reference),
+            None => (own_rate(b, &self.velocities, k), own_rate(b, &self.reference, k)),
         }
     }
 
@@ -77,15 +77,16 @@ pub fn motions(b: &Builder, chain: &Chain, drive: &Drive) -> Vec<StageMotion> {
         let before = spin.turned_x(b, stage.twist);
         let (sin, cos) = stage.twist;
         acceleration = crate::lagrangian::elements::turn_x(b, &sin, &cos, &acceleration);
-        let speeds = stage.coordinates(b, &drive.speeds);
+        let velocities = stage.coordinates(b, &drive.velocities);
         let reference = stage.coordinates(b, &drive.reference);
         let accelerations = stage.coordinates(b, &drive.accelerations);
         let of_motor = |member: &Member| {
             let rate = |rates: &[Expr]| member.coupled_rate(b, rates);
-            Some([rate(&drive.speeds)?, rate(&drive.reference)?, rate(&drive.accelerations)?])
+            Some([rate(&drive.velocities)?, rate(&drive.reference)?, rate(&drive.accelerations)?])
         };
         let coupled = stage.members.iter().map(of_motor).collect();
-        let mut motion = StageMotion { before, speeds, reference, accelerations, links: Vec::new(), coupled };
+        let mut motion =
+            StageMotion { before, velocities, reference, accelerations, links: Vec::new(), coupled };
         motion.links = match stage.kind {
             JointKind::Revolute => revolute(b, stage, &motion, acceleration, chain.form.link_to_link),
             JointKind::Prismatic => vec![prismatic(b, stage, &motion, acceleration)],
@@ -107,8 +108,8 @@ fn revolute(
 ) -> Vec<LinkMotion> {
     let mut links: Vec<LinkMotion> = Vec::with_capacity(stage.members.len());
     for (k, member) in stage.members.iter().enumerate() {
-        let (speed, reference) = (motion.speeds[k], motion.reference[k]);
-        let spin = motion.before.joined(b, member.angle, speed, reference, motion.accelerations[k]);
+        let (velocity, reference) = (motion.velocities[k], motion.reference[k]);
+        let spin = motion.before.joined(b, member.angle, velocity, reference, motion.accelerations[k]);
         let turn = |(sin, cos): (Expr, Expr), v: &Vector| turn_z(b, &sin, &cos, v);
         let acceleration = match links.last() {
             Some(inner) if link_to_link => turn(member.step, &inner.next),
@@ -132,8 +133,8 @@ fn prismatic(b: &Builder, stage: &Stage, motion: &StageMotion, before: Vector) -
         rows: super::spin::turned_tensor(&motion.before.rows, turn),
     };
     let carried = scaled(b, stage.shift, &motion.before.column(2));
-    // Coriolis acceleration 2 ω×(q̇ z), symmetric in speeds and reference speeds.
-    let turned = axis_rate_sum(b, &motion.before, motion.speeds[0], motion.reference[0]);
+    // Coriolis acceleration 2 ω×(q̇ z), symmetric in velocities and reference velocities.
+    let turned = axis_rate_sum(b, &motion.before, motion.velocities[0], motion.reference[0]);
     let own = [turned[0], turned[1], motion.accelerations[0]];
     let acceleration = turn(&plus(b, &before, &plus(b, &carried, &own)));
     let next = plus(b, &acceleration, &spin.times(b, &member.reach));
@@ -141,23 +142,23 @@ fn prismatic(b: &Builder, stage: &Stage, motion: &StageMotion, before: Vector) -
 }
 
 /// q̇ᵣ ω×z + q̇ ωᵣ×z
-fn axis_rate_sum(b: &Builder, before: &Spin, speed: Expr, reference: Expr) -> Vector {
+fn axis_rate_sum(b: &Builder, before: &Spin, velocity: Expr, reference: Expr) -> Vector {
     let across = |i: usize| {
-        if before.omega == before.reference && speed == reference {
-            return b.mul(&b.add(&speed, &speed), &before.omega[i]);
+        if before.omega == before.reference && velocity == reference {
+            return b.mul(&b.add(&velocity, &velocity), &before.omega[i]);
         }
-        b.add(&b.mul(&reference, &before.omega[i]), &b.mul(&speed, &before.reference[i]))
+        b.add(&b.mul(&reference, &before.omega[i]), &b.mul(&velocity, &before.reference[i]))
     };
     [across(1), -across(0), Expr::ZERO]
 }
 
-/// q̇·ω×z for a joint axis z, symmetric in speeds and reference speeds.
-pub fn axis_rate(b: &Builder, before: &Spin, speed: Expr, reference: Expr) -> Vector {
-    if before.omega == before.reference && speed == reference {
-        return [b.mul(&speed, &before.omega[1]), -b.mul(&speed, &before.omega[0]), Expr::ZERO];
+/// q̇·ω×z for a joint axis z, symmetric in velocities and reference velocities.
+pub fn axis_rate(b: &Builder, before: &Spin, velocity: Expr, reference: Expr) -> Vector {
+    if before.omega == before.reference && velocity == reference {
+        return [b.mul(&velocity, &before.omega[1]), -b.mul(&velocity, &before.omega[0]), Expr::ZERO];
     }
     let half = b.constant(&crate::exact::rational::Rational::new(1.into(), 2.into()));
-    axis_rate_sum(b, before, speed, reference).map(|x| b.mul(&half, &x))
+    axis_rate_sum(b, before, velocity, reference).map(|x| b.mul(&half, &x))
 }
 
 /// A joint's own rate from the rates of its stage's coordinates.

@@ -1,5 +1,5 @@
 //! Kinematics of the tool, or of the last link where no tool is declared: pose, Jacobian, and the
-//! acceleration that speeds alone make.
+//! acceleration that velocities alone make.
 
 use super::body::Vector;
 use super::chain::LinkGeometry;
@@ -130,7 +130,7 @@ pub fn jacobian(b: &Builder, arm: &ArmElements<Expr>, ends: &Ends) -> Vec<Expr> 
 }
 
 /// J̇·q̇: acceleration of the tool's origin above its angular acceleration where q̈ = 0, in base axes.
-pub fn jacobian_rate_times_speed(
+pub fn jacobian_rate_times_velocity(
     b: &Builder,
     arm: &ArmElements<Expr>,
     chain: &Chain,

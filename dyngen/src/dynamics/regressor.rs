@@ -13,7 +13,7 @@ use crate::exact::constant::ConstantField;
 use crate::graph::{Builder, Expr};
 use crate::parameters::ParameterSet;
 
-/// What a unit of a coordinate's speed gives a frame.
+/// What a unit of a coordinate's velocity gives a frame.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     /// Angular velocity.
@@ -28,7 +28,7 @@ struct LinkView {
     motion: LinkMotion,
     /// The coordinates up to the link's own, in its axes.
     axes: Vec<Axis>,
-    /// The way of a force back to the link whose end is this link's origin, and the speeds of that end there.
+    /// The way of a force back to the link whose end is this link's origin, and the velocities of that end there.
     home: Option<(Vec<Turn>, Vec<Vector>)>,
 }
 
@@ -57,11 +57,11 @@ pub struct Columns<'a> {
     pub field: &'a ConstantField,
     /// Where the file's frames lie in the chain's.
     pub links: &'a [LinkGeometry<Expr>],
-    /// Whether forces are turned back to where their origin is at rest, not the axes' speeds outwards.
+    /// Whether forces are turned back to where their origin is at rest, not the axes' velocities outwards.
     pub forces_home: bool,
 }
 
-/// Y(q, q̇, q̈), row-major n × p: τ = Y·π for the parameters of a set; with reference speeds the regressor of
+/// Y(q, q̇, q̈), row-major n × p: τ = Y·π for the parameters of a set; with reference velocities the regressor of
 /// Slotine and Li, Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g.
 pub fn regressor(b: &Builder, chain: &Chain, columns: &Columns<'_>, drive: &Drive) -> Vec<Expr> {
     let (n, p) = (chain.dof(), columns.set.parameters.len());
@@ -175,13 +175,13 @@ fn body_column(
     let forced = |axis: usize| -> Expr {
         let Axis { angular, linear } = view.axes[axis];
         match &view.home {
-            Some((turns, speeds)) if columns.forces_home && !at_file && axis < speeds.len() => {
+            Some((turns, velocities)) if columns.forces_home && !at_file && axis < velocities.len() => {
                 let home = turns.iter().rev().fold(wrench.force, |f, turn| turn.back(b, &f));
-                b.dot(&speeds[axis], &home)
+                b.dot(&velocities[axis], &home)
             }
             _ if at_file => {
-                let speed = plus(b, &linear, &b.cross(&angular, &origin));
-                b.dot(&speed, &wrench.force)
+                let velocity = plus(b, &linear, &b.cross(&angular, &origin));
+                b.dot(&velocity, &wrench.force)
             }
             _ => b.dot(&linear, &wrench.force),
         }
@@ -319,8 +319,8 @@ fn rotor_column(
     let (stage, motion) = (&chain.stages[s], &motions[s]);
     let Some(ratio) = stage.members[k].ratio else { return coordinates };
     let ddq = motion.motor_acceleration(b, k);
-    let (speed, reference) = motion.motor_rates(b, k);
-    let mut moment = scaled(b, ratio, &axis_rate(b, &motion.before, speed, reference));
+    let (velocity, reference) = motion.motor_rates(b, k);
+    let mut moment = scaled(b, ratio, &axis_rate(b, &motion.before, velocity, reference));
     moment[2] = b.mul(&ratio, &ddq);
     for (j, axis) in before[s].iter().enumerate() {
         coordinates[j] = b.dot(&axis.angular, &moment);

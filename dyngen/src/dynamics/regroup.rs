@@ -134,7 +134,7 @@ impl Source<Constant> for Constants<'_> {
     fn position(&mut self, _: usize) -> Constant {
         self.field.integer(0)
     }
-    fn speed(&mut self, _: usize) -> Constant {
+    fn velocity(&mut self, _: usize) -> Constant {
         self.field.integer(0)
     }
     fn a(&mut self, joint: usize) -> Constant {

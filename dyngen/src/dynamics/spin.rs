@@ -7,13 +7,13 @@ use crate::lagrangian::elements::{turn_x, turn_z};
 
 /// The motion of a frame in its own axes.
 ///
-/// Accelerations are those of Christoffel symbols: J·q̈ᵣ + J̇(q, q̇)·q̇ᵣ, symmetric in the speeds q̇ and
-/// reference speeds q̇ᵣ; where those are the same they are the accelerations of the motion itself.
+/// Accelerations are those of Christoffel symbols: J·q̈ᵣ + J̇(q, q̇)·q̇ᵣ, symmetric in the velocities q̇ and
+/// reference velocities q̇ᵣ; where those are the same they are the accelerations of the motion itself.
 #[derive(Clone, Copy, Debug)]
 pub struct Spin {
-    /// Angular velocity at the speeds.
+    /// Angular velocity at the velocities.
     pub omega: Vector,
-    /// Angular velocity at the reference speeds.
+    /// Angular velocity at the reference velocities.
     pub reference: Vector,
     /// `U = [ω̇×] + [ω×][ω×]` by rows: the acceleration of a point at r, relative to the origin, is U·r.
     pub rows: [Vector; 3],
@@ -84,8 +84,8 @@ impl Spin {
         }
     }
 
-    /// The motion of a frame that turns about this one's z by an angle with the given sine and cosine, speed,
-    /// reference speed and acceleration.
+    /// The motion of a frame that turns about this one's z by an angle with the given sine and cosine, velocity,
+    /// reference velocity and acceleration.
     ///
     /// Points of the axis move alike in both frames, so U's column along z is the same vector. What else U
     /// holds follows from it, from ω, and from the angular acceleration about z.
@@ -93,14 +93,14 @@ impl Spin {
         &self,
         b: &Builder,
         trig: (Expr, Expr),
-        speed: Expr,
+        velocity: Expr,
         reference: Expr,
         acceleration: Expr,
     ) -> Spin {
         let (sin, cos) = trig;
         let mut omega = turn_z(b, &sin, &cos, &self.omega);
         let mut omega_r = turn_z(b, &sin, &cos, &self.reference);
-        omega[2] = b.add(&omega[2], &speed);
+        omega[2] = b.add(&omega[2], &velocity);
         omega_r[2] = b.add(&omega_r[2], &reference);
         let [xz, yz, zz] = turn_z(b, &sin, &cos, &self.column(2));
         let mut to = Spin { omega, reference: omega_r, rows: self.rows };

@@ -23,7 +23,7 @@ pub struct Form {
     pub link_to_link: bool,
     /// The last link keeps the axes of the frame before it, and its moments are turned instead.
     pub last_in_frame_before: bool,
-    /// The regressor's forces are turned back to where their origin is at rest, not the axes' speeds
+    /// The regressor's forces are turned back to where their origin is at rest, not the axes' velocities
     /// outwards.
     pub forces_home: bool,
 }

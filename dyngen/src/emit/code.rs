@@ -72,9 +72,9 @@ pub(super) fn is_number(built: &FunctionGraph) -> bool {
 fn input_of(argument: Argument, i: usize) -> Input {
     match argument {
         Argument::Positions => Input::Position(i),
-        Argument::Speeds => Input::Speed(i),
+        Argument::Velocities => Input::Velocity(i),
         Argument::Accelerations => Input::Acceleration(i),
-        Argument::ReferenceSpeeds => Input::ReferenceSpeed(i),
+        Argument::ReferenceVelocities => Input::ReferenceVelocity(i),
         Argument::ReferenceAccelerations => Input::ReferenceAcceleration(i),
         Argument::Torques => Input::Torque(i),
         Argument::Errors => Input::Error(i),

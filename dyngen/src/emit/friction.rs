@@ -1,4 +1,4 @@
-//! Columns for friction beside the regressor: each joint's own terms, functions of its speed alone.
+//! Columns for friction beside the regressor: each joint's own terms, functions of its velocity alone.
 
 use super::docs;
 use proc_macro2::{Literal, TokenStream};
@@ -6,7 +6,7 @@ use quote::quote;
 use std::fmt;
 use std::str::FromStr;
 
-/// One friction term of every joint: its column, a function of the joint's speed v.
+/// One friction term of every joint: its column, a function of the joint's velocity v.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FrictionTerm {
     /// v
@@ -76,15 +76,15 @@ pub(super) fn items(terms: &[FrictionTerm], n: usize) -> TokenStream {
     let list: String = terms.iter().enumerate().map(|(k, term)| format!("\n{}. `{term}`", k + 1)).collect();
     let shapes = |what: &str| format!("{what}, one for each column:\n{list}");
     let columns_doc = docs::lines(&format!(
-        "{}\n\n* `dq`: joint speeds, rad/s\n\nReturns n × terms: row i holds joint i's columns, so joint i's \
+        "{}\n\n* `dq`: joint velocities, rad/s\n\nReturns n × terms: row i holds joint i's columns, so joint i's \
             friction is \
          this row times its coefficients.\nIn a regression they stand beside the regressor, each in its own \
          joint's rows.",
         shapes("Friction columns of every joint")
     ));
-    let speeds: Vec<_> = (0..n).map(|i| quote::format_ident!("dq{}", i + 1)).collect();
+    let velocities: Vec<_> = (0..n).map(|i| quote::format_ident!("dq{}", i + 1)).collect();
     let column = |term: &FrictionTerm| -> TokenStream {
-        let entries = speeds.iter().enumerate().map(|(i, v)| match term {
+        let entries = velocities.iter().enumerate().map(|(i, v)| match term {
             FrictionTerm::Viscous => quote!(#v),
             FrictionTerm::Coulomb => quote!(sign(#v)),
             FrictionTerm::Tanh(shapes) => {
@@ -116,14 +116,14 @@ pub(super) fn items(terms: &[FrictionTerm], n: usize) -> TokenStream {
         pub fn friction_columns<T: SimdRealField + Copy>(
             dq: &SVector<T, JOINTS>,
         ) -> SMatrix<T, JOINTS, FRICTION_TERMS> {
-            let [[#(#speeds),*]] = dq.data.0;
+            let [[#(#velocities),*]] = dq.data.0;
             SMatrix::from_array_storage(ArrayStorage([#(#columns),*]))
         }
 
         /// Friction torques of all joints: each row of [`friction_columns`] times the same row of
         /// coefficients.
         ///
-        /// * `dq`: joint speeds, rad/s
+        /// * `dq`: joint velocities, rad/s
         /// * `coefficients`: n × terms, N·m (N·m·s/rad where viscous)
         ///
         /// Returns the torques, N·m, that the drives spend on friction.

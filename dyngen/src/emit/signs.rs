@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn neighbours_differ_where_a_difference_allows_it() {
         let b = Builder::new();
-        let [x, y, z, w] = [0, 1, 2, 3].map(|i| b.input(Input::Speed(i)));
+        let [x, y, z, w] = [0, 1, 2, 3].map(|i| b.input(Input::Velocity(i)));
         let difference = b.sub(&x, &y);
         let outputs = [
             b.sub(&z, &w),

@@ -78,8 +78,8 @@ pub(super) fn module(model: &Model, options: &Options) -> Result<TokenStream, Er
                 let step = 1e-5;
                 for [q, dq, ddq] in states() {
                     let energy = |t: f64| {
-                        let (place, speed) = (q + dq * t + ddq * (0.5 * t * t), dq + ddq * t);
-                        kinetic_energy(&place, &speed #p) + potential_energy(&place #p)
+                        let (place, velocity) = (q + dq * t + ddq * (0.5 * t * t), dq + ddq * t);
+                        kinetic_energy(&place, &velocity #p) + potential_energy(&place #p)
                     };
                     let rate = SVector::<f64, 1>::new((energy(step) - energy(-step)) / (2.0 * step));
                     let power = SVector::<f64, 1>::new(dq.dot(&inverse_dynamics(&q, &dq, &ddq #p)));
@@ -132,7 +132,7 @@ pub(super) fn module(model: &Model, options: &Options) -> Result<TokenStream, Er
 
             #parameters
 
-            /// Positions, speeds, and accelerations or torques.
+            /// Positions, velocities, and accelerations or torques.
             fn states() -> impl Iterator<Item = [SVector<f64, JOINTS>; 3]> {
                 (0..5_u8).map(|k| {
                     [0.3, 1.7, 2.9].map(|phase| {

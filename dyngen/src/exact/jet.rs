@@ -28,8 +28,8 @@ impl Jet {
         Jet { value, rate: derivative * dq, joints }
     }
 
-    /// The joint speed q̇ᵢ itself, where q̈ᵢ = `ddq`.
-    pub fn speed(dof: usize, joint: usize, dq: Fp, ddq: Fp) -> Jet {
+    /// The joint velocity q̇ᵢ itself, where q̈ᵢ = `ddq`.
+    pub fn velocity(dof: usize, joint: usize, dq: Fp, ddq: Fp) -> Jet {
         let mut joints = vec![[Fp::ZERO; 3]; dof];
         joints[joint][0] = Fp::ONE;
         Jet { value: dq, rate: ddq, joints }
@@ -46,7 +46,7 @@ impl Jet {
     }
 
     /// ∂/∂q̇ᵢ of this function.
-    pub fn by_speed(&self, joint: usize) -> Fp {
+    pub fn by_velocity(&self, joint: usize) -> Fp {
         self.joints.get(joint).map_or(Fp::ZERO, |j| j[0])
     }
 
@@ -112,8 +112,8 @@ mod tests {
         let (s, c) = Fp::from_integer(5).circle_point();
         let (dq, ddq) = (Fp::from_integer(3), Fp::from_integer(-11));
         let cos = Jet::of_position(1, 0, c, -s, dq);
-        let speed = Jet::speed(1, 0, dq, ddq);
-        let twice = Jets.add(&Jets.mul(&speed, &speed), &Jets.mul(&Jets.integer(14), &cos));
+        let velocity = Jet::velocity(1, 0, dq, ddq);
+        let twice = Jets.add(&Jets.mul(&velocity, &velocity), &Jets.mul(&Jets.integer(14), &cos));
         assert_eq!(twice.euler_lagrange(0), Fp::from_integer(2) * ddq + Fp::from_integer(14) * s);
     }
 }

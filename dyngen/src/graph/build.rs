@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn equal_expressions_are_one_node_whatever_their_sign_and_order() {
         let b = Builder::new();
-        let (x, y) = (b.input(Input::Speed(0)), b.input(Input::Speed(1)));
+        let (x, y) = (b.input(Input::Velocity(0)), b.input(Input::Velocity(1)));
         let sum = b.add(&x, &y);
         assert_eq!(b.add(&y, &x), sum);
         assert_eq!(b.add(&-x, &-y), -sum);

@@ -10,7 +10,7 @@ pub enum Direction {
     /// q of a joint: its sine, cosine or position.
     Position(usize),
     /// q̇ of a joint.
-    Speed(usize),
+    Velocity(usize),
 }
 
 /// The derivative of each output in one direction.
@@ -35,7 +35,7 @@ fn rate(b: &Builder, graph: &Graph, rates: &HashMap<usize, Expr>, node: usize, d
         Node::Input(input) => match (input, direction) {
             (Input::Sin(sum), Direction::Position(j)) => times_sign(b.input(Input::Cos(sum)), sum.sign(j)),
             (Input::Cos(sum), Direction::Position(j)) => times_sign(-b.input(Input::Sin(sum)), sum.sign(j)),
-            (Input::Position(i), Direction::Position(j)) | (Input::Speed(i), Direction::Speed(j))
+            (Input::Position(i), Direction::Position(j)) | (Input::Velocity(i), Direction::Velocity(j))
                 if i == j =>
             {
                 Expr::ONE

@@ -66,13 +66,13 @@ pub enum Input {
     /// q of a prismatic joint.
     Position(usize),
     /// q̇
-    Speed(usize),
+    Velocity(usize),
     /// q̈
     Acceleration(usize),
     /// Joint torque or force, for forward dynamics.
     Torque(usize),
-    /// Reference speed q̇ᵣ of Slotine and Li.
-    ReferenceSpeed(usize),
+    /// Reference velocity q̇ᵣ of Slotine and Li.
+    ReferenceVelocity(usize),
     /// Reference acceleration q̈ᵣ.
     ReferenceAcceleration(usize),
     /// A vector of one number a joint that the regressor's transpose is multiplied with.
@@ -90,10 +90,10 @@ impl fmt::Display for Input {
             Input::Sin(sum) => return write!(f, "s{sum}"),
             Input::Cos(sum) => return write!(f, "c{sum}"),
             Input::Position(i) => ("q", i),
-            Input::Speed(i) => ("dq", i),
+            Input::Velocity(i) => ("dq", i),
             Input::Acceleration(i) => ("ddq", i),
             Input::Torque(i) => ("tau", i),
-            Input::ReferenceSpeed(i) => ("dqr", i),
+            Input::ReferenceVelocity(i) => ("dqr", i),
             Input::ReferenceAcceleration(i) => ("ddqr", i),
             Input::Error(i) => ("e", i),
             Input::Parameter(i) => ("p", i),

@@ -73,7 +73,7 @@ mod tests {
     fn what_two_functions_need_of_the_parameters_is_prepared_once() {
         let b = Builder::new();
         let [p, r] = [0, 1].map(|i| b.input(Input::Parameter(i)));
-        let [x, y] = [0, 1].map(|i| b.input(Input::Speed(i)));
+        let [x, y] = [0, 1].map(|i| b.input(Input::Velocity(i)));
         let sum = b.add(&p, &b.mul(&b.integer(2), &r));
         let one = b.mul(&sum, &x);
         let other = b.add(&b.mul(&-sum, &y), &b.mul(&p, &x));

@@ -36,10 +36,10 @@ pub struct JointElements<V> {
     pub cos: V,
     /// Shift along z: d, or d + q of a prismatic joint.
     pub shift: V,
-    /// Joint speed q̇.
-    pub speed: V,
-    /// Speed of the joint's motor on the joint's side of its gear: q̇ unless a transmission couples it.
-    pub motor_speed: V,
+    /// Joint velocity q̇.
+    pub velocity: V,
+    /// Velocity of the joint's motor on the joint's side of its gear: q̇ unless a transmission couples it.
+    pub motor_velocity: V,
     /// Link length a.
     pub a: V,
     /// Offset b beside it, along y.
@@ -124,7 +124,7 @@ pub trait Source<V> {
     /// q of a prismatic joint.
     fn position(&mut self, joint: usize) -> V;
     /// q̇.
-    fn speed(&mut self, joint: usize) -> V;
+    fn velocity(&mut self, joint: usize) -> V;
     /// Link length; asked for only where it is not zero.
     fn a(&mut self, joint: usize) -> V;
     /// Offset along y beside it; asked for only where it is not zero.
@@ -165,14 +165,14 @@ impl<V: Clone> ArmElements<V> {
                 }
             };
             let (sin_alpha, cos_alpha) = symbols.sin_cos(&joint.alpha);
-            let speed = source.speed(i);
+            let velocity = source.velocity(i);
             joints.push(JointElements {
                 kind: joint.kind,
                 sin,
                 cos,
                 shift,
-                speed: speed.clone(),
-                motor_speed: speed,
+                velocity: velocity.clone(),
+                motor_velocity: velocity,
                 a: if joint.a.is_zero() { algebra.integer(0) } else { source.a(i) },
                 b: if joint.b.is_zero() { algebra.integer(0) } else { source.b(i) },
                 sin_alpha: constant(algebra, sin_alpha, &mut |m, s| source.symbol(m, s)),
@@ -183,10 +183,10 @@ impl<V: Clone> ArmElements<V> {
         for motor in 0..joints.len() {
             if let Some(row) = arm.coupled_motor(motor) {
                 let term = |(joint, factor): &(usize, Rational)| {
-                    algebra.mul(&source.coupling(factor), &joints[*joint].speed)
+                    algebra.mul(&source.coupling(factor), &joints[*joint].velocity)
                 };
                 let terms: Vec<V> = row.iter().map(term).collect();
-                joints[motor].motor_speed =
+                joints[motor].motor_velocity =
                     terms.iter().fold(algebra.integer(0), |sum, term| algebra.add(&sum, term));
             }
         }

@@ -105,14 +105,14 @@ fn advance<A: Algebra>(alg: &A, joint: &JointElements<A::Value>, state: &mut Mot
         JointKind::Revolute => &mut state.omega[2],
         JointKind::Prismatic => &mut state.velocity[2],
     };
-    *moved = alg.add(moved, &joint.speed);
+    *moved = alg.add(moved, &joint.velocity);
 }
 
-/// 2·(k q̇ (z·ω) + ½ k² q̇²), the rotor's terms of Eq. 5, with the motor's speed for q̇; zero without a
+/// 2·(k q̇ (z·ω) + ½ k² q̇²), the rotor's terms of Eq. 5, with the motor's velocity for q̇; zero without a
 /// rotor.
 fn rotor_column<A: Algebra>(alg: &A, joint: &JointElements<A::Value>, omega_z: &A::Value) -> A::Value {
     let Some(ratio) = &joint.ratio else { return alg.integer(0) };
-    let spin = alg.mul(ratio, &joint.motor_speed);
+    let spin = alg.mul(ratio, &joint.motor_velocity);
     let coupling = alg.mul(&alg.integer(2), omega_z);
     alg.mul(&spin, &alg.add(&coupling, &spin))
 }

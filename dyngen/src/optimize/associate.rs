@@ -159,7 +159,7 @@ mod tests {
     fn sums_and_products_share_their_parts() {
         let field = ConstantField::new(&AngleSymbols::default(), &mut Draws::new(1));
         let b = Builder::new();
-        let [x, y, z, w] = [0, 1, 2, 3].map(|i| b.input(Input::Speed(i)));
+        let [x, y, z, w] = [0, 1, 2, 3].map(|i| b.input(Input::Velocity(i)));
         let [p, r] = [0, 1].map(|i| b.input(Input::Parameter(i)));
         // x − z is in both sums; p·r is prepared.
         let outputs = [

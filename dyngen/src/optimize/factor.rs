@@ -108,7 +108,7 @@ mod tests {
     fn a_common_factor_is_multiplied_once() {
         let field = ConstantField::new(&AngleSymbols::default(), &mut Draws::new(1));
         let b = Builder::new();
-        let [x, y, z, w] = [0, 1, 2, 3].map(|i| b.input(Input::Speed(i)));
+        let [x, y, z, w] = [0, 1, 2, 3].map(|i| b.input(Input::Velocity(i)));
         let [p, r] = [0, 1].map(|i| b.input(Input::Parameter(i)));
         let product = |e: &[Expr]| e.iter().fold(Expr::ONE, |all, x| b.mul(&all, x));
         let shared = b.mul(&y, &y);

@@ -117,7 +117,7 @@ mod tests {
         let b = Builder::new();
         let sum = JointSum::joint(0);
         let (s, c) = (b.input(Input::Sin(sum)), b.input(Input::Cos(sum)));
-        let (x, y) = (b.input(Input::Speed(0)), b.input(Input::Speed(1)));
+        let (x, y) = (b.input(Input::Velocity(0)), b.input(Input::Velocity(1)));
         let square = |e: Expr| b.mul(&e, &e);
         let one = b.add(&square(s), &square(c));
         let factored = b.mul(&b.add(&x, &y), &b.sub(&x, &y));

@@ -90,7 +90,7 @@ pub fn prove(
 fn expected(point: &Point<'_>, set: &ParameterSet, function: Function) -> Vec<Fp> {
     let n = point.dof();
     let zeros = vec![Fp::ZERO; n];
-    let motion = |gravity| point.state(&point.speeds, &point.accelerations, gravity);
+    let motion = |gravity| point.state(&point.velocities, &point.accelerations, gravity);
     let of_set = |columns: &[Vec<Fp>]| point.of_set(set, columns);
     match function {
         Function::InverseDynamics => motion(true).torques(),
@@ -104,8 +104,10 @@ fn expected(point: &Point<'_>, set: &ParameterSet, function: Function) -> Vec<Fp
         Function::MassMatrix => mass_matrix(point),
         Function::MassMatrixInverse => inverse(mass_matrix(point), n),
         Function::CoriolisMatrix => coriolis_matrix(point),
-        Function::CoriolisTimesSpeed => point.state(&point.speeds, &zeros, false).torques(),
-        Function::CoriolisTransposeTimesSpeed => transpose_times(&coriolis_matrix(point), &point.speeds),
+        Function::CoriolisTimesVelocity => point.state(&point.velocities, &zeros, false).torques(),
+        Function::CoriolisTransposeTimesVelocity => {
+            transpose_times(&coriolis_matrix(point), &point.velocities)
+        }
         Function::Gravity => point.state(&zeros, &zeros, true).torques(),
         Function::ForwardDynamics => point.accelerations.clone(),
         Function::ForwardKinematics => PoseSeries::along(point, &zeros).pose(),
@@ -114,14 +116,14 @@ fn expected(point: &Point<'_>, set: &ParameterSet, function: Function) -> Vec<Fp
                 (0..n).map(|j| PoseSeries::along(point, &unit(n, j)).velocity()).collect();
             transpose(&columns)
         }
-        Function::JacobianRateTimesSpeed => PoseSeries::along(point, &point.speeds).acceleration(),
+        Function::JacobianRateTimesVelocity => PoseSeries::along(point, &point.velocities).acceleration(),
         Function::KineticEnergy => point.weigh(&singles(motion(false).values())),
         Function::PotentialEnergy => point.weigh(&singles(potential(point))),
         Function::KineticEnergyRegressor => of_set(&singles(motion(false).values())),
         Function::PotentialEnergyRegressor => of_set(&singles(potential(point))),
         Function::Momentum => motion(false).momentum(),
         Function::TorqueByPosition => torque_derivatives(point, Direction::Position),
-        Function::TorqueBySpeed => torque_derivatives(point, Direction::Speed),
+        Function::TorqueByVelocity => torque_derivatives(point, Direction::Velocity),
     }
 }
 
@@ -136,7 +138,7 @@ fn singles(values: Vec<Fp>) -> Vec<Vec<Fp>> {
 }
 
 fn torque_derivatives(point: &Point<'_>, direction: fn(usize) -> Direction) -> Vec<Fp> {
-    let motion = point.state(&point.speeds, &point.accelerations, true);
+    let motion = point.state(&point.velocities, &point.accelerations, true);
     let columns: Vec<Vec<Fp>> = (0..point.dof()).map(|j| motion.torque_derivative(direction(j))).collect();
     transpose(&columns)
 }
@@ -163,7 +165,7 @@ fn polarised(point: &Point<'_>, u: &[Fp], v: &[Fp]) -> Vec<Vec<Fp>> {
 
 fn coriolis_matrix(point: &Point<'_>) -> Vec<Fp> {
     let n = point.dof();
-    let column = |j: usize| point.weigh(&polarised(point, &point.speeds, &unit(n, j)));
+    let column = |j: usize| point.weigh(&polarised(point, &point.velocities, &unit(n, j)));
     transpose(&(0..n).map(column).collect::<Vec<_>>())
 }
 
@@ -171,7 +173,7 @@ fn coriolis_matrix(point: &Point<'_>) -> Vec<Fp> {
 fn slotine_li_columns(point: &Point<'_>) -> Vec<Vec<Fp>> {
     let zeros = vec![Fp::ZERO; point.dof()];
     let still = point.state(&zeros, &point.reference_accelerations, true).columns();
-    let moving = polarised(point, &point.speeds, &point.reference_speeds);
+    let moving = polarised(point, &point.velocities, &point.reference_velocities);
     let sum = |(a, b): (Vec<Fp>, Vec<Fp>)| a.into_iter().zip(b).map(|(x, y)| x + y).collect();
     still.into_iter().zip(moving).map(sum).collect()
 }

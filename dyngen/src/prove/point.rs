@@ -18,9 +18,9 @@ pub(super) struct Point<'a> {
     pub(super) sets: &'a Sets,
     /// For a revolute joint sine and cosine of its trigonometric input, for a prismatic one q twice.
     pub(super) positions: Vec<(Fp, Fp)>,
-    pub(super) speeds: Vec<Fp>,
+    pub(super) velocities: Vec<Fp>,
     pub(super) accelerations: Vec<Fp>,
-    pub(super) reference_speeds: Vec<Fp>,
+    pub(super) reference_velocities: Vec<Fp>,
     pub(super) reference_accelerations: Vec<Fp>,
     pub(super) errors: Vec<Fp>,
     /// Values of the arm's kept parameters.
@@ -47,9 +47,9 @@ impl<'a> Point<'a> {
             symbols,
             sets,
             positions,
-            speeds: vector(),
+            velocities: vector(),
             accelerations: vector(),
-            reference_speeds: vector(),
+            reference_velocities: vector(),
             reference_accelerations: vector(),
             errors: vector(),
             values,
@@ -64,9 +64,9 @@ impl<'a> Point<'a> {
         };
         Point {
             positions: self.arm.joints.iter().map(zero).collect(),
-            speeds: self.speeds.clone(),
+            velocities: self.velocities.clone(),
             accelerations: self.accelerations.clone(),
-            reference_speeds: self.reference_speeds.clone(),
+            reference_velocities: self.reference_velocities.clone(),
             reference_accelerations: self.reference_accelerations.clone(),
             errors: self.errors.clone(),
             values: self.values.clone(),
@@ -138,16 +138,16 @@ impl<'a> Point<'a> {
         let sums: Vec<Fp> = set.parameters.iter().map(|p| self.sum(&p.terms)).collect();
         // Forward dynamics gets the torques of the point's motion and must give its accelerations back.
         let torques = match function.function.takes(Argument::Torques) {
-            true => self.state(&self.speeds, &self.accelerations, true).torques(),
+            true => self.state(&self.velocities, &self.accelerations, true).torques(),
             false => Vec::new(),
         };
         let input = |input: Input| match input {
             Input::Sin(sum) => sine_and_cosine(sum, &|i| self.positions[i]).0,
             Input::Cos(sum) => sine_and_cosine(sum, &|i| self.positions[i]).1,
             Input::Position(i) => self.positions[i].0,
-            Input::Speed(i) => self.speeds[i],
+            Input::Velocity(i) => self.velocities[i],
             Input::Acceleration(i) => self.accelerations[i],
-            Input::ReferenceSpeed(i) => self.reference_speeds[i],
+            Input::ReferenceVelocity(i) => self.reference_velocities[i],
             Input::ReferenceAcceleration(i) => self.reference_accelerations[i],
             Input::Error(i) => self.errors[i],
             Input::Torque(i) => torques[i],

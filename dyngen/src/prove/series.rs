@@ -59,14 +59,14 @@ fn fixed(point: &Point<'_>, placement: &Option<Placement>) -> Vec<Matrix> {
     vec![shift, yaw, pitch, roll]
 }
 
-/// The tool frame's transform along a motion of constant joint speeds.
+/// The tool frame's transform along a motion of constant joint velocities.
 pub(super) struct PoseSeries(Matrix);
 
 impl PoseSeries {
-    pub(super) fn along(point: &Point<'_>, speeds: &[Fp]) -> PoseSeries {
+    pub(super) fn along(point: &Point<'_>, velocities: &[Fp]) -> PoseSeries {
         let alg = SeriesAlgebra;
         let elements =
-            ArmElements::build(&alg, point.arm, point.symbols, &mut SeriesSource { point, speeds });
+            ArmElements::build(&alg, point.arm, point.symbols, &mut SeriesSource { point, velocities });
         let (zero, one) = (alg.integer(0), alg.integer(1));
         let same: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { one } else { zero }));
         let mut pose = fixed(point, &point.arm.base).iter().fold(same, times);
@@ -125,7 +125,7 @@ impl PoseSeries {
 
 struct SeriesSource<'p, 'a> {
     point: &'p Point<'a>,
-    speeds: &'p [Fp],
+    velocities: &'p [Fp],
 }
 
 fn number(value: &Rational) -> Series {
@@ -134,15 +134,15 @@ fn number(value: &Rational) -> Series {
 
 impl Source<Series> for SeriesSource<'_, '_> {
     fn joint_trig(&mut self, joint: usize) -> (Series, Series) {
-        let ((s, c), v) = (self.point.joint_trig(joint), self.speeds[joint]);
+        let ((s, c), v) = (self.point.joint_trig(joint), self.velocities[joint]);
         let half = v * v * Fp::from_integer(2).inverse().unwrap_or(Fp::ONE);
         ([s, c * v, -(s * half)], [c, -(s * v), -(c * half)])
     }
     fn position(&mut self, joint: usize) -> Series {
-        [self.point.positions[joint].0, self.speeds[joint], Fp::ZERO]
+        [self.point.positions[joint].0, self.velocities[joint], Fp::ZERO]
     }
-    fn speed(&mut self, joint: usize) -> Series {
-        [self.speeds[joint], Fp::ZERO, Fp::ZERO]
+    fn velocity(&mut self, joint: usize) -> Series {
+        [self.velocities[joint], Fp::ZERO, Fp::ZERO]
     }
     fn a(&mut self, joint: usize) -> Series {
         number(&self.point.arm.joints[joint].a)

@@ -15,7 +15,7 @@ use crate::lagrangian::twice_lagrangian;
 #[derive(Clone, Copy)]
 pub(super) struct State<'p, 'a> {
     pub(super) point: &'p Point<'a>,
-    pub(super) speeds: &'p [Fp],
+    pub(super) velocities: &'p [Fp],
     pub(super) accelerations: &'p [Fp],
     pub(super) gravity: bool,
 }
@@ -28,11 +28,11 @@ impl<'a> Point<'a> {
     /// A motion at this pose.
     pub(super) fn state<'p>(
         &'p self,
-        speeds: &'p [Fp],
+        velocities: &'p [Fp],
         accelerations: &'p [Fp],
         gravity: bool,
     ) -> State<'p, 'a> {
-        State { point: self, speeds, accelerations, gravity }
+        State { point: self, velocities, accelerations, gravity }
     }
 }
 
@@ -69,7 +69,7 @@ impl<'p, 'a> State<'p, 'a> {
         let columns: Vec<Vec<Fp>> = self
             .lagrangian()
             .iter()
-            .map(|jet| (0..self.dof()).map(|i| half() * jet.by_speed(i)).collect())
+            .map(|jet| (0..self.dof()).map(|i| half() * jet.by_velocity(i)).collect())
             .collect();
         self.point.weigh(&columns)
     }
@@ -99,7 +99,7 @@ impl JetSource<'_, '_> {
     }
 
     fn of_position(&self, joint: usize, value: Fp, derivative: Fp) -> Jet {
-        Jet::of_position(self.state.dof(), joint, value, derivative, self.state.speeds[joint])
+        Jet::of_position(self.state.dof(), joint, value, derivative, self.state.velocities[joint])
     }
 }
 
@@ -111,9 +111,9 @@ impl Source<Jet> for JetSource<'_, '_> {
     fn position(&mut self, joint: usize) -> Jet {
         self.of_position(joint, self.state.point.positions[joint].0, Fp::ONE)
     }
-    fn speed(&mut self, joint: usize) -> Jet {
-        let State { speeds, accelerations, .. } = self.state;
-        Jet::speed(self.state.dof(), joint, speeds[joint], accelerations[joint])
+    fn velocity(&mut self, joint: usize) -> Jet {
+        let State { velocities, accelerations, .. } = self.state;
+        Jet::velocity(self.state.dof(), joint, velocities[joint], accelerations[joint])
     }
     fn a(&mut self, joint: usize) -> Jet {
         self.number(&self.state.point.arm.joints[joint].a)
@@ -154,7 +154,7 @@ impl DualSource<'_, '_> {
         match self.direction {
             Direction::Position(j) if j == joint => self.inner.of_position(joint, first, second),
             // Its rate is first·q̇.
-            Direction::Speed(j) if j == joint => Jet::of_rate(first),
+            Direction::Velocity(j) if j == joint => Jet::of_rate(first),
             _ => Jets.integer(0),
         }
     }
@@ -173,9 +173,9 @@ impl Source<(Jet, Jet)> for DualSource<'_, '_> {
     fn position(&mut self, joint: usize) -> (Jet, Jet) {
         (self.inner.position(joint), self.derivative(joint, Fp::ONE, Fp::ZERO))
     }
-    fn speed(&mut self, joint: usize) -> (Jet, Jet) {
-        let own = self.direction == Direction::Speed(joint);
-        (self.inner.speed(joint), Jets.integer(i64::from(own)))
+    fn velocity(&mut self, joint: usize) -> (Jet, Jet) {
+        let own = self.direction == Direction::Velocity(joint);
+        (self.inner.velocity(joint), Jets.integer(i64::from(own)))
     }
     fn a(&mut self, joint: usize) -> (Jet, Jet) {
         Self::fixed(self.inner.a(joint))

@@ -4,17 +4,17 @@ use super::{Cause, CompareOptions, Comparison, Side, compare};
 use crate::controller::friction::TanhFriction;
 use crate::identification::chain::Chain;
 use crate::identification::estimate::{
-    FrictionLaw, Uncertainty, estimates, reduce_in_bands, solve_in_band, standard_errors,
+    FrictionKind, Uncertainty, estimates, reduce_in_bands, solve_in_band, standard_errors,
 };
 use crate::identification::excite::{Fourier, Harmonics};
-use crate::logs::regression::{DataOptions, RigidBody};
+use crate::logs::regression::{DataOptions, RigidArm};
 use crate::logs::summary::Bands;
 use crate::virtual_arm::{Body, Dynamics, Plant, lwa4p};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// A fit of three logs of 20 s.
-fn fitted(body: &RigidBody, links: Vec<Body>, friction: Vec<TanhFriction<f64>>, seed: u64) -> Side {
+fn fitted(body: &RigidArm, links: Vec<Body>, friction: Vec<TanhFriction<f64>>, seed: u64) -> Side {
     let chain = Chain::new(&lwa4p::arm().unwrap());
     let sensors = lwa4p::plant().unwrap().sensors().clone();
     let plant = Plant::new(Dynamics::new(chain, links).unwrap(), friction, sensors);
@@ -28,7 +28,7 @@ fn fitted(body: &RigidBody, links: Vec<Body>, friction: Vec<TanhFriction<f64>>, 
         let recording = plant.record(&path.sample(plant.sensors().rate), 0.0, 1000 * seed + log);
         bands.merge(&reduce_in_bands(body, &recording.log("virtual"), &options).unwrap().0).unwrap();
     }
-    let solution = solve_in_band(&bands, FrictionLaw::Symmetric).solution;
+    let solution = solve_in_band(&bands, FrictionKind::Symmetric).solution;
     let errors = standard_errors(&solution);
     let found = estimates(body.names(), &solution, &errors);
     let uncertainty = Some(Uncertainty::of(body.names(), &solution, &errors));
@@ -54,7 +54,7 @@ fn compared(a: &Side, b: &Side) -> Comparison {
 
 #[test]
 fn equal_arms_are_equal_and_five_per_cent_of_viscous_friction_is_seen() {
-    let body = RigidBody::new(&lwa4p::arm().unwrap()).unwrap();
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let a = fitted(&body, lwa4p::links(), table(), 1);
     for seed in 2..4 {
         let same = compared(&a, &fitted(&body, lwa4p::links(), table(), seed));
@@ -80,7 +80,7 @@ fn equal_arms_are_equal_and_five_per_cent_of_viscous_friction_is_seen() {
 
 #[test]
 fn a_payload_is_told_with_its_mass() {
-    let body = RigidBody::new(&lwa4p::arm().unwrap()).unwrap();
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let a = fitted(&body, lwa4p::links(), table(), 1);
     let mut links = lwa4p::links();
     let last = links.last_mut().unwrap();
@@ -97,7 +97,7 @@ fn a_payload_is_told_with_its_mass() {
 
 #[test]
 fn what_cannot_be_compared_is_told() {
-    let body = RigidBody::new(&lwa4p::arm().unwrap()).unwrap();
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let a = fitted(&body, lwa4p::links(), table(), 1);
     let mut other = a.clone();
     other.parameters.pop();

@@ -8,7 +8,7 @@ use crate::identification::conventions::{Conventions, conventions};
 use crate::identification::motion::Motion;
 use crate::identification::transmission::{JointTransmission, transmission};
 use crate::logs::log::{Log, common_clock};
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use dyngen::Arm;
 use std::path::Path;
 
@@ -38,7 +38,7 @@ pub fn explain(
 #[derive(Debug)]
 pub struct Prepared {
     /// The arm as it is known to be.
-    pub body: RigidBody,
+    pub body: RigidArm,
     /// Logs to fit, on the common clock.
     pub logs: Vec<Log>,
     /// The validation set, on the common clock.
@@ -65,7 +65,7 @@ impl Prepared {
         common_clock(&mut all);
         options.progress.say("deriving and proving the arm's dynamics");
         let changed = options.known.as_ref().map(|known| known.additions.arm_changes.of(arm)).transpose();
-        let body = RigidBody::new(changed.map_err(ExplainError::Changes)?.as_ref().unwrap_or(arm))
+        let body = RigidArm::new(changed.map_err(ExplainError::Changes)?.as_ref().unwrap_or(arm))
             .map_err(ExplainError::Arm)?;
         let checked = |known: TorqueModel| {
             known.in_set_of(&body).checked(body.names(), body.dof(), Path::new("the known model"))

@@ -3,7 +3,7 @@
 use super::estimate::BaseModel;
 use super::mounting::Mounting;
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, RigidBody};
+use crate::logs::regression::{Data, RigidArm};
 use dyngen::Arm;
 use std::fmt;
 
@@ -19,13 +19,13 @@ pub trait KnownModel: fmt::Debug + Sync {
     ///
     /// # Errors
     /// What the model lacks for this body, in words.
-    fn in_set_of(&self, body: &RigidBody) -> Result<Box<dyn KnownModel>, String>;
+    fn in_set_of(&self, body: &RigidArm) -> Result<Box<dyn KnownModel>, String>;
 
     /// Takes out of logs what goes beyond rigid arm and Eq. 16. `body` is the arm of [`KnownModel::arm`].
-    fn take_out(&self, body: &RigidBody, logs: &mut [Log]);
+    fn take_out(&self, body: &RigidArm, logs: &mut [Log]);
 
     /// Measured less predicted torque, by joint and row, N·m.
-    fn residual(&self, body: &RigidBody, data: &Data<'_>) -> Vec<Vec<f64>>;
+    fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Vec<Vec<f64>>;
 }
 
 /// What was identified goes beyond nothing: it can be judged on other logs as it is.
@@ -34,7 +34,7 @@ impl KnownModel for BaseModel {
         Ok(arm.clone())
     }
 
-    fn in_set_of(&self, body: &RigidBody) -> Result<Box<dyn KnownModel>, String> {
+    fn in_set_of(&self, body: &RigidArm) -> Result<Box<dyn KnownModel>, String> {
         let mut model = self.clone().in_set_of(body);
         let of_name = |name: &String| {
             let found = model.parameters.iter().find(|p| p.name == *name).cloned();
@@ -55,9 +55,9 @@ impl KnownModel for BaseModel {
         Ok(Box::new(model))
     }
 
-    fn take_out(&self, _: &RigidBody, _: &mut [Log]) {}
+    fn take_out(&self, _: &RigidArm, _: &mut [Log]) {}
 
-    fn residual(&self, body: &RigidBody, data: &Data<'_>) -> Vec<Vec<f64>> {
+    fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Vec<Vec<f64>> {
         BaseModel::residual(self, body, data)
     }
 }

@@ -142,7 +142,7 @@ mod tests {
         let bow = to([0.0, 1.7, 0.0, 0.0, 0.0, 0.0]);
         assert!(open.check(&LWA4P, &bow).is_ok());
         assert!(refused(&envelope(Some(-0.05), 0.0), &bow).contains("floor"));
-        // 1.1 rad/s at 60 N·m·s/rad, and the arm's weight: more than joint 2 has, in its limits of speed.
+        // 1.1 rad/s at 60 N·m·s/rad, and the arm's weight: more than joint 2 has, in its limits of velocity.
         let rise = way(&LWA4P, &[0.0, 1.7, 0.0, 0.0, 0.0, 0.0], &[0.0; 6], 0.9, 1.0);
         assert!(open.check(&LWA4P, &rise).is_ok());
         assert!(refused(&envelope(None, 60.0), &rise).contains("joint 2 takes"));

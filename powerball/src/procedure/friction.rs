@@ -1,7 +1,7 @@
-//! The friction experiment (§II.C): each joint alone at constant speeds where gravity does not load it, and
+//! The friction experiment (§II.C): each joint alone at constant velocities where gravity does not load it, and
 //! the law that fits.
 
-use super::constant_speed::{self, Bounds, Plan};
+use super::constant_velocity::{self, Bounds, Plan};
 use super::gravity_free::{self, GravityFree};
 use super::laws::{Point, Rated, choose};
 use super::{Columns, RecordError, Recorder, resume};
@@ -62,7 +62,7 @@ impl fmt::Display for FrictionError {
             FrictionError::Log(e) => e.fmt(f),
             FrictionError::TooLittle(path) => write!(
                 f,
-                "{}: fewer than five speeds can be told from this log: delete it and record the joint again",
+                "{}: fewer than five velocities can be told from this log: delete it and record the joint again",
                 path.display()
             ),
         }
@@ -100,8 +100,9 @@ pub fn plan(
     if place.leftover > gravity_free::FREE {
         return Ok(None);
     }
-    let speeds = constant_speed::speeds(velocity);
-    let plan = constant_speed::plan(joint, &place.pose, Bounds { position, acceleration }, &speeds, period);
+    let velocities = constant_velocity::velocities(velocity);
+    let plan =
+        constant_velocity::plan(joint, &place.pose, Bounds { position, acceleration }, &velocities, period);
     Ok(Some(Experiment { place, plan }))
 }
 
@@ -163,7 +164,7 @@ impl JointFriction {
             json!({"law": f.law.name(), "levels": f.levels, "shapes": f.shapes, "constant_torque": f.offset,
                 "held_out_rms": rated.held_out, "gamma": f.gamma()})
         };
-        let point = |p: &Point| json!({"speed": p.speed, "torque": p.torque, "error": p.error});
+        let point = |p: &Point| json!({"velocity": p.velocity, "torque": p.torque, "error": p.error});
         json!({
             "joint": self.joint + 1,
             "mounting": self.place.mounting.to_string(),

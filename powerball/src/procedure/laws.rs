@@ -1,23 +1,23 @@
-//! Friction laws fitted to the mean torques of constant speeds, and the choice between them.
+//! Friction laws fitted to the mean torques of constant velocities, and the choice between them.
 
 use crate::identification::estimate::bounded;
 use faer::Mat;
 
-/// The mean torque of one joint at one constant speed.
+/// The mean torque of one joint at one constant velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// Speed, rad/s, negative in the negative direction.
-    pub speed: f64,
-    /// Mean torque, N·m, positive in the direction of positive speed.
+    /// Velocity, rad/s, negative in the negative direction.
+    pub velocity: f64,
+    /// Mean torque, N·m, positive in the direction of positive velocity.
     pub torque: f64,
     /// Its standard error, N·m.
     pub error: f64,
 }
 
-/// A friction law: levels that are not negative times functions of the speed with shapes, and a constant
+/// A friction law: levels that are not negative times functions of the velocity with shapes, and a constant
 /// torque beside them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Law {
+pub enum FrictionLaw {
     /// Eq. 16: γ1·tanh(γ2·v) + γ3·tanh(γ4·v) + γ5·v.
     Tanh,
     /// Eq. 15: F_c·sign v + F_v·v.
@@ -37,40 +37,41 @@ const ROUNDS: usize = 9;
 /// taken.
 const ALIKE: f64 = 1.0;
 
-impl Law {
+impl FrictionLaw {
     /// All of them; of those that fit equally well the first is taken: Eq. 16, because it is smooth and what
     /// everything else here works with.
-    pub const ALL: [Law; 4] = [Law::Tanh, Law::CoulombViscous, Law::Stribeck, Law::StribeckPower];
+    pub const ALL: [FrictionLaw; 4] =
+        [FrictionLaw::Tanh, FrictionLaw::CoulombViscous, FrictionLaw::Stribeck, FrictionLaw::StribeckPower];
 
     /// Its name in results.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Law::Tanh => "tanh",
-            Law::CoulombViscous => "coulomb_viscous",
-            Law::Stribeck => "stribeck",
-            Law::StribeckPower => "stribeck_power",
+            FrictionLaw::Tanh => "tanh",
+            FrictionLaw::CoulombViscous => "coulomb_viscous",
+            FrictionLaw::Stribeck => "stribeck",
+            FrictionLaw::StribeckPower => "stribeck_power",
         }
     }
 
     /// Least and greatest value of each shape: s/rad for γ2 and γ4, rad/s for v_s, 1 for δ.
     fn ranges(self) -> &'static [(f64, f64)] {
         match self {
-            Law::Tanh => &[(20.0, 2000.0), (0.5, 2000.0)],
-            Law::CoulombViscous => &[],
-            Law::Stribeck => &[(1e-3, 0.5)],
-            Law::StribeckPower => &[(1e-3, 0.5), (0.3, 3.0)],
+            FrictionLaw::Tanh => &[(20.0, 2000.0), (0.5, 2000.0)],
+            FrictionLaw::CoulombViscous => &[],
+            FrictionLaw::Stribeck => &[(1e-3, 0.5)],
+            FrictionLaw::StribeckPower => &[(1e-3, 0.5), (0.3, 3.0)],
         }
     }
 
-    /// The functions whose levels are fitted, at a speed.
+    /// The functions whose levels are fitted, at a velocity.
     fn columns(self, shapes: &[f64], v: f64) -> [f64; 3] {
         let sign = if v == 0.0 { 0.0 } else { v.signum() };
         match self {
-            Law::Tanh => [(shapes[0] * v).tanh(), (shapes[1] * v).tanh(), v],
-            Law::CoulombViscous => [sign, 0.0, v],
-            Law::Stribeck => [sign, sign * (-(v / shapes[0]).powi(2)).exp(), v],
-            Law::StribeckPower => [sign, sign * (-(v / shapes[0]).abs().powf(shapes[1])).exp(), v],
+            FrictionLaw::Tanh => [(shapes[0] * v).tanh(), (shapes[1] * v).tanh(), v],
+            FrictionLaw::CoulombViscous => [sign, 0.0, v],
+            FrictionLaw::Stribeck => [sign, sign * (-(v / shapes[0]).powi(2)).exp(), v],
+            FrictionLaw::StribeckPower => [sign, sign * (-(v / shapes[0]).abs().powf(shapes[1])).exp(), v],
         }
     }
 
@@ -113,7 +114,7 @@ impl Law {
         let mut square = 0.0;
         for point in points {
             let w = point.error.max(f64::MIN_POSITIVE).powi(-2);
-            let [a, b, c] = self.columns(shapes, point.speed);
+            let [a, b, c] = self.columns(shapes, point.velocity);
             let row = [a, b, c, 1.0];
             for i in 0..4 {
                 for k in 0..4 {
@@ -151,7 +152,7 @@ fn grid(ranges: &[(f64, f64)], count: usize) -> Vec<Vec<f64>> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fitted {
     /// Which law.
-    pub law: Law,
+    pub law: FrictionLaw,
     /// Its shapes, in the order of its formula.
     pub shapes: Vec<f64>,
     /// Its levels: N·m, N·m, N·m·s/rad.
@@ -164,7 +165,7 @@ pub struct Fitted {
 }
 
 impl Fitted {
-    /// Friction torque, N·m, at a speed, rad/s; without the constant torque.
+    /// Friction torque, N·m, at a velocity, rad/s; without the constant torque.
     #[must_use]
     pub fn torque(&self, v: f64) -> f64 {
         self.law.columns(&self.shapes, v).iter().zip(self.levels).map(|(c, l)| c * l).sum()
@@ -175,7 +176,7 @@ impl Fitted {
     pub fn gamma(&self) -> Option<[f64; 5]> {
         let [g1, g3, g5] = self.levels;
         match (self.law, self.shapes.as_slice()) {
-            (Law::Tanh, [g2, g4]) => Some([g1, *g2, g3, *g4, g5]),
+            (FrictionLaw::Tanh, [g2, g4]) => Some([g1, *g2, g3, *g4, g5]),
             _ => None,
         }
     }
@@ -186,14 +187,14 @@ impl Fitted {
 pub struct Rated {
     /// The fit.
     pub fitted: Fitted,
-    /// Root of the mean squared error of speeds that were left out, both directions of a speed together, N·m.
+    /// Root of the mean squared error of velocities that were left out, both directions of a velocity together, N·m.
     pub held_out: f64,
-    /// The fits without each speed: their spread is the band of the curve.
+    /// The fits without each velocity: their spread is the band of the curve.
     folds: Vec<Fitted>,
 }
 
 impl Rated {
-    /// Standard error of the curve at a speed, N·m, by the jackknife over speeds.
+    /// Standard error of the curve at a velocity, N·m, by the jackknife over velocities.
     #[must_use]
     pub fn band(&self, v: f64) -> f64 {
         let n = self.folds.len() as f64;
@@ -206,40 +207,40 @@ impl Rated {
     }
 }
 
-/// Every law fitted and rated by leaving speeds out, and the index of the one that is chosen: the least
+/// Every law fitted and rated by leaving velocities out, and the index of the one that is chosen: the least
 /// held-out error, or the first one whose error is not told apart from it. `None` with fewer than five
-/// different speeds.
+/// different velocities.
 #[must_use]
 pub fn choose(points: &[Point]) -> Option<(Vec<Rated>, usize)> {
-    let mut speeds: Vec<f64> = points.iter().map(|p| p.speed.abs()).collect();
-    speeds.sort_by(f64::total_cmp);
-    speeds.dedup_by(|a, b| (*a - *b).abs() < 0.02 * b.abs());
-    if speeds.len() < 5 {
+    let mut velocities: Vec<f64> = points.iter().map(|p| p.velocity.abs()).collect();
+    velocities.sort_by(f64::total_cmp);
+    velocities.dedup_by(|a, b| (*a - *b).abs() < 0.02 * b.abs());
+    if velocities.len() < 5 {
         return None;
     }
-    let near = |p: &Point, speed: f64| (p.speed.abs() - speed).abs() < 0.02 * speed;
+    let near = |p: &Point, velocity: f64| (p.velocity.abs() - velocity).abs() < 0.02 * velocity;
     let mut rated = Vec::new();
     let mut squares: Vec<Vec<f64>> = Vec::new();
-    for law in Law::ALL {
-        let folds: Vec<Fitted> = crate::logs::parallel::map(&speeds, |speed| {
-            let rest: Vec<Point> = points.iter().filter(|p| !near(p, *speed)).copied().collect();
+    for law in FrictionLaw::ALL {
+        let folds: Vec<Fitted> = crate::logs::parallel::map(&velocities, |velocity| {
+            let rest: Vec<Point> = points.iter().filter(|p| !near(p, *velocity)).copied().collect();
             law.fit(&rest)
         });
-        let of_fold = |(speed, fold): (&f64, &Fitted)| -> f64 {
-            let left_out = points.iter().filter(|p| near(p, *speed));
+        let of_fold = |(velocity, fold): (&f64, &Fitted)| -> f64 {
+            let left_out = points.iter().filter(|p| near(p, *velocity));
             let errors: Vec<f64> =
-                left_out.map(|p| (p.torque - fold.offset - fold.torque(p.speed)).powi(2)).collect();
+                left_out.map(|p| (p.torque - fold.offset - fold.torque(p.velocity)).powi(2)).collect();
             errors.iter().sum::<f64>() / errors.len().max(1) as f64
         };
-        let errors: Vec<f64> = speeds.iter().zip(&folds).map(of_fold).collect();
+        let errors: Vec<f64> = velocities.iter().zip(&folds).map(of_fold).collect();
         let held_out = (errors.iter().sum::<f64>() / errors.len() as f64).sqrt();
         rated.push(Rated { fitted: law.fit(points), held_out, folds });
         squares.push(errors);
     }
     let best = (0..rated.len()).min_by(|a, b| rated[*a].held_out.total_cmp(&rated[*b].held_out))?;
-    // Paired over speeds: the mean difference against its standard error.
+    // Paired over velocities: the mean difference against its standard error.
     let alike = |k: &usize| {
-        let n = speeds.len() as f64;
+        let n = velocities.len() as f64;
         let differences: Vec<f64> = squares[*k].iter().zip(&squares[best]).map(|(a, b)| a - b).collect();
         let mean = differences.iter().sum::<f64>() / n;
         let spread = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
@@ -262,14 +263,14 @@ mod tests {
         let fast = (1..=7).map(|k| 0.2 + 0.35 * f64::from(k) / 7.0);
         slow.chain(fast)
             .flat_map(|v| [v, -v])
-            .map(|speed| {
+            .map(|velocity| {
                 let e: f64 = StandardNormal.sample(&mut rng);
-                Point { speed, torque: truth(speed) + noise * e, error: noise }
+                Point { velocity, torque: truth(velocity) + noise * e, error: noise }
             })
             .collect()
     }
 
-    /// Table 2's curves come back within 1 % of their range, at every speed of the experiment.
+    /// Table 2's curves come back within 1 % of their range, at every velocity of the experiment.
     #[test]
     fn the_curves_of_table_2_are_recovered() {
         for (joint, gamma) in TABLE_2.iter().enumerate() {
@@ -294,9 +295,9 @@ mod tests {
         let stribeck = |v: f64| v.signum() * (3.0 + 2.0 * (-(v / 0.05).powi(2)).exp()) + 4.0 * v;
         for seed in 0..3 {
             let (rated, chosen) = choose(&points(|v| tanh.torque(v), 0.02, seed)).unwrap();
-            assert_eq!(rated[chosen].fitted.law, Law::Tanh);
+            assert_eq!(rated[chosen].fitted.law, FrictionLaw::Tanh);
             let (rated, chosen) = choose(&points(stribeck, 0.02, seed)).unwrap();
-            assert_eq!(rated[chosen].fitted.law, Law::Stribeck);
+            assert_eq!(rated[chosen].fitted.law, FrictionLaw::Stribeck);
             approx::assert_abs_diff_eq!(rated[chosen].fitted.shapes[0], 0.05, epsilon = 0.005);
         }
     }

@@ -2,7 +2,7 @@
 
 mod approach;
 pub mod behind;
-pub mod constant_speed;
+pub mod constant_velocity;
 pub mod envelope;
 pub mod friction;
 pub mod gravity_free;

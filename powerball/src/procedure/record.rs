@@ -11,7 +11,7 @@ use serde::Serialize;
 use std::fmt;
 use std::io::Write;
 
-/// Share of the joints' speeds and accelerations on the way to where a motion begins.
+/// Share of the joints' velocities and accelerations on the way to where a motion begins.
 const APPROACH: f64 = 0.25;
 
 /// Time that bringing up and enabling may take, µs: joints commutate one after the other.
@@ -180,7 +180,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         }
     }
 
-    /// The way to a position, each joint straight there: at a share of its speed and acceleration, in `least` s at
+    /// The way to a position, each joint straight there: at a share of its velocity and acceleration, in `least` s at
     /// least. It was looked at as a whole.
     ///
     /// # Errors
@@ -310,9 +310,9 @@ pub fn way<const N: usize>(
     share: f64,
     least: f64,
 ) -> Motion {
-    let speed = profile.joints.map(|joint| share * joint.velocity);
+    let velocity = profile.joints.map(|joint| share * joint.velocity);
     let acceleration = profile.joints.map(|joint| share * joint.acceleration);
-    approach(from, to, &speed, &acceleration, profile.period_seconds(), least)
+    approach(from, to, &velocity, &acceleration, profile.period_seconds(), least)
 }
 
 /// Where a motion begins, if it is one of `N` joints.
@@ -320,7 +320,7 @@ fn beginning<const N: usize>(motion: &Motion) -> Option<[f64; N]> {
     motion.samples().next().and_then(|[q, ..]| q.try_into().ok())
 }
 
-/// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its speed, follows the
+/// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its velocity, follows the
 /// motion, writes the log, and stops; `told` hears how far it has come. The motion is looked at before anything
 /// is sent, the way to where it begins before the arm is enabled.
 ///

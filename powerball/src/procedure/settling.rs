@@ -11,14 +11,14 @@ pub struct Cycle {
     pub torque: f64,
 }
 
-/// The mean torque of every whole cycle; samples slower than a tenth of the greatest speed are left out.
+/// The mean torque of every whole cycle; samples slower than a tenth of the greatest velocity are left out.
 #[must_use]
-pub fn cycles(t: &[f64], speed: &[f64], torque: &[f64], period: f64) -> Vec<Cycle> {
+pub fn cycles(t: &[f64], velocity: &[f64], torque: &[f64], period: f64) -> Vec<Cycle> {
     let (Some(first), Some(last)) = (t.first(), t.last()) else { return Vec::new() };
-    let top = speed.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let top = velocity.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     let count = ((last - first) / period + 1e-9).floor() as usize;
     let mut sums = vec![(0.0, 0usize); count];
-    for ((t, v), tau) in t.iter().zip(speed).zip(torque) {
+    for ((t, v), tau) in t.iter().zip(velocity).zip(torque) {
         let cycle = ((t - first) / period) as usize;
         if let Some((sum, n)) = sums.get_mut(cycle)
             && v.abs() > 0.1 * top
@@ -165,10 +165,13 @@ mod tests {
     fn gravity_cancels_over_a_cycle() {
         let t: Vec<f64> = (0..4001).map(|k| f64::from(k) * 0.005).collect();
         let w = std::f64::consts::TAU / 5.0;
-        let speed: Vec<f64> = t.iter().map(|t| w * (w * t).cos()).collect();
-        let torque: Vec<f64> =
-            t.iter().zip(&speed).map(|(t, v)| 3.0 * v.signum() + 7.0 * ((w * t).sin() + 0.3).cos()).collect();
-        let cycles = cycles(&t, &speed, &torque, 5.0);
+        let velocity: Vec<f64> = t.iter().map(|t| w * (w * t).cos()).collect();
+        let torque: Vec<f64> = t
+            .iter()
+            .zip(&velocity)
+            .map(|(t, v)| 3.0 * v.signum() + 7.0 * ((w * t).sin() + 0.3).cos())
+            .collect();
+        let cycles = cycles(&t, &velocity, &torque, 5.0);
         assert_eq!(cycles.len(), 4);
         for c in cycles {
             approx::assert_abs_diff_eq!(c.torque, 3.0, epsilon = 0.02);

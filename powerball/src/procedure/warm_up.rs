@@ -13,7 +13,7 @@ use std::io::Write;
 pub struct Settings {
     /// Length of a cycle, s.
     pub period: f64,
-    /// Share of each joint's range, speed and acceleration that is used.
+    /// Share of each joint's range, velocity and acceleration that is used.
     pub share: f64,
     /// Greatest change of a joint's cycle-mean torque that may still be to come, as a share of it.
     pub tolerance: f64,
@@ -50,7 +50,7 @@ pub struct Warmth {
 }
 
 /// One cycle of all joints, from rest to rest at one end of their swings: q = middle − A·cos ωt, so that
-/// cycles follow each other without a stop. Amplitudes keep the share of range, speed and acceleration.
+/// cycles follow each other without a stop. Amplitudes keep the share of range, velocity and acceleration.
 #[must_use]
 pub fn swing<const N: usize>(profile: &Profile<N>, settings: &Settings) -> Motion {
     let period = profile.period_seconds();
@@ -135,9 +135,9 @@ impl Seen {
             return;
         }
         for (j, seen) in self.cycles.iter_mut().enumerate() {
-            let speed: Vec<f64> = known.iter().map(|(k, _)| motion.dq[k * n + j]).collect();
+            let velocity: Vec<f64> = known.iter().map(|(k, _)| motion.dq[k * n + j]).collect();
             let torque: Vec<f64> = known.iter().map(|(_, row)| row[1 + n + j]).collect();
-            let found = cycles(&times, &speed, &torque, motion.duration());
+            let found = cycles(&times, &velocity, &torque, motion.duration());
             seen.extend(found.iter().map(|c| Cycle { time: c.time + start, ..*c }));
         }
     }

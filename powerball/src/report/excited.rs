@@ -23,7 +23,7 @@ pub fn page(told: &Excited) -> Page {
     ]);
     for trajectory in &told.trajectories {
         page.heading(&format!("Base {}", trajectory.mounting));
-        page.figure(&motion(trajectory), "Positions, speeds and accelerations of all joints.");
+        page.figure(&motion(trajectory), "Positions, velocities and accelerations of all joints.");
         if let Some(figure) = torques(trajectory) {
             page.figure(
                 &figure,
@@ -52,7 +52,7 @@ fn motion(trajectory: &Trajectory) -> Figure {
     };
     Figure::new("Motion", "time [s]")
         .panel(panel("position [rad]", 0))
-        .panel(panel("speed [rad/s]", 1))
+        .panel(panel("velocity [rad/s]", 1))
         .panel(panel("acceleration [rad/s²]", 2))
 }
 
@@ -95,8 +95,8 @@ pub fn json(told: &Excited) -> Value {
             .iter()
             .zip(&path.joints)
             .enumerate()
-            .map(|(i, ([low, high, speed, acceleration], series))| {
-                json!({"position": [low, high], "velocity": speed, "acceleration": acceleration,
+            .map(|(i, ([low, high, velocity, acceleration], series))| {
+                json!({"position": [low, high], "velocity": velocity, "acceleration": acceleration,
                     "torque": torque.map(|t| t[i]),
                     "middle": series.middle, "a": series.a, "b": series.b})
             })
@@ -127,10 +127,10 @@ pub fn json(told: &Excited) -> Value {
 pub fn peaks(motion: &Motion) -> Vec<[f64; 4]> {
     let mut peaks = vec![[f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0]; motion.dof()];
     for [q, dq, ddq] in motion.samples() {
-        for (i, [low, high, speed, acceleration]) in peaks.iter_mut().enumerate() {
+        for (i, [low, high, velocity, acceleration]) in peaks.iter_mut().enumerate() {
             *low = low.min(q[i]);
             *high = high.max(q[i]);
-            *speed = speed.max(dq[i].abs());
+            *velocity = velocity.max(dq[i].abs());
             *acceleration = acceleration.max(ddq[i].abs());
         }
     }

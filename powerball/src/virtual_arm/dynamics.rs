@@ -110,7 +110,7 @@ impl Dynamics {
     pub fn coriolis_matrix(&self, q: &[f64], dq: &[f64]) -> Vec<f64> {
         let n = self.dof();
         let zero = vec![0.0; n];
-        let h = |speed: &[f64]| self.without_gravity(q, speed, &zero);
+        let h = |velocity: &[f64]| self.without_gravity(q, velocity, &zero);
         let at_dq = h(dq);
         columns(n, |unit| {
             let sum: Vec<f64> = dq.iter().zip(unit).map(|(a, b)| a + b).collect();

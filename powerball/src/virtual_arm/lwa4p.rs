@@ -102,7 +102,7 @@ pub fn modules() -> Result<Vec<Module>, Diagnostics> {
                 serial: 1000 + u32::from(known.node.raw()),
             },
             limits: joint.position.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
-            speed: joint.velocity.unwrap_or(f64::INFINITY),
+            velocity: joint.velocity.unwrap_or(f64::INFINITY),
             acceleration: joint.acceleration.unwrap_or(f64::INFINITY),
             torque: joint.torque.unwrap_or(f64::INFINITY),
             rated_current: if known.units.rated_torque > 2.0 { RATED_145 } else { RATED_115 },

@@ -18,7 +18,7 @@ pub use body::{Body, PER_LINK, bodies};
 
 pub use dynamics::{Dynamics, solve_positive_definite};
 pub use effect::{Gear, Instant, PlantEffect, State};
-pub use plant::{Plant, Recording, Sensors};
+pub use plant::{Plant, Sensors, SimulatedLog};
 pub use servo::{Gains, Servo};
 pub use simulation::Simulation;
 pub use slave::VirtualArm;

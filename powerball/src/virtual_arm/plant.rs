@@ -37,7 +37,7 @@ pub struct Plant {
 
 /// A log as the drives give it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Recording {
+pub struct SimulatedLog {
     dof: usize,
     /// Times, s.
     pub t: Vec<f64>,
@@ -78,7 +78,7 @@ impl Plant {
     /// Follows a motion exactly, as a stiff position servo does, and records it from time `start` (s) on.
     ///
     /// The same plant, motion, start and seed give the same log, to the bit.
-    pub fn record(&self, motion: &Motion, start: f64, seed: u64) -> Recording {
+    pub fn record(&self, motion: &Motion, start: f64, seed: u64) -> SimulatedLog {
         let n = motion.dof();
         let mut torques = Vec::with_capacity(motion.q.len());
         let mut windups = vec![0.0; motion.q.len()];
@@ -105,7 +105,7 @@ impl Plant {
             }
         }
         let positions: Vec<f64> = motion.q.iter().zip(&windups).map(|(q, w)| q + w).collect();
-        let mut recording = Recording {
+        let mut recording = SimulatedLog {
             dof: n,
             t: (0..motion.len()).map(|k| start + k as f64 * motion.period).collect(),
             q: positions,
@@ -136,7 +136,7 @@ impl Plant {
     }
 
     /// Encoder steps and torque noise.
-    fn measure(&self, recording: &mut Recording, period: f64, seed: u64) {
+    fn measure(&self, recording: &mut SimulatedLog, period: f64, seed: u64) {
         let step = self.sensors.encoder_step;
         if step > 0.0 {
             recording.q.iter_mut().for_each(|q| *q = (*q / step).round() * step);
@@ -154,7 +154,7 @@ impl Plant {
     }
 }
 
-impl Recording {
+impl SimulatedLog {
     /// The number of joints n.
     pub fn dof(&self) -> usize {
         self.dof
@@ -260,7 +260,7 @@ mod tests {
         let other = plant.record(&motion, 0.0, 8);
         let truth = quiet().record(&motion, 0.0, 0);
         for i in 0..6 {
-            let rms = |a: &Recording, b: &Recording| {
+            let rms = |a: &SimulatedLog, b: &SimulatedLog| {
                 let sum: f64 =
                     a.tau.iter().zip(&b.tau).skip(i).step_by(6).map(|(a, b)| (a - b).powi(2)).sum();
                 (sum / motion.len() as f64).sqrt()

@@ -11,12 +11,12 @@ pub struct Gains {
     pub integral: f64,
     /// Torque at the current limit, N·m.
     pub limit: f64,
-    /// Coulomb friction that is fed forward with the sign of the wanted speed, N·m: without it a joint dwells
+    /// Coulomb friction that is fed forward with the sign of the wanted velocity, N·m: without it a joint dwells
     /// at each reversal until the integrator has turned round.
     pub friction: f64,
 }
 
-/// Below this speed the friction is not yet fed forward whole, rad/s.
+/// Below this velocity the friction is not yet fed forward whole, rad/s.
 const TURN: f64 = 5e-3;
 
 impl Gains {
@@ -49,7 +49,7 @@ impl Servo {
         self.held = 0.0;
     }
 
-    /// The torque for the next `h` s, N·m: `wanted` and `actual` are position (rad) and speed (rad/s),
+    /// The torque for the next `h` s, N·m: `wanted` and `actual` are position (rad) and velocity (rad/s),
     /// `forward` is torque that is fed forward.
     ///
     /// At the current limit the integrator waits, unless it leads away from the limit.

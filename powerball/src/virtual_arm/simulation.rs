@@ -1,9 +1,9 @@
 //! The plant in time: what the arm does under the torques of its drives.
 //!
-//! Each step is linearly implicit in what is stiff. Friction is first a torque s·q̇' against the new speed
+//! Each step is linearly implicit in what is stiff. Friction is first a torque s·q̇' against the new velocity
 //! q̇' with the secant s = f(q̇)/q̇ of the old one: Eq. 16's tanh(216 q̇) then dissipates at any step and
-//! comes to rest without chatter. With the speed so found, the chord of f from the old speed to the new one
-//! takes the secant's place: where friction has saturated, it no longer follows the speed. A gear that gives
+//! comes to rest without chatter. With the velocity so found, the chord of f from the old velocity to the new one
+//! takes the secant's place: where friction has saturated, it no longer follows the velocity. A gear that gives
 //! way is a spring and a damper between two masses, taken at the end of the step. Everything else is taken at
 //! its start.
 
@@ -11,7 +11,7 @@ use super::dynamics::{Dynamics, solve_positive_definite};
 use super::effect::{Gear, Instant, State};
 use super::plant::Plant;
 
-/// Speeds nearer than this have no chord, rad/s.
+/// Velocities nearer than this have no chord, rad/s.
 const REST: f64 = 1e-9;
 /// A closed brake holds this much more than the joint can ask for, N·m, and turns a millionth of a radian a
 /// second.
@@ -27,9 +27,9 @@ struct Motor {
     /// Inertia k²·Im at the joint, kg·m².
     inertia: f64,
     damping: f64,
-    /// Position and speed at the joint, rad and rad/s.
+    /// Position and velocity at the joint, rad and rad/s.
     position: f64,
-    speed: f64,
+    velocity: f64,
 }
 
 /// A plant that moves. Effects, friction and bodies are those of the [`Plant`]; sensors are not asked here.
@@ -59,7 +59,7 @@ impl Simulation {
                 (plant.dynamics().chain().rows().get(joint), plant.dynamics().bodies().get(joint));
             let inertia = row.map_or(0.0, |r| r.ratio().powi(2)) * body.map_or(0.0, |b| b.rotor);
             let damping = 2.0 * GEAR_DAMPING * (gear.stiffness * inertia).sqrt();
-            motors[joint] = Some(Motor { gear, inertia, damping, position: q[joint], speed: 0.0 });
+            motors[joint] = Some(Motor { gear, inertia, damping, position: q[joint], velocity: 0.0 });
         }
         let mut simulation = Simulation {
             dynamics: plant.dynamics().clone(),
@@ -110,8 +110,8 @@ impl Simulation {
         &self.q
     }
 
-    /// True joint speeds on the links' side, rad/s.
-    pub fn link_speeds(&self) -> &[f64] {
+    /// True joint velocities on the links' side, rad/s.
+    pub fn link_velocities(&self) -> &[f64] {
         &self.dq
     }
 
@@ -120,9 +120,9 @@ impl Simulation {
         self.motors[joint].map_or(self.q[joint], |motor| motor.position)
     }
 
-    /// Speed of a joint where its encoder sits, rad/s.
-    pub fn speed(&self, joint: usize) -> f64 {
-        self.motors[joint].map_or(self.dq[joint], |motor| motor.speed)
+    /// Velocity of a joint where its encoder sits, rad/s.
+    pub fn velocity(&self, joint: usize) -> f64 {
+        self.motors[joint].map_or(self.dq[joint], |motor| motor.velocity)
     }
 
     /// Closes or opens a joint's brake.
@@ -155,34 +155,37 @@ impl Simulation {
         let free: Vec<f64> = (0..n).map(|i| bias[i] + load[i]).collect();
         self.time += h;
 
-        // A first step tells the new speeds to within what friction changes on the way to them.
-        let [old, rest] = [self.speeds(), vec![[0.0; 2]; n]].map(|speeds| (self.friction(&speeds), speeds));
+        // A first step tells the new velocities to within what friction changes on the way to them.
+        let [old, rest] =
+            [self.velocities(), vec![[0.0; 2]; n]].map(|velocities| (self.friction(&velocities), velocities));
         let secants = chords(&rest, &old, |i| self.slope(i));
         let Some((first, _)) = self.solve(h, tau, &inertia, &free, &rest.0, &secants) else { return };
         let new = (self.friction(&first), first);
         let chords = chords(&old, &new, |i| self.slope(i));
         let offsets: Vec<[f64; 2]> =
             (0..n).map(|i| [0, 1].map(|side| old.0[i][side] - chords[i][side] * old.1[i][side])).collect();
-        let Some((speeds, change)) = self.solve(h, tau, &inertia, &free, &offsets, &chords) else { return };
+        let Some((velocities, change)) = self.solve(h, tau, &inertia, &free, &offsets, &chords) else {
+            return;
+        };
         for i in 0..n {
             self.rigid[i] = bias[i] + (0..n).map(|j| inertia[i * n + j] * change[j]).sum::<f64>();
-            let [link, motor] = speeds[i];
+            let [link, motor] = velocities[i];
             self.q[i] += h * link;
             self.dq[i] = link;
             if let Some(behind) = &mut self.motors[i] {
-                behind.speed = motor;
+                behind.velocity = motor;
                 behind.position += h * motor;
             }
         }
     }
 
-    /// Speeds of links and motors, rad/s.
-    fn speeds(&self) -> Vec<[f64; 2]> {
-        (0..self.dof()).map(|i| [self.dq[i], self.speed(i)]).collect()
+    /// Velocities of links and motors, rad/s.
+    fn velocities(&self) -> Vec<[f64; 2]> {
+        (0..self.dof()).map(|i| [self.dq[i], self.velocity(i)]).collect()
     }
 
-    /// The new speeds of links and motors, and the links' accelerations, where friction on either side is an
-    /// offset plus a slope times the new speed. `None` stops the arm.
+    /// The new velocities of links and motors, and the links' accelerations, where friction on either side is an
+    /// offset plus a slope times the new velocity. `None` stops the arm.
     fn solve(
         &mut self,
         h: f64,
@@ -211,7 +214,7 @@ impl Simulation {
                     let (spring, touching) = motor.gear.torque(motor.position - self.q[i]);
                     let c = if touching { h * motor.gear.stiffness + motor.damping } else { 0.0 };
                     let m = motor.inertia + h * (slopes[i][1] + brake + c);
-                    let a = motor.inertia * motor.speed + h * (tau[i] - offsets[i][1] - spring);
+                    let a = motor.inertia * motor.velocity + h * (tau[i] - offsets[i][1] - spring);
                     matrix[i * n + i] += h * c - (h * c).powi(2) / m;
                     right[i] += h * (spring + c * a / m);
                     windings[i] = Some((a, h * c, m));
@@ -224,9 +227,9 @@ impl Simulation {
             return None;
         };
         let motor = |i: usize| windings[i].map_or(links[i], |(a, hc, m)| (a + hc * links[i]) / m);
-        let speeds = (0..n).map(|i| [links[i], motor(i)]).collect();
+        let velocities = (0..n).map(|i| [links[i], motor(i)]).collect();
         let change = links.iter().zip(&self.dq).map(|(new, old)| (new - old) / h).collect();
-        Some((speeds, change))
+        Some((velocities, change))
     }
 
     /// The bodies as the effects make them now, without the motors that move on their own.
@@ -246,29 +249,29 @@ impl Simulation {
         }
     }
 
-    /// A closed brake as a torque over the motor's speed, N·m·s/rad.
+    /// A closed brake as a torque over the motor's velocity, N·m·s/rad.
     fn brake(&self, joint: usize) -> f64 {
-        if self.brakes[joint] { BRAKE / self.speed(joint).abs().max(BRAKE_CREEP) } else { 0.0 }
+        if self.brakes[joint] { BRAKE / self.velocity(joint).abs().max(BRAKE_CREEP) } else { 0.0 }
     }
 
-    /// Torques against the motion, N·m, at given speeds: of the effects that rub, on the links' side, and of
+    /// Torques against the motion, N·m, at given velocities: of the effects that rub, on the links' side, and of
     /// Eq. 16, on the motors'.
-    fn friction(&self, speeds: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    fn friction(&self, velocities: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let mut rubbing = vec![0.0; self.dof()];
         if self.plant.effects().iter().any(|effect| effect.rubs_at().is_some()) {
-            let dq: Vec<f64> = speeds.iter().map(|speed| speed[0]).collect();
+            let dq: Vec<f64> = velocities.iter().map(|velocity| velocity[0]).collect();
             let now = self.now(&dq);
             for effect in self.plant.effects().iter().filter(|effect| effect.rubs_at().is_some()) {
                 effect.add_torque(&now, &mut State::default(), &mut rubbing);
             }
         }
-        let laws = self.plant.friction().iter().zip(speeds);
-        rubbing.into_iter().zip(laws).map(|(rub, (law, speed))| [rub, law.torque(speed[1])]).collect()
+        let laws = self.plant.friction().iter().zip(velocities);
+        rubbing.into_iter().zip(laws).map(|(rub, (law, velocity))| [rub, law.torque(velocity[1])]).collect()
     }
 
-    /// The slope of Eq. 16 at a motor's speed, N·m·s/rad.
+    /// The slope of Eq. 16 at a motor's velocity, N·m·s/rad.
     fn slope(&self, joint: usize) -> [f64; 2] {
-        [0.0, self.plant.friction()[joint].slope(self.speed(joint))]
+        [0.0, self.plant.friction()[joint].slope(self.velocity(joint))]
     }
 
     /// Torques against the motion of all effects that do not rub, N·m.
@@ -291,11 +294,11 @@ impl Simulation {
     }
 }
 
-/// Friction at two sets of speeds, and those speeds.
-type AtSpeeds = (Vec<[f64; 2]>, Vec<[f64; 2]>);
+/// Friction at two sets of velocities, and those velocities.
+type AtVelocities = (Vec<[f64; 2]>, Vec<[f64; 2]>);
 
-/// The chord of the friction between two speeds, never negative; the slope where they are one.
-fn chords(a: &AtSpeeds, b: &AtSpeeds, slope: impl Fn(usize) -> [f64; 2]) -> Vec<[f64; 2]> {
+/// The chord of the friction between two velocities, never negative; the slope where they are one.
+fn chords(a: &AtVelocities, b: &AtVelocities, slope: impl Fn(usize) -> [f64; 2]) -> Vec<[f64; 2]> {
     let chord = |i: usize, side: usize| {
         let way = b.1[i][side] - a.1[i][side];
         if way.abs() > REST { (b.0[i][side] - a.0[i][side]) / way } else { slope(i)[side] }
@@ -365,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_speed_takes_gravity_and_friction() {
+    fn a_constant_velocity_takes_gravity_and_friction() {
         // Joint 1 has no gravity: under a constant torque it ends where Eq. 16 says.
         let mut simulation = open(lwa4p::plant().unwrap());
         (1..6).for_each(|joint| simulation.set_brake(joint, true));

@@ -151,10 +151,10 @@ fn rests(world: &World, fault: Fault) -> Result<(), String> {
     for (j, node) in arm.nodes().iter().enumerate() {
         // A node that neither hears nor speaks cannot be told, and this one does not watch either.
         let deaf = fault == Fault::Silent && node.id() == VICTIM;
-        let speed = arm.simulation().speed(j);
-        if !deaf && (!node.brake_closed() || speed.abs() > 1e-3) {
+        let velocity = arm.simulation().velocity(j);
+        if !deaf && (!node.brake_closed() || velocity.abs() > 1e-3) {
             return Err(format!(
-                "joint {} does not rest: {speed} rad/s, brake closed: {}",
+                "joint {} does not rest: {velocity} rad/s, brake closed: {}",
                 j + 1,
                 node.brake_closed()
             ));

@@ -169,7 +169,7 @@ fn two_set_points_never_meet_in_one_sync() {
     }
 }
 
-/// Two steps in one cycle would be twice the greatest speed.
+/// Two steps in one cycle would be twice the greatest velocity.
 #[test]
 fn steps_are_measured_from_what_has_left() {
     let mut world = running(ControlMode::InterpolatedPosition);
@@ -354,24 +354,24 @@ fn profile_position_shakes_hands() {
     assert!((world.driver.positions()[2] - targets[2]).abs() < 0.06);
 }
 
-/// With 0x604C at its default the i16 target ends at 32.767°/s, less than the joint's greatest speed.
+/// With 0x604C at its default the i16 target ends at 32.767°/s, less than the joint's greatest velocity.
 #[test]
 fn velocities_that_the_wire_cannot_hold_are_rejected_not_cut() {
     let mut world = running(ControlMode::Velocity);
     let step = LWA4P.joints[0].acceleration * 0.005;
-    let mut speeds = world.accepted.last().unwrap().1;
+    let mut velocities = world.accepted.last().unwrap().1;
     world.hold_pilot(CYCLE);
     let mut rejected = None;
     for _ in 0..60 {
         world.run_until(CYCLE, |w| w.driver.cycle_complete());
-        speeds[0] += step;
-        if let Err(rejection) = world.driver.set(&speeds) {
+        velocities[0] += step;
+        if let Err(rejection) = world.driver.set(&velocities) {
             rejected = Some(rejection);
             break;
         }
         world.hold_pilot(CYCLE);
     }
-    let degrees = speeds[0].to_degrees();
+    let degrees = velocities[0].to_degrees();
     assert_eq!(rejected, Some(Rejection::Saturated(JOINT_1)), "at {degrees}°/s");
     assert!((degrees - 32.767).abs() < step.to_degrees(), "{degrees}°/s");
 }
@@ -470,13 +470,13 @@ fn measurements_are_in_si() {
     let simulation = world.bus.peer().arm.simulation();
     for (j, joint) in world.driver.joints().iter().enumerate() {
         // Not older than a cycle.
-        let speed = simulation.speed(j).abs().max(0.1);
+        let velocity = simulation.velocity(j).abs().max(0.1);
         assert!(
-            (joint.position - simulation.position(j)).abs() < 2.0 * speed * 0.005 + 2e-5,
+            (joint.position - simulation.position(j)).abs() < 2.0 * velocity * 0.005 + 2e-5,
             "joint {}",
             j + 1
         );
-        assert!((joint.velocity - simulation.speed(j)).abs() < 0.05, "joint {}", j + 1);
+        assert!((joint.velocity - simulation.velocity(j)).abs() < 0.05, "joint {}", j + 1);
         let rated = joint.units.rated_current;
         assert!(
             (joint.torque / joint.units.rated_torque

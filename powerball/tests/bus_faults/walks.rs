@@ -193,9 +193,9 @@ impl Walk {
                     continue;
                 }
                 if self.control != ControlMode::InterpolatedPosition {
-                    let speed = joint.units.position(q) / joint.units.counts_per_radian.signum();
-                    if self.control == ControlMode::Velocity && speed.abs() > 1.01 * joint.velocity {
-                        return Err(format!("{speed} rad/s at {at}"));
+                    let velocity = joint.units.position(q) / joint.units.counts_per_radian.signum();
+                    if self.control == ControlMode::Velocity && velocity.abs() > 1.01 * joint.velocity {
+                        return Err(format!("{velocity} rad/s at {at}"));
                     }
                     continue;
                 }

@@ -138,23 +138,23 @@ class Functions:
         """
         return self._evaluate("coriolis_matrix", parameters, values, {"q": q, "dq": dq})
 
-    def coriolis_times_speed(
+    def coriolis_times_velocity(
         self, q: ArrayLike, dq: ArrayLike, values: Optional[Values] = None, *, parameters: str = "minimal"
     ) -> Array:
         """Coriolis and centrifugal torques C(q, q̇)·q̇, N·m.
 
         Returns: (n,) for one sample, (N, n) for N.
         """
-        return self._evaluate("coriolis_times_speed", parameters, values, {"q": q, "dq": dq})
+        return self._evaluate("coriolis_times_velocity", parameters, values, {"q": q, "dq": dq})
 
-    def coriolis_transpose_times_speed(
+    def coriolis_transpose_times_velocity(
         self, q: ArrayLike, dq: ArrayLike, values: Optional[Values] = None, *, parameters: str = "minimal"
     ) -> Array:
         """Cᵀ(q, q̇)·q̇ of the Christoffel matrix, which is ∂T/∂q: what a momentum observer integrates. N·m.
 
         Returns: (n,) for one sample, (N, n) for N.
         """
-        return self._evaluate("coriolis_transpose_times_speed", parameters, values, {"q": q, "dq": dq})
+        return self._evaluate("coriolis_transpose_times_velocity", parameters, values, {"q": q, "dq": dq})
 
     def gravity(self, q: ArrayLike, values: Optional[Values] = None, *, parameters: str = "minimal") -> Array:
         """Joint torques that hold the arm still, g(q), N·m.
@@ -194,12 +194,12 @@ class Functions:
         """
         return self._evaluate("jacobian", "full", None, {"q": q})
 
-    def jacobian_rate_times_speed(self, q: ArrayLike, dq: ArrayLike) -> Array:
+    def jacobian_rate_times_velocity(self, q: ArrayLike, dq: ArrayLike) -> Array:
         """J̇(q, q̇)·q̇ of the geometric Jacobian: acceleration of the tool's frame where q̈ = 0.
 
         Returns: (6,) for one sample, (N, 6) for N.
         """
-        return self._evaluate("jacobian_rate_times_speed", "full", None, {"q": q, "dq": dq})
+        return self._evaluate("jacobian_rate_times_velocity", "full", None, {"q": q, "dq": dq})
 
     def kinetic_energy(
         self, q: ArrayLike, dq: ArrayLike, values: Optional[Values] = None, *, parameters: str = "minimal"
@@ -257,7 +257,7 @@ class Functions:
         """
         return self._evaluate("torque_by_position", parameters, values, {"q": q, "dq": dq, "ddq": ddq})
 
-    def torque_by_speed(
+    def torque_by_velocity(
         self,
         q: ArrayLike,
         dq: ArrayLike,
@@ -270,4 +270,4 @@ class Functions:
 
         Returns: (n, n) for one sample, (N, n, n) for N.
         """
-        return self._evaluate("torque_by_speed", parameters, values, {"q": q, "dq": dq, "ddq": ddq})
+        return self._evaluate("torque_by_velocity", parameters, values, {"q": q, "dq": dq, "ddq": ddq})

@@ -6,7 +6,7 @@ use powerball::explanation::explain::Trajectory;
 use powerball::explanation::{ExplainOptions, Explained};
 use powerball::identification::motion::Motion;
 use powerball::logs::log::Log;
-use powerball::logs::regression::RigidBody;
+use powerball::logs::regression::RigidArm;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 
@@ -36,7 +36,7 @@ pub(super) struct Settled {
 
 /// Where an explanation leaves names open: designs the experiment, has it recorded, and explains again.
 pub(super) fn settle(
-    body: &RigidBody,
+    body: &RigidArm,
     (to_fit, held_out): (&[Log], &[Log]),
     mut explained: Explained,
     record: impl FnOnce(&Motion) -> Log,

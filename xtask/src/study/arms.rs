@@ -104,14 +104,14 @@ impl Drawn {
         let coulomb = friction.gamma1 + friction.gamma3;
         let noise = self.plant.sensors().white[joint];
         let usual = 100.0 * noise;
-        // Ways and speeds of a sliding joint in m against those of a turning one in rad.
+        // Ways and velocities of a sliding joint in m against those of a turning one in rad.
         let unit = if rows[joint].is_revolute() { 1.0 } else { 0.2 };
         Some(match name {
             "load_friction" => Effect::LoadFriction { joint, coefficient: rng.random_range(0.05..0.11) },
             "stribeck" => Effect::Stribeck {
                 joint,
                 level: friction.gamma1 * rng.random_range(0.3..0.6),
-                speed: unit * rng.random_range(0.03..0.07),
+                velocity: unit * rng.random_range(0.03..0.07),
             },
             "velocity_nonlinearity" => {
                 let exponent = rng.random_range(2.2..3.0);

@@ -12,7 +12,7 @@ use powerball::identification::estimate::{Folds, fit, spread};
 use powerball::identification::excite::{Settings, optimise};
 use powerball::identification::motion::Motion;
 use powerball::logs::log::{Log, common_clock};
-use powerball::logs::regression::{Data, DataOptions, RigidBody};
+use powerball::logs::regression::{Data, DataOptions, RigidArm};
 use powerball::virtual_arm::{Plant, PlantEffect as Effect, lwa4p};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -27,7 +27,7 @@ const HELD_OUT: [f64; 2] = [12.0, 11.5];
 const PAUSE: f64 = 5.0;
 /// The search for a path: enough for a condition number near the best.
 const EVALUATIONS: usize = 60;
-/// Logs that leave names open: on paths that leave this share of range, speed and acceleration unused.
+/// Logs that leave names open: on paths that leave this share of range, velocity and acceleration unused.
 const NARROW: f64 = 0.7;
 /// Rounds in which a truth is scaled to its size.
 const ROUNDS: usize = 4;
@@ -37,7 +37,7 @@ const WIDE: DataOptions = DataOptions { cutoff: 60.0, smoothing: 60.0, block: 2.
 /// What every case needs.
 pub(super) struct Bench {
     model: Model,
-    body: RigidBody,
+    body: RigidArm,
     plant: Plant,
     /// Where the arm was drawn by lot.
     drawn: Option<Drawn>,
@@ -105,7 +105,7 @@ impl Bench {
     }
 
     fn of(arm: Arm, plant: Plant, drawn: Option<Drawn>) -> Result<Bench, String> {
-        let body = RigidBody::new(&arm).map_err(|e| e.to_string())?;
+        let body = RigidArm::new(&arm).map_err(|e| e.to_string())?;
         let model = Model::derive(arm).map_err(|e| e.to_string())?;
         Ok(Bench { model, body, plant, drawn })
     }

@@ -23,7 +23,7 @@ pub(super) enum Outside {
     PinchedBearing,
     /// A torque sensor's zero that wanders.
     Wander,
-    /// Losses with the product of two joints' speeds.
+    /// Losses with the product of two joints' velocities.
     Windage,
 }
 
@@ -114,7 +114,7 @@ impl ExtraTorque for OutsideLaw {
     }
 }
 
-/// A misfit of every joint that is a smooth function of all positions and speeds.
+/// A misfit of every joint that is a smooth function of all positions and velocities.
 #[derive(Clone, Debug)]
 pub(super) struct Misfit {
     /// N·m by joint.

@@ -7,10 +7,10 @@ use dyngen::Arm;
 use powerball::controller::friction::TanhFriction;
 use powerball::explanation::{ExplainOptions, Explained, explain_body};
 use powerball::identification::chain::Chain;
-use powerball::identification::estimate::{Folds, FrictionLaw, consistent_fit, fit, solve_reduced};
+use powerball::identification::estimate::{Folds, FrictionKind, consistent_fit, fit, solve_reduced};
 use powerball::identification::motion::Motion;
 use powerball::logs::log::{Log, common_clock, read_logs};
-use powerball::logs::regression::{Data, DataOptions, Recording, RigidBody};
+use powerball::logs::regression::{Data, DataOptions, Recording, RigidArm};
 use powerball::logs::summary::Summary;
 use powerball::virtual_arm::{Dynamics, Plant, PlantEffect as Effect, Sensors, bodies};
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ const DRAWS: usize = 20;
 
 /// The measured arm, a plant like it, and what is in its logs already.
 pub(super) struct Measured {
-    body: RigidBody,
+    body: RigidArm,
     logs: Vec<Log>,
     plant: Plant,
     explained: Explained,
@@ -52,7 +52,7 @@ impl Measured {
             FIT.iter().chain(&HELD_OUT).map(|name| folder.join(format!("fourier_{name}.csv"))).collect();
         let (mut logs, _) = read_logs(&files, &arm).map_err(|e| e.to_string())?;
         common_clock(&mut logs);
-        let body = RigidBody::new(&arm).map_err(|e| e.to_string())?;
+        let body = RigidArm::new(&arm).map_err(|e| e.to_string())?;
         let options = DataOptions::default();
         let explained =
             explain_body(&body, &logs[..FIT.len()], &logs[FIT.len()..], &ExplainOptions::default())
@@ -64,7 +64,7 @@ impl Measured {
             for log in &logs[..FIT.len()] {
                 summary.push(&body, log, &options).map_err(|e| e.to_string())?;
             }
-            let reduced = solve_reduced(&summary, FrictionLaw::Symmetric);
+            let reduced = solve_reduced(&summary, FrictionKind::Symmetric);
             let possible = consistent_fit(&body, &reduced).map_err(|e| e.to_string())?;
             let links = bodies(&possible.consistent.all).ok_or("the arm has no bodies")?;
             let dynamics = Dynamics::new(Chain::new(&arm), links).ok_or("the arm is no chain of bodies")?;

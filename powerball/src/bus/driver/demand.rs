@@ -79,12 +79,12 @@ mod tests {
     #[test]
     fn what_goes_on_comes_to_rest_within_its_range() {
         let (period, acceleration) = (0.005, 4.0);
-        for speed in [0.02, 0.3, 1.2] {
+        for velocity in [0.02, 0.3, 1.2] {
             for side in [1.0, -1.0] {
                 let mut demand = Demand::at_rest(0.0);
-                let way = rest(0.0, speed, acceleration) + 0.01;
-                (0..KEPT).rev().for_each(|k| demand.push(side * (1.0 - way - speed * period * k as f64)));
-                let mut v = side * speed;
+                let way = rest(0.0, velocity, acceleration) + 0.01;
+                (0..KEPT).rev().for_each(|k| demand.push(side * (1.0 - way - velocity * period * k as f64)));
+                let mut v = side * velocity;
                 for _ in 0..400 {
                     demand.push(demand.next(period, [-1.0, 1.0], 1.2, acceleration));
                     let now = demand.velocity(period);

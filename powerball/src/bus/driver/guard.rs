@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn interpolated_steps_end_at_the_greatest_speed() {
+    fn interpolated_steps_end_at_the_greatest_velocity() {
         let step = LWA4P.joints[0].velocity * 0.005;
         let demand = run_up(step);
         let guard = moving(ControlMode::InterpolatedPosition, &demand, 0.1);
@@ -208,7 +208,7 @@ mod tests {
         );
     }
 
-    /// At full speed the way to rest is 0.17 rad: nearer to the end of the range such a point does not leave.
+    /// At full velocity the way to rest is 0.17 rad: nearer to the end of the range such a point does not leave.
     #[test]
     fn interpolated_points_leave_room_to_come_to_rest() {
         let joint = &LWA4P.joints[0];
@@ -255,7 +255,7 @@ mod tests {
         assert!(matches!(guard(ControlMode::Current, 0.0).check(0.01), Err(Rejection::Position(..))));
     }
 
-    /// At speed v a joint needs v²/2a to stop: the guard sees the limit that far ahead.
+    /// At velocity v a joint needs v²/2a to stop: the guard sees the limit that far ahead.
     #[test]
     fn velocities_are_rejected_where_the_joint_could_not_stop_before_its_limit() {
         let joint = &LWA4P.joints[0];

@@ -48,7 +48,7 @@ pub struct JointProfile {
     pub units: JointUnits,
     /// Least and greatest position, rad; written to 0x607D.
     pub position: [f64; 2],
-    /// Greatest speed, rad/s.
+    /// Greatest velocity, rad/s.
     pub velocity: f64,
     /// Greatest acceleration, rad/s².
     pub acceleration: f64,
@@ -87,7 +87,7 @@ pub struct Reactions {
     pub step_factor: f64,
     /// Greatest change of a current set-point in a cycle, as part of the joint's greatest current.
     pub current_step: f64,
-    /// A joint measured faster than this times its greatest speed, for [`Reactions::missing_cycles`] cycles,
+    /// A joint measured faster than this times its greatest velocity, for [`Reactions::missing_cycles`] cycles,
     /// stops the arm.
     pub overspeed_factor: f64,
     /// So much travel, rad, is asked for in velocity mode before it is compared with the travel that was gone.
@@ -137,7 +137,7 @@ pub struct Reactions {
     pub commutation_settle: Micros,
     /// Enable and commutate one joint after the other, from the base on.
     pub one_at_a_time: bool,
-    /// Below this speed, rad/s, a joint counts as at rest.
+    /// Below this velocity, rad/s, a joint counts as at rest.
     pub rest_velocity: f64,
 }
 

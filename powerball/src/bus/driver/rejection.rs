@@ -10,7 +10,7 @@ pub enum Rejection {
     NotFinite(JointNumber),
     /// Joint, position (asked for, or reached before it can stop) and the limit that it would pass, rad.
     Position(JointNumber, f64, f64),
-    /// Joint, speed and greatest speed, rad/s.
+    /// Joint, velocity and greatest velocity, rad/s.
     Velocity(JointNumber, f64, f64),
     /// Joint, current and greatest current, A.
     Current(JointNumber, f64, f64),
@@ -34,7 +34,7 @@ impl fmt::Display for Rejection {
                 write!(f, "joint {j}: position {q:.4} rad beyond the limit {limit:.4} rad")
             }
             Rejection::Velocity(j, v, limit) => {
-                write!(f, "joint {j}: {v:.4} rad/s is more than the greatest speed {limit:.4} rad/s")
+                write!(f, "joint {j}: {v:.4} rad/s is more than the greatest velocity {limit:.4} rad/s")
             }
             Rejection::Current(j, i, limit) => {
                 write!(f, "joint {j}: {i:.3} A is more than the greatest current {limit:.3} A")

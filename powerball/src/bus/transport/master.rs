@@ -315,7 +315,7 @@ mod tests {
         let arm = bus.peer();
         for (j, node) in arm.nodes().iter().enumerate() {
             assert!(node.brake_closed() && !node.state().has_torque(), "joint {}: {}", j + 1, node.state());
-            assert!(arm.simulation().speed(j).abs() < 1e-3);
+            assert!(arm.simulation().velocity(j).abs() < 1e-3);
             assert_ne!(node.state(), State::Fault);
             // Nothing was missed by the drive: no emergency stands in its error history.
             let history = crate::bus::canopen::Object::new(0x1003, 0);

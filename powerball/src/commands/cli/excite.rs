@@ -275,17 +275,17 @@ fn in_words(told: &Excited, files: &[PathBuf]) -> String {
     for trajectory in &told.trajectories {
         let _ = writeln!(
             out,
-            "\njoint   position [rad]     of limit        speed  of limit   acceleration  of limit   torque  of limit"
+            "\njoint   position [rad]     of limit        velocity  of limit   acceleration  of limit   torque  of limit"
         );
         let torque = trajectory.tightest.torque.as_ref();
-        for (i, ([low, high, speed, acceleration], limit)) in
+        for (i, ([low, high, velocity, acceleration], limit)) in
             peaks(&trajectory.motion).iter().zip(&trajectory.limits.0).enumerate()
         {
             let [lowest, highest] = limit.position;
             let torque = torque.map_or("-".to_string(), |t| format!("{:.1}", t[i]));
             let _ = writeln!(
                 out,
-                "{:>5}  {low:>6.2} … {high:<6.2}  {lowest:>6.2} … {highest:<6.2}  {speed:>6.2}    {:>6.2}      {acceleration:>9.2}    {:>6.2}   {torque:>6}    {:>6}",
+                "{:>5}  {low:>6.2} … {high:<6.2}  {lowest:>6.2} … {highest:<6.2}  {velocity:>6.2}    {:>6.2}      {acceleration:>9.2}    {:>6.2}   {torque:>6}    {:>6}",
                 JointNumber::from_index(i).number(),
                 limit.velocity,
                 limit.acceleration,

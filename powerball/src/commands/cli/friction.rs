@@ -19,7 +19,7 @@ use dyngen::Model;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Move each joint at 18 constant speeds each way where gravity does not load it, and fit friction laws (Eq.
+/// Move each joint at 18 constant velocities each way where gravity does not load it, and fit friction laws (Eq.
 /// 15, Eq. 16, Stribeck).
 ///
 /// Writes friction_K.csv for each joint as it is recorded, friction.json and report.html. A run that was
@@ -121,7 +121,7 @@ impl Friction {
         for joint in &found {
             let chosen = &joint.laws[joint.chosen];
             output::print(&format!(
-                "joint {}: {} fits best on speeds left out ({:.4} N·m); Eq. 16: {}",
+                "joint {}: {} fits best on velocities left out ({:.4} N·m); Eq. 16: {}",
                 joint.joint + 1,
                 chosen.fitted.law.name(),
                 chosen.held_out,
@@ -197,8 +197,8 @@ fn failure(e: FrictionError) -> Failure {
 fn page(arm: &str, found: &[JointFriction], notes: &[String]) -> Page {
     let mut page = Page::new(format!("Friction of {arm}"));
     page.lead(
-        "Mean torques at constant speeds where gravity does not load the joint. Laws are rated on \
-        speeds that were left out of their fit, both directions of a speed together; of laws that cannot be \
+        "Mean torques at constant velocities where gravity does not load the joint. Laws are rated on \
+        velocities that were left out of their fit, both directions of a velocity together; of laws that cannot be \
         told apart Eq. 16 is taken.",
     );
     for note in notes {
@@ -207,9 +207,9 @@ fn page(arm: &str, found: &[JointFriction], notes: &[String]) -> Page {
     for joint in found {
         page.heading(&format!("Joint {}", joint.joint + 1));
         let chosen = &joint.laws[joint.chosen];
-        let top = joint.points.iter().map(|p| p.speed.abs()).fold(0.0, f64::max);
-        let speeds: Vec<f64> = (-200..=200).map(|k| f64::from(k) / 200.0 * top).collect();
-        let curve = |f: &dyn Fn(f64) -> f64| speeds.iter().map(|v| (*v, f(*v))).collect::<Vec<_>>();
+        let top = joint.points.iter().map(|p| p.velocity.abs()).fold(0.0, f64::max);
+        let velocities: Vec<f64> = (-200..=200).map(|k| f64::from(k) / 200.0 * top).collect();
+        let curve = |f: &dyn Fn(f64) -> f64| velocities.iter().map(|v| (*v, f(*v))).collect::<Vec<_>>();
         let offset = chosen.fitted.offset;
         let panel = Panel::new("torque [N·m]")
             .series(Series::dashed(
@@ -230,10 +230,10 @@ fn page(arm: &str, found: &[JointFriction], notes: &[String]) -> Page {
             .series(Series::points(
                 "measured",
                 Ink::Blue,
-                joint.points.iter().map(|p| (p.speed, p.torque)).collect(),
+                joint.points.iter().map(|p| (p.velocity, p.torque)).collect(),
             ));
         page.figure(
-            &Figure::new("Friction against speed", "speed [rad/s]").panel(panel),
+            &Figure::new("Friction against velocity", "velocity [rad/s]").panel(panel),
             &format!("Base {}.", joint.place.mounting),
         );
         let mut table = Table::new([

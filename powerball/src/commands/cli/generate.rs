@@ -3,7 +3,7 @@
 use super::inputs::Known;
 use super::{Failure, output};
 use crate::explanation::torque_model::{Scalar, SourceError};
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use clap::{Args, ValueEnum};
 use dyngen::{Arm, Function};
 use std::path::{Path, PathBuf};
@@ -56,7 +56,7 @@ fn function(name: &str) -> Result<Function, String> {
 impl Generate {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let known = Known::read(&self.arm, Some(&self.model))?;
-        let body = RigidBody::new(&known.arm).map_err(|e| Failure::Refused(e.to_string()))?;
+        let body = RigidArm::new(&known.arm).map_err(|e| Failure::Refused(e.to_string()))?;
         let Some(model) = known.model(&body)? else { return Ok(()) };
         let file = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
         let scalar = match self.scalar {

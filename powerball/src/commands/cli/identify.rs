@@ -4,7 +4,7 @@ use super::inputs::MapArgument;
 use super::mounted::MountedLogs;
 use super::{Failure, output};
 use crate::explanation::torque_model::ModelFile;
-use crate::identification::estimate::FrictionLaw;
+use crate::identification::estimate::FrictionKind;
 use crate::identification::{Estimator, IdentifyOptions, KnownModel, identify};
 use crate::logs::Progress;
 use crate::report;
@@ -83,8 +83,8 @@ impl Identify {
         let say = |what: &str| terminal.say(what);
         let options = IdentifyOptions {
             friction: match self.friction {
-                Friction::Symmetric => FrictionLaw::Symmetric,
-                Friction::Asymmetric => FrictionLaw::Asymmetric,
+                Friction::Symmetric => FrictionKind::Symmetric,
+                Friction::Asymmetric => FrictionKind::Asymmetric,
             },
             estimator: match self.estimator {
                 EstimatorName::Weighted => Estimator::Weighted,

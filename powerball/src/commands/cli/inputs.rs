@@ -6,7 +6,7 @@ use crate::explanation::torque_model::{ModelFile, TorqueModel};
 use crate::identification::mounting::Mounting;
 use crate::identification::{KnownModel, Recorded, Source};
 use crate::logs::log::ColumnMap;
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use clap::Args;
 use dyngen::Arm;
 use std::path::{Path, PathBuf};
@@ -66,7 +66,7 @@ impl Known {
     }
 
     /// The model, if it is one of this arm.
-    pub(crate) fn model(self, body: &RigidBody) -> Result<Option<TorqueModel>, Failure> {
+    pub(crate) fn model(self, body: &RigidArm) -> Result<Option<TorqueModel>, Failure> {
         let checked = self.model.map(|model| model.checked(body)).transpose();
         checked.map_err(|e| Failure::Unusable(e.to_string()))
     }

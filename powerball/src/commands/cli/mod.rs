@@ -46,7 +46,7 @@ enum Command {
     Record(record::RecordCommand),
     /// Swing the arm until its friction has settled.
     WarmUp(warm_up::WarmUp),
-    /// Measure every joint's friction at constant speeds and fit its law.
+    /// Measure every joint's friction at constant velocities and fit its law.
     Friction(friction::Friction),
     /// Make an arm's constant tables for the bus driver from its drives' DCF and one TOML.
     Profile(profile::ProfileCommand),

@@ -31,7 +31,7 @@ pub(crate) struct WarmUp {
     /// Length of a cycle, s.
     #[arg(long, default_value_t = 5.0)]
     period: f64,
-    /// Share of each joint's range, speed and acceleration that is used.
+    /// Share of each joint's range, velocity and acceleration that is used.
     #[arg(long, default_value_t = 0.6)]
     share: f64,
     /// Change of the torque that may still be to come, as a share of it.

@@ -34,7 +34,7 @@ const PATHS: [(bool, f64); 8] = [
 /// The path, one to fit, during which something may begin.
 const BEGINS_IN: usize = 3;
 /// Between two logs the arm goes to where the next one begins: in so many seconds at least, and at this share
-/// of its speed.
+/// of its velocity.
 const PAUSE: f64 = 3.0;
 const SHARE: f64 = 0.5;
 /// Paths tried for each log: enough for a condition number near the best, in a fraction of a second.

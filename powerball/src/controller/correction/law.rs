@@ -7,7 +7,7 @@ use nalgebra::RealField;
 pub struct Instant<'a, T> {
     /// Positions, rad (m where prismatic).
     pub q: &'a [T],
-    /// Speeds, rad/s.
+    /// Velocities, rad/s.
     pub dq: &'a [T],
     /// Accelerations, rad/s².
     pub ddq: &'a [T],
@@ -27,7 +27,7 @@ pub enum Law<T> {
     /// 1: a constant torque.
     Constant,
     /// |q̇|: viscous friction that differs with the direction.
-    SpeedMagnitude,
+    VelocityMagnitude,
     /// |τ_rigid|·tanh(γ·q̇): gears rub harder under load.
     Load {
         /// γ, s/rad.
@@ -38,7 +38,7 @@ pub enum Law<T> {
         /// γ, s/rad.
         steepness: T,
         /// v, rad/s.
-        speed: T,
+        velocity: T,
     },
     /// tanh(γ·q̇)·|q̇|^p.
     Power {
@@ -71,7 +71,7 @@ pub enum Law<T> {
         time_constant: T,
     },
     /// q̇·e^(−t/T): its viscous part alone.
-    CoolSpeed {
+    CoolVelocity {
         /// T, s.
         time_constant: T,
     },
@@ -81,7 +81,7 @@ pub enum Law<T> {
         reference: T,
     },
     /// q̇·(ϑ − ϑ₀)/10 K.
-    HotSpeed {
+    HotVelocity {
         /// ϑ₀, °C.
         reference: T,
     },
@@ -93,7 +93,7 @@ pub enum Law<T> {
         steepness: T,
     },
     /// q̇ₖ of another joint k.
-    OtherSpeed {
+    OtherVelocity {
         /// k, from 0.
         other: usize,
     },
@@ -114,7 +114,7 @@ pub enum Law<T> {
         steepness: T,
     },
     /// a·q̇ + b·q̇ₖ: its viscous friction.
-    SumSpeed {
+    SumVelocity {
         /// k, from 0.
         other: usize,
         /// a.
@@ -237,10 +237,10 @@ impl<T: RealField + Copy> Law<T> {
         };
         match *self {
             Law::Constant => T::one(),
-            Law::SpeedMagnitude => dq.abs(),
+            Law::VelocityMagnitude => dq.abs(),
             Law::Load { steepness } => of(now.rigid, joint).abs() * (steepness * dq).tanh(),
-            Law::Stribeck { steepness, speed } => {
-                let x = dq / speed;
+            Law::Stribeck { steepness, velocity } => {
+                let x = dq / velocity;
                 (steepness * dq).tanh() * (-(x * x)).exp()
             }
             Law::Power { steepness, power } => (steepness * dq).tanh() * dq.abs().powf(power),
@@ -251,16 +251,16 @@ impl<T: RealField + Copy> Law<T> {
             Law::CoolFriction { time_constant } => {
                 of(now.friction, joint) * (-now.running / time_constant).exp()
             }
-            Law::CoolSpeed { time_constant } => dq * (-now.running / time_constant).exp(),
+            Law::CoolVelocity { time_constant } => dq * (-now.running / time_constant).exp(),
             Law::HotFriction { reference } => of(now.friction, joint) * heat(reference),
-            Law::HotSpeed { reference } => dq * heat(reference),
+            Law::HotVelocity { reference } => dq * heat(reference),
             Law::OtherDirection { other, steepness } => (steepness * of(now.dq, other)).tanh(),
-            Law::OtherSpeed { other } => of(now.dq, other),
+            Law::OtherVelocity { other } => of(now.dq, other),
             Law::OtherAcceleration { other } => of(now.ddq, other),
             Law::SumDirection { other, own, theirs, steepness } => {
                 (steepness * (own * dq + theirs * of(now.dq, other))).tanh()
             }
-            Law::SumSpeed { other, own, theirs } => own * dq + theirs * of(now.dq, other),
+            Law::SumVelocity { other, own, theirs } => own * dq + theirs * of(now.dq, other),
             Law::SumAcceleration { other, own, theirs } => {
                 own * of(now.ddq, joint) + theirs * of(now.ddq, other)
             }

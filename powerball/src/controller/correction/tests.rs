@@ -38,7 +38,10 @@ fn the_gap_is_crossed_once_after_each_reversal() {
 #[test]
 fn single_precision_agrees() {
     let terms = [
-        (Law::Stribeck { steepness: 80.0, speed: 0.05 }, Law::Stribeck { steepness: 80.0f32, speed: 0.05 }),
+        (
+            Law::Stribeck { steepness: 80.0, velocity: 0.05 },
+            Law::Stribeck { steepness: 80.0f32, velocity: 0.05 },
+        ),
         (Law::Power { steepness: 80.0, power: 0.5 }, Law::Power { steepness: 80.0f32, power: 0.5 }),
         (Law::Cosine { order: 7.0 }, Law::Cosine { order: 7.0f32 }),
         (Law::Presliding { distance: 0.01 }, Law::Presliding { distance: 0.01f32 }),
@@ -84,7 +87,7 @@ fn single_precision_agrees() {
 fn a_joint_that_is_not_there_does_nothing() {
     let mut corrector = Corrector::new([
         Term { joint: 9, coefficient: 1.0, law: Law::Compliance },
-        Term { joint: 9, coefficient: 1.0, law: Law::OtherSpeed { other: 12 } },
+        Term { joint: 9, coefficient: 1.0, law: Law::OtherVelocity { other: 12 } },
     ]);
     let mut torque = [1.0, 2.0];
     let now =

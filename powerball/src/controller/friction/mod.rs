@@ -1,4 +1,4 @@
-//! Joint friction as a function of joint speed: the five-parameter model of the paper's Eq. 16.
+//! Joint friction as a function of joint velocity: the five-parameter model of the paper's Eq. 16.
 
 mod tanh;
 

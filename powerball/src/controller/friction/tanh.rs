@@ -26,7 +26,7 @@ impl<T: RealField + Copy> TanhFriction<T> {
         TanhFriction { gamma1, gamma2, gamma3, gamma4, gamma5 }
     }
 
-    /// Friction torque in N·m at joint speed `dq` in rad/s, positive against positive motion.
+    /// Friction torque in N·m at joint velocity `dq` in rad/s, positive against positive motion.
     pub fn torque(&self, dq: T) -> T {
         self.gamma1 * (self.gamma2 * dq).tanh() + self.gamma3 * (self.gamma4 * dq).tanh() + self.gamma5 * dq
     }

@@ -236,14 +236,14 @@ mod tests {
     #[test]
     fn a_payload_is_weighed_in_two_seconds() {
         use crate::identification::excite::{Settings, optimise};
-        use crate::logs::regression::RigidBody;
+        use crate::logs::regression::RigidArm;
         use crate::virtual_arm::lwa4p;
         use dyngen::arm::ParameterKind;
         use dyngen::{Model, SetKind};
         use rand_distr::{Distribution, StandardNormal};
 
         let arm = lwa4p::arm().unwrap();
-        let body = RigidBody::new(&arm).unwrap();
+        let body = RigidArm::new(&arm).unwrap();
         let model = Model::derive(arm.clone()).unwrap();
         let settings = Settings { evaluations: 50, ..Settings::default() };
         let motion = optimise(&model, SetKind::Minimal, &settings).unwrap().paths[0].sample(200.0);

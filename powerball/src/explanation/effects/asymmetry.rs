@@ -63,8 +63,8 @@ impl Effect for Asymmetry {
     fn laws(&self, _: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
         match Settings::of(candidate) {
             Some(Settings::Constant) => vec![Law::Constant],
-            Some(Settings::Viscous) => vec![Law::SpeedMagnitude],
-            Some(Settings::Both) => vec![Law::Constant, Law::SpeedMagnitude],
+            Some(Settings::Viscous) => vec![Law::VelocityMagnitude],
+            Some(Settings::Both) => vec![Law::Constant, Law::VelocityMagnitude],
             None => Vec::new(),
         }
     }

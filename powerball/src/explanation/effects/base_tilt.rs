@@ -20,7 +20,7 @@ pub(super) struct BaseTilt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Whether the parameters that level gravity does not show are fitted too
-    /// ([`RigidBody::hidden`](crate::logs::regression::RigidBody::hidden)).
+    /// ([`RigidArm::hidden`](crate::logs::regression::RigidArm::hidden)).
     pub unshown: bool,
 }
 

@@ -92,14 +92,14 @@ impl<'a> Context<'a> {
             (true, true) => g2.max(g4),
             (true, false) => g2,
             (false, true) => g4,
-            (false, false) => 20.0 / self.top_speed(joint),
+            (false, false) => 20.0 / self.top_velocity(joint),
         }
     }
 
-    /// The speed that a joint exceeds in 5 % of the samples that were fitted, rad/s.
+    /// The velocity that a joint exceeds in 5 % of the samples that were fitted, rad/s.
     #[must_use]
-    pub fn top_speed(&self, joint: JointNumber) -> f64 {
-        self.fit.top_speed[joint.index()]
+    pub fn top_velocity(&self, joint: JointNumber) -> f64 {
+        self.fit.top_velocity[joint.index()]
     }
 
     /// The column of laws that share a coefficient, each at a joint of its own.
@@ -198,7 +198,7 @@ const SIDE: f64 = 3.0;
 /// [`DataOptions`](crate::logs::regression::DataOptions)): both are differentiated alike.
 const WAY: (usize, f64) = (4, 8.0);
 
-/// Adds to positions, speeds and accelerations how a law moves one link, `size` times: n values a sample,
+/// Adds to positions, velocities and accelerations how a law moves one link, `size` times: n values a sample,
 /// `rigid` the torque of the rigid arm where the motors are. What gives way is smoothed, Hz.
 pub(crate) fn move_link(
     motion: &mut [Vec<f64>; 3],
@@ -220,7 +220,7 @@ pub(crate) fn move_link(
         Law::Compliance => smooth((2, smoothing), shifts(load)),
         _ => smooth(WAY, shifts(smooth((2, SIDE), load))),
     };
-    // What follows the load has speed and acceleration.
+    // What follows the load has velocity and acceleration.
     let (dv, da) =
         (difference::derivative(&shift, 1.0 / rate), difference::second_derivative(&shift, 1.0 / rate));
     let moves = [shift, dv, da];

@@ -26,7 +26,7 @@ impl Class {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Class::Friction => "depends on speed and its history",
+            Class::Friction => "depends on velocity and its history",
             Class::Position => "depends on position",
             Class::Dynamics => "depends on the torque and its timing",
             Class::Event => "depends on time",

@@ -190,7 +190,7 @@ impl Effect for JointCoupling {
         let mut columns =
             vec![both(&|other, own, theirs| Law::SumDirection { other, own, theirs, steepness })];
         if viscous {
-            columns.push(both(&|other, own, theirs| Law::SumSpeed { other, own, theirs }));
+            columns.push(both(&|other, own, theirs| Law::SumVelocity { other, own, theirs }));
         }
         if inertia {
             columns.push(both(&|other, own, theirs| Law::SumAcceleration { other, own, theirs }));
@@ -203,11 +203,11 @@ impl Effect for JointCoupling {
         let other = from.index();
         match kind {
             Kind::Coulomb => vec![Law::OtherDirection { other, steepness: context.steepness(*from) }],
-            Kind::Viscous => vec![Law::OtherSpeed { other }],
+            Kind::Viscous => vec![Law::OtherVelocity { other }],
             Kind::Inertial => vec![Law::OtherAcceleration { other }],
             Kind::Friction { steepness } => {
                 let level = |steepness: &f64| Law::OtherDirection { other, steepness: *steepness };
-                steepness.iter().map(level).chain([Law::OtherSpeed { other }]).collect()
+                steepness.iter().map(level).chain([Law::OtherVelocity { other }]).collect()
             }
             Kind::Transmission(_) => Vec::new(),
         }
@@ -240,7 +240,7 @@ fn from(candidate: &Candidate) -> Option<JointNumber> {
 /// The one number that stands for a coupling (see [`Figures::coefficient`]).
 fn coefficient(context: &Context<'_>, from: JointNumber, kind: &Kind, coefficients: &[f64]) -> f64 {
     let Kind::Friction { steepness } = kind else { return coefficients[0] };
-    let velocity = context.top_speed(from);
+    let velocity = context.top_velocity(from);
     let levels = steepness.iter().map(|steepness| (steepness * velocity).tanh());
     let felt: f64 = levels.chain([velocity]).zip(coefficients).map(|(x, c)| c * x).sum();
     felt / TanhFriction::new(context.fit.friction(from.index())).torque(velocity)

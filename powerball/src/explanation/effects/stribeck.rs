@@ -1,4 +1,4 @@
-//! Friction that falls with rising speed where a film of lubricant builds up.
+//! Friction that falls with rising velocity where a film of lubricant builds up.
 
 use super::candidate::{geometric, scaled};
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
@@ -21,7 +21,7 @@ pub struct Figures {
     /// c, N·m.
     pub level: ByJoint,
     /// v_s, rad/s.
-    pub speed: ByJoint,
+    pub velocity: ByJoint,
 }
 
 /// Velocities tried on a joint.
@@ -42,7 +42,7 @@ impl Effect for Stribeck {
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
         let on = |j| {
-            let top = context.top_speed(j);
+            let top = context.top_velocity(j);
             let velocities = geometric(0.02 * top, 0.3 * top, TRIED).into_iter();
             velocities.map(move |velocity| Candidate::on(j, Settings { velocity }, TRIED))
         };
@@ -50,10 +50,10 @@ impl Effect for Stribeck {
     }
 
     fn laws(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
-        let speed = velocity(candidate);
+        let velocity = velocity(candidate);
         // The sign must have changed well inside the bump.
-        let steepness = context.steepness(candidate.joints[0]).max(4.0 / speed);
-        vec![Law::Stribeck { steepness, speed }]
+        let steepness = context.steepness(candidate.joints[0]).max(4.0 / velocity);
+        vec![Law::Stribeck { steepness, velocity }]
     }
 
     fn non_negative(&self) -> bool {
@@ -67,7 +67,7 @@ impl Effect for Stribeck {
 
     fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
         let level = ByJoint::of(found, |f| f.coefficients[0]);
-        Figures { level, speed: ByJoint::of(found, |f| velocity(f.candidate)) }.into()
+        Figures { level, velocity: ByJoint::of(found, |f| velocity(f.candidate)) }.into()
     }
 }
 

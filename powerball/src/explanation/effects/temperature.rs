@@ -100,9 +100,9 @@ impl Effect for Temperature {
         let Some(Settings { of, with }) = Settings::of(candidate) else { return Vec::new() };
         vec![match (of, *with) {
             (Friction::Whole, Warmth::RunningTime { time_constant }) => Law::CoolFriction { time_constant },
-            (Friction::Viscous, Warmth::RunningTime { time_constant }) => Law::CoolSpeed { time_constant },
+            (Friction::Viscous, Warmth::RunningTime { time_constant }) => Law::CoolVelocity { time_constant },
             (Friction::Whole, Warmth::Logged { reference }) => Law::HotFriction { reference },
-            (Friction::Viscous, Warmth::Logged { reference }) => Law::HotSpeed { reference },
+            (Friction::Viscous, Warmth::Logged { reference }) => Law::HotVelocity { reference },
         }]
     }
 

@@ -1,4 +1,4 @@
-//! Friction at speed that Eq. 16 cannot bend to: growing faster or slower than in proportion.
+//! Friction at velocity that Eq. 16 cannot bend to: growing faster or slower than in proportion.
 
 use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;

@@ -10,7 +10,7 @@ use crate::explanation::options::{ExplainError, ExplainOptions};
 use crate::identification::estimate::Folds;
 use crate::identification::estimate::distribution::f_tail;
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, RigidBody};
+use crate::logs::regression::{Data, RigidArm};
 
 /// What was decided.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,7 +32,7 @@ pub struct Decision {
 /// # Errors
 /// Logs that hold too little.
 pub fn decide(
-    body: &RigidBody,
+    body: &RigidArm,
     open: &Open,
     fit: &[Log],
     held_out: &[Log],

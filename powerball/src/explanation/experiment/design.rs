@@ -11,7 +11,7 @@ use crate::identification::estimate::{Design, Folds, Gram, Solver};
 use crate::identification::excite::{Error, Fourier, Limits, Settings, search};
 use crate::identification::motion::Motion;
 use crate::logs::log::Log;
-use crate::logs::regression::{Column, Data, DataOptions, RigidBody};
+use crate::logs::regression::{Column, Data, DataOptions, RigidArm};
 use crate::logs::vector::dot;
 use faer::Mat;
 
@@ -50,7 +50,7 @@ fn settings() -> Settings {
 ///
 /// # Errors
 /// Limits that the arm file misses.
-pub fn design(body: &RigidBody, open: &Open, options: &DataOptions) -> Result<DesignedExperiment, Error> {
+pub fn design(body: &RigidArm, open: &Open, options: &DataOptions) -> Result<DesignedExperiment, Error> {
     let settings = settings();
     let limits = Limits::of(body.arm(), settings.margin)?;
     let duels = duels(open);
@@ -160,7 +160,7 @@ struct Shows {
 
 /// What a path shows of the pair of names that is hardest to tell apart; `None` where the path moves nothing.
 fn judge(
-    body: &RigidBody,
+    body: &RigidArm,
     open: &Open,
     duels: &[Duel<'_>],
     path: &Fourier,

@@ -15,14 +15,14 @@ use super::explain::{Experiment, Explained, Hypothesis, Open, Trajectory, explai
 use super::options::{ExplainError, ExplainOptions, RuledOut};
 use crate::identification::motion::Motion;
 use crate::logs::log::Log;
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 
 /// Name of the trajectory's file beside explained.json.
 pub const TRAJECTORY: &str = "next_experiment.csv";
 
 /// Designs the experiment for what an explanation leaves open, and says so in its `next_experiment`; `None`
 /// where nothing is open or the arm file has no limits to move within.
-pub fn propose(body: &RigidBody, explained: &mut Explained, options: &ExplainOptions<'_>) -> Option<Motion> {
+pub fn propose(body: &RigidArm, explained: &mut Explained, options: &ExplainOptions<'_>) -> Option<Motion> {
     let open = explained.open.clone()?;
     options.progress.say("designing the experiment that tells the open names apart");
     let designed = design(body, &open, &options.data);
@@ -74,7 +74,7 @@ fn advice(open: &Open, design: &DesignedExperiment, visible: f64) -> String {
 /// # Errors
 /// As [`explain_body`].
 pub fn learn(
-    body: &RigidBody,
+    body: &RigidArm,
     (fit, held_out): (&[Log], &[Log]),
     new: Log,
     before: &Explained,

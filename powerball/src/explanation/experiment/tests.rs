@@ -8,12 +8,12 @@ use crate::explanation::explain::{Explained, explain_body};
 use crate::identification::excite::{Limits, Settings, optimise};
 use crate::identification::motion::Motion;
 use crate::logs::log::{Log, common_clock};
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use crate::virtual_arm::{Plant, PlantEffect as Effect, lwa4p};
 use dyngen::{Model, SetKind};
 
 /// Logs along paths that leave most of every joint's range unused, and what they say.
-fn session(plant: &Plant, body: &RigidBody) -> (Vec<Log>, Vec<Log>, Explained) {
+fn session(plant: &Plant, body: &RigidArm) -> (Vec<Log>, Vec<Log>, Explained) {
     let model = Model::derive(lwa4p::arm().unwrap()).unwrap();
     let mut logs: Vec<Log> = (0..5)
         .map(|seed| {
@@ -36,7 +36,7 @@ fn log(plant: &Plant, motion: &Motion, seed: u64) -> Log {
 #[test]
 fn an_experiment_is_designed_within_the_limits_and_decides_what_the_logs_left_open() {
     let arm = lwa4p::arm().unwrap();
-    let body = RigidBody::new(&arm).unwrap();
+    let body = RigidArm::new(&arm).unwrap();
     let truths = [
         (Effect::Spring { joint: 0, stiffness: 0.4, rest: -2.0 }, "spring", "asymmetry"),
         (Effect::Asymmetry { joint: 0, share: 0.0, constant: 0.8 }, "asymmetry", "spring"),
@@ -87,11 +87,11 @@ fn an_experiment_is_designed_within_the_limits_and_decides_what_the_logs_left_op
 #[test]
 fn without_limits_there_is_advice_and_no_trajectory() {
     let plant = lwa4p::plant().unwrap().with(Effect::Asymmetry { joint: 0, share: 0.0, constant: 0.8 });
-    let body = RigidBody::new(&lwa4p::arm().unwrap()).unwrap();
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let (_, _, mut explained) = session(&plant, &body);
     let mut arm = lwa4p::arm().unwrap();
     arm.joints[3].velocity = None;
-    let body = RigidBody::new(&arm).unwrap();
+    let body = RigidArm::new(&arm).unwrap();
     assert!(propose(&body, &mut explained, &ExplainOptions::default()).is_none());
     let next = serde_json::to_value(explained.next_experiment.unwrap()).unwrap();
     assert!(next["advice"].as_str().unwrap().contains("other positions"));

@@ -9,8 +9,8 @@ use crate::identification::estimate::Fit;
 /// [`Effect::beside`](crate::explanation::effects::Effect::beside)): every effect is then judged beside that.
 pub(super) fn begin<'a>(base: Fit, study: &Study<'a>) -> Model {
     let plain = Model::new(base);
-    // Joints that are fitted apart have an offset already.
-    if study.data.joints_apart {
+    // Per-joint fits have an offset already.
+    if study.data.per_joint {
         return plain;
     }
     let with = plain.beside(study);

@@ -37,7 +37,7 @@ pub use results::{
 
 use crate::explanation::options::{ExplainError, ExplainOptions};
 use crate::logs::log::Log;
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use begin::begin;
 use comparison::{History, withhold};
 use findings::Findings;
@@ -50,7 +50,7 @@ use step::{Outcome, Proposed, accept, propose, settle_beside};
 /// # Errors
 /// [`ExplainError`] where logs hold too little.
 pub fn explain_body(
-    body: &RigidBody,
+    body: &RigidArm,
     logs: &[Log],
     validate: &[Log],
     options: &ExplainOptions<'_>,

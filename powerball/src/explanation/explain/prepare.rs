@@ -6,7 +6,7 @@ use super::study::Study;
 use crate::explanation::options::{ExplainError, ExplainOptions};
 use crate::identification::estimate::{Fit, Folds, bands_of, fit, spread};
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, RigidBody};
+use crate::logs::regression::{Data, RigidArm};
 use crate::logs::summary::BANDS;
 
 /// Whose inertial parameters are fitted.
@@ -40,15 +40,15 @@ pub(super) struct Beforehand {
 
 /// Prepares the logs and fits the base model.
 pub(super) fn prepare<'a>(
-    body: &'a RigidBody,
+    body: &'a RigidArm,
     (logs, validate): (&[Log], &[Log]),
     options: &'a ExplainOptions<'a>,
     inertia: Inertia,
 ) -> Result<Begun<'a>, ExplainError> {
     let rule = &options.rule;
     let (mut data, mut validation) = in_own_bands(body, (logs, validate), options)?;
-    data.take_apart(inertia == Inertia::PerJoint);
-    validation.take_apart(inertia == Inertia::PerJoint);
+    data.set_per_joint(inertia == Inertia::PerJoint);
+    validation.set_per_joint(inertia == Inertia::PerJoint);
     options.progress.say("fitting the base model");
     let folds = Folds::new(&data);
     let base = fit(&data, &folds, &[], None);
@@ -71,7 +71,7 @@ pub(super) fn prepare<'a>(
 /// be judged there on the noise of positions that were differentiated twice: whatever attenuates the model
 /// helps. It is taken in the band below those octaves.
 fn in_own_bands<'a>(
-    body: &'a RigidBody,
+    body: &'a RigidArm,
     (logs, validate): (&[Log], &[Log]),
     options: &ExplainOptions<'_>,
 ) -> Result<(Data<'a>, Data<'a>), ExplainError> {

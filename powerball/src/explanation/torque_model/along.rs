@@ -5,14 +5,14 @@ use crate::controller::correction::{Law, Memory, Term, add_torques};
 use crate::controller::friction::TanhFriction;
 use crate::explanation::effects::{PASSES, SOFT, Window, each_instant, move_link, time_delay};
 use crate::logs::parallel;
-use crate::logs::regression::{Data, Recording, RigidBody};
+use crate::logs::regression::{Data, Recording, RigidArm};
 use dyngen::arm::ParameterKind;
 
 impl TorqueModel {
     /// Measured less predicted torque, by joint and row, N·m. `body` is the arm with the model's changes; the
     /// last link holds the model's latest payload during the windows `held`.
     #[must_use]
-    pub fn residual(&self, body: &RigidBody, data: &Data<'_>, held: &[Window]) -> Vec<Vec<f64>> {
+    pub fn residual(&self, body: &RigidArm, data: &Data<'_>, held: &[Window]) -> Vec<Vec<f64>> {
         let recordings: Vec<usize> = (0..data.recordings.len()).collect();
         let torque = parallel::map(&recordings, |r| {
             let recording = &data.recordings[*r];
@@ -26,7 +26,7 @@ impl TorqueModel {
     /// The torque along one recording, n a sample, N·m as logged; `held` says by the log's time whether the
     /// payload is there.
     #[must_use]
-    pub fn torque(&self, body: &RigidBody, recording: &Recording, held: &dyn Fn(f64) -> bool) -> Vec<f64> {
+    pub fn torque(&self, body: &RigidArm, recording: &Recording, held: &dyn Fn(f64) -> bool) -> Vec<f64> {
         let n = recording.dof;
         let mut true_places = recording.clone();
         for (k, q) in true_places.q.iter_mut().enumerate() {
@@ -69,7 +69,7 @@ impl TorqueModel {
     /// The torque of the rigid arm and what it holds.
     fn rigid(
         &self,
-        body: &RigidBody,
+        body: &RigidArm,
         [q, v, a]: &[Vec<f64>; 3],
         recording: &Recording,
         held: &dyn Fn(f64) -> bool,

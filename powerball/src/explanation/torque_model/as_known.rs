@@ -5,7 +5,7 @@ use super::{FileError, TorqueModel};
 use crate::identification::KnownModel;
 use crate::identification::mounting::Mounting;
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, RigidBody};
+use crate::logs::regression::{Data, RigidArm};
 use dyngen::Arm;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -46,7 +46,7 @@ impl ModelFile {
     ///
     /// # Errors
     /// As [`TorqueModel::checked`].
-    pub fn checked(self, body: &RigidBody) -> Result<TorqueModel, FileError> {
+    pub fn checked(self, body: &RigidArm) -> Result<TorqueModel, FileError> {
         self.model.in_set_of(body).checked(body.names(), body.dof(), &self.file)
     }
 }
@@ -63,16 +63,16 @@ impl KnownModel for ModelFile {
         changes.of(arm).map_err(|e| format!("{}: {e}", self.file.display()))
     }
 
-    fn in_set_of(&self, body: &RigidBody) -> Result<Box<dyn KnownModel>, String> {
+    fn in_set_of(&self, body: &RigidArm) -> Result<Box<dyn KnownModel>, String> {
         let model = self.clone().checked(body).map_err(|e| e.to_string())?;
         Ok(Box::new(ModelFile { model, ..self.clone() }))
     }
 
-    fn take_out(&self, body: &RigidBody, logs: &mut [Log]) {
+    fn take_out(&self, body: &RigidArm, logs: &mut [Log]) {
         self.model.take_out(body, logs);
     }
 
-    fn residual(&self, body: &RigidBody, data: &Data<'_>) -> Vec<Vec<f64>> {
+    fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Vec<Vec<f64>> {
         self.model.residual(body, data, &[])
     }
 }

@@ -48,13 +48,13 @@ impl From<NamedTerm> for TermEntry {
 #[serde(remote = "Law<f64>", tag = "law", rename_all = "snake_case")]
 enum LawEntry {
     Constant,
-    SpeedMagnitude,
+    VelocityMagnitude,
     Load {
         steepness: f64,
     },
     Stribeck {
         steepness: f64,
-        speed: f64,
+        velocity: f64,
     },
     Power {
         steepness: f64,
@@ -73,13 +73,13 @@ enum LawEntry {
     CoolFriction {
         time_constant: f64,
     },
-    CoolSpeed {
+    CoolVelocity {
         time_constant: f64,
     },
     HotFriction {
         reference: f64,
     },
-    HotSpeed {
+    HotVelocity {
         reference: f64,
     },
     OtherDirection {
@@ -87,7 +87,7 @@ enum LawEntry {
         other: usize,
         steepness: f64,
     },
-    OtherSpeed {
+    OtherVelocity {
         #[serde(with = "from_one")]
         other: usize,
     },
@@ -102,7 +102,7 @@ enum LawEntry {
         theirs: f64,
         steepness: f64,
     },
-    SumSpeed {
+    SumVelocity {
         #[serde(with = "from_one")]
         other: usize,
         own: f64,
@@ -201,9 +201,9 @@ impl TorqueModel {
         for NamedTerm { effect, term } in &self.additions.terms {
             let other = match term.law {
                 Law::OtherDirection { other, .. }
-                | Law::OtherSpeed { other }
+                | Law::OtherVelocity { other }
                 | Law::SumDirection { other, .. }
-                | Law::SumSpeed { other, .. }
+                | Law::SumVelocity { other, .. }
                 | Law::SumAcceleration { other, .. }
                 | Law::OtherAcceleration { other } => other,
                 _ => 0,

@@ -4,13 +4,13 @@ use super::{Additions, LogChanges, NamedTerm, TorqueModel};
 use crate::controller::JointNumber;
 use crate::controller::correction::{Law, Term};
 use crate::logs::log::Log;
-use crate::logs::regression::{DataOptions, Recording, RigidBody};
+use crate::logs::regression::{DataOptions, Recording, RigidArm};
 use crate::logs::signal::resample::median_step;
 
 impl TorqueModel {
     /// Leaves in logs what a base model is to be fitted to: true positions, torques at their own time,
     /// without the terms, which stay as they are known. `body` is the arm with the model's changes.
-    pub fn take_out(&self, body: &RigidBody, logs: &mut [Log]) {
+    pub fn take_out(&self, body: &RigidArm, logs: &mut [Log]) {
         self.additions.log_changes.clean(logs);
         if self.additions.terms.is_empty() {
             return;

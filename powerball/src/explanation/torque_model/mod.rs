@@ -20,7 +20,7 @@ pub use source::{Scalar, SourceError};
 
 use crate::controller::correction::{Law, Term};
 use crate::identification::estimate::{JointFriction, ParameterEstimate, in_set_of};
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use serde::{Deserialize, Serialize};
 
 /// The model of one arm; as JSON the keys are those of `identified.json` and more.
@@ -154,7 +154,7 @@ impl TorqueModel {
     /// mountings determine together, say. Errors of converted values are not known. As it is where they do
     /// not.
     #[must_use]
-    pub fn in_set_of(mut self, body: &RigidBody) -> TorqueModel {
+    pub fn in_set_of(mut self, body: &RigidArm) -> TorqueModel {
         if let Some(parameters) = in_set_of(&self.parameters, &self.arm, body) {
             self.parameters = parameters;
         }

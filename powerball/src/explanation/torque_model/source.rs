@@ -71,7 +71,7 @@ impl TorqueModel {
                 _ => continue,
             };
             notes.push(format!(
-                "joint {joint}: {what}; the torque below has its part of the position, not that of its speed \
+                "joint {joint}: {what}; the torque below has its part of the position, not that of its velocity \
                     and acceleration: \
                  give the motor a reference ahead of the link's by as much"
             ));
@@ -239,7 +239,7 @@ impl TorqueModel {{
     /// Call it once a sample, in the order of time.
     ///
     /// * `q`: positions as the encoders show them, rad
-    /// * `dq`: speeds, rad/s
+    /// * `dq`: velocities, rad/s
     /// * `ddq`: accelerations, rad/s²
     /// * `running`: time since the arm began to work, as cold as when it was recorded, s
     /// * `temperature`: of the joints, °C; may be empty where no term asks for it

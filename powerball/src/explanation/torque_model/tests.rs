@@ -2,29 +2,29 @@
 
 use super::*;
 use crate::controller::correction::Law;
-use crate::logs::regression::{Recording, RigidBody};
+use crate::logs::regression::{Recording, RigidArm};
 use dyngen::Arm;
 
 fn every_law() -> Vec<Law<f64>> {
     vec![
         Law::Constant,
-        Law::SpeedMagnitude,
+        Law::VelocityMagnitude,
         Law::Load { steepness: 216.5 },
-        Law::Stribeck { steepness: 80.0, speed: 0.05 },
+        Law::Stribeck { steepness: 80.0, velocity: 0.05 },
         Law::Power { steepness: 80.0, power: 0.5 },
         Law::Presliding { distance: 0.004 },
         Law::Position,
         Law::Cosine { order: 7.0 },
         Law::Sine { order: 161.25 },
         Law::CoolFriction { time_constant: 60.0 },
-        Law::CoolSpeed { time_constant: 60.0 },
+        Law::CoolVelocity { time_constant: 60.0 },
         Law::HotFriction { reference: 21.5 },
-        Law::HotSpeed { reference: 21.5 },
+        Law::HotVelocity { reference: 21.5 },
         Law::OtherDirection { other: 3, steepness: 50.0 },
-        Law::OtherSpeed { other: 3 },
+        Law::OtherVelocity { other: 3 },
         Law::OtherAcceleration { other: 3 },
         Law::SumDirection { other: 3, own: 1.0, theirs: -1.0, steepness: 50.0 },
-        Law::SumSpeed { other: 3, own: 1.0, theirs: -1.0 },
+        Law::SumVelocity { other: 3, own: 1.0, theirs: -1.0 },
         Law::SumAcceleration { other: 3, own: 1.0, theirs: -1.0 },
         Law::Torque,
         Law::TorqueMagnitude { scale: 64.0 },
@@ -35,14 +35,14 @@ fn every_law() -> Vec<Law<f64>> {
     ]
 }
 
-fn body() -> RigidBody {
+fn body() -> RigidArm {
     let mut arm = Arm::parse(include_str!("../../../lwa4p.toml"), "lwa4p.toml").unwrap();
     arm.groupings.clear();
-    RigidBody::new(&arm).unwrap()
+    RigidArm::new(&arm).unwrap()
 }
 
 /// A model with the given laws at the second joint and values without meaning.
-fn model(body: &RigidBody, laws: &[Law<f64>]) -> TorqueModel {
+fn model(body: &RigidArm, laws: &[Law<f64>]) -> TorqueModel {
     let value = |k: usize| 0.3 + 0.1 * (k as f64 * 1.7).sin();
     let friction = (0..body.dof()).map(|joint| JointFriction::plain(joint, [4.5, 216.0, 2.0, 4.7, 15.0]));
     let term = |(k, law): (usize, &Law<f64>)| NamedTerm {
@@ -133,7 +133,7 @@ fn a_model_of_another_arm_is_refused_with_the_reason() {
     wrong(&|m| m.friction.truncate(5), "no friction for joint 6");
     wrong(&|m| m.additions.terms[0].term.joint = 6, "a joint that the arm does not have");
     wrong(
-        &|m| m.additions.terms[0].term.law = Law::OtherSpeed { other: 9 },
+        &|m| m.additions.terms[0].term.law = Law::OtherVelocity { other: 9 },
         "a joint that the arm does not have",
     );
     wrong(&|m| m.additions.log_changes.delay = vec![0.1], "1 numbers for 6 joints");
@@ -209,7 +209,7 @@ fn code_for_changed_arms_holds_what_was_changed() {
     changed.additions.arm_changes =
         ArmChanges { gravity: Some([0.1, -0.2, -9.8]), not_zero: vec!["mx3".into()] };
     let arm = changed.additions.arm_changes.of(body.arm()).unwrap();
-    let other = RigidBody::new(&arm).unwrap();
+    let other = RigidArm::new(&arm).unwrap();
     assert!(other.names().len() > body.names().len());
     changed.parameters = model(&other, &[]).parameters;
     let source = changed.source(body.arm(), Scalar::F32, &[]).unwrap();

@@ -4,7 +4,7 @@ use super::reading::Positions;
 use super::rows::{Gravity, Rows};
 use super::thin::thin;
 use crate::logs::log::Log;
-use crate::logs::regression::{DataError, RigidBody};
+use crate::logs::regression::{DataError, RigidArm};
 
 /// How much of the logs is looked at: seconds, and samples a second.
 #[derive(Clone, Copy, Debug)]
@@ -39,7 +39,7 @@ impl Thinned {
 
     fn rows<'a>(
         &self,
-        body: &'a RigidBody,
+        body: &'a RigidArm,
         read: &Positions,
         gravity: Gravity,
     ) -> Result<Rows<'a>, DataError> {
@@ -61,13 +61,13 @@ impl Thinned {
 /// What is asked.
 #[derive(Debug)]
 pub(super) struct Asked<'a> {
-    pub(super) body: &'a RigidBody,
+    pub(super) body: &'a RigidArm,
     whole: Thinned,
     few: Thinned,
 }
 
 impl<'a> Asked<'a> {
-    pub(super) fn new(body: &'a RigidBody, logs: &[Log], validate: &[Log]) -> Asked<'a> {
+    pub(super) fn new(body: &'a RigidArm, logs: &[Log], validate: &[Log]) -> Asked<'a> {
         Asked { body, whole: Thinned::new(logs, validate, WHOLE), few: Thinned::new(logs, validate, FEW) }
     }
 

@@ -37,7 +37,7 @@ pub use told::{Answer, Conventions, GravityIs, Kind, PerJoint, PositionColumns, 
 
 use crate::controller::JointNumber;
 use crate::logs::log::Log;
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use answers::{Facts, answers};
 use asked::Asked;
 use search::{Found, gravity_is, search};
@@ -49,7 +49,7 @@ use unit::{Size, Unit};
 ///
 /// Nothing is changed by it, and nothing fails: where the logs hold too little, that is told.
 #[must_use]
-pub fn conventions(body: &RigidBody, logs: &[Log], validate: &[Log]) -> Conventions {
+pub fn conventions(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventions {
     let asked = Asked::new(body, logs, validate);
     let found = match search(&asked) {
         Ok(found) => found,

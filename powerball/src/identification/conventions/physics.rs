@@ -56,21 +56,21 @@ impl Energies {
         // B(q)·q̇ as columns; half of it times q̇ is the energy of motion.
         let y = body.regressor(&q, &still, &v);
         let mut kinetic = vec![0.0; size];
-        for (row, speed) in v.iter().enumerate() {
+        for (row, velocity) in v.iter().enumerate() {
             let of = row * p..(row + 1) * p;
             for ((sum, y), g) in kinetic.iter_mut().zip(&y[of.clone()]).zip(&gravity[of]) {
-                *sum += 0.5 * speed * (y - g) / count;
+                *sum += 0.5 * velocity * (y - g) / count;
             }
         }
         let friction = (0..n).map(|j| {
             let mut sum = vec![0.0; size];
             let rows_of = &rows.joints[j][part];
             let first = rows.places[j].len() - FRICTION;
-            let [step, speed] = [0, 1].map(|k| &rows_of.columns[first + k]);
-            let rows_count = speed.len().max(1) as f64;
-            let mean = |x: &[f64]| x.iter().zip(speed).map(|(x, v)| x * v).sum::<f64>() / rows_count;
+            let [step, velocity] = [0, 1].map(|k| &rows_of.columns[first + k]);
+            let rows_count = velocity.len().max(1) as f64;
+            let mean = |x: &[f64]| x.iter().zip(velocity).map(|(x, v)| x * v).sum::<f64>() / rows_count;
             sum[p + FRICTION * j] = mean(step);
-            sum[p + FRICTION * j + 1] = mean(speed);
+            sum[p + FRICTION * j + 1] = mean(velocity);
             sum
         });
         let friction = friction.collect();

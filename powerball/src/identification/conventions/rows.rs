@@ -5,7 +5,7 @@
 
 use super::reading::Torques;
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, DataError, DataOptions, Recording, RigidBody};
+use crate::logs::regression::{Data, DataError, DataOptions, Recording, RigidArm};
 use faer::Mat;
 
 /// Friction columns of a joint: tanh(q̇/v₀), q̇, 1.
@@ -56,7 +56,7 @@ impl<'a> Rows<'a> {
     /// # Errors
     /// As [`Data::new`].
     pub(super) fn new(
-        body: &'a RigidBody,
+        body: &'a RigidArm,
         logs: &[Log],
         part: &[Option<usize>],
         gravity: Gravity,
@@ -136,9 +136,9 @@ fn take_gravity_out(data: &mut Data<'_>) {
 
 fn joint_rows(data: &Data<'_>, joint: usize, part: &[Option<usize>]) -> (Vec<usize>, [Part; 2]) {
     let (rows, p) = (&data.joints[joint], data.body.names().len());
-    let step = STEP * data.top_speed(joint);
+    let step = STEP * data.top_velocity(joint);
     let friction =
-        |f: &dyn Fn(f64) -> f64| rows.column(&data.recordings, |_, r| r.speed(joint).map(f).collect());
+        |f: &dyn Fn(f64) -> f64| rows.column(&data.recordings, |_, r| r.velocity(joint).map(f).collect());
     let is_there = |c: &usize| rows.inertial[*c].iter().any(|x| *x != 0.0);
     let used: Vec<usize> = (0..p).filter(is_there).collect();
     let own = [friction(&|v| (v / step).tanh()), friction(&|v| v), friction(&|_| 1.0)];

@@ -23,8 +23,8 @@ pub(super) fn least_share(
         let shares = [0, 1].map(|part| {
             let torque = rows.torque(read, joint, part);
             let columns = &rows.joints[joint][part].columns;
-            let speed = &columns[columns.len() - 2];
-            let power = torque.iter().zip(speed).map(|(t, v)| (t * v).abs()).sum::<f64>();
+            let velocity = &columns[columns.len() - 2];
+            let power = torque.iter().zip(velocity).map(|(t, v)| (t * v).abs()).sum::<f64>();
             energies[part].friction(&judged.fits[part], joint).value.abs() * torque.len() as f64 / power
         });
         0.5 * (shares[0] + shares[1])

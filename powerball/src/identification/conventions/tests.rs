@@ -3,15 +3,15 @@
 use super::{Conventions, GravityIs, Kind, PerJoint, Side, conventions};
 use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::log::Log;
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use crate::virtual_arm::lwa4p;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::LazyLock;
 
 /// The virtual arm and six logs of it; the last two are of another path than those that are fitted.
-static SOUND: LazyLock<(RigidBody, Vec<Log>)> = LazyLock::new(|| {
-    let body = RigidBody::new(&lwa4p::arm().unwrap()).unwrap();
+static SOUND: LazyLock<(RigidArm, Vec<Log>)> = LazyLock::new(|| {
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let plant = lwa4p::plant().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let log = |k: u64| {

@@ -72,8 +72,8 @@ impl Size {
             squares.0 += recording.v.iter().map(|v| v * v).sum::<f64>();
             squares.1 += recording.len();
         }
-        let speed = squares.0 / squares.1.max(1) as f64;
-        let inertia = 2.0 * found.energies[0].kinetic(fit).value.abs() / speed;
+        let velocity = squares.0 / squares.1.max(1) as f64;
+        let inertia = 2.0 * found.energies[0].kinetic(fit).value.abs() / velocity;
         Size {
             weight: if acts(rows) { over(largest / g / reach.powi(4)) } else { None },
             inertia: over(inertia / reach.powi(5)),

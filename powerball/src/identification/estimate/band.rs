@@ -9,9 +9,9 @@
 
 use super::design::Design;
 use super::fit::{Fit, friction_columns};
-use super::reduced::{FrictionLaw, Solution, solve_reduced};
+use super::reduced::{FrictionKind, Solution, solve_reduced};
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, DataError, DataOptions, RigidBody};
+use crate::logs::regression::{Data, DataError, DataOptions, RigidArm};
 use crate::logs::signal::occupied::between;
 use crate::logs::summary::{BANDS, Bands, Powers, Summary, parts};
 
@@ -26,7 +26,7 @@ pub struct InBand {
 
 /// Fits the base model to reduced logs, every joint in the band that they ask for.
 #[must_use]
-pub fn solve_in_band(reduced: &Bands, law: FrictionLaw) -> InBand {
+pub fn solve_in_band(reduced: &Bands, law: FrictionKind) -> InBand {
     // A log that is too short for a band must not fall out of the fit.
     let whole = |narrower: &&Summary| narrower.logs.len() == reduced.widest().logs.len();
     let narrower = reduced.all()[1..].iter().take_while(whole).count();
@@ -52,13 +52,13 @@ pub fn bands_of(data: &Data<'_>, fit: &Fit) -> Vec<usize> {
 /// # Errors
 /// [`DataError`] where nothing of the log can be used.
 pub fn reduce_in_bands(
-    body: &RigidBody,
+    body: &RigidArm,
     log: &Log,
     options: &DataOptions,
 ) -> Result<(Bands, Vec<String>), DataError> {
     let mut bands = Bands::new(body, options);
     let notes = bands.push(body, log, options)?;
-    let own = solve_reduced(bands.widest(), FrictionLaw::Symmetric);
+    let own = solve_reduced(bands.widest(), FrictionKind::Symmetric);
     let widest = DataOptions { cutoff: BANDS[0], ..options.clone() };
     // Some minutes say where a spectrum sinks.
     let first = parts(log).into_iter().find_map(|part| Data::new(body, &[part], &widest).ok());

@@ -3,7 +3,7 @@
 use super::estimates::{JointFriction, ParameterEstimate};
 use crate::controller::friction::TanhFriction;
 use crate::logs::parallel;
-use crate::logs::regression::{Data, Recording, RigidBody};
+use crate::logs::regression::{Data, Recording, RigidArm};
 use dyngen::{SetKind, Values};
 
 /// What an identification finds: τ = rigid(q, q̇, q̈) + Eq. 16 friction.
@@ -21,7 +21,7 @@ impl BaseModel {
     /// The model in the minimal set of a body, whose parameters its own determine. As it is where they do
     /// not.
     #[must_use]
-    pub fn in_set_of(mut self, body: &RigidBody) -> BaseModel {
+    pub fn in_set_of(mut self, body: &RigidArm) -> BaseModel {
         if let Some(parameters) = in_set_of(&self.parameters, &self.arm, body) {
             self.parameters = parameters;
         }
@@ -30,12 +30,12 @@ impl BaseModel {
 
     /// Measured less predicted torque, by joint and row, N·m.
     #[must_use]
-    pub fn residual(&self, body: &RigidBody, data: &Data<'_>) -> Vec<Vec<f64>> {
+    pub fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Vec<Vec<f64>> {
         data.residual(&parallel::map(&data.recordings, |recording| self.torque(body, recording)))
     }
 
     /// The torque along one recording, n a sample, N·m.
-    fn torque(&self, body: &RigidBody, recording: &Recording) -> Vec<f64> {
+    fn torque(&self, body: &RigidArm, recording: &Recording) -> Vec<f64> {
         let parameters: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
         let mut torque = body.torque(&recording.q, &recording.v, &recording.a, &parameters);
         let law = |f: &JointFriction| (TanhFriction::new(f.gamma()), f.offset.unwrap_or(0.0));
@@ -59,7 +59,7 @@ impl BaseModel {
 pub(crate) fn in_set_of(
     parameters: &[ParameterEstimate],
     arm: &str,
-    body: &RigidBody,
+    body: &RigidArm,
 ) -> Option<Vec<ParameterEstimate>> {
     let names = body.names();
     if names.iter().all(|name| parameters.iter().any(|p| p.name == *name)) {

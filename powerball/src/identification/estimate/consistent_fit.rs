@@ -4,7 +4,7 @@ use super::consistent::{Consistent, nearest};
 use super::estimates::{Spread, spread_of};
 use super::reduced::Solution;
 use super::solve::{Solver, bounded};
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use dyngen::{Error, SetKind};
 use faer::Mat;
 use serde::Serialize;
@@ -45,7 +45,7 @@ pub struct ConsistentReport {
 ///
 /// # Errors
 /// As [`nearest`].
-pub fn consistent_fit(body: &RigidBody, solution: &Solution) -> Result<ConsistentFit, Error> {
+pub fn consistent_fit(body: &RigidArm, solution: &Solution) -> Result<ConsistentFit, Error> {
     let layout = solution.layout;
     let (p, size) = (layout.inertial, layout.size());
     let (gram, right, _) = solution.products();
@@ -71,7 +71,7 @@ pub fn consistent_fit(body: &RigidBody, solution: &Solution) -> Result<Consisten
 impl ConsistentFit {
     /// In the words of a report.
     #[must_use]
-    pub fn report(&self, body: &RigidBody, solution: &Solution) -> ConsistentReport {
+    pub fn report(&self, body: &RigidArm, solution: &Solution) -> ConsistentReport {
         let error = spread_of(solution, &self.theta);
         let free = spread_of(solution, &solution.theta);
         let ratio = |(a, b): (&f64, &f64)| if *b > 0.0 { a / b - 1.0 } else { 0.0 };

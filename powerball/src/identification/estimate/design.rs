@@ -11,7 +11,7 @@ use std::ops::Range;
 
 /// The regression columns for given friction shapes and terms.
 ///
-/// Global order: the minimal set (one after the other for each joint, where [`Data::joints_apart`]),
+/// Global order: the minimal set (one after the other for each joint, where [`Data::per_joint`]),
 /// `FRICTION` columns a joint, the terms' columns.
 #[derive(Clone, Debug)]
 pub struct Design {
@@ -41,7 +41,7 @@ impl Design {
     pub fn new(data: &Data<'_>, friction: &[[Vec<f64>; FRICTION]], extra: &[Column]) -> Design {
         let (n, p) = (data.dof(), data.inertial_columns());
         let layout = Layout::of(data, extra.len());
-        let own = |j: usize| if data.joints_apart { p * j } else { 0 };
+        let own = |j: usize| if data.per_joint { p * j } else { 0 };
         let joints = (0..n)
             .map(|j| {
                 let rows = data.joints[j].len();

@@ -1,9 +1,9 @@
 //! Torque columns that were exchanged between joints, or have the wrong sign: where the fit is bad, and is
 //! good with them put right.
 
-use super::{FrictionLaw, Spread, solve_reduced, spread_of};
+use super::{FrictionKind, Spread, solve_reduced, spread_of};
 use crate::logs::log::Log;
-use crate::logs::regression::{DataOptions, RigidBody};
+use crate::logs::regression::{DataOptions, RigidArm};
 use crate::logs::summary::Summary;
 
 /// A joint whose error is more than this share of its torque is suspected.
@@ -14,7 +14,7 @@ const RIGHT: f64 = 0.5;
 /// What is wrong with the torques of the logs, in words; `None` where nothing is suspected, or no exchange of
 /// two joints and no change of one sign mends it. `found` are the errors of the fit to them.
 #[must_use]
-pub fn exchanged(body: &RigidBody, logs: &[Log], options: &DataOptions, found: &Spread) -> Option<String> {
+pub fn exchanged(body: &RigidArm, logs: &[Log], options: &DataOptions, found: &Spread) -> Option<String> {
     let suspects: Vec<usize> = (0..body.dof()).filter(|j| found.relative[*j] > SUSPECT).collect();
     let changes = suspects.iter().enumerate().flat_map(|(k, j)| suspects[k..].iter().map(|l| (*j, *l)));
     let mut best: Option<(f64, (usize, usize))> = None;
@@ -31,7 +31,7 @@ pub fn exchanged(body: &RigidBody, logs: &[Log], options: &DataOptions, found: &
             // What cannot be used was said before.
             let _ = summary.push(body, log, options);
         }
-        let solution = solve_reduced(&summary, FrictionLaw::Symmetric);
+        let solution = solve_reduced(&summary, FrictionKind::Symmetric);
         let errors = spread_of(&solution, &solution.theta);
         let share = [j, k].map(|i| errors.relative[i] / found.relative[i]).into_iter().fold(0.0, f64::max);
         if share < RIGHT && best.is_none_or(|(least, _)| share < least) {
@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn exchanged_torques_and_wrong_signs_are_named_and_sound_ones_are_not() {
-        let body = RigidBody::new(&lwa4p::arm().unwrap()).unwrap();
+        let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
         let settings = Settings { evaluations: 60, ..Settings::default() };
         let path = optimise(body.model(), SetKind::Minimal, &settings).unwrap().paths.swap_remove(0);
         let sound = lwa4p::plant().unwrap().record(&path.sample(200.0), 0.0, 5).log("made.csv");
@@ -72,7 +72,7 @@ mod tests {
         let said = |log: &Log| {
             let mut summary = Summary::new(&body, &options);
             summary.push(&body, log, &options).unwrap();
-            let solution = solve_reduced(&summary, FrictionLaw::Symmetric);
+            let solution = solve_reduced(&summary, FrictionKind::Symmetric);
             exchanged(&body, std::slice::from_ref(log), &options, &spread_of(&solution, &solution.theta))
         };
         assert_eq!(said(&sound), None);

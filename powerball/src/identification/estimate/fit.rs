@@ -8,7 +8,7 @@ use super::normal_equations::dot;
 use super::rows::{FRICTION, Layout, Rows, Scatter, Trials};
 use super::vary::{Start, vary};
 use crate::logs::parallel;
-use crate::logs::regression::{Column, Data, RigidBody};
+use crate::logs::regression::{Column, Data, RigidArm};
 use faer::Mat;
 
 /// A column that was added to the base model.
@@ -34,7 +34,7 @@ pub struct Fit {
     /// How many times the variance of slow means exceeds that of independent samples, by joint, at least 1.
     pub inflation: Vec<f64>,
     /// The velocity that each joint exceeds in 5 % of the samples, rad/s.
-    pub top_speed: Vec<f64>,
+    pub top_velocity: Vec<f64>,
     /// Residual by joint.
     pub residual: Vec<Vec<f64>>,
     /// The columns at these shapes.
@@ -60,7 +60,7 @@ impl Fit {
 
     /// Torque of the rigid arm along a motion, n a sample, N·m.
     #[must_use]
-    pub fn rigid_torque(&self, body: &RigidBody, q: &[f64], v: &[f64], a: &[f64]) -> Vec<f64> {
+    pub fn rigid_torque(&self, body: &RigidArm, q: &[f64], v: &[f64], a: &[f64]) -> Vec<f64> {
         let set = self.design.set;
         let by_set = |theta: &[f64]| body.torque(q, v, a, &theta[..body.names().len()]);
         if self.design.inertial == set {
@@ -108,7 +108,7 @@ pub fn fit(data: &Data<'_>, folds: &Folds, terms: &[Term], start: Option<&Fit>) 
         weights: done.weights,
         sigma: done.scatter.sigma,
         inflation: done.scatter.inflation,
-        top_speed: (0..data.dof()).map(|j| data.top_speed(j)).collect(),
+        top_velocity: (0..data.dof()).map(|j| data.top_velocity(j)).collect(),
         design,
         gram,
         free: done.free,
@@ -134,7 +134,7 @@ impl Rows for InMemory<'_> {
     }
 
     fn range(&self, joint: usize) -> (f64, f64) {
-        friction_shape::range(self.data.top_speed(joint))
+        friction_shape::range(self.data.top_velocity(joint))
     }
 
     fn power(&self, joint: usize) -> f64 {
@@ -155,7 +155,7 @@ impl Rows for InMemory<'_> {
     fn trials(&self, (design, _): &(Design, Gram), joint: usize, steep: &[f64]) -> Trials {
         let rows_of = &self.data.joints[joint];
         let trial: Vec<Vec<f64>> = parallel::map(steep, |g| {
-            rows_of.column(&self.data.recordings, |_, r| r.speed(joint).map(|v| (g * v).tanh()).collect())
+            rows_of.column(&self.data.recordings, |_, r| r.velocity(joint).map(|v| (g * v).tanh()).collect())
         });
         let columns: Vec<&[f64]> = trial.iter().map(Vec::as_slice).collect();
         let grid = steep.len();

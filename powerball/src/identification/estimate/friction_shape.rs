@@ -14,7 +14,7 @@ const GRID: usize = 64;
 #[must_use]
 pub(super) fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f64>; FRICTION] {
     let column = |f: &dyn Fn(f64) -> f64| {
-        data.joints[joint].column(&data.recordings, |_, r| r.speed(joint).map(f).collect())
+        data.joints[joint].column(&data.recordings, |_, r| r.velocity(joint).map(f).collect())
     };
     let tangent = |g: f64| move |v: f64| tangent(g, v);
     let [g2, g4] = shape;

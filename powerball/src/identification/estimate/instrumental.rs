@@ -17,8 +17,8 @@ use super::friction_shape;
 use super::normal_equations::dot;
 use super::reduced::{Part, Solution};
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, DataOptions, Recording, RigidBody};
-use crate::logs::summary::{Octaves, Triangle, parts};
+use crate::logs::regression::{Data, DataOptions, Recording, RigidArm};
+use crate::logs::summary::{Octaves, RFactor, parts};
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 
@@ -27,7 +27,7 @@ use faer::linalg::solvers::Solve;
 /// # Errors
 /// Why not, in words: no log can be used, or the instruments do not determine what the columns do.
 pub fn solve_instrumental(
-    body: &RigidBody,
+    body: &RigidArm,
     logs: &[Log],
     options: &DataOptions,
     start: &Solution,
@@ -105,7 +105,7 @@ pub fn solve_instrumental(
 /// By joint, where it moves: the model's columns by their index, and the rows [Z A y].
 type Rows = Vec<Option<(Vec<usize>, Octaves)>>;
 
-fn rows(body: &RigidBody, logs: &[Log], options: &DataOptions, start: &Solution) -> Result<Rows, String> {
+fn rows(body: &RigidArm, logs: &[Log], options: &DataOptions, start: &Solution) -> Result<Rows, String> {
     let mut rows: Rows = (0..start.layout.dof).map(|_| None).collect();
     let mut refused = None;
     for log in logs {
@@ -174,7 +174,7 @@ struct Level {
 }
 
 impl Level {
-    fn new(factor: &Triangle, global: &[usize]) -> Level {
+    fn new(factor: &RFactor, global: &[usize]) -> Level {
         let width = global.len();
         let column = |k: usize| factor.column(k).to_vec();
         let part = Part {

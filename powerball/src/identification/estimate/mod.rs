@@ -48,7 +48,7 @@ pub use mountings::Together;
 pub use noise::noise_floor;
 pub(crate) use noise::noise_in_band;
 pub(crate) use ratio::over_blocks;
-pub use reduced::{FrictionLaw, Solution, solve_reduced};
+pub use reduced::{FrictionKind, Solution, solve_reduced};
 pub use robust::{Robust, solve_robust};
 pub use rows::Layout;
 pub use solve::{Solver, bounded};

@@ -7,9 +7,9 @@
 
 use super::estimates::Spread;
 use super::reduced::{Solution, solve_reduced};
-use super::{FrictionLaw, spread_of};
+use super::{FrictionKind, spread_of};
 use crate::identification::mounting::together;
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use crate::logs::summary::{Bands, SummaryError};
 use dyngen::Arm;
 
@@ -17,7 +17,7 @@ use dyngen::Arm;
 #[derive(Debug)]
 pub struct Together {
     /// The arm under gravity in a general direction.
-    pub body: RigidBody,
+    pub body: RigidArm,
     /// All logs.
     pub bands: Bands,
     /// Those of each mounting, in the same set.
@@ -33,14 +33,14 @@ impl Together {
     ///
     /// # Errors
     /// Why they are no logs of one arm, or why its set is not to be had.
-    pub fn new(mountings: &[(&RigidBody, &Bands)]) -> Result<Together, String> {
+    pub fn new(mountings: &[(&RigidArm, &Bands)]) -> Result<Together, String> {
         let arms: Vec<&Arm> = mountings.iter().map(|(body, _)| body.arm()).collect();
         let general = together(&arms)?;
         let filed = mountings.first().map(|(body, _)| body.filed()).ok_or("no mounting was given")?;
-        let body = RigidBody::mounted(&general, &filed).map_err(|e| e.to_string())?;
+        let body = RigidArm::mounted(&general, &filed).map_err(|e| e.to_string())?;
         let undetermined =
             || "gravity between the mountings does not determine what they determine".to_string();
-        let in_set = |(own, bands): &(&RigidBody, &Bands)| bands.in_set(own, &body).ok_or_else(undetermined);
+        let in_set = |(own, bands): &(&RigidArm, &Bands)| bands.in_set(own, &body).ok_or_else(undetermined);
         let each = mountings.iter().map(in_set).collect::<Result<Vec<_>, _>>()?;
         let mut all = each.iter().cloned();
         let mut bands = all.next().ok_or_else(undetermined)?;
@@ -64,7 +64,12 @@ impl Together {
     /// vector of their own does, by mounting: its mounting or another one's is told wrong, or the arm was not
     /// the same.
     #[must_use]
-    pub fn contradictions(&self, spreads: &[Spread], in_band: &[usize], law: FrictionLaw) -> Vec<Vec<usize>> {
+    pub fn contradictions(
+        &self,
+        spreads: &[Spread],
+        in_band: &[usize],
+        law: FrictionKind,
+    ) -> Vec<Vec<usize>> {
         let of = |(bands, together): (&Bands, &Spread)| {
             let alone = solve_reduced(&bands.of_joints(in_band), law);
             let alone = spread_of(&alone, &alone.theta);

@@ -4,13 +4,13 @@ use super::normal_equations::{Products, add_columns, dot, zeros};
 use super::rows::{FRICTION, Layout, Rows, Scatter, Trials};
 use super::vary::vary;
 use crate::logs::summary::{
-    Columns, Identity, NODES, OCTAVES, SLOW, Steepness, Summary, SummaryError, Triangle,
+    Columns, Identity, NODES, OCTAVES, RFactor, SLOW, Steepness, Summary, SummaryError,
 };
 use faer::Mat;
 
 /// What stands beside the minimal set in a model of a joint's torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum FrictionLaw {
+pub enum FrictionKind {
     /// Eq. 16 of the paper: γ1·tanh(γ2·q̇) + γ3·tanh(γ4·q̇) + γ5·q̇.
     #[default]
     Symmetric,
@@ -83,7 +83,7 @@ impl Solution {
     /// [`SummaryError::Differs`] where they are of another arm, set or band.
     pub fn on(&self, summary: &Summary) -> Result<Solution, SummaryError> {
         self.identity.same_as(&summary.identity)?;
-        let law = if self.layout.extra > 0 { FrictionLaw::Asymmetric } else { FrictionLaw::Symmetric };
+        let law = if self.layout.extra > 0 { FrictionKind::Asymmetric } else { FrictionKind::Symmetric };
         Ok(Solution {
             layout: self.layout,
             identity: summary.identity.clone(),
@@ -104,7 +104,7 @@ fn parts_at(reduced: &Reduced<'_>, shapes: &[[f64; 2]]) -> Vec<Vec<Part>> {
 
 /// Fits the base model to reduced logs.
 #[must_use]
-pub fn solve_reduced(summary: &Summary, law: FrictionLaw) -> Solution {
+pub fn solve_reduced(summary: &Summary, law: FrictionKind) -> Solution {
     let reduced = Reduced::new(summary, law);
     let done = vary(&reduced, &[], None);
     Solution {
@@ -155,23 +155,23 @@ struct Reduced<'a> {
     columns: Columns,
     layout: Layout,
     /// By joint: the factor of all rows, and of what is slower than the means of weights.
-    totals: Vec<[Triangle; 2]>,
+    totals: Vec<[RFactor; 2]>,
 }
 
 impl Reduced<'_> {
-    fn new(summary: &Summary, law: FrictionLaw) -> Reduced<'_> {
+    fn new(summary: &Summary, law: FrictionKind) -> Reduced<'_> {
         let dof = summary.joints.len();
         let columns = summary.columns();
         let totals = summary
             .joints
             .iter()
             .map(|octaves| {
-                let mut slow = Triangle::new(columns.width());
+                let mut slow = RFactor::new(columns.width());
                 octaves.levels()[SLOW..].iter().for_each(|level| slow.merge(level));
                 [octaves.total(), slow]
             })
             .collect();
-        let extra = if law == FrictionLaw::Asymmetric { dof } else { 0 };
+        let extra = if law == FrictionKind::Asymmetric { dof } else { 0 };
         Reduced { summary, columns, layout: Layout { inertial: columns.inertial, dof, extra }, totals }
     }
 
@@ -180,7 +180,7 @@ impl Reduced<'_> {
     }
 
     /// The combination of a factor's saturating columns.
-    fn saturating(&self, factor: &Triangle, weights: &[f64; NODES]) -> Vec<f64> {
+    fn saturating(&self, factor: &RFactor, weights: &[f64; NODES]) -> Vec<f64> {
         let mut out = vec![0.0; factor.width()];
         for (k, w) in weights.iter().enumerate() {
             out.iter_mut().zip(factor.column(self.columns.node(k))).for_each(|(o, c)| *o += w * c);
@@ -189,7 +189,7 @@ impl Reduced<'_> {
     }
 
     /// The model's columns of a joint's factor.
-    fn part(&self, factor: &Triangle, joint: usize, shape: [f64; 2]) -> Part {
+    fn part(&self, factor: &RFactor, joint: usize, shape: [f64; 2]) -> Part {
         let (mut columns, mut global) = (Vec::new(), Vec::new());
         for c in 0..self.layout.inertial {
             // Links inside a joint do not load it.

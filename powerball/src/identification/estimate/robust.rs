@@ -6,10 +6,10 @@
 //! miss up to three deviations, less of it beyond, nothing from six on (Hampel's ψ). The deviation is the
 //! median one of each joint, which outliers do not move.
 
-use super::reduced::{FrictionLaw, Solution, solve_reduced};
+use super::reduced::{FrictionKind, Solution, solve_reduced};
 use crate::controller::friction::TanhFriction;
 use crate::logs::log::Log;
-use crate::logs::regression::{DataError, DataOptions, Recording, RigidBody};
+use crate::logs::regression::{DataError, DataOptions, Recording, RigidArm};
 use crate::logs::signal::rest::REST_SPEED;
 use crate::logs::summary::Summary;
 
@@ -40,10 +40,10 @@ pub struct Robust {
 /// # Errors
 /// [`DataError`] where no log can be used.
 pub fn solve_robust(
-    body: &RigidBody,
+    body: &RigidArm,
     logs: &[Log],
     options: &DataOptions,
-    law: FrictionLaw,
+    law: FrictionKind,
 ) -> Result<Robust, DataError> {
     let n = body.dof();
     let mut solution = solve_reduced(&reduce(body, logs, options, |_| {})?, law);
@@ -66,7 +66,7 @@ pub fn solve_robust(
             for (j, miss) in model.misses(body, recording).into_iter().enumerate() {
                 // Near a reversal friction itself may be far from its law: nothing is discarded there, only
                 // bounded.
-                let slow: Vec<bool> = recording.speed(j).map(|v| v.abs() <= REST_SPEED).collect();
+                let slow: Vec<bool> = recording.velocity(j).map(|v| v.abs() <= REST_SPEED).collect();
                 for (k, tau) in recording.torque[j].iter_mut().enumerate() {
                     let bound = DISCARDED * deviation[j];
                     let counts = match slow[k] {
@@ -90,13 +90,13 @@ pub fn solve_robust(
 
 impl Solution {
     /// Measured less predicted torque at every sample of a recording, outside any band, by joint, N·m.
-    fn misses(&self, body: &RigidBody, recording: &Recording) -> Vec<Vec<f64>> {
+    fn misses(&self, body: &RigidArm, recording: &Recording) -> Vec<Vec<f64>> {
         let n = recording.dof;
         let rigid = body.torque(&recording.q, &recording.v, &recording.a, self.inertial());
         (0..n)
             .map(|j| {
                 let friction = TanhFriction::new(self.friction(j));
-                let predicted = rigid.iter().skip(j).step_by(n).zip(recording.speed(j));
+                let predicted = rigid.iter().skip(j).step_by(n).zip(recording.velocity(j));
                 let torque = recording.torque[j].iter();
                 torque
                     .zip(predicted)
@@ -109,7 +109,7 @@ impl Solution {
 
 /// The samples in which a joint moves: at rest its friction is anything.
 fn in_motion(recording: &Recording, joint: usize) -> impl Iterator<Item = usize> + '_ {
-    recording.speed(joint).enumerate().filter(|(_, v)| v.abs() > REST_SPEED).map(|(k, _)| k)
+    recording.velocity(joint).enumerate().filter(|(_, v)| v.abs() > REST_SPEED).map(|(k, _)| k)
 }
 
 /// How much of a miss counts.
@@ -128,7 +128,7 @@ fn believed(miss: f64, deviation: f64, gentle: bool) -> f64 {
 }
 
 fn reduce(
-    body: &RigidBody,
+    body: &RigidArm,
     logs: &[Log],
     options: &DataOptions,
     mut correct: impl FnMut(&mut Recording),

@@ -23,7 +23,7 @@ impl Layout {
     #[must_use]
     pub fn of(data: &Data<'_>, extra: usize) -> Layout {
         let (dof, set) = (data.dof(), data.inertial_columns());
-        Layout { inertial: if data.joints_apart { dof * set } else { set }, dof, extra }
+        Layout { inertial: if data.per_joint { dof * set } else { set }, dof, extra }
     }
 
     /// Columns in all.

@@ -6,8 +6,8 @@
 use super::normal_equations::{add_columns, zeros};
 use super::solve::Solver;
 use crate::logs::parallel;
-use crate::logs::regression::RigidBody;
-use crate::logs::summary::Triangle;
+use crate::logs::regression::RigidArm;
+use crate::logs::summary::RFactor;
 
 /// Samples that are worked on together: their rows stay in a second-level cache.
 const BLOCK: usize = 128;
@@ -19,7 +19,7 @@ const FRICTION: usize = 3;
 pub struct States<'a> {
     /// Positions, rad or m.
     pub q: &'a [f64],
-    /// Speeds.
+    /// Velocities.
     pub dq: &'a [f64],
     /// Accelerations.
     pub ddq: &'a [f64],
@@ -30,12 +30,12 @@ pub struct States<'a> {
 /// The factors of all states so far.
 #[derive(Clone, Debug)]
 pub struct Stream<'a> {
-    body: &'a RigidBody,
+    body: &'a RigidArm,
     /// γ2, γ4 by joint, s/rad.
     shapes: Vec<[f64; 2]>,
     /// By joint: the columns of the minimal set that are not zero everywhere.
     columns: Vec<Vec<usize>>,
-    factors: Vec<Triangle>,
+    factors: Vec<RFactor>,
 }
 
 /// What a stream's states say.
@@ -52,7 +52,7 @@ pub struct StreamFit {
 impl<'a> Stream<'a> {
     /// No states yet; `shapes` are γ2, γ4 of every joint.
     #[must_use]
-    pub fn new(body: &'a RigidBody, shapes: &[[f64; 2]]) -> Stream<'a> {
+    pub fn new(body: &'a RigidArm, shapes: &[[f64; 2]]) -> Stream<'a> {
         let (n, p) = (body.dof(), body.names().len());
         // An entry that is exactly zero at three states without any symmetry is zero.
         let odd = |k: usize| 0.3 + 0.7 * ((k * k) as f64).sin();
@@ -61,7 +61,7 @@ impl<'a> Stream<'a> {
         let columns: Vec<Vec<usize>> = (0..n)
             .map(|j| (0..p).filter(|c| (0..3).any(|s| y[(s * n + j) * p + c] != 0.0)).collect())
             .collect();
-        let factors = columns.iter().map(|c| Triangle::new(c.len() + FRICTION + 1)).collect();
+        let factors = columns.iter().map(|c| RFactor::new(c.len() + FRICTION + 1)).collect();
         Stream { body, shapes: shapes.to_vec(), columns, factors }
     }
 
@@ -114,10 +114,10 @@ impl<'a> Stream<'a> {
                     rows.extend(y.chunks_exact(n * p).map(|sample| sample[j * p + c]));
                 }
                 let [g2, g4] = self.shapes[j];
-                let speeds = || dq.iter().skip(j).step_by(n);
-                rows.extend(speeds().map(|v| (g2 * v).tanh()));
-                rows.extend(speeds().map(|v| (g4 * v).tanh()));
-                rows.extend(speeds());
+                let velocities = || dq.iter().skip(j).step_by(n);
+                rows.extend(velocities().map(|v| (g2 * v).tanh()));
+                rows.extend(velocities().map(|v| (g4 * v).tanh()));
+                rows.extend(velocities());
                 rows.extend(tau.iter().skip(j).step_by(n));
                 self.factors[j].push_block(&mut rows, count);
             }
@@ -177,7 +177,7 @@ mod tests {
     #[test]
     fn known_values_come_back_from_any_blocks() {
         let arm = Arm::parse(include_str!("../../../arm.toml"), "arm.toml").unwrap();
-        let body = RigidBody::new(&arm).unwrap();
+        let body = RigidArm::new(&arm).unwrap();
         let n = arm.dof();
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(8);
         let mut draw = |count: usize| (0..count).map(|_| rng.random_range(-1.5..1.5)).collect::<Vec<f64>>();

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// States over which torques are compared.
 const STATES: usize = 400;
-/// Speeds and accelerations where the arm file gives no limit.
+/// Velocities and accelerations where the arm file gives no limit.
 const SPEED: f64 = 1.0;
 const ACCELERATION: f64 = 3.0;
 /// What a unit of a parameter counts beside a N·m: directions that no torque shows are held by it alone.

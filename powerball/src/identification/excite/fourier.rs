@@ -80,8 +80,8 @@ impl Fourier {
         } else if t < r {
             rise(t)
         } else if left < r {
-            let [sigma, speed, change] = rise(left);
-            [self.periods as f64 * self.period() - sigma, speed, -change]
+            let [sigma, velocity, change] = rise(left);
+            [self.periods as f64 * self.period() - sigma, velocity, -change]
         } else {
             [t - 0.5 * r, 1.0, 0.0]
         }
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn speeds_and_accelerations_are_derivatives_and_the_ends_are_at_rest() {
+    fn velocities_and_accelerations_are_derivatives_and_the_ends_are_at_rest() {
         for seed in 0..5 {
             let (fourier, _) = random(seed);
             let h = 1e-5;

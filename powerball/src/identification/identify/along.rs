@@ -6,7 +6,7 @@ use crate::controller::friction::TanhFriction;
 use crate::identification::estimate::{BaseModel, TorqueCurve, curves, noise_floor};
 use crate::identification::mounting::Mounting;
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, DataOptions, Recording, RigidBody};
+use crate::logs::regression::{Data, DataOptions, Recording, RigidArm};
 use crate::logs::signal::occupied::occupied;
 use crate::logs::signal::turns::{Turns, turns};
 use dyngen::exact::rational::to_f64;
@@ -69,7 +69,7 @@ pub struct LogFacts {
 impl Along {
     /// `joint_bands` are the ends of the joints' bands, Hz, in which the noise floor counts.
     pub(super) fn new(
-        body: &RigidBody,
+        body: &RigidArm,
         logs: &[Log],
         mounting: Mounting,
         options: &DataOptions,
@@ -130,7 +130,7 @@ impl LogFacts {
 
 /// The frequency below which 99 % of the power of the velocities lies, Hz.
 fn motion(data: &Data<'_>) -> Option<f64> {
-    let of = |r: &Recording| -> Vec<Vec<f64>> { (0..data.dof()).map(|j| r.speed(j).collect()).collect() };
+    let of = |r: &Recording| -> Vec<Vec<f64>> { (0..data.dof()).map(|j| r.velocity(j).collect()).collect() };
     let velocities: Vec<Vec<f64>> = data.recordings.iter().flat_map(of).collect();
     occupied(&velocities, data.rate(), MOST_POWER)
 }

@@ -2,12 +2,12 @@
 
 use super::error::IdentifyError;
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, DataOptions, RigidBody};
+use crate::logs::regression::{Data, DataOptions, RigidArm};
 use crate::logs::summary::BANDS;
 
 /// Logs prepared in every band that a joint has, widest first, with the joints of that band, from 0.
 pub(crate) fn by_band<'a>(
-    body: &'a RigidBody,
+    body: &'a RigidArm,
     logs: &[Log],
     joint_bands: &[f64],
     options: &DataOptions,

@@ -9,7 +9,7 @@ use crate::identification::source::{Input, Source, read_summary};
 use crate::identification::transmission::{JointTransmission, transmission};
 use crate::logs::Progress;
 use crate::logs::log::{ColumnMap, Log, LogError, read_log_as};
-use crate::logs::regression::{DataOptions, FEWEST_ROWS, RigidBody, rest_note, silent_joints};
+use crate::logs::regression::{DataOptions, FEWEST_ROWS, RigidArm, rest_note, silent_joints};
 use crate::logs::summary::{Bands, Octaves, Summary};
 use dyngen::Arm;
 use std::path::Path;
@@ -18,7 +18,7 @@ use std::path::Path;
 #[derive(Debug)]
 pub(crate) struct Mounted {
     pub mounting: Mounting,
-    pub body: RigidBody,
+    pub body: RigidArm,
     pub bands: Bands,
     /// The first logs as they were read, for figures; all where they were asked for.
     pub logs: Vec<Log>,
@@ -33,11 +33,11 @@ impl Mounted {
         options: &DataOptions,
     ) -> Result<Mounted, IdentifyError> {
         let mounted = mounting.of(arm).map_err(IdentifyError::Mounting)?;
-        Ok(Mounted::of(RigidBody::mounted(&mounted, arm)?, mounting, options))
+        Ok(Mounted::of(RigidArm::mounted(&mounted, arm)?, mounting, options))
     }
 
     /// The same for a body that is there already.
-    pub(crate) fn of(body: RigidBody, mounting: Mounting, options: &DataOptions) -> Mounted {
+    pub(crate) fn of(body: RigidArm, mounting: Mounting, options: &DataOptions) -> Mounted {
         let bands = Bands::new(&body, options);
         Mounted { mounting, body, bands, logs: Vec::new(), held_out: Vec::new() }
     }
@@ -81,7 +81,7 @@ impl Gathered {
         };
         if let [_, _, ..] = gathered.mounted.as_slice() {
             progress.say("deriving and proving what the mountings determine together");
-            let parts: Vec<(&RigidBody, &Bands)> =
+            let parts: Vec<(&RigidArm, &Bands)> =
                 gathered.mounted.iter().map(|m| (&m.body, &m.bands)).collect();
             gathered.together = Some(Together::new(&parts).map_err(IdentifyError::Together)?);
         }
@@ -134,7 +134,7 @@ impl Gathered {
     }
 
     /// The arm in whose minimal set the logs are fitted.
-    pub(crate) fn body(&self) -> &RigidBody {
+    pub(crate) fn body(&self) -> &RigidArm {
         self.together.as_ref().map_or(&self.mounted[0].body, |all| &all.body)
     }
 

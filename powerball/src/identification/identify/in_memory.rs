@@ -7,7 +7,7 @@ use crate::identification::mounting::Mounting;
 use crate::identification::source::Source;
 use crate::logs::Progress;
 use crate::logs::log::Log;
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use dyngen::Arm;
 
 /// An arm, as a model has it, and its logs on one clock.
@@ -16,7 +16,7 @@ pub(crate) struct InMemory {
     /// The arm of the file with the model's changes.
     pub arm: Arm,
     /// The same, mounted as for the logs.
-    pub body: RigidBody,
+    pub body: RigidArm,
     pub fit: Vec<Log>,
     pub validate: Vec<Log>,
     /// The model in the set of the body.
@@ -59,7 +59,7 @@ impl InMemory {
         let Recorded { fit, validate, warnings: found } = Recorded::read(&arm, fit, validate)?;
         warnings.extend(found);
         progress.say("deriving and proving the arm's dynamics");
-        let body = RigidBody::mounted(&mounted, &arm)?;
+        let body = RigidArm::mounted(&mounted, &arm)?;
         let known = known.in_set_of(&body).map_err(IdentifyError::Known)?;
         Ok(InMemory { arm, body, fit, validate, known, warnings })
     }

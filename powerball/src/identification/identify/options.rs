@@ -1,6 +1,6 @@
 //! How logs are identified.
 
-use crate::identification::estimate::FrictionLaw;
+use crate::identification::estimate::FrictionKind;
 use crate::identification::known::KnownModel;
 use crate::logs::Progress;
 use crate::logs::regression::DataOptions;
@@ -9,7 +9,7 @@ use crate::logs::regression::DataOptions;
 #[derive(Clone, Debug, Default)]
 pub struct IdentifyOptions<'a> {
     /// The friction of every joint.
-    pub friction: FrictionLaw,
+    pub friction: FrictionKind,
     /// How samples are counted.
     pub estimator: Estimator,
     /// How logs are filtered and cut into blocks. Its band counts where the estimator looks at single

@@ -105,7 +105,7 @@ pub(super) fn band_reason(bands: &[usize], motion: Option<f64>) -> String {
         } else {
             "gravity and inertia are within, and so is what friction does at reversals, several times faster"
         };
-        format!("; 99 % of the power of the speeds lies below {motion:.1} Hz: {verdict}")
+        format!("; 99 % of the power of the velocities lies below {motion:.1} Hz: {verdict}")
     });
     format!("band {}{motion}", why.join("; "))
 }

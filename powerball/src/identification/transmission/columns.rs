@@ -14,7 +14,7 @@ pub(super) enum Column {
     /// q̈.
     Acceleration,
     /// q̇.
-    Speed,
+    Velocity,
     /// 1.
     Constant,
     /// τ̇.
@@ -38,7 +38,7 @@ pub(super) struct Scales {
     pub widths: Vec<f64>,
     /// Distances of presliding, rad.
     pub distances: Vec<f64>,
-    /// Speeds of a Stribeck bump, rad/s.
+    /// Velocities of a Stribeck bump, rad/s.
     pub bumps: Vec<f64>,
     /// Where the sign of a law has changed, s/rad.
     steepness: f64,
@@ -51,7 +51,7 @@ impl Scales {
     /// For a joint whose fast velocity is `top`, rad/s.
     pub(super) fn new(top: f64) -> Scales {
         Scales {
-            // From a step to a third of the speeds: friction that is sharper than what is tried would be
+            // From a step to a third of the velocities: friction that is sharper than what is tried would be
             // taken for presliding.
             widths: geometric(1e-3 * top, 0.3 * top, Column::WIDTHS),
             distances: geometric(1e-4, 0.02, Column::DISTANCES),
@@ -80,7 +80,7 @@ impl Column {
             Column::Motor,
             Column::Link,
             Column::Acceleration,
-            Column::Speed,
+            Column::Velocity,
             Column::Constant,
             Column::LinkRate,
         ];
@@ -101,7 +101,7 @@ impl Column {
             Column::Motor => 0,
             Column::Link => 1,
             Column::Acceleration => 2,
-            Column::Speed => 3,
+            Column::Velocity => 3,
             Column::Constant => 4,
             Column::LinkRate => 5,
             Column::Coulomb(k) => 6 + k,
@@ -113,7 +113,7 @@ impl Column {
     }
 
     /// Whether its coefficient cannot be negative: inertia, and what takes power. Friction may grow slower
-    /// than in proportion to the speed, and either torque may be the later one.
+    /// than in proportion to the velocity, and either torque may be the later one.
     pub(super) fn is_non_negative(self) -> bool {
         !matches!(self, Column::Motor | Column::Link | Column::Constant | Column::LinkRate | Column::Power(_))
     }
@@ -123,7 +123,7 @@ impl Column {
         let link = &recording.torque[joint];
         let along = |law: Law<f64>| -> Vec<f64> {
             let mut memory = Memory::default();
-            let states = recording.position(joint).zip(recording.speed(joint)).zip(link);
+            let states = recording.position(joint).zip(recording.velocity(joint)).zip(link);
             states
                 .map(|((q, dq), torque)| {
                     let now = Instant {
@@ -144,13 +144,13 @@ impl Column {
             Column::Motor => Vec::new(),
             Column::Link => link.clone(),
             Column::Acceleration => recording.acceleration(joint).collect(),
-            Column::Speed => recording.speed(joint).collect(),
+            Column::Velocity => recording.velocity(joint).collect(),
             Column::Constant => along(Law::Constant),
             Column::LinkRate => difference::derivative(link, 1.0 / recording.rate),
-            Column::Coulomb(k) => recording.speed(joint).map(|v| (v / scales.widths[k]).tanh()).collect(),
+            Column::Coulomb(k) => recording.velocity(joint).map(|v| (v / scales.widths[k]).tanh()).collect(),
             Column::Load(k) => along(Law::Load { steepness: 1.0 / scales.widths[k] }),
             Column::Presliding(k) => along(Law::Presliding { distance: scales.distances[k] }),
-            Column::Bump(k) => along(Law::Stribeck { steepness, speed: scales.bumps[k] }),
+            Column::Bump(k) => along(Law::Stribeck { steepness, velocity: scales.bumps[k] }),
             Column::Power(k) => along(Law::Power { steepness, power: Scales::POWERS[k] }),
         }
     }

@@ -103,7 +103,7 @@ impl Candidate {
         let list = match self.kind {
             Kind::LoadFriction => vec![("coefficient", coefficient)],
             Kind::Hysteresis => vec![("distance", scales.distances[self.setting]), ("level", coefficient)],
-            Kind::Stribeck => vec![("level", coefficient), ("speed", scales.bumps[self.setting])],
+            Kind::Stribeck => vec![("level", coefficient), ("velocity", scales.bumps[self.setting])],
             Kind::VelocityNonlinearity => {
                 vec![("coefficient", coefficient), ("power", Scales::POWERS[self.setting])]
             }

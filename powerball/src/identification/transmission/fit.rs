@@ -16,7 +16,7 @@ use faer::Mat;
 /// The law of a transmission with its coefficients.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
-    /// The link's torque, the acceleration, the speed, the constant and Coulomb friction; then what was
+    /// The link's torque, the acceleration, the velocity, the constant and Coulomb friction; then what was
     /// added.
     pub columns: Vec<Column>,
     /// In the motor's unit, the first one positive.
@@ -127,7 +127,7 @@ impl Fit {
 /// The columns of a law.
 fn columns(width: usize, effects: &[Candidate]) -> Vec<Column> {
     let mut columns =
-        vec![Column::Link, Column::Acceleration, Column::Speed, Column::Constant, Column::Coulomb(width)];
+        vec![Column::Link, Column::Acceleration, Column::Velocity, Column::Constant, Column::Coulomb(width)];
     columns.extend(effects.iter().map(|effect| effect.column(width)));
     columns
 }

@@ -4,7 +4,7 @@ use super::columns::{Column, Scales};
 use super::grid::Grid;
 use crate::controller::JointNumber;
 use crate::identification::estimate::noise_in_band;
-use crate::logs::regression::{Recording, top_speed};
+use crate::logs::regression::{Recording, top_velocity};
 use crate::logs::signal::rest;
 use dyngen::Arm;
 use faer::Mat;
@@ -104,9 +104,9 @@ pub(super) fn evidence(arm: &Arm, grid: &Grid, joint: JointNumber) -> Result<(Ev
         return Err(format!("motor{joint} never changes: it was not recorded, or its drive is dead"));
     }
     let recordings: Vec<&Recording> = used().map(|piece| &piece.recording).collect();
-    let top = top_speed(recordings.iter().copied(), j);
-    let speeds = recordings.iter().flat_map(|r| r.speed(j).map(f64::abs)).collect();
-    let rest_speed = rest::rest_speed(speeds, arm.joints[j].velocity);
+    let top = top_velocity(recordings.iter().copied(), j);
+    let velocities = recordings.iter().flat_map(|r| r.velocity(j).map(f64::abs)).collect();
+    let rest_velocity = rest::rest_velocity(velocities, arm.joints[j].velocity);
     let scales = Scales::new(top);
     let torques: Vec<&[f64]> = recordings.iter().map(|r| r.torque[j].as_slice()).collect();
     let noise = noise_in_band(&torques, &grid.band, grid.rate).powi(2);
@@ -114,7 +114,7 @@ pub(super) fn evidence(arm: &Arm, grid: &Grid, joint: JointNumber) -> Result<(Ev
     let mut blocks: Vec<Block> = Vec::new();
     for piece in used() {
         let recording = &piece.recording;
-        let moving = rest::moving(&recording.speed(j).collect::<Vec<_>>(), recording.rate, rest_speed);
+        let moving = rest::moving(&recording.velocity(j).collect::<Vec<_>>(), recording.rate, rest_velocity);
         let kept = grid.band.kept(recording.len());
         let in_band = |column: Column| match column {
             Column::Motor => grid.band.pass(piece.motor(j)),

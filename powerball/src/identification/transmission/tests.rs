@@ -176,7 +176,7 @@ fn a_column_that_is_not_the_motor_is_refused_in_words() {
     let logs: Vec<Log> = logs
         .iter()
         .map(|(_, log)| {
-            // Joint 1: noise; 2: sound, with a hole; 3: its own speed; 4: nothing; 5: no number; 6: another
+            // Joint 1: noise; 2: sound, with a hole; 3: its own velocity; 4: nothing; 5: no number; 6: another
             // one's.
             let mut motor = log.torque.clone();
             motor[0].iter_mut().for_each(|x| *x = rng.random_range(-1.0..1.0));

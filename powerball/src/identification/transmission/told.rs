@@ -38,7 +38,7 @@ pub struct Transmission {
     pub viscous: f64,
     /// F_c, N·m.
     pub coulomb: f64,
-    /// γ: the speed at which Coulomb friction is at three quarters, rad/s.
+    /// γ: the velocity at which Coulomb friction is at three quarters, rad/s.
     pub width: f64,
     /// Iₘ: inertia of rotor and gear at the link, kg·m².
     pub rotor_inertia: f64,

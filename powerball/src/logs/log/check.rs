@@ -1,7 +1,7 @@
 //! What can be wrong with numbers that are there: time, wraps, units, dead and saturated signals.
 
 use super::raw::{Effort, Raw};
-use super::{Doubts, Finding, Log, LogError, Severity, levels, signs, speeds};
+use super::{Doubts, Finding, Log, LogError, Severity, levels, signs, velocities};
 use crate::logs::signal::resample::median_step;
 use dyngen::Arm;
 use dyngen::arm::JointKind;
@@ -89,7 +89,7 @@ pub(super) fn into_log(
         levels::steps(effort, &format!("{name}{}", j + 1), false, &mut doubts);
         levels::steps(q, &format!("q{}", j + 1), true, &mut doubts);
     }
-    speeds::look(&raw, step, &mut doubts);
+    velocities::look(&raw, step, &mut doubts);
     signs::look(&raw, step, name, &mut doubts);
     rate(&raw.t, &mut doubts);
     if !errors.is_empty() {

@@ -18,8 +18,8 @@ mod read;
 mod samples;
 mod shift;
 mod signs;
-mod speeds;
 mod topics;
+mod velocities;
 mod write;
 
 pub use crate::logs::tables::{Finding, LogError};

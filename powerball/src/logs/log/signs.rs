@@ -23,15 +23,15 @@ pub(super) fn look(raw: &Raw, step: f64, name: &str, doubts: &mut Doubts<'_>) {
             continue;
         }
         let stride = ((0.05 / step) as usize).max(1);
-        let speeds: Vec<f64> = (stride..q.len().saturating_sub(stride))
+        let velocities: Vec<f64> = (stride..q.len().saturating_sub(stride))
             .map(|k| (q[k + stride] - q[k - stride]) / (raw.t[k + stride] - raw.t[k - stride]))
             .collect();
-        let top = speeds.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        let top = velocities.iter().fold(0.0f64, |m, v| m.max(v.abs()));
         // Mean effort of every half swing; what is slow belongs to none.
         let direction = |v: f64| if v.abs() < 0.1 * top { 0.0 } else { v.signum() };
         let mut swings: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
         let (mut sum, mut count, mut now) = (0.0, 0usize, 0.0);
-        for (k, v) in speeds.iter().enumerate() {
+        for (k, v) in velocities.iter().enumerate() {
             let next = direction(*v);
             if next != 0.0 && next != now {
                 if count as f64 * step > 0.1 {

@@ -207,10 +207,10 @@ fn each_doubt_finds_its_fault_and_no_other() {
         (&swings(|_, r| r[3] = -r[3]), &["dq1: is -1.000 times the slope of q1: their signs differ"]),
         (&swings(|_, r| r[4] *= 57.2958), &["dq2: is 57.2", "degrees a second"]),
         (&swings(|k, r| r[4] = (0.001 * (k * k) as f64).sin()), &["dq2: does not follow q2"]),
-        (&swings(|_, r| r[0] *= 1.02), &["t: passes 2.0 % too fast for the joints' speeds"]),
+        (&swings(|_, r| r[0] *= 1.02), &["t: passes 2.0 % too fast for the joints' velocities"]),
         (
             &swings(|_, r| r[0] += 2e-4 * r[0] * r[0]),
-            &["drifts against the joints' speeds", "x.csv:2668: t: at 26.8"],
+            &["drifts against the joints' velocities", "x.csv:2668: t: at 26.8"],
         ),
         (&swings(|_, r| r[5] = r[5].clamp(-100.0, 12.0)), &["tau1: at ", "stays at its extreme 12 for"]),
         (&swings(|_, r| round(&mut r[6], 1.5)), &["tau2: has 12 levels", "1.500e0 apart"]),

@@ -1,14 +1,14 @@
 //! What level gravity hides: parameters that no motion shows until gravity comes from another side.
 
-use super::RigidBody;
+use super::RigidArm;
 use dyngen::SetKind;
 use faer::{Mat, Side};
 
 /// Poses at which it is seen whether a gravity from another side shows a parameter.
 const HIDDEN_POSES: usize = 8;
 
-/// See [`RigidBody::hidden`].
-pub(super) fn hidden(body: &RigidBody) -> Option<Vec<Vec<f64>>> {
+/// See [`RigidArm::hidden`].
+pub(super) fn hidden(body: &RigidArm) -> Option<Vec<Vec<f64>>> {
     let arm = body.arm();
     let kept: Vec<usize> = arm.kept_parameters().iter().map(|p| p.index()).collect();
     let mut shown = Mat::<f64>::zeros(body.names().len(), kept.len());
@@ -64,7 +64,7 @@ mod tests {
     fn what_gravity_from_the_side_shows_is_known() {
         let hidden = |text: &str, gravity: &str| {
             let text = text.replace("[0, 0, -9.81]", gravity).replace("[0.0, 0.0, -9.81]", gravity);
-            RigidBody::new(&Arm::parse(&text, "arm.toml").unwrap()).unwrap().hidden().len()
+            RigidArm::new(&Arm::parse(&text, "arm.toml").unwrap()).unwrap().hidden().len()
         };
         let ur5e = include_str!("../../../../tests/arms/ur5e.toml");
         // The weight of all that turns about the upright first axis: how far from it, and whereto. Hung on a
@@ -77,7 +77,7 @@ mod tests {
         // The numbers of base parameters say the same.
         let count = |gravity: &str| {
             let arm = Arm::parse(&ur5e.replace("[0, 0, -9.81]", gravity), "arm.toml").unwrap();
-            RigidBody::new(&arm).unwrap().names().len()
+            RigidArm::new(&arm).unwrap().names().len()
         };
         assert_eq!(count("[1, 2, -9]"), count("[0, 0, -9.81]") + 2);
     }

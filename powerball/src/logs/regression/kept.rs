@@ -14,12 +14,12 @@ pub(super) fn kept_samples(
     logs: &[Log],
     recordings: &[Recording],
     bands: &[Band],
-    rest_speed: &[f64],
+    rest_velocity: &[f64],
     silent: &[Option<String>],
 ) -> (Kept, Vec<String>) {
     let n = silent.len();
     let mut left_out = Vec::new();
-    let mut kept = keep_moving(recordings, bands, rest_speed, n);
+    let mut kept = keep_moving(recordings, bands, rest_velocity, n);
     for j in 0..n {
         let at_limit = saturated(logs, j);
         let count = |kept: &Kept| -> usize { kept[0][j].iter().map(Vec::len).sum() };
@@ -51,7 +51,7 @@ fn keep_moving(recordings: &[Recording], bands: &[Band], limit: &[f64], n: usize
     let mut all = vec![vec![Vec::with_capacity(recordings.len()); n]; bands.len()];
     for j in 0..n {
         for r in recordings {
-            let moving = rest::moving(&r.speed(j).collect::<Vec<_>>(), r.rate, limit[j]);
+            let moving = rest::moving(&r.velocity(j).collect::<Vec<_>>(), r.rate, limit[j]);
             for (of_band, band) in all.iter_mut().zip(bands) {
                 // A joint that never moves has the limit 0 and is never below it.
                 let kept = if limit[j] < 1e-5 { Vec::new() } else { band.kept(r.len()) };

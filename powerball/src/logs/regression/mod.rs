@@ -1,10 +1,10 @@
 //! From logs to the rows of a regression: minimal-set regressor, friction columns, one band for all.
 
-mod apart;
 mod hidden;
 mod kept;
 #[cfg(test)]
 pub(crate) mod newton_euler;
+mod per_joint;
 mod prepare;
 mod recording;
 mod rest_notes;
@@ -13,10 +13,10 @@ mod rows;
 mod saturated;
 mod silent;
 
-pub(crate) use prepare::top_speed;
+pub(crate) use prepare::top_velocity;
 pub use prepare::{Data, DataError, DataOptions, column_in_bands};
 pub use recording::Recording;
 pub(crate) use rest_notes::{FEWEST_ROWS, rest_note};
-pub use rigid::RigidBody;
+pub use rigid::RigidArm;
 pub use rows::{Block, Column, JointRows};
 pub use silent::silent_joints;

@@ -40,11 +40,11 @@ pub(crate) fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3])
         };
         if let Some(ratio) = &joint.rotor_ratio {
             let (k, column) = (number(ratio), 11 * i + 10);
-            let (speed, change) = (rate(i, v), rate(i, a));
+            let (velocity, change) = (rate(i, v), rate(i, a));
             for (j, factor) in motors[i].iter().enumerate() {
                 y[j * 11 * n + column] += factor * (k * k * change + k * axis.dot(&dw));
             }
-            let moment = axis * (k * change) + w.cross(&axis) * (k * speed);
+            let moment = axis * (k * change) + w.cross(&axis) * (k * velocity);
             for j in 0..i {
                 if arm.joints[j].kind == JointKind::Revolute {
                     let z: Vector3<f64> = axes[j];

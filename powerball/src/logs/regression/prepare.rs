@@ -3,7 +3,7 @@
 use super::kept::kept_samples;
 use super::rest_notes::{FEWEST_ROWS, notes};
 use super::silent::silent_joints;
-use super::{Block, Column, JointRows, Recording, RigidBody};
+use super::{Block, Column, JointRows, Recording, RigidArm};
 use crate::logs::log::Log;
 use crate::logs::parallel;
 use crate::logs::signal::resample::median_step;
@@ -62,7 +62,7 @@ impl std::error::Error for DataError {}
 #[derive(Debug)]
 pub struct Data<'a> {
     /// The arm's rigid-body functions.
-    pub body: &'a RigidBody,
+    pub body: &'a RigidArm,
     /// The pieces of all logs.
     pub recordings: Vec<Recording>,
     /// The band.
@@ -74,16 +74,16 @@ pub struct Data<'a> {
     /// File names by log.
     pub logs: Vec<String>,
     /// The velocity below which a joint rests, by joint, rad/s.
-    pub rest_speed: Vec<f64>,
+    pub rest_velocity: Vec<f64>,
     /// By joint: why its samples say nothing, in words.
     pub silent: Vec<Option<String>>,
     /// Pieces of logs, and joints of some logs, that were left out, in words.
     pub left_out: Vec<String>,
     /// What was left out or done, in words.
     pub notes: Vec<String>,
-    /// Whether joints are fitted apart (see [`Data::take_apart`]).
-    pub joints_apart: bool,
-    top_speed: Vec<f64>,
+    /// Whether each joint has a fit of its own (see [`Data::set_per_joint`]).
+    pub per_joint: bool,
+    top_velocity: Vec<f64>,
     last_link: OnceLock<Vec<Column>>,
     force: OnceLock<Vec<Column>>,
     declared_zero: OnceLock<Vec<Column>>,
@@ -94,7 +94,7 @@ impl<'a> Data<'a> {
     ///
     /// # Errors
     /// [`DataError`] where nothing usable remains.
-    pub fn new(body: &'a RigidBody, logs: &[Log], options: &DataOptions) -> Result<Data<'a>, DataError> {
+    pub fn new(body: &'a RigidArm, logs: &[Log], options: &DataOptions) -> Result<Data<'a>, DataError> {
         Data::corrected(body, logs, options, |_| {})
     }
 
@@ -103,7 +103,7 @@ impl<'a> Data<'a> {
     /// # Errors
     /// As [`Data::new`].
     pub fn corrected(
-        body: &'a RigidBody,
+        body: &'a RigidArm,
         logs: &[Log],
         options: &DataOptions,
         correct: impl FnMut(&mut Recording),
@@ -117,7 +117,7 @@ impl<'a> Data<'a> {
     /// # Errors
     /// As [`Data::new`], where nothing usable remains in any band.
     pub fn in_bands(
-        body: &'a RigidBody,
+        body: &'a RigidArm,
         logs: &[Log],
         options: &DataOptions,
         count: usize,
@@ -148,15 +148,15 @@ impl<'a> Data<'a> {
             return Err(DataError::TooShort);
         }
         recordings.iter_mut().for_each(correct);
-        let rest_speed: Vec<f64> = (0..n)
+        let rest_velocity: Vec<f64> = (0..n)
             .map(|j| {
-                let speeds = recordings.iter().flat_map(|r| r.speed(j).map(f64::abs)).collect();
-                rest::rest_speed(speeds, body.arm().joints[j].velocity)
+                let velocities = recordings.iter().flat_map(|r| r.velocity(j).map(f64::abs)).collect();
+                rest::rest_velocity(velocities, body.arm().joints[j].velocity)
             })
             .collect();
-        let top_speed: Vec<f64> = (0..n).map(|j| top_speed(&recordings, j)).collect();
+        let top_velocity: Vec<f64> = (0..n).map(|j| top_velocity(&recordings, j)).collect();
         let silent = silent_joints(body.arm(), logs);
-        let (kept, without) = kept_samples(logs, &recordings, &bands, &rest_speed, &silent);
+        let (kept, without) = kept_samples(logs, &recordings, &bands, &rest_velocity, &silent);
         left_out.extend(without);
         let joints = joint_rows(body, &recordings, &bands, kept);
         let logs: Vec<String> = logs.iter().map(|log| log.file.clone()).collect();
@@ -166,17 +166,17 @@ impl<'a> Data<'a> {
             }
             Ok(Data {
                 body,
-                notes: notes(&left_out, &recordings, &band, &joints, &silent, &rest_speed),
+                notes: notes(&left_out, &recordings, &band, &joints, &silent, &rest_velocity),
                 blocks: blocks_of(&recordings, &joints, &band, options.block),
                 recordings: recordings.clone(),
                 band,
                 joints,
                 logs: logs.clone(),
-                rest_speed: rest_speed.clone(),
+                rest_velocity: rest_velocity.clone(),
                 silent: silent.clone(),
                 left_out: left_out.clone(),
-                joints_apart: false,
-                top_speed: top_speed.clone(),
+                per_joint: false,
+                top_velocity: top_velocity.clone(),
                 last_link: OnceLock::new(),
                 force: OnceLock::new(),
                 declared_zero: OnceLock::new(),
@@ -198,12 +198,12 @@ impl<'a> Data<'a> {
             joints,
             blocks: self.blocks.clone(),
             logs: self.logs.clone(),
-            rest_speed: self.rest_speed.clone(),
+            rest_velocity: self.rest_velocity.clone(),
             silent: self.silent.clone(),
             left_out: self.left_out.clone(),
             notes: self.notes.clone(),
-            joints_apart: false,
-            top_speed: self.top_speed.clone(),
+            per_joint: false,
+            top_velocity: self.top_velocity.clone(),
             last_link: OnceLock::new(),
             force: OnceLock::new(),
             declared_zero: OnceLock::new(),
@@ -261,8 +261,8 @@ impl<'a> Data<'a> {
 
     /// The velocity that a joint exceeds in 5 % of its samples, rad/s, at least 1e-3.
     #[must_use]
-    pub fn top_speed(&self, joint: usize) -> f64 {
-        self.top_speed[joint]
+    pub fn top_velocity(&self, joint: usize) -> f64 {
+        self.top_velocity[joint]
     }
 
     /// Samples a second on the even grid.
@@ -382,19 +382,20 @@ pub fn column_in_bands(
 }
 
 /// The velocity that a joint exceeds in 5 % of its samples, rad/s, at least 1e-3.
-pub(crate) fn top_speed<'r>(recordings: impl IntoIterator<Item = &'r Recording>, joint: usize) -> f64 {
-    let mut speeds: Vec<f64> = recordings.into_iter().flat_map(|r| r.speed(joint).map(f64::abs)).collect();
-    if speeds.is_empty() {
+pub(crate) fn top_velocity<'r>(recordings: impl IntoIterator<Item = &'r Recording>, joint: usize) -> f64 {
+    let mut velocities: Vec<f64> =
+        recordings.into_iter().flat_map(|r| r.velocity(joint).map(f64::abs)).collect();
+    if velocities.is_empty() {
         return 1.0;
     }
-    let at = (speeds.len() * 95 / 100).min(speeds.len() - 1);
-    let (_, top, _) = speeds.select_nth_unstable_by(at, f64::total_cmp);
+    let at = (velocities.len() * 95 / 100).min(velocities.len() - 1);
+    let (_, top, _) = velocities.select_nth_unstable_by(at, f64::total_cmp);
     top.max(1e-3)
 }
 
 /// The rows by band and joint; the bands are each half of the one before.
 fn joint_rows(
-    body: &RigidBody,
+    body: &RigidArm,
     recordings: &[Recording],
     bands: &[Band],
     kept: Vec<Vec<Vec<Vec<usize>>>>,

@@ -101,7 +101,7 @@ impl Recording {
     }
 
     /// One joint's velocities.
-    pub fn speed(&self, joint: usize) -> impl Iterator<Item = f64> + '_ {
+    pub fn velocity(&self, joint: usize) -> impl Iterator<Item = f64> + '_ {
         self.v.iter().skip(joint).step_by(self.dof).copied()
     }
 

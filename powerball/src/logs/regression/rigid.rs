@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 ///
 /// States are slices with n numbers a sample, one sample after another.
 #[derive(Debug)]
-pub struct RigidBody {
+pub struct RigidArm {
     model: Model,
     regressor: Evaluator,
     torque: Evaluator,
@@ -22,7 +22,7 @@ pub struct RigidBody {
     unconstrained: OnceLock<Option<Wide>>,
     /// The same at unit gravity along x, y and z of the base.
     unit_gravity: OnceLock<Option<[Wide; 3]>>,
-    /// See [`RigidBody::hidden`].
+    /// See [`RigidArm::hidden`].
     hidden: OnceLock<Vec<Vec<f64>>>,
 }
 
@@ -51,25 +51,25 @@ impl Wide {
     }
 }
 
-impl RigidBody {
+impl RigidArm {
     /// Derives and proves the minimal-set functions of an arm.
     ///
     /// # Errors
     /// As [`Model::derive`] and [`Evaluator::new`].
-    pub fn new(arm: &Arm) -> Result<RigidBody, Error> {
-        RigidBody::mounted(arm, arm)
+    pub fn new(arm: &Arm) -> Result<RigidArm, Error> {
+        RigidArm::mounted(arm, arm)
     }
 
     /// The same for an arm under another gravity than that of its file.
     ///
     /// # Errors
-    /// As [`RigidBody::new`].
-    pub fn mounted(arm: &Arm, filed: &Arm) -> Result<RigidBody, Error> {
+    /// As [`RigidArm::new`].
+    pub fn mounted(arm: &Arm, filed: &Arm) -> Result<RigidArm, Error> {
         let model = Model::derive(arm.clone())?;
         let regressor = Evaluator::new(&model, Function::Regressor, SetKind::Minimal)?;
         let torque = Evaluator::new(&model, Function::InverseDynamics, SetKind::Minimal)?;
         let names = model.set(SetKind::Minimal)?.names();
-        Ok(RigidBody {
+        Ok(RigidArm {
             model,
             regressor,
             torque,
@@ -102,8 +102,8 @@ impl RigidBody {
     /// The parameters of the minimal set as combinations of those of the same arm's under another gravity, by
     /// row; `None` where these do not determine them.
     #[must_use]
-    pub fn parameters_from(&self, other: &RigidBody) -> Option<Vec<Vec<f64>>> {
-        let sums = |body: &RigidBody| Some(body.model.sums(body.model.set(SetKind::Minimal).ok()?));
+    pub fn parameters_from(&self, other: &RigidArm) -> Option<Vec<Vec<f64>>> {
+        let sums = |body: &RigidArm| Some(body.model.sums(body.model.set(SetKind::Minimal).ok()?));
         combinations(&sums(self)?, &sums(other)?)
     }
 
@@ -233,7 +233,7 @@ mod tests {
     fn columns_agree_with_newton_euler() {
         let text = include_str!("../../../arm.toml").replace("rotor_ratio = 1\n", "rotor_ratio = 100\n");
         let arm = Arm::parse(&text, "arm.toml").unwrap();
-        let body = RigidBody::new(&arm).unwrap();
+        let body = RigidArm::new(&arm).unwrap();
         let n = arm.dof();
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         let mut draw = |count: usize| (0..count).map(|_| rng.random_range(-1.5..1.5)).collect::<Vec<f64>>();

@@ -55,7 +55,7 @@ pub(super) fn saturation_notes(logs: &[Log], joint: usize, spans: &[Vec<[f64; 2]
 mod tests {
     use super::*;
     use crate::logs::log::Arrays;
-    use crate::logs::regression::{Data, DataOptions, RigidBody};
+    use crate::logs::regression::{Data, DataOptions, RigidArm};
     use std::f64::consts::TAU;
 
     /// 20 s of one joint at 100 Hz: a torque of 10 N·m at most, cut at `limit`.
@@ -76,7 +76,7 @@ mod tests {
     #[test]
     fn a_torque_at_its_limit_is_left_out_and_said() {
         let (arm, whole, cut) = (arm(), log(11.0), log(8.0));
-        let body = RigidBody::new(&arm).unwrap();
+        let body = RigidArm::new(&arm).unwrap();
         // 0.2 Hz: above 0.8 of its peak for (π − 2 asin 0.8)/τ of each half turn, 1.02 s, eight times.
         let spans = saturated(std::slice::from_ref(&cut), 0);
         assert_eq!(spans[0].len(), 8);

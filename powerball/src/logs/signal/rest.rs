@@ -17,12 +17,12 @@ const SMOOTHING: f64 = 2.0;
 /// The velocity below which a joint counts as resting, from samples of |q̇| of all its recordings and its
 /// velocity limit if known.
 #[must_use]
-pub fn rest_speed(mut speeds: Vec<f64>, limit: Option<f64>) -> f64 {
-    if speeds.is_empty() {
+pub fn rest_velocity(mut velocities: Vec<f64>, limit: Option<f64>) -> f64 {
+    if velocities.is_empty() {
         return REST_SPEED;
     }
-    let high = (speeds.len() * 95 / 100).min(speeds.len() - 1);
-    let (_, p95, _) = speeds.select_nth_unstable_by(high, f64::total_cmp);
+    let high = (velocities.len() * 95 / 100).min(velocities.len() - 1);
+    let (_, p95, _) = velocities.select_nth_unstable_by(high, f64::total_cmp);
     REST_SPEED.min((REST_SHARE * *p95).max(REST_OF_LIMIT * limit.unwrap_or(0.0)))
 }
 
@@ -61,14 +61,14 @@ mod tests {
     #[test]
     fn heads_tails_and_stops_go_but_reversals_stay() {
         let rate = 100.0;
-        let speed = |k: usize| match k {
+        let velocity = |k: usize| match k {
             0..200 => 0.0,
             200..1000 => 0.5 * (2.0 * std::f64::consts::PI * (k - 200) as f64 / 400.0).sin(),
             1000..1200 => 0.0,
             1200..1600 => 0.3,
             _ => 0.0,
         };
-        let v: Vec<f64> = (0..1800).map(speed).collect();
+        let v: Vec<f64> = (0..1800).map(velocity).collect();
         let keep = moving(&v, rate, REST_SPEED);
         assert!(keep[..180].iter().all(|k| !k), "head");
         assert!(keep[260..940].iter().all(|k| *k), "motion with its reversals");
@@ -79,9 +79,9 @@ mod tests {
 
     #[test]
     fn slow_joints_have_a_lower_limit() {
-        assert_eq!(rest_speed(vec![1.5; 100], Some(2.0)), REST_SPEED);
-        approx::assert_relative_eq!(rest_speed(vec![0.1; 100], None), 0.003);
-        assert_eq!(rest_speed(Vec::new(), None), REST_SPEED);
-        approx::assert_relative_eq!(rest_speed(vec![1e-4; 100], Some(1.2)), 0.0012);
+        assert_eq!(rest_velocity(vec![1.5; 100], Some(2.0)), REST_SPEED);
+        approx::assert_relative_eq!(rest_velocity(vec![0.1; 100], None), 0.003);
+        assert_eq!(rest_velocity(Vec::new(), None), REST_SPEED);
+        approx::assert_relative_eq!(rest_velocity(vec![1e-4; 100], Some(1.2)), 0.0012);
     }
 }

@@ -3,7 +3,7 @@
 use super::reduce::push_in_bands;
 use super::{Summary, SummaryError};
 use crate::logs::log::Log;
-use crate::logs::regression::{DataError, DataOptions, RigidBody};
+use crate::logs::regression::{DataError, DataOptions, RigidArm};
 
 /// The bands, Hz, widest first, an octave apart. Above the widest arms of this size are not rigid; a motion
 /// and what friction does at its reversals are slower than the narrowest.
@@ -21,7 +21,7 @@ pub struct Bands {
 impl Bands {
     /// Of no log yet; the band of `options` does not count.
     #[must_use]
-    pub fn new(body: &RigidBody, options: &DataOptions) -> Bands {
+    pub fn new(body: &RigidArm, options: &DataOptions) -> Bands {
         Bands { bands: BANDS.iter().map(|band| Summary::new(body, &with(options, *band))).collect() }
     }
 
@@ -63,7 +63,7 @@ impl Bands {
     /// short for a narrow band is missing from that band alone.
     pub fn push(
         &mut self,
-        body: &RigidBody,
+        body: &RigidArm,
         log: &Log,
         options: &DataOptions,
     ) -> Result<Vec<String>, DataError> {
@@ -72,7 +72,7 @@ impl Bands {
 
     /// The logs in the columns of another set of the same arm, as [`Summary::in_set`].
     #[must_use]
-    pub fn in_set(&self, own: &RigidBody, general: &RigidBody) -> Option<Bands> {
+    pub fn in_set(&self, own: &RigidArm, general: &RigidArm) -> Option<Bands> {
         let bands = self.bands.iter().map(|summary| summary.in_set(own, general));
         Some(Bands { bands: bands.collect::<Option<_>>()? })
     }

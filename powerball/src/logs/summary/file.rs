@@ -1,6 +1,6 @@
 //! Summaries on disk: one line of JSON that says what it is, then the factors as little-endian doubles.
 
-use super::{Columns, Identity, NODES, OCTAVES, Octaves, Powers, Steepness, Summary, Triangle, fnv};
+use super::{Columns, Identity, NODES, OCTAVES, Octaves, Powers, RFactor, Steepness, Summary, fnv};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -123,7 +123,7 @@ impl Summary {
             logs: self.logs.clone(),
             samples: self.samples,
             silent: self.silent.clone(),
-            rows: self.joints.iter().map(|j| j.levels().iter().map(Triangle::rows).collect()).collect(),
+            rows: self.joints.iter().map(|j| j.levels().iter().map(RFactor::rows).collect()).collect(),
             spectrum: self.spectrum.clone(),
             checksum: format!("{:016x}", fnv(&numbers)),
         };
@@ -162,7 +162,7 @@ impl Summary {
         let hash =
             u64::from_str_radix(&head.arm_hash, 16).map_err(|_| unreadable("its arm_hash is no number"))?;
         let width = Columns { inertial: head.parameters.len() }.width();
-        let each = Triangle::packed_len(width);
+        let each = RFactor::packed_len(width);
         let joints = head.steepness.len();
         let length = 8 * each * OCTAVES * joints;
         let after = numbers.get(length..).unwrap_or_default();
@@ -186,7 +186,7 @@ impl Summary {
             .map(|rows| {
                 let levels = rows
                     .iter()
-                    .map(|rows| Triangle::from_packed(width, parts.next()?, *rows))
+                    .map(|rows| RFactor::from_packed(width, parts.next()?, *rows))
                     .collect::<Option<Vec<_>>>()?;
                 Octaves::from_levels(levels)
             })

@@ -8,20 +8,20 @@
 mod bands;
 mod file;
 mod octaves;
+mod r_factor;
 mod reduce;
 mod steepness;
-mod triangle;
 
 pub use bands::{BANDS, Bands, Powers};
 pub use file::SummaryError;
 pub use octaves::{OCTAVES, Octaves, SLOW, halved};
+pub use r_factor::RFactor;
 pub use reduce::Columns;
 pub(crate) use reduce::parts;
 pub use steepness::{NODES, Steepness};
-pub use triangle::Triangle;
 
 use crate::logs::parallel;
-use crate::logs::regression::{DataOptions, RigidBody};
+use crate::logs::regression::{DataOptions, RigidArm};
 
 /// What must agree for summaries to be of the same thing.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +65,7 @@ const ORDINARY_SPEED: f64 = 1.0;
 impl Summary {
     /// Of no log yet.
     #[must_use]
-    pub fn new(body: &RigidBody, options: &DataOptions) -> Summary {
+    pub fn new(body: &RigidArm, options: &DataOptions) -> Summary {
         let arm = body.filed();
         let mut described = format!("{:?} {:?} {:?} {:?}", arm.convention, arm.gravity, arm.joints, arm.tool);
         // Without transmissions the hash is that of summaries that were written before there were any.
@@ -106,7 +106,7 @@ impl Summary {
     /// The same rows in the columns of the minimal set of `general`, which is the same arm under a gravity
     /// whose parameters determine those of `own`, in whose columns the rows are; `None` where they do not.
     #[must_use]
-    pub fn in_set(&self, own: &RigidBody, general: &RigidBody) -> Option<Summary> {
+    pub fn in_set(&self, own: &RigidArm, general: &RigidArm) -> Option<Summary> {
         let rows = own.parameters_from(general)?;
         let parameters = general.names().to_vec();
         let inertial = |c: usize| -> Vec<(usize, f64)> {

@@ -6,7 +6,7 @@
 //! whatever model is found later. Noise of robots has colour but hardly any memory between octaves, which is
 //! all that standard errors need.
 
-use super::Triangle;
+use super::RFactor;
 use crate::logs::regression::JointRows;
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -25,39 +25,39 @@ pub fn halved(signal: &[f64]) -> (Vec<f64>, Vec<f64>) {
 /// One factor an octave, from fast to slow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Octaves {
-    levels: Vec<Triangle>,
+    levels: Vec<RFactor>,
 }
 
 impl Octaves {
     /// Of no rows.
     #[must_use]
     pub fn new(width: usize) -> Octaves {
-        Octaves { levels: vec![Triangle::new(width); OCTAVES] }
+        Octaves { levels: vec![RFactor::new(width); OCTAVES] }
     }
 
     /// From the factors, fast to slow; `None` unless there are [`OCTAVES`] of one width.
     #[must_use]
-    pub fn from_levels(levels: Vec<Triangle>) -> Option<Octaves> {
+    pub fn from_levels(levels: Vec<RFactor>) -> Option<Octaves> {
         let width = levels.first()?.width();
         (levels.len() == OCTAVES && levels.iter().all(|l| l.width() == width)).then_some(Octaves { levels })
     }
 
     /// The factors, fast to slow.
     #[must_use]
-    pub fn levels(&self) -> &[Triangle] {
+    pub fn levels(&self) -> &[RFactor] {
         &self.levels
     }
 
     /// Rows that went in.
     #[must_use]
     pub fn rows(&self) -> u64 {
-        self.levels.iter().map(Triangle::rows).sum()
+        self.levels.iter().map(RFactor::rows).sum()
     }
 
     /// The factor of all rows.
     #[must_use]
-    pub fn total(&self) -> Triangle {
-        let mut total = Triangle::new(self.levels[0].width());
+    pub fn total(&self) -> RFactor {
+        let mut total = RFactor::new(self.levels[0].width());
         for level in &self.levels {
             total.merge(level);
         }
@@ -95,7 +95,7 @@ impl Octaves {
         }
     }
 
-    /// The same rows with combinations of their columns, as [`Triangle::combined`].
+    /// The same rows with combinations of their columns, as [`RFactor::combined`].
     #[must_use]
     pub fn combined(&self, columns: &[Vec<(usize, f64)>]) -> Octaves {
         Octaves { levels: self.levels.iter().map(|level| level.combined(columns)).collect() }

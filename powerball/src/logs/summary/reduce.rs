@@ -3,7 +3,7 @@
 use super::{Octaves, Steepness, Summary, steepness};
 use crate::logs::log::Log;
 use crate::logs::parallel;
-use crate::logs::regression::{Data, DataError, DataOptions, Recording, RigidBody, column_in_bands};
+use crate::logs::regression::{Data, DataError, DataOptions, Recording, RigidArm, column_in_bands};
 
 /// A log is worked on in parts of this length, s.
 const PART: f64 = 120.0;
@@ -52,7 +52,7 @@ impl Columns {
     /// The columns on a joint's rows in each band.
     fn of(&self, bands: &[Data<'_>], joint: usize, steepness: &Steepness) -> Vec<Vec<Vec<f64>>> {
         let column =
-            |f: &dyn Fn(f64) -> f64| column_in_bands(bands, joint, |r| r.speed(joint).map(f).collect());
+            |f: &dyn Fn(f64) -> f64| column_in_bands(bands, joint, |r| r.velocity(joint).map(f).collect());
         let rows = || bands.iter().map(|data| &data.joints[joint]);
         let mut columns: Vec<Vec<Vec<f64>>> = rows().map(|rows| rows.inertial.clone()).collect();
         let mut push = |values: Vec<Vec<f64>>| {
@@ -73,7 +73,7 @@ impl Summary {
     /// [`DataError`] where nothing of the log can be used; nothing has been taken in then.
     pub fn push(
         &mut self,
-        body: &RigidBody,
+        body: &RigidArm,
         log: &Log,
         options: &DataOptions,
     ) -> Result<Vec<String>, DataError> {
@@ -86,7 +86,7 @@ impl Summary {
     /// As [`Summary::push`].
     pub fn push_corrected(
         &mut self,
-        body: &RigidBody,
+        body: &RigidArm,
         log: &Log,
         options: &DataOptions,
         correct: impl FnMut(&mut Recording),
@@ -111,7 +111,7 @@ impl Summary {
 /// log that is too short for a narrower band is missing from that band alone.
 pub(super) fn push_in_bands(
     summaries: &mut [Summary],
-    body: &RigidBody,
+    body: &RigidArm,
     log: &Log,
     options: &DataOptions,
     mut correct: impl FnMut(&mut Recording),

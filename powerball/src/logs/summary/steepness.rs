@@ -23,10 +23,10 @@ pub struct Steepness {
 }
 
 impl Steepness {
-    /// For a joint of speed limit `speed`, rad/s or m/s.
+    /// For a joint of velocity limit `velocity`, rad/s or m/s.
     #[must_use]
-    pub fn new(speed: f64) -> Steepness {
-        Steepness { low: LOW / speed, high: HIGH / speed }
+    pub fn new(velocity: f64) -> Steepness {
+        Steepness { low: LOW / velocity, high: HIGH / velocity }
     }
 
     /// Over a given range, s/rad.
@@ -101,8 +101,8 @@ mod tests {
 
     #[test]
     fn columns_and_tangents_are_those_of_the_law() {
-        let speed = 1.3;
-        let steepness = Steepness::new(speed);
+        let velocity = 1.3;
+        let steepness = Steepness::new(velocity);
         let (low, high) = steepness.range();
         let (mut off, mut off_slope) = (0.0f64, 0.0f64);
         for i in 0..=300 {
@@ -110,7 +110,7 @@ mod tests {
             let (weights, slopes) = (steepness.weights(gamma), steepness.slopes(gamma));
             approx::assert_abs_diff_eq!(weights.iter().sum::<f64>(), 1.0, epsilon = 1e-9);
             for k in -40..=10 {
-                let v = speed * 1.4f64.powi(k);
+                let v = velocity * 1.4f64.powi(k);
                 let at = |w: &[f64; NODES]| -> f64 {
                     steepness.nodes().iter().zip(w).map(|(g, w)| w * (g * v).tanh()).sum()
                 };

@@ -58,7 +58,7 @@ impl PlantEffect {
             "stribeck" => PlantEffect::Stribeck {
                 joint: large,
                 level: plant.friction()[large].gamma1 * rng.random_range(0.3..0.6),
-                speed: rng.random_range(0.03..0.07),
+                velocity: rng.random_range(0.03..0.07),
             },
             "velocity_nonlinearity" => PlantEffect::VelocityNonlinearity {
                 joint: large,

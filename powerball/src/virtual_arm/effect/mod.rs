@@ -60,18 +60,18 @@ pub enum PlantEffect {
     Stribeck {
         /// The joint.
         joint: usize,
-        /// Additional friction at the smallest speeds, N·m.
+        /// Additional friction at the smallest velocities, N·m.
         level: f64,
-        /// Speed at which the film is built up, rad/s.
-        speed: f64,
+        /// Velocity at which the film is built up, rad/s.
+        velocity: f64,
     },
-    /// Losses that grow faster than the speed: churned grease.
+    /// Losses that grow faster than the velocity: churned grease.
     VelocityNonlinearity {
         /// The joint.
         joint: usize,
         /// Torque at 1 rad/s, N·m.
         torque: f64,
-        /// Exponent of the speed.
+        /// Exponent of the velocity.
         exponent: f64,
     },
     /// Friction that is higher in one direction, and a torque that pulls to one side.
@@ -202,7 +202,7 @@ pub struct Instant<'a> {
     pub t: f64,
     /// True joint positions.
     pub q: &'a [f64],
-    /// True joint speeds.
+    /// True joint velocities.
     pub dq: &'a [f64],
     /// Torques of the rigid bodies, rotors included.
     pub rigid: &'a [f64],
@@ -273,9 +273,9 @@ impl PlantEffect {
             PlantEffect::LoadFriction { coefficient, .. } => {
                 format!("gear friction of {coefficient:.3} N·m for each N·m that the gear carries")
             }
-            PlantEffect::Stribeck { level, speed, .. } => {
+            PlantEffect::Stribeck { level, velocity, .. } => {
                 format!(
-                    "{level:.2} N·m more friction at the smallest speeds, gone beyond about {speed:.3} rad/s"
+                    "{level:.2} N·m more friction at the smallest velocities, gone beyond about {velocity:.3} rad/s"
                 )
             }
             PlantEffect::VelocityNonlinearity { torque, exponent, .. } => {
@@ -364,7 +364,7 @@ impl PlantEffect {
     }
 
     /// The joint whose friction the effect changes, where its torque may turn round within a small change of
-    /// speed.
+    /// velocity.
     pub(super) fn rubs_at(&self) -> Option<usize> {
         match self {
             PlantEffect::LoadFriction { joint, .. }

@@ -2,7 +2,7 @@
 
 use super::{Instant, PlantEffect, SLIDERS, State};
 
-/// Below this speed the teeth of a gear do not yet rub at full strength, rad/s.
+/// Below this velocity the teeth of a gear do not yet rub at full strength, rad/s.
 const RUB_SPEED: f64 = 0.004;
 /// A hose stiffens by its own stiffness over this angle, rad.
 const HOSE_STIFFENS_OVER: f64 = 6.0;
@@ -17,9 +17,9 @@ impl PlantEffect {
                 let carried = now.rigid[*joint];
                 tau[*joint] += coefficient * carried.hypot(0.02) * direction(now.dq[*joint], RUB_SPEED);
             }
-            PlantEffect::Stribeck { joint, level, speed } => {
+            PlantEffect::Stribeck { joint, level, velocity } => {
                 let dq = now.dq[*joint];
-                let film = 1.0 / (1.0 + (dq / speed).powi(2));
+                let film = 1.0 / (1.0 + (dq / velocity).powi(2));
                 tau[*joint] += level * film * direction(dq, RUB_SPEED);
             }
             PlantEffect::VelocityNonlinearity { joint, torque, exponent } => {
@@ -70,7 +70,7 @@ impl PlantEffect {
     }
 }
 
-/// A smooth sign of the speed that reaches 1 like an algebraic curve, not like tanh.
+/// A smooth sign of the velocity that reaches 1 like an algebraic curve, not like tanh.
 fn direction(dq: f64, half: f64) -> f64 {
     dq / dq.hypot(half)
 }

@@ -111,9 +111,9 @@ impl VirtualArm {
         let (now, h) = (self.ticks * TICK, TICK as f64 * 1e-6);
         let before = self.torque.clone();
         for joint in 0..self.nodes.len() {
-            let speed = self.simulation.speed(joint);
+            let velocity = self.simulation.velocity(joint);
             let position = self.simulation.position(joint) + self.offsets[joint];
-            self.torque[joint] = self.nodes[joint].tick(h, now, [position, speed]);
+            self.torque[joint] = self.nodes[joint].tick(h, now, [position, velocity]);
         }
         self.measure(h, &before);
         for (joint, node) in self.nodes.iter().enumerate() {
@@ -147,7 +147,7 @@ impl VirtualArm {
             let torque = self.history.front().map_or(0.0, |torque| torque[joint]);
             node.measure(Sample {
                 position: self.simulation.position(joint) + self.offsets[joint],
-                speed: self.simulation.speed(joint),
+                velocity: self.simulation.velocity(joint),
                 torque: torque * gains[joint] + *slow + sensors.white[joint] * normal(),
             });
         }

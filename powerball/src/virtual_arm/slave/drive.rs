@@ -9,7 +9,7 @@ use crate::virtual_arm::servo::{Gains, Servo};
 const BRAKE_TIME: f64 = 0.02;
 /// A quick stop brakes so much harder than a joint usually may.
 const QUICK: f64 = 2.0;
-/// Below this speed a joint stands still, rad/s.
+/// Below this velocity a joint stands still, rad/s.
 const STILL: f64 = 2e-3;
 /// The commutation search: how long, s, and how far the joint jerks, rad.
 const SEARCH: (f64, f64) = (0.4, 2e-3);
@@ -30,7 +30,7 @@ pub(super) struct Inputs {
     pub(super) patience: f64,
     /// Torque that is fed forward, or the target of the current mode, N·m.
     pub(super) torque: f64,
-    /// Profile speed and acceleration, rad/s and rad/s².
+    /// Profile velocity and acceleration, rad/s and rad/s².
     pub(super) profile: [f64; 2],
     /// Software limits, rad; no limits where both are equal.
     pub(super) limits: [f64; 2],
@@ -139,7 +139,7 @@ impl Drive {
         (self.search, self.search_from) = (SEARCH.0, None);
     }
 
-    /// Changes the mode; the joint keeps its speed until the new mode says otherwise.
+    /// Changes the mode; the joint keeps its velocity until the new mode says otherwise.
     pub(super) fn set_mode(&mut self, mode: Mode) {
         if mode != self.mode {
             self.mode = mode;
@@ -237,7 +237,7 @@ impl Drive {
         } else {
             self.servo.gains.limit = inputs.torque_limit;
             let forward = if before == State::OperationEnabled { inputs.torque } else { 0.0 };
-            self.servo.torque(h, [self.reference.position, self.reference.speed], actual, forward)
+            self.servo.torque(h, [self.reference.position, self.reference.velocity], actual, forward)
         };
         self.torque
     }
@@ -256,7 +256,7 @@ impl Drive {
                 let from = *self.search_from.get_or_insert(self.reference.position);
                 self.search -= h;
                 let wave = (1.0 - self.search / SEARCH.0).clamp(0.0, 1.0) * std::f64::consts::TAU;
-                self.reference = Reference { position: from + SEARCH.1 * wave.sin(), speed: 0.0 };
+                self.reference = Reference { position: from + SEARCH.1 * wave.sin(), velocity: 0.0 };
                 if self.search <= 0.0 {
                     self.reference.position = from;
                     self.points = [from; 4];
@@ -268,7 +268,7 @@ impl Drive {
             State::QuickStopActive | State::FaultReactionActive => self.reference.stop(h, quick),
             _ => {
                 // Without torque the target is where the joint is: nothing jumps when it is enabled.
-                self.reference = Reference { position: actual[0], speed: 0.0 };
+                self.reference = Reference { position: actual[0], velocity: 0.0 };
                 self.interpolating = false;
                 (self.profile, self.next) = (None, None);
             }
@@ -289,15 +289,15 @@ impl Drive {
             Mode::Velocity => {
                 let ramp = Controlword::MODE_4 | Controlword::MODE_5 | Controlword::MODE_6;
                 let wanted = if self.word.has(ramp) { inputs.velocity } else { 0.0 };
-                let wanted = wanted.clamp(-self.module.speed, self.module.speed);
+                let wanted = wanted.clamp(-self.module.velocity, self.module.velocity);
                 self.limited = !self.reference.cruise(h, wanted, self.module.acceleration, inputs.limits);
             }
             Mode::ProfilePosition => {
                 self.shake_hands(inputs);
                 match self.profile {
                     Some(target) => {
-                        let speed = inputs.profile[0].min(self.module.speed);
-                        if self.reference.approach(h, target, speed, gentle) {
+                        let velocity = inputs.profile[0].min(self.module.velocity);
+                        if self.reference.approach(h, target, velocity, gentle) {
                             self.profile = self.next.take();
                         }
                     }
@@ -305,7 +305,7 @@ impl Drive {
                 }
             }
             _ if self.in_current_mode() => {
-                self.reference = Reference { position: actual[0], speed: actual[1] }
+                self.reference = Reference { position: actual[0], velocity: actual[1] }
             }
             _ => self.reference.stop(h, QUICK * self.module.acceleration),
         }
@@ -327,12 +327,12 @@ impl Drive {
     }
 
     fn stands(&self, actual: [f64; 2]) -> bool {
-        self.reference.speed == 0.0 && actual[1].abs() < STILL
+        self.reference.velocity == 0.0 && actual[1].abs() < STILL
     }
 
     /// The brake follows what is asked of it with its delay.
     fn brake(&mut self, h: f64, inputs: &Inputs) {
-        let halted = self.halted && self.reference.speed == 0.0;
+        let halted = self.halted && self.reference.velocity == 0.0;
         let close = !self.state.has_torque() || !self.supply || halted || inputs.brake || self.brake_stuck;
         self.brake_wait = if close == self.brake_closed { 0.0 } else { self.brake_wait + h };
         if self.brake_wait >= BRAKE_TIME {
@@ -352,7 +352,7 @@ impl Drive {
             Mode::ProfilePosition => {
                 self.profile.is_none() && (self.reference.position - actual[0]).abs() < ARRIVED
             }
-            Mode::Velocity => self.reference.speed == inputs.velocity,
+            Mode::Velocity => self.reference.velocity == inputs.velocity,
             _ => false,
         };
         set(Statusword::TARGET_REACHED, reached && self.state == State::OperationEnabled);

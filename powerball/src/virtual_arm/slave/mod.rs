@@ -36,7 +36,7 @@ struct Sample {
     /// rad.
     position: f64,
     /// rad/s.
-    speed: f64,
+    velocity: f64,
     /// N·m, from the current.
     torque: f64,
 }

@@ -22,8 +22,8 @@ pub struct Module {
     pub identity: Identity,
     /// Software limits, rad.
     pub limits: [f64; 2],
-    /// Greatest speed, rad/s.
-    pub speed: f64,
+    /// Greatest velocity, rad/s.
+    pub velocity: f64,
     /// Greatest acceleration, rad/s².
     pub acceleration: f64,
     /// Torque at the current limit, N·m.

@@ -119,9 +119,9 @@ impl Node {
         self.drive.brake_closed()
     }
 
-    /// Where the drive wants the joint to be: position, rad, and speed, rad/s.
+    /// Where the drive wants the joint to be: position, rad, and velocity, rad/s.
     pub fn demand(&self) -> [f64; 2] {
-        [self.drive.reference.position, self.drive.reference.speed]
+        [self.drive.reference.position, self.drive.reference.velocity]
     }
 
     /// The object dictionary with its present values.
@@ -415,13 +415,13 @@ impl Node {
     /// Brings the objects that live up to date.
     fn publish(&mut self) {
         let inputs = self.inputs;
-        let Sample { position, speed, torque } = self.sample;
-        let actual = [position, speed];
+        let Sample { position, velocity, torque } = self.sample;
+        let actual = [position, velocity];
         let remote = self.nmt == nmt::State::Operational;
         let word = self.garbage.unwrap_or(self.drive.statusword(&inputs, actual, remote).0);
         let vl_unit =
             DEGREE * number_or(inputs.velocity, self.dictionary.get(drive_objects::VL_TARGET_VELOCITY));
-        let [demand, demand_speed] = self.demand();
+        let [demand, demand_velocity] = self.demand();
         let count = |value: f64| (value / DEGREE).round() as i64;
         let extended =
             if self.drive.is_commutated() { schunk::COMMUTATED | schunk::POSITION_VERIFIED } else { 0 };
@@ -429,13 +429,13 @@ impl Node {
             (drive_objects::STATUSWORD, i64::from(word)),
             (drive_objects::MODE_DISPLAY, i64::from(self.drive.mode().code())),
             (drive_objects::POSITION, count(position)),
-            (drive_objects::VELOCITY, count(speed)),
+            (drive_objects::VELOCITY, count(velocity)),
             (drive_objects::POSITION_DEMAND, count(demand)),
-            (drive_objects::VELOCITY_DEMAND, count(demand_speed)),
+            (drive_objects::VELOCITY_DEMAND, count(demand_velocity)),
             (drive_objects::FOLLOWING_ERROR, count(demand - position)),
             (drive_objects::TORQUE, (1000.0 * torque / self.module.rated_torque).round() as i64),
-            (Object::new(0x6043, 0), (demand_speed / vl_unit).round() as i64),
-            (Object::new(0x6044, 0), (speed / vl_unit).round() as i64),
+            (Object::new(0x6043, 0), (demand_velocity / vl_unit).round() as i64),
+            (Object::new(0x6044, 0), (velocity / vl_unit).round() as i64),
             (schunk::EXTENDED_STATUS, i64::from(extended)),
         ];
         for (object, value) in set {

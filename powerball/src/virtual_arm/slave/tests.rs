@@ -231,7 +231,7 @@ fn interpolated_position_follows_and_brakes_hold_before_and_after() {
     for k in 0..100 {
         bench.cycle(0x11F, Some(path(1000 + k)));
     }
-    assert!(bench.arm().nodes()[0].brake_closed() && bench.simulation().link_speeds()[0].abs() < 1e-4);
+    assert!(bench.arm().nodes()[0].brake_closed() && bench.simulation().link_velocities()[0].abs() < 1e-4);
 }
 
 #[test]
@@ -244,7 +244,7 @@ fn without_fresh_set_points_the_drive_stops_quickly_by_itself() {
         bench.start();
         let path = |k: usize| START[0] + 0.4 * (0.005 * k as f64);
         (0..100).for_each(|k| bench.cycle(0x1F, Some(path(k))));
-        assert!(bench.simulation().link_speeds()[0] > 0.3);
+        assert!(bench.simulation().link_velocities()[0] > 0.3);
         let mut cycles = 0;
         while bench.state(3) == State::OperationEnabled {
             if lose_sync {
@@ -288,18 +288,26 @@ fn velocity_mode_scales_ramps_and_stops_at_the_limit() {
     bench.enable(3, 2);
     bench.write(3, drive::VL_TARGET_VELOCITY, 20_000).unwrap();
     bench.pass(200_000);
-    assert!(bench.simulation().link_speeds()[0].abs() < 1e-3, "the ramp is held without bits 4 to 6");
+    assert!(bench.simulation().link_velocities()[0].abs() < 1e-3, "the ramp is held without bits 4 to 6");
     bench.write(3, drive::CONTROLWORD, 0x7F).unwrap();
     bench.pass(500_000);
-    approx::assert_relative_eq!(bench.simulation().link_speeds()[0], 20f64.to_radians(), max_relative = 0.01);
+    approx::assert_relative_eq!(
+        bench.simulation().link_velocities()[0],
+        20f64.to_radians(),
+        max_relative = 0.01
+    );
     // Four times as fast for the same count.
     bench.write(3, drive::VL_FACTOR_DENOMINATOR, 24_000).unwrap();
     bench.write(3, drive::VL_TARGET_VELOCITY, 7_500).unwrap();
     bench.pass(500_000);
-    approx::assert_relative_eq!(bench.simulation().link_speeds()[0], 30f64.to_radians(), max_relative = 0.01);
+    approx::assert_relative_eq!(
+        bench.simulation().link_velocities()[0],
+        30f64.to_radians(),
+        max_relative = 0.01
+    );
     bench.pass(8_000_000);
     let at = bench.simulation().links()[0];
-    assert!((2.9..2.968).contains(&at) && bench.simulation().link_speeds()[0].abs() < 1e-3, "{at}");
+    assert!((2.9..2.968).contains(&at) && bench.simulation().link_velocities()[0].abs() < 1e-3, "{at}");
     let word = Statusword(bench.number(3, drive::STATUSWORD) as u16);
     assert!(word.has(Statusword::INTERNAL_LIMIT), "{word:?}");
 }
@@ -386,10 +394,10 @@ fn a_current_mode_is_there_only_where_it_is_told() {
     assert_eq!(bench.number(3, drive::SUPPORTED_MODES), 0x4B);
     assert_eq!(bench.read(4, target), Err(AbortCode::NO_OBJECT));
     bench.enable(3, 4);
-    // 14 N·m are 2000 ‰: the joint speeds up until friction takes them.
+    // 14 N·m are 2000 ‰: the joint velocities up until friction takes them.
     bench.write(3, target, 2000).unwrap();
     bench.pass(1_000_000);
-    assert!(bench.simulation().link_speeds()[0] > 0.2);
+    assert!(bench.simulation().link_velocities()[0] > 0.2);
     approx::assert_relative_eq!(bench.arm().torques()[0], 14.0, max_relative = 1e-9);
 }
 

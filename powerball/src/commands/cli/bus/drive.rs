@@ -66,9 +66,9 @@ pub(crate) struct Move {
     /// How far, rad.
     #[arg(long, value_name = "RAD", allow_negative_numbers = true)]
     by: Option<f64>,
-    /// Share of the joint's greatest speed and acceleration, 0.01 to 0.5.
-    #[arg(long, default_value_t = 0.1)]
-    speed: f64,
+    /// Share of the joint's greatest velocity and acceleration, 0.01 to 0.5.
+    #[arg(long = "speed", value_name = "SHARE", default_value_t = 0.1)]
+    velocity: f64,
     /// How the base stands: filed, ROLL,PITCH in degrees, or gravity in the base frame as X,Y,Z in m/s².
     #[arg(long, default_value = "filed", allow_hyphen_values = true)]
     mounting: Mounting,
@@ -176,7 +176,7 @@ impl Stop {
 
 impl Move {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        if !(0.01..=0.5).contains(&self.speed) {
+        if !(0.01..=0.5).contains(&self.velocity) {
             return Err(Failure::Unusable("--speed is a share from 0.01 to 0.5".to_string()));
         }
         let index = usize::from(self.joint) - 1;
@@ -206,11 +206,11 @@ impl Move {
                 Failure::Unusable(why) | Failure::Refused(why) => why,
             }));
         }
-        recorder.way_to(&to, self.speed, 1.0).map_err(arm)?;
+        recorder.way_to(&to, self.velocity, 1.0).map_err(arm)?;
         recorder.release().map_err(arm)?;
-        recorder.go(&to, self.speed, 1.0).map_err(arm)?;
+        recorder.go(&to, self.velocity, 1.0).map_err(arm)?;
         // Until the drives' interpolation has caught up.
-        recorder.go(&to, self.speed, 0.3).map_err(arm)?;
+        recorder.go(&to, self.velocity, 0.3).map_err(arm)?;
         let at = recorder.master().driver().positions();
         let master = recorder.finish().map_err(arm)?;
         let off = (at[index] - to[index]).abs();

@@ -33,7 +33,7 @@ pub(crate) struct BusCommand {
 enum What {
     /// Find the nodes and ask who they are.
     Scan(scan::Scan),
-    /// Each drive's state, mode, position, speed, current and errors.
+    /// Each drive's state, mode, position, velocity, current and errors.
     State(state::Show),
     /// The same, again and again.
     Watch(state::Watch),

@@ -13,7 +13,7 @@ use std::fmt::Write as _;
 use std::io::IsTerminal;
 use std::time::Duration;
 
-/// Ask each drive once for its state, mode, position, speed, torque and errors. Nothing is changed and
+/// Ask each drive once for its state, mode, position, velocity, torque and errors. Nothing is changed and
 /// nothing moves.
 #[derive(Args, Debug)]
 #[command(after_help = "Example: powerball bus state --bus socketcan:can0 --node 3 --node 4")]

@@ -9,7 +9,7 @@ use crate::explanation::effects::{Context, Part, Window};
 use crate::explanation::options::ExplainError;
 use crate::explanation::torque_model::{Additions, ArmChanges, LogChanges, NamedTerm, Payload, TorqueModel};
 use crate::identification::estimate::{JointFriction, ParameterEstimate, fit};
-use crate::logs::regression::{Data, RigidBody};
+use crate::logs::regression::{Data, RigidArm};
 use dyngen::SetKind;
 use dyngen::arm::Parameter;
 
@@ -57,7 +57,7 @@ pub(crate) fn compose(
         true => None,
         false => {
             let arm = model.additions.arm_changes.of(body.arm()).map_err(ExplainError::Changes)?;
-            Some(RigidBody::new(&arm).map_err(ExplainError::Arm)?)
+            Some(RigidArm::new(&arm).map_err(ExplainError::Arm)?)
         }
     };
     // Another gravity alone can make the minimal set another.
@@ -77,18 +77,18 @@ pub(crate) fn compose(
 /// What the per-joint fit leaves, and a model of one body with the effects that were found by it.
 pub(crate) fn compose_per_joint(study: &mut Study<'_>, found: &Model) -> Result<Composed, ExplainError> {
     let held_out = found.residual_on_validation(study);
-    take_apart(study, false);
+    set_per_joint(study, false);
     let base = fit(&study.data, &study.folds, &[], None);
     let mut shared = Model { accepted: found.accepted.clone(), ..Model::new(base) };
     shared.refit(study);
     let composed = compose(study, &shared, None);
-    take_apart(study, true);
+    set_per_joint(study, true);
     Ok(Composed { model: composed?.model, fitted: found.fit.residual.clone(), held_out })
 }
 
-fn take_apart(study: &mut Study<'_>, apart: bool) {
-    study.data.take_apart(apart);
-    study.validation.take_apart(apart);
+fn set_per_joint(study: &mut Study<'_>, per_joint: bool) {
+    study.data.set_per_joint(per_joint);
+    study.validation.set_per_joint(per_joint);
 }
 
 /// The accepted effects, each as what it is in a model.
@@ -159,8 +159,8 @@ fn take_out(found: &Model, which: &[usize], context: &Context<'_>, residual: &mu
 
 /// The values of a changed arm's minimal set that move as those of the arm do with what they gain.
 fn moved(
-    body: &RigidBody,
-    changed: &RigidBody,
+    body: &RigidArm,
+    changed: &RigidArm,
     inertial: &[f64],
     gained: &[(Parameter, f64)],
 ) -> Vec<ParameterEstimate> {
@@ -173,6 +173,6 @@ fn moved(
 }
 
 /// Values of an arm's minimal set by name.
-fn plain(body: &RigidBody, values: &[f64]) -> Vec<ParameterEstimate> {
+fn plain(body: &RigidArm, values: &[f64]) -> Vec<ParameterEstimate> {
     body.names().iter().zip(values).map(|(name, value)| ParameterEstimate::plain(name, *value)).collect()
 }

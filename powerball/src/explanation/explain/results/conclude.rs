@@ -26,7 +26,7 @@ use std::sync::Arc;
 /// Makes the result.
 pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainError> {
     let held = findings.beforehand.held.as_ref();
-    let Composed { model: torque_model, fitted, held_out } = match findings.study.data.joints_apart {
+    let Composed { model: torque_model, fitted, held_out } = match findings.study.data.per_joint {
         true => compose_per_joint(&mut findings.study, &findings.model)?,
         false => compose(&findings.study, &findings.model, held)?,
     };
@@ -59,7 +59,7 @@ pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainE
         next_experiment: open.as_ref().map(|open| NextExperiment::not_designed(open.names())),
         experiment: None,
         // An experiment moves a body.
-        open: open.filter(|_| !study.data.joints_apart).map(Arc::new),
+        open: open.filter(|_| !study.data.per_joint).map(Arc::new),
         warnings: doubts(&findings).into_iter().chain(unexplained).collect(),
         curves: curves(&study.validation, &before.residual, &held_out),
         shown: shown(study, model),

@@ -60,7 +60,7 @@ pub(crate) fn signals(context: &Context<'_>, joint: usize) -> Vec<(String, Vec<f
     for i in 0..n {
         let name = |what: &str| format!("{what}{}", i + 1);
         signals.push((name("q"), pick(&|r| data.recordings[r].position(i).collect())));
-        signals.push((name("dq"), pick(&|r| data.recordings[r].speed(i).collect())));
+        signals.push((name("dq"), pick(&|r| data.recordings[r].velocity(i).collect())));
         signals.push((name("ddq"), pick(&|r| data.recordings[r].acceleration(i).collect())));
         if i == joint {
             let rigid = context.rigid();

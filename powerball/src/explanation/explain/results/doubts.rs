@@ -3,7 +3,7 @@
 use super::super::findings::Findings;
 use crate::identification::estimate::Solver;
 
-/// Said where joints were taken apart.
+/// Said where each joint was fitted by itself.
 const PER_JOINT: &str = "the logs repeat one path, and joints by themselves predict the held-out logs \
     better than a rigid body that all joints share: each joint was given inertial parameters of its own, \
     an offset and a slope with its position, all errors here are of that model, and effects of the body \
@@ -46,7 +46,7 @@ pub(crate) fn doubts(findings: &Findings<'_>) -> Vec<String> {
              several paths of 20 s or more"
         ));
     }
-    if study.data.joints_apart {
+    if study.data.per_joint {
         doubts.push(PER_JOINT.to_string());
     }
     if study.one_path {

@@ -60,8 +60,8 @@ pub struct Explained {
     /// Torques over time on the validation set, by joint; not part of the JSON.
     #[serde(skip)]
     pub curves: Vec<TorqueCurve>,
-    /// The model with everything that was named: model.json. Its errors are `after`; not where joints were
-    /// taken apart, as it has one body for all.
+    /// The model with everything that was named: model.json. Its errors are `after`; not where each joint was
+    /// fitted by itself, as it has one body for all.
     #[serde(skip)]
     pub model: TorqueModel,
     /// The plots that show the effects; not part of the JSON.

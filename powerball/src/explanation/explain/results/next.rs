@@ -72,7 +72,7 @@ impl NextExperiment {
     pub(crate) fn not_designed(names: Vec<&'static str>) -> NextExperiment {
         NextExperiment {
             advice: format!(
-                "record the joints concerned on a path with other positions, speeds and loads than these \
+                "record the joints concerned on a path with other positions, velocities and loads than these \
                  logs, where {} predict different torques",
                 names.join(" and ")
             ),

@@ -65,8 +65,8 @@ pub(crate) fn shown(study: &Study<'_>, model: &Model) -> Vec<Shown> {
 fn plot(context: &Context<'_>, effect: &str, axis: Axis, joint: usize, own: &[f64]) -> Shown {
     let signal = values(context, axis, joint, own);
     let against_motion = matches!(axis, Axis::Load | Axis::Travel(_) | Axis::Warmth);
-    let speed = rows(context, joint, |r| context.data.recordings[r].speed(joint).collect());
-    let sign = |row: usize| if against_motion { speed[row].signum() } else { 1.0 };
+    let velocity = rows(context, joint, |r| context.data.recordings[r].velocity(joint).collect());
+    let sign = |row: usize| if against_motion { velocity[row].signum() } else { 1.0 };
     let seen = |row: &usize| !matches!(axis, Axis::Travel(way) if signal[*row] > WAYS * way);
     let rows: Vec<[f64; 4]> = (0..signal.len())
         .filter(seen)
@@ -108,7 +108,7 @@ fn in_words(axis: Axis, joint: usize, context: &Context<'_>) -> String {
     match axis {
         Axis::Position(j) => format!("position of joint {j} [{}]", unit(j)),
         Axis::Cycle(order) => format!("place within a cycle, {order:.1} cycles a turn [cycles]"),
-        Axis::Velocity(j) => format!("speed of joint {j} [{}/s]", unit(j)),
+        Axis::Velocity(j) => format!("velocity of joint {j} [{}/s]", unit(j)),
         Axis::Torque => "torque of the rigid arm [N·m]".to_string(),
         Axis::Load => "size of the torque that the rigid arm asks of the joint [N·m]".to_string(),
         Axis::Travel(_) => {
@@ -132,7 +132,7 @@ fn values(context: &Context<'_>, axis: Axis, joint: usize, own: &[f64]) -> Vec<f
             let cycles = |q: f64| (order * q / std::f64::consts::TAU).rem_euclid(1.0);
             data.recordings[r].position(joint).map(cycles).collect()
         }),
-        Axis::Velocity(j) => rows(context, joint, |r| data.recordings[r].speed(j.index()).collect()),
+        Axis::Velocity(j) => rows(context, joint, |r| data.recordings[r].velocity(j.index()).collect()),
         Axis::Torque => rows(context, joint, rigid),
         Axis::Load => rows(context, joint, |r| rigid(r).into_iter().map(f64::abs).collect()),
         Axis::Travel(_) => rows(context, joint, |r| travel(data.recordings[r].position(joint))),

@@ -86,7 +86,7 @@ pub(crate) fn unattributed(
     });
     let unexplained = (!nothing.is_empty()).then(|| {
         format!(
-            "what stays on joint {} is slower than white noise and depends on no position, speed, \
+            "what stays on joint {} is slower than white noise and depends on no position, velocity, \
              acceleration, load or time: slow noise of the sensor, or something that comes and goes",
             nothing.join(", ")
         )

@@ -88,7 +88,7 @@ pub(crate) fn groups(study: &Study<'_>, model: &Model, screen: &Screen<'_>) -> (
     let mut groups = Vec::new();
     let lists: Vec<_> = effects::all().iter().map(|e| (*e, e.candidates(screen.context))).collect();
     for (effect, candidates) in lists {
-        if study.data.joints_apart && effect.of_the_body() {
+        if study.data.per_joint && effect.of_the_body() {
             continue;
         }
         let open: Vec<Candidate> =

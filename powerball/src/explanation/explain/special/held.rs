@@ -9,7 +9,7 @@ use crate::explanation::options::ExplainOptions;
 use crate::explanation::rule::Rule;
 use crate::identification::estimate::{Fit, Folds, Term, fit, spread};
 use crate::logs::log::Log;
-use crate::logs::regression::{Column, Data, DataError, RigidBody};
+use crate::logs::regression::{Column, Data, DataError, RigidArm};
 
 /// Rounds in which the settings are made consistent with the coefficients.
 const ROUNDS: usize = 3;
@@ -51,7 +51,7 @@ struct Seen {
 /// # Errors
 /// [`DataError`] as for any data.
 pub(crate) fn held_in_validation(
-    body: &RigidBody,
+    body: &RigidArm,
     (logs, validate): (&[Log], &[Log]),
     options: &ExplainOptions<'_>,
     base: &Fit,

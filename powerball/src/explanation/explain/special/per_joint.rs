@@ -1,7 +1,7 @@
 //! On a repeated path: one multibody model for all joints (the joint fit), or inertial parameters for each
-//! joint by itself (the per-joint fit, see [`Data::take_apart`]).
+//! joint by itself (the per-joint fit, see [`Data::set_per_joint`]).
 //!
-//! [`Data::take_apart`]: crate::logs::regression::Data::take_apart
+//! [`Data::set_per_joint`]: crate::logs::regression::Data::set_per_joint
 
 use super::super::model::Model;
 use super::super::study::Study;

@@ -9,7 +9,7 @@ use crate::explanation::explain::results::dependencies::depends_on;
 use crate::explanation::{ExplainOptions, Rule};
 use crate::identification::estimate::{Folds, fit};
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, DataOptions, RigidBody};
+use crate::logs::regression::{Data, DataOptions, RigidArm};
 
 /// Adds to joint 2's torque what no effect of the library is: a bump over the product of two positions.
 fn disturbed(mut logs: Vec<Log>, size: f64) -> Vec<Log> {
@@ -23,7 +23,7 @@ fn disturbed(mut logs: Vec<Log>, size: f64) -> Vec<Log> {
 
 #[test]
 fn a_curve_is_kept_where_it_helps_and_named_by_nothing() {
-    let body = RigidBody::new(&arm()).unwrap();
+    let body = RigidArm::new(&arm()).unwrap();
     let logs = disturbed(record(body.arm(), Truth::Clean, 0.0, Noise::White, 7, 22.0, 5), 2.0);
     let (to_fit, held_out) = logs.split_at(5);
     let run = |correct_unattributed: bool| {
@@ -44,7 +44,7 @@ fn a_curve_is_kept_where_it_helps_and_named_by_nothing() {
 
 #[test]
 fn what_the_held_out_path_contradicts_is_not_kept() {
-    let body = RigidBody::new(&arm()).unwrap();
+    let body = RigidArm::new(&arm()).unwrap();
     let clean = record(body.arm(), Truth::Clean, 0.0, Noise::White, 7, 22.0, 6);
     let torque = |logs: &mut [Log], sign: f64| {
         for log in logs {

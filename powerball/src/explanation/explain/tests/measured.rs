@@ -4,7 +4,7 @@ use super::figures;
 use crate::explanation::ExplainOptions;
 use crate::explanation::explain::{Explained, State, explain_body};
 use crate::logs::log::{common_clock, read_logs};
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use dyngen::Arm;
 use std::path::PathBuf;
 
@@ -32,7 +32,7 @@ fn explained(arm: &str, fit: &[String], validate: &[String]) -> Option<Explained
     let (mut logs, _) = read_logs(&files, &arm).unwrap();
     common_clock(&mut logs);
     let validate = logs.split_off(fit.len());
-    let body = RigidBody::new(&arm).unwrap();
+    let body = RigidArm::new(&arm).unwrap();
     Some(explain_body(&body, &logs, &validate, &ExplainOptions::default()).unwrap())
 }
 

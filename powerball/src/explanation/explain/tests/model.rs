@@ -6,7 +6,7 @@ use crate::explanation::torque_model::{Additions, Scalar, TorqueModel};
 use crate::explanation::{ExplainError, ExplainOptions, explain};
 use crate::identification::estimate::{Folds, fit, spread};
 use crate::logs::log::common_clock;
-use crate::logs::regression::{Data, DataOptions, RigidBody};
+use crate::logs::regression::{Data, DataOptions, RigidArm};
 
 /// Whether a model holds what the plant has.
 type Holds = fn(&Additions) -> bool;
@@ -15,7 +15,7 @@ type Holds = fn(&Additions) -> bool;
 /// its fit is another, with other columns, and knows nothing of the explanation.
 #[test]
 fn a_base_model_beside_what_is_known_does_as_well_as_the_whole() {
-    let body = RigidBody::new(&arm()).unwrap();
+    let body = RigidArm::new(&arm()).unwrap();
     let (told, options) = (ExplainOptions::default(), DataOptions::default());
     let given = |list: &[f64]| list.iter().any(|x| *x != 0.0);
     let parts: [(Truth, Holds); 5] = [
@@ -32,7 +32,7 @@ fn a_base_model_beside_what_is_known_does_as_well_as_the_whole() {
         assert!(part(&model.additions), "{truth:?}: {:?}", model.additions);
         assert_eq!(given(&model.additions.log_changes.delay), truth == Truth::TimeDelay);
 
-        let changed = RigidBody::new(&model.additions.arm_changes.of(body.arm()).unwrap()).unwrap();
+        let changed = RigidArm::new(&model.additions.arm_changes.of(body.arm()).unwrap()).unwrap();
         assert_eq!(model.parameters.len(), changed.names().len());
         model.take_out(&changed, &mut logs);
         let [data, other] = [&logs[..5], &logs[5..]].map(|logs| Data::new(&changed, logs, &options).unwrap());
@@ -53,7 +53,7 @@ fn a_base_model_beside_what_is_known_does_as_well_as_the_whole() {
 /// model.
 #[test]
 fn the_door_needs_nothing_prepared() {
-    let body = RigidBody::new(&arm()).unwrap();
+    let body = RigidArm::new(&arm()).unwrap();
     let mut logs = record(body.arm(), Truth::Temperature, 1.0, Noise::White, 7, 22.0, 3);
     common_clock(&mut logs);
     // The door asks besides what the columns are.

@@ -6,9 +6,9 @@ use crate::explanation::ExplainOptions;
 use crate::explanation::Rule;
 use crate::explanation::explain::special::repeats;
 use crate::explanation::explain::{Explained, explain_body};
-use crate::logs::regression::{Data, DataOptions, RigidBody};
+use crate::logs::regression::{Data, DataOptions, RigidArm};
 
-fn run(body: &RigidBody, truth: Truth, size: f64, noise: Noise, seed: u64) -> Explained {
+fn run(body: &RigidArm, truth: Truth, size: f64, noise: Noise, seed: u64) -> Explained {
     let logs = record(body.arm(), truth, size, noise, 7, 22.0, seed);
     let (fit, validate) = logs.split_at(5);
     explain_body(body, fit, validate, &ExplainOptions::default()).unwrap()
@@ -24,7 +24,7 @@ fn names(explained: &Explained) -> Vec<String> {
 
 #[test]
 fn one_missing_effect_is_named_with_its_figures() {
-    let body = RigidBody::new(&arm()).unwrap();
+    let body = RigidArm::new(&arm()).unwrap();
     let figure = |explained: &Explained, name: &str| figures(&explained.effects[0])[name].as_f64().unwrap();
     let load = run(&body, Truth::LoadFriction, 1.0, Noise::White, 3);
     assert_eq!(load.effects[0].effect, "load_friction");
@@ -57,7 +57,7 @@ fn one_missing_effect_is_named_with_its_figures() {
 
 #[test]
 fn nothing_is_found_where_nothing_is_missing() {
-    let body = RigidBody::new(&arm()).unwrap();
+    let body = RigidArm::new(&arm()).unwrap();
     for (noise, seed) in [(Noise::White, 11), (Noise::White, 12), (Noise::Coloured(0.3), 13)] {
         let explained = run(&body, Truth::Clean, 0.0, noise, seed);
         assert_eq!(names(&explained), Vec::<String>::new(), "{noise:?} {seed}");
@@ -69,7 +69,7 @@ fn nothing_is_found_where_nothing_is_missing() {
 /// rival.
 #[test]
 fn a_tool_that_swings_is_given_no_name() {
-    let body = RigidBody::new(&arm()).unwrap();
+    let body = RigidArm::new(&arm()).unwrap();
     for seed in 0..3 {
         let explained = run(&body, Truth::Swing, 1.0, Noise::White, seed);
         assert_eq!(names(&explained), Vec::<String>::new(), "{seed}");
@@ -80,7 +80,7 @@ fn a_tool_that_swings_is_given_no_name() {
 /// would gain.
 #[test]
 fn nothing_of_the_position_is_named_on_a_repeated_path() {
-    let body = RigidBody::new(&arm()).unwrap();
+    let body = RigidArm::new(&arm()).unwrap();
     let logs = record(body.arm(), Truth::Spring, 1.0, Noise::White, 7, 22.0, 3);
     let data = |logs: &[crate::logs::log::Log]| Data::new(&body, logs, &DataOptions::default()).unwrap();
     let mut drifted = logs[0].clone();
@@ -95,7 +95,7 @@ fn nothing_of_the_position_is_named_on_a_repeated_path() {
 /// All effects on an arm whose laws are neither the candidates' formulas nor the virtual arm's.
 #[test]
 fn every_effect_is_named() {
-    let body = RigidBody::new(&arm()).unwrap();
+    let body = RigidArm::new(&arm()).unwrap();
     let mut wrong = Vec::new();
     for truth in Truth::ALL {
         let explained = run(&body, truth, 1.0, Noise::White, 3);

@@ -5,14 +5,14 @@ use crate::explanation::ExplainOptions;
 use crate::explanation::explain::{Explained, explain_body};
 use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::log::common_clock;
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use crate::virtual_arm::{PlantEffect as Effect, lwa4p};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 
 fn explained(effect: Option<Effect>) -> Explained {
-    let body = RigidBody::new(&lwa4p::arm().unwrap()).unwrap();
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let mut plant = lwa4p::plant().unwrap();
     if let Some(effect) = effect {
         plant = plant.with(effect);

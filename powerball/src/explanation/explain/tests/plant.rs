@@ -147,7 +147,7 @@ fn parameters(arm: &Arm, rng: &mut ChaCha8Rng) -> Vec<f64> {
     all
 }
 
-/// Fourier paths: position, speed, acceleration.
+/// Fourier paths: position, velocity, acceleration.
 struct Motion {
     terms: Vec<Vec<(f64, f64, f64)>>,
     centre: Vec<f64>,
@@ -296,16 +296,16 @@ pub(super) fn record(
                 })
                 .collect();
             let scale = [1.0, 1.2, 1.0, 0.6, 0.12, 0.1][at.min(5)] * size;
-            let (x, speed) = (q[at], v[at]);
-            let sign = speed.signum();
+            let (x, velocity) = (q[at], v[at]);
+            let sign = velocity.signum();
             tau[at] += match truth {
                 Truth::LoadFriction => {
-                    0.08 * size * (rigid[at].powi(2) + 0.01).sqrt() * (300.0 * speed).tanh()
+                    0.08 * size * (rigid[at].powi(2) + 0.01).sqrt() * (300.0 * velocity).tanh()
                 }
-                Truth::Stribeck => scale * sign / (1.0 + (speed / 0.06).powi(2)),
-                Truth::VelocityNonlinearity => 3.0 * scale * sign * speed.abs().powf(1.8),
+                Truth::Stribeck => scale * sign / (1.0 + (velocity / 0.06).powi(2)),
+                Truth::VelocityNonlinearity => 3.0 * scale * sign * velocity.abs().powf(1.8),
                 Truth::Asymmetry => {
-                    if speed > 0.0 {
+                    if velocity > 0.0 {
                         0.6 * scale
                     } else {
                         -0.1 * scale
@@ -314,7 +314,7 @@ pub(super) fn record(
                 Truth::Hysteresis => {
                     z = f64::clamp(z + (x - previous) / 0.004, -1.0, 1.0);
                     previous = x;
-                    2.5 * scale * (z - (200.0 * speed).tanh())
+                    2.5 * scale * (z - (200.0 * velocity).tanh())
                 }
                 Truth::Spring => scale * ((x - 0.2) + 0.2 * (x - 0.2).powi(3)),
                 Truth::Ripple => 0.4 * scale * ((7.0 * x + 0.5).cos() + 0.2 * (14.0 * x).cos()),

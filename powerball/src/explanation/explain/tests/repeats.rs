@@ -7,7 +7,7 @@ use crate::explanation::explain::{Explained, explain_body};
 use crate::identification::estimate::{Folds, fit};
 use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::log::{Log, common_clock};
-use crate::logs::regression::{Data, DataOptions, RigidBody};
+use crate::logs::regression::{Data, DataOptions, RigidArm};
 use crate::virtual_arm::lwa4p;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -26,10 +26,10 @@ fn runs(count: usize, warmth: f64, seed: u64) -> Vec<Log> {
     let path = Fourier { fundamental: TAU / 10.0, periods: 1, ramp: 1.0, joints };
     let plant = lwa4p::plant().unwrap();
     let sampled = path.sample(plant.sensors().rate);
-    let speed: Vec<f64> = sampled.dq.iter().step_by(6).copied().collect();
+    let velocity: Vec<f64> = sampled.dq.iter().step_by(6).copied().collect();
     let run = |k: usize| {
         let mut log = plant.record(&sampled, 0.0, 1000 * seed + k as u64).log(format!("run {k}"));
-        for ((tau, v), t) in log.torque[0].iter_mut().zip(&speed).zip(&log.t) {
+        for ((tau, v), t) in log.torque[0].iter_mut().zip(&velocity).zip(&log.t) {
             *tau += warmth * (-(k as f64 * DURATION + t) / WARMING).exp() * v;
         }
         log
@@ -47,7 +47,7 @@ fn without_a_body(mut logs: Vec<Log>) -> Vec<Log> {
 }
 
 fn even_to_odd(logs: Vec<Log>) -> Explained {
-    let body = RigidBody::new(&lwa4p::arm().unwrap()).unwrap();
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let (mut fit, mut validate) = (Vec::new(), Vec::new());
     for (k, log) in logs.into_iter().enumerate() {
         if k % 2 == 0 { fit.push(log) } else { validate.push(log) }
@@ -59,7 +59,7 @@ fn even_to_odd(logs: Vec<Log>) -> Explained {
     explain_body(&body, &fit, &validate, &ExplainOptions::default()).unwrap()
 }
 
-fn taken_apart(explained: &Explained) -> bool {
+fn fitted_per_joint(explained: &Explained) -> bool {
     explained.warnings.iter().any(|w| w.contains("joints by themselves"))
 }
 
@@ -68,7 +68,7 @@ fn warmth_is_found_with_a_body_that_fits_and_without() {
     for inconsistent in [false, true] {
         let logs = runs(12, 6.0, 5);
         let explained = even_to_odd(if inconsistent { without_a_body(logs) } else { logs });
-        assert_eq!(taken_apart(&explained), inconsistent, "{:?}", explained.warnings);
+        assert_eq!(fitted_per_joint(&explained), inconsistent, "{:?}", explained.warnings);
         let names: Vec<(&str, Vec<JointNumber>)> =
             explained.effects.iter().map(|e| (e.effect.as_str(), e.joints.clone())).collect();
         assert_eq!(names, [("temperature", numbered(&[1]))], "inconsistent: {inconsistent}");
@@ -89,19 +89,19 @@ fn repeats_that_do_not_change_lack_nothing() {
 }
 
 #[test]
-fn joints_apart_fit_what_no_body_does_and_come_together_again() {
-    let body = RigidBody::new(&lwa4p::arm().unwrap()).unwrap();
+fn joints_fitted_by_themselves_fit_what_no_body_does_and_come_together_again() {
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let logs = without_a_body(runs(3, 0.0, 9));
     let mut data = Data::new(&body, &logs, &DataOptions::default()).unwrap();
     let folds = Folds::new(&data);
     let together = fit(&data, &folds, &[], None);
-    data.take_apart(true);
+    data.set_per_joint(true);
     let apart = fit(&data, &folds, &[], None);
     assert!(apart.sigma[1] < 0.7 * together.sigma[1], "{:?} {:?}", apart.sigma, together.sigma);
     for (a, t) in apart.sigma.iter().zip(&together.sigma) {
         assert!(*a < 1.001 * t);
     }
-    data.take_apart(false);
+    data.set_per_joint(false);
     let again = fit(&data, &folds, &[], None);
     assert_eq!(again.theta, together.theta);
 }

@@ -8,7 +8,7 @@ use crate::explanation::explain::{Explained, explain_body};
 use crate::identification::chain::Chain;
 use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::log::{Log, common_clock};
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use crate::virtual_arm::{Body, Dynamics, Plant, PlantEffect as Effect, Sensors};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
@@ -95,7 +95,7 @@ fn recorded(arm: &Arm, usual: &Plant, effects: &[(Effect, &[usize])]) -> Vec<Log
 fn explained_logs(arm: &Arm, mut logs: Vec<Log>) -> Explained {
     common_clock(&mut logs);
     let (fit, validate) = logs.split_at(FITTED);
-    let body = RigidBody::new(arm).unwrap();
+    let body = RigidArm::new(arm).unwrap();
     explain_body(&body, fit, validate, &ExplainOptions::default()).unwrap()
 }
 

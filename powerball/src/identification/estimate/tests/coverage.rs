@@ -2,7 +2,7 @@
 
 use super::plant::{record, sensors, truth};
 use crate::identification::estimate::{
-    FrictionLaw, InBand, estimates, reduce_in_bands, solve_in_band, standard_errors,
+    FrictionKind, InBand, estimates, reduce_in_bands, solve_in_band, standard_errors,
 };
 use crate::logs::regression::DataOptions;
 use crate::logs::summary::{BANDS, Bands};
@@ -34,7 +34,7 @@ fn coverage(experiments: u64, logs: usize, periods: usize, colour: f64) -> (Coun
         for log in record(&sensors, logs, periods, seed) {
             reduced.merge(&reduce_in_bands(&body, &log, &options).unwrap().0).unwrap();
         }
-        let InBand { solution, bands } = solve_in_band(&reduced, FrictionLaw::Symmetric);
+        let InBand { solution, bands } = solve_in_band(&reduced, FrictionKind::Symmetric);
         bands.iter().for_each(|band| in_band[*band] += 1);
         let found = estimates(body.names(), &solution, &standard_errors(&solution));
         for ((count, estimate), truth) in counts.iter_mut().zip(&found.parameters).zip(&truth) {

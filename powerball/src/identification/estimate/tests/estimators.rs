@@ -2,22 +2,22 @@
 
 use super::plant::{record, sensors, truth};
 use crate::identification::estimate::{
-    FrictionLaw, Solution, StandardErrors, solve_instrumental, solve_reduced, solve_robust, standard_errors,
+    FrictionKind, Solution, StandardErrors, solve_instrumental, solve_reduced, solve_robust, standard_errors,
 };
 use crate::logs::log::Log;
-use crate::logs::regression::{DataOptions, RigidBody};
+use crate::logs::regression::{DataOptions, RigidArm};
 use crate::logs::summary::Summary;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-fn weighted(body: &RigidBody, logs: &[Log]) -> Solution {
+fn weighted(body: &RigidArm, logs: &[Log]) -> Solution {
     let options = DataOptions::default();
     let mut summary = Summary::new(body, &options);
     for log in logs {
         summary.push(body, log, &options).unwrap();
     }
-    solve_reduced(&summary, FrictionLaw::Symmetric)
+    solve_reduced(&summary, FrictionKind::Symmetric)
 }
 
 /// Error of the inertial parameters in the standard errors of a fit without faults, rms.
@@ -49,7 +49,7 @@ fn knocks_do_not_bend_the_robust_fit() {
         }
     }
     let bent = weighted(&body, &logs);
-    let robust = solve_robust(&body, &logs, &DataOptions::default(), FrictionLaw::Symmetric).unwrap();
+    let robust = solve_robust(&body, &logs, &DataOptions::default(), FrictionKind::Symmetric).unwrap();
     let [clean, bent, held] = [&clean, &bent, &robust.solution].map(|s| miss(s, &truth, &clean_errors));
     println!("clean {clean:.2}, weighted {bent:.2}, robust {held:.2}");
     assert!(clean < 2.0 && bent > 4.0 && held < 2.0, "clean {clean}, weighted {bent}, robust {held}");
@@ -62,7 +62,7 @@ fn without_knocks_the_robust_fit_is_the_weighted_one() {
     let (body, truth) = truth();
     let logs = record(&sensors(), 1, 3, 12);
     let clean = weighted(&body, &logs);
-    let robust = solve_robust(&body, &logs, &DataOptions::default(), FrictionLaw::Symmetric).unwrap();
+    let robust = solve_robust(&body, &logs, &DataOptions::default(), FrictionKind::Symmetric).unwrap();
     let clean_errors = standard_errors(&clean);
     assert!(miss(&robust.solution, clean.inertial(), &clean_errors) < 0.5);
     assert!(miss(&robust.solution, &truth, &clean_errors) < 2.0);

@@ -2,18 +2,18 @@
 
 use super::plant::{record_mounted, sensors};
 use crate::identification::estimate::{
-    Estimates, FrictionLaw, Solution, Spread, Together, estimates, reduce_in_bands, solve_in_band,
+    Estimates, FrictionKind, Solution, Spread, Together, estimates, reduce_in_bands, solve_in_band,
     standard_errors,
 };
 use crate::identification::mounting::Mounting;
 use crate::logs::log::Log;
-use crate::logs::regression::{DataOptions, RigidBody};
+use crate::logs::regression::{DataOptions, RigidArm};
 use crate::logs::summary::Bands;
 use crate::virtual_arm::{Body, lwa4p};
 use dyngen::SetKind;
 use nalgebra::Vector3;
 
-const LAW: FrictionLaw = FrictionLaw::Symmetric;
+const LAW: FrictionKind = FrictionKind::Symmetric;
 
 /// The virtual arm's links with the second one's centre 4 cm further along its z: the moments whose sum only
 /// one mounting sees would cancel else.
@@ -24,10 +24,10 @@ fn links() -> Vec<Body> {
 }
 
 /// Logs as the base stood, reduced for the mounting that they are told to be of.
-fn reduced(stood: &str, told: &str, seed: u64, still: &[usize]) -> (RigidBody, Bands) {
+fn reduced(stood: &str, told: &str, seed: u64, still: &[usize]) -> (RigidArm, Bands) {
     let arm = lwa4p::arm().unwrap();
     let [stood, told] = [stood, told].map(|text| text.parse::<Mounting>().unwrap());
-    let body = RigidBody::mounted(&told.of(&arm).unwrap(), &arm).unwrap();
+    let body = RigidArm::mounted(&told.of(&arm).unwrap(), &arm).unwrap();
     let options = DataOptions::default();
     let mut bands = Bands::new(&body, &options);
     let logs: Vec<Log> = record_mounted(stood.gravity(&arm), links(), &sensors(), 2, 4, seed, still);
@@ -37,7 +37,7 @@ fn reduced(stood: &str, told: &str, seed: u64, still: &[usize]) -> (RigidBody, B
     (body, bands)
 }
 
-fn together(parts: &[(RigidBody, Bands)]) -> Together {
+fn together(parts: &[(RigidArm, Bands)]) -> Together {
     Together::new(&parts.iter().map(|(body, bands)| (body, bands)).collect::<Vec<_>>()).unwrap()
 }
 
@@ -89,8 +89,8 @@ fn friction_comes_from_the_mounting_in_which_a_joint_moves() {
     let f = &found.friction[1];
     let law =
         crate::controller::friction::TanhFriction::new([f.gamma1, f.gamma2, f.gamma3, f.gamma4, f.gamma5]);
-    for speed in [0.1, 0.3, 0.6] {
-        approx::assert_relative_eq!(law.torque(speed), friction.torque(speed), max_relative = 0.03);
+    for velocity in [0.1, 0.3, 0.6] {
+        approx::assert_relative_eq!(law.torque(velocity), friction.torque(velocity), max_relative = 0.03);
     }
 }
 

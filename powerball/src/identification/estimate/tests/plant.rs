@@ -5,15 +5,15 @@ use crate::identification::chain::Chain;
 use crate::identification::excite::{Fourier, Harmonics};
 use crate::identification::mounting::Mounting;
 use crate::logs::log::Log;
-use crate::logs::regression::RigidBody;
+use crate::logs::regression::RigidArm;
 use crate::virtual_arm::{Body, Dynamics, Plant, Sensors, lwa4p};
 use dyngen::SetKind;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// The arm's functions, and the true values of its minimal set.
-pub(super) fn truth() -> (RigidBody, Vec<f64>) {
-    let body = RigidBody::new(&lwa4p::arm().unwrap()).unwrap();
+pub(super) fn truth() -> (RigidArm, Vec<f64>) {
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let all: Vec<f64> = lwa4p::links().iter().flat_map(Body::parameters).collect();
     let values = body.model().set_values(body.model().set(SetKind::Minimal).unwrap(), &all);
     (body, values)

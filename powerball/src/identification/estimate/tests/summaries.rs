@@ -3,7 +3,7 @@
 use super::plant::{record, sensors, truth};
 use crate::explanation::torque_model::{Additions, TorqueModel};
 use crate::identification::estimate::{
-    Folds, FrictionLaw, JointFriction, ParameterEstimate, Solution, fit, reduce_in_bands, solve_in_band,
+    Folds, FrictionKind, JointFriction, ParameterEstimate, Solution, fit, reduce_in_bands, solve_in_band,
     solve_reduced, spread, spread_of,
 };
 use crate::logs::regression::{Data, DataOptions};
@@ -20,7 +20,7 @@ fn a_reduced_fit_is_the_fit_of_the_rows() {
     for log in &logs {
         summary.push(&body, log, &options).unwrap();
     }
-    let reduced = solve_reduced(&summary, FrictionLaw::Symmetric);
+    let reduced = solve_reduced(&summary, FrictionKind::Symmetric);
     let data = Data::new(&body, &logs, &options).unwrap();
     let direct = fit(&data, &Folds::new(&data), &[], None);
     let errors = crate::identification::estimate::standard_errors(&reduced);
@@ -50,7 +50,7 @@ fn summaries_join_to_the_answer_of_their_logs() {
     };
     let (a, b) = (joined([0, 1, 2]), joined([2, 0, 1]));
     assert_eq!(a.to_bytes(), joined([0, 1, 2]).to_bytes());
-    let (a, b) = (solve_reduced(&a, FrictionLaw::Asymmetric), solve_reduced(&b, FrictionLaw::Asymmetric));
+    let (a, b) = (solve_reduced(&a, FrictionKind::Asymmetric), solve_reduced(&b, FrictionKind::Asymmetric));
     for (x, y) in a.theta.iter().zip(&b.theta) {
         approx::assert_relative_eq!(x, y, max_relative = 1e-6, epsilon = 1e-7);
     }
@@ -78,17 +78,17 @@ fn a_noisy_joint_asks_for_a_narrower_band() {
         all
     };
     let quiet = reduced(0.0, 35);
-    assert_eq!(solve_in_band(&quiet, FrictionLaw::Symmetric).bands, [0; 6]);
+    assert_eq!(solve_in_band(&quiet, FrictionKind::Symmetric).bands, [0; 6]);
     let noisy = reduced(1.0, 35);
-    let found = solve_in_band(&noisy, FrictionLaw::Symmetric);
+    let found = solve_in_band(&noisy, FrictionKind::Symmetric);
     assert!(found.bands[4] > 0 && found.bands.iter().sum::<usize>() == found.bands[4], "{:?}", found.bands);
     assert_eq!(BANDS[0] / BANDS[1], 2.0);
     let read = Bands::from_bytes(&noisy.to_bytes()).unwrap();
     assert_eq!(read, noisy);
-    assert_eq!(solve_in_band(&read, FrictionLaw::Symmetric).solution.theta, found.solution.theta);
+    assert_eq!(solve_in_band(&read, FrictionKind::Symmetric).solution.theta, found.solution.theta);
     // White noise of the rows is what the narrower band leaves of it.
     let rms = |solution: &Solution| spread_of(solution, &solution.theta).rms[4];
-    let wide = solve_reduced(noisy.widest(), FrictionLaw::Symmetric);
+    let wide = solve_reduced(noisy.widest(), FrictionKind::Symmetric);
     let share = (BANDS[found.bands[4]] / BANDS[0]).sqrt();
     approx::assert_relative_eq!(rms(&found.solution), share * rms(&wide), max_relative = 0.1);
     assert!(Bands::from_bytes(&noisy.widest().to_bytes()).is_err());
@@ -105,7 +105,7 @@ fn a_log_that_took_no_part_judges_the_fit() {
         summary.push(&body, &logs[k], &options).unwrap();
         summary
     };
-    let solution = solve_reduced(&one(0), FrictionLaw::Symmetric);
+    let solution = solve_reduced(&one(0), FrictionKind::Symmetric);
     let there = solution.on(&one(1)).unwrap();
     let reduced = spread_of(&there, &there.theta);
     let data = Data::new(&body, &logs[1..], &options).unwrap();

@@ -1,24 +1,24 @@
-//! One joint at constant speeds, there and back: the motion of a friction experiment, and the mean torques of
+//! One joint at constant velocities, there and back: the motion of a friction experiment, and the mean torques of
 //! its log.
 
 use super::laws::Point;
 use crate::identification::motion::Motion;
 
-/// Speeds of the paper's experiment, rad/s: eleven up to 0.2, where a Stribeck effect would show, and seven
+/// Velocities of the paper's experiment, rad/s: eleven up to 0.2, where a Stribeck effect would show, and seven
 /// more up to 0.55; less where the joint is not as fast.
 #[must_use]
-pub fn speeds(fastest: f64) -> Vec<f64> {
+pub fn velocities(fastest: f64) -> Vec<f64> {
     let scale = (0.95 * fastest / 0.55).min(1.0);
     let slow = (0..11).map(|k| 0.01 + 0.019 * f64::from(k));
     let fast = (1..=7).map(|k| 0.2 + 0.05 * f64::from(k));
     slow.chain(fast).map(|v| v * scale).collect()
 }
 
-/// A stretch of constant speed.
+/// A stretch of constant velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plateau {
     /// rad/s
-    pub speed: f64,
+    pub velocity: f64,
     /// From the start of the motion, s.
     pub from: f64,
     /// s
@@ -32,7 +32,7 @@ pub struct Plan {
     pub joint: usize,
     /// All joints; from rest at the start of the joint's way to rest at the same place.
     pub motion: Motion,
-    /// The stretches of constant speed, in order.
+    /// The stretches of constant velocity, in order.
     pub plateaus: Vec<Plateau>,
 }
 
@@ -45,7 +45,7 @@ pub struct Bounds {
     pub acceleration: f64,
 }
 
-/// Time at one speed that is aimed at, s, and the least way, rad: several turns of the motor's ripple.
+/// Time at one velocity that is aimed at, s, and the least way, rad: several turns of the motor's ripple.
 const TIME: f64 = 2.0;
 const WAY: f64 = 0.1;
 /// Settling at the beginning of a plateau that is left out, s.
@@ -53,21 +53,21 @@ const SETTLE: f64 = 0.25;
 /// Rest between two ways, s.
 const REST: f64 = 0.3;
 
-/// Plans the experiment of a joint: at each speed once in either direction over the same way, so that what
+/// Plans the experiment of a joint: at each velocity once in either direction over the same way, so that what
 /// gravity is left acts on both alike. `pose` holds the other joints.
 #[must_use]
-pub fn plan(joint: usize, pose: &[f64], bounds: Bounds, speeds: &[f64], period: f64) -> Plan {
+pub fn plan(joint: usize, pose: &[f64], bounds: Bounds, velocities: &[f64], period: f64) -> Plan {
     let [low, high] = bounds.position;
     let middle = 0.5 * (low + high);
     let room = 0.9 * (high - low);
     let mut motion = Motion::new(pose.len(), period);
     let mut plateaus = Vec::new();
-    // The place at rest between speeds; each way is symmetric about the middle.
+    // The place at rest between velocities; each way is symmetric about the middle.
     let way_of = |v: f64| {
         let ramps = 1.5 * v * v / bounds.acceleration;
         ((TIME + SETTLE) * v).max(WAY).min((room - ramps).max(0.1 * room)) + ramps
     };
-    let first = speeds.first().map_or(0.0, |v| way_of(*v));
+    let first = velocities.first().map_or(0.0, |v| way_of(*v));
     let mut place = middle - 0.5 * first;
     let mut sample = |motion: &mut Motion, q: f64, dq: f64, ddq: f64| {
         motion.push(pose.iter().enumerate().map(
@@ -80,12 +80,12 @@ pub fn plan(joint: usize, pose: &[f64], bounds: Bounds, speeds: &[f64], period: 
         (0..(REST / period).ceil() as usize).for_each(|_| sample(motion, q, 0.0, 0.0));
     };
     sample(&mut motion, place, 0.0, 0.0);
-    for v in speeds {
+    for v in velocities {
         let way = way_of(*v);
         for direction in [1.0, -1.0] {
             let goal = middle + 0.5 * direction * way;
-            let speed = direction * v;
-            // Speed rises and falls as 3x² − 2x³, whose steepest slope is 3/2.
+            let velocity = direction * v;
+            // Velocity rises and falls as 3x² − 2x³, whose steepest slope is 3/2.
             let ramp = ((1.5 * v / bounds.acceleration) / period).ceil().max(1.0);
             let ramp_time = ramp * period;
             let plateau_time = (((goal - place).abs() / v - ramp_time) / period).floor().max(0.0) * period;
@@ -103,11 +103,11 @@ pub fn plan(joint: usize, pose: &[f64], bounds: Bounds, speeds: &[f64], period: 
                     let (shape, slope, way) = smooth(left / ramp_time, ramp_time);
                     (shape, -slope, ramp_time + plateau_time - way)
                 };
-                place = from + speed * way;
-                sample(&mut motion, place, speed * shape, speed * slope);
+                place = from + velocity * way;
+                sample(&mut motion, place, velocity * shape, velocity * slope);
             }
             plateaus.push(Plateau {
-                speed,
+                velocity,
                 from: start + ramp_time + SETTLE.min(0.2 * plateau_time),
                 to: start + ramp_time + plateau_time,
             });
@@ -148,7 +148,7 @@ impl Plan {
                 .collect();
             let mean = means.iter().sum::<f64>() / PARTS as f64;
             let spread = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (PARTS - 1) as f64;
-            Some(Point { speed: plateau.speed, torque: mean, error: (spread / PARTS as f64).sqrt() })
+            Some(Point { velocity: plateau.velocity, torque: mean, error: (spread / PARTS as f64).sqrt() })
         };
         let mut points: Vec<Point> = self.plateaus.iter().filter_map(of).collect();
         // Five means know their own spread badly: none is taken for much better than the others.
@@ -166,11 +166,11 @@ mod tests {
 
     fn example() -> Plan {
         let bounds = Bounds { position: [-1.0, 1.2], acceleration: 2.0 };
-        plan(1, &[0.3, 0.0, -0.4], bounds, &speeds(1.257), 0.005)
+        plan(1, &[0.3, 0.0, -0.4], bounds, &velocities(1.257), 0.005)
     }
 
     #[test]
-    fn the_motion_is_smooth_keeps_its_bounds_and_has_the_speeds_it_says() {
+    fn the_motion_is_smooth_keeps_its_bounds_and_has_the_velocities_it_says() {
         let plan = example();
         assert_eq!(plan.plateaus.len(), 36);
         let samples: Vec<[f64; 3]> =
@@ -185,7 +185,7 @@ mod tests {
         for p in &plan.plateaus {
             let (first, last) = ((p.from / 0.005).ceil() as usize, (p.to / 0.005) as usize);
             assert!(last - first > 200, "{p:?}");
-            assert!(samples[first..last].iter().all(|[_, v, _]| (v - p.speed).abs() < 1e-9), "{p:?}");
+            assert!(samples[first..last].iter().all(|[_, v, _]| (v - p.velocity).abs() < 1e-9), "{p:?}");
         }
         let (first, last) = (samples[0], samples[samples.len() - 1]);
         assert_eq!((first[1], last[1]), (0.0, 0.0));
@@ -203,10 +203,10 @@ mod tests {
         let points = plan.points(&t, &torque);
         assert_eq!(points.len(), 36);
         for pair in points.chunks_exact(2) {
-            assert_eq!(pair[0].speed, -pair[1].speed);
+            assert_eq!(pair[0].velocity, -pair[1].velocity);
             let half = 0.5 * (pair[0].torque - pair[1].torque);
             // The settling that is left out stands at the beginning of each way, so the ways differ a little.
-            approx::assert_abs_diff_eq!(half, friction(pair[0].speed), epsilon = 1.5 * 0.55 * SETTLE);
+            approx::assert_abs_diff_eq!(half, friction(pair[0].velocity), epsilon = 1.5 * 0.55 * SETTLE);
         }
     }
 }

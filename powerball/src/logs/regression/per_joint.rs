@@ -1,4 +1,4 @@
-//! Joints by themselves, for logs that repeat one path.
+//! A fit of each joint by itself, for logs that repeat one path.
 //!
 //! One path, however often it is run, tells little of a rigid body, and whatever else depends on positions is
 //! one more function of that path. Where that does not fit, what it leaves is large and smooth on every
@@ -12,13 +12,13 @@ use crate::logs::parallel;
 impl Data<'_> {
     /// Gives every joint columns of its own for the minimal set, an offset and its position; `false` takes
     /// that back.
-    pub fn take_apart(&mut self, apart: bool) {
-        if apart == self.joints_apart {
+    pub fn set_per_joint(&mut self, per_joint: bool) {
+        if per_joint == self.per_joint {
             return;
         }
-        self.joints_apart = apart;
+        self.per_joint = per_joint;
         let set = self.body.names().len();
-        if !apart {
+        if !per_joint {
             self.joints.iter_mut().for_each(|joint| joint.inertial.truncate(set));
             return;
         }
@@ -36,7 +36,7 @@ impl Data<'_> {
         }
     }
 
-    /// Inertial columns of a joint: the minimal set, and where joints are apart what stands beside it.
+    /// Inertial columns of a joint: the minimal set, and where each joint has its own fit what stands beside it.
     #[must_use]
     pub fn inertial_columns(&self) -> usize {
         self.joints.iter().map(|joint| joint.inertial.len()).max().unwrap_or(0)

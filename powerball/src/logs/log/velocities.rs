@@ -58,7 +58,7 @@ pub(super) fn look(raw: &Raw, step: f64, doubts: &mut Doubts<'_>) {
                 name,
                 format!(
                     "does not follow q{}: check the order and the units of the \
-                columns. Speeds are computed from q; dq is not used",
+                columns. Velocities are computed from q; dq is not used",
                     j + 1
                 ),
                 Severity::Told,
@@ -75,7 +75,7 @@ pub(super) fn look(raw: &Raw, step: f64, doubts: &mut Doubts<'_>) {
                 ("check units and order of columns", Severity::Told)
             };
             let message = format!(
-                "is {:.3} times the slope of q{}: {hint}. Speeds are computed from q; dq is not used",
+                "is {:.3} times the slope of q{}: {hint}. Velocities are computed from q; dq is not used",
                 1.0 / ratio,
                 j + 1
             );
@@ -96,7 +96,7 @@ fn clocks(raw: &Raw, joints: &[Stretches], ratios: &[(usize, f64)], doubts: &mut
     let common = all[all.len() / 2];
     if all.len() >= 2 && (common - 1.0).abs() > CLOCKS && most - least < 0.5 * (common - 1.0).abs() {
         let message = format!(
-            "passes {:.1} % too {} for the joints' speeds, on every joint alike: the time base is off (are \
+            "passes {:.1} % too {} for the joints' velocities, on every joint alike: the time base is off (are \
                 these the times of the samples, or a count times a nominal step?)",
             100.0 * (common - 1.0).abs(),
             if common > 1.0 { "slowly" } else { "fast" }
@@ -125,7 +125,7 @@ fn clocks(raw: &Raw, joints: &[Stretches], ratios: &[(usize, f64)], doubts: &mut
     {
         let begin = raw.t.len() * 2 / 3;
         let message = format!(
-            "drifts against the joints' speeds: by {:.1} % from the first third of the log to the last",
+            "drifts against the joints' velocities: by {:.1} % from the first third of the log to the last",
             100.0 * (b - a)
         );
         doubts.add(Some(begin), "t".into(), message, Severity::Told);

@@ -9,7 +9,7 @@ use pulp::{Arch, NullaryFnOnce};
 
 /// An upper triangular factor of rows of a fixed width.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Triangle {
+pub struct RFactor {
     width: usize,
     /// By column, each as long as the factor is wide, zero below the diagonal.
     columns: Vec<f64>,
@@ -19,28 +19,28 @@ pub struct Triangle {
 /// Rows that are reflected together: a block of seventy columns stays in a second-level cache.
 const BLOCK: usize = 256;
 
-impl Triangle {
+impl RFactor {
     /// The factor of no rows.
     #[must_use]
-    pub fn new(width: usize) -> Triangle {
-        Triangle { width, columns: vec![0.0; width * width], rows: 0 }
+    pub fn new(width: usize) -> RFactor {
+        RFactor { width, columns: vec![0.0; width * width], rows: 0 }
     }
 
-    /// From its upper triangle by columns, as [`Triangle::packed`] gives it; `None` where the length does not
+    /// From its upper triangle by columns, as [`RFactor::packed`] gives it; `None` where the length does not
     /// fit.
     #[must_use]
-    pub fn from_packed(width: usize, packed: &[f64], rows: u64) -> Option<Triangle> {
-        if packed.len() != Triangle::packed_len(width) {
+    pub fn from_packed(width: usize, packed: &[f64], rows: u64) -> Option<RFactor> {
+        if packed.len() != RFactor::packed_len(width) {
             return None;
         }
-        let mut triangle = Triangle { rows, ..Triangle::new(width) };
+        let mut factor = RFactor { rows, ..RFactor::new(width) };
         let mut rest = packed;
-        for (k, column) in triangle.columns.chunks_exact_mut(width.max(1)).enumerate() {
+        for (k, column) in factor.columns.chunks_exact_mut(width.max(1)).enumerate() {
             let (head, tail) = rest.split_at(k + 1);
             column[..=k].copy_from_slice(head);
             rest = tail;
         }
-        Some(triangle)
+        Some(factor)
     }
 
     /// The upper triangle by columns.
@@ -49,7 +49,7 @@ impl Triangle {
         (0..self.width).flat_map(|k| self.column(k)[..=k].iter().copied()).collect()
     }
 
-    /// Numbers in [`Triangle::packed`].
+    /// Numbers in [`RFactor::packed`].
     #[must_use]
     pub fn packed_len(width: usize) -> usize {
         width * (width + 1) / 2
@@ -95,7 +95,7 @@ impl Triangle {
     }
 
     /// Takes another factor's rows in.
-    pub fn merge(&mut self, other: &Triangle) {
+    pub fn merge(&mut self, other: &RFactor) {
         debug_assert_eq!(self.width, other.width);
         if self.rows == 0 {
             // To the bit: a summary that was written and read again is the same.
@@ -109,8 +109,8 @@ impl Triangle {
 
     /// The factor of rows whose columns are combinations of this one's: each a sum of columns with factors.
     #[must_use]
-    pub fn combined(&self, columns: &[Vec<(usize, f64)>]) -> Triangle {
-        let mut combined = Triangle::new(columns.len());
+    pub fn combined(&self, columns: &[Vec<(usize, f64)>]) -> RFactor {
+        let mut combined = RFactor::new(columns.len());
         let mut block = vec![0.0; self.width * columns.len()];
         for (to, sum) in block.chunks_exact_mut(self.width.max(1)).zip(columns) {
             for (k, factor) in sum {
@@ -229,7 +229,7 @@ mod tests {
         columns.iter().map(Vec::as_slice).collect()
     }
 
-    fn products(t: &Triangle) -> Vec<f64> {
+    fn products(t: &RFactor) -> Vec<f64> {
         let w = t.width();
         (0..w * w).map(|i| dots(t.column(i / w), [t.column(i % w)])[0]).collect()
     }
@@ -238,13 +238,13 @@ mod tests {
     fn the_factor_has_the_rows_products_however_they_came_in() {
         let (count, width) = (1000, 7);
         let all = rows(count, width, 1);
-        let mut whole = Triangle::new(width);
+        let mut whole = RFactor::new(width);
         whole.push(&slices(&all));
-        let mut joined = Triangle::new(width);
+        let mut joined = RFactor::new(width);
         for (from, to) in [(700, 1000), (0, 3), (3, 700)] {
-            let mut part = Triangle::new(width);
+            let mut part = RFactor::new(width);
             part.push(&all.iter().map(|c| &c[from..to]).collect::<Vec<_>>());
-            let part = Triangle::from_packed(width, &part.packed(), part.rows()).unwrap();
+            let part = RFactor::from_packed(width, &part.packed(), part.rows()).unwrap();
             joined.merge(&part);
         }
         assert_eq!((whole.rows(), joined.rows()), (1000, 1000));
@@ -262,7 +262,7 @@ mod tests {
     #[test]
     fn columns_are_combined_as_their_rows() {
         let all = rows(90, 4, 5);
-        let mut t = Triangle::new(4);
+        let mut t = RFactor::new(4);
         t.push(&slices(&all));
         let sums = [vec![(3, 1.0)], vec![], vec![(0, 2.0), (2, -1.0)], vec![(1, 1.0)], vec![(2, 0.5)]];
         let made: Vec<Vec<f64>> = sums
@@ -282,7 +282,7 @@ mod tests {
     fn what_products_would_lose_is_kept() {
         let small = 1e-9;
         let columns = [vec![1.0, small, 0.0], vec![1.0, 0.0, small]];
-        let mut t = Triangle::new(2);
+        let mut t = RFactor::new(2);
         t.push(&slices(&columns));
         approx::assert_relative_eq!(t.column(1)[1].abs(), 2f64.sqrt() * small, max_relative = 1e-6);
     }
@@ -290,7 +290,7 @@ mod tests {
     /// Where rows are fewer than columns, what is left of the columns is rounding of rounding.
     #[test]
     fn fewer_rows_than_columns_stay_finite() {
-        let mut t = Triangle::new(40);
+        let mut t = RFactor::new(40);
         let all: Vec<Vec<f64>> =
             rows(3, 40, 3).into_iter().map(|c| c.iter().map(|x| x * 1e-150).collect()).collect();
         for _ in 0..30 {
@@ -303,9 +303,9 @@ mod tests {
     fn columns_of_zeros_stay_and_lengths_are_checked() {
         let mut all = rows(50, 4, 2);
         all[2].fill(0.0);
-        let mut t = Triangle::new(4);
+        let mut t = RFactor::new(4);
         t.push(&slices(&all));
         assert!(t.column(2).iter().all(|x| *x == 0.0));
-        assert!(Triangle::from_packed(4, &[0.0; 9], 0).is_none());
+        assert!(RFactor::from_packed(4, &[0.0; 9], 0).is_none());
     }
 }
