@@ -56,52 +56,64 @@ fn load_friction_of_the_ur10e_is_found_and_held_out_errors_fall() {
     assert!(explained.false_positives.rate <= 0.01);
 }
 
+fn the_load_of_the_ur10e_is_a_payload(fit: &[&str], validate: &[&str]) {
+    let Some(explained) = ur10e(fit, validate) else { return };
+    let payload = explained.effects.iter().find(|e| e.effect == "payload").unwrap();
+    let mass = figures(payload)["mass"].as_f64().unwrap();
+    assert!((mass - 2.8).abs() < 0.15 * 2.8, "{mass}");
+    assert!(payload.logs.len() == 1 && payload.logs[0].contains("14_load"));
+    assert!(joints(&explained, "load_friction").contains(&2));
+}
+
 #[test]
-fn the_load_of_the_ur10e_is_a_payload_on_either_side() {
-    let sides: [(&[&str], &[&str]); 2] = [
-        (&["12a", "12b", "12c", "14_load", "5", "8"], &["14", "7"]),
-        (&["12a", "12b", "12c", "14", "7"], &["14_load", "5"]),
-    ];
-    for (fit, validate) in sides {
-        let Some(explained) = ur10e(fit, validate) else { return };
-        let payload = explained.effects.iter().find(|e| e.effect == "payload").unwrap();
-        let mass = figures(payload)["mass"].as_f64().unwrap();
-        assert!((mass - 2.8).abs() < 0.15 * 2.8, "{mass}");
-        assert!(payload.logs.len() == 1 && payload.logs[0].contains("14_load"));
-        assert!(joints(&explained, "load_friction").contains(&2));
-    }
+fn the_load_of_the_ur10e_is_a_payload_in_a_held_out_log() {
+    the_load_of_the_ur10e_is_a_payload(&["12a", "12b", "12c", "14", "7"], &["14_load", "5"]);
+}
+
+#[test]
+#[ignore = "at length: the one above guards it"]
+fn the_load_of_the_ur10e_is_a_payload_in_a_fitted_log_at_length() {
+    the_load_of_the_ur10e_is_a_payload(&["12a", "12b", "12c", "14_load", "5", "8"], &["14", "7"]);
 }
 
 /// A SCHUNK arm runs one path again and again; no rigid body fits it. (The published analysis of these logs:
 /// warming friction, and ripple of joint 4 at 161 and 322 cycles a turn.)
-#[test]
-fn repeats_of_a_schunk_arm_warm_and_joint_4_ripples() {
-    let repeats = |runs: &mut dyn Iterator<Item = usize>| -> Vec<String> {
+fn repeats_warm_and_joint_4_ripples(
+    mut fit: impl Iterator<Item = usize>,
+    mut validate: impl Iterator<Item = usize>,
+) {
+    let named = |runs: &mut dyn Iterator<Item = usize>| -> Vec<String> {
         runs.map(|k| format!("B0_{k:02}")).collect()
     };
-    let splits = [
-        [repeats(&mut (2..=14).step_by(2)), repeats(&mut (1..=14).step_by(2))],
-        [repeats(&mut (1..=7)), repeats(&mut (8..=14))],
-    ];
-    for [fit, validate] in splits {
-        let Some(explained) = explained("lwa4p_rollouts", &fit, &validate) else { return };
-        assert!(joints(&explained, "temperature").len() >= 3, "{:?}", explained.effects);
-        let ripple = explained.effects.iter().find(|e| e.effect == "position_ripple").unwrap();
-        let list = |key: &str| -> Vec<f64> {
-            figures(ripple)[key].as_array().unwrap().iter().filter_map(serde_json::Value::as_f64).collect()
-        };
-        let of_joint_4: Vec<f64> = (list("orders").into_iter().zip(list("joints")))
-            .filter(|(_, joint)| *joint == 4.0)
-            .map(|(order, _)| order)
-            .collect();
-        for known in [161.0, 322.0] {
-            assert!(of_joint_4.iter().any(|order| (order - known).abs() <= 1.0), "{of_joint_4:?}");
-        }
-        assert!(explained.false_positives.rate < 0.05);
-        for change in &explained.held_out_change {
-            assert!(change.interval[0] <= 0.0, "the held-out error surely rises: {change:?}");
-        }
+    let (fit, validate) = (named(&mut fit), named(&mut validate));
+    let Some(explained) = explained("lwa4p_rollouts", &fit, &validate) else { return };
+    assert!(joints(&explained, "temperature").len() >= 3, "{:?}", explained.effects);
+    let ripple = explained.effects.iter().find(|e| e.effect == "position_ripple").unwrap();
+    let list = |key: &str| -> Vec<f64> {
+        figures(ripple)[key].as_array().unwrap().iter().filter_map(serde_json::Value::as_f64).collect()
+    };
+    let of_joint_4: Vec<f64> = (list("orders").into_iter().zip(list("joints")))
+        .filter(|(_, joint)| *joint == 4.0)
+        .map(|(order, _)| order)
+        .collect();
+    for known in [161.0, 322.0] {
+        assert!(of_joint_4.iter().any(|order| (order - known).abs() <= 1.0), "{of_joint_4:?}");
     }
+    assert!(explained.false_positives.rate < 0.05);
+    for change in &explained.held_out_change {
+        assert!(change.interval[0] <= 0.0, "the held-out error surely rises: {change:?}");
+    }
+}
+
+#[test]
+fn repeats_of_a_schunk_arm_warm_and_joint_4_ripples() {
+    repeats_warm_and_joint_4_ripples(1..=7, 8..=14);
+}
+
+#[test]
+#[ignore = "at length: the one above guards it"]
+fn every_other_repeat_of_a_schunk_arm_tells_the_same_at_length() {
+    repeats_warm_and_joint_4_ripples((2..=14).step_by(2), (1..=14).step_by(2));
 }
 
 /// Motor 6 of this arm turns with joint 5 too; each half of the run is 4.5 s long.
@@ -122,17 +134,24 @@ fn the_coupled_wrist_of_the_tx40_is_found_in_either_half() {
 }
 
 /// Every torque sensor of this arm has a zero of its own, up to 2.5 N·m, and its base is spoilt by them.
-#[test]
-fn the_zeros_of_the_kinova_are_found_both_ways_round() {
+fn the_zeros_of_the_kinova_are_found(fit: &[usize], validate: &[usize]) {
     let logs = |which: &[usize]| which.iter().map(|k| format!("trajectory_{k}")).collect::<Vec<_>>();
-    let (odd, even) = (logs(&[1, 3, 5]), logs(&[2, 4]));
-    for (fit, validate) in [(&odd, &even), (&even, &odd)] {
-        let Some(explained) = explained("kinova_in_step", fit, validate) else { return };
-        assert_eq!(joints(&explained, "asymmetry"), [1, 2, 3, 4, 5, 6, 7]);
-        let torque = figures_of(&explained, "asymmetry")["torque"][3].as_f64().unwrap();
-        assert!((-2.8..-2.2).contains(&torque), "{torque}");
-        let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
-        let fell = before.iter().zip(after).filter(|(b, a)| **a < 0.5 * **b).count();
-        assert!(fell == 7, "{before:?} {after:?}");
-    }
+    let Some(explained) = explained("kinova_in_step", &logs(fit), &logs(validate)) else { return };
+    assert_eq!(joints(&explained, "asymmetry"), [1, 2, 3, 4, 5, 6, 7]);
+    let torque = figures_of(&explained, "asymmetry")["torque"][3].as_f64().unwrap();
+    assert!((-2.8..-2.2).contains(&torque), "{torque}");
+    let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
+    let fell = before.iter().zip(after).filter(|(b, a)| **a < 0.5 * **b).count();
+    assert!(fell == 7, "{before:?} {after:?}");
+}
+
+#[test]
+fn the_zeros_of_the_kinova_are_found_from_two_logs() {
+    the_zeros_of_the_kinova_are_found(&[2, 4], &[1, 3, 5]);
+}
+
+#[test]
+#[ignore = "at length: the one above guards it"]
+fn the_zeros_of_the_kinova_are_found_the_other_way_round_at_length() {
+    the_zeros_of_the_kinova_are_found(&[1, 3, 5], &[2, 4]);
 }

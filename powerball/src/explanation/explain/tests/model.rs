@@ -28,6 +28,7 @@ fn a_base_model_beside_what_is_known_does_as_well_as_the_whole() {
     for (truth, part) in parts {
         let mut logs = record(body.arm(), truth, 1.0, Noise::White, 7, 22.0, 3);
         let explained = explain_body(&body, &logs[..5], &logs[5..], &told).unwrap();
+        assert_eq!(explained.effects[0].effect, truth.name());
         let model = &explained.model;
         assert!(part(&model.additions), "{truth:?}: {:?}", model.additions);
         assert_eq!(given(&model.additions.log_changes.delay), truth == Truth::TimeDelay);

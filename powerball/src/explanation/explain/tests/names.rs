@@ -7,6 +7,22 @@ use crate::explanation::Rule;
 use crate::explanation::explain::special::repeats;
 use crate::explanation::explain::{Explained, explain_body};
 use crate::logs::regression::{Data, DataOptions, RigidArm};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use std::ops::Range;
+
+/// What other tests name, from the same logs.
+const ELSEWHERE: [Truth; 8] = [
+    Truth::LoadFriction,
+    Truth::PayloadLater,
+    Truth::MotorRipple,
+    Truth::EncoderOffset,
+    Truth::TimeDelay,
+    Truth::BaseTilt,
+    Truth::BrokenSymmetry,
+    Truth::TorqueConstant,
+];
 
 fn run(body: &RigidArm, truth: Truth, size: f64, noise: Noise, seed: u64) -> Explained {
     let logs = record(body.arm(), truth, size, noise, 7, 22.0, seed);
@@ -67,13 +83,23 @@ fn nothing_is_found_where_nothing_is_missing() {
 
 /// In slow motion a tool that swings looks like a delay or like hysteresis, and fits far better than any
 /// rival.
-#[test]
-fn a_tool_that_swings_is_given_no_name() {
+fn swings(seeds: Range<u64>) {
     let body = RigidArm::new(&arm()).unwrap();
-    for seed in 0..3 {
+    for seed in seeds {
         let explained = run(&body, Truth::Swing, 1.0, Noise::White, seed);
         assert_eq!(names(&explained), Vec::<String>::new(), "{seed}");
     }
+}
+
+#[test]
+fn a_tool_that_swings_is_given_no_name() {
+    swings(0..1);
+}
+
+#[test]
+#[ignore = "at length: minutes; the one above guards it"]
+fn a_tool_that_swings_is_given_no_name_at_length() {
+    swings(1..3);
 }
 
 /// A repeat, even one that drifts, is known from another path; and there a spring is not named, whatever it
@@ -92,16 +118,30 @@ fn nothing_of_the_position_is_named_on_a_repeated_path() {
     assert!(repeated.warnings.iter().any(|w| w.contains("run the same path")));
 }
 
-/// All effects on an arm whose laws are neither the candidates' formulas nor the virtual arm's.
-#[test]
-fn every_effect_is_named() {
+/// Effects on an arm whose laws are neither the candidates' formulas nor the virtual arm's.
+fn are_named(truths: &[Truth]) {
     let body = RigidArm::new(&arm()).unwrap();
     let mut wrong = Vec::new();
-    for truth in Truth::ALL {
+    for &truth in truths {
         let explained = run(&body, truth, 1.0, Noise::White, 3);
         if explained.effects.first().is_none_or(|e| e.effect != truth.name()) {
             wrong.push(format!("{truth:?}: {:?}", names(&explained)));
         }
     }
     assert_eq!(wrong, Vec::<String>::new());
+}
+
+/// Half of those that `one_missing_effect_is_named_with_its_figures` and the tests of models do not name.
+#[test]
+fn a_sample_of_effects_is_named() {
+    let mut truths: Vec<Truth> = Truth::ALL.into_iter().filter(|truth| !ELSEWHERE.contains(truth)).collect();
+    truths.shuffle(&mut ChaCha8Rng::seed_from_u64(17));
+    truths.truncate(truths.len() / 2);
+    are_named(&truths);
+}
+
+#[test]
+#[ignore = "at length: minutes; the sample above guards it"]
+fn every_effect_is_named_at_length() {
+    are_named(&Truth::ALL);
 }
