@@ -72,6 +72,25 @@ fn controller(folder: &Path) -> PathBuf {
     target.join("debug").join(name)
 }
 
+/// The program of `examples/cpp-controller` with this model; none where there is no C++ compiler.
+fn called_from_cpp(arm: &str, model: &str) -> Option<PathBuf> {
+    let compiler = std::env::var("CXX").unwrap_or("c++".to_string());
+    if Command::new(compiler).arg("--version").output().is_err() {
+        println!("skipped: there is no C++ compiler");
+        return None;
+    }
+    let check = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/cpp-controller/check");
+    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cpp-controller");
+    let done = Command::new(check)
+        .args([arm, model])
+        .env("POWERBALL", env!("CARGO_BIN_EXE_powerball"))
+        .env("CARGO_TARGET_DIR", &target)
+        .output()
+        .unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    Some(target.join("cpp-controller"))
+}
+
 fn run(program: &Path, input: String) -> Vec<Vec<f64>> {
     use std::io::Write as _;
     let mut child = Command::new(program)
@@ -163,11 +182,22 @@ fn of_the_controller_and_the_report(cases: &[(&str, u64)]) {
         std::fs::write(&model, serde_json::to_string(&explained.model).unwrap()).unwrap();
         let (arm_file, model) = (session.arm_file.to_str().unwrap(), model.to_str().unwrap());
         let source = folder.join("controller.rs");
-        powerball(&["generate", "--arm", arm_file, "--model", model, "-o", source.to_str().unwrap()]);
+        // With functions for C as well, so that they are held to the same lints.
+        let header = folder.join("controller.h");
+        let (to, header) = (source.to_str().unwrap(), header.to_str().unwrap());
+        powerball(&["generate", "--arm", arm_file, "--model", model, "-o", to, "--c-header", header]);
         let program = controller(&folder);
         let data = Data::new(&body, &held_out, &options).unwrap();
         for (j, difference) in disagreement(&program, &data, &explained).into_iter().enumerate() {
             assert!(difference < 1e-9, "{effect}, joint {}: {difference:e}", j + 1);
+        }
+        // A law with a state, called from C++.
+        if effect == "hysteresis"
+            && let Some(program) = called_from_cpp(arm_file, model)
+        {
+            for (j, difference) in disagreement(&program, &data, &explained).into_iter().enumerate() {
+                assert!(difference < 1e-9, "C++, joint {}: {difference:e}", j + 1);
+            }
         }
 
         // The judge of models agrees with the report, and a model without the effect does worse.

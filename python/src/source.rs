@@ -68,7 +68,7 @@ pub(crate) fn generate_model(
         let body = RigidArm::new(&known).map_err(refused)?;
         let model = file.checked(&body).map_err(input)?;
         let source = model.source(&arm, scalar, &names).map_err(|e| match e {
-            SourceError::Changes(_) => input(e),
+            SourceError::Changes(_) | SourceError::Prefix(_) => input(e),
             SourceError::Generator(_) => refused(e),
         })?;
         Ok((source, model.not_compensated()))

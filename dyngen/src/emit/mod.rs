@@ -4,6 +4,7 @@
 mod accuracy;
 mod angles;
 mod batch;
+pub mod c_door;
 mod code;
 mod docs;
 mod friction;

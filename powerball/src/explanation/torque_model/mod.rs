@@ -6,9 +6,11 @@
 
 mod along;
 mod as_known;
+mod c_door;
 mod changes;
 mod file;
 mod known;
+mod ros;
 mod source;
 #[cfg(test)]
 mod tests;
@@ -16,7 +18,7 @@ mod tests;
 pub use as_known::ModelFile;
 pub use changes::Unchanged;
 pub use file::FileError;
-pub use source::{Scalar, SourceError};
+pub use source::{ForC, Scalar, SourceError};
 
 use crate::controller::correction::{Law, Term};
 use crate::identification::estimate::{JointFriction, ParameterEstimate, in_set_of};

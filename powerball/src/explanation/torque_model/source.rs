@@ -1,9 +1,11 @@
 //! The model as one Rust file for a controller: no `std`, no allocation, nothing needed but nalgebra.
 
+use super::c_door::Behind;
 use super::changes::with_open_hand;
 use super::{TorqueModel, Unchanged};
 use crate::controller::{correction, friction};
 use dyngen::arm::{Parameter, ParameterKind};
+use dyngen::emit::c_door::checked_prefix;
 use dyngen::emit::{self, Options};
 use dyngen::{Arm, Function, Model, SetKind};
 use std::fmt::{self, Write};
@@ -27,6 +29,15 @@ impl fmt::Display for Scalar {
     }
 }
 
+/// A model's code with a door for callers in C.
+#[derive(Clone, Debug)]
+pub struct ForC {
+    /// The file in Rust, with the `extern "C"` functions.
+    pub source: String,
+    /// The header.
+    pub header: String,
+}
+
 /// Why there is no code.
 #[derive(Clone, Debug)]
 pub enum SourceError {
@@ -34,6 +45,8 @@ pub enum SourceError {
     Changes(Unchanged),
     /// What cannot be proven is not emitted.
     Generator(dyngen::Error),
+    /// No name in C can begin so.
+    Prefix(String),
 }
 
 impl fmt::Display for SourceError {
@@ -41,6 +54,7 @@ impl fmt::Display for SourceError {
         match self {
             SourceError::Changes(e) => e.fmt(f),
             SourceError::Generator(e) => e.fmt(f),
+            SourceError::Prefix(e) => e.fmt(f),
         }
     }
 }
@@ -112,6 +126,34 @@ impl TorqueModel {
         text.push_str(&module("", "friction", friction::SOURCE));
         text.push_str(&module("", "correction", correction::SOURCE));
         Ok(text)
+    }
+
+    /// The same with `extern "C"` functions whose names begin with `prefix`, and a header for them.
+    ///
+    /// The model is the caller's own memory, so there is no allocation; no pointer is kept.
+    ///
+    /// # Errors
+    /// [`SourceError`]: also where `prefix` cannot begin a name in C.
+    pub fn source_for_c(
+        &self,
+        arm: &Arm,
+        scalar: Scalar,
+        functions: &[Function],
+        prefix: &str,
+    ) -> Result<ForC, SourceError> {
+        checked_prefix(prefix).map_err(SourceError::Prefix)?;
+        let source = self.source(arm, scalar, functions)?;
+        let behind = Behind {
+            arm: &arm.name,
+            scalar: scalar.to_string(),
+            joints: self.friction.len(),
+            parameters: self.parameters.len(),
+            terms: self.terms().len(),
+            payload: !self.additions.payloads.is_empty(),
+            functions,
+        };
+        let door = behind.door(prefix);
+        Ok(ForC { source: source + &door.module, header: door.header })
     }
 
     fn head(&self, arm: &Arm) -> String {
