@@ -93,6 +93,7 @@ impl Octaves {
         for run in rows.runs() {
             self.push(&columns.iter().map(|c| &c[run.clone()]).collect::<Vec<_>>());
         }
+        self.levels.iter_mut().for_each(RFactor::clean);
     }
 
     /// The same rows with combinations of their columns, as [`RFactor::combined`].

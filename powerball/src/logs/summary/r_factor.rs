@@ -16,6 +16,9 @@ pub struct RFactor {
     rows: u64,
 }
 
+/// What of a column's length is rounding: some units in the last place, as reflections add them up.
+const ROUNDING: f64 = 1e-14;
+
 /// Rows that are reflected together: a block of seventy columns stays in a second-level cache.
 const BLOCK: usize = 256;
 
@@ -26,7 +29,7 @@ impl RFactor {
         RFactor { width, columns: vec![0.0; width * width], rows: 0 }
     }
 
-    /// From its upper triangle by columns, as [`RFactor::packed`] gives it; `None` where the length does not
+    /// From its upper factor by rows, as [`RFactor::packed`] gives it; `None` where the length does not
     /// fit.
     #[must_use]
     pub fn from_packed(width: usize, packed: &[f64], rows: u64) -> Option<RFactor> {
@@ -34,19 +37,31 @@ impl RFactor {
             return None;
         }
         let mut factor = RFactor { rows, ..RFactor::new(width) };
-        let mut rest = packed;
-        for (k, column) in factor.columns.chunks_exact_mut(width.max(1)).enumerate() {
-            let (head, tail) = rest.split_at(k + 1);
-            column[..=k].copy_from_slice(head);
-            rest = tail;
-        }
+        let places = (0..width).flat_map(|row| (row..width).map(move |column| column * width + row));
+        places.zip(packed).for_each(|(place, value)| factor.columns[place] = *value);
         Some(factor)
     }
 
-    /// The upper triangle by columns.
+    /// The upper triangle by rows.
     #[must_use]
     pub fn packed(&self) -> Vec<f64> {
-        (0..self.width).flat_map(|k| self.column(k)[..=k].iter().copied()).collect()
+        (0..self.width)
+            .flat_map(|row| (row..self.width).map(move |column| self.column(column)[row]))
+            .collect()
+    }
+
+    /// Puts rows of the factor to zero that are nothing but rounding: those of fewer rows than columns, say. A file
+    /// has no room for them.
+    pub fn clean(&mut self) {
+        let least: Vec<f64> = (0..self.width)
+            .map(|k| ROUNDING * self.column(k).iter().map(|x| x * x).sum::<f64>().sqrt())
+            .collect();
+        for row in 0..self.width {
+            let at = |column: usize| column * self.width + row;
+            if (row..self.width).all(|column| self.columns[at(column)].abs() <= least[column]) {
+                (row..self.width).for_each(|column| self.columns[column * self.width + row] = 0.0);
+            }
+        }
     }
 
     /// Numbers in [`RFactor::packed`].
@@ -297,6 +312,20 @@ mod tests {
             t.push(&slices(&all));
         }
         assert!(t.packed().iter().all(|x| x.is_finite()));
+    }
+
+    /// Three rows have three dimensions: cleaned, the factor has three rows, and the same products.
+    #[test]
+    fn rounding_is_no_row_of_the_factor() {
+        let all = rows(3, 40, 9);
+        let mut t = RFactor::new(40);
+        t.push(&slices(&all));
+        let before = products(&t);
+        t.clean();
+        assert!((3..40).all(|row| (row..40).all(|k| t.column(k)[row] == 0.0)));
+        for (a, b) in before.iter().zip(products(&t)) {
+            approx::assert_abs_diff_eq!(*a, b, epsilon = 1e-13);
+        }
     }
 
     #[test]
