@@ -52,6 +52,9 @@ fn every_format_comes_to_the_same_log_whatever_the_order_of_its_joints() {
         ("json.mcap", "tau.scale = 1e-3", 5e-7),
         ("stored.npz", "", 0.0),
         ("packed.npz", "", 0.0),
+        ("stored.mat", "", 0.0),
+        ("packed.mat", "", 0.0),
+        ("lists.parquet", "", 0.0),
     ] {
         let (log, findings) = read(name, &format!("{JOINTS}{map}")).unwrap();
         assert!(differs(&log, &csv) <= within, "{name}: {}", differs(&log, &csv));
@@ -64,6 +67,51 @@ fn every_format_comes_to_the_same_log_whatever_the_order_of_its_joints() {
     // The same names the other way round are another arm.
     let turned = read("bag.db3", "joints = [\"elbow\", \"shoulder\"]").unwrap().0;
     assert!(turned.q[0][0] == 1.0 && turned.q[1][0] == 0.0);
+}
+
+/// Lists by the names of their dataset's description; each episode is a piece of its own.
+#[test]
+fn a_dataset_of_lists_is_a_log_of_episodes() {
+    let (csv, _) = read("log.csv", "").unwrap();
+    let columns = "q.column = \"observation.state\"\ntau.column = \"observation.effort\"\n";
+    let file = "dataset/data/chunk-000/file-000.parquet";
+    let (log, _) = read(file, &format!("{JOINTS}{columns}")).unwrap();
+    assert_eq!((log.t.len(), log.pieces.len()), (120, 2));
+    assert_eq!((&log.q, &log.torque), (&csv.q, &csv.torque));
+    // The second episode begins a second after the first one has ended; its time is in single precision.
+    let step = |k: usize| log.t[k + 1] - log.t[k];
+    assert!((step(59) - 1.0).abs() < 1e-6 && (step(60) - 0.01).abs() < 1e-6);
+    // Without its description they are numbered, and the numbers are not the arm's order: it is the file's.
+    let copy = std::env::temp_dir().join(format!("powerball_lists_{}.parquet", std::process::id()));
+    std::fs::copy(data(file), &copy).unwrap();
+    let (plain, _) = Log::read_as(&copy, &arm(), &ColumnMap::parse(columns, "map").unwrap()).unwrap();
+    std::fs::remove_file(&copy).unwrap();
+    assert_eq!((&plain.q[0], &plain.q[1]), (&csv.q[1], &csv.q[0]));
+}
+
+/// A file of MATLAB's that is torn or of a version with another format says so; no byte of it stops the program.
+#[test]
+fn a_damaged_file_of_matlabs_is_told() {
+    for name in ["stored.mat", "packed.mat"] {
+        let whole = std::fs::read(data(name)).unwrap();
+        let file = std::env::temp_dir().join(format!("powerball_{}_{name}", std::process::id()));
+        let contents = |bytes: &[u8]| {
+            std::fs::write(&file, bytes).unwrap();
+            read_contents(&file)
+        };
+        for length in [100, 127, 130, 140, 200, 300, whole.len() / 2, whole.len() - 9] {
+            assert!(contents(&whole[..length]).is_err(), "{name} of {length} bytes");
+        }
+        // Whatever a byte is, there is an answer.
+        for at in (128..whole.len().min(1200)).chain([whole.len() - 1]) {
+            let mut damaged = whole.clone();
+            damaged[at] ^= 0xa5;
+            let _ = contents(&damaged);
+        }
+        let error = contents(b"MATLAB 7.3 MAT-file, Platform: GLNXA64").unwrap_err().to_string();
+        assert!(error.contains("-v7"), "{error}");
+        std::fs::remove_file(&file).unwrap();
+    }
 }
 
 #[test]
@@ -294,4 +342,37 @@ fn the_command_says_what_is_in_a_file() {
     let shown = json(&powerball(&["log", &two, "--json"]));
     assert!(shown["files"][0]["alignment"][0]["median"].as_f64().unwrap() < 0.01, "{shown}");
     assert_eq!(powerball(&["log", "nowhere.mcap"]).status.code(), Some(2));
+}
+
+/// With and without an arm: what is in a file as a page with figures, and as JSON beside it.
+#[test]
+fn a_look_into_a_log_is_a_page_with_figures() {
+    let folder = std::env::temp_dir().join(format!("powerball_look_{}", std::process::id()));
+    let arm_file = folder.join("two.toml");
+    std::fs::create_dir_all(&folder).unwrap();
+    let joint = "[[joint]]\nkind = \"revolute\"\na = 0.3\nalpha = 0\nd = 0\ntheta = 0\n";
+    let text = format!("name = \"two\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n{joint}{joint}");
+    std::fs::write(&arm_file, text).unwrap();
+    let (file, out) = (data("two_topics.mcap"), folder.join("out"));
+    let (file, out_text) = (file.to_str().unwrap(), out.to_str().unwrap());
+    let page = || std::fs::read_to_string(out.join("report.html")).unwrap();
+
+    let done = powerball(&["log", file, "--out", out_text]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let plain = page();
+    // A figure a topic, a curve a joint.
+    assert_eq!(plain.matches("<svg").count(), 2);
+    for word in ["/encoders", "/drives", "position.shoulder", "effort.elbow", "Topics in time"] {
+        assert!(plain.contains(word), "{word}");
+    }
+    let told: Value = serde_json::from_slice(&std::fs::read(out.join("log.json")).unwrap()).unwrap();
+    assert_eq!(told["files"][0]["tables"].as_array().unwrap().len(), 2);
+    assert!(told["files"][0]["tables"][0].get("times").is_none());
+
+    let map = JOINTS.trim();
+    let with_arm = ["log", file, "--arm", arm_file.to_str().unwrap(), "--map", map, "--out", out_text];
+    assert!(powerball(&with_arm).status.success());
+    assert_eq!(page().matches("<svg").count(), 3);
+    assert!(page().contains("A log of two"));
+    std::fs::remove_dir_all(&folder).unwrap();
 }

@@ -34,7 +34,7 @@ pub enum Input<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// A file: CSV, Parquet, MCAP, rosbag2, npz or a summary.
+    /// A file: CSV, Parquet, MCAP, rosbag2, npz, mat or a summary.
     #[must_use]
     pub fn file(path: impl Into<PathBuf>) -> Source<'a> {
         Source::from(path.into())

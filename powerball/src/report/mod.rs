@@ -29,6 +29,7 @@ pub mod explained;
 mod figure;
 pub mod files;
 pub mod identified;
+pub mod inspected;
 mod page;
 mod table;
 pub mod transmission;

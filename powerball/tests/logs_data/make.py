@@ -1,6 +1,6 @@
 """Makes the logs of this folder, each with the writer of its format: sqlite3, the package mcap, numpy.
 
-    pip install mcap numpy lz4 zstandard && python make.py
+    pip install mcap numpy lz4 zstandard scipy pyarrow && python make.py
 
 All hold the same 120 samples of two joints at 100 Hz. `shoulder` is the first of the chain; messages name the joints in
 the order of the alphabet, every third one the other way round. A gripper publishes on the same topic.
@@ -13,6 +13,9 @@ import sqlite3
 import struct
 
 import numpy
+import pyarrow
+import pyarrow.parquet
+import scipy.io
 from mcap.writer import CompressionType, Writer
 
 SAMPLES, STEP, START = 120, 0.01, 1_700_000_000
@@ -185,3 +188,41 @@ with open("log.csv", "w") as out:
     out.write("t,q1,q2,dq1,dq2,tau1,tau2\n")
     for k in range(SAMPLES):
         out.write(",".join(repr(v) for v in [STEP * k, *sum(map(list, sample(k)), [])]) + "\n")
+
+cells = numpy.array(CHAIN[::-1], dtype=object)
+scipy.io.savemat("stored.mat", {"t": t, "q": q, "dq": dq, "tau": tau, "comment": "no number"})
+turned = {"time": t, "q": q[:, ::-1], "tau": tau[:, ::-1].T, "joints": cells, "mode": numpy.int16(3)}
+scipy.io.savemat("packed.mat", {"log": turned}, do_compression=True)
+
+
+def dataset(folder):
+    """A dataset as LeRobot's of version 3: two episodes in one file, each with its own time."""
+    half = SAMPLES // 2
+    columns = {
+        "observation.state": [row[::-1] for row in q.tolist()],
+        "observation.effort": [row[::-1] for row in tau.tolist()],
+        "timestamp": numpy.array([STEP * (k % half) for k in range(SAMPLES)], dtype=numpy.float32),
+        "episode_index": [k // half for k in range(SAMPLES)],
+    }
+    os.makedirs(f"{folder}/data/chunk-000", exist_ok=True)
+    os.makedirs(f"{folder}/meta", exist_ok=True)
+    schema = pyarrow.schema(
+        [
+            ("observation.state", pyarrow.list_(pyarrow.float64(), 2)),
+            ("observation.effort", pyarrow.list_(pyarrow.float64())),
+            ("timestamp", pyarrow.float32()),
+            ("episode_index", pyarrow.int64()),
+        ]
+    )
+    file = f"{folder}/data/chunk-000/file-000.parquet"
+    pyarrow.parquet.write_table(pyarrow.table(columns, schema=schema), file, compression="zstd")
+    names = {"names": {"motors": CHAIN[::-1]}}
+    features = {"observation.state": names, "observation.effort": {"names": CHAIN[::-1]}}
+    with open(f"{folder}/meta/info.json", "w") as out:
+        json.dump({"codebase_version": "v3.0", "features": features}, out)
+    pyarrow.parquet.write_table(
+        pyarrow.table({"t": t, "q": q.tolist(), "tau": tau.tolist()}), "lists.parquet", compression="snappy"
+    )
+
+
+dataset("dataset")

@@ -18,7 +18,7 @@ pub(crate) struct Inputs {
     /// The arm file (TOML).
     #[arg(long, value_name = "ARM.toml")]
     pub arm: PathBuf,
-    /// Logs to fit (CSV, Parquet, MCAP, rosbag2 or npz: t, q1…, tau1… or i1…); several, in the order in which
+    /// Logs to fit (CSV, Parquet, MCAP, rosbag2, npz or mat: t, q1…, tau1… or i1…); several, in the order in which
     /// they were recorded.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     pub log: Vec<PathBuf>,

@@ -3,18 +3,20 @@
 use super::inputs::MapArgument;
 use super::{Failure, log_out, output};
 use crate::logs::log::{Inspected, InspectedTable, inspect};
+use crate::report::inspected;
 use clap::{Args, ValueEnum};
 use dyngen::Arm;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Show what is in log files and what they are taken to be: topics, columns, units, rates, gaps, doubts.
+/// Show what is in log files and what they are taken to be: topics, columns, units, rates, gaps, doubts;
+/// with --out as a page with figures.
 ///
-/// CSV, Parquet, MCAP, rosbag2 (`.db3`) and npz. With an arm also the log that `identify` would read. Exit
+/// CSV, Parquet, MCAP, rosbag2 (`.db3`), npz and mat. With an arm also the log that `identify` would read. Exit
 /// code 1 where a file is no log of that arm.
 #[derive(Args, Debug)]
 #[command(
-    after_help = "Examples:\n  powerball log recording.mcap\n  powerball log bag_0.db3 --arm arm.toml --map \
+    after_help = "Examples:\n  powerball log recording.mcap --out looked\n  powerball log bag_0.db3 --arm arm.toml --map \
         'joints = [\"shoulder_pan_joint\", \"shoulder_lift_joint\"]'\n  powerball log run.csv --arm arm.toml --model \
         result/identified.json --to mcap -o run.mcap"
 )]
@@ -30,8 +32,8 @@ pub(crate) struct LogCommand {
     /// Write the log that was found as another file, in SI units and under plain names; needs --arm.
     #[arg(long, value_enum, value_name = "FORMAT", requires_all = ["arm", "out"])]
     to: Option<Target>,
-    /// The file to write.
-    #[arg(short, long, value_name = "OUT", requires = "to")]
+    /// A folder for report.html, the same with figures, and log.json; with --to the file to write.
+    #[arg(short, long, value_name = "OUT")]
     out: Option<PathBuf>,
     /// A model, identified.json or model.json: an MCAP then has measured, predicted and residual torque of
     /// each joint beside each other, in the band of the fit.
@@ -64,7 +66,12 @@ impl LogCommand {
         let inspected =
             self.files.iter().map(|file| inspect(file, &map, arm.as_ref()).map_err(|e| unusable(&e)));
         let files = inspected.collect::<Result<Vec<_>, _>>()?;
-        self.write(&files, arm.as_ref())?;
+        match (&self.out, self.to) {
+            (Some(folder), None) => {
+                inspected::files(&files).and_then(|page| page.write(folder)).map_err(Failure::Unusable)?;
+            }
+            _ => self.write(&files, arm.as_ref())?,
+        }
         let refused: Vec<String> = files.iter().flat_map(|file| file.refused.clone()).collect();
         if self.json {
             output::print(&output::json(&Written { files })?);

@@ -26,7 +26,7 @@ impl MountedLogs {
 /// As they stand on the command line.
 #[derive(Args, Debug)]
 struct Options {
-    /// Logs to fit (CSV, Parquet, MCAP, rosbag2 or npz: t, q1…, tau1… or i1…), or their summaries from
+    /// Logs to fit (CSV, Parquet, MCAP, rosbag2, npz or mat: t, q1…, tau1… or i1…), or their summaries from
     /// `powerball summarize`.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     log: Vec<PathBuf>,

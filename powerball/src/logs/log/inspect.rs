@@ -32,7 +32,7 @@ pub struct Inspected {
     pub refused: Vec<String>,
     /// What is odd about it.
     pub doubts: Vec<String>,
-    /// The tables and the log themselves, for figures.
+    /// The log itself, for figures.
     #[serde(skip)]
     pub log: Option<Log>,
 }
@@ -70,6 +70,9 @@ pub struct InspectedTable {
     pub joints: Vec<String>,
     /// Its columns.
     pub columns: Vec<InspectedColumn>,
+    /// The time of every sample, s, for figures; empty where there is no time.
+    #[serde(skip)]
+    pub times: Vec<f64>,
 }
 
 /// One column of a table.
@@ -89,6 +92,9 @@ pub struct InspectedColumn {
     pub max: Option<f64>,
     /// Samples without a number.
     pub missing: usize,
+    /// What is taken for a quantity of a joint, sample by sample, for figures; empty of all else.
+    #[serde(skip)]
+    pub values: Vec<f64>,
 }
 
 /// Two topics in time.
@@ -225,6 +231,7 @@ fn table(table: &Table, map: &ColumnMap) -> InspectedTable {
         not_rising: steps().filter(|s| *s < 0.0 || (*s == 0.0 && table.received.is_empty())).count(),
         joints,
         columns,
+        times: t,
     }
 }
 
@@ -233,6 +240,7 @@ fn column(column: &Column, map: &ColumnMap, step: Option<f64>) -> InspectedColum
     let range = range(&column.values);
     let quantity = means.as_ref().map(|(key, _)| *key);
     let said = quantity.and_then(|key| map.of(key).unit.as_ref()?.of(0).cloned());
+    let joint = means.as_ref().is_some_and(|(_, joint)| joint.is_some());
     let guess = |key| guessed(key, range?, &column.values, step);
     InspectedColumn {
         name: column.name.clone(),
@@ -242,6 +250,7 @@ fn column(column: &Column, map: &ColumnMap, step: Option<f64>) -> InspectedColum
         min: range.map(|[min, _]| min),
         max: range.map(|[_, max]| max),
         missing: column.values.iter().filter(|v| !v.is_finite()).count(),
+        values: if joint { column.values.clone() } else { Vec::new() },
     }
 }
 

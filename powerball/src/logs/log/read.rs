@@ -60,7 +60,7 @@ pub fn read_log_as(
             let unreadable = |e| LogError::of_file(&file, "file", format!("cannot be read: {e}"));
             parse(&std::fs::read(path).map_err(unreadable)?, asked, findings)
         }
-        Format::Mcap | Format::Rosbag | Format::Npz => {
+        Format::Mcap | Format::Rosbag | Format::Npz | Format::Mat => {
             let contents = read_contents(path)?;
             findings.extend(contents.notes);
             topics::log(&contents.tables, asked, findings)
@@ -84,7 +84,7 @@ pub(super) fn parse(bytes: &[u8], asked: Asked<'_>, findings: &mut Vec<Finding>)
 }
 
 impl Log {
-    /// Reads a log of an arm from a file, CSV, Parquet, MCAP, rosbag2 (`.db3`) or npz, with what is odd about
+    /// Reads a log of an arm from a file, CSV, Parquet, MCAP, rosbag2 (`.db3`), npz or mat, with what is odd about
     /// it.
     ///
     /// # Errors

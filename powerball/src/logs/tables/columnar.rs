@@ -1,7 +1,11 @@
-//! The same columns in Parquet.
+//! The same columns in Parquet. A list of k numbers is k columns.
 
+#[cfg(feature = "parquet")]
+use super::lists::Flattened;
 use super::table::Rows;
 use super::{Finding, LogError};
+#[cfg(feature = "parquet")]
+use std::path::Path;
 
 /// Hands the rows of a Parquet file over. They take the place of lines in findings.
 #[cfg(feature = "parquet")]
@@ -21,7 +25,7 @@ pub(crate) fn read(bytes: &[u8], file: &str, rows: &mut impl Rows) -> Result<(),
     let reader = SerializedFileReader::new(bytes.clone()).map_err(|e| unreadable(None, &e))?;
     let schema = reader.metadata().file_metadata().schema();
     let names: Vec<String> = schema.get_fields().iter().map(|field| field.name().to_string()).collect();
-    rows.begin(&names)?;
+    let mut flattened: Option<Flattened> = None;
     let mut count = 0;
     for group in 0..reader.num_row_groups() {
         let inner = reader.get_row_group(group).map_err(|e| unreadable(Some(count + 1), &e))?;
@@ -29,9 +33,20 @@ pub(crate) fn read(bytes: &[u8], file: &str, rows: &mut impl Rows) -> Result<(),
         for row in group.get_row_iter(None).map_err(|e| unreadable(Some(count + 1), &e))? {
             count += 1;
             let row = row.map_err(|e| unreadable(Some(count), &e))?;
-            let values: Vec<Option<f64>> = row.get_column_iter().map(|(_, field)| number(field)).collect();
+            let flattened = match &mut flattened {
+                Some(flattened) => flattened,
+                None => {
+                    let first = flattened.insert(Flattened::of(&names, &row, Path::new(file)));
+                    rows.begin(first.names())?;
+                    first
+                }
+            };
+            let values = flattened.values(&row);
             rows.row(count, &|column| values.get(column).copied().flatten());
         }
+    }
+    if flattened.is_none() {
+        rows.begin(&names)?;
     }
     Ok(())
 }
@@ -45,24 +60,6 @@ pub(crate) fn read(_: &[u8], file: &str, _: &mut impl Rows) -> Result<(), LogErr
         quantity: "Parquet".into(),
         message: "this build reads CSV alone: enable the feature `parquet`".into(),
     }]))
-}
-
-#[cfg(feature = "parquet")]
-fn number(field: &parquet::record::Field) -> Option<f64> {
-    use parquet::record::Field;
-    match *field {
-        Field::Double(x) => Some(x),
-        Field::Float(x) => Some(f64::from(x)),
-        Field::Int(x) => Some(f64::from(x)),
-        Field::UInt(x) => Some(f64::from(x)),
-        Field::Long(x) => Some(x as f64),
-        Field::ULong(x) => Some(x as f64),
-        Field::Short(x) => Some(f64::from(x)),
-        Field::UShort(x) => Some(f64::from(x)),
-        Field::Byte(x) => Some(f64::from(x)),
-        Field::UByte(x) => Some(f64::from(x)),
-        _ => None,
-    }
 }
 
 /// Rows of a row group.

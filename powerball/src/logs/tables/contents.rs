@@ -24,6 +24,9 @@ pub enum Format {
     /// An archive of NumPy arrays.
     #[serde(rename = "npz")]
     Npz,
+    /// A file of MATLAB's, of version 5 to 7.
+    #[serde(rename = "mat")]
+    Mat,
 }
 
 /// The tables of a file.
@@ -47,6 +50,7 @@ impl Format {
             () if begins(b"\x89MCAP0\r\n") => Format::Mcap,
             () if begins(b"SQLite format 3\0") => Format::Rosbag,
             () if begins(b"PK\x03\x04") => Format::Npz,
+            () if begins(b"MATLAB ") => Format::Mat,
             () => Format::Csv,
         }
     }
@@ -94,6 +98,7 @@ pub fn read_contents(path: &Path) -> Result<Contents, LogError> {
         Format::Mcap => mcap_tables(path, &file, &mut notes)?,
         Format::Rosbag => rosbag_tables(path, &file, &mut notes)?,
         Format::Npz => npz_tables(path, &file, &mut notes)?,
+        Format::Mat => mat_tables(path, &file, &mut notes)?,
     };
     for table in &tables {
         if let Some((count, reason)) = &table.unreadable {
@@ -137,6 +142,15 @@ fn npz_tables(path: &Path, file: &str, notes: &mut Vec<Finding>) -> Result<Vec<T
     Ok(vec![table])
 }
 
+#[cfg(feature = "mat")]
+fn mat_tables(path: &Path, file: &str, notes: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
+    let read = std::fs::read(path).and_then(|bytes| super::mat::read(&bytes));
+    let (table, left_out) =
+        read.map_err(|e| LogError::of_file(file, "mat", format!("cannot be read: {e}")))?;
+    notes.extend(left_out.map(|note| Finding::of_file(file, "arrays", note)));
+    Ok(vec![table])
+}
+
 /// What is said where a build lacks a format.
 macro_rules! absent {
     ($feature:literal, $function:ident) => {
@@ -151,3 +165,4 @@ macro_rules! absent {
 absent!("mcap", mcap_tables);
 absent!("rosbag", rosbag_tables);
 absent!("npz", npz_tables);
+absent!("mat", mat_tables);

@@ -1,10 +1,16 @@
 //! What is in a file: tables of named columns, whatever the format, before anybody says what they mean.
 
+#[cfg(any(feature = "npz", feature = "mat"))]
+mod arrays;
 #[cfg(any(feature = "mcap", feature = "rosbag"))]
 mod cdr;
 pub(crate) mod columnar;
 mod contents;
 mod finding;
+#[cfg(feature = "parquet")]
+mod lists;
+#[cfg(feature = "mat")]
+mod mat;
 #[cfg(feature = "mcap")]
 mod mcap;
 #[cfg(feature = "mcap")]

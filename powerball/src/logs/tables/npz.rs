@@ -1,26 +1,11 @@
 //! Archives of NumPy arrays (`.npz`, `numpy.savez` and `savez_compressed`): a ZIP of `.npy` files.
-//!
-//! An array of N numbers is a column of its name, one of N × k numbers is k columns `name1` … `namek`. An
-//! array of k texts (`joints`, `names`) names the columns of N × k arrays: `q.shoulder`.
 
-use super::table::{Column, Table};
+use super::arrays::{Array, Values, table};
+use super::table::Table;
 use std::io::{self, Read};
 
 /// An array that claims to be larger than this, bytes, is torn.
 const LARGEST: u64 = 1 << 32;
-
-/// One array as it is stored.
-struct Array {
-    name: String,
-    shape: Vec<usize>,
-    columns_first: bool,
-    values: Values,
-}
-
-enum Values {
-    Numbers(Vec<f64>),
-    Texts(Vec<String>),
-}
 
 /// The arrays of an archive as one table, and those that have no place in it.
 pub(super) fn read(bytes: &[u8]) -> io::Result<(Table, Option<String>)> {
@@ -32,44 +17,7 @@ pub(super) fn read(bytes: &[u8]) -> io::Result<(Table, Option<String>)> {
             Err(reason) => left_out.push(format!("{name} ({reason})")),
         }
     }
-    // As many samples as the time has, or as most arrays have.
-    let longest = |a: &Array| a.shape.iter().copied().max().unwrap_or(0);
-    let time = arrays.iter().find(|a| ["t", "time", "times", "timestamp"].contains(&a.name.as_str()));
-    let samples = time.map_or_else(|| arrays.iter().map(longest).max().unwrap_or(0), longest);
-    let texts = |a: &Array| match &a.values {
-        Values::Texts(texts) => Some(texts.clone()),
-        Values::Numbers(_) => None,
-    };
-    let names: Vec<Vec<String>> = arrays.iter().filter_map(texts).collect();
-    let mut table = Table::new("", "arrays");
-    table.line = (1..=samples).collect();
-    for array in &arrays {
-        let Values::Numbers(values) = &array.values else { continue };
-        let (width, down) = match array.shape[..] {
-            [n] if n == samples => (1, !array.columns_first),
-            [n, k] if n == samples => (k, !array.columns_first),
-            // Joint by joint: a row of the array is a column of the log.
-            [k, n] if n == samples => (k, array.columns_first),
-            _ => {
-                left_out
-                    .push(format!("{} (its shape is {:?}, of {samples} samples)", array.name, array.shape));
-                continue;
-            }
-        };
-        let joints = names.iter().find(|names| names.len() == width && width > 1);
-        for k in 0..width {
-            let name = match (joints, array.shape.len()) {
-                (_, 1) => array.name.clone(),
-                (Some(joints), _) => format!("{}.{}", array.name, joints[k]),
-                (None, _) => format!("{}{}", array.name, k + 1),
-            };
-            let at = |n: usize| if down { n * width + k } else { k * samples + n };
-            let values = (0..samples).map(|n| values.get(at(n)).copied().unwrap_or(f64::NAN)).collect();
-            table.columns.push(Column { name, values });
-        }
-    }
-    let note = (!left_out.is_empty()).then(|| format!("kept out: {}", left_out.join(", ")));
-    Ok((table, note))
+    Ok(table(&arrays, left_out))
 }
 
 fn torn(what: &str) -> io::Error {

@@ -39,7 +39,7 @@ impl RowGroupReader for RowGroup<'_> {
             return self.inner.get_column_page_reader(i);
         }
         let bytes = self.file.slice(bytes_of(column, self.file.len())?);
-        Ok(Box::new(Pages { rest: bytes, values: column.num_values() }))
+        Ok(Box::new(Pages { rest: bytes, values: column.num_values(), ahead: None }))
     }
 
     fn get_column_bloom_filter(&self, _: usize) -> Option<&Sbbf> {
@@ -76,6 +76,8 @@ struct Pages {
     rest: Bytes,
     /// Values that are still to come.
     values: i64,
+    /// A page that was looked at and not taken: a row that is a list ends where the next page says so.
+    ahead: Option<Page>,
 }
 
 impl Pages {
@@ -116,15 +118,28 @@ impl Iterator for Pages {
 
 impl PageReader for Pages {
     fn get_next_page(&mut self) -> Result<Option<Page>> {
-        self.next_page()
+        match self.ahead.take() {
+            Some(page) => Ok(Some(page)),
+            None => self.next_page(),
+        }
     }
 
     fn peek_next_page(&mut self) -> Result<Option<PageMetadata>> {
-        Err(ParquetError::NYI("pages are read one after the other".into()))
+        if self.ahead.is_none() {
+            self.ahead = self.next_page()?;
+        }
+        Ok(self.ahead.as_ref().map(|page| PageMetadata {
+            num_rows: match page {
+                Page::DataPageV2 { num_rows, .. } => Some(*num_rows as usize),
+                Page::DataPage { .. } | Page::DictionaryPage { .. } => None,
+            },
+            num_levels: Some(page.num_values() as usize),
+            is_dict: page.is_dictionary_page(),
+        }))
     }
 
     fn skip_next_page(&mut self) -> Result<()> {
-        self.next_page().map(|_| ())
+        self.get_next_page().map(|_| ())
     }
 }
 

@@ -1,0 +1,62 @@
+//! Named arrays as a table: what archives of NumPy and MATLAB hold.
+//!
+//! An array of N numbers is a column of its name, one of N × k numbers is k columns `name1` … `namek`. An
+//! array of k texts (`joints`, `names`) names the columns of N × k arrays: `q.shoulder`.
+
+use super::table::{Column, Table};
+
+/// One array as it is stored.
+pub(super) struct Array {
+    pub name: String,
+    pub shape: Vec<usize>,
+    /// Whether neighbours in memory are of one column.
+    pub columns_first: bool,
+    pub values: Values,
+}
+
+pub(super) enum Values {
+    Numbers(Vec<f64>),
+    Texts(Vec<String>),
+}
+
+/// The arrays as one table, and those that have no place in it. `left_out`: those that could not be read.
+pub(super) fn table(arrays: &[Array], mut left_out: Vec<String>) -> (Table, Option<String>) {
+    // As many samples as the time has, or as most arrays have.
+    let longest = |a: &Array| a.shape.iter().copied().max().unwrap_or(0);
+    let time = arrays.iter().find(|a| ["t", "time", "times", "timestamp"].contains(&a.name.as_str()));
+    let samples = time.map_or_else(|| arrays.iter().map(longest).max().unwrap_or(0), longest);
+    let texts = |a: &Array| match &a.values {
+        Values::Texts(texts) => Some(texts.clone()),
+        Values::Numbers(_) => None,
+    };
+    let names: Vec<Vec<String>> = arrays.iter().filter_map(texts).collect();
+    let mut table = Table::new("", "arrays");
+    table.line = (1..=samples).collect();
+    for array in arrays {
+        let Values::Numbers(values) = &array.values else { continue };
+        let (width, down) = match array.shape[..] {
+            [n] if n == samples => (1, !array.columns_first),
+            [n, k] if n == samples => (k, !array.columns_first),
+            // Joint by joint: a row of the array is a column of the log.
+            [k, n] if n == samples => (k, array.columns_first),
+            _ => {
+                left_out
+                    .push(format!("{} (its shape is {:?}, of {samples} samples)", array.name, array.shape));
+                continue;
+            }
+        };
+        let joints = names.iter().find(|names| names.len() == width && width > 1);
+        for k in 0..width {
+            let name = match (joints, array.shape.len()) {
+                (_, 1) => array.name.clone(),
+                (Some(joints), _) => format!("{}.{}", array.name, joints[k]),
+                (None, _) => format!("{}{}", array.name, k + 1),
+            };
+            let at = |n: usize| if down { n * width + k } else { k * samples + n };
+            let values = (0..samples).map(|n| values.get(at(n)).copied().unwrap_or(f64::NAN)).collect();
+            table.columns.push(Column { name, values });
+        }
+    }
+    let note = (!left_out.is_empty()).then(|| format!("kept out: {}", left_out.join(", ")));
+    (table, note)
+}
