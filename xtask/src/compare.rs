@@ -25,6 +25,9 @@ pub(crate) struct Arguments {
     /// In which share of comparisons equal arms may be called different
     #[arg(long, default_value_t = 0.01)]
     level: f64,
+    /// Instead, fits of equal arms, each compared with every other one
+    #[arg(long, value_name = "FITS")]
+    equal: Option<u64>,
 }
 
 /// The virtual arm, recorded and fitted.
@@ -88,6 +91,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let bench = Bench { body: RigidArm::new(&arm).map_err(|e| e.to_string())?, logs: arguments.logs };
     let options = CompareOptions { level: arguments.level };
     let same = || viscous(0, 1.0);
+    if let Some(fits) = arguments.equal {
+        let fitted = (0..fits).map(|seed| bench.fitted(lwa4p::links(), same(), 100 * seed));
+        return equal(&fitted.collect::<Result<Vec<_>, _>>()?, &options);
+    }
     let mut rows = vec![("equal arms".to_string(), 0, 0)];
     rows.extend((1..=6).map(|joint| (format!("5 % more viscous friction on joint {joint}"), 0, 0)));
     rows.push(("a payload of 0.5 kg".to_string(), 0, 0));
@@ -119,5 +126,30 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     for (kind, differ, named) in rows {
         println!("{kind}: different {differ} of {}, the right sentence {named}", arguments.pairs);
     }
+    Ok(())
+}
+
+/// Every fit against every other: how often equal arms are called different. Pairs of one fit depend on each other, so
+/// the fits that take part in a false alarm are counted too; the rate is that of independent pairs on average.
+fn equal(fits: &[Side], options: &CompareOptions) -> Result<(), String> {
+    let (mut pairs, mut differ) = (0u64, vec![0u64; fits.len()]);
+    for (a, left) in fits.iter().enumerate() {
+        for (b, right) in fits.iter().enumerate().skip(a + 1) {
+            let compared = compare(left, right, options).map_err(|e| e.to_string())?;
+            pairs += 1;
+            if compared.differ {
+                differ[a] += 1;
+                differ[b] += 1;
+                eprintln!("{} and {}: {}", left.name, right.name, compared.sentence);
+            }
+        }
+    }
+    let different: u64 = differ.iter().sum::<u64>() / 2;
+    let alarmed = differ.iter().filter(|count| **count > 0).count();
+    println!(
+        "equal arms: different {different} of {pairs} pairs of {} fits ({:.2} %), {alarmed} fits among them",
+        fits.len(),
+        100.0 * different as f64 / pairs.max(1) as f64
+    );
     Ok(())
 }
