@@ -74,12 +74,14 @@ def limited():
     resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
 
 
-def torques(path, joints, states):
-    """Pinocchio's inverse dynamics of the chain; what hangs on other joints is massless, as for dyngen."""
-    model = pin.buildModelFromUrdf(str(path))
+def torques(path, joints, states, followers=()):
+    """Pinocchio's inverse dynamics of the chain, in which some joints may follow others by their <mimic>; what hangs on
+    other joints is massless, as for dyngen."""
+    model = pin.buildModelFromUrdf(str(path), mimic=True) if followers else pin.buildModelFromUrdf(str(path))
     ids = [model.getJointId(name) for name in joints]
+    kept = {*ids, *(model.getJointId(name) for name in followers)}
     for j in range(1, model.njoints):
-        if j not in ids:
+        if j not in kept:
             model.inertias[j] = pin.Inertia.Zero()
     data = model.createData()
     found = []

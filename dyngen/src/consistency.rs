@@ -86,8 +86,7 @@ impl Search<'_> {
     /// joint.
     fn worst(&self, arm: &Arm) -> ((f64, f64), Vec<f64>, usize) {
         let limits: Vec<[f64; 2]> = arm
-            .joints
-            .iter()
+            .moving_joints()
             .map(|joint| {
                 joint.position.unwrap_or(match joint.kind {
                     JointKind::Revolute => [-std::f64::consts::PI, std::f64::consts::PI],
@@ -141,7 +140,7 @@ fn impossible_links(arm: &Arm, set: &ParameterSet, values: &[f64]) -> Vec<String
         set.parameters.iter().position(single).map(|i| values[i])
     };
     let mut reasons = Vec::new();
-    for link in 0..arm.dof() {
+    for link in 0..arm.links() {
         let of = |kind| {
             let p = Parameter { link, kind };
             if arm.keeps(p) { given(p) } else { Some(0.0) }

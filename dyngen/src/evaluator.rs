@@ -4,6 +4,7 @@ use crate::base::SetKind;
 use crate::dynamics::Function;
 use crate::dynamics::build::trig_offset;
 use crate::dynamics::function::Argument;
+use crate::exact::rational::to_f64;
 use crate::graph::tape::{LANES, Lane, Tape};
 use crate::graph::{Input, JointSum, Preparation};
 use crate::model::{Error, Model};
@@ -52,7 +53,8 @@ pub struct Evaluator {
     shape: (usize, usize),
     dof: usize,
     parameters: usize,
-    offsets: Vec<f64>,
+    /// Of each joint: its coordinate, what its angle is for a unit of that, and what is added.
+    angles: Vec<(usize, f64, f64)>,
     /// What depends on the parameters alone, run once for all samples.
     preparation: Tape,
     tape: Tape,
@@ -78,7 +80,9 @@ impl Evaluator {
             shape: built.shape,
             dof,
             parameters: model.set(kind)?.parameters.len(),
-            offsets: (0..dof).map(|i| trig_offset(model.arm(), i)).collect(),
+            angles: (model.arm().drives().iter().enumerate())
+                .map(|(i, drive)| (drive.coordinate, to_f64(&drive.ratio), trig_offset(model.arm(), i)))
+                .collect(),
             preparation: Tape::compile(&preparation.graph(), preparation.values(), symbol),
             tape: Tape::compile(&built.graph, &built.outputs, symbol),
         })
@@ -136,7 +140,10 @@ impl Evaluator {
             };
             let gather_angle = |sum: JointSum, to: &mut Lane| {
                 for (lane, x) in to.iter_mut().enumerate() {
-                    *x = sum.value(|i| samples.q[at(lane) + i] + self.offsets[i]);
+                    *x = sum.value(|i| {
+                        let (coordinate, ratio, offset) = self.angles[i];
+                        ratio * samples.q[at(lane) + coordinate] + offset
+                    });
                 }
             };
             self.tape.run(

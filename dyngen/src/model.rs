@@ -42,6 +42,8 @@ pub enum Error {
     Values(String),
     /// A function does not agree with the Lagrangian.
     Disagreement(Disagreement),
+    /// Joints that follow others, where every joint must move on its own: which.
+    Mimics(String),
 }
 
 impl fmt::Display for Error {
@@ -57,7 +59,7 @@ impl fmt::Display for Error {
                 write!(f, "the published sums do not keep the torque, so no code can be proven for them:")?;
                 lost.iter().try_for_each(|(_, reason)| write!(f, "\n  {reason}"))
             }
-            Error::Values(reason) | Error::Friction(reason) => f.write_str(reason),
+            Error::Values(reason) | Error::Friction(reason) | Error::Mimics(reason) => f.write_str(reason),
             Error::Disagreement(e) => e.fmt(f),
         }
     }

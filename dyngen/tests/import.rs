@@ -307,8 +307,8 @@ fn refusal(text: &str, tip: Option<&str>) -> String {
     }
 }
 
-/// A follower on the chain is a joint of the arm, and the note says how torques go together; what follows a joint
-/// that is held is held where the ratio takes it.
+/// A follower on the chain is a link of the arm without a coordinate; what follows a joint that is held is held
+/// where the ratio takes it.
 #[test]
 fn a_joint_that_follows_another_is_coupled_or_held_with_it() {
     let text = ODD.replacen(
@@ -319,7 +319,13 @@ fn a_joint_that_follows_another_is_coupled_or_held_with_it() {
     assert_ne!(text, ODD, "the test itself is wrong");
     let plain = imported(ODD, None).unwrap();
     let coupled = imported(&text, None).unwrap();
-    assert_eq!(plain.arm.dof(), coupled.arm.dof());
+    assert_eq!((plain.arm.dof(), coupled.arm.dof(), coupled.arm.links()), (3, 2, 3));
+    let mimic = coupled.arm.joints[2].mimic.as_ref().unwrap();
+    assert_eq!(
+        (mimic.joint, &mimic.ratio.to_string()[..], &mimic.offset.to_string()[..]),
+        (1, "-3/2", "1/10")
+    );
+    assert_eq!(coupled.arm.joint_names(), ["one", "two"]);
     assert!(coupled.notes.iter().any(|n| n.contains("q(three) = -1.5·q(two) + 0.1")), "{:?}", coupled.notes);
     let held = |text: &str, lock: &[(&str, f64)]| {
         let lock = lock.iter().map(|(name, value)| (name.to_string(), *value)).collect();

@@ -100,13 +100,107 @@ fn drives_and_ranges_are_kept() {
     assert!((range[0] - degrees(-90.0)).abs() < 1e-12 && (range[1] - degrees(100.0)).abs() < 1e-12);
     assert_eq!(joints[3].position, None);
     assert!(imported.text.contains("# damping 0.5 N·m·s/rad, frictionloss 2.0 N·m"), "{}", imported.text);
-    let geoms = ARM.replace(
+    let mesh = ARM.replace(
         "<inertial pos=\"0.02 0 0.03\" mass=\"0.8\" diaginertia=\"0.002 0.003 0.004\"/>",
-        "<geom size=\"1\"/>",
+        "<geom type=\"mesh\" mesh=\"hand\"/>",
     );
-    assert_ne!(geoms, ARM);
-    let notes = self::imported(&geoms).unwrap().notes;
-    assert!(notes.iter().any(|n| n.contains("'hand' has no <inertial>")), "{notes:?}");
+    assert_ne!(mesh, ARM);
+    let notes = self::imported(&mesh).unwrap().notes;
+    assert!(
+        notes.iter().any(|n| n.contains("'hand' has no <inertial>, and its <geom> is a mesh")),
+        "{notes:?}"
+    );
+}
+
+/// Mass, centre, and inertia xx yy zz xy xz yz about it in the body's axes, as MuJoCo 4.0 compiles them of the shapes
+/// below.
+#[rustfmt::skip]
+const SHAPES: [f64; 10] = [
+    31.40730628757113, 0.10379043886602604, 0.058738253679611156, 0.17348647716053014, 1.8679184458164453, 1.196128181926393, 1.0930137819695247, -0.03156059859280793, -0.20321367401383497, 0.12612581150268465,
+];
+
+#[test]
+fn a_body_without_inertial_has_that_of_its_shapes() {
+    let text = r#"<mujoco>
+  <compiler angle="radian" inertiagrouprange="0 2"/>
+  <default><geom density="500"/><default class="light"><geom density="100" group="1"/></default></default>
+  <worldbody><body name="link"><joint name="turn"/>
+    <geom type="box" size="0.1 0.2 0.3" pos="0.1 0 0.2" euler="0.3 0.2 0.1"/>
+    <geom type="capsule" size="0.05" fromto="0 0 0 0.3 0.4 0.1"/>
+    <geom class="light" type="cylinder" size="0.1 0.25" pos="0 0.3 0" quat="1 0.5 0 0"/>
+    <frame pos="0.1 0.2 0.3" euler="0 0 1"><geom type="ellipsoid" size="0.1 0.2 0.15" mass="2.5" pos="0.2 0 0" euler="0.5 0 0"/></frame>
+    <geom size="0.12" density="0"/><geom size="0.12" group="3"/><geom size="0.08" pos="0 0 -0.2"/>
+  </body></worldbody></mujoco>"#;
+    let imported = imported(text).unwrap();
+    assert!(
+        imported.notes.iter().any(|n| n.contains("'link' has no <inertial>: it has the")),
+        "{:?}",
+        imported.notes
+    );
+    // The joint's axis is the body's z, so frames and body agree but for a turn about it.
+    let value =
+        |name: &str| imported.values.iter().find(|(p, _)| Parameter::parse(name) == Some(*p)).unwrap().1;
+    let [mass, x, y, z, xx, yy, zz, _, xz, yz] = SHAPES;
+    let expected = [mass, mass * z, zz + mass * (x * x + y * y)];
+    for (found, expected) in ["m1", "mz1", "Izz1"].map(value).iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-9 * expected.abs(), "{found} {expected}");
+    }
+    // Sums and lengths that no turn about z changes.
+    let along = |name: &str, other: &str| value(name).hypot(value(other));
+    let tensor = [xz - mass * x * z, yz - mass * y * z];
+    for (found, expected) in [
+        (along("mx1", "my1"), mass * x.hypot(y)),
+        (value("Ixx1") + value("Iyy1"), xx + yy + mass * (x * x + y * y + 2.0 * z * z)),
+        (along("Ixz1", "Iyz1"), tensor[0].hypot(tensor[1])),
+    ] {
+        assert!((found - expected).abs() < 1e-9 * expected.abs(), "{found} {expected}");
+    }
+}
+
+/// q is what MuJoCo calls qpos: where the model is drawn it is the reference.
+#[test]
+fn a_reference_is_where_the_model_is_drawn() {
+    let drawn = ARM
+        .replace("<joint name=\"pan\"/>", "<joint name=\"pan\" ref=\"30\"/>")
+        .replace("name=\"stroke\"", "name=\"stroke\" ref=\"0.1\"");
+    assert_ne!(drawn, ARM);
+    let pose = |text: &str, q: &[f64; 4]| {
+        let model = Model::kinematic(imported(text).unwrap().arm);
+        let pose = Evaluator::new(&model, Function::ForwardKinematics, SetKind::Full).unwrap();
+        let mut out = [0.0; 16];
+        pose.evaluate(q, &[], &[], &[], &mut out);
+        out
+    };
+    let (plain, moved) =
+        (pose(ARM, &[0.4, -0.3, 0.15, 0.8]), pose(&drawn, &[0.4 + 30f64.to_radians(), -0.3, 0.25, 0.8]));
+    for (a, b) in plain.iter().zip(&moved) {
+        assert!((a - b).abs() < 1e-10, "{plain:?} {moved:?}");
+    }
+}
+
+/// A joint follows another one by a straight line through both references; what an arm file cannot hold is told.
+#[test]
+fn equalities_are_followed_or_told() {
+    let with =
+        |equality: &str| ARM.replace("</mujoco>", &format!("<equality>{equality}</equality></mujoco>"));
+    let text = with("<joint joint1=\"turn\" joint2=\"pan\" polycoef=\"0.2 -1.5 0 0 0\"/>")
+        .replace("<joint name=\"pan\"/>", "<joint name=\"pan\" ref=\"180\"/>");
+    let arm = imported(&text).unwrap().arm;
+    let mimic = arm.joints[3].mimic.as_ref().unwrap();
+    let offset = dyngen::exact::rational::to_f64(&mimic.offset);
+    assert_eq!((mimic.joint, &mimic.ratio.to_string()[..], arm.dof()), (0, "-3/2", 3));
+    assert!((offset - (0.2 + 1.5 * std::f64::consts::PI)).abs() < 1e-12, "{offset}");
+    for (equality, words) in [
+        ("<joint joint1=\"turn\" joint2=\"pan\" polycoef=\"0 1 2 0 0\"/>", "by a curve"),
+        ("<joint joint1=\"turn\" polycoef=\"0.3\"/>", "--lock turn=0.3"),
+        ("<weld body1=\"hand\" body2=\"world\"/>", "<weld> is left out"),
+    ] {
+        let imported = imported(&with(equality)).unwrap();
+        assert_eq!(imported.arm.dof(), 4);
+        assert!(imported.notes.iter().any(|n| n.contains(words)), "{words}: {:?}", imported.notes);
+    }
+    let off = imported(&with("<joint joint1=\"turn\" joint2=\"pan\" active=\"false\"/>")).unwrap();
+    assert_eq!(off.arm.dof(), 4);
 }
 
 #[test]
@@ -121,7 +215,6 @@ fn what_is_not_read_is_told_with_its_line() {
         ("eulerseq=\"zyx\"", "eulerseq=\"zy\"", "line 4: compiler: eulerseq 'zy'"),
         ("euler=\"10 0 20\"", "euler=\"10 0\"", "euler of <body> must be 3 numbers"),
         ("axisangle=\"1 1 0 30\"", "axisangle=\"0 0 0 30\"", "axisangle has no direction"),
-        ("<joint name=\"pan\"/>", "<joint name=\"pan\" ref=\"5\"/>", "joint 'pan': ref = 5"),
         ("<joint name=\"pan\"/>", "<joint name=\"pan\" type=\"ball\"/>", "joint 'pan' is ball"),
         ("<joint name=\"pan\"/>", "<freejoint name=\"pan\"/>", "joint 'pan' is floating"),
         (

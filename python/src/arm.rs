@@ -171,14 +171,14 @@ impl Arm {
             JointKind::Revolute => "revolute",
             JointKind::Prismatic => "prismatic",
         };
-        self.arm.joints.iter().map(kind).collect()
+        self.arm.moving_joints().map(kind).collect()
     }
 
     #[getter]
     fn limits(&self) -> Vec<Limits> {
         let of =
             |j: &dyngen::arm::Joint| (j.position, j.velocity, j.acceleration, j.torque, j.torque_constant);
-        self.arm.joints.iter().map(of).collect()
+        self.arm.moving_joints().map(of).collect()
     }
 
     #[getter]

@@ -1,5 +1,6 @@
 //! The arm as its file describes it: kinematics, declared symmetries, rotors, limits.
 
+mod mimic;
 pub mod parameter;
 mod read;
 pub mod sum;
@@ -9,6 +10,7 @@ pub mod transmission;
 use crate::diagnostic::Diagnostics;
 pub use crate::exact::angle::Angle;
 use crate::exact::rational::{self, Rational};
+pub use mimic::{Drive, Mimic};
 use num_traits::{One, Zero};
 pub use parameter::{Parameter, ParameterKind};
 use std::fmt;
@@ -68,6 +70,8 @@ pub struct Joint {
     pub torque: Option<f64>,
     /// Torque at the joint for each ampere, N·m/A.
     pub torque_constant: Option<f64>,
+    /// The joint that it follows, where it does not move on its own.
+    pub mimic: Option<Mimic>,
 }
 
 /// What the file does not say is left out, as for [`Arm`].
@@ -90,8 +94,11 @@ impl fmt::Debug for Joint {
             .field("velocity", &self.velocity)
             .field("acceleration", &self.acceleration)
             .field("torque", &self.torque)
-            .field("torque_constant", &self.torque_constant)
-            .finish()
+            .field("torque_constant", &self.torque_constant);
+        if let Some(mimic) = &self.mimic {
+            text.field("mimic", mimic);
+        }
+        text.finish()
     }
 }
 
@@ -177,15 +184,17 @@ impl Arm {
         read::parse(text, file)
     }
 
-    /// The number of joints.
+    /// The number of joints that move on their own: of coordinates q. Joints that follow others are links
+    /// without a coordinate.
     pub fn dof(&self) -> usize {
-        self.joints.len()
+        self.moving_joints().count()
     }
 
-    /// The joints' names in order: where the file gives none, the joint's number from 1, as logs have it.
+    /// The names of the joints that move on their own, in order: where the file gives none, the joint's
+    /// number among them from 1, as logs have it.
     pub fn joint_names(&self) -> Vec<String> {
         let name = |(i, joint): (usize, &Joint)| joint.name.clone().unwrap_or_else(|| (i + 1).to_string());
-        self.joints.iter().enumerate().map(name).collect()
+        self.moving_joints().enumerate().map(name).collect()
     }
 
     /// Whether the file names a joint.
@@ -200,7 +209,7 @@ impl Arm {
 
     /// All eleven parameters of every link, in order.
     pub fn all_parameters(&self) -> Vec<Parameter> {
-        (0..self.dof()).flat_map(|link| ParameterKind::ALL.map(|kind| Parameter { link, kind })).collect()
+        (0..self.links()).flat_map(|link| ParameterKind::ALL.map(|kind| Parameter { link, kind })).collect()
     }
 
     /// Whether a parameter is neither declared zero nor a rotor inertia of a joint without rotor.
@@ -217,7 +226,7 @@ impl Arm {
     /// The identity where the file has no `[[transmission]]`. Rotors are in the model already; friction sits
     /// on these velocities as well, and whoever adds it takes them from here.
     pub fn motor_velocity_matrix(&self) -> Vec<Vec<Rational>> {
-        let n = self.dof();
+        let n = self.links();
         let unit = |i: usize, j: usize| if i == j { Rational::one() } else { Rational::zero() };
         let mut matrix: Vec<Vec<Rational>> = (0..n).map(|i| (0..n).map(|j| unit(i, j)).collect()).collect();
         for block in &self.transmissions {

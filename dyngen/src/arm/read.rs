@@ -2,8 +2,8 @@
 
 use super::table::{Reader, Table, Value, describe};
 use super::{
-    Angle, Arm, Convention, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind, Placement, sum,
-    transmission,
+    Angle, Arm, Convention, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind, Placement,
+    mimic, sum, transmission,
 };
 use crate::diagnostic::{Collector, Diagnostics};
 use crate::exact::rational::{self, Rational};
@@ -13,7 +13,7 @@ use toml::de::DeTable;
 const ARM_KEYS: [&str; 8] =
     ["name", "convention", "gravity", "joint", "base", "tool", "grouping", "transmission"];
 const PLACEMENT_KEYS: [&str; 2] = ["xyz", "rpy"];
-const JOINT_KEYS: [&str; 14] = [
+const JOINT_KEYS: [&str; 15] = [
     "name",
     "kind",
     "a",
@@ -28,6 +28,7 @@ const JOINT_KEYS: [&str; 14] = [
     "acceleration",
     "torque",
     "torque_constant",
+    "mimic",
 ];
 const GROUPING_KEYS: [&str; 2] = ["name", "sum"];
 /// A larger file is no arm.
@@ -68,7 +69,7 @@ impl Reader<'_> {
             return None;
         }
         let dof = joint_tables.len();
-        let joints: Vec<Option<Joint>> = joint_tables.iter().map(|t| self.joint(t)).collect();
+        let joints: Vec<Option<Joint>> = joint_tables.iter().map(|t| self.joint(t, dof)).collect();
         self.same_names(&joint_tables);
         let base = self.optional(&top, "base", |r, v| r.placement(v, "base", "the root link"));
         let tool = self.optional(&top, "tool", |r, v| r.placement(v, "tool", "the last frame"));
@@ -89,11 +90,17 @@ impl Reader<'_> {
             }
             groupings.push(grouping);
         }
+        let mut joints: Vec<Joint> = joints.into_iter().collect::<Option<_>>()?;
+        if let Err((joint, why)) = mimic::resolve(&mut joints) {
+            let t = &joint_tables[joint];
+            self.errors.error(t.span.clone(), format!("{}: mimic: {why}", t.place));
+            return None;
+        }
         Some(Arm {
             name: name?,
             convention: convention?,
             gravity: gravity?,
-            joints: joints.into_iter().collect::<Option<_>>()?,
+            joints,
             base: base?,
             tool: tool?,
             groupings: groupings.into_iter().collect::<Option<_>>()?,
@@ -101,7 +108,7 @@ impl Reader<'_> {
         })
     }
 
-    fn joint(&mut self, t: &Table<'_, '_>) -> Option<Joint> {
+    fn joint(&mut self, t: &Table<'_, '_>, dof: usize) -> Option<Joint> {
         self.unknown_keys(t, &JOINT_KEYS);
         let place = t.place.clone();
         let name = self.optional(t, "name", |r, v| r.text(v, &format!("{place}: name")));
@@ -152,6 +159,7 @@ impl Reader<'_> {
         let acceleration = limit("acceleration", "rad/s² or m/s²");
         let torque = limit("torque", "N·m or N");
         let torque_constant = limit("torque_constant", "N·m/A or N/A");
+        let mimic = self.optional(t, "mimic", |r, v| mimic::read(r, v, &place, dof));
         Some(Joint {
             name: name?,
             kind: kind?,
@@ -167,6 +175,7 @@ impl Reader<'_> {
             acceleration: acceleration?,
             torque: torque?,
             torque_constant: torque_constant?,
+            mimic: mimic?,
         })
     }
 

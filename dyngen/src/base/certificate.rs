@@ -6,14 +6,15 @@
 //! is not zero and vanishes at a random point with probability below 2⁻⁵⁴; as many points are taken as there
 //! are columns.
 
-use super::coefficients::Sizes;
-use crate::arm::{Arm, JointKind};
+use super::steps::Sizes;
+use crate::arm::{Arm, Drive};
 use crate::exact::constant::ConstantField;
 use crate::exact::elimination::{Dependence, Unproven, rank};
 use crate::exact::prime::{Draws, Fp, PrimeField};
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::lagrangian::elements::{ArmElements, Source};
+use crate::lagrangian::followers::{input_angles, with_theta};
 use crate::lagrangian::twice_lagrangian;
 
 /// Points beyond one for each kept column.
@@ -42,16 +43,7 @@ pub(super) fn certify(
     }
     let mut kept = Vec::new();
     for _ in 0..dependence.kept.len() + MORE {
-        let mut point = Point::draw(arm, field, sizes, &mut draws);
-        let columns = |point: &mut Point<'_>| {
-            let elements = ArmElements::build(&PrimeField, arm, symbols, point);
-            twice_lagrangian(&PrimeField, &elements)
-        };
-        let moving = columns(&mut point);
-        // A constant changes no torque: columns count up to one, which depends on the sizes alone.
-        point.joints.iter_mut().for_each(|joint| *joint = [Fp::ZERO, Fp::ONE, Fp::ZERO, Fp::ZERO]);
-        let still = columns(&mut point);
-        let values: Vec<Fp> = moving.iter().zip(&still).map(|(a, b)| *a - *b).collect();
+        let values = Point::draw(arm, field, sizes, &mut draws).columns(symbols);
         for (column, terms) in &relations {
             let sum = terms.iter().fold(Fp::ZERO, |sum, (k, factor)| sum + *factor * values[*k]);
             if sum != values[*column] {
@@ -63,26 +55,54 @@ pub(super) fn certify(
     if rank(kept) == dependence.kept.len() { Ok(()) } else { Err(Unproven) }
 }
 
+/// The rank of the columns of all the arm's parameters, at random points.
+pub(super) fn rank_of_all(arm: &Arm, symbols: &AngleSymbols, field: &ConstantField, sizes: Sizes) -> usize {
+    let mut draws = Draws::new(0x7261_6e6b);
+    let mut point = || Point::draw(arm, field, sizes, &mut draws).columns(symbols);
+    rank((0..arm.all_parameters().len() + MORE).map(|_| point()).collect())
+}
+
 /// A random pose and motion, with random sizes where they are variables.
 struct Point<'a> {
     arm: &'a Arm,
     field: &'a ConstantField,
-    /// Sine, cosine, position and velocity of each joint.
-    joints: Vec<[Fp; 4]>,
+    drives: Vec<Drive>,
+    /// Sine and cosine of each joint's angle.
+    angles: Vec<(Fp, Fp)>,
+    /// Of the coordinates.
+    positions: Vec<Fp>,
+    velocities: Vec<Fp>,
     /// a, d, rotor ratio and b of each joint, where they are variables.
     sizes: Option<Vec<[Fp; 4]>>,
 }
 
 impl<'a> Point<'a> {
     fn draw(arm: &'a Arm, field: &'a ConstantField, sizes: Sizes, draws: &mut Draws) -> Self {
-        let joint = |draws: &mut Draws| {
-            let (sin, cos) = draws.element().circle_point();
-            [sin, cos, draws.element(), draws.element()]
-        };
-        let joints = arm.joints.iter().map(|_| joint(draws)).collect();
+        let angles = angles(arm, &mut || draws.element().circle_point());
+        let mut vector = || (0..arm.dof()).map(|_| draws.element()).collect::<Vec<Fp>>();
+        let (positions, velocities) = (vector(), vector());
         let four = |draws: &mut Draws| std::array::from_fn(|_| draws.element());
         let sizes = (sizes == Sizes::Variables).then(|| arm.joints.iter().map(|_| four(draws)).collect());
-        Point { arm, field, joints, sizes }
+        Point { arm, field, drives: arm.drives(), angles, positions, velocities, sizes }
+    }
+
+    /// The columns of all parameters, less what they are at rest where every coordinate is zero: a constant
+    /// changes no torque, and columns count up to one, which depends on the sizes alone.
+    fn columns(mut self, symbols: &AngleSymbols) -> Vec<Fp> {
+        let columns = |point: &mut Self| {
+            let elements = ArmElements::build(&PrimeField, point.arm, symbols, point);
+            twice_lagrangian(&PrimeField, &elements)
+        };
+        let moving = columns(&mut self);
+        self.rest();
+        let still = columns(&mut self);
+        moving.iter().zip(&still).map(|(a, b)| *a - *b).collect()
+    }
+
+    /// Every coordinate at zero, and still.
+    fn rest(&mut self) {
+        self.angles = angles(self.arm, &mut || (Fp::ZERO, Fp::ONE));
+        self.positions.iter_mut().chain(&mut self.velocities).for_each(|x| *x = Fp::ZERO);
     }
 
     fn size(&self, joint: usize, which: usize, value: Option<&Rational>) -> Fp {
@@ -94,17 +114,26 @@ impl<'a> Point<'a> {
     }
 }
 
+/// A number with the prime in its denominator fails the certificate.
+fn number(value: &Rational) -> Fp {
+    Fp::from_rational(value).unwrap_or(Fp::ZERO)
+}
+
+fn angles(arm: &Arm, circle: &mut dyn FnMut() -> (Fp, Fp)) -> Vec<(Fp, Fp)> {
+    input_angles(&PrimeField, arm, &number, circle, None)
+}
+
 impl Source<Fp> for Point<'_> {
     fn joint_trig(&mut self, joint: usize) -> (Fp, Fp) {
-        debug_assert_eq!(self.arm.joints[joint].kind, JointKind::Revolute);
-        let [sin, cos, ..] = self.joints[joint];
-        (sin, cos)
+        with_theta(&PrimeField, &self.arm.joints[joint].theta, self.angles[joint])
     }
     fn position(&mut self, joint: usize) -> Fp {
-        self.joints[joint][2]
+        let drive = &self.drives[joint];
+        number(&drive.ratio) * self.positions[drive.coordinate] + number(&drive.offset)
     }
     fn velocity(&mut self, joint: usize) -> Fp {
-        self.joints[joint][3]
+        let drive = &self.drives[joint];
+        number(&drive.ratio) * self.velocities[drive.coordinate]
     }
     fn a(&mut self, joint: usize) -> Fp {
         self.size(joint, 0, Some(&self.arm.joints[joint].a))

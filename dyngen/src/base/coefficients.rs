@@ -15,6 +15,7 @@
 use super::preference::Preference;
 pub use super::steps::Sizes;
 use super::steps::{LINK, Step, Steps, Values};
+use super::tied;
 use crate::arm::Arm;
 use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{self, SparseRow, Unproven};
@@ -41,6 +42,9 @@ pub fn all_rows(
     field: &ConstantField,
     sizes: Sizes,
 ) -> Result<Vec<SparseRow>, Unproven> {
+    if arm.has_mimics() {
+        return tied::all_rows(arm, symbols, field, sizes);
+    }
     let chain = Steps::new(arm, symbols, field, sizes);
     let mut constant = vec![chain.at_rest(arm)];
     let mut moving: Vec<Values> = Vec::new();

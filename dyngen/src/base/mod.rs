@@ -12,6 +12,7 @@ mod published;
 pub mod sets;
 mod steps;
 pub mod symmetry;
+mod tied;
 
 pub use crate::parameters::{ParameterSet, SetKind, SetParameter, span};
 pub use sets::Sets;

@@ -27,7 +27,7 @@ impl Preference {
     /// along the joint axis and one of the two inertias across it.
     pub fn order(self, arm: &Arm) -> Vec<Parameter> {
         let mut order = arm.kept_parameters();
-        let link = |p: &Parameter| if self.outer { arm.dof() - p.link } else { p.link };
+        let link = |p: &Parameter| if self.outer { arm.links() - p.link } else { p.link };
         order.sort_by_key(|p| (self.rank(arm, *p), link(p), p.kind));
         order
     }

@@ -66,7 +66,7 @@ impl Sets {
     /// [`Unproven`] where a number of the arm is a multiple of the proof's prime.
     pub fn derive(arm: &Arm, symbols: &AngleSymbols) -> Result<Sets, Unproven> {
         let field = ConstantField::new(symbols, &mut Draws::new(SEED));
-        let columns = arm.dof() * 11;
+        let columns = arm.links() * 11;
         let eliminate_of = |arm: &Arm, rows: &[SparseRow], preference: Preference| {
             let order: Vec<usize> = preference.order(arm).iter().map(|p| p.index()).collect();
             // What is found is certified by the Lagrangian itself below.
@@ -110,7 +110,7 @@ impl Sets {
     /// The set `full` alone, and nothing known of how columns depend: enough for what takes no parameters.
     pub(crate) fn underived(arm: &Arm, symbols: &AngleSymbols) -> Sets {
         let field = ConstantField::new(symbols, &mut Draws::new(SEED));
-        let minimal = Dependence { kept: Vec::new(), coordinates: vec![Vec::new(); arm.dof() * 11] };
+        let minimal = Dependence { kept: Vec::new(), coordinates: vec![Vec::new(); arm.links() * 11] };
         let sets = vec![full_set(arm, &field)];
         Sets { field, sets, minimal, on_joints: None, rows: Vec::new(), candidates: Vec::new() }
     }

@@ -3,7 +3,7 @@
 use super::digits::Digits;
 use super::{Failure, Progress, model, print};
 use dyngen::Model;
-use dyngen::arm::{Convention, JointKind, Placement};
+use dyngen::arm::{Convention, Joint, JointKind, Placement};
 use dyngen::base::choice;
 use dyngen::base::sets::{Class, combination_text};
 use dyngen::base::symmetry::{Removed, Symmetry};
@@ -54,13 +54,15 @@ fn table(model: &Model, description: &Description, digits: Digits) -> String {
     // A String takes every write.
     let _ = writeln!(
         t,
-        "{}: {} joints, {convention} DH, gravity [{}] m/s²\n",
+        "{}: {} joints{}, {convention} DH, gravity [{}] m/s²\n",
         arm.name,
-        arm.dof(),
+        arm.links(),
+        if arm.has_mimics() { format!(", {} of them coordinates", arm.dof()) } else { String::new() },
         gravity.join(", ")
     );
     // Names where the file has some.
-    let names = arm.joint_names();
+    let name = |joint: &Joint| joint.name.clone().unwrap_or_default();
+    let names: Vec<String> = arm.joints.iter().map(name).collect();
     let width = match arm.has_joint_names() {
         true => names.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(4) + 2,
         false => 0,
@@ -104,6 +106,19 @@ fn table(model: &Model, description: &Description, digits: Digits) -> String {
     {
         if let Some(frame) = frame {
             let _ = writeln!(t, "  {name}: {}", placement_text(frame, digits));
+        }
+    }
+    for (i, joint) in arm.joints.iter().enumerate() {
+        if let Some(mimic) = &joint.mimic {
+            let number = |x: &rational::Rational| digits.number(rational::to_f64(x));
+            let _ = writeln!(
+                t,
+                "  joint {} follows joint {}: {}·q + {}; it has no coordinate",
+                i + 1,
+                mimic.joint + 1,
+                number(&mimic.ratio),
+                number(&mimic.offset)
+            );
         }
     }
     for block in &arm.transmissions {

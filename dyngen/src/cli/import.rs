@@ -56,8 +56,11 @@ fn tolerance(text: &str) -> Result<f64, String> {
 
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let file = args.urdf.display().to_string();
-    let text = std::fs::read_to_string(&args.urdf)
+    let bytes = std::fs::read(&args.urdf)
         .map_err(|e| Failure::input(format!("{file}: the URDF cannot be read: {e}")))?;
+    // Names and comments of old files are Latin-1, which is not said everywhere; its letters are its bytes.
+    let latin = |bytes: &[u8]| bytes.iter().map(|byte| char::from(*byte)).collect();
+    let text = String::from_utf8(bytes).unwrap_or_else(|e| latin(e.as_bytes()));
     let convention = match args.convention {
         Frames::Modified => Convention::Modified,
         Frames::Standard => Convention::Standard,

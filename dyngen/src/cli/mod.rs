@@ -131,7 +131,7 @@ struct Progress {
 
 impl Progress {
     fn new(arm: &Arm) -> Progress {
-        let n = arm.dof();
+        let n = arm.links();
         let general = arm.joints.iter().filter(|joint| joint.alpha.quarter_turns().is_none()).count();
         // Of arms of 2 to 16 joints in both conventions.
         let seconds = 0.012 * (n * n) as f64 * (1.0 + general as f64 / 9.0);

@@ -4,7 +4,7 @@ mod weak;
 
 pub use weak::Weak;
 
-use crate::arm::Transmission;
+use crate::arm::{Arm, Joint, Transmission};
 use crate::base::sets::{Class, combination_text};
 use crate::base::symmetry::{self, Removed, Symmetry};
 use crate::dynamics::Function;
@@ -76,6 +76,7 @@ impl Description {
             "arm": arm.name,
             "joints": arm.dof(),
             "joint_names": arm.joint_names(),
+            "mimics": mimics_json(arm),
             "transmissions": arm.transmissions.iter().map(transmission_json).collect::<Vec<_>>(),
             "parameters": names,
             "sets": sets_json(model),
@@ -95,6 +96,17 @@ impl Description {
 pub fn sets_json(model: &Model) -> Value {
     let of = |set: &ParameterSet| (set.kind.name().to_string(), set_json(model, set));
     Value::Object(model.sets().sets.iter().map(of).collect())
+}
+
+/// Joints that follow others, from 1; ratio and offset as exact text.
+fn mimics_json(arm: &Arm) -> Vec<Value> {
+    let of = |(i, joint): (usize, &Joint)| {
+        let mimic = joint.mimic.as_ref()?;
+        let (ratio, offset) = (rational::to_text(&mimic.ratio), rational::to_text(&mimic.offset));
+        let (joint, follows) = (i + 1, mimic.joint + 1);
+        Some(json!({"joint": joint, "follows": follows, "ratio": ratio, "offset": offset}))
+    };
+    arm.joints.iter().enumerate().filter_map(of).collect()
 }
 
 /// Joints from 1; the matrix as exact text.

@@ -36,7 +36,7 @@ pub(super) fn weak(model: &Model) -> Result<Vec<Weak>, Error> {
     let mut unit = || draws.element().residue() as f64 / (1u64 << 61) as f64;
     let mut states = [Vec::new(), Vec::new(), Vec::new()];
     for _ in 0..STATES {
-        for joint in &model.arm().joints {
+        for joint in model.arm().moving_joints() {
             let [low, high] = joint.position.unwrap_or(match joint.kind {
                 JointKind::Revolute => [-PI, PI],
                 JointKind::Prismatic => [-0.5, 0.5],

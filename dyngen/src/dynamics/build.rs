@@ -1,6 +1,7 @@
 //! A function of an arm as a graph, in the form that costs least.
 
 use super::chain::{self, Origins};
+use super::followers::Followers;
 use super::function::{Argument, Function, Kind};
 use super::motion;
 use super::regroup::Regrouping;
@@ -10,7 +11,7 @@ use crate::arm::{Arm, Placement};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
 use crate::exact::elimination::Dependence;
-use crate::exact::rational::Rational;
+use crate::exact::rational::{Rational, to_f64};
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::differentiate::{self, Direction};
 use crate::graph::{Builder, Expr, Graph, Input, JointSum, Operations, Preparation};
@@ -29,7 +30,7 @@ pub struct FunctionGraph {
     pub outputs: Vec<Expr>,
     /// Its rows and columns.
     pub shape: (usize, usize),
-    /// Number of joints.
+    /// Number of coordinates.
     pub joints: usize,
     /// Number of parameters of the set.
     pub parameters: usize,
@@ -130,7 +131,11 @@ pub fn build_in(
         Some(values) => b.constant(&values[i]),
         None => b.input(Input::Parameter(i)),
     };
-    let n = arm.dof();
+    // Of the chain; joints that follow others are links of it. Its functions become those of the coordinates.
+    let (n, dof) = (arm.links(), arm.dof());
+    let followers = Followers::new(arm);
+    let rows = |matrix: Vec<Expr>| followers.rows(&b, matrix);
+    let square = |matrix: Vec<Expr>| rows(followers.columns(&b, matrix));
     let elements = ArmElements::build(&b, arm, symbols, &mut Inputs { b: &b, arm });
     let chain = Chain::build(&b, arm, &elements, form);
     let mut bodies = regrouping.map_or(Vec::new(), |r| r.bodies(&b, arm, symbols, field, set, value));
@@ -147,12 +152,12 @@ pub fn build_in(
             accelerations: accelerations.to_vec(),
             gravity,
         };
-        inverse::inverse_dynamics(&b, &chain, &bodies, &drive)
+        rows(inverse::inverse_dynamics(&b, &chain, &bodies, &drive))
     };
     let geometry = chain::geometry(&b, arm, form.origins, &elements);
     let regressor = |drive: &motion::Drive| {
         let columns = regressor::Columns { set, field, links: &geometry, forces_home: form.forces_home };
-        regressor::regressor(&b, &chain, &columns, drive)
+        rows(regressor::regressor(&b, &chain, &columns, drive))
     };
     let motion = || motion::Drive {
         velocities: velocities.clone(),
@@ -166,10 +171,11 @@ pub fn build_in(
         accelerations: input(Input::ReferenceAcceleration),
         gravity: true,
     };
-    let transposed = |rows: Vec<Expr>| -> Vec<Expr> {
+    let transposed = |y: Vec<Expr>| -> Vec<Expr> {
         let p = set.parameters.len();
         let product = |c: usize| {
-            (0..n).fold(Expr::ZERO, |sum, i| b.add(&sum, &b.mul(&rows[i * p + c], &b.input(Input::Error(i)))))
+            let times = |i: usize| b.mul(&y[i * p + c], &b.input(Input::Error(i)));
+            (0..dof).fold(Expr::ZERO, |sum, i| b.add(&sum, &times(i)))
         };
         (0..p).map(product).collect()
     };
@@ -177,12 +183,13 @@ pub fn build_in(
         let torques = torque(&input(Input::Acceleration), true);
         let columns: Vec<Vec<Expr>> =
             (0..n).map(|j| differentiate::derivative(&b, &torques, direction(j))).collect();
-        (0..n * n).map(|k| columns[k % n][k / n]).collect()
+        followers.columns(&b, (0..dof * n).map(|k| columns[k % n][k / n]).collect())
     };
     let placed = |frame: &Option<Placement>| {
         let symbol = |index, sine| b.symbol(index, sine);
         PlacementElements::build(&b, frame.as_ref(), symbols, |x| b.constant(x), symbol)
     };
+    let mass_matrix = || square(composite::mass_matrix(&b, &chain, &bodies));
     let ends = || pose::Ends { base: placed(&arm.base), tool: placed(&arm.tool) };
     let outputs = match function {
         Function::InverseDynamics => torque(&input(Input::Acceleration), true),
@@ -191,23 +198,22 @@ pub fn build_in(
         Function::RegressorTransposeTimes => transposed(regressor(&motion())),
         Function::SlotineLiRegressor => regressor(&reference()),
         Function::SlotineLiTransposeTimes => transposed(regressor(&reference())),
-        Function::MassMatrix => composite::mass_matrix(&b, &chain, &bodies),
-        Function::MassMatrixInverse => {
-            forward::inverse_symmetric(&b, &composite::mass_matrix(&b, &chain, &bodies), n)
-        }
-        Function::CoriolisMatrix => coriolis::coriolis_matrix(&b, &chain, &bodies, &velocities),
+        Function::MassMatrix => mass_matrix(),
+        Function::MassMatrixInverse => forward::inverse_symmetric(&b, &mass_matrix(), dof),
+        Function::CoriolisMatrix => square(coriolis::coriolis_matrix(&b, &chain, &bodies, &velocities)),
         Function::CoriolisTimesVelocity => torque(&none, false),
         Function::CoriolisTransposeTimesVelocity => {
-            momentum::coriolis_transpose_times_velocity(&b, &chain, &bodies, &velocities)
+            rows(momentum::coriolis_transpose_times_velocity(&b, &chain, &bodies, &velocities))
         }
-        Function::Gravity => composite::gravity(&b, &chain, &bodies),
+        Function::Gravity => rows(composite::gravity(&b, &chain, &bodies)),
         Function::ForwardDynamics => {
             let bias = torque(&none, true);
-            let right: Vec<Expr> = input(Input::Torque).iter().zip(&bias).map(|(t, c)| b.sub(t, c)).collect();
-            forward::solve_symmetric(&b, &composite::mass_matrix(&b, &chain, &bodies), &right)
+            let torques: Vec<Expr> = (0..dof).map(|i| b.input(Input::Torque(i))).collect();
+            let right: Vec<Expr> = torques.iter().zip(&bias).map(|(t, c)| b.sub(t, c)).collect();
+            forward::solve_symmetric(&b, &mass_matrix(), &right)
         }
         Function::ForwardKinematics => pose::forward_kinematics(&b, &elements, &ends()),
-        Function::Jacobian => pose::jacobian(&b, &elements, &ends()),
+        Function::Jacobian => followers.columns(&b, pose::jacobian(&b, &elements, &ends())),
         Function::JacobianRateTimesVelocity => {
             let drive = motion::Drive {
                 velocities: velocities.clone(),
@@ -227,14 +233,15 @@ pub fn build_in(
         }
         Function::KineticEnergyRegressor => energy::kinetic_regressor(&b, arm, &elements, set, field),
         Function::PotentialEnergyRegressor => energy::potential_regressor(&b, arm, &elements, set, field),
-        Function::Momentum => momentum::momentum(&b, &chain, &bodies, &velocities),
+        Function::Momentum => rows(momentum::momentum(&b, &chain, &bodies, &velocities)),
         Function::TorqueByPosition => derivatives(Direction::Position),
         Function::TorqueByVelocity => derivatives(Direction::Velocity),
     };
     let parameters = set.parameters.len();
-    let (graph, outputs) = optimize::optimize(b.finish(), outputs, field, passes);
-    let shape = function.shape(n, parameters);
-    FunctionGraph { function, graph, outputs, shape, joints: n, parameters, baked: baked.is_some() }
+    let (graph, outputs) = followers.of_coordinates(b.finish(), outputs);
+    let (graph, outputs) = optimize::optimize(graph, outputs, field, passes);
+    let shape = function.shape(dof, parameters);
+    FunctionGraph { function, graph, outputs, shape, joints: dof, parameters, baked: baked.is_some() }
 }
 
 /// The arm's quantities as inputs and constants of a graph.
@@ -284,8 +291,10 @@ impl Source<Expr> for Inputs<'_> {
     }
 }
 
-/// What is added to q before its sine and cosine are taken: theta where it is no multiple of pi/2.
+/// What is added to q before its sine and cosine are taken: theta where it is no multiple of pi/2; of a joint
+/// that follows another, to its ratio times the other's q, its offset too.
 pub fn trig_offset(arm: &Arm, joint: usize) -> f64 {
-    let theta = &arm.joints[joint].theta;
-    if theta.quarter_turns().is_some() { 0.0 } else { theta.radians() }
+    let joint = &arm.joints[joint];
+    let offset = joint.mimic.as_ref().map_or(0.0, |mimic| to_f64(&mimic.offset));
+    if joint.theta.quarter_turns().is_some() { offset } else { joint.theta.radians() + offset }
 }

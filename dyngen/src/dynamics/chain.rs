@@ -31,7 +31,7 @@ pub struct LinkGeometry<V> {
 /// The joints of each stage.
 pub fn stages(arm: &Arm) -> Vec<std::ops::Range<usize>> {
     let mut stages: Vec<std::ops::Range<usize>> = Vec::new();
-    for i in 0..arm.dof() {
+    for i in 0..arm.links() {
         let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
         match stages.last_mut() {
             Some(stage) if revolute(i) && revolute(i - 1) && is_parallel(arm, i) => stage.end = i + 1,
@@ -72,8 +72,8 @@ fn is_parallel(arm: &Arm, joint: usize) -> bool {
 
 /// For each joint, whether z of the chain's frame points against its axis.
 pub fn reversed(arm: &Arm) -> Vec<bool> {
-    let mut reversed = Vec::with_capacity(arm.dof());
-    for i in 0..arm.dof() {
+    let mut reversed = Vec::with_capacity(arm.links());
+    for i in 0..arm.links() {
         let before = i > 0 && reversed[i - 1];
         let now = match quarter_turns(arm, i) {
             Some(0) => before,
@@ -93,7 +93,7 @@ fn slid(arm: &Arm, origins: Origins) -> Vec<bool> {
     let cost = |i: usize, here: bool, next: bool| -> usize {
         let normal = lengths(arm, i).iter().any(|length| !length.is_zero());
         let along = revolute(i) && !arm.joints[i].d.is_zero() && !here;
-        let along_next = i + 1 < arm.dof() && revolute(i + 1) && !arm.joints[i + 1].d.is_zero() && next;
+        let along_next = i + 1 < arm.links() && revolute(i + 1) && !arm.joints[i + 1].d.is_zero() && next;
         let lengths = [normal, along, along_next].iter().filter(|x| **x).count();
         let unwanted = match origins {
             Origins::Inner => along_next,
@@ -101,7 +101,7 @@ fn slid(arm: &Arm, origins: Origins) -> Vec<bool> {
         };
         [0, 6, 10, 13][lengths] + usize::from(unwanted)
     };
-    let n = arm.dof();
+    let n = arm.links();
     let choices = |i: usize| if revolute(i) && !arm.joints[i].d.is_zero() { 0..2 } else { 0..1 };
     // The cheapest way from each choice at a joint to the end, from the last joint inwards.
     let mut best = vec![[(0usize, false); 2]; n];
@@ -127,7 +127,7 @@ fn lengths(arm: &Arm, joint: usize) -> [&crate::exact::rational::Rational; 2] {
     let row = match arm.convention {
         Convention::Standard => &arm.joints[joint],
         // The tip beyond the last axis has no length.
-        Convention::Modified => &arm.joints[(joint + 1).min(arm.dof() - 1)],
+        Convention::Modified => &arm.joints[(joint + 1).min(arm.links() - 1)],
     };
     [&row.a, &row.b]
 }
@@ -150,7 +150,7 @@ pub fn geometry<A: Algebra>(
 ) -> Vec<LinkGeometry<A::Value>> {
     let (zero, one) = (alg.integer(0), alg.integer(1));
     let (reversed, slid) = (reversed(arm), slid(arm, origins));
-    let n = arm.dof();
+    let n = arm.links();
     let joint = |i: usize| &elements.joints[i];
     let turned = |negative: bool, (s, c): (A::Value, A::Value)| {
         if negative { (alg.neg(&s), alg.neg(&c)) } else { (s, c) }

@@ -46,7 +46,7 @@ fn of_set(
     field: &ConstantField,
     negate: bool,
 ) -> Vec<Expr> {
-    debug_assert_eq!(arm.dof(), elements.joints.len());
+    debug_assert_eq!(arm.links(), elements.joints.len());
     let half = b.constant(&Rational::new(1.into(), 2.into()));
     let half = if negate { -half } else { half };
     let columns = twice_lagrangian(b, elements);

@@ -6,6 +6,7 @@ pub mod chain;
 pub mod composite;
 pub mod coriolis;
 pub mod energy;
+pub mod followers;
 pub mod forward;
 pub mod function;
 pub mod inverse;

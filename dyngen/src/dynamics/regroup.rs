@@ -289,7 +289,7 @@ impl Regrouping {
                 minimal_coordinates(field, dependence, &sum)
             }
         };
-        let n = arm.dof();
+        let n = arm.links();
         let mut before_stage = vec![None; n];
         let mut stage_of = vec![0; n];
         for (s, stage) in chain::stages(arm).into_iter().enumerate() {
@@ -349,7 +349,7 @@ impl Regrouping {
             rotor: Expr::ZERO,
             flywheel: Expr::ZERO,
         };
-        let mut bodies = vec![none; arm.dof()];
+        let mut bodies = vec![none; arm.links()];
         let map = Map::new(arm, symbols, field, self.order.origins);
         let term = |factor: &Constant, x: Expr| b.mul(&constant(b, field, factor), &x);
         for (column, sum) in &self.columns {

@@ -1,11 +1,12 @@
 //! What functions take of joint positions: sines and cosines, all angles of a function at once.
 
 use super::lanes::{lane_name, used};
-use crate::arm::{Arm, JointKind};
+use crate::arm::{Arm, Drive, Joint, JointKind};
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::build::trig_offset;
-use crate::dynamics::chain;
+use crate::dynamics::followers::angles;
 use crate::dynamics::function::Argument;
+use crate::exact::rational;
 use crate::graph::{Input, JointSum};
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
@@ -15,9 +16,13 @@ use std::collections::BTreeSet;
 /// The struct of sines and cosines that functions share.
 pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
     let (bindings, fields) = trig_fields(arm, &all_inputs(arm));
-    let sums: Vec<String> = chain::sums(arm)
-        .iter()
-        .enumerate()
+    let drives = arm.drives();
+    let term = |i: usize| {
+        let Drive { coordinate, joint, ratio, .. } = &drives[i];
+        let q = format!("q{}", coordinate + 1);
+        if *joint == i { q } else { format!("{}·{q}", rational::to_f64(ratio)) }
+    };
+    let sums: Vec<String> = (angles(arm).iter().enumerate().skip(arm.dof()))
         .map(|(k, sum)| {
             let text: String = sum
                 .joints()
@@ -30,16 +35,16 @@ pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
                     } else {
                         " + "
                     };
-                    format!("{sign}q{}", i + 1)
+                    format!("{sign}{}", term(i))
                 })
                 .collect();
-            format!(" Angle {}: {text}, across parallel axes.", arm.dof() + k + 1)
+            format!(" Angle {}: {text}, across parallel axes.", k + 1)
         })
         .collect();
     let count = Literal::usize_unsuffixed(angles(arm).len());
-    let shifted: Vec<String> = (0..arm.dof())
-        .filter(|i| trig_offset(arm, *i) != 0.0)
-        .map(|i| format!(" Joint {}: of q + {} rad.", i + 1, trig_offset(arm, i)))
+    let shifted: Vec<String> = (arm.coordinates().into_iter().enumerate())
+        .filter(|(_, joint)| trig_offset(arm, *joint) != 0.0)
+        .map(|(i, joint)| format!(" Joint {}: of q + {} rad.", i + 1, trig_offset(arm, joint)))
         .collect();
     quote! {
         /// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
@@ -73,7 +78,16 @@ pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
 /// Everything that is made of q.
 fn all_inputs(arm: &Arm) -> BTreeSet<Input> {
     let turning = angles(arm).into_iter().flat_map(|sum| [Input::Sin(sum), Input::Cos(sum)]);
-    turning.chain((0..arm.dof()).map(Input::Position)).collect()
+    let read = (0..arm.dof()).filter(|i| is_read(arm, *i));
+    turning.chain(read.map(Input::Position)).collect()
+}
+
+/// Whether a coordinate may be read as it is: where it, or a joint that follows it, is prismatic.
+fn is_read(arm: &Arm, coordinate: usize) -> bool {
+    let slides = |(joint, drive): (&Joint, &Drive)| {
+        drive.coordinate == coordinate && joint.kind == JointKind::Prismatic
+    };
+    arm.joints.iter().zip(&arm.drives()).any(slides)
 }
 
 pub(super) fn uses_positions(used: &BTreeSet<Input>) -> bool {
@@ -101,8 +115,7 @@ impl Positions {
     fn new(arm: &Arm, used: &BTreeSet<Input>, position: impl Fn(usize) -> TokenStream) -> Positions {
         let zero = quote!(T::zero());
         let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
-        let places: Vec<bool> =
-            (0..arm.dof()).map(|i| !revolute(i) && used.contains(&Input::Position(i))).collect();
+        let places: Vec<bool> = (0..arm.dof()).map(|i| used.contains(&Input::Position(i))).collect();
         let (mut found, mut sines, mut cosines) = (Vec::new(), Vec::new(), Vec::new());
         for sum in angles(arm) {
             let turns = sum.joints().all(|(i, _)| revolute(i));
@@ -125,10 +138,18 @@ impl Positions {
     }
 }
 
-/// An angle of the joints at their positions.
+/// An angle of the joints for the coordinates' positions.
 fn angle(arm: &Arm, sum: JointSum, position: impl Fn(usize) -> TokenStream) -> TokenStream {
+    let drives = arm.drives();
     let terms = sum.joints().enumerate().map(|(k, (i, negative))| {
-        let q = position(i);
+        let Drive { coordinate, joint, ratio, .. } = &drives[i];
+        let q = position(*coordinate);
+        let q = if *joint == i {
+            q
+        } else {
+            let ratio = Literal::f64_suffixed(rational::to_f64(ratio));
+            quote!(nalgebra::convert::<f64, T>(#ratio) * #q)
+        };
         match (k, negative) {
             (0, _) => q,
             (_, false) => quote!(+ #q),
@@ -141,6 +162,12 @@ fn angle(arm: &Arm, sum: JointSum, position: impl Fn(usize) -> TokenStream) -> T
         quote!(+ nalgebra::convert::<f64, T>(#offset))
     });
     quote!(#(#terms)* #offset)
+}
+
+/// The coordinates that an angle depends on.
+fn coordinates_of(arm: &Arm, sum: JointSum) -> BTreeSet<usize> {
+    let drives = arm.drives();
+    sum.joints().map(|(i, _)| drives[i].coordinate).collect()
 }
 
 /// Computes all sines and cosines together, and builds a `Trig` of the inputs that are used. A pattern over
@@ -176,7 +203,8 @@ pub(super) fn angle_functions(arm: &Arm, functions: &[FunctionGraph]) -> TokenSt
         .collect();
     let items = sets.iter().map(|sums| {
         let (name, count) = (angles_name(sums.iter().copied()), Literal::usize_unsuffixed(sums.len()));
-        let reads = |i: usize| sums.iter().any(|sum| sum.sign(i).is_some());
+        let read: BTreeSet<usize> = sums.iter().flat_map(|sum| coordinates_of(arm, *sum)).collect();
+        let reads = |i: usize| read.contains(&i);
         let patterns = (0..arm.dof()).map(|i| if reads(i) { position(i) } else { quote!(_) });
         let values = sums.iter().map(|sum| angle(arm, *sum, position));
         quote! {
@@ -194,7 +222,7 @@ pub(super) fn angle_functions(arm: &Arm, functions: &[FunctionGraph]) -> TokenSt
 pub(super) struct TrigOfLane {
     /// Lines without a branch that make its `trig`.
     pub(super) lines: TokenStream,
-    /// Joints whose angles that is right for only where they are near.
+    /// Coordinates for which that is right only where they are near.
     pub(super) turning: BTreeSet<usize>,
     /// Whether each joint's position is read.
     pub(super) read: Vec<bool>,
@@ -218,7 +246,7 @@ impl TrigOfLane {
             let trig = #trig;
         };
         let turning: BTreeSet<usize> =
-            angles.iter().flat_map(|(sum, ..)| sum.joints().map(|(i, _)| i)).collect();
+            angles.iter().flat_map(|(sum, ..)| coordinates_of(arm, *sum)).collect();
         let read = (0..arm.dof()).map(|i| places[i] || turning.contains(&i)).collect();
         TrigOfLane { lines, turning, read }
     }
@@ -238,11 +266,6 @@ pub(super) fn trigonometry(arm: &Arm) -> TokenStream {
             #(#items)*
         }
     }
-}
-
-/// The angles of a `Trig`: those of the joints, then sums of parallel joints' angles.
-fn angles(arm: &Arm) -> Vec<JointSum> {
-    (0..arm.dof()).map(JointSum::joint).chain(chain::sums(arm)).collect()
 }
 
 /// Names for what is read of a `Trig`.

@@ -5,6 +5,7 @@ use super::angles::TrigOfLane;
 use super::{code, docs, lanes};
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;
+use crate::exact::rational::to_f64;
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
@@ -13,12 +14,15 @@ use quote::{format_ident, quote};
 pub(super) fn module(model: &Model, functions: &[FunctionGraph]) -> TokenStream {
     let items: Vec<TokenStream> = functions.iter().map(|built| function(model, built)).collect();
     let has_angles = functions.iter().any(|built| !TrigOfLane::new(model, built).turning.is_empty());
+    // With joints that turn faster than what they follow the angles are larger than q.
+    let fastest = model.arm().drives().iter().fold(1.0f64, |m, drive| m.max(to_f64(&drive.ratio).abs()));
+    let limit = Literal::f64_unsuffixed(6000.0 / fastest);
     let are_near = has_angles.then(|| {
         quote! {
             /// Whether sums of a few of these angles are right without a branch.
             #[inline(always)]
             fn are_near<T: SimdRealField + Copy>(angles: &[T]) -> bool {
-                let limit = nalgebra::convert(6000.0);
+                let limit = nalgebra::convert(#limit);
                 // No early end: that would be a branch for each angle.
                 angles
                     .iter()

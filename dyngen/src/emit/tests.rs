@@ -163,8 +163,8 @@ pub(super) fn module(model: &Model, options: &Options) -> Result<TokenStream, Er
 /// Eleven parameters a link of bodies that keep the declared symmetries: a compact body whose mass shrinks
 /// outwards.
 fn sample_bodies(arm: &Arm) -> Vec<f64> {
-    let mut all = Vec::with_capacity(11 * arm.dof());
-    for link in 0..arm.dof() {
+    let mut all = Vec::with_capacity(11 * arm.links());
+    for link in 0..arm.links() {
         let mass = 4.0 / (1.0 + link as f64);
         let keeps = |kind| arm.keeps(crate::arm::Parameter { link, kind });
         let place = |kind, x: f64| if keeps(kind) { x } else { 0.0 };

@@ -20,6 +20,23 @@ impl Angle {
         Angle::PiMultiple(Rational::zero())
     }
 
+    /// Σ factor·angle: exact where all are multiples of pi, else in radians.
+    pub fn sum(terms: &[(Angle, Rational)]) -> Angle {
+        let (mut multiple, mut radians) = (Rational::zero(), Rational::zero());
+        for (angle, factor) in terms {
+            match angle {
+                Angle::PiMultiple(x) => multiple += x * factor,
+                Angle::Radians(x) => radians += x * factor,
+            }
+        }
+        if radians.is_zero() {
+            return Angle::PiMultiple(multiple);
+        }
+        // pi is no rational; what is added to a number of radians is as near to it as a number can be.
+        let turn = Rational::from_float(Angle::PiMultiple(multiple).radians()).unwrap_or_default();
+        Angle::from_radians(radians + turn)
+    }
+
     /// The number of quarter turns, 0 to 3, where the angle is a multiple of pi/2.
     pub fn quarter_turns(&self) -> Option<u8> {
         let Angle::PiMultiple(multiple) = self else { return None };

@@ -176,15 +176,23 @@ pub fn unit_vectors(
 
 /// The rank of a dense matrix modulo the prime.
 pub fn rank(rows: Vec<Vec<Fp>>) -> usize {
-    let mut echelon: BTreeMap<usize, Vec<Fp>> = BTreeMap::new();
-    for mut row in rows {
-        if let Some(lead) = reduce_modular(&mut row, &echelon) {
-            let scale = row[lead].inverse().unwrap_or(Fp::ONE);
-            row.iter_mut().for_each(|x| *x = *x * scale);
-            echelon.insert(lead, row);
-        }
+    let mut echelon = Echelon::default();
+    rows.into_iter().map(|row| usize::from(echelon.takes(row))).sum()
+}
+
+/// Independent rows modulo the prime, as they come.
+#[derive(Clone, Debug, Default)]
+pub struct Echelon(BTreeMap<usize, Vec<Fp>>);
+
+impl Echelon {
+    /// Takes a row if it is independent of those before.
+    pub fn takes(&mut self, mut row: Vec<Fp>) -> bool {
+        let Some(lead) = reduce_modular(&mut row, &self.0) else { return false };
+        let scale = row[lead].inverse().unwrap_or(Fp::ONE);
+        row.iter_mut().for_each(|x| *x = *x * scale);
+        self.0.insert(lead, row);
+        true
     }
-    echelon.len()
 }
 
 fn reduce_modular(row: &mut [Fp], echelon: &BTreeMap<usize, Vec<Fp>>) -> Option<usize> {

@@ -27,8 +27,8 @@ pub struct Known {
     pub values: Vec<f64>,
     /// For each link what is known of its parameters, in words: sums with values and standard errors.
     pub words: Vec<Vec<String>>,
-    /// By joint.
-    pub friction: Option<Vec<Friction>>,
+    /// By joint; none of those that follow others, whose friction is felt at the joint that they follow.
+    pub friction: Option<Vec<Option<Friction>>>,
 }
 
 impl Known {
@@ -64,7 +64,7 @@ impl Known {
         if !missing.is_empty() {
             return Err(format!("{file}: no value for {}", missing.join(", ")));
         }
-        for link in 0..arm.dof() {
+        for link in 0..arm.links() {
             let ten: [f64; 10] = std::array::from_fn(|k| all[11 * link + k]);
             let scale = ten.iter().fold(0.0f64, |m, x| m.max(x.abs()));
             let least = pseudo_inertia(&ten).symmetric_eigenvalues().min();
@@ -83,17 +83,17 @@ impl Known {
 }
 
 fn is_of(arm: &Arm, name: &str) -> bool {
-    Parameter::parse(name).is_some_and(|p| p.link < arm.dof())
+    Parameter::parse(name).is_some_and(|p| p.link < arm.links())
 }
 
 /// The sums that an identification lists, with their errors, at each link whose parameters they hold.
 fn words(arm: &Arm, json: &Value) -> Vec<Vec<String>> {
-    let mut words = vec![Vec::new(); arm.dof()];
+    let mut words = vec![Vec::new(); arm.links()];
     for entry in json.get("parameters").and_then(Value::as_array).into_iter().flatten() {
         let (Some(name), Some(value)) = (entry["name"].as_str(), entry["value"].as_f64()) else { continue };
         let links = match parse_sum(name) {
             // The sum's first term is its own; others only add to it.
-            Ok(terms) => terms.first().map(|(p, _)| p.link).filter(|link| *link < arm.dof()),
+            Ok(terms) => terms.first().map(|(p, _)| p.link).filter(|link| *link < arm.links()),
             Err(_) => None,
         };
         if let Some(link) = links {
@@ -105,7 +105,7 @@ fn words(arm: &Arm, json: &Value) -> Vec<Vec<String>> {
 }
 
 /// Eq. 16 of the paper, γ1 tanh(γ2 q̇) + γ3 tanh(γ4 q̇) + γ5 q̇: its saturating terms come to γ1 + γ3.
-fn read_friction(arm: &Arm, text: &str, file: &str) -> Result<Vec<Friction>, String> {
+fn read_friction(arm: &Arm, text: &str, file: &str) -> Result<Vec<Option<Friction>>, String> {
     let wrong = |what: String| format!("{file}: {what}");
     let json: Value = serde_json::from_str(text).map_err(|e| wrong(format!("not valid JSON: {e}")))?;
     let list = json.get("friction").and_then(Value::as_array);
@@ -125,5 +125,7 @@ fn read_friction(arm: &Arm, text: &str, file: &str) -> Result<Vec<Friction>, Str
         let coulomb_std = std(0).map(|s| s + std(2).unwrap_or(0.0));
         Ok(Friction { viscous, coulomb: first + second, std: [std(4), coulomb_std] })
     };
-    (0..arm.dof()).map(of_joint).collect()
+    let coordinates = arm.coordinates();
+    let coordinate = |link: usize| coordinates.iter().position(|joint| *joint == link);
+    (0..arm.links()).map(|link| coordinate(link).map(of_joint).transpose()).collect()
 }

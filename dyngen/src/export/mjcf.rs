@@ -48,7 +48,7 @@ pub fn mjcf(
         let line = robot.joints.iter().find(|j| j.name == joint.name).map_or(0, |j| j.line);
         let rotor = known.values[11 * i + 10];
         let armature = arm.joints[i].rotor_ratio.as_ref().map(|k| to_f64(k).powi(2) * rotor);
-        let friction = known.friction.as_ref().map(|f| f[i]);
+        let friction = known.friction.as_ref().and_then(|f| f[i]);
         let old = (joint.position, degrees);
         writer.joint((&joint.name, line), &arm.joints[i], friction, armature, old);
     }

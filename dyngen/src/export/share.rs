@@ -2,7 +2,7 @@
 
 use super::body::{Body, apart, frames};
 use super::known::Known;
-use crate::arm::Arm;
+use crate::arm::{Arm, Joint};
 use crate::import::Options;
 use crate::import::chain::{Chain, ChainJoint};
 use crate::import::pose::Pose;
@@ -97,15 +97,22 @@ fn own(robot: &Robot, name: &str, pose: &Pose) -> Body {
     })
 }
 
+/// Of all joints, those that follow others too.
+fn all_names(arm: &Arm) -> Vec<String> {
+    let name = |(i, joint): (usize, &Joint)| joint.name.clone().unwrap_or_else(|| (i + 1).to_string());
+    arm.joints.iter().enumerate().map(name).collect()
+}
+
 /// The joints' names and axes must be the arm's.
 fn same_arm(arm: &Arm, chain: &Chain) -> Result<(), String> {
     let names: Vec<&str> = chain.joints.iter().map(|joint| joint.name.as_str()).collect();
-    if names.len() != arm.dof() || arm.has_joint_names() && arm.joint_names() != names {
+    let named = |i: usize| arm.joints[i].name.as_deref().is_none_or(|name| name == names[i]);
+    if names.len() != arm.links() || !(0..names.len()).all(named) {
         return Err(format!(
             "its joints are {}, those of the arm {}: give --base, --tip and --lock as they were given to \
              the import",
             names.join(", "),
-            arm.joint_names().join(", ")
+            all_names(arm).join(", ")
         ));
     }
     let (_, axes) = frames(arm);

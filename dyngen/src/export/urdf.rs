@@ -55,9 +55,9 @@ pub fn urdf(
             }
         }
         writer.notes.extend(share.note);
-        writer.joint(&chain.joints[i].name, &arm.joints[i], known.friction.as_ref().map(|f| f[i]));
+        writer.joint(&chain.joints[i].name, &arm.joints[i], known.friction.as_ref().and_then(|f| f[i]));
     }
-    if (0..arm.dof()).any(|i| known.values[11 * i + 10] != 0.0) {
+    if (0..arm.links()).any(|i| known.values[11 * i + 10] != 0.0) {
         let what = "rotor inertias are left out: a URDF has no place for them".to_string();
         writer.notes.push(what);
     }

@@ -36,6 +36,8 @@ pub(crate) struct ChainJoint {
     pub(crate) position: Option<[f64; 2]>,
     pub(crate) velocity: Option<f64>,
     pub(crate) torque: Option<f64>,
+    /// The joint of the chain that it follows, by its index there, with ratio and offset.
+    pub(crate) follows: Option<(usize, Mimic)>,
     /// What the file says of its drive.
     pub(crate) motor: Option<Motor>,
     /// The links that move as one behind the joint.
@@ -95,7 +97,12 @@ pub(crate) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<Strin
             walk.body(child, &pose);
         }
     }
-    let Walk { joints, mut refused, notes, .. } = walk;
+    let Walk { mut joints, mut refused, notes, .. } = walk;
+    let names: Vec<String> = joints.iter().map(|joint| joint.name.clone()).collect();
+    for joint in &mut joints {
+        let mimic = robot.joints.iter().find(|j| j.name == joint.name).and_then(|j| j.mimic.clone());
+        joint.follows = mimic.and_then(|m| Some((names.iter().position(|n| *n == m.joint)?, m)));
+    }
     match joints.len() {
         1..=MAX_JOINTS => {}
         0 if refused.is_empty() => refused.push(format!(
@@ -114,7 +121,7 @@ pub(crate) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<Strin
     if !refused.is_empty() {
         return Err(refused);
     }
-    let mut notes = notes;
+    let mut notes: Vec<String> = notes.into_iter().chain(robot.notes.iter().cloned()).collect();
     let massless = joints.iter().filter(|joint| joint.masses.is_empty());
     let massless: Vec<String> = massless.map(|joint| format!("'{}'", joint.name)).collect();
     if massless.len() == joints.len() {
@@ -331,16 +338,18 @@ impl Walk<'_> {
             "prismatic" => Some(JointKind::Prismatic),
             other => {
                 self.refused.push(format!(
-                    "line {}: joint '{name}' is {other}: an arm file has revolute and prismatic joints only",
-                    joint.line
+                    "line {}: joint '{name}' is {other}: an arm file has revolute and prismatic joints only \
+                     (--base '{}' starts behind it)",
+                    joint.line, joint.child
                 ));
                 None
             }
         };
         let pose = self.origin(&joint.origin, parent, &format!("joint '{name}'"));
         let Some(kind) = kind else { return (pose, false) };
+        self.notes.extend(joint.note.clone());
         if let Some(mimic) = &joint.mimic {
-            self.follows(joint, mimic);
+            self.may_follow(joint, mimic);
         }
         let axis = Vector3::from(joint.axis);
         let length = axis.norm();
@@ -366,6 +375,7 @@ impl Walk<'_> {
             position: (bounded && lower < upper).then_some([lower, upper]),
             velocity: (velocity > 0.0 && usable(velocity)).then_some(velocity),
             torque: (effort > 0.0 && usable(effort)).then_some(effort),
+            follows: None,
             motor: joint.motor,
             links: Vec::new(),
             poses: Vec::new(),
@@ -374,14 +384,22 @@ impl Walk<'_> {
         (pose, true)
     }
 
-    /// A joint that follows another one of the chain: both are joints of the arm, and it is said how their
-    /// torques go together.
-    fn follows(&mut self, joint: &Joint, Mimic { joint: leader, ratio, offset }: &Mimic) {
+    /// A joint that follows another one must follow one of the chain, by a ratio that moves it.
+    fn may_follow(&mut self, joint: &Joint, Mimic { joint: leader, ratio, offset }: &Mimic) {
         let name = &joint.name;
-        if self.path.iter().any(|j| self.tree.robot.joints[*j].name == *leader) {
+        let leads = |j: &usize| self.tree.moves(*j) && self.tree.robot.joints[*j].name == *leader;
+        if !usable(*ratio) || !usable(*offset) || *ratio == 0.0 {
+            self.refused.push(format!(
+                "line {}: joint '{name}' mimics joint '{leader}' with the multiplier {ratio} and the offset \
+                 {offset}: --lock {name}=0 holds it",
+                joint.line
+            ));
+        } else if *leader == *name {
+            self.refused.push(format!("line {}: joint '{name}' mimics itself", joint.line));
+        } else if self.path.iter().any(leads) {
             self.notes.push(format!(
-                "joint '{name}' follows joint '{leader}': q({name}) = {ratio}·q({leader}) + {offset}. Both are \
-                 joints of the arm; the torque of the drive at '{leader}' is tau({leader}) + {ratio}·tau({name})"
+                "joint '{name}' follows joint '{leader}': q({name}) = {ratio}·q({leader}) + {offset}. It is a \
+                 link of the arm without a coordinate of its own"
             ));
         } else {
             self.refused.push(format!(

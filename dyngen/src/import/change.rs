@@ -27,7 +27,13 @@ impl Change {
         let mut draws = Draws::new(0x0072_6f75_6e64);
         let mut change = Change::default();
         for _ in 0..POSES {
-            let q: Vec<f64> = one.joints.iter().map(|joint| within(joint, &mut draws)).collect();
+            let mut q: Vec<f64> = one.joints.iter().map(|joint| within(joint, &mut draws)).collect();
+            // Of those that follow one that follows in turn only the range is looked at.
+            for (i, joint) in one.joints.iter().enumerate() {
+                if let Some((leader, mimic)) = &joint.follows {
+                    q[i] = mimic.ratio * q[*leader] + mimic.offset;
+                }
+            }
             let [(a, m), (b, n)] = [one, other].map(|chain| {
                 let moved = displacements(chain, &q);
                 let tip = moved.last().map_or(chain.tip_pose, |last| last.then(&chain.tip_pose));

@@ -4,10 +4,12 @@
 //! not sit at the body's origin, a fixed joint leads back from it. What MuJoCo says of `compiler`, `default`
 //! classes and orientations: mujoco.readthedocs.io, XMLreference and modeling.
 
+use super::equality::{self, Equality};
 use super::orientation::{Angles, turn};
 use super::pose::Pose;
-use super::urdf::{Joint, Link, Motor, Origin, Robot, broken, nested};
-use nalgebra::{Matrix3, Vector3};
+use super::shapes::{GROUPS, Solid};
+use super::urdf::{Joint, Link, Mimic, Motor, Origin, Robot, broken, nested};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::BTreeMap;
 
@@ -39,6 +41,7 @@ pub(crate) fn read(text: &str) -> Result<Robot, String> {
         compiler: Compiler::default(),
         classes: BTreeMap::new(),
         gears: BTreeMap::new(),
+        references: BTreeMap::new(),
         robot: Robot { name: root.attribute("model").unwrap_or("").to_string(), ..Robot::default() },
         errors: Vec::new(),
     };
@@ -53,20 +56,34 @@ pub(crate) fn angles_are_radians(document: &Document<'_>) -> bool {
 }
 
 /// What `<compiler>` says of numbers.
-#[derive(Default)]
 struct Compiler {
     angles: Angles,
     /// Whether a joint with a range is limited without saying so; it is unless this is set.
     no_auto_limits: bool,
+    /// Of shapes whose mass counts.
+    groups: [f64; 2],
 }
+
+impl Default for Compiler {
+    fn default() -> Self {
+        Compiler { angles: Angles::default(), no_auto_limits: false, groups: GROUPS }
+    }
+}
+
+/// Attributes that a default class gives to joints and to geoms.
+type Class = [BTreeMap<String, String>; 2];
+const JOINT: usize = 0;
+const GEOM: usize = 1;
 
 struct Reader<'d, 'i> {
     document: &'d Document<'i>,
     compiler: Compiler,
-    /// Attributes of joints by class, with those of the classes around.
-    classes: BTreeMap<String, BTreeMap<String, String>>,
+    /// Attributes of joints and shapes by class, with those of the classes around.
+    classes: BTreeMap<String, Class>,
     /// Gear of the actuator of a joint.
     gears: BTreeMap<String, f64>,
+    /// Positions of joints where the model is drawn, where they are not zero, rad or m.
+    references: BTreeMap<String, f64>,
     robot: Robot,
     errors: Vec<String>,
 }
@@ -104,7 +121,7 @@ impl<'d, 'i> Reader<'d, 'i> {
             }
         }
         for node in sections("default") {
-            self.class(node, "main", &BTreeMap::new());
+            self.class(node, "main", &Class::default());
         }
         for node in sections("actuator").flat_map(elements) {
             if let (Some(joint), Some(gear)) = (node.attribute("joint"), node.attribute("gear")) {
@@ -115,6 +132,33 @@ impl<'d, 'i> Reader<'d, 'i> {
         self.robot.links.push(massless(WORLD, 1));
         for node in sections("worldbody") {
             self.children(node, WORLD, &Pose::identity(), "main");
+        }
+        for node in sections("equality").flat_map(elements) {
+            self.equality(node);
+        }
+    }
+
+    /// A joint that follows another one by a straight line is one that mimics it; other equalities are told.
+    fn equality(&mut self, node: Node<'d, 'i>) {
+        let (line, kind) = (self.line(node), node.tag_name().name());
+        let reference = |joint: &str| self.references.get(joint).copied().unwrap_or(0.0);
+        let left_out = |what: &str| format!("line {line}: the equality <{kind}> is left out: {what}");
+        match equality::read(node) {
+            Ok(None) => {}
+            Ok(Some(Equality::LeftOut(why))) => self.robot.notes.push(left_out(why)),
+            Ok(Some(Equality::Stands { joint, offset })) => {
+                let held = offset + reference(&joint);
+                let what = left_out(&format!("it holds joint '{joint}', as --lock {joint}={held} does"));
+                self.robot.notes.push(what);
+            }
+            Ok(Some(Equality::Follows { joint, leader, offset, ratio })) => {
+                let offset = offset + reference(&joint) - ratio * reference(&leader);
+                match self.robot.joints.iter_mut().find(|j| j.name == joint) {
+                    Some(follower) => follower.mimic = Some(Mimic { joint: leader, ratio, offset }),
+                    None => self.error(node, format!("<joint joint1=\"{joint}\">: there is no such joint")),
+                }
+            }
+            Err(message) => self.error(node, message),
         }
     }
 
@@ -144,16 +188,21 @@ impl<'d, 'i> Reader<'d, 'i> {
         if node.attribute("inertiafromgeom") == Some("true") {
             self.error(node, "compiler: inertiafromgeom sets inertials aside: save the compiled model first");
         }
+        if let Some(groups) = self.numbers::<2>(node, "inertiagrouprange") {
+            self.compiler.groups = groups;
+        }
         if node.attribute("coordinate") == Some("global") {
             self.error(node, "compiler: global coordinates are not read: save the compiled model first");
         }
     }
 
-    fn class(&mut self, node: Node<'d, 'i>, name: &str, around: &BTreeMap<String, String>) {
+    fn class(&mut self, node: Node<'d, 'i>, name: &str, around: &Class) {
         let name = node.attribute("class").unwrap_or(name);
         let mut own = around.clone();
-        for joint in elements(node).filter(|n| n.has_tag_name("joint")) {
-            own.extend(joint.attributes().map(|a| (a.name().to_string(), a.value().to_string())));
+        for (own, kind) in own.iter_mut().zip(["joint", "geom"]) {
+            for element in elements(node).filter(|n| n.has_tag_name(kind)) {
+                own.extend(attributes(element));
+            }
         }
         self.classes.insert(name.to_string(), own.clone());
         for inner in elements(node).filter(|n| n.has_tag_name("default")) {
@@ -195,7 +244,7 @@ impl<'d, 'i> Reader<'d, 'i> {
             parent = link;
         }
         self.robot.joints.push(fixed(&parent, &name, &at, line));
-        let link = self.inertial(node, &name, line);
+        let link = self.inertial(node, &name, line, &class);
         self.robot.links.push(link);
         self.children(node, &name, &Pose::identity(), &class);
     }
@@ -217,8 +266,7 @@ impl<'d, 'i> Reader<'d, 'i> {
             None => format!("{body}, joint in line {line}"),
         };
         let class = node.attribute("class").unwrap_or(class);
-        let mut all = self.classes.get(class).cloned().unwrap_or_default();
-        all.extend(node.attributes().map(|a| (a.name().to_string(), a.value().to_string())));
+        let all = self.all_attributes(node, class, JOINT);
         let place = format!("joint '{name}'");
         let mut list = |key: &str, count: usize| -> Option<Vec<f64>> {
             let text = all.get(key)?;
@@ -235,15 +283,14 @@ impl<'d, 'i> Reader<'d, 'i> {
         let point = Vector3::from(three(list("pos", 3), [0.0; 3]));
         let range = list("range", 2);
         let mut number = |key: &str| list(key, 1).map_or(0.0, |v| v[0]);
-        let (armature, damping, loss, reference) =
-            (number("armature"), number("damping"), number("frictionloss"), number("ref"));
+        let (armature, damping, loss, reference, stiffness) = (
+            number("armature"),
+            number("damping"),
+            number("frictionloss"),
+            number("ref"),
+            number("stiffness"),
+        );
         let force = list("actuatorfrcrange", 2);
-        if reference != 0.0 {
-            self.error(
-                node,
-                format!("{place}: ref = {reference}: its position must be 0 where the model is drawn"),
-            );
-        }
         let free = node.has_tag_name("freejoint");
         let kind = match all.get("type").map(String::as_str) {
             _ if free => "floating",
@@ -260,7 +307,15 @@ impl<'d, 'i> Reader<'d, 'i> {
         let unit = if kind == "revolute" { self.compiler.angles.unit() } else { 1.0 };
         let range = range.filter(|r| limited && r[0] < r[1]).map(|r| [r[0] * unit, r[1] * unit]);
         let motor = Motor { armature, damping, friction: loss, gear: self.gears.get(&name).copied() };
-        let joint_at = Pose { origin: at.point(point), ..*at };
+        let note = (stiffness != 0.0)
+            .then(|| format!("line {line}: {place}: its spring of {stiffness} N·m/rad (or N/m) is left out"));
+        let reference = reference * unit;
+        if reference != 0.0 {
+            self.references.insert(name.clone(), reference);
+        }
+        // Where the model is drawn the joint is at its reference: it goes back by that to zero.
+        let back = back(kind, Vector3::from(axis), reference);
+        let joint_at = Pose { origin: at.point(point), ..*at }.then(&back);
         self.robot.joints.push(Joint {
             name,
             line,
@@ -275,20 +330,68 @@ impl<'d, 'i> Reader<'d, 'i> {
             velocity: 0.0,
             mimic: None,
             motor: Some(motor),
+            note,
         });
         Pose { rotation: Matrix3::identity(), origin: -point }
     }
 
-    fn inertial(&mut self, node: Node<'d, 'i>, name: &str, line: u32) -> Link {
+    /// An element's attributes, with those of its class.
+    fn all_attributes(&self, node: Node<'d, 'i>, class: &str, kind: usize) -> BTreeMap<String, String> {
+        let class = self.classes.get(node.attribute("class").unwrap_or(class));
+        let mut all = class.map(|class| class[kind].clone()).unwrap_or_default();
+        all.extend(attributes(node));
+        all
+    }
+
+    /// The shapes of a body, or of a frame in it, which lies at `pose` in the body.
+    fn solids(
+        &mut self,
+        node: Node<'d, 'i>,
+        pose: &Pose,
+        class: &str,
+        solids: &mut Vec<Solid>,
+    ) -> Result<(), String> {
+        for child in elements(node) {
+            match child.tag_name().name() {
+                "geom" => {
+                    let all = self.all_attributes(child, class, GEOM);
+                    let at = self.pose(child);
+                    let solid = Solid::read(&all, at, self.compiler.groups)?;
+                    solids.extend(solid.map(|solid| solid.seen_from(pose)));
+                }
+                "frame" => {
+                    let inner = pose.then(&self.pose(child));
+                    let class = child.attribute("childclass").unwrap_or(class).to_string();
+                    self.solids(child, &inner, &class, solids)?;
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// A body without `<inertial>` has the inertia of its shapes.
+    fn of_shapes(&mut self, node: Node<'d, 'i>, name: &str, line: u32, class: &str) -> Link {
+        let mut solids = Vec::new();
+        if let Err(why) = self.solids(node, &Pose::identity(), class, &mut solids) {
+            let note = format!(
+                "line {line}: body '{name}' has no <inertial>, and {why}: here it has no mass \
+                 (mujoco.mj_saveLastXML writes inertials)"
+            );
+            return Link { note: Some(note), ..massless(name, line) };
+        }
+        let (mass, centre, t) = Solid::together(&solids);
+        let note = (mass > 0.0).then(|| {
+            format!("line {line}: body '{name}' has no <inertial>: it has the {mass:.6} kg of its shapes")
+        });
+        let inertia = [t[(0, 0)], t[(0, 1)], t[(0, 2)], t[(1, 1)], t[(1, 2)], t[(2, 2)]];
+        let origin = Origin { xyz: centre.into(), rpy: [0.0; 3] };
+        Link { origin, mass, inertia, note, ..massless(name, line) }
+    }
+
+    fn inertial(&mut self, node: Node<'d, 'i>, name: &str, line: u32, class: &str) -> Link {
         let Some(inertial) = elements(node).find(|n| n.has_tag_name("inertial")) else {
-            let shapes = elements(node).any(|n| n.has_tag_name("geom"));
-            let note = shapes.then(|| {
-                format!(
-                    "line {line}: body '{name}' has no <inertial>: MuJoCo takes its mass from geoms, here \
-                     it has none (mujoco.mj_saveLastXML writes inertials)"
-                )
-            });
-            return Link { note, ..massless(name, line) };
+            return self.of_shapes(node, name, line, class);
         };
         let pose = self.pose(inertial);
         let [mass] = self.numbers::<1>(inertial, "mass").unwrap_or([0.0]);
@@ -332,8 +435,25 @@ impl<'d, 'i> Reader<'d, 'i> {
     }
 }
 
+fn attributes<'i>(node: Node<'_, 'i>) -> impl Iterator<Item = (String, String)> {
+    let all: Vec<_> = node.attributes().map(|a| (a.name().to_string(), a.value().to_string())).collect();
+    all.into_iter()
+}
+
 fn elements<'d, 'i>(node: Node<'d, 'i>) -> impl Iterator<Item = Node<'d, 'i>> {
     node.children().filter(|n| n.is_element())
+}
+
+/// From where a joint is at its reference to where it is at zero.
+fn back(kind: &str, axis: Vector3<f64>, reference: f64) -> Pose {
+    let still = Pose::identity();
+    match (kind, axis.try_normalize(1e-9)) {
+        ("revolute", Some(axis)) => {
+            Pose { rotation: Rotation3::new(-axis * reference).into_inner(), ..still }
+        }
+        ("prismatic", Some(axis)) => Pose { origin: -axis * reference, ..still },
+        _ => still,
+    }
 }
 
 fn massless(name: &str, line: u32) -> Link {
@@ -355,6 +475,7 @@ fn fixed(parent: &str, child: &str, at: &Pose, line: u32) -> Joint {
         velocity: 0.0,
         mimic: None,
         motor: None,
+        note: None,
     }
 }
 

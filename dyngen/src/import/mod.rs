@@ -11,11 +11,13 @@
 
 pub(crate) mod chain;
 mod change;
+mod equality;
 mod frames;
 pub(crate) mod mjcf;
 mod orientation;
 pub(crate) mod pose;
 mod rounding;
+mod shapes;
 mod text;
 pub(crate) mod urdf;
 

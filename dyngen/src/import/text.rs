@@ -58,6 +58,14 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
             length(row.d),
             angle(row.theta),
         );
+        if let Some((leader, mimic)) = &joint.follows {
+            let (ratio, offset) = (mimic.ratio, mimic.offset);
+            let _ = writeln!(
+                text,
+                "mimic = {{ joint = {}, ratio = {ratio:?}, offset = {offset:?} }}",
+                leader + 1
+            );
+        }
         if let Some(motor) = joint.motor {
             if let Some(ratio) = ratio(joint) {
                 let _ = writeln!(text, "rotor_ratio = {ratio:?}  # armature {:?}", motor.armature);

@@ -11,6 +11,8 @@ pub(crate) struct Robot {
     pub(crate) joints: Vec<Joint>,
     /// Gravity in the root link, where the file says it, m/s².
     pub(crate) gravity: Option<[f64; 3]>,
+    /// What of the file is left out, whatever chain is taken.
+    pub(crate) notes: Vec<String>,
 }
 
 /// A link, with zeros where it has no `<inertial>`.
@@ -48,6 +50,8 @@ pub(crate) struct Joint {
     pub(crate) mimic: Option<Mimic>,
     /// What a MuJoCo model says of its drive.
     pub(crate) motor: Option<Motor>,
+    /// What may surprise, where it is a joint of the chain.
+    pub(crate) note: Option<String>,
 }
 
 /// What a joint follows: its position is ratio · the other's + offset.
@@ -151,10 +155,22 @@ pub(crate) fn nested(text: &str) -> Result<(), String> {
     Ok(())
 }
 
+/// Elements of xacro itself: what is not among them is a call of a macro.
+const XACRO: [&str; 10] =
+    ["macro", "include", "property", "arg", "if", "unless", "insert_block", "element", "attribute", "call"];
+
+fn is_xacro(node: &Node<'_, '_>) -> bool {
+    node.tag_name().namespace().is_some_and(|n| n.contains("xacro"))
+}
+
 fn robot(document: &Document<'_>) -> Result<Robot, String> {
     let root = document.root_element();
-    let xacro = |node: &Node<'_, '_>| node.tag_name().namespace().is_some_and(|n| n.contains("xacro"));
-    if document.descendants().any(|node| xacro(&node)) {
+    let macros: Vec<Node<'_, '_>> = document.descendants().filter(is_xacro).collect();
+    // A call of a macro that nobody defined is left in files that were expanded otherwise.
+    let left_over =
+        |node: &Node<'_, '_>| node.parent_element() == Some(root) && !XACRO.contains(&node.tag_name().name());
+    let computed = || document.descendants().flat_map(|n| n.attributes()).any(|a| a.value().contains("${"));
+    if !macros.is_empty() && (!macros.iter().all(left_over) || computed()) {
         return Err("it is a xacro: expand it first with `xacro FILE.xacro -o robot.urdf`".to_string());
     }
     match root.tag_name().name() {
@@ -166,6 +182,10 @@ fn robot(document: &Document<'_>) -> Result<Robot, String> {
     }
     let mut reader = Reader { document, errors: Vec::new() };
     let mut robot = Robot { name: root.attribute("name").unwrap_or("").to_string(), ..Robot::default() };
+    for node in macros {
+        let (line, name) = (reader.line(node), node.tag_name().name());
+        robot.notes.push(format!("line {line}: the macro <xacro:{name}> was not expanded and is left out"));
+    }
     // An element of another namespace, <drake:joint>, is none of the robot's.
     let own = |node: &Node<'_, '_>| node.tag_name().namespace() == root.tag_name().namespace();
     for node in root.children().filter(|node| node.is_element() && own(node)) {
@@ -245,6 +265,7 @@ impl<'d, 'i> Reader<'d, 'i> {
             velocity,
             mimic,
             motor: None,
+            note: None,
             name,
         })
     }

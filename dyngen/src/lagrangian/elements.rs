@@ -119,7 +119,7 @@ fn constant<A: Algebra>(
 
 /// Where the elements come from: symbols, numbers, inputs of a graph.
 pub trait Source<V> {
-    /// Sine and cosine of q + theta of a revolute joint.
+    /// Sine and cosine of q + theta of a revolute joint, which may follow another one.
     fn joint_trig(&mut self, joint: usize) -> (V, V);
     /// q of a prismatic joint.
     fn position(&mut self, joint: usize) -> V;
@@ -149,7 +149,7 @@ impl<V: Clone> ArmElements<V> {
         symbols: &AngleSymbols,
         source: &mut impl Source<V>,
     ) -> Self {
-        let mut joints = Vec::with_capacity(arm.dof());
+        let mut joints = Vec::with_capacity(arm.links());
         for (i, joint) in arm.joints.iter().enumerate() {
             let d = if joint.d.is_zero() { algebra.integer(0) } else { source.d(i) };
             let (sin, cos, shift) = match joint.kind {

@@ -2,6 +2,7 @@
 //! derived from or proven against.
 
 pub mod elements;
+pub mod followers;
 
 use crate::arm::{Convention, JointKind, ParameterKind};
 use crate::exact::algebra::Algebra;

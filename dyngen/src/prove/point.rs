@@ -1,14 +1,15 @@
 //! A random point: a pose of the arm, rates, and values of its parameters, modulo the prime.
 
-use crate::arm::{Arm, JointKind, Parameter};
+use crate::arm::{Arm, Drive, Parameter};
 use crate::base::Sets;
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;
-use crate::exact::prime::{Draws, Fp};
+use crate::exact::prime::{Draws, Fp, PrimeField};
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::evaluate::sine_and_cosine;
 use crate::graph::{Input, evaluate};
+use crate::lagrangian::followers::{input_angles, with_theta};
 use crate::parameters::{Combination, ParameterSet};
 
 /// A pose, rates and parameter values.
@@ -16,8 +17,12 @@ pub(super) struct Point<'a> {
     pub(super) arm: &'a Arm,
     pub(super) symbols: &'a AngleSymbols,
     pub(super) sets: &'a Sets,
-    /// For a revolute joint sine and cosine of its trigonometric input, for a prismatic one q twice.
-    pub(super) positions: Vec<(Fp, Fp)>,
+    /// How every joint moves with the coordinates.
+    pub(super) drives: Vec<Motion>,
+    /// Sine and cosine of each revolute joint's trigonometric input.
+    angles: Vec<(Fp, Fp)>,
+    /// The coordinates q, where they are taken as they are: as good as free of their sines and cosines.
+    positions: Vec<Fp>,
     pub(super) velocities: Vec<Fp>,
     pub(super) accelerations: Vec<Fp>,
     pub(super) reference_velocities: Vec<Fp>,
@@ -27,25 +32,41 @@ pub(super) struct Point<'a> {
     values: Vec<(Parameter, Fp)>,
 }
 
+/// How a joint moves with the coordinates, modulo the prime.
+#[derive(Clone, Copy)]
+pub(super) struct Motion {
+    pub(super) coordinate: usize,
+    pub(super) ratio: Fp,
+    offset: Fp,
+}
+
+impl Motion {
+    fn of(drive: &Drive) -> Motion {
+        // A number with the prime in its denominator was refused when the sets were derived.
+        let number = |x: &Rational| Fp::from_rational(x).unwrap_or(Fp::ZERO);
+        Motion { coordinate: drive.coordinate, ratio: number(&drive.ratio), offset: number(&drive.offset) }
+    }
+}
+
+/// Sine and cosine of each joint's trigonometric input, for points of the circle.
+fn angles(arm: &Arm, circle: &mut dyn FnMut() -> (Fp, Fp)) -> Vec<(Fp, Fp)> {
+    // A number with the prime in its denominator was refused when the sets were derived.
+    let number = |x: &Rational| Fp::from_rational(x).unwrap_or(Fp::ZERO);
+    input_angles(&PrimeField, arm, &number, circle, None)
+}
+
 impl<'a> Point<'a> {
     pub(super) fn draw(arm: &'a Arm, symbols: &'a AngleSymbols, sets: &'a Sets, draws: &mut Draws) -> Self {
-        let positions = arm
-            .joints
-            .iter()
-            .map(|joint| match joint.kind {
-                JointKind::Revolute => draws.element().circle_point(),
-                JointKind::Prismatic => {
-                    let q = draws.element();
-                    (q, q)
-                }
-            })
-            .collect();
+        let angles = angles(arm, &mut || draws.element().circle_point());
+        let positions = (0..arm.dof()).map(|_| draws.element()).collect();
         let values = arm.kept_parameters().into_iter().map(|p| (p, draws.element())).collect();
         let mut vector = || (0..arm.dof()).map(|_| draws.element()).collect::<Vec<_>>();
         Point {
             arm,
             symbols,
             sets,
+            drives: arm.drives().iter().map(Motion::of).collect(),
+            angles,
             positions,
             velocities: vector(),
             accelerations: vector(),
@@ -56,14 +77,12 @@ impl<'a> Point<'a> {
         }
     }
 
-    /// The same values at the pose where every input angle is zero.
+    /// The same values at the pose where every coordinate's input angle is zero.
     pub(super) fn at_zero(&self) -> Point<'a> {
-        let zero = |joint: &crate::arm::Joint| match joint.kind {
-            JointKind::Revolute => (Fp::ZERO, Fp::ONE),
-            JointKind::Prismatic => (Fp::ZERO, Fp::ZERO),
-        };
         Point {
-            positions: self.arm.joints.iter().map(zero).collect(),
+            drives: self.drives.clone(),
+            angles: angles(self.arm, &mut || (Fp::ZERO, Fp::ONE)),
+            positions: vec![Fp::ZERO; self.positions.len()],
             velocities: self.velocities.clone(),
             accelerations: self.accelerations.clone(),
             reference_velocities: self.reference_velocities.clone(),
@@ -95,15 +114,13 @@ impl<'a> Point<'a> {
     /// Sine and cosine of q + theta: by the addition theorem where theta is a multiple of pi/2; the input
     /// holds any other theta.
     pub(super) fn joint_trig(&self, joint: usize) -> (Fp, Fp) {
-        let (sin, cos) = self.positions[joint];
-        let (st, ct) = match self.arm.joints[joint].theta.quarter_turns() {
-            None => (Fp::ZERO, Fp::ONE),
-            Some(turns) => {
-                let cycle = [0, 1, 0, -1].map(Fp::from_integer);
-                (cycle[usize::from(turns % 4)], cycle[usize::from((turns + 1) % 4)])
-            }
-        };
-        (sin * ct + cos * st, cos * ct - sin * st)
+        with_theta(&PrimeField, &self.arm.joints[joint].theta, self.angles[joint])
+    }
+
+    /// q of a prismatic joint.
+    pub(super) fn joint_position(&self, joint: usize) -> Fp {
+        let drive = &self.drives[joint];
+        drive.ratio * self.positions[drive.coordinate] + drive.offset
     }
 
     /// The sum of the parameters' columns with their values.
@@ -142,9 +159,9 @@ impl<'a> Point<'a> {
             false => Vec::new(),
         };
         let input = |input: Input| match input {
-            Input::Sin(sum) => sine_and_cosine(sum, &|i| self.positions[i]).0,
-            Input::Cos(sum) => sine_and_cosine(sum, &|i| self.positions[i]).1,
-            Input::Position(i) => self.positions[i].0,
+            Input::Sin(sum) => sine_and_cosine(sum, &|i| self.angles[i]).0,
+            Input::Cos(sum) => sine_and_cosine(sum, &|i| self.angles[i]).1,
+            Input::Position(i) => self.positions[i],
             Input::Velocity(i) => self.velocities[i],
             Input::Acceleration(i) => self.accelerations[i],
             Input::ReferenceVelocity(i) => self.reference_velocities[i],

@@ -132,17 +132,25 @@ fn number(value: &Rational) -> Series {
     [Fp::from_rational(value).unwrap_or(Fp::ZERO), Fp::ZERO, Fp::ZERO]
 }
 
+impl SeriesSource<'_, '_> {
+    /// Of a joint of the chain.
+    fn rate(&self, joint: usize) -> Fp {
+        let drive = &self.point.drives[joint];
+        drive.ratio * self.velocities[drive.coordinate]
+    }
+}
+
 impl Source<Series> for SeriesSource<'_, '_> {
     fn joint_trig(&mut self, joint: usize) -> (Series, Series) {
-        let ((s, c), v) = (self.point.joint_trig(joint), self.velocities[joint]);
+        let ((s, c), v) = (self.point.joint_trig(joint), self.rate(joint));
         let half = v * v * Fp::from_integer(2).inverse().unwrap_or(Fp::ONE);
         ([s, c * v, -(s * half)], [c, -(s * v), -(c * half)])
     }
     fn position(&mut self, joint: usize) -> Series {
-        [self.point.positions[joint].0, self.velocities[joint], Fp::ZERO]
+        [self.point.joint_position(joint), self.rate(joint), Fp::ZERO]
     }
     fn velocity(&mut self, joint: usize) -> Series {
-        [self.velocities[joint], Fp::ZERO, Fp::ZERO]
+        [self.rate(joint), Fp::ZERO, Fp::ZERO]
     }
     fn a(&mut self, joint: usize) -> Series {
         number(&self.point.arm.joints[joint].a)

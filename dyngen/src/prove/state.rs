@@ -1,7 +1,7 @@
 //! The Lagrangian's side at a state of the arm, modulo the prime: Euler–Lagrange over jets, without any
 //! recursion.
 
-use super::point::Point;
+use super::point::{Motion, Point};
 use crate::exact::algebra::Algebra;
 use crate::exact::dual::Duals;
 use crate::exact::jet::{Jet, Jets};
@@ -98,8 +98,11 @@ impl JetSource<'_, '_> {
         Jet::constant(Fp::from_rational(value).unwrap_or(Fp::ZERO))
     }
 
+    /// A function of a joint's position with a value and its derivative by that position.
     fn of_position(&self, joint: usize, value: Fp, derivative: Fp) -> Jet {
-        Jet::of_position(self.state.dof(), joint, value, derivative, self.state.velocities[joint])
+        let Motion { coordinate, ratio, .. } = self.state.point.drives[joint];
+        let velocity = self.state.velocities[coordinate];
+        Jet::of_position(self.state.dof(), coordinate, value, ratio * derivative, velocity)
     }
 }
 
@@ -109,11 +112,14 @@ impl Source<Jet> for JetSource<'_, '_> {
         (self.of_position(joint, s, c), self.of_position(joint, c, -s))
     }
     fn position(&mut self, joint: usize) -> Jet {
-        self.of_position(joint, self.state.point.positions[joint].0, Fp::ONE)
+        self.of_position(joint, self.state.point.joint_position(joint), Fp::ONE)
     }
     fn velocity(&mut self, joint: usize) -> Jet {
         let State { velocities, accelerations, .. } = self.state;
-        Jet::velocity(self.state.dof(), joint, velocities[joint], accelerations[joint])
+        let Motion { coordinate, ratio, .. } = self.state.point.drives[joint];
+        let velocity =
+            Jet::velocity(self.state.dof(), coordinate, velocities[coordinate], accelerations[coordinate]);
+        Jets.mul(&Jet::constant(ratio), &velocity)
     }
     fn a(&mut self, joint: usize) -> Jet {
         self.number(&self.state.point.arm.joints[joint].a)
@@ -149,14 +155,16 @@ struct DualSource<'p, 'a> {
 }
 
 impl DualSource<'_, '_> {
-    /// The derivative of a function of q with the given value and first two derivatives.
+    /// The derivative of a function of a joint's position with the given first two derivatives by it.
     fn derivative(&self, joint: usize, first: Fp, second: Fp) -> Jet {
-        match self.direction {
-            Direction::Position(j) if j == joint => self.inner.of_position(joint, first, second),
+        let Motion { coordinate, ratio, .. } = self.inner.state.point.drives[joint];
+        let by_own = match self.direction {
+            Direction::Position(j) if j == coordinate => self.inner.of_position(joint, first, second),
             // Its rate is first·q̇.
-            Direction::Velocity(j) if j == joint => Jet::of_rate(first),
-            _ => Jets.integer(0),
-        }
+            Direction::Velocity(j) if j == coordinate => Jet::of_rate(first),
+            _ => return Jets.integer(0),
+        };
+        Jets.mul(&Jet::constant(ratio), &by_own)
     }
 
     fn fixed(value: Jet) -> (Jet, Jet) {
@@ -174,8 +182,9 @@ impl Source<(Jet, Jet)> for DualSource<'_, '_> {
         (self.inner.position(joint), self.derivative(joint, Fp::ONE, Fp::ZERO))
     }
     fn velocity(&mut self, joint: usize) -> (Jet, Jet) {
-        let own = self.direction == Direction::Velocity(joint);
-        (self.inner.velocity(joint), Jets.integer(i64::from(own)))
+        let Motion { coordinate, ratio, .. } = self.inner.state.point.drives[joint];
+        let own = self.direction == Direction::Velocity(coordinate);
+        (self.inner.velocity(joint), if own { Jet::constant(ratio) } else { Jets.integer(0) })
     }
     fn a(&mut self, joint: usize) -> (Jet, Jet) {
         Self::fixed(self.inner.a(joint))

@@ -78,6 +78,7 @@ impl From<Error> for NearestError {
 /// [`NearestError`]: values of another arm, or an arm that cannot be derived.
 pub fn nearest_arm(arm: &Arm, values: &Values, progress: Progress<'_>) -> Result<NearestArm, NearestError> {
     progress.say("deriving the arm");
+    arm.without_mimics().map_err(dyngen::Error::Mimics)?;
     let model = Model::derive(arm.clone())?;
     let (kind, given) = values.recognise(&model).map_err(NearestError::Values)?;
     let verdict = consistency::check(&model, kind, &given)?;

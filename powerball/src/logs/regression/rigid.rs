@@ -55,7 +55,7 @@ impl RigidArm {
     /// Derives and proves the minimal-set functions of an arm.
     ///
     /// # Errors
-    /// As [`Model::derive`] and [`Evaluator::new`].
+    /// As [`Model::derive`] and [`Evaluator::new`]; [`Error::Mimics`] where a joint follows another one.
     pub fn new(arm: &Arm) -> Result<RigidArm, Error> {
         RigidArm::mounted(arm, arm)
     }
@@ -65,6 +65,7 @@ impl RigidArm {
     /// # Errors
     /// As [`RigidArm::new`].
     pub fn mounted(arm: &Arm, filed: &Arm) -> Result<RigidArm, Error> {
+        arm.without_mimics().map_err(Error::Mimics)?;
         let model = Model::derive(arm.clone())?;
         let regressor = Evaluator::new(&model, Function::Regressor, SetKind::Minimal)?;
         let torque = Evaluator::new(&model, Function::InverseDynamics, SetKind::Minimal)?;

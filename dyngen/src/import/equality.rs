@@ -1,0 +1,47 @@
+//! What MuJoCo holds by equalities: a joint that follows another one, or what an arm file cannot hold.
+
+use roxmltree::Node;
+
+/// An equality of a model.
+pub(super) enum Equality {
+    /// The first joint's position beyond its reference is offset + ratio times the second's beyond its own.
+    Follows { joint: String, leader: String, offset: f64, ratio: f64 },
+    /// A joint stands at an offset from its reference.
+    Stands { joint: String, offset: f64 },
+    /// Why it is left out.
+    LeftOut(&'static str),
+}
+
+/// Reads one; none where it is not active.
+///
+/// # Errors
+/// What is wrong with its numbers.
+pub(super) fn read(node: Node<'_, '_>) -> Result<Option<Equality>, String> {
+    if node.attribute("active") == Some("false") {
+        return Ok(None);
+    }
+    if !node.has_tag_name("joint") {
+        return Ok(Some(Equality::LeftOut("an arm file has no closed loops and no tendons")));
+    }
+    let [offset, ratio, curve @ ..] = coefficients(node)?;
+    let name = |key: &str| node.attribute(key).unwrap_or("").to_string();
+    let (joint, leader) = (name("joint1"), name("joint2"));
+    Ok(Some(if leader.is_empty() {
+        Equality::Stands { joint, offset }
+    } else if curve.iter().any(|x| *x != 0.0) {
+        Equality::LeftOut("its joint follows by a curve, not by a straight line")
+    } else {
+        Equality::Follows { joint, leader, offset, ratio }
+    }))
+}
+
+/// Of the polynomial by which a joint follows another.
+fn coefficients(node: Node<'_, '_>) -> Result<[f64; 5], String> {
+    let mut all = [0.0, 1.0, 0.0, 0.0, 0.0];
+    let Some(text) = node.attribute("polycoef") else { return Ok(all) };
+    let numbers: Option<Vec<f64>> = text.split_whitespace().map(|t| t.parse().ok()).collect();
+    let numbers = numbers.filter(|n| n.len() <= all.len() && n.iter().all(|x| x.is_finite()));
+    let wrong = || format!("polycoef of <joint> must be up to 5 numbers, found '{text}'");
+    all.iter_mut().zip(numbers.ok_or_else(wrong)?).for_each(|(to, x)| *to = x);
+    Ok(all)
+}

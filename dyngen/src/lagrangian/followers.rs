@@ -1,0 +1,150 @@
+//! Angles of joints that follow others, in any algebra: multiples of an angle by the addition theorem.
+
+use crate::arm::{Angle, Arm, JointKind};
+use crate::exact::algebra::Algebra;
+use crate::exact::rational::{Rational, to_f64};
+use num_bigint::BigInt;
+use num_traits::{FromPrimitive, One, Signed, Zero};
+use std::f64::consts::TAU;
+
+/// Sine and cosine of the trigonometric input of every joint, where each group of joints that move together is at
+/// a point of the circle that `draw` gives.
+///
+/// An angle that is p/q of another is p times one of which the other is q times. Where p or q exceeds
+/// `largest`, the angle gets a point of its own: no sum of fewer than p or q angles tells the two apart, so for
+/// functions of the low degrees of a Lagrangian the sine and cosine of both are as good as free. A constant between
+/// two angles that is no multiple of pi/2 is taken to 1e-12 rad.
+pub fn input_angles<A: Algebra>(
+    alg: &A,
+    arm: &Arm,
+    number: &dyn Fn(&Rational) -> A::Value,
+    draw: &mut dyn FnMut() -> (A::Value, A::Value),
+    largest: Option<u32>,
+) -> Vec<(A::Value, A::Value)> {
+    let free = |x: &BigInt| largest.is_some_and(|most| x.abs() > BigInt::from(most));
+    let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
+    let drives = arm.drives();
+    let mut angles: Vec<Option<(A::Value, A::Value)>> = vec![None; arm.links()];
+    for leader in arm.coordinates() {
+        let point = draw();
+        let together: Vec<(usize, &Rational)> = (drives.iter().enumerate())
+            .filter(|(i, drive)| drive.joint == leader && revolute(*i))
+            .map(|(i, drive)| (i, &drive.ratio))
+            .collect();
+        let tied = |ratio: &Rational| !free(ratio.numer()) && !free(ratio.denom());
+        // The least common multiple: b/a in lowest terms has in its numerator what a lacks.
+        let common = |a: BigInt, b: &BigInt| Rational::new(b.clone(), a.clone()).numer() * a;
+        let tied_ratios = together.iter().filter(|(_, ratio)| tied(ratio));
+        let parts = tied_ratios.fold(BigInt::one(), |parts, (_, ratio)| common(parts, ratio.denom()));
+        for (joint, ratio) in together {
+            // What is free has no constant to another angle.
+            if !tied(ratio) {
+                angles[joint] = Some(draw());
+                continue;
+            }
+            let turned = multiple(alg, &(ratio.numer() * &parts / ratio.denom()), &point);
+            let shift = match arm.phase(joint) {
+                phase if phase.quarter_turns().is_some() => {
+                    with_theta(alg, &phase, (alg.integer(0), alg.integer(1)))
+                }
+                phase => {
+                    let (sin, cos) = near(phase.radians());
+                    (number(&sin), number(&cos))
+                }
+            };
+            angles[joint] = Some(sum(alg, &turned, &shift));
+        }
+    }
+    let zero = || (alg.integer(0), alg.integer(1));
+    angles.into_iter().map(|angle| angle.unwrap_or_else(zero)).collect()
+}
+
+/// Sine and cosine of q + theta of a joint from those of its trigonometric input, which holds theta already where
+/// that is no multiple of pi/2.
+pub fn with_theta<A: Algebra>(alg: &A, theta: &Angle, (s, c): (A::Value, A::Value)) -> (A::Value, A::Value) {
+    match theta.quarter_turns() {
+        Some(1) => (c, alg.neg(&s)),
+        Some(2) => (alg.neg(&s), alg.neg(&c)),
+        Some(3) => (alg.neg(&c), s),
+        _ => (s, c),
+    }
+}
+
+/// Sine and cosine of a sum of two angles.
+fn sum<A: Algebra>(
+    alg: &A,
+    (s, c): &(A::Value, A::Value),
+    (t, d): &(A::Value, A::Value),
+) -> (A::Value, A::Value) {
+    (alg.add(&alg.mul(s, d), &alg.mul(c, t)), alg.sub(&alg.mul(c, d), &alg.mul(s, t)))
+}
+
+/// A rational point of the circle within 1e-12 rad of an angle: from the tangent of its half by its continued
+/// fraction.
+fn near(angle: f64) -> (Rational, Rational) {
+    let tangent = (angle.rem_euclid(TAU) / 2.0).tan();
+    let mut rest = tangent;
+    let (mut before, mut t) = ([BigInt::zero(), BigInt::one()], [BigInt::one(), BigInt::zero()]);
+    for _ in 0..40 {
+        let whole = rest.floor();
+        let Some(count) = BigInt::from_f64(whole) else { break };
+        let next = [&count * &t[0] + &before[0], &count * &t[1] + &before[1]];
+        (before, t) = (t, next);
+        let value = to_f64(&Rational::new(t[0].clone(), t[1].clone()));
+        if (value - tangent).abs() < 4e-13 * (1.0 + tangent * tangent) || rest == whole {
+            break;
+        }
+        rest = 1.0 / (rest - whole);
+    }
+    let [p, q] = t;
+    let (square, scale) = (&q * &q - &p * &p, &q * &q + &p * &p);
+    (Rational::new(&p * &q * 2, scale.clone()), Rational::new(square, scale))
+}
+
+/// Sine and cosine of a multiple of an angle, by doubling.
+fn multiple<A: Algebra>(alg: &A, count: &BigInt, angle: &(A::Value, A::Value)) -> (A::Value, A::Value) {
+    let mut total = (alg.integer(0), alg.integer(1));
+    let mut power = angle.clone();
+    let mut rest = count.abs();
+    while !rest.is_zero() {
+        if rest.bit(0) {
+            total = sum(alg, &total, &power);
+        }
+        rest >>= 1u32;
+        if !rest.is_zero() {
+            power = sum(alg, &power, &power);
+        }
+    }
+    if count.is_negative() { (alg.neg(&total.0), total.1) } else { total }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::exact::prime::{Draws, Fp, PrimeField};
+
+    #[test]
+    fn a_point_of_the_circle_is_near_its_angle() {
+        for k in -50..50 {
+            let angle = 0.137 * f64::from(k);
+            let (s, c) = near(angle);
+            assert_eq!(&s * &s + &c * &c, Rational::one());
+            assert!(
+                (to_f64(&s) - angle.sin()).abs() < 2e-12 && (to_f64(&c) - angle.cos()).abs() < 2e-12,
+                "{angle}"
+            );
+        }
+    }
+
+    #[test]
+    fn multiples_of_an_angle_are_sums_of_it() {
+        let point = Draws::new(7).element().circle_point();
+        let mut added = (Fp::ZERO, Fp::ONE);
+        for count in 0..40 {
+            let (s, c) = multiple(&PrimeField, &BigInt::from(count), &point);
+            assert_eq!((s, c), added);
+            assert_eq!(multiple(&PrimeField, &BigInt::from(-count), &point), (-s, c));
+            added = sum(&PrimeField, &added, &point);
+        }
+    }
+}
