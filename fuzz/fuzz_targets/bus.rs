@@ -1,4 +1,5 @@
-//! Frames of a CAN bus: what is read of one is written as it was read, and a driver that hears them never panics.
+//! Frames of a CAN bus and the datagrams that carry them: what is read of one is written as it was read, and a driver
+//! that hears them never panics.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -7,6 +8,7 @@ use powerball::bus::canopen::sdo::{Request, Response};
 use powerball::bus::canopen::{Frame, nmt};
 use powerball::bus::driver::lwa4p::LWA4P;
 use powerball::bus::driver::{ControlMode, Driver, QueueFull, Transmit};
+use powerball::bus::transport::msgpack;
 
 struct Wire;
 
@@ -19,6 +21,9 @@ impl Transmit for Wire {
 
 // Ten bytes a frame: identifier, data; the time goes on by a millisecond.
 fuzz_target!(|data: &[u8]| {
+    if let Some(frame) = msgpack::decode(data) {
+        assert_eq!(msgpack::decode(&msgpack::encode(&frame, 0.0)), Some(frame));
+    }
     let Ok(mut driver) = Driver::new(LWA4P) else { return };
     let _ = driver.start(ControlMode::InterpolatedPosition, false);
     for (k, part) in data.chunks(10).enumerate() {
@@ -34,6 +39,10 @@ fuzz_target!(|data: &[u8]| {
             assert_eq!(Emcy::decode(&emcy.frame(node)), Some((node, emcy)));
         }
         let _ = nmt::State::decode(&frame);
+        for mapping in LWA4P.tpdos.into_iter().filter(|mapping| !mapping.is_empty()) {
+            let bits: usize = mapping.entries().iter().map(|entry| usize::from(entry.bits)).sum();
+            assert_eq!(mapping.unpack(bytes).is_some(), bytes.len() == bits.div_ceil(8));
+        }
         let now = 1000 * k as u64;
         driver.poll(now, &mut Wire);
         driver.receive(&frame, now, &mut Wire);

@@ -8,7 +8,7 @@ mod interrupt;
 mod master;
 mod memory;
 #[cfg(unix)]
-mod msgpack;
+pub mod msgpack;
 #[cfg(target_os = "linux")]
 pub mod realtime;
 #[cfg(unix)]

@@ -1,9 +1,11 @@
-//! The datagrams of python-can's `udp_multicast`: one MessagePack map for each frame.
+//! The datagrams of python-can's `udp_multicast`: one MessagePack map for each frame. What is recorded of such a bus
+//! (a capture of its network) is read by these as well.
 
 use crate::bus::canopen::Frame;
 
 /// A frame as the map that python-can writes, `timestamp` in s.
-pub(super) fn encode(frame: &Frame, timestamp: f64) -> Vec<u8> {
+#[must_use]
+pub fn encode(frame: &Frame, timestamp: f64) -> Vec<u8> {
     const FALSE: u8 = 0xC2;
     let mut out = vec![0x80 | 11];
     let key = |out: &mut Vec<u8>, name: &str| {
@@ -35,7 +37,8 @@ pub(super) fn encode(frame: &Frame, timestamp: f64) -> Vec<u8> {
 }
 
 /// The frame in a datagram; `None` for what is no classic data frame with an 11-bit identifier.
-pub(super) fn decode(bytes: &[u8]) -> Option<Frame> {
+#[must_use]
+pub fn decode(bytes: &[u8]) -> Option<Frame> {
     let mut rest = bytes;
     let count = match next(&mut rest)? {
         Item::Map(count) => count,
