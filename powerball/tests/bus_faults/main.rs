@@ -6,6 +6,7 @@
 
 mod faults;
 mod motion;
+mod pairs;
 mod rules;
 mod walks;
 mod world;

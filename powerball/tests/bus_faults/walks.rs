@@ -23,15 +23,16 @@ const WIRE: Micros = 2_500;
 static WALL: TorqueGuard<6> =
     TorqueGuard::new(&|q, _, _| [0.0, 0.0, if q[2] > 0.0 { 1e3 } else { 0.0 }, 0.0, 0.0, 0.0]);
 
-struct Walk {
-    world: World,
+#[derive(Clone)]
+pub(crate) struct Walk {
+    pub(crate) world: World,
     rng: ChaCha8Rng,
     control: ControlMode,
     /// What was done, for who reads a failure.
-    done: Vec<String>,
+    pub(crate) done: Vec<String>,
     /// When causes were latched, and the times of the caller's acts that allow motion.
-    causes: Vec<Micros>,
-    enabled: Vec<Micros>,
+    pub(crate) causes: Vec<Micros>,
+    pub(crate) enabled: Vec<Micros>,
     /// Spans in which the driver followed set-points.
     running: Vec<(Micros, Micros)>,
     fault: Option<Fault>,
@@ -42,22 +43,29 @@ struct Walk {
 impl Walk {
     fn new(seed: u64) -> Walk {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let commutated = rng.random_bool(0.8);
+        let guarded = rng.random_bool(0.3);
+        let mut walk = Walk::of(ControlMode::ALL[(seed % 4) as usize], commutated, rng);
+        if guarded {
+            walk.world.driver.guard_torque(WALL);
+            walk.guarded = true;
+        }
+        walk
+    }
+
+    /// In a mode, with nothing done yet.
+    pub(crate) fn of(control: ControlMode, commutated: bool, rng: ChaCha8Rng) -> Walk {
         let mut profile = LWA4P;
         profile.reactions.commutation_settle = 50_000;
         profile.reactions.boot_timeout = 500_000;
-        let mut world = World::new(rng.random_bool(0.8), profile);
+        let mut world = World::new(commutated, profile);
         world.pilot.enable = false;
-        let control = ControlMode::ALL[(seed % 4) as usize];
-        let guarded = rng.random_bool(0.3);
-        if guarded {
-            world.driver.guard_torque(WALL);
-        }
         let (done, causes, enabled, running) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Walk { world, rng, control, done, causes, enabled, running, fault: None, guarded, wrong: None }
+        Walk { world, rng, control, done, causes, enabled, running, fault: None, guarded: false, wrong: None }
     }
 
     /// Lets time pass, a turn at a time, and watches the driver's cause.
-    fn pass(&mut self, time: Micros) {
+    pub(crate) fn pass(&mut self, time: Micros) {
         let until = self.world.now() + time;
         while self.world.now() < until {
             let before = (self.world.driver.phase(), self.world.driver.cause().copied());
@@ -162,7 +170,7 @@ impl Walk {
     }
 
     /// Reads all that reached the drives.
-    fn judge(&mut self) -> Result<(), String> {
+    pub(crate) fn judge(&mut self) -> Result<(), String> {
         if let Some(wrong) = self.wrong.take() {
             return Err(wrong);
         }

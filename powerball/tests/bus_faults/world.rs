@@ -61,7 +61,7 @@ pub(crate) enum Wire {
 }
 
 /// The arm behind a faulty wire, with a record of what reaches it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Faulty {
     pub(crate) arm: VirtualArm,
     pub(crate) wire: Wire,
@@ -242,6 +242,7 @@ pub(crate) struct Pilot {
     pub(crate) bad_value: f64,
 }
 
+#[derive(Clone)]
 pub(crate) struct World {
     pub(crate) bus: Memory<Faulty>,
     pub(crate) driver: Driver<6>,

@@ -36,7 +36,7 @@ struct Waiting {
 }
 
 /// A bus with a [`Peer`] on the other end.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Memory<P> {
     peer: P,
     now: Micros,

@@ -33,7 +33,7 @@ pub struct Setup {
 }
 
 /// An arm of CiA 402 drives.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct VirtualArm {
     simulation: Simulation,
     nodes: Vec<Node>,
@@ -46,7 +46,7 @@ pub struct VirtualArm {
 }
 
 /// Noise of the current sensors.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Noise {
     rng: ChaCha8Rng,
     slow: Vec<f64>,
