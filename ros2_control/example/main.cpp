@@ -15,6 +15,33 @@ static void expect(bool true_, const char * what)
   }
 }
 
+// A model by which joint 6 has no torque beyond 0.05 rad.
+static void wall(void *, const double * position, const double *, const double *, double * torque)
+{
+  for (int j = 0; j < POWERBALL_JOINTS; ++j) {
+    torque[j] = j == 5 && position[5] > 0.05 ? 1000.0 : 0.0;
+  }
+}
+
+// The C functions alone, with a model of one's own: a slow motion of joint 6 ends where it has no torque.
+static void own_model(const char * bus)
+{
+  powerball_arm * arm = powerball_open(bus, nullptr, 0);
+  expect(powerball_guard_model(arm, "sideways", nullptr) == POWERBALL_ERROR, "a mounting that is none is refused");
+  expect(powerball_guard_torque(arm, wall, nullptr) == POWERBALL_OK, "a model of one's own");
+  expect(powerball_configure(arm) == POWERBALL_OK && powerball_activate(arm) == POWERBALL_OK, "the arm holds");
+  double position[POWERBALL_JOINTS];
+  powerball_read(arm, position, nullptr, nullptr);
+  bool refused = false;
+  while (!refused && position[5] < 0.1) {
+    position[5] += 1e-4;
+    refused = powerball_write(arm, position) == POWERBALL_ERROR;
+    powerball_read(arm, nullptr, nullptr, nullptr);
+  }
+  expect(refused && std::fabs(position[5] - 0.05) < 2e-4, powerball_message(arm));
+  powerball_close(arm);
+}
+
 int main(int count, char ** arguments)
 {
   hardware_interface::HardwareInfo info;
@@ -58,5 +85,7 @@ int main(int count, char ** arguments)
   expect(stopped, "a jump of 0.5 rad is refused and stops the arm");
   expect(arm.on_error(state) == CallbackReturn::SUCCESS, "the arm stands");
   expect(arm.on_cleanup(state) == CallbackReturn::SUCCESS, "cleanup");
+
+  own_model(info.hardware_parameters["bus"].c_str());
   return 0;
 }

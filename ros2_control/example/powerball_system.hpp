@@ -20,7 +20,7 @@ public:
 
   ~PowerballSystem() override { powerball_close(arm_); }
 
-  // The hardware parameter `bus` names the bus; six joints are expected, from the base on.
+  // The hardware parameter `bus` names the bus; `mounting` and `values` are those of powerball_guard_model. Six joints are expected, from the base on.
   CallbackReturn on_init(const hardware_interface::HardwareInfo & info) override
   {
     if (SystemInterface::on_init(info) != CallbackReturn::SUCCESS) {
@@ -40,6 +40,10 @@ public:
       arm_ = powerball_open(info_.hardware_parameters["bus"].c_str(), why, sizeof(why));
       if (arm_ == nullptr) {
         std::fprintf(stderr, "powerball: %s\n", why);
+        return CallbackReturn::FAILURE;
+      }
+      // How the base stands and what the arm weighs: no set-point leaves that takes more torque than a joint has.
+      if (!told(powerball_guard_model(arm_, parameter("mounting"), parameter("values")))) {
         return CallbackReturn::FAILURE;
       }
     }
@@ -111,6 +115,13 @@ public:
 
 private:
   using Joints = std::array<double, POWERBALL_JOINTS>;
+
+  // A hardware parameter that may be left out.
+  const char * parameter(const std::string & name) const
+  {
+    const auto found = info_.hardware_parameters.find(name);
+    return found == info_.hardware_parameters.end() ? nullptr : found->second.c_str();
+  }
 
   int read_all() { return powerball_read(arm_, position_.data(), velocity_.data(), effort_.data()); }
 

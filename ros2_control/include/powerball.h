@@ -35,6 +35,20 @@ powerball_arm *powerball_open(const char *bus, char *why, size_t room);
 /* Stops the arm where it moves and closes the bus. */
 void powerball_close(powerball_arm *arm);
 
+/* Inverse dynamics of the arm as it is mounted, friction included: POWERBALL_JOINTS numbers each, rad, rad/s, rad/s^2 in,
+ * N m out. Called once in each powerball_write, so it must be quick; it must not throw and must not call these functions. */
+typedef void (*powerball_inverse_dynamics)(void *context, const double *position, const double *velocity,
+                                           const double *acceleration, double *torque);
+
+/* From now on no set-point leaves for which the model asks more torque of a joint than the joint has; a torque that is no
+ * number is too much. The context must live until powerball_close. */
+int powerball_guard_torque(powerball_arm *arm, powerball_inverse_dynamics torque, void *context);
+
+/* The same with the built-in model of the arm. mounting says how its base stands: "filed" (upright; null says so too),
+ * "ROLL,PITCH" in degrees, or gravity in the base frame as "X,Y,Z" in m/s^2. values is the path of an identified.json or a
+ * values file; null takes the masses of the CAD model and the published friction. It allocates in powerball_write. */
+int powerball_guard_model(powerball_arm *arm, const char *mounting, const char *values);
+
 /* Boots, identifies, configures and verifies all drives: some seconds. Nothing moves. */
 int powerball_configure(powerball_arm *arm);
 

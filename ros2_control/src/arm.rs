@@ -1,9 +1,13 @@
 //! The arm as a hardware interface sees it: its lifecycle, and one cycle a call.
 
 use powerball::bus::driver::lwa4p::LWA4P;
-use powerball::bus::driver::{ControlMode, Driver, Phase};
+use powerball::bus::driver::{ControlMode, Driver, Phase, TorqueGuard};
 use powerball::bus::transport::{self, Bus, BusUrl, Master, Memory, Moment};
+use powerball::identification::excite::Masses;
+use powerball::identification::mounting::Mounting;
+use powerball::procedure::Envelope;
 use powerball::virtual_arm::{VirtualArm, lwa4p};
+use std::path::Path;
 
 /// The arm's joints.
 pub const JOINTS: usize = 6;
@@ -51,6 +55,30 @@ impl Arm {
         };
         let driver = Driver::new(LWA4P).map_err(|e| e.to_string())?;
         Ok(Arm { master: Master::new(driver, bus) })
+    }
+
+    /// From now on no set-point leaves for which the model asks more torque of a joint than it has.
+    pub fn guard_torque(&mut self, guard: TorqueGuard<JOINTS>) {
+        self.master.driver_mut().guard_torque(guard);
+    }
+
+    /// The same with the model of the built-in arm, mounted as said (`filed`, `ROLL,PITCH` in degrees, or gravity in the
+    /// base frame as `X,Y,Z` in m/s²). Masses and friction are those of an identified.json or a values file, or, where
+    /// there is none, the CAD model's and the published friction. It allocates in each [`Arm::write`].
+    ///
+    /// # Errors
+    /// A mounting or a file that cannot be read, in words.
+    pub fn guard_model(&mut self, mounting: &str, values: Option<&Path>) -> Result<(), String> {
+        let mounting: Mounting = mounting.parse()?;
+        let arm = lwa4p::arm().map_err(|e| e.to_string())?;
+        let masses = match values {
+            Some(path) => Masses::read(path, &arm).map_err(|e| e.to_string())?,
+            None => lwa4p::masses(),
+        };
+        let envelope =
+            Envelope::<JOINTS>::of(&arm, &mounting, None, Some(&masses)).map_err(|e| e.to_string())?;
+        self.guard_torque(envelope.torque_guard().ok_or("the built-in arm has no torque model")?);
+        Ok(())
     }
 
     /// Boots, identifies, configures and verifies all drives; nothing moves. SYNC runs from here on: [`Arm::read`] must be
@@ -213,6 +241,39 @@ mod tests {
         assert!(arm.activate().is_err());
         assert!(arm.on_error().unwrap());
         arm.activate().unwrap();
+        arm.deactivate().unwrap();
+    }
+
+    /// A joint that the model says has no torque beyond a place stops before it; the built-in model holds nothing back
+    /// that the arm can do, and a mounting or a file that is none is told.
+    #[test]
+    fn what_takes_more_torque_than_a_joint_has_does_not_leave() {
+        let mut arm = Arm::open("virtual").unwrap();
+        arm.guard_torque(TorqueGuard::new(&|q, _, _| {
+            [0.0, 0.0, 0.0, 0.0, 0.0, if q[5] > 0.05 { 1e3 } else { 0.0 }]
+        }));
+        arm.configure().unwrap();
+        arm.activate().unwrap();
+        let mut position = arm.read().unwrap().position;
+        let mut refused = None;
+        while refused.is_none() && position[5] < 0.1 {
+            position[5] += 1e-4;
+            refused = arm.write(&position).err();
+            // What goes on as it went would have no torque either: the driver stops the arm.
+            assert!(arm.read().is_ok() || refused.is_some());
+        }
+        let told = refused.unwrap();
+        assert!(told.contains("joint 6") && told.contains("N·m"), "{told}");
+        assert!((position[5] - 0.05).abs() < 2e-4, "{position:?}");
+
+        let mut arm = Arm::open("virtual").unwrap();
+        assert!(arm.guard_model("sideways", None).unwrap_err().contains("no mounting"));
+        let missing = arm.guard_model("filed", Some(Path::new("nowhere.json"))).unwrap_err();
+        assert!(missing.contains("nowhere.json: cannot be read"), "{missing}");
+        arm.guard_model("filed", None).unwrap();
+        arm.configure().unwrap();
+        arm.activate().unwrap();
+        go(&mut arm, 0.1);
         arm.deactivate().unwrap();
     }
 

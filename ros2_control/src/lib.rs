@@ -7,8 +7,10 @@ mod arm;
 
 pub use arm::{Arm, JOINTS, State};
 
-use std::ffi::{CStr, c_char, c_int};
+use powerball::bus::driver::TorqueGuard;
+use std::ffi::{CStr, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 
 /// It is done.
 pub const OK: c_int = 0;
@@ -94,6 +96,69 @@ pub unsafe extern "C" fn powerball_close(handle: *mut Handle) {
         let handle = unsafe { Box::from_raw(handle) };
         let _ = catch_unwind(AssertUnwindSafe(|| drop(handle)));
     }
+}
+
+/// Inverse dynamics in the caller's language: context; position, velocity, acceleration; torque, N·m, to be written.
+pub type InverseDynamics = unsafe extern "C" fn(*mut c_void, *const f64, *const f64, *const f64, *mut f64);
+
+/// A model that a caller gave, with what is his.
+struct Callback(InverseDynamics, *mut c_void);
+
+// SAFETY: powerball.h allows one thread at a time with an arm; its model is called from there alone.
+unsafe impl Send for Callback {}
+// SAFETY: as above.
+unsafe impl Sync for Callback {}
+
+impl Callback {
+    fn torque(&self, q: &[f64; JOINTS], dq: &[f64; JOINTS], ddq: &[f64; JOINTS]) -> [f64; JOINTS] {
+        // What is not written is no number, and no number lets nothing through.
+        let mut torque = [f64::NAN; JOINTS];
+        // SAFETY: the promise of `powerball_guard_torque`; all arrays have the length that the header says.
+        unsafe { (self.0)(self.1, q.as_ptr(), dq.as_ptr(), ddq.as_ptr(), torque.as_mut_ptr()) };
+        torque
+    }
+}
+
+/// See [`Arm::guard_torque`]. What the guard needs beside the caller's own stays in memory until the program ends.
+///
+/// # Safety
+/// `handle` is null or an open arm's that nobody else uses now; `torque` is null or may be called with `context` until
+/// the arm is closed, reads and writes [`JOINTS`] numbers, and does not unwind.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn powerball_guard_torque(
+    handle: *mut Handle,
+    torque: Option<InverseDynamics>,
+    context: *mut c_void,
+) -> c_int {
+    // SAFETY: the caller's promise.
+    unsafe {
+        with(handle, |arm| {
+            let callback = Callback(torque.ok_or("no model is given")?, context);
+            let guard = move |q: &_, dq: &_, ddq: &_| callback.torque(q, dq, ddq);
+            arm.guard_torque(TorqueGuard::new(Box::leak(Box::new(guard))));
+            Ok(OK)
+        })
+    }
+}
+
+/// See [`Arm::guard_model`].
+///
+/// # Safety
+/// `handle` is null or an open arm's that nobody else uses now; the others are null or texts that end with zero.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn powerball_guard_model(
+    handle: *mut Handle,
+    mounting: *const c_char,
+    values: *const c_char,
+) -> c_int {
+    // SAFETY: the caller's promise; null is not read.
+    let text = |text: *const c_char| unsafe {
+        (!text.is_null()).then(|| CStr::from_ptr(text).to_string_lossy().into_owned())
+    };
+    let (mounting, values) = (text(mounting), text(values));
+    let mounting = mounting.as_deref().unwrap_or("filed");
+    // SAFETY: the caller's promise.
+    unsafe { with(handle, |arm| arm.guard_model(mounting, values.as_deref().map(Path::new)).map(|()| OK)) }
 }
 
 /// See [`Arm::configure`].
@@ -212,6 +277,8 @@ mod tests {
         unsafe {
             assert!(powerball_open(std::ptr::null(), std::ptr::null_mut(), 0).is_null());
             assert_eq!(powerball_configure(null), ERROR);
+            assert_eq!(powerball_guard_torque(null, None, std::ptr::null_mut()), ERROR);
+            assert_eq!(powerball_guard_model(null, std::ptr::null(), std::ptr::null()), ERROR);
             assert_eq!(
                 powerball_read(null, std::ptr::null_mut(), std::ptr::null_mut(), std::ptr::null_mut()),
                 ERROR

@@ -7,6 +7,7 @@ use super::slave::{Identity, Module, Setup};
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::controller::friction::{TABLE_2, TanhFriction};
 use crate::identification::chain::Chain;
+use crate::identification::excite::Masses;
 use dyngen::{Arm, Diagnostics};
 
 /// The arm file of the hardware, which the virtual arm follows to the letter.
@@ -38,6 +39,18 @@ const LINKS: [(f64, [f64; 3], [f64; 3], f64); 6] = [
 /// The virtual arm's bodies, in the order of the links.
 pub fn links() -> Vec<Body> {
     LINKS.iter().map(|(mass, centre, edges, rotor)| Body::even_box(*mass, *centre, *edges, *rotor)).collect()
+}
+
+/// What set-points and motions are checked with where nothing better is known: the bodies of [`links`], and Table 2's
+/// friction. What a cold arm's friction is beyond that, and what is mounted on it, must fit into a fifth of its torque.
+#[must_use]
+pub fn masses() -> Masses {
+    Masses {
+        parameters: links().iter().flat_map(|body| body.parameters()).collect(),
+        friction: Some(TABLE_2.to_vec()),
+        reserve: 0.2,
+        origin: "the CAD model's masses and Table 2's friction".to_string(),
+    }
 }
 
 /// The arm file as a description.

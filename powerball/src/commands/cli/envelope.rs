@@ -2,13 +2,12 @@
 
 use super::Failure;
 use super::excite::{FloorAt, floor};
-use crate::controller::friction::TABLE_2;
 use crate::identification::excite::Masses;
 use crate::identification::mounting::Mounting;
 use crate::procedure::Envelope;
 use crate::virtual_arm::lwa4p;
 use clap::Args;
-use dyngen::{Arm, Model};
+use dyngen::Arm;
 use std::path::PathBuf;
 
 /// The shoulder, which is the base frame's origin, stands 205 mm above what the arm is mounted on.
@@ -45,29 +44,12 @@ impl Surroundings {
     pub(crate) fn envelope(&self, arm: &Arm, mounting: &Mounting) -> Result<Envelope<6>, Failure> {
         let unusable = |e: String| Failure::Unusable(e);
         let masses = match (&self.values, &self.arm) {
-            (Some(path), _) => {
-                let file = path.display().to_string();
-                let text = std::fs::read_to_string(path)
-                    .map_err(|e| unusable(format!("{file}: cannot be read: {e}")))?;
-                let model = Model::derive(arm.clone()).map_err(|e| unusable(e.to_string()))?;
-                Some(Masses::parse(&text, &file, &model).map_err(|e| unusable(e.to_string()))?)
-            }
-            (None, None) => Some(built_in()),
+            (Some(path), _) => Some(Masses::read(path, arm).map_err(|e| unusable(e.to_string()))?),
+            (None, None) => Some(lwa4p::masses()),
             (None, Some(_)) => None,
         };
         let upright = self.arm.is_none() && mounting.up(arm).z > 0.5;
         let floor = self.floor.or(upright.then_some(FloorAt(Some(FLOOR))));
         Envelope::of(arm, mounting, floor, masses.as_ref()).map_err(|e| unusable(e.to_string()))
-    }
-}
-
-/// The CAD model of the modules and tubes, with Table 2's friction. What a cold arm's friction is beyond that, and what
-/// is mounted on it, must fit into the rest of its torque.
-fn built_in() -> Masses {
-    Masses {
-        parameters: lwa4p::links().iter().flat_map(|body| body.parameters()).collect(),
-        friction: Some(TABLE_2.to_vec()),
-        reserve: 0.2,
-        origin: "the CAD model's masses and Table 2's friction".to_string(),
     }
 }

@@ -9,6 +9,7 @@ use dyngen::exact::rational::to_f64;
 use dyngen::{Evaluator, Function, Model, SetKind, Values};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
+use std::path::Path;
 
 /// Dynamic parameters of a link.
 const PER_LINK: usize = ParameterKind::ALL.len();
@@ -34,6 +35,17 @@ pub struct Masses {
 }
 
 impl Masses {
+    /// From a file of an arm, as [`Masses::parse`] takes its text.
+    ///
+    /// # Errors
+    /// As there, and where it cannot be read.
+    pub fn read(path: &Path, arm: &Arm) -> Result<Masses, Error> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| Error::Setting(format!("{file}: cannot be read: {e}")))?;
+        Masses::parse(&text, &file, &Model::derive(arm.clone())?)
+    }
+
     /// From a values file (`{"parameter": number, …}`, as `dyngen` takes it), or from an identified.json,
     /// whose consistent parameters and friction are taken.
     ///
