@@ -39,7 +39,7 @@ pub use axis::number;
 pub use bars::BarPairs;
 pub use figure::{Figure, Ink, Mark, Panel, Series};
 pub use files::Files;
-pub use page::{Page, Tone};
+pub use page::{Page, Tone, sign};
 pub use table::Table;
 
 /// The style of pages and figures.

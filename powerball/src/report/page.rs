@@ -3,6 +3,16 @@
 use super::{BarPairs, Figure, Table, escape};
 use std::fmt::Write as _;
 use std::path::Path;
+use std::sync::OnceLock;
+
+/// What stands at the foot of every page.
+static SIGNATURE: OnceLock<String> = OnceLock::new();
+
+/// Puts a line below every page that this process makes from now on: what made it, how and when. A program says it once;
+/// without it pages say nothing of themselves.
+pub fn sign(text: impl Into<String>) {
+    let _ = SIGNATURE.set(text.into());
+}
 
 /// How a note is meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,11 +115,13 @@ impl Page {
     /// The whole page.
     pub fn to_html(&self) -> String {
         let title = escape(&self.title);
+        let foot =
+            SIGNATURE.get().map_or(String::new(), |text| format!("<footer>{}</footer>\n", escape(text)));
         format!(
             "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
              <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
              <meta name=\"color-scheme\" content=\"light dark\"><title>{title}</title>\n\
-             <style>\n{}</style></head>\n<body><main>\n<h1>{title}</h1>\n{}</main></body></html>\n",
+             <style>\n{}</style></head>\n<body><main>\n<h1>{title}</h1>\n{}{foot}</main></body></html>\n",
             super::STYLE,
             self.body
         )

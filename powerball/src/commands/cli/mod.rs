@@ -90,6 +90,7 @@ impl From<IdentifyError> for Failure {
 pub fn main() -> ExitCode {
     // clap itself exits with 2 on wrong use.
     let cli = Cli::parse();
+    crate::report::sign(output::signature(std::env::args(), std::time::SystemTime::now()));
     let done = match cli.command {
         Command::Demo(command) => command.run(),
         Command::Bus(command) => command.run(),

@@ -6,6 +6,7 @@ use crate::identification::estimate::Spread;
 use crate::report::files;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
+use std::time::SystemTime;
 
 /// Progress on standard error, where a person looks at it.
 pub(crate) struct Progress(bool);
@@ -76,6 +77,36 @@ pub(crate) fn print(text: &str) {
     let _ = writeln!(std::io::stdout(), "{text}");
 }
 
+/// The foot of a page: version, command and time (UTC).
+pub(crate) fn signature(arguments: impl Iterator<Item = String>, now: SystemTime) -> String {
+    let seconds = now.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let (year, month, day) = date(seconds / 86_400);
+    let (hour, minute) = (seconds / 3600 % 24, seconds / 60 % 60);
+    let quoted = |word: &String| match word.contains(|c: char| c.is_whitespace() || c == '\'') {
+        true => format!("'{}'", word.replace('\'', "'\\''")),
+        false => word.clone(),
+    };
+    let command: Vec<String> = arguments.skip(1).map(|word| quoted(&word)).collect();
+    format!(
+        "{year}-{month:02}-{day:02} {hour:02}:{minute:02} UTC, powerball {}: powerball {}",
+        env!("CARGO_PKG_VERSION"),
+        command.join(" ")
+    )
+}
+
+/// Year, month and day of a day since 1970-01-01 (Gregorian calendar; H. Hinnant, "chrono-compatible low-level date
+/// algorithms", `civil_from_days`).
+fn date(days: u64) -> (u64, u64, u64) {
+    let z = days + 719_468;
+    let (era, of_era) = (z / 146_097, z % 146_097);
+    let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year + year / 4 - year / 100);
+    let month = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * month + 2) / 5 + 1;
+    let month = if month < 10 { month + 3 } else { month - 9 };
+    (400 * era + year + u64::from(month <= 2), month, day)
+}
+
 /// Errors by joint as a table; several spreads side by side.
 pub(crate) fn table(columns: &[(&str, &Spread)]) -> String {
     let mut text = String::from("joint");
@@ -91,4 +122,29 @@ pub(crate) fn table(columns: &[(&str, &Spread)]) -> String {
         }
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    /// Times by `date -u -d @SECONDS`.
+    #[test]
+    fn a_page_says_when_and_how_it_was_made() {
+        let signed = |seconds| {
+            let words = ["/bin/powerball", "verify", "--out", "a b"].map(String::from);
+            signature(words.into_iter(), SystemTime::UNIX_EPOCH + Duration::from_secs(seconds))
+        };
+        let rest = format!("UTC, powerball {}: powerball verify --out 'a b'", env!("CARGO_PKG_VERSION"));
+        for (seconds, time) in [
+            (0, "1970-01-01 00:00"),
+            (951_782_399, "2000-02-28 23:59"),
+            (951_868_800, "2000-03-01 00:00"),
+            (1_709_208_000, "2024-02-29 12:00"),
+            (4_107_542_400, "2100-03-01 00:00"),
+        ] {
+            assert_eq!(signed(seconds), format!("{time} {rest}"));
+        }
+    }
 }
