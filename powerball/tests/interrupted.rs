@@ -100,7 +100,7 @@ fn a_killed_warm_up_goes_on_with_what_it_saw() {
         (output.status.code(), serde_json::from_slice(&output.stdout).unwrap())
     };
     let arguments = warm_up(&[]);
-    kill_when(&arguments.iter().map(String::as_str).collect::<Vec<_>>(), &csv, 1_500_000);
+    kill_when(&arguments.iter().map(String::as_str).collect::<Vec<_>>(), &csv, 4_000_000);
     let before = std::fs::read_to_string(&csv).unwrap();
     assert!(!folder.join("warm_up.json").exists());
 

@@ -9,9 +9,9 @@ use std::thread::{self, JoinHandle};
 const WAITING: usize = 4000;
 
 /// What is written here is written by another thread, whole and in order, each call by one call there. An error there
-/// is the error of a later call here.
+/// is the error of a later call here. Dropping it waits until everything is written, as [`close`](Behind::close) does.
 #[derive(Debug)]
-pub struct Behind<W> {
+pub struct Behind<W: Write + Send + 'static> {
     lines: Option<SyncSender<Vec<u8>>>,
     thread: Option<JoinHandle<(W, io::Result<()>)>>,
     done: Option<W>,
@@ -45,7 +45,13 @@ impl<W: Write + Send + 'static> Behind<W> {
     /// ended it.
     pub fn close(mut self) -> (Option<W>, io::Result<()>) {
         let done = self.finish();
-        (self.done, done)
+        (self.done.take(), done)
+    }
+}
+
+impl<W: Write + Send + 'static> Drop for Behind<W> {
+    fn drop(&mut self) {
+        let _ = self.finish();
     }
 }
 

@@ -14,6 +14,19 @@ use std::fmt;
 /// Says why the arm must not go along a motion.
 type Barred = Box<dyn Fn(&Motion) -> Option<String>>;
 
+/// A motion that was looked at as a whole and let through. It takes a millisecond a thousand samples to look, so it is
+/// done before the arm has torque: a cycle has no such time.
+#[derive(Clone, Debug)]
+pub struct Cleared(Motion);
+
+impl Cleared {
+    /// What was let through.
+    #[must_use]
+    pub fn motion(&self) -> &Motion {
+        &self.0
+    }
+}
+
 /// What the motions of an arm of `N` joints must keep.
 pub struct Envelope<const N: usize> {
     /// Why the arm must not go along a motion, beside the limits of its joints.
@@ -79,6 +92,31 @@ impl<const N: usize> Envelope<N> {
     /// The model for the driver's guard of set-points, where there is one.
     pub fn torque_guard(&self) -> Option<TorqueGuard<N>> {
         self.torque
+    }
+
+    /// Lets a motion through, or says why the arm must not go along it.
+    ///
+    /// # Errors
+    /// As [`check`](Self::check), and [`RecordError::Motion`] where it is no motion of this arm at its rate.
+    pub fn clear(&self, profile: &Profile<N>, motion: Motion) -> Result<Cleared, RecordError> {
+        let period = profile.period_seconds();
+        if motion.dof() != N || motion.is_empty() {
+            return Err(RecordError::Motion(format!(
+                "the motion has {} joints and {} samples; the arm has {N} joints",
+                motion.dof(),
+                motion.len()
+            )));
+        }
+        if (motion.period - period).abs() > 1e-6 {
+            return Err(RecordError::Motion(format!(
+                "the motion has a sample every {:.3} ms, the arm's SYNC comes every {:.3} ms: sample it at {} Hz",
+                1e3 * motion.period,
+                1e3 * period,
+                (1.0 / period).round()
+            )));
+        }
+        self.check(profile, &motion)?;
+        Ok(Cleared(motion))
     }
 
     /// Whether the arm may go along a motion, from rest at its first sample to rest at its last.

@@ -4,7 +4,7 @@
 use super::constant_velocity::{self, Bounds, Plan};
 use super::gravity_free::{self, GravityFree};
 use super::laws::{Point, Rated, choose};
-use super::{Columns, RecordError, Recorder, resume};
+use super::{Behind, Cleared, Columns, LogTime, RecordError, Recorder, resume};
 use crate::bus::transport::Bus;
 use crate::identification::mounting::Mounting;
 use crate::logs::log::{LogError, read_log};
@@ -112,27 +112,25 @@ pub fn log_file(folder: &Path, joint: usize) -> PathBuf {
     folder.join(format!("friction_{}.csv", joint + 1))
 }
 
-/// Runs the experiment: goes to the pose and records the motion. A log that is there already and complete is
-/// kept, so that an experiment that was broken off goes on where it was.
+/// Runs a joint's experiment: goes to the pose and records the motion, which was let through before the arm was
+/// released. Gives its log, which may still be on its way to the disk: [close](Behind::close) it when the arm stands.
 ///
 /// # Errors
 /// Where the arm stops, or the log cannot be written.
 pub fn run<B: Bus, const N: usize>(
     recorder: &mut Recorder<B, N>,
-    experiment: &Experiment,
+    joint: usize,
+    motion: &Cleared,
     folder: &Path,
-) -> Result<(), FrictionError> {
-    let path = log_file(folder, experiment.plan.joint);
-    if is_complete(&path, experiment) {
-        return Ok(());
-    }
-    let start = experiment.plan.motion.samples().next().and_then(|[q, ..]| <[f64; N]>::try_from(q).ok());
+) -> Result<Behind<File>, FrictionError> {
+    let path = log_file(folder, joint);
+    let start = motion.motion().samples().next().and_then(|[q, ..]| <[f64; N]>::try_from(q).ok());
     if let Some(start) = start {
         recorder.go(&start, 0.25, 1.0)?;
     }
-    let mut log = File::create(&path).map_err(|e| FrictionError::Write(path.clone(), e))?;
-    recorder.record(&experiment.plan.motion, 0.0, Columns::Torques, &mut log)?;
-    Ok(())
+    let mut log = Behind::new(File::create(&path).map_err(|e| FrictionError::Write(path, e))?);
+    recorder.record(motion, &mut LogTime::default(), Columns::Everything, &mut log)?;
+    Ok(log)
 }
 
 /// Whether a log reaches the end of the motion.
@@ -203,7 +201,8 @@ mod tests {
             let mut recorder =
                 Recorder::enable(Master::new(Driver::new(LWA4P).unwrap(), bus), Envelope::new(|_| None))
                     .unwrap();
-            run(&mut recorder, &experiment, &folder).unwrap();
+            let motion = recorder.clear(experiment.plan.motion.clone()).unwrap();
+            run(&mut recorder, joint, &motion, &folder).unwrap().close().1.unwrap();
             let path = log_file(&folder, joint);
             assert!(is_complete(&path, &experiment));
             let found = analyse(&model, &experiment, &path).unwrap();

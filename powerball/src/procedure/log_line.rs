@@ -4,6 +4,27 @@ use crate::bus::canopen::Micros;
 use crate::bus::driver::{Counters, Driver};
 use std::fmt::Write as _;
 
+/// The time of a log: so many s at the first of its SYNCs, and from there on what the bus's clock measures.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LogTime {
+    start: f64,
+    first: Option<Micros>,
+}
+
+impl LogTime {
+    /// A log, or a part of one, that begins at `start`, s.
+    #[must_use]
+    pub fn from(start: f64) -> LogTime {
+        LogTime { start, first: None }
+    }
+
+    /// The time of a SYNC in the log, s. The first that is asked for is where it begins.
+    pub fn at(&mut self, sync: Micros) -> f64 {
+        let since = sync.saturating_sub(*self.first.get_or_insert(sync));
+        self.start + since as f64 * 1e-6
+    }
+}
+
 /// Which columns a recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Columns {

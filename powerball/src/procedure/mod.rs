@@ -17,8 +17,8 @@ pub mod warm_up;
 
 pub use approach::approach;
 pub use behind::Behind;
-pub use envelope::Envelope;
-pub use log_line::Columns;
+pub use envelope::{Cleared, Envelope};
+pub use log_line::{Columns, LogTime};
 pub use record::{Record, Recorder, record, way};
 pub use record_error::RecordError;
 pub use told::Told;

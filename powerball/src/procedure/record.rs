@@ -3,7 +3,7 @@
 //! Every line of a log is written whole, by one call, when its cycle is over: whatever moment the program
 //! dies at, the file can be read up to there.
 
-use super::{Columns, Envelope, RecordError, Told, approach};
+use super::{Cleared, Columns, Envelope, LogTime, RecordError, Told, approach};
 use crate::bus::driver::{ControlMode, Phase, Profile};
 use crate::bus::transport::{ArmError, Bus, Master, Moment};
 use crate::identification::motion::Motion;
@@ -185,10 +185,10 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
     ///
     /// # Errors
     /// [`RecordError::Barred`] where the arm must not go it.
-    pub fn way_to(&self, to: &[f64; N], share: f64, least: f64) -> Result<Motion, RecordError> {
+    pub fn way_to(&self, to: &[f64; N], share: f64, least: f64) -> Result<Cleared, RecordError> {
         let profile = self.master.driver().profile();
         let motion = way(profile, &self.target, to, share, least);
-        self.envelope.check(profile, &motion).map_err(|e| match e {
+        self.envelope.clear(profile, motion).map_err(|e| match e {
             RecordError::Motion(why) | RecordError::Barred(why) => {
                 let to: Vec<String> = to.iter().map(|q| format!("{q:.3}")).collect();
                 let to = to.join(", ");
@@ -197,8 +197,16 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
                 ))
             }
             other => other,
-        })?;
-        Ok(motion)
+        })
+    }
+
+    /// Looks at a motion as a whole, for [`record`](Self::record): before the arm is [released](Self::release), as a
+    /// long one takes longer than a cycle.
+    ///
+    /// # Errors
+    /// Where the arm must not go along it.
+    pub fn clear(&self, motion: Motion) -> Result<Cleared, RecordError> {
+        self.envelope.clear(self.master.driver().profile(), motion)
     }
 
     /// Goes that way and holds the position.
@@ -206,31 +214,34 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
     /// # Errors
     /// As [`way_to`](Self::way_to) and [`record`](Self::record).
     pub fn go(&mut self, to: &[f64; N], share: f64, least: f64) -> Result<(), RecordError> {
-        let motion = self.way_to(to, share, least)?;
-        self.follow(&motion, |_, _| Ok(()))
+        let way = self.way_to(to, share, least)?;
+        self.follow(way.motion(), |_, _| Ok(()))
     }
 
-    /// Follows a motion that begins where the arm is, and writes the log with these columns: `t` in s is `start`, and
-    /// the time since the first of its SYNCs, as the bus's clock measured it.
+    /// Follows a motion that begins where the arm is, and writes the log with these columns, `t` by `time`. The log is
+    /// written in the cycle, a line by a call: hand over a [`Behind`](super::Behind) where it is a file.
     ///
     /// # Errors
-    /// Where the motion does not fit the arm, the arm is stopped, or the log cannot be written. The log ends
-    /// there.
+    /// Where the motion begins elsewhere, the arm is stopped, or the log cannot be written. The log ends there.
     pub fn record(
         &mut self,
-        motion: &Motion,
-        start: f64,
+        motion: &Cleared,
+        time: &mut LogTime,
         columns: Columns,
         log: &mut impl Write,
     ) -> Result<Record, RecordError> {
-        self.check(motion)?;
+        let motion = motion.motion();
+        let far = motion.q.iter().zip(&self.target).fold(0.0f64, |far, (a, b)| far.max((a - b).abs()));
+        if far > 1e-3 {
+            let why = format!("the motion begins {far:.4} rad from where the arm is; go there first");
+            return Err(RecordError::Motion(why));
+        }
         let counters = *self.master.driver().counters();
         let mut record =
             Record { following_max: vec![0.0; N], following_rms: vec![0.0; N], ..Record::default() };
         log.write_all(columns.header(N).as_bytes()).map_err(RecordError::Write)?;
         let rows: Vec<&[f64]> = motion.samples().map(|[q, ..]| q).collect();
         let mut line = String::new();
-        let mut first = None;
         self.follow(motion, |k, master| {
             let Some(master) = master else {
                 record.missing += 1;
@@ -238,8 +249,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
             };
             let driver = master.driver();
             let joints = driver.joints();
-            let since = driver.synced_at() - *first.get_or_insert(driver.synced_at());
-            columns.line(&mut line, start + since as f64 * 1e-6, driver, rows[k], &counters);
+            columns.line(&mut line, time.at(driver.synced_at()), driver, rows[k], &counters);
             log.write_all(line.as_bytes()).map_err(RecordError::Write)?;
             record.samples += 1;
             for (i, joint) in joints.iter().enumerate() {
@@ -259,37 +269,11 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         Ok(record)
     }
 
-    fn approach_and_record(&mut self, motion: &Motion, log: &mut impl Write) -> Result<Record, RecordError> {
-        if let Some(begin) = beginning(motion) {
+    fn approach_and_record(&mut self, motion: &Cleared, log: &mut impl Write) -> Result<Record, RecordError> {
+        if let Some(begin) = beginning(motion.motion()) {
             self.go(&begin, APPROACH, 1.0)?;
         }
-        self.record(motion, 0.0, Columns::Everything, log)
-    }
-
-    fn check(&self, motion: &Motion) -> Result<(), RecordError> {
-        let period = self.master.driver().profile().period_seconds();
-        let wrong = |what| Err(RecordError::Motion(what));
-        if motion.dof() != N || motion.is_empty() {
-            return wrong(format!(
-                "the motion has {} joints and {} samples; the arm has {N} joints",
-                motion.dof(),
-                motion.len()
-            ));
-        }
-        if (motion.period - period).abs() > 1e-6 {
-            return wrong(format!(
-                "the motion has a sample every {:.3} ms, the arm's SYNC comes every {:.3} ms: sample it at \
-                    {} Hz",
-                1e3 * motion.period,
-                1e3 * period,
-                (1.0 / period).round()
-            ));
-        }
-        let far = motion.q.iter().zip(&self.target).fold(0.0f64, |far, (a, b)| far.max((a - b).abs()));
-        if far > 1e-3 {
-            return wrong(format!("the motion begins {far:.4} rad from where the arm is; go there first"));
-        }
-        self.envelope.check(self.master.driver().profile(), motion)
+        self.record(motion, &mut LogTime::default(), Columns::Everything, log)
     }
 
     /// Stops the arm: brakes closed, torque off.
@@ -333,18 +317,16 @@ pub fn record<B: Bus, const N: usize>(
     told: impl FnMut(&Told) + 'static,
     log: &mut impl Write,
 ) -> Result<Record, RecordError> {
-    if motion.dof() == N {
-        envelope.check(master.driver().profile(), motion).map_err(|e| match e {
-            RecordError::Barred(why) => RecordError::Barred(format!("on the trajectory {why}")),
-            other => other,
-        })?;
-    }
+    let cleared = envelope.clear(master.driver().profile(), motion.clone()).map_err(|e| match e {
+        RecordError::Barred(why) => RecordError::Barred(format!("on the trajectory {why}")),
+        other => other,
+    })?;
     let mut recorder = Recorder::bring_up(master, envelope)?.telling(told);
     if let Some(begin) = beginning(motion) {
         recorder.way_to(&begin, APPROACH, 1.0)?;
     }
     recorder.release()?;
-    let done = recorder.approach_and_record(motion, log);
+    let done = recorder.approach_and_record(&cleared, log);
     // Also where the recording failed, the arm is stopped; why it failed is what is told.
     let stopped = recorder.finish();
     let done = done?;
@@ -393,7 +375,9 @@ mod tests {
         let (motion, mut log) = (swing(6.0), Vec::new());
         let mut recorder = Recorder::enable(arm(), open()).unwrap();
         recorder.go(&START, 0.25, 1.0).unwrap();
-        let record = recorder.record(&motion, 10.0, Columns::Everything, &mut log).unwrap();
+        let cleared = recorder.clear(motion.clone()).unwrap();
+        let mut time = LogTime::from(10.0);
+        let record = recorder.record(&cleared, &mut time, Columns::Everything, &mut log).unwrap();
         assert_eq!((record.samples, record.missing, record.late, record.dropped), (motion.len(), 0, 0, 0));
         // Two and a half cycles of delay at 1 rad/s, and the servo.
         assert!(record.following_max.iter().all(|e| *e < 0.03), "{record:?}");
@@ -435,7 +419,9 @@ mod tests {
         assert!(failed.is_ok() && lines == motion.len());
         recorder.go(&START, 0.25, 1.0).unwrap();
         recorder.master_mut().bus_mut().peer_mut().fault(NodeId::clamped(5), Fault::Silent(true));
-        let failed = recorder.record(&motion, 0.0, Columns::Torques, &mut log).unwrap_err();
+        let cleared = recorder.clear(motion).unwrap();
+        let mut time = LogTime::default();
+        let failed = recorder.record(&cleared, &mut time, Columns::Torques, &mut log).unwrap_err();
         let RecordError::Arm(ArmError::Stopped(cause, _)) = &failed else { panic!("{failed}") };
         // The first cause, or the graver one that follows from the same silence.
         assert!(matches!(cause, Cause::DataMissing(_) | Cause::HeartbeatLost(_)), "{cause:?}");
@@ -471,15 +457,20 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_refused_before_anything_moves() {
         let mut recorder = Recorder::enable(arm(), open()).unwrap();
-        let mut refused =
-            |motion: Motion| match recorder.record(&motion, 0.0, Columns::Torques, &mut Vec::new()) {
+        let mut refused = |motion: Motion| {
+            let done = recorder.clear(motion).and_then(|motion| {
+                let (mut time, mut log) = (LogTime::default(), Vec::new());
+                recorder.record(&motion, &mut time, Columns::Torques, &mut log)
+            });
+            match done {
                 Err(RecordError::Motion(what)) => what,
                 other => panic!("{other:?}"),
-            };
+            }
+        };
         let mut slow = swing(1.0);
         slow.period = 0.01;
         assert!(refused(slow).contains("sample it at 200 Hz"));
-        let mut far = swing(1.0);
+        let mut far = swing(6.0);
         far.q.iter_mut().for_each(|q| *q += 0.1);
         assert!(refused(far).contains("go there first"));
         assert!(refused(Motion::new(6, 0.005)).contains("0 samples"));

@@ -10,11 +10,14 @@ use std::path::Path;
 pub fn rows(path: &Path) -> Vec<Vec<f64>> {
     let Ok(text) = std::fs::read_to_string(path) else { return Vec::new() };
     let columns = text.lines().next().map_or(0, |header| header.split(',').count());
-    let row = |line: &str| -> Option<Vec<f64>> {
-        let row: Option<Vec<f64>> = line.strip_suffix('\n')?.split(',').map(|x| x.parse().ok()).collect();
-        row.filter(|row| row.len() == columns)
-    };
-    text.split_inclusive('\n').skip(1).filter_map(row).collect()
+    let whole = |row: &Vec<f64>| row.len() == columns;
+    text.split_inclusive('\n').skip(1).filter_map(row).filter(whole).collect()
+}
+
+/// The numbers of a line, where it is whole and there is nothing else in it.
+#[must_use]
+pub fn row(line: &str) -> Option<Vec<f64>> {
+    line.strip_suffix('\n')?.split(',').map(|x| x.parse().ok()).collect()
 }
 
 /// The time of the last whole row, s.

@@ -1,12 +1,12 @@
 //! Warming an arm up (§II.C): every joint swings until the torque that friction takes no longer changes.
 
 use super::settling::{Cycle, Exponential, Trend, cycles, exponential, trend};
-use super::{Columns, RecordError, Recorder};
+use super::{Columns, LogTime, RecordError, Recorder, resume};
 use crate::bus::driver::Profile;
 use crate::bus::transport::Bus;
 use crate::identification::motion::Motion;
 use serde_json::{Value, json};
-use std::io::Write;
+use std::io::{self, Write};
 
 /// How to swing, and when to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,6 +83,8 @@ pub struct Seen {
 
 /// A logged position further than this from where the swing should be is another swing's, rad.
 const ANOTHER: f64 = 0.3;
+/// Between two rows of one cycle less time than this passes, s.
+const BROKEN_OFF: f64 = 0.5;
 
 impl Seen {
     /// Nothing seen yet of a swing.
@@ -91,47 +93,45 @@ impl Seen {
         Seen { cycles: vec![Vec::new(); motion.dof()], motion }
     }
 
-    /// Length of a cycle in the log, s: the next one begins a sample later than the last ends.
-    #[must_use]
-    pub fn length(&self) -> f64 {
-        self.motion.len() as f64 * self.motion.period
-    }
-
-    /// Takes the rows (`t`, `q1…qn`, `tau1…taun`) of an earlier log of the same swing. `None` where they are
-    /// of another one.
+    /// Takes the rows (`t`, `q1…qn`, `tau1…taun`, `ref1…refn`, and more) of an earlier log of the same swing. `None`
+    /// where they are of another one.
     #[must_use]
     pub fn earlier(mut self, rows: &[Vec<f64>]) -> Option<Seen> {
         let n = self.motion.dof();
-        let cycle = |row: &Vec<f64>| (row[0] / self.length() + 1e-9).floor();
-        let same = |row: &Vec<f64>| {
-            let sample = ((row[0] - cycle(row) * self.length()) / self.motion.period).round() as usize;
-            row.len() == 1 + 2 * n
-                && self
-                    .motion
-                    .q
-                    .get(sample * n..(sample + 1) * n)
-                    .is_some_and(|q| q.iter().zip(&row[1..]).all(|(a, b)| (a - b).abs() < ANOTHER))
-        };
-        if !rows.iter().all(same) {
+        if rows.iter().any(|row| row.len() < 1 + 3 * n) {
             return None;
         }
-        let parts: Vec<(f64, &[Vec<f64>])> = rows
-            .chunk_by(|a, b| cycle(a) == cycle(b))
-            .map(|part| (cycle(&part[0]) * self.length(), part))
-            .collect();
-        parts.into_iter().for_each(|(start, part)| self.take(start, part));
+        // A cycle ends and the next one begins with the set-point of the swing's end; where a program died, time
+        // has passed.
+        let reference = 1 + 2 * n;
+        let end = self.motion.q.first().copied()?;
+        let rests = |row: &[f64]| (row[reference] - end).abs() < 1e-7;
+        let parts = rows.chunk_by(|a, b| !(rests(a) && rests(b)) && b[0] - a[0] < BROKEN_OFF);
+        for part in parts.clone() {
+            let sample = |row: &Vec<f64>| ((row[0] - part[0][0]) / self.motion.period).round() as usize;
+            let same = |row: &Vec<f64>| {
+                // What comes late comes after the last sample.
+                let q = self.motion.q.get(sample(row) * n..(sample(row) + 1) * n).unwrap_or(&[]);
+                q.iter().zip(&row[1..]).all(|(a, b)| (a - b).abs() < ANOTHER)
+            };
+            if !part.iter().all(same) {
+                return None;
+            }
+        }
+        parts.for_each(|part| self.take(part));
         Some(self)
     }
 
-    /// Takes the rows of the cycle that began at `start`, s; one that is not whole is left out.
-    fn take(&mut self, start: f64, rows: &[Vec<f64>]) {
+    /// Takes the rows of a cycle; one that is not whole is left out.
+    fn take(&mut self, rows: &[Vec<f64>]) {
+        let Some(start) = rows.first().map(|row| row[0]) else { return };
         let (n, motion) = (self.motion.dof(), &self.motion);
         // Lines may be missing; each knows by its time which sample it is.
         let sample = |row: &Vec<f64>| ((row[0] - start) / motion.period).round() as usize;
         let known: Vec<(usize, &Vec<f64>)> =
             rows.iter().map(|row| (sample(row), row)).filter(|(k, _)| *k < motion.len()).collect();
         let times: Vec<f64> = known.iter().map(|(k, _)| *k as f64 * motion.period).collect();
-        if times.first() != Some(&0.0) || times.last().is_none_or(|t| *t < motion.duration()) {
+        if times.last().is_none_or(|t| *t < motion.duration()) {
             return;
         }
         for (j, seen) in self.cycles.iter_mut().enumerate() {
@@ -150,9 +150,34 @@ impl Seen {
     }
 }
 
+/// Passes the lines of a log on, the header where the log begins alone, and keeps their numbers.
+struct Lines<'a, W> {
+    log: &'a mut W,
+    begun: bool,
+    rows: Vec<Vec<f64>>,
+}
+
+impl<W: Write> Write for Lines<'_, W> {
+    /// Takes a line, which is written by one call.
+    fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        match std::str::from_utf8(line).ok().and_then(resume::row) {
+            Some(row) => self.rows.push(row),
+            None if self.begun => return Ok(line.len()),
+            None => self.begun = true,
+        }
+        self.log.write_all(line)?;
+        Ok(line.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.log.flush()
+    }
+}
+
 /// Swings until every joint is warm, or the time is over. The log gets every cycle, t running on from
 /// `start`, which is 0 where a log begins; `seen` is what an earlier part of it showed. `progress` is told
-/// the time and the greatest change that may still be to come.
+/// the time and the greatest change that may still be to come. The log is written in the cycle: hand over a
+/// [`Behind`](super::Behind) where it is a file.
 ///
 /// # Errors
 /// Where the arm stops, or the log cannot be written.
@@ -164,27 +189,17 @@ pub fn warm_up<B: Bus, const N: usize>(
     log: &mut impl Write,
     mut progress: impl FnMut(f64, Option<f64>),
 ) -> Result<Warmth, RecordError> {
-    let motion = seen.motion.clone();
-    let begin = motion.samples().next().and_then(|[q, ..]| <[f64; N]>::try_from(q).ok());
+    let motion = recorder.clear(seen.motion.clone())?;
+    let begin = motion.motion().samples().next().and_then(|[q, ..]| <[f64; N]>::try_from(q).ok());
     if let Some(begin) = begin {
         recorder.go(&begin, 0.25, 1.0)?;
     }
-    let mut seconds = start;
+    let mut time = LogTime::from(start);
+    let mut lines = Lines { log, begun: start > 0.0, rows: Vec::new() };
     loop {
-        let mut text = Vec::new();
-        recorder.record(&motion, seconds, Columns::Torques, &mut text)?;
-        let text = String::from_utf8_lossy(&text);
-        // The header is written once.
-        let mut lines = text.split_inclusive('\n').skip(usize::from(seconds > 0.0));
-        lines.try_for_each(|line| log.write_all(line.as_bytes())).map_err(RecordError::Write)?;
-        let rows: Vec<Vec<f64>> = text
-            .lines()
-            .skip(1)
-            .map(|line| line.split(',').filter_map(|x| x.parse().ok()).collect())
-            .filter(|row: &Vec<f64>| row.len() == 1 + 2 * N)
-            .collect();
-        seen.take(seconds, &rows);
-        seconds += seen.length();
+        recorder.record(&motion, &mut time, Columns::Everything, &mut lines)?;
+        seen.take(&std::mem::take(&mut lines.rows));
+        let seconds = time.at(recorder.master().driver().synced_at());
         let change = seen.change();
         progress(seconds, change);
         let warm = change.is_some_and(|c| c < settings.tolerance);

@@ -150,10 +150,10 @@ impl Friction {
                 continue;
             }
             let envelope = self.surroundings.envelope(model.arm(), &mounting)?;
-            for experiment in &open {
-                let wrong =
-                    |e: RecordError| Failure::Refused(format!("joint {}: {e}", experiment.plan.joint + 1));
-                envelope.check(&LWA4P, &experiment.plan.motion).map_err(wrong)?;
+            let mut motions = Vec::new();
+            for plan in open.iter().map(|experiment| &experiment.plan) {
+                let wrong = |e: RecordError| Failure::Refused(format!("joint {}: {e}", plan.joint + 1));
+                motions.push(envelope.clear(&LWA4P, plan.motion.clone()).map_err(wrong)?);
             }
             let bus: Box<dyn Bus> = match self.place.bus {
                 BusUrl::Virtual => {
@@ -167,17 +167,27 @@ impl Friction {
                 _ => self.place.open()?,
             };
             let refused = |e: RecordError| Failure::Refused(e.to_string());
-            let mut recorder = Recorder::enable(self.place.driver(bus)?, envelope).map_err(refused)?;
+            let mut recorder =
+                Recorder::enable(self.place.driver(bus)?, envelope).map_err(refused)?.telling(output::live());
+            let joints = open.iter().map(|experiment| experiment.plan.joint);
+            // The first that fails is the last. No log is waited for before the arm stands.
             let mut done = Ok(());
-            for experiment in open {
-                progress.say(&format!("joint {}, base {mounting}", experiment.plan.joint + 1));
-                done = run(&mut recorder, experiment, &self.out);
-                if done.is_err() {
-                    break;
+            let mut logs = Vec::new();
+            for (joint, motion) in joints.zip(&motions) {
+                progress.say(&format!("joint {}, base {mounting}", joint + 1));
+                match run(&mut recorder, joint, motion, &self.out) {
+                    Ok(log) => logs.push((joint, log)),
+                    Err(e) => {
+                        done = Err(e);
+                        break;
+                    }
                 }
             }
             let stopped = recorder.finish();
-            done.map_err(failure)?;
+            let closed = logs.into_iter().try_for_each(|(joint, log)| {
+                log.close().1.map_err(|e| FrictionError::Write(log_file(&self.out, joint), e))
+            });
+            done.and(closed).map_err(failure)?;
             stopped.map_err(refused)?;
         }
         Ok(())

@@ -8,7 +8,7 @@ use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::{Bus, BusUrl};
 use crate::identification::mounting::Mounting;
 use crate::procedure::warm_up::{Seen, Settings, Warmth, swing, warm_up};
-use crate::procedure::{RecordError, Recorder, resume};
+use crate::procedure::{Behind, RecordError, Recorder, resume};
 use crate::report::{Figure, Ink, Page, Panel, Series};
 use crate::virtual_arm::{PlantEffect, VirtualArm, lwa4p};
 use clap::Args;
@@ -73,7 +73,7 @@ impl WarmUp {
         let unwritable =
             |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", path.display()));
         let (seen, start) = self.earlier(&settings);
-        let mut log = match start > 0.0 {
+        let log = match start > 0.0 {
             true => resume::append(&path).map_err(unwritable)?,
             false => File::create(&path).map_err(unwritable)?,
         };
@@ -99,14 +99,17 @@ impl WarmUp {
             _ => self.place.open()?,
         };
         let mut recorder = Recorder::enable(self.place.driver(bus)?, envelope).map_err(refused)?;
+        let mut log = Behind::new(log);
         let done = warm_up(&mut recorder, &settings, seen, start, &mut log, |seconds, change| {
             let change = change
                 .map_or("too early to say".to_string(), |c| format!("up to {:.1} % to come", 100.0 * c));
             progress.say(&format!("{seconds:.0} s: {change}"));
         });
         let stopped = recorder.finish();
+        let (_, written) = log.close();
         let warmth = done.map_err(refused)?;
         stopped.map_err(refused)?;
+        written.map_err(unwritable)?;
         let text = output::json(&warmth.json())?;
         output::write(&self.out, "warm_up.json", text.as_bytes())?;
         output::write(&self.out, "report.html", page(&warmth).to_html().as_bytes())?;
@@ -160,13 +163,8 @@ impl WarmUp {
         if finished || stood > 0.2 * last {
             return (nothing(), 0.0);
         }
-        match nothing().earlier(&rows) {
-            Some(seen) => {
-                let start = ((last + stood) / seen.length()).ceil() * seen.length();
-                (seen, start)
-            }
-            None => (nothing(), 0.0),
-        }
+        // A second lies between what was broken off and what goes on.
+        nothing().earlier(&rows).map_or((nothing(), 0.0), |seen| (seen, last + stood.max(1.0)))
     }
 }
 

@@ -7,7 +7,7 @@ use crate::bus::driver::{Driver, Refusal};
 use crate::bus::transport::{Master, Memory};
 use crate::identification::excite::{self, Settings};
 use crate::identification::motion::Motion;
-use crate::procedure::{Columns, Envelope, RecordError, Recorder, way};
+use crate::procedure::{Columns, Envelope, LogTime, RecordError, Recorder, way};
 use crate::virtual_arm::slave::Setup;
 use crate::virtual_arm::{Plant, PlantEffect as Effect, Undeclared, VirtualArm, lwa4p};
 use dyngen::{Model, SetKind};
@@ -171,7 +171,8 @@ impl Session {
             }
             let unwritten = |e| SessionError::Write(path.clone(), e);
             let mut file = std::fs::File::create(&path).map_err(unwritten)?;
-            match recorder.record(&motions[k], starts[k], Columns::Torques, &mut file) {
+            let motion = recorder.clear(motions[k].clone())?;
+            match recorder.record(&motion, &mut LogTime::from(starts[k]), Columns::Torques, &mut file) {
                 Err(RecordError::Write(e)) => return Err(unwritten(e)),
                 done => done?,
             };
