@@ -21,7 +21,7 @@ pub(crate) fn model_file((text, name): &ModelText) -> PyResult<ModelFile> {
     ModelFile::parse(text, Path::new(name)).map_err(input)
 }
 
-fn failure(e: IdentifyError) -> PyErr {
+pub(crate) fn failure(e: IdentifyError) -> PyErr {
     if e.is_input() { input(e) } else { refused(e) }
 }
 

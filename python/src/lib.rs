@@ -11,6 +11,7 @@ mod logs;
 mod motion;
 mod session;
 mod source;
+mod summary;
 mod work;
 
 use pyo3::prelude::*;
@@ -34,4 +35,6 @@ mod _core {
     use super::session::{virtual_effects, virtual_session};
     #[pymodule_export]
     use super::source::{export_imported, generate, generate_model};
+    #[pymodule_export]
+    use super::summary::{Summary, summarize};
 }

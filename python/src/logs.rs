@@ -2,6 +2,7 @@
 
 use crate::arm::Arm;
 use crate::failure::{input, value};
+use crate::summary::Summary;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use powerball::Log;
 use powerball::identification::{Input, Recorded, Source};
@@ -11,13 +12,14 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// One log: a file, or columns with their names.
+/// One log: a file, columns with their names, or a summary.
 #[derive(FromPyObject)]
 pub(crate) struct Given<'py> {
     path: Option<PathBuf>,
     name: String,
     columns: Vec<(String, PyReadonlyArray1<'py, f64>)>,
     mounting: Option<String>,
+    summary: Option<Py<Summary>>,
 }
 
 /// Logs as the library takes them, and what was found in those from memory.
@@ -36,9 +38,10 @@ pub(crate) fn taken(arm: &dyngen::Arm, logs: &[Given<'_>], map: &Arc<ColumnMap>)
     let (mut sources, mut findings, mut wrong) = (Vec::new(), Vec::new(), Vec::new());
     for given in logs {
         let mounting = given.mounting.as_deref().map(str::parse).transpose().map_err(|e: String| value(e))?;
-        let source = match &given.path {
-            Some(path) => Source::file(path.clone()),
-            None => match in_memory(arm, given, map)? {
+        let source = match (&given.path, &given.summary) {
+            (Some(path), _) => Source::file(path.clone()),
+            (None, Some(summary)) => Source::from(summary.get().bands.clone()),
+            (None, None) => match in_memory(arm, given, map)? {
                 Ok((log, found)) => {
                     findings.extend(found);
                     Source::from(Input::Log(Cow::Owned(log)))

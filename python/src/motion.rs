@@ -163,6 +163,6 @@ pub(crate) fn excite(
 
 /// Writes a file whole or not at all.
 #[pyfunction]
-pub(crate) fn write_whole(path: PathBuf, text: &str) -> PyResult<()> {
-    report::files::write_whole(&path, text.as_bytes()).map_err(input)
+pub(crate) fn write_whole(path: PathBuf, data: &[u8]) -> PyResult<()> {
+    report::files::write_whole(&path, data).map_err(input)
 }

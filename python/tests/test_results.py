@@ -224,3 +224,22 @@ def test_generate_is_the_commands(arm, session, tmp_path):
     assert pb.generate(arm, functions=["gravity", "regressor"]) == (tmp_path / "arm.rs").read_text()
     with pytest.raises(ValueError, match="there is no function 'weight'"):
         pb.generate(arm, functions=["weight"])
+
+
+def test_numbers_for_ros_are_the_models(arm, session, identified, tmp_path):
+    yaml = need("yaml")
+    identified.save(tmp_path)
+    done = command(
+        "powerball",
+        *("generate", "--arm", session.arm_file, "--model", tmp_path / "identified.json"),
+        *("--yaml", tmp_path / "arm.yaml", "--json"),
+    )
+    assert done.returncode == 0, done.stderr
+    told = yaml.safe_load((tmp_path / "arm.yaml").read_text())["/**"]["ros__parameters"]["torque_model"]
+    assert dict(zip(told["inertial"]["names"], told["inertial"]["values"])) == identified.values
+    assert told["gravity"] == [0.0, 0.0, -9.81] and told["encoder_offset"] == [0.0] * 6
+    assert told["joints"] == [f"joint{j}" for j in range(1, 7)]
+    for name, friction in zip(told["joints"], identified.friction):
+        own = told["friction"][name]
+        assert [own[f"gamma{k}"] for k in range(1, 6)] == list(friction.gamma)
+        assert own["coulomb"] == friction.gamma[0] + friction.gamma[2] and own["viscous"] == friction.gamma[4]

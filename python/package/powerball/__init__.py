@@ -27,6 +27,7 @@ from .identification import (
 )
 from .reading import Recording, inspect, read_log
 from .source import export, generate
+from .summary import Summary, summarize
 from .virtual import Session, Truth, virtual_effects, virtual_session
 
 __all__ = [
@@ -51,6 +52,7 @@ __all__ = [
     "Session",
     "SetParameter",
     "Spread",
+    "Summary",
     "Trajectory",
     "Truth",
     "Verdict",
@@ -63,6 +65,7 @@ __all__ = [
     "identify",
     "inspect",
     "read_log",
+    "summarize",
     "verify",
     "virtual_effects",
     "virtual_session",

@@ -10,6 +10,7 @@ from typing import Any, List, Optional, Tuple, Union, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import _core
 from ._arrays import Array, PathLike
 
 
@@ -63,6 +64,8 @@ class Given:
     name: str
     columns: List[Tuple[str, Array]] = field(default_factory=list)
     mounting: Optional[str] = None
+    #: A summary of the compiled part.
+    summary: Any = None
 
 
 def given(logs: Optional[Logs], argument: str) -> List[Given]:
@@ -70,6 +73,7 @@ def given(logs: Optional[Logs], argument: str) -> List[Given]:
     if logs is None:
         return []
     one = isinstance(logs, (str, os.PathLike, Mapping, Mounted)) or _is_table(logs) or _is_samples(logs)
+    one = one or _is_summary(logs)
     several: List[Any] = [logs] if one else list(cast(Iterable[Any], logs))
     return [_given(log, f"{argument}[{k}]", None) for k, log in enumerate(several)]
 
@@ -85,11 +89,17 @@ def _is_samples(log: Any) -> bool:
     return all(hasattr(log, key) for key in ("t", "q", "tau"))
 
 
+def _is_summary(log: Any) -> bool:
+    return isinstance(getattr(log, "_core", None), _core.Summary)
+
+
 def _given(log: Any, name: str, mounting: Optional[str]) -> Given:
     if isinstance(log, Mounted):
         return _given(log.log, name, log.mounting)
     if isinstance(log, (str, os.PathLike)):
         return Given(os.fspath(log), os.fspath(log), mounting=mounting)
+    if _is_summary(log):
+        return Given(None, name, mounting=mounting, summary=log._core)
     if _is_samples(log):
         kept = ("t", "q", "tau", "i", "dq", "temp", "motor")
         quantities = {key: getattr(log, key) for key in kept if getattr(log, key, None) is not None}
@@ -101,8 +111,8 @@ def _given(log: Any, name: str, mounting: Optional[str]) -> Given:
     if _is_table(log):
         return Given(None, name, _columns({str(key): log[key] for key in log.columns}, name), mounting)
     raise TypeError(
-        f"{name} must be a file, a dict or a frame with columns t, q1 …, tau1 …, a structured array, a Log "
-        f"or a Mounted log, not {type(log).__name__}"
+        f"{name} must be a file, a dict or a frame with columns t, q1 …, tau1 …, a structured array, a Log, "
+        f"a Mounted log or a summary, not {type(log).__name__}"
     )
 
 

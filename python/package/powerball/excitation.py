@@ -74,7 +74,7 @@ class Excited:
         """Writes the first trajectory as CSV, and a page with figures where ``report`` names one."""
         self.trajectory.save(path)
         if report is not None:
-            _core.write_whole(report, self._core.page())
+            _core.write_whole(report, self._core.page().encode())
 
     def __repr__(self) -> str:
         return f"<Excited: condition number {self.condition:.2f}, {self.trajectory.t[-1]:.1f} s>"

@@ -72,7 +72,7 @@ class Trajectory:
 
     def save(self, path: Any) -> None:
         """Writes it as CSV for ``powerball record``."""
-        _core.write_whole(path, self.csv)
+        _core.write_whole(path, self.csv.encode())
 
 
 def trajectory(core: _core.Trajectory) -> Trajectory:

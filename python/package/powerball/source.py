@@ -69,7 +69,7 @@ def export(
     exported, notes = _core.export_imported(arm._core, text, of)
     _warn(notes)
     if output is not None:
-        _core.write_whole(output, exported)
+        _core.write_whole(output, exported.encode())
     return exported
 
 
