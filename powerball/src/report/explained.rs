@@ -27,6 +27,7 @@ pub fn add_to_page(page: &mut Page, explained: &Explained) {
     verdict(page, explained);
     errors(page, explained);
     effects(page, explained);
+    laws(page, explained);
     if let Some(joints) = &explained.transmission {
         transmission::add_to_page(page, joints);
     }
@@ -48,7 +49,9 @@ fn verdict(page: &mut Page, explained: &Explained) {
 /// What is said where no effect was named: never more than the logs show.
 #[must_use]
 pub fn nothing_named(explained: &Explained) -> &'static str {
-    if explained.verdict.iter().all(|v| v.state == State::Explained) {
+    if !explained.laws.is_empty() {
+        "No effect was named: what the model lacks has no name here, and is told as a formula."
+    } else if explained.verdict.iter().all(|v| v.state == State::Explained) {
         "No effect was named: little is left of the torques, and these logs do not show that the model lacks \
          anything."
     } else {
@@ -156,6 +159,21 @@ fn effects(page: &mut Page, explained: &Explained) {
             &format!("Rivals of {} on joint {}", effect.effect, list(&effect.joints)),
             &rivals(effect),
         );
+    }
+}
+
+/// What is there without a name.
+fn laws(page: &mut Page, explained: &Explained) {
+    if explained.laws.is_empty() {
+        return;
+    }
+    page.heading("What has no name");
+    page.paragraph(
+        "No effect with a name explains this torque, and a smooth function of two joints does, on the other path too: \
+         a hose, a cable or a linkage between them. The formula is in the model; what it is of you must see on the arm.",
+    );
+    for law in &explained.laws {
+        page.paragraph(&law.sentence());
     }
 }
 

@@ -230,6 +230,9 @@ fn summary(explained: &Explained) -> String {
     for effect in &explained.effects {
         text.push_str(&effect_in_words(effect));
     }
+    for law in &explained.laws {
+        text.push_str(&format!("\nno name on joint {}: {}\n", list(&law.joints), law.sentence()));
+    }
     if let Some(unattributed) = &explained.unattributed {
         text.push_str(&unattributed_in_words(unattributed));
     }

@@ -131,6 +131,40 @@ pub enum Law<T> {
         /// b.
         theirs: T,
     },
+    /// qₖ of another joint k.
+    OtherPosition {
+        /// k, from 0.
+        other: usize,
+    },
+    /// qᵢ·qₖ of two joints.
+    PositionProduct {
+        /// i and k, from 0.
+        joints: [usize; 2],
+    },
+    /// cos(a·qᵢ + b·qₖ) of two joints.
+    CosineOfTwo {
+        /// i and k, from 0.
+        joints: [usize; 2],
+        /// a and b.
+        orders: [T; 2],
+    },
+    /// sin(a·qᵢ + b·qₖ) of two joints.
+    SineOfTwo {
+        /// i and k, from 0.
+        joints: [usize; 2],
+        /// a and b.
+        orders: [T; 2],
+    },
+    /// q̇·q̇ₖ with another joint k.
+    VelocityProduct {
+        /// k, from 0.
+        other: usize,
+    },
+    /// q̇·|q̇ₖ| with another joint k.
+    VelocityByMagnitude {
+        /// k, from 0.
+        other: usize,
+    },
     /// τ of the rigid arm with friction: a factor between current and torque.
     Torque,
     /// τ·|τ|/s: a factor that changes with the torque.
@@ -188,6 +222,11 @@ impl<T: RealField + Copy> Default for Memory<T> {
 
 fn of<T: RealField + Copy>(signal: &[T], joint: usize) -> T {
     signal.get(joint).copied().unwrap_or_else(T::zero)
+}
+
+/// a·qᵢ + b·qₖ.
+fn angle<T: RealField + Copy>(q: &[T], [i, k]: [usize; 2], [a, b]: [T; 2]) -> T {
+    a * of(q, i) + b * of(q, k)
 }
 
 fn number<T: RealField>(x: f64) -> T {
@@ -264,6 +303,12 @@ impl<T: RealField + Copy> Law<T> {
             Law::SumAcceleration { other, own, theirs } => {
                 own * of(now.ddq, joint) + theirs * of(now.ddq, other)
             }
+            Law::OtherPosition { other } => of(now.q, other),
+            Law::PositionProduct { joints: [i, k] } => of(now.q, i) * of(now.q, k),
+            Law::CosineOfTwo { joints, orders } => angle(now.q, joints, orders).cos(),
+            Law::SineOfTwo { joints, orders } => angle(now.q, joints, orders).sin(),
+            Law::VelocityProduct { other } => dq * of(now.dq, other),
+            Law::VelocityByMagnitude { other } => dq * of(now.dq, other).abs(),
             Law::Torque => torque(),
             Law::TorqueMagnitude { scale } => torque() * torque().abs() / scale,
             Law::TorqueSquare { scale } => {

@@ -70,6 +70,12 @@ pub trait Effect: Sync {
     /// What it is easily confused with.
     fn class(&self) -> Class;
 
+    /// Whether its name says what it is. What has none is looked for only where nothing with a name passes,
+    /// and is told as a formula.
+    fn has_name(&self) -> bool {
+        true
+    }
+
     /// Whether the instants at which it sets in are known only roughly, so that nothing can be said of its
     /// fast part.
     fn abrupt(&self) -> bool {

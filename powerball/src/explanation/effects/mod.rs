@@ -34,6 +34,7 @@ pub mod stribeck;
 pub mod temperature;
 pub mod time_delay;
 pub mod torque_constant;
+pub mod unnamed_law;
 pub mod velocity_nonlinearity;
 mod window_sums;
 mod windows;
@@ -120,6 +121,7 @@ library! {
     joint_coupling::JointCoupling,
     backlash::Backlash,
     joint_elasticity::JointElasticity,
+    unnamed_law::UnnamedLaw,
 }
 
 /// Every effect, in the order in which equals are preferred.

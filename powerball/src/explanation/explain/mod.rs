@@ -31,8 +31,8 @@ mod study;
 pub use comparison::{Hypothesis, Open};
 pub use named::{FalsePositives, NamedEffect, Rival, Spreads};
 pub use results::{
-    Change, Correction, Curve, Experiment, Explained, NextExperiment, Shown, State, TorqueCurve, Trajectory,
-    Unattributed, Verdict, curves,
+    Change, Correction, Curve, Experiment, Explained, LawCoefficient, NextExperiment, Shown, State,
+    TorqueCurve, Trajectory, Unattributed, UnnamedLaw, Verdict, curves,
 };
 
 use crate::explanation::options::{ExplainError, ExplainOptions};
@@ -42,6 +42,7 @@ use begin::begin;
 use comparison::{History, withhold};
 use findings::Findings;
 use prepare::{Begun, Inertia, prepare};
+use search::Among;
 use step::{Outcome, Proposed, accept, propose, settle_beside};
 
 /// Explains what the base model of an arm that is derived already lacks on `logs`, judged on `validate`. The
@@ -65,18 +66,22 @@ pub fn explain_body(
     results::conclude(findings)
 }
 
-/// Adds one effect after the other until nothing passes and nothing is taken back.
+/// Adds one effect after the other until nothing passes and nothing is taken back; laws without a name where
+/// no name passes.
 fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
-    let (mut model, mut history) = (begin(base, &study), History::default());
+    let (mut model, mut history, mut among) = (begin(base, &study), History::default(), Among::Names);
     for number in 0..study.rule().most_steps {
         study.say(&format!("step {}: screening candidates", number + 1));
-        let Proposed { refused, outcome } = propose(&study, &model, number);
-        history.refused = refused;
+        let Proposed { refused, outcome } = propose(&study, &model, number, among);
+        if among == Among::Names {
+            history.refused = refused;
+        }
         match outcome {
             Outcome::Named(choice) => {
                 let step = accept(&study, &mut model, *choice, number);
                 study.say(&format!("step {}: {} accepted", number + 1, step.effect.name()));
                 history.steps.push(step);
+                among = Among::Names;
             }
             Outcome::Chance(candidates) => {
                 study.say(&format!("step {}: what fits best fits no better than by chance", number + 1));
@@ -84,9 +89,17 @@ fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
             }
             // Only now is it known what is left beside all that fits.
             Outcome::Nothing(question) => {
-                history.questions.extend(question);
-                let Some(taken) = withhold(&study, &mut model, &mut history) else { break };
-                study.say(&format!("{} is not named: {}", taken.effect.name(), taken.why));
+                if among == Among::Names {
+                    history.questions.extend(question);
+                }
+                if let Some(taken) = withhold(&study, &mut model, &mut history) {
+                    study.say(&format!("{} is not named: {}", taken.effect.name(), taken.why));
+                    among = Among::Names;
+                } else if among == Among::Names && search::is_left(&study, &model) {
+                    among = Among::Laws;
+                } else {
+                    break;
+                }
             }
         }
     }

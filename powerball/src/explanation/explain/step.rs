@@ -4,7 +4,8 @@ use super::comparison::{Comparison, Question, Step, compare};
 use super::model::{Accepted, Model};
 use super::named::Rival;
 use super::search::{
-    Group, Member, Screen, Tester, Trial, Validation, eliminate, groups, is_beside, keep_needed, surrogates,
+    Among, Group, Member, Screen, Tester, Trial, Validation, eliminate, gains, groups, is_beside,
+    keep_needed, surrogates,
 };
 use super::study::Study;
 use crate::controller::JointNumber;
@@ -42,10 +43,10 @@ pub(super) struct Choice {
 }
 
 /// Screens, tests and compares; changes nothing.
-pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize) -> Proposed {
+pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize, among: Among) -> Proposed {
     let context = model.context(study);
     let screen = Screen::new(&context);
-    let (mut groups, tests) = groups(study, model, &screen);
+    let (mut groups, tests) = groups(study, model, &screen, among);
     let columns = model.columns_on_validation(study);
     let residual = model.fit.residual_on(&study.validation, &columns);
     let design =
@@ -80,6 +81,8 @@ pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize) -> Propos
     joints.dedup();
     let comparison = compare(&screen, &groups, chosen, &joints);
     let question = Question::twins(study.rule(), &groups, chosen, comparison.twin.as_deref(), &joints);
+    // Which formula is not a question of names.
+    let question = question.filter(|_| groups[chosen].effect.has_name());
     let Group { effect, members } = groups.swap_remove(chosen);
     let kept = members.into_iter().enumerate().filter(|(m, _)| above.contains(m)).map(|(_, member)| member);
     let before = spread(&study.validation, &residual).rms;
@@ -181,6 +184,9 @@ pub(super) fn accept(study: &Study<'_>, model: &mut Model, choice: Choice, numbe
     let fell: Vec<f64> = fell.collect();
     model.accepted[first..].iter_mut().for_each(|a| a.explained.clone_from(&fell));
     eliminate(study, model);
+    if !effect.has_name() {
+        drop_words_for(study, model, number);
+    }
     // What does not last is not tried again: it would be accepted and taken out for ever.
     let gone = added.into_iter().filter(|candidate| !model.has(candidate)).collect::<Vec<_>>();
     model.given_up.extend(gone);
@@ -198,6 +204,31 @@ fn drop_covered(study: &Study<'_>, model: &mut Model, first: usize) {
     let kept: Vec<bool> = model.accepted.iter().map(|a| !covered(a)).collect();
     let mut kept = kept.into_iter();
     model.accepted.retain(|_| kept.next().unwrap_or(true));
+}
+
+/// Takes out the names that a law without a name has made small on its joints: they were words for a part of
+/// it.
+fn drop_words_for(study: &Study<'_>, model: &mut Model, number: usize) {
+    let laws: Vec<Accepted> = model.accepted.iter().filter(|a| a.step == Some(number)).cloned().collect();
+    let word = |(a, gain): (&Accepted, f64)| {
+        let on = |law: &&Accepted| a.candidate.is_on(&law.candidate.joints);
+        let explained = |law: &Accepted| -> f64 {
+            let of = |j: &JointNumber| law.explained[j.index()] * model.fit.weights[j.index()];
+            law.candidate.joints.iter().map(of).sum()
+        };
+        laws.iter().filter(on).any(|law| gain < study.rule().mends_only * explained(law))
+    };
+    let gains = gains(model);
+    let gone: Vec<bool> = (model.accepted.iter().zip(gains))
+        .map(|(a, gain)| a.effect().has_name() && a.step.is_some() && word((a, gain)))
+        .collect();
+    if gone.contains(&true) {
+        let mut gone = gone.into_iter();
+        model
+            .given_up
+            .extend(model.accepted.extract_if(.., |_| gone.next() == Some(true)).map(|a| a.candidate));
+        model.refit(study);
+    }
 }
 
 /// Once everything else is known: what was in the model from the start goes out where it is not needed and
@@ -227,7 +258,7 @@ fn name_beside(study: &Study<'_>, model: &mut Model, effect: &'static dyn Effect
     model.refit(study);
     let context = model.context(study);
     let screen = Screen::new(&context);
-    let (mut groups, _) = groups(study, model, &screen);
+    let (mut groups, _) = groups(study, model, &screen, Among::Names);
     groups.retain(|g| g.effect != effect);
     let member = |k: &usize| {
         let candidate = fitted[*k].candidate.clone();

@@ -114,6 +114,32 @@ enum LawEntry {
         own: f64,
         theirs: f64,
     },
+    OtherPosition {
+        #[serde(with = "from_one")]
+        other: usize,
+    },
+    PositionProduct {
+        #[serde(with = "pair_from_one")]
+        joints: [usize; 2],
+    },
+    CosineOfTwo {
+        #[serde(with = "pair_from_one")]
+        joints: [usize; 2],
+        orders: [f64; 2],
+    },
+    SineOfTwo {
+        #[serde(with = "pair_from_one")]
+        joints: [usize; 2],
+        orders: [f64; 2],
+    },
+    VelocityProduct {
+        #[serde(with = "from_one")]
+        other: usize,
+    },
+    VelocityByMagnitude {
+        #[serde(with = "from_one")]
+        other: usize,
+    },
     Torque,
     TorqueMagnitude {
         scale: f64,
@@ -140,6 +166,19 @@ mod from_one {
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
         Ok(usize::deserialize(from)?.saturating_sub(1))
+    }
+}
+
+/// The same for two joints.
+mod pair_from_one {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(joints: &[usize; 2], to: S) -> Result<S::Ok, S::Error> {
+        joints.map(|joint| joint + 1).serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<[usize; 2], D::Error> {
+        Ok(<[usize; 2]>::deserialize(from)?.map(|joint| joint.saturating_sub(1)))
     }
 }
 
@@ -205,7 +244,13 @@ impl TorqueModel {
                 | Law::SumDirection { other, .. }
                 | Law::SumVelocity { other, .. }
                 | Law::SumAcceleration { other, .. }
+                | Law::OtherPosition { other }
+                | Law::VelocityProduct { other }
+                | Law::VelocityByMagnitude { other }
                 | Law::OtherAcceleration { other } => other,
+                Law::PositionProduct { joints }
+                | Law::CosineOfTwo { joints, .. }
+                | Law::SineOfTwo { joints, .. } => joints[0].max(joints[1]),
                 _ => 0,
             };
             if term.joint >= dof || other >= dof {

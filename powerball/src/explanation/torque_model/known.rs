@@ -62,32 +62,11 @@ impl Additions {
     /// The same torque with terms that were fitted at logged positions of a joint written for true ones,
     /// `offset` rad less.
     pub(crate) fn put_zero_right(&mut self, joint: JointNumber, offset: f64) {
-        let joint = joint.index();
-        let mut constants = Vec::new();
-        for NamedTerm { effect, term } in self.terms.iter().filter(|t| t.term.joint == joint) {
-            if term.law == Law::Position {
-                let term = Term { law: Law::Constant, coefficient: term.coefficient * offset, ..*term };
-                constants.push(NamedTerm { effect: effect.clone(), term });
-            }
-        }
-        self.terms.extend(constants);
-        let waves: Vec<(usize, f64, f64)> = (self.terms.iter().enumerate())
-            .filter(|(_, t)| t.term.joint == joint)
-            .filter_map(|(k, t)| match t.term.law {
-                Law::Cosine { order } => Some((k, order, 1.0)),
-                Law::Sine { order } => Some((k, order, -1.0)),
-                _ => None,
-            })
-            .collect();
-        // a·cos(k(x + o)) = a·cos(ko)·cos(kx) − a·sin(ko)·sin(kx), and a·sin(k(x + o)) likewise.
-        for (k, order, sign) in waves {
-            let NamedTerm { effect, term } = self.terms[k].clone();
-            let (sin, cos) = (order * offset).sin_cos();
-            self.terms[k].term.coefficient = term.coefficient * cos;
-            let law = if sign > 0.0 { Law::Sine { order } } else { Law::Cosine { order } };
-            let term = Term { law, coefficient: -sign * term.coefficient * sin, ..term };
-            self.terms.push(NamedTerm { effect, term });
-        }
+        let moved = |NamedTerm { effect, term }: NamedTerm| {
+            let parts = at_true_position(&term, joint.index(), offset).into_iter();
+            parts.map(move |term| NamedTerm { effect: effect.clone(), term })
+        };
+        self.terms = self.terms.drain(..).flat_map(moved).collect();
         self.join();
     }
 
@@ -105,6 +84,43 @@ impl Additions {
         }
         self.terms = joined;
     }
+}
+
+/// A term that was fitted at logged positions of a joint written for true ones, `offset` rad less: a sum.
+fn at_true_position(term: &Term<f64>, joint: usize, offset: f64) -> Vec<Term<f64>> {
+    let part = |factor: f64, law: Law<f64>| Term { coefficient: factor * term.coefficient, law, ..*term };
+    let position = |of: usize| match of == term.joint {
+        true => Law::Position,
+        false => Law::OtherPosition { other: of },
+    };
+    let by = |of: usize| if of == joint { offset } else { 0.0 };
+    // cos(x + o) = cos o·cos x − sin o·sin x, sin(x + o) = cos o·sin x + sin o·cos x.
+    let turned = |by: f64, law: Law<f64>, other: Law<f64>, sign: f64| {
+        vec![part(by.cos(), law), part(sign * by.sin(), other)]
+    };
+    let phase = |[i, k]: [usize; 2], [a, b]: [f64; 2]| a * by(i) + b * by(k);
+    let mut parts = match term.law {
+        Law::Position => vec![*term, part(by(term.joint), Law::Constant)],
+        Law::OtherPosition { other } => vec![*term, part(by(other), Law::Constant)],
+        Law::PositionProduct { joints: [i, k] } => vec![
+            *term,
+            part(by(i), position(k)),
+            part(by(k), position(i)),
+            part(by(i) * by(k), Law::Constant),
+        ],
+        Law::Cosine { order } => turned(order * by(term.joint), term.law, Law::Sine { order }, -1.0),
+        Law::Sine { order } => turned(order * by(term.joint), term.law, Law::Cosine { order }, 1.0),
+        Law::CosineOfTwo { joints, orders } => {
+            turned(phase(joints, orders), term.law, Law::SineOfTwo { joints, orders }, -1.0)
+        }
+        Law::SineOfTwo { joints, orders } => {
+            turned(phase(joints, orders), term.law, Law::CosineOfTwo { joints, orders }, 1.0)
+        }
+        _ => vec![*term],
+    };
+    let unmoved = |part: &Term<f64>| part.law == term.law;
+    parts.retain(|part| part.coefficient != 0.0 || unmoved(part));
+    parts
 }
 
 impl LogChanges {

@@ -10,6 +10,7 @@ use super::curves::curves;
 use super::dependencies::effective_samples;
 use super::doubts::doubts;
 use super::explained::{Change, Explained};
+use super::laws::laws;
 use super::next::NextExperiment;
 use super::shown::shown;
 use super::unattributed::{Unattributed, unattributed};
@@ -52,6 +53,7 @@ pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainE
         before: before.errors.clone(),
         noise_floor: floor,
         effects: named,
+        laws: laws(study, model, &history.steps),
         band: [0.0, study.data.band.cutoff],
         bands: study.data.joints.iter().map(|joint| joint.band.cutoff).collect(),
         effective_samples: effective_samples(&study.data, &model.fit.residual),
@@ -79,7 +81,7 @@ fn named_effects(
     let mut order: Vec<&'static dyn Effect> = Vec::new();
     let mut accepted: Vec<&Accepted> = model.accepted.iter().collect();
     accepted.sort_by_key(|a| a.step);
-    for effect in accepted.into_iter().map(Accepted::effect) {
+    for effect in accepted.into_iter().map(Accepted::effect).filter(|effect| effect.has_name()) {
         if !order.contains(&effect) {
             order.push(effect);
         }

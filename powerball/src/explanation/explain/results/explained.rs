@@ -3,6 +3,7 @@
 use super::super::comparison::Open;
 use super::super::named::{FalsePositives, NamedEffect, Spreads};
 use super::curves::TorqueCurve;
+use super::laws::UnnamedLaw;
 use super::next::{Experiment, NextExperiment};
 use super::shown::Shown;
 use super::unattributed::Unattributed;
@@ -37,6 +38,8 @@ pub struct Explained {
     pub noise_floor: Vec<f64>,
     /// Accepted effects in the order in which they were added.
     pub effects: Vec<NamedEffect>,
+    /// What is there without a name, as formulas.
+    pub laws: Vec<UnnamedLaw>,
     /// Band of all errors here, Hz: the widest, where joints have their own.
     pub band: [f64; 2],
     /// The upper end of each joint's band, Hz.

@@ -1,7 +1,7 @@
 //! What is said of what was found.
 //!
 //! `conclude` makes the result ([`Explained`]): `compose` the model of what was accepted and what that
-//! leaves, `unattributed` and `dependencies` what stays without a name and what it depends on, `correction`
+//! leaves, `unattributed` and `dependencies` what stays without a name and what it depends on, `laws` the formulas of what has no name, `correction`
 //! the curves that take a part of it off, `doubts` what a reader must know, `verdict` how far each
 //! joint is explained, `curves` and `shown` the figures,
 //! `next` what an experiment would decide. JSON is made of these types by whoever writes it, and nothing here
@@ -14,6 +14,7 @@ mod curves;
 pub(super) mod dependencies;
 mod doubts;
 mod explained;
+mod laws;
 mod next;
 mod shown;
 mod unattributed;
@@ -23,6 +24,7 @@ pub(super) use conclude::conclude;
 pub use correction::{Correction, Curve};
 pub use curves::{TorqueCurve, curves};
 pub use explained::{Change, Explained};
+pub use laws::{LawCoefficient, UnnamedLaw};
 pub use next::{Experiment, NextExperiment, Trajectory};
 pub use shown::Shown;
 pub use unattributed::Unattributed;

@@ -82,11 +82,32 @@ fn best<'m>(members: impl Iterator<Item = &'m Member>) -> Option<&'m Member> {
     members.max_by(|a, b| a.trial.score.total_cmp(&b.trial.score))
 }
 
+/// What is looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Among {
+    /// Effects that have a name.
+    Names,
+    /// Laws without one as well, where no name passes.
+    Laws,
+}
+
+/// Whether there is anything left in which a law without a name is worth a look.
+pub(crate) fn is_left(study: &Study<'_>, model: &Model) -> bool {
+    let context = model.context(study);
+    effects::all().iter().any(|effect| !effect.has_name() && !effect.candidates(&context).is_empty())
+}
+
 /// The candidate group of every effect, and how many candidates were tried in all.
-pub(crate) fn groups(study: &Study<'_>, model: &Model, screen: &Screen<'_>) -> (Vec<Group>, f64) {
+pub(crate) fn groups(
+    study: &Study<'_>,
+    model: &Model,
+    screen: &Screen<'_>,
+    among: Among,
+) -> (Vec<Group>, f64) {
     let mut tests = 0.0;
     let mut groups = Vec::new();
-    let lists: Vec<_> = effects::all().iter().map(|e| (*e, e.candidates(screen.context))).collect();
+    let asked = effects::all().iter().filter(|e| e.has_name() || among == Among::Laws);
+    let lists: Vec<_> = asked.map(|e| (*e, e.candidates(screen.context))).collect();
     for (effect, candidates) in lists {
         if study.data.per_joint && effect.of_the_body() {
             continue;
@@ -176,7 +197,29 @@ fn untested_refusal(
     if model.gave_up(candidate) {
         return Some(("did not last, or could not be told from its rivals".to_string(), true));
     }
+    if let Some(name) = would_swallow(model, screen, member) {
+        return Some((format!("gains too little to take the place of {name}"), true));
+    }
     mends(model, screen, member).map(|name| (format!("only mends the law of {name}"), true))
+}
+
+/// The accepted effect that would be a part of a law without a name, where it leaves too little to be a false
+/// name.
+fn would_swallow(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<&'static str> {
+    let Member { candidate, trial, .. } = member;
+    if candidate.effect().has_name() {
+        return None;
+    }
+    let laws = |c: &Candidate| c.effect().placed_laws(screen.context, c);
+    let own = laws(candidate);
+    let share = screen.context.rule.much_left;
+    let joint = candidate.joints[0];
+    let swallowed = |a: &&Accepted| {
+        let part = a.candidate.is_on(&[joint]) && laws(&a.candidate).iter().any(|law| own.contains(law));
+        let explained = a.explained.get(joint.index()).copied().unwrap_or(0.0);
+        part && trial.gain < share / (1.0 - share) * explained * model.fit.weights[joint.index()]
+    };
+    model.accepted.iter().filter(|a| a.step.is_some()).find(swallowed).map(Accepted::effect).map(|e| e.name())
 }
 
 fn is_ruled_out(study: &Study<'_>, candidate: &Candidate) -> bool {

@@ -21,9 +21,9 @@ mod surrogates;
 
 pub(super) use beside::{is_beside, keep_needed};
 pub(super) use both_ways::Swapped;
-pub(super) use elimination::eliminate;
+pub(super) use elimination::{eliminate, gains};
 pub(super) use evidence::{Extent, Validation, evidence, validation_gain};
-pub(super) use groups::{Group, Member, Tester, groups};
+pub(super) use groups::{Among, Group, Member, Tester, groups, is_left};
 pub(super) use refinement::refine;
 pub(super) use refusal::refusal;
 pub(super) use screen::{Screen, Trial};

@@ -5,7 +5,7 @@ use super::super::model::Model;
 use super::super::named::FalsePositives;
 use super::super::study::Study;
 use super::evidence::{Extent, evidence};
-use super::groups::groups;
+use super::groups::{Among, groups};
 use super::refusal::refusal;
 use super::screen::{Screen, Trial};
 use crate::controller::JointNumber;
@@ -69,7 +69,7 @@ pub(crate) fn surrogates(
 pub(crate) fn false_positives(study: &Study<'_>, model: &Model) -> FalsePositives {
     let context = model.context(study);
     let screen = Screen::new(&context);
-    let (groups, tests) = groups(study, model, &screen);
+    let (groups, tests) = groups(study, model, &screen, Among::Names);
     let trials: Vec<(&Trial, &[JointNumber])> = groups
         .iter()
         .flat_map(|f| &f.members)

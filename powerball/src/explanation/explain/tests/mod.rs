@@ -1,4 +1,5 @@
 mod correction;
+mod laws;
 mod measured;
 mod model;
 mod names;
