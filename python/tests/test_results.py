@@ -181,6 +181,7 @@ def test_explain_is_the_commands_and_its_model_goes_on(session, arm, tmp_path):
     for name in ("explained.json", "model.json", "report.html"):
         assert (tmp_path / "ours" / name).read_bytes() == (tmp_path / "theirs" / name).read_bytes(), name
     assert session.truth.effect in [effect.effect for effect in explained.effects]
+    assert [law.formula for law in explained.laws] == [law["formula"] for law in explained.to_dict()["laws"]]
     assert len(explained.verdict) == 6 and explained.after.rms.sum() < explained.before.rms.sum()
     assert session.truth.effect in explained._repr_html_()
     verified = pb.verify(arm, explained, validate)

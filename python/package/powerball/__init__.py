@@ -13,7 +13,7 @@ from ._logs import Log, Mounted
 from ._result import Spread
 from .arm import Arm, Check, Limits, ParameterSet, SetParameter
 from .excitation import Excited, excite
-from .explanation import Effect, Explained, Trajectory, Verdict, explain
+from .explanation import Coefficient, Effect, Explained, Law, Trajectory, Verdict, explain
 from .identification import (
     Compared,
     Identified,
@@ -33,6 +33,7 @@ from .virtual import Session, Truth, virtual_effects, virtual_session
 __all__ = [
     "Arm",
     "Check",
+    "Coefficient",
     "Compared",
     "Effect",
     "Error",
@@ -42,6 +43,7 @@ __all__ = [
     "InputError",
     "JointFriction",
     "JointVerdict",
+    "Law",
     "Limits",
     "Log",
     "Mounted",

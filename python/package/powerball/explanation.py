@@ -58,6 +58,34 @@ class Verdict:
 
 
 @dataclass(frozen=True)
+class Coefficient:
+    """A coefficient of a law."""
+
+    name: str
+    value: float
+    #: Standard error.
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Law:
+    """A torque without a name, as a formula."""
+
+    #: As text: ``tau2 = c1·q2·q3 + …``, N·m.
+    formula: str
+    latex: str
+    joints: List[int]
+    coefficients: List[Coefficient]
+    #: Change of the rms error on the validation logs by it, by joint: with it over without it, less 1.
+    held_out_change: Array
+    #: 1 less the probability of as much by chance.
+    probability: float
+    #: The named effect that came nearest.
+    nearest: Optional[str]
+
+
+@dataclass(frozen=True)
 class Trajectory:
     """Samples of a motion from rest to rest."""
 
@@ -113,6 +141,23 @@ class Explained(OfLogs):
             )
 
         return [of(entry) for entry in self._told["effects"]]
+
+    @property
+    def laws(self) -> List[Law]:
+        """What is there without a name, as formulas."""
+
+        def of(entry: Dict[str, Any]) -> Law:
+            return Law(
+                formula=entry["formula"],
+                latex=entry["latex"],
+                joints=list(entry["joints"]),
+                coefficients=[Coefficient(**coefficient) for coefficient in entry["coefficients"]],
+                held_out_change=numbers(entry["held_out_change"]),
+                probability=entry["probability"],
+                nearest=entry["nearest"],
+            )
+
+        return [of(entry) for entry in self._told["laws"]]
 
     @property
     def before(self) -> Spread:
@@ -171,7 +216,8 @@ class Explained(OfLogs):
             for v, b, a in zip(self.verdict, self.before.rms, self.after.rms)
         ]
         lead = paragraph(named and "What the model lacks" or "No effect was named.", strong=True)
-        return lead + named + table(["joint", "verdict", "base model", "with effects", "advice"], rows)
+        formulas = "".join(paragraph(f"Without a name: {law.formula}") for law in self.laws)
+        return lead + named + formulas + table(["joint", "verdict", "base model", "with effects", "advice"], rows)
 
 
 def _joints(joints: List[int]) -> str:
