@@ -73,7 +73,8 @@ fn every_format_comes_to_the_same_log_whatever_the_order_of_its_joints() {
 #[test]
 fn a_dataset_of_lists_is_a_log_of_episodes() {
     let (csv, _) = read("log.csv", "").unwrap();
-    let columns = "q.column = \"observation.state\"\ntau.column = \"observation.effort\"\n";
+    let columns =
+        "t.column = \"timestamp\"\nq.column = \"observation.state\"\ntau.column = \"observation.effort\"\n";
     let file = "dataset/data/chunk-000/file-000.parquet";
     let (log, _) = read(file, &format!("{JOINTS}{columns}")).unwrap();
     assert_eq!((log.t.len(), log.pieces.len()), (120, 2));
