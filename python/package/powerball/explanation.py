@@ -217,7 +217,12 @@ class Explained(OfLogs):
         ]
         lead = paragraph(named and "What the model lacks" or "No effect was named.", strong=True)
         formulas = "".join(paragraph(f"Without a name: {law.formula}") for law in self.laws)
-        return lead + named + formulas + table(["joint", "verdict", "base model", "with effects", "advice"], rows)
+        return (
+            lead
+            + named
+            + formulas
+            + table(["joint", "verdict", "base model", "with effects", "advice"], rows)
+        )
 
 
 def _joints(joints: List[int]) -> str:
