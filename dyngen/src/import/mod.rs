@@ -1,6 +1,6 @@
 //! Arms from other descriptions: a serial chain of a URDF becomes an arm file with inertial values beside it.
 //!
-//! 1. `chain`: from the tree of links to one chain: fixed joints merged, everything at q = 0 in the root
+//! 1. `tree`, `chain`: from the tree of links to one chain: fixed joints merged, everything at q = 0 in the root
 //!    link's frame.
 //! 2. `rounding`: the nearest arm with right angles and without residues of lengths.
 //!    `change`: what that does to the tip and to the mass matrix.
@@ -19,6 +19,7 @@ pub(crate) mod pose;
 mod rounding;
 mod shapes;
 mod text;
+mod tree;
 pub(crate) mod urdf;
 
 use crate::arm::{Arm, Convention, Parameter};
