@@ -4,7 +4,7 @@ use super::Failure;
 use super::import::{lock, refuse_to_replace, write};
 use dyngen::Arm;
 use dyngen::export::{self, Known};
-use dyngen::import::{ImportError, Options};
+use dyngen::import::{ImportError, Options, Source};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -59,7 +59,8 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     };
     let name = |path: &Path| path.display().to_string();
     let arm = Arm::read(&args.arm).map_err(Failure::input)?;
-    let (text, values) = (read(&args.original)?, read(&args.values)?);
+    let source = Source::read(&args.original).map_err(Failure::input)?;
+    let values = read(&args.values)?;
     let friction = args.friction.as_ref().map(|path| Ok((read(path)?, name(path)))).transpose()?;
     let friction = friction.as_ref().map(|(text, file)| (text.as_str(), file.as_str()));
     let known = Known::read(&arm, (&values, &name(&args.values)), friction).map_err(Failure::refused)?;
@@ -69,18 +70,24 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         lock: args.lock.clone(),
         ..Options::default()
     };
-    let file = name(&args.original);
+    let (text, file) = (&source.text, &source.file);
     let exported = match args.to {
-        Format::Urdf => export::urdf(&text, &file, &arm, &known, &options),
-        Format::Mjcf => export::mjcf(&text, &file, &arm, &known, &options),
+        Format::Urdf => export::urdf(text, file, &arm, &known, &options),
+        Format::Mjcf => export::mjcf(text, file, &arm, &known, &options),
     };
     let exported = exported.map_err(|e| match e {
-        ImportError::Unreadable(_) => Failure::input(e),
-        ImportError::Refused(_) => Failure::refused(e),
+        ImportError::Unreadable(_) => Failure::input(source.placed(&e.to_string())),
+        ImportError::Refused(_) => Failure::refused(source.placed(&e.to_string())),
     })?;
     for note in &exported.notes {
         eprintln!("{file}: note: {note}");
     }
-    write(&[(&args.output, &exported.text)])?;
+    if !source.included().is_empty() {
+        eprintln!(
+            "{file}: note: the new file holds {}, which the model includes",
+            source.included().join(", ")
+        );
+    }
+    write(&[(&args.output, &source.bytes(&exported.text))])?;
     Ok(ExitCode::SUCCESS)
 }

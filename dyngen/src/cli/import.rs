@@ -55,12 +55,8 @@ fn tolerance(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
-    let file = args.urdf.display().to_string();
-    let bytes = std::fs::read(&args.urdf)
-        .map_err(|e| Failure::input(format!("{file}: the URDF cannot be read: {e}")))?;
-    // Names and comments of old files are Latin-1, which is not said everywhere; its letters are its bytes.
-    let latin = |bytes: &[u8]| bytes.iter().map(|byte| char::from(*byte)).collect();
-    let text = String::from_utf8(bytes).unwrap_or_else(|e| latin(e.as_bytes()));
+    let source = import::Source::read(&args.urdf).map_err(Failure::input)?;
+    let file = &source.file;
     let convention = match args.convention {
         Frames::Modified => Convention::Modified,
         Frames::Standard => Convention::Standard,
@@ -73,7 +69,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         angle_tolerance: args.angle_tolerance,
         exact: args.exact,
     };
-    let imported = import::any(&text, &file, &options).map_err(Failure::input)?;
+    let imported = import::source(&source, &options).map_err(Failure::input)?;
     for note in imported.notes.iter().chain(&imported.arm.notes()) {
         eprintln!("{file}: note: {note}");
     }
@@ -82,9 +78,9 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         refuse_to_replace(path, &args.urdf, args.force)?;
     }
     let json = imported.values_json();
-    let mut files: Vec<(&Path, &str)> = vec![(&args.output, &imported.text)];
+    let mut files: Vec<(&Path, &[u8])> = vec![(&args.output, imported.text.as_bytes())];
     if !imported.values.is_empty() {
-        files.push((&values, &json));
+        files.push((&values, json.as_bytes()));
     }
     write(&files)?;
     Ok(ExitCode::SUCCESS)
@@ -105,13 +101,13 @@ pub(super) fn refuse_to_replace(path: &Path, original: &Path, force: bool) -> Re
 }
 
 /// Writes all files or none: each is complete on the disk before the first takes its name.
-pub(super) fn write(files: &[(&Path, &str)]) -> Result<(), Failure> {
+pub(super) fn write(files: &[(&Path, &[u8])]) -> Result<(), Failure> {
     let partial = |path: &Path| {
         let mut name = path.as_os_str().to_os_string();
         name.push(".partial");
         PathBuf::from(name)
     };
-    let put = |step: &dyn Fn(&Path, &str) -> std::io::Result<()>| {
+    let put = |step: &dyn Fn(&Path, &[u8]) -> std::io::Result<()>| {
         files.iter().try_for_each(|(path, text)| {
             step(path, text)
                 .map_err(|e| Failure::input(format!("{}: cannot be written: {e}", path.display())))

@@ -106,8 +106,8 @@ impl<'d, 'i> Reader<'d, 'i> {
             self.error(
                 node,
                 format!(
-                    "<{name}> is not followed: save the compiled model first, with mujoco.mj_saveLastXML or \
-                     `compile model.xml whole.xml`"
+                    "<{name}> is not followed here: save the compiled model first, with \
+                     mujoco.mj_saveLastXML or `compile model.xml whole.xml`"
                 ),
             );
         }

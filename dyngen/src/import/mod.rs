@@ -1,5 +1,6 @@
 //! Arms from other descriptions: a serial chain of a URDF becomes an arm file with inertial values beside it.
 //!
+//! 0. `source`: the file's letters and what it includes; `urdf`, `mjcf`: its links and joints.
 //! 1. `tree`, `chain`: from the tree of links to one chain: fixed joints merged, everything at q = 0 in the root
 //!    link's frame.
 //! 2. `rounding`: the nearest arm with right angles and without residues of lengths.
@@ -18,12 +19,14 @@ mod orientation;
 pub(crate) mod pose;
 mod rounding;
 mod shapes;
+mod source;
 mod text;
 mod tree;
 pub(crate) mod urdf;
 
 use crate::arm::{Arm, Convention, Parameter};
 use change::Change;
+pub use source::Source;
 use std::fmt;
 
 /// How to read a URDF.
@@ -114,7 +117,7 @@ impl std::error::Error for ImportError {}
 /// # Errors
 /// What is wrong, or why this is no arm, with the names of links and joints.
 pub fn urdf(text: &str, file: &str, options: &Options) -> Result<Imported, ImportError> {
-    imported(urdf::read(text).map_err(|e| unreadable("a URDF", file, &e))?, file, options)
+    read_as("a URDF", urdf::read, &Source::of_text(text, file), options)
 }
 
 /// The serial arm of a MuJoCo model (MJCF); `file` names the text in errors.
@@ -124,9 +127,9 @@ pub fn urdf(text: &str, file: &str, options: &Options) -> Result<Imported, Impor
 /// then.
 ///
 /// # Errors
-/// As [`urdf`].
+/// As [`urdf`]. Models that include other files are read by [`source`].
 pub fn mjcf(text: &str, file: &str, options: &Options) -> Result<Imported, ImportError> {
-    imported(mjcf::read(text).map_err(|e| unreadable("a MuJoCo model", file, &e))?, file, options)
+    read_as("a MuJoCo model", mjcf::read, &Source::of_text(text, file), options)
 }
 
 /// The serial arm of a URDF or of a MuJoCo model, whichever the text is.
@@ -134,7 +137,29 @@ pub fn mjcf(text: &str, file: &str, options: &Options) -> Result<Imported, Impor
 /// # Errors
 /// As [`urdf`].
 pub fn any(text: &str, file: &str, options: &Options) -> Result<Imported, ImportError> {
-    if mjcf::is_mjcf(text) { mjcf(text, file, options) } else { urdf(text, file, options) }
+    source(&Source::of_text(text, file), options)
+}
+
+/// The serial arm of a URDF or of a MuJoCo model from the disk.
+///
+/// # Errors
+/// As [`urdf`].
+pub fn source(source: &Source, options: &Options) -> Result<Imported, ImportError> {
+    if mjcf::is_mjcf(&source.text) {
+        read_as("a MuJoCo model", mjcf::read, source, options)
+    } else {
+        read_as("a URDF", urdf::read, source, options)
+    }
+}
+
+fn read_as(
+    what: &str,
+    read: fn(&str) -> Result<urdf::Robot, String>,
+    source: &Source,
+    options: &Options,
+) -> Result<Imported, ImportError> {
+    let robot = read(&source.text).map_err(|e| unreadable(what, &source.file, &source.placed(&e)))?;
+    imported(robot, source, options)
 }
 
 fn unreadable(what: &str, file: &str, reasons: &str) -> ImportError {
@@ -142,8 +167,10 @@ fn unreadable(what: &str, file: &str, reasons: &str) -> ImportError {
     ImportError::Unreadable(lines.join("\n"))
 }
 
-fn imported(robot: urdf::Robot, file: &str, options: &Options) -> Result<Imported, ImportError> {
-    let refused = |reasons| ImportError::refused(file, reasons);
+fn imported(robot: urdf::Robot, source: &Source, options: &Options) -> Result<Imported, ImportError> {
+    let file = source.file.as_str();
+    let placed = |said: Vec<String>| said.iter().map(|line| source.placed(line)).collect();
+    let refused = |reasons| ImportError::refused(file, placed(reasons));
     let mut chain = chain::chain(&robot, options).map_err(refused)?;
     if !options.exact {
         chain = meant(&robot, chain, options).map_err(refused)?;
@@ -155,6 +182,7 @@ fn imported(robot: urdf::Robot, file: &str, options: &Options) -> Result<Importe
         });
         chain.notes.extend(said);
     }
+    chain.notes = placed(chain.notes);
     let frames = frames::place(&chain, options).map_err(|reason| refused(vec![reason]))?;
     let text = text::arm_file(&chain, &frames, file, options);
     let arm = Arm::parse(&text, file)
