@@ -22,7 +22,7 @@ pub(super) struct Args {
     /// What `powerball identify` wrote, or values of every parameter of the arm.
     #[arg(long, value_name = "FILE.json")]
     values: PathBuf,
-    /// The friction of what `powerball identify` wrote: damping and friction of the joints.
+    /// What `powerball identify` or `explain` wrote: damping and friction of the joints, and effects for MuJoCo.
     #[arg(long, value_name = "FILE.json")]
     friction: Option<PathBuf>,
     /// The format of the original.

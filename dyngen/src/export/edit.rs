@@ -49,6 +49,11 @@ pub(super) fn comment(words: &str) -> String {
     format!("<!-- {} -->", words.trim_end_matches('-'))
 }
 
+/// A text as an attribute's value.
+pub(super) fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
+}
+
 /// The shortest text that is the number.
 pub(super) fn shortest(x: f64) -> String {
     if x == 0.0 { "0".to_string() } else { format!("{x:?}") }

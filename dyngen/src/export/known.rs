@@ -1,5 +1,6 @@
 //! What was identified, from the files that say it: every link's parameters, what is known of them, friction.
 
+use super::term::{self, Term};
 use crate::arm::sum::parse_sum;
 use crate::arm::{Arm, Parameter, ParameterKind};
 use crate::consistency::pseudo_inertia;
@@ -29,10 +30,12 @@ pub struct Known {
     pub words: Vec<Vec<String>>,
     /// By joint; none of those that follow others, whose friction is felt at the joint that they follow.
     pub friction: Option<Vec<Option<Friction>>>,
+    /// Effects beyond friction.
+    pub terms: Vec<Term>,
 }
 
 impl Known {
-    /// From a values file and, where there is one, a file with friction, by their texts and names.
+    /// From a values file and, where there is one, a file with friction and effects, by their texts and names.
     ///
     /// # Errors
     /// What the files lack: each link needs all its parameters, and they must be those of a body.
@@ -77,8 +80,14 @@ impl Known {
             }
         }
         let words = words(arm, &json);
-        let friction = friction.map(|(text, file)| read_friction(arm, text, file)).transpose()?;
-        Ok(Known { values: all, words, friction })
+        let Some((text, file)) = friction else {
+            return Ok(Known { values: all, words, friction: None, terms: Vec::new() });
+        };
+        let wrong = |what: String| format!("{file}: {what}");
+        let json: Value = serde_json::from_str(text).map_err(|e| wrong(format!("not valid JSON: {e}")))?;
+        let friction = Some(read_friction(arm, &json).map_err(wrong)?);
+        let terms = term::read(arm, &json).map_err(wrong)?;
+        Ok(Known { values: all, words, friction, terms })
     }
 }
 
@@ -105,21 +114,19 @@ fn words(arm: &Arm, json: &Value) -> Vec<Vec<String>> {
 }
 
 /// Eq. 16 of the paper, γ1 tanh(γ2 q̇) + γ3 tanh(γ4 q̇) + γ5 q̇: its saturating terms come to γ1 + γ3.
-fn read_friction(arm: &Arm, text: &str, file: &str) -> Result<Vec<Option<Friction>>, String> {
-    let wrong = |what: String| format!("{file}: {what}");
-    let json: Value = serde_json::from_str(text).map_err(|e| wrong(format!("not valid JSON: {e}")))?;
+fn read_friction(arm: &Arm, json: &Value) -> Result<Vec<Option<Friction>>, String> {
     let list = json.get("friction").and_then(Value::as_array);
-    let list = list.ok_or_else(|| wrong("it has no list 'friction'".to_string()))?;
+    let list = list.ok_or_else(|| "it has no list 'friction'".to_string())?;
     let of_joint = |joint: usize| -> Result<Friction, String> {
         let entry = list.iter().find(|e| e["joint"].as_u64() == Some(joint as u64 + 1));
         let number = |key: &str| entry.and_then(|e| e[key].as_f64()).filter(|x| x.is_finite());
         let (Some(first), Some(second), Some(viscous)) =
             (number("gamma1"), number("gamma3"), number("gamma5"))
         else {
-            return Err(wrong(format!("no gamma1, gamma3 and gamma5 for joint {}", joint + 1)));
+            return Err(format!("no gamma1, gamma3 and gamma5 for joint {}", joint + 1));
         };
         if first + second < 0.0 || viscous < 0.0 {
-            return Err(wrong(format!("the friction of joint {} is negative", joint + 1)));
+            return Err(format!("the friction of joint {} is negative", joint + 1));
         }
         let std = |k: usize| entry.and_then(|e| e["std"][k].as_f64());
         let coulomb_std = std(0).map(|s| s + std(2).unwrap_or(0.0));

@@ -2,9 +2,11 @@
 //! every other byte stays.
 
 use super::body::Body;
-use super::edit::{Edits, child, comment, indentation, shortest};
+use super::dcmotor::{self, Motor};
+use super::edit::{Edits, child, comment, escaped, indentation, shortest};
 use super::known::{Friction, Known};
 use super::share::{self, Share};
+use super::term::Term;
 use super::urdf::Exported;
 use crate::arm::{Arm, Joint, JointKind};
 use crate::exact::rational::to_f64;
@@ -37,6 +39,7 @@ pub fn mjcf(
     let shares = share::shares(arm, &chain, &robot, known, &holds).map_err(|e| refused(vec![e]))?;
     let degrees = !angles_are_radians(&document);
     let mut notes = Vec::new();
+    let mut actuators = Actuators::default();
     for (i, Share { link, body, emptied, note }) in shares.into_iter().enumerate() {
         writer.inertial(&link, lines(&link), &body, &known.words[i]);
         let none = Body::of_parameters(&[0.0; 10]);
@@ -48,12 +51,36 @@ pub fn mjcf(
         let line = robot.joints.iter().find(|j| j.name == joint.name).map_or(0, |j| j.line);
         let rotor = known.values[11 * i + 10];
         let armature = arm.joints[i].rotor_ratio.as_ref().map(|k| to_f64(k).powi(2) * rotor);
-        let friction = known.friction.as_ref().and_then(|f| f[i]);
+        let mut friction = known.friction.as_ref().and_then(|f| f[i]);
+        let terms: Vec<&Term> = known.terms.iter().filter(|term| term.link == i).collect();
+        let effects = dcmotor::motors(arm.joints[i].kind, friction, &terms);
+        if let Some(friction) = friction.as_mut().filter(|_| effects.has_coulomb) {
+            friction.coulomb = 0.0;
+        }
         let old = (joint.position, degrees);
         writer.joint((&joint.name, line), &arm.joints[i], friction, armature, old);
+        if !effects.motors.is_empty() {
+            writer.name_joint(&joint.name, line);
+        }
+        let left_out = effects.left_out.into_iter().map(|why| format!("joint '{}': {why}", joint.name));
+        actuators.left_out.extend(left_out);
+        actuators.motors.extend(effects.motors.into_iter().map(|motor| (joint.name.clone(), motor)));
     }
+    notes.extend(actuators.left_out.iter().map(|what| format!("left out: {what}")));
+    writer.actuators(&actuators);
     Ok(Exported { text: writer.edits.apply(text), notes })
 }
+
+/// Effects of all joints.
+#[derive(Default)]
+struct Actuators {
+    /// With the joint's name.
+    motors: Vec<(String, Motor)>,
+    left_out: Vec<String>,
+}
+
+/// What the names of actuators begin with that an export writes, and the next one replaces.
+const OURS: &str = "dyngen ";
 
 struct Writer<'t, 'd> {
     text: &'t str,
@@ -119,6 +146,87 @@ impl<'t, 'd> Writer<'t, 'd> {
             if degrees && joint.kind == JointKind::Revolute { 180.0 / std::f64::consts::PI } else { 1.0 };
         if let Some([low, high]) = joint.position.filter(|p| Some(*p) != old) {
             self.attribute(node, "range", format!("{} {}", shortest(low * unit), shortest(high * unit)));
+        }
+    }
+
+    /// A joint that an actuator turns has a name.
+    fn name_joint(&mut self, name: &str, line: u32) {
+        if let Some(node) = self.element("joint", name, line).filter(|node| node.attribute("name").is_none())
+        {
+            self.attribute(node, "name", escaped(name));
+        }
+    }
+
+    /// Writes effects as passive actuators, in the place of those of an earlier export.
+    fn actuators(&mut self, Actuators { motors, left_out }: &Actuators) {
+        let root = self.document.root_element();
+        let sections: Vec<Node<'d, 't>> = root.children().filter(|n| n.has_tag_name("actuator")).collect();
+        let ours = |n: &Node<'d, 't>| {
+            n.has_tag_name("dcmotor") && n.attribute("name").is_some_and(|name| name.starts_with(OURS))
+                || n.is_comment() && n.text().is_some_and(|text| text.trim_start().starts_with("dyngen: "))
+        };
+        let mut states = 0;
+        for old in sections.iter().flat_map(|section| section.children()).filter(ours) {
+            let before = self.text[..old.range().start].trim_end().len();
+            self.edits.replace(before..old.range().end, "");
+            states -= i64::from(old.attribute("lugre").is_some());
+        }
+        if motors.is_empty() && left_out.is_empty() && states == 0 {
+            return;
+        }
+        let mut lines: Vec<String> =
+            left_out.iter().map(|what| comment(&format!("dyngen: left out: {what}"))).collect();
+        for (k, (joint, motor)) in motors.iter().enumerate() {
+            states += i64::from(motor.has_state);
+            lines.push(comment(&format!("dyngen: joint '{joint}': {}", motor.words)));
+            let (name, joint) = (escaped(&format!("{OURS}{} {joint}", k + 1)), escaped(joint));
+            lines.push(format!(
+                "<dcmotor name=\"{name}\" joint=\"{joint}\" input=\"none\" motorconst=\"0 0\" resistance=\"1\" {}/>",
+                motor.attributes
+            ));
+        }
+        self.append_to_actuators(sections.last().copied(), &lines);
+        self.states(states);
+    }
+
+    /// Puts lines at the end of the actuators, which come last then, as their states do.
+    fn append_to_actuators(&mut self, section: Option<Node<'d, 't>>, lines: &[String]) {
+        if lines.is_empty() {
+            return;
+        }
+        let root = self.document.root_element();
+        let inner =
+            |margin: &str| -> String { lines.iter().map(|line| format!("\n{margin}{line}")).collect() };
+        match section.map(|section| (section, section.last_child())) {
+            Some((section, Some(last))) => {
+                let margin = indentation(self.text, section.range().start);
+                let end = last.range().start + self.text[last.range()].trim_end().len();
+                self.edits.insert(end, inner(&format!("{margin}  ")));
+            }
+            // <actuator/>
+            Some((section, None)) => {
+                let margin = indentation(self.text, section.range().start);
+                let inner = inner(&format!("{margin}  "));
+                self.edits.replace(section.range(), format!("<actuator>{inner}\n{margin}</actuator>"));
+            }
+            None => {
+                let end = root.last_child().map_or(root.range().end, |last| last.range().end);
+                let end = self.text[..end].trim_end().len();
+                self.edits.insert(end, format!("\n  <actuator>{}\n  </actuator>", inner("    ")));
+            }
+        }
+    }
+
+    /// Key frames have a number for each state.
+    fn states(&mut self, more: i64) {
+        let root = self.document.root_element();
+        let keys = root.children().filter(|n| n.has_tag_name("keyframe")).flat_map(|n| n.children());
+        for act in keys.filter_map(|key| key.attribute_node("act")) {
+            let mut states: Vec<&str> = act.value().split_whitespace().collect();
+            let kept = states.len().saturating_sub(usize::try_from(-more).unwrap_or(0));
+            states.truncate(kept);
+            states.resize(kept + usize::try_from(more).unwrap_or(0), "0");
+            self.edits.replace(act.range_value(), states.join(" "));
         }
     }
 

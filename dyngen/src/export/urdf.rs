@@ -57,6 +57,12 @@ pub fn urdf(
         writer.notes.extend(share.note);
         writer.joint(&chain.joints[i].name, &arm.joints[i], known.friction.as_ref().and_then(|f| f[i]));
     }
+    let mut effects: Vec<&str> = known.terms.iter().map(|term| term.effect.as_str()).collect();
+    effects.sort_unstable();
+    effects.dedup();
+    if !effects.is_empty() {
+        writer.notes.push(format!("a URDF has no place for effects: {} are left out", effects.join(", ")));
+    }
     if (0..arm.links()).any(|i| known.values[11 * i + 10] != 0.0) {
         let what = "rotor inertias are left out: a URDF has no place for them".to_string();
         writer.notes.push(what);

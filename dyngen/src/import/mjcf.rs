@@ -124,6 +124,15 @@ impl<'d, 'i> Reader<'d, 'i> {
             self.class(node, "main", &Class::default());
         }
         for node in sections("actuator").flat_map(elements) {
+            let has = |key: &str| node.attribute(key).is_some();
+            if node.has_tag_name("dcmotor") && (has("lugre") || has("cogging")) {
+                let line = self.line(node);
+                self.robot.notes.push(format!("line {line}: friction and cogging of <dcmotor> are left out"));
+            }
+            // A passive one drives nothing: its gear is the order of its cogging.
+            if node.attribute("input") == Some("none") {
+                continue;
+            }
             if let (Some(joint), Some(gear)) = (node.attribute("joint"), node.attribute("gear")) {
                 let first = gear.split_whitespace().next().and_then(|g| g.parse::<f64>().ok());
                 self.gears.extend(first.filter(|g| g.abs() > 1.0).map(|g| (joint.to_string(), g.abs())));

@@ -1,0 +1,124 @@
+//! Named effects as MuJoCo's `<dcmotor>` has them: cogging, and LuGre's friction (MuJoCo 4, XML reference,
+//! actuator/dcmotor and its technical note).
+//!
+//! A `<dcmotor>` without input and without motor constant is passive: nothing of it is left but these two. Its
+//! torque acts on the joint; a term is what the motor has to bring up against it, of the other sign.
+
+use super::edit::shortest;
+use super::known::Friction;
+use super::term::{Law, Term};
+use crate::arm::JointKind;
+use std::f64::consts::FRAC_PI_2;
+
+/// What LuGre's bristles give way before they slide, rad and m, where no log says it: far below what an encoder's
+/// user sees, far above what a simulation's step of 2 ms cannot follow.
+const BRISTLES: [f64; 2] = [1e-3, 1e-4];
+
+/// The effects of one joint.
+#[derive(Debug, Default)]
+pub(super) struct Motors {
+    pub(super) motors: Vec<Motor>,
+    /// Whether the joint's constant friction is among them, in the place of `frictionloss`.
+    pub(super) has_coulomb: bool,
+    /// Terms for which MuJoCo has no law, in words.
+    pub(super) left_out: Vec<String>,
+}
+
+/// A passive `<dcmotor>`.
+#[derive(Debug)]
+pub(super) struct Motor {
+    /// Its attributes beside those that make it passive.
+    pub(super) attributes: String,
+    /// What it is, and how exactly.
+    pub(super) words: String,
+    /// Whether it has a state, MuJoCo's `act`.
+    pub(super) has_state: bool,
+}
+
+/// The motors of the terms of one joint.
+pub(super) fn motors(kind: JointKind, friction: Option<Friction>, terms: &[&Term]) -> Motors {
+    let mut all = Motors::default();
+    let mut orders: Vec<f64> = Vec::new();
+    for term in terms {
+        let (effect, c) = (&term.effect, term.coefficient);
+        let mut left_out = |why: &str| all.left_out.push(format!("{effect}: {why}"));
+        match &term.law {
+            Law::Cosine { order } | Law::Sine { order } => {
+                if !orders.contains(order) {
+                    orders.push(*order);
+                    all.motors.push(cogging(effect, *order, terms));
+                }
+            }
+            Law::Presliding { .. } if c <= 0.0 => left_out("a negative level, which no bristles have"),
+            Law::Presliding { distance } => all.motors.push(Motor {
+                attributes: lugre(c / distance, c, c, 1.0),
+                words: format!(
+                    "{effect}: Dahl's presliding friction of {} within {}, exactly",
+                    shortest(c),
+                    shortest(*distance)
+                ),
+                has_state: true,
+            }),
+            Law::Stribeck { velocity } => {
+                let coulomb = friction.map_or(0.0, |friction| friction.coulomb);
+                if coulomb <= 0.0 || coulomb + c <= 0.0 {
+                    left_out("LuGre's friction has it beside constant friction only");
+                } else if all.has_coulomb {
+                    left_out("LuGre's friction has one velocity");
+                } else {
+                    let bristles = BRISTLES[usize::from(kind == JointKind::Prismatic)];
+                    all.has_coulomb = true;
+                    all.motors.push(Motor {
+                        attributes: lugre(coulomb / bristles, coulomb, coulomb + c, *velocity),
+                        words: format!(
+                            "{effect}: in place of frictionloss, {} + {} exp(-(v/{})^2) in steady sliding; not from \
+                             a log: that bristles of {} hold it at rest",
+                            shortest(coulomb),
+                            shortest(c),
+                            shortest(*velocity),
+                            shortest(bristles)
+                        ),
+                        has_state: true,
+                    });
+                }
+            }
+            Law::Other(law) => left_out(&format!("MuJoCo has no law '{law}'")),
+        }
+    }
+    all
+}
+
+/// σ0, σ1 = 0, Coulomb's and static level, Stribeck's velocity. Without σ1 nothing is added to steady sliding, and with
+/// equal levels this is Dahl's model.
+fn lugre(stiffness: f64, coulomb: f64, breakaway: f64, velocity: f64) -> String {
+    let numbers = [stiffness, 0.0, coulomb, breakaway, velocity].map(shortest);
+    format!("gear=\"1\" lugre=\"{}\"", numbers.join(" "))
+}
+
+/// All terms of one order: −(a cos kq + b sin kq) = amplitude·sin(kq + phase).
+fn cogging(effect: &str, order: f64, terms: &[&Term]) -> Motor {
+    let (mut sine, mut cosine) = (0.0, 0.0);
+    for term in terms {
+        match term.law {
+            Law::Cosine { order: k } if k == order => cosine += term.coefficient,
+            Law::Sine { order: k } if k == order => sine += term.coefficient,
+            _ => {}
+        }
+    }
+    let amplitude = f64::hypot(cosine, sine);
+    let phase = if sine == 0.0 { -FRAC_PI_2.copysign(cosine) } else { f64::atan2(-cosine, -sine) };
+    // The number of poles is an integer. What turns k times as fast with one pole has k times its torque at the joint.
+    let whole = order.fract() == 0.0;
+    let (gear, poles, amplitude) =
+        if whole { (1.0, order, amplitude) } else { (order, 1.0, amplitude / order) };
+    let [gear, amplitude, poles, phase] = [gear, amplitude, poles, phase].map(shortest);
+    Motor {
+        attributes: format!("gear=\"{gear}\" cogging=\"{amplitude} {poles} {phase}\""),
+        words: format!(
+            "{effect}: the motor has to bring up {} cos({order} q) + {} sin({order} q), exactly",
+            shortest(cosine),
+            shortest(sine)
+        ),
+        has_state: false,
+    }
+}

@@ -1,0 +1,160 @@
+//! Effects that were named stand in a MuJoCo model as passive motors, whose laws are those of the terms.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use dyngen::export::{self, Exported, Known};
+use dyngen::import::{self, Options};
+use roxmltree::Document;
+
+const ARM: &str = include_str!("mjcf/arm.xml");
+const PUMA: &str = include_str!("urdf/puma.urdf");
+const MODEL: &str = include_str!("mjcf/model.json");
+
+fn exact() -> Options {
+    Options { exact: true, ..Options::default() }
+}
+
+fn exported(text: &str, model: &str) -> Exported {
+    let imported = import::mjcf(text, "arm.xml", &exact()).unwrap();
+    let known = Known::read(&imported.arm, (&imported.values_json(), "v.json"), Some((model, "model.json")));
+    export::mjcf(text, "arm.xml", &imported.arm, &known.unwrap(), &Options::default()).unwrap()
+}
+
+/// Of each passive motor the joint, the gear, and the numbers of `cogging` or `lugre`.
+fn motors(text: &str) -> Vec<(String, f64, &'static str, Vec<f64>)> {
+    let document = Document::parse(text).unwrap();
+    let passive = document.descendants().filter(|n| n.attribute("input") == Some("none"));
+    passive
+        .map(|node| {
+            assert_eq!(
+                (node.attribute("motorconst"), node.attribute("resistance")),
+                (Some("0 0"), Some("1"))
+            );
+            let law = if node.attribute("lugre").is_some() { "lugre" } else { "cogging" };
+            let numbers = node.attribute(law).unwrap().split(' ').map(|x| x.parse().unwrap()).collect();
+            let gear = node.attribute("gear").unwrap().parse().unwrap();
+            (node.attribute("joint").unwrap().to_string(), gear, law, numbers)
+        })
+        .collect()
+}
+
+/// Cogging acts on the joint, against what the motor has to bring up.
+#[test]
+fn cogging_is_the_ripple_of_the_model() {
+    let motors = motors(&exported(ARM, MODEL).text);
+    let of = |joint: &str| -> Vec<_> {
+        motors.iter().filter(|m| m.0 == joint && m.2 == "cogging").cloned().collect()
+    };
+    for k in 0..50 {
+        let q = f64::from(k) * 0.37 - 9.0;
+        let torque = |joint: &str| -> f64 {
+            of(joint).iter().map(|(_, gear, _, n)| gear * n[0] * (n[1] * gear * q + n[2]).sin()).sum()
+        };
+        let pan = 0.5 * (32.0 * q).cos() - 0.25 * (32.0 * q).sin() + 0.125 * (2.5 * q).sin();
+        assert!((torque("pan") + pan).abs() < 1e-12, "{q}: {} {pan}", torque("pan"));
+        assert!((torque("stroke") + 3.0 * (100.0 * q).cos()).abs() < 1e-12);
+    }
+    // MuJoCo wants whole numbers of poles.
+    assert!(motors.iter().filter(|m| m.2 == "cogging").all(|m| m.3[1].fract() == 0.0));
+    assert_eq!(of("pan").len(), 2);
+}
+
+#[test]
+fn lugre_is_dahl_where_the_levels_are_equal_and_takes_the_place_of_frictionloss_otherwise() {
+    let new = exported(ARM, MODEL);
+    let motors = motors(&new.text);
+    let lugre: Vec<_> = motors.iter().filter(|m| m.2 == "lugre").collect();
+    // Dahl: c·z with dz/dq = (1 − z)/δ is a stiffness c/δ.
+    let expected = ("lift".to_string(), 1.0, "lugre", vec![1.5 / 0.02, 0.0, 1.5, 1.5, 1.0]);
+    assert_eq!(*lugre[0], expected);
+    // Constant friction 0.75 of the joint, and 0.4 more at low speed.
+    assert_eq!(*lugre[1], ("turn".to_string(), 1.0, "lugre", vec![750.0, 0.0, 0.75, 0.75 + 0.4, 0.05]));
+    assert_eq!(lugre.len(), 2);
+    let document = Document::parse(&new.text).unwrap();
+    let loss = |joint: &str| {
+        let named =
+            |n: &roxmltree::Node<'_, '_>| n.has_tag_name("joint") && n.attribute("name") == Some(joint);
+        document.descendants().find(named).unwrap().attribute("frictionloss").unwrap().to_string()
+    };
+    assert_eq!((loss("lift"), loss("turn")), ("0.75".to_string(), "0".to_string()));
+}
+
+/// What MuJoCo cannot say is said in the file, and nothing is written that is wrong.
+#[test]
+fn other_laws_are_left_out_and_told() {
+    let new = exported(ARM, MODEL);
+    let words = "joint 'lift': load_friction: MuJoCo has no law 'load'";
+    assert!(new.text.contains(&format!("<!-- dyngen: left out: {words} -->")), "{}", new.text);
+    assert!(new.notes.iter().any(|note| note.contains(words)), "{:?}", new.notes);
+    let negative = exported(ARM, &MODEL.replace("\"coefficient\": 1.5", "\"coefficient\": -1.5"));
+    assert!(negative.notes.iter().any(|note| note.contains("a negative level")), "{:?}", negative.notes);
+    assert_eq!(motors(&negative.text).len(), motors(&new.text).len() - 1);
+
+    let puma = import::urdf(PUMA, "puma.urdf", &exact()).unwrap();
+    let friction: Vec<String> = (1..=6)
+        .map(|j| format!("{{\"joint\": {j}, \"gamma1\": 0.5, \"gamma3\": 0.25, \"gamma5\": 1.5}}"))
+        .collect();
+    let model = format!(
+        "{{\"friction\": [{}], \"terms\": [{{\"effect\": \"spring\", \"joint\": 6, \"coefficient\": 1, \"law\": \
+         \"position\"}}]}}",
+        friction.join(", ")
+    );
+    let known = Known::read(&puma.arm, (&puma.values_json(), "v.json"), Some((&model, "m.json"))).unwrap();
+    let new = export::urdf(PUMA, "puma.urdf", &puma.arm, &known, &Options::default()).unwrap();
+    assert!(new.notes.iter().any(|note| note.contains("no place for effects: spring")), "{:?}", new.notes);
+}
+
+#[test]
+fn terms_that_are_none_are_refused() {
+    let arm = import::mjcf(ARM, "arm.xml", &exact()).unwrap();
+    let refused = |from: &str, to: &str| {
+        let model = MODEL.replace(from, to);
+        assert_ne!(model, MODEL);
+        Known::read(&arm.arm, (&arm.values_json(), "v.json"), Some((&model, "m.json"))).unwrap_err()
+    };
+    let told = refused("\"order\": 2.5", "\"order\": -2.5");
+    assert_eq!(told, "m.json: term 3, position_ripple: 'order' must be positive, found -2.5");
+    let told = refused("\"joint\": 3, \"coefficient\": 3", "\"joint\": 9, \"coefficient\": 3");
+    assert_eq!(told, "m.json: term 4, position_ripple: 'joint' must be 1 to 4, found 9");
+    let told = refused("\"distance\": 0.02", "\"distance\": null");
+    assert!(told.contains("'distance' must be a number, found null"), "{told}");
+    assert!(refused("\"law\": \"load\"", "\"law\": 1").contains("'law' must be a name"));
+}
+
+/// A second export takes the place of the first, and an import is that of the arm without them.
+#[test]
+fn an_export_into_an_export_is_one() {
+    // Key frames hold MuJoCo's states; joints without a name get the one that the import gave them.
+    let text = ARM.replace("<joint name=\"turn\"", "<joint");
+    let text = text.replace("<motor joint=\"turn\" gear=\"50\"/>", "<intvelocity joint=\"pan\" kp=\"1\"/>");
+    let text = text.replace("</mujoco>", "<keyframe><key act=\"0.5\"/><key/></keyframe></mujoco>");
+    let once = exported(&text, MODEL);
+    assert!(once.text.contains("<key act=\"0.5 0 0\"/><key/>"), "{}", once.text);
+    assert!(motors(&once.text).iter().any(|m| m.0.starts_with("hand, joint in line ")));
+    let twice = exported(&once.text, MODEL);
+    assert_eq!(motors(&twice.text), motors(&once.text));
+    assert!(twice.text.contains("<key act=\"0.5 0 0\"/>"));
+    let section = |text: &str| text[text.find("<actuator>").unwrap()..].to_string();
+    assert_eq!(section(&twice.text), section(&once.text));
+    let before = import::mjcf(&text, "a.xml", &exact()).unwrap();
+    assert_eq!(import::mjcf(&twice.text, "a.xml", &exact()).unwrap().arm, before.arm);
+
+    let none = exported(
+        &twice.text,
+        "{\"friction\": [{\"joint\": 1, \"gamma1\": 0, \"gamma3\": 0, \"gamma5\": 0}, \
+        {\"joint\": 2, \"gamma1\": 0, \"gamma3\": 0, \"gamma5\": 0}, {\"joint\": 3, \"gamma1\": 0, \"gamma3\": 0, \
+        \"gamma5\": 0}, {\"joint\": 4, \"gamma1\": 0, \"gamma3\": 0, \"gamma5\": 0}]}",
+    );
+    assert!(motors(&none.text).is_empty() && none.text.contains("<key act=\"0.5\"/>"), "{}", none.text);
+
+    // Wherever actuators stand.
+    for (from, to) in [("<motor joint=\"turn\" gear=\"50\"/>", ""), ("motor joint", "motor name=\"m\" joint")]
+    {
+        assert_eq!(motors(&exported(&ARM.replace(from, to), MODEL).text).len(), 5);
+    }
+    let start = ARM.find("  <actuator>").unwrap();
+    for section in ["", "  <actuator/>\n"] {
+        let text = format!("{}{section}</mujoco>\n", &ARM[..start]);
+        assert_eq!(motors(&exported(&text, MODEL).text).len(), 5, "{section}");
+    }
+}
