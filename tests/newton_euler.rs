@@ -11,6 +11,10 @@ use powerball_workspace::generated;
 use powerball_workspace::{arm, paper_arm_with_ratios};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use support::{State, evaluate, proven};
+
+#[path = "../dyngen/tests/support/mod.rs"]
+mod support;
 
 /// Rounding error that two ways of computing the same sum may differ by, relative to the largest result.
 const TOLERANCE: f64 = 1e-12;
@@ -66,28 +70,6 @@ fn add_point(link: &mut [f64; 11], m: f64, [x, y, z]: [f64; 3]) {
         m * (x * x + y * y),
     ];
     link.iter_mut().zip(point).for_each(|(sum, p)| *sum += p);
-}
-
-/// A random state: q, q̇, q̈, and reference motion and errors for those who take them.
-struct State {
-    q: Vec<f64>,
-    dq: Vec<f64>,
-    ddq: Vec<f64>,
-    dqr: Vec<f64>,
-    ddqr: Vec<f64>,
-    e: Vec<f64>,
-}
-
-impl State {
-    fn random(n: usize, rng: &mut ChaCha8Rng) -> State {
-        let mut vector = || (0..n).map(|_| rng.random_range(-3.0..3.0)).collect::<Vec<f64>>();
-        State { q: vector(), dq: vector(), ddq: vector(), dqr: vector(), ddqr: vector(), e: vector() }
-    }
-
-    fn samples<'a>(&'a self, tau: &'a [f64], parameters: &'a [f64]) -> Samples<'a> {
-        let State { q, dq, ddq, dqr, ddqr, e } = self;
-        Samples { q, dq, ddq, dqr, ddqr, tau, e, parameters }
-    }
 }
 
 /// What the numeric Newton–Euler knows of a function; nothing where it has no such function.
@@ -159,25 +141,18 @@ fn compare(
     }
 }
 
-fn evaluate(evaluator: &Evaluator, samples: &Samples<'_>) -> Vec<f64> {
-    let mut out = vec![0.0; evaluator.outputs()];
-    evaluator.run(samples, &mut out);
-    out
-}
-
 fn check_evaluator(name: &str, arm: Arm) {
     let model = Model::derive(arm).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(42);
     for set in &model.sets().sets {
-        let evaluators: Vec<Evaluator> =
-            Function::ALL.iter().map(|f| Evaluator::new(&model, *f, set.kind).unwrap()).collect();
+        let evaluators = proven(&model, set.kind);
         for _ in 0..STATES {
             let all = values(model.arm(), &mut rng);
-            let state = State::random(model.arm().dof(), &mut rng);
+            let state = State::draw(&mut rng, model.arm().dof(), 3.0);
             let tau = reference(model.arm(), &all, &state, Function::InverseDynamics).unwrap();
             let parameters = model.set_values(set, &all);
             for evaluator in &evaluators {
-                let result = evaluate(evaluator, &state.samples(&tau, &parameters));
+                let result = evaluate(evaluator, &Samples { tau: &tau, ..state.samples(&parameters) });
                 let name = format!("{name} {}", set.kind);
                 compare(&name, model.arm(), &all, &state, evaluator.function(), &result, &parameters);
             }
@@ -233,15 +208,14 @@ fn compiled_functions_agree_for_every_arm_and_set() {
     for file in generated::ALL {
         let model = Model::derive(arm(file.arm)).unwrap();
         let set = model.set(file.set).unwrap();
-        let evaluators: Vec<Evaluator> =
-            Function::ALL.iter().map(|f| Evaluator::new(&model, *f, set.kind).unwrap()).collect();
+        let evaluators = proven(&model, set.kind);
         let name = format!("{} {}", file.arm, file.set);
         for _ in 0..STATES {
             let all = values(model.arm(), &mut rng);
-            let state = State::random(model.arm().dof(), &mut rng);
+            let state = State::draw(&mut rng, model.arm().dof(), 3.0);
             let tau = reference(model.arm(), &all, &state, Function::InverseDynamics).unwrap();
             let parameters = model.set_values(set, &all);
-            let samples = state.samples(&tau, &parameters);
+            let samples = Samples { tau: &tau, ..state.samples(&parameters) };
             for (evaluator, result) in evaluators.iter().zip((file.call)(&samples)) {
                 let function = evaluator.function();
                 compare(&name, model.arm(), &all, &state, function, &result, &parameters);
@@ -259,8 +233,8 @@ fn the_full_regressor_agrees_column_by_column() {
         let set = model.set(SetKind::Full).unwrap();
         let evaluator = Evaluator::new(&model, Function::Regressor, SetKind::Full).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(44);
-        let state = State::random(model.arm().dof(), &mut rng);
-        let out = evaluate(&evaluator, &state.samples(&[], &[]));
+        let state = State::draw(&mut rng, model.arm().dof(), 3.0);
+        let out = evaluate(&evaluator, &state.samples(&[]));
         let all = vec![0.0; model.arm().all_parameters().len()];
         let numeric = Dynamics::new(Chain::new(model.arm()), bodies(&all).unwrap()).unwrap();
         let reference = numeric.regressor(&state.q, &state.dq, &state.ddq);
@@ -291,9 +265,9 @@ fn rates_and_derivatives_agree_with_differences() {
         let model = Model::derive(arm(file.arm)).unwrap();
         let (n, name) = (model.arm().dof(), format!("{} {}", file.arm, file.set));
         let parameters = model.set_values(model.set(file.set).unwrap(), &values(model.arm(), &mut rng));
-        let state = State::random(n, &mut rng);
+        let state = State::draw(&mut rng, n, 3.0);
         let at = |q: Vec<f64>, dq: Vec<f64>| {
-            (file.call)(&Samples { q: &q, dq: &dq, ..state.samples(&state.ddq, &parameters) })
+            (file.call)(&Samples { q: &q, dq: &dq, tau: &state.ddq, ..state.samples(&parameters) })
         };
         let shifted = |x: &[f64], by: &[f64], h: f64| -> Vec<f64> {
             x.iter().zip(by).map(|(a, b)| a + h * b).collect()

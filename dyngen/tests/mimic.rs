@@ -5,9 +5,12 @@
 
 use dyngen::dynamics::function::Size;
 use dyngen::exact::rational::to_f64;
-use dyngen::{Arm, Evaluator, Function, Model, Samples, SetKind};
+use dyngen::{Arm, Evaluator, Function, Model, SetKind};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use support::{State, evaluate, model, proven};
+
+mod support;
 
 /// A palletizer: a parallelogram keeps the wrist upright.
 const PALLETIZER: &str = r#"
@@ -58,10 +61,6 @@ joint = [
 
 const ARMS: [&str; 3] = [PALLETIZER, MIXED, SCREW];
 
-fn model(text: &str) -> Model {
-    Model::derive(Arm::parse(text, "arm.toml").unwrap_or_else(|e| panic!("{e}"))).unwrap()
-}
-
 /// The same chain with every joint free.
 fn free(text: &str) -> Model {
     let mut arm = Arm::parse(text, "arm.toml").unwrap();
@@ -73,7 +72,7 @@ fn free(text: &str) -> Model {
 #[test]
 fn every_function_is_proven_for_every_size() {
     for text in ARMS {
-        proven(&model(text), SetKind::Symbolic, &vec![0.0; 11 * model(text).arm().links()]);
+        assert_eq!(proven(&model(text), SetKind::Symbolic).len(), Function::ALL.len());
     }
 }
 
@@ -84,14 +83,17 @@ fn transpose(a: &Matrix) -> Matrix {
     (0..a[0].len()).map(|j| a.iter().map(|row| row[j]).collect()).collect()
 }
 
+fn dot(u: &[f64], v: &[f64]) -> f64 {
+    u.iter().zip(v).map(|(x, y)| x * y).sum()
+}
+
 fn times(a: &Matrix, b: &Matrix) -> Matrix {
     let columns = transpose(b);
-    let dot = |u: &[f64], v: &[f64]| u.iter().zip(v).map(|(x, y)| x * y).sum::<f64>();
     a.iter().map(|row| columns.iter().map(|column| dot(row, column)).collect()).collect()
 }
 
 fn applied(a: &Matrix, v: &[f64]) -> Vec<f64> {
-    a.iter().map(|row| row.iter().zip(v).map(|(x, y)| x * y).sum()).collect()
+    a.iter().map(|row| dot(row, v)).collect()
 }
 
 /// A⁻¹·B by Gauss and Jordan with row pivots.
@@ -114,7 +116,6 @@ fn solved(mut a: Matrix, mut b: Matrix) -> Matrix {
 
 /// The rank of columns, the longest taken first (Gram and Schmidt, twice).
 fn rank(columns: &mut Matrix) -> usize {
-    let dot = |u: &[f64], v: &[f64]| u.iter().zip(v).map(|(x, y)| x * y).sum::<f64>();
     for column in columns.iter_mut() {
         let length = dot(column, column).sqrt();
         // Rotors' columns are longer than others by their ratio's square; what is rounding is no column.
@@ -156,68 +157,37 @@ fn chain(arm: &Arm) -> (Matrix, Vec<f64>) {
     (g, o)
 }
 
-#[derive(Clone)]
-struct State {
-    q: Vec<f64>,
-    dq: Vec<f64>,
-    ddq: Vec<f64>,
-    dqr: Vec<f64>,
-    ddqr: Vec<f64>,
-    tau: Vec<f64>,
-    e: Vec<f64>,
-}
-
-impl State {
-    fn draw(random: &mut ChaCha8Rng, n: usize) -> State {
-        let mut vector = || (0..n).map(|_| random.random_range(-1.5..1.5)).collect();
-        State {
-            q: vector(),
-            dq: vector(),
-            ddq: vector(),
-            dqr: vector(),
-            ddqr: vector(),
-            tau: vector(),
-            e: vector(),
-        }
-    }
-
-    /// The motion of every joint of the chain; what is projected has no torques.
-    fn of_chain(&self, g: &Matrix, o: &[f64]) -> State {
-        let of = |v: &[f64]| applied(g, v);
-        State {
-            q: of(&self.q).iter().zip(o).map(|(q, o)| q + o).collect(),
-            dq: of(&self.dq),
-            ddq: of(&self.ddq),
-            dqr: of(&self.dqr),
-            ddqr: of(&self.ddqr),
-            tau: vec![0.0; o.len()],
-            e: of(&self.e),
-        }
-    }
-
-    fn run(&self, (evaluators, parameters): &Proven, function: Function) -> Matrix {
-        let evaluator = &evaluators[function as usize];
-        let takes = |argument: dyngen::dynamics::function::Argument| function.takes(argument);
-        use dyngen::dynamics::function::Argument::*;
-        let of = |argument, v: &Vec<f64>| if takes(argument) { v.clone() } else { vec![] };
-        let (q, dq, ddq) = (of(Positions, &self.q), of(Velocities, &self.dq), of(Accelerations, &self.ddq));
-        let (dqr, ddqr) = (of(ReferenceVelocities, &self.dqr), of(ReferenceAccelerations, &self.ddqr));
-        let (tau, e) = (of(Torques, &self.tau), of(Errors, &self.e));
-        let parameters: &[f64] = if takes(Parameters) { parameters } else { &[] };
-        let samples =
-            Samples { q: &q, dq: &dq, ddq: &ddq, dqr: &dqr, ddqr: &ddqr, tau: &tau, e: &e, parameters };
-        let mut out = vec![0.0; evaluator.outputs()];
-        evaluator.run(&samples, &mut out);
-        out.chunks(evaluator.shape().1).map(<[f64]>::to_vec).collect()
+/// The motion of every joint of the chain; what is projected has no torques.
+fn of_chain(state: &State, g: &Matrix, o: &[f64]) -> State {
+    let of = |v: &[f64]| applied(g, v);
+    State {
+        q: of(&state.q).iter().zip(o).map(|(q, o)| q + o).collect(),
+        dq: of(&state.dq),
+        ddq: of(&state.ddq),
+        dqr: of(&state.dqr),
+        ddqr: of(&state.ddqr),
+        e: of(&state.e),
+        tau: vec![0.0; o.len()],
     }
 }
 
 /// Every function of a model for a set, with values of its parameters.
-type Proven = (Vec<Evaluator>, Vec<f64>);
+struct Valued {
+    evaluators: Vec<Evaluator>,
+    parameters: Vec<f64>,
+}
 
-fn proven(model: &Model, kind: SetKind, all: &[f64]) -> Proven {
-    let evaluator = |f| Evaluator::new(model, f, kind).unwrap_or_else(|e| panic!("{f} {kind}: {e}"));
-    (Function::ALL.map(evaluator).into(), model.set_values(model.set(kind).unwrap(), all))
+impl Valued {
+    fn new(model: &Model, kind: SetKind, all: &[f64]) -> Valued {
+        let parameters = model.set_values(model.set(kind).unwrap(), all);
+        Valued { evaluators: proven(model, kind), parameters }
+    }
+
+    fn at(&self, state: &State, function: Function) -> Matrix {
+        let evaluator = &self.evaluators[function as usize];
+        let out = evaluate(evaluator, &state.samples(&self.parameters));
+        out.chunks(evaluator.shape().1).map(<[f64]>::to_vec).collect()
+    }
 }
 
 /// Parameters of compact bodies.
@@ -240,19 +210,19 @@ fn functions_are_those_of_the_free_chain_projected() {
         let (tied, free) = (model(text), free(text));
         let (g, o) = chain(tied.arm());
         let all = bodies(tied.arm(), &mut random);
-        let [minimal, full] = [SetKind::Minimal, SetKind::Full].map(|kind| proven(&tied, kind, &all));
-        let free = proven(&free, SetKind::Full, &all);
+        let [minimal, full] = [SetKind::Minimal, SetKind::Full].map(|kind| Valued::new(&tied, kind, &all));
+        let free = Valued::new(&free, SetKind::Full, &all);
         let back = transpose(&g);
         for _ in 0..5 {
-            let s = State::draw(&mut random, tied.arm().dof());
-            let whole = s.of_chain(&g, &o);
-            let free_chain = |function| whole.run(&free, function);
+            let s = State::draw(&mut random, tied.arm().dof(), 1.5);
+            let whole = of_chain(&s, &g, &o);
+            let free_chain = |function| free.at(&whole, function);
             let mass = times(&back, &times(&free_chain(Function::MassMatrix), &g));
             for function in Function::ALL {
                 let expected = match function {
                     Function::ForwardDynamics => {
                         let still = State { ddq: vec![0.0; g.len()], ..whole.clone() };
-                        let bias = still.run(&free, Function::InverseDynamics);
+                        let bias = free.at(&still, Function::InverseDynamics);
                         let bias = times(&back, &bias);
                         let right = s.tau.iter().zip(&bias).map(|(tau, bias)| vec![tau - bias[0]]);
                         solved(mass.clone(), right.collect())
@@ -273,11 +243,11 @@ fn functions_are_those_of_the_free_chain_projected() {
                         result
                     }
                 };
-                let found = s.run(&full, function);
+                let found = full.at(&s, function);
                 close(&found, &expected, &format!("{text} {function}"));
                 let takes = function.takes(dyngen::dynamics::function::Argument::Parameters);
                 if takes && function != Function::PotentialEnergy {
-                    let found = s.run(&minimal, function);
+                    let found = minimal.at(&s, function);
                     close(&found, &expected, &format!("{text} {function}, minimal"));
                 }
             }
@@ -303,9 +273,8 @@ fn the_rank_is_that_of_the_columns_in_numbers() {
         let p = regressor.shape().1;
         let mut rows = Matrix::new();
         for _ in 0..2 * p {
-            let whole = State::draw(&mut random, tied.arm().dof()).of_chain(&g, &o);
-            let mut out = vec![0.0; regressor.outputs()];
-            regressor.evaluate(&whole.q, &whole.dq, &whole.ddq, &[], &mut out);
+            let whole = of_chain(&State::draw(&mut random, tied.arm().dof(), 1.5), &g, &o);
+            let out = evaluate(&regressor, &whole.samples(&[]));
             rows.extend(times(&transpose(&g), &out.chunks(p).map(<[f64]>::to_vec).collect()));
         }
         let found = rank(&mut transpose(&rows));

@@ -5,9 +5,12 @@
 
 use dyngen::arm::{Convention, JointKind};
 use dyngen::exact::rational::to_f64;
-use dyngen::{Arm, Evaluator, Function, Model, Samples, SetKind};
+use dyngen::{Arm, Evaluator, Function, Samples, SetKind};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use support::{State, evaluate, model, proven};
+
+mod support;
 
 /// A wrist whose last motor turns with the joint before, a shoulder whose two motors work on parallel axes,
 /// and axes that point both ways.
@@ -49,18 +52,12 @@ joints = [3, 1, 2]
 matrix = [[1, 2, 0.5], [-1, 1, 0], [1, 0, 3]]
 "#;
 
-fn model(text: &str) -> Model {
-    Model::derive(Arm::parse(text, "arm.toml").unwrap()).unwrap()
-}
-
 #[test]
 fn every_function_is_proven() {
     for text in [WRIST, MIXED] {
         let model = model(text);
         for kind in [SetKind::Minimal, SetKind::Full, SetKind::Symbolic] {
-            for function in Function::ALL {
-                model.function(function, kind).unwrap_or_else(|e| panic!("{function} {kind}: {e}"));
-            }
+            assert_eq!(proven(&model, kind).len(), Function::ALL.len());
         }
     }
 }
@@ -181,18 +178,17 @@ fn the_torque_is_that_of_the_energy() {
         let set = model.set(SetKind::Minimal).unwrap();
         let evaluator = Evaluator::new(&model, Function::InverseDynamics, SetKind::Minimal).unwrap();
         for _ in 0..5 {
-            let mut some = |scale: f64| (0..n).map(|_| rng.random_range(-scale..scale)).collect::<Vec<f64>>();
-            let (q, dq, ddq) = (some(3.0), some(1.0), some(1.0));
+            let state = State::draw(&mut rng, n, 1.0);
+            // Right round.
+            let q: Vec<f64> = state.q.iter().map(|q| 3.0 * q).collect();
             let all: Vec<f64> = (0..11 * n)
                 .map(
                     |k| if k % 11 == 10 { rng.random_range(1e-4..1e-3) } else { rng.random_range(-1.0..1.0) },
                 )
                 .collect();
             let values = model.set_values(set, &all);
-            let mut found = vec![0.0; n];
-            let samples = Samples { q: &q, dq: &dq, ddq: &ddq, parameters: &values, ..Samples::default() };
-            evaluator.run(&samples, &mut found);
-            let expected = torque(arm, &all, &q, &dq, &ddq);
+            let found = evaluate(&evaluator, &Samples { q: &q, ..state.samples(&values) });
+            let expected = torque(arm, &all, &q, &state.dq, &state.ddq);
             let scale = expected.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
             for (j, (a, b)) in found.iter().zip(&expected).enumerate() {
                 // Differences of second order with steps of 1e-3.

@@ -1,0 +1,50 @@
+//! What tests of an arm's functions share: models of a text, states drawn by lot.
+
+// Each test uses a part of it.
+#![allow(dead_code)]
+
+use dyngen::{Arm, Evaluator, Function, Model, Samples, SetKind};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+pub(crate) fn model(text: &str) -> Model {
+    Model::derive(Arm::parse(text, "arm.toml").unwrap_or_else(|e| panic!("{e}"))).unwrap()
+}
+
+/// Every function for a set, in the order of [`Function::ALL`]: it is proven, or this panics.
+pub(crate) fn proven(model: &Model, kind: SetKind) -> Vec<Evaluator> {
+    let evaluator = |f| Evaluator::new(model, f, kind).unwrap_or_else(|e| panic!("{f} {kind}: {e}"));
+    Function::ALL.map(evaluator).into()
+}
+
+/// One sample of everything that functions take but parameters.
+#[derive(Clone)]
+pub(crate) struct State {
+    pub(crate) q: Vec<f64>,
+    pub(crate) dq: Vec<f64>,
+    pub(crate) ddq: Vec<f64>,
+    pub(crate) dqr: Vec<f64>,
+    pub(crate) ddqr: Vec<f64>,
+    pub(crate) e: Vec<f64>,
+    pub(crate) tau: Vec<f64>,
+}
+
+impl State {
+    /// Every number between -size and size.
+    pub(crate) fn draw(random: &mut ChaCha8Rng, joints: usize, size: f64) -> State {
+        let mut v = || (0..joints).map(|_| random.random_range(-size..size)).collect();
+        State { q: v(), dq: v(), ddq: v(), dqr: v(), ddqr: v(), e: v(), tau: v() }
+    }
+
+    pub(crate) fn samples<'a>(&'a self, parameters: &'a [f64]) -> Samples<'a> {
+        let State { q, dq, ddq, dqr, ddqr, e, tau } = self;
+        Samples { q, dq, ddq, dqr, ddqr, tau, e, parameters }
+    }
+}
+
+/// A function's result at one sample, row by row.
+pub(crate) fn evaluate(evaluator: &Evaluator, samples: &Samples<'_>) -> Vec<f64> {
+    let mut out = vec![0.0; evaluator.outputs()];
+    evaluator.run(samples, &mut out);
+    out
+}
