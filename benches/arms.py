@@ -181,7 +181,7 @@ def main():
     done = [found for found in theirs if found]
     errors = [wrong for *_, wrong in done if wrong is not None]
     print("# Arms of public URDFs\n")
-    print("The files are those of `example-robot-data`, `pybullet` and `rtb-data` from PyPI, and 272 others of public repositories. Of the")
+    print("The files are those of `example-robot-data`, `pybullet` and `rtb-data` from PyPI, and others of public repositories. Of the")
     print(f"{len(theirs)} of them that Pinocchio reads and that hold a serial chain {len(done)} are imported, derived and proven, each in at most")
     print(f"{largest(s for _, s, _, _ in done):.1f} s and {largest(m for _, _, m, _ in done):.0f} MB. {len(errors)} have inertias; their torques differ from Pinocchio's by at most {largest(errors):.0e}.\n")
     print(f"The table has the chains of at least {options.joints} joints, of files that Pinocchio does not read too. It is written by")

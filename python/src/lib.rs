@@ -34,7 +34,7 @@ mod _core {
     #[pymodule_export]
     use super::session::{virtual_effects, virtual_session};
     #[pymodule_export]
-    use super::source::{export_imported, generate, generate_model};
+    use super::source::{description, export_imported, generate, generate_model};
     #[pymodule_export]
     use super::summary::{Summary, summarize};
 }

@@ -6,7 +6,7 @@ use crate::identify::{ModelText, model_file};
 use crate::work;
 use dyngen::emit::{self, Options};
 use dyngen::export::{self, Known};
-use dyngen::import::ImportError;
+use dyngen::import::{ImportError, Source};
 use dyngen::{FrictionTerm, Function};
 use numpy::PyReadonlyArray1;
 use powerball::explanation::torque_model::{Scalar, SourceError};
@@ -14,6 +14,7 @@ use powerball::identification::KnownModel;
 use powerball::identification::mounting::Mounting;
 use powerball::logs::regression::RigidArm;
 use pyo3::prelude::*;
+use std::path::PathBuf;
 
 fn functions(names: Option<Vec<String>>) -> PyResult<Option<Vec<Function>>> {
     names.map(|names| names.iter().map(|name| function(name)).collect()).transpose()
@@ -73,6 +74,12 @@ pub(crate) fn generate_model(
         })?;
         Ok((source, model.not_compensated()))
     })?
+}
+
+/// The text of a robot description with what it includes.
+#[pyfunction]
+pub(crate) fn description(path: PathBuf) -> PyResult<String> {
+    Ok(Source::read(&path).map_err(input)?.text)
 }
 
 /// A copy of the robot description that the arm was imported from, with values; and what is to be said of it.

@@ -58,6 +58,20 @@ def test_a_mujoco_model():
     assert pb.Arm.from_mjcf(MJCF.read_text()).values == arm.values
 
 
+def test_a_mujoco_model_in_parts(tmp_path):
+    text = MJCF.read_text()
+    start, end = text.index("<default>"), text.rindex("</default>") + len("</default>")
+    (tmp_path / "classes.xml").write_text(f"<mujoco>{text[start:end]}</mujoco>")
+    parts = text[:start] + '<include file="classes.xml"/>' + text[end:]
+    (tmp_path / "model.xml").write_text(parts, encoding="utf-16")
+    arm = pb.Arm.from_mjcf(tmp_path / "model.xml")
+    assert arm.values == pb.Arm.from_mjcf(MJCF).values
+    assert "<default>" in pb.export(arm, arm.values)
+    (tmp_path / "classes.xml").unlink()
+    with pytest.raises(pb.InputError, match=r"line \d+: <include file=\"classes.xml\"> cannot be read"):
+        pb.Arm.from_mjcf(tmp_path / "model.xml")
+
+
 def test_an_arm_goes_to_other_processes():
     for arm in (pb.Arm.from_urdf(PUMA, tip="forearm"), pb.Arm.from_toml(LWA4P)):
         copy = pickle.loads(pickle.dumps(arm))

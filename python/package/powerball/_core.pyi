@@ -19,6 +19,7 @@ __all__ = [
     "Trajectory",
     "Written",
     "compare",
+    "description",
     "excite",
     "explain",
     "export_imported",
@@ -179,6 +180,7 @@ def generate(
 def generate_model(
     arm: Arm, model: _Text, scalar: str, names: Optional[List[str]]
 ) -> Tuple[str, List[str]]: ...
+def description(path: str) -> str: ...
 def export_imported(arm: Arm, values: _Text, friction: Optional[_Text]) -> Tuple[str, List[str]]: ...
 def virtual_effects() -> List[str]: ...
 def virtual_session(

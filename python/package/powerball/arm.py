@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass
-from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
+from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -80,14 +80,19 @@ class Check:
     min_eigenvalue: float
 
 
-def _text(source: Union[PathLike, str], mark: str) -> Tuple[str, str]:
+def _text(source: Union[PathLike, str], mark: str, read: Callable[[str], str]) -> Tuple[str, str]:
     """The text of a file, or the text that was given in place of one, and a name for errors."""
     if isinstance(source, str) and (mark in source or "\n" in source):
         return source, "text"
     path = os.fspath(source)
+    return read(path), path
+
+
+def _read(path: str) -> str:
+    """The text of an arm file."""
     try:
         with open(path, encoding="utf-8") as file:
-            return file.read(), path
+            return file.read()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
 
@@ -111,7 +116,7 @@ class Arm(Functions):
 
         Raises: ``InputError`` with every error of the file at once, each with line and column.
         """
-        text, file = _text(source, "=")
+        text, file = _text(source, "=", _read)
         return _made("parse", (text, file))
 
     @classmethod
@@ -146,7 +151,10 @@ class Arm(Functions):
         convention: str = "modified",
         angle_tolerance: float = 1e-9,
     ) -> Arm:
-        """The serial chain of a MuJoCo model, with its values. Arguments as :meth:`from_urdf`."""
+        """The serial chain of a MuJoCo model, with its values. Arguments as :meth:`from_urdf`.
+
+        Files that the model includes are read with it, where ``source`` is a path.
+        """
         return cls._imported(source, True, base, tip, lock, exact, convention, angle_tolerance)
 
     @classmethod
@@ -161,7 +169,7 @@ class Arm(Functions):
         convention: str,
         angle_tolerance: float,
     ) -> Arm:
-        text, file = _text(source, "<")
+        text, file = _text(source, "<", _core.description)
         locked = [(joint, float(at)) for joint, at in (lock or {}).items()]
         made = (text, file, mjcf, base, tip, locked, exact, convention, angle_tolerance)
         return _made("import_from", made)

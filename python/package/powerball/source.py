@@ -55,7 +55,8 @@ def export(
 
     Written to ``output`` too, where that is given. ``values`` are a result of ``identify``, of which the
     nearest real arm is taken, or values of all parameters. ``friction`` is where damping and friction are
-    from; a result brings its own, unless it is ``False``. What is to be said of the new file is told as a
+    from; a result brings its own, unless it is ``False``. That of ``explain`` has effects, of which a MuJoCo
+    model gets ripple, presliding and Stribeck's friction. What is to be said of the new file is told as a
     warning.
     """
     if isinstance(values, Mapping):
