@@ -80,8 +80,16 @@ struct Point {
     /// Of the coordinates.
     positions: Vec<Rational>,
     velocities: Vec<Rational>,
-    /// a, d, rotor ratio and b of each joint, where they are variables.
-    sizes: Option<Vec<[Rational; 4]>>,
+    /// Of each joint, where they are variables.
+    sizes: Option<Vec<JointSizes>>,
+}
+
+#[derive(Clone)]
+struct JointSizes {
+    a: Rational,
+    b: Rational,
+    d: Rational,
+    rotor_ratio: Rational,
 }
 
 impl Point {
@@ -96,7 +104,8 @@ impl Point {
         let positions = (0..arm.dof()).map(|_| small(&[0, 1, -1, 2, 3])).collect();
         let variables = sizes == Sizes::Variables;
         let mut size = || small(&[1, 2, 3, 4, 5, 6, 7, 8, 9]);
-        let sizes = variables.then(|| arm.joints.iter().map(|_| std::array::from_fn(|_| size())).collect());
+        let mut of_joint = || JointSizes { a: size(), b: size(), d: size(), rotor_ratio: size() };
+        let sizes = variables.then(|| arm.joints.iter().map(|_| of_joint()).collect());
         // The angle whose half has the tangent p/q: of quarter turns at first.
         let most = if attempt < SIMPLE { 1 } else { 9 };
         let circle = (0..arm.links()).map(|_| {
@@ -137,7 +146,7 @@ impl<A: Algebra> Algebraic<'_, A> {
             let mut next = point.circle.iter().map(|(s, c)| ((self.number)(s), (self.number)(c)));
             let mut circle = || next.next().unwrap_or_else(|| (self.alg.integer(0), self.alg.integer(1)));
             let angles = input_angles(self.alg, self.arm, self.number, &mut circle, Some(LARGEST));
-            let mut source = Quantities { of: self, point, drives: self.arm.drives(), angles };
+            let mut source = Quantities { algebraic: self, point, drives: self.arm.drives(), angles };
             let elements = ArmElements::build(self.alg, self.arm, self.symbols, &mut source);
             twice_lagrangian(self.alg, &elements)
         };
@@ -146,51 +155,53 @@ impl<A: Algebra> Algebraic<'_, A> {
     }
 }
 
+/// What the Lagrangian asks of an arm, at a point.
 struct Quantities<'a, 'b, A: Algebra> {
-    of: &'a Algebraic<'b, A>,
+    algebraic: &'a Algebraic<'b, A>,
     point: &'a Point,
     drives: Vec<Drive>,
     angles: Vec<(A::Value, A::Value)>,
 }
 
 impl<A: Algebra> Quantities<'_, '_, A> {
-    fn size(&self, joint: usize, which: usize, value: &Rational) -> A::Value {
-        (self.of.number)(self.point.sizes.as_ref().map_or(value, |sizes| &sizes[joint][which]))
+    /// A size of a joint: the point's where it is a variable, else the arm's.
+    fn size(&self, joint: usize, variable: fn(&JointSizes) -> &Rational, value: &Rational) -> A::Value {
+        (self.algebraic.number)(self.point.sizes.as_ref().map_or(value, |sizes| variable(&sizes[joint])))
     }
 }
 
 impl<A: Algebra> Source<A::Value> for Quantities<'_, '_, A> {
     fn joint_trig(&mut self, joint: usize) -> (A::Value, A::Value) {
-        with_theta(self.of.alg, &self.of.arm.joints[joint].theta, self.angles[joint].clone())
+        with_theta(self.algebraic.alg, &self.algebraic.arm.joints[joint].theta, self.angles[joint].clone())
     }
     fn position(&mut self, joint: usize) -> A::Value {
         let drive = &self.drives[joint];
-        (self.of.number)(&(&drive.ratio * &self.point.positions[drive.coordinate] + &drive.offset))
+        (self.algebraic.number)(&(&drive.ratio * &self.point.positions[drive.coordinate] + &drive.offset))
     }
     fn velocity(&mut self, joint: usize) -> A::Value {
         let drive = &self.drives[joint];
-        (self.of.number)(&(&drive.ratio * &self.point.velocities[drive.coordinate]))
+        (self.algebraic.number)(&(&drive.ratio * &self.point.velocities[drive.coordinate]))
     }
     fn a(&mut self, joint: usize) -> A::Value {
-        self.size(joint, 0, &self.of.arm.joints[joint].a)
+        self.size(joint, |sizes| &sizes.a, &self.algebraic.arm.joints[joint].a)
     }
     fn b(&mut self, joint: usize) -> A::Value {
-        self.size(joint, 3, &self.of.arm.joints[joint].b)
+        self.size(joint, |sizes| &sizes.b, &self.algebraic.arm.joints[joint].b)
     }
     fn d(&mut self, joint: usize) -> A::Value {
-        self.size(joint, 1, &self.of.arm.joints[joint].d)
+        self.size(joint, |sizes| &sizes.d, &self.algebraic.arm.joints[joint].d)
     }
     fn ratio(&mut self, joint: usize) -> A::Value {
-        let ratio = self.of.arm.joints[joint].rotor_ratio.clone().unwrap_or_default();
-        self.size(joint, 2, &ratio)
+        let ratio = self.algebraic.arm.joints[joint].rotor_ratio.clone().unwrap_or_default();
+        self.size(joint, |sizes| &sizes.rotor_ratio, &ratio)
     }
     fn coupling(&mut self, factor: &Rational) -> A::Value {
-        (self.of.number)(factor)
+        (self.algebraic.number)(factor)
     }
     fn gravity(&mut self, axis: usize) -> A::Value {
-        (self.of.number)(&self.of.arm.gravity[axis])
+        (self.algebraic.number)(&self.algebraic.arm.gravity[axis])
     }
     fn symbol(&mut self, index: usize, sine: bool) -> A::Value {
-        (self.of.symbol)(index, sine)
+        (self.algebraic.symbol)(index, sine)
     }
 }

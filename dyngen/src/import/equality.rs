@@ -1,5 +1,6 @@
 //! What MuJoCo holds by equalities: a joint that follows another one, or what an arm file cannot hold.
 
+use super::numbers::finite;
 use roxmltree::Node;
 
 /// An equality of a model.
@@ -39,8 +40,7 @@ pub(super) fn read(node: Node<'_, '_>) -> Result<Option<Equality>, String> {
 fn coefficients(node: Node<'_, '_>) -> Result<[f64; 5], String> {
     let mut all = [0.0, 1.0, 0.0, 0.0, 0.0];
     let Some(text) = node.attribute("polycoef") else { return Ok(all) };
-    let numbers: Option<Vec<f64>> = text.split_whitespace().map(|t| t.parse().ok()).collect();
-    let numbers = numbers.filter(|n| n.len() <= all.len() && n.iter().all(|x| x.is_finite()));
+    let numbers = finite(text).filter(|n| n.len() <= all.len());
     let wrong = || format!("polycoef of <joint> must be up to 5 numbers, found '{text}'");
     all.iter_mut().zip(numbers.ok_or_else(wrong)?).for_each(|(to, x)| *to = x);
     Ok(all)

@@ -5,6 +5,7 @@
 //! classes and orientations: mujoco.readthedocs.io, XMLreference and modeling.
 
 use super::equality::{self, Equality};
+use super::numbers::finite;
 use super::orientation::{Angles, turn};
 use super::pose::Pose;
 use super::shapes::{GROUPS, Solid};
@@ -279,8 +280,7 @@ impl<'d, 'i> Reader<'d, 'i> {
         let place = format!("joint '{name}'");
         let mut list = |key: &str, count: usize| -> Option<Vec<f64>> {
             let text = all.get(key)?;
-            let numbers: Option<Vec<f64>> = text.split_whitespace().map(|t| t.parse().ok()).collect();
-            let found = numbers.filter(|n| n.len() == count && n.iter().all(|x| x.is_finite()));
+            let found = finite(text).filter(|n| n.len() == count);
             if found.is_none() {
                 self.errors
                     .push(format!("line {line}: {place}: {key} must be {count} numbers, found '{text}'"));
@@ -433,9 +433,7 @@ impl<'d, 'i> Reader<'d, 'i> {
 
     fn numbers<const N: usize>(&mut self, node: Node<'d, 'i>, key: &str) -> Option<[f64; N]> {
         let text = node.attribute(key)?;
-        let numbers: Option<Vec<f64>> = text.split_whitespace().map(|t| t.parse().ok()).collect();
-        let finite = numbers.filter(|n| n.iter().all(|x| x.is_finite()));
-        let found = finite.and_then(|n| <[f64; N]>::try_from(n).ok());
+        let found = finite(text).and_then(|n| <[f64; N]>::try_from(n).ok());
         if found.is_none() {
             let element = node.tag_name().name();
             self.error(node, format!("{key} of <{element}> must be {N} numbers, found '{text}'"));

@@ -15,6 +15,7 @@ mod change;
 mod equality;
 mod frames;
 pub(crate) mod mjcf;
+mod numbers;
 mod orientation;
 pub(crate) mod pose;
 mod rounding;

@@ -1,5 +1,6 @@
 //! The five ways in which a MuJoCo model says how a frame is turned.
 
+use super::numbers::finite;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use roxmltree::Node;
 
@@ -29,9 +30,8 @@ impl Angles {
 pub(super) fn turn(node: Node<'_, '_>, angles: &Angles) -> Result<Matrix3<f64>, String> {
     let list = |key: &str, count: usize| -> Result<Option<Vec<f64>>, String> {
         let Some(text) = node.attribute(key) else { return Ok(None) };
-        let numbers: Option<Vec<f64>> = text.split_whitespace().map(|t| t.parse().ok()).collect();
         let element = node.tag_name().name();
-        match numbers.filter(|n| n.len() == count && n.iter().all(|x| x.is_finite())) {
+        match finite(text).filter(|n| n.len() == count) {
             Some(numbers) => Ok(Some(numbers)),
             None => Err(format!("{key} of <{element}> must be {count} numbers, found '{text}'")),
         }

@@ -1,5 +1,6 @@
 //! The inertia that MuJoCo gives a body without `<inertial>`: that of its shapes, each solid and even.
 
+use super::numbers::finite;
 use super::pose::Pose;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -30,9 +31,9 @@ impl Solid {
     ) -> Result<Option<Solid>, String> {
         let list = |key: &str| -> Result<Option<Vec<f64>>, String> {
             let Some(text) = all.get(key) else { return Ok(None) };
-            let numbers: Option<Vec<f64>> = text.split_whitespace().map(|t| t.parse().ok()).collect();
-            let numbers = numbers.filter(|n| n.iter().all(|x: &f64| x.is_finite()));
-            numbers.map(Some).ok_or_else(|| format!("{key} of its <geom> must be numbers, found '{text}'"))
+            finite(text)
+                .map(Some)
+                .ok_or_else(|| format!("{key} of its <geom> must be numbers, found '{text}'"))
         };
         let number = |key: &str| list(key).map(|n| n.and_then(|n| n.first().copied()));
         let group = number("group")?.unwrap_or(0.0);

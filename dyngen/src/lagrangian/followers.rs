@@ -42,17 +42,17 @@ pub fn input_angles<A: Algebra>(
                 angles[joint] = Some(draw());
                 continue;
             }
-            let turned = multiple(alg, &(ratio.numer() * &parts / ratio.denom()), &point);
+            let turned = multiple_of(alg, &(ratio.numer() * &parts / ratio.denom()), &point);
             let shift = match arm.phase(joint) {
                 phase if phase.quarter_turns().is_some() => {
                     with_theta(alg, &phase, (alg.integer(0), alg.integer(1)))
                 }
                 phase => {
-                    let (sin, cos) = near(phase.radians());
+                    let (sin, cos) = circle_point_near(phase.radians());
                     (number(&sin), number(&cos))
                 }
             };
-            angles[joint] = Some(sum(alg, &turned, &shift));
+            angles[joint] = Some(sum_of_angles(alg, &turned, &shift));
         }
     }
     let zero = || (alg.integer(0), alg.integer(1));
@@ -71,7 +71,7 @@ pub fn with_theta<A: Algebra>(alg: &A, theta: &Angle, (s, c): (A::Value, A::Valu
 }
 
 /// Sine and cosine of a sum of two angles.
-fn sum<A: Algebra>(
+fn sum_of_angles<A: Algebra>(
     alg: &A,
     (s, c): &(A::Value, A::Value),
     (t, d): &(A::Value, A::Value),
@@ -81,7 +81,7 @@ fn sum<A: Algebra>(
 
 /// A rational point of the circle within 1e-12 rad of an angle: from the tangent of its half by its continued
 /// fraction.
-fn near(angle: f64) -> (Rational, Rational) {
+fn circle_point_near(angle: f64) -> (Rational, Rational) {
     let tangent = (angle.rem_euclid(TAU) / 2.0).tan();
     let mut rest = tangent;
     let (mut before, mut t) = ([BigInt::zero(), BigInt::one()], [BigInt::one(), BigInt::zero()]);
@@ -102,17 +102,17 @@ fn near(angle: f64) -> (Rational, Rational) {
 }
 
 /// Sine and cosine of a multiple of an angle, by doubling.
-fn multiple<A: Algebra>(alg: &A, count: &BigInt, angle: &(A::Value, A::Value)) -> (A::Value, A::Value) {
+fn multiple_of<A: Algebra>(alg: &A, count: &BigInt, angle: &(A::Value, A::Value)) -> (A::Value, A::Value) {
     let mut total = (alg.integer(0), alg.integer(1));
     let mut power = angle.clone();
     let mut rest = count.abs();
     while !rest.is_zero() {
         if rest.bit(0) {
-            total = sum(alg, &total, &power);
+            total = sum_of_angles(alg, &total, &power);
         }
         rest >>= 1u32;
         if !rest.is_zero() {
-            power = sum(alg, &power, &power);
+            power = sum_of_angles(alg, &power, &power);
         }
     }
     if count.is_negative() { (alg.neg(&total.0), total.1) } else { total }
@@ -127,7 +127,7 @@ mod tests {
     fn a_point_of_the_circle_is_near_its_angle() {
         for k in -50..50 {
             let angle = 0.137 * f64::from(k);
-            let (s, c) = near(angle);
+            let (s, c) = circle_point_near(angle);
             assert_eq!(&s * &s + &c * &c, Rational::one());
             assert!(
                 (to_f64(&s) - angle.sin()).abs() < 2e-12 && (to_f64(&c) - angle.cos()).abs() < 2e-12,
@@ -141,10 +141,10 @@ mod tests {
         let point = Draws::new(7).element().circle_point();
         let mut added = (Fp::ZERO, Fp::ONE);
         for count in 0..40 {
-            let (s, c) = multiple(&PrimeField, &BigInt::from(count), &point);
+            let (s, c) = multiple_of(&PrimeField, &BigInt::from(count), &point);
             assert_eq!((s, c), added);
-            assert_eq!(multiple(&PrimeField, &BigInt::from(-count), &point), (-s, c));
-            added = sum(&PrimeField, &added, &point);
+            assert_eq!(multiple_of(&PrimeField, &BigInt::from(-count), &point), (-s, c));
+            added = sum_of_angles(&PrimeField, &added, &point);
         }
     }
 }

@@ -42,17 +42,19 @@ pub(super) struct Motion {
 
 impl Motion {
     fn of(drive: &Drive) -> Motion {
-        // A number with the prime in its denominator was refused when the sets were derived.
-        let number = |x: &Rational| Fp::from_rational(x).unwrap_or(Fp::ZERO);
-        Motion { coordinate: drive.coordinate, ratio: number(&drive.ratio), offset: number(&drive.offset) }
+        Motion { coordinate: drive.coordinate, ratio: residue(&drive.ratio), offset: residue(&drive.offset) }
     }
+}
+
+/// A number of the arm modulo the prime. One with the prime in its denominator was refused when the sets were
+/// derived.
+fn residue(x: &Rational) -> Fp {
+    Fp::from_rational(x).unwrap_or(Fp::ZERO)
 }
 
 /// Sine and cosine of each joint's trigonometric input, for points of the circle.
 fn angles(arm: &Arm, circle: &mut dyn FnMut() -> (Fp, Fp)) -> Vec<(Fp, Fp)> {
-    // A number with the prime in its denominator was refused when the sets were derived.
-    let number = |x: &Rational| Fp::from_rational(x).unwrap_or(Fp::ZERO);
-    input_angles(&PrimeField, arm, &number, circle, None)
+    input_angles(&PrimeField, arm, &residue, circle, None)
 }
 
 impl<'a> Point<'a> {
@@ -97,7 +99,7 @@ impl<'a> Point<'a> {
     pub(super) fn carry(&mut self, set: &ParameterSet, values: &[Rational]) {
         self.values.iter_mut().for_each(|(_, value)| *value = Fp::ZERO);
         for (parameter, sum) in set.parameters.iter().zip(values) {
-            let sum = Fp::from_rational(sum).unwrap_or(Fp::ZERO);
+            let sum = residue(sum);
             for (carrier, factor) in &parameter.carriers {
                 let factor = self.sets.field.modular(factor).unwrap_or(Fp::ZERO);
                 for (_, value) in self.values.iter_mut().filter(|(p, _)| p == carrier) {
@@ -111,8 +113,7 @@ impl<'a> Point<'a> {
         self.arm.dof()
     }
 
-    /// Sine and cosine of q + theta: by the addition theorem where theta is a multiple of pi/2; the input
-    /// holds any other theta.
+    /// Sine and cosine of q + theta.
     pub(super) fn joint_trig(&self, joint: usize) -> (Fp, Fp) {
         with_theta(&PrimeField, &self.arm.joints[joint].theta, self.angles[joint])
     }
