@@ -124,3 +124,47 @@ fn friction_is_the_sum_of_its_columns() {
     let moving = rubbing::friction_columns(&SVector::from([0.0, 0.5]));
     assert!((moving[(1, 2)] - tanh(1.0)).abs() < 1e-15);
 }
+
+mod wrist {
+    #![deny(warnings, missing_docs)]
+    //! A motor that turns with two joints, and friction.
+    dyngen_macros::arm! {
+        toml = r#"
+            name = "wrist"
+            convention = "modified"
+            gravity = [0, 0, -9.81]
+            joint = [
+                { kind = "revolute", a = 0, alpha = 0, d = 0.1, theta = 0, rotor_ratio = 100 },
+                { kind = "revolute", a = 0.3, alpha = "pi/2", d = 0, theta = 0, rotor_ratio = 80 },
+                { kind = "revolute", a = 0.2, alpha = "pi/2", d = 0, theta = 0, rotor_ratio = 50 },
+            ]
+            [[transmission]]
+            joints = [2, 3]
+            matrix = [[1, 0], [-1.5, 1]]
+        "#,
+        functions = [gravity],
+        friction = ["viscous", "coulomb", "tanh:20"],
+    }
+}
+
+/// Friction sits on the motors: what they lose is what the joints bring up.
+#[test]
+fn friction_is_that_of_the_motors() {
+    let dq = SVector::from([0.4, -0.3, 0.2]);
+    let motors = [0.4, -0.3, 1.5 * 0.3 + 0.2];
+    let coefficients = SMatrix::<f64, 3, 3>::from_fn(|i, k| 1.0 + i as f64 + 0.25 * k as f64);
+    let of_motor = |i: usize| {
+        let v: f64 = motors[i];
+        coefficients[(i, 0)] * v
+            + coefficients[(i, 1)] * v.signum()
+            + coefficients[(i, 2)] * (20.0 * v).tanh()
+    };
+    let torque = wrist::friction(&dq, &coefficients);
+    let expected = [of_motor(0), of_motor(1) - 1.5 * of_motor(2), of_motor(2)];
+    for (found, expected) in torque.iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-12, "{torque} {expected:?}");
+    }
+    let power: f64 = (0..3).map(|i| motors[i] * of_motor(i)).sum();
+    assert!((torque.dot(&dq) - power).abs() < 1e-12);
+    assert_eq!(wrist::MOTOR_VELOCITIES, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.5, 1.0]]);
+}

@@ -158,3 +158,22 @@ fn an_export_into_an_export_is_one() {
         assert_eq!(motors(&exported(&text, MODEL).text).len(), 5, "{section}");
     }
 }
+
+/// Armature is of one joint: a rotor that turns with two is told, not written.
+#[test]
+fn a_rotor_of_several_joints_is_left_out() {
+    let imported = import::mjcf(ARM, "arm.xml", &exact()).unwrap();
+    let coupled =
+        format!("{}\n[[transmission]]\njoints = [1, 4]\nmatrix = [[1, 0], [1, 1]]\n", imported.text);
+    let arm = dyngen::Arm::parse(&coupled, "arm.toml").unwrap();
+    let known = Known::read(&arm, (&imported.values_json(), "v.json"), None).unwrap();
+    let new = export::mjcf(ARM, "arm.xml", &arm, &known, &Options::default()).unwrap();
+    // Motor 1 still turns with its own joint alone.
+    assert_eq!(
+        new.notes.iter().filter(|note| note.contains("its rotor is left out")).count(),
+        1,
+        "{:?}",
+        new.notes
+    );
+    assert!(new.notes[0].contains("joint 'turn'"), "{:?}", new.notes);
+}

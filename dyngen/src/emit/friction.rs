@@ -1,8 +1,11 @@
-//! Columns for friction beside the regressor: each joint's own terms, functions of its velocity alone.
+//! Columns for friction beside the regressor: each motor's own terms, functions of its velocity alone. A motor turns
+//! with its joint, but where a transmission says that it turns with several.
 
 use super::docs;
-use proc_macro2::{Literal, TokenStream};
-use quote::quote;
+use crate::arm::Arm;
+use crate::exact::rational::to_f64;
+use proc_macro2::{Ident, Literal, TokenStream};
+use quote::{format_ident, quote};
 use std::fmt;
 use std::str::FromStr;
 
@@ -67,22 +70,86 @@ impl FromStr for FrictionTerm {
     }
 }
 
+/// How the motors of the joints that move on their own turn with the coordinates, n × n: the identity without
+/// transmissions.
+fn motor_velocities(arm: &Arm) -> Vec<Vec<f64>> {
+    let (matrix, drives) = (arm.motor_velocity_matrix(), arm.drives());
+    let row = |motor: usize| {
+        let mut row = vec![0.0; arm.dof()];
+        for (factor, drive) in matrix[motor].iter().zip(&drives) {
+            row[drive.coordinate] += to_f64(&(factor * &drive.ratio));
+        }
+        row
+    };
+    arm.coordinates().into_iter().map(row).collect()
+}
+
+/// Σ factor·name.
+fn sum<'a>(terms: impl Iterator<Item = (f64, &'a Ident)>) -> TokenStream {
+    let terms = terms.filter(|(factor, _)| *factor != 0.0).map(|(factor, name)| {
+        let number = Literal::f64_suffixed(factor);
+        if factor == 1.0 { quote!(#name) } else { quote!(#name * nalgebra::convert::<f64, T>(#number)) }
+    });
+    let terms: Vec<TokenStream> = terms.collect();
+    quote!(#(#terms)+*)
+}
+
 /// The items for some terms; none where there are no terms.
-pub(super) fn items(terms: &[FrictionTerm], n: usize) -> TokenStream {
+pub(super) fn items(terms: &[FrictionTerm], arm: &Arm) -> TokenStream {
     if terms.is_empty() {
         return quote!();
     }
+    let n = arm.dof();
+    let motors = motor_velocities(arm);
+    let is_coupled = !arm.transmissions.is_empty();
     let count = Literal::usize_unsuffixed(terms.len());
     let list: String = terms.iter().enumerate().map(|(k, term)| format!("\n{}. `{term}`", k + 1)).collect();
     let shapes = |what: &str| format!("{what}, one for each column:\n{list}");
+    let (title, rows) = if is_coupled {
+        (
+            "Friction columns of every motor",
+            "row i holds motor i's columns, so motor i's friction is this row times its coefficients.\nIn a \
+             regression each column stands beside the regressor in the rows of every joint j, times \
+             `MOTOR_VELOCITIES[i][j]`.",
+        )
+    } else {
+        (
+            "Friction columns of every joint",
+            "row i holds joint i's columns, so joint i's friction is this row times its coefficients.\nIn a \
+             regression they stand beside the regressor, each in its own joint's rows.",
+        )
+    };
     let columns_doc = docs::lines(&format!(
-        "{}\n\n* `dq`: joint velocities, rad/s\n\nReturns n × terms: row i holds joint i's columns, so joint i's \
-            friction is \
-         this row times its coefficients.\nIn a regression they stand beside the regressor, each in its own \
-         joint's rows.",
-        shapes("Friction columns of every joint")
+        "{}\n\n* `dq`: joint velocities, rad/s\n\nReturns n × terms: {rows}",
+        shapes(title)
     ));
-    let velocities: Vec<_> = (0..n).map(|i| quote::format_ident!("dq{}", i + 1)).collect();
+    let names = |name: &str| (0..n).map(|i| format_ident!("{name}{}", i + 1)).collect::<Vec<_>>();
+    let (joints, torques) = (names("dq"), names("f"));
+    let velocities = if is_coupled { names("motor") } else { joints.clone() };
+    let turned = is_coupled.then(|| {
+        let of = motors.iter().map(|row| sum(row.iter().copied().zip(&joints)));
+        quote!(#(let #velocities = #of;)*)
+    });
+    let matrix = is_coupled.then(|| {
+        let rows = motors.iter().map(|row| {
+            let row = row.iter().map(|x| Literal::f64_suffixed(*x));
+            quote!([#(#row),*])
+        });
+        quote! {
+            /// Motor i turns at the sum over joints j of `MOTOR_VELOCITIES[i][j]` times their velocities, on the
+            /// joint's side of its gear.
+            pub const MOTOR_VELOCITIES: [[f64; JOINTS]; JOINTS] = [#(#rows),*];
+        }
+    });
+    let spent = if is_coupled {
+        let of = (0..n).map(|j| sum(motors.iter().map(|row| row[j]).zip(&torques)));
+        quote! {
+            let [[#(#torques),*]] = friction_columns(dq).component_mul(coefficients).column_sum().data.0;
+            SVector::from_array_storage(ArrayStorage([[#(#of),*]]))
+        }
+    } else {
+        quote!(friction_columns(dq).component_mul(coefficients).column_sum())
+    };
     let column = |term: &FrictionTerm| -> TokenStream {
         let entries = velocities.iter().enumerate().map(|(i, v)| match term {
             FrictionTerm::Viscous => quote!(#v),
@@ -109,6 +176,8 @@ pub(super) fn items(terms: &[FrictionTerm], n: usize) -> TokenStream {
         /// Number of friction terms of a joint.
         pub const FRICTION_TERMS: usize = #count;
 
+        #matrix
+
         #sign
 
         #(#[doc = #columns_doc])*
@@ -116,7 +185,8 @@ pub(super) fn items(terms: &[FrictionTerm], n: usize) -> TokenStream {
         pub fn friction_columns<T: SimdRealField + Copy>(
             dq: &SVector<T, JOINTS>,
         ) -> SMatrix<T, JOINTS, FRICTION_TERMS> {
-            let [[#(#velocities),*]] = dq.data.0;
+            let [[#(#joints),*]] = dq.data.0;
+            #turned
             SMatrix::from_array_storage(ArrayStorage([#(#columns),*]))
         }
 
@@ -132,7 +202,7 @@ pub(super) fn items(terms: &[FrictionTerm], n: usize) -> TokenStream {
             dq: &SVector<T, JOINTS>,
             coefficients: &SMatrix<T, JOINTS, FRICTION_TERMS>,
         ) -> SVector<T, JOINTS> {
-            friction_columns(dq).component_mul(coefficients).column_sum()
+            #spent
         }
     }
 }

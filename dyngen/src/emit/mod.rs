@@ -126,7 +126,7 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     for term in &options.friction {
         term.check(model.arm().dof()).map_err(Error::Friction)?;
     }
-    let friction = friction::items(&options.friction, model.arm().dof());
+    let friction = friction::items(&options.friction, model.arm());
     let tests = if options.tests { tests::module(model, options)? } else { quote!() };
     let joint_names = model.arm().has_joint_names().then(|| {
         let names = model.arm().joint_names();

@@ -50,7 +50,15 @@ pub fn mjcf(
         let joint = &chain.joints[i];
         let line = robot.joints.iter().find(|j| j.name == joint.name).map_or(0, |j| j.line);
         let rotor = known.values[11 * i + 10];
-        let armature = arm.joints[i].rotor_ratio.as_ref().map(|k| to_f64(k).powi(2) * rotor);
+        let coupled = arm.coupled_motor(i).is_some();
+        let ratio = arm.joints[i].rotor_ratio.as_ref().filter(|_| !coupled);
+        let armature = ratio.map(|k| to_f64(k).powi(2) * rotor);
+        if coupled && rotor != 0.0 {
+            notes.push(format!(
+                "joint '{}': its motor turns with several joints, which armature cannot say: its rotor is left out",
+                joint.name
+            ));
+        }
         let mut friction = known.friction.as_ref().and_then(|f| f[i]);
         let terms: Vec<&Term> = known.terms.iter().filter(|term| term.link == i).collect();
         let effects = dcmotor::motors(arm.joints[i].kind, friction, &terms);
