@@ -1,14 +1,13 @@
-//! Summaries on disk: one line of JSON that says what it is, then the factors as little-endian doubles, where zeros that
-//! follow each other are one zero and their count: a short log fills a part of its factors.
+//! Summaries on disk: one line of JSON that says what it is, then the factors, packed.
 
-use super::{Columns, Identity, NODES, OCTAVES, Octaves, Powers, RFactor, Steepness, Summary, fnv};
+use super::{Columns, Identity, NODES, OCTAVES, Powers, RFactor, Steepness, Summary, fnv, packed};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// First word of every summary.
 const FORMAT: &str = "powerball summary";
 /// Raised whenever a reader of the version before would misread.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 /// No arm has more joints.
 const MOST_JOINTS: usize = 64;
@@ -60,50 +59,10 @@ struct Head {
     /// By joint and octave.
     rows: Vec<Vec<u64>>,
     spectrum: Vec<Powers>,
-    /// Doubles that follow.
-    doubles: usize,
+    /// Bytes that follow.
+    bytes: usize,
     /// Of them.
     checksum: String,
-}
-
-/// Numbers with zeros that follow each other as one zero and their count.
-fn squeezed(numbers: impl Iterator<Item = f64>) -> Vec<f64> {
-    let (mut out, mut zeros) = (Vec::new(), 0u32);
-    let close = |out: &mut Vec<f64>, zeros: &mut u32| {
-        if *zeros > 0 {
-            out.extend([0.0, f64::from(std::mem::take(zeros))]);
-        }
-    };
-    for x in numbers {
-        if x == 0.0 {
-            zeros += 1;
-        } else {
-            close(&mut out, &mut zeros);
-            out.push(x);
-        }
-    }
-    close(&mut out, &mut zeros);
-    out
-}
-
-/// The numbers again; `None` unless there are `count`.
-fn unsqueezed(squeezed: &[f64], count: usize) -> Option<Vec<f64>> {
-    let mut out = Vec::with_capacity(count);
-    let mut rest = squeezed.iter();
-    while let Some(x) = rest.next() {
-        let zeros = if *x == 0.0 { *rest.next()? } else { 0.0 };
-        if *x != 0.0 {
-            out.push(*x);
-        } else if zeros >= 1.0 && zeros <= (count - out.len()) as f64 {
-            out.resize(out.len() + zeros as usize, 0.0);
-        } else {
-            return None;
-        }
-        if out.len() > count {
-            return None;
-        }
-    }
-    (out.len() == count).then_some(out)
 }
 
 impl Identity {
@@ -150,9 +109,7 @@ impl Summary {
     /// The bytes of a file.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        let levels = || self.joints.iter().flat_map(|j| j.levels());
-        let numbers: Vec<u8> =
-            squeezed(levels().flat_map(|t| t.packed())).into_iter().flat_map(f64::to_le_bytes).collect();
+        let numbers = packed::write(&self.joints);
         let id = &self.identity;
         let head = Head {
             format: FORMAT.into(),
@@ -172,7 +129,7 @@ impl Summary {
             silent: self.silent.clone(),
             rows: self.joints.iter().map(|j| j.levels().iter().map(RFactor::rows).collect()).collect(),
             spectrum: self.spectrum.clone(),
-            doubles: numbers.len() / 8,
+            bytes: numbers.len(),
             checksum: format!("{:016x}", fnv(&numbers)),
         };
         // A head of text and finite numbers always is JSON.
@@ -210,12 +167,9 @@ impl Summary {
         let hash =
             u64::from_str_radix(&head.arm_hash, 16).map_err(|_| unreadable("its arm_hash is no number"))?;
         let width = Columns { inertial: head.parameters.len() }.width();
-        let each = RFactor::packed_len(width);
         let joints = head.steepness.len();
-        let length = head.doubles.saturating_mul(8);
-        let after = numbers.get(length..).unwrap_or_default();
-        let numbers = &numbers[..length.min(numbers.len())];
-        // Zeros take no room in the file: what says that there are billions is damaged.
+        let (numbers, after) = numbers.split_at(head.bytes.min(numbers.len()));
+        // Zeros take little room in the file: what says that there are billions is damaged.
         let shaped = head.nodes == NODES
             && joints <= MOST_JOINTS
             && head.parameters.len() <= 16 * MOST_JOINTS
@@ -224,26 +178,11 @@ impl Summary {
             && head.silent.len() == joints
             && head.spectrum.len() == joints
             && head.rows.iter().all(|r| r.len() == OCTAVES)
-            && numbers.len() == length;
+            && numbers.len() == head.bytes;
         if !shaped || format!("{:016x}", fnv(numbers)) != head.checksum {
             return Err(unreadable("it is torn or damaged: summarize the log anew"));
         }
-        let doubles: Vec<f64> =
-            numbers.chunks_exact(8).filter_map(|b| Some(f64::from_le_bytes(b.try_into().ok()?))).collect();
-        let doubles = unsqueezed(&doubles, each * OCTAVES * joints)
-            .ok_or_else(|| unreadable("its factors do not fit its first line"))?;
-        let mut parts = doubles.chunks_exact(each.max(1));
-        let joints = head
-            .rows
-            .iter()
-            .map(|rows| {
-                let levels = rows
-                    .iter()
-                    .map(|rows| RFactor::from_packed(width, parts.next()?, *rows))
-                    .collect::<Option<Vec<_>>>()?;
-                Octaves::from_levels(levels)
-            })
-            .collect::<Option<Vec<_>>>()
+        let joints = packed::read(width, &head.rows, numbers)
             .ok_or_else(|| unreadable("its factors do not fit its first line"))?;
         let identity = Identity {
             arm: head.arm,
@@ -256,24 +195,5 @@ impl Summary {
         };
         let (logs, samples, silent, spectrum) = (head.logs, head.samples, head.silent, head.spectrum);
         Ok((Summary { identity, logs, samples, silent, joints, spectrum }, after))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn zeros_are_counted_and_come_back() {
-        for numbers in [vec![], vec![0.0; 7], vec![1.0, 0.0, 0.0, -2.0, 0.0], vec![3.0, 4.0]] {
-            let small = squeezed(numbers.iter().copied());
-            assert_eq!(unsqueezed(&small, numbers.len()), Some(numbers.clone()), "{small:?}");
-            assert_eq!(unsqueezed(&small, numbers.len() + 1), None);
-        }
-        // Damaged counts are refused, whatever they are.
-        for wrong in [f64::NAN, -1.0, 0.0, 1e300, f64::INFINITY] {
-            assert_eq!(unsqueezed(&[1.0, 0.0, wrong], 3), None, "{wrong}");
-        }
-        assert_eq!(unsqueezed(&[1.0, 0.0], 3), None);
     }
 }

@@ -8,6 +8,7 @@
 mod bands;
 mod file;
 mod octaves;
+mod packed;
 mod r_factor;
 mod reduce;
 mod steepness;
@@ -85,15 +86,18 @@ impl Summary {
                 .map(|j| Steepness::new(j.velocity.filter(|v| *v > 0.0).unwrap_or(ORDINARY_SPEED)))
                 .collect(),
         };
-        let columns = Columns { inertial: identity.parameters.len() };
-        let joints = vec![Octaves::new(columns.width()); arm.dof()];
+        Summary::without_logs(identity)
+    }
+
+    fn without_logs(identity: Identity) -> Summary {
+        let (columns, dof) = (Columns { inertial: identity.parameters.len() }, identity.steepness.len());
         Summary {
             identity,
             logs: Vec::new(),
             samples: 0,
-            silent: vec![None; arm.dof()],
-            joints,
-            spectrum: vec![Powers::default(); arm.dof()],
+            silent: vec![None; dof],
+            joints: vec![Octaves::new(columns.width()); dof],
+            spectrum: vec![Powers::default(); dof],
         }
     }
 
@@ -126,6 +130,12 @@ impl Summary {
     /// [`SummaryError::Differs`] where they are of another arm, mounting, set or band.
     pub fn merge(&mut self, other: &Summary) -> Result<(), SummaryError> {
         self.identity.same_as(&other.identity)?;
+        self.join(other);
+        Ok(())
+    }
+
+    /// [`Summary::merge`] of what is known to be of the same arm.
+    fn join(&mut self, other: &Summary) {
         for (octaves, other) in self.joints.iter_mut().zip(&other.joints) {
             octaves.merge(other);
         }
@@ -137,7 +147,6 @@ impl Summary {
         }
         self.samples += other.samples;
         self.logs.extend(other.logs.iter().cloned());
-        Ok(())
     }
 }
 

@@ -15,6 +15,9 @@ pub const OCTAVES: usize = 8;
 /// Octaves from this one on are slower than the means over one second that weights are made of.
 pub const SLOW: usize = 5;
 
+/// Binary digits of a column's length that a log's factors keep: 4e-9 of it.
+const DIGITS: i32 = 28;
+
 /// The differences and the sums of neighbours over √2; a last value without a neighbour is in neither.
 #[must_use]
 pub fn halved(signal: &[f64]) -> (Vec<f64>, Vec<f64>) {
@@ -93,7 +96,18 @@ impl Octaves {
         for run in rows.runs() {
             self.push(&columns.iter().map(|c| &c[run.clone()]).collect::<Vec<_>>());
         }
-        self.levels.iter_mut().for_each(RFactor::clean);
+    }
+
+    /// Rounds each column to [`DIGITS`] binary digits of its length over all octaves: below what any sensor tells,
+    /// and what a file has to keep.
+    pub fn round(&mut self) {
+        let step = |k: usize| {
+            let square: f64 = self.levels.iter().flat_map(|level| level.column(k)).map(|x| x * x).sum();
+            let exponent = square.sqrt().log2().ceil();
+            if exponent.is_finite() && exponent > -900.0 { 2f64.powi(exponent as i32 - DIGITS) } else { 0.0 }
+        };
+        let steps: Vec<f64> = (0..self.levels[0].width()).map(step).collect();
+        self.levels.iter_mut().for_each(|level| level.round(&steps));
     }
 
     /// The same rows with combinations of their columns, as [`RFactor::combined`].

@@ -16,9 +16,6 @@ pub struct RFactor {
     rows: u64,
 }
 
-/// What of a column's length is rounding: some units in the last place, as reflections add them up.
-const ROUNDING: f64 = 1e-14;
-
 /// Rows that are reflected together: a block of seventy columns stays in a second-level cache.
 const BLOCK: usize = 256;
 
@@ -50,16 +47,12 @@ impl RFactor {
             .collect()
     }
 
-    /// Puts rows of the factor to zero that are nothing but rounding: those of fewer rows than columns, say. A file
-    /// has no room for them.
-    pub fn clean(&mut self) {
-        let least: Vec<f64> = (0..self.width)
-            .map(|k| ROUNDING * self.column(k).iter().map(|x| x * x).sum::<f64>().sqrt())
-            .collect();
-        for row in 0..self.width {
-            let at = |column: usize| column * self.width + row;
-            if (row..self.width).all(|column| self.columns[at(column)].abs() <= least[column]) {
-                (row..self.width).for_each(|column| self.columns[column * self.width + row] = 0.0);
+    /// Rounds each column to multiples of its step; a step of 0 leaves it as it is.
+    pub fn round(&mut self, steps: &[f64]) {
+        for (column, step) in self.columns.chunks_exact_mut(self.width.max(1)).zip(steps) {
+            if *step > 0.0 {
+                // Adding 0 makes −0 a plain zero.
+                column.iter_mut().for_each(|x| *x = (*x / step).round() * step + 0.0);
             }
         }
     }
@@ -314,17 +307,19 @@ mod tests {
         assert!(t.packed().iter().all(|x| x.is_finite()));
     }
 
-    /// Three rows have three dimensions: cleaned, the factor has three rows, and the same products.
+    /// Three rows have three dimensions: rounded, the factor has three rows, and the same products.
     #[test]
     fn rounding_is_no_row_of_the_factor() {
         let all = rows(3, 40, 9);
         let mut t = RFactor::new(40);
         t.push(&slices(&all));
         let before = products(&t);
-        t.clean();
+        let step = 2f64.powi(-40);
+        t.round(&[step; 40]);
         assert!((3..40).all(|row| (row..40).all(|k| t.column(k)[row] == 0.0)));
+        assert!(t.packed().iter().all(|x| (x / step).fract() == 0.0));
         for (a, b) in before.iter().zip(products(&t)) {
-            approx::assert_abs_diff_eq!(*a, b, epsilon = 1e-13);
+            approx::assert_abs_diff_eq!(*a, b, epsilon = 20.0 * step);
         }
     }
 

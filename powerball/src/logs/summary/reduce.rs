@@ -117,11 +117,14 @@ pub(super) fn push_in_bands(
     mut correct: impl FnMut(&mut Recording),
 ) -> Result<Vec<String>, DataError> {
     let (mut notes, mut refused) = (Vec::new(), None);
+    // A log is reduced by itself and rounded once, so that it is the same in a file and beside others.
+    let empty = |summary: &Summary| Summary::without_logs(summary.identity.clone());
+    let mut reduced: Vec<Summary> = summaries.iter().map(empty).collect();
     // By band: the seconds that were taken in.
     let mut seconds: Vec<Option<f64>> = vec![None; summaries.len()];
     for part in parts(log) {
         let part = std::slice::from_ref(&part);
-        let bands = Data::in_bands(body, part, options, summaries.len(), &mut correct);
+        let bands = Data::in_bands(body, part, options, reduced.len(), &mut correct);
         let mut bands: Vec<Result<Data<'_>, DataError>> = bands.unwrap_or_else(|error| vec![Err(error)]);
         // What is too little in a band is too little in narrower ones.
         let usable = bands.iter().take_while(|band| band.is_ok()).count();
@@ -132,26 +135,28 @@ pub(super) fn push_in_bands(
         let Some(widest) = bands.first() else { continue };
         notes.extend(widest.left_out.iter().cloned());
         let of_joint = |&j: &usize| -> Vec<Octaves> {
-            let columns = summaries[0].columns().of(&bands, j, &summaries[0].identity.steepness[j]);
+            let columns = reduced[0].columns().of(&bands, j, &reduced[0].identity.steepness[j]);
             let pushed = |((summary, data), columns): ((&Summary, &Data<'_>), Vec<Vec<f64>>)| {
                 let mut octaves = summary.joints[j].clone();
                 octaves.push_rows(&data.joints[j], &columns);
                 octaves
             };
-            summaries.iter().zip(&bands).zip(columns).map(pushed).collect()
+            reduced.iter().zip(&bands).zip(columns).map(pushed).collect()
         };
         let joints = parallel::map(&(0..widest.dof()).collect::<Vec<_>>(), of_joint);
         for (j, octaves) in joints.into_iter().enumerate() {
-            summaries.iter_mut().zip(octaves).for_each(|(summary, octaves)| summary.joints[j] = octaves);
+            reduced.iter_mut().zip(octaves).for_each(|(summary, octaves)| summary.joints[j] = octaves);
         }
-        for ((summary, data), seconds) in summaries.iter_mut().zip(&bands).zip(&mut seconds) {
+        for ((summary, data), seconds) in reduced.iter_mut().zip(&bands).zip(&mut seconds) {
             summary.count(data);
             let own: f64 = data.recordings.iter().map(|r| r.len() as f64 / r.rate).sum();
             *seconds = Some(seconds.unwrap_or(0.0) + own);
         }
     }
-    for (summary, seconds) in summaries.iter_mut().zip(&seconds) {
-        summary.logs.extend(seconds.map(|seconds| (log.file.clone(), seconds)));
+    for ((summary, mut reduced), seconds) in summaries.iter_mut().zip(reduced).zip(&seconds) {
+        reduced.logs.extend(seconds.map(|seconds| (log.file.clone(), seconds)));
+        reduced.joints.iter_mut().for_each(Octaves::round);
+        summary.join(&reduced);
     }
     match refused {
         Some(error) if seconds[0].is_none() => Err(error),
