@@ -26,6 +26,15 @@ const NAMES: [(&str, &[&str]); 6] = [
     ("temp", &["temp", "temperature"]),
     ("motor", &["motor"]),
 ];
+/// The same in recordings of Universal Robots' RTDE, which count joints from 0; its torques by current are those that
+/// controllers from 5.23 on give.
+const RTDE: [(&str, &str); 5] = [
+    ("q", "actual_q_"),
+    ("dq", "actual_qd_"),
+    ("tau", "actual_current_as_torque_"),
+    ("i", "actual_current_"),
+    ("temp", "joint_temperatures_"),
+];
 /// Names of the time; the first is that of this project's own logs. Lines with a header have that one alone.
 pub(super) const TIMES: [&str; 3] = ["t", "time", "timestamp"];
 
@@ -69,6 +78,16 @@ fn stems(key: &str) -> Vec<&'static str> {
     NAMES.iter().filter(|(own, _)| *own == key).flat_map(|(_, stems)| stems.iter().copied()).collect()
 }
 
+/// The name that RTDE has for a quantity of a joint, from 0.
+fn rtde(key: &str, joint: usize) -> Option<String> {
+    RTDE.iter().find(|(own, _)| *own == key).map(|(_, stem)| format!("{stem}{joint}"))
+}
+
+/// Whether columns are those of a recording by RTDE.
+fn by_rtde(names: &[String]) -> bool {
+    rtde("q", 0).is_some_and(|first| names.contains(&first))
+}
+
 /// What a column is taken to be by its name, and the joint that the name says.
 pub(super) fn meaning(name: &str, map: &ColumnMap) -> Option<(&'static str, Option<String>)> {
     let own = map.t.column.as_ref().and_then(|by| by.of(0)).map(String::as_str);
@@ -92,7 +111,9 @@ pub(super) fn meaning(name: &str, map: &ColumnMap) -> Option<(&'static str, Opti
             }
         }
     }
-    None
+    let unmapped = RTDE.iter().filter(|(key, _)| map.of(key).column.is_none());
+    let number = |stem: &str| name.strip_prefix(stem)?.parse::<usize>().ok();
+    unmapped.into_iter().find_map(|(key, stem)| Some((*key, Some((number(stem)? + 1).to_string()))))
 }
 
 /// The columns of a quantity; an error is the names of those that are missing.
@@ -126,7 +147,8 @@ pub(super) fn group(names: &[String], key: &str, asked: Asked<'_>) -> Result<Gro
             }
             None => format!("{}{}", stems[0], j + 1),
         };
-        stems.iter().find_map(one).ok_or_else(missing)
+        let by_rtde = || at(&rtde(key, j).filter(|_| mapped.column.is_none())?);
+        stems.iter().find_map(one).or_else(by_rtde).ok_or_else(missing)
     };
     let found: Vec<Result<usize, String>> = (0..n).map(column).collect();
     let missing: Vec<String> = found.iter().filter_map(|c| c.clone().err()).collect();
@@ -272,7 +294,7 @@ impl Columns {
 
 fn time(names: &[String], asked: Asked<'_>) -> Option<Group> {
     let at = |name: &str| names.iter().position(|own| own == name);
-    let known = if asked.header.is_some() { &TIMES[..1] } else { &TIMES[..] };
+    let known = if asked.header.is_some() && !by_rtde(names) { &TIMES[..1] } else { &TIMES[..] };
     let found = match asked.map.t.column.as_ref().and_then(|by| by.of(0)) {
         Some(name) => at(name),
         None => known.iter().find_map(|name| at(name)),

@@ -71,6 +71,31 @@ fn a_sound_log_is_read_without_findings() {
     assert_eq!(log.q[1][0], 1.0);
 }
 
+/// Recordings of Universal Robots' RTDE: joints from 0, `timestamp`, blanks or commas between columns, and much else.
+#[test]
+fn rtde_recordings_are_read_by_their_names() {
+    let (own, _) = read(&text(HEADER, |_, f| Some(f.join(","))));
+    let own = own.unwrap();
+    let names = "timestamp target_q_0 target_q_1 actual_q_0 actual_q_1 actual_current_0 actual_current_1 \
+                 actual_current_as_torque_0 actual_current_as_torque_1 joint_temperatures_0 \
+                 joint_temperatures_1 robot_mode";
+    for between in [" ", ",", ";", "\t"] {
+        let line = |_: usize, f: Vec<String>| {
+            let [t, q1, q2, tau1, tau2] = &f[..] else { return None };
+            Some([t, q1, q2, q1, q2, "1", "2", tau1, tau2, "30", "31", "7"].join(between))
+        };
+        let (log, findings) = read(&text(&names.replace(' ', between), line));
+        let log = log.unwrap();
+        assert_eq!((&log.t, &log.q, &log.torque), (&own.t, &own.q, &own.torque), "{between:?}");
+        assert_eq!(log.temperature.unwrap()[1][0], 31.0);
+        assert!(findings.iter().any(|f| f.message.contains("kept out: target_q_0")), "{findings:?}");
+        // Without torques currents count, with the arm's constants, and the second joint has none.
+        let bare = names.replace("actual_current_as_torque", "target_moment").replace(' ', between);
+        let why = read(&text(&bare, line)).0.unwrap_err().to_string();
+        assert!(why.contains("no torque_constant") && why.contains("joint 2"), "{why}");
+    }
+}
+
 #[test]
 fn faults_are_found_with_their_line_and_taken_out() {
     let spoilt = text(&format!("{HEADER},mode"), |k, mut f| {

@@ -180,6 +180,7 @@ impl Found {
                 Some(numbers) if numbers.len() == count => keep(Values::Numbers(numbers), shape),
                 _ => return Err(torn()),
             },
+            STRUCT => self.left_out.push(format!("{name} (is a list of structs, or lies too deep)")),
             _ => self.left_out.push(format!("{name} (is neither numbers nor texts)")),
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! Logs as CSV with a header line.
+//! Logs as CSV with a header line, between whose names stand commas, semicolons, tabs or blanks.
 
 use super::table::Rows;
 use super::{Finding, LogError};
@@ -18,7 +18,11 @@ pub(crate) fn read(
         quantity: quantity.to_string(),
         message,
     };
-    let mut reader = csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).from_reader(bytes);
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(delimiter(bytes))
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .from_reader(bytes);
     let header = reader
         .byte_headers()
         .map_err(|e| LogError(vec![error(Some(1), "header", format!("cannot be read: {e}"))]))?
@@ -46,4 +50,10 @@ pub(crate) fn read(
         });
     }
     Ok(last_torn)
+}
+
+/// What stands between the names of the first line: names may hold blanks where commas or the like are there.
+fn delimiter(bytes: &[u8]) -> u8 {
+    let header = bytes.split(|b| *b == b'\n').next().unwrap_or_default().trim_ascii();
+    *b",;\t ".iter().find(|delimiter| header.contains(delimiter)).unwrap_or(&b',')
 }
