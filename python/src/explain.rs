@@ -7,7 +7,7 @@ use crate::logs::{Given, column_map, taken};
 use crate::motion::Trajectory;
 use crate::work;
 use powerball::ExplainOptions;
-use powerball::explanation::{ExplainError, Prepared};
+use powerball::explanation::{ExplainError, Prepared, Rule};
 use powerball::identification::{IdentifyError, Recorded};
 use powerball::report::{self, Files};
 use pyo3::prelude::*;
@@ -52,7 +52,8 @@ impl Explained {
 
 /// Explains what the base model of an arm lacks on logs.
 #[pyfunction]
-#[pyo3(signature = (arm, log, validate, map, model, correct_unattributed, progress))]
+#[pyo3(signature = (arm, log, validate, map, model, correct_unattributed, rule, progress))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn explain(
     py: Python<'_>,
     arm: &Arm,
@@ -61,16 +62,19 @@ pub(crate) fn explain(
     map: Vec<String>,
     model: Option<ModelText>,
     correct_unattributed: bool,
+    rule: &str,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Explained> {
     let (arm, map) = (arm.arm.clone(), column_map(&map)?);
+    let rule = Rule::from_json(rule).map_err(input)?;
     let (logs, validate) = (taken(&arm, &log, &map)?, taken(&arm, &validate, &map)?);
     let name = model.as_ref().map(|(_, name)| name.clone());
     let known = model.as_ref().map(model_file).transpose()?.map(|file| file.model);
     let done = work::run(py, progress.as_ref(), move |progress| -> Result<_, Why> {
         progress.say("reading logs");
         let recorded = Recorded::read(&arm, &logs.sources, &validate.sources).map_err(Why::Logs)?;
-        let options = ExplainOptions { known, correct_unattributed, progress, ..ExplainOptions::default() };
+        let options =
+            ExplainOptions { rule, known, correct_unattributed, progress, ..ExplainOptions::default() };
         let prepared =
             Prepared::new(&arm, &recorded.fit, &recorded.validate, &options).map_err(Why::Explain)?;
         let (mut explained, motion) = prepared.explained(&options).map_err(Why::Explain)?;
@@ -92,4 +96,10 @@ pub(crate) fn explain(
     }
     let model = report::files::json(&explained.model).map_err(refused)?;
     Ok(Explained { files, model, trajectory: motion.map(Trajectory) })
+}
+
+/// Every threshold of `explain` with its default, as JSON.
+#[pyfunction]
+pub(crate) fn rule() -> PyResult<String> {
+    report::files::json(&Rule::default()).map_err(refused)
 }

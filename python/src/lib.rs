@@ -24,7 +24,7 @@ mod _core {
     #[pymodule_export]
     use super::evaluate::functions;
     #[pymodule_export]
-    use super::explain::{Explained, explain};
+    use super::explain::{Explained, explain, rule};
     #[pymodule_export]
     use super::identify::{ComparedSide, Identified, Written, compare, identify, verify};
     #[pymodule_export]

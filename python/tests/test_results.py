@@ -1,5 +1,6 @@
 """Results: the commands' JSON from files, frames and arrays."""
 
+import dataclasses
 import json
 import re
 
@@ -172,6 +173,21 @@ def test_verify_and_compare_are_the_commands(session, arm, identified, tmp_path)
         pb.compare(identified, session.log[0])
 
 
+def test_thresholds_are_the_programs_and_can_be_given(session, arm):
+    assert dataclasses.asdict(pb.Rule()) == json.loads(pb._core.rule())
+    log, validate = session.log[:2], session.validate[:1]
+    asked = pb.explain(arm, log, validate, rule=pb.Rule(most_steps=0))
+    assert not asked.effects
+    for rule, why in [
+        (pb.Rule(least_score=-1.0), "least_score is -1: give 0 or more"),
+        (pb.Rule(least_score=float("nan")), "expected value"),
+        (pb.Rule(most_steps=1.5), "most_steps: invalid type"),
+        (pb.Rule(shortest_block=3.0), "shortest_block .* is longer than longest_block"),
+    ]:
+        with pytest.raises(pb.InputError, match=why):
+            pb.explain(arm, log, validate, rule=rule)
+
+
 def test_explain_is_the_commands_and_its_model_goes_on(session, arm, tmp_path):
     told = []
     log, validate = session.log[:3], session.validate[:1]
@@ -250,3 +266,30 @@ def test_numbers_for_ros_are_the_models(arm, session, identified, tmp_path):
         own = told["friction"][name]
         assert [own[f"gamma{k}"] for k in range(1, 6)] == list(friction.gamma)
         assert own["coulomb"] == friction.gamma[0] + friction.gamma[2] and own["viscous"] == friction.gamma[4]
+
+
+def test_recordings_as_mcap_open_with_the_reader_of_its_makers(session, identified, tmp_path):
+    reader = need("mcap.reader")
+    identified.save(tmp_path / "fit")
+    out = tmp_path / "run.mcap"
+    done = command(
+        "powerball",
+        *("log", session.log[0], "--arm", session.arm_file, "--to", "mcap", "-o", out),
+        *("--model", tmp_path / "fit" / "identified.json"),
+    )
+    assert done.returncode == 0, done.stderr
+    states, torques = 0, []
+    with open(out, "rb") as file:
+        for schema, channel, message in reader.make_reader(file, validate_crcs=True).iter_messages():
+            if channel.topic == "/joint_states":
+                assert schema.name == "sensor_msgs/msg/JointState"
+                states += 1
+            elif channel.topic == "/torque/joint2":
+                torques.append(json.loads(message.data))
+    assert states == len(table(session.log[0])["t"])
+    measured, predicted, residual = (
+        np.array([torque[key] for torque in torques]) for key in ("measured", "predicted", "residual")
+    )
+    np.testing.assert_allclose(measured - predicted, residual, atol=1e-9)
+    rms = [float(np.sqrt(np.mean(x**2))) for x in (measured, residual)]
+    assert len(residual) > 100 and rms[1] < 0.2 * rms[0]

@@ -37,4 +37,4 @@ pub mod torque_model;
 pub use door::{Prepared, explain};
 pub use explain::{Explained, explain_body};
 pub use options::{ExplainError, ExplainOptions, RuledOut};
-pub use rule::Rule;
+pub use rule::{Rule, RuleError};

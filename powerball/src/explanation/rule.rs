@@ -1,11 +1,15 @@
 //! Every threshold that decides what an explanation says, with its reason.
 
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
 /// The thresholds of the rule that accepts, names or refuses effects.
 ///
 /// The defaults are those of every published figure (`docs/study.md`, `docs/measured.md`). A gain is a fall
 /// of χ², the squared error in units of independent samples; a score is a gain after penalties for
 /// coefficients and for having searched.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Rule {
     /// Effects added at most.
     pub most_steps: usize,
@@ -205,6 +209,108 @@ impl Default for Rule {
             decision_level: 0.01,
             same_model: 0.1,
             visible: 10.0,
+        }
+    }
+}
+
+/// Why thresholds are no rule.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RuleError(String);
+
+impl fmt::Display for RuleError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the rule: {}", self.0)
+    }
+}
+
+impl std::error::Error for RuleError {}
+
+impl Rule {
+    /// From JSON: an object with the fields that differ from the defaults.
+    ///
+    /// # Errors
+    /// [`RuleError`] where a field is unknown or has a value that no threshold can have.
+    pub fn from_json(text: &str) -> Result<Rule, RuleError> {
+        let fields: serde_json::Map<String, serde_json::Value> =
+            serde_json::from_str(text).map_err(|e| RuleError(e.to_string()))?;
+        let read = |fields| serde_json::from_value::<Rule>(serde_json::Value::Object(fields));
+        // One by one, as a wrong value does not say whose it is.
+        for (name, value) in &fields {
+            let one = [(name.clone(), value.clone())].into_iter().collect();
+            read(one).map_err(|e| RuleError(format!("{name}: {e}")))?;
+        }
+        let rule = read(fields).map_err(|e| RuleError(e.to_string()))?;
+        for (name, value) in rule.numbers() {
+            if name != "worst_fold" && value < 0.0 {
+                return Err(RuleError(format!("{name} is {value}: give 0 or more")));
+            }
+        }
+        for (name, share) in rule.shares() {
+            if share > 1.0 {
+                return Err(RuleError(format!("{name} is {share}: it is a share, give at most 1")));
+            }
+        }
+        if rule.shortest_block > rule.longest_block {
+            return Err(RuleError(format!(
+                "shortest_block ({} s) is longer than longest_block ({} s)",
+                rule.shortest_block, rule.longest_block
+            )));
+        }
+        Ok(rule)
+    }
+
+    /// All fields by name.
+    fn numbers(&self) -> Vec<(String, f64)> {
+        let fields = match serde_json::to_value(self) {
+            Ok(serde_json::Value::Object(fields)) => fields,
+            _ => serde_json::Map::new(),
+        };
+        fields.into_iter().filter_map(|(name, value)| Some((name, value.as_f64()?))).collect()
+    }
+
+    /// What is a probability, a correlation or a share of a whole.
+    fn shares(&self) -> [(&'static str, f64); 10] {
+        [
+            ("family_wise", self.family_wise),
+            ("folds_that_must_gain", self.folds_that_must_gain),
+            ("alike", self.alike),
+            ("surrogate_level", self.surrogate_level),
+            ("surrogate_correlation", self.surrogate_correlation),
+            ("right", self.right),
+            ("right_beside_rest", self.right_beside_rest),
+            ("right_with_twin", self.right_with_twin),
+            ("same_path", self.same_path),
+            ("decision_level", self.decision_level),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rule_is_read_field_by_field() {
+        let read = Rule::from_json(r#"{"least_score": 12.5, "most_steps": 3}"#).unwrap();
+        assert_eq!(read, Rule { least_score: 12.5, most_steps: 3, ..Rule::default() });
+        let whole = serde_json::to_string(&Rule::default()).unwrap();
+        assert_eq!(Rule::from_json(&whole).unwrap(), Rule::default());
+        assert_eq!(Rule::default().numbers().len(), whole.matches(':').count());
+    }
+
+    #[test]
+    fn what_is_no_threshold_is_told_by_name() {
+        for (text, reason) in [
+            (r#"{"least_scores": 1}"#, "unknown field `least_scores`"),
+            (r#"{"least_score": -1}"#, "least_score is -1: give 0 or more"),
+            (r#"{"family_wise": 2}"#, "family_wise is 2: it is a share"),
+            (r#"{"most_steps": 1.5}"#, "most_steps: invalid type"),
+            (r#"{"least_score": NaN}"#, "expected value"),
+            (r#"{"shortest_block": 9}"#, "shortest_block (9 s) is longer than longest_block (2 s)"),
+            ("7", "invalid type"),
+        ] {
+            let why = Rule::from_json(text).unwrap_err().to_string();
+            assert!(why.starts_with("the rule: ") && why.contains(reason), "{why}");
         }
     }
 }

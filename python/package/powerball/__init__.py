@@ -26,6 +26,7 @@ from .identification import (
     verify,
 )
 from .reading import Recording, inspect, read_log
+from .rule import Rule
 from .source import export, generate
 from .summary import Summary, summarize
 from .virtual import Session, Truth, virtual_effects, virtual_session
@@ -51,6 +52,7 @@ __all__ = [
     "ParameterSet",
     "Recording",
     "RefusedError",
+    "Rule",
     "Session",
     "SetParameter",
     "Spread",

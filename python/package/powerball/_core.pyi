@@ -29,6 +29,7 @@ __all__ = [
     "identify",
     "inspect",
     "read_log",
+    "rule",
     "summarize",
     "verify",
     "virtual_effects",
@@ -160,8 +161,10 @@ def explain(
     map: List[str],
     model: Optional[_Text],
     correct_unattributed: bool,
+    rule: str,
     progress: _Tell,
 ) -> Explained: ...
+def rule() -> str: ...
 def read_log(
     arm: Arm, log: Any, map: List[str]
 ) -> Tuple[_Array, _Array, _Array, Optional[_Array], List[str]]: ...

@@ -14,6 +14,7 @@ from ._progress import Progress, listener
 from ._result import OfLogs, Spread, numbers, paragraph, spread, table
 from .arm import Arm
 from .identification import Map, said
+from .rule import Rule, rule_text
 
 
 @dataclass(frozen=True)
@@ -246,6 +247,7 @@ def explain(
     map: Optional[Map] = None,
     model: Optional[Model] = None,
     correct_unattributed: bool = False,
+    rule: Optional[Rule] = None,
     progress: Progress = False,
 ) -> Explained:
     """Finds, names and adds what the model lacks on logs; every addition is judged on logs of another path.
@@ -253,8 +255,9 @@ def explain(
     Logs as for :func:`identify`, in the order in which they were recorded. ``model`` is what is known
     already: it is taken out of the logs as it stands, and what is found comes to it. ``correct_unattributed``
     fits a bounded curve to what stays without a name, kept where errors fall that it was not fitted to.
+    ``rule`` has every threshold by which this is decided.
 
-    Raises: ``InputError`` where logs cannot be used, ``RefusedError`` where they hold too little.
+    Raises: ``InputError`` where logs or the rule cannot be used, ``RefusedError`` where they hold too little.
     """
     with listener(progress) as tell:
         core = _core.explain(
@@ -264,6 +267,7 @@ def explain(
             said(map),
             optional_model(model),
             correct_unattributed,
+            rule_text(rule or Rule()),
             tell,
         )
     return Explained(core)

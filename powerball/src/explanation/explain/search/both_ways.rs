@@ -91,8 +91,8 @@ fn by_blocks(screen: &Screen<'_>, trial: &Trial, candidate: &Candidate) -> f64 {
     let rule = screen.context.rule;
     let residual = left(screen, trial, &screen.residualised(trial));
     let memory = candidate.joints.iter().map(|j| memory(data, j.index(), &residual[j.index()]));
-    let length =
-        (rule.block_memories * memory.fold(0.0, f64::max)).clamp(rule.shortest_block, rule.longest_block);
+    let length = (rule.block_memories * memory.fold(0.0, f64::max)).max(rule.shortest_block);
+    let length = length.min(rule.longest_block);
     wald(screen, trial, &data.blocks_of(length))
 }
 

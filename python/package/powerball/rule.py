@@ -1,0 +1,155 @@
+"""Every threshold that decides what ``explain`` says."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Rule:
+    """The thresholds of the rule that accepts, names or refuses effects.
+
+    The defaults are those of every published figure. A gain is a fall of χ², the squared error in units of
+    independent samples; a score is a gain after penalties for coefficients and for having searched.
+
+    ``explain(..., rule=Rule(least_score=20.0))``. Only effects that pass every threshold are named, so a
+    stricter one names less; what the study says of right and wrong names holds for the defaults alone.
+    """
+
+    #: Effects added at most.
+    most_steps: int = 12
+    #: Least score of an effect: e^(−10/2) is a likelihood ratio of 150 after the penalties.
+    least_score: float = 10.0
+    #: Penalty for each coefficient: what one coefficient gains by chance, twice over (Akaike).
+    per_coefficient: float = 2.0
+    #: Probability of accepting anything at all where nothing is missing, over all joints and candidates.
+    family_wise: float = 0.01
+    #: The held-out squared error must fall by this share on average over folds: 1 % of the rms, below
+    #: which no user would notice.
+    least_gain: float = 0.02
+    #: … and it must fall at all in this share of the folds: four of five.
+    folds_that_must_gain: float = 0.8
+    #: No fold may lose more than this share of its squared error.
+    worst_fold: float = -0.05
+    #: What lowers the squared error of its joints by this share, on the validation set and the other way
+    #: round, needs no folds: a tenth of the rms.
+    large_gain: float = 0.19
+    #: … where either way adds the same: their correlation.
+    alike: float = 0.5
+    #: The zeros of torque sensors are in the model from the start where so many joints gain ``large_gain``
+    #: by them, both ways round: one joint alone is an effect like any other.
+    joints_with_zeros: int = 2
+    #: Blocks that count as independent last so many autocorrelation times of what is left …
+    block_memories: float = 3.0
+    #: … but not less, s …
+    shortest_block: float = 0.5
+    #: … and not more, s.
+    longest_block: float = 2.0
+    #: Share of the time-shift surrogates whose score a candidate must exceed.
+    surrogate_level: float = 0.99
+    #: Surrogates that a step asks.
+    step_surrogates: int = 60
+    #: Surrogates that state the false-positive rate.
+    final_surrogates: int = 200
+    #: A shifted column that still correlates so much with the unshifted one (a periodic motion) is no
+    #: surrogate.
+    surrogate_correlation: float = 0.4
+    #: A term of the class of an accepted one, on the same joint, that gains less than this share of it
+    #: mends that one's law and is no effect of its own.
+    mends_only: float = 0.15
+    #: The same for a term of another class: laws are wrong by a few percent, and that shows in any guise.
+    mends_any: float = 0.05
+    #: Two events this close count as one whose time is a little off, s.
+    same_event: float = 2.0
+    #: A group with fewer columns is preferred where the better one's score is larger by less than this
+    #: share or ``as_good_score``: these data do not tell the two apart.
+    as_good: float = 0.02
+    #: See ``as_good``: a likelihood ratio of 4.
+    as_good_score: float = 3.0
+    #: Two names whose gains differ by less than this factor cannot be told apart by these data.
+    least_margin: float = 1.1
+    #: Two names of which one explains this share of what the other does are words for the same part of a
+    #: residual. Names for the same thing share 98 % and more of it, names for different things less than
+    #: 70 % (noise-free trials on other data).
+    same_part: float = 0.9
+    #: A name that is not told apart (``least_margin``) from the next best one for another part
+    #: (``same_part``) is not given where it leaves more than this share of the excess over the noise
+    #: floor: then something else is there, and what fits best only resembles it. The share is that of an
+    #: earlier trial on other data.
+    much_left: float = 0.35
+    #: An effect of which this share is missing in some octave, and by more than ``missing_errors``, is not
+    #: the effect that it is called: most of it is not there.
+    least_missing: float = 0.5
+    #: See ``least_missing``: standard errors that chance exceeds once in 800, ``family_wise`` over eight
+    #: octaves.
+    missing_errors: float = 3.2
+    #: How often a name is right that no other one equals and beside which nothing is left on its joints:
+    #: 469 of 472 names in docs/study.md (white noise, pairs, easily confused effects, drawn arms), less
+    #: some for arms unlike those.
+    right: float = 0.97
+    #: How often where something without a name is left on its joints: beside a smooth misfit, in other
+    #: friction laws and in measured logs, 101 of 115 names.
+    right_beside_rest: float = 0.88
+    #: How often where another name fits as well: one of two.
+    right_with_twin: float = 0.5
+    #: A name is taken back where without its effect the squared error on the validation set is smaller by
+    #: this share, on its joints.
+    harm: float = 0.1
+    #: A setting is refined for more than chance gains by one more coefficient, in units of χ².
+    refinement_gain: float = 1.0
+    #: Two recordings are one path where their positions over time correlate more than this: a path that
+    #: drifts with warmth keeps its shape, and two different paths hardly correlate.
+    same_path: float = 0.9
+    #: A ripple with fewer cycles along the path than this is as good as any other smooth function of the
+    #: position.
+    few_cycles: float = 5.0
+    #: On repeats of one path whatever errs alike in all of them is fitted by whoever has more parameters;
+    #: the per-joint fit is taken only where it lowers the held-out squared error by more than this share,
+    #: 5 % of the rms.
+    clearly_better: float = 0.1
+    #: Two runs start at the same place where every joint does to this share of its travel in all logs.
+    same_start: float = 0.05
+    #: A validation log whose squared error is this many times that of the fitted logs holds something that
+    #: they do not.
+    odd_log: float = 2.0
+    #: A log has the same payload if that explains this much more, and has it not if that explains this
+    #: much more (in units of χ²). The same for a push.
+    another_log: float = 10.0
+    #: A log has the same push if that also explains this share of the force's own torque: a push of
+    #: another size or direction is another one.
+    same_force: float = 0.8
+    #: … over at least this share of the time that it lasted: another push resembles this one for a moment
+    #: only.
+    same_time: float = 0.5
+    #: A residual of this many times the noise floor is looked at for what it depends on …
+    above_floor: float = 1.2
+    #: … where the variance of its slow means exceeds that of white noise by this factor.
+    coloured: float = 2.0
+    #: Least share of a residual's variance that a signal must explain to be named as one that it depends
+    #: on.
+    least_share: float = 0.02
+    #: The correction of what has no name stays within so many rms of what is left.
+    correction_bound: float = 2.0
+    #: A joint is explained where no more than this share of its torque's rms is left on the validation
+    #: set.
+    explained_share: float = 0.1
+    #: Where more than this share is left a model predicts next to nothing.
+    nothing_share: float = 0.9
+    #: Below this time of motion a reader is warned that the folds are too short to tell much, s.
+    least_time: float = 30.0
+    #: A share of accepted surrogates above this is no chance: the residuals are not what the tests take
+    #: them for, and a reader is warned.
+    many_accepted: float = 0.05
+    #: Probability of a wrong decision between two names by an experiment.
+    decision_level: float = 0.01
+    #: Two names whose models differ by less than this share of what either explains say the same.
+    same_model: float = 0.1
+    #: A difference of so many units of χ² can be seen through the noise: a likelihood ratio of 150.
+    visible: float = 10.0
+
+
+def rule_text(rule: Rule) -> str:
+    """As the compiled part reads it."""
+    return json.dumps(dataclasses.asdict(rule))
