@@ -146,6 +146,7 @@ def keys_in(store: str, folder: str) -> set[str]:
 def find(job: Job, logs: str) -> dict[str, str]:
     """The logs of a pattern, by key. The key changes with the file, the arm file, the map and the version."""
     fs, pattern = fsspec.url_to_fs(logs)
+    fs.invalidate_cache()
     same = (job.arm, "\n".join(job.map), importlib.metadata.version("powerball"))
     names = sorted(fs.glob(pattern))
     return {key_of(*same, name, str(fs.ukey(name))): fs.unstrip_protocol(name) for name in names}

@@ -81,6 +81,45 @@ def test_a_fleet_is_one_process(short_logs, tmp_path):
     same(pb.identify(arm, joined), pb.identify(arm, files))
 
 
+@pytest.fixture
+def memory():
+    """A store in the memory of this process, and workers that are its threads."""
+    distributed = need("dask.distributed")
+    with distributed.Client(
+        processes=False, n_workers=2, threads_per_worker=1, dashboard_address=None
+    ) as client:
+        yield client, "memory://bucket"
+
+
+def test_a_fleet_in_an_object_store(short_logs, memory):
+    client, bucket = memory
+    fsspec = need("fsspec")
+    sys.path.insert(0, str(ROOT / "examples" / "fleet"))
+    import fleet
+
+    arm_file, logs = short_logs
+    files = sorted(logs.glob("[0-9]*.csv"))[:20]
+    fs, root = fsspec.url_to_fs(bucket)
+    fs.mkdir(root)
+    for file in [*files, logs / "broken.csv"]:
+        fs.pipe_file(f"{root}/logs/{file.name}", file.read_bytes())
+    # Workers that are threads have it.
+    job = fleet.Job(arm_file.read_text(), f"{bucket}/fleet")
+    part = fleet.run(client, job, f"{bucket}/logs/00*.csv")
+    done = fleet.run(client, job, f"{bucket}/logs/*.csv")
+    assert part.known == 0 and done.known == 10
+    assert [name.rsplit("/", 1)[1] for name in done.failed] == ["broken.csv"]
+    again = fleet.run(client, job, f"{bucket}/logs/*.csv")
+    assert again.known == 21 and not again.workers and again.joined == done.joined
+    # A log that changed is another log.
+    fs.pipe_file(f"{root}/logs/{files[0].name}", files[1].read_bytes())
+    assert fleet.run(client, job, f"{bucket}/logs/*.csv").known == 20
+
+    arm = pb.Arm.from_toml(arm_file)
+    joined = pb.Summary.from_bytes(fleet.read(done.joined))
+    same(pb.identify(arm, joined), pb.identify(arm, files))
+
+
 def test_summaries_from_python(short_logs, tmp_path):
     import pickle
 
