@@ -1,14 +1,14 @@
 //! What the base model leaves of each log when it is fitted to the others, beside a plain model on the same
 //! rows.
 
+use super::textbook::{Plain, Squares};
 use dyngen::Arm;
-use faer::Mat;
 use powerball::identification::estimate::{
-    FrictionKind, Solver, Spread, reduce_in_bands, solve_in_band, solve_reduced, spread_of,
+    FrictionKind, Spread, reduce_in_bands, solve_in_band, solve_reduced, spread_of,
 };
 use powerball::logs::log::read_logs;
 use powerball::logs::regression::{DataOptions, RigidArm};
-use powerball::logs::summary::{BANDS, Bands, Octaves, Powers, RFactor, Summary};
+use powerball::logs::summary::{BANDS, Bands, Octaves, Powers, Summary};
 use std::path::PathBuf;
 
 /// Which logs, and how they are seen.
@@ -21,9 +21,6 @@ pub(crate) struct Arguments {
     #[arg(long, num_args = 2.., required = true)]
     log: Vec<PathBuf>,
 }
-
-/// Sums of squares of errors and of torques of one log, by joint.
-type Squares = Vec<(f64, f64)>;
 
 /// Prints what is left of each joint's torque: log by log, their mean, and all samples together.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
@@ -108,62 +105,4 @@ fn table(names: &[String], logs: &[Squares]) {
         let sum = |of: fn(&(f64, f64)) -> f64| logs.iter().map(|log| of(&log[j])).sum::<f64>();
         (sum(|s| s.0) / sum(|s| s.1)).sqrt()
     });
-}
-
-/// The plain model: linear, joints weighted by what they leave.
-struct Plain {
-    /// The minimal set, then viscous, constant and Coulomb friction by joint.
-    theta: Vec<f64>,
-}
-
-/// Columns of its friction.
-const FRICTION: usize = 3;
-
-impl Plain {
-    fn fit(summary: &Summary) -> Plain {
-        let (p, torque) = (summary.identity.parameters.len(), summary.columns().torque());
-        let size = p + FRICTION * summary.joints.len();
-        let joints: Vec<RFactor> = summary.joints.iter().map(Octaves::total).collect();
-        let mut plain = Plain { theta: vec![0.0; size] };
-        for _ in 0..4 {
-            let (mut gram, mut right) = (Mat::<f64>::zeros(size, size), vec![0.0; size]);
-            let left = plain.squares(summary);
-            for (j, rows) in joints.iter().enumerate().filter(|(j, _)| left[*j].0 > 0.0) {
-                let weight = rows.rows() as f64 / left[j].0;
-                let dot = |a: usize, b: usize| -> f64 {
-                    rows.column(a).iter().zip(rows.column(b)).map(|(x, y)| x * y).sum()
-                };
-                let columns = columns(summary, j);
-                for (a, at) in &columns {
-                    right[*at] += weight * dot(*a, torque);
-                    columns.iter().for_each(|(b, to)| gram[(*at, *to)] += weight * dot(*a, *b));
-                }
-            }
-            plain.theta = Solver::new(&gram, |_| true).solve(&right);
-        }
-        plain
-    }
-
-    fn squares(&self, summary: &Summary) -> Squares {
-        let of_joint = |(j, octaves): (usize, &Octaves)| {
-            let rows = octaves.total();
-            let torque = rows.column(summary.columns().torque());
-            let mut left = torque.to_vec();
-            for (column, at) in columns(summary, j) {
-                left.iter_mut().zip(rows.column(column)).for_each(|(l, c)| *l -= self.theta[at] * c);
-            }
-            let sum = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
-            (sum(&left), sum(torque))
-        };
-        summary.joints.iter().enumerate().map(of_joint).collect()
-    }
-}
-
-/// The columns of a joint's rows that the plain model takes, and where their coefficients stand.
-fn columns(summary: &Summary, joint: usize) -> Vec<(usize, usize)> {
-    let (p, columns) = (summary.identity.parameters.len(), summary.columns());
-    // The first node is the steepest: a step for all that is measurable.
-    let friction = [columns.viscous(), columns.constant(), columns.node(0)];
-    let friction = friction.into_iter().enumerate().map(|(k, c)| (c, p + FRICTION * joint + k));
-    (0..p).map(|c| (c, c)).chain(friction).collect()
 }

@@ -5,6 +5,7 @@ mod conventions;
 mod held_out;
 mod stories;
 mod study;
+mod textbook;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -26,6 +27,8 @@ enum Command {
     Benchmark(study::BenchmarkArguments),
     /// What the base model leaves of each log when it is fitted to the others
     HeldOut(held_out::Arguments),
+    /// What a textbook's fit leaves of other logs, and how `explain` compares
+    Textbook(textbook::Arguments),
     /// How often `compare` calls equal arms different, and sees what changed
     Compare(compare::Arguments),
     /// What `explain` finds in the measured logs, case by case, as a page with figures
@@ -38,6 +41,7 @@ fn main() -> ExitCode {
         Command::Study(arguments) => study::run(&arguments),
         Command::Benchmark(arguments) => study::benchmark(&arguments),
         Command::HeldOut(arguments) => held_out::run(&arguments),
+        Command::Textbook(arguments) => textbook::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Stories(arguments) => stories::run(&arguments),
     };

@@ -89,17 +89,19 @@ impl Drawn {
         Ok(Drawn { arm, text, plant: Plant::new(dynamics, friction, sensors), symmetric })
     }
 
-    /// An effect of that name at any joint; `None` where the arm has no place for it.
+    /// An effect of that name at joint `on`, from 0, or at any joint; `None` where the arm has no place for it.
     pub(super) fn effect(
         &self,
         name: &str,
+        on: Option<usize>,
         session: f64,
         begins: Range<f64>,
         rng: &mut impl Rng,
     ) -> Option<Effect> {
         let rows = self.plant.dynamics().chain().rows();
         let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
-        let joint = rng.random_range(0..rows.len());
+        let any = rng.random_range(0..rows.len());
+        let joint = on.unwrap_or(any);
         let friction = self.plant.friction()[joint];
         let coulomb = friction.gamma1 + friction.gamma3;
         let noise = self.plant.sensors().white[joint];

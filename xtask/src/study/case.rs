@@ -40,6 +40,10 @@ pub(super) enum Table {
     Arms,
     /// No effect, on arms that were drawn by lot
     CleanArms,
+    /// Two effects, half of them on one joint, on arms, friction, logs and sensors that were drawn by lot
+    Drawn,
+    /// The same arms, friction, logs and sensors without an effect
+    CleanDrawn,
 }
 
 impl Table {
@@ -54,7 +58,12 @@ impl Table {
 
     /// Whether every case has an arm of its own.
     pub(super) fn draws_arms(self) -> bool {
-        matches!(self, Table::Arms | Table::CleanArms)
+        matches!(self, Table::Arms | Table::CleanArms) || self.draws_logs()
+    }
+
+    /// Whether friction's law, the torques' zeros, noise, and rate, number and length of the logs are drawn too.
+    pub(super) fn draws_logs(self) -> bool {
+        matches!(self, Table::Drawn | Table::CleanDrawn)
     }
 
     /// The name in results and on the command line.
@@ -82,6 +91,10 @@ impl Table {
             Table::MeasuredSmall => "one effect of size 0.6 put into the measured UR10e logs",
             Table::Arms => "one effect of size 0.3 to 1.5 on arms drawn by lot, white noise",
             Table::CleanArms => "no effect, arms drawn by lot, white noise",
+            Table::Drawn => {
+                "two effects as they were drawn, of size 0.5 and more, half of them on one joint; arms and logs drawn by lot"
+            }
+            Table::CleanDrawn => "no effect, arms and logs drawn by lot",
         }
     }
 
@@ -96,13 +109,14 @@ impl Table {
             Table::Friction | Table::Misfit | Table::ColouredEffect | Table::Alike => 5,
             Table::Measured | Table::MeasuredSmall => 3,
             Table::Arms => 5,
-            Table::CleanArms => 50,
+            Table::CleanArms | Table::Drawn | Table::CleanDrawn => 50,
         }
     }
 
     fn sizes(self) -> Range<f64> {
         match self {
             Table::Small => 0.15..0.3,
+            Table::Drawn => 0.5..0.500_001,
             Table::Measured => 1.0..1.000_001,
             Table::MeasuredSmall => 0.6..0.600_001,
             _ => 0.3..1.5,
@@ -134,7 +148,9 @@ impl Case {
             let mut add =
                 |kinds: Vec<String>, sizes: Vec<f64>| cases.push(Case { table, kinds, sizes, seed });
             match table {
-                Table::Clean | Table::Coloured | Table::CleanArms => add(Vec::new(), Vec::new()),
+                Table::Clean | Table::Coloured | Table::CleanArms | Table::CleanDrawn => {
+                    add(Vec::new(), Vec::new())
+                }
                 Table::Outside => {
                     for law in Outside::ALL {
                         add(vec![law.name().to_string()], vec![size()]);
@@ -145,7 +161,7 @@ impl Case {
                         add(vec![name.to_string()], vec![size()]);
                     }
                 }
-                Table::Pairs => {
+                Table::Pairs | Table::Drawn => {
                     let sizes = vec![size(), size()];
                     let two: Vec<String> =
                         Effect::NAMES.sample(&mut rng, 2).map(|n| (*n).to_string()).collect();

@@ -3,7 +3,7 @@
 use super::alike;
 use super::arms::{DRAWS, Drawn, LARGEST_FACTOR};
 use super::case::{Case, Table};
-use super::judge::Outcome;
+use super::judge::{Named, Outcome};
 use super::law::{ExtraTorque, Misfit, OtherFriction, OtherLaw, Outside, OutsideLaw};
 use dyngen::{Arm, Model, SetKind};
 use powerball::controller::friction::TanhFriction;
@@ -13,13 +13,15 @@ use powerball::identification::excite::{Settings, optimise};
 use powerball::identification::motion::Motion;
 use powerball::logs::log::{Log, common_clock};
 use powerball::logs::regression::{Data, DataOptions, RigidArm};
-use powerball::virtual_arm::{Plant, PlantEffect as Effect, lwa4p};
+use powerball::virtual_arm::{Plant, PlantEffect as Effect, Sensors, lwa4p};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 use std::path::Path;
 use std::time::Instant;
 
+/// The usual torque of a drawn arm's joint over its white noise.
+const USUAL: f64 = 100.0;
 /// Paths of a session: those to fit, then those held out. Periods, s.
 const FIT: [f64; 5] = [10.0, 11.0, 9.5, 10.5, 9.0];
 const HELD_OUT: [f64; 2] = [12.0, 11.5];
@@ -58,6 +60,17 @@ impl Truth {
         }
     }
 
+    /// Its joint, from 0, where it is of one alone.
+    fn joint(&self) -> Option<usize> {
+        match self {
+            Truth::Effect(effect) => match effect.joints()[..] {
+                [joint] => Some(joint - 1),
+                _ => None,
+            },
+            Truth::Law(law) => Some(law.joint),
+        }
+    }
+
     fn words(&self) -> String {
         match self {
             Truth::Effect(effect) => {
@@ -76,8 +89,14 @@ struct Session {
     plant: Plant,
     friction: Option<OtherLaw>,
     misfit: Option<Misfit>,
+    /// What the torque sensors tell where there is no torque, N·m by joint.
+    zeros: Vec<f64>,
     motions: Vec<Motion>,
     starts: Vec<f64>,
+    /// Logs that are fitted; the others are held out.
+    fitted: usize,
+    /// Whether truths stay as large as they were drawn.
+    as_drawn: bool,
     seed: u64,
 }
 
@@ -129,7 +148,7 @@ impl Bench {
     fn run_here(&self, case: &Case) -> Result<Option<Outcome>, String> {
         let Some(Recorded { session, truths, sizes }) = self.recorded(case)? else { return Ok(None) };
         let logs = session.logs(&truths, true);
-        let (to_fit, held_out) = logs.split_at(FIT.len());
+        let (to_fit, held_out) = logs.split_at(session.fitted);
         let start = Instant::now();
         let explained = explain_body(&self.body, to_fit, held_out, &ExplainOptions::default())
             .map_err(|e| e.to_string())?;
@@ -144,7 +163,8 @@ impl Bench {
         let clean = self.clean_errors(&session)?;
         let over = explained.after.validate.rms.iter().zip(&clean).map(|(a, c)| a / c).fold(0.0, f64::max);
         let words = truths.iter().map(Truth::words).collect();
-        let outcome = Outcome::new(case, words, sizes, &explained, &[], over, seconds);
+        let outcome =
+            Outcome::new(case, words, sizes, &explained, &session.known(&case.kinds), over, seconds);
         Ok(Some(Outcome { settled, ..outcome }))
     }
 
@@ -157,7 +177,10 @@ impl Bench {
         }
         let (mut truths, mut sizes) = (Vec::new(), Vec::new());
         for (kind, size) in case.kinds.iter().zip(&case.sizes) {
-            let Some((truth, reached)) = self.truth(&session, kind, *size, &mut rng)? else {
+            // Half of them where the one before is.
+            let together = case.table == Table::Drawn && rng.random_bool(0.5);
+            let on = if together { truths.last().and_then(Truth::joint) } else { None };
+            let Some((truth, reached)) = self.truth(&session, kind, on, *size, &mut rng)? else {
                 return Ok(None);
             };
             truths.push(truth);
@@ -169,7 +192,7 @@ impl Bench {
     /// Held-out errors of the base model where nothing is missing, by joint, N·m.
     fn clean_errors(&self, session: &Session) -> Result<Vec<f64>, String> {
         let clean = session.logs(&[], true);
-        self.errors(&clean[..FIT.len()], &clean[FIT.len()..], &DataOptions::default())
+        self.errors(&clean[..session.fitted], &clean[session.fitted..], &DataOptions::default())
     }
 
     /// Writes a case as files: the arm, logs to fit and logs to judge on. Returns what is in them; `None` as
@@ -187,7 +210,7 @@ impl Bench {
         let text = self.drawn.as_ref().map_or(lwa4p::ARM_FILE, |drawn| &drawn.text);
         std::fs::write(&arm, text).map_err(|e| failed(&arm, e))?;
         for (k, mut log) in session.logs(&truths, true).into_iter().enumerate() {
-            let kind = if k < FIT.len() { "fit" } else { "validate" };
+            let kind = if k < session.fitted { "fit" } else { "validate" };
             let path = folder.join(format!("{kind}{k}.csv"));
             let clock = log.clock;
             log.t.iter_mut().for_each(|t| *t += clock);
@@ -213,16 +236,22 @@ impl Bench {
             .collect();
         let mut sensors = plant.sensors().clone();
         match case.table {
-            Table::Coloured | Table::ColouredEffect => {
-                let share = rng.random_range(0.3..1.0);
-                sensors.coloured = sensors.white.iter().map(|w| share * w).collect();
-                sensors.colour_time = rng.random_range(0.05..1.0);
-            }
+            Table::Coloured | Table::ColouredEffect => draw_colour(&mut sensors, rng),
+            Table::Drawn | Table::CleanDrawn => draw_sensors(&mut sensors, rng),
             _ => sensors.coloured.fill(0.0),
+        }
+        let mut zeros = vec![0.0; friction.len()];
+        let mut periods: Vec<f64> = FIT.iter().chain(&HELD_OUT).copied().collect();
+        let mut fitted = FIT.len();
+        if case.table.draws_logs() {
+            let usual = sensors.white.iter().map(|white| USUAL * white);
+            zeros = usual.map(|usual| usual * rng.random_range(-0.2..0.2)).collect();
+            fitted = rng.random_range(3..=5);
+            periods = (0..fitted + HELD_OUT.len()).map(|_| rng.random_range(2.5..10.0)).collect();
         }
         plant = Plant::new(plant.dynamics().clone(), friction, sensors);
         let mut motions = Vec::new();
-        for period in FIT.iter().chain(&HELD_OUT) {
+        for period in periods {
             let settings = Settings {
                 harmonics: 5,
                 fundamental: TAU / period,
@@ -240,40 +269,55 @@ impl Bench {
             starts.push(now);
             now += motion.duration() + PAUSE;
         }
-        let friction = (case.table == Table::Friction).then(|| OtherLaw::draw(rng));
-        Ok(Session { plant, friction, misfit: None, motions, starts, seed: rng.random() })
+        let other = case.table == Table::Friction || case.table.draws_logs() && rng.random_bool(0.5);
+        let friction = other.then(|| OtherLaw::draw(rng));
+        Ok(Session {
+            plant,
+            friction,
+            misfit: None,
+            zeros,
+            motions,
+            starts,
+            fitted,
+            as_drawn: case.table.draws_logs(),
+            seed: rng.random(),
+        })
     }
 
     /// A misfit that is as large on every joint as the noise allows: 0.3 of it, after the base was refitted.
     fn misfit(&self, session: &Session, rng: &mut ChaCha8Rng) -> Result<Misfit, String> {
         let mut misfit = Misfit::draw(session.plant.friction().len(), rng);
-        let plain = self.base(&session.logs(&[], false))?;
+        let plain = self.base(session, &[])?;
         for _ in 0..2 {
             let with = Session { misfit: Some(misfit.clone()), ..session.alone() };
-            let left = self.visible(session, &with.logs(&[], false), &plain)?;
+            let left = self.visible(&with, &[], &plain)?;
             misfit.amplitude.iter_mut().zip(left).for_each(|(a, left)| *a *= 0.3 / left);
         }
         Ok(misfit)
     }
 
-    /// A truth of that kind whose visible size is `size`, and the size that was reached; `None` where the arm
-    /// has none.
+    /// A truth of that kind whose visible size is `size`, or at least that where it stays as it was drawn, and the size that was reached; `None` where the arm
+    /// has none. It sits on joint `on` where an arm that was drawn is told one and the kind is of one joint.
     fn truth(
         &self,
         session: &Session,
         kind: &str,
+        on: Option<usize>,
         size: f64,
         rng: &mut ChaCha8Rng,
     ) -> Result<Option<(Truth, f64)>, String> {
         let end = session.starts.last().copied().unwrap_or(0.0)
             + session.motions.last().map_or(0.0, Motion::duration);
-        let begins = session.starts[2] + 3.0..session.starts[3] - PAUSE - 3.0;
+        let middle = session.fitted / 2;
+        let (start, length) = (session.starts[middle], session.motions[middle].duration());
+        let aside = f64::min(3.0, 0.2 * length);
+        let begins = start + aside..start + length - aside;
         let quiet = session.alone();
-        let plain = self.base(&quiet.logs(&[], false))?;
+        let plain = self.base(&quiet, &[])?;
         for _ in 0..DRAWS {
             let truth = match (Outside::ALL.into_iter().find(|law| law.name() == kind), &self.drawn) {
                 (Some(law), _) => Truth::Law(OutsideLaw::draw(law, &session.plant, rng)),
-                (None, Some(drawn)) => match drawn.effect(kind, end, begins.clone(), rng) {
+                (None, Some(drawn)) => match drawn.effect(kind, on, end, begins.clone(), rng) {
                     Some(effect) => Truth::Effect(effect),
                     None => return Ok(None),
                 },
@@ -282,6 +326,13 @@ impl Bench {
                         .ok_or_else(|| format!("no effect is called {kind}"))?,
                 ),
             };
+            if session.as_drawn {
+                let reached = self.visible(&quiet, &[truth.clone()], &plain)?.into_iter().fold(0.0, f64::max);
+                if reached >= size {
+                    return Ok(Some((truth, reached)));
+                }
+                continue;
+            }
             let (truth, reached, factor) = self.scaled(&quiet, truth, size, &plain)?;
             // On an arm of any kind many a truth is a part of the base model, or next to nothing beside it.
             if self.drawn.is_none() || ((0.8..1.25).contains(&(reached / size)) && factor < LARGEST_FACTOR) {
@@ -302,8 +353,7 @@ impl Bench {
     ) -> Result<(Truth, f64, f64), String> {
         let (mut reached, mut factor) = (0.0, 1.0);
         for _ in 0..ROUNDS {
-            let logs = quiet.logs(std::slice::from_ref(&truth), false);
-            reached = self.visible(quiet, &logs, plain)?.into_iter().fold(0.0, f64::max);
+            reached = self.visible(quiet, &[truth.clone()], plain)?.into_iter().fold(0.0, f64::max);
             if (reached / size - 1.0).abs() < 0.03 || reached <= 0.0 {
                 break;
             }
@@ -313,10 +363,10 @@ impl Bench {
         Ok((truth, reached, factor))
     }
 
-    /// What of a truth is left on the fitted logs when the base model was refitted, without noise and in a
-    /// wide band, over the noise of a sample, by joint; `plain` is what the model leaves without it.
-    fn visible(&self, session: &Session, logs: &[Log], plain: &[Vec<f64>]) -> Result<Vec<f64>, String> {
-        let with = self.base(logs)?;
+    /// What of truths is left on the fitted logs when the base model was refitted, without noise and in a
+    /// wide band, over the noise of a sample, by joint; `plain` is what the model leaves without them.
+    fn visible(&self, session: &Session, truths: &[Truth], plain: &[Vec<f64>]) -> Result<Vec<f64>, String> {
+        let with = self.base(session, truths)?;
         let sensors = session.plant.sensors();
         let noise = sensors.white.iter().zip(&sensors.coloured).map(|(w, c)| w.hypot(*c));
         let change = with.iter().zip(plain).map(|(with, without)| {
@@ -326,9 +376,10 @@ impl Bench {
         Ok(change.zip(noise).map(|(change, noise)| change / noise).collect())
     }
 
-    /// The residual of the base model on the fitted logs, in a wide band.
-    fn base(&self, logs: &[Log]) -> Result<Vec<Vec<f64>>, String> {
-        let data = Data::new(&self.body, &logs[..FIT.len()], &WIDE).map_err(|e| e.to_string())?;
+    /// The residual of the base model on the fitted logs, without noise and in a wide band.
+    fn base(&self, session: &Session, truths: &[Truth]) -> Result<Vec<Vec<f64>>, String> {
+        let logs = session.logs(truths, false);
+        let data = Data::new(&self.body, &logs[..session.fitted], &WIDE).map_err(|e| e.to_string())?;
         Ok(fit(&data, &Folds::new(&data), &[], None).residual)
     }
 
@@ -348,9 +399,23 @@ impl Session {
             plant: self.plant.clone(),
             friction: None,
             misfit: None,
+            zeros: vec![0.0; self.zeros.len()],
             motions: self.motions.clone(),
             starts: self.starts.clone(),
+            fitted: self.fitted,
+            as_drawn: self.as_drawn,
             seed: self.seed,
+        }
+    }
+
+    /// What is there beside the truths: zeros of torque sensors, which are called `asymmetry`.
+    fn known(&self, kinds: &[String]) -> Vec<Named> {
+        const NAME: &str = "asymmetry";
+        let off = (0..self.zeros.len()).filter(|joint| self.zeros[*joint] != 0.0);
+        // Where it is a truth as well, one name says both.
+        match kinds.iter().any(|kind| kind == NAME) {
+            true => Vec::new(),
+            false => vec![Named::beside(NAME, off.map(|joint| joint + 1).collect())],
         }
     }
 
@@ -400,9 +465,23 @@ impl Session {
             if let Some(law) = self.friction {
                 add(&OtherFriction { law, plant: &self.plant });
             }
+            let rows = recording.tau.chunks_exact_mut(self.zeros.len());
+            rows.for_each(|row| row.iter_mut().zip(&self.zeros).for_each(|(tau, zero)| *tau += zero));
             logs.push(recording.log(format!("log{k}.csv")));
         }
         common_clock(&mut logs);
         logs
     }
+}
+
+/// Noise and rate as on arms that people have.
+fn draw_sensors(sensors: &mut Sensors, rng: &mut ChaCha8Rng) {
+    sensors.rate = [100.0, 125.0, 200.0, 250.0, 500.0][rng.random_range(0..5)];
+    draw_colour(sensors, rng);
+}
+
+fn draw_colour(sensors: &mut Sensors, rng: &mut ChaCha8Rng) {
+    let share = rng.random_range(0.3..1.0);
+    sensors.coloured = sensors.white.iter().map(|w| share * w).collect();
+    sensors.colour_time = rng.random_range(0.05..1.0);
 }

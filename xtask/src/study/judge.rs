@@ -19,6 +19,14 @@ pub(super) struct Named {
     pub(super) probability: Option<f64>,
 }
 
+impl Named {
+    /// What is there beside the truths, on these joints, from 1.
+    pub(super) fn beside(effect: &str, joints: Vec<usize>) -> Named {
+        let (effect, alike) = (effect.into(), Vec::new());
+        Named { effect, joints, alike, margin: f64::NAN, leftover: f64::NAN, probability: None }
+    }
+}
+
 /// What a rival says where it fits as well.
 pub(super) const AS_WELL: &str = "fits as well";
 
