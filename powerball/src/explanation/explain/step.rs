@@ -175,6 +175,7 @@ pub(super) fn accept(study: &Study<'_>, model: &mut Model, choice: Choice, numbe
             fold_gain: evidence.median_gain(),
             explained: Vec::new(),
             step: Some(number),
+            measured: None,
         });
     }
     drop_covered(study, model, first);
@@ -260,6 +261,12 @@ fn name_beside(study: &Study<'_>, model: &mut Model, effect: &'static dyn Effect
     let screen = Screen::new(&context);
     let (mut groups, _) = groups(study, model, &screen, Among::Names);
     groups.retain(|g| g.effect != effect);
+    // What has it as a part and explains no more is no rival: a spring at rest elsewhere has the zero in it.
+    let own: Vec<Vec<Placed>> =
+        which.iter().flat_map(|k| effect.placed_laws(&context, &fitted[*k].candidate)).collect();
+    let holds =
+        |m: &Member| m.candidate.effect().placed_laws(&context, &m.candidate).iter().any(|l| own.contains(l));
+    groups.iter_mut().for_each(|g| g.members.retain(|m| !holds(m)));
     let member = |k: &usize| {
         let candidate = fitted[*k].candidate.clone();
         let trial = screen.try_candidate(&candidate)?;

@@ -18,4 +18,4 @@ pub(super) use naming::{Comparison, compare, surprise};
 pub(super) use open::open;
 pub use open::{Hypothesis, Open};
 pub(super) use question::Question;
-pub(super) use withhold::{leftover, withhold};
+pub(super) use withhold::{leftover, withhold, withhold_harmful};

@@ -22,12 +22,35 @@ pub(crate) fn withhold(study: &Study<'_>, model: &mut Model, history: &mut Histo
     let (taken, why) = if let Some(a) = inconstant(study, model) {
         (vec![model.accepted.remove(a)], "what it says of some pace of motion is not there")
     } else if let Some(a) = harmful(study, model) {
-        (vec![model.accepted.remove(a)], "with it the error on the logs to judge on is larger")
+        (vec![model.accepted.remove(a)], HARMS)
     } else {
         let step = history.steps.iter().rev().find(|s| is_weak(study, model, s))?.number;
         let taken = model.accepted.extract_if(.., |a| a.step == Some(step)).collect();
         (taken, "others fit as well and much is left")
     };
+    take_back(study, model, history, taken, why)
+}
+
+/// Takes back what makes the error on the logs to judge on larger, and nothing else.
+pub(crate) fn withhold_harmful(
+    study: &Study<'_>,
+    model: &mut Model,
+    history: &mut History,
+) -> Option<Withheld> {
+    let taken = vec![model.accepted.remove(harmful(study, model)?)];
+    take_back(study, model, history, taken, HARMS)
+}
+
+/// Why something goes out that makes the error on the logs to judge on larger.
+const HARMS: &str = "with it the error on the logs to judge on is larger";
+
+fn take_back(
+    study: &Study<'_>,
+    model: &mut Model,
+    history: &mut History,
+    taken: Vec<Accepted>,
+    why: &'static str,
+) -> Option<Withheld> {
     let Accepted { step, .. } = *taken.first()?;
     let effect = taken.first()?.effect();
     // What was found beside it on its joints may be there because of it, and is asked again.
