@@ -18,7 +18,8 @@ pub struct Rule {
     pub least_score: f64,
     /// Penalty for each coefficient: what one coefficient gains by chance, twice over (Akaike).
     pub per_coefficient: f64,
-    /// Probability of accepting anything at all where nothing is missing, over all joints and candidates.
+    /// Probability of accepting anything at all where nothing is missing, over all joints and candidates; above
+    /// the band that of a ripple, over all joints and orders.
     pub family_wise: f64,
     /// The held-out squared error must fall by this share on average over folds: 1 % of the rms, below which
     /// no user would notice.
@@ -47,7 +48,7 @@ pub struct Rule {
     pub surrogate_level: f64,
     /// Surrogates that a step asks.
     pub step_surrogates: usize,
-    /// Surrogates that state the false-positive rate.
+    /// Surrogates that state the false-positive rate, and those that judge ripple above the band.
     pub final_surrogates: usize,
     /// A shifted column that still correlates so much with the unshifted one (a periodic motion) is no
     /// surrogate.

@@ -120,22 +120,24 @@ impl<'a> Context<'a> {
         if law.moves_link() {
             return self.moved_link_column(joint, law, None);
         }
-        let joint = joint.index();
-        let torques = law.needs_torque();
-        self.data.column_on(joint, |r, recording| {
-            let none: &[f64] = &[];
-            let (rigid, friction) = if torques {
-                (self.rigid()[r].as_slice(), self.friction()[r].as_slice())
-            } else {
-                (none, none)
-            };
-            let mut memory = Memory::default();
-            let mut values = Vec::with_capacity(recording.len());
-            each_instant(recording, rigid, friction, |_, now| {
-                values.push(law.value(joint, now, &mut memory))
-            });
-            values
-        })
+        self.data.column_on(joint.index(), |r, _| self.law_along(r, joint, law))
+    }
+
+    /// A law that moves no link along a recording, one value a sample.
+    pub(crate) fn law_along(&self, recording: usize, joint: JointNumber, law: Law<f64>) -> Vec<f64> {
+        let none: &[f64] = &[];
+        let (rigid, friction) = if law.needs_torque() {
+            (self.rigid()[recording].as_slice(), self.friction()[recording].as_slice())
+        } else {
+            (none, none)
+        };
+        let mut memory = Memory::default();
+        let recording = &self.data.recordings[recording];
+        let mut values = Vec::with_capacity(recording.len());
+        each_instant(recording, rigid, friction, |_, now| {
+            values.push(law.value(joint.index(), now, &mut memory))
+        });
+        values
     }
 
     /// The change of rigid torque on all joints for a link that is moved, over the law's coefficient: to

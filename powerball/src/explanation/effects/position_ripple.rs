@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 /// τ = a·cos(k·q) + b·sin(k·q), k ≥ 2 cycles a joint turn.
 ///
 /// k = 1 is left out: an arm's own weight turns that way.
-pub(super) struct PositionRipple;
+pub(crate) struct PositionRipple;
 
 /// What is searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +37,7 @@ pub struct Figures {
 /// Whole orders up to here are tried one by one, higher ones are found by a scan.
 const SMALL_ORDERS: usize = 20;
 /// Bins of a turn in the scan: orders up to half of it.
-const BINS: usize = 2048;
+pub(crate) const BINS: usize = 2048;
 /// Two ripples of a joint whose orders differ by less than this are one.
 const SAME_ORDER: f64 = 0.5;
 /// Peaks of the scan that are looked at closely.
@@ -109,6 +109,7 @@ impl Effect for PositionRipple {
     }
 }
 
+/// The order of a candidate of this effect.
 fn order(candidate: &Candidate) -> f64 {
     Settings::of(candidate).map_or(f64::NAN, |settings| settings.order)
 }
@@ -124,29 +125,18 @@ fn cycles(data: &Data<'_>, joint: JointNumber, order: f64) -> f64 {
 fn scan(context: &Context<'_>, joint: usize) -> Vec<f64> {
     let data = context.data;
     let rows = &data.joints[joint];
-    let residual = &context.residual[joint];
     let mut positions = Vec::with_capacity(rows.len());
     for (r, recording) in data.recordings.iter().enumerate() {
         let q: Vec<f64> = recording.position(joint).collect();
         let kept = rows.band.kept(recording.len());
         positions.extend(rows.kept[r].iter().map(|k| q[kept[*k]]));
     }
-    let (low, high) = positions.iter().fold((f64::MAX, f64::MIN), |(l, h), q| (l.min(*q), h.max(*q)));
-    let width = TAU / BINS as f64;
-    if high - low <= 20.0 * width || high - low > 100.0 {
-        return Vec::new();
-    }
-    let bins = ((high - low) / width) as usize + 1;
-    let length = (4 * bins).next_power_of_two().max(4 * BINS);
-    let mut signal = vec![Complex::new(0.0, 0.0); length];
-    for (q, r) in positions.iter().zip(residual) {
-        signal[((q - low) / width) as usize] += Complex::new(*r, 0.0);
-    }
-    FftPlanner::new().plan_fft_forward(length).process(&mut signal);
-    let order = |k: usize| k as f64 * BINS as f64 / length as f64;
-    let power: Vec<f64> = signal[..length / 2].iter().map(Complex::norm_sqr).collect();
+    let samples = || positions.iter().copied().zip(context.residual[joint].iter().copied());
+    let Some(spectrum) = Spectrum::new(samples) else { return Vec::new() };
+    let power: Vec<f64> = spectrum.values.iter().map(Complex::norm_sqr).collect();
     let mut peaks: Vec<usize> = (1..power.len() - 1)
-        .filter(|k| order(*k) > SMALL_ORDERS as f64 && power[*k] > power[k - 1] && power[*k] >= power[k + 1])
+        .filter(|k| spectrum.order(*k) > SMALL_ORDERS as f64)
+        .filter(|k| power[*k] > power[k - 1] && power[*k] >= power[k + 1])
         .collect();
     peaks.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
     peaks
@@ -156,7 +146,40 @@ fn scan(context: &Context<'_>, joint: usize) -> Vec<f64> {
             // The top of the parabola through the peak and its neighbours.
             let (a, b, c) = (power[k - 1], power[k], power[k + 1]);
             let shift = if a - 2.0 * b + c == 0.0 { 0.0 } else { 0.5 * (a - c) / (a - 2.0 * b + c) };
-            order(k) + shift * order(1)
+            spectrum.order(k) + shift * spectrum.order(1)
         })
         .collect()
+}
+
+/// A joint's torque by order: Σ τ·e^(−i·k·q) over samples.
+pub(crate) struct Spectrum {
+    /// Its values, up to the order of half a cycle a bin of position.
+    pub(crate) values: Vec<Complex<f64>>,
+    step: f64,
+}
+
+impl Spectrum {
+    /// Of positions and torques, which are gone through twice; `None` where the positions hardly differ, or
+    /// by many turns.
+    pub(crate) fn new<I: Iterator<Item = (f64, f64)>>(samples: impl Fn() -> I) -> Option<Spectrum> {
+        let (low, high) = samples().fold((f64::MAX, f64::MIN), |(l, h), (q, _)| (l.min(q), h.max(q)));
+        let width = TAU / BINS as f64;
+        if high - low <= 20.0 * width || high - low > 100.0 {
+            return None;
+        }
+        let bins = ((high - low) / width) as usize + 1;
+        let length = (4 * bins).next_power_of_two().max(4 * BINS);
+        let mut signal = vec![Complex::new(0.0, 0.0); length];
+        for (q, torque) in samples() {
+            signal[((q - low) / width) as usize] += Complex::new(torque, 0.0);
+        }
+        FftPlanner::new().plan_fft_forward(length).process(&mut signal);
+        signal.truncate(length / 2);
+        Some(Spectrum { values: signal, step: BINS as f64 / length as f64 })
+    }
+
+    /// The order of a value, cycles a joint turn.
+    pub(crate) fn order(&self, k: usize) -> f64 {
+        k as f64 * self.step
+    }
 }

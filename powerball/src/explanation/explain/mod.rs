@@ -39,7 +39,7 @@ use crate::explanation::options::{ExplainError, ExplainOptions};
 use crate::logs::log::Log;
 use crate::logs::regression::RigidArm;
 use begin::begin;
-use comparison::{History, withhold};
+use comparison::{History, withhold, withhold_harmful};
 use findings::Findings;
 use prepare::{Begun, Inertia, prepare};
 use search::Among;
@@ -106,8 +106,11 @@ fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
     while withhold(&study, &mut model, &mut history).is_some() {}
     study.say("judging the zeros of the torques");
     history.steps.extend(settle_beside(&study, &mut model));
+    while withhold_harmful(&study, &mut model, &mut history).is_some() {}
     study.say("refining settings");
     search::refine(&study, &mut model);
+    study.say("looking for ripple above the band");
+    history.steps.extend(search::ripple_above_band(&study, &mut model, 2 * study.rule().most_steps));
     study.say("asking time-shift surrogates");
     let false_positives = search::false_positives(&study, &model);
     Findings { study, beforehand, model, history, false_positives }

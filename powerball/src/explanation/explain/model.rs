@@ -20,6 +20,8 @@ pub(super) struct Accepted {
     pub(super) explained: Vec<f64>,
     /// The step that accepted it; none where it is in the model from the start (see [`Effect::beside`]).
     pub(super) step: Option<usize>,
+    /// Its coefficients where they were measured above the band of the fit: it has no column there.
+    pub(super) measured: Option<Vec<f64>>,
 }
 
 /// The model in the making.
@@ -62,6 +64,7 @@ impl Model {
                 fold_gain: 0.0,
                 explained: Vec::new(),
                 step: None,
+                measured: None,
             }
         };
         let candidates = effects::all().iter().flat_map(|effect| effect.beside(&context));
@@ -73,12 +76,16 @@ impl Model {
     pub(super) fn without(&self, study: &Study<'_>, k: usize) -> Model {
         let mut accepted = self.accepted.clone();
         accepted.remove(k);
-        let mut candidates: Vec<Candidate> = accepted.iter().map(|a| a.candidate.clone()).collect();
-        let fit = refitted(&study.data, &study.folds, &mut candidates, &self.fit, study.rule());
-        for (a, candidate) in accepted.iter_mut().zip(candidates) {
-            a.candidate = candidate;
-        }
+        let fit = fitted_again(study, &mut accepted, &self.fit);
         Model { accepted, given_up: Vec::new(), fit }
+    }
+
+    /// Takes in what was measured above the band of the fit.
+    pub(super) fn add_measured(&mut self, study: &Study<'_>, accepted: Accepted) {
+        let context = Context::for_columns(&study.data, &self.fit, study.rule());
+        let columns = accepted.effect().columns(&context, &accepted.candidate);
+        take_measured_out(&accepted, &columns, &mut self.fit.residual);
+        self.accepted.push(accepted);
     }
 
     /// The terms of what was accepted on some data, of all or of all but one.
@@ -88,7 +95,8 @@ impl Model {
             let columns = a.effect().columns(context, &a.candidate).into_iter();
             columns.map(move |column| Term { column, non_negative }).collect::<Vec<_>>()
         };
-        self.accepted.iter().enumerate().filter(|(k, _)| Some(*k) != without).flat_map(term).collect()
+        let fitted = |(k, a): &(usize, &Accepted)| Some(*k) != without && a.measured.is_none();
+        self.accepted.iter().enumerate().filter(fitted).flat_map(term).collect()
     }
 
     /// The model seen on the logs that it was fitted to.
@@ -118,28 +126,32 @@ impl Model {
 
     /// The coefficients of each accepted effect.
     pub(super) fn coefficients(&self) -> Vec<Vec<f64>> {
-        self.places().into_iter().map(|place| self.fit.theta[place].to_vec()).collect()
+        let of = |(a, place): (&Accepted, Range<usize>)| {
+            a.measured.clone().unwrap_or_else(|| self.fit.theta[place].to_vec())
+        };
+        self.accepted.iter().zip(self.places()).map(of).collect()
     }
 
     /// Measured less predicted torque of the validation set, by joint and row, N·m.
     pub(super) fn residual_on_validation(&self, study: &Study<'_>) -> Vec<Vec<f64>> {
-        self.fit.residual_on(&study.validation, &self.columns_on_validation(study))
+        let mut residual = self.fit.residual_on(&study.validation, &self.columns_on_validation(study));
+        let context = Context::for_columns(&study.validation, &self.fit, study.rule());
+        for a in self.accepted.iter().filter(|a| a.measured.is_some()) {
+            take_measured_out(a, &a.effect().columns(&context, &a.candidate), &mut residual);
+        }
+        residual
     }
 
-    /// The columns of what was accepted on the validation set.
+    /// The columns of what was accepted, as the fit has them, on the validation set.
     pub(super) fn columns_on_validation(&self, study: &Study<'_>) -> Vec<Column> {
         let context = Context::for_columns(&study.validation, &self.fit, study.rule());
         let columns = |a: &Accepted| a.effect().columns(&context, &a.candidate);
-        self.accepted.iter().flat_map(columns).collect()
+        self.accepted.iter().filter(|a| a.measured.is_none()).flat_map(columns).collect()
     }
 
     /// Fits everything again, and asks the validation logs whether they have what is in some logs only.
     pub(super) fn refit(&mut self, study: &Study<'_>) {
-        let mut candidates: Vec<Candidate> = self.accepted.iter().map(|a| a.candidate.clone()).collect();
-        self.fit = refitted(&study.data, &study.folds, &mut candidates, &self.fit, study.rule());
-        for (a, candidate) in self.accepted.iter_mut().zip(candidates) {
-            a.candidate = candidate;
-        }
+        self.fit = fitted_again(study, &mut self.accepted, &self.fit);
         for k in 0..self.accepted.len() {
             if let Some(seen) = self.seen_in_validation(study, k) {
                 self.accepted[k].candidate = seen;
@@ -160,6 +172,28 @@ impl Model {
         own.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut without, *c));
         let context = Context::new(&study.validation, &self.fit, &without, study.rule());
         a.effect().seen_in(&context, &a.candidate, coefficients)
+    }
+}
+
+/// The fit with what was accepted; candidates move to where it fits best.
+fn fitted_again(study: &Study<'_>, accepted: &mut [Accepted], start: &Fit) -> Fit {
+    let mut own: Vec<&mut Accepted> = accepted.iter_mut().filter(|a| a.measured.is_none()).collect();
+    let mut candidates: Vec<Candidate> = own.iter().map(|a| a.candidate.clone()).collect();
+    let mut fit = refitted(&study.data, &study.folds, &mut candidates, start, study.rule());
+    for (a, candidate) in own.iter_mut().zip(candidates) {
+        a.candidate = candidate;
+    }
+    let context = Context::for_columns(&study.data, start, study.rule());
+    for a in accepted.iter().filter(|a| a.measured.is_some()) {
+        take_measured_out(a, &a.effect().columns(&context, &a.candidate), &mut fit.residual);
+    }
+    fit
+}
+
+/// Takes the torque of what was measured above the band out of a residual.
+fn take_measured_out(a: &Accepted, columns: &[Column], residual: &mut [Vec<f64>]) {
+    for (column, coefficient) in columns.iter().zip(a.measured.iter().flatten()) {
+        column.add_to(residual, -coefficient);
     }
 }
 

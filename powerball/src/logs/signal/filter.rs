@@ -153,7 +153,8 @@ impl Band {
     }
 
     /// Amplitude that is kept at a frequency, Hz.
-    fn amplitude(&self, frequency: f64, rate: f64) -> f64 {
+    #[must_use]
+    pub fn amplitude(&self, frequency: f64, rate: f64) -> f64 {
         self.whole().map(|f| f.zero_phase_gain(frequency, rate).sqrt()).product()
     }
 }

@@ -5,8 +5,10 @@
 //! blocks, from held-out folds and from the validation set (`evidence`, `folds`), and judged (`refusal`);
 //! time-shift surrogates say how often these very data agree by chance (`surrogates`). What stays in the
 //! model is moved to where everything together fits best (`refinement`), and what later additions made
-//! unneeded goes out again (`elimination`).
+//! unneeded goes out again (`elimination`). Ripple that is too fast for the band of the fit is looked for
+//! above it, by a test of its own (`above_band`).
 
+mod above_band;
 mod beside;
 mod both_ways;
 mod elimination;
@@ -19,6 +21,7 @@ mod refusal;
 mod screen;
 mod surrogates;
 
+pub(super) use above_band::ripple_above_band;
 pub(super) use beside::{is_beside, keep_needed};
 pub(super) use both_ways::Swapped;
 pub(super) use elimination::{eliminate, gains};

@@ -1,12 +1,13 @@
 //! What the rule does on logs whose truth is known.
 
 use super::figures;
-use super::plant::{Noise, Truth, arm, record};
+use super::plant::{Noise, RATE, Truth, arm, record};
 use crate::explanation::ExplainOptions;
 use crate::explanation::Rule;
 use crate::explanation::explain::special::repeats;
 use crate::explanation::explain::{Explained, explain_body};
 use crate::logs::regression::{Data, DataOptions, RigidArm};
+use crate::logs::signal::Band;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -69,6 +70,30 @@ fn one_missing_effect_is_named_with_its_figures() {
             |wanted: fn([f64; 2]) -> bool| explained.held_out_change.iter().any(|c| wanted(c.interval));
         assert!(surely(|[_, high]| high < 0.0) && !surely(|[low, _]| low > 0.0));
     }
+}
+
+/// Teeth that pass faster than the band holds: all of the ripple below 10 Hz is taken out of the logs.
+#[test]
+fn ripple_above_the_band_is_named() {
+    let body = RigidArm::new(&arm()).unwrap();
+    let mut logs = record(body.arm(), Truth::Clean, 0.0, Noise::White, 7, 22.0, 11);
+    let band = Band::new(DataOptions::default().cutoff, RATE);
+    for log in &mut logs {
+        let ripple: Vec<f64> = log.q[2].iter().map(|q| 0.5 * (150.4 * q + 0.3).cos()).collect();
+        let slow = band.filtered(&ripple);
+        log.torque[2].iter_mut().zip(ripple.iter().zip(slow)).for_each(|(t, (r, s))| *t += r - s);
+    }
+    let (fit, validate) = logs.split_at(5);
+    let explained = explain_body(&body, fit, validate, &ExplainOptions::default()).unwrap();
+    let [ripple] = explained.effects.as_slice() else { panic!("{:?}", names(&explained)) };
+    assert_eq!((ripple.effect.as_str(), ripple.joints[0].number()), ("position_ripple", 3));
+    let figure = |key: &str| figures(ripple)[key][0].as_f64().unwrap();
+    approx::assert_abs_diff_eq!(figure("orders"), 150.4, epsilon = 0.1);
+    approx::assert_abs_diff_eq!(figure("amplitudes"), 0.5, epsilon = 0.05);
+    // A controller adds it.
+    let terms = &explained.model.additions.terms;
+    let amplitude = terms.iter().map(|t| t.term.coefficient.powi(2)).sum::<f64>().sqrt();
+    approx::assert_abs_diff_eq!(amplitude, 0.5, epsilon = 0.05);
 }
 
 #[test]
