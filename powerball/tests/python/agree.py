@@ -487,11 +487,14 @@ def python_is_the_arm(powerball, failures):
     print("python-canopen as the arm of powerball record:")
     with tempfile.TemporaryDirectory() as folder:
         path = trajectory(folder, 3.0)
-        arm, result, _, log = record(powerball, Udp(), path, 0)
-        done = result["record"]
-        check("a whole trajectory is followed", done["samples"] + done["missing"] == 601, done)
-        # How often python is late is a matter of what else the machine does.
-        check("with data in many cycles", done["samples"] > 100, done)
+        # How often python is late is a matter of what else the machine does: one good recording of three.
+        for _ in range(3):
+            arm, result, _, log = record(powerball, Udp(), path, 0)
+            done = result["record"]
+            check("a whole trajectory is followed", done["samples"] + done["missing"] == 601, done)
+            if done["missing"] < 120:
+                break
+        check("with few cycles without data", done["missing"] < 120, done)
         check("to its end", all(abs(drive.position) <= 2 for drive in arm.drives), [d.position for d in arm.drives])
         with open(log) as file:
             rows = [line.split(",") for line in file.read().splitlines()[1:]]

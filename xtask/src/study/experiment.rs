@@ -327,7 +327,10 @@ impl Bench {
                 ),
             };
             if session.as_drawn {
-                let reached = self.visible(&quiet, &[truth.clone()], &plain)?.into_iter().fold(0.0, f64::max);
+                let reached = self
+                    .visible(&quiet, std::slice::from_ref(&truth), &plain)?
+                    .into_iter()
+                    .fold(0.0, f64::max);
                 if reached >= size {
                     return Ok(Some((truth, reached)));
                 }
@@ -353,7 +356,8 @@ impl Bench {
     ) -> Result<(Truth, f64, f64), String> {
         let (mut reached, mut factor) = (0.0, 1.0);
         for _ in 0..ROUNDS {
-            reached = self.visible(quiet, &[truth.clone()], plain)?.into_iter().fold(0.0, f64::max);
+            reached =
+                self.visible(quiet, std::slice::from_ref(&truth), plain)?.into_iter().fold(0.0, f64::max);
             if (reached / size - 1.0).abs() < 0.03 || reached <= 0.0 {
                 break;
             }
