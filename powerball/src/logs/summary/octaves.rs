@@ -98,7 +98,7 @@ impl Octaves {
         }
     }
 
-    /// Rounds each column to `DIGITS` binary digits of its length over all octaves: below what any sensor tells,
+    /// Rounds each column to 28 binary digits of its length over all octaves: below what any sensor tells,
     /// and what a file has to keep.
     pub fn round(&mut self) {
         let step = |k: usize| {
