@@ -6,7 +6,7 @@
 //! time-shift surrogates say how often these very data agree by chance (`surrogates`). What stays in the
 //! model is moved to where everything together fits best (`refinement`), and what later additions made
 //! unneeded goes out again (`elimination`). Ripple that is too fast for the band of the fit is looked for
-//! above it, by a test of its own (`above_band`).
+//! above it, by a test of its own (`above_band`, `traces`).
 
 mod above_band;
 mod beside;
@@ -20,6 +20,7 @@ mod refinement;
 mod refusal;
 mod screen;
 mod surrogates;
+mod traces;
 
 pub(super) use above_band::ripple_above_band;
 pub(super) use beside::{is_beside, keep_needed};
