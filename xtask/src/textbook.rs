@@ -44,7 +44,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let left = Plain::fit(&summary(&arguments.log)?).squares(&summary(&arguments.validate)?);
     let textbook: Vec<f64> = left.iter().map(|(error, torque)| (error / torque).sqrt()).collect();
     let line = |name: &str, values: &[f64]| {
-        let values: Vec<String> = values.iter().map(|v| format!("{:6.1}", 100.0 * v)).collect();
+        // A joint that says nothing has no error.
+        let percent =
+            |v: &f64| if v.is_finite() { format!("{:6.1}", 100.0 * v) } else { format!("{:>6}", "-") };
+        let values: Vec<String> = values.iter().map(percent).collect();
         println!("{name:<28}{} %", values.join(" "));
     };
     line("textbook, held out", &textbook);
@@ -135,4 +138,21 @@ fn columns(summary: &Summary, joint: usize) -> Vec<(usize, usize)> {
     let friction = [columns.viscous(), columns.constant(), columns.node(0)];
     let friction = friction.into_iter().enumerate().map(|(k, c)| (c, p + FRICTION * joint + k));
     (0..p).map(|c| (c, c)).chain(friction).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_read_by_joint_and_what_lacks_them_is_told() {
+        let file = std::env::temp_dir().join(format!("textbook_{}.json", std::process::id()));
+        fs::write(&file, r#"{"after": {"validate": {"relative": [0.25, null]}}}"#).unwrap();
+        let read = relative(&file).unwrap();
+        assert!(read[0] == 0.25 && read[1].is_nan(), "{read:?}");
+        fs::write(&file, r#"{"after": {}}"#).unwrap();
+        let why = relative(&file).unwrap_err();
+        fs::remove_file(&file).unwrap();
+        assert!(why.contains("textbook_") && why.contains("after.validate.relative"), "{why}");
+    }
 }

@@ -24,7 +24,8 @@ class Rule:
     least_score: float = 10.0
     #: Penalty for each coefficient: what one coefficient gains by chance, twice over (Akaike).
     per_coefficient: float = 2.0
-    #: Probability of accepting anything at all where nothing is missing, over all joints and candidates.
+    #: Probability of accepting anything at all where nothing is missing, over all joints and candidates;
+    #: above the band that of a ripple, over all joints and orders.
     family_wise: float = 0.01
     #: The held-out squared error must fall by this share on average over folds: 1 % of the rms, below
     #: which no user would notice.
@@ -51,7 +52,7 @@ class Rule:
     surrogate_level: float = 0.99
     #: Surrogates that a step asks.
     step_surrogates: int = 60
-    #: Surrogates that state the false-positive rate.
+    #: Surrogates that state the false-positive rate, and those that judge ripple above the band.
     final_surrogates: int = 200
     #: A shifted column that still correlates so much with the unshifted one (a periodic motion) is no
     #: surrogate.

@@ -296,8 +296,9 @@ impl Bench {
         Ok(misfit)
     }
 
-    /// A truth of that kind whose visible size is `size`, or at least that where it stays as it was drawn, and the size that was reached; `None` where the arm
-    /// has none. It sits on joint `on` where an arm that was drawn is told one and the kind is of one joint.
+    /// A truth of that kind and the size that it reached: visible size `size`, or at least that where it stays as it
+    /// was drawn. `None` where the arm has none. It sits on joint `on` where an arm that was drawn is told one and the
+    /// kind is of one joint.
     fn truth(
         &self,
         session: &Session,
