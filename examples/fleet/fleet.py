@@ -143,13 +143,22 @@ def keys_in(store: str, folder: str) -> set[str]:
     return {os.path.basename(path).split(".")[0] for path in fs.ls(name, detail=False)}
 
 
+def version_of(fs: fsspec.AbstractFileSystem, name: str) -> str:
+    """What changes when a file does. Not ``fs.ukey``: S3 tells more of a file by itself than in a listing."""
+    info = fs.info(name)
+    for tag in ("ETag", "etag", "md5Hash", "mtime", "created"):
+        if info.get(tag):
+            return f"{info['size']} {info[tag]}"
+    return str(fs.ukey(name))
+
+
 def find(job: Job, logs: str) -> dict[str, str]:
     """The logs of a pattern, by key. The key changes with the file, the arm file, the map and the version."""
     fs, pattern = fsspec.url_to_fs(logs)
     fs.invalidate_cache()
     same = (job.arm, "\n".join(job.map), importlib.metadata.version("powerball"))
     names = sorted(fs.glob(pattern))
-    return {key_of(*same, name, str(fs.ukey(name))): fs.unstrip_protocol(name) for name in names}
+    return {key_of(*same, name, version_of(fs, name)): fs.unstrip_protocol(name) for name in names}
 
 
 def run(client: dd.Client, job: Job, logs: str, retry: bool = False) -> Report:

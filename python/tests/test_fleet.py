@@ -81,18 +81,36 @@ def test_a_fleet_is_one_process(short_logs, tmp_path):
     same(pb.identify(arm, joined), pb.identify(arm, files))
 
 
-@pytest.fixture
-def memory():
-    """A store in the memory of this process, and workers that are its threads."""
+@pytest.fixture(params=["memory", "s3"])
+def bucket(request, monkeypatch):
+    """A store in the memory of this process, and one behind S3's protocol, with workers that are threads."""
     distributed = need("dask.distributed")
+    fsspec = need("fsspec")
+    server = None
+    if request.param == "s3":
+        need("s3fs")
+        server = need("moto.server").ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+        server.start()
+        host, port = server.get_host_and_port()
+        for name, value in {
+            "AWS_ENDPOINT_URL": f"http://{host}:{port}",
+            "AWS_ACCESS_KEY_ID": "any",
+            "AWS_SECRET_ACCESS_KEY": "any",
+            "AWS_DEFAULT_REGION": "us-east-1",
+        }.items():
+            monkeypatch.setenv(name, value)
+    # What was opened before may have been told of another server.
+    fsspec.get_filesystem_class(request.param).clear_instance_cache()
     with distributed.Client(
         processes=False, n_workers=2, threads_per_worker=1, dashboard_address=None
     ) as client:
-        yield client, "memory://bucket"
+        yield client, f"{request.param}://bucket"
+    if server:
+        server.stop()
 
 
-def test_a_fleet_in_an_object_store(short_logs, memory):
-    client, bucket = memory
+def test_a_fleet_in_an_object_store(short_logs, bucket):
+    client, bucket = bucket
     fsspec = need("fsspec")
     sys.path.insert(0, str(ROOT / "examples" / "fleet"))
     import fleet
@@ -103,7 +121,6 @@ def test_a_fleet_in_an_object_store(short_logs, memory):
     fs.mkdir(root)
     for file in [*files, logs / "broken.csv"]:
         fs.pipe_file(f"{root}/logs/{file.name}", file.read_bytes())
-    # Workers that are threads have it.
     job = fleet.Job(arm_file.read_text(), f"{bucket}/fleet")
     part = fleet.run(client, job, f"{bucket}/logs/00*.csv")
     done = fleet.run(client, job, f"{bucket}/logs/*.csv")
