@@ -4,7 +4,7 @@ use super::identify::{Gathering, IdentifyError};
 use super::mounting::Mounting;
 use super::source::Source;
 use crate::logs::Progress;
-use crate::logs::regression::DataOptions;
+use crate::logs::regression::{DataOptions, notes_of};
 use crate::logs::summary::Bands;
 use dyngen::Arm;
 
@@ -31,7 +31,7 @@ pub fn summarize<'a, S: Into<Source<'a>>>(
     progress: Progress<'_>,
 ) -> Result<Summarized, IdentifyError> {
     let logs: Vec<Source<'a>> = logs.into_iter().map(Into::into).collect();
-    let gathered = Gathering::new(arm, options, false, progress).said(arm.notes()).all(&logs)?;
+    let gathered = Gathering::new(arm, options, false, progress).said(notes_of(arm)).all(&logs)?;
     let mountings: Vec<String> = gathered.mounted.iter().map(|m| m.mounting.to_string()).collect();
     let mut mounted = gathered.mounted.into_iter();
     match (mounted.next(), mounted.next()) {

@@ -65,7 +65,7 @@ impl Plant {
         &self.dynamics
     }
 
-    /// The friction of each joint without effects.
+    /// The friction of each joint without effects: of its motor, where a transmission couples joints.
     pub fn friction(&self) -> &[TanhFriction<f64>] {
         &self.friction
     }
@@ -99,9 +99,12 @@ impl Plant {
         for (k, [_, dq, _]) in motion.samples().enumerate() {
             let (last, next) = (k.saturating_sub(1), (k + 1).min(motion.len() - 1));
             let time = (next - last).max(1) as f64 * motion.period;
-            for i in 0..n {
-                let winding = (windups[next * n + i] - windups[last * n + i]) / time;
-                torques[k * n + i] += self.friction[i].torque(dq[i] + winding);
+            let winding = |i: usize| (windups[next * n + i] - windups[last * n + i]) / time;
+            let rates: Vec<f64> = dq.iter().enumerate().map(|(i, dq)| dq + winding(i)).collect();
+            let chain = self.dynamics.chain();
+            for (i, law) in self.friction.iter().enumerate() {
+                let spent = law.torque(chain.motor_rate(i, &rates));
+                chain.add_motor_torque(i, spent, &mut torques[k * n..(k + 1) * n]);
             }
         }
         let positions: Vec<f64> = motion.q.iter().zip(&windups).map(|(q, w)| q + w).collect();

@@ -6,7 +6,7 @@ use crate::explanation::torque_model::{ModelFile, TorqueModel};
 use crate::identification::mounting::Mounting;
 use crate::identification::{KnownModel, Recorded, Source};
 use crate::logs::log::ColumnMap;
-use crate::logs::regression::RigidArm;
+use crate::logs::regression::{RigidArm, notes_of};
 use clap::Args;
 use dyngen::Arm;
 use std::path::{Path, PathBuf};
@@ -85,7 +85,7 @@ pub(crate) fn recorded(
         files.iter().map(|file| Source::file(file).mapped(Arc::clone(&map))).collect()
     };
     let mut read = Recorded::read(arm, &sources(&inputs.log), &sources(validate))?;
-    read.warnings.splice(0..0, arm.notes());
+    read.warnings.splice(0..0, notes_of(arm));
     output::make_folder(&inputs.out)?;
     Ok(read)
 }

@@ -11,6 +11,16 @@ impl TorqueModel {
     /// Leaves in logs what a base model is to be fitted to: true positions, torques at their own time,
     /// without the terms, which stay as they are known. `body` is the arm with the model's changes.
     pub fn take_out(&self, body: &RigidArm, logs: &mut [Log]) {
+        let Some(motors) = body.motors() else { return self.take_out_of(body, logs) };
+        for log in logs {
+            let mut turned = [motors.log(log)];
+            self.take_out_of(body, &mut turned);
+            *log = motors.log_of_joints(&turned[0]);
+        }
+    }
+
+    /// The same for logs of motors.
+    fn take_out_of(&self, body: &RigidArm, logs: &mut [Log]) {
         self.additions.log_changes.clean(logs);
         if self.additions.terms.is_empty() {
             return;

@@ -1,6 +1,7 @@
 //! The model's numbers as a parameter file of ROS 2, for a controller of ros2_control that computes torques itself.
 
 use super::TorqueModel;
+use crate::logs::regression::Motors;
 use dyngen::Arm;
 use dyngen::exact::rational::to_f64;
 use std::fmt::Write;
@@ -37,6 +38,16 @@ impl TorqueModel {
             text,
             "# Friction (Eq. 16): gamma1*tanh(gamma2*dq) + gamma3*tanh(gamma4*dq) + gamma5*dq + constant."
         )?;
+        if let Some(motors) = Motors::of(arm) {
+            writeln!(
+                text,
+                "# A transmission couples joints: friction and encoder offsets are of their motors, which turn at \
+                 motor_velocities times the joints' velocities; the joints' torques are its transpose times the motors'."
+            )?;
+            let rows =
+                motors.matrix().into_iter().map(|row| format!("[{}]", list(row.into_iter().map(number))));
+            writeln!(text, "# motor_velocities: [{}]", list(rows))?;
+        }
         for note in self.not_compensated() {
             writeln!(text, "# Note: {note}.")?;
         }

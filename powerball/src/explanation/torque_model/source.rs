@@ -4,6 +4,7 @@ use super::c_door::Behind;
 use super::changes::with_open_hand;
 use super::{TorqueModel, Unchanged};
 use crate::controller::{correction, friction};
+use crate::logs::regression::Motors;
 use dyngen::arm::{Parameter, ParameterKind};
 use dyngen::emit::c_door::checked_prefix;
 use dyngen::emit::{self, Options};
@@ -117,7 +118,10 @@ impl TorqueModel {
         let mut text = self.head(&arm);
         // Writing to a String cannot fail.
         let _ = self.tables(&mut text, scalar);
-        text.push_str(&door(payload.is_some(), self.terms().iter().any(|t| t.term.law.moves_link())));
+        let motors = Motors::of(&arm);
+        text.push_str(&motors.as_ref().map(coordinates).unwrap_or_default());
+        let moves = self.terms().iter().any(|t| t.term.law.moves_link());
+        text.push_str(&door(payload.is_some(), moves, motors.is_some()));
         let module = |doc: &str, name: &str, body: &str| format!("\n{doc}pub mod {name} {{\n{body}}}\n");
         text.push_str(&module("/// The rigid arm.\n", "rigid", &rigid));
         if let Some(payload) = payload {
@@ -172,10 +176,11 @@ impl TorqueModel {
     }
 
     fn tables(&self, text: &mut String, scalar: Scalar) -> fmt::Result {
+        let law = if self.terms().is_empty() { "" } else { "Law, " };
         writeln!(
             text,
             "
-use correction::{{Corrector, Instant, Law, Term}};
+use correction::{{Corrector, Instant, {law}Term}};
 use friction::TanhFriction;
 use nalgebra::SVector;
 
@@ -238,8 +243,38 @@ fn dynamics(
     emit::source(&model, &options).map_err(SourceError::Generator)
 }
 
-/// The struct that a controller calls.
-fn door(payload: bool, moves: bool) -> String {
+/// Between joints and motors, where a transmission couples joints: everything but the rigid arm is of motors.
+fn coordinates(motors: &Motors) -> String {
+    let [velocities, back] = [motors.matrix(), motors.inverse()]
+        .map(|rows| rows.iter().map(|row| format!("\n    {row:?},")).collect::<String>());
+    format!(
+        "
+/// Motor i turns at the sum over joints j of `MOTOR_VELOCITIES[i][j]` times their velocities, on the joint's side
+/// of its gear. Friction, encoders and corrections are of the motors.
+#[allow(clippy::excessive_precision)]
+pub const MOTOR_VELOCITIES: [[Real; JOINTS]; JOINTS] = [{velocities}
+];
+
+/// The inverse of `MOTOR_VELOCITIES`.
+#[allow(clippy::excessive_precision)]
+const JOINT_VELOCITIES: [[Real; JOINTS]; JOINTS] = [{back}
+];
+
+/// A matrix times a column.
+fn times(matrix: &[[Real; JOINTS]; JOINTS], x: &SVector<Real, JOINTS>) -> SVector<Real, JOINTS> {{
+    SVector::from_fn(|i, _| matrix[i].iter().zip(x.iter()).map(|(m, x)| m * x).sum())
+}}
+
+/// A transposed matrix times a column.
+fn transposed_times(matrix: &[[Real; JOINTS]; JOINTS], x: &SVector<Real, JOINTS>) -> SVector<Real, JOINTS> {{
+    SVector::from_fn(|j, _| matrix.iter().zip(x.iter()).map(|(row, x)| row[j] * x).sum())
+}}
+"
+    )
+}
+
+/// The struct that a controller calls; `coupled`: a transmission couples joints.
+fn door(payload: bool, moves: bool, coupled: bool) -> String {
     let field = "\n    /// Whether the last link holds the payload.\n    pub holds_payload: bool,";
     let (field, held) = if payload { (field, ", holds_payload: false") } else { ("", "") };
     let rigid = match payload {
@@ -259,6 +294,26 @@ fn door(payload: bool, moves: bool) -> String {
         let rigid = self.rigid(&link, dq, ddq);"
         }
         false => "",
+    };
+    let (to_motors, to_joints, of_motors) = match coupled {
+        true => (
+            "
+        let [q, dq, ddq] = [q, dq, ddq].map(|x| times(&MOTOR_VELOCITIES, x));
+        let (dq, ddq) = (&dq, &ddq);",
+            "transposed_times(&MOTOR_VELOCITIES, &torque)",
+            "
+        let [q, dq, ddq] = [q, dq, ddq].map(|x| times(&JOINT_VELOCITIES, x));
+        let (q, dq, ddq) = (&q, &dq, &ddq);
+        let torque = ",
+        ),
+        false => ("", "torque", "\n        "),
+    };
+    let (whose, on_motors) = match coupled {
+        true => (
+            "rigid arm on its motors, at their true positions",
+            ";\n        transposed_times(&JOINT_VELOCITIES, &torque)",
+        ),
+        false => ("rigid arm at true positions", ""),
     };
     format!(
         "
@@ -293,7 +348,7 @@ impl TorqueModel {{
         ddq: &SVector<Real, JOINTS>,
         running: Real,
         temperature: &[Real],
-    ) -> SVector<Real, JOINTS> {{
+    ) -> SVector<Real, JOINTS> {{{to_motors}
         let place = q - SVector::from(ENCODER_OFFSET);
         let rigid = self.rigid(&place, dq, ddq);{again}
         let mut friction = *dq;
@@ -311,17 +366,16 @@ impl TorqueModel {{
         }};
         let mut torque = rigid + friction;
         self.corrector.add_torques(&now, torque.as_mut_slice());
-        torque
+        {to_joints}
     }}
 
-    /// The torque of the rigid arm at true positions.
+    /// The torque of the {whose}.
     fn rigid(
         &self,
         q: &SVector<Real, JOINTS>,
         dq: &SVector<Real, JOINTS>,
         ddq: &SVector<Real, JOINTS>,
-    ) -> SVector<Real, JOINTS> {{
-        {rigid}
+    ) -> SVector<Real, JOINTS> {{{of_motors}{rigid}{on_motors}
     }}
 }}
 "

@@ -17,7 +17,7 @@ use super::friction_shape;
 use super::normal_equations::dot;
 use super::reduced::{Part, Solution};
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, DataOptions, Recording, RigidArm};
+use crate::logs::regression::{Data, DataOptions, Recording, RigidArm, logs_of_motors};
 use crate::logs::summary::{Octaves, RFactor, parts};
 use faer::Mat;
 use faer::linalg::solvers::Solve;
@@ -108,8 +108,8 @@ type Rows = Vec<Option<(Vec<usize>, Octaves)>>;
 fn rows(body: &RigidArm, logs: &[Log], options: &DataOptions, start: &Solution) -> Result<Rows, String> {
     let mut rows: Rows = (0..start.layout.dof).map(|_| None).collect();
     let mut refused = None;
-    for log in logs {
-        for part in parts(log) {
+    for (log, of_motors) in logs.iter().zip(&*logs_of_motors(body.arm(), logs)) {
+        for (part, turned) in parts(log).into_iter().zip(parts(of_motors)) {
             let data = match Data::new(body, std::slice::from_ref(&part), options) {
                 Ok(data) => data,
                 Err(error) => {
@@ -118,7 +118,7 @@ fn rows(body: &RigidArm, logs: &[Log], options: &DataOptions, start: &Solution) 
                 }
             };
             let half = |first: usize| {
-                data.seen_otherwise(|recording| every_second(recording, &part, first, options.smoothing))
+                data.seen_otherwise(|recording| every_second(recording, &turned, first, options.smoothing))
             };
             let (seen, instrument) = (half(0), half(1));
             for (j, joint) in rows.iter_mut().enumerate().filter(|(j, _)| !data.joints[*j].is_empty()) {

@@ -14,7 +14,7 @@ const BLOCK: usize = 128;
 /// Friction columns of a joint: tanh(γ2·q̇), tanh(γ4·q̇), q̇.
 const FRICTION: usize = 3;
 
-/// States and torques: n numbers a sample, one sample after another.
+/// States and torques of the joints: n numbers a sample, one sample after another.
 #[derive(Clone, Copy, Debug)]
 pub struct States<'a> {
     /// Positions, rad or m.
@@ -43,7 +43,7 @@ pub struct Stream<'a> {
 pub struct StreamFit {
     /// The minimal set's values; 0 where nothing determines one.
     pub inertial: Vec<f64>,
-    /// γ1 … γ5 by joint.
+    /// γ1 … γ5 by joint, or motor where a transmission couples joints.
     pub friction: Vec<[f64; 5]>,
     /// rms of the error by joint, N·m.
     pub rms: Vec<f64>,
@@ -75,6 +75,14 @@ impl<'a> Stream<'a> {
         for given in [states.dq, states.ddq, states.tau] {
             assert_eq!(given.len(), states.q.len(), "all slices of a block of states are of one length");
         }
+        let turned = self.body.motors().map(|motors| {
+            let [q, dq, ddq] = [states.q, states.dq, states.ddq].map(|state| motors.positions(state));
+            [q, dq, ddq, motors.torques(states.tau, 1)]
+        });
+        let states = match &turned {
+            None => states,
+            Some([q, dq, ddq, tau]) => States { q, dq, ddq, tau },
+        };
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let shares: Vec<(usize, usize)> =
             (0..cores).map(|c| (count * c / cores, count * (c + 1) / cores)).collect();

@@ -4,6 +4,7 @@ use super::Error;
 use super::limits::JointLimits;
 use super::shape::{Shape, poses};
 use crate::controller::friction::TanhFriction;
+use crate::logs::regression::Motors;
 use dyngen::arm::{Arm, ParameterKind};
 use dyngen::exact::rational::to_f64;
 use dyngen::{Evaluator, Function, Model, SetKind, Values};
@@ -160,6 +161,8 @@ pub struct Load {
     torque: Evaluator,
     values: Vec<f64>,
     friction: Vec<TanhFriction<f64>>,
+    /// Where a transmission couples joints: friction sits on these.
+    motors: Option<Motors>,
     /// N·m; no limit is infinite.
     limits: Vec<f64>,
 }
@@ -175,6 +178,7 @@ impl Load {
             torque: Evaluator::new(model, Function::InverseDynamics, SetKind::Minimal)?,
             values: model.set_values(set, &masses.parameters),
             friction: masses.friction.iter().flatten().map(|gamma| TanhFriction::new(*gamma)).collect(),
+            motors: Motors::of(model.arm()),
             limits: limits
                 .iter()
                 .map(|limit| limit.torque.map_or(f64::INFINITY, |t| t * (1.0 - masses.reserve)))
@@ -187,11 +191,17 @@ impl Load {
     pub fn torques(&self, q: &[f64], dq: &[f64], ddq: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; q.len()];
         self.torque.evaluate(q, dq, ddq, &self.values, &mut out);
-        for (tau, v) in out.chunks_exact_mut(self.limits.len()).zip(dq.chunks_exact(self.limits.len())) {
-            for ((tau, v), friction) in tau.iter_mut().zip(v).zip(&self.friction) {
-                *tau += friction.torque(*v);
-            }
+        if self.friction.is_empty() {
+            return out;
         }
+        let laws = self.friction.iter().cycle();
+        let spent =
+            |v: &[f64]| -> Vec<f64> { v.iter().zip(laws.clone()).map(|(v, law)| law.torque(*v)).collect() };
+        let friction = match &self.motors {
+            None => spent(dq),
+            Some(motors) => motors.joint_torques(&spent(&motors.positions(dq))),
+        };
+        out.iter_mut().zip(friction).for_each(|(tau, friction)| *tau += friction);
         out
     }
 

@@ -7,7 +7,7 @@ use crate::identification::mounting::Mounting;
 use crate::identification::source::Source;
 use crate::logs::Progress;
 use crate::logs::log::Log;
-use crate::logs::regression::RigidArm;
+use crate::logs::regression::{RigidArm, notes_of};
 use dyngen::Arm;
 
 /// An arm, as a model has it, and its logs on one clock.
@@ -54,7 +54,7 @@ impl InMemory {
     ) -> Result<InMemory, IdentifyError> {
         let arm = known.arm(arm, mounting).map_err(IdentifyError::Known)?;
         let mounted = mounting.of(&arm).map_err(IdentifyError::Mounting)?;
-        let mut warnings = mounted.notes();
+        let mut warnings = notes_of(&mounted);
         progress.say("reading logs");
         let Recorded { fit, validate, warnings: found } = Recorded::read(&arm, fit, validate)?;
         warnings.extend(found);

@@ -29,6 +29,7 @@ use super::conventions::conventions;
 use super::estimate::{BaseModel, Uncertainty, consistent_fit, estimates, spread_of};
 use super::source::Source;
 use super::transmission::transmission;
+use crate::logs::regression::notes_of;
 use crate::logs::summary::BANDS;
 use dyngen::{Arm, SetKind};
 use fit::{Fitted, fit};
@@ -115,7 +116,7 @@ fn gather_logs(
         }
         None => {
             let mut gathered = Gathering::new(arm, &options.data, needs_samples, options.progress)
-                .said(arm.notes())
+                .said(notes_of(arm))
                 .all(logs)?;
             for (log, mounting) in in_memory::held_out(validate, arm, &mut gathered.warnings)? {
                 gathered.hold_out(log, mounting, &options.data)?;

@@ -31,7 +31,7 @@ pub use told::{JointTransmission, Transmission, Unknown};
 use crate::controller::JointNumber;
 use crate::logs::log::Log;
 use crate::logs::parallel;
-use crate::logs::regression::silent_joints;
+use crate::logs::regression::{logs_of_motors, silent_joints};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 use grid::Grid;
@@ -55,7 +55,8 @@ pub fn transmission<'l>(
     }
     // Where only logs to judge on hold both, these are fitted.
     let fitted = if fitted == 0 { all.len() } else { fitted };
-    let grid = Grid::new(&all, fitted);
+    // Beside a motor's torque stands what its gear gives, which where joints are coupled is not one joint's.
+    let grid = Grid::new(&logs_of_motors(arm, &all), fitted);
     let silent = silent_joints(arm, &all);
     let joints: Vec<usize> = (0..arm.dof()).collect();
     Some(parallel::map(&joints, |&j| {

@@ -128,7 +128,7 @@ pub(super) fn into_log(
         Effort::Torque => raw.effort,
         Effort::Current(constants) => {
             let scaled = |(x, c): (Vec<f64>, &f64)| x.into_iter().map(|i| i * c).collect();
-            raw.effort.into_iter().zip(constants).map(scaled).collect()
+            of_motors(arm, raw.effort.into_iter().zip(constants).map(scaled).collect())
         }
     };
     let temperature = raw.temperature.filter(|t| t.iter().flatten().all(|v| v.is_finite()));
@@ -142,6 +142,20 @@ pub(super) fn into_log(
         pieces,
         clock: 0.0,
     })
+}
+
+/// The joints' torques of those that the motors' currents make: where a transmission couples joints a motor's
+/// torque is on all joints that turn it.
+fn of_motors(arm: &Arm, motors: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    if arm.transmissions.is_empty() {
+        return motors;
+    }
+    let matrix = arm.motor_velocity_matrix_f64();
+    let joint = |j: usize| {
+        let at = |k: usize| motors.iter().zip(&matrix).map(|(motor, row)| row[j] * motor[k]).sum();
+        (0..motors[j].len()).map(at).collect()
+    };
+    (0..motors.len()).map(joint).collect()
 }
 
 /// A clock that changes its pace: the mean step of the last third of the samples against the first.

@@ -2,6 +2,7 @@
 
 mod hidden;
 mod kept;
+mod motors;
 #[cfg(test)]
 pub(crate) mod newton_euler;
 mod per_joint;
@@ -13,6 +14,7 @@ mod rows;
 mod saturated;
 mod silent;
 
+pub use motors::{Motors, logs_of_motors, notes_of};
 pub(crate) use prepare::top_velocity;
 pub use prepare::{Data, DataError, DataOptions, column_in_bands};
 pub use recording::Recording;

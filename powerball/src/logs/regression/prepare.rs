@@ -1,6 +1,7 @@
 //! Logs of an arm into rows: even grid, derivatives, band, rest removed, blocks laid out.
 
 use super::kept::kept_samples;
+use super::motors::logs_of_motors;
 use super::rest_notes::{FEWEST_ROWS, notes};
 use super::silent::silent_joints;
 use super::{Block, Column, JointRows, Recording, RigidArm};
@@ -59,6 +60,8 @@ impl fmt::Display for DataError {
 impl std::error::Error for DataError {}
 
 /// Everything that regressions over some logs share.
+///
+/// Where a transmission couples joints, recordings and rows are of motors: see [`Motors`](super::Motors).
 #[derive(Debug)]
 pub struct Data<'a> {
     /// The arm's rigid-body functions.
@@ -124,6 +127,8 @@ impl<'a> Data<'a> {
         correct: impl FnMut(&mut Recording),
     ) -> Result<Vec<Result<Data<'a>, DataError>>, DataError> {
         let n = body.dof();
+        let silent = silent_joints(body.arm(), logs);
+        let logs = &*logs_of_motors(body.arm(), logs);
         let mut steps: Vec<f64> = logs.iter().filter_map(|log| median_step(&log.t)).collect();
         steps.sort_by(f64::total_cmp);
         let step = *steps.get(steps.len() / 2).ok_or(DataError::TooShort)?;
@@ -151,11 +156,10 @@ impl<'a> Data<'a> {
         let rest_velocity: Vec<f64> = (0..n)
             .map(|j| {
                 let velocities = recordings.iter().flat_map(|r| r.velocity(j).map(f64::abs)).collect();
-                rest::rest_velocity(velocities, body.arm().joints[j].velocity)
+                rest::rest_velocity(velocities, body.speed(j))
             })
             .collect();
         let top_velocity: Vec<f64> = (0..n).map(|j| top_velocity(&recordings, j)).collect();
-        let silent = silent_joints(body.arm(), logs);
         let (kept, without) = kept_samples(logs, &recordings, &bands, &rest_velocity, &silent);
         left_out.extend(without);
         let joints = joint_rows(body, &recordings, &bands, kept);

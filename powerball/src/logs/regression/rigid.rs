@@ -1,18 +1,22 @@
 //! The rigid arm of a file at run time: columns of its minimal set and of what lies outside it.
 
 use super::hidden::hidden;
+use super::motors::Motors;
 use dyngen::arm::ParameterKind;
 use dyngen::base::span::combinations;
 use dyngen::exact::rational::{self, Rational};
 use dyngen::{Arm, Error, Evaluator, Function, Model, SetKind};
+use std::borrow::Cow;
 use std::sync::OnceLock;
 
 /// The rigid-body functions that an analysis needs, proven once and run over any number of samples.
 ///
-/// States are slices with n numbers a sample, one sample after another.
+/// States are slices with n numbers a sample, one sample after another. States and torques are those of the
+/// motors, on the joints' side of the gears: where no `[[transmission]]` couples joints, the joints' own.
 #[derive(Debug)]
 pub struct RigidArm {
     model: Model,
+    motors: Option<Motors>,
     regressor: Evaluator,
     torque: Evaluator,
     names: Vec<String>,
@@ -71,6 +75,7 @@ impl RigidArm {
         let torque = Evaluator::new(&model, Function::InverseDynamics, SetKind::Minimal)?;
         let names = model.set(SetKind::Minimal)?.names();
         Ok(RigidArm {
+            motors: Motors::of(arm),
             model,
             regressor,
             torque,
@@ -136,15 +141,51 @@ impl RigidArm {
 
     /// The same into a slice of n × p numbers a sample.
     pub fn regressor_into(&self, q: &[f64], v: &[f64], a: &[f64], out: &mut [f64]) {
-        self.regressor.evaluate(q, v, a, &[], out);
+        let [q, v, a] = self.of_joints([q, v, a]);
+        self.regressor.evaluate(&q, &v, &a, &[], out);
+        if let Some(motors) = &self.motors {
+            out.copy_from_slice(&motors.torques(out, self.names.len()));
+        }
     }
 
-    /// Joint torques of the minimal set's `parameters`, n a sample.
+    /// The motors, where a transmission couples joints.
+    #[must_use]
+    pub fn motors(&self) -> Option<&Motors> {
+        self.motors.as_ref()
+    }
+
+    /// The limit of a motor's velocity, where the arm file's limits say one.
+    #[must_use]
+    pub fn speed(&self, motor: usize) -> Option<f64> {
+        match &self.motors {
+            None => self.arm().joints[motor].velocity,
+            Some(motors) => motors.speed(self.arm(), motor),
+        }
+    }
+
+    /// Positions, velocities and accelerations of the joints for those of the motors.
+    fn of_joints<'s>(&self, states: [&'s [f64]; 3]) -> [Cow<'s, [f64]>; 3] {
+        states.map(|state| match &self.motors {
+            None => Cow::Borrowed(state),
+            Some(motors) => Cow::Owned(motors.joints(state)),
+        })
+    }
+
+    /// Torques of the minimal set's `parameters`, n a sample.
     #[must_use]
     pub fn torque(&self, q: &[f64], v: &[f64], a: &[f64], parameters: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; q.len()];
-        self.torque.evaluate(q, v, a, parameters, &mut out);
-        out
+        let [q, v, a] = self.of_joints([q, v, a]);
+        self.torque.evaluate(&q, &v, &a, parameters, &mut out);
+        self.on_motors(out, 1)
+    }
+
+    /// Rows of the motors for those of the joints, `width` numbers each.
+    fn on_motors(&self, rows: Vec<f64>, width: usize) -> Vec<f64> {
+        match &self.motors {
+            None => rows,
+            Some(motors) => motors.torques(&rows, width),
+        }
     }
 
     /// Why no real arm can have these values of the minimal set; empty where nothing speaks against them.
@@ -174,7 +215,8 @@ impl RigidArm {
     #[must_use]
     pub fn parameter_columns(&self, chosen: &[usize], q: &[f64], v: &[f64], a: &[f64]) -> Option<Vec<f64>> {
         let wide = self.unconstrained.get_or_init(|| Wide::new(self.arm(), None).ok()).as_ref()?;
-        pick(wide, chosen, q, v, a, self.dof())
+        let [q, v, a] = self.of_joints([q, v, a]);
+        Some(self.on_motors(pick(wide, chosen, &q, &v, &a, self.dof())?, chosen.len()))
     }
 
     /// The static torque of chosen parameters under unit gravity along base axis `axis`: by sample, n ×
@@ -189,7 +231,8 @@ impl RigidArm {
             })
             .as_ref()?;
         let still = vec![0.0; q.len()];
-        pick(&wides[axis], chosen, q, &still, &still, self.dof())
+        let [q, v, a] = self.of_joints([q, &still, &still]);
+        Some(self.on_motors(pick(&wides[axis], chosen, &q, &v, &a, self.dof())?, chosen.len()))
     }
 
     /// Directions in the space of all parameters, eleven a link in the order of [`Arm::all_parameters`], that

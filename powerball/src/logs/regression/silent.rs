@@ -1,6 +1,7 @@
 //! Joints whose samples say nothing, and why.
 
 use super::Recording;
+use super::motors::logs_of_motors;
 use crate::logs::log::Log;
 use dyngen::Arm;
 use dyngen::arm::JointKind;
@@ -22,9 +23,10 @@ enum Silent {
 }
 
 /// For each joint why nothing can be said of it from these logs, and what to record instead; `None` where
-/// there can.
+/// there can. Where a transmission couples joints it is their motors that must move.
 #[must_use]
 pub fn silent_joints(arm: &Arm, logs: &[Log]) -> Vec<Option<String>> {
+    let logs = &*logs_of_motors(arm, logs);
     let why = |(j, joint): (usize, &dyngen::arm::Joint)| {
         let unit = if joint.kind == JointKind::Prismatic { "m" } else { "rad" };
         Silent::of(logs, j, joint.kind).map(|silent| silent.note(j + 1, unit))

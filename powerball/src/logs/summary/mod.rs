@@ -71,7 +71,7 @@ impl Summary {
         let mut described = format!("{:?} {:?} {:?} {:?}", arm.convention, arm.gravity, arm.joints, arm.tool);
         // Without transmissions the hash is that of summaries that were written before there were any.
         if !arm.transmissions.is_empty() {
-            described += &format!(" {:?}", arm.transmissions);
+            described += &format!(" rows of motors {:?}", arm.transmissions);
         }
         let identity = Identity {
             arm: arm.name.clone(),
@@ -80,10 +80,8 @@ impl Summary {
             parameters: body.names().to_vec(),
             cutoff: options.cutoff,
             smoothing: options.smoothing,
-            steepness: arm
-                .joints
-                .iter()
-                .map(|j| Steepness::new(j.velocity.filter(|v| *v > 0.0).unwrap_or(ORDINARY_SPEED)))
+            steepness: (0..body.dof())
+                .map(|j| Steepness::new(body.speed(j).filter(|v| *v > 0.0).unwrap_or(ORDINARY_SPEED)))
                 .collect(),
         };
         Summary::without_logs(identity)
