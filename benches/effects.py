@@ -7,7 +7,8 @@
 
 The model of the tests is imported and exported with the effects of dyngen/tests/mjcf/model.json. Then
 
-1. the torque that MuJoCo asks for at random states and bristles is that of `dyngen eval` with the effects' own formulas added;
+1. the torque that MuJoCo asks for at random states and bristles is that of `dyngen eval` with the effects' own formulas added, and so where
+   motors 1 and 2 turn with joints 1 and 2 as those of a differential do;
 2. bristles that MuJoCo moves along a path with reversals are where Dahl's solution says;
 3. in steady sliding LuGre's friction is Coulomb's with Stribeck's bump.
 
@@ -31,8 +32,12 @@ LIMIT = 1e-9
 COULOMB, DAMPING, LEVEL, DISTANCE, BUMP, VELOCITY = 0.75, 1.5, 1.5, 0.02, 0.4, 0.05
 
 
+# Motors 1 and 2 of the differential, and what its first rotor is at the joint, kg·m².
+DIFFERENTIAL, ARMATURE = [[1, 1], [1, -1]], 0.02
+
+
 def exported(dyngen, folder):
-    """The new model, and rigid torques of states by `dyngen eval`."""
+    """The new model, that of the arm with a differential, and rigid torques of states by `dyngen eval`."""
     arm, values, new = folder / "arm.toml", folder / "arm.values.json", folder / "new.xml"
     call = lambda *command: subprocess.run([dyngen, *command], check=True, capture_output=True).stdout
     call("import", TESTS / "arm.xml", "--exact", "-o", arm)
@@ -41,6 +46,12 @@ def exported(dyngen, folder):
     values.write_text(json.dumps(no_rotors))
     files = ["--arm", arm, "--values", values, "--friction", TESTS / "model.json"]
     call("export", TESTS / "arm.xml", *files, "--to", "mjcf", "-o", new)
+    coupled, turned = folder / "coupled.toml", folder / "coupled.xml"
+    coupled.write_text(arm.read_text() + f"\n[[transmission]]\njoints = [1, 2]\nmatrix = {DIFFERENTIAL}\n")
+    rotor = folder / "rotor.values.json"
+    rotor.write_text(json.dumps(no_rotors | {"Im1": ARMATURE / 100**2}))
+    files = ["--arm", coupled, "--values", rotor, "--friction", TESTS / "model.json"]
+    call("export", TESTS / "arm.xml", *files, "--to", "mjcf", "-o", turned)
     assert json.loads((TESTS / "model.json").read_text())["terms"], "the effects that ripple() and the rest know"
 
     def rigid(states):
@@ -50,20 +61,21 @@ def exported(dyngen, folder):
         lines = call("eval", arm, "--function", "inverse_dynamics", "--states", file, "--values", values)
         return np.array([line.split(",") for line in lines.decode().split()[1:]], dtype=float)
 
-    return mujoco.MjModel.from_xml_path(str(new)), rigid
+    load = lambda path: mujoco.MjModel.from_xml_path(str(path))
+    return load(new), load(turned), rigid
 
 
 def ripple(q):
     pan = 0.5 * np.cos(32 * q[0]) - 0.25 * np.sin(32 * q[0]) + 0.125 * np.sin(2.5 * q[0])
-    return np.array([pan, 0, 3 * np.cos(100 * q[2]), 0])
+    return np.array([pan, 20 * q[1] - 5, 3 * np.cos(100 * q[2]), 0])
 
 
 def sliding(v):
     return COULOMB + BUMP * np.exp(-((v / VELOCITY) ** 2))
 
 
-def torques(model, rigid):
-    """The largest difference of what the motors have to bring up."""
+def torques(model, rigid, matrix, rotors):
+    """The largest difference of what the motors have to bring up; they turn at `matrix` times the joints' velocities."""
     random = np.random.default_rng(4)
     states = random.uniform(-1.5, 1.5, (200, 12))
     states[::2, 7] *= 0.05
@@ -77,9 +89,11 @@ def torques(model, rigid):
         data.qacc[:] = a
         mujoco.mj_inverse(model, data)
         found.append(np.append(data.qfrc_inverse - data.qfrc_actuator, data.act_dot))
+        place, rate, change = (matrix @ x for x in (q, v, a))
         friction = np.array([0, LEVEL / DISTANCE * rest[0], 0, 750 * rest[1]])
-        moves = [v[1] - abs(v[1]) * rest[0] / DISTANCE, v[3] - 750 * abs(v[3]) / sliding(v[3]) * rest[1]]
-        expected.append(np.append(torque + DAMPING * v + ripple(q) + friction, moves))
+        moves = [rate[i] - abs(rate[i]) * k * rest[j] for i, j, k in [(1, 0, 1 / DISTANCE), (3, 1, 750 / sliding(rate[3]))]]
+        motors = DAMPING * rate + ripple(place) + friction + rotors * change
+        expected.append(np.append(torque + matrix.T @ motors, moves))
     return np.abs(np.array(found) - expected).max() / np.abs(expected).max()
 
 
@@ -114,11 +128,18 @@ def main():
     parser.add_argument("--dyngen", required=True, type=pathlib.Path, help="the program")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        model, rigid = exported(options.dyngen.resolve(), pathlib.Path(folder))
-        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+        model, coupled, rigid = exported(options.dyngen.resolve(), pathlib.Path(folder))
+        for each in (model, coupled):
+            each.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
         names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, j) for j in range(model.njnt)]
         assert names == NAMES and model.na == 2, names
-        found = {"torque": torques(model, rigid), "path": path(model), "steady sliding": steady(model)}
+        matrix = np.eye(4)
+        matrix[:2, :2] = DIFFERENTIAL
+        found = {
+            "torque": torques(model, rigid, np.eye(4), np.zeros(4)),
+            "torque of coupled motors": torques(coupled, rigid, matrix, np.array([ARMATURE, 0, 0, 0])),
+        }
+        found |= {"path": path(model), "steady sliding": steady(model)}
     print(f"effects in MuJoCo {mujoco.__version__}: " + ", ".join(f"{k} {v:.0e}" for k, v in found.items()))
     sys.exit(0 if max(found.values()) < LIMIT else 1)
 

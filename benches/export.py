@@ -8,8 +8,7 @@
 Every link's parameters are scaled by a factor of its own between 1 and 1.5, which leaves them those of a body; friction
 and its standard errors are made up. Pinocchio then loads the new file. What is printed is the largest difference of inverse
 dynamics over 20 random states, relative to the largest torque there, for each file; the exit code is 1 where one is above
-1e-8 (lengths of an arm file are written to 1e-12 m, which a wheel of 1e-5 kg·m² feels) or where more than the elements
-that hold values has changed.
+1e-9 or where more than the elements that hold values has changed.
 """
 
 import argparse
@@ -84,7 +83,7 @@ def main():
             elif found is not None:
                 worst = max(worst, found)
     print("worst", worst)
-    sys.exit(0 if worst < 1e-8 else 1)
+    sys.exit(0 if worst < 1e-9 else 1)
 
 
 if __name__ == "__main__":

@@ -159,21 +159,70 @@ fn an_export_into_an_export_is_one() {
     }
 }
 
-/// Armature is of one joint: a rotor that turns with two is told, not written.
+/// Torque that grows with the position is a spring of the joint, in the model's unit of angles.
 #[test]
-fn a_rotor_of_several_joints_is_left_out() {
+fn a_spring_is_the_joints_stiffness() {
+    let new = exported(ARM, MODEL);
+    let of_lift = |text: &str, key: &str| -> Option<f64> {
+        let document = Document::parse(text).unwrap();
+        let lift = document.descendants().find(|n| n.attribute("name") == Some("lift")).unwrap();
+        lift.attribute(key).map(|x| x.parse().unwrap())
+    };
+    assert_eq!(of_lift(&new.text, "stiffness"), Some(20.0));
+    let rest = of_lift(&new.text, "springref").unwrap();
+    assert!((rest - 0.25f64.to_degrees()).abs() < 1e-12, "{rest}");
+    assert!(new.text.contains("spring: the motor has to bring up (20.0 ± 5.000e-1) q + (-5.0 ± 2.000e-1)"));
+    assert!(new.text.contains("(0.5 ± 3.000e-2) cos(32 q) + (-0.25 ± 4.000e-2) sin(32 q)"), "{}", new.text);
+    assert!(new.text.contains("(1.5, standard error unknown) within 0.02"));
+    let pushing = exported(ARM, &MODEL.replace("\"coefficient\": 20", "\"coefficient\": -20"));
+    assert_eq!(of_lift(&pushing.text, "stiffness"), None);
+    assert!(
+        pushing.notes.iter().any(|n| n.contains("'lift': spring: a torque that falls")),
+        "{:?}",
+        pushing.notes
+    );
+}
+
+/// What sits on a motor that turns with several joints sits on a tendon that is as long as the motor has turned.
+#[test]
+fn a_motor_of_several_joints_is_a_tendon() {
     let imported = import::mjcf(ARM, "arm.xml", &exact()).unwrap();
     let coupled =
-        format!("{}\n[[transmission]]\njoints = [1, 4]\nmatrix = [[1, 0], [1, 1]]\n", imported.text);
+        format!("{}\n[[transmission]]\njoints = [1, 4]\nmatrix = [[1, 0], [\"-1/2\", 1]]\n", imported.text);
     let arm = dyngen::Arm::parse(&coupled, "arm.toml").unwrap();
-    let known = Known::read(&arm, (&imported.values_json(), "v.json"), None).unwrap();
+    let known = Known::read(&arm, (&imported.values_json(), "v.json"), Some((MODEL, "model.json"))).unwrap();
     let new = export::mjcf(ARM, "arm.xml", &arm, &known, &Options::default()).unwrap();
     // Motor 1 still turns with its own joint alone.
-    assert_eq!(
-        new.notes.iter().filter(|note| note.contains("its rotor is left out")).count(),
-        1,
-        "{:?}",
-        new.notes
-    );
-    assert!(new.notes[0].contains("joint 'turn'"), "{:?}", new.notes);
+    let told: Vec<_> = new.notes.iter().filter(|note| note.contains("turns with several joints")).collect();
+    assert!(told.len() == 1 && told[0].contains("joint 'turn'"), "{:?}", new.notes);
+    let document = Document::parse(&new.text).unwrap();
+    let tendon = document.descendants().find(|n| n.has_tag_name("fixed")).unwrap();
+    let number = |key: &str| tendon.attribute(key).unwrap().parse::<f64>().unwrap();
+    let joint = document.descendants().find(|n| n.attribute("name") == Some("turn")).unwrap();
+    // Stribeck's friction is the actuator's, Coulomb's among it.
+    assert_eq!((number("damping"), number("frictionloss")), (1.5, 0.0));
+    assert_eq!((joint.attribute("damping"), joint.attribute("armature")), (Some("0"), Some("0")));
+    assert!((number("armature") - 0.005).abs() < 1e-15);
+    let turns: Vec<_> = tendon.children().filter(|n| n.is_element()).collect();
+    let turns: Vec<_> =
+        turns.iter().map(|n| (n.attribute("joint").unwrap(), n.attribute("coef").unwrap())).collect();
+    assert_eq!(turns, [("pan", "-0.5"), ("turn", "1.0")]);
+    let lugre = document.descendants().find(|n| n.has_tag_name("dcmotor") && n.attribute("tendon").is_some());
+    assert_eq!(lugre.unwrap().attribute("tendon"), tendon.attribute("name"));
+    // The next export takes its place.
+    let again = export::mjcf(&new.text, "new.xml", &arm, &known, &Options::default()).unwrap();
+    let tendons =
+        |text: &str| text[text.find("<tendon>").unwrap()..text.find("</tendon>").unwrap()].to_string();
+    assert_eq!(tendons(&again.text), tendons(&new.text));
+
+    let puma = import::urdf(PUMA, "puma.urdf", &exact()).unwrap();
+    let text = format!("{}\n[[transmission]]\njoints = [5, 6]\nmatrix = [[1, 0], [1, 1]]\n", puma.text);
+    let arm = dyngen::Arm::parse(&text, "arm.toml").unwrap();
+    let friction: Vec<String> = (1..=6)
+        .map(|j| format!("{{\"joint\": {j}, \"gamma1\": 0.5, \"gamma3\": 0.25, \"gamma5\": 1.5}}"))
+        .collect();
+    let friction = format!("{{\"friction\": [{}]}}", friction.join(", "));
+    let known = Known::read(&arm, (&puma.values_json(), "v.json"), Some((&friction, "f.json"))).unwrap();
+    let new = export::urdf(PUMA, "puma.urdf", &arm, &known, &Options::default()).unwrap();
+    assert_eq!(new.notes.iter().filter(|note| note.contains("its friction is the motor's")).count(), 1);
 }

@@ -10,6 +10,7 @@ mod generated;
 
 use dyngen::Arm;
 use powerball::controller::JointNumber;
+use powerball::controller::correction::Law;
 use powerball::controller::friction::TanhFriction;
 use powerball::explanation::torque_model::{Scalar, TorqueModel};
 use powerball::identification::chain::Chain;
@@ -185,4 +186,15 @@ fn ripple_of_a_coupled_motor_is_named_on_it() {
     let number = |key: &str| said["parameters"][key][0].as_f64().unwrap();
     approx::assert_relative_eq!(number("orders"), order, max_relative = 1e-3);
     approx::assert_relative_eq!(number("amplitudes"), size, max_relative = 0.03);
+    // Its terms are within their standard errors, which are told.
+    for t in &explained.model.additions.terms {
+        let truth = match t.term.law {
+            Law::Sine { .. } => size,
+            Law::Cosine { .. } => 0.0,
+            other => panic!("{other:?}"),
+        };
+        let std = t.std.unwrap();
+        println!("{:?}: {} ± {std}", t.term.law, t.term.coefficient);
+        assert!(std < 0.02 * size && (t.term.coefficient - truth).abs() < 4.0 * std);
+    }
 }

@@ -1,5 +1,5 @@
-//! Named effects as MuJoCo's `<dcmotor>` has them: cogging, and LuGre's friction (MuJoCo 4, XML reference,
-//! actuator/dcmotor and its technical note).
+//! Named effects as MuJoCo has them: cogging and LuGre's friction of a `<dcmotor>` (MuJoCo 4, XML reference,
+//! actuator/dcmotor and its technical note), and springs.
 //!
 //! A `<dcmotor>` without input and without motor constant is passive: nothing of it is left but these two. Its
 //! torque acts on the joint; a term is what the motor has to bring up against it, of the other sign.
@@ -20,8 +20,20 @@ pub(super) struct Motors {
     pub(super) motors: Vec<Motor>,
     /// Whether the joint's constant friction is among them, in the place of `frictionloss`.
     pub(super) has_coulomb: bool,
+    /// Torque that grows with the position.
+    pub(super) spring: Option<Spring>,
     /// Terms for which MuJoCo has no law, in words.
     pub(super) left_out: Vec<String>,
+}
+
+/// A spring of a joint or a tendon: stiffness·(q − rest) is what the motor has to bring up.
+#[derive(Debug)]
+pub(super) struct Spring {
+    /// N·m/rad or N/m; positive.
+    pub(super) stiffness: f64,
+    /// rad or m.
+    pub(super) rest: f64,
+    pub(super) words: String,
 }
 
 /// A passive `<dcmotor>`.
@@ -39,8 +51,12 @@ pub(super) struct Motor {
 pub(super) fn motors(kind: JointKind, friction: Option<Friction>, terms: &[&Term]) -> Motors {
     let mut all = Motors::default();
     let mut orders: Vec<f64> = Vec::new();
+    all.spring = spring(terms);
     for term in terms {
         let (effect, c) = (&term.effect, term.coefficient);
+        if all.spring.is_some() && is_of_spring(terms, term) {
+            continue;
+        }
         let mut left_out = |why: &str| all.left_out.push(format!("{effect}: {why}"));
         match &term.law {
             Law::Cosine { order } | Law::Sine { order } => {
@@ -54,7 +70,7 @@ pub(super) fn motors(kind: JointKind, friction: Option<Friction>, terms: &[&Term
                 attributes: lugre(c / distance, c, c, 1.0),
                 words: format!(
                     "{effect}: Dahl's presliding friction of {} within {}, exactly",
-                    shortest(c),
+                    told(&[term]),
                     shortest(*distance)
                 ),
                 has_state: true,
@@ -74,7 +90,7 @@ pub(super) fn motors(kind: JointKind, friction: Option<Friction>, terms: &[&Term
                             "{effect}: in place of frictionloss, {} + {} exp(-(v/{})^2) in steady sliding; not from \
                              a log: that bristles of {} hold it at rest",
                             shortest(coulomb),
-                            shortest(c),
+                            told(&[term]),
                             shortest(*velocity),
                             shortest(bristles)
                         ),
@@ -82,10 +98,48 @@ pub(super) fn motors(kind: JointKind, friction: Option<Friction>, terms: &[&Term
                     });
                 }
             }
+            Law::Position => left_out("a torque that falls with the position, which no spring's does"),
+            Law::Constant => left_out("MuJoCo has no constant torque that is no actuator's"),
             Law::Other(law) => left_out(&format!("MuJoCo has no law '{law}'")),
         }
     }
     all
+}
+
+/// Whether a term is one of the joint's spring: grows with the position, or moves where that is zero.
+fn is_of_spring(terms: &[&Term], term: &Term) -> bool {
+    let grows = |other: &&Term| other.law == Law::Position && other.effect == term.effect;
+    term.law == Law::Position || term.law == Law::Constant && terms.iter().any(grows)
+}
+
+fn spring(terms: &[&Term]) -> Option<Spring> {
+    let of = |law: Law| -> Vec<&Term> {
+        terms.iter().copied().filter(|term| term.law == law && is_of_spring(terms, term)).collect()
+    };
+    let sum = |terms: &[&Term]| terms.iter().map(|term| term.coefficient).sum::<f64>();
+    let (grows, constant) = (of(Law::Position), of(Law::Constant));
+    let (stiffness, offset) = (sum(&grows), sum(&constant));
+    (stiffness > 0.0).then(|| Spring {
+        stiffness,
+        rest: -offset / stiffness,
+        words: format!(
+            "{}: the motor has to bring up {} q + {}, exactly",
+            grows[0].effect,
+            told(&grows),
+            told(&constant)
+        ),
+    })
+}
+
+/// The sum of some terms' coefficients with its standard error, which takes those of the terms for independent.
+fn told(terms: &[&Term]) -> String {
+    let value = shortest(terms.iter().map(|term| term.coefficient).sum());
+    let square: Option<f64> = terms.iter().map(|term| term.std.map(|std| std * std)).sum();
+    match square {
+        _ if terms.is_empty() => value,
+        Some(square) => format!("({value} ± {:.3e})", square.sqrt()),
+        None => format!("({value}, standard error unknown)"),
+    }
 }
 
 /// σ0, σ1 = 0, Coulomb's and static level, Stribeck's velocity. Without σ1 nothing is added to steady sliding, and with
@@ -97,14 +151,9 @@ fn lugre(stiffness: f64, coulomb: f64, breakaway: f64, velocity: f64) -> String 
 
 /// All terms of one order: −(a cos kq + b sin kq) = amplitude·sin(kq + phase).
 fn cogging(effect: &str, order: f64, terms: &[&Term]) -> Motor {
-    let (mut sine, mut cosine) = (0.0, 0.0);
-    for term in terms {
-        match term.law {
-            Law::Cosine { order: k } if k == order => cosine += term.coefficient,
-            Law::Sine { order: k } if k == order => sine += term.coefficient,
-            _ => {}
-        }
-    }
+    let of = |law: Law| -> Vec<&Term> { terms.iter().copied().filter(|term| term.law == law).collect() };
+    let [sines, cosines] = [of(Law::Sine { order }), of(Law::Cosine { order })];
+    let [sine, cosine] = [&sines, &cosines].map(|all| all.iter().map(|term| term.coefficient).sum::<f64>());
     let amplitude = f64::hypot(cosine, sine);
     let phase = if sine == 0.0 { -FRAC_PI_2.copysign(cosine) } else { f64::atan2(-cosine, -sine) };
     // The number of poles is an integer. What turns k times as fast with one pole has k times its torque at the joint.
@@ -116,8 +165,8 @@ fn cogging(effect: &str, order: f64, terms: &[&Term]) -> Motor {
         attributes: format!("gear=\"{gear}\" cogging=\"{amplitude} {poles} {phase}\""),
         words: format!(
             "{effect}: the motor has to bring up {} cos({order} q) + {} sin({order} q), exactly",
-            shortest(cosine),
-            shortest(sine)
+            told(&cosines),
+            told(&sines)
         ),
         has_state: false,
     }

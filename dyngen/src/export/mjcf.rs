@@ -1,15 +1,15 @@
-//! Identified values in a copy of a MuJoCo model: inertials, damping, frictionloss, armature and ranges;
+//! Identified values in a copy of a MuJoCo model: inertials, damping, frictionloss, armature, springs and ranges;
 //! every other byte stays.
 
 use super::body::Body;
-use super::dcmotor::{self, Motor};
+use super::dcmotor::{self, Motor, Spring};
 use super::edit::{Edits, child, comment, escaped, indentation, shortest};
 use super::known::{Friction, Known};
 use super::share::{self, Share};
 use super::term::Term;
 use super::urdf::Exported;
 use crate::arm::{Arm, Joint, JointKind};
-use crate::exact::rational::to_f64;
+use crate::exact::rational::{Rational, to_f64};
 use crate::import::chain;
 use crate::import::mjcf::{angles_are_radians, read};
 use crate::import::{ImportError, Options};
@@ -40,6 +40,7 @@ pub fn mjcf(
     let degrees = !angles_are_radians(&document);
     let mut notes = Vec::new();
     let mut actuators = Actuators::default();
+    let mut tendons = Vec::new();
     for (i, Share { link, body, emptied, note }) in shares.into_iter().enumerate() {
         writer.inertial(&link, lines(&link), &body, &known.words[i]);
         let none = Body::of_parameters(&[0.0; 10]);
@@ -50,15 +51,7 @@ pub fn mjcf(
         let joint = &chain.joints[i];
         let line = robot.joints.iter().find(|j| j.name == joint.name).map_or(0, |j| j.line);
         let rotor = known.values[11 * i + 10];
-        let coupled = arm.coupled_motor(i).is_some();
-        let ratio = arm.joints[i].rotor_ratio.as_ref().filter(|_| !coupled);
-        let armature = ratio.map(|k| to_f64(k).powi(2) * rotor);
-        if coupled && rotor != 0.0 {
-            notes.push(format!(
-                "joint '{}': its motor turns with several joints, which armature cannot say: its rotor is left out",
-                joint.name
-            ));
-        }
+        let armature = arm.joints[i].rotor_ratio.as_ref().map(|k| to_f64(k).powi(2) * rotor);
         let mut friction = known.friction.as_ref().and_then(|f| f[i]);
         let terms: Vec<&Term> = known.terms.iter().filter(|term| term.link == i).collect();
         let effects = dcmotor::motors(arm.joints[i].kind, friction, &terms);
@@ -66,25 +59,103 @@ pub fn mjcf(
             friction.coulomb = 0.0;
         }
         let old = (joint.position, degrees);
-        writer.joint((&joint.name, line), &arm.joints[i], friction, armature, old);
+        let held = Held { friction, armature, spring: effects.spring };
+        let turns = match arm.coupled_motor(i) {
+            None => {
+                writer.joint((&joint.name, line), &arm.joints[i], &held, old);
+                format!("joint=\"{}\"", escaped(&joint.name))
+            }
+            Some(joints) => {
+                let tendon = format!("{OURS}motor {}", joint.name);
+                let none = Held {
+                    friction: held.friction.map(|_| Friction { viscous: 0.0, coulomb: 0.0, std: [None; 2] }),
+                    armature: armature.map(|_| 0.0),
+                    spring: None,
+                };
+                writer.joint((&joint.name, line), &arm.joints[i], &none, old);
+                let of = |(j, factor): (usize, Rational)| (chain.joints[j].name.as_str(), to_f64(&factor));
+                let joints: Vec<(&str, f64)> = joints.into_iter().map(of).collect();
+                for (name, _) in &joints {
+                    writer.name_joint(
+                        name,
+                        robot.joints.iter().find(|j| j.name == *name).map_or(0, |j| j.line),
+                    );
+                }
+                notes.push(format!(
+                    "joint '{}': its motor turns with several joints: friction and rotor are on the tendon '{tendon}', \
+                     whose length is the motor's position",
+                    joint.name
+                ));
+                tendons.extend(tendon_lines(&tendon, &joints, &held));
+                format!("tendon=\"{}\"", escaped(&tendon))
+            }
+        };
         if !effects.motors.is_empty() {
             writer.name_joint(&joint.name, line);
         }
         let left_out = effects.left_out.into_iter().map(|why| format!("joint '{}': {why}", joint.name));
         actuators.left_out.extend(left_out);
-        actuators.motors.extend(effects.motors.into_iter().map(|motor| (joint.name.clone(), motor)));
+        let placed = |motor| Placed { joint: joint.name.clone(), turns: turns.clone(), motor };
+        actuators.motors.extend(effects.motors.into_iter().map(placed));
     }
     notes.extend(actuators.left_out.iter().map(|what| format!("left out: {what}")));
+    writer.tendons(&tendons);
     writer.actuators(&actuators);
     Ok(Exported { text: writer.edits.apply(text), notes })
+}
+
+/// What a joint holds beside its range, or the tendon of a motor that turns with several joints.
+struct Held {
+    friction: Option<Friction>,
+    armature: Option<f64>,
+    spring: Option<Spring>,
 }
 
 /// Effects of all joints.
 #[derive(Default)]
 struct Actuators {
-    /// With the joint's name.
-    motors: Vec<(String, Motor)>,
+    motors: Vec<Placed>,
     left_out: Vec<String>,
+}
+
+struct Placed {
+    joint: String,
+    /// The attribute that says what its torque acts on.
+    turns: String,
+    motor: Motor,
+}
+
+/// The fixed tendon of a motor, whose length is the motor's position: the sum of joint positions times factors.
+fn tendon_lines(name: &str, joints: &[(&str, f64)], held: &Held) -> Vec<String> {
+    let mut words = vec!["dyngen: a motor that turns with several joints".to_string()];
+    let mut attributes = format!("name=\"{}\"", escaped(name));
+    let mut add = |key: &str, value: f64| attributes += &format!(" {key}=\"{}\"", shortest(value));
+    if let Some(friction) = &held.friction {
+        words.push(errors(friction));
+        add("damping", friction.viscous);
+        add("frictionloss", friction.coulomb);
+    }
+    if let Some(armature) = held.armature {
+        add("armature", armature);
+    }
+    if let Some(spring) = &held.spring {
+        words.push(spring.words.clone());
+        add("stiffness", spring.stiffness);
+        add("springlength", spring.rest);
+    }
+    let joint = |(name, factor): &(&str, f64)| {
+        format!("  <joint joint=\"{}\" coef=\"{}\"/>", escaped(name), shortest(*factor))
+    };
+    let mut lines = vec![comment(&words.join("; ")), format!("<fixed {attributes}>")];
+    lines.extend(joints.iter().map(joint));
+    lines.push("</fixed>".to_string());
+    lines
+}
+
+/// The standard errors of friction, in words.
+fn errors(friction: &Friction) -> String {
+    let error = |k: usize| friction.std[k].map_or("unknown".to_string(), |s| format!("{s:.3e}"));
+    format!("standard errors: damping {}, frictionloss {}", error(0), error(1))
 }
 
 /// What the names of actuators begin with that an export writes, and the next one replaces.
@@ -135,23 +206,27 @@ impl<'t, 'd> Writer<'t, 'd> {
         &mut self,
         (name, line): (&str, u32),
         joint: &Joint,
-        friction: Option<Friction>,
-        armature: Option<f64>,
+        held: &Held,
         (old, degrees): (Option<[f64; 2]>, bool),
     ) {
         let Some(node) = self.element("joint", name, line) else { return };
-        if let Some(friction) = friction {
-            let error = |k: usize| friction.std[k].map_or("unknown".to_string(), |s| format!("{s:.3e}"));
-            let words = format!("dyngen: standard errors: damping {}, frictionloss {}", error(0), error(1));
-            self.edits.insert(node.range().start, comment(&words));
+        if let Some(friction) = &held.friction {
+            if friction.viscous != 0.0 || friction.coulomb != 0.0 || friction.std != [None; 2] {
+                self.edits.insert(node.range().start, comment(&format!("dyngen: {}", errors(friction))));
+            }
             self.attribute(node, "damping", shortest(friction.viscous));
             self.attribute(node, "frictionloss", shortest(friction.coulomb));
         }
-        if let Some(armature) = armature {
+        if let Some(armature) = held.armature {
             self.attribute(node, "armature", shortest(armature));
         }
         let unit =
             if degrees && joint.kind == JointKind::Revolute { 180.0 / std::f64::consts::PI } else { 1.0 };
+        if let Some(spring) = &held.spring {
+            self.edits.insert(node.range().start, comment(&format!("dyngen: {}", spring.words)));
+            self.attribute(node, "stiffness", shortest(spring.stiffness));
+            self.attribute(node, "springref", shortest(spring.rest * unit));
+        }
         if let Some([low, high]) = joint.position.filter(|p| Some(*p) != old) {
             self.attribute(node, "range", format!("{} {}", shortest(low * unit), shortest(high * unit)));
         }
@@ -167,38 +242,52 @@ impl<'t, 'd> Writer<'t, 'd> {
 
     /// Writes effects as passive actuators, in the place of those of an earlier export.
     fn actuators(&mut self, Actuators { motors, left_out }: &Actuators) {
-        let root = self.document.root_element();
-        let sections: Vec<Node<'d, 't>> = root.children().filter(|n| n.has_tag_name("actuator")).collect();
-        let ours = |n: &Node<'d, 't>| {
-            n.has_tag_name("dcmotor") && n.attribute("name").is_some_and(|name| name.starts_with(OURS))
-                || n.is_comment() && n.text().is_some_and(|text| text.trim_start().starts_with("dyngen: "))
-        };
-        let mut states = 0;
-        for old in sections.iter().flat_map(|section| section.children()).filter(ours) {
-            let before = self.text[..old.range().start].trim_end().len();
-            self.edits.replace(before..old.range().end, "");
-            states -= i64::from(old.attribute("lugre").is_some());
-        }
+        let (last, old) = self.cleared("actuator", "dcmotor");
+        let mut states = -(old.iter().filter(|node| node.attribute("lugre").is_some()).count() as i64);
         if motors.is_empty() && left_out.is_empty() && states == 0 {
             return;
         }
         let mut lines: Vec<String> =
             left_out.iter().map(|what| comment(&format!("dyngen: left out: {what}"))).collect();
-        for (k, (joint, motor)) in motors.iter().enumerate() {
+        for (k, Placed { joint, turns, motor }) in motors.iter().enumerate() {
             states += i64::from(motor.has_state);
             lines.push(comment(&format!("dyngen: joint '{joint}': {}", motor.words)));
-            let (name, joint) = (escaped(&format!("{OURS}{} {joint}", k + 1)), escaped(joint));
+            let name = escaped(&format!("{OURS}{} {joint}", k + 1));
             lines.push(format!(
-                "<dcmotor name=\"{name}\" joint=\"{joint}\" input=\"none\" motorconst=\"0 0\" resistance=\"1\" {}/>",
+                "<dcmotor name=\"{name}\" {turns} input=\"none\" motorconst=\"0 0\" resistance=\"1\" {}/>",
                 motor.attributes
             ));
         }
-        self.append_to_actuators(sections.last().copied(), &lines);
+        self.append("actuator", last, &lines);
         self.states(states);
     }
 
-    /// Puts lines at the end of the actuators, which come last then, as their states do.
-    fn append_to_actuators(&mut self, section: Option<Node<'d, 't>>, lines: &[String]) {
+    /// Writes motors that turn with several joints, in the place of those of an earlier export.
+    fn tendons(&mut self, lines: &[String]) {
+        let (last, _) = self.cleared("tendon", "fixed");
+        self.append("tendon", last, lines);
+    }
+
+    /// Takes out what an earlier export wrote into the sections of a name: elements of one kind, and comments. Returns
+    /// the last of the sections, and what was in.
+    fn cleared(&mut self, section: &str, kind: &str) -> (Option<Node<'d, 't>>, Vec<Node<'d, 't>>) {
+        let root = self.document.root_element();
+        let sections: Vec<Node<'d, 't>> = root.children().filter(|n| n.has_tag_name(section)).collect();
+        let ours = |n: &Node<'d, 't>| {
+            n.has_tag_name(kind) && n.attribute("name").is_some_and(|name| name.starts_with(OURS))
+                || n.is_comment() && n.text().is_some_and(|text| text.trim_start().starts_with("dyngen: "))
+        };
+        let old: Vec<Node<'d, 't>> =
+            sections.iter().flat_map(|section| section.children()).filter(ours).collect();
+        for node in &old {
+            let before = self.text[..node.range().start].trim_end().len();
+            self.edits.replace(before..node.range().end, "");
+        }
+        (sections.last().copied(), old)
+    }
+
+    /// Puts lines at the end of a section: actuators come last then, as their states do.
+    fn append(&mut self, name: &str, section: Option<Node<'d, 't>>, lines: &[String]) {
         if lines.is_empty() {
             return;
         }
@@ -215,12 +304,12 @@ impl<'t, 'd> Writer<'t, 'd> {
             Some((section, None)) => {
                 let margin = indentation(self.text, section.range().start);
                 let inner = inner(&format!("{margin}  "));
-                self.edits.replace(section.range(), format!("<actuator>{inner}\n{margin}</actuator>"));
+                self.edits.replace(section.range(), format!("<{name}>{inner}\n{margin}</{name}>"));
             }
             None => {
                 let end = root.last_child().map_or(root.range().end, |last| last.range().end);
                 let end = self.text[..end].trim_end().len();
-                self.edits.insert(end, format!("\n  <actuator>{}\n  </actuator>", inner("    ")));
+                self.edits.insert(end, format!("\n  <{name}>{}\n  </{name}>", inner("    ")));
             }
         }
     }

@@ -12,6 +12,8 @@ pub struct Term {
     pub effect: String,
     /// N·m or N.
     pub coefficient: f64,
+    /// Its standard error, where it is known.
+    pub std: Option<f64>,
     /// What it is multiplied with.
     pub law: Law,
 }
@@ -39,6 +41,10 @@ pub enum Law {
         /// rad/s or m/s.
         velocity: f64,
     },
+    /// q.
+    Position,
+    /// 1.
+    Constant,
     /// One for which there is none, by its name.
     Other(String),
 }
@@ -71,10 +77,13 @@ pub(super) fn read(arm: &Arm, json: &Value) -> Result<Vec<Term>, String> {
             Some("sine") => Law::Sine { order: size("order")? },
             Some("presliding") => Law::Presliding { distance: size("distance")? },
             Some("stribeck") => Law::Stribeck { velocity: size("velocity")? },
+            Some("position") => Law::Position,
+            Some("constant") => Law::Constant,
             Some(other) => Law::Other(other.to_string()),
             None => return Err(wrong(format!("'law' must be a name, found {}", entry["law"]))),
         };
-        Ok(Term { link, coefficient: number("coefficient")?, law, effect })
+        let std = entry["std"].as_f64().filter(|x| x.is_finite() && *x >= 0.0);
+        Ok(Term { link, coefficient: number("coefficient")?, std, law, effect })
     };
     list.into_iter().flatten().enumerate().map(term).collect()
 }

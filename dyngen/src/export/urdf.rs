@@ -55,7 +55,15 @@ pub fn urdf(
             }
         }
         writer.notes.extend(share.note);
-        writer.joint(&chain.joints[i].name, &arm.joints[i], known.friction.as_ref().and_then(|f| f[i]));
+        let mut friction = known.friction.as_ref().and_then(|f| f[i]);
+        if arm.coupled_motor(i).is_some() && friction.take().is_some() {
+            writer.notes.push(format!(
+                "joint '{}': its motor turns with several joints, and its friction is the motor's: a URDF has no place \
+                 for it, what stood at the joint stays",
+                chain.joints[i].name
+            ));
+        }
+        writer.joint(&chain.joints[i].name, &arm.joints[i], friction);
     }
     let mut effects: Vec<&str> = known.terms.iter().map(|term| term.effect.as_str()).collect();
     effects.sort_unstable();

@@ -150,10 +150,16 @@ fn link_values(joint: &ChainJoint, frame: &Pose) -> [f64; 10] {
     parameters_of_body(mass, &moment, &tensor)
 }
 
-/// A length to 1e-12 m, as a decimal.
+/// A length as a decimal: to 1e-12 m where that is the number but for rounding, so that lengths that are meant to be
+/// equal are; to 1e-15 m otherwise, as a wheel of 1e-5 kg·m² feels its axis 1e-12 m aside.
 fn length(value: f64) -> String {
-    decimal(value, 12)
+    let short = decimal(value, 12);
+    let meant = short.parse().is_ok_and(|short: f64| (value - short).abs() < ROUNDING * value.abs().max(1.0));
+    if meant { short } else { decimal(value, 15) }
 }
+
+/// What sums and products of a chain's numbers are off by at most, relative.
+const ROUNDING: f64 = 1e-14;
 
 fn decimal(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");

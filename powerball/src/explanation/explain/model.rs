@@ -3,7 +3,7 @@
 use super::study::Study;
 use crate::explanation::effects::{self, Candidate, Context, Effect};
 use crate::explanation::rule::Rule;
-use crate::identification::estimate::{Fit, Folds, Term, fit};
+use crate::identification::estimate::{Fit, Folds, Solver, Term, fit};
 use crate::logs::regression::{Column, Data};
 use std::ops::Range;
 
@@ -130,6 +130,13 @@ impl Model {
             a.measured.clone().unwrap_or_else(|| self.fit.theta[place].to_vec())
         };
         self.accepted.iter().zip(self.places()).map(of).collect()
+    }
+
+    /// Standard errors of the fit's columns by their place; none of a column that is not free.
+    pub(super) fn errors(&self) -> impl Fn(usize) -> Option<f64> {
+        let (gram, _, _) = self.fit.gram.fitted(&self.fit.weights, |_| true);
+        let variances = Solver::new(&gram, |c| self.fit.free[c]).inverse_diagonal();
+        move |column| variances.get(column).filter(|v| v.is_finite()).map(|v| v.max(0.0).sqrt())
     }
 
     /// Measured less predicted torque of the validation set, by joint and row, N·m.

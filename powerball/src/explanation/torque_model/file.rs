@@ -25,6 +25,8 @@ pub(super) struct TermEntry {
     effect: String,
     joint: usize,
     coefficient: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    std: Option<f64>,
     #[serde(flatten, with = "LawEntry")]
     law: Law<f64>,
 }
@@ -32,14 +34,14 @@ pub(super) struct TermEntry {
 impl From<TermEntry> for NamedTerm {
     fn from(e: TermEntry) -> NamedTerm {
         let term = Term { joint: e.joint.saturating_sub(1), coefficient: e.coefficient, law: e.law };
-        NamedTerm { effect: e.effect, term }
+        NamedTerm { effect: e.effect, term, std: e.std }
     }
 }
 
 impl From<NamedTerm> for TermEntry {
     fn from(t: NamedTerm) -> TermEntry {
         let Term { joint, coefficient, law } = t.term;
-        TermEntry { effect: t.effect, joint: joint + 1, coefficient, law }
+        TermEntry { effect: t.effect, joint: joint + 1, coefficient, std: t.std, law }
     }
 }
 
@@ -237,7 +239,7 @@ impl TorqueModel {
                 None => return wrong(format!("has no friction for joint {joint}")),
             }
         }
-        for NamedTerm { effect, term } in &self.additions.terms {
+        for NamedTerm { effect, term, .. } in &self.additions.terms {
             let other = match term.law {
                 Law::OtherDirection { other, .. }
                 | Law::OtherVelocity { other }

@@ -72,9 +72,13 @@ impl Additions {
     /// The same torque with terms that were fitted at logged positions of a joint written for true ones,
     /// `offset` rad less.
     pub(crate) fn put_zero_right(&mut self, joint: JointNumber, offset: f64) {
-        let moved = |NamedTerm { effect, term }: NamedTerm| {
+        let moved = |NamedTerm { effect, term, std }: NamedTerm| {
             let parts = at_true_position(&term, joint.index(), offset).into_iter();
-            parts.map(move |term| NamedTerm { effect: effect.clone(), term })
+            parts.map(move |part| {
+                // What is turned into two terms shares an error that none of them has alone.
+                let std = std.filter(|_| part == term);
+                NamedTerm { effect: effect.clone(), term: part, std }
+            })
         };
         self.terms = self.terms.drain(..).flat_map(moved).collect();
         self.join();
@@ -88,7 +92,10 @@ impl Additions {
                 o.effect == t.effect && o.term.joint == t.term.joint && o.term.law == t.term.law
             };
             match joined.iter_mut().find(twin) {
-                Some(other) => other.term.coefficient += t.term.coefficient,
+                Some(other) => {
+                    other.term.coefficient += t.term.coefficient;
+                    other.std = other.std.zip(t.std).map(|(a, b)| a.hypot(b));
+                }
                 None => joined.push(t),
             }
         }

@@ -65,6 +65,8 @@ pub struct NamedTerm {
     pub effect: String,
     /// Joint, law and coefficient.
     pub term: Term<f64>,
+    /// Standard error of the coefficient, where it is known.
+    pub std: Option<f64>,
 }
 
 /// Where the arm is not as its file says.
@@ -147,7 +149,7 @@ impl TorqueModel {
     pub fn terms(&self) -> Vec<NamedTerm> {
         let constant = |f: &JointFriction| {
             let term = Term { joint: f.joint.saturating_sub(1), coefficient: f.offset?, law: Law::Constant };
-            Some(NamedTerm { effect: "constant torque".to_string(), term })
+            Some(NamedTerm { effect: "constant torque".to_string(), term, std: None })
         };
         self.friction.iter().filter_map(constant).chain(self.additions.terms.iter().cloned()).collect()
     }

@@ -53,6 +53,7 @@ fn model(body: &RigidArm, laws: &[Law<f64>]) -> TorqueModel {
     let friction = (0..body.dof()).map(|joint| JointFriction::plain(joint, [4.5, 216.0, 2.0, 4.7, 15.0]));
     let term = |(k, law): (usize, &Law<f64>)| NamedTerm {
         effect: format!("effect_{k}"),
+        std: (k % 2 == 0).then_some(1e-3),
         term: Term { joint: 1, coefficient: 0.01 * (k + 1) as f64, law: *law },
     };
     TorqueModel {

@@ -50,7 +50,7 @@ pub(crate) fn compose(
         arm: body.arm().name.clone(),
         set: SetKind::Minimal.to_string(),
         parameters: plain(body, found.fit.inertial()),
-        friction: (0..body.dof()).map(|j| JointFriction::plain(j, found.fit.friction(j))).collect(),
+        friction: friction(found),
         additions,
     };
     let changed = match model.additions.arm_changes == ArmChanges::default() {
@@ -99,17 +99,20 @@ fn parts(study: &Study<'_>, found: &Model, held: Option<&Held>) -> Parts {
     let (mut offset, mut delay) = (vec![0.0; n], vec![0.0; n]);
     let mut parts = Parts::default();
     parts.additions.payloads.extend(held.and_then(|held| payload(&held.part, &held.windows)));
+    let (errors, places) = (found.errors(), found.places());
     for (k, (a, coefficients)) in found.accepted.iter().zip(found.coefficients()).enumerate() {
+        // What was measured above the band has no column.
+        let error = |c: usize| errors(places[k].start + c).filter(|_| a.measured.is_none());
         let (effect, candidate) = (a.effect(), &a.candidate);
         let add = |to: &mut [f64], by: f64| candidate.joints.iter().for_each(|j| to[j.index()] += by);
         let part = effect.part(&context, candidate, &coefficients);
         match part {
             Part::Laws => {
-                for (laws, coefficient) in
-                    effect.placed_laws(&context, candidate).into_iter().zip(coefficients)
-                {
+                let laws = effect.placed_laws(&context, candidate).into_iter().zip(coefficients);
+                for (c, (laws, coefficient)) in laws.enumerate() {
                     parts.additions.terms.extend(laws.into_iter().map(|(joint, law, share)| NamedTerm {
                         effect: effect.name().to_string(),
+                        std: error(c).map(|std| std * share.abs()),
                         term: Term { joint: joint.index(), coefficient: coefficient * share, law },
                     }));
                 }
@@ -137,6 +140,17 @@ fn parts(study: &Study<'_>, found: &Model, held: Option<&Held>) -> Parts {
     let given = |list: Vec<f64>| if list.iter().any(|x| *x != 0.0) { list } else { Vec::new() };
     parts.additions.log_changes = LogChanges { encoder_offset: given(offset), delay: given(delay) };
     parts
+}
+
+/// Eq. 16 by joint, with the errors of its levels; those of its steepnesses are not told.
+fn friction(found: &Model) -> Vec<JointFriction> {
+    let (errors, layout) = (found.errors(), found.fit.design.layout);
+    let of_joint = |j: usize| {
+        let level = |k| errors(layout.friction(j, k));
+        let std = [level(0), None, level(1), None, level(2)];
+        JointFriction { std, ..JointFriction::plain(j, found.fit.friction(j)) }
+    };
+    (0..layout.dof).map(of_joint).collect()
 }
 
 /// A payload of a model, where a part is one.

@@ -5,7 +5,7 @@ use super::super::model::{Accepted, Model};
 use super::super::study::Study;
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Figures, Found};
-use crate::identification::estimate::{Solver, spread};
+use crate::identification::estimate::spread;
 use serde::Serialize;
 
 /// A torque without a name that joints feel, as a formula that holds on logs that were not fitted.
@@ -64,13 +64,7 @@ pub struct LawCoefficient {
 pub(crate) fn laws(study: &Study<'_>, model: &Model, steps: &[Step]) -> Vec<UnnamedLaw> {
     let context = model.context(study);
     let with = spread(&study.validation, &model.residual_on_validation(study)).rms;
-    let (gram, _, _) = model.fit.gram.fitted(&model.fit.weights, |_| true);
-    let solver = Solver::new(&gram, |c| model.fit.free[c]);
-    let std = |column: usize| {
-        let mut unit = vec![0.0; model.fit.free.len()];
-        unit[column] = 1.0;
-        solver.solve(&unit)[column].max(0.0).sqrt()
-    };
+    let errors = model.errors();
     let of = |(k, (a, place)): (usize, (&Accepted, std::ops::Range<usize>))| {
         let coefficients = &model.fit.theta[place.clone()];
         let found = Found { candidate: &a.candidate, coefficients };
@@ -81,7 +75,7 @@ pub(crate) fn laws(study: &Study<'_>, model: &Model, steps: &[Step]) -> Vec<Unna
         let coefficient = |(n, (value, unit)): (usize, (&f64, &'static str))| LawCoefficient {
             name: format!("c{}", n + 1),
             value: *value,
-            std: std(place.start + n),
+            std: errors(place.start + n).unwrap_or(0.0),
             unit,
         };
         Some(UnnamedLaw {
