@@ -1,6 +1,6 @@
 //! What an effect may look at: the data, the model fitted so far, and what it leaves.
 
-use super::Placed;
+use super::{MotionColumns, Placed};
 use crate::controller::JointNumber;
 use crate::controller::correction::{Instant, Law, Memory};
 use crate::controller::friction::TanhFriction;
@@ -24,6 +24,8 @@ pub struct Context<'a> {
     pub residual: &'a [Vec<f64>],
     /// The thresholds of the rule.
     pub rule: &'a Rule,
+    /// The data's columns that were made already.
+    made: Option<&'a MotionColumns>,
     rigid: OnceLock<Vec<Vec<f64>>>,
     friction: OnceLock<Vec<Vec<f64>>>,
     prediction: OnceLock<Vec<Vec<f64>>>,
@@ -38,6 +40,7 @@ impl<'a> Context<'a> {
             fit,
             residual,
             rule,
+            made: None,
             rigid: OnceLock::new(),
             friction: OnceLock::new(),
             prediction: OnceLock::new(),
@@ -48,6 +51,12 @@ impl<'a> Context<'a> {
     #[must_use]
     pub fn for_columns(data: &'a Data<'a>, fit: &'a Fit, rule: &'a Rule) -> Context<'a> {
         Context::new(data, fit, &[], rule)
+    }
+
+    /// Takes from columns of the same data what was made already, and adds to them.
+    pub(crate) fn with(mut self, made: &'a MotionColumns) -> Context<'a> {
+        self.made = Some(made);
+        self
     }
 
     /// Joints that move.
@@ -120,7 +129,15 @@ impl<'a> Context<'a> {
         if law.moves_link() {
             return self.moved_link_column(joint, law, None);
         }
-        self.data.column_on(joint.index(), |r, _| self.law_along(r, joint, law))
+        let make = || {
+            let rows = &self.data.joints[joint.index()];
+            rows.column(&self.data.recordings, |r, _| self.law_along(r, joint, law))
+        };
+        let values = match self.made {
+            Some(made) => made.get(joint, law, make),
+            None => make(),
+        };
+        Column::on(joint.index(), values)
     }
 
     /// A law that moves no link along a recording, one value a sample.

@@ -101,7 +101,7 @@ impl Model {
 
     /// The model seen on the logs that it was fitted to.
     pub(super) fn context<'c>(&'c self, study: &'c Study<'_>) -> Context<'c> {
-        Context::new(&study.data, &self.fit, &self.fit.residual, study.rule())
+        Context::new(&study.data, &self.fit, &self.fit.residual, study.rule()).with(&study.columns)
     }
 
     /// Whether a candidate or one that excludes it was accepted.

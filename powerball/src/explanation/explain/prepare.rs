@@ -3,6 +3,7 @@
 use super::named::Spreads;
 use super::special::{Clock, Held, held_in_validation, repeats, settle};
 use super::study::Study;
+use crate::explanation::effects::MotionColumns;
 use crate::explanation::options::{ExplainError, ExplainOptions};
 use crate::identification::estimate::{Fit, Folds, bands_of, fit, spread};
 use crate::logs::log::Log;
@@ -61,7 +62,7 @@ pub(super) fn prepare<'a>(
     };
     let one_path = repeats(rule, &data, &validation);
     let clock = settle(rule, logs, validate, &mut data, &base, &mut validation);
-    let study = Study { data, validation, folds, one_path, options };
+    let study = Study { data, columns: MotionColumns::default(), validation, folds, one_path, options };
     Ok(Begun { study, base, beforehand: Beforehand { errors, residual, held, clock } })
 }
 

@@ -1,5 +1,6 @@
 //! What does not change while effects are looked for.
 
+use crate::explanation::effects::MotionColumns;
 use crate::explanation::options::ExplainOptions;
 use crate::explanation::rule::Rule;
 use crate::identification::estimate::Folds;
@@ -9,6 +10,8 @@ use crate::logs::regression::Data;
 pub(super) struct Study<'a> {
     /// The logs to fit.
     pub(super) data: Data<'a>,
+    /// Their columns that do not depend on the model.
+    pub(super) columns: MotionColumns,
     /// The validation set: logs of another path, on which additions must hold.
     pub(super) validation: Data<'a>,
     /// How the logs to fit are held out.

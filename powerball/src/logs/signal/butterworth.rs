@@ -21,13 +21,16 @@ impl Biquad {
     }
 
     /// One sample through the section in the given state.
+    ///
+    /// The next state is written in the present one alone, not in the output: a sample waits for one product
+    /// and one sum of the sample before it.
     #[inline(always)]
     fn step(&self, [s1, s2]: &mut [f64; 2], x: f64) -> f64 {
         let [b0, b1, b2] = self.b;
         let [a1, a2] = self.a;
-        let y = b0 * x + *s1;
-        *s1 = b1 * x - a1 * y + *s2;
-        *s2 = b2 * x - a2 * y;
+        let (state, y) = (*s1, b0 * x + *s1);
+        *s1 = ((b1 - a1 * b0) * x + *s2) - a1 * state;
+        *s2 = (b2 - a2 * b0) * x - a2 * state;
         y
     }
 }

@@ -75,7 +75,7 @@ fn needed(study: &Study<'_>, model: &Model, place: usize) -> Option<Needed> {
     let mut residual = model.fit.residual.clone();
     let columns = effect.columns(&model.context(study), candidate);
     columns.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut residual, *c));
-    let context = Context::new(&study.data, &model.fit, &residual, study.rule());
+    let context = Context::new(&study.data, &model.fit, &residual, study.rule()).with(&study.columns);
     let screen = Screen::without(&context, own);
     let trial = screen.try_candidate(candidate)?;
     let all = model.columns_on_validation(study);

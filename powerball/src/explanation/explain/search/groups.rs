@@ -140,13 +140,15 @@ fn best_by_joint(screen: &Screen<'_>, candidates: Vec<Candidate>) -> Vec<Member>
             None => members.push(Member { candidate, trial, evidence: None, refusal: None, judged: true }),
         }
     }
-    for member in &mut members {
-        for candidate in member.candidate.effect().neighbours(&member.candidate, 1.0) {
-            if let Some(trial) = screen.try_candidate(&candidate)
-                && trial.score > member.trial.score
-            {
-                (member.candidate, member.trial) = (candidate, trial);
-            }
+    let near = |(m, member): (usize, &Member)| {
+        let neighbours = member.candidate.effect().neighbours(&member.candidate, 1.0);
+        neighbours.into_iter().map(|candidate| (m, candidate)).collect::<Vec<_>>()
+    };
+    let near: Vec<(usize, Candidate)> = members.iter().enumerate().flat_map(near).collect();
+    let trials = parallel::map(&near, |(_, candidate)| screen.try_candidate(candidate));
+    for ((m, candidate), trial) in near.into_iter().zip(trials) {
+        if let Some(trial) = trial.filter(|trial| trial.score > members[m].trial.score) {
+            (members[m].candidate, members[m].trial) = (candidate, trial);
         }
     }
     members
