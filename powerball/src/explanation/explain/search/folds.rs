@@ -23,8 +23,16 @@ impl Cross {
         Cross { base: vec![vec![0.0; size]; k], square: vec![0.0; k * k], right: vec![0.0; k] }
     }
 
-    fn add(&mut self, other: &Cross, sign: f64) {
-        let add = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| *t += sign * f);
+    /// The sum over some cells; a difference from all of them would leave rounding where nothing is left.
+    fn sum<'c>(cells: impl Iterator<Item = &'c Cross>, size: usize, k: usize) -> Cross {
+        cells.fold(Cross::zero(size, k), |mut sum, cell| {
+            sum.add(cell);
+            sum
+        })
+    }
+
+    fn add(&mut self, other: &Cross) {
+        let add = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| *t += f);
         self.base.iter_mut().zip(&other.base).for_each(|(t, f)| add(t, f));
         add(&mut self.square, &other.square);
         add(&mut self.right, &other.right);
@@ -44,7 +52,6 @@ pub(crate) fn fold_gains(
     let (data, fit) = (screen.context.data, screen.context.fit);
     let (size, k) = (fit.design.size, trial.columns.len());
     let mut cells: Vec<Option<Cross>> = vec![None; folds.cells];
-    let mut total = Cross::zero(size, k);
     for j in 0..fit.design.dof() {
         let parts: Vec<&[f64]> = trial.columns.iter().filter_map(|c| c.at(j)).collect();
         let w = fit.weights[j];
@@ -68,16 +75,17 @@ pub(crate) fn fold_gains(
             }
         }
     }
-    cells.iter().flatten().for_each(|c| total.add(c, 1.0));
+    let sum = |wanted: &dyn Fn(usize) -> bool| {
+        let own = cells.iter().enumerate().filter(|(cell, _)| wanted(*cell));
+        Cross::sum(own.filter_map(|(_, cross)| cross.as_ref()), size, k)
+    };
     screen
         .folds(folds, local)
         .iter()
         .filter_map(|fold| {
             let scale: f64 = joints.iter().map(|j| fold.error[j.index()]).sum();
-            let mut fitted = total.clone();
-            fold.left_out.iter().filter_map(|c| cells[*c].as_ref()).for_each(|c| fitted.add(c, -1.0));
-            let mut held = Cross::zero(size, k);
-            fold.held.iter().filter_map(|c| cells[*c].as_ref()).for_each(|c| held.add(c, 1.0));
+            let fitted = sum(&|cell| !fold.left_out.contains(&cell));
+            let held = sum(&|cell| fold.held.contains(&cell));
             (scale > 0.0).then(|| change(fold, &fitted, &held, k) / scale)
         })
         .collect()

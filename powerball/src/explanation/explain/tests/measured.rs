@@ -45,35 +45,43 @@ fn figures_of(explained: &Explained, name: &str) -> serde_json::Value {
     figures(explained.effects.iter().find(|e| e.effect == name).unwrap())
 }
 
-#[test]
-fn load_friction_of_the_ur10e_is_found_and_held_out_errors_fall() {
-    let Some(explained) = ur10e(&["12a", "12b", "12c", "7", "8"], &["14", "5"]) else { return };
-    let load = joints(&explained, "load_friction");
-    assert!(load.contains(&2) && load.contains(&3), "{load:?}");
-    assert!(joints(&explained, "payload").is_empty());
-    let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
-    assert!(after[1] < 0.65 * before[1] && after[2] < 0.75 * before[2], "{before:?} {after:?}");
-    assert!(explained.false_positives.rate <= 0.01);
-}
-
-fn the_load_of_the_ur10e_is_a_payload(fit: &[&str], validate: &[&str]) {
+/// The load on the flange is a payload in its log alone, and beside it the load friction is found that every log
+/// shows: held-out errors fall.
+fn the_load_and_the_load_friction_of_the_ur10e_are_found(fit: &[&str], validate: &[&str]) {
     let Some(explained) = ur10e(fit, validate) else { return };
     let payload = explained.effects.iter().find(|e| e.effect == "payload").unwrap();
     let mass = figures(payload)["mass"].as_f64().unwrap();
     assert!((mass - 2.8).abs() < 0.15 * 2.8, "{mass}");
     assert!(payload.logs.len() == 1 && payload.logs[0].contains("14_load"));
-    assert!(joints(&explained, "load_friction").contains(&2));
+    let load = joints(&explained, "load_friction");
+    assert!(load.contains(&2) && load.contains(&3), "{load:?}");
+    let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
+    assert!(after[1] < 0.65 * before[1] && after[2] < 0.75 * before[2], "{before:?} {after:?}");
+    assert!(explained.false_positives.rate <= 0.01);
 }
 
 #[test]
 fn the_load_of_the_ur10e_is_a_payload_in_a_held_out_log() {
-    the_load_of_the_ur10e_is_a_payload(&["12a", "12b", "12c", "14", "7"], &["14_load", "5"]);
+    the_load_and_the_load_friction_of_the_ur10e_are_found(
+        &["12a", "12b", "12c", "14", "7"],
+        &["14_load", "5"],
+    );
 }
 
 #[test]
 #[ignore = "at length: the one above guards it"]
 fn the_load_of_the_ur10e_is_a_payload_in_a_fitted_log_at_length() {
-    the_load_of_the_ur10e_is_a_payload(&["12a", "12b", "12c", "14_load", "5", "8"], &["14", "7"]);
+    the_load_and_the_load_friction_of_the_ur10e_are_found(
+        &["12a", "12b", "12c", "14_load", "5", "8"],
+        &["14", "7"],
+    );
+}
+
+#[test]
+#[ignore = "at length: those above guard it"]
+fn no_payload_is_found_in_logs_of_the_ur10e_without_load_at_length() {
+    let Some(explained) = ur10e(&["12a", "12b", "12c", "7", "8"], &["14", "5"]) else { return };
+    assert!(joints(&explained, "load_friction").contains(&2) && joints(&explained, "payload").is_empty());
 }
 
 /// A SCHUNK arm runs one path again and again; no rigid body fits it. (The published analysis of these logs:
@@ -122,7 +130,10 @@ fn the_coupled_wrist_of_the_tx40_is_found_in_either_half() {
     for [fit, validate] in [["fit", "validate"], ["validate", "fit"]] {
         let Some(explained) = explained("tx40", &[fit.to_string()], &[validate.to_string()]) else { return };
         assert_eq!(joints(&explained, "joint_coupling"), [5, 6]);
-        let figures = figures_of(&explained, "joint_coupling");
+        // One log: nothing is left to fit to where it is held out, and rounding is no gain.
+        let coupling = explained.effects.iter().find(|e| e.effect == "joint_coupling").unwrap();
+        assert_eq!(coupling.held_out_gain, [0.0]);
+        let figures = figures(coupling);
         let motor = &figures["transmissions"][0];
         assert_eq!((motor["motor"].as_u64(), motor["with"].as_u64()), (Some(6), Some(5)), "{figures}");
         let ratio = motor["ratio"].as_f64().unwrap();
