@@ -15,10 +15,12 @@ pub(crate) struct MotionColumns {
     made: Mutex<Made>,
 }
 
+/// A joint and a kind of law; what it holds is the law with its settings, and its values.
+type Kind = (JointNumber, Discriminant<Law<f64>>);
+
 #[derive(Debug, Default)]
 struct Made {
-    /// By joint and kind of law: the law with its settings, and its values.
-    columns: HashMap<(JointNumber, Discriminant<Law<f64>>), Vec<(Law<f64>, Vec<f64>)>>,
+    columns: HashMap<Kind, Vec<(Law<f64>, Vec<f64>)>>,
     bytes: usize,
 }
 
