@@ -15,12 +15,19 @@ pub(crate) struct MotionColumns {
     made: Mutex<Made>,
 }
 
-/// A joint and a kind of law; what it holds is the law with its settings, and its values.
+/// A joint and a kind of law.
 type Kind = (JointNumber, Discriminant<Law<f64>>);
+
+/// A law with its settings, and its values.
+#[derive(Debug)]
+struct Known {
+    law: Law<f64>,
+    values: Vec<f64>,
+}
 
 #[derive(Debug, Default)]
 struct Made {
-    columns: HashMap<Kind, Vec<(Law<f64>, Vec<f64>)>>,
+    columns: HashMap<Kind, Vec<Known>>,
     bytes: usize,
 }
 
@@ -33,7 +40,7 @@ impl MotionColumns {
         }
         let key = (joint, discriminant(&law));
         let known = |made: &Made| {
-            made.columns.get(&key)?.iter().find(|(own, _)| *own == law).map(|(_, values)| values.clone())
+            made.columns.get(&key)?.iter().find(|known| known.law == law).map(|known| known.values.clone())
         };
         if let Some(values) = known(&self.made.lock().unwrap_or_else(PoisonError::into_inner)) {
             return values;
@@ -44,7 +51,7 @@ impl MotionColumns {
         let bytes = size_of::<f64>() * values.len();
         if made.bytes + bytes <= MOST && known(&made).is_none() {
             made.bytes += bytes;
-            made.columns.entry(key).or_default().push((law, values.clone()));
+            made.columns.entry(key).or_default().push(Known { law, values: values.clone() });
         }
         values
     }
