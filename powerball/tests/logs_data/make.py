@@ -216,8 +216,11 @@ def dataset(folder):
     )
     file = f"{folder}/data/chunk-000/file-000.parquet"
     pyarrow.parquet.write_table(pyarrow.table(columns, schema=schema), file, compression="zstd")
-    names = {"names": {"motors": CHAIN[::-1]}}
-    features = {"observation.state": names, "observation.effort": {"names": CHAIN[::-1]}}
+    names = [[f"{joint}.{what}" for joint in CHAIN[::-1]] for what in ("pos", "effort")]
+    features = {
+        "observation.state": {"names": {"motors": names[0]}},
+        "observation.effort": {"names": names[1]},
+    }
     with open(f"{folder}/meta/info.json", "w") as out:
         json.dump({"codebase_version": "v3.0", "features": features}, out)
     pyarrow.parquet.write_table(

@@ -1,7 +1,8 @@
 //! Rows of Parquet whose columns may be lists of numbers, as those of LeRobot's datasets are: `observation.state`.
 //!
 //! A list of k numbers is k columns `name1` … `namek`; where the file lies in a dataset of LeRobot's, the names that
-//! `meta/info.json` gives its numbers take the place of their count: `observation.state.shoulder_pan`.
+//! `meta/info.json` gives its numbers take the place of their count: `observation.state.shoulder_pan`, also where it
+//! calls them `shoulder_pan.pos` and so on.
 //!
 //! Such a file holds many episodes, and the time of each begins at zero: episodes are put behind each other, a second
 //! apart, so that they are pieces of one log.
@@ -129,5 +130,10 @@ fn description(file: &Path) -> Option<Value> {
 /// Names of the numbers of a list: a list of them, or one within a group such as "motors".
 fn told(names: &Value) -> Option<Vec<String>> {
     let list = names.as_array().or_else(|| names.as_object()?.values().find_map(Value::as_array))?;
-    list.iter().map(|name| name.as_str().map(str::to_string)).collect()
+    let names: Vec<&str> = list.iter().map(Value::as_str).collect::<Option<_>>()?;
+    // "shoulder_pan.pos", "elbow.pos": what all end with is the quantity, and the rest the joint.
+    let quantity = names.first().and_then(|name| name.rsplit_once('.')).map(|(_, last)| format!(".{last}"));
+    let joints: Option<Vec<&str>> =
+        quantity.and_then(|end| names.iter().map(|name| name.strip_suffix(end.as_str())).collect());
+    Some(joints.unwrap_or(names).into_iter().map(str::to_string).collect())
 }
