@@ -1,11 +1,12 @@
 //! `powerball identify`: from logs to identified.json.
 
+use super::export::Original;
 use super::inputs::MapArgument;
 use super::mounted::MountedLogs;
 use super::{Failure, output};
 use crate::explanation::torque_model::ModelFile;
 use crate::identification::estimate::FrictionKind;
-use crate::identification::{Estimator, IdentifyOptions, KnownModel, identify};
+use crate::identification::{Estimator, Identified, IdentifyOptions, KnownModel, identify};
 use crate::logs::Progress;
 use crate::report;
 use clap::{Args, ValueEnum};
@@ -42,6 +43,10 @@ pub(crate) struct Identify {
     /// How rows are counted.
     #[arg(long, value_enum, default_value_t)]
     estimator: EstimatorName,
+    /// The URDF or MuJoCo model that the arm file was imported from: a copy of it with the identified values, friction
+    /// and effects is written into the folder of the results, under its name.
+    #[arg(long, value_name = "ORIGINAL")]
+    export: Option<PathBuf>,
     /// Folder for the results; made if missing.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -96,6 +101,7 @@ impl Identify {
             ..IdentifyOptions::default()
         };
         output::make_folder(&self.out)?;
+        let original = self.export.as_deref().map(|path| Original::read(path, &self.out)).transpose()?;
         let logs = self.logs.mapped(self.map.read()?);
         let identified = identify(&arm, &logs.log, &logs.validate, &options)?;
         let known = known.as_ref().map(|known| &known.model.additions);
@@ -103,21 +109,29 @@ impl Identify {
         files.write(&self.out).map_err(Failure::Unusable)?;
         if self.json {
             output::print(&files.first());
-            return Ok(());
+        } else {
+            told(&identified);
         }
-        if let Some(conventions) = &identified.conventions {
-            output::print(&conventions.verdict());
+        match original {
+            Some(original) => original.write(&arm, &files.first(), &self.out.join("identified.json")),
+            None => Ok(()),
         }
-        for warning in &identified.warnings {
-            output::print(&format!("note: {warning}"));
-        }
-        let mut columns = vec![("fit", &identified.fit)];
-        columns.extend(identified.mountings.iter().map(|m| (m.mounting.as_str(), &m.fit)));
-        columns.extend(identified.validate.as_ref().map(|s| ("held out", s)));
-        output::print(&output::table(&columns));
-        for joint in identified.transmission.iter().flatten() {
-            output::print(&joint.sentence());
-        }
-        Ok(())
+    }
+}
+
+/// Tells a person what was found.
+fn told(identified: &Identified) {
+    if let Some(conventions) = &identified.conventions {
+        output::print(&conventions.verdict());
+    }
+    for warning in &identified.warnings {
+        output::print(&format!("note: {warning}"));
+    }
+    let mut columns = vec![("fit", &identified.fit)];
+    columns.extend(identified.mountings.iter().map(|m| (m.mounting.as_str(), &m.fit)));
+    columns.extend(identified.validate.as_ref().map(|s| ("held out", s)));
+    output::print(&output::table(&columns));
+    for joint in identified.transmission.iter().flatten() {
+        output::print(&joint.sentence());
     }
 }

@@ -7,6 +7,7 @@ mod demo;
 mod envelope;
 mod excite;
 mod explain;
+mod export;
 mod friction;
 mod generate;
 mod identify;

@@ -1,0 +1,128 @@
+//! `powerball identify --export`: what was identified goes back into the URDF that the arm came from.
+
+#![allow(clippy::unwrap_used)]
+
+use dyngen::import::{self, Options};
+use dyngen::{Arm, Model, SetKind, Values};
+use powerball::controller::friction::TanhFriction;
+use powerball::identification::chain::Chain;
+use powerball::identification::excite::{Fourier, Harmonics};
+use powerball::virtual_arm::{Body, Dynamics, Plant, Sensors};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::f64::consts::TAU;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// Two joints across each other; the bodies are guesses, as in the files that makers give.
+const URDF: &str = r#"<?xml version="1.0"?>
+<robot name="two">
+  <!-- kept as it is -->
+  <link name="base"/>
+  <link name="upper"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+  <link name="lower"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
+    <origin xyz="0 0 0.2" rpy="1.5707963267948966 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" effort="50" velocity="3"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/>
+    <origin xyz="0.3 0 0" rpy="1.5707963267948966 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" effort="50" velocity="3"/></joint>
+</robot>
+"#;
+
+const FRICTION: [[f64; 5]; 2] = [[1.0, 20.0, 0.0, 1.0, 0.8], [0.5, 30.0, 0.0, 1.0, 0.3]];
+
+fn plant(arm: &Arm) -> Plant {
+    let bodies = vec![
+        Body::even_box(2.0, [0.12, 0.03, -0.02], [0.3, 0.1, 0.1], 0.0),
+        Body::even_box(1.2, [0.02, 0.10, 0.05], [0.1, 0.2, 0.1], 0.0),
+    ];
+    let sensors = Sensors {
+        rate: 200.0,
+        encoder_step: 1e-5,
+        white: vec![0.02; 2],
+        coloured: vec![0.0; 2],
+        colour_time: 0.1,
+    };
+    let friction = FRICTION.map(TanhFriction::new).to_vec();
+    Plant::new(Dynamics::new(Chain::new(arm), bodies).unwrap(), friction, sensors)
+}
+
+fn record(plant: &Plant, seed: u64, file: &Path) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut draw = || -> Vec<f64> { (0..5).map(|_| 0.25 * rng.random_range(-1.0..1.0)).collect() };
+    let joints = (0..2).map(|_| Harmonics { middle: 0.0, a: draw(), b: draw() }).collect();
+    let path = Fourier { fundamental: TAU / 10.0, periods: 2, ramp: 1.0, joints };
+    plant.record(&path.sample(200.0), 0.0, seed).write(file).unwrap();
+}
+
+/// A folder with the robot, its arm file and three logs.
+fn session(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).unwrap();
+    let imported = import::urdf(URDF, "two.urdf", &Options::default()).unwrap();
+    fs::write(folder.join("two.urdf"), URDF).unwrap();
+    fs::write(folder.join("arm.toml"), &imported.text).unwrap();
+    let plant = plant(&imported.arm);
+    (0..3).for_each(|k| record(&plant, k, &folder.join(format!("log{k}.csv"))));
+    folder
+}
+
+fn identify(folder: &Path, out: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_powerball"));
+    command
+        .current_dir(folder)
+        .args(["identify", "--arm", "arm.toml", "--log", "log0.csv", "log1.csv", "log2.csv"]);
+    command.args(["--export", "two.urdf", "--out", out]).output().unwrap()
+}
+
+#[test]
+fn what_was_identified_is_in_a_copy_of_the_urdf() {
+    let folder = session("export");
+    let done = identify(&folder, "result");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let text = fs::read_to_string(folder.join("result/two.urdf")).unwrap();
+    assert!(text.contains("<!-- kept as it is -->"));
+    assert_eq!(fs::read_to_string(folder.join("two.urdf")).unwrap(), URDF);
+
+    // The bodies of the copy are those of the result, and in what an arm's torque depends on those that were recorded.
+    let back = import::urdf(&text, "two.urdf", &Options::default()).unwrap();
+    let named =
+        |values: &[(String, f64)]| Values::named(values.iter().map(|(n, v)| (n.as_str(), *v)), "values");
+    let given: Vec<_> = back.values.iter().map(|(p, value)| (p.to_string(), *value)).collect();
+    let consistent = Values::read(&folder.join("result/consistent.json")).unwrap();
+    let bodies =
+        plant(&back.arm).dynamics().bodies().iter().map(Body::parameters).collect::<Vec<_>>().concat();
+    let names = back.arm.kept_parameters();
+    let truth: Vec<_> = names.iter().map(|p| (p.to_string(), bodies[p.index()])).collect();
+    let model = Model::derive(back.arm).unwrap();
+    let minimal = |values: &Values| values.of_set(&model, model.set(SetKind::Minimal).unwrap()).unwrap();
+    for ((value, written), truth) in
+        minimal(&named(&given)).into_iter().zip(minimal(&consistent)).zip(minimal(&named(&truth)))
+    {
+        approx::assert_relative_eq!(value, written, max_relative = 1e-9, epsilon = 1e-12);
+        approx::assert_relative_eq!(value, truth, max_relative = 0.05, epsilon = 2e-3);
+    }
+    for [coulomb, _, _, _, viscous] in FRICTION {
+        let near = |key: &str, wanted: f64| {
+            let key = format!("{key}=\"");
+            let values = text.split(&key).skip(1).filter_map(|rest| rest.split('"').next());
+            values.filter_map(|v| v.parse::<f64>().ok()).any(|v| (v / wanted - 1.0).abs() < 0.05)
+        };
+        assert!(near("friction", coulomb) && near("damping", viscous), "{text}");
+    }
+}
+
+#[test]
+fn the_original_is_never_written_over() {
+    let folder = session("export_over");
+    let refused = identify(&folder, ".");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("--export would write over it"));
+    assert_eq!(fs::read_to_string(folder.join("two.urdf")).unwrap(), URDF);
+    assert!(!folder.join("identified.json").exists());
+}
