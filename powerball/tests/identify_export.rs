@@ -107,6 +107,10 @@ fn what_was_identified_is_in_a_copy_of_the_urdf() {
         approx::assert_relative_eq!(value, written, max_relative = 1e-9, epsilon = 1e-12);
         approx::assert_relative_eq!(value, truth, max_relative = 0.05, epsilon = 2e-3);
     }
+    // The errors of its Coulomb friction are those of the sum of both terms, of which neither is known by itself.
+    let errors = text.split("friction ").skip(1).filter_map(|rest| rest.split(' ').next());
+    let errors: Vec<f64> = errors.filter_map(|error| error.parse().ok()).collect();
+    assert!(errors.len() == 2 && errors.iter().all(|error| (1e-4..0.02).contains(error)), "{text}");
     for [coulomb, _, _, _, viscous] in FRICTION {
         let near = |key: &str, wanted: f64| {
             let key = format!("{key}=\"");

@@ -17,7 +17,8 @@ pub struct Friction {
     pub viscous: f64,
     /// N·m or N: what saturating terms come to.
     pub coulomb: f64,
-    /// Standard errors of both; that of a sum of terms is the sum of theirs, which it is at most.
+    /// Standard errors of both; where a file does not have that of the sum of saturating terms it is the sum of
+    /// theirs, which it is at most.
     pub std: [Option<f64>; 2],
 }
 
@@ -129,7 +130,8 @@ fn read_friction(arm: &Arm, json: &Value) -> Result<Vec<Option<Friction>>, Strin
             return Err(format!("the friction of joint {} is negative", joint + 1));
         }
         let std = |k: usize| entry.and_then(|e| e["std"][k].as_f64());
-        let coulomb_std = std(0).map(|s| s + std(2).unwrap_or(0.0));
+        let told = entry.and_then(|e| e["coulomb_std"].as_f64());
+        let coulomb_std = told.or_else(|| std(0).map(|s| s + std(2).unwrap_or(0.0)));
         Ok(Friction { viscous, coulomb: first + second, std: [std(4), coulomb_std] })
     };
     let coordinates = arm.coordinates();

@@ -51,6 +51,8 @@ class JointFriction:
     std: Array
     #: A constant torque, N·m or N.
     offset: Optional[float]
+    #: Standard error of γ1 + γ3, which logs determine better than either.
+    coulomb_std: Optional[float] = None
 
 
 class Identified(OfLogs):
@@ -73,7 +75,8 @@ class Identified(OfLogs):
 
         def of(entry: Dict[str, Any]) -> JointFriction:
             gamma = np.array([entry[f"gamma{k}"] for k in range(1, 6)])
-            return JointFriction(entry["joint"], gamma, numbers(entry["std"]), entry.get("offset"))
+            std = numbers(entry["std"])
+            return JointFriction(entry["joint"], gamma, std, entry.get("offset"), entry.get("coulomb_std"))
 
         return [of(entry) for entry in self._told["friction"]]
 

@@ -52,6 +52,10 @@ pub struct JointFriction {
     /// Standard errors of γ1 … γ5; null where not determined or at a bound.
     #[serde(default)]
     pub std: [Option<f64>; 5],
+    /// Standard error of the Coulomb friction γ1 + γ3, N·m: where both bend alike the logs determine the sum far
+    /// better than either. Left out where it is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coulomb_std: Option<f64>,
 }
 
 impl JointFriction {
@@ -67,6 +71,7 @@ impl JointFriction {
             gamma5,
             offset: None,
             std: [None; 5],
+            coulomb_std: None,
         }
     }
 
@@ -165,6 +170,9 @@ pub fn estimates(names: &[String], solution: &Solution, errors: &StandardErrors)
                 let level = solution.theta[at(k)];
                 std(at(3 + k)).filter(|_| level > 0.0).map(|s| s / level * gamma)
             };
+            let determined = || [at(0), at(1)].into_iter().filter(|c| errors.std[*c].is_some());
+            let variance: f64 =
+                determined().flat_map(|a| determined().map(move |b| errors.covariance[(a, b)])).sum();
             JointFriction {
                 joint: j + 1,
                 gamma1,
@@ -174,6 +182,7 @@ pub fn estimates(names: &[String], solution: &Solution, errors: &StandardErrors)
                 gamma5,
                 offset: (layout.extra > 0).then(|| solution.offset(j)),
                 std: [std(at(0)), shape(0, gamma2), std(at(1)), shape(1, gamma4), std(at(2))],
+                coulomb_std: (determined().count() > 0).then(|| variance.max(0.0).sqrt()),
             }
         })
         .collect();
