@@ -16,18 +16,21 @@ use rand_chacha::ChaCha8Rng;
 /// How much is simulated.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// Pairs of each kind
-    #[arg(long, default_value_t = 100)]
-    pairs: u64,
+    /// Fits of each kind of arm; each fit is compared with every fit of the unchanged arm
+    #[arg(long, default_value_t = 20)]
+    fits: u64,
     /// Logs of 20 s a fit
     #[arg(long, default_value_t = 3)]
     logs: u64,
     /// In which share of comparisons equal arms may be called different
     #[arg(long, default_value_t = 0.01)]
     level: f64,
-    /// Instead, fits of equal arms, each compared with every other one
-    #[arg(long, value_name = "FITS")]
-    equal: Option<u64>,
+    /// Draws paths and noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// The unchanged arm alone
+    #[arg(long)]
+    equal: bool,
 }
 
 /// The virtual arm, recorded and fitted.
@@ -85,71 +88,119 @@ fn loaded(mass: f64) -> Vec<Body> {
     links
 }
 
+/// What is different about an arm.
+#[derive(Clone, Copy, PartialEq)]
+enum Change {
+    Nothing,
+    /// 5 % more viscous friction on a joint, from 1.
+    Viscous(usize),
+    /// 0.5 kg on the last link.
+    Payload,
+}
+
+impl Change {
+    fn says(self) -> String {
+        match self {
+            Change::Nothing => "equal arms".into(),
+            Change::Viscous(joint) => format!("5 % more viscous friction on joint {joint}"),
+            Change::Payload => "a payload of 0.5 kg".into(),
+        }
+    }
+
+    /// Whether these causes are this change and no other.
+    fn is(self, causes: &[Cause]) -> bool {
+        match (self, causes) {
+            (Change::Nothing, []) | (Change::Payload, [Cause::Payload { .. }]) => true,
+            (Change::Viscous(own), [Cause::Friction { joint, .. }]) => own == *joint,
+            _ => false,
+        }
+    }
+}
+
 /// Prints how often each kind of pair was called different, and how often with the right cause alone.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let arm = lwa4p::arm().map_err(|e| e.to_string())?;
     let bench = Bench { body: RigidArm::new(&arm).map_err(|e| e.to_string())?, logs: arguments.logs };
     let options = CompareOptions { level: arguments.level };
-    let same = || viscous(0, 1.0);
-    if let Some(fits) = arguments.equal {
-        let fitted = (0..fits).map(|seed| bench.fitted(lwa4p::links(), same(), 100 * seed));
-        return equal(&fitted.collect::<Result<Vec<_>, _>>()?, &options);
+    let mut changes = vec![Change::Nothing];
+    if !arguments.equal {
+        changes.extend((1..=6).map(Change::Viscous));
+        changes.push(Change::Payload);
     }
-    let mut rows = vec![("equal arms".to_string(), 0, 0)];
-    rows.extend((1..=6).map(|joint| (format!("5 % more viscous friction on joint {joint}"), 0, 0)));
-    rows.push(("a payload of 0.5 kg".to_string(), 0, 0));
-    for pair in 0..arguments.pairs {
-        let seed = 100 * pair;
-        let a = bench.fitted(lwa4p::links(), same(), seed)?;
-        for (kind, (_, differ, named)) in rows.iter_mut().enumerate() {
-            let own = seed + 1 + kind as u64;
-            let b = match kind {
-                0 => bench.fitted(lwa4p::links(), same(), own),
-                7 => bench.fitted(loaded(0.5), same(), own),
-                joint => bench.fitted(lwa4p::links(), viscous(joint - 1, 1.05), own),
-            }?;
-            let compared = compare(&a, &b, &options).map_err(|e| e.to_string())?;
-            let right = match (kind, compared.causes.as_slice()) {
-                (0, []) => true,
-                (7, [Cause::Payload { .. }]) => true,
-                (own, [Cause::Friction { joint, .. }]) => own == *joint,
-                _ => false,
-            };
-            *differ += u64::from(compared.differ);
-            *named += u64::from(right);
-            if !right {
-                eprintln!("pair {pair}, {kind}: {}", compared.sentence);
+    println!("fits of {} logs of 20 s, level {} %", arguments.logs, 100.0 * arguments.level);
+    let mut equal: Vec<Side> = Vec::new();
+    for (kind, change) in changes.into_iter().enumerate() {
+        let (links, friction) = match change {
+            Change::Nothing => (lwa4p::links(), viscous(0, 1.0)),
+            Change::Viscous(joint) => (lwa4p::links(), viscous(joint - 1, 1.05)),
+            Change::Payload => (loaded(0.5), viscous(0, 1.0)),
+        };
+        let seeds = (0..arguments.fits).map(|fit| (1000 * arguments.seed + kind as u64) * 1000 + fit);
+        let fits: Vec<Side> = seeds
+            .map(|seed| bench.fitted(links.clone(), friction.clone(), seed))
+            .collect::<Result<_, _>>()?;
+        if change == Change::Nothing {
+            equal.clone_from(&fits);
+        }
+        // Whether each pair differs; none of a fit with itself.
+        let mut differ: Vec<Vec<Option<bool>>> = vec![vec![None; fits.len()]; equal.len()];
+        let mut right = 0;
+        let (mut numbers, mut missed) = (0, 0);
+        for (i, a) in equal.iter().enumerate() {
+            for (k, b) in fits.iter().enumerate().filter(|(k, _)| change != Change::Nothing || *k > i) {
+                let compared = compare(a, b, &options).map_err(|e| e.to_string())?;
+                differ[i][k] = Some(compared.differ);
+                numbers += compared.parameters.len();
+                missed += compared.parameters.iter().filter(|p| p.p_value < 0.05).count();
+                if change.is(&compared.causes) {
+                    right += 1;
+                } else {
+                    eprintln!("{}: {}, {}: {}", change.says(), a.name, b.name, compared.sentence);
+                }
             }
         }
-    }
-    println!("pairs of fits to {} logs of 20 s, level {} %", arguments.logs, 100.0 * arguments.level);
-    for (kind, differ, named) in rows {
-        println!("{kind}: different {differ} of {}, the right sentence {named}", arguments.pairs);
+        let (pairs, different, error) = share(&differ);
+        println!(
+            "{}: different {different} of {pairs} pairs ({:.2} %, standard error {:.2} %), the right sentence {right}",
+            change.says(),
+            100.0 * different as f64 / pairs as f64,
+            100.0 * error
+        );
+        if change == Change::Nothing {
+            let share = 100.0 * missed as f64 / numbers as f64;
+            println!(
+                "  of the parameters one by one {share:.1} % differ at 5 %: right standard errors make it 5"
+            );
+        }
     }
     Ok(())
 }
 
-/// Every fit against every other: how often equal arms are called different. Pairs of one fit depend on each other, so
-/// the fits that take part in a false alarm are counted too; the rate is that of independent pairs on average.
-fn equal(fits: &[Side], options: &CompareOptions) -> Result<(), String> {
-    let (mut pairs, mut differ) = (0u64, vec![0u64; fits.len()]);
-    for (a, left) in fits.iter().enumerate() {
-        for (b, right) in fits.iter().enumerate().skip(a + 1) {
-            let compared = compare(left, right, options).map_err(|e| e.to_string())?;
-            pairs += 1;
-            if compared.differ {
-                differ[a] += 1;
-                differ[b] += 1;
-                eprintln!("{} and {}: {}", left.name, right.name, compared.sentence);
-            }
-        }
-    }
-    let different: u64 = differ.iter().sum::<u64>() / 2;
-    let alarmed = differ.iter().filter(|count| **count > 0).count();
-    println!(
-        "equal arms: different {different} of {pairs} pairs of {} fits ({:.2} %), {alarmed} fits among them",
-        fits.len(),
-        100.0 * different as f64 / pairs.max(1) as f64
-    );
-    Ok(())
+/// Pairs, those that differ, and the standard error of their share: pairs of one fit depend on each other, so what varies
+/// is the share of each fit.
+fn share(differ: &[Vec<Option<bool>>]) -> (usize, usize, f64) {
+    let all: Vec<bool> = differ.iter().flatten().copied().flatten().collect();
+    let (pairs, different) = (all.len().max(1), all.iter().filter(|d| **d).count());
+    let mean = different as f64 / pairs as f64;
+    let count = differ.first().map_or(0, Vec::len);
+    let same = differ.len() == count && (0..count).all(|i| differ[i][i].is_none());
+    let variance = |of: &dyn Fn(usize) -> Vec<bool>, count: usize| {
+        let shares: Vec<f64> = (0..count)
+            .map(of)
+            .filter(|d| !d.is_empty())
+            .map(|d| d.iter().filter(|d| **d).count() as f64 / d.len() as f64)
+            .collect();
+        let n = shares.len().max(2) as f64;
+        shares.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n * (n - 1.0))
+    };
+    let row = |i: usize| differ[i].iter().copied().flatten().collect::<Vec<_>>();
+    let column = |k: usize| differ.iter().filter_map(|row| row[k]).collect::<Vec<_>>();
+    let error = if same {
+        // Every fit is on both sides.
+        let both = |i: usize| [row(i), column(i)].concat();
+        4.0 * variance(&both, count)
+    } else {
+        variance(&row, differ.len()) + variance(&column, count)
+    };
+    (pairs, different, error.sqrt())
 }

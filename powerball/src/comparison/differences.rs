@@ -1,20 +1,15 @@
 //! Number by number: what differs, and how surely.
 
+use super::difference::Difference;
+use super::friction::Curves;
 use super::result::{
     CompareError, CompareOptions, ConstantDifference, FrictionDifference, ParameterDifference,
     TorqueDifference,
 };
 use super::side::Side;
-use crate::identification::estimate::distribution::{f_tail, t_critical};
 use crate::identification::estimate::{Solver, Uncertainty, friction_row};
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
-
-/// Friction is compared at these shares of the rms velocity: where it breaks loose, where it bends, and where
-/// the joint is as fast as it gets.
-const VELOCITIES: [f64; 5] = [0.1, 0.3, 0.7, 1.2, 1.8];
-/// rad/s, where the logs' velocities are not known.
-const ORDINARY: f64 = 0.5;
 
 /// All differences, `b` less `a`.
 pub(super) struct Differences {
@@ -49,55 +44,6 @@ impl Inertia {
             freedom: compared.iter().map(|(_, _, d)| d.freedom).fold(f64::INFINITY, f64::min),
         }
     }
-
-    /// How often equal arms would differ so in all of them (Hotelling's T²); 0 where they are too many to
-    /// tell.
-    fn p_value(&self) -> f64 {
-        let count = self.weights.kept().len() as f64;
-        let left = self.freedom - count + 1.0;
-        if count == 0.0 || left <= 0.0 {
-            return 0.0;
-        }
-        let square: f64 =
-            self.difference.iter().zip(self.weights.solve(&self.difference)).map(|(d, w)| d * w).sum();
-        f_tail(square * left / (count * self.freedom), count, left)
-    }
-}
-
-/// A difference with its variance.
-#[derive(Clone, Copy)]
-struct Difference {
-    value: f64,
-    variance: f64,
-    freedom: f64,
-}
-
-impl Difference {
-    /// Of two independent values, each with its variance and degrees of freedom (Welch and Satterthwaite).
-    fn of(a: (f64, f64, f64), b: (f64, f64, f64)) -> Difference {
-        let variance = a.1 + b.1;
-        let doubt = a.1 * a.1 / a.2 + b.1 * b.1 / b.2;
-        let freedom = if doubt > 0.0 { variance * variance / doubt } else { a.2.min(b.2) };
-        Difference { value: b.0 - a.0, variance, freedom }
-    }
-
-    /// How often equal arms would differ so.
-    fn p_value(self) -> f64 {
-        if self.variance > 0.0 {
-            f_tail(self.value * self.value / self.variance, 1.0, self.freedom)
-        } else {
-            1.0
-        }
-    }
-
-    /// Half the width of an interval that misses the truth with probability `p`.
-    fn half(self, p: f64) -> f64 {
-        t_critical(p, self.freedom) * self.variance.sqrt()
-    }
-
-    fn interval(self, p: f64) -> [f64; 2] {
-        [self.value - self.half(p), self.value + self.half(p)]
-    }
 }
 
 impl Differences {
@@ -117,11 +63,11 @@ impl Differences {
             ));
         }
         let parameters = parameters(a, b, &place);
-        let friction = friction(a, b);
+        let friction = Curves::of(a, b);
         let constant = |j: usize| Some((j, a.constant(j)?, b.constant(j)?));
         let constants: Vec<(usize, _, _)> = (0..a.friction.len()).filter_map(constant).collect();
         let comparisons =
-            parameters.len() + friction.iter().map(|(_, rows)| rows.len()).sum::<usize>() + constants.len();
+            parameters.len() + friction.iter().map(Curves::points).sum::<usize>() + constants.len();
         if comparisons == 0 {
             let message =
                 format!("{} and {} have no standard errors in common: identify again", a.name, b.name);
@@ -129,8 +75,12 @@ impl Differences {
         }
         // Bonferroni: each interval misses with an equal share of the level.
         let p = level / comparisons as f64;
+        // Questions are fewer: each joint's friction, each constant torque, and inertia, which counts twice, as a
+        // payload is what changes most often.
+        let inertial = if parameters.is_empty() { 0 } else { 2 };
+        let share = level / (inertial + friction.len() + constants.len()) as f64;
+        let each = 2.0 * share / parameters.len().max(1) as f64;
         let inertia = Inertia::new(a, b, &parameters);
-        let together = inertia.p_value();
         let parameters = parameters.into_iter().map(|(k, other, d)| ParameterDifference {
             name: a.parameters[k].name.clone(),
             a: a.parameters[k].value,
@@ -138,8 +88,7 @@ impl Differences {
             difference: d.value,
             interval: d.interval(p),
             p_value: d.p_value(),
-            // One of twenty that is far off by itself is noise where all together are not.
-            differs: d.p_value() < p && together < level,
+            differs: d.p_value() < each,
         });
         let constants = constants.into_iter().map(|(j, own, other)| {
             let d = Difference::of(own, other);
@@ -152,7 +101,7 @@ impl Differences {
                 difference: d.value,
                 interval,
                 p_value,
-                differs: p_value < p,
+                differs: p_value < share,
             }
         });
         Ok(Differences {
@@ -160,7 +109,7 @@ impl Differences {
             comparisons,
             parameters: parameters.collect(),
             inertia,
-            friction: friction.into_iter().map(|(j, rows)| curve(j, &rows, p)).collect(),
+            friction: friction.iter().map(|curves| curves.difference(p, share)).collect(),
             constants: constants.collect(),
             torque: torque(a, b, &place),
             warnings,
@@ -204,46 +153,6 @@ fn parameters(a: &Side, b: &Side, place: &[usize]) -> Vec<(usize, usize, Differe
         Some((k, *other, Difference::of(own, theirs)))
     };
     place.iter().enumerate().filter_map(one).collect()
-}
-
-/// A velocity, both frictions there and their difference.
-type AtVelocity = (f64, f64, f64, Difference);
-
-fn friction(a: &Side, b: &Side) -> Vec<(usize, Vec<AtVelocity>)> {
-    let known = |j: &usize| a.knows_friction(*j) && b.knows_friction(*j);
-    let rows = |j: usize| {
-        let top = match (a.velocity(j), b.velocity(j)) {
-            (Some(a), Some(b)) => a.min(b),
-            (one, other) => one.or(other).unwrap_or(ORDINARY),
-        };
-        let at = |share: f64| {
-            let (own, other) = (a.friction_at(j, share * top), b.friction_at(j, share * top));
-            (share * top, own.0, other.0, Difference::of(own, other))
-        };
-        (j, VELOCITIES.map(at).to_vec())
-    };
-    (0..a.friction.len()).filter(known).map(rows).collect()
-}
-
-fn curve(joint: usize, rows: &[AtVelocity], p: f64) -> FrictionDifference {
-    let of = |what: &dyn Fn(&AtVelocity) -> f64| rows.iter().map(what).collect::<Vec<f64>>();
-    let surest = rows.iter().min_by(|x, y| x.3.p_value().total_cmp(&y.3.p_value()));
-    let change = surest.map_or([0.0; 2], |(_, a, _, d)| match a.abs() {
-        0.0 => [f64::NEG_INFINITY, f64::INFINITY],
-        size => d.interval(p).map(|end| end / size),
-    });
-    let p_value = surest.map_or(1.0, |(_, _, _, d)| d.p_value());
-    FrictionDifference {
-        joint: joint + 1,
-        velocities: of(&|r| r.0),
-        a: of(&|r| r.1),
-        b: of(&|r| r.2),
-        difference: of(&|r| r.3.value),
-        interval: rows.iter().map(|r| r.3.interval(p)).collect(),
-        change,
-        p_value,
-        differs: p_value < p,
-    }
 }
 
 /// What the difference is in torque along the logs of `a`; nothing where these are not known.

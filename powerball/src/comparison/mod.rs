@@ -3,12 +3,15 @@
 //!
 //! Two fits never come to the same numbers. What differs is told by the covariance of both: intervals that
 //! hold all at once at one stated level (Bonferroni's, over every parameter and every point of the friction
-//! curves that is compared), so that equal arms are called different in that share of comparisons and not in
-//! that share of numbers. Friction is compared as a curve: its five coefficients make up for each other, the
-//! torque at a velocity does not.
+//! curves that is compared), and by a few questions that share the level: inertia, each joint's friction, each
+//! constant torque. So equal arms are called different in that share of comparisons and not in that share of
+//! numbers. Friction is compared as a curve: its five coefficients make up for each other, the torque at a
+//! velocity does not.
 
 mod cause;
+mod difference;
 mod differences;
+mod friction;
 mod result;
 mod side;
 

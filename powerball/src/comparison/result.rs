@@ -82,9 +82,10 @@ pub struct FrictionDifference {
     pub difference: Vec<f64>,
     /// Where the differences lie.
     pub interval: Vec<[f64; 2]>,
-    /// Where (b − a)/a lies, at the velocity at which the difference is surest.
+    /// Where (b − a)/a lies, at the velocity at which the difference is surest; at the fastest one where only
+    /// the slope tells a difference.
     pub change: [f64; 2],
-    /// How often equal arms would differ so at one velocity, the smallest.
+    /// How often equal arms would differ so in the curve.
     pub p_value: f64,
     /// Whether it differs.
     pub differs: bool,

@@ -121,25 +121,40 @@ impl Side {
     pub(super) fn friction_at(&self, joint: usize, velocity: f64) -> (f64, f64, f64) {
         let gamma = self.friction[joint].gamma();
         let value = TanhFriction::new(gamma).torque(velocity);
-        let row = friction_row(self.shape(joint), velocity);
         match &self.uncertainty {
             Some(all) => {
-                let at = |k: usize| all.friction(joint, k);
-                let terms = (0..5).flat_map(|i| (0..5).map(move |k| (i, k)));
-                let variance =
-                    terms.map(|(i, k)| row[i] * row[k] * all.covariance(at(i), at(k))).sum::<f64>();
-                let freedom = (0..5).map(|k| all.freedom[at(k)]).filter(|f| *f > 0.0).fold(MANY, f64::min);
-                (value, variance.max(0.0), freedom)
+                let variance = self.friction_covariance(joint, &[velocity]).map_or(0.0, |c| c[0][0]);
+                let freedom = (0..5)
+                    .map(|k| all.freedom[all.friction(joint, k)])
+                    .filter(|f| *f > 0.0)
+                    .fold(MANY, f64::min);
+                (value, variance, freedom)
             }
             None => {
                 // Nobody knows how the errors hang together: as badly as they can.
                 let [g1, g2, g3, g4, g5] = self.friction[joint].std.map(|std| std.unwrap_or(0.0));
                 let relative = |std: f64, gamma: f64| if gamma > 0.0 { std / gamma } else { 0.0 };
+                let row = friction_row(self.shape(joint), velocity);
                 let own = [g1, g3, g5, gamma[0] * relative(g2, gamma[1]), gamma[2] * relative(g4, gamma[3])];
                 let std: f64 = own.iter().zip(row).map(|(std, row)| std * row.abs()).sum();
                 (value, std * std, MANY)
             }
         }
+    }
+
+    /// The covariance of a joint's friction at some velocities; `None` where only standard errors are known.
+    pub(super) fn friction_covariance(&self, joint: usize, velocities: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let all = self.uncertainty.as_ref()?;
+        let at = |k: usize| all.friction(joint, k);
+        let rows: Vec<_> = velocities.iter().map(|v| friction_row(self.shape(joint), *v)).collect();
+        let of = |a: &[f64; 5], b: &[f64; 5]| -> f64 {
+            let terms = (0..5).flat_map(|i| (0..5).map(move |k| (i, k)));
+            terms.map(|(i, k)| a[i] * b[k] * all.covariance(at(i), at(k))).sum()
+        };
+        let mut covariance: Vec<Vec<f64>> =
+            rows.iter().map(|a| rows.iter().map(|b| of(a, b)).collect()).collect();
+        covariance.iter_mut().enumerate().for_each(|(k, row)| row[k] = row[k].max(0.0));
+        Some(covariance)
     }
 
     /// The constant torque of a joint, its variance and the degrees of freedom of that, where it was fitted.

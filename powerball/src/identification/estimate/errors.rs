@@ -12,11 +12,15 @@
 //!
 //! and solving these equations gives unbiased powers (Rao's MINQUE for this structure). How well a power is
 //! known enters by Satterthwaite's degrees of freedom.
+//!
+//! Octaves leak into each other, so noise is not quite independent between them. What counts in the covariance
+//! are powers from which the leaks are taken out (`spectrum.rs`).
 
 use super::distribution::t_quantile_975;
 use super::normal_equations::zeros;
 use super::reduced::Solution;
 use super::solve::Solver;
+use super::spectrum::{Power, sharpened};
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 
@@ -33,6 +37,8 @@ pub struct StandardErrors {
 
 /// One joint's rows of one octave.
 struct Group {
+    joint: usize,
+    octave: usize,
     weight: f64,
     rows: f64,
     /// What the fit left, sum of squares.
@@ -58,8 +64,8 @@ pub fn standard_errors(solution: &Solution) -> StandardErrors {
         }
     }
     let mut groups = Vec::new();
-    for (parts, weight) in solution.parts.iter().zip(&solution.weights) {
-        for part in parts.iter().filter(|p| p.rows > 0 && *weight > 0.0) {
+    for (joint, (parts, weight)) in solution.parts.iter().zip(&solution.weights).enumerate() {
+        for (octave, part) in parts.iter().enumerate().filter(|(_, p)| p.rows > 0 && *weight > 0.0) {
             let mut products = zeros(size);
             part.add_to(&mut products, 1.0);
             let turned = &inverse * &products.0;
@@ -67,10 +73,11 @@ pub fn standard_errors(solution: &Solution) -> StandardErrors {
                 .map(|i| (0..size).map(|k| turned[(i, k)] * inverse[(k, i)]).sum::<f64>().max(0.0))
                 .collect();
             let left = part.left(&solution.theta);
-            groups.push(Group { weight: *weight, rows: part.rows as f64, left, turned, spread });
+            let rows = part.rows as f64;
+            groups.push(Group { joint, octave, weight: *weight, rows, left, turned, spread });
         }
     }
-    let powers = powers(&groups);
+    let powers = without_leaks(&groups, &powers(&groups));
     let (mut std, mut quantile) = (vec![None; size], vec![0.0; size]);
     for &c in solver.kept() {
         let (mut variance, mut doubt) = (0.0, 0.0);
@@ -88,6 +95,22 @@ pub fn standard_errors(solution: &Solution) -> StandardErrors {
         covariance += faer::Scale(weight) * (&group.turned * &inverse);
     }
     StandardErrors { std, quantile, covariance }
+}
+
+/// The powers by group without what leaks between the octaves of a joint; each keeps its degrees of freedom.
+fn without_leaks(groups: &[Group], powers: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let with: Vec<(&Group, &(f64, f64))> = groups.iter().zip(powers).collect();
+    with.chunk_by(|(a, _), (b, _)| a.joint == b.joint)
+        .flat_map(|joint| {
+            let seen = |(group, (mean, freedom)): &(&Group, &(f64, f64))| Power {
+                octave: group.octave,
+                mean: *mean,
+                freedom: *freedom,
+            };
+            let sharp = sharpened(&joint.iter().map(seen).collect::<Vec<_>>());
+            sharp.into_iter().zip(joint).map(|(power, (_, (_, freedom)))| (power, *freedom))
+        })
+        .collect()
 }
 
 /// λ and its degrees of freedom by group.

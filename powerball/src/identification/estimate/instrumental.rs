@@ -16,6 +16,7 @@ use super::errors::StandardErrors;
 use super::friction_shape;
 use super::normal_equations::dot;
 use super::reduced::{Part, Solution};
+use super::spectrum::{Power, sharpened};
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, DataOptions, Recording, RigidArm, logs_of_motors};
 use crate::logs::summary::{Octaves, RFactor, parts};
@@ -67,22 +68,30 @@ pub fn solve_instrumental(
     let (mut std, mut quantile) = (vec![None; layout.size()], vec![0.0; layout.size()]);
     let mut sums = vec![(0.0, 0.0); size];
     let mut covariance = Mat::<f64>::zeros(layout.size(), layout.size());
-    for (level, weight) in weighted(&levels, &start.weights).filter(|(l, _)| l.part.rows > 0) {
-        let (za, _) = level.moments(&place, size);
-        let taken: f64 = {
-            let turned = &inverse * &za;
-            weight * (0..size).map(|i| turned[(i, i)]).sum::<f64>()
-        };
-        let freedom = (level.part.rows as f64 - taken).max(1.0);
-        let power = level.part.left(&theta) / freedom;
-        let spread = &inverse * level.instrument_products(&place, size) * inverse.transpose();
-        for (i, (variance, doubt)) in sums.iter_mut().enumerate() {
-            let share = weight * weight * power * spread[(i, i)].max(0.0);
-            *variance += share;
-            *doubt += share * share / freedom;
-        }
-        for (i, k) in (0..size).flat_map(|i| (0..size).map(move |k| (i, k))) {
-            covariance[(free[i], free[k])] += weight * weight * power * spread[(i, k)];
+    for (joint, weight) in levels.iter().zip(&start.weights) {
+        let known: Vec<(&Level, Power)> = joint
+            .iter()
+            .enumerate()
+            .filter(|(_, level)| level.part.rows > 0)
+            .map(|(octave, level)| {
+                let (za, _) = level.moments(&place, size);
+                let turned = &inverse * &za;
+                let taken = weight * (0..size).map(|i| turned[(i, i)]).sum::<f64>();
+                let freedom = (level.part.rows as f64 - taken).max(1.0);
+                (level, Power { octave, mean: level.part.left(&theta) / freedom, freedom })
+            })
+            .collect();
+        let sharp = sharpened(&known.iter().map(|(_, power)| *power).collect::<Vec<_>>());
+        for ((level, Power { freedom, .. }), power) in known.into_iter().zip(sharp) {
+            let spread = &inverse * level.instrument_products(&place, size) * inverse.transpose();
+            for (i, (variance, doubt)) in sums.iter_mut().enumerate() {
+                let share = weight * weight * power * spread[(i, i)].max(0.0);
+                *variance += share;
+                *doubt += share * share / freedom;
+            }
+            for (i, k) in (0..size).flat_map(|i| (0..size).map(move |k| (i, k))) {
+                covariance[(free[i], free[k])] += weight * weight * power * spread[(i, k)];
+            }
         }
     }
     for (c, (variance, doubt)) in free.iter().zip(&sums) {

@@ -22,6 +22,7 @@ mod reduced;
 mod robust;
 mod rows;
 mod solve;
+mod spectrum;
 mod stream;
 mod torque_metric;
 mod uncertainty;
