@@ -55,7 +55,7 @@ fn payload(joints: usize, found: &Differences) -> Option<Cause> {
         })
         .collect();
     let inner = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
-    let Inertia { difference, weights, freedom } = &found.inertia;
+    let Inertia { difference, weights, freedom, .. } = &found.inertia;
     let weighted: Vec<Vec<f64>> = columns.iter().map(|column| weights.solve(column)).collect();
     let gram = Mat::from_fn(kinds.len(), kinds.len(), |i, k| inner(&columns[i], &weighted[k]));
     let right: Vec<f64> = weighted.iter().map(|column| inner(column, difference)).collect();

@@ -7,6 +7,7 @@ use super::result::{
     TorqueDifference,
 };
 use super::side::Side;
+use crate::identification::estimate::distribution::f_tail;
 use crate::identification::estimate::{Solver, Uncertainty, friction_row};
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
@@ -31,6 +32,8 @@ pub(super) struct Inertia {
     pub weights: Solver,
     /// Degrees of freedom of the least known.
     pub freedom: f64,
+    /// How often equal arms would differ so in all of them.
+    pub p_value: f64,
 }
 
 impl Inertia {
@@ -38,12 +41,27 @@ impl Inertia {
         let covariance = Mat::from_fn(compared.len(), compared.len(), |i, k| {
             a.covariance(compared[i].0, compared[k].0) + b.covariance(compared[i].1, compared[k].1)
         });
-        Inertia {
-            difference: compared.iter().map(|(_, _, d)| d.value).collect(),
-            weights: Solver::new(&covariance, |_| true),
-            freedom: compared.iter().map(|(_, _, d)| d.freedom).fold(f64::INFINITY, f64::min),
-        }
+        let difference: Vec<f64> = compared.iter().map(|(_, _, d)| d.value).collect();
+        let weights = Solver::new(&covariance, |_| true);
+        let mut freedom: Vec<f64> = compared.iter().map(|(_, _, d)| d.freedom).collect();
+        freedom.sort_by(f64::total_cmp);
+        let typical = freedom.get(freedom.len() / 2).copied().unwrap_or(0.0);
+        let p_value = hotelling(&difference, &weights, typical);
+        Inertia { difference, p_value, weights, freedom: freedom.first().copied().unwrap_or(f64::INFINITY) }
     }
+}
+
+/// How often differences like these come by chance (Hotelling's T²), their covariance known with so many degrees of
+/// freedom; 0 where they are too many to tell. The covariance is a sum over joints and octaves, each known with
+/// degrees of freedom of its own: those of a typical parameter stand for all.
+fn hotelling(difference: &[f64], weights: &Solver, freedom: f64) -> f64 {
+    let count = weights.kept().len() as f64;
+    let left = freedom - count + 1.0;
+    if count == 0.0 || left <= 0.0 {
+        return 0.0;
+    }
+    let square: f64 = difference.iter().zip(weights.solve(difference)).map(|(d, w)| d * w).sum();
+    f_tail(square * left / (count * freedom), count, left)
 }
 
 impl Differences {
@@ -88,7 +106,8 @@ impl Differences {
             difference: d.value,
             interval: d.interval(p),
             p_value: d.p_value(),
-            differs: d.p_value() < each,
+            // One of twenty that is far off by itself is noise where all together are not.
+            differs: d.p_value() < each && inertia.p_value < 2.0 * share,
         });
         let constants = constants.into_iter().map(|(j, own, other)| {
             let d = Difference::of(own, other);

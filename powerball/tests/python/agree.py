@@ -491,7 +491,9 @@ def python_is_the_arm(powerball, failures):
         for _ in range(3):
             arm, result, _, log = record(powerball, Udp(), path, 0)
             done = result["record"]
-            check("a whole trajectory is followed", done["samples"] + done["missing"] == 601, done)
+            # Where set-points came too late for their slot a sample is given again.
+            again = done["samples"] + done["missing"] - 601
+            check("a whole trajectory is followed", 0 <= again <= done["dropped"], done)
             if done["missing"] < 120:
                 break
         check("with few cycles without data", done["missing"] < 120, done)
