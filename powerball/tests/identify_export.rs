@@ -77,13 +77,16 @@ fn identify(folder: &Path, out: &str) -> Output {
     command
         .current_dir(folder)
         .args(["identify", "--arm", "arm.toml", "--log", "log0.csv", "log1.csv", "log2.csv"]);
-    command.args(["--export", "two.urdf", "--out", out]).output().unwrap()
+    command.args(["--export", "two.urdf", "--json", "--out", out]).output().unwrap()
 }
 
 #[test]
 fn what_was_identified_is_in_a_copy_of_the_urdf() {
     let folder = session("export");
     let done = identify(&folder, "result");
+    // Standard output is the result alone, whatever is to be said of the export.
+    let told: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert!(told["friction"][1]["coulomb_std"].as_f64().is_some_and(|std| std > 0.0));
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let text = fs::read_to_string(folder.join("result/two.urdf")).unwrap();
     assert!(text.contains("<!-- kept as it is -->"));

@@ -70,23 +70,20 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         lock: args.lock.clone(),
         ..Options::default()
     };
-    let (text, file) = (&source.text, &source.file);
-    let exported = match args.to {
-        Format::Urdf => export::urdf(text, file, &arm, &known, &options),
-        Format::Mjcf => export::mjcf(text, file, &arm, &known, &options),
+    let file = &source.file;
+    let (asked, other) = match args.to {
+        Format::Urdf => (false, "a MuJoCo model: --to mjcf"),
+        Format::Mjcf => (true, "no MuJoCo model: --to urdf"),
     };
-    let exported = exported.map_err(|e| match e {
-        ImportError::Unreadable(_) => Failure::input(source.placed(&e.to_string())),
-        ImportError::Refused(_) => Failure::refused(source.placed(&e.to_string())),
+    if source.is_mjcf() != asked {
+        return Err(Failure::input(format!("{file}: this is {other}")));
+    }
+    let exported = export::source(&source, &arm, &known, &options).map_err(|e| match e {
+        ImportError::Unreadable(_) => Failure::input(e),
+        ImportError::Refused(_) => Failure::refused(e),
     })?;
     for note in &exported.notes {
         eprintln!("{file}: note: {note}");
-    }
-    if !source.included().is_empty() {
-        eprintln!(
-            "{file}: note: the new file holds {}, which the model includes",
-            source.included().join(", ")
-        );
     }
     write(&[(&args.output, &source.bytes(&exported.text))])?;
     Ok(ExitCode::SUCCESS)

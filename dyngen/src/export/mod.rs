@@ -15,14 +15,14 @@ pub use term::{Law, Term};
 pub use urdf::{Exported, urdf};
 
 use crate::Arm;
-use crate::import::{ImportError, Options, Source, is_mjcf};
+use crate::import::{ImportError, Options, Source};
 
 /// A URDF or a MuJoCo model from the disk with what is known of the arm in it, whichever it is.
 ///
 /// # Errors
 /// As [`urdf()`] and [`mjcf()`], with the files and lines of what the model includes.
 pub fn source(source: &Source, arm: &Arm, known: &Known, options: &Options) -> Result<Exported, ImportError> {
-    let write = if is_mjcf(&source.text) { mjcf } else { urdf };
+    let write = if source.is_mjcf() { mjcf } else { urdf };
     let exported = write(&source.text, &source.file, arm, known, options);
     let mut exported = exported.map_err(|e| match e {
         ImportError::Unreadable(reason) => ImportError::Unreadable(source.placed(&reason)),

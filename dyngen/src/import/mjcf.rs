@@ -20,7 +20,7 @@ const WORLD: &str = "world";
 const UNREADABLE: [&str; 5] = ["include", "attach", "replicate", "composite", "flexcomp"];
 
 /// Whether a text looks like a MuJoCo model.
-pub(crate) fn is_mjcf(text: &str) -> bool {
+pub(super) fn is_mjcf(text: &str) -> bool {
     let parsed =
         Document::parse_with_options(text, ParsingOptions { allow_dtd: true, ..ParsingOptions::default() });
     match parsed {

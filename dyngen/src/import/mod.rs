@@ -27,7 +27,6 @@ pub(crate) mod urdf;
 
 use crate::arm::{Arm, Convention, Parameter};
 use change::Change;
-pub(crate) use mjcf::is_mjcf;
 pub use source::Source;
 use std::fmt;
 
@@ -147,7 +146,7 @@ pub fn any(text: &str, file: &str, options: &Options) -> Result<Imported, Import
 /// # Errors
 /// As [`urdf`].
 pub fn source(source: &Source, options: &Options) -> Result<Imported, ImportError> {
-    if is_mjcf(&source.text) {
+    if source.is_mjcf() {
         read_as("a MuJoCo model", mjcf::read, source, options)
     } else {
         read_as("a URDF", urdf::read, source, options)

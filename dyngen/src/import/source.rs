@@ -108,6 +108,11 @@ impl Source {
         Ok(Source { text, file, letters, included, lines })
     }
 
+    /// Whether it is a MuJoCo model, and no URDF.
+    pub fn is_mjcf(&self) -> bool {
+        is_mjcf(&self.text)
+    }
+
     /// A text that includes nothing; `file` names it in errors.
     pub fn of_text(text: &str, file: &str) -> Source {
         let letters = Letters::Utf8;

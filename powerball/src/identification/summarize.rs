@@ -4,7 +4,8 @@ use super::identify::{Gathering, IdentifyError};
 use super::mounting::Mounting;
 use super::source::Source;
 use crate::logs::Progress;
-use crate::logs::regression::{DataOptions, notes_of};
+use crate::logs::log::notes_of;
+use crate::logs::regression::DataOptions;
 use crate::logs::summary::Bands;
 use dyngen::Arm;
 

@@ -40,7 +40,8 @@ impl Original {
             }
         })?;
         for note in &exported.notes {
-            output::print(&format!("note: {}: {note}", self.source.file));
+            // Standard output may be the result as JSON.
+            eprintln!("{}: note: {note}", self.source.file);
         }
         output::write_file(&self.copy, &self.source.bytes(&exported.text))
     }

@@ -1,7 +1,7 @@
 //! The model's numbers as a parameter file of ROS 2, for a controller of ros2_control that computes torques itself.
 
 use super::TorqueModel;
-use crate::logs::regression::Motors;
+use crate::logs::log::Motors;
 use dyngen::Arm;
 use dyngen::exact::rational::to_f64;
 use std::fmt::Write;

@@ -4,7 +4,7 @@ use super::c_door::Behind;
 use super::changes::with_open_hand;
 use super::{TorqueModel, Unchanged};
 use crate::controller::{correction, friction};
-use crate::logs::regression::Motors;
+use crate::logs::log::Motors;
 use dyngen::arm::{Parameter, ParameterKind};
 use dyngen::emit::c_door::checked_prefix;
 use dyngen::emit::{self, Options};

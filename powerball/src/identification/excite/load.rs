@@ -4,7 +4,7 @@ use super::Error;
 use super::limits::JointLimits;
 use super::shape::{Shape, poses};
 use crate::controller::friction::TanhFriction;
-use crate::logs::regression::Motors;
+use crate::logs::log::Motors;
 use dyngen::arm::{Arm, ParameterKind};
 use dyngen::exact::rational::to_f64;
 use dyngen::{Evaluator, Function, Model, SetKind, Values};

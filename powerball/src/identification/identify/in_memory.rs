@@ -6,8 +6,8 @@ use crate::identification::known::KnownModel;
 use crate::identification::mounting::Mounting;
 use crate::identification::source::Source;
 use crate::logs::Progress;
-use crate::logs::log::Log;
-use crate::logs::regression::{RigidArm, notes_of};
+use crate::logs::log::{Log, notes_of};
+use crate::logs::regression::RigidArm;
 use dyngen::Arm;
 
 /// An arm, as a model has it, and its logs on one clock.

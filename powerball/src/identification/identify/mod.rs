@@ -29,7 +29,7 @@ use super::conventions::conventions;
 use super::estimate::{BaseModel, Uncertainty, consistent_fit, estimates, spread_of};
 use super::source::Source;
 use super::transmission::transmission;
-use crate::logs::regression::notes_of;
+use crate::logs::log::notes_of;
 use crate::logs::summary::BANDS;
 use dyngen::{Arm, SetKind};
 use fit::{Fitted, fit};

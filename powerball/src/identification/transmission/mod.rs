@@ -29,9 +29,9 @@ pub use effects::{Figures, TransmissionEffect};
 pub use told::{JointTransmission, Transmission, Unknown};
 
 use crate::controller::JointNumber;
-use crate::logs::log::Log;
+use crate::logs::log::{Log, logs_of_motors};
 use crate::logs::parallel;
-use crate::logs::regression::{logs_of_motors, silent_joints};
+use crate::logs::regression::silent_joints;
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 use grid::Grid;

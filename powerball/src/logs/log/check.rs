@@ -1,7 +1,7 @@
 //! What can be wrong with numbers that are there: time, wraps, units, dead and saturated signals.
 
 use super::raw::{Effort, Raw};
-use super::{Doubts, Finding, Log, LogError, Severity, levels, signs, velocities};
+use super::{Doubts, Finding, Log, LogError, Motors, Severity, levels, signs, velocities};
 use crate::logs::signal::resample::median_step;
 use dyngen::Arm;
 use dyngen::arm::JointKind;
@@ -147,15 +147,10 @@ pub(super) fn into_log(
 /// The joints' torques of those that the motors' currents make: where a transmission couples joints a motor's
 /// torque is on all joints that turn it.
 fn of_motors(arm: &Arm, motors: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-    if arm.transmissions.is_empty() {
-        return motors;
+    match Motors::of(arm) {
+        None => motors,
+        Some(turned) => turned.joint_torque_signals(&motors),
     }
-    let matrix = arm.motor_velocity_matrix_f64();
-    let joint = |j: usize| {
-        let at = |k: usize| motors.iter().zip(&matrix).map(|(motor, row)| row[j] * motor[k]).sum();
-        (0..motors[j].len()).map(at).collect()
-    };
-    (0..motors.len()).map(joint).collect()
 }
 
 /// A clock that changes its pace: the mean step of the last third of the samples against the first.

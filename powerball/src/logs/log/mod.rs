@@ -13,6 +13,7 @@ mod file;
 mod inspect;
 mod levels;
 mod map;
+mod motors;
 mod raw;
 mod read;
 mod samples;
@@ -29,6 +30,7 @@ use doubts::{Doubts, Severity};
 pub use file::LogFile;
 pub use inspect::{Aligned, Inspected, InspectedColumn, InspectedTable, TakenAs, inspect};
 pub use map::{ByJoint, Clock, ColumnMap, Mapped};
+pub use motors::{Motors, logs_of_motors, notes_of};
 pub use read::{read_log, read_log_as, read_logs, read_logs_as};
 pub use topics::{Alignment, alignment};
 

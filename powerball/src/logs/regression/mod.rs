@@ -2,7 +2,6 @@
 
 mod hidden;
 mod kept;
-mod motors;
 #[cfg(test)]
 pub(crate) mod newton_euler;
 mod per_joint;
@@ -14,7 +13,6 @@ mod rows;
 mod saturated;
 mod silent;
 
-pub use motors::{Motors, logs_of_motors, notes_of};
 pub(crate) use prepare::top_velocity;
 pub use prepare::{Data, DataError, DataOptions, column_in_bands};
 pub use recording::Recording;

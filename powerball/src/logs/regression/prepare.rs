@@ -1,11 +1,10 @@
 //! Logs of an arm into rows: even grid, derivatives, band, rest removed, blocks laid out.
 
 use super::kept::kept_samples;
-use super::motors::logs_of_motors;
 use super::rest_notes::{FEWEST_ROWS, notes};
 use super::silent::silent_joints;
 use super::{Block, Column, JointRows, Recording, RigidArm};
-use crate::logs::log::Log;
+use crate::logs::log::{Log, logs_of_motors};
 use crate::logs::parallel;
 use crate::logs::signal::resample::median_step;
 use crate::logs::signal::{Band, rest};
@@ -61,7 +60,7 @@ impl std::error::Error for DataError {}
 
 /// Everything that regressions over some logs share.
 ///
-/// Where a transmission couples joints, recordings and rows are of motors: see [`Motors`](super::Motors).
+/// Where a transmission couples joints, recordings and rows are of motors: see [`Motors`](crate::logs::log::Motors).
 #[derive(Debug)]
 pub struct Data<'a> {
     /// The arm's rigid-body functions.
@@ -156,7 +155,7 @@ impl<'a> Data<'a> {
         let rest_velocity: Vec<f64> = (0..n)
             .map(|j| {
                 let velocities = recordings.iter().flat_map(|r| r.velocity(j).map(f64::abs)).collect();
-                rest::rest_velocity(velocities, body.speed(j))
+                rest::rest_velocity(velocities, body.velocity_limit(j))
             })
             .collect();
         let top_velocity: Vec<f64> = (0..n).map(|j| top_velocity(&recordings, j)).collect();

@@ -1,7 +1,7 @@
 //! The rigid arm of a file at run time: columns of its minimal set and of what lies outside it.
 
 use super::hidden::hidden;
-use super::motors::Motors;
+use crate::logs::log::Motors;
 use dyngen::arm::ParameterKind;
 use dyngen::base::span::combinations;
 use dyngen::exact::rational::{self, Rational};
@@ -156,10 +156,10 @@ impl RigidArm {
 
     /// The limit of a motor's velocity, where the arm file's limits say one.
     #[must_use]
-    pub fn speed(&self, motor: usize) -> Option<f64> {
+    pub fn velocity_limit(&self, motor: usize) -> Option<f64> {
         match &self.motors {
             None => self.arm().joints[motor].velocity,
-            Some(motors) => motors.speed(self.arm(), motor),
+            Some(motors) => motors.velocity_limit(self.arm(), motor),
         }
     }
 

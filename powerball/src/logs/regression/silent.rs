@@ -1,8 +1,7 @@
 //! Joints whose samples say nothing, and why.
 
 use super::Recording;
-use super::motors::logs_of_motors;
-use crate::logs::log::Log;
+use crate::logs::log::{Log, logs_of_motors};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 

@@ -81,7 +81,9 @@ impl Summary {
             cutoff: options.cutoff,
             smoothing: options.smoothing,
             steepness: (0..body.dof())
-                .map(|j| Steepness::new(body.speed(j).filter(|v| *v > 0.0).unwrap_or(ORDINARY_SPEED)))
+                .map(|j| {
+                    Steepness::new(body.velocity_limit(j).filter(|v| *v > 0.0).unwrap_or(ORDINARY_SPEED))
+                })
                 .collect(),
         };
         Summary::without_logs(identity)

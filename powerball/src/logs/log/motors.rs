@@ -4,9 +4,8 @@
 //! friction is in its own row alone, as it is in a joint's where each motor turns one joint; so regressions
 //! work in them, and their rows, states and torques with the number of a coupled joint are its motor's.
 
-use crate::logs::log::Log;
+use super::Log;
 use dyngen::Arm;
-use dyngen::exact::rational::to_f64;
 use faer::Mat;
 use faer::linalg::solvers::DenseSolveCore;
 use std::borrow::Cow;
@@ -27,8 +26,8 @@ impl Motors {
         if arm.transmissions.is_empty() {
             return None;
         }
-        let rows = arm.motor_velocity_matrix();
-        let matrix = Mat::from_fn(rows.len(), rows.len(), |i, j| to_f64(&rows[i][j]));
+        let rows = arm.motor_velocity_matrix_f64();
+        let matrix = Mat::from_fn(rows.len(), rows.len(), |i, j| rows[i][j]);
         let inverse = matrix.partial_piv_lu().inverse();
         Some(Motors { matrix, inverse })
     }
@@ -80,15 +79,19 @@ impl Motors {
     /// The log of the joints of one of the motors.
     #[must_use]
     pub fn log_of_joints(&self, motors: &Log) -> Log {
-        let (q, torque) =
-            (by_joint(&motors.q, |q| self.joints(q)), by_joint(&motors.torque, |x| self.joint_torques(x)));
-        Log { q, torque, ..motors.clone() }
+        let q = by_joint(&motors.q, |q| self.joints(q));
+        Log { q, torque: self.joint_torque_signals(&motors.torque), ..motors.clone() }
+    }
+
+    /// Joint torques of motor torques, each a signal.
+    pub(super) fn joint_torque_signals(&self, motors: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        by_joint(motors, |x| self.joint_torques(x))
     }
 
     /// The largest velocity of a motor, rad/s or m/s, by the limits of the joints that turn it; `None` where
     /// one has none.
     #[must_use]
-    pub fn speed(&self, arm: &Arm, motor: usize) -> Option<f64> {
+    pub fn velocity_limit(&self, arm: &Arm, motor: usize) -> Option<f64> {
         let turning = (0..self.matrix.ncols()).filter(|j| self.matrix[(motor, *j)] != 0.0);
         turning.map(|j| Some(self.matrix[(motor, j)].abs() * arm.joints[j].velocity?)).sum()
     }
@@ -191,7 +194,7 @@ mod tests {
         for (a, b) in motors.joint_torques(&on_motors).iter().zip(&torque) {
             approx::assert_abs_diff_eq!(a, b, epsilon = 1e-14);
         }
-        assert_eq!(motors.speed(&wrist(), 2), Some(5.0));
+        assert_eq!(motors.velocity_limit(&wrist(), 2), Some(5.0));
         assert!(motors_note(&wrist()).unwrap().contains("joints 2, 3"));
     }
 }
