@@ -182,6 +182,12 @@ pub enum Law<T> {
         /// The play, rad.
         gap: T,
     },
+    /// Where the load turns, the link leaves the flank and flies through the play: −τ_rigid on the way, and the
+    /// impulse with which the other flank takes it up, without a bounce.
+    Flight {
+        /// The play times the inertia that flies, N·m·s².
+        reach: T,
+    },
     /// The link gives way by −τ_rigid/K for a coefficient 1/K, rad/(N·m). Moves the link.
     Compliance,
     /// The link hangs to the side its load pushes it to: −tanh(50·τ_rigid/s). Moves the link.
@@ -206,11 +212,11 @@ pub struct Term<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Memory<T> {
     begun: bool,
-    /// The last position, or the farthest one in the present direction.
+    /// The last position, the farthest one in the present direction, or the link's in its play.
     place: T,
-    /// Presliding state, or the direction of the last reversal's end.
+    /// Presliding state, the direction of the last reversal's end, or the link's velocity in its play.
     wound: T,
-    /// Where the motion last reversed.
+    /// Where the motion last reversed, or the last sample's time.
     turned: Option<T>,
 }
 
@@ -246,6 +252,7 @@ impl<T: RealField + Copy> Law<T> {
                 | Law::TorqueMagnitude { .. }
                 | Law::TorqueSquare { .. }
                 | Law::Gap { .. }
+                | Law::Flight { .. }
         ) || self.moves_link()
     }
 
@@ -322,6 +329,7 @@ impl<T: RealField + Copy> Law<T> {
                     T::zero()
                 }
             }
+            Law::Flight { reach } => memory.fly(of(now.rigid, joint), reach, now.running),
             Law::Compliance | Law::HangingBack { .. } => T::zero(),
         }
     }
@@ -337,6 +345,27 @@ impl<T: RealField + Copy> Memory<T> {
             self.wound = side + (self.wound - side) * (-step.abs() / distance).exp();
         }
         self.wound
+    }
+
+    /// J·ẍ of a link that is x ahead of its motor, within the play: x = `place`/J, ẋ = `wound`/J. No torque passes
+    /// in flight, so J·ẍ = −load; a flank stops it within a sample.
+    fn fly(&mut self, load: T, reach: T, time: T) -> T {
+        let flank = reach * number(0.5);
+        if !self.begun {
+            // The motor pushes: the link is behind it.
+            (self.begun, self.place) = (true, -load.signum() * flank);
+        }
+        let step = self.turned.replace(time).map_or_else(T::zero, |before| time - before);
+        if step <= T::zero() {
+            return T::zero();
+        }
+        let before = self.wound;
+        self.wound -= load * step;
+        self.place += self.wound * step;
+        if self.place.abs() >= flank {
+            (self.place, self.wound) = (self.place.signum() * flank, T::zero());
+        }
+        (self.wound - before) / step
     }
 
     /// Whether the motor has moved less than the gap since its motion last reversed.

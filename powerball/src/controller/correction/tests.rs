@@ -34,6 +34,29 @@ fn the_gap_is_crossed_once_after_each_reversal() {
     assert!(torque[60..].iter().all(|x| *x == 0.0));
 }
 
+/// Under a load of 2 N·m that turns, 0.04 N·m·s² take √(2·0.04/2) s; what the motor did not feel on the way comes back at
+/// once at the other flank, and nothing more comes while the load presses the link to it.
+#[test]
+fn a_link_flies_through_its_play_in_the_time_of_its_fall_and_is_stopped_with_its_momentum() {
+    let rate = 1000.0;
+    let law = Law::Flight { reach: 0.04 };
+    let mut memory = Memory::default();
+    let torque: Vec<f64> = (0..1000)
+        .map(|k| {
+            let load = [if k < 400 { 2.0 } else { -2.0 }];
+            let running = f64::from(k) / rate;
+            let now =
+                Instant { q: &[], dq: &[], ddq: &[], rigid: &load, friction: &[], temperature: &[], running };
+            law.value(0, &now, &mut memory)
+        })
+        .collect();
+    assert!(torque[..400].iter().all(|x| *x == 0.0), "the link is pressed to its flank");
+    let flying = torque.iter().filter(|x| **x == 2.0).count();
+    assert!((flying as f64 / rate - 0.2).abs() < 2.0 / rate, "{flying} ms in flight");
+    approx::assert_abs_diff_eq!(torque.iter().sum::<f64>() / rate, 0.0, epsilon = 1e-9);
+    assert_eq!(torque.iter().filter(|x| **x < 0.0).count(), 1, "one impulse");
+}
+
 /// Single precision is enough for a controller: a millionth of the torque.
 #[test]
 fn single_precision_agrees() {

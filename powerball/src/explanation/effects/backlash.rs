@@ -1,12 +1,12 @@
 //! Backlash in a gear: after a reversal the motor turns through a gap before it drives the link again.
 
-use super::candidate::geometric;
+use super::candidate::{geometric, scaled};
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
 use serde::Serialize;
 
-/// The rigid torque is missing while the motor is in the gap, or the link stands beside the motor by half the
-/// gap.
+/// A link that friction holds is not felt while the motor crosses the gap; a free one flies through it where its load
+/// turns; one that is loaded slowly stands beside the motor by half the gap.
 pub(super) struct Backlash;
 
 /// What of the backlash shows.
@@ -16,6 +16,13 @@ pub enum Settings {
     Gap {
         /// The gap, rad.
         gap: f64,
+    },
+    /// The link flies through the gap where its load turns, and is stopped at the other flank.
+    Flight {
+        /// The gap, rad.
+        gap: f64,
+        /// The inertia that flies, kg·m²: of the joint, on the average over the logs.
+        inertia: f64,
     },
     /// The link stands back by half the gap on the side its load pushes it to.
     Offset {
@@ -33,6 +40,7 @@ pub struct Figures {
 
 /// Gaps tried on a joint, and the largest, rad.
 const GAPS: usize = 6;
+const FLIGHTS: usize = 12;
 const MOST: f64 = 0.05;
 
 impl Effect for Backlash {
@@ -60,8 +68,11 @@ impl Effect for Backlash {
         let mut candidates = Vec::new();
         for j in context.moving_joints() {
             let gaps = geometric(5e-4, MOST, GAPS).into_iter().map(|gap| Settings::Gap { gap });
-            let all = gaps.chain([Settings::Offset { scale: top(j.index()) }]);
-            candidates.extend(all.map(|settings| Candidate::on(j, settings, GAPS + 1)));
+            let inertia = mean_inertia(context, j.index());
+            let flights =
+                geometric(1e-3, MOST, FLIGHTS).into_iter().map(|gap| Settings::Flight { gap, inertia });
+            let all = gaps.chain(flights).chain([Settings::Offset { scale: top(j.index()) }]);
+            candidates.extend(all.map(|settings| Candidate::on(j, settings, GAPS + FLIGHTS + 1)));
         }
         candidates
     }
@@ -69,6 +80,7 @@ impl Effect for Backlash {
     fn laws(&self, _: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
         match Settings::of(candidate) {
             Some(Settings::Gap { gap }) => vec![Law::Gap { gap: *gap }],
+            Some(Settings::Flight { gap, inertia }) => vec![Law::Flight { reach: gap * inertia }],
             Some(Settings::Offset { scale }) => vec![Law::HangingBack { scale: *scale }],
             None => Vec::new(),
         }
@@ -78,9 +90,15 @@ impl Effect for Backlash {
         true
     }
 
+    fn neighbours(&self, candidate: &Candidate, share: f64) -> Vec<Candidate> {
+        let Some(&Settings::Flight { gap, inertia }) = Settings::of(candidate) else { return Vec::new() };
+        let near = |f: f64| candidate.with(Settings::Flight { gap: scaled(gap, f, share), inertia });
+        [0.7, 0.85, 1.2, 1.4].map(near).to_vec()
+    }
+
     fn admissible(&self, candidate: &Candidate, c: &[f64]) -> bool {
         match Settings::of(candidate) {
-            Some(Settings::Gap { .. }) => (0.1..2.0).contains(&c[0]),
+            Some(Settings::Gap { .. } | Settings::Flight { .. }) => (0.1..2.0).contains(&c[0]),
             Some(Settings::Offset { .. }) => c[0] < MOST,
             None => false,
         }
@@ -88,9 +106,28 @@ impl Effect for Backlash {
 
     fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
         let gap = |f: &Found<'_>| match Settings::of(f.candidate) {
-            Some(Settings::Gap { gap }) => *gap,
+            Some(Settings::Gap { gap } | Settings::Flight { gap, .. }) => *gap,
             _ => 2.0 * f.coefficients[0],
         };
         Figures { gap: ByJoint::of(found, gap) }.into()
     }
+}
+
+/// Every so many samples are enough for an average.
+const SPARSE: usize = 16;
+
+/// The diagonal element of the mass matrix on the average over the logs, kg·m² or kg.
+fn mean_inertia(context: &Context<'_>, joint: usize) -> f64 {
+    let n = context.data.dof();
+    let sparse = |signal: &[f64]| signal.chunks_exact(n).step_by(SPARSE).flatten().copied().collect();
+    let (mut sum, mut samples) = (0.0, 0);
+    for (recording, rigid) in context.data.recordings.iter().zip(context.rigid()) {
+        let [q, v, mut a]: [Vec<f64>; 3] = [&recording.q, &recording.v, &recording.a].map(|s| sparse(s));
+        a.iter_mut().skip(joint).step_by(n).for_each(|a| *a += 1.0);
+        let faster = context.fit.rigid_torque(context.data.body, &q, &v, &a);
+        let change = |(k, faster): (usize, &f64)| faster - rigid[k * SPARSE * n + joint];
+        sum += faster.iter().skip(joint).step_by(n).enumerate().map(change).sum::<f64>();
+        samples += faster.len() / n;
+    }
+    (sum / samples.max(1) as f64).max(f64::MIN_POSITIVE)
 }

@@ -152,6 +152,9 @@ enum LawEntry {
     Gap {
         gap: f64,
     },
+    Flight {
+        reach: f64,
+    },
     Compliance,
     HangingBack {
         scale: f64,

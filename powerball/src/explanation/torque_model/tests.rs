@@ -36,6 +36,7 @@ fn every_law() -> Vec<Law<f64>> {
         Law::TorqueMagnitude { scale: 64.0 },
         Law::TorqueSquare { scale: 64.0 },
         Law::Gap { gap: 0.002 },
+        Law::Flight { reach: 0.002 },
         Law::Compliance,
         Law::HangingBack { scale: 30.0 },
     ]
