@@ -115,7 +115,7 @@ pub(crate) fn groups(
         let open: Vec<Candidate> =
             candidates.into_iter().filter(|c| !model.has(c) && !is_ruled_out(study, c)).collect();
         tests += open.iter().map(|c| c.searched.max(1.0)).fold(0.0, f64::max).max(open.len() as f64);
-        let mut members = compatible(screen, best_by_joint(screen, open));
+        let mut members = without_repeats(screen, compatible(screen, best_by_joint(screen, open)));
         for member in &mut members {
             if let Some((reason, judged)) = untested_refusal(study, model, screen, member) {
                 (member.refusal, member.judged) = (Some(reason), judged);
@@ -178,6 +178,35 @@ fn compatible(screen: &Screen<'_>, mut members: Vec<Member>) -> Vec<Member> {
         kept.contains(&(at - 1))
     });
     members
+}
+
+/// Takes members out that explain again what better ones do: the zeros of two encoders on parallel axes are one thing
+/// twice, and their sum would win over a name that is as good as each. Only what acts on all joints can do so.
+fn without_repeats(screen: &Screen<'_>, members: Vec<Member>) -> Vec<Member> {
+    let dof = screen.context.data.dof();
+    let wide = |m: &Member| m.trial.columns.iter().all(|column| column.parts.len() == dof);
+    if members.len() < 2 || !members.iter().all(wide) {
+        return members;
+    }
+    let least = screen.context.rule.least_score;
+    let (mut columns, mut gain) = (Vec::new(), 0.0);
+    let mut adds = |member: &Member| {
+        let Trial { columns: own, gain: alone, score, .. } = &member.trial;
+        if *score < least {
+            // Refused for that, and told so.
+            return true;
+        }
+        columns.extend(own.iter().cloned());
+        let together = screen.try_columns(columns.clone(), 1.0).map_or(gain, |trial| trial.gain);
+        let adds = together - gain - (alone - score) >= least;
+        if adds {
+            gain = together;
+        } else {
+            columns.truncate(columns.len() - own.len());
+        }
+        adds
+    };
+    members.into_iter().filter(|member| adds(member)).collect()
 }
 
 /// Why a member need not be tested, and whether it could have been judged.

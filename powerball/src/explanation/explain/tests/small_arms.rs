@@ -281,3 +281,25 @@ fn a_tilted_base_shows_weight_that_level_gravity_hides() {
     }
     at_the_floor(&explained);
 }
+
+/// Encoders on parallel axes have zeros that say the same of the last link, and so does a body that does not lie where it
+/// is declared: none of them is counted twice, and the answer is all names that fit.
+#[test]
+fn the_zeros_of_parallel_encoders_do_not_outvote_a_body_that_lies_aside() {
+    let text = include_str!("../../../../../tests/arms/planar2r.toml");
+    let text = text.replace("rotor_ratio = 30", "rotor_ratio = 30\nzero = [\"my\"]");
+    let arm = Arm::parse(&text, "planar2r.toml").unwrap();
+    let bodies = vec![
+        Body::even_box(4.0, [-0.2, 0.01, 0.0], [0.4, 0.08, 0.08], 4e-5),
+        Body::even_box(2.0, [-0.15, 0.012, 0.02], [0.3, 0.06, 0.06], 4e-5),
+    ];
+    let plant = plant(&arm, bodies, &[4.0, 2.0], &[0.2, 0.06]);
+    let explained = explained_logs(&arm, recorded(&arm, &plant, &[]));
+    let [found] = explained.effects.as_slice() else { panic!("{:?}", names(&explained)) };
+    assert_eq!(found.joints.len(), 1, "{found:?}");
+    let as_well = found.rivals.iter().filter(|rival| rival.why_not.starts_with("fits as well"));
+    let mut all: Vec<&str> = as_well.map(|rival| rival.effect.as_str()).collect();
+    all.push(&found.effect);
+    assert!(all.contains(&"broken_symmetry") && all.contains(&"encoder_offset"), "{found:?}");
+    at_the_floor(&explained);
+}
