@@ -180,8 +180,9 @@ fn compatible(screen: &Screen<'_>, mut members: Vec<Member>) -> Vec<Member> {
     members
 }
 
-/// Takes members out that explain again what better ones do: the zeros of two encoders on parallel axes are one thing
-/// twice, and their sum would win over a name that is as good as each. Only what acts on all joints can do so.
+/// Members with what each adds to the better ones, not what it explains alone: the zeros of two encoders on parallel axes
+/// are one thing twice, and their sum would win over a name that is as good as each. What adds too little goes out. Only
+/// what acts on all joints can be so alike.
 fn without_repeats(screen: &Screen<'_>, members: Vec<Member>) -> Vec<Member> {
     let dof = screen.context.data.dof();
     let wide = |m: &Member| m.trial.columns.iter().all(|column| column.parts.len() == dof);
@@ -190,23 +191,24 @@ fn without_repeats(screen: &Screen<'_>, members: Vec<Member>) -> Vec<Member> {
     }
     let least = screen.context.rule.least_score;
     let (mut columns, mut gain) = (Vec::new(), 0.0);
-    let mut adds = |member: &Member| {
-        let Trial { columns: own, gain: alone, score, .. } = &member.trial;
-        if *score < least {
+    let added = |mut member: Member| {
+        if member.trial.score < least {
             // Refused for that, and told so.
-            return true;
+            return Some(member);
         }
-        columns.extend(own.iter().cloned());
+        let own = member.trial.columns.len();
+        columns.extend(member.trial.columns.iter().cloned());
         let together = screen.try_columns(columns.clone(), 1.0).map_or(gain, |trial| trial.gain);
-        let adds = together - gain - (alone - score) >= least;
-        if adds {
-            gain = together;
-        } else {
-            columns.truncate(columns.len() - own.len());
+        let penalty = member.trial.gain - member.trial.score;
+        if together - gain - penalty < least {
+            columns.truncate(columns.len() - own);
+            return None;
         }
-        adds
+        (member.trial.gain, member.trial.score) = (together - gain, together - gain - penalty);
+        gain = together;
+        Some(member)
     };
-    members.into_iter().filter(|member| adds(member)).collect()
+    members.into_iter().filter_map(added).collect()
 }
 
 /// Why a member need not be tested, and whether it could have been judged.
