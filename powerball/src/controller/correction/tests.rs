@@ -34,8 +34,8 @@ fn the_gap_is_crossed_once_after_each_reversal() {
     assert!(torque[60..].iter().all(|x| *x == 0.0));
 }
 
-/// Under a load of 2 N·m that turns, 0.04 N·m·s² take √(2·0.04/2) s; what the motor did not feel on the way comes back at
-/// once at the other flank, and nothing more comes while the load presses the link to it.
+/// Under a load of 2 N·m that turns, 0.04 N·m·s² take √(2·0.04/2) s; what the motor did not feel on the way
+/// comes back at once at the other flank, and nothing more comes while the load presses the link to it.
 #[test]
 fn a_link_flies_through_its_play_in_the_time_of_its_fall_and_is_stopped_with_its_momentum() {
     let rate = 1000.0;

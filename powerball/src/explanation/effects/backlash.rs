@@ -5,8 +5,8 @@ use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
 use serde::Serialize;
 
-/// A link that friction holds is not felt while the motor crosses the gap; a free one flies through it where its load
-/// turns; one that is loaded slowly stands beside the motor by half the gap.
+/// A link that friction holds is not felt while the motor crosses the gap; a free one flies through it where
+/// its load turns; one that is loaded slowly stands beside the motor by half the gap.
 pub(super) struct Backlash;
 
 /// What of the backlash shows.

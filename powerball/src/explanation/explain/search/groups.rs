@@ -180,9 +180,9 @@ fn compatible(screen: &Screen<'_>, mut members: Vec<Member>) -> Vec<Member> {
     members
 }
 
-/// Members with what each adds to the better ones, not what it explains alone: the zeros of two encoders on parallel axes
-/// are one thing twice, and their sum would win over a name that is as good as each. What adds too little goes out. Only
-/// what acts on all joints can be so alike.
+/// Members with what each adds to the better ones, not what it explains alone: the zeros of two encoders on
+/// parallel axes are one thing twice, and their sum would win over a name that is as good as each. What adds
+/// too little goes out. Only what acts on all joints can be so alike.
 fn without_repeats(screen: &Screen<'_>, members: Vec<Member>) -> Vec<Member> {
     let dof = screen.context.data.dof();
     let wide = |m: &Member| m.trial.columns.iter().all(|column| column.parts.len() == dof);

@@ -282,8 +282,8 @@ fn a_tilted_base_shows_weight_that_level_gravity_hides() {
     at_the_floor(&explained);
 }
 
-/// Encoders on parallel axes have zeros that say the same of the last link, and so does a body that does not lie where it
-/// is declared: none of them is counted twice, and the answer is all names that fit.
+/// Encoders on parallel axes have zeros that say the same of the last link, and so does a body that does not
+/// lie where it is declared: none of them is counted twice, and the answer is all names that fit.
 #[test]
 fn the_zeros_of_parallel_encoders_do_not_outvote_a_body_that_lies_aside() {
     let text = include_str!("../../../../../tests/arms/planar2r.toml");
