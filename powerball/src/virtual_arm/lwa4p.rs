@@ -2,6 +2,7 @@
 
 use super::body::Body;
 use super::dynamics::Dynamics;
+use super::effect::{Places, PlantEffect};
 use super::plant::{Plant, Sensors};
 use super::slave::{Identity, Module, Setup};
 use crate::bus::driver::lwa4p::LWA4P;
@@ -9,12 +10,14 @@ use crate::controller::friction::{TABLE_2, TanhFriction};
 use crate::identification::chain::Chain;
 use crate::identification::excite::Masses;
 use dyngen::{Arm, Diagnostics};
+use rand::Rng;
+use std::ops::Range;
 
 /// The arm file of the hardware, which the virtual arm follows to the letter.
 pub const ARM_FILE: &str = include_str!("../../lwa4p.toml");
 
 /// From the wrist's centre to the flange, m.
-pub(super) const FLANGE: f64 = 0.085;
+const FLANGE: f64 = 0.085;
 
 /// Rotor inertia of the ERB 145 and ERB 115 modules at the motor, kg·m²: what motors of their size have.
 /// Nothing is published.
@@ -39,6 +42,34 @@ const LINKS: [(f64, [f64; 3], [f64; 3], f64); 6] = [
 /// The virtual arm's bodies, in the order of the links.
 pub fn links() -> Vec<Body> {
     LINKS.iter().map(|(mass, centre, edges, rotor)| Body::even_box(*mass, *centre, *edges, *rotor)).collect()
+}
+
+/// Where effects that are drawn sit on this arm.
+#[must_use]
+pub fn places() -> Places {
+    Places {
+        any: (0..6).collect(),
+        large: (0..4).collect(),
+        // Gravity loads the shoulder and the elbow.
+        loaded: vec![1, 2],
+        // The elbow and the forearm, whose centres of mass are declared to lie in a plane.
+        symmetric: vec![(2, 0.02), (3, 0.06)],
+        // Both axes of a module share a housing.
+        coupled: [[0, 1], [1, 0], [2, 3], [3, 2], [4, 5], [5, 4]].map(|pair| (pair, 1.0)).to_vec(),
+        stiffness: vec![1500.0..3500.0; 6],
+        flange: FLANGE,
+    }
+}
+
+/// Draws an effect of this arm, as [`PlantEffect::draw`] does.
+pub fn draw_effect(
+    name: &str,
+    plant: &Plant,
+    session: f64,
+    begins: Range<f64>,
+    rng: &mut impl Rng,
+) -> Option<PlantEffect> {
+    PlantEffect::draw(name, plant, &places(), session, begins, rng)
 }
 
 /// What set-points and motions are checked with where nothing better is known: the bodies of [`links`], and Table 2's

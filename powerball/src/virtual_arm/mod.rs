@@ -17,7 +17,7 @@ mod undeclared;
 pub use body::{Body, PER_LINK, bodies};
 
 pub use dynamics::{Dynamics, solve_positive_definite};
-pub use effect::{Gear, Instant, PlantEffect, State};
+pub use effect::{Gear, Instant, Places, PlantEffect, State};
 pub use plant::{Plant, Sensors, SimulatedLog};
 pub use servo::{Gains, Servo};
 pub use simulation::Simulation;

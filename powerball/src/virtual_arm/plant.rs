@@ -285,8 +285,7 @@ mod tests {
             for seed in 0..5 {
                 let mut rng = ChaCha8Rng::seed_from_u64(seed);
                 let effect =
-                    PlantEffect::draw_named(name, &lwa4p::plant().unwrap(), 20.0, 5.0..15.0, &mut rng)
-                        .unwrap();
+                    lwa4p::draw_effect(name, &lwa4p::plant().unwrap(), 20.0, 5.0..15.0, &mut rng).unwrap();
                 let with = quiet().with(effect.clone()).record(&motion, 0.0, 0);
                 let change: Vec<f64> = with.tau.iter().zip(&plain.tau).map(|(a, b)| a - b).collect();
                 let largest =

@@ -435,7 +435,7 @@ mod tests {
         let plain = lwa4p::plant().unwrap();
         for name in PlantEffect::NAMES {
             let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
-            let effect = PlantEffect::draw_named(name, &plain, 20.0, 0.1..0.2, &mut rng).unwrap();
+            let effect = lwa4p::draw_effect(name, &plain, 20.0, 0.1..0.2, &mut rng).unwrap();
             let mut simulation = open(plain.clone().with(effect));
             let hold = simulation.plant().dynamics().gravity(&POSE);
             (0..1000).for_each(|_| simulation.step(1e-3, &hold));

@@ -56,7 +56,7 @@ mod tests {
         let plant = lwa4p::plant().unwrap();
         for (seed, name) in PlantEffect::NAMES.into_iter().enumerate() {
             let mut rng = ChaCha8Rng::seed_from_u64(seed as u64);
-            let effect = PlantEffect::draw_named(name, &plant, 100.0, 1.0..2.0, &mut rng).unwrap();
+            let effect = lwa4p::draw_effect(name, &plant, 100.0, 1.0..2.0, &mut rng).unwrap();
             let undeclared = Undeclared { effect, age: 100.0 };
             let text = serde_json::to_string(&undeclared).unwrap();
             assert!(text.contains(name), "{text}");

@@ -1,17 +1,17 @@
-//! Arms drawn by lot, with bodies, friction and sensors to go with them, and effects drawn for any arm.
+//! Arms drawn by lot, with bodies, friction and sensors to go with them.
 
 use dyngen::Arm;
 use powerball::controller::friction::{TABLE_2, TanhFriction};
 use powerball::identification::chain::Chain;
-use powerball::virtual_arm::{Body, Dynamics, Plant, PlantEffect as Effect, Sensors};
+use powerball::virtual_arm::{Body, Dynamics, Places, Plant, Sensors};
 use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt};
-use std::f64::consts::PI;
 use std::fmt::Write as _;
-use std::ops::Range;
 
 /// Draws until a truth can be seen at the size that is wanted.
 pub(super) const DRAWS: usize = 12;
+/// Noise of a torque against what is usual there.
+const NOISE: f64 = 0.01;
 /// How far a truth may be scaled away from what it was drawn as: an encoder is not off by a radian.
 pub(super) const LARGEST_FACTOR: f64 = 4.0;
 
@@ -78,7 +78,7 @@ impl Drawn {
             TanhFriction::new([level * g1, slow * g2, level * g3, slow * g4, level * slow * g5])
         };
         let friction = usual.iter().enumerate().map(friction).collect();
-        let white: Vec<f64> = usual.iter().map(|usual| 0.01 * usual).collect();
+        let white: Vec<f64> = usual.iter().map(|usual| NOISE * usual).collect();
         let sensors = Sensors {
             rate: 200.0,
             encoder_step: 0.001f64.to_radians(),
@@ -89,98 +89,29 @@ impl Drawn {
         Ok(Drawn { arm, text, plant: Plant::new(dynamics, friction, sensors), symmetric })
     }
 
-    /// An effect of that name at joint `on`, from 0, or at any joint; `None` where the arm has no place for it.
-    pub(super) fn effect(
-        &self,
-        name: &str,
-        on: Option<usize>,
-        session: f64,
-        begins: Range<f64>,
-        rng: &mut impl Rng,
-    ) -> Option<Effect> {
-        let rows = self.plant.dynamics().chain().rows();
-        let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
-        let any = rng.random_range(0..rows.len());
-        let joint = on.unwrap_or(any);
-        let friction = self.plant.friction()[joint];
-        let coulomb = friction.gamma1 + friction.gamma3;
-        let noise = self.plant.sensors().white[joint];
-        let usual = 100.0 * noise;
-        // Ways and velocities of a sliding joint in m against those of a turning one in rad.
-        let unit = if rows[joint].is_revolute() { 1.0 } else { 0.2 };
-        Some(match name {
-            "load_friction" => Effect::LoadFriction { joint, coefficient: rng.random_range(0.05..0.11) },
-            "stribeck" => Effect::Stribeck {
-                joint,
-                level: friction.gamma1 * rng.random_range(0.3..0.6),
-                velocity: unit * rng.random_range(0.03..0.07),
-            },
-            "velocity_nonlinearity" => {
-                let exponent = rng.random_range(2.2..3.0);
-                let torque =
-                    friction.gamma5 * unit * rng.random_range(0.35..0.7) * f64::powf(unit, -exponent);
-                Effect::VelocityNonlinearity { joint, torque, exponent }
-            }
-            "asymmetry" => Effect::Asymmetry {
-                joint,
-                share: rng.random_range(0.1..0.3),
-                constant: coulomb * rng.random_range(0.0..0.15),
-            },
-            "hysteresis" => Effect::Hysteresis {
-                joint,
-                level: coulomb * rng.random_range(0.3..0.6),
-                way: unit * rng.random_range(0.010..0.030),
-            },
-            "payload" => {
-                let mut aside = || rng.random_range(-0.05..0.05);
-                let centre = [aside(), aside(), 0.1 + aside()];
-                Effect::Payload { mass: rng.random_range(0.4..1.2), centre, start: rng.random_range(begins) }
-            }
-            "spring" => Effect::Spring {
-                joint,
-                stiffness: 4.0 * noise / unit,
-                rest: if unit < 1.0 { rng.random_range(0.2..0.5) } else { rng.random_range(-0.5..0.5) },
-            },
-            "position_ripple" => Effect::PositionRipple {
-                joint,
-                order: *[5.0, 9.0, 14.0, 100.0, 160.0].choose(rng)? / unit,
-                amplitude: 2.0 * noise,
-                phase: rng.random_range(-PI..PI),
-            },
-            "temperature" => Effect::Temperature {
-                change: -rng.random_range(0.15..0.30),
-                time_constant: session * rng.random_range(0.3..0.6),
-            },
-            "torque_constant" => {
-                Effect::TorqueConstant { joint, gain: 1.0 + sign * rng.random_range(0.04..0.1) }
-            }
-            "time_delay" => Effect::TimeDelay { delay: rng.random_range(0.006..0.018) },
-            "encoder_offset" => {
-                Effect::EncoderOffset { joint, offset: sign * unit * rng.random_range(0.03..0.08) }
-            }
-            "base_tilt" => Effect::BaseTilt { tilt: [0, 1].map(|_| sign * rng.random_range(0.02..0.06)) },
-            "contact_wrench" => Effect::ContactWrench {
-                force: [0, 1, 2].map(|_| sign * rng.random_range(5.0..15.0)),
-                start: session * rng.random_range(0.0..0.1),
-                length: rng.random_range(2.0..5.0),
-                every: rng.random_range(17.0..29.0),
-            },
-            "broken_symmetry" => Effect::BrokenSymmetry {
-                link: *self.symmetric.choose(rng)?,
-                aside: sign * rng.random_range(0.01..0.03),
-            },
-            "joint_elasticity" => {
-                Effect::JointElasticity { joint, stiffness: usual / (unit * rng.random_range(0.003..0.015)) }
-            }
-            "backlash" => Effect::Backlash { joint, gap: unit * rng.random_range(0.01..0.03) },
-            "joint_coupling" => {
-                let from = if joint == 0 { 1 } else { joint - 1 };
-                let felt = self.plant.friction()[from];
-                let share = coulomb / (felt.gamma1 + felt.gamma3) * rng.random_range(0.06..0.15);
-                Effect::JointCoupling { from, onto: joint, share }
-            }
-            _ => return None,
-        })
+    /// Where effects sit on it: on joint `on`, from 0, or anywhere.
+    pub(super) fn places(&self, on: Option<usize>) -> Places {
+        let (plant, joints) = (&self.plant, 0..self.plant.friction().len());
+        let coulomb = |j: usize| plant.friction()[j].gamma1 + plant.friction()[j].gamma3;
+        let any: Vec<usize> = joints.clone().filter(|j| on.is_none_or(|on| on == *j)).collect();
+        let coupled = |&onto: &usize| {
+            let from = if onto == 0 { 1 } else { onto - 1 };
+            ([from, onto], coulomb(onto) / coulomb(from))
+        };
+        let stiffness = |j: usize| {
+            let unit = if plant.dynamics().chain().rows()[j].is_revolute() { 1.0 } else { 0.2 };
+            let usual = plant.sensors().white[j] / NOISE;
+            usual / (unit * 0.015)..usual / (unit * 0.003)
+        };
+        Places {
+            large: any.clone(),
+            loaded: any.clone(),
+            symmetric: self.symmetric.iter().map(|link| (*link, 0.015)).collect(),
+            coupled: any.iter().map(coupled).collect(),
+            stiffness: joints.map(stiffness).collect(),
+            flange: 0.035,
+            any,
+        }
     }
 }
 

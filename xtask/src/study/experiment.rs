@@ -316,16 +316,16 @@ impl Bench {
         let quiet = session.alone();
         let plain = self.base(&quiet, &[])?;
         for _ in 0..DRAWS {
-            let truth = match (Outside::ALL.into_iter().find(|law| law.name() == kind), &self.drawn) {
-                (Some(law), _) => Truth::Law(OutsideLaw::draw(law, &session.plant, rng)),
-                (None, Some(drawn)) => match drawn.effect(kind, on, end, begins.clone(), rng) {
-                    Some(effect) => Truth::Effect(effect),
-                    None => return Ok(None),
-                },
-                (None, None) => Truth::Effect(
-                    Effect::draw_named(kind, &session.plant, end, begins.clone(), rng)
-                        .ok_or_else(|| format!("no effect is called {kind}"))?,
-                ),
+            let truth = match Outside::ALL.into_iter().find(|law| law.name() == kind) {
+                Some(law) => Truth::Law(OutsideLaw::draw(law, &session.plant, rng)),
+                None => {
+                    let places = self.drawn.as_ref().map_or_else(lwa4p::places, |drawn| drawn.places(on));
+                    match Effect::draw(kind, &session.plant, &places, end, begins.clone(), rng) {
+                        Some(effect) => Truth::Effect(effect),
+                        None if self.drawn.is_some() => return Ok(None),
+                        None => return Err(format!("no effect is called {kind}")),
+                    }
+                }
             };
             if session.as_drawn {
                 let reached = self

@@ -12,7 +12,7 @@ use powerball::identification::motion::Motion;
 use powerball::logs::log::{Log, common_clock, read_logs};
 use powerball::logs::regression::{Data, DataOptions, Recording, RigidArm};
 use powerball::logs::summary::Summary;
-use powerball::virtual_arm::{Dynamics, Plant, PlantEffect as Effect, Sensors, bodies};
+use powerball::virtual_arm::{Dynamics, Plant, PlantEffect as Effect, Sensors, bodies, lwa4p};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -97,7 +97,7 @@ impl Measured {
             self.known.iter().any(same)
         };
         let drawn = (0..DRAWS)
-            .filter_map(|_| Effect::draw_named(kind, &self.plant, end, begins.clone(), &mut rng))
+            .filter_map(|_| lwa4p::draw_effect(kind, &self.plant, end, begins.clone(), &mut rng))
             .find(|effect| !known(effect));
         let Some(mut effect) = drawn else { return Ok(None) };
         let mut reached = 0.0;

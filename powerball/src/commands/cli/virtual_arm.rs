@@ -110,13 +110,12 @@ pub(crate) fn virtual_arm(
     setup.modules.iter_mut().for_each(|module| module.commutated = commutated);
     if let Some(name) = effect {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let effect =
-            PlantEffect::draw_named(name, &setup.plant, 100.0, 1.0..2.0, &mut rng).ok_or_else(|| {
-                Failure::Unusable(format!(
-                    "no effect is called {name}; there are {}",
-                    PlantEffect::NAMES.join(", ")
-                ))
-            })?;
+        let effect = lwa4p::draw_effect(name, &setup.plant, 100.0, 1.0..2.0, &mut rng).ok_or_else(|| {
+            Failure::Unusable(format!(
+                "no effect is called {name}; there are {}",
+                PlantEffect::NAMES.join(", ")
+            ))
+        })?;
         setup.plant = setup.plant.with(effect);
     }
     VirtualArm::new(setup).ok_or_else(|| broken("its parts do not fit".to_string()))

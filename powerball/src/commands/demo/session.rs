@@ -147,7 +147,7 @@ impl Session {
         // What begins at some time begins while a log is recorded that will be fitted, with logs before and
         // after.
         let begins = starts[BEGINS_IN] + PAUSE..starts[BEGINS_IN] + motions[BEGINS_IN].duration() - PAUSE;
-        let effect = Effect::draw_named(name, &plant, session, begins, &mut rng)
+        let effect = lwa4p::draw_effect(name, &plant, session, begins, &mut rng)
             .ok_or_else(|| SessionError::UnknownEffect(name.to_string()))?;
         let plant = plant.with(effect.clone());
 

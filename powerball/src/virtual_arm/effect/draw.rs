@@ -7,8 +7,32 @@ use rand::{Rng, RngExt};
 use std::f64::consts::PI;
 use std::ops::Range;
 
+/// Where effects sit on an arm; joints and links from 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Places {
+    /// Joints that have what any joint may have.
+    pub any: Vec<usize>,
+    /// Joints whose friction at low and at high velocity can be seen.
+    pub large: Vec<usize>,
+    /// Joints that carry a load.
+    pub loaded: Vec<usize>,
+    /// Links with a declared plane of symmetry, and how far aside a centre of mass may lie there, m.
+    pub symmetric: Vec<(usize, f64)>,
+    /// Joints of which the second feels friction of the first, and its share where both have the same friction.
+    pub coupled: Vec<([usize; 2], f64)>,
+    /// Stiffness of each joint's gear, N·m/rad or N/m.
+    pub stiffness: Vec<Range<f64>>,
+    /// From the last frame to the flange, m.
+    pub flange: f64,
+}
+
+/// `None` where there is none.
+fn one_of<T: Clone>(from: &[T], rng: &mut impl Rng) -> Option<T> {
+    if from.is_empty() { None } else { from.get(rng.random_range(0..from.len())).cloned() }
+}
+
 impl PlantEffect {
-    /// The names that [`draw_named`](Self::draw_named) knows.
+    /// The names that [`draw`](Self::draw) knows.
     pub const NAMES: [&'static str; 18] = [
         "load_friction",
         "stribeck",
@@ -30,65 +54,74 @@ impl PlantEffect {
         "backlash",
     ];
 
-    /// Draws an effect of that name for the virtual LWA 4P: its joint and its figures. `session` is the time
-    /// in s within which the logs are recorded, and what starts at some time starts within `begins`.
+    /// Draws an effect of that name: its joint and its figures. `session` is the time in s within which the logs
+    /// are recorded, and what starts at some time starts within `begins`.
     ///
     /// Sizes are chosen against the joint's friction and noise, such that the effect can be seen in a log but
-    /// does not outgrow what it disturbs. `None` for a name that is not known.
-    pub fn draw_named(
+    /// does not outgrow what it disturbs. `None` for a name that is not known, or has no place on the arm.
+    pub fn draw(
         name: &str,
         plant: &Plant,
+        places: &Places,
         session: f64,
         begins: Range<f64>,
         rng: &mut impl Rng,
     ) -> Option<PlantEffect> {
         let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
-        let any = rng.random_range(0..plant.friction().len());
-        let large = rng.random_range(0..4);
-        let friction = plant.friction()[any];
-        let coulomb = friction.gamma1 + friction.gamma3;
-        let noise = plant.sensors().white[any];
+        let any = one_of(&places.any, rng)?;
+        let large = one_of(&places.large, rng)?;
         let moment = rng.random_range(begins);
+        let friction = |joint: usize| plant.friction()[joint];
+        let coulomb = |joint: usize| friction(joint).gamma1 + friction(joint).gamma3;
+        let noise = plant.sensors().white[any];
+        // Ways and velocities of a sliding joint in m against those of a turning one in rad.
+        let unit =
+            |joint: usize| if plant.dynamics().chain().rows()[joint].is_revolute() { 1.0 } else { 0.2 };
         Some(match name {
-            // The joints that gravity loads.
             "load_friction" => PlantEffect::LoadFriction {
-                joint: rng.random_range(1..3),
+                joint: one_of(&places.loaded, rng)?,
                 coefficient: rng.random_range(0.05..0.11),
             },
             "stribeck" => PlantEffect::Stribeck {
                 joint: large,
-                level: plant.friction()[large].gamma1 * rng.random_range(0.3..0.6),
-                velocity: rng.random_range(0.03..0.07),
+                level: friction(large).gamma1 * rng.random_range(0.3..0.6),
+                velocity: unit(large) * rng.random_range(0.03..0.07),
             },
-            "velocity_nonlinearity" => PlantEffect::VelocityNonlinearity {
-                joint: large,
-                torque: plant.friction()[large].gamma5 * rng.random_range(0.35..0.7),
-                exponent: rng.random_range(2.2..3.0),
-            },
+            "velocity_nonlinearity" => {
+                let share = rng.random_range(0.35..0.7);
+                let exponent: f64 = rng.random_range(2.2..3.0);
+                let torque = friction(large).gamma5 * share * unit(large).powf(1.0 - exponent);
+                PlantEffect::VelocityNonlinearity { joint: large, torque, exponent }
+            }
             "asymmetry" => PlantEffect::Asymmetry {
                 joint: any,
                 share: rng.random_range(0.1..0.3),
-                constant: coulomb * rng.random_range(0.0..0.15),
+                constant: coulomb(any) * rng.random_range(0.0..0.15),
             },
             "hysteresis" => PlantEffect::Hysteresis {
                 joint: any,
-                level: coulomb * rng.random_range(0.3..0.6),
-                way: rng.random_range(0.010..0.030),
+                level: coulomb(any) * rng.random_range(0.3..0.6),
+                way: unit(any) * rng.random_range(0.010..0.030),
             },
-            // What joint 2 can still carry on an exciting path.
+            // What the arm can still carry on an exciting path.
             "payload" => {
                 let aside = [0, 1].map(|_| rng.random_range(-0.04..0.04));
-                PlantEffect::payload(rng.random_range(0.6..1.2), aside, rng.random_range(0.03..0.10), moment)
+                let mass = rng.random_range(0.6..1.2);
+                PlantEffect::Payload {
+                    mass,
+                    centre: [aside[0], aside[1], places.flange + rng.random_range(0.03..0.10)],
+                    start: moment,
+                }
             }
             "spring" => PlantEffect::Spring {
                 joint: any,
-                stiffness: 6.0 * noise * rng.random_range(0.5..1.2),
-                rest: rng.random_range(-0.5..0.5),
+                stiffness: 6.0 * noise / unit(any) * rng.random_range(0.5..1.2),
+                rest: if unit(any) < 1.0 { rng.random_range(0.2..0.5) } else { rng.random_range(-0.5..0.5) },
             },
             "position_ripple" => PlantEffect::PositionRipple {
                 joint: any,
                 // Teeth and wave generator turn with the motor, bearings and cables with the joint.
-                order: *[5.0, 9.0, 14.0, 100.0, 160.0].choose(rng)?,
+                order: *[5.0, 9.0, 14.0, 100.0, 160.0].choose(rng)? / unit(any),
                 amplitude: noise * rng.random_range(1.2..2.5),
                 phase: rng.random_range(-PI..PI),
             },
@@ -97,14 +130,17 @@ impl PlantEffect {
                 time_constant: session * rng.random_range(0.3..0.6),
             },
             "torque_constant" => PlantEffect::TorqueConstant {
-                joint: rng.random_range(1..3),
+                joint: one_of(&places.loaded, rng)?,
                 gain: 1.0 + sign * rng.random_range(0.04..0.1),
             },
             "time_delay" => PlantEffect::TimeDelay { delay: rng.random_range(0.006..0.018) },
-            "encoder_offset" => PlantEffect::EncoderOffset {
-                joint: rng.random_range(1..3),
-                offset: sign * rng.random_range(0.03..0.08),
-            },
+            "encoder_offset" => {
+                let joint = one_of(&places.loaded, rng)?;
+                PlantEffect::EncoderOffset {
+                    joint,
+                    offset: sign * unit(joint) * rng.random_range(0.03..0.08),
+                }
+            }
             "base_tilt" => {
                 PlantEffect::BaseTilt { tilt: [0, 1].map(|_| sign * rng.random_range(0.02..0.06)) }
             }
@@ -114,25 +150,22 @@ impl PlantEffect {
                 length: rng.random_range(2.0..5.0),
                 every: rng.random_range(17.0..29.0),
             },
-            // The elbow and the forearm, whose centres of mass are declared to lie in a plane.
             "broken_symmetry" => {
-                let link = rng.random_range(2..4);
-                PlantEffect::BrokenSymmetry {
-                    link,
-                    aside: sign * [0.02, 0.06][link - 2] * rng.random_range(0.8..1.5),
-                }
+                let (link, aside) = one_of(&places.symmetric, rng)?;
+                PlantEffect::BrokenSymmetry { link, aside: sign * aside * rng.random_range(0.8..1.5) }
             }
-            "joint_elasticity" => PlantEffect::JointElasticity {
-                joint: rng.random_range(1..3),
-                stiffness: rng.random_range(1500.0..3500.0),
-            },
+            "joint_elasticity" => {
+                let joint = one_of(&places.loaded, rng)?;
+                let stiffness = places.stiffness.get(joint).filter(|range| !range.is_empty())?.clone();
+                PlantEffect::JointElasticity { joint, stiffness: rng.random_range(stiffness) }
+            }
             "backlash" => {
-                PlantEffect::Backlash { joint: rng.random_range(1..3), gap: rng.random_range(0.01..0.03) }
+                let joint = one_of(&places.loaded, rng)?;
+                PlantEffect::Backlash { joint, gap: unit(joint) * rng.random_range(0.01..0.03) }
             }
-            // Both axes of a module share a housing.
             "joint_coupling" => {
-                let [from, onto] = [[0, 1], [1, 0], [2, 3], [3, 2], [4, 5], [5, 4]][rng.random_range(0..6)];
-                PlantEffect::JointCoupling { from, onto, share: rng.random_range(0.06..0.15) }
+                let ([from, onto], scale) = one_of(&places.coupled, rng)?;
+                PlantEffect::JointCoupling { from, onto, share: scale * rng.random_range(0.06..0.15) }
             }
             _ => return None,
         })
@@ -181,16 +214,16 @@ mod tests {
         let plant = lwa4p::plant().unwrap();
         for name in PlantEffect::NAMES {
             let draw = |seed| {
-                PlantEffect::draw_named(name, &plant, 100.0, 30.0..60.0, &mut ChaCha8Rng::seed_from_u64(seed))
-                    .unwrap()
+                let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+                PlantEffect::draw(name, &plant, &lwa4p::places(), 100.0, 30.0..60.0, rng).unwrap()
             };
             assert_eq!(draw(5).name(), name);
             assert_eq!(draw(5), draw(5));
             assert!((0..20).any(|seed| draw(seed) != draw(5)), "{name}");
         }
-        assert!(
-            PlantEffect::draw_named("ghosts", &plant, 1.0, 0.0..1.0, &mut ChaCha8Rng::seed_from_u64(1))
-                .is_none()
-        );
+        let rng = &mut ChaCha8Rng::seed_from_u64(1);
+        assert!(PlantEffect::draw("ghosts", &plant, &lwa4p::places(), 1.0, 0.0..1.0, rng).is_none());
+        let nowhere = Places { loaded: Vec::new(), ..lwa4p::places() };
+        assert!(PlantEffect::draw("backlash", &plant, &nowhere, 1.0, 0.0..1.0, rng).is_none());
     }
 }

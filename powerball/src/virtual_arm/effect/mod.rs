@@ -7,9 +7,10 @@
 mod draw;
 mod torque;
 
+pub use draw::Places;
+
 use super::body::Body;
 use super::dynamics::Dynamics;
-use super::lwa4p::FLANGE;
 use crate::controller::friction::TanhFriction;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -418,10 +419,5 @@ impl PlantEffect {
             }
             _ => {}
         }
-    }
-
-    /// The payload's place: `mass` kg, its centre `beyond` m beyond the flange and `aside` m beside the axis.
-    fn payload(mass: f64, aside: [f64; 2], beyond: f64, start: f64) -> PlantEffect {
-        PlantEffect::Payload { mass, centre: [aside[0], aside[1], FLANGE + beyond], start }
     }
 }
