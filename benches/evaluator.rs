@@ -7,8 +7,8 @@ mod support;
 
 use dyngen::{Evaluator, Function, Model, Samples, SetKind};
 use nalgebra::SVector;
-use powerball::controller::model::minimal as lwa4p;
 use powerball_workspace::arm;
+use powerball_workspace::generated::lwa4p_minimal as lwa4p;
 use powerball_workspace::generated::panda_minimal as panda;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,7 +1,7 @@
 //! A million samples of six joints identified from memory: this project's stream, beside numpy with Pinocchio
 //! in the same run.
 //!
-//! `cargo bench -p powerball-workspace --bench identify` (`PYTHON=…` names an interpreter that has both;
+//! `cargo bench -p powerball-benches --bench identify` (`PYTHON=…` names an interpreter that has both;
 //! without one only the stream is timed); `-- --write docs/performance.md` writes how the stream grows with
 //! the length of a log into the page.
 
@@ -109,7 +109,7 @@ fn main() {
     }
     drop(file);
     let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/support/identify_numpy.py");
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/support/identify_numpy.py");
     let done = Command::new(&python).arg(script).arg(&folder).output();
     std::fs::remove_dir_all(&folder).unwrap();
     match done {

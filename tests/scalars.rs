@@ -1,9 +1,9 @@
-//! One emission for every scalar: f32, several samples at once, dual numbers.
+//! One emission for every scalar: f32, several samples at once. `benches/tests/` has
+//! dual numbers.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use nalgebra::{SMatrix, SVector, SimdValue};
-use num_dual::Dual64;
 use powerball::logs::batch::{self, Work};
 use powerball_workspace::generated::{panda_minimal, stanford_minimal};
 use rand::{RngExt, SeedableRng};
@@ -78,32 +78,6 @@ fn blocks_are_the_samples() {
                 assert_eq!(expected, found);
                 assert_eq!(energy[lane], stanford_minimal::kinetic_energy(q, dq, &parameters));
             }
-        }
-    }
-}
-
-/// Derivatives by dual numbers are the emitted derivatives.
-#[test]
-fn dual_numbers_carry_the_derivatives() {
-    let mut rng = ChaCha8Rng::seed_from_u64(2);
-    let (q, dq, ddq): (SVector<f64, 6>, _, _) = (random(&mut rng), random(&mut rng), random(&mut rng));
-    let parameters: SVector<f64, { stanford_minimal::PARAMETERS }> = random(&mut rng);
-    let constant = |v: &SVector<f64, 6>| v.map(Dual64::from_re);
-    let by_position = stanford_minimal::torque_by_position(&q, &dq, &ddq, &parameters);
-    let by_velocity = stanford_minimal::torque_by_velocity(&q, &dq, &ddq, &parameters);
-    for j in 0..6 {
-        let seeded = |v: &SVector<f64, 6>| {
-            let mut v = constant(v);
-            v[j] = v[j].derivative();
-            v
-        };
-        let torque = |q: &_, dq: &_| {
-            stanford_minimal::inverse_dynamics(q, dq, &constant(&ddq), &parameters.map(Dual64::from_re))
-        };
-        let (a, b) = (torque(&seeded(&q), &constant(&dq)), torque(&constant(&q), &seeded(&dq)));
-        for i in 0..6 {
-            assert!((a[i].eps - by_position[(i, j)]).abs() < 1e-11, "{i} {j}");
-            assert!((b[i].eps - by_velocity[(i, j)]).abs() < 1e-11, "{i} {j}");
         }
     }
 }

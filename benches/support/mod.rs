@@ -7,7 +7,6 @@ pub(crate) mod by_hand;
 pub(crate) mod with_dynibo;
 pub(crate) mod with_nalgebra;
 
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// The shortest of many runs of each of several things, run in turn.
@@ -28,7 +27,7 @@ pub(crate) fn publish(section: &str, table: &str) {
     println!("{table}");
     let mut arguments = std::env::args().skip_while(|argument| argument != "--write").skip(1);
     if let Some(page) = arguments.next() {
-        let page = Path::new(env!("CARGO_MANIFEST_DIR")).join(page);
+        let page = powerball_workspace::root().join(page);
         powerball_workspace::document::write_section(&page, section, table).unwrap();
     }
 }

@@ -6,6 +6,7 @@ use powerball::commands::demo::Session;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::OnceLock;
 
 fn powerball(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_powerball")).args(arguments).output().unwrap()
@@ -22,13 +23,21 @@ fn scratch(name: &str) -> PathBuf {
     folder
 }
 
-/// Logs of an arm whose friction grows with the load: fitted ones, and those of another path.
+/// Logs of an arm whose friction grows with the load: fitted ones, and those of another path. They are recorded
+/// once, and every test has them in a folder of its own.
 fn session(name: &str) -> (PathBuf, Vec<String>, Vec<String>) {
+    static RECORDED: OnceLock<Session> = OnceLock::new();
+    let recorded =
+        RECORDED.get_or_init(|| Session::record(&scratch("identify_logs"), 3, &["load_friction"]).unwrap());
     let folder = scratch(name);
-    let session = Session::record(&folder, 3, &["load_friction"]).unwrap();
-    let text = |files: &[PathBuf]| files.iter().map(|f| f.display().to_string()).collect();
-    let logs = (text(&session.fit), text(&session.held_out));
-    (folder, logs.0, logs.1)
+    let own = |file: &PathBuf| {
+        let copy = folder.join(file.file_name().unwrap());
+        std::fs::copy(file, &copy).unwrap();
+        copy.display().to_string()
+    };
+    own(&recorded.arm_file);
+    let [fit, held_out] = [&recorded.fit, &recorded.held_out].map(|files| files.iter().map(own).collect());
+    (folder, fit, held_out)
 }
 
 fn run(command: &[&str], logs: &[String], rest: &[&str]) -> Output {

@@ -72,6 +72,9 @@ macro_rules! files {
 
 files! {
     lwa4p_full = "lwa4p_full.rs";
+    lwa4p_minimal = "lwa4p_minimal.rs";
+    lwa4p_symbolic = "lwa4p_symbolic.rs";
+    lwa4p_published = "lwa4p_published.rs";
     lwa4p_rotorless_minimal = "lwa4p_rotorless_minimal.rs";
     puma560_full = "puma560_full.rs";
     puma560_minimal = "puma560_minimal.rs";
@@ -89,9 +92,9 @@ files! {
 
 generated! {
     "arm" Full from lwa4p_full;
-    "arm" Minimal from powerball::controller::model::minimal;
-    "arm" Symbolic from powerball::controller::model::symbolic;
-    "arm" Published from powerball::controller::model::published;
+    "arm" Minimal from lwa4p_minimal;
+    "arm" Symbolic from lwa4p_symbolic;
+    "arm" Published from lwa4p_published;
     "puma560" Full from puma560_full;
     "puma560" Minimal from puma560_minimal;
     "puma560" Symbolic from puma560_symbolic;

@@ -14,16 +14,8 @@ use rand_chacha::ChaCha8Rng;
 use std::ops::Range;
 
 /// What other tests name, from the same logs.
-const ELSEWHERE: [Truth; 8] = [
-    Truth::LoadFriction,
-    Truth::PayloadLater,
-    Truth::MotorRipple,
-    Truth::EncoderOffset,
-    Truth::TimeDelay,
-    Truth::BaseTilt,
-    Truth::BrokenSymmetry,
-    Truth::TorqueConstant,
-];
+const ELSEWHERE: [Truth; 5] =
+    [Truth::LoadFriction, Truth::PayloadLater, Truth::MotorRipple, Truth::TimeDelay, Truth::BrokenSymmetry];
 
 fn run(body: &RigidArm, truth: Truth, size: f64, noise: Noise, seed: u64) -> Explained {
     let logs = record(body.arm(), truth, size, noise, 7, 22.0, seed);
@@ -160,12 +152,12 @@ fn are_named(truths: &[Truth]) {
     assert_eq!(wrong, Vec::<String>::new());
 }
 
-/// Half of those that `one_missing_effect_is_named_with_its_figures` and the tests of models do not name.
+/// A third of those that `one_missing_effect_is_named_with_its_figures` and the tests of models do not name.
 #[test]
 fn a_sample_of_effects_is_named() {
     let mut truths: Vec<Truth> = Truth::ALL.into_iter().filter(|truth| !ELSEWHERE.contains(truth)).collect();
     truths.shuffle(&mut ChaCha8Rng::seed_from_u64(17));
-    truths.truncate(truths.len() / 2);
+    truths.truncate(truths.len() / 3);
     are_named(&truths);
 }
 
