@@ -1,5 +1,4 @@
-//! One emission for every scalar: f32, several samples at once. `benches/tests/` has
-//! dual numbers.
+//! One emission for every scalar: f32, several samples at once. `benches/tests/` has dual numbers.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 

@@ -39,6 +39,11 @@ impl Dynamics {
         &self.chain
     }
 
+    /// The way of joint `joint` that is drawn where a turning joint turns by 1 rad: 1 rad, or 0.2 m for a sliding one.
+    pub fn usual_way(&self, joint: usize) -> f64 {
+        if self.chain.rows()[joint].is_revolute() { 1.0 } else { 0.2 }
+    }
+
     /// The bodies from the first link on.
     pub fn bodies(&self) -> &[Body] {
         &self.bodies

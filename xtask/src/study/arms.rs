@@ -99,9 +99,8 @@ impl Drawn {
             ([from, onto], coulomb(onto) / coulomb(from))
         };
         let stiffness = |j: usize| {
-            let unit = if plant.dynamics().chain().rows()[j].is_revolute() { 1.0 } else { 0.2 };
-            let usual = plant.sensors().white[j] / NOISE;
-            usual / (unit * 0.015)..usual / (unit * 0.003)
+            let usual = plant.sensors().white[j] / (NOISE * plant.dynamics().usual_way(j));
+            usual / 0.015..usual / 0.003
         };
         Places {
             large: any.clone(),
@@ -122,9 +121,7 @@ fn usual_torques(dynamics: &Dynamics, rng: &mut impl Rng) -> Vec<f64> {
     let mut squares = vec![0.0; n];
     for _ in 0..STATES {
         let mut state = |reach: f64| -> Vec<f64> {
-            (dynamics.chain().rows().iter())
-                .map(|row| rng.random_range(-reach..reach) * if row.is_revolute() { 1.0 } else { 0.2 })
-                .collect()
+            (0..n).map(|i| rng.random_range(-reach..reach) * dynamics.usual_way(i)).collect()
         };
         let tau = dynamics.inverse(&state(2.0), &state(1.0), &state(3.0));
         squares.iter_mut().zip(tau).for_each(|(s, t)| *s += t * t / STATES as f64);

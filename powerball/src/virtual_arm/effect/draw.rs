@@ -74,9 +74,7 @@ impl PlantEffect {
         let friction = |joint: usize| plant.friction()[joint];
         let coulomb = |joint: usize| friction(joint).gamma1 + friction(joint).gamma3;
         let noise = plant.sensors().white[any];
-        // Ways and velocities of a sliding joint in m against those of a turning one in rad.
-        let unit =
-            |joint: usize| if plant.dynamics().chain().rows()[joint].is_revolute() { 1.0 } else { 0.2 };
+        let unit = |joint: usize| plant.dynamics().usual_way(joint);
         Some(match name {
             "load_friction" => PlantEffect::LoadFriction {
                 joint: one_of(&places.loaded, rng)?,
