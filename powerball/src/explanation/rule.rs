@@ -76,7 +76,8 @@ pub struct Rule {
     /// A name that is not told apart ([`least_margin`](Self::least_margin)) from the next best one for
     /// another part ([`same_part`](Self::same_part)) is not given where it leaves more than this share of the
     /// excess over the noise floor: then something else is there, and what fits best only resembles it. The
-    /// share is that of an earlier trial on other data.
+    /// share is that of an earlier trial on other data. What is in validation logs only must leave no more of
+    /// their excess over the fitted logs.
     pub much_left: f64,
     /// An effect of which this share is missing in some octave, and by more than
     /// [`missing_errors`](Self::missing_errors), is not the effect that it is called: most of it is not
@@ -96,7 +97,7 @@ pub struct Rule {
     /// How often where another name fits as well: one of two.
     pub right_with_twin: f64,
     /// A name is taken back where without its effect the squared error on the validation set is smaller by this
-    /// share, on its joints.
+    /// share, on its joints. What is in validation logs only must not raise that of any joint by this share.
     pub harm: f64,
 
     /// A setting is refined for more than chance gains by one more coefficient, in units of χ².

@@ -61,7 +61,8 @@ impl Outcome {
         seconds: f64,
     ) -> Outcome {
         let new = |n: &Named| {
-            !known.iter().any(|k| k.effect == n.effect && n.joints.iter().all(|j| k.joints.contains(j)))
+            let is = |k: &Named| k.effect == n.effect || n.alike.contains(&k.effect);
+            !known.iter().any(|k| is(k) && n.joints.iter().all(|j| k.joints.contains(j)))
         };
         Outcome {
             case: case.name(),

@@ -53,6 +53,12 @@ impl<'a> Context<'a> {
         Context::new(data, fit, &[], rule)
     }
 
+    /// The same model on the same data, where something else is left.
+    #[must_use]
+    pub(crate) fn seen_with<'b>(&'b self, residual: &'b [Vec<f64>]) -> Context<'b> {
+        Context { made: self.made, ..Context::new(self.data, self.fit, residual, self.rule) }
+    }
+
     /// Takes from columns of the same data what was made already, and adds to them.
     pub(crate) fn with(mut self, made: &'a MotionColumns) -> Context<'a> {
         self.made = Some(made);

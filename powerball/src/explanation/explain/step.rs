@@ -4,8 +4,8 @@ use super::comparison::{Comparison, Question, Step, compare};
 use super::model::{Accepted, Model};
 use super::named::Rival;
 use super::search::{
-    Among, Group, Member, Screen, Tester, Trial, Validation, eliminate, gains, groups, is_beside,
-    keep_needed, surrogates,
+    Among, Extent, Group, Member, Screen, Tester, Trial, Validation, eliminate, gains, groups, is_beside,
+    keep_needed, searched_again, surrogates,
 };
 use super::study::Study;
 use crate::controller::JointNumber;
@@ -149,10 +149,16 @@ fn above_chance(
     let rule = study.rule();
     let trials: Vec<(&Trial, &[JointNumber])> =
         group.passing().map(|m| (&m.trial, m.candidate.joints.as_slice())).collect();
-    let found = surrogates(screen, &trials, &study.folds, tests, rule.step_surrogates, number as u64);
-    let mut scores = found.scores;
-    scores.sort_by(f64::total_cmp);
-    let level = scores.get((scores.len() as f64 * rule.surrogate_level) as usize).copied().unwrap_or(0.0);
+    let (count, seed) = (rule.step_surrogates, number as u64);
+    let exceeded = |mut scores: Vec<f64>| {
+        scores.sort_by(f64::total_cmp);
+        scores.get((scores.len() as f64 * rule.surrogate_level) as usize).copied().unwrap_or(0.0)
+    };
+    let mut level = exceeded(surrogates(screen, &trials, &study.folds, tests, count, seed).scores);
+    // Whether in some logs, and from when on, was looked for: chance is what that search finds.
+    if group.passing().any(|m| Extent::of(&m.candidate) == Extent::SomeLogs) {
+        level = level.max(exceeded(searched_again(screen.context, group.effect, count, seed)));
+    }
     let above = |m: &Member| m.refusal.is_none() && m.trial.score > level;
     (0..group.members.len()).filter(|m| above(&group.members[*m])).collect()
 }

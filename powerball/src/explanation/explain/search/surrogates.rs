@@ -9,12 +9,14 @@ use super::groups::{Among, groups};
 use super::refusal::refusal;
 use super::screen::{Screen, Trial};
 use crate::controller::JointNumber;
+use crate::explanation::effects::{Context, Effect};
 use crate::identification::estimate::Folds;
 use crate::logs::parallel;
 use crate::logs::regression::{Column, Data};
 use crate::logs::vector::dot;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::ops::Range;
 
 /// Draws the final surrogates; a step draws by its number.
 const FINAL_SEED: u64 = 99;
@@ -64,6 +66,30 @@ pub(crate) fn surrogates(
     surrogates
 }
 
+/// What the search of an effect for the logs and times that it is in reaches by chance: the best score among its
+/// candidates where the residual is shifted in time within each recording. What was looked for over many windows
+/// is compared with what is found over as many.
+#[must_use]
+pub(crate) fn searched_again(
+    context: &Context<'_>,
+    effect: &dyn Effect,
+    count: usize,
+    seed: u64,
+) -> Vec<f64> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let fractions: Vec<f64> = (0..count).map(|_| rng.random_range(0.15..0.85)).collect();
+    parallel::map(&fractions, |fraction| {
+        let residual: Vec<Vec<f64>> = (context.residual.iter().enumerate())
+            .map(|(j, values)| rotated(values, &context.data.joints[j].rows, *fraction))
+            .collect();
+        let context = context.seen_with(&residual);
+        let screen = Screen::new(&context);
+        let candidates = effect.candidates(&context);
+        let scores = candidates.iter().filter_map(|c| Some(screen.try_candidate(c)?.score));
+        scores.fold(0.0, f64::max)
+    })
+}
+
 /// Asks surrogates of every kind on the final residual: where nothing is missing any more, what passes is
 /// chance.
 pub(crate) fn false_positives(study: &Study<'_>, model: &Model) -> FalsePositives {
@@ -88,15 +114,18 @@ pub(crate) fn false_positives(study: &Study<'_>, model: &Model) -> FalsePositive
 }
 
 fn shifted(column: &Column, data: &Data<'_>, fraction: f64) -> Column {
-    let shift = |(j, values): &(usize, Vec<f64>)| {
-        let mut values = values.clone();
-        for rows in &data.joints[*j].rows {
-            let by = (fraction * rows.len() as f64) as usize;
-            values[rows.clone()].rotate_left(by);
-        }
-        (*j, values)
-    };
+    let shift = |(j, values): &(usize, Vec<f64>)| (*j, rotated(values, &data.joints[*j].rows, fraction));
     Column { parts: column.parts.iter().map(shift).collect() }
+}
+
+/// Values shifted by a share of each recording, whose rows are given; what leaves at one end comes in at the
+/// other.
+fn rotated(values: &[f64], recordings: &[Range<usize>], fraction: f64) -> Vec<f64> {
+    let mut values = values.to_vec();
+    for rows in recordings {
+        values[rows.clone()].rotate_left((fraction * rows.len() as f64) as usize);
+    }
+    values
 }
 
 /// Correlation of two columns. One that hardly changes (a constant torque) is the same wherever it is shifted

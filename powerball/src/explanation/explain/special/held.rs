@@ -59,7 +59,8 @@ pub(crate) fn held_in_validation(
 ) -> Result<Option<Held>, DataError> {
     let rule = &options.rule;
     let residual = base.residual_on(validation, &[]);
-    if !odd(rule, base, validation, &residual) {
+    let odd = |log: usize| oddness(base, validation, &residual, log) > rule.odd_log;
+    if !(0..validation.logs.len()).any(odd) {
         return Ok(None);
     }
     let all: Vec<Log> = logs.iter().chain(validate).cloned().collect();
@@ -72,6 +73,9 @@ pub(crate) fn held_in_validation(
     let Seen { candidate, coefficients, p_value, mut fold_gains, margin } = seen;
     let effect = candidate.effect();
     let columns = effect.columns(&Context::new(validation, base, &residual, rule), &candidate);
+    if !makes_it_odd(rule, base, validation, &residual, (&candidate.windows, &columns, &coefficients)) {
+        return Ok(None);
+    }
     let before = spread(validation, &residual).rms;
     take_out(validation, &columns, &coefficients);
     let after = spread(validation, &base.residual_on(validation, &[])).rms;
@@ -140,22 +144,41 @@ fn settle(rule: &Rule, pooled: &mut Pooled<'_>, seen: &mut Seen) {
     }
 }
 
-/// Whether a log's error is out of all proportion.
-fn odd(rule: &Rule, base: &Fit, other: &Data<'_>, residual: &[Vec<f64>]) -> bool {
-    (0..other.logs.len()).any(|log| {
-        let ratios: Vec<f64> = (0..other.dof())
-            .filter_map(|j| {
-                let rows = other.recordings.iter().zip(&other.joints[j].rows).filter(|(r, _)| r.log == log);
-                let (mut square, mut count) = (0.0, 0usize);
-                for (_, rows) in rows {
-                    square += residual[j][rows.clone()].iter().map(|v| v * v).sum::<f64>();
-                    count += rows.len();
-                }
-                (count > 50 && base.sigma[j] > 0.0).then(|| square / count as f64 / base.sigma[j].powi(2))
-            })
-            .collect();
-        !ratios.is_empty() && ratios.iter().sum::<f64>() / ratios.len() as f64 > rule.odd_log
-    })
+/// How many times the squared error of the fitted logs a log of other data has, mean over joints.
+fn oddness(base: &Fit, other: &Data<'_>, residual: &[Vec<f64>], log: usize) -> f64 {
+    let ratios: Vec<f64> = (0..other.dof())
+        .filter_map(|j| {
+            let rows = other.recordings.iter().zip(&other.joints[j].rows).filter(|(r, _)| r.log == log);
+            let (mut square, mut count) = (0.0, 0usize);
+            for (_, rows) in rows {
+                square += residual[j][rows.clone()].iter().map(|v| v * v).sum::<f64>();
+                count += rows.len();
+            }
+            (count > 50 && base.sigma[j] > 0.0).then(|| square / count as f64 / base.sigma[j].powi(2))
+        })
+        .collect();
+    ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
+}
+
+/// Whether what was seen is what makes its logs odd: without it little of their excess over the fitted logs is
+/// left, and no joint's error is larger. A base model that errs on a new path makes them odd as well, and what
+/// fits best there only resembles that error.
+fn makes_it_odd(
+    rule: &Rule,
+    base: &Fit,
+    other: &Data<'_>,
+    residual: &[Vec<f64>],
+    (windows, columns, coefficients): (&[Window], &[Column], &[f64]),
+) -> bool {
+    let mut left = residual.to_vec();
+    columns.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut left, -c));
+    let logs = || (0..other.logs.len()).filter(|log| windows.iter().any(|w| w.log == other.logs[*log]));
+    let excess =
+        |residual: &[Vec<f64>]| -> f64 { logs().map(|log| oddness(base, other, residual, log) - 1.0).sum() };
+    let square = |residual: &[f64]| residual.iter().map(|v| v * v).sum::<f64>();
+    let harms =
+        |(left, residual): (&Vec<f64>, &Vec<f64>)| square(left) > (1.0 + rule.harm) * square(residual);
+    excess(&left) <= rule.much_left * excess(residual) && !left.iter().zip(residual).any(harms)
 }
 
 fn take_out(other: &mut Data<'_>, columns: &[Column], coefficients: &[f64]) {
