@@ -13,6 +13,8 @@ mod law;
 mod measured;
 mod page;
 mod reliability;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use benchmark::{Arguments as BenchmarkArguments, run as benchmark};
 use case::{Case, Table};

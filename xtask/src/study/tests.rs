@@ -1,0 +1,27 @@
+//! Drawn arms on which a name was false once.
+
+use super::case::{Case, Table};
+use super::experiment::Bench;
+
+/// The names that the first case of a seed gets.
+fn names(table: Table, seed: u64) -> Vec<String> {
+    let case = Case::all(table, Some(seed..seed + 1)).remove(0);
+    let outcome = Bench::new().unwrap().run(&case).unwrap().unwrap();
+    outcome.named.into_iter().map(|named| named.effect).collect()
+}
+
+/// A base model that errs on a new path, here for the zeros of the torque sensors, shows no payload there.
+#[test]
+fn what_errs_on_a_new_path_is_no_payload() {
+    assert_eq!(names(Table::CleanDrawn, 513), [String::new(); 0]);
+}
+
+/// Once what else is there is known, a stiffness that was found beside a sensor's zero is needed no more.
+#[test]
+fn a_zero_is_no_spring() {
+    let names = names(Table::Drawn, 515);
+    assert!(
+        names.iter().all(|name| name != "spring") && names.iter().any(|name| name == "hysteresis"),
+        "{names:?}"
+    );
+}
