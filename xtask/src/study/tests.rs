@@ -13,7 +13,8 @@ fn names(table: Table, seed: u64) -> Vec<String> {
 /// A base model that errs on a new path, here for the zeros of the torque sensors, shows no payload there.
 #[test]
 fn what_errs_on_a_new_path_is_no_payload() {
-    assert_eq!(names(Table::CleanDrawn, 513), [String::new(); 0]);
+    let names = names(Table::CleanDrawn, 513);
+    assert!(names.is_empty(), "{names:?}");
 }
 
 /// Once what else is there is known, a stiffness that was found beside a sensor's zero is needed no more.
