@@ -3,11 +3,13 @@
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
 use crate::controller::JointNumber;
 use crate::identification::estimate::Solver;
-use crate::logs::regression::Column;
+use crate::logs::regression::{Column, PULLED};
+use crate::logs::vector::dot;
 use dyngen::arm::ParameterKind;
 use dyngen::exact::rational;
 use faer::Mat;
 use serde::Serialize;
+use std::sync::Arc;
 
 /// Two columns: the change of gravity torque for a small turn of the base about its x and y axes.
 ///
@@ -30,9 +32,6 @@ pub struct Figures {
     /// The turn of the base about its x and y axes, rad.
     pub tilt: [f64; 2],
 }
-
-/// Of a link's eleven parameters gravity feels those before the inertias: the mass and the first moments.
-const FELT: usize = ParameterKind::Ixx as usize;
 
 impl Effect for BaseTilt {
     fn name(&self) -> &'static str {
@@ -101,19 +100,20 @@ fn with_unshown(candidate: &Candidate) -> bool {
 /// The static torque of some parameters under some gravity.
 fn pulled(context: &Context<'_>, gravity: &[f64; 3], all: &[f64]) -> Option<Column> {
     let data = context.data;
-    let carriers: Vec<usize> =
-        (0..all.len()).filter(|k| all[*k] != 0.0 && k % ParameterKind::ALL.len() < FELT).collect();
-    let by_recording = data.recordings.iter().map(|r| {
-        let mut torque = vec![0.0; r.q.len()];
-        for (axis, g) in gravity.iter().enumerate().filter(|(_, g)| **g != 0.0) {
-            let columns = data.body.gravity_columns(axis, &carriers, &r.q)?;
-            for (t, row) in torque.iter_mut().zip(columns.chunks_exact(carriers.len().max(1))) {
-                *t += g * row.iter().zip(&carriers).map(|(c, k)| c * all[*k]).sum::<f64>();
-            }
+    let mut torque: Vec<Vec<f64>> = data.joints.iter().map(|rows| vec![0.0; rows.len()]).collect();
+    for (axis, g) in gravity.iter().enumerate().filter(|(_, g)| **g != 0.0) {
+        let columns = data.pull_columns(axis);
+        let values = all.chunks_exact(ParameterKind::ALL.len()).flat_map(|link| &link[..PULLED]);
+        if columns.is_empty() {
+            return None;
         }
-        Some(torque)
-    });
-    Some(data.column_over_all(&by_recording.collect::<Option<Vec<_>>>()?))
+        columns
+            .iter()
+            .zip(values)
+            .filter(|(_, v)| **v != 0.0)
+            .for_each(|(c, v)| c.add_to(&mut torque, g * v));
+    }
+    Some(Column { parts: torque.into_iter().map(Arc::new).enumerate().collect() })
 }
 
 /// What all parameters gain where the unshown ones' torques are those found: under the whole tilt they are
@@ -130,7 +130,7 @@ fn moments(context: &Context<'_>, tilt: &[f64], found: &[f64]) -> Vec<f64> {
         return Vec::new();
     }
     let product = |a: &Column, b: &Column| -> f64 {
-        a.parts.iter().zip(&b.parts).flat_map(|((_, a), (_, b))| a.iter().zip(b)).map(|(a, b)| a * b).sum()
+        a.parts.iter().zip(&b.parts).map(|((_, a), (_, b))| dot(a, b)).sum()
     };
     let gram = Mat::from_fn(own.len(), own.len(), |a, b| product(&own[a], &own[b]));
     let right: Vec<f64> =

@@ -1,6 +1,7 @@
 //! What an effect may look at: the data, the model fitted so far, and what it leaves.
 
-use super::{MotionColumns, Placed};
+use super::made::{Made, OfModel};
+use super::{Candidate, Placed};
 use crate::controller::JointNumber;
 use crate::controller::correction::{Instant, Law, Memory};
 use crate::controller::friction::TanhFriction;
@@ -8,7 +9,7 @@ use crate::explanation::rule::Rule;
 use crate::identification::estimate::Fit;
 use crate::logs::regression::{Column, Data, Recording};
 use crate::logs::signal::{Butterworth, difference};
-use std::sync::OnceLock;
+use std::sync::Arc;
 
 /// Rows of a joint that moves, at least.
 const LEAST_ROWS: usize = 50;
@@ -25,26 +26,16 @@ pub struct Context<'a> {
     /// The thresholds of the rule.
     pub rule: &'a Rule,
     /// The data's columns that were made already.
-    made: Option<&'a MotionColumns>,
-    rigid: OnceLock<Vec<Vec<f64>>>,
-    friction: OnceLock<Vec<Vec<f64>>>,
-    prediction: OnceLock<Vec<Vec<f64>>>,
+    made: Option<&'a Made>,
+    /// What is made of the model on the data, once it is asked for.
+    of_model: Arc<OfModel>,
 }
 
 impl<'a> Context<'a> {
     /// A model seen on some data.
     #[must_use]
     pub fn new(data: &'a Data<'a>, fit: &'a Fit, residual: &'a [Vec<f64>], rule: &'a Rule) -> Context<'a> {
-        Context {
-            data,
-            fit,
-            residual,
-            rule,
-            made: None,
-            rigid: OnceLock::new(),
-            friction: OnceLock::new(),
-            prediction: OnceLock::new(),
-        }
+        Context { data, fit, residual, rule, made: None, of_model: Arc::new(OfModel::new(fit)) }
     }
 
     /// The same where columns are wanted and nothing else: what the model leaves is not known.
@@ -56,13 +47,21 @@ impl<'a> Context<'a> {
     /// The same model on the same data, where something else is left.
     #[must_use]
     pub(crate) fn seen_with<'b>(&'b self, residual: &'b [Vec<f64>]) -> Context<'b> {
-        Context { made: self.made, ..Context::new(self.data, self.fit, residual, self.rule) }
+        let of_model = Arc::clone(&self.of_model);
+        Context { residual, of_model, ..*self }
     }
 
     /// Takes from columns of the same data what was made already, and adds to them.
-    pub(crate) fn with(mut self, made: &'a MotionColumns) -> Context<'a> {
+    pub(crate) fn with(mut self, made: &'a Made) -> Context<'a> {
         self.made = Some(made);
+        self.of_model = made.of_model(self.fit);
         self
+    }
+
+    /// The columns of a candidate: made once for this model on these data.
+    #[must_use]
+    pub fn columns(&self, candidate: &Candidate) -> Vec<Column> {
+        self.of_model.columns(candidate, || candidate.effect().columns(self, candidate))
     }
 
     /// Joints that move.
@@ -73,7 +72,7 @@ impl<'a> Context<'a> {
 
     /// Torque of the rigid arm by recording, n a sample, N·m.
     pub fn rigid(&self) -> &[Vec<f64>] {
-        self.rigid.get_or_init(|| {
+        self.of_model.rigid.get_or_init(|| {
             let torque = |r: &Recording| self.fit.rigid_torque(self.data.body, &r.q, &r.v, &r.a);
             self.data.recordings.iter().map(torque).collect()
         })
@@ -81,7 +80,7 @@ impl<'a> Context<'a> {
 
     /// Eq. 16 friction by recording, n a sample, N·m.
     pub fn friction(&self) -> &[Vec<f64>] {
-        self.friction.get_or_init(|| {
+        self.of_model.friction.get_or_init(|| {
             let n = self.data.dof();
             let friction: Vec<TanhFriction<f64>> =
                 (0..n).map(|j| TanhFriction::new(self.fit.friction(j))).collect();
@@ -93,7 +92,7 @@ impl<'a> Context<'a> {
 
     /// Rigid torque and friction by recording, n a sample, N·m.
     pub fn prediction(&self) -> &[Vec<f64>] {
-        self.prediction.get_or_init(|| {
+        self.of_model.prediction.get_or_init(|| {
             let sum = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a + b).collect();
             self.rigid().iter().zip(self.friction()).map(sum).collect()
         })
@@ -123,7 +122,9 @@ impl<'a> Context<'a> {
         for (joint, law, share) in laws {
             let mut column = self.law_column(*joint, *law);
             if *share != 1.0 {
-                column.parts.iter_mut().flat_map(|(_, values)| values).for_each(|v| *v *= share);
+                for (_, values) in &mut column.parts {
+                    Arc::make_mut(values).iter_mut().for_each(|v| *v *= share);
+                }
             }
             parts.extend(column.parts);
         }
@@ -139,11 +140,10 @@ impl<'a> Context<'a> {
             let rows = &self.data.joints[joint.index()];
             rows.column(&self.data.recordings, |r, _| self.law_along(r, joint, law))
         };
-        let values = match self.made {
-            Some(made) => made.get(joint, law, make),
-            None => make(),
-        };
-        Column::on(joint.index(), values)
+        match self.made {
+            Some(made) => Column::on(joint.index(), made.motion.get(joint, law, make)),
+            None => Column::on(joint.index(), make()),
+        }
     }
 
     /// A law that moves no link along a recording, one value a sample.

@@ -27,7 +27,7 @@ pub mod hysteresis;
 pub mod joint_coupling;
 pub mod joint_elasticity;
 pub mod load_friction;
-mod motion_columns;
+mod made;
 pub mod payload;
 pub mod position_ripple;
 pub mod spring;
@@ -46,7 +46,7 @@ pub use candidate::{Candidate, Found, Window};
 pub use context::Context;
 pub(crate) use context::{PASSES, SOFT, each_instant, move_link};
 pub use effect::{Class, Effect, Part, Placed};
-pub(crate) use motion_columns::MotionColumns;
+pub(crate) use made::Made;
 pub(crate) use windows::mask;
 
 /// Makes of the list of effects what must know all of them: [`Settings`], [`Figures`] and [`all`].

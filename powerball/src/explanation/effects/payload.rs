@@ -9,6 +9,7 @@ use crate::logs::regression::{Block, Column, Data};
 use dyngen::arm::ParameterKind;
 use serde::Serialize;
 use std::ops::{Range, RangeInclusive};
+use std::sync::Arc;
 
 /// Mass and first moment in the last frame as four columns; the inertia is that of a point mass at the centre
 /// of mass last estimated, so a few rounds make it consistent.
@@ -191,7 +192,7 @@ fn payload_columns(context: &Context<'_>, com: Option<[f64; 3]>) -> Vec<Column> 
             let mut column = links[c].clone();
             for (share, link) in shares.iter().zip(&links[INERTIAS..]).filter(|(s, _)| **s != 0.0) {
                 for ((_, values), (_, more)) in column.parts.iter_mut().zip(&link.parts) {
-                    values.iter_mut().zip(more).for_each(|(v, m)| *v += share * m);
+                    Arc::make_mut(values).iter_mut().zip(more.iter()).for_each(|(v, m)| *v += share * m);
                 }
             }
             column

@@ -3,6 +3,7 @@
 use super::{Context, Window};
 use crate::logs::regression::{Block, Column, Recording};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// 1 in the windows, 0 elsewhere, by row.
 pub(crate) fn mask(context: &Context<'_>, joint: usize, windows: &[Window]) -> Vec<f64> {
@@ -15,8 +16,9 @@ pub(crate) fn mask(context: &Context<'_>, joint: usize, windows: &[Window]) -> V
 /// Columns that are there in the windows only.
 pub(super) fn cut(context: &Context<'_>, columns: &[Column], windows: &[Window]) -> Vec<Column> {
     let masks: Vec<Vec<f64>> = (0..context.data.dof()).map(|j| mask(context, j, windows)).collect();
-    let part = |(j, values): &(usize, Vec<f64>)| {
-        (*j, values.iter().zip(&masks[*j]).map(|(value, m)| value * m).collect())
+    let part = |(j, values): &(usize, Arc<Vec<f64>>)| {
+        let inside: Vec<f64> = values.iter().zip(&masks[*j]).map(|(value, m)| value * m).collect();
+        (*j, inside.into())
     };
     columns.iter().map(|column| Column { parts: column.parts.iter().map(part).collect() }).collect()
 }

@@ -1,7 +1,7 @@
 //! The base model with what was accepted: what a step changes.
 
 use super::study::Study;
-use crate::explanation::effects::{self, Candidate, Context, Effect};
+use crate::explanation::effects::{self, Candidate, Context, Effect, Made};
 use crate::explanation::rule::Rule;
 use crate::identification::estimate::{Fit, Folds, Solver, Term, fit};
 use crate::logs::regression::{Column, Data};
@@ -54,7 +54,7 @@ impl Model {
         let mut terms: Vec<Term> = Vec::new();
         let accepted = |candidate: Candidate| {
             let effect = candidate.effect();
-            let (columns, non_negative) = (effect.columns(&context, &candidate), effect.non_negative());
+            let (columns, non_negative) = (context.columns(&candidate), effect.non_negative());
             let count = columns.len();
             terms.extend(columns.into_iter().map(|column| Term { column, non_negative }));
             Accepted {
@@ -82,8 +82,7 @@ impl Model {
 
     /// Takes in what was measured above the band of the fit.
     pub(super) fn add_measured(&mut self, study: &Study<'_>, accepted: Accepted) {
-        let context = Context::for_columns(&study.data, &self.fit, study.rule());
-        let columns = accepted.effect().columns(&context, &accepted.candidate);
+        let columns = study.here(&self.fit, &[]).columns(&accepted.candidate);
         take_measured_out(&accepted, &columns, &mut self.fit.residual);
         self.accepted.push(accepted);
     }
@@ -92,7 +91,7 @@ impl Model {
     pub(super) fn terms(&self, context: &Context<'_>, without: Option<usize>) -> Vec<Term> {
         let term = |(_, a): (usize, &Accepted)| {
             let non_negative = a.effect().non_negative();
-            let columns = a.effect().columns(context, &a.candidate).into_iter();
+            let columns = context.columns(&a.candidate).into_iter();
             columns.map(move |column| Term { column, non_negative }).collect::<Vec<_>>()
         };
         let fitted = |(k, a): &(usize, &Accepted)| Some(*k) != without && a.measured.is_none();
@@ -101,7 +100,7 @@ impl Model {
 
     /// The model seen on the logs that it was fitted to.
     pub(super) fn context<'c>(&'c self, study: &'c Study<'_>) -> Context<'c> {
-        Context::new(&study.data, &self.fit, &self.fit.residual, study.rule()).with(&study.columns)
+        study.here(&self.fit, &self.fit.residual)
     }
 
     /// Whether a candidate or one that excludes it was accepted.
@@ -142,17 +141,17 @@ impl Model {
     /// Measured less predicted torque of the validation set, by joint and row, N·m.
     pub(super) fn residual_on_validation(&self, study: &Study<'_>) -> Vec<Vec<f64>> {
         let mut residual = self.fit.residual_on(&study.validation, &self.columns_on_validation(study));
-        let context = Context::for_columns(&study.validation, &self.fit, study.rule());
+        let context = study.there(&self.fit, &[]);
         for a in self.accepted.iter().filter(|a| a.measured.is_some()) {
-            take_measured_out(a, &a.effect().columns(&context, &a.candidate), &mut residual);
+            take_measured_out(a, &context.columns(&a.candidate), &mut residual);
         }
         residual
     }
 
     /// The columns of what was accepted, as the fit has them, on the validation set.
     pub(super) fn columns_on_validation(&self, study: &Study<'_>) -> Vec<Column> {
-        let context = Context::for_columns(&study.validation, &self.fit, study.rule());
-        let columns = |a: &Accepted| a.effect().columns(&context, &a.candidate);
+        let context = study.there(&self.fit, &[]);
+        let columns = |a: &Accepted| context.columns(&a.candidate);
         self.accepted.iter().filter(|a| a.measured.is_none()).flat_map(columns).collect()
     }
 
@@ -174,10 +173,10 @@ impl Model {
         }
         let coefficients = &self.coefficients()[k];
         let mut without = self.residual_on_validation(study);
-        let context = Context::for_columns(&study.validation, &self.fit, study.rule());
-        let own = a.effect().columns(&context, &a.candidate);
+        let context = study.there(&self.fit, &[]);
+        let own = context.columns(&a.candidate);
         own.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut without, *c));
-        let context = Context::new(&study.validation, &self.fit, &without, study.rule());
+        let context = study.there(&self.fit, &without);
         a.effect().seen_in(&context, &a.candidate, coefficients)
     }
 }
@@ -186,13 +185,14 @@ impl Model {
 fn fitted_again(study: &Study<'_>, accepted: &mut [Accepted], start: &Fit) -> Fit {
     let mut own: Vec<&mut Accepted> = accepted.iter_mut().filter(|a| a.measured.is_none()).collect();
     let mut candidates: Vec<Candidate> = own.iter().map(|a| a.candidate.clone()).collect();
-    let mut fit = refitted(&study.data, &study.folds, &mut candidates, start, study.rule());
+    let mut fit =
+        refitted(&study.data, &study.folds, &mut candidates, start, study.rule(), Some(&study.made));
     for (a, candidate) in own.iter_mut().zip(candidates) {
         a.candidate = candidate;
     }
-    let context = Context::for_columns(&study.data, start, study.rule());
+    let context = study.here(start, &[]);
     for a in accepted.iter().filter(|a| a.measured.is_some()) {
-        take_measured_out(a, &a.effect().columns(&context, &a.candidate), &mut fit.residual);
+        take_measured_out(a, &context.columns(&a.candidate), &mut fit.residual);
     }
     fit
 }
@@ -204,22 +204,25 @@ fn take_measured_out(a: &Accepted, columns: &[Column], residual: &mut [Vec<f64>]
     }
 }
 
-/// Fits the base model with some candidates; columns that depend on estimates are taken anew, twice.
+/// Fits the base model with some candidates; columns that depend on estimates are taken anew, twice. `made` has columns
+/// of the data that were made already.
 pub(super) fn refitted(
     data: &Data<'_>,
     folds: &Folds,
     candidates: &mut [Candidate],
     start: &Fit,
     rule: &Rule,
+    made: Option<&Made>,
 ) -> Fit {
     let once = |candidates: &mut [Candidate], start: &Fit| {
         let context = Context::new(data, start, &start.residual, rule);
+        let context = if let Some(made) = made { context.with(made) } else { context };
         let mut terms: Vec<Term> = Vec::new();
         let mut counts = Vec::new();
         for candidate in candidates.iter() {
             let effect = candidate.effect();
             let (before, non_negative) = (terms.len(), effect.non_negative());
-            let columns = effect.columns(&context, candidate).into_iter();
+            let columns = context.columns(candidate).into_iter();
             terms.extend(columns.map(|column| Term { column, non_negative }));
             counts.push(terms.len() - before);
         }

@@ -3,7 +3,7 @@
 use super::named::Spreads;
 use super::special::{Clock, Held, held_in_validation, repeats, settle};
 use super::study::Study;
-use crate::explanation::effects::MotionColumns;
+use crate::explanation::effects::Made;
 use crate::explanation::options::{ExplainError, ExplainOptions};
 use crate::identification::estimate::{Fit, Folds, bands_of, fit, spread};
 use crate::logs::log::Log;
@@ -62,7 +62,8 @@ pub(super) fn prepare<'a>(
     };
     let one_path = repeats(rule, &data, &validation);
     let clock = settle(rule, logs, validate, &mut data, &base, &mut validation);
-    let study = Study { data, columns: MotionColumns::default(), validation, folds, one_path, options };
+    let [made, made_there] = [Made::default(), Made::default()];
+    let study = Study { data, made, validation, made_there, folds, one_path, options };
     Ok(Begun { study, base, beforehand: Beforehand { errors, residual, held, clock } })
 }
 

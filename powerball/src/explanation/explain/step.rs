@@ -9,7 +9,7 @@ use super::search::{
 };
 use super::study::Study;
 use crate::controller::JointNumber;
-use crate::explanation::effects::{Candidate, Context, Effect, Placed};
+use crate::explanation::effects::{Candidate, Effect, Placed};
 use crate::identification::estimate::{Design, Fit, friction_columns, spread};
 use std::sync::OnceLock;
 
@@ -52,7 +52,7 @@ pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize, among: Am
     let design =
         Design::new(&study.validation, &friction_columns(&study.validation, &model.fit.shapes), &columns);
     let validation = Validation { data: &study.validation, design, residual: residual.clone() };
-    let there = Context::new(&study.validation, &model.fit, &residual, study.rule());
+    let there = study.there(&model.fit, &residual);
     let tester = Tester {
         study,
         screen: &screen,

@@ -1,19 +1,21 @@
 //! What does not change while effects are looked for.
 
-use crate::explanation::effects::MotionColumns;
+use crate::explanation::effects::{Context, Made};
 use crate::explanation::options::ExplainOptions;
 use crate::explanation::rule::Rule;
-use crate::identification::estimate::Folds;
+use crate::identification::estimate::{Fit, Folds};
 use crate::logs::regression::Data;
 
 /// The logs as rows, how they are held out, and what the search was told.
 pub(super) struct Study<'a> {
     /// The logs to fit.
     pub(super) data: Data<'a>,
-    /// Their columns that do not depend on the model.
-    pub(super) columns: MotionColumns,
+    /// Their columns that were made already.
+    pub(super) made: Made,
     /// The validation set: logs of another path, on which additions must hold.
     pub(super) validation: Data<'a>,
+    /// Its columns that were made already.
+    pub(super) made_there: Made,
     /// How the logs to fit are held out.
     pub(super) folds: Folds,
     /// Whether the validation set repeats the path of the fitted logs.
@@ -26,6 +28,16 @@ impl Study<'_> {
     /// The thresholds.
     pub(super) fn rule(&self) -> &Rule {
         &self.options.rule
+    }
+
+    /// A model seen on the logs to fit, with what is left of them.
+    pub(super) fn here<'c>(&'c self, fit: &'c Fit, residual: &'c [Vec<f64>]) -> Context<'c> {
+        Context::new(&self.data, fit, residual, self.rule()).with(&self.made)
+    }
+
+    /// The same on the validation set.
+    pub(super) fn there<'c>(&'c self, fit: &'c Fit, residual: &'c [Vec<f64>]) -> Context<'c> {
+        Context::new(&self.validation, fit, residual, self.rule()).with(&self.made_there)
     }
 
     /// Says what is being done.

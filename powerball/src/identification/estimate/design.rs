@@ -8,6 +8,7 @@ use crate::logs::regression::{Column, Data};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// The regression columns for given friction shapes and terms.
 ///
@@ -38,7 +39,7 @@ struct Local {
 impl Design {
     /// Lays out the columns; `friction[j]` are joint j's `FRICTION` columns.
     #[must_use]
-    pub fn new(data: &Data<'_>, friction: &[[Vec<f64>; FRICTION]], extra: &[Column]) -> Design {
+    pub fn new(data: &Data<'_>, friction: &[Arc<[Vec<f64>; FRICTION]>], extra: &[Column]) -> Design {
         let (n, p) = (data.dof(), data.inertial_columns());
         let layout = Layout::of(data, extra.len());
         let own = |j: usize| if data.per_joint { p * j } else { 0 };

@@ -10,6 +10,7 @@ use super::vary::{Start, vary};
 use crate::logs::parallel;
 use crate::logs::regression::{Column, Data, RigidArm};
 use faer::Mat;
+use std::sync::Arc;
 
 /// A column that was added to the base model.
 #[derive(Clone, Debug)]
@@ -199,9 +200,10 @@ impl Rows for InMemory<'_> {
 
 /// The friction columns of all joints for given shapes.
 #[must_use]
-pub fn friction_columns(data: &Data<'_>, shapes: &[[f64; 2]]) -> Vec<[Vec<f64>; FRICTION]> {
+pub fn friction_columns(data: &Data<'_>, shapes: &[[f64; 2]]) -> Vec<Arc<[Vec<f64>; FRICTION]>> {
     let joints: Vec<usize> = (0..shapes.len()).collect();
-    parallel::map(&joints, |&j| friction_shape::columns(data, j, shapes[j]))
+    let of = |j: usize| data.friction_columns(j, shapes[j], || friction_shape::columns(data, j, shapes[j]));
+    parallel::map(&joints, |&j| of(j))
 }
 
 fn residuals(data: &Data<'_>, design: &Design, theta: &[f64]) -> Vec<Vec<f64>> {

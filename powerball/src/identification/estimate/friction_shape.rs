@@ -2,7 +2,7 @@
 
 use super::rows::{FRICTION, Rows};
 use super::solve::Solver;
-use crate::logs::regression::Data;
+use crate::logs::regression::{Data, Recording};
 use crate::logs::summary::{NODES, Steepness};
 
 /// Steepnesses tried for each level. A steep level that is off by a grid's step leaves an error at which a
@@ -13,24 +13,28 @@ const GRID: usize = 64;
 /// Friction columns of a joint in the band: tanh(γ2 q̇), tanh(γ4 q̇), q̇, and ∂/∂ ln γ of the first two.
 #[must_use]
 pub(super) fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f64>; FRICTION] {
-    let column = |f: &dyn Fn(f64) -> f64| {
-        data.joints[joint].column(&data.recordings, |_, r| r.velocity(joint).map(f).collect())
+    let column =
+        |signal: &dyn Fn(usize, &Recording) -> Vec<f64>| data.joints[joint].column(&data.recordings, signal);
+    let level = |g: f64| {
+        let of = |r: &Recording| r.velocity(joint).map(|v| (g * v).tanh()).collect();
+        let levels: Vec<Vec<f64>> = data.recordings.iter().map(of).collect();
+        let slope = |k: usize, r: &Recording| {
+            levels[k].iter().zip(r.velocity(joint)).map(|(t, v)| slope(g, v, *t)).collect()
+        };
+        [column(&|k, _| levels[k].clone()), column(&slope)]
     };
-    let tangent = |g: f64| move |v: f64| tangent(g, v);
-    let [g2, g4] = shape;
-    [
-        column(&|v| (g2 * v).tanh()),
-        column(&|v| (g4 * v).tanh()),
-        column(&|v| v),
-        column(&tangent(g2)),
-        column(&tangent(g4)),
-    ]
+    let ([first, first_tangent], [second, second_tangent]) = (level(shape[0]), level(shape[1]));
+    [first, second, column(&|_, r| r.velocity(joint).collect()), first_tangent, second_tangent]
 }
 
 /// ∂ tanh(γ·q̇) / ∂ ln γ.
 #[must_use]
 pub(super) fn tangent(g: f64, v: f64) -> f64 {
-    let t = (g * v).tanh();
+    slope(g, v, (g * v).tanh())
+}
+
+/// The same where t = tanh(γ·q̇) is known.
+fn slope(g: f64, v: f64, t: f64) -> f64 {
     g * v * (1.0 - t * t)
 }
 

@@ -2,10 +2,8 @@
 
 use super::normal_equations::Products;
 use crate::logs::regression::Data;
+pub(super) use crate::logs::regression::FRICTION;
 use faer::Mat;
-
-/// Friction columns of a joint: two saturating levels, the viscous one, and the two tangents of the shapes.
-pub(super) const FRICTION: usize = 5;
 
 /// Where a coefficient stands: the minimal set, five friction columns a joint, further columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -10,7 +10,7 @@ use crate::logs::signal::resample::median_step;
 use crate::logs::signal::{Band, rest};
 use dyngen::arm::{Parameter, ParameterKind};
 use std::fmt;
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// How logs are prepared.
 #[derive(Clone, Debug)]
@@ -89,7 +89,21 @@ pub struct Data<'a> {
     last_link: OnceLock<Vec<Column>>,
     force: OnceLock<Vec<Column>>,
     declared_zero: OnceLock<Vec<Column>>,
+    pull: [OnceLock<Vec<Column>>; 3],
+    friction: KeptFriction,
 }
+
+/// Friction columns of the last few steepnesses: joint, γ2 and γ4, and what was made of them.
+type KeptFriction = Mutex<Vec<(usize, [f64; 2], Arc<[Vec<f64>; FRICTION]>)>>;
+
+/// Friction columns of a joint: two saturating levels, the viscous one, and the two tangents of the shapes.
+pub(crate) const FRICTION: usize = 5;
+
+/// Steepnesses of a joint whose columns are kept: a fit goes to and fro between a few.
+const KEPT_FRICTION: usize = 4;
+
+/// Mass and first moments: the parameters of a link that gravity pulls at.
+pub(crate) const PULLED: usize = 4;
 
 impl<'a> Data<'a> {
     /// Prepares logs.
@@ -183,6 +197,8 @@ impl<'a> Data<'a> {
                 last_link: OnceLock::new(),
                 force: OnceLock::new(),
                 declared_zero: OnceLock::new(),
+                pull: Default::default(),
+                friction: KeptFriction::default(),
             })
         };
         Ok(bands.into_iter().zip(joints).map(of_band).collect())
@@ -210,6 +226,8 @@ impl<'a> Data<'a> {
             last_link: OnceLock::new(),
             force: OnceLock::new(),
             declared_zero: OnceLock::new(),
+            pull: Default::default(),
+            friction: KeptFriction::default(),
         }
     }
 
@@ -253,6 +271,7 @@ impl<'a> Data<'a> {
             }
         }
         self.blocks = blocks_of(&self.recordings, &self.joints, &self.band, block);
+        (self.pull, self.friction) = Default::default();
         self
     }
 
@@ -302,6 +321,51 @@ impl<'a> Data<'a> {
         })
     }
 
+    /// The static torque of every link's mass and first moments, [`PULLED`] a link, under unit gravity along a base axis;
+    /// empty where they cannot be had. A column has no part on a joint that does not feel it.
+    pub(crate) fn pull_columns(&self, axis: usize) -> &[Column] {
+        self.pull[axis].get_or_init(|| {
+            let mut columns = Vec::new();
+            // Link by link: of a long log all of them at full rate would be large.
+            for link in 0..self.dof() {
+                let first = link * ParameterKind::ALL.len();
+                let chosen: Vec<usize> = (first..first + PULLED).collect();
+                let of_link =
+                    self.columns_over_all(PULLED, |r| self.body.gravity_columns(axis, &chosen, &r.q));
+                if of_link.is_empty() {
+                    return of_link;
+                }
+                columns.extend(of_link);
+            }
+            for column in &mut columns {
+                column.parts.retain(|(_, values)| values.iter().any(|v| *v != 0.0));
+            }
+            columns
+        })
+    }
+
+    /// Columns of a joint's friction with steepnesses γ2 and γ4; `make` makes them where they were not made lately.
+    pub(crate) fn friction_columns(
+        &self,
+        joint: usize,
+        shape: [f64; 2],
+        make: impl FnOnce() -> [Vec<f64>; FRICTION],
+    ) -> Arc<[Vec<f64>; FRICTION]> {
+        let same = |kept: &&(usize, [f64; 2], Arc<_>)| kept.0 == joint && kept.1 == shape;
+        let lock = || self.friction.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, _, known)) = lock().iter().find(same) {
+            return Arc::clone(known);
+        }
+        let made = Arc::new(make());
+        let mut kept = lock();
+        let own = |kept: &(usize, [f64; 2], Arc<_>)| kept.0 == joint;
+        if kept.iter().filter(|kept| own(kept)).count() >= KEPT_FRICTION {
+            kept.iter().position(own).map(|oldest| kept.remove(oldest));
+        }
+        kept.push((joint, shape, Arc::clone(&made)));
+        made
+    }
+
     /// The parameters that the arm file declares zero.
     #[must_use]
     pub fn declared_zero(&self) -> Vec<Parameter> {
@@ -346,7 +410,7 @@ impl<'a> Data<'a> {
             let signal = |r: usize, _: &Recording| -> Vec<f64> {
                 signals[r].iter().skip(j).step_by(n).copied().collect()
             };
-            (j, self.joints[j].column(&self.recordings, signal))
+            (j, self.joints[j].column(&self.recordings, signal).into())
         };
         Column { parts: parallel::map(&(0..n).collect::<Vec<_>>(), |j| part(*j)) }
     }
@@ -354,8 +418,8 @@ impl<'a> Data<'a> {
     /// Measured less predicted torque by joint and row, from torques along the recordings, n a sample.
     #[must_use]
     pub fn residual(&self, predicted: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let of_joint = |(rows, (_, predicted)): (&JointRows, &(usize, Vec<f64>))| {
-            rows.torque.iter().zip(predicted).map(|(y, p)| y - p).collect()
+        let of_joint = |(rows, (_, predicted)): (&JointRows, &(usize, Arc<Vec<f64>>))| {
+            rows.torque.iter().zip(predicted.iter()).map(|(y, p)| y - p).collect()
         };
         self.joints.iter().zip(&self.column_over_all(predicted).parts).map(of_joint).collect()
     }

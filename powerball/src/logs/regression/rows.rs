@@ -3,6 +3,7 @@
 use super::Recording;
 use crate::logs::signal::Band;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// A stretch of about [`super::DataOptions::block`] seconds of one recording: the unit that is taken as
 /// independent.
@@ -79,18 +80,18 @@ impl JointRows {
     }
 }
 
-/// A regression column: its values on the joints it acts on.
+/// A regression column: its values on the joints it acts on. Copies share the values.
 #[derive(Clone, Debug, Default)]
 pub struct Column {
     /// (joint, values by row), each joint at most once.
-    pub parts: Vec<(usize, Vec<f64>)>,
+    pub parts: Vec<(usize, Arc<Vec<f64>>)>,
 }
 
 impl Column {
     /// A column that acts on one joint.
     #[must_use]
-    pub fn on(joint: usize, values: Vec<f64>) -> Column {
-        Column { parts: vec![(joint, values)] }
+    pub fn on(joint: usize, values: impl Into<Arc<Vec<f64>>>) -> Column {
+        Column { parts: vec![(joint, values.into())] }
     }
 
     /// The values on a joint, where the column acts on it.
@@ -102,7 +103,7 @@ impl Column {
     /// Adds a share of it to signals by joint and row.
     pub fn add_to(&self, signals: &mut [Vec<f64>], share: f64) {
         for (joint, values) in &self.parts {
-            signals[*joint].iter_mut().zip(values).for_each(|(s, v)| *s += share * v);
+            signals[*joint].iter_mut().zip(values.iter()).for_each(|(s, v)| *s += share * v);
         }
     }
 

@@ -69,7 +69,7 @@ impl Hypothesis {
         for (k, column) in columns.iter().enumerate() {
             let coefficient = self.fit.coefficient(first + k);
             for (j, values) in &column.parts {
-                torque[*j].iter_mut().zip(values).for_each(|(t, v)| *t += coefficient * v);
+                torque[*j].iter_mut().zip(values.iter()).for_each(|(t, v)| *t += coefficient * v);
             }
         }
         torque
@@ -79,7 +79,7 @@ impl Hypothesis {
     #[must_use]
     pub fn fitted_to(&self, data: &Data<'_>, folds: &Folds) -> Hypothesis {
         let mut candidates = self.candidates.clone();
-        let fit = refitted(data, folds, &mut candidates, &self.fit, &self.rule);
+        let fit = refitted(data, folds, &mut candidates, &self.fit, &self.rule, None);
         let mut new = Hypothesis {
             joints: self.joints.clone(),
             candidates,
@@ -94,7 +94,7 @@ impl Hypothesis {
 }
 
 fn columns(context: &Context<'_>, of: &[Candidate]) -> Vec<Column> {
-    of.iter().flat_map(|candidate| candidate.effect().columns(context, candidate)).collect()
+    of.iter().flat_map(|candidate| context.columns(candidate)).collect()
 }
 
 /// What stays open after all steps: a name with a twin, else a name that was not given, else, where
@@ -119,7 +119,8 @@ pub(crate) fn open(
         model.accepted.iter().filter(|a| !asked(a)).map(|a| a.candidate.clone()).collect();
     let hypothesis = |own: &Vec<Candidate>| {
         let mut candidates: Vec<Candidate> = rest.iter().chain(own).cloned().collect();
-        let fit = refitted(&study.data, &study.folds, &mut candidates, &model.fit, study.rule());
+        let made = Some(&study.made);
+        let fit = refitted(&study.data, &study.folds, &mut candidates, &model.fit, study.rule(), made);
         let mut joints: Vec<JointNumber> = own.iter().flat_map(|c| c.joints.clone()).collect();
         joints.sort_unstable();
         joints.dedup();

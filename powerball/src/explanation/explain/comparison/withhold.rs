@@ -66,16 +66,16 @@ fn take_back(
 
 /// The accepted effect without which the logs to judge on are predicted clearly better on its joints.
 fn harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
-    let error = |model: &Model, joints: &[JointNumber]| -> f64 {
-        let left = model.residual_on_validation(study);
+    let error = |left: &[Vec<f64>], joints: &[JointNumber]| -> f64 {
         let square = |j: &JointNumber| left[j.index()].iter().map(|e| e * e).sum::<f64>();
         joints.iter().map(square).filter(|s| *s > 0.0).map(f64::ln).sum::<f64>() / joints.len() as f64
     };
+    let with = model.residual_on_validation(study);
     let found = (0..model.accepted.len()).rev().filter(|k| model.accepted[*k].step.is_some());
     found.into_iter().find(|k| {
         let joints = &model.accepted[*k].candidate.joints;
-        let without = model.without(study, *k);
-        error(&without, joints) < error(model, joints) - study.rule().harm
+        let without = model.without(study, *k).residual_on_validation(study);
+        error(&without, joints) < error(&with, joints) - study.rule().harm
     })
 }
 

@@ -94,7 +94,7 @@ fn set_per_joint(study: &mut Study<'_>, per_joint: bool) {
 /// The accepted effects, each as what it is in a model.
 fn parts(study: &Study<'_>, found: &Model, held: Option<&Held>) -> Parts {
     let context = found.context(study);
-    let there = Context::for_columns(&study.validation, &found.fit, study.rule());
+    let there = study.there(&found.fit, &[]);
     let n = study.data.dof();
     let (mut offset, mut delay) = (vec![0.0; n], vec![0.0; n]);
     let mut parts = Parts::default();
@@ -166,7 +166,7 @@ fn take_out(found: &Model, which: &[usize], context: &Context<'_>, residual: &mu
     let coefficients = found.coefficients();
     for k in which {
         let a = &found.accepted[*k];
-        let columns = a.effect().columns(context, &a.candidate);
+        let columns = context.columns(&a.candidate);
         columns.iter().zip(&coefficients[*k]).for_each(|(column, c)| column.add_to(residual, -c));
     }
 }

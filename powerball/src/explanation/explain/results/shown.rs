@@ -40,7 +40,7 @@ pub(crate) fn shown(study: &Study<'_>, model: &Model) -> Vec<Shown> {
     let context = model.context(study);
     let mut shown = Vec::new();
     for (a, coefficients) in model.accepted.iter().zip(model.coefficients()) {
-        let columns = a.effect().columns(&context, &a.candidate);
+        let columns = context.columns(&a.candidate);
         let mut best: Vec<(f64, usize, Vec<f64>)> = Vec::new();
         for j in 0..study.data.dof() {
             let mut own = vec![0.0; study.data.joints[j].len()];

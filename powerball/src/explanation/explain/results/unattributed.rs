@@ -7,7 +7,6 @@ use super::super::study::Study;
 use super::correction::{Correction, correct};
 use super::dependencies::depends_on;
 use crate::controller::JointNumber;
-use crate::explanation::effects::Context;
 use crate::logs::parallel;
 use serde::Serialize;
 
@@ -55,7 +54,7 @@ pub(crate) fn unattributed(
         |j: &usize| rms[*j] > rule.above_floor * floor[*j] && model.fit.inflation[*j] > rule.coloured;
     let candidates: Vec<usize> = context.moving_joints().map(JointNumber::index).filter(is_left).collect();
     let found = parallel::map(&candidates, |j| depends_on(&context, *j));
-    let there = Context::new(&study.validation, &model.fit, held_out, rule);
+    let there = study.there(&model.fit, held_out);
     let correction = study.options.correct_unattributed.then(|| {
         let of = |(j, list): (&usize, &Vec<(String, f64)>)| correct(&context, &there, &study.folds, *j, list);
         candidates.iter().zip(&found).filter_map(of).collect()

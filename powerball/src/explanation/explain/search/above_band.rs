@@ -115,8 +115,7 @@ fn is_the_same(a: &Candidate, b: &Candidate) -> bool {
 /// there changes little.
 fn raises_error(study: &Study<'_>, model: &Model, ripple: &Accepted) -> bool {
     let joint = ripple.candidate.joints[0].index();
-    let context = Context::for_columns(&study.validation, &model.fit, study.rule());
-    let columns = ripple.effect().columns(&context, &ripple.candidate);
+    let columns = study.there(&model.fit, &[]).columns(&ripple.candidate);
     let square = |residual: &[Vec<f64>]| residual[joint].iter().map(|e| e * e).sum::<f64>();
     let mut residual = model.residual_on_validation(study);
     let before = square(&residual);

@@ -5,7 +5,6 @@ use super::super::study::Study;
 use super::both_ways::Swapped;
 use super::evidence::{Evidence, Extent, Validation, evidence, log_change};
 use super::screen::Screen;
-use crate::explanation::effects::Context;
 use crate::identification::estimate::{Design, friction_columns};
 
 /// What speaks for a part of the model, everything else refitted.
@@ -71,17 +70,16 @@ pub(crate) fn is_beside(accepted: &Accepted) -> bool {
 fn needed(study: &Study<'_>, model: &Model, place: usize) -> Option<Needed> {
     let (candidate, own) = (&model.accepted[place].candidate, model.places()[place].clone());
     let coefficients = &model.coefficients()[place];
-    let effect = candidate.effect();
     let mut residual = model.fit.residual.clone();
-    let columns = effect.columns(&model.context(study), candidate);
+    let columns = model.context(study).columns(candidate);
     columns.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut residual, *c));
-    let context = Context::new(&study.data, &model.fit, &residual, study.rule()).with(&study.columns);
+    let context = study.here(&model.fit, &residual);
     let screen = Screen::without(&context, own);
     let trial = screen.try_candidate(candidate)?;
     let all = model.columns_on_validation(study);
     let mut there = model.fit.residual_on(&study.validation, &all);
-    let context = Context::for_columns(&study.validation, &model.fit, study.rule());
-    let columns = effect.columns(&context, candidate);
+    let context = study.there(&model.fit, &[]);
+    let columns = context.columns(candidate);
     columns.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut there, *c));
     let design =
         Design::new(&study.validation, &friction_columns(&study.validation, &model.fit.shapes), &all);

@@ -10,7 +10,7 @@ use super::super::model::Model;
 use super::super::study::Study;
 use super::evidence::{Validation, left, log_change, validation_gain, wald};
 use super::screen::{Screen, Trial};
-use crate::explanation::effects::{Candidate, Context};
+use crate::explanation::effects::Candidate;
 use crate::identification::estimate::{Design, Fit, Folds, fit, friction_columns};
 use crate::logs::regression::Data;
 use crate::logs::vector::dot;
@@ -42,7 +42,7 @@ pub(crate) struct BothWays {
 impl Swapped {
     /// Fits the model to the validation set, all of it or without one accepted effect.
     pub(crate) fn new(study: &Study<'_>, model: &Model, without: Option<usize>) -> Swapped {
-        let there = Context::for_columns(&study.validation, &model.fit, study.rule());
+        let there = study.there(&model.fit, &[]);
         let terms = model.terms(&there, without);
         let fit = fit(&study.validation, &Folds::new(&study.validation), &terms, Some(&model.fit));
         let here: Vec<_> =
@@ -64,11 +64,10 @@ impl Swapped {
         screen: &Screen<'_>,
         (candidate, trial, forward): (&Candidate, &Trial, f64),
     ) -> Option<BothWays> {
-        let there = Context::new(&study.validation, &self.fit, &self.fit.residual, study.rule());
-        let effect = candidate.effect();
+        let there = study.there(&self.fit, &self.fit.residual);
         let back = Screen::new(&there);
-        let swapped = back.try_columns(effect.columns(&there, candidate), candidate.searched)?;
-        let columns = effect.columns(screen.context, candidate);
+        let swapped = back.try_columns(there.columns(candidate), candidate.searched)?;
+        let columns = screen.context.columns(candidate);
         let judged =
             Validation { data: &study.data, design: self.design.clone(), residual: self.residual.clone() };
         let gain = validation_gain(&back, &swapped, &candidate.joints, &judged, &columns);

@@ -322,7 +322,7 @@ impl Tester<'_> {
         let spoken_for = self.study.options.ruled_out.iter().any(|r| r.in_favour_of == group.name());
         let found = parallel::map(&open, |m| {
             let Member { candidate, trial, .. } = &group.members[*m];
-            let columns = group.effect.columns(self.there, candidate);
+            let columns = self.there.columns(candidate);
             let extent = match Extent::of(candidate) {
                 Extent::Everywhere if spoken_for => Extent::SomeLogs,
                 extent => extent,

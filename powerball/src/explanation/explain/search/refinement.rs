@@ -62,9 +62,9 @@ fn moved(
 ) -> Option<(Candidate, Trial)> {
     let effect = accepted.effect();
     let mut without = model.fit.residual.clone();
-    let columns = effect.columns(&model.context(study), &accepted.candidate);
+    let columns = model.context(study).columns(&accepted.candidate);
     columns.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut without, *c));
-    let context = Context::new(&study.data, &model.fit, &without, study.rule()).with(&study.columns);
+    let context = study.here(&model.fit, &without);
     let screen = Screen::without(&context, own);
     let mut candidate = accepted.candidate.clone();
     let mut best = screen.try_candidate(&candidate)?;

@@ -80,7 +80,7 @@ impl<'c> Screen<'c> {
     #[must_use]
     pub(crate) fn try_candidate(&self, candidate: &Candidate) -> Option<Trial> {
         let effect = candidate.effect();
-        let columns = effect.columns(self.context, candidate);
+        let columns = self.context.columns(candidate);
         let trial = self.try_columns(columns, candidate.searched)?;
         let sound = !(effect.non_negative() && trial.theta.iter().any(|t| *t <= 0.0));
         (sound && effect.admissible(candidate, &trial.theta)).then_some(trial)

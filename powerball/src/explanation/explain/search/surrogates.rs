@@ -17,6 +17,7 @@ use crate::logs::vector::dot;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Draws the final surrogates; a step draws by its number.
 const FINAL_SEED: u64 = 99;
@@ -114,7 +115,8 @@ pub(crate) fn false_positives(study: &Study<'_>, model: &Model) -> FalsePositive
 }
 
 fn shifted(column: &Column, data: &Data<'_>, fraction: f64) -> Column {
-    let shift = |(j, values): &(usize, Vec<f64>)| (*j, rotated(values, &data.joints[*j].rows, fraction));
+    let shift =
+        |(j, values): &(usize, Arc<Vec<f64>>)| (*j, rotated(values, &data.joints[*j].rows, fraction).into());
     Column { parts: column.parts.iter().map(shift).collect() }
 }
 
@@ -149,7 +151,8 @@ mod tests {
 
     #[test]
     fn a_shift_changes_no_constant_and_a_wave_is_like_itself() {
-        let column = |f: &dyn Fn(f64) -> f64| Column::on(0, (0..1000).map(|k| f(f64::from(k))).collect());
+        let column =
+            |f: &dyn Fn(f64) -> f64| Column::on(0, (0..1000).map(|k| f(f64::from(k))).collect::<Vec<f64>>());
         // Filters leave a constant with rounding.
         let constant = column(&|k| 1.0 + 1e-12 * (k * 0.7).sin());
         assert_eq!(alike(&constant, &column(&|k| 1.0 - 1e-12 * (k * 0.7).cos())), 1.0);

@@ -184,7 +184,7 @@ fn makes_it_odd(
 fn take_out(other: &mut Data<'_>, columns: &[Column], coefficients: &[f64]) {
     for (column, c) in columns.iter().zip(coefficients) {
         for (j, values) in &column.parts {
-            other.joints[*j].torque.iter_mut().zip(values).for_each(|(t, v)| *t -= c * v);
+            other.joints[*j].torque.iter_mut().zip(values.iter()).for_each(|(t, v)| *t -= c * v);
         }
     }
 }

@@ -1,0 +1,179 @@
+//! Columns of one data set that were made already: every step of a search asks for most of them again.
+
+use super::Candidate;
+use super::Settings;
+use crate::controller::JointNumber;
+use crate::controller::correction::Law;
+use crate::identification::estimate::Fit;
+use crate::logs::regression::Column;
+use std::collections::HashMap;
+use std::mem::{Discriminant, discriminant, size_of};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// What is kept at most of laws of the motion, bytes. What is made after that is made anew each time.
+const MOST: usize = 96 << 20;
+/// What is kept at most of one model, bytes.
+const MOST_OF_MODEL: usize = 32 << 20;
+/// Models of which something is kept: the one that is searched with, the one before it, and those that are tried beside it.
+const MODELS: usize = 3;
+
+/// What was made of one data set.
+#[derive(Debug, Default)]
+pub(crate) struct Made {
+    /// Columns of laws of the motion alone: whatever the model becomes, they stay as they are.
+    pub(super) motion: MotionColumns,
+    /// Of the last few models, the last one asked for at the end.
+    models: Mutex<Vec<Arc<OfModel>>>,
+}
+
+impl Made {
+    /// What was made of a model, empty where nothing was.
+    pub(super) fn of_model(&self, fit: &Fit) -> Arc<OfModel> {
+        let mut models = self.models.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = models.iter().position(|model| model.is_of(fit));
+        let model = known.map_or_else(|| Arc::new(OfModel::new(fit)), |k| models.remove(k));
+        models.push(Arc::clone(&model));
+        if models.len() > MODELS {
+            models.remove(0);
+        }
+        model
+    }
+}
+
+/// Torques of a fitted model along the recordings of one data set, and the columns of candidates with it.
+#[derive(Debug)]
+pub(super) struct OfModel {
+    theta: Vec<f64>,
+    shapes: Vec<[f64; 2]>,
+    /// By recording, n a sample, N·m.
+    pub(super) rigid: OnceLock<Vec<Vec<f64>>>,
+    pub(super) friction: OnceLock<Vec<Vec<f64>>>,
+    pub(super) prediction: OnceLock<Vec<Vec<f64>>>,
+    columns: Mutex<Columns>,
+}
+
+/// The joints and the effect of a candidate: others need not be compared.
+type Key = (Vec<JointNumber>, Discriminant<Settings>);
+
+#[derive(Debug, Default)]
+struct Columns {
+    made: HashMap<Key, Vec<(Candidate, Vec<Column>)>>,
+    bytes: usize,
+}
+
+impl OfModel {
+    pub(super) fn new(fit: &Fit) -> OfModel {
+        OfModel {
+            theta: fit.theta.clone(),
+            shapes: fit.shapes.clone(),
+            rigid: OnceLock::new(),
+            friction: OnceLock::new(),
+            prediction: OnceLock::new(),
+            columns: Mutex::default(),
+        }
+    }
+
+    fn is_of(&self, fit: &Fit) -> bool {
+        self.theta == fit.theta && self.shapes == fit.shapes
+    }
+
+    /// The columns of a candidate; `make` makes them where they have not been made.
+    pub(super) fn columns(&self, candidate: &Candidate, make: impl FnOnce() -> Vec<Column>) -> Vec<Column> {
+        let key = (candidate.joints.clone(), discriminant(&candidate.settings));
+        let same =
+            |known: &Candidate| known.settings == candidate.settings && known.windows == candidate.windows;
+        let known = |made: &Columns| {
+            let (_, columns) = made.made.get(&key)?.iter().find(|(known, _)| same(known))?;
+            Some(columns.clone())
+        };
+        if let Some(columns) = known(&self.columns.lock().unwrap_or_else(PoisonError::into_inner)) {
+            return columns;
+        }
+        // Others go on while they are made.
+        let columns = make();
+        let bytes: usize =
+            columns.iter().flat_map(|c| &c.parts).map(|(_, v)| size_of::<f64>() * v.len()).sum();
+        let mut made = self.columns.lock().unwrap_or_else(PoisonError::into_inner);
+        if made.bytes + bytes <= MOST_OF_MODEL && known(&made).is_none() {
+            made.bytes += bytes;
+            made.made.entry(key).or_default().push((candidate.clone(), columns.clone()));
+        }
+        columns
+    }
+}
+
+/// Columns of laws of the motion alone.
+#[derive(Debug, Default)]
+pub(super) struct MotionColumns {
+    made: Mutex<Laws>,
+}
+
+/// A joint and a kind of law.
+type Kind = (JointNumber, Discriminant<Law<f64>>);
+
+/// A law with its settings, and its values.
+#[derive(Debug)]
+struct Known {
+    law: Law<f64>,
+    values: Arc<Vec<f64>>,
+}
+
+#[derive(Debug, Default)]
+struct Laws {
+    columns: HashMap<Kind, Vec<Known>>,
+    bytes: usize,
+}
+
+impl MotionColumns {
+    /// The values of a law at a joint; `make` makes them where they have not been made. Laws of torques
+    /// change with the model and are made each time.
+    pub(super) fn get(
+        &self,
+        joint: JointNumber,
+        law: Law<f64>,
+        make: impl FnOnce() -> Vec<f64>,
+    ) -> Arc<Vec<f64>> {
+        if law.needs_torque() || law.moves_link() {
+            return make().into();
+        }
+        let key = (joint, discriminant(&law));
+        let known = |made: &Laws| {
+            let found = made.columns.get(&key)?.iter().find(|known| known.law == law)?;
+            Some(Arc::clone(&found.values))
+        };
+        if let Some(values) = known(&self.made.lock().unwrap_or_else(PoisonError::into_inner)) {
+            return values;
+        }
+        // Others go on while it is made.
+        let values = Arc::new(make());
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        let bytes = size_of::<f64>() * values.len();
+        if made.bytes + bytes <= MOST && known(&made).is_none() {
+            made.bytes += bytes;
+            made.columns.entry(key).or_default().push(Known { law, values: Arc::clone(&values) });
+        }
+        values
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn laws_of_the_motion_are_made_once_and_laws_of_torques_each_time() {
+        let columns = MotionColumns::default();
+        let joint = JointNumber::from_index;
+        let get = |j, law, values: [f64; 2]| columns.get(joint(j), law, || values.to_vec()).to_vec();
+        let sine = |order| Law::Sine { order };
+        assert_eq!(get(0, sine(3.0), [1.0, 2.0]), [1.0, 2.0]);
+        assert_eq!(get(0, sine(3.0), [9.0, 9.0]), [1.0, 2.0]);
+        // Another setting, another joint, another law.
+        assert_eq!(get(0, sine(4.0), [3.0, 4.0]), [3.0, 4.0]);
+        assert_eq!(get(1, sine(3.0), [5.0, 6.0]), [5.0, 6.0]);
+        assert_eq!(get(0, Law::Cosine { order: 3.0 }, [7.0, 8.0]), [7.0, 8.0]);
+        let load = Law::Load { steepness: 10.0 };
+        assert_eq!(get(0, load, [1.0, 1.0]), [1.0, 1.0]);
+        assert_eq!(get(0, load, [2.0, 2.0]), [2.0, 2.0]);
+    }
+}
