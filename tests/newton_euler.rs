@@ -11,6 +11,7 @@ use powerball_workspace::generated;
 use powerball_workspace::{arm, paper_arm_with_ratios};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::sync::OnceLock;
 use support::{State, evaluate, proven};
 
 #[path = "../dyngen/tests/support/mod.rs"]
@@ -141,17 +142,42 @@ fn compare(
     }
 }
 
-fn check_evaluator(name: &str, arm: Arm) {
-    let model = Model::derive(arm).unwrap();
+/// A model with every function of every set: proven once, for all tests.
+struct Proven {
+    model: Model,
+    functions: Vec<(SetKind, Vec<Evaluator>)>,
+}
+
+impl Proven {
+    fn new(arm: Arm) -> Proven {
+        let model = Model::derive(arm).unwrap();
+        let functions = model.sets().sets.iter().map(|set| (set.kind, proven(&model, set.kind))).collect();
+        Proven { model, functions }
+    }
+
+    fn of(&self, kind: SetKind) -> &[Evaluator] {
+        &self.functions.iter().find(|(of, _)| *of == kind).unwrap().1
+    }
+}
+
+const ARMS: [&str; 6] = ["arm", "puma560", "ur5e", "panda", "stanford", "scara"];
+
+fn proven_arm(name: &str) -> &'static Proven {
+    static ALL: [OnceLock<Proven>; ARMS.len()] = [const { OnceLock::new() }; ARMS.len()];
+    ALL[ARMS.iter().position(|n| *n == name).unwrap()].get_or_init(|| Proven::new(arm(name)))
+}
+
+fn check_evaluator(name: &str, proven: &Proven) {
+    let model = &proven.model;
     let mut rng = ChaCha8Rng::seed_from_u64(42);
     for set in &model.sets().sets {
-        let evaluators = proven(&model, set.kind);
+        let evaluators = proven.of(set.kind);
         for _ in 0..STATES {
             let all = values(model.arm(), &mut rng);
             let state = State::draw(&mut rng, model.arm().dof(), 3.0);
             let tau = reference(model.arm(), &all, &state, Function::InverseDynamics).unwrap();
             let parameters = model.set_values(set, &all);
-            for evaluator in &evaluators {
+            for evaluator in evaluators {
                 let result = evaluate(evaluator, &Samples { tau: &tau, ..state.samples(&parameters) });
                 let name = format!("{name} {}", set.kind);
                 compare(&name, model.arm(), &all, &state, evaluator.function(), &result, &parameters);
@@ -162,8 +188,8 @@ fn check_evaluator(name: &str, arm: Arm) {
 
 #[test]
 fn evaluated_functions_agree_for_every_arm_and_set() {
-    for name in ["arm", "puma560", "ur5e", "panda", "stanford", "scara"] {
-        check_evaluator(name, arm(name));
+    for name in ARMS {
+        check_evaluator(name, proven_arm(name));
     }
 }
 
@@ -171,10 +197,10 @@ fn evaluated_functions_agree_for_every_arm_and_set() {
 fn evaluated_functions_agree_with_high_gear_ratios() {
     let mut geared = paper_arm_with_ratios([100; 6].map(Some));
     geared.groupings.clear();
-    check_evaluator("k = 100", geared);
+    check_evaluator("k = 100", &Proven::new(geared));
     let mut stanford = arm("stanford");
     stanford.joints.iter_mut().for_each(|j| j.rotor_ratio = Some(dyngen::exact::rational::integer(50)));
-    check_evaluator("stanford k = 50", stanford);
+    check_evaluator("stanford k = 50", &Proven::new(stanford));
 }
 
 /// Motors that turn with several joints, tables that go along y too, both conventions, sliding joints.
@@ -196,7 +222,7 @@ fn evaluated_functions_agree_with_transmissions_and_offsets_along_y() {
         coupled.transmissions = vec![wrist, shoulder];
         coupled.joints[1].b = parse_rational("0.07").unwrap();
         coupled.joints[3].b = parse_rational("-0.11").unwrap();
-        check_evaluator(&format!("{name}, coupled"), coupled);
+        check_evaluator(&format!("{name}, coupled"), &Proven::new(coupled));
     }
 }
 
@@ -206,9 +232,10 @@ fn evaluated_functions_agree_with_transmissions_and_offsets_along_y() {
 fn compiled_functions_agree_for_every_arm_and_set() {
     let mut rng = ChaCha8Rng::seed_from_u64(43);
     for file in generated::ALL {
-        let model = Model::derive(arm(file.arm)).unwrap();
+        let proven = proven_arm(file.arm);
+        let model = &proven.model;
         let set = model.set(file.set).unwrap();
-        let evaluators = proven(&model, set.kind);
+        let evaluators = proven.of(set.kind);
         let name = format!("{} {}", file.arm, file.set);
         for _ in 0..STATES {
             let all = values(model.arm(), &mut rng);
@@ -229,12 +256,14 @@ fn compiled_functions_agree_for_every_arm_and_set() {
 #[test]
 fn the_full_regressor_agrees_column_by_column() {
     for name in ["arm", "puma560", "panda", "stanford"] {
-        let model = Model::derive(arm(name)).unwrap();
+        let proven = proven_arm(name);
+        let model = &proven.model;
         let set = model.set(SetKind::Full).unwrap();
-        let evaluator = Evaluator::new(&model, Function::Regressor, SetKind::Full).unwrap();
+        let functions = proven.of(SetKind::Full);
+        let evaluator = functions.iter().find(|e| e.function() == Function::Regressor).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(44);
         let state = State::draw(&mut rng, model.arm().dof(), 3.0);
-        let out = evaluate(&evaluator, &state.samples(&[]));
+        let out = evaluate(evaluator, &state.samples(&[]));
         let all = vec![0.0; model.arm().all_parameters().len()];
         let numeric = Dynamics::new(Chain::new(model.arm()), bodies(&all).unwrap()).unwrap();
         let reference = numeric.regressor(&state.q, &state.dq, &state.ddq);
@@ -262,7 +291,7 @@ fn rates_and_derivatives_agree_with_differences() {
     let mut rng = ChaCha8Rng::seed_from_u64(45);
     let index = |f: Function| Function::ALL.iter().position(|g| *g == f).unwrap();
     for file in generated::ALL {
-        let model = Model::derive(arm(file.arm)).unwrap();
+        let model = &proven_arm(file.arm).model;
         let (n, name) = (model.arm().dof(), format!("{} {}", file.arm, file.set));
         let parameters = model.set_values(model.set(file.set).unwrap(), &values(model.arm(), &mut rng));
         let state = State::draw(&mut rng, n, 3.0);

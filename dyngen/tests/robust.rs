@@ -174,6 +174,7 @@ fn the_command_ends_with_its_codes_whatever_it_reads() {
     let names = "m mx my mz Ixx Ixy Ixz Iyy Iyz Izz Im".split(' ');
     let good: Vec<String> = names.flat_map(|n| [format!("\"{n}1\": 1.5"), format!("\"{n}2\": 2")]).collect();
     let good = format!("{{{}}}", good.join(", "));
+    let files = [&arm, &urdf, &values, &states];
     let commands: [&[&str]; 5] = [
         &["describe", &arm, "--json"],
         &["eval", &arm, "--function", "inverse_dynamics", "--states", &states, "--values", &values],
@@ -184,14 +185,17 @@ fn the_command_ends_with_its_codes_whatever_it_reads() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     for i in 0..mutants(100) {
         let mut texts = [ARM.to_string(), URDF.to_string(), good.clone(), STATES.to_string()];
+        let mut spoilt = None;
         if i > 0 {
             let which = rng.random_range(0..texts.len());
             texts[which] = damaged(&texts[which], &mut rng);
+            spoilt = Some(files[which].as_str());
         }
-        for (file, text) in [&arm, &urdf, &values, &states].iter().zip(&texts) {
+        for (file, text) in files.iter().zip(&texts) {
             std::fs::write(file, text).unwrap();
         }
-        for command in commands {
+        // What reads only good files was asked in the first round.
+        for command in commands.into_iter().filter(|c| spoilt.is_none_or(|file| c.contains(&file))) {
             let run = Command::new(env!("CARGO_BIN_EXE_dyngen")).args(command).output().unwrap();
             let said = String::from_utf8_lossy(&run.stderr);
             let code = run.status.code();

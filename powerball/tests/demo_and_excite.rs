@@ -6,6 +6,7 @@ use powerball::commands::demo::{self, Session};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::OnceLock;
 
 fn powerball(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_powerball")).args(arguments).output().unwrap()
@@ -29,15 +30,24 @@ fn arm(name: &str) -> String {
     format!("{}/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
+/// One demo for the tests of this file: its effect, what it says, and its folder.
+fn demo() -> (&'static str, &'static Value, PathBuf) {
+    static SAID: OnceLock<Value> = OnceLock::new();
+    let (effect, seed) = ("load_friction", "3");
+    let folder = scratch(&format!("demo_{effect}"));
+    let said = SAID.get_or_init(|| {
+        let out = folder.to_str().unwrap();
+        let run = powerball(&["demo", "--effect", effect, "--seed", seed, "--out", out, "--json"]);
+        assert!(run.status.success(), "{}", complaint(&run));
+        json(&run)
+    });
+    (effect, said, folder)
+}
+
 /// Other effects are taken from the demo's session to a controller in `round_trip.rs`.
 #[test]
 fn the_demo_finds_what_it_hid_and_writes_what_it_promises() {
-    let (effect, seed) = ("load_friction", "3");
-    let folder = scratch(&format!("demo_{effect}"));
-    let out = folder.to_str().unwrap();
-    let run = powerball(&["demo", "--effect", effect, "--seed", seed, "--out", out, "--json"]);
-    assert!(run.status.success(), "{}", complaint(&run));
-    let result = json(&run);
+    let (effect, result, folder) = demo();
     assert_eq!(result["verdict"]["truth"], effect);
     assert_eq!(result["verdict"]["judgement"], "right", "{}", result["verdict"]);
     let rms = |when: &str| -> Vec<f64> {
@@ -119,7 +129,9 @@ fn the_same_seed_gives_the_same_logs_and_another_one_others() {
     };
     let first = log(5, "session_a");
     assert!(first == log(5, "session_b"));
-    assert!(first.1 != log(6, "session_c").1);
+    // The demo's seed is another one.
+    let (_, _, folder) = demo();
+    assert!(first.1 != std::fs::read(folder.join("held_out_2.csv")).unwrap());
 }
 
 #[test]

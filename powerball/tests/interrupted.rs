@@ -59,7 +59,8 @@ fn trajectory(file: &Path, seconds: usize) {
 fn a_killed_recording_is_there_and_becomes_parquet_next_time() {
     let folder = scratch("killed_record");
     let (long, short, log) = (folder.join("long.csv"), folder.join("short.csv"), folder.join("log.parquet"));
-    trajectory(&long, 1000);
+    // Far longer than until it is killed.
+    trajectory(&long, 400);
     trajectory(&short, 10);
     let lines = folder.join("log.parquet.csv");
     let arguments = |path: &Path| -> Vec<String> {
@@ -91,7 +92,8 @@ fn a_killed_warm_up_goes_on_with_what_it_saw() {
     let folder = scratch("killed_warm_up");
     let (out, csv) = (folder.to_str().unwrap().to_string(), folder.join("warm_up.csv"));
     let warm_up = |more: &[&str]| -> Vec<String> {
-        let base = ["warm-up", "--out", &out, "--json"].map(String::from).to_vec();
+        // Twice the usual tolerance is reached in half the time.
+        let base = ["warm-up", "--out", &out, "--json", "--tolerance", "0.02"].map(String::from).to_vec();
         base.into_iter().chain(more.iter().map(|m| m.to_string())).collect()
     };
     let run = |more: &[&str]| -> (Option<i32>, Value) {
@@ -134,7 +136,8 @@ fn a_signal_stops_the_arm_and_closes_the_log() {
     for signal in ["-INT", "-TERM", "-HUP"] {
         let path = |name: &str| folder.join(name).display().to_string();
         let (motion, log) = (path("motion.csv"), path(&format!("log{signal}.parquet")));
-        trajectory(Path::new(&motion), 3000);
+        // Far longer than until the signal comes.
+        trajectory(Path::new(&motion), 600);
         let lines = PathBuf::from(format!("{log}.csv"));
         let child = powerball(&["record", "--trajectory", &motion, "--out", &log]).spawn().unwrap();
         let begun = Instant::now();

@@ -12,6 +12,7 @@ use crate::logs::summary::Bands;
 use crate::virtual_arm::{Body, Dynamics, Plant, lwa4p};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::sync::LazyLock;
 
 /// A fit of three logs of 20 s.
 fn fitted(body: &RigidArm, links: Vec<Body>, friction: Vec<TanhFriction<f64>>, seed: u64) -> Side {
@@ -36,6 +37,15 @@ fn fitted(body: &RigidArm, links: Vec<Body>, friction: Vec<TanhFriction<f64>>, s
     Side { name: format!("seed {seed}"), arm: "virtual".into(), parameters, friction, uncertainty }
 }
 
+/// The usual arm, which every other one is compared with.
+fn usual() -> &'static Side {
+    static USUAL: LazyLock<Side> = LazyLock::new(|| {
+        let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
+        fitted(&body, lwa4p::links(), table(), 1)
+    });
+    &USUAL
+}
+
 fn table() -> Vec<TanhFriction<f64>> {
     lwa4p::plant().unwrap().friction().to_vec()
 }
@@ -55,15 +65,16 @@ fn compared(a: &Side, b: &Side) -> Comparison {
 #[test]
 fn equal_arms_are_equal_and_five_per_cent_of_viscous_friction_is_seen() {
     let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
-    let a = fitted(&body, lwa4p::links(), table(), 1);
+    let a = usual();
     for seed in 2..4 {
-        let same = compared(&a, &fitted(&body, lwa4p::links(), table(), seed));
+        let same = compared(a, &fitted(&body, lwa4p::links(), table(), seed));
         assert!(!same.differ && same.sentence.starts_with("Same arm"), "{}", same.sentence);
         // What differs in torque is what the errors of both make.
         for t in &same.torque_difference {
             assert!(t.rms < 3.0 * t.expected && t.relative < 0.02, "{t:?}");
         }
-        let other = compared(&a, &fitted(&body, lwa4p::links(), viscous(1.05), 10 + seed));
+        let changed = fitted(&body, lwa4p::links(), viscous(1.05), 10 + seed);
+        let other = compared(a, &changed);
         assert!(other.differ);
         let [Cause::Friction { joint: 3, change: [low, high] }] = other.causes[..] else {
             panic!("{}", other.sentence)
@@ -72,7 +83,7 @@ fn equal_arms_are_equal_and_five_per_cent_of_viscous_friction_is_seen() {
         assert!(low > 0.0 && high < 0.1, "{low} {high}");
         assert!(other.sentence.starts_with("Friction changed on joint 3 by"), "{}", other.sentence);
         // The other way round it is the other way round.
-        let back = compared(&fitted(&body, lwa4p::links(), viscous(1.05), 10 + seed), &a);
+        let back = compared(&changed, a);
         assert!(back.differ && back.friction[2].change[1] < 0.0);
         assert_eq!(back.parameters[0].difference, -other.parameters[0].difference);
     }
@@ -81,13 +92,13 @@ fn equal_arms_are_equal_and_five_per_cent_of_viscous_friction_is_seen() {
 #[test]
 fn a_payload_is_told_with_its_mass() {
     let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
-    let a = fitted(&body, lwa4p::links(), table(), 1);
+    let a = usual();
     let mut links = lwa4p::links();
     let last = links.last_mut().unwrap();
     let load = Body::even_box(1.0, [0.02, 0.0, 0.1], [0.05; 3], 0.0);
     (last.mass, last.moment, last.inertia) =
         (last.mass + load.mass, last.moment + load.moment, last.inertia + load.inertia);
-    let loaded = compared(&a, &fitted(&body, links, table(), 5));
+    let loaded = compared(a, &fitted(&body, links, table(), 5));
     let Some(Cause::Payload { mass: Some([mass, std]) }) = loaded.causes.first() else {
         panic!("{}", loaded.sentence)
     };
@@ -98,19 +109,19 @@ fn a_payload_is_told_with_its_mass() {
 #[test]
 fn what_cannot_be_compared_is_told() {
     let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
-    let a = fitted(&body, lwa4p::links(), table(), 1);
+    let a = usual();
     let mut other = a.clone();
     other.parameters.pop();
-    let refused = compare(&a, &other, &CompareOptions::default()).unwrap_err().to_string();
+    let refused = compare(a, &other, &CompareOptions::default()).unwrap_err().to_string();
     assert!(refused.contains("one arm file"), "{refused}");
-    let level = compare(&a, &a, &CompareOptions { level: 1.5 }).unwrap_err().to_string();
+    let level = compare(a, a, &CompareOptions { level: 1.5 }).unwrap_err().to_string();
     assert!(level.contains("--level"), "{level}");
     // Without the covariance less is known, never more.
     let bare = Side { uncertainty: None, ..a.clone() };
     let b = fitted(&body, lwa4p::links(), viscous(1.05), 12);
     let alone = compared(&bare, &b);
     assert!(alone.warnings[0].contains("covariance.json"));
-    for (with, without) in compared(&a, &b).friction.iter().zip(&alone.friction) {
+    for (with, without) in compared(a, &b).friction.iter().zip(&alone.friction) {
         let width = |[low, high]: [f64; 2]| high - low;
         assert!(width(without.interval[0]) >= 0.9 * width(with.interval[0]));
     }

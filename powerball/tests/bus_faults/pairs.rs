@@ -73,43 +73,54 @@ fn arm(control: ControlMode, phase: Phase) -> Walk {
     walk
 }
 
-/// All pairs from one phase in one mode; how many of them latched a cause.
-fn pairs(control: ControlMode, phase: Phase) -> usize {
+/// The pairs from one phase in one mode that are asked for by their numbers; the share of them that latched a cause.
+fn pairs(control: ControlMode, phase: Phase, asked: impl Fn(usize, usize) -> bool) -> f64 {
     let begin = arm(control, phase);
-    let mut latched = 0;
-    for first in Act::all() {
+    let (mut latched, mut all) = (0, 0);
+    for (i, first) in Act::all().enumerate() {
         let mut after = begin.clone();
         first.done(&mut after);
         after.pass(BETWEEN);
-        for second in Act::all() {
+        for (_, second) in Act::all().enumerate().filter(|(j, _)| asked(i, *j)) {
+            all += 1;
             let mut walk = after.clone();
             second.done(&mut walk);
             walk.pass(BETWEEN);
             Act::Enable.done(&mut walk);
             walk.pass(2 * BETWEEN);
-            latched += usize::from(walk.causes.len() > begin.causes.len());
+            latched += u32::from(walk.causes.len() > begin.causes.len());
             if let Err(wrong) = walk.judge() {
                 panic!("{control:?}, {phase:?}: {wrong}; what was done:\n{}", walk.done.join("\n"));
             }
         }
     }
-    latched
+    f64::from(latched) / f64::from(all)
 }
 
-#[test]
-fn every_two_things_in_every_mode() {
-    let all = Act::all().count().pow(2);
+/// The pairs in every mode, those that `asked` takes by the numbers of mode, first and second.
+fn in_every_mode(asked: impl Fn(usize, usize, usize) -> bool + Copy + Send) {
     std::thread::scope(|scope| {
-        for control in ControlMode::ALL {
+        for (k, control) in ControlMode::ALL.into_iter().enumerate() {
             scope.spawn(move || {
-                let latched =
-                    [Phase::Running, Phase::Ready, Phase::Faulted].map(|phase| pairs(control, phase));
-                println!("{control:?}: {all} pairs a phase, causes latched in {latched:?} of them");
-                assert!(
-                    latched[0] > all / 2 && latched[1] > all / 4,
-                    "the pairs see too little: {latched:?}"
+                let latched = [Phase::Running, Phase::Ready, Phase::Faulted]
+                    .map(|phase| pairs(control, phase, |i, j| asked(k, i, j)));
+                println!(
+                    "{control:?}: causes latched in these shares of the pairs of each phase: {latched:?}"
                 );
+                assert!(latched[0] > 0.5 && latched[1] > 0.25, "the pairs see too little: {latched:?}");
             });
         }
     });
+}
+
+/// In one mode each, by turns: everything comes first and second in every mode.
+#[test]
+fn every_two_things() {
+    in_every_mode(|mode, i, j| (i + j) % ControlMode::ALL.len() == mode);
+}
+
+#[test]
+#[ignore = "at length: four times the one above, which guards it"]
+fn every_two_things_in_every_mode_at_length() {
+    in_every_mode(|_, _, _| true);
 }
