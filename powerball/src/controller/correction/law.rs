@@ -256,6 +256,22 @@ impl<T: RealField + Copy> Law<T> {
         ) || self.moves_link()
     }
 
+    /// Whether its torque is the same on whichever joint it acts: it depends on joints that it names itself.
+    #[must_use]
+    pub fn is_alike_on_all(&self) -> bool {
+        matches!(
+            self,
+            Law::Constant
+                | Law::OtherDirection { .. }
+                | Law::OtherVelocity { .. }
+                | Law::OtherAcceleration { .. }
+                | Law::OtherPosition { .. }
+                | Law::PositionProduct { .. }
+                | Law::CosineOfTwo { .. }
+                | Law::SineOfTwo { .. }
+        )
+    }
+
     /// Whether the law moves the link, so that the torque of the whole arm is another: [`Law::shift`] has it.
     #[must_use]
     pub fn moves_link(&self) -> bool {

@@ -119,3 +119,38 @@ fn a_joint_that_is_not_there_does_nothing() {
     corrector.add_torques(&now, &mut torque);
     assert_eq!(torque, [1.0, 2.0]);
 }
+
+/// What is said to be the same on every joint is; what depends on the joint's own motion is not.
+#[test]
+fn laws_that_are_alike_on_all_joints_have_one_value() {
+    let (q, dq, ddq) = ([0.3, -0.7, 1.1], [0.5, -0.2, 0.9], [1.0, 2.0, -3.0]);
+    let [none, temperature] = [[0.4, 0.5, 0.6], [30.0, 31.0, 32.0]];
+    let now = Instant {
+        q: &q,
+        dq: &dq,
+        ddq: &ddq,
+        rigid: &none,
+        friction: &none,
+        temperature: &temperature,
+        running: 2.0,
+    };
+    let (other, joints, orders, steepness) = (2, [1, 2], [1.0, -2.0], 5.0);
+    for law in [
+        Law::Constant,
+        Law::OtherDirection { other, steepness },
+        Law::OtherVelocity { other },
+        Law::OtherAcceleration { other },
+        Law::OtherPosition { other },
+        Law::PositionProduct { joints },
+        Law::CosineOfTwo { joints, orders },
+        Law::SineOfTwo { joints, orders },
+        Law::Position,
+        Law::Sine { order: 3.0 },
+        Law::VelocityProduct { other },
+        Law::SumVelocity { other, own: 1.0, theirs: 1.0 },
+        Law::Load { steepness },
+    ] {
+        let [a, b] = [0, 1].map(|j| law.value(j, &now, &mut Memory::default()));
+        assert_eq!(law.is_alike_on_all(), a == b, "{law:?}");
+    }
+}

@@ -125,10 +125,10 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     let (gram, _, _) = fit.gram.fitted(&fit.weights, |_| true);
     let solver = Solver::new(&gram, |c| fit.free[c]);
     let steps = data.blocks_of(GRID);
-    let mut before = vec![Sums::zero(fit.design.size, 3)];
+    let mut before = vec![Sums::zero(&solver, 3)];
     for step in &steps {
         let mut sum = before[before.len() - 1].clone();
-        sum.add(&Sums::of_block(context, columns, step), 1.0);
+        sum.add(&Sums::of_block(context, &solver, columns, step), 1.0);
         before.push(sum);
     }
     let mut searched = 0.0;
@@ -137,7 +137,7 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
         let mut sums = before[window.end].clone();
         sums.add(&before[window.start], -1.0);
         searched += 1.0;
-        let (gain, force) = sums.gain(&solver);
+        let (gain, force) = sums.gain();
         if gain > best.as_ref().map_or(0.0, |(g, _)| *g) && force.iter().all(|f| f.abs() < MOST) {
             *best = Some((gain, window));
         }

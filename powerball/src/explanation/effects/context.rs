@@ -141,8 +141,20 @@ impl<'a> Context<'a> {
             rows.column(&self.data.recordings, |r, _| self.law_along(r, joint, law))
         };
         match self.made {
-            Some(made) => Column::on(joint.index(), made.motion.get(joint, law, make)),
-            None => Column::on(joint.index(), make()),
+            Some(made) if !law.needs_torque() => {
+                let rows = &self.data.joints[joint.index()];
+                let pass = || {
+                    let of = |r| rows.band.pass(&self.law_along(r, joint, law));
+                    (0..self.data.recordings.len()).map(of).collect()
+                };
+                // What is the same on every joint passes a band once.
+                let values = || match law.is_alike_on_all() {
+                    true => rows.rows_of(&made.passed.get((rows.band.cutoff, law), pass)),
+                    false => make(),
+                };
+                Column::on(joint.index(), made.motion.get((joint, law), values))
+            }
+            _ => Column::on(joint.index(), make()),
         }
     }
 

@@ -20,8 +20,10 @@ const MODELS: usize = 3;
 /// What was made of one data set.
 #[derive(Debug, Default)]
 pub(crate) struct Made {
-    /// Columns of laws of the motion alone: whatever the model becomes, they stay as they are.
-    pub(super) motion: MotionColumns,
+    /// Columns of laws of the motion alone, by joint.
+    pub(super) motion: ByLaw<JointNumber, Vec<f64>>,
+    /// Of laws that are the same on every joint: what passes a band, by recording and its cutoff, Hz.
+    pub(super) passed: ByLaw<f64, Vec<Vec<f64>>>,
     /// Of the last few models, the last one asked for at the end.
     models: Mutex<Vec<Arc<OfModel>>>,
 }
@@ -102,57 +104,61 @@ impl OfModel {
     }
 }
 
-/// Columns of laws of the motion alone.
-#[derive(Debug, Default)]
-pub(super) struct MotionColumns {
-    made: Mutex<Laws>,
-}
-
-/// A joint and a kind of law.
-type Kind = (JointNumber, Discriminant<Law<f64>>);
-
-/// A law with its settings, and its values.
+/// Values by something with a law of the motion alone: whatever the model becomes, they stay as they are.
 #[derive(Debug)]
-struct Known {
-    law: Law<f64>,
-    values: Arc<Vec<f64>>,
+pub(super) struct ByLaw<K, V> {
+    made: Mutex<Laws<K, V>>,
 }
 
-#[derive(Debug, Default)]
-struct Laws {
-    columns: HashMap<Kind, Vec<Known>>,
+#[derive(Debug)]
+struct Laws<K, V> {
+    /// By kind of law.
+    made: HashMap<Discriminant<Law<f64>>, Vec<((K, Law<f64>), Arc<V>)>>,
     bytes: usize,
 }
 
-impl MotionColumns {
-    /// The values of a law at a joint; `make` makes them where they have not been made. Laws of torques
-    /// change with the model and are made each time.
-    pub(super) fn get(
-        &self,
-        joint: JointNumber,
-        law: Law<f64>,
-        make: impl FnOnce() -> Vec<f64>,
-    ) -> Arc<Vec<f64>> {
-        if law.needs_torque() || law.moves_link() {
-            return make().into();
-        }
-        let key = (joint, discriminant(&law));
-        let known = |made: &Laws| {
-            let found = made.columns.get(&key)?.iter().find(|known| known.law == law)?;
-            Some(Arc::clone(&found.values))
+impl<K, V> Default for ByLaw<K, V> {
+    fn default() -> Self {
+        ByLaw { made: Mutex::new(Laws { made: HashMap::new(), bytes: 0 }) }
+    }
+}
+
+impl<K: PartialEq, V: Size> ByLaw<K, V> {
+    /// The values of a law; `make` makes them where they have not been made.
+    pub(super) fn get(&self, key: (K, Law<f64>), make: impl FnOnce() -> V) -> Arc<V> {
+        let kind = discriminant(&key.1);
+        let known = |laws: &Laws<K, V>| {
+            let found = laws.made.get(&kind)?.iter().find(|(known, _)| *known == key)?;
+            Some(Arc::clone(&found.1))
         };
         if let Some(values) = known(&self.made.lock().unwrap_or_else(PoisonError::into_inner)) {
             return values;
         }
         // Others go on while it is made.
         let values = Arc::new(make());
-        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        let bytes = size_of::<f64>() * values.len();
-        if made.bytes + bytes <= MOST && known(&made).is_none() {
-            made.bytes += bytes;
-            made.columns.entry(key).or_default().push(Known { law, values: Arc::clone(&values) });
+        let mut laws = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        if laws.bytes + values.bytes() <= MOST && known(&laws).is_none() {
+            laws.bytes += values.bytes();
+            laws.made.entry(kind).or_default().push((key, Arc::clone(&values)));
         }
         values
+    }
+}
+
+/// How much memory values take.
+pub(super) trait Size {
+    fn bytes(&self) -> usize;
+}
+
+impl Size for Vec<f64> {
+    fn bytes(&self) -> usize {
+        size_of::<f64>() * self.len()
+    }
+}
+
+impl Size for Vec<Vec<f64>> {
+    fn bytes(&self) -> usize {
+        self.iter().map(Size::bytes).sum()
     }
 }
 
@@ -161,10 +167,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn laws_of_the_motion_are_made_once_and_laws_of_torques_each_time() {
-        let columns = MotionColumns::default();
+    fn a_law_at_a_joint_is_made_once() {
+        let columns = ByLaw::default();
         let joint = JointNumber::from_index;
-        let get = |j, law, values: [f64; 2]| columns.get(joint(j), law, || values.to_vec()).to_vec();
+        let get = |j, law, values: [f64; 2]| columns.get((joint(j), law), || values.to_vec()).to_vec();
         let sine = |order| Law::Sine { order };
         assert_eq!(get(0, sine(3.0), [1.0, 2.0]), [1.0, 2.0]);
         assert_eq!(get(0, sine(3.0), [9.0, 9.0]), [1.0, 2.0]);
@@ -172,8 +178,5 @@ mod tests {
         assert_eq!(get(0, sine(4.0), [3.0, 4.0]), [3.0, 4.0]);
         assert_eq!(get(1, sine(3.0), [5.0, 6.0]), [5.0, 6.0]);
         assert_eq!(get(0, Law::Cosine { order: 3.0 }, [7.0, 8.0]), [7.0, 8.0]);
-        let load = Law::Load { steepness: 10.0 };
-        assert_eq!(get(0, load, [1.0, 1.0]), [1.0, 1.0]);
-        assert_eq!(get(0, load, [2.0, 2.0]), [2.0, 2.0]);
     }
 }

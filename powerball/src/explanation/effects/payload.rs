@@ -209,7 +209,7 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     }
     let (gram, _, _) = fit.gram.fitted(&fit.weights, |_| true);
     let steps = data.blocks_of(GRID);
-    let mut held = Search::new(context, &columns, &steps, Solver::new(&gram, |c| fit.free[c]));
+    let mut held = Search::new(context, &columns, &steps, &Solver::new(&gram, |c| fit.free[c]));
     let mut open = by_log(&steps);
     let mut chosen: Vec<(Range<usize>, Range<usize>)> = Vec::new();
     // The log that shows it best, then every other one that explains more with it.
@@ -248,7 +248,6 @@ fn long_enough(run: &Range<usize>, log: &Range<usize>, step: f64) -> bool {
 struct Search {
     /// Sums of all steps before each.
     before: Vec<Sums>,
-    solver: Solver,
     /// The sums of what was found, and what it explains with which coefficients.
     found: Sums,
     coefficients: Vec<f64>,
@@ -257,15 +256,15 @@ struct Search {
 }
 
 impl Search {
-    fn new(context: &Context<'_>, columns: &[Column], steps: &[Block], solver: Solver) -> Search {
-        let empty = Sums::zero(context.fit.design.size, columns.len());
+    fn new(context: &Context<'_>, columns: &[Column], steps: &[Block], base: &Solver) -> Search {
+        let empty = Sums::zero(base, columns.len());
         let mut before = vec![empty.clone()];
         for step in steps {
             let mut sum = before[before.len() - 1].clone();
-            sum.add(&Sums::of_block(context, columns, step), 1.0);
+            sum.add(&Sums::of_block(context, base, columns, step), 1.0);
             before.push(sum);
         }
-        Search { before, solver, found: empty, coefficients: Vec::new(), explained: 0.0, searched: 0.0 }
+        Search { before, found: empty, coefficients: Vec::new(), explained: 0.0, searched: 0.0 }
     }
 
     /// What was found and a run of steps, summed.
@@ -279,13 +278,13 @@ impl Search {
     /// What that explains with a positive mass.
     fn gain(&mut self, run: &Range<usize>) -> f64 {
         self.searched += 1.0;
-        let (gain, x) = self.with(run).gain(&self.solver);
+        let (gain, x) = self.with(run).gain();
         if x[0] > 0.0 { gain } else { 0.0 }
     }
 
     fn take(&mut self, gain: f64, run: &Range<usize>) {
         (self.found, self.explained) = (self.with(run), gain);
-        self.coefficients = self.found.gain(&self.solver).1;
+        self.coefficients = self.found.gain().1;
     }
 
     /// The run of a log that explains most beside what was found: on a coarse grid first, then its ends are

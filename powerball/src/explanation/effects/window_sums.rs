@@ -11,8 +11,9 @@ use faer::Mat;
 #[derive(Clone, Debug)]
 pub(super) struct Sums {
     k: usize,
-    /// A'C, base columns × k.
-    cross: Vec<f64>,
+    /// L⁻¹ A'C, L the base's factor: by column of C (see [`Solver::whitened`]). It is linear in the rows, so that a
+    /// window costs no solve.
+    cross: Vec<Vec<f64>>,
     /// C'C, k × k.
     square: Vec<f64>,
     /// C'r.
@@ -20,14 +21,20 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    pub(super) fn zero(size: usize, k: usize) -> Sums {
-        Sums { k, cross: vec![0.0; size * k], square: vec![0.0; k * k], score: vec![0.0; k] }
+    pub(super) fn zero(base: &Solver, k: usize) -> Sums {
+        Sums {
+            k,
+            cross: vec![vec![0.0; base.kept().len()]; k],
+            square: vec![0.0; k * k],
+            score: vec![0.0; k],
+        }
     }
 
     /// The sums over one block.
-    pub(super) fn of_block(context: &Context<'_>, columns: &[Column], block: &Block) -> Sums {
+    pub(super) fn of_block(context: &Context<'_>, base: &Solver, columns: &[Column], block: &Block) -> Sums {
         let (fit, k) = (context.fit, columns.len());
-        let mut sums = Sums::zero(fit.design.size, k);
+        let mut sums = Sums::zero(base, k);
+        let mut cross = vec![vec![0.0; fit.design.size]; k];
         for (j, rows) in block.rows.iter().enumerate() {
             let w = fit.weights[j];
             let parts: Vec<&[f64]> = columns.iter().filter_map(|c| c.at(j)).collect();
@@ -36,7 +43,7 @@ impl Sums {
             }
             for (g, values) in fit.design.cross(j, rows, &parts) {
                 for c in 0..k {
-                    sums.cross[g * k + c] += w * values[c];
+                    cross[c][g] += w * values[c];
                 }
             }
             let over = |a: &[f64], b: &[f64]| dot(&a[rows.clone()], &b[rows.clone()]);
@@ -47,26 +54,24 @@ impl Sums {
                 sums.score[a] += w * over(parts[a], &context.residual[j]);
             }
         }
+        sums.cross = cross.iter().map(|c| base.whitened(c)).collect();
         sums
     }
 
     pub(super) fn add(&mut self, other: &Sums, sign: f64) {
         let add = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| *t += sign * f);
-        add(&mut self.cross, &other.cross);
+        self.cross.iter_mut().zip(&other.cross).for_each(|(to, from)| add(to, from));
         add(&mut self.square, &other.square);
         add(&mut self.score, &other.score);
     }
 
     /// χ² that the columns explain over these rows with the base refitted, and their coefficients.
-    pub(super) fn gain(&self, solver: &Solver) -> (f64, Vec<f64>) {
+    pub(super) fn gain(&self) -> (f64, Vec<f64>) {
         let k = self.k;
-        let column = |c: usize| self.cross.iter().skip(c).step_by(k).copied().collect::<Vec<f64>>();
-        let cross: Vec<Vec<f64>> = (0..k).map(column).collect();
-        let base: Vec<Vec<f64>> = cross.iter().map(|c| solver.solve(c)).collect();
         let mut gram = Mat::zeros(k, k);
         for i in 0..k {
             for c in 0..k {
-                let shared = dot(&cross[i], &base[c]);
+                let shared = dot(&self.cross[i], &self.cross[c]);
                 gram[(i, c)] = self.square[i * k + c] - shared;
             }
         }

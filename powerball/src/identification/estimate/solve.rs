@@ -64,8 +64,7 @@ impl Solver {
     #[must_use]
     pub fn solve(&self, right: &[f64]) -> Vec<f64> {
         let m = self.kept.len();
-        let mut x: Vec<f64> = self.kept.iter().zip(&self.scale).map(|(k, s)| right[*k] * s).collect();
-        self.forward(&mut x);
+        let mut x = self.whitened(right);
         for i in (0..m).rev() {
             let tail: f64 = (i + 1..m).map(|k| self.lower[k * m + i] * x[k]).sum();
             x[i] = (x[i] - tail) / self.lower[i * m + i];
@@ -75,6 +74,15 @@ impl Solver {
             out[*k] = value * s;
         }
         out
+    }
+
+    /// The products A'c of a column with the kept ones, turned so that c'A (A'A)⁻¹ A'd of two columns is the scalar
+    /// product of what comes of both: L⁻¹ A'c.
+    #[must_use]
+    pub fn whitened(&self, right: &[f64]) -> Vec<f64> {
+        let mut x: Vec<f64> = self.kept.iter().zip(&self.scale).map(|(k, s)| right[*k] * s).collect();
+        self.forward(&mut x);
+        x
     }
 
     fn forward(&self, x: &mut [f64]) {

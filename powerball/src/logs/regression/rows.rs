@@ -78,6 +78,12 @@ impl JointRows {
         }
         column
     }
+
+    /// The rows of a signal that has passed the band already: by recording, one value for each kept sample of the band.
+    #[must_use]
+    pub fn rows_of(&self, passed: &[Vec<f64>]) -> Vec<f64> {
+        self.kept.iter().zip(passed).flat_map(|(kept, passed)| kept.iter().map(|k| passed[*k])).collect()
+    }
 }
 
 /// A regression column: its values on the joints it acts on. Copies share the values.
