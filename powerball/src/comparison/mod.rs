@@ -53,6 +53,5 @@ pub fn compare(a: &Side, b: &Side, options: &CompareOptions) -> Result<Compariso
     })
 }
 
-#[cfg(test)]
-#[cfg(feature = "virtual-arm")]
+#[cfg(all(test, feature = "virtual-arm"))]
 mod tests;

@@ -151,7 +151,7 @@ fn as_sent(motion: &Motion) -> Motion {
     sent
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "virtual-arm"))]
 mod tests {
     use super::*;
     use crate::bus::driver::lwa4p::LWA4P;

@@ -176,7 +176,7 @@ impl JointFriction {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "virtual-arm"))]
 mod tests {
     use super::*;
     use crate::bus::driver::Driver;

@@ -334,7 +334,7 @@ pub fn record<B: Bus, const N: usize>(
     Ok(done)
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "virtual-arm"))]
 mod tests {
     use super::*;
     use crate::bus::canopen::NodeId;

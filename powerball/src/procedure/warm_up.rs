@@ -231,7 +231,7 @@ impl Warmth {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "virtual-arm"))]
 mod tests {
     use super::*;
     use crate::bus::driver::Driver;

@@ -274,8 +274,7 @@ impl<B: Bus, const N: usize> Drop for Master<B, N> {
     }
 }
 
-#[cfg(test)]
-#[cfg(feature = "virtual-arm")]
+#[cfg(all(test, feature = "virtual-arm"))]
 mod tests {
     use super::*;
     use crate::bus::cia402::State;

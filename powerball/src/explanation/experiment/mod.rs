@@ -119,5 +119,5 @@ fn ruled_out<'o>(open: &'o Open, decision: &'o Decision) -> impl Iterator<Item =
     decision.winner.into_iter().flat_map(of)
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "virtual-arm"))]
 mod tests;

@@ -152,5 +152,5 @@ fn order(columns: &[usize]) -> Option<Vec<JointNumber>> {
     (!own).then(|| columns.iter().map(|c| JointNumber::from_index(*c)).collect())
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "virtual-arm"))]
 mod tests;

@@ -55,7 +55,7 @@ pub fn exchanged(body: &RigidArm, logs: &[Log], options: &DataOptions, found: &S
     })
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "virtual-arm"))]
 mod tests {
     use super::*;
     use crate::identification::excite::{Settings, optimise};

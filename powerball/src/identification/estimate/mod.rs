@@ -58,5 +58,5 @@ pub use torque_metric::TorqueMetric;
 pub use uncertainty::{Path, Uncertainty, friction_row};
 pub use verdict::{JointVerdict, verdicts};
 
-#[cfg(test)]
+#[cfg(all(test, feature = "virtual-arm"))]
 mod tests;

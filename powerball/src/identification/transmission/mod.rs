@@ -82,5 +82,5 @@ fn of_joint(arm: &Arm, grid: &Grid, joint: JointNumber) -> Result<Transmission, 
     Ok(search::tell(&evidence, &scales, (joint, unit), &base, &found))
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "virtual-arm"))]
 mod tests;
