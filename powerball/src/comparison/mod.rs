@@ -53,5 +53,6 @@ pub fn compare(a: &Side, b: &Side, options: &CompareOptions) -> Result<Compariso
     })
 }
 
-#[cfg(all(test, feature = "virtual-arm"))]
+#[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests;

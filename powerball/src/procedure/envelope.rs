@@ -151,7 +151,8 @@ fn as_sent(motion: &Motion) -> Motion {
     sent
 }
 
-#[cfg(all(test, feature = "virtual-arm"))]
+#[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests {
     use super::*;
     use crate::bus::driver::lwa4p::LWA4P;

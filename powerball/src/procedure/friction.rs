@@ -176,7 +176,8 @@ impl JointFriction {
     }
 }
 
-#[cfg(all(test, feature = "virtual-arm"))]
+#[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests {
     use super::*;
     use crate::bus::driver::Driver;

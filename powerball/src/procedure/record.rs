@@ -334,7 +334,8 @@ pub fn record<B: Bus, const N: usize>(
     Ok(done)
 }
 
-#[cfg(all(test, feature = "virtual-arm"))]
+#[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests {
     use super::*;
     use crate::bus::canopen::NodeId;

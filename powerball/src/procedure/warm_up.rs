@@ -231,7 +231,8 @@ impl Warmth {
     }
 }
 
-#[cfg(all(test, feature = "virtual-arm"))]
+#[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests {
     use super::*;
     use crate::bus::driver::Driver;

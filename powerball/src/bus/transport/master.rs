@@ -274,7 +274,8 @@ impl<B: Bus, const N: usize> Drop for Master<B, N> {
     }
 }
 
-#[cfg(all(test, feature = "virtual-arm"))]
+#[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests {
     use super::*;
     use crate::bus::cia402::State;

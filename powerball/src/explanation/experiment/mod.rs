@@ -119,5 +119,6 @@ fn ruled_out<'o>(open: &'o Open, decision: &'o Decision) -> impl Iterator<Item =
     decision.winner.into_iter().flat_map(of)
 }
 
-#[cfg(all(test, feature = "virtual-arm"))]
+#[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests;

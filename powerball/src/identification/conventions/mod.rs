@@ -152,5 +152,6 @@ fn order(columns: &[usize]) -> Option<Vec<JointNumber>> {
     (!own).then(|| columns.iter().map(|c| JointNumber::from_index(*c)).collect())
 }
 
-#[cfg(all(test, feature = "virtual-arm"))]
+#[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests;

@@ -55,7 +55,8 @@ pub fn exchanged(body: &RigidArm, logs: &[Log], options: &DataOptions, found: &S
     })
 }
 
-#[cfg(all(test, feature = "virtual-arm"))]
+#[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests {
     use super::*;
     use crate::identification::excite::{Settings, optimise};

@@ -58,5 +58,6 @@ pub use torque_metric::TorqueMetric;
 pub use uncertainty::{Path, Uncertainty, friction_row};
 pub use verdict::{JointVerdict, verdicts};
 
-#[cfg(all(test, feature = "virtual-arm"))]
+#[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests;

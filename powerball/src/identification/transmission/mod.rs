@@ -82,5 +82,6 @@ fn of_joint(arm: &Arm, grid: &Grid, joint: JointNumber) -> Result<Transmission, 
     Ok(search::tell(&evidence, &scales, (joint, unit), &base, &found))
 }
 
-#[cfg(all(test, feature = "virtual-arm"))]
+#[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests;
