@@ -1,4 +1,4 @@
-# What a day's work asks for. Each recipe is one line that can be copied; CONTRIBUTING.md says how to have `just`.
+# What a day's work asks for. Every line of a recipe can be copied into a shell; CONTRIBUTING.md says how to have `just`.
 
 # The recipes.
 default:
