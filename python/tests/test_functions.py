@@ -68,7 +68,7 @@ def compare(text, rng):
     close(np.array(fixed), np.broadcast_to(fixed[0], (N, 4, 4)))
 
 
-def test_the_repositorys_urdf_against_pinocchio(rng):
+def test_urdf_of_the_repository_against_pinocchio(rng):
     compare(urdf_text(PUMA), rng)
 
 

@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn right_angles_put_gravity_along_the_axes_exactly() {
-        let arm = crate::virtual_arm::lwa4p::arm().unwrap();
+        let arm = Arm::parse(include_str!("../../lwa4p.toml"), "lwa4p.toml").unwrap();
         let cases = [
             ("filed", [0.0, 0.0, -9.81]),
             ("90,0", [0.0, -9.81, 0.0]),

@@ -152,6 +152,7 @@ fn as_sent(motion: &Motion) -> Motion {
 }
 
 #[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests {
     use super::*;
     use crate::bus::driver::lwa4p::LWA4P;

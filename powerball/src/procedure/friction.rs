@@ -177,6 +177,7 @@ impl JointFriction {
 }
 
 #[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests {
     use super::*;
     use crate::bus::driver::Driver;

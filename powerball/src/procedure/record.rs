@@ -335,6 +335,7 @@ pub fn record<B: Bus, const N: usize>(
 }
 
 #[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests {
     use super::*;
     use crate::bus::canopen::NodeId;

@@ -232,6 +232,7 @@ impl Warmth {
 }
 
 #[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests {
     use super::*;
     use crate::bus::driver::Driver;

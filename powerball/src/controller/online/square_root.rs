@@ -233,6 +233,7 @@ mod tests {
 
     /// A thing is put into the hand of an arm whose model is known: its mass is there within 5 % after 2 s of
     /// motion.
+    #[cfg(feature = "virtual-arm")]
     #[test]
     fn a_payload_is_weighed_in_two_seconds() {
         use crate::identification::excite::{Settings, optimise};

@@ -120,4 +120,5 @@ fn ruled_out<'o>(open: &'o Open, decision: &'o Decision) -> impl Iterator<Item =
 }
 
 #[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests;

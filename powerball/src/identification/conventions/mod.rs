@@ -153,4 +153,5 @@ fn order(columns: &[usize]) -> Option<Vec<JointNumber>> {
 }
 
 #[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests;

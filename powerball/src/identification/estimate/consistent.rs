@@ -304,6 +304,7 @@ mod tests {
     }
 
     /// Values that a real arm gave are kept, whatever full parameters come out.
+    #[cfg(feature = "virtual-arm")]
     #[test]
     fn what_is_consistent_stays() {
         let model = model(include_str!("../../../lwa4p.toml"));

@@ -56,6 +56,7 @@ pub fn exchanged(body: &RigidArm, logs: &[Log], options: &DataOptions, found: &S
 }
 
 #[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests {
     use super::*;
     use crate::identification::excite::{Settings, optimise};

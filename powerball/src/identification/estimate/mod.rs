@@ -59,4 +59,5 @@ pub use uncertainty::{Path, Uncertainty, friction_row};
 pub use verdict::{JointVerdict, verdicts};
 
 #[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests;

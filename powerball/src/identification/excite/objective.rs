@@ -308,7 +308,7 @@ mod tests {
     /// parameters apart; and the condition number is that of the stacked columns.
     #[test]
     fn mountings_count_together() {
-        let arm = crate::virtual_arm::lwa4p::arm().unwrap();
+        let arm = dyngen::Arm::parse(include_str!("../../../lwa4p.toml"), "lwa4p.toml").unwrap();
         let mountings = ["filed", "90,0"].map(|text| text.parse::<Mounting>().unwrap());
         let models = mountings.map(|m| Model::derive(m.of(&arm).unwrap()).unwrap());
         let objective = Objective::new(&[&models[0], &models[1]], SetKind::Minimal, 8).unwrap();

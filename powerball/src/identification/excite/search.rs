@@ -380,11 +380,15 @@ impl Candidate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::virtual_arm::lwa4p;
+    use dyngen::Arm;
+
+    fn lwa4p() -> Arm {
+        Arm::parse(include_str!("../../../lwa4p.toml"), "lwa4p.toml").unwrap()
+    }
 
     #[test]
     fn the_search_improves_keeps_the_limits_and_repeats_itself() {
-        let model = Model::derive(lwa4p::arm().unwrap()).unwrap();
+        let model = Model::derive(lwa4p()).unwrap();
         let settings = Settings { evaluations: 400, seed: 3, ..Settings::default() };
         let found = optimise(&model, SetKind::Minimal, &settings).unwrap();
         assert_eq!(found, optimise(&model, SetKind::Minimal, &settings).unwrap());
@@ -403,7 +407,7 @@ mod tests {
 
     #[test]
     fn an_arm_without_limits_is_refused_with_what_is_missing() {
-        let mut arm = lwa4p::arm().unwrap();
+        let mut arm = lwa4p();
         arm.joints[2].velocity = None;
         arm.joints[4].position = None;
         let model = Model::derive(arm).unwrap();

@@ -335,7 +335,7 @@ acceleration = 3
     #[test]
     fn the_nearest_is_that_of_many_points() {
         let file = |text: &str| Arm::parse(text, "arm.toml").unwrap();
-        let lwa4p = crate::virtual_arm::lwa4p::ARM_FILE;
+        let lwa4p = include_str!("../../../lwa4p.toml");
         let modified = lwa4p.replace("\"standard\"", "\"modified\"").replace("d = 0.0\n", "d = 0.11\n");
         let radius = 0.03;
         for arm in [file(lwa4p), file(&modified), file(SCARA)] {
@@ -372,7 +372,7 @@ acceleration = 3
     /// triangle's own formula.
     #[test]
     fn an_elbow_folds_as_far_as_its_triangle_says() {
-        let arm = crate::virtual_arm::lwa4p::arm().unwrap();
+        let arm = Arm::parse(include_str!("../../../lwa4p.toml"), "lwa4p.toml").unwrap();
         let limits = Limits::of(&arm, 0.0).unwrap().0;
         let shape = Shape::new(&arm, &limits, 0.05);
         for fold in [-2.6, -1.9, -1.0, 1.0, 2.0, 2.6] {

@@ -83,4 +83,5 @@ fn of_joint(arm: &Arm, grid: &Grid, joint: JointNumber) -> Result<Transmission, 
 }
 
 #[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests;

@@ -3,9 +3,12 @@ mod laws;
 mod measured;
 mod model;
 mod names;
+#[cfg(feature = "virtual-arm")]
 mod on_virtual_arm;
 mod plant;
+#[cfg(feature = "virtual-arm")]
 mod repeats;
+#[cfg(feature = "virtual-arm")]
 mod small_arms;
 
 use super::NamedEffect;

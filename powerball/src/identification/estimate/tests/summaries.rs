@@ -1,14 +1,11 @@
 //! Reduced logs say what the logs say.
 
 use super::plant::{record, sensors, truth};
-use crate::explanation::torque_model::{Additions, TorqueModel};
 use crate::identification::estimate::{
-    Folds, FrictionKind, JointFriction, ParameterEstimate, Solution, fit, reduce_in_bands, solve_in_band,
-    solve_reduced, spread, spread_of,
+    Folds, FrictionKind, Solution, fit, reduce_in_bands, solve_in_band, solve_reduced, spread_of,
 };
 use crate::logs::regression::{Data, DataOptions};
 use crate::logs::summary::{BANDS, Bands, Summary, SummaryError};
-use dyngen::SetKind;
 
 /// The fit of summaries is that of the rows themselves, which knows no interpolation of steepnesses.
 #[test]
@@ -95,8 +92,13 @@ fn a_noisy_joint_asks_for_a_narrower_band() {
 }
 
 /// What a solution leaves of another log is the same from that log's rows and from its summary.
+#[cfg(feature = "explain")]
 #[test]
 fn a_log_that_took_no_part_judges_the_fit() {
+    use crate::explanation::torque_model::{Additions, TorqueModel};
+    use crate::identification::estimate::{JointFriction, ParameterEstimate, spread};
+    use dyngen::SetKind;
+
     let (body, _) = truth();
     let options = DataOptions::default();
     let logs = record(&sensors(), 2, 3, 34);
