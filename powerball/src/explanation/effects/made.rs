@@ -112,9 +112,15 @@ pub(super) struct ByLaw<K, V> {
 
 #[derive(Debug)]
 struct Laws<K, V> {
-    /// By kind of law.
-    made: HashMap<Discriminant<Law<f64>>, Vec<((K, Law<f64>), Arc<V>)>>,
+    /// By kind of law: others need not be compared.
+    made: HashMap<Discriminant<Law<f64>>, Vec<Known<K, V>>>,
     bytes: usize,
+}
+
+#[derive(Debug)]
+struct Known<K, V> {
+    of: (K, Law<f64>),
+    values: Arc<V>,
 }
 
 impl<K, V> Default for ByLaw<K, V> {
@@ -128,8 +134,8 @@ impl<K: PartialEq, V: Size> ByLaw<K, V> {
     pub(super) fn get(&self, key: (K, Law<f64>), make: impl FnOnce() -> V) -> Arc<V> {
         let kind = discriminant(&key.1);
         let known = |laws: &Laws<K, V>| {
-            let found = laws.made.get(&kind)?.iter().find(|(known, _)| *known == key)?;
-            Some(Arc::clone(&found.1))
+            let found = laws.made.get(&kind)?.iter().find(|known| known.of == key)?;
+            Some(Arc::clone(&found.values))
         };
         if let Some(values) = known(&self.made.lock().unwrap_or_else(PoisonError::into_inner)) {
             return values;
@@ -139,7 +145,7 @@ impl<K: PartialEq, V: Size> ByLaw<K, V> {
         let mut laws = self.made.lock().unwrap_or_else(PoisonError::into_inner);
         if laws.bytes + values.bytes() <= MOST && known(&laws).is_none() {
             laws.bytes += values.bytes();
-            laws.made.entry(kind).or_default().push((key, Arc::clone(&values)));
+            laws.made.entry(kind).or_default().push(Known { of: key, values: Arc::clone(&values) });
         }
         values
     }
