@@ -28,7 +28,9 @@ fuzz_target!(|data: &[u8]| {
     let _ = driver.start(ControlMode::InterpolatedPosition, false);
     for (k, part) in data.chunks(10).enumerate() {
         let Some((id, bytes)) = part.split_at_checked(2) else { continue };
-        let Some(frame) = Frame::from_raw(u16::from_le_bytes([id[0], id[1]]) & 0x7FF, bytes) else { continue };
+        let Some(frame) = Frame::from_raw(u16::from_le_bytes([id[0], id[1]]) & 0x7FF, bytes) else {
+            continue;
+        };
         if let Ok(request) = Request::decode(bytes) {
             assert_eq!(Request::decode(&request.encode()).ok(), Some(request));
         }
