@@ -13,8 +13,8 @@ mod rows;
 mod saturated;
 mod silent;
 
-pub use prepare::{Data, DataError, DataOptions, column_in_bands};
-pub(crate) use prepare::{FRICTION, PULLED, top_velocity};
+pub use prepare::{Data, DataError, DataOptions, PULLED, column_in_bands};
+pub(crate) use prepare::{FRICTION, top_velocity};
 pub use recording::Recording;
 pub(crate) use rest_notes::{FEWEST_ROWS, rest_note};
 pub use rigid::RigidArm;

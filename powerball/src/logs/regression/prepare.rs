@@ -103,7 +103,7 @@ pub(crate) const FRICTION: usize = 5;
 const KEPT_FRICTION: usize = 4;
 
 /// Mass and first moments: the parameters of a link that gravity pulls at.
-pub(crate) const PULLED: usize = 4;
+pub const PULLED: usize = 4;
 
 impl<'a> Data<'a> {
     /// Prepares logs.
@@ -323,7 +323,7 @@ impl<'a> Data<'a> {
 
     /// The static torque of every link's mass and first moments, [`PULLED`] a link, under unit gravity along a base axis;
     /// empty where they cannot be had. A column has no part on a joint that does not feel it.
-    pub(crate) fn pull_columns(&self, axis: usize) -> &[Column] {
+    pub fn pull_columns(&self, axis: usize) -> &[Column] {
         self.pull[axis].get_or_init(|| {
             let mut columns = Vec::new();
             // Link by link: of a long log all of them at full rate would be large.
