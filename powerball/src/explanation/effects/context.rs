@@ -35,7 +35,14 @@ impl<'a> Context<'a> {
     /// A model seen on some data.
     #[must_use]
     pub fn new(data: &'a Data<'a>, fit: &'a Fit, residual: &'a [Vec<f64>], rule: &'a Rule) -> Context<'a> {
-        Context { data, fit, residual, rule, made: None, of_model: Arc::new(OfModel::new(fit)) }
+        Context {
+            data,
+            fit,
+            residual,
+            rule,
+            made: None,
+            of_model: Arc::new(OfModel::new(&fit.theta, &fit.shapes)),
+        }
     }
 
     /// The same where columns are wanted and nothing else: what the model leaves is not known.
@@ -54,7 +61,7 @@ impl<'a> Context<'a> {
     /// Takes from columns of the same data what was made already, and adds to them.
     pub(crate) fn with(mut self, made: &'a Made) -> Context<'a> {
         self.made = Some(made);
-        self.of_model = made.of_model(self.fit);
+        self.of_model = made.of_model(&self.fit.theta, &self.fit.shapes);
         self
     }
 
@@ -141,7 +148,7 @@ impl<'a> Context<'a> {
             rows.column(&self.data.recordings, |r, _| self.law_along(r, joint, law))
         };
         match self.made {
-            Some(made) if !law.needs_torque() => {
+            Some(made) => {
                 let rows = &self.data.joints[joint.index()];
                 let pass = || {
                     let of = |r| rows.band.pass(&self.law_along(r, joint, law));
@@ -149,12 +156,12 @@ impl<'a> Context<'a> {
                 };
                 // What is the same on every joint passes a band once.
                 let values = || match law.is_alike_on_all() {
-                    true => rows.rows_of(&made.passed.get((rows.band.cutoff, law), pass)),
+                    true => rows.passed_rows(&made.passed.get((rows.band.cutoff, law), pass)),
                     false => make(),
                 };
                 Column::on(joint.index(), made.motion.get((joint, law), values))
             }
-            _ => Column::on(joint.index(), make()),
+            None => Column::on(joint.index(), make()),
         }
     }
 

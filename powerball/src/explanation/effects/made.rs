@@ -4,7 +4,6 @@ use super::Candidate;
 use super::Settings;
 use crate::controller::JointNumber;
 use crate::controller::correction::Law;
-use crate::identification::estimate::Fit;
 use crate::logs::regression::Column;
 use std::collections::HashMap;
 use std::mem::{Discriminant, discriminant, size_of};
@@ -14,7 +13,8 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 const MOST: usize = 96 << 20;
 /// What is kept at most of one model, bytes.
 const MOST_OF_MODEL: usize = 32 << 20;
-/// Models of which something is kept: the one that is searched with, the one before it, and those that are tried beside it.
+/// Models of which something is kept: the one that is searched with, the one before it, and those that are
+/// tried beside it.
 const MODELS: usize = 3;
 
 /// What was made of one data set.
@@ -29,11 +29,11 @@ pub(crate) struct Made {
 }
 
 impl Made {
-    /// What was made of a model, empty where nothing was.
-    pub(super) fn of_model(&self, fit: &Fit) -> Arc<OfModel> {
+    /// What was made of a model with these coefficients and friction steepnesses, empty where nothing was.
+    pub(super) fn of_model(&self, theta: &[f64], shapes: &[[f64; 2]]) -> Arc<OfModel> {
         let mut models = self.models.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = models.iter().position(|model| model.is_of(fit));
-        let model = known.map_or_else(|| Arc::new(OfModel::new(fit)), |k| models.remove(k));
+        let known = models.iter().position(|model| model.theta == theta && model.shapes == shapes);
+        let model = known.map_or_else(|| Arc::new(OfModel::new(theta, shapes)), |k| models.remove(k));
         models.push(Arc::clone(&model));
         if models.len() > MODELS {
             models.remove(0);
@@ -64,19 +64,15 @@ struct Columns {
 }
 
 impl OfModel {
-    pub(super) fn new(fit: &Fit) -> OfModel {
+    pub(super) fn new(theta: &[f64], shapes: &[[f64; 2]]) -> OfModel {
         OfModel {
-            theta: fit.theta.clone(),
-            shapes: fit.shapes.clone(),
+            theta: theta.to_vec(),
+            shapes: shapes.to_vec(),
             rigid: OnceLock::new(),
             friction: OnceLock::new(),
             prediction: OnceLock::new(),
             columns: Mutex::default(),
         }
-    }
-
-    fn is_of(&self, fit: &Fit) -> bool {
-        self.theta == fit.theta && self.shapes == fit.shapes
     }
 
     /// The columns of a candidate; `make` makes them where they have not been made.
@@ -130,8 +126,12 @@ impl<K, V> Default for ByLaw<K, V> {
 }
 
 impl<K: PartialEq, V: Size> ByLaw<K, V> {
-    /// The values of a law; `make` makes them where they have not been made.
+    /// The values of a law; `make` makes them where they have not been made. Laws of torques change with the
+    /// model and are made each time.
     pub(super) fn get(&self, key: (K, Law<f64>), make: impl FnOnce() -> V) -> Arc<V> {
+        if key.1.needs_torque() {
+            return Arc::new(make());
+        }
         let kind = discriminant(&key.1);
         let known = |laws: &Laws<K, V>| {
             let found = laws.made.get(&kind)?.iter().find(|known| known.of == key)?;
@@ -173,7 +173,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_law_at_a_joint_is_made_once() {
+    fn laws_of_the_motion_are_made_once_and_laws_of_torques_each_time() {
         let columns = ByLaw::default();
         let joint = JointNumber::from_index;
         let get = |j, law, values: [f64; 2]| columns.get((joint(j), law), || values.to_vec()).to_vec();
@@ -184,5 +184,33 @@ mod tests {
         assert_eq!(get(0, sine(4.0), [3.0, 4.0]), [3.0, 4.0]);
         assert_eq!(get(1, sine(3.0), [5.0, 6.0]), [5.0, 6.0]);
         assert_eq!(get(0, Law::Cosine { order: 3.0 }, [7.0, 8.0]), [7.0, 8.0]);
+        let load = Law::Load { steepness: 10.0 };
+        assert_eq!(get(0, load, [1.0, 1.0]), [1.0, 1.0]);
+        assert_eq!(get(0, load, [2.0, 2.0]), [2.0, 2.0]);
+    }
+
+    #[test]
+    fn columns_of_a_candidate_are_made_once_for_a_model() {
+        let made = Made::default();
+        let candidate = |order| {
+            let settings = crate::explanation::effects::position_ripple::Settings { order };
+            Candidate::on(JointNumber::from_index(0), settings, 1)
+        };
+        let get = |theta: f64, order, value: f64| {
+            let model = made.of_model(&[theta], &[[1.0, 2.0]]);
+            let columns = model.columns(&candidate(order), || vec![Column::on(0, vec![value])]);
+            columns[0].parts[0].1[0]
+        };
+        assert_eq!(get(1.0, 3.0, 10.0), 10.0);
+        assert_eq!(get(1.0, 3.0, 11.0), 10.0);
+        // Another candidate, another model.
+        assert_eq!(get(1.0, 4.0, 12.0), 12.0);
+        assert_eq!(get(2.0, 3.0, 13.0), 13.0);
+        assert_eq!(get(1.0, 3.0, 14.0), 10.0);
+        // The model that was not asked for longest is forgotten.
+        for other in 3..3 + MODELS {
+            assert_eq!(get(other as f64, 3.0, 20.0), 20.0);
+        }
+        assert_eq!(get(1.0, 3.0, 15.0), 15.0);
     }
 }

@@ -321,8 +321,8 @@ impl<'a> Data<'a> {
         })
     }
 
-    /// The static torque of every link's mass and first moments, [`PULLED`] a link, under unit gravity along a base axis;
-    /// empty where they cannot be had. A column has no part on a joint that does not feel it.
+    /// The static torque of every link's mass and first moments, [`PULLED`] a link, under unit gravity along a
+    /// base axis; empty where they cannot be had. A column has no part on a joint that does not feel it.
     pub fn pull_columns(&self, axis: usize) -> &[Column] {
         self.pull[axis].get_or_init(|| {
             let mut columns = Vec::new();

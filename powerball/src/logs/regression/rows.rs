@@ -68,20 +68,17 @@ impl JointRows {
         recordings: &'r [Recording],
         mut signal: impl FnMut(usize, &'r Recording) -> Vec<f64>,
     ) -> Vec<f64> {
-        let mut column = Vec::with_capacity(self.len());
-        for (r, recording) in recordings.iter().enumerate() {
-            if self.kept[r].is_empty() {
-                continue;
-            }
-            let passed = self.band.pass(&signal(r, recording));
-            column.extend(self.kept[r].iter().map(|k| passed[*k]));
-        }
-        column
+        let pass = |(r, recording): (usize, &'r Recording)| match self.kept[r].is_empty() {
+            true => Vec::new(),
+            false => self.band.pass(&signal(r, recording)),
+        };
+        let passed: Vec<Vec<f64>> = recordings.iter().enumerate().map(pass).collect();
+        self.passed_rows(&passed)
     }
 
     /// The rows of a signal that has passed the band already: by recording, one value for each kept sample of the band.
     #[must_use]
-    pub fn rows_of(&self, passed: &[Vec<f64>]) -> Vec<f64> {
+    pub fn passed_rows(&self, passed: &[Vec<f64>]) -> Vec<f64> {
         self.kept.iter().zip(passed).flat_map(|(kept, passed)| kept.iter().map(|k| passed[*k])).collect()
     }
 }
