@@ -256,10 +256,13 @@ fn rest(page: &mut Page, explained: &Explained) {
         page.note(Tone::Plain, &format!("Next experiment: {}", next.advice));
     }
     let chance = &explained.false_positives;
+    let without = match chance.without {
+        0 => String::new(),
+        n => format!(" ({n} more draws were of constants, which no shift in time changes)"),
+    };
     page.paragraph(&format!(
-        "How often the rule is wrong on these data: {} of {} effects that cannot be there were accepted. The \
-            residuals \
-         are worth {} independent samples.",
+        "How often the rule is wrong on these data: {} of {} effects that cannot be there were accepted{without}. \
+         The residuals are worth {} independent samples.",
         chance.accepted, chance.surrogates, explained.effective_samples
     ));
     if !explained.warnings.is_empty() {

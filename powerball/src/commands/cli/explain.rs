@@ -55,6 +55,9 @@ pub(crate) struct Explain {
     /// its log.
     #[arg(long)]
     experiment: bool,
+    /// Print how long each phase took, on standard error.
+    #[arg(long)]
+    timings: bool,
     /// Where something stays without a name, fit a bounded curve of the one or two signals that it depends on
     /// most; kept where errors fall that it was not fitted to.
     #[arg(long)]
@@ -70,7 +73,7 @@ pub(crate) struct Explain {
 
 impl Explain {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let progress = Progress::new();
+        let progress = Progress::timed(self.timings);
         let experiment = if self.experiment { Some(self.arm()?) } else { None };
         let arm = Arm::read(&self.inputs.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
         let known = self.model.as_deref().map(TorqueModel::read).transpose();
@@ -105,6 +108,7 @@ impl Explain {
             (None, _) => {}
         }
         explained.warnings.splice(0..0, recorded.warnings);
+        progress.say("writing");
         self.write(&prepared.with_known(explained))
     }
 
@@ -240,8 +244,11 @@ fn summary(explained: &Explained) -> String {
         text.push_str(&format!("\n{}", joint.sentence()));
     }
     text.push_str(&open_in_words(explained));
-    let FalsePositives { accepted, surrogates, .. } = &explained.false_positives;
-    text.push_str(&format!("\n{accepted} of {surrogates} time-shift surrogates were accepted"));
+    let FalsePositives { accepted, surrogates, without, .. } = &explained.false_positives;
+    text.push_str(&format!("\n{accepted} of {surrogates} surrogates were accepted"));
+    if *without > 0 {
+        text.push_str(&format!(" ({without} more draws were of constants that have none)"));
+    }
     text
 }
 

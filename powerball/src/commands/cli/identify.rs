@@ -47,6 +47,9 @@ pub(crate) struct Identify {
     /// and effects is written into the folder of the results, under its name.
     #[arg(long, value_name = "ORIGINAL")]
     export: Option<PathBuf>,
+    /// Print how long each phase took, on standard error.
+    #[arg(long)]
+    timings: bool,
     /// Folder for the results; made if missing.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -84,7 +87,7 @@ impl Identify {
         let arm = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
         let known = self.model.as_deref().map(ModelFile::read).transpose();
         let known = known.map_err(|e| Failure::Unusable(e.to_string()))?;
-        let terminal = output::Progress::new();
+        let terminal = output::Progress::timed(self.timings);
         let say = |what: &str| terminal.say(what);
         let options = IdentifyOptions {
             friction: match self.friction {
@@ -104,6 +107,7 @@ impl Identify {
         let original = self.export.as_deref().map(|path| Original::read(path, &self.out)).transpose()?;
         let logs = self.logs.mapped(self.map.read()?);
         let identified = identify(&arm, &logs.log, &logs.validate, &options)?;
+        terminal.say("writing");
         let known = known.as_ref().map(|known| &known.model.additions);
         let files = report::identified::files(&identified, known).map_err(Failure::Refused)?;
         files.write(&self.out).map_err(Failure::Unusable)?;

@@ -6,21 +6,92 @@ use crate::identification::estimate::Spread;
 use crate::report::files;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
-use std::time::SystemTime;
+use std::sync::Mutex;
+use std::time::{Duration, Instant, SystemTime};
 
-/// Progress on standard error, where a person looks at it.
-pub(crate) struct Progress(bool);
+/// What a command is doing, on standard error: as it happens where a person looks at it, and as a table of
+/// times at its end where `--timings` asks for one.
+pub(crate) struct Progress {
+    shown: bool,
+    phases: Option<Mutex<Vec<Phase>>>,
+}
+
+/// What was being done from when on.
+struct Phase {
+    what: String,
+    clock: Instant,
+    processor: Duration,
+}
+
+impl Phase {
+    fn from_now(what: &str) -> Phase {
+        Phase { what: what.to_string(), clock: Instant::now(), processor: processor() }
+    }
+}
+
+/// Processor time that this program has taken, all its threads together.
+#[cfg(unix)]
+fn processor() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec.try_into().unwrap_or(0))
+}
+
+/// Processor time is not known here.
+#[cfg(not(unix))]
+fn processor() -> Duration {
+    Duration::ZERO
+}
 
 impl Progress {
     pub(crate) fn new() -> Progress {
-        Progress(std::io::stderr().is_terminal())
+        Progress { shown: std::io::stderr().is_terminal(), phases: None }
+    }
+
+    /// The same, with times by phase on standard error when it ends.
+    pub(crate) fn timed(timings: bool) -> Progress {
+        let phases = timings.then(|| Mutex::new(vec![Phase::from_now("reading the arm file")]));
+        Progress { phases, ..Progress::new() }
     }
 
     pub(crate) fn say(&self, what: &str) {
-        if self.0 {
+        if self.shown {
             eprintln!("  {what} …");
         }
+        if let Some(mut phases) = self.phases.as_ref().and_then(|phases| phases.lock().ok()) {
+            phases.push(Phase::from_now(what));
+        }
     }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        let Some(mut phases) = self.phases.as_ref().and_then(|phases| phases.lock().ok()) else { return };
+        phases.push(Phase::from_now(""));
+        eprintln!("{}", times(&phases));
+    }
+}
+
+/// A table of phases: what lies between the start of each and of the next one.
+fn times(phases: &[Phase]) -> String {
+    let line = |clock: Duration, processor: Duration, what: &str| {
+        format!("{:9.3} {:11.3}  {what}\n", clock.as_secs_f64(), processor.as_secs_f64())
+    };
+    let mut text = String::from("  clock s processor s  what\n");
+    for (phase, next) in phases.iter().zip(phases.iter().skip(1)) {
+        text.push_str(&line(
+            next.clock - phase.clock,
+            next.processor.saturating_sub(phase.processor),
+            &phase.what,
+        ));
+    }
+    if let (Some(first), Some(last)) = (phases.first(), phases.last()) {
+        text.push_str(&line(
+            last.clock - first.clock,
+            last.processor.saturating_sub(first.processor),
+            "in all",
+        ));
+    }
+    text
 }
 
 /// A line on standard error, where a person looks at it, that is written over by the next one: how far a motion has
@@ -127,7 +198,36 @@ pub(crate) fn table(columns: &[(&str, &Spread)]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::time::Duration;
+
+    #[test]
+    fn times_are_those_between_one_phase_and_the_next() {
+        let start = Instant::now();
+        let at = |what: &str, seconds, processor| Phase {
+            what: what.to_string(),
+            clock: start + Duration::from_millis(seconds),
+            processor: Duration::from_millis(processor),
+        };
+        let text = times(&[at("reading", 0, 100), at("fitting", 250, 300), at("", 1250, 2200)]);
+        let lines: Vec<&str> = text.lines().skip(1).collect();
+        assert_eq!(
+            lines,
+            [
+                "    0.250       0.200  reading",
+                "    1.000       1.900  fitting",
+                "    1.250       2.100  in all"
+            ]
+        );
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn work_takes_processor_time() {
+        let (before, began) = (processor(), Instant::now());
+        while began.elapsed() < Duration::from_millis(30) {
+            std::hint::spin_loop();
+        }
+        assert!(processor() > before);
+    }
 
     /// Times by `date -u -d @SECONDS`.
     #[test]

@@ -56,8 +56,8 @@ pub struct Rival {
     pub why_not: String,
 }
 
-/// The rule applied to time-shift surrogates: candidates that cannot be true, shifted in time within each
-/// recording.
+/// The rule applied to surrogates: candidates that cannot be true, shifted in time within each recording or, where
+/// that changes nothing (a constant torque), with the signs of the recordings drawn.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FalsePositives {
     /// Surrogates tried.
@@ -65,8 +65,10 @@ pub struct FalsePositives {
     pub surrogates: usize,
     /// Surrogates that the whole rule accepted.
     pub accepted: usize,
-    /// Their share.
+    /// Share of those tried that were accepted.
     pub rate: f64,
     /// Family-wise level of the significance test.
     pub family_wise: f64,
+    /// Draws that had no surrogate: a constant torque in a single recording, say.
+    pub without: usize,
 }

@@ -5,7 +5,7 @@ use super::model::{Accepted, Model};
 use super::named::Rival;
 use super::search::{
     Among, Extent, Group, Member, Screen, Tester, Trial, Validation, eliminate, gains, groups, is_beside,
-    keep_needed, searched_again, surrogates,
+    keep_needed, scores, searched_again,
 };
 use super::study::Study;
 use crate::controller::JointNumber;
@@ -69,7 +69,7 @@ pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize, among: Am
         return Proposed { refused, outcome: Outcome::Nothing(question) };
     };
     let chosen = simplest_as_good(&mut groups, best, &tester);
-    let above = above_chance(study, &screen, &groups[chosen], tests, number);
+    let above = above_chance(study, &screen, &groups[chosen], number);
     if above.is_empty() {
         let chance = groups[chosen].passing().map(|m| m.candidate.clone()).collect();
         return Proposed { refused, outcome: Outcome::Chance(chance) };
@@ -139,22 +139,15 @@ fn refused(groups: &[Group]) -> Vec<Rival> {
 }
 
 /// The places of the members of a group that score more than time-shift surrogates do.
-fn above_chance(
-    study: &Study<'_>,
-    screen: &Screen<'_>,
-    group: &Group,
-    tests: f64,
-    number: usize,
-) -> Vec<usize> {
+fn above_chance(study: &Study<'_>, screen: &Screen<'_>, group: &Group, number: usize) -> Vec<usize> {
     let rule = study.rule();
-    let trials: Vec<(&Trial, &[JointNumber])> =
-        group.passing().map(|m| (&m.trial, m.candidate.joints.as_slice())).collect();
+    let trials: Vec<&Trial> = group.passing().map(|m| &m.trial).collect();
     let (count, seed) = (rule.step_surrogates, number as u64);
     let exceeded = |mut scores: Vec<f64>| {
         scores.sort_by(f64::total_cmp);
         scores.get((scores.len() as f64 * rule.surrogate_level) as usize).copied().unwrap_or(0.0)
     };
-    let mut level = exceeded(surrogates(screen, &trials, &study.folds, tests, count, seed).scores);
+    let mut level = exceeded(scores(screen, &trials, count, seed));
     // Whether in some logs, and from when on, was looked for: chance is what that search finds.
     if group.passing().any(|m| Extent::of(&m.candidate) == Extent::SomeLogs) {
         level = level.max(exceeded(searched_again(screen.context, group.effect, count, seed)));
