@@ -59,7 +59,7 @@ struct Written {
     rows: Vec<u64>,
     bytes: usize,
     /// Their ends, Hz.
-    bands: [f64; 3],
+    bands: [f64; BANDS.len()],
     warnings: Vec<String>,
 }
 

@@ -232,15 +232,12 @@ const MOVED: f64 = 1e-4;
 const STIFF: f64 = 5.0;
 /// The same where it is as large as was found: above the frequency at which a soft arm swings on its gear the
 /// deflection is not what its load says.
-pub(crate) const SOFT: f64 = 2.5;
+pub(crate) const SOFT: f64 = 2.0;
 /// A link that gives way far carries another load there: the load is taken so many times.
 pub(crate) const PASSES: usize = 2;
 /// The load whose side a link hangs to is smoothed to this, Hz: going through the play is an impulse in the
 /// rigid torque of the motor's motion, and would change the side that it follows from.
 const SIDE: f64 = 3.0;
-/// The way through the play is smoothed as positions are, Hz and order (see
-/// [`DataOptions`](crate::logs::regression::DataOptions)): both are differentiated alike.
-const WAY: (usize, f64) = (4, 8.0);
 
 /// Adds to positions, velocities and accelerations how a law moves one link, `size` times: n values a sample,
 /// `rigid` the torque of the rigid arm where the motors are. What gives way is smoothed, Hz.
@@ -262,7 +259,8 @@ pub(crate) fn move_link(
     let shifts = |load: Vec<f64>| load.iter().map(|t| size * law.shift(*t)).collect();
     let shift = match law {
         Law::Compliance => smooth((2, smoothing), shifts(load)),
-        _ => smooth(WAY, shifts(smooth((2, SIDE), load))),
+        // The way through the play is smoothed as positions are: both are differentiated alike.
+        _ => smooth((4, recording.smoothing), shifts(smooth((2, SIDE), load))),
     };
     // What follows the load has velocity and acceleration.
     let (dv, da) =

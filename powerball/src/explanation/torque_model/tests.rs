@@ -84,6 +84,7 @@ fn recording(n: usize, shift: f64) -> Recording {
     };
     let state = |d: usize| (0..samples * n).map(|i| wave(i / n, i % n, d)).collect();
     Recording {
+        smoothing: 24.0,
         log: 0,
         start: 2.0,
         clock: 12.0,

@@ -66,8 +66,9 @@ impl<'a> Rows<'a> {
         if gravity == Gravity::TakenOut {
             take_gravity_out(&mut data);
         }
-        let torque = data.recordings.iter().map(|r| r.torque.iter().map(|x| data.band.filtered(x)).collect());
-        let torque = torque.collect();
+        let of_recording =
+            |r: &Recording| (0..r.dof).map(|j| data.band.filtered(&r.smooth_torque(j))).collect();
+        let torque = data.recordings.iter().map(of_recording).collect();
         let (mut places, mut joints) = (Vec::new(), Vec::new());
         for joint in 0..data.dof() {
             let (of_joint, parts) = joint_rows(&data, joint, part);

@@ -7,7 +7,7 @@ use super::{Block, Column, JointRows, Recording, RigidArm};
 use crate::logs::log::{Log, logs_of_motors};
 use crate::logs::parallel;
 use crate::logs::signal::resample::median_step;
-use crate::logs::signal::{Band, rest};
+use crate::logs::signal::{BANDS, Band, rest};
 use dyngen::arm::{Parameter, ParameterKind};
 use std::fmt;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -15,10 +15,12 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 /// How logs are prepared.
 #[derive(Clone, Debug)]
 pub struct DataOptions {
-    /// Band of the regression, Hz: torques and columns pass the same zero-phase low-pass.
+    /// Band of the regression, Hz: torques and columns pass the same zero-phase low-pass. The noise of accelerations
+    /// grows with its power 2.5.
     pub cutoff: f64,
-    /// Smoothing of positions before they are differentiated, Hz. The noise of accelerations grows with its
-    /// power 2.5.
+    /// Smoothing of positions before they are differentiated, Hz. Torques pass it as well, so that what is linear in
+    /// the motion is exact in any band. What is not (friction, which changes its sign with the velocity) is made of
+    /// the smoothed motion before it passes the band, so this is far above the band.
     pub smoothing: f64,
     /// Length of a block, s: residuals further apart count as independent.
     pub block: f64,
@@ -26,7 +28,7 @@ pub struct DataOptions {
 
 impl Default for DataOptions {
     fn default() -> Self {
-        DataOptions { cutoff: 10.0, smoothing: 8.0, block: 2.0 }
+        DataOptions { cutoff: BANDS[0], smoothing: 24.0, block: 2.0 }
     }
 }
 
@@ -127,8 +129,8 @@ impl<'a> Data<'a> {
         Data::in_bands(body, logs, options, 1, correct)?.pop().unwrap_or(Err(DataError::TooShort))
     }
 
-    /// Prepares logs in `count` bands, each of half the cutoff of the one before, the first that of the
-    /// options. What can be used in a band may be too little in a narrower one.
+    /// Prepares logs in `count` bands: the one of the options, which is one of [`BANDS`] where there is more than
+    /// one, and those that are made of it. What can be used in a band may be too little in a narrower one.
     ///
     /// # Errors
     /// As [`Data::new`], where nothing usable remains in any band.
@@ -146,9 +148,9 @@ impl<'a> Data<'a> {
         steps.sort_by(f64::total_cmp);
         let step = *steps.get(steps.len() / 2).ok_or(DataError::TooShort)?;
         let rate = 1.0 / step;
-        let widest = Band::new(options.cutoff, rate);
-        let bands: Vec<Band> =
-            std::iter::successors(Some(widest), |band| Some(band.halved(rate))).take(count).collect();
+        let narrower = BANDS.iter().copied().filter(|cutoff| *cutoff < options.cutoff);
+        let cutoffs = std::iter::once(options.cutoff).chain(narrower).take(count);
+        let bands: Vec<Band> = cutoffs.map(|cutoff| Band::new(cutoff, rate)).collect();
         let mut left_out: Vec<String> = Vec::new();
         let mut recordings: Vec<Recording> = Vec::new();
         for (index, log) in logs.iter().enumerate() {
@@ -261,8 +263,8 @@ impl<'a> Data<'a> {
         joints
     }
 
-    /// The same logs with some joints in narrower bands: `narrower` are the bands after this one, each of half
-    /// the cutoff of the one before, and `which` says by joint which of them, 0 for this one.
+    /// The same logs with some joints in narrower bands: `narrower` are the bands after this one, each made of
+    /// the one before, and `which` says by joint which of them, 0 for this one.
     #[must_use]
     pub fn with_narrower(mut self, narrower: &[Data<'_>], which: &[usize], block: f64) -> Data<'a> {
         for (j, which) in which.iter().enumerate() {
@@ -460,7 +462,7 @@ pub(crate) fn top_velocity<'r>(recordings: impl IntoIterator<Item = &'r Recordin
     top.max(1e-3)
 }
 
-/// The rows by band and joint; the bands are each half of the one before.
+/// The rows by band and joint; each band is made of the one before.
 fn joint_rows(
     body: &RigidArm,
     recordings: &[Recording],
@@ -500,7 +502,7 @@ fn joint_rows(
                 };
                 passed.into_iter().zip(&all).map(rows).collect()
             };
-            let mut columns = vec![pass(recording.torque[j].clone())];
+            let mut columns = vec![pass(recording.smooth_torque(j))];
             columns.extend((0..p).map(|c| pass(y.iter().skip(j * p + c).step_by(n * p).copied().collect())));
             columns
         });

@@ -26,6 +26,8 @@ pub struct Recording {
     pub torque: Vec<Vec<f64>>,
     /// Temperatures, by joint, °C, where they were logged.
     pub temperature: Option<Vec<Vec<f64>>>,
+    /// What positions were smoothed to, Hz.
+    pub smoothing: f64,
     /// Joints.
     pub dof: usize,
 }
@@ -53,6 +55,7 @@ impl Recording {
             a,
             torque: log.torque.iter().map(onto).collect(),
             temperature: log.temperature.as_ref().map(|t| t.iter().map(onto).collect()),
+            smoothing,
             dof,
         };
         let positions: Vec<&[f64]> = log.q.iter().map(|q| &q[piece.clone()]).collect();
@@ -64,9 +67,7 @@ impl Recording {
     ///
     /// `false` where there are too few samples or no such filter; nothing has changed then.
     pub fn follow(&mut self, t: &[f64], positions: &[&[f64]], smoothing: f64) -> bool {
-        let Some(filter) = Butterworth::low_pass(4, smoothing.min(0.4 * self.rate), self.rate) else {
-            return false;
-        };
+        let Some(filter) = smoother(smoothing, self.rate) else { return false };
         if t.len() < 2 {
             return false;
         }
@@ -81,7 +82,15 @@ impl Recording {
                 }
             }
         }
+        self.smoothing = smoothing;
         true
+    }
+
+    /// One joint's torque, smoothed as the positions are: a torque that is linear in the motion stays so.
+    #[must_use]
+    pub fn smooth_torque(&self, joint: usize) -> Vec<f64> {
+        let torque = &self.torque[joint];
+        smoother(self.smoothing, self.rate).map_or_else(|| torque.clone(), |filter| filter.zero_phase(torque))
     }
 
     /// Samples.
@@ -110,4 +119,9 @@ impl Recording {
     pub fn acceleration(&self, joint: usize) -> impl Iterator<Item = f64> + '_ {
         self.a.iter().skip(joint).step_by(self.dof).copied()
     }
+}
+
+/// What positions pass before they are differentiated, and torques with them.
+fn smoother(smoothing: f64, rate: f64) -> Option<Butterworth> {
+    Butterworth::low_pass(4, smoothing.min(0.4 * rate), rate)
 }

@@ -2,12 +2,14 @@
 
 use super::Butterworth;
 
-/// The widest band from which narrower ones are made, Hz.
-const WIDEST: f64 = 10.0;
+/// The bands of an analysis, Hz, widest first, an octave apart: each is made of the one before. Above the widest, accelerations are
+/// noise of positions differentiated twice, and arms are hardly rigid; a motion and what friction does at its
+/// reversals are slower than the narrowest.
+pub const BANDS: [f64; 3] = [7.0, 3.5, 1.75];
 
 /// A low-pass band with its decimation, the same on both sides of a regression.
 ///
-/// A band of half another's cutoff is made of the other's samples at five times the other's cutoff: filtered
+/// The narrower ones of [`BANDS`] are made of the samples of the one before at five times its cutoff: filtered
 /// again at that rate. It costs a fraction of a filter at full rate, and differs from one by 3 % of amplitude
 /// at most, around its end. What the wider band leaves of faster signals and folds into this one (a
 /// ten-thousandth) is the same on both sides, as is everything that is linear.
@@ -26,8 +28,6 @@ pub struct Band {
 /// A filter and a decimation.
 #[derive(Clone, Debug)]
 struct Stage {
-    /// As asked for, Hz.
-    cutoff: f64,
     /// At the rate of its samples.
     filter: Option<Butterworth>,
     /// The same at full rate, for what is not decimated.
@@ -50,7 +50,7 @@ impl Stage {
             if filter.is_some() { ((rate / (share * cutoff)).floor() as usize).max(1) } else { 1 }
         };
         let (decimation, onward) = (every(2.5), every(5.0));
-        Stage { cutoff, whole: filter.as_ref().and_then(|_| at(whole)), filter, decimation, onward, first }
+        Stage { whole: filter.as_ref().and_then(|_| at(whole)), filter, decimation, onward, first }
     }
 
     fn filtered(&self, x: &[f64]) -> Vec<f64> {
@@ -59,25 +59,16 @@ impl Stage {
 }
 
 impl Band {
-    /// A band up to `cutoff` Hz for signals of `rate` Hz; one of 5 Hz or less is made of the band of twice
-    /// its cutoff.
+    /// A band up to `cutoff` Hz for signals of `rate` Hz; one of [`BANDS`] is made of those before it.
     ///
     /// The kept rate is at least 2.5 times the cutoff. Where the rate is too low to hold the band, nothing is
     /// filtered and the band ends at half the rate.
     #[must_use]
     pub fn new(cutoff: f64, rate: f64) -> Band {
-        if cutoff > 0.0 && 2.0 * cutoff <= WIDEST {
-            return Band::new(2.0 * cutoff, rate).halved(rate);
-        }
+        let wider = BANDS.iter().position(|band| *band == cutoff).unwrap_or(0);
         let trim = (0.3 * rate).ceil() as usize;
-        Band { cutoff, decimation: 1, trim, stages: Vec::new() }.with(cutoff, rate)
-    }
-
-    /// The band of half the cutoff, made of this one's samples; `rate` is that of the signals.
-    #[must_use]
-    pub fn halved(&self, rate: f64) -> Band {
-        let last = self.stages.last().map_or(self.cutoff, |stage| stage.cutoff);
-        self.clone().with(0.5 * last, rate)
+        let none = Band { cutoff, decimation: 1, trim, stages: Vec::new() };
+        BANDS[..wider].iter().chain([&cutoff]).fold(none, |band, cutoff| band.with(*cutoff, rate))
     }
 
     fn with(mut self, cutoff: f64, rate: f64) -> Band {
@@ -195,12 +186,12 @@ mod tests {
             [(200.0, 4001), (100.0, 1999), (125.0, 2500), (62.0, 900), (20.0, 300), (1000.0, 9000)]
         {
             let wave = |f: f64, k: usize| (std::f64::consts::TAU * f * k as f64 / rate + 0.3).sin();
-            let narrow = Band::new(2.5, rate);
+            let narrow = Band::new(BANDS[2], rate);
             assert_eq!(narrow.stages.len(), 3);
-            for f in [0.4, 1.3, 2.5, 3.2, 5.5] {
+            for f in [0.3, 0.9, 1.7, 2.2, 3.9] {
                 let x: Vec<f64> = (0..n).map(|k| wave(f, k)).collect();
                 let bands = narrow.pass_bands(&x, 3);
-                for (cutoff, out) in [10.0, 5.0, 2.5].into_iter().zip(&bands) {
+                for (cutoff, out) in BANDS.into_iter().zip(&bands) {
                     let band = Band::new(cutoff, rate);
                     assert_eq!(*out, band.pass(&x), "{cutoff} Hz of {rate}");
                     let kept = band.kept(n);
@@ -219,6 +210,6 @@ mod tests {
             }
             assert!(narrow.pass_bands(&vec![0.0; n], 2).iter().flatten().all(|y| *y == 0.0));
         }
-        assert_eq!(Band::new(2.5, 100.0).decimation, 16);
+        assert_eq!(Band::new(1.75, 100.0).decimation, 20);
     }
 }

@@ -12,4 +12,4 @@ pub mod turns;
 
 pub use biquad::Biquad;
 pub use butterworth::Butterworth;
-pub use filter::Band;
+pub use filter::{BANDS, Band};

@@ -5,11 +5,9 @@ use super::{Summary, SummaryError};
 use crate::logs::log::Log;
 use crate::logs::regression::{DataError, DataOptions, RigidArm};
 
-/// The bands, Hz, widest first, an octave apart. Above the widest arms of this size are not rigid; a motion
-/// and what friction does at its reversals are slower than the narrowest.
-pub const BANDS: [f64; 3] = [10.0, 5.0, 2.5];
+pub use crate::logs::signal::BANDS;
 
-/// A model's power and that of what it leaves, (N·m)², by octave between neighbouring bands.
+/// A model's power and that of what it leaves, (N·m)², between neighbouring bands.
 pub type Powers = [[f64; 2]; BANDS.len() - 1];
 
 /// Logs of one arm, reduced in each of [`BANDS`].

@@ -103,7 +103,7 @@ impl Summary {
     }
 }
 
-/// Takes a log into summaries of bands, each of half the cutoff of the one before, the first that of the
+/// Takes a log into summaries of bands, each made of the one before, the first that of the
 /// options. Returns what was left out of it in the first, in words.
 ///
 /// # Errors

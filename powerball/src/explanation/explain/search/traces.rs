@@ -36,7 +36,11 @@ pub(super) fn traces(context: &Context<'_>, model: &Model, joint: usize) -> Vec<
         .filter(|(at, law, _)| at.index() == joint && !law.moves_link())
         .collect();
     let of = |(r, recording): (usize, &Recording)| {
-        let predicted = context.prediction()[r].iter().skip(joint).step_by(n);
+        let own =
+            |torque: &[Vec<f64>]| -> Vec<f64> { torque[r].iter().skip(joint).step_by(n).copied().collect() };
+        // Above the widest band a rigid torque is noise of accelerations; friction changes its sign there.
+        let rigid = data.band.filtered(&own(context.rigid()));
+        let predicted = rigid.iter().zip(own(context.friction())).map(|(rigid, friction)| rigid + friction);
         let mut left: Vec<f64> = recording.torque[joint].iter().zip(predicted).map(|(t, p)| t - p).collect();
         for (at, law, coefficient) in &laws {
             let along = context.law_along(r, *at, *law);

@@ -104,8 +104,12 @@ fn names(explained: &Explained) -> Vec<&str> {
 }
 
 fn at_the_floor(explained: &Explained) {
+    near_the_floor(explained, 1.15);
+}
+
+fn near_the_floor(explained: &Explained, times: f64) {
     for (after, floor) in explained.after.validate.rms.iter().zip(&explained.noise_floor) {
-        assert!(*after < 1.15 * floor, "{:?} {:?}", explained.after.validate.rms, explained.noise_floor);
+        assert!(*after < times * floor, "{:?} {:?}", explained.after.validate.rms, explained.noise_floor);
     }
 }
 
@@ -214,7 +218,8 @@ fn every_log_says_by_itself_when_a_payload_is_taken_up() {
             approx::assert_relative_eq!(parameters["start_time"][k].as_f64().unwrap(), start, epsilon = 0.15);
         }
         approx::assert_relative_eq!(parameters["mass"].as_f64().unwrap(), PAYLOAD, max_relative = 0.05);
-        at_the_floor(&explained);
+        // The jerk with which it is taken up is no law of the model.
+        near_the_floor(&explained, 1.35);
     }
 }
 

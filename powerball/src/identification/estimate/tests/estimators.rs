@@ -77,7 +77,7 @@ fn instruments_are_not_biased_by_noisy_positions() {
     for log in &mut logs {
         for q in log.q.iter_mut().flatten() {
             let noise: f64 = StandardNormal.sample(&mut rng);
-            *q += 8e-4 * noise;
+            *q += 1.2e-3 * noise;
         }
     }
     let start = weighted(&body, &logs);

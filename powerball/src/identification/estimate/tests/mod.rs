@@ -6,5 +6,6 @@ mod coverage;
 mod estimators;
 mod friction;
 mod mountings;
+mod noise_free;
 mod plant;
 mod summaries;
