@@ -46,6 +46,9 @@ pub struct Rule {
 
     /// Share of the time-shift surrogates whose score a candidate must exceed.
     pub surrogate_level: f64,
+    /// The same for events of some seconds: shifted in time they fall onto others of their kind for at most a quarter of
+    /// a log.
+    pub event_surrogate_level: f64,
     /// Surrogates that a step asks.
     pub step_surrogates: usize,
     /// Surrogates that state the false-positive rate, and those that judge ripple above the band.
@@ -79,6 +82,9 @@ pub struct Rule {
     /// share is that of an earlier trial on other data. What is in validation logs only must leave no more of
     /// their excess over the fitted logs.
     pub much_left: f64,
+    /// An event of some seconds (a push) is not given where more than this share of what its time has more than others
+    /// of squared error stays: three quarters, since a push has no simple form and other things are there as well.
+    pub event_left: f64,
     /// An effect of which this share is missing in some octave, and by more than
     /// [`missing_errors`](Self::missing_errors), is not the effect that it is called: most of it is not
     /// there.
@@ -174,6 +180,7 @@ impl Default for Rule {
             shortest_block: 0.5,
             longest_block: 2.0,
             surrogate_level: 0.99,
+            event_surrogate_level: 0.75,
             step_surrogates: 60,
             final_surrogates: 200,
             surrogate_correlation: 0.4,
@@ -185,6 +192,7 @@ impl Default for Rule {
             least_margin: 1.1,
             same_part: 0.9,
             much_left: 0.35,
+            event_left: 0.75,
             least_missing: 0.5,
             missing_errors: 3.2,
             right: 0.97,
@@ -271,12 +279,13 @@ impl Rule {
     }
 
     /// What is a probability, a correlation or a share of a whole.
-    fn shares(&self) -> [(&'static str, f64); 10] {
+    fn shares(&self) -> [(&'static str, f64); 11] {
         [
             ("family_wise", self.family_wise),
             ("folds_that_must_gain", self.folds_that_must_gain),
             ("alike", self.alike),
             ("surrogate_level", self.surrogate_level),
+            ("event_surrogate_level", self.event_surrogate_level),
             ("surrogate_correlation", self.surrogate_correlation),
             ("right", self.right),
             ("right_beside_rest", self.right_beside_rest),

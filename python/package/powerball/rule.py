@@ -50,6 +50,9 @@ class Rule:
     longest_block: float = 2.0
     #: Share of the time-shift surrogates whose score a candidate must exceed.
     surrogate_level: float = 0.99
+    #: The same for events of some seconds: shifted in time they fall onto others of their kind for at most a
+    #: quarter of a log.
+    event_surrogate_level: float = 0.75
     #: Surrogates that a step asks.
     step_surrogates: int = 60
     #: Surrogates that state the false-positive rate, and those that judge ripple above the band.
@@ -80,6 +83,10 @@ class Rule:
     #: floor: then something else is there, and what fits best only resembles it. The share is that of an
     #: earlier trial on other data.
     much_left: float = 0.35
+    #: An event of some seconds (a push) is not given where more than this share of what its time has more
+    #: than others of squared error stays: three quarters, since a push has no simple form and other things
+    #: are there as well.
+    event_left: float = 0.75
     #: An effect of which this share is missing in some octave, and by more than ``missing_errors``, is not
     #: the effect that it is called: most of it is not there.
     least_missing: float = 0.5

@@ -3,25 +3,33 @@
 use super::payload::all_joints;
 use super::window_sums::{Sums, explained};
 use super::windows::{best_run, by_log, cut, window};
-use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
+use super::{Axis, Candidate, Class, Context, Effect, Found, Part, Window};
 use crate::identification::estimate::Solver;
 use crate::logs::regression::Column;
 use serde::Serialize;
+use std::f64::consts::PI;
 use std::ops::Range;
+use std::sync::Arc;
 
-/// A constant force in the base frame at the last frame's origin, during a window of one log.
+/// A force in the base frame at the last frame's origin, during a window of one log: constant, or rising and falling
+/// as that of a hand does.
 pub(super) struct ContactWrench;
 
-/// It has no settings but its windows.
+/// How its force goes through its windows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Settings;
+pub enum Settings {
+    /// It is the same from the window's beginning to its end.
+    Constant,
+    /// Half a wave: largest in the middle of the window.
+    Push,
+}
 
 /// What it is, one entry a window.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// When it ended, in the log's own t, s.
     pub end_time: Vec<f64>,
-    /// The force in the base frame, N.
+    /// The force in the base frame, N; of a push that rises and falls the largest.
     pub force: Vec<Vec<f64>>,
     /// When it began, in the log's own t, s.
     pub start_time: Vec<f64>,
@@ -36,8 +44,17 @@ const COARSE: usize = 4;
 /// Longer windows keep away from their log's ends by a share of 1 / `CLEAR` of it: what is there until the
 /// end is a payload.
 const CLEAR: usize = 10;
+/// Share of a window's gain that one half of its time must explain to be a push by itself: a force that is constant
+/// explains half of it in half of its time.
+const ALONE: f64 = 0.65;
 /// Larger forces are a rank-poor fit, N.
 const MOST: f64 = 2000.0;
+/// How many times as long as the constant force that fits best a push is taken to be …
+const LONGER: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
+/// … and by which share of that its middle is later.
+const LATE: [f64; 3] = [-0.25, 0.0, 0.25];
+/// What is longer leans on the arm, and does not push it, s.
+const LONGEST_PUSH: f64 = 4.0;
 /// Grid of the same push in other logs, s: its force is known there, so that a row more or less can be told.
 const FINE: f64 = 0.1;
 
@@ -60,11 +77,18 @@ impl Effect for ContactWrench {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        search(context).into_iter().collect()
+        let Some(constant) = search(context) else { return Vec::new() };
+        let pushes = pushes(context, &constant);
+        let searched = constant.searched + pushes.len() as f64;
+        std::iter::once(constant).chain(pushes).map(|c| Candidate { searched, ..c }).collect()
     }
 
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
-        cut(context, context.data.force_columns(), &candidate.windows)
+        let constant = cut(context, context.data.force_columns(), &candidate.windows);
+        match Settings::of(candidate) {
+            Some(Settings::Push) => rising_and_falling(context, constant, &candidate.windows),
+            _ => constant,
+        }
     }
 
     fn part(&self, _: &Context<'_>, _: &Candidate, _: &[f64]) -> Part {
@@ -168,9 +192,59 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
             }
         }
     }
-    let (_, found) = best?;
+    let (mut gain, mut found) = best?;
+    // Two pushes with a pause are two: one that explains most of a window in half of its time is taken by itself,
+    // and the other one is found after it.
+    while found.len() > 1 {
+        let longest = found.len().div_ceil(2);
+        let mut part = None;
+        for first in found.clone() {
+            for end in first + 1..=(first + longest).min(found.end) {
+                consider(first..end, &mut part);
+            }
+        }
+        match part.filter(|(own, _)| *own > ALONE * gain) {
+            Some((own, window)) => (gain, found) = (own, window),
+            None => break,
+        }
+    }
     let windows = vec![window(context, &steps, log, &found)?];
-    Some(Candidate { joints: all_joints(data), settings: Settings.into(), windows, searched })
+    Some(Candidate { joints: all_joints(data), settings: Settings::Constant.into(), windows, searched })
+}
+
+/// Pushes about the middle of a constant force, which covers but the height of one.
+fn pushes(context: &Context<'_>, constant: &Candidate) -> Vec<Candidate> {
+    let Some(window) = constant.windows.first() else { return Vec::new() };
+    let (middle, length) = (0.5 * (window.from + window.to), window.to - window.from);
+    let recordings = || context.data.recordings.iter().filter(|r| context.data.logs[r.log] == window.log);
+    let starts = recordings().map(|r| r.start).fold(f64::INFINITY, f64::min);
+    let ends = recordings().map(|r| r.start + r.len() as f64 / r.rate).fold(f64::NEG_INFINITY, f64::max);
+    let push = |(longer, late): (f64, f64)| {
+        let (middle, half) = (middle + late * length, 0.5 * longer * length);
+        let window = Window { from: middle - half, to: middle + half, ..window.clone() };
+        let inside = window.from > starts && window.to < ends && half < 0.5 * LONGEST_PUSH;
+        inside.then(|| Candidate {
+            windows: vec![window],
+            settings: Settings::Push.into(),
+            ..constant.clone()
+        })
+    };
+    LONGER.iter().flat_map(|longer| LATE.map(|late| (*longer, late))).filter_map(push).collect()
+}
+
+/// Columns of a force that is the largest in the middle of its window and nothing at its ends.
+fn rising_and_falling(context: &Context<'_>, constant: Vec<Column>, windows: &[Window]) -> Vec<Column> {
+    let height = |(log, t): &(usize, f64)| {
+        let own = windows.iter().find(|w| w.log == context.data.logs[*log] && *t >= w.from && *t <= w.to);
+        own.map_or(0.0, |w| (PI * (t - w.from) / (w.to - w.from)).sin())
+    };
+    let heights: Vec<Vec<f64>> =
+        (0..context.data.dof()).map(|j| context.row_times(j).iter().map(height).collect()).collect();
+    let part = |(j, values): (usize, Arc<Vec<f64>>)| {
+        (j, values.iter().zip(&heights[j]).map(|(v, h)| v * h).collect::<Vec<f64>>().into())
+    };
+    let of = |column: Column| Column { parts: column.parts.into_iter().map(part).collect() };
+    constant.into_iter().map(of).collect()
 }
 
 /// Where a log's longer windows lie.

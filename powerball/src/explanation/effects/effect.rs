@@ -47,8 +47,8 @@ pub enum Part {
     /// A rigid arm under another gravity, m/s² in the base frame, and what all its parameters gain by what
     /// that shows; empty for nothing.
     Gravity([f64; 3], Vec<f64>),
-    /// A body that the last link may hold: mass in kg and centre in m, in the last frame.
-    Payload(f64, [f64; 3]),
+    /// A body that a link may carry (the last one where none is named): mass in kg and centre in m, in its frame.
+    Payload(f64, [f64; 3], Option<JointNumber>),
     /// Logs whose position of the candidate's joints is so many rad above the true one.
     EncoderOffset(f64),
     /// Logs whose torque of the candidate's joints is so many s late.

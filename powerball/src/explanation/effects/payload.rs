@@ -1,5 +1,6 @@
-//! A body held by the last link, from the start of a log or from some time on, to its end or to some time.
+//! A body held by the last link or carried by another one, from the start of a log or from some time on, to its end or to some time.
 
+use super::link_body::{self, Body};
 use super::window_sums::{Sums, explained};
 use super::windows::{best_run, by_log, cut, lasting_window};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part, Window};
@@ -11,8 +12,9 @@ use serde::Serialize;
 use std::ops::{Range, RangeInclusive};
 use std::sync::Arc;
 
-/// Mass and first moment in the last frame as four columns; the inertia is that of a point mass at the centre
-/// of mass last estimated, so a few rounds make it consistent.
+/// On the last link: mass and first moment in the last frame as four columns; the inertia is that of a point mass at the
+/// centre of mass last estimated, so a few rounds make it consistent. On any other link ([`link_body`]): first moment
+/// about its joint, mass and inertia, since often the first moment is all that shows.
 pub(super) struct Payload;
 
 /// What columns and windows depend on.
@@ -23,19 +25,30 @@ pub struct Settings {
     pub com: Option<[f64; 3]>,
     /// Whether it is in every log that was recorded after its start.
     pub stays: bool,
+    /// The link that carries it; `None` for the last one's hand. Of another link `com` is the direction of the first
+    /// moment.
+    pub link: Option<usize>,
 }
 
 /// What it is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
-    /// Its centre in the last frame, m.
-    pub com: [f64; 3],
+    /// Its centre in the frame of its link, m; nothing where only its first moment shows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub com: Option<[f64; 3]>,
     /// Until when, one for each log that has it, in the log's own t, s: null where it stays to the end; nothing
     /// where it does in all.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub end_time: Vec<Option<f64>>,
-    /// Its mass, kg.
-    pub mass: f64,
+    /// Its first moment about the joint of its link, in the link's frame, kg·m; nothing on the last link.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_moment: Option<[f64; 3]>,
+    /// The link that carries it, where it is not the last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub link: Option<JointNumber>,
+    /// Its mass, kg; nothing where only its first moment shows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mass: Option<f64>,
     /// From when on, one for each log that has it, in the log's own t, s.
     pub start_time: Vec<f64>,
 }
@@ -81,12 +94,18 @@ impl Effect for Payload {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        search(context).into_iter().collect()
+        let others = (0..context.data.dof().saturating_sub(1)).map(Some);
+        std::iter::once(None).chain(others).filter_map(|link| search(context, link)).collect()
+    }
+
+    /// One body at a time.
+    fn excludes(&self, a: &Candidate, b: &Candidate) -> bool {
+        a.windows.iter().any(|w| b.windows.iter().any(|other| w.overlaps(other)))
     }
 
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
         let Some(settings) = Settings::of(candidate) else { return Vec::new() };
-        let columns = payload_columns(context, settings.com);
+        let columns = columns_of(context, settings);
         cut(context, &columns, &self.windows(context, candidate))
     }
 
@@ -110,16 +129,27 @@ impl Effect for Payload {
             .collect()
     }
 
-    fn part(&self, _: &Context<'_>, _: &Candidate, c: &[f64]) -> Part {
-        Part::Payload(c[0], centre(c))
+    fn part(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Part {
+        let Some(link) = Settings::of(candidate).and_then(|settings| settings.link) else {
+            return Part::Payload(c[0], centre(c), None);
+        };
+        let body = Body::new(context, link, c);
+        Part::Payload(body.mass, body.centre.into(), Some(JointNumber::from_index(link)))
     }
 
-    fn admissible(&self, _: &Candidate, c: &[f64]) -> bool {
-        c[0] > 0.0 && c[1..].iter().all(|h| h.abs() < REACH * c[0])
+    fn admissible(&self, candidate: &Candidate, c: &[f64]) -> bool {
+        match Settings::of(candidate).and_then(|settings| settings.link) {
+            None => c[0] > 0.0 && c[1..].iter().all(|h| h.abs() < REACH * c[0]),
+            Some(_) => link_body::is_possible(c, REACH),
+        }
     }
 
     fn refined(&self, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
         let settings = Settings::of(candidate)?;
+        if settings.link.is_some() {
+            let along = link_body::direction(c)?;
+            return Some(candidate.with(Settings { com: Some(along), ..*settings }));
+        }
         let com = || centre(c).map(|x| x.clamp(-REACH, REACH));
         (c[0] > 0.0).then(|| candidate.with(Settings { com: Some(com()), ..*settings }))
     }
@@ -133,7 +163,7 @@ impl Effect for Payload {
         let (mut seen, settings) = (candidate.clone(), *Settings::of(candidate)?);
         seen.windows.retain(|w| !data.logs.contains(&w.log));
         let steps = data.blocks_of(FINE);
-        let explains = explained(context, &payload_columns(context, settings.com), c, &steps);
+        let explains = explained(context, &columns_of(context, &settings), c, &steps);
         for log in by_log(&steps) {
             let run = best_run(&explains[log.clone()]);
             let run = log.start + run.start..log.start + run.end;
@@ -154,12 +184,20 @@ impl Effect for Payload {
         Some(seen)
     }
 
-    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+    fn figures(&self, context: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
         let (c, windows) = (found[0].coefficients, &found[0].candidate.windows);
+        let link = Settings::of(found[0].candidate).and_then(|settings| settings.link);
+        let body = link.map(|link| Body::new(context, link, c));
+        let point = match body {
+            None => Some((c[0], centre(c))),
+            Some(body) => body.shows_mass.then(|| (body.mass, body.centre.into())),
+        };
         Figures {
-            com: centre(c),
+            com: point.map(|(_, com)| com),
+            first_moment: body.map(|body| body.moment.into()),
+            link: link.map(JointNumber::from_index),
             end_time: Window::ends(windows),
-            mass: c[0],
+            mass: point.map(|(mass, _)| mass),
             start_time: windows.iter().map(|w| w.from).collect(),
         }
         .into()
@@ -171,9 +209,17 @@ fn centre(c: &[f64]) -> [f64; 3] {
     [1, 2, 3].map(|k| if c[0] != 0.0 { c[k] / c[0] } else { 0.0 })
 }
 
+/// The columns of a body where its settings say that it is.
+fn columns_of(context: &Context<'_>, settings: &Settings) -> Vec<Column> {
+    match settings.link {
+        None => payload_columns(context, settings.com),
+        Some(link) => link_body::columns(context, link, settings.com),
+    }
+}
+
 /// Columns for mass and first moments with the inertia of a point mass at `com`.
 fn payload_columns(context: &Context<'_>, com: Option<[f64; 3]>) -> Vec<Column> {
-    let links = context.data.last_link_columns();
+    let links = context.data.link_columns(context.data.dof() - 1);
     if links.len() < OF_A_BODY {
         return Vec::new();
     }
@@ -201,15 +247,18 @@ fn payload_columns(context: &Context<'_>, com: Option<[f64; 3]>) -> Vec<Column> 
 }
 
 /// When each log has it, as explains most, and which logs share it.
-fn search(context: &Context<'_>) -> Option<Candidate> {
+fn search(context: &Context<'_>, link: Option<usize>) -> Option<Candidate> {
     let (data, fit) = (context.data, context.fit);
-    let columns = payload_columns(context, None);
+    let settings = Settings { com: None, stays: false, link };
+    let columns = columns_of(context, &settings);
     if columns.is_empty() {
         return None;
     }
     let (gram, _, _) = fit.gram.fitted(&fit.weights, |_| true);
     let steps = data.blocks_of(GRID);
-    let mut held = Search::new(context, &columns, &steps, &Solver::new(&gram, |c| fit.free[c]));
+    // A first moment has no sign: what a log lacks would be as good a body as what another one has.
+    let positive = if link.is_some() { link_body::INERTIA } else { 0 };
+    let mut held = Search::new(context, &columns, &steps, &Solver::new(&gram, |c| fit.free[c]), positive);
     let mut open = by_log(&steps);
     let mut chosen: Vec<(Range<usize>, Range<usize>)> = Vec::new();
     // The log that shows it best, then every other one that explains more with it.
@@ -230,8 +279,10 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     let keeps = |log: usize| windows.iter().any(|w| w.log == data.logs[log] && w.to.is_infinite());
     let ends = windows.iter().any(|w| w.to.is_finite());
     let stays = !ends && data.recordings.iter().filter(|r| r.clock >= first).all(|r| keeps(r.log));
-    let settings = Settings { com: None, stays }.into();
-    Some(Candidate { joints: all_joints(data), settings, windows, searched: held.searched })
+    let settings = Settings { stays, ..settings }.into();
+    let mut joints = all_joints(data);
+    joints.truncate(link.map_or(joints.len(), |link| link + 1));
+    Some(Candidate { joints, settings, windows, searched: held.searched })
 }
 
 /// Whether a run of steps of so many seconds can be a body that is held.
@@ -253,10 +304,18 @@ struct Search {
     coefficients: Vec<f64>,
     explained: f64,
     searched: f64,
+    /// Which coefficient no body has negative.
+    positive: usize,
 }
 
 impl Search {
-    fn new(context: &Context<'_>, columns: &[Column], steps: &[Block], base: &Solver) -> Search {
+    fn new(
+        context: &Context<'_>,
+        columns: &[Column],
+        steps: &[Block],
+        base: &Solver,
+        positive: usize,
+    ) -> Search {
         let empty = Sums::zero(base, columns.len());
         let mut before = vec![empty.clone()];
         for step in steps {
@@ -264,7 +323,7 @@ impl Search {
             sum.add(&Sums::of_block(context, base, columns, step), 1.0);
             before.push(sum);
         }
-        Search { before, found: empty, coefficients: Vec::new(), explained: 0.0, searched: 0.0 }
+        Search { before, found: empty, coefficients: Vec::new(), explained: 0.0, searched: 0.0, positive }
     }
 
     /// What was found and a run of steps, summed.
@@ -275,11 +334,11 @@ impl Search {
         sum
     }
 
-    /// What that explains with a positive mass.
+    /// What that explains where it can be a body.
     fn gain(&mut self, run: &Range<usize>) -> f64 {
         self.searched += 1.0;
         let (gain, x) = self.with(run).gain();
-        if x[0] > 0.0 { gain } else { 0.0 }
+        if x[self.positive] > 0.0 { gain } else { 0.0 }
     }
 
     fn take(&mut self, gain: f64, run: &Range<usize>) {

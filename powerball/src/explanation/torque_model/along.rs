@@ -1,6 +1,7 @@
 //! The model along logs: the same laws in the same order as in the controller's code.
 
 use super::TorqueModel;
+use crate::controller::JointNumber;
 use crate::controller::correction::{Law, Memory, Term, add_torques};
 use crate::controller::friction::TanhFriction;
 use crate::explanation::effects::{PASSES, SOFT, Window, each_instant, move_link, time_delay};
@@ -82,9 +83,9 @@ impl TorqueModel {
             return torque;
         };
         let added = payload.parameters();
-        let of_a_body = &ParameterKind::ALL[..added.len()];
-        let last: Vec<usize> = of_a_body.iter().map(|kind| body.last_link(*kind)).collect();
-        let Some(columns) = body.parameter_columns(&last, q, v, a) else { return torque };
+        let first = payload.link.map_or(body.dof() - 1, JointNumber::index) * ParameterKind::ALL.len();
+        let of_link: Vec<usize> = (first..first + added.len()).collect();
+        let Some(columns) = body.parameter_columns(&of_link, q, v, a) else { return torque };
         for (row, columns) in columns.chunks_exact(added.len()).enumerate().filter(|(row, _)| holds[row / n])
         {
             torque[row] += columns.iter().zip(&added).map(|(c, p)| c * p).sum::<f64>();

@@ -20,6 +20,7 @@ pub use changes::Unchanged;
 pub use file::FileError;
 pub use source::{ForC, Scalar, SourceError};
 
+use crate::controller::JointNumber;
 use crate::controller::correction::{Law, Term};
 use crate::identification::estimate::{JointFriction, ParameterEstimate, in_set_of};
 use crate::logs::regression::RigidArm;
@@ -89,13 +90,16 @@ pub struct LogChanges {
     pub delay: Vec<f64>,
 }
 
-/// A body in the last link's hand.
+/// A body that a link carries.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Payload {
     /// Its mass, kg.
     pub mass: f64,
-    /// Its centre in the last frame, m; it counts as a point.
+    /// Its centre in the link's frame, m; it counts as a point.
     pub com: [f64; 3],
+    /// The link, from 1; the last where none is named.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub link: Option<JointNumber>,
     /// The logs it is in.
     pub logs: Vec<String>,
     /// From when on, in each log's own t, s.
@@ -106,7 +110,7 @@ pub struct Payload {
 }
 
 impl Payload {
-    /// What it adds to the last link: m mx my mz Ixx Ixy Ixz Iyy Iyz Izz.
+    /// What it adds to its link: m mx my mz Ixx Ixy Ixz Iyy Iyz Izz.
     #[must_use]
     pub fn parameters(&self) -> [f64; 10] {
         let (m, [x, y, z]) = (self.mass, self.com);

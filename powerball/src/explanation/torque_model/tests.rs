@@ -105,6 +105,7 @@ fn every_law_comes_back_from_the_file() {
     written.additions.log_changes.delay = vec![0.0, 0.004, 0.0, 0.0, 0.0, 0.0];
     written.additions.arm_changes.not_zero = vec!["my3".into()];
     written.additions.payloads = vec![Payload {
+        link: None,
         mass: 2.0,
         com: [0.0, 0.1, 0.2],
         logs: vec!["a.csv".into(), "b.csv".into()],
@@ -177,6 +178,7 @@ fn a_payload_weighs_what_it_should() {
     let body = body();
     let mut loaded = model(&body, &[]);
     loaded.additions.payloads = vec![Payload {
+        link: None,
         mass: 2.0,
         com: [0.1, 0.0, 0.05],
         logs: Vec::new(),

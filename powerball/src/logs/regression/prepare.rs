@@ -88,7 +88,7 @@ pub struct Data<'a> {
     /// Whether each joint has a fit of its own (see [`Data::set_per_joint`]).
     pub per_joint: bool,
     top_velocity: Vec<f64>,
-    last_link: OnceLock<Vec<Column>>,
+    links: Vec<OnceLock<Vec<Column>>>,
     force: OnceLock<Vec<Column>>,
     declared_zero: OnceLock<Vec<Column>>,
     pull: [OnceLock<Vec<Column>>; 3],
@@ -196,7 +196,7 @@ impl<'a> Data<'a> {
                 left_out: left_out.clone(),
                 per_joint: false,
                 top_velocity: top_velocity.clone(),
-                last_link: OnceLock::new(),
+                links: vec![OnceLock::new(); n],
                 force: OnceLock::new(),
                 declared_zero: OnceLock::new(),
                 pull: Default::default(),
@@ -225,7 +225,7 @@ impl<'a> Data<'a> {
             notes: self.notes.clone(),
             per_joint: false,
             top_velocity: self.top_velocity.clone(),
-            last_link: OnceLock::new(),
+            links: vec![OnceLock::new(); self.dof()],
             force: OnceLock::new(),
             declared_zero: OnceLock::new(),
             pull: Default::default(),
@@ -301,12 +301,11 @@ impl<'a> Data<'a> {
         blocks_of(&self.recordings, &self.joints, &self.band, length)
     }
 
-    /// The ten inertial parameters of the last link as columns over all joints; empty where they cannot be
-    /// had.
-    pub fn last_link_columns(&self) -> &[Column] {
-        self.last_link.get_or_init(|| {
-            let chosen: Vec<usize> =
-                ParameterKind::ALL[..10].iter().map(|kind| self.body.last_link(*kind)).collect();
+    /// The ten inertial parameters of a link as columns over all joints; empty where they cannot be had.
+    pub fn link_columns(&self, link: usize) -> &[Column] {
+        self.links[link].get_or_init(|| {
+            let first = link * ParameterKind::ALL.len();
+            let chosen: Vec<usize> = (first..first + 10).collect();
             self.columns_over_all(10, |r| self.body.parameter_columns(&chosen, &r.q, &r.v, &r.a))
         })
     }

@@ -155,10 +155,10 @@ fn friction(found: &Model) -> Vec<JointFriction> {
 
 /// A payload of a model, where a part is one.
 fn payload(part: &Part, windows: &[Window]) -> Option<Payload> {
-    let Part::Payload(mass, com) = *part else { return None };
+    let Part::Payload(mass, com, link) = *part else { return None };
     let logs = windows.iter().map(|w| w.log.clone()).collect();
     let start_time = windows.iter().map(|w| w.from).collect();
-    Some(Payload { mass, com, logs, start_time, end_time: Window::ends(windows) })
+    Some(Payload { mass, com, link, logs, start_time, end_time: Window::ends(windows) })
 }
 
 /// Takes the torque of some accepted effects out of residuals.

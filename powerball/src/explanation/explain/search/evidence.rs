@@ -21,6 +21,9 @@ pub(crate) struct Evidence {
     pub(crate) fold_gains: Vec<f64>,
     /// The same on the validation set: the median over its logs.
     pub(crate) validation_gain: f64,
+    /// Of an event: how much of what its time has more than other times of squared error stays; 1 and more where that
+    /// time has no more than others.
+    pub(crate) event_left: Option<f64>,
 }
 
 impl Evidence {
@@ -85,7 +88,12 @@ pub(crate) fn evidence(
             )
         }
     };
+    let event_left = match extent {
+        Extent::Short(_) => Some(event_left(screen, trial)),
+        _ => None,
+    };
     Evidence {
+        event_left,
         score: trial.score,
         p_value,
         fold_gains,
@@ -220,6 +228,32 @@ fn event_gains(screen: &Screen<'_>, trial: &Trial) -> Vec<f64> {
             (*square > 0.0).then(|| (2.0 * dot(&x, right) - quadratic) / square)
         })
         .collect()
+}
+
+/// See [`Evidence::event_left`]. Other times are told by the median over blocks, so that other events do not count.
+fn event_left(screen: &Screen<'_>, trial: &Trial) -> f64 {
+    let (data, fit) = (screen.context.data, screen.context.fit);
+    let after = left(screen, trial, &screen.residualised(trial));
+    let (mut excess, mut stays) = (0.0, 0.0);
+    for (j, residual) in screen.context.residual.iter().enumerate() {
+        let inside = |i: &usize| trial.columns.iter().any(|c| c.at(j).is_some_and(|v| v[*i] != 0.0));
+        let rows: Vec<usize> = (0..residual.len()).filter(inside).collect();
+        let mut elsewhere: Vec<f64> = (data.blocks.iter())
+            .filter(|block| !block.rows[j].is_empty())
+            .map(|block| mean_square(&residual[block.rows[j].clone()]))
+            .collect();
+        elsewhere.sort_by(f64::total_cmp);
+        let usual = elsewhere.get(elsewhere.len() / 2).copied().unwrap_or(0.0);
+        for i in rows {
+            excess += fit.weights[j] * (residual[i] * residual[i] - usual);
+            stays += fit.weights[j] * (after[j][i] * after[j][i] - usual);
+        }
+    }
+    if excess > 0.0 { stays.max(0.0) / excess } else { f64::INFINITY }
+}
+
+fn mean_square(x: &[f64]) -> f64 {
+    dot(x, x) / x.len().max(1) as f64
 }
 
 /// What a trial adds to the prediction on the validation set, by joint and row, N·m.

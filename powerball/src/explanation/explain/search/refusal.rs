@@ -27,6 +27,15 @@ pub(crate) fn refusal(rule: &Rule, evidence: &Evidence, tests: f64, local: bool)
     if let Some(worst) = folds.iter().copied().reduce(f64::min).filter(|w| *w < rule.worst_fold) {
         return Some(format!("one held-out fold is {:.0} % worse", -100.0 * worst));
     }
+    // A push is where errors are larger than elsewhere, and explains that.
+    if let Some(left) = evidence.event_left.filter(|left| *left > rule.event_left) {
+        return Some(match left.is_finite() {
+            true => {
+                format!("leaves {:.0} % of what its time has more than others of squared error", 100.0 * left)
+            }
+            false => "its time has no larger error than others".to_string(),
+        });
+    }
     // What happens in some logs only need not happen in the validation set.
     if evidence.validation_gain <= 0.0 && !local {
         return Some(format!(

@@ -12,12 +12,15 @@ use crate::logs::regression::RigidArm;
 use crate::virtual_arm::{Body, Dynamics, Plant, PlantEffect as Effect, Sensors};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
+use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
 const PAYLOAD: f64 = 0.2;
+/// Length of the first link of the arm in a plane, m.
+const CRANK: f64 = 0.4;
 /// The first logs are fitted, the rest judges.
 const FITTED: usize = 4;
 const LOGS: usize = 6;
@@ -184,6 +187,58 @@ fn the_same_push_is_seen_in_other_logs_and_another_one_is_not() {
     let excess = |rms: &[f64]| rms[0].powi(2) - alone.noise_floor[0].powi(2);
     let (before, after) = (excess(&alone.before.validate.rms), excess(&alone.after.validate.rms));
     assert!(after < 0.1 * before, "{before} {after}");
+}
+
+/// Two pushes with a pause of 0.7 s are two, each with its own force.
+#[test]
+fn pushes_close_to_each_other_are_told_apart() {
+    let push = |force, start| Effect::ContactWrench { force, start, length: 1.0, every: 1e3 };
+    let pushes = [push([2.0, 6.0, 0.0], 6.0), push([6.0, -2.0, 0.0], 7.7), push([3.0, 6.0, 0.0], 12.0)];
+    let [a, b, c] = pushes.map(|push| (push, &[2usize][..]));
+    let explained = explained_of(planar(), &[a, b, c]);
+    assert_eq!(names(&explained), ["contact_wrench"]);
+    let mut spans = spans(&explained);
+    spans.sort_by(|a, b| a.0.total_cmp(&b.0));
+    assert_eq!(spans.len(), 3, "{spans:?}");
+    for ((from, to), start) in spans.into_iter().zip([6.0, 7.7, 12.0]) {
+        assert!((from - start).abs() < 0.3 && (to - start - 1.0).abs() < 0.3, "{from} {to}");
+    }
+}
+
+/// What is bolted to a link that is not the last is a body on that link. Where the link's joint stands still in
+/// space its mass does not show, and is not given.
+#[test]
+fn a_body_on_another_link_is_found_there() {
+    let (arm, usual) = planar();
+    let (mass, centre) = (0.5, Vector3::new(-0.12, 0.06, 0.0));
+    let mut bodies = usual.dynamics().bodies().to_vec();
+    let body = Body::about_centre(mass, centre, Matrix3::identity() * 1e-4, 0.0);
+    bodies[0].mass += body.mass;
+    bodies[0].moment += body.moment;
+    bodies[0].inertia += body.inertia;
+    let loaded = plant(&arm, bodies, &[4.0, 2.0], &[0.2, 0.06]);
+    // In a fitted log and one to judge on; in one of each kind only.
+    for listed in [&[1usize, 4][..], &[2], &[5]] {
+        let mut logs = recorded(&arm, &usual, &[]);
+        let with = recorded(&arm, &loaded, &[]);
+        for k in listed {
+            logs[*k] = with[*k].clone();
+        }
+        let explained = explained_logs(&arm, logs);
+        assert_eq!(names(&explained), ["payload"], "{listed:?}");
+        let found = figures(&explained.effects[0]);
+        assert_eq!(found["link"], 1);
+        assert!(found.get("mass").is_none() && found.get("com").is_none(), "{found}");
+        // The joint is at the frame's origin less the link's length along x.
+        let truth = mass * (centre + Vector3::new(CRANK, 0.0, 0.0));
+        for (axis, truth) in truth.iter().enumerate() {
+            let moment = found["first_moment"][axis].as_f64().unwrap();
+            assert!((moment - truth).abs() < 0.1 * 0.2, "{found} {truth}");
+        }
+        let logs: Vec<String> = listed.iter().map(|k| format!("log{k}")).collect();
+        assert_eq!(explained.effects[0].logs, logs);
+        at_the_floor(&explained);
+    }
 }
 
 #[test]
