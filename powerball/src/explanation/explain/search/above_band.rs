@@ -53,7 +53,9 @@ fn search(study: &Study<'_>, model: &Model) -> Vec<Ripple> {
     let rule = study.rule();
     let of = |data: &Data<'_>| -> Vec<Vec<Trace>> {
         let context = Context::for_columns(data, &model.fit, rule);
-        (context.rigid(), context.friction());
+        // Made once, before joints ask for them from several threads.
+        context.rigid();
+        context.friction();
         let joints: Vec<usize> = (0..data.dof()).collect();
         parallel::map(&joints, |j| traces(&context, model, *j))
     };

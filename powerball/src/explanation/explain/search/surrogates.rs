@@ -229,7 +229,7 @@ mod tests {
             rows,
             band: Band::new(10.0, 200.0),
         };
-        let (one, two) = ([rows(vec![0..1000])], [rows(vec![0..500, 500..1000])]);
+        let (one, two) = ([rows(std::iter::once(0..1000).collect())], [rows(vec![0..500, 500..1000])]);
         let (constant, signs) = (vec![Column::on(0, vec![2.0; 1000])], [1.0, -1.0]);
         assert!(surrogate(&constant, &one, 0.9, 0.3, &signs[..1]).is_none());
         assert!(surrogate(&constant, &two, 0.9, 0.3, &[1.0, 1.0]).is_none());
