@@ -176,3 +176,39 @@ fn the_zeros_of_the_kinova_are_found_from_two_logs() {
 fn the_zeros_of_the_kinova_are_found_the_other_way_round_at_length() {
     the_zeros_of_the_kinova_are_found(&[1, 3, 5], &[2, 4]);
 }
+
+/// By their owners: 105 g on the housing of the insertion axis, which is link 2 and does not slide; its first moment about
+/// the remote centre is 0.056 kg·m. By hand, from the difference of the logs, 0.054.
+#[test]
+fn a_mass_on_the_second_link_of_the_dvrk_is_found_there() {
+    for [fit, validate] in [[&["clean", "ins105"][..], &["other"]], [&["clean"], &["ins105"]]] {
+        let named = |logs: &[&str]| -> Vec<String> { logs.iter().map(ToString::to_string).collect() };
+        let Some(explained) = explained("psm_masses", &named(fit), &named(validate)) else { return };
+        let payload = explained.effects.iter().find(|e| e.effect == "payload").unwrap();
+        assert!(payload.logs.len() == 1 && payload.logs[0].contains("ins105"), "{:?}", payload.logs);
+        let figures = figures(payload);
+        assert_eq!(figures["link"], 2);
+        let moment = figures["first_moment"][1].as_f64().unwrap();
+        assert!((0.042..0.062).contains(&moment), "{figures}");
+        assert!(joints(&explained, "contact_wrench").is_empty());
+    }
+}
+
+/// A hand pushes five times, read off the difference to a log of the same path.
+#[test]
+fn every_push_on_the_ur5_is_found() {
+    let named = |logs: &[&str]| -> Vec<String> { logs.iter().map(ToString::to_string).collect() };
+    let (fit, validate) = (named(&["no7", "no8", "no9_pushed"]), named(&["no9"]));
+    let Some(explained) = explained("ur5_pushes", &fit, &validate) else { return };
+    let figures = figures_of(&explained, "contact_wrench");
+    let times = |key: &str| -> Vec<f64> {
+        figures[key].as_array().unwrap().iter().filter_map(serde_json::Value::as_f64).collect()
+    };
+    let spans: Vec<(f64, f64)> = times("start_time").into_iter().zip(times("end_time")).collect();
+    assert_eq!(spans.len(), 5, "{spans:?}");
+    for (from, to) in [(4.4, 5.3), (5.9, 6.8), (10.4, 11.2), (12.0, 13.1), (13.8, 14.6)] {
+        let shared = |(a, b): &(f64, f64)| (b.min(to) - a.max(from)).max(0.0);
+        let found: f64 = spans.iter().map(shared).sum();
+        assert!(found > 0.6 * (to - from), "{from} to {to}: {spans:?}");
+    }
+}
