@@ -83,7 +83,7 @@ pub struct Rule {
     /// their excess over the fitted logs.
     pub much_left: f64,
     /// An event of some seconds (a push) is not given where more than this share of what its time has more than others
-    /// of squared error stays: three quarters, since a push has no simple form and other things are there as well.
+    /// of squared error stays: what explains less than half of it is something else.
     pub event_left: f64,
     /// An effect of which this share is missing in some octave, and by more than
     /// [`missing_errors`](Self::missing_errors), is not the effect that it is called: most of it is not
@@ -192,7 +192,7 @@ impl Default for Rule {
             least_margin: 1.1,
             same_part: 0.9,
             much_left: 0.35,
-            event_left: 0.75,
+            event_left: 0.5,
             least_missing: 0.5,
             missing_errors: 3.2,
             right: 0.97,

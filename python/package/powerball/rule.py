@@ -84,9 +84,8 @@ class Rule:
     #: earlier trial on other data.
     much_left: float = 0.35
     #: An event of some seconds (a push) is not given where more than this share of what its time has more
-    #: than others of squared error stays: three quarters, since a push has no simple form and other things
-    #: are there as well.
-    event_left: float = 0.75
+    #: than others of squared error stays: what explains less than half of it is something else.
+    event_left: float = 0.5
     #: An effect of which this share is missing in some octave, and by more than ``missing_errors``, is not
     #: the effect that it is called: most of it is not there.
     least_missing: float = 0.5

@@ -67,7 +67,7 @@ impl Drop for Progress {
     fn drop(&mut self) {
         let Some(mut phases) = self.phases.as_ref().and_then(|phases| phases.lock().ok()) else { return };
         phases.push(Phase::from_now(""));
-        eprintln!("{}", times(&phases));
+        eprint!("{}", times(&phases));
     }
 }
 

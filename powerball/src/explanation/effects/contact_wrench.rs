@@ -107,7 +107,10 @@ impl Effect for ContactWrench {
         seen.windows.retain(|w| !data.logs.contains(&w.log));
         let lasted = seen.windows.iter().map(|w| w.to - w.from).fold(f64::INFINITY, f64::min);
         let steps = data.blocks_of(FINE);
-        let explains = explained(context, data.force_columns(), c, &steps);
+        // Of a push the mean of its half wave: it explains over its time what its own form would explain there.
+        let mean = if Settings::of(candidate) == Some(&Settings::Push) { 2.0 / PI } else { 1.0 };
+        let force: Vec<f64> = c.iter().map(|c| mean * c).collect();
+        let explains = explained(context, data.force_columns(), &force, &steps);
         for log in by_log(&steps) {
             let chance = 4.0 * (log.len().max(1) as f64).ln();
             let mut open = vec![log.clone()];

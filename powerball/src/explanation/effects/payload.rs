@@ -1,4 +1,5 @@
-//! A body held by the last link or carried by another one, from the start of a log or from some time on, to its end or to some time.
+//! A body held by the last link or carried by another one, from the start of a log or from some time on, to its
+//! end or to some time.
 
 use super::link_body::{self, Body};
 use super::window_sums::{Sums, explained};

@@ -2,9 +2,9 @@
 
 use super::Butterworth;
 
-/// The bands of an analysis, Hz, widest first, an octave apart: each is made of the one before. Above the widest, accelerations are
-/// noise of positions differentiated twice, and arms are hardly rigid; a motion and what friction does at its
-/// reversals are slower than the narrowest.
+/// The bands of an analysis, Hz, widest first, an octave apart: each is made of the one before. Above the widest,
+/// accelerations are noise of positions differentiated twice, and arms are hardly rigid; a motion and what
+/// friction does at its reversals are slower than the narrowest.
 pub const BANDS: [f64; 3] = [7.0, 3.5, 1.75];
 
 /// A low-pass band with its decimation, the same on both sides of a regression.

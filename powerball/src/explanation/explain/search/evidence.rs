@@ -78,19 +78,18 @@ pub(crate) fn evidence(
     extent: Extent,
     validation: Option<(&Validation<'_>, &[Column])>,
 ) -> Evidence {
-    let (p_value, fold_gains) = match extent {
-        Extent::Short(seconds) => (by_chance(screen, trial, seconds), event_gains(screen, trial)),
+    let (p_value, fold_gains, event_left) = match extent {
+        Extent::Short(seconds) => {
+            let columns = screen.residualised(trial);
+            let after = left(screen, trial, &columns);
+            let by_chance = by_chance(screen, trial, &after, seconds);
+            (by_chance, event_gains(screen, trial, &columns), Some(event_left(screen, trial, &after)))
+        }
         _ => {
             let local = extent != Extent::Everywhere;
-            (
-                wald(screen, trial, &screen.context.data.blocks),
-                fold_gains(screen, trial, joints, folds, local),
-            )
+            let p_value = wald(screen, trial, &screen.context.data.blocks);
+            (p_value, fold_gains(screen, trial, joints, folds, local), None)
         }
-    };
-    let event_left = match extent {
-        Extent::Short(_) => Some(event_left(screen, trial)),
-        _ => None,
     };
     Evidence {
         event_left,
@@ -170,9 +169,9 @@ pub(super) fn left(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]
 /// The probability of the gain by chance, for an event of some seconds, too short for blocks. Gains are over
 /// the variance inflation of means over 1 s; slow noise looks like an event that lasts as long as it stays,
 /// so it is that of means over the event's own duration that counts.
-fn by_chance(screen: &Screen<'_>, trial: &Trial, seconds: f64) -> f64 {
+fn by_chance(screen: &Screen<'_>, trial: &Trial, after: &[Vec<f64>], seconds: f64) -> f64 {
     let data = screen.context.data;
-    let slower: Vec<f64> = (left(screen, trial, &screen.residualised(trial)).iter().enumerate())
+    let slower: Vec<f64> = (after.iter().enumerate())
         .filter(|(j, e)| !e.is_empty() && trial.columns.iter().any(|c| c.at(*j).is_some()))
         .map(|(j, e)| {
             let inflation = |over: f64| variance_inflation(data, j, e, over);
@@ -192,9 +191,8 @@ const EVENT_PARTS: usize = 5;
 /// others. Rows are dealt to the parts in turn: a part in one piece would ask whether the noise of a fifth of
 /// the event is smaller than the event, while what tells an event from slow noise is what its log holds
 /// elsewhere ([`by_chance`]).
-fn event_gains(screen: &Screen<'_>, trial: &Trial) -> Vec<f64> {
+fn event_gains(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) -> Vec<f64> {
     let fit = screen.context.fit;
-    let columns = screen.residualised(trial);
     let k = trial.columns.len();
     let mut parts = vec![(Mat::<f64>::zeros(k, k), vec![0.0; k], 0.0); EVENT_PARTS];
     for j in 0..fit.design.dof() {
@@ -231,9 +229,8 @@ fn event_gains(screen: &Screen<'_>, trial: &Trial) -> Vec<f64> {
 }
 
 /// See [`Evidence::event_left`]. Other times are told by the median over blocks, so that other events do not count.
-fn event_left(screen: &Screen<'_>, trial: &Trial) -> f64 {
+fn event_left(screen: &Screen<'_>, trial: &Trial, after: &[Vec<f64>]) -> f64 {
     let (data, fit) = (screen.context.data, screen.context.fit);
-    let after = left(screen, trial, &screen.residualised(trial));
     let (mut excess, mut stays) = (0.0, 0.0);
     for (j, residual) in screen.context.residual.iter().enumerate() {
         let inside = |i: &usize| trial.columns.iter().any(|c| c.at(j).is_some_and(|v| v[*i] != 0.0));
