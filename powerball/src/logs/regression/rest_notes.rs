@@ -4,8 +4,8 @@ use super::{JointRows, Recording};
 use crate::controller::JointNumber;
 use crate::logs::signal::{Band, rest};
 
-/// With fewer rows than these nothing is said of a joint.
-pub(crate) const FEWEST_ROWS: usize = 20;
+/// With fewer rows than these nothing is said of a joint: 0.8 s of motion in the widest band.
+pub(crate) const FEWEST_ROWS: usize = 14;
 
 /// A note where a joint with so many of all `samples` in the band rests in most or much of them. `limit`
 /// is the velocity below which it rests, rad/s, where it is one for all logs.
