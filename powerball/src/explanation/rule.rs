@@ -51,8 +51,12 @@ pub struct Rule {
     pub event_surrogate_level: f64,
     /// Surrogates that a step asks.
     pub step_surrogates: usize,
-    /// Surrogates that state the false-positive rate, and those that judge ripple above the band.
+    /// Those for which an effect's search for logs and times is done again.
+    pub searched_surrogates: usize,
+    /// Surrogates that state the false-positive rate.
     pub final_surrogates: usize,
+    /// Those that judge ripple above the band.
+    pub peak_surrogates: usize,
     /// A shifted column that still correlates so much with the unshifted one (a periodic motion) is no
     /// surrogate.
     pub surrogate_correlation: f64,
@@ -181,8 +185,10 @@ impl Default for Rule {
             longest_block: 2.0,
             surrogate_level: 0.99,
             event_surrogate_level: 0.75,
-            step_surrogates: 60,
-            final_surrogates: 200,
+            step_surrogates: 2000,
+            searched_surrogates: 60,
+            final_surrogates: 2000,
+            peak_surrogates: 200,
             surrogate_correlation: 0.4,
             mends_only: 0.15,
             mends_any: 0.05,

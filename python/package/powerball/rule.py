@@ -54,9 +54,13 @@ class Rule:
     #: quarter of a log.
     event_surrogate_level: float = 0.75
     #: Surrogates that a step asks.
-    step_surrogates: int = 60
-    #: Surrogates that state the false-positive rate, and those that judge ripple above the band.
-    final_surrogates: int = 200
+    step_surrogates: int = 2000
+    #: Those for which an effect's search for logs and times is done again.
+    searched_surrogates: int = 60
+    #: Surrogates that state the false-positive rate.
+    final_surrogates: int = 2000
+    #: Those that judge ripple above the band.
+    peak_surrogates: int = 200
     #: A shifted column that still correlates so much with the unshifted one (a periodic motion) is no
     #: surrogate.
     surrogate_correlation: float = 0.4

@@ -142,7 +142,7 @@ fn refused(groups: &[Group]) -> Vec<Rival> {
 fn above_chance(study: &Study<'_>, screen: &Screen<'_>, group: &Group, number: usize) -> Vec<usize> {
     let rule = study.rule();
     let trials: Vec<&Trial> = group.passing().map(|m| &m.trial).collect();
-    let (count, seed) = (rule.step_surrogates, number as u64);
+    let seed = number as u64;
     // A push that is shifted in time may fall onto another one: most of its surrogates must score less, not all.
     let short = group.passing().any(|m| matches!(Extent::of(&m.candidate), Extent::Short(_)));
     let share = if short { rule.event_surrogate_level } else { rule.surrogate_level };
@@ -150,10 +150,11 @@ fn above_chance(study: &Study<'_>, screen: &Screen<'_>, group: &Group, number: u
         scores.sort_by(f64::total_cmp);
         scores.get((scores.len() as f64 * share) as usize).copied().unwrap_or(0.0)
     };
-    let mut level = exceeded(scores(screen, &trials, count, seed));
+    let mut level = exceeded(scores(screen, &trials, rule.step_surrogates, seed));
     // Whether in some logs, and from when on, was looked for: chance is what that search finds.
     if group.passing().any(|m| Extent::of(&m.candidate) == Extent::SomeLogs) {
-        level = level.max(exceeded(searched_again(screen.context, group.effect, count, seed)));
+        level =
+            level.max(exceeded(searched_again(screen.context, group.effect, rule.searched_surrogates, seed)));
     }
     let above = |m: &Member| m.refusal.is_none() && m.trial.score > level;
     (0..group.members.len()).filter(|m| above(&group.members[*m])).collect()

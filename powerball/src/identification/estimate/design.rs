@@ -95,13 +95,18 @@ impl Design {
             .subrows(rows.start, rows.len())
     }
 
+    /// The columns that act on a joint: place in the global order, values by row.
+    pub(crate) fn columns(&self, joint: usize) -> impl Iterator<Item = (usize, &[f64])> {
+        let local = &self.joints[joint];
+        local.global.iter().copied().zip(local.values.chunks_exact(local.rows.max(1)))
+    }
+
     /// The prediction on a joint's rows.
     #[must_use]
     pub fn predict(&self, joint: usize, theta: &[f64]) -> Vec<f64> {
-        let local = &self.joints[joint];
-        let mut out = vec![0.0; local.rows];
-        for (column, g) in local.values.chunks_exact(local.rows.max(1)).zip(&local.global) {
-            let value = theta[*g];
+        let mut out = vec![0.0; self.joints[joint].rows];
+        for (g, column) in self.columns(joint) {
+            let value = theta[g];
             if value != 0.0 {
                 out.iter_mut().zip(column).for_each(|(o, c)| *o += value * c);
             }

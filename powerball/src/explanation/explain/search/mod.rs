@@ -19,6 +19,7 @@ mod groups;
 mod refinement;
 mod refusal;
 mod screen;
+mod shifts;
 mod surrogates;
 mod traces;
 

@@ -41,6 +41,26 @@ pub(crate) struct Trial {
     pub(crate) score: f64,
 }
 
+/// Weighted products of a candidate's columns.
+#[derive(Clone, Debug)]
+pub(super) struct Products {
+    /// By column: with the columns of the base.
+    pub(super) cross: Vec<Vec<f64>>,
+    /// With each other, the lower triangle.
+    pub(super) square: Mat<f64>,
+    /// By column: with the residual.
+    pub(super) score: Vec<f64>,
+}
+
+/// What columns explain beside the base; a [`Trial`] without its columns.
+#[derive(Clone, Debug)]
+pub(super) struct Solved {
+    theta: Vec<f64>,
+    base: Vec<Vec<f64>>,
+    gain: f64,
+    pub(super) score: f64,
+}
+
 /// What a score takes off a gain: for coefficients, and for having searched.
 pub(crate) fn penalty(rule: &Rule, coefficients: usize, searched: f64) -> f64 {
     rule.per_coefficient * coefficients as f64 + 2.0 * searched.max(1.0).ln()
@@ -92,16 +112,26 @@ impl<'c> Screen<'c> {
         if columns.is_empty() || !columns.iter().all(Column::is_finite) {
             return None;
         }
+        let Solved { theta, base, gain, score } = self.solve(&self.products(&columns), searched)?;
+        Some(Trial { columns, theta, base, gain, score })
+    }
+
+    /// The joints that columns act on and that count.
+    pub(super) fn joints_of(&self, columns: &[Column]) -> impl Iterator<Item = usize> {
+        let fit = self.context.fit;
+        (0..fit.design.dof())
+            .filter(move |j| fit.weights[*j] != 0.0 && columns.iter().all(|c| c.at(*j).is_some()))
+    }
+
+    /// The products of columns with the base, with each other and with the residual.
+    pub(super) fn products(&self, columns: &[Column]) -> Products {
         let fit = self.context.fit;
         let k = columns.len();
         let mut cross = vec![vec![0.0; fit.design.size]; k];
         let (mut square, mut score) = (Mat::<f64>::zeros(k, k), vec![0.0; k]);
-        for j in 0..fit.design.dof() {
+        for j in self.joints_of(columns) {
             let parts: Vec<&[f64]> = columns.iter().filter_map(|c| c.at(j)).collect();
             let w = fit.weights[j];
-            if parts.len() < k || w == 0.0 {
-                continue;
-            }
             let residual = &self.context.residual[j];
             for (g, values) in fit.design.cross(j, &(0..residual.len()), &parts) {
                 for c in 0..k {
@@ -115,6 +145,14 @@ impl<'c> Screen<'c> {
                 score[a] += w * dot(parts[a], residual);
             }
         }
+        Products { cross, square, score }
+    }
+
+    /// What columns explain beside the base, from their products.
+    pub(super) fn solve(&self, products: &Products, searched: f64) -> Option<Solved> {
+        let Products { cross, square, score } = products;
+        let (mut square, mut score) = (square.clone(), score.clone());
+        let k = cross.len();
         let base: Vec<Vec<f64>> = cross.iter().map(|c| self.solver.solve(c)).collect();
         let raw: Vec<f64> = (0..k).map(|a| square[(a, a)]).collect();
         for a in 0..k {
@@ -134,7 +172,7 @@ impl<'c> Screen<'c> {
         let theta = solver.solve(&score);
         let gain = dot(&theta, &score);
         let score = gain - penalty(self.context.rule, solver.kept().len(), searched);
-        gain.is_finite().then_some(Trial { columns, theta, base, gain, score })
+        gain.is_finite().then_some(Solved { theta, base, gain, score })
     }
 
     /// The gain by joint: on the only joint all of it, else where the squared error falls.

@@ -1,5 +1,5 @@
-//! Surrogates: candidates shifted in time, or with the signs of recordings drawn, that cannot be true, asked the same questions. They tell how often these
-//! very data say yes by chance.
+//! Surrogates: candidates shifted in time, or with the signs of recordings drawn, that cannot be true, asked the same
+//! questions. They tell how often these very data say yes by chance.
 
 use super::super::model::Model;
 use super::super::named::FalsePositives;
@@ -7,12 +7,12 @@ use super::super::study::Study;
 use super::evidence::{Extent, evidence};
 use super::groups::{Among, groups};
 use super::refusal::refusal;
-use super::screen::{Screen, Trial};
+use super::screen::{Products, Screen, Trial};
+use super::shifts::{Shift, products, unlike};
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Context, Effect};
 use crate::logs::parallel;
 use crate::logs::regression::{Column, JointRows};
-use crate::logs::vector::dot;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::Range;
@@ -21,77 +21,53 @@ use std::sync::Arc;
 /// Draws the final surrogates; a step draws by its number.
 const FINAL_SEED: u64 = 99;
 
-/// What surrogates scored.
-#[derive(Clone, Debug, Default)]
-struct Surrogates {
-    /// Their penalised scores.
-    scores: Vec<f64>,
-    /// How many the rule accepted.
-    accepted: usize,
-    /// How many draws had none: as they are drawn, they would be what they are drawn from.
-    without: usize,
+/// A surrogate: of which trial, how it was made, and what it scores.
+struct Surrogate {
+    which: usize,
+    shift: Shift,
+    score: f64,
 }
 
 /// The penalised scores of surrogates of these trials.
 #[must_use]
 pub(crate) fn scores(screen: &Screen<'_>, trials: &[&Trial], count: usize, seed: u64) -> Vec<f64> {
-    draw(screen, trials, count, seed, |_, _| false).scores
+    draw(screen, trials, count, seed).into_iter().flatten().map(|s| s.score).collect()
 }
 
-/// Draws surrogates of real trials and asks each whether it is accepted.
-fn draw(
-    screen: &Screen<'_>,
-    trials: &[&Trial],
-    count: usize,
-    seed: u64,
-    accepts: impl Fn(usize, &Trial) -> bool + Sync,
-) -> Surrogates {
+/// Draws surrogates of real trials; `None` for one that would be what it is drawn from.
+///
+/// Columns are shifted in time within each recording. Where a shift leaves one of them what it was (a constant
+/// torque, a wave of this very period), the signs of the recordings are drawn as well, the same for all columns.
+/// Neither helps a constant in a single recording: it has no surrogate.
+fn draw(screen: &Screen<'_>, trials: &[&Trial], count: usize, seed: u64) -> Vec<Option<Surrogate>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let recordings = screen.context.data.joints.iter().map(|j| j.rows.len()).max().unwrap_or(0);
-    let draws: Vec<(usize, f64, Vec<f64>)> = (0..count)
-        .map(|k| {
-            let fraction = rng.random_range(0.15..0.85);
-            // The first keeps its sign, since a column with all of them turned is the same column.
-            let sign = |r: usize| if r > 0 && rng.random_bool(0.5) { -1.0 } else { 1.0 };
-            (k % trials.len().max(1), fraction, (0..recordings).map(sign).collect())
-        })
-        .collect();
-    let limit = screen.context.rule.surrogate_correlation;
-    let outcomes = parallel::map(&draws, |(which, fraction, signs)| {
-        let trial = trials.get(*which)?;
-        let columns = surrogate(&trial.columns, &screen.context.data.joints, limit, *fraction, signs)?;
-        let surrogate = screen.try_columns(columns, 1.0)?;
-        Some((surrogate.score, accepts(*which, &surrogate)))
-    });
-    let mut surrogates = Surrogates::default();
-    for outcome in outcomes {
-        match outcome {
-            Some((score, accepted)) => {
-                surrogates.scores.push(score);
-                surrogates.accepted += usize::from(accepted);
-            }
-            None => surrogates.without += 1,
+    let mut by_trial: Vec<Vec<Shift>> = vec![Vec::new(); trials.len()];
+    for k in 0..count {
+        let fraction = rng.random_range(0.15..0.85);
+        // The first keeps its sign, since a column with all of them turned is the same column.
+        let sign = |r: usize| if r > 0 && rng.random_bool(0.5) { -1.0 } else { 1.0 };
+        let shift = Shift { fraction, signs: (0..recordings).map(sign).collect() };
+        if let Some(of_trial) = by_trial.get_mut(k % trials.len().max(1)) {
+            of_trial.push(shift);
         }
     }
-    surrogates
-}
-
-/// Columns that cannot be true: shifted in time within each recording. Where a shift leaves one of them what it was
-/// (a constant torque, a wave of this very period), the signs of the recordings are drawn as well, the same
-/// for all columns. Neither helps a constant in a single recording: it has no surrogate.
-fn surrogate(
-    columns: &[Column],
-    joints: &[JointRows],
-    limit: f64,
-    fraction: f64,
-    signs: &[f64],
-) -> Option<Vec<Column>> {
-    let shifted: Vec<Column> = columns.iter().map(|c| shifted(c, joints, fraction)).collect();
-    if !columns.iter().zip(&shifted).any(|(a, b)| alike(a, b) > limit) {
-        return Some(shifted);
-    }
-    let turned: Vec<Column> = shifted.iter().map(|c| turned(c, joints, signs)).collect();
-    (!columns.iter().zip(&turned).any(|(a, b)| cosine(a, b).abs() > limit)).then_some(turned)
+    let limit = screen.context.rule.surrogate_correlation;
+    let of_trial = |(which, shifts): (usize, Vec<Shift>)| {
+        let columns = &trials[which].columns;
+        let unlike = unlike(columns, &screen.context.data.joints, &shifts, limit);
+        let mut outcomes: Vec<Option<Surrogate>> =
+            unlike.iter().filter(|shift| shift.is_none()).map(|_| None).collect();
+        let shifts: Vec<Shift> = unlike.into_iter().flatten().collect();
+        let asked: Vec<(Shift, Products)> =
+            shifts.iter().cloned().zip(products(screen, columns, &shifts)).collect();
+        outcomes.extend(parallel::map(&asked, |(shift, products)| {
+            let score = screen.solve(products, 1.0)?.score;
+            Some(Surrogate { which, shift: shift.clone(), score })
+        }));
+        outcomes
+    };
+    by_trial.into_iter().enumerate().flat_map(of_trial).collect()
 }
 
 /// What the search of an effect for the logs and times that it is in reaches by chance: the best score among its
@@ -105,10 +81,11 @@ pub(crate) fn searched_again(
     seed: u64,
 ) -> Vec<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let fractions: Vec<f64> = (0..count).map(|_| rng.random_range(0.15..0.85)).collect();
-    parallel::map(&fractions, |fraction| {
+    let shift = |rng: &mut ChaCha8Rng| Shift { fraction: rng.random_range(0.15..0.85), signs: Vec::new() };
+    let shifts: Vec<Shift> = (0..count).map(|_| shift(&mut rng)).collect();
+    parallel::map(&shifts, |shift| {
         let residual: Vec<Vec<f64>> = (context.residual.iter().enumerate())
-            .map(|(j, values)| rotated(values, &context.data.joints[j].rows, *fraction))
+            .map(|(j, values)| rotated(values, &context.data.joints[j].rows, shift))
             .collect();
         let context = context.seen_with(&residual);
         let screen = Screen::new(&context);
@@ -131,112 +108,94 @@ pub(crate) fn false_positives(study: &Study<'_>, model: &Model) -> FalsePositive
         .map(|m| (&m.trial, m.candidate.joints.as_slice()))
         .collect();
     let rule = study.rule();
-    let accepts = |which: usize, trial: &Trial| {
+    let accepts = |surrogate: &Surrogate| {
         // The validation set is not asked: a surrogate has no meaning there, so this is the stricter count.
-        let joints = trials[which].1;
-        let mut found = evidence(&screen, trial, joints, &study.folds, Extent::Everywhere, None);
-        found.validation_gain = 1.0;
-        refusal(rule, &found, tests, false).is_none()
+        let (trial, joints) = trials[surrogate.which];
+        let columns = trial.columns.iter().map(|c| shifted(c, &screen.context.data.joints, &surrogate.shift));
+        screen.try_columns(columns.collect(), 1.0).is_some_and(|trial| {
+            let mut found = evidence(&screen, &trial, joints, &study.folds, Extent::Everywhere, None);
+            found.validation_gain = 1.0;
+            refusal(rule, &found, tests, false).is_none()
+        })
     };
     let drawn: Vec<&Trial> = trials.iter().map(|(trial, _)| *trial).collect();
-    let found = draw(&screen, &drawn, rule.final_surrogates, FINAL_SEED, accepts);
-    let surrogates = found.scores.len();
+    let draws = draw(&screen, &drawn, rule.final_surrogates, FINAL_SEED);
+    let found: Vec<&Surrogate> = draws.iter().flatten().collect();
+    // What scores too little is refused by that alone.
+    let high: Vec<&Surrogate> = found.iter().copied().filter(|s| s.score >= rule.least_score).collect();
+    let accepted = parallel::map(&high, |surrogate| accepts(surrogate)).into_iter().filter(|a| *a).count();
+    let surrogates = found.len();
     FalsePositives {
         surrogates,
-        accepted: found.accepted,
-        without: found.without,
-        rate: found.accepted as f64 / surrogates.max(1) as f64,
+        accepted,
+        without: draws.len() - surrogates,
+        rate: accepted as f64 / surrogates.max(1) as f64,
         family_wise: rule.family_wise,
     }
 }
 
-fn shifted(column: &Column, joints: &[JointRows], fraction: f64) -> Column {
-    let shift =
-        |(j, values): &(usize, Arc<Vec<f64>>)| (*j, rotated(values, &joints[*j].rows, fraction).into());
-    Column { parts: column.parts.iter().map(shift).collect() }
-}
-
-/// A column with the sign of each recording turned or not.
-fn turned(column: &Column, joints: &[JointRows], signs: &[f64]) -> Column {
-    let turn = |(j, values): &(usize, Arc<Vec<f64>>)| {
-        let mut values = values.to_vec();
-        for (rows, sign) in joints[*j].rows.iter().zip(signs) {
+/// A surrogate's column, row by row.
+fn shifted(column: &Column, joints: &[JointRows], shift: &Shift) -> Column {
+    let of = |(j, values): &(usize, Arc<Vec<f64>>)| {
+        let mut values = rotated(values, &joints[*j].rows, shift);
+        for (rows, sign) in joints[*j].rows.iter().zip(&shift.signs) {
             values[rows.clone()].iter_mut().for_each(|v| *v *= sign);
         }
         (*j, values.into())
     };
-    Column { parts: column.parts.iter().map(turn).collect() }
+    Column { parts: column.parts.iter().map(of).collect() }
 }
 
-/// Values shifted by a share of each recording, whose rows are given; what leaves at one end comes in at the
-/// other.
-fn rotated(values: &[f64], recordings: &[Range<usize>], fraction: f64) -> Vec<f64> {
+/// Values shifted within each recording, whose rows are given; what leaves at one end comes in at the other.
+fn rotated(values: &[f64], recordings: &[Range<usize>], shift: &Shift) -> Vec<f64> {
     let mut values = values.to_vec();
     for rows in recordings {
-        values[rows.clone()].rotate_left((fraction * rows.len() as f64) as usize);
+        values[rows.clone()].rotate_left(shift.rows(rows.len()));
     }
     values
 }
 
-/// Correlation of two columns. One that hardly changes (a constant torque) is the same wherever it is shifted
-/// to.
-fn alike(a: &Column, b: &Column) -> f64 {
-    let (mut cross, mut left, mut right, mut size) = (0.0, 0.0, 0.0, 0.0);
-    for ((_, x), (_, y)) in a.parts.iter().zip(&b.parts) {
-        let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len().max(1) as f64;
-        let (mx, my) = (mean(x), mean(y));
-        cross += dot(x, y) - mx * my * x.len() as f64;
-        left += dot(x, x) - mx * mx * x.len() as f64;
-        right += dot(y, y) - my * my * y.len() as f64;
-        size += dot(x, x) + dot(y, y);
-    }
-    if left.min(right) > 1e-6 * size { cross / (left * right).sqrt() } else { 1.0 }
-}
-
-/// Cosine of the angle between two columns, means and all.
-fn cosine(a: &Column, b: &Column) -> f64 {
-    let of = |x: &Column, y: &Column| -> f64 {
-        x.parts.iter().zip(&y.parts).map(|((_, x), (_, y))| dot(x, y)).sum()
-    };
-    of(a, b) / (of(a, a) * of(b, b)).sqrt()
-}
-
-#[cfg(test)]
+#[cfg(all(test, feature = "virtual-arm"))]
 mod tests {
+    use super::super::super::begin::begin;
+    use super::super::super::prepare::{Inertia, prepare};
+    use super::super::super::tests::small_arms::planar_with_payload;
     use super::*;
-    use crate::logs::signal::Band;
+    use crate::explanation::options::ExplainOptions;
 
+    /// By correlations and row by row, columns on one joint and on two.
     #[test]
-    fn a_shift_changes_no_constant_and_a_wave_is_like_itself() {
-        let column =
-            |f: &dyn Fn(f64) -> f64| Column::on(0, (0..1000).map(|k| f(f64::from(k))).collect::<Vec<f64>>());
-        // Filters leave a constant with rounding.
-        let constant = column(&|k| 1.0 + 1e-12 * (k * 0.7).sin());
-        assert_eq!(alike(&constant, &column(&|k| 1.0 - 1e-12 * (k * 0.7).cos())), 1.0);
-        let wave = column(&|k| 3.0 + (k * 0.1).sin());
-        assert!(alike(&wave, &wave) > 0.999);
-        assert!(alike(&wave, &column(&|k| 3.0 + (k * 0.1).cos())).abs() < 0.1);
-    }
-
-    /// A constant is what it was wherever it is shifted to: with two recordings its signs are drawn, with one it
-    /// has no surrogate; a wave is shifted, and no sign is touched.
-    #[test]
-    fn a_constant_has_surrogates_where_there_are_two_recordings() {
-        let rows = |rows: Vec<Range<usize>>| JointRows {
-            torque: vec![0.0; 1000],
-            inertial: Vec::new(),
-            kept: Vec::new(),
-            rows,
-            band: Band::new(10.0, 200.0),
-        };
-        let (one, two) = ([rows(std::iter::once(0..1000).collect())], [rows(vec![0..500, 500..1000])]);
-        let (constant, signs) = (vec![Column::on(0, vec![2.0; 1000])], [1.0, -1.0]);
-        assert!(surrogate(&constant, &one, 0.9, 0.3, &signs[..1]).is_none());
-        assert!(surrogate(&constant, &two, 0.9, 0.3, &[1.0, 1.0]).is_none());
-        let drawn = surrogate(&constant, &two, 0.9, 0.3, &signs).unwrap();
-        assert_eq!(drawn[0].at(0).unwrap()[499..501], [2.0, -2.0]);
-        let wave: Vec<f64> = (0..1000).map(|k| (f64::from(k) * 0.1).sin()).collect();
-        let drawn = surrogate(&[Column::on(0, wave.clone())], &two, 0.9, 0.3, &signs).unwrap();
-        assert_eq!(drawn[0].at(0).unwrap()[500], wave[650]);
+    fn the_products_of_a_surrogate_are_those_of_its_rows() {
+        let (body, logs) = planar_with_payload();
+        let (fit, validate) = logs.split_at(4);
+        let options = ExplainOptions::default();
+        let begun = prepare(&body, (fit, validate), &options, Inertia::Shared).unwrap();
+        let model = begin(begun.base, &begun.study);
+        let context = model.context(&begun.study);
+        let screen = Screen::new(&context);
+        let (groups, _) = groups(&begun.study, &model, &screen, Among::Names);
+        let shifts = [(0.2, [1.0; 4]), (0.51, [1.0, -1.0, 1.0, -1.0]), (0.84, [1.0, 1.0, 1.0, -1.0])]
+            .map(|(fraction, signs)| Shift { fraction, signs: signs.to_vec() });
+        let close = |a: f64, b: f64, size: f64| assert!((a - b).abs() <= 1e-9 * size, "{a} {b} of {size}");
+        let mut joints = [0; 2];
+        for trial in groups.iter().flat_map(|g| &g.members).map(|m| &m.trial) {
+            joints[trial.columns[0].parts.len() - 1] += 1;
+            for (shift, fast) in shifts.iter().zip(products(&screen, &trial.columns, &shifts)) {
+                let columns = trial.columns.iter().map(|c| shifted(c, &context.data.joints, shift));
+                let slow = screen.products(&columns.collect::<Vec<_>>());
+                for a in 0..trial.columns.len() {
+                    let size = slow.square[(a, a)].sqrt();
+                    let gram = &screen.context.fit.gram.fitted(&context.fit.weights, |_| true).0;
+                    for (g, value) in slow.cross[a].iter().enumerate() {
+                        close(fast.cross[a][g], *value, 1e-9 + size * gram[(g, g)].sqrt());
+                    }
+                    close(fast.square[(a, a)], slow.square[(a, a)], size * size);
+                    let residual = (context.residual.iter().zip(&context.fit.weights))
+                        .map(|(r, w)| w * r.iter().map(|v| v * v).sum::<f64>());
+                    close(fast.score[a], slow.score[a], size * residual.sum::<f64>().sqrt());
+                }
+            }
+        }
+        assert!(joints.iter().all(|n| *n > 0), "{joints:?}");
     }
 }

@@ -9,7 +9,7 @@ mod plant;
 #[cfg(feature = "virtual-arm")]
 mod repeats;
 #[cfg(feature = "virtual-arm")]
-mod small_arms;
+pub(super) mod small_arms;
 
 use super::NamedEffect;
 use crate::controller::JointNumber;
