@@ -1,6 +1,5 @@
 mod correction;
 mod laws;
-mod measured;
 mod model;
 mod names;
 #[cfg(feature = "virtual-arm")]

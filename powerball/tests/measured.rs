@@ -1,11 +1,10 @@
-//! What a real arm's logs say; skipped where they are missing.
+//! What the logs of real arms say; skipped where they are missing.
 
-use super::figures;
-use crate::explanation::ExplainOptions;
-use crate::explanation::explain::{Explained, State, explain_body};
-use crate::logs::log::{common_clock, read_logs};
-use crate::logs::regression::RigidArm;
 use dyngen::Arm;
+use powerball::explanation::explain::{NamedEffect, State};
+use powerball::explanation::{ExplainOptions, Explained, explain_body};
+use powerball::logs::log::{common_clock, read_logs};
+use powerball::logs::regression::RigidArm;
 use std::path::PathBuf;
 
 /// The folder of measured logs: `POWERBALL_DATA`, or `../shared/data` from the project's root.
@@ -34,6 +33,11 @@ fn explained(arm: &str, fit: &[String], validate: &[String]) -> Option<Explained
     let validate = logs.split_off(fit.len());
     let body = RigidArm::new(&arm).unwrap();
     Some(explain_body(&body, &logs, &validate, &ExplainOptions::default()).unwrap())
+}
+
+/// The figures of an effect as explained.json has them.
+fn figures(effect: &NamedEffect) -> serde_json::Value {
+    serde_json::to_value(&effect.figures).unwrap()
 }
 
 fn joints(explained: &Explained, name: &str) -> Vec<usize> {
