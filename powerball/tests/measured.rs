@@ -198,7 +198,9 @@ fn a_mass_on_the_second_link_of_the_dvrk_is_found_there() {
     }
 }
 
-/// A hand pushes five times, read off the difference to a log of the same path.
+/// When a hand pushes, s: read off the difference to a log of the same path.
+const PUSHES: [(f64, f64); 5] = [(4.4, 5.3), (5.9, 6.8), (10.4, 11.2), (12.0, 13.1), (13.8, 14.6)];
+
 #[test]
 fn every_push_on_the_ur5_is_found() {
     let named = |logs: &[&str]| -> Vec<String> { logs.iter().map(ToString::to_string).collect() };
@@ -210,9 +212,29 @@ fn every_push_on_the_ur5_is_found() {
     };
     let spans: Vec<(f64, f64)> = times("start_time").into_iter().zip(times("end_time")).collect();
     assert_eq!(spans.len(), 5, "{spans:?}");
-    for (from, to) in [(4.4, 5.3), (5.9, 6.8), (10.4, 11.2), (12.0, 13.1), (13.8, 14.6)] {
+    for (from, to) in PUSHES {
         let shared = |(a, b): &(f64, f64)| (b.min(to) - a.max(from)).max(0.0);
         let found: f64 = spans.iter().map(shared).sum();
         assert!(found > 0.6 * (to - from), "{from} to {to}: {spans:?}");
     }
+}
+
+/// The same hand in the log that judges: nothing of it can be learnt from the others, and the log is the one that differs.
+#[test]
+fn pushes_in_the_validation_log_only_are_found_and_the_log_differs() {
+    let named = |logs: &[&str]| -> Vec<String> { logs.iter().map(ToString::to_string).collect() };
+    let (fit, validate) = (named(&["no6", "no7", "no8"]), named(&["no9_pushed"]));
+    let Some(explained) = explained("ur5_pushes", &fit, &validate) else { return };
+    for (result, fitted) in explained.logs.iter().zip([true, true, true, false]) {
+        assert_eq!(result.like_the_others, fitted, "{}", result.sentence());
+    }
+    let pushes = &explained.logs[3].differs;
+    assert!(pushes.iter().all(|d| d.effect == "contact_wrench") && pushes.len() == 5, "{pushes:?}");
+    for (push, (from, to)) in pushes.iter().zip(PUSHES) {
+        let shared = push.end_time.min(to) - push.start_time.max(from);
+        assert!(shared > 0.6 * (to - from), "{from} to {to}: {push:?}");
+    }
+    let after = &explained.after.validate.rms;
+    let before = &explained.before.validate.rms;
+    assert!((0..3).all(|j| after[j] < 0.45 * before[j]), "{before:?} {after:?}");
 }

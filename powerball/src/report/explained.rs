@@ -24,6 +24,7 @@ pub fn add_to_page(page: &mut Page, explained: &Explained) {
     if let Some(told) = &explained.conventions {
         conventions::add_to_page(page, told);
     }
+    logs(page, explained);
     verdict(page, explained);
     errors(page, explained);
     effects(page, explained);
@@ -33,6 +34,34 @@ pub fn add_to_page(page: &mut Page, explained: &Explained) {
     }
     torques(page, explained);
     rest(page, explained);
+}
+
+/// What is different in which log.
+fn logs(page: &mut Page, explained: &Explained) {
+    if explained.logs.iter().all(|log| log.like_the_others) {
+        return;
+    }
+    page.heading("Which logs differ");
+    let mut table = Table::new(["log", "differs by", "joints", "from [s]", "to [s]", "share of its excess"]);
+    for log in explained.logs.iter() {
+        let row = |cells: [String; 5]| -> [String; 6] {
+            let [effect, joints, from, to, share] = cells;
+            [log.log.clone(), effect, joints, from, to, share]
+        };
+        let no = String::new;
+        if log.like_the_others {
+            table.push(row(["like the others".into(), no(), no(), no(), no()]));
+        } else if log.differs.is_empty() {
+            table.push(row(["nothing that was tried says why".into(), no(), no(), no(), no()]));
+        }
+        for d in &log.differs {
+            let joints: Vec<String> = d.joints.iter().map(ToString::to_string).collect();
+            let times = [d.start_time, d.end_time].map(|t| format!("{t:.1}"));
+            let [from, to] = times;
+            table.push(row([d.effect.clone(), joints.join(", "), from, to, percent(d.share)]));
+        }
+    }
+    page.table(&table);
 }
 
 /// How far each joint is explained.

@@ -123,6 +123,12 @@ class Explained(OfLogs):
         return [of(entry) for entry in self._told["verdict"]]
 
     @property
+    def logs(self) -> List[Dict[str, Any]]:
+        """Log by log, those that were fitted first: ``log``, ``like_the_others`` and what ``differs``."""
+        told: List[Dict[str, Any]] = self._told["logs"]
+        return told
+
+    @property
     def effects(self) -> List[Effect]:
         """Named effects in the order in which they were added; empty where the model lacks nothing."""
 

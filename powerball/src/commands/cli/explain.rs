@@ -223,6 +223,7 @@ pub(super) fn open_in_words(explained: &Explained) -> String {
 fn summary(explained: &Explained) -> String {
     let told = explained.conventions.as_ref().map(|told| format!("{}\n", told.verdict()));
     let mut text = told.unwrap_or_default();
+    text.push_str(&logs_in_words(explained));
     text.push_str(&verdict_in_words(explained));
     for warning in &explained.warnings {
         text.push_str(&format!("note: {warning}\n"));
@@ -250,6 +251,12 @@ fn summary(explained: &Explained) -> String {
         text.push_str(&format!(" ({without} more draws were of constants that have none)"));
     }
     text
+}
+
+/// Which logs are unlike the others, one line a log.
+fn logs_in_words(explained: &Explained) -> String {
+    let odd = explained.logs.iter().filter(|log| !log.like_the_others);
+    odd.map(|log| format!("{}\n", log.sentence())).collect()
 }
 
 /// How far each joint is explained, one line a joint.

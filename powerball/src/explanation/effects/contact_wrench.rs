@@ -67,6 +67,10 @@ impl Effect for ContactWrench {
         Class::Event
     }
 
+    fn may_be_in_validation_only(&self) -> bool {
+        true
+    }
+
     fn shown_by(&self, _: &Candidate) -> Axis {
         Axis::Time
     }

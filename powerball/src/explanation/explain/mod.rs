@@ -31,8 +31,8 @@ mod study;
 pub use comparison::{Hypothesis, Open};
 pub use named::{FalsePositives, NamedEffect, Rival, Spreads};
 pub use results::{
-    Change, Correction, Curve, Experiment, Explained, LawCoefficient, NextExperiment, Shown, State,
-    TorqueCurve, Trajectory, Unattributed, UnnamedLaw, Verdict, curves,
+    Change, Correction, Curve, Difference, Experiment, Explained, LawCoefficient, LogResult, NextExperiment,
+    Shown, State, TorqueCurve, Trajectory, Unattributed, UnnamedLaw, Verdict, curves,
 };
 
 use crate::explanation::options::{ExplainError, ExplainOptions};

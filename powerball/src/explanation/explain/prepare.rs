@@ -34,7 +34,7 @@ pub(super) struct Beforehand {
     /// What the base model leaves on the validation set, by joint and row, N·m.
     pub(super) residual: Vec<Vec<f64>>,
     /// What is in logs of the validation set only; its torque is taken out of them.
-    pub(super) held: Option<Held>,
+    pub(super) held: Vec<Held>,
     /// When the logs are taken to have been recorded.
     pub(super) clock: Clock,
 }
@@ -56,7 +56,7 @@ pub(super) fn prepare<'a>(
     let residual = base.residual_on(&validation, &[]);
     let errors = Spreads { fit: spread(&data, &base.residual), validate: spread(&validation, &residual) };
     let held = match inertia {
-        Inertia::PerJoint => None,
+        Inertia::PerJoint => Vec::new(),
         Inertia::Shared => held_in_validation(body, (logs, validate), options, &base, &mut validation)
             .map_err(ExplainError::Validate)?,
     };

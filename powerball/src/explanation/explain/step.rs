@@ -5,7 +5,7 @@ use super::model::{Accepted, Model};
 use super::named::Rival;
 use super::search::{
     Among, Extent, Group, Member, Screen, Tester, Trial, Validation, eliminate, gains, groups, is_beside,
-    keep_needed, scores, searched_again,
+    keep_needed, level_by_chance, level_of_search,
 };
 use super::study::Study;
 use crate::controller::JointNumber;
@@ -69,7 +69,7 @@ pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize, among: Am
         return Proposed { refused, outcome: Outcome::Nothing(question) };
     };
     let chosen = simplest_as_good(&mut groups, best, &tester);
-    let above = above_chance(study, &screen, &groups[chosen], number);
+    let above = above_chance(&screen, &groups[chosen], number);
     if above.is_empty() {
         let chance = groups[chosen].passing().map(|m| m.candidate.clone()).collect();
         return Proposed { refused, outcome: Outcome::Chance(chance) };
@@ -139,22 +139,14 @@ fn refused(groups: &[Group]) -> Vec<Rival> {
 }
 
 /// The places of the members of a group that score more than time-shift surrogates do.
-fn above_chance(study: &Study<'_>, screen: &Screen<'_>, group: &Group, number: usize) -> Vec<usize> {
-    let rule = study.rule();
+fn above_chance(screen: &Screen<'_>, group: &Group, number: usize) -> Vec<usize> {
     let trials: Vec<&Trial> = group.passing().map(|m| &m.trial).collect();
     let seed = number as u64;
-    // A push that is shifted in time may fall onto another one: most of its surrogates must score less, not all.
     let short = group.passing().any(|m| matches!(Extent::of(&m.candidate), Extent::Short(_)));
-    let share = if short { rule.event_surrogate_level } else { rule.surrogate_level };
-    let exceeded = |mut scores: Vec<f64>| {
-        scores.sort_by(f64::total_cmp);
-        scores.get((scores.len() as f64 * share) as usize).copied().unwrap_or(0.0)
-    };
-    let mut level = exceeded(scores(screen, &trials, rule.step_surrogates, seed));
+    let mut level = level_by_chance(screen, &trials, short, seed);
     // Whether in some logs, and from when on, was looked for: chance is what that search finds.
     if group.passing().any(|m| Extent::of(&m.candidate) == Extent::SomeLogs) {
-        level =
-            level.max(exceeded(searched_again(screen.context, group.effect, rule.searched_surrogates, seed)));
+        level = level.max(level_of_search(screen.context, group.effect, seed));
     }
     let above = |m: &Member| m.refusal.is_none() && m.trial.score > level;
     (0..group.members.len()).filter(|m| above(&group.members[*m])).collect()

@@ -39,11 +39,7 @@ struct Parts {
 ///
 /// The residuals are those of the whole model put together, not of the sum of columns that it was fitted
 /// with: what is reported is what a controller computes. They differ by products of small effects.
-pub(crate) fn compose(
-    study: &Study<'_>,
-    found: &Model,
-    held: Option<&Held>,
-) -> Result<Composed, ExplainError> {
+pub(crate) fn compose(study: &Study<'_>, found: &Model, held: &[Held]) -> Result<Composed, ExplainError> {
     let body = study.data.body;
     let Parts { additions, gained, held, events } = parts(study, found, held);
     let mut model = TorqueModel {
@@ -81,7 +77,7 @@ pub(crate) fn compose_per_joint(study: &mut Study<'_>, found: &Model) -> Result<
     let base = fit(&study.data, &study.folds, &[], None);
     let mut shared = Model { accepted: found.accepted.clone(), ..Model::new(base) };
     shared.refit(study);
-    let composed = compose(study, &shared, None);
+    let composed = compose(study, &shared, &[]);
     set_per_joint(study, true);
     Ok(Composed { model: composed?.model, fitted: found.fit.residual.clone(), held_out })
 }
@@ -92,13 +88,15 @@ fn set_per_joint(study: &mut Study<'_>, per_joint: bool) {
 }
 
 /// The accepted effects, each as what it is in a model.
-fn parts(study: &Study<'_>, found: &Model, held: Option<&Held>) -> Parts {
+fn parts(study: &Study<'_>, found: &Model, held: &[Held]) -> Parts {
     let context = found.context(study);
     let there = study.there(&found.fit, &[]);
     let n = study.data.dof();
     let (mut offset, mut delay) = (vec![0.0; n], vec![0.0; n]);
     let mut parts = Parts::default();
-    parts.additions.payloads.extend(held.and_then(|held| payload(&held.part, &held.windows)));
+    let of_held = held.iter().flat_map(|held| &held.parts);
+    let of_held = of_held.filter_map(|held| payload(&held.part, &held.windows));
+    parts.additions.payloads.extend(of_held);
     let (errors, places) = (found.errors(), found.places());
     for (k, (a, coefficients)) in found.accepted.iter().zip(found.coefficients()).enumerate() {
         // What was measured above the band has no column.

@@ -11,6 +11,7 @@ use super::dependencies::effective_samples;
 use super::doubts::doubts;
 use super::explained::{Change, Explained};
 use super::laws::laws;
+use super::logs::logs;
 use super::next::NextExperiment;
 use super::shown::shown;
 use super::unattributed::{Unattributed, unattributed};
@@ -26,7 +27,7 @@ use std::sync::Arc;
 
 /// Makes the result.
 pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainError> {
-    let held = findings.beforehand.held.as_ref();
+    let held = &findings.beforehand.held;
     let Composed { model: torque_model, fitted, held_out } = match findings.study.data.per_joint {
         true => compose_per_joint(&mut findings.study, &findings.model)?,
         false => compose(&findings.study, &findings.model, held)?,
@@ -36,7 +37,7 @@ pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainE
     let after = Spreads { fit: spread(&study.data, &fitted), validate: spread(&study.validation, &held_out) };
     let floor = noise_floor(&study.data);
     let left = |joints: &[JointNumber]| leftover(&before.errors.fit.rms, &after.fit.rms, &floor, joints);
-    let mut named: Vec<NamedEffect> = held.map(|held| held.named.clone()).into_iter().collect();
+    let mut named: Vec<NamedEffect> = held.iter().map(|held| held.named.clone()).collect();
     named.extend(named_effects(study, model, &history.steps, &left));
     let (unattributed, unexplained, dependencies) =
         unattributed(study, model, history, &held_out, &floor, &after);
@@ -46,6 +47,7 @@ pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainE
     let open = open(study, model, history, unattributed.is_some());
     Ok(Explained {
         verdict: verdict(study, &named, &after.validate, &floor, &dependencies),
+        logs: logs(&findings),
         arm: study.data.body.arm().name.clone(),
         conventions: None,
         transmission: None,

@@ -4,6 +4,7 @@ use super::super::comparison::Open;
 use super::super::named::{FalsePositives, NamedEffect, Spreads};
 use super::curves::TorqueCurve;
 use super::laws::UnnamedLaw;
+use super::logs::LogResult;
 use super::next::{Experiment, NextExperiment};
 use super::shown::Shown;
 use super::unattributed::Unattributed;
@@ -20,6 +21,8 @@ use std::sync::Arc;
 pub struct Explained {
     /// How far each joint's torque is explained: the first thing to read.
     pub verdict: Vec<Verdict>,
+    /// Whether each log is like the others, and what differs where it is not: those that were fitted first.
+    pub logs: Vec<LogResult>,
     /// The arm's name.
     pub arm: String,
     /// What the columns of the logs are, where they were asked.

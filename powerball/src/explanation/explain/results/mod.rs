@@ -1,7 +1,7 @@
 //! What is said of what was found.
 //!
 //! `conclude` makes the result ([`Explained`]): `compose` the model of what was accepted and what that
-//! leaves, `unattributed` and `dependencies` what stays without a name and what it depends on, `laws` the formulas of what has no name, `correction`
+//! leaves, `unattributed` and `dependencies` what stays without a name and what it depends on, `laws` the formulas of what has no name, `logs` what is different in which log, `correction`
 //! the curves that take a part of it off, `doubts` what a reader must know, `verdict` how far each
 //! joint is explained, `curves` and `shown` the figures,
 //! `next` what an experiment would decide. JSON is made of these types by whoever writes it, and nothing here
@@ -15,6 +15,7 @@ pub(super) mod dependencies;
 mod doubts;
 mod explained;
 mod laws;
+mod logs;
 mod next;
 mod shown;
 mod unattributed;
@@ -25,6 +26,7 @@ pub use correction::{Correction, Curve};
 pub use curves::{TorqueCurve, curves};
 pub use explained::{Change, Explained};
 pub use laws::{LawCoefficient, UnnamedLaw};
+pub use logs::{Difference, LogResult};
 pub use next::{Experiment, NextExperiment, Trajectory};
 pub use shown::Shown;
 pub use unattributed::Unattributed;

@@ -32,4 +32,4 @@ pub(super) use groups::{Among, Group, Member, Tester, groups, is_left};
 pub(super) use refinement::refine;
 pub(super) use refusal::refusal;
 pub(super) use screen::{Screen, Trial};
-pub(super) use surrogates::{false_positives, scores, searched_again};
+pub(super) use surrogates::{false_positives, level_by_chance, level_of_search};

@@ -28,10 +28,20 @@ struct Surrogate {
     score: f64,
 }
 
-/// The penalised scores of surrogates of these trials.
+/// The score that trials must exceed to be told from chance: that of most of their surrogates. A push that is shifted in
+/// time may fall onto another one: of what is short, most must score less, not all.
 #[must_use]
-pub(crate) fn scores(screen: &Screen<'_>, trials: &[&Trial], count: usize, seed: u64) -> Vec<f64> {
-    draw(screen, trials, count, seed).into_iter().flatten().map(|s| s.score).collect()
+pub(crate) fn level_by_chance(screen: &Screen<'_>, trials: &[&Trial], short: bool, seed: u64) -> f64 {
+    let rule = screen.context.rule;
+    let draws = draw(screen, trials, rule.step_surrogates, seed);
+    let share = if short { rule.event_surrogate_level } else { rule.surrogate_level };
+    exceeded(draws.into_iter().flatten().map(|s| s.score).collect(), share)
+}
+
+/// What a share of some scores stays below.
+fn exceeded(mut scores: Vec<f64>, share: f64) -> f64 {
+    scores.sort_by(f64::total_cmp);
+    scores.get((scores.len() as f64 * share) as usize).copied().unwrap_or(0.0)
 }
 
 /// Draws surrogates of real trials; `None` for one that would be what it is drawn from.
@@ -70,20 +80,15 @@ fn draw(screen: &Screen<'_>, trials: &[&Trial], count: usize, seed: u64) -> Vec<
     by_trial.into_iter().enumerate().flat_map(of_trial).collect()
 }
 
-/// What the search of an effect for the logs and times that it is in reaches by chance: the best score among its
-/// candidates where the residual is shifted in time within each recording. What was looked for over many windows
-/// is compared with what is found over as many.
+/// The score that the search of an effect for the logs and times that it is in exceeds by chance alone: its best
+/// candidate where the residual is shifted in time within each recording. What was looked for over many windows is
+/// compared with what is found over as many.
 #[must_use]
-pub(crate) fn searched_again(
-    context: &Context<'_>,
-    effect: &dyn Effect,
-    count: usize,
-    seed: u64,
-) -> Vec<f64> {
+pub(crate) fn level_of_search(context: &Context<'_>, effect: &dyn Effect, seed: u64) -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let shift = |rng: &mut ChaCha8Rng| Shift { fraction: rng.random_range(0.15..0.85), signs: Vec::new() };
-    let shifts: Vec<Shift> = (0..count).map(|_| shift(&mut rng)).collect();
-    parallel::map(&shifts, |shift| {
+    let shifts: Vec<Shift> = (0..context.rule.searched_surrogates).map(|_| shift(&mut rng)).collect();
+    let scores = parallel::map(&shifts, |shift| {
         let residual: Vec<Vec<f64>> = (context.residual.iter().enumerate())
             .map(|(j, values)| rotated(values, &context.data.joints[j].rows, shift))
             .collect();
@@ -92,7 +97,8 @@ pub(crate) fn searched_again(
         let candidates = effect.candidates(&context);
         let scores = candidates.iter().filter_map(|c| Some(screen.try_candidate(c)?.score));
         scores.fold(0.0, f64::max)
-    })
+    });
+    exceeded(scores, context.rule.surrogate_level)
 }
 
 /// Asks surrogates of every kind on the final residual: where nothing is missing any more, what passes is

@@ -3,36 +3,51 @@
 
 use super::super::comparison::surprise;
 use super::super::named::NamedEffect;
-use super::super::search::{Extent, Screen, evidence, refusal};
+use super::super::search::{Extent, Screen, evidence, level_by_chance, refusal};
 use crate::explanation::effects::{self, Candidate, Context, Found, Part, Window};
 use crate::explanation::options::ExplainOptions;
 use crate::explanation::rule::Rule;
 use crate::identification::estimate::{Fit, Folds, Term, fit, spread};
 use crate::logs::log::Log;
-use crate::logs::regression::{Column, Data, DataError, RigidArm};
+use crate::logs::regression::{Data, DataError, RigidArm};
 
 /// Rounds in which the settings are made consistent with the coefficients.
 const ROUNDS: usize = 3;
+/// Effects that are looked for in all logs together, at most.
+const MOST: usize = 16;
+/// Draws their surrogates.
+const SEED: u64 = 7;
 
 /// What is in logs of the validation set only.
 #[derive(Clone, Debug)]
 pub(crate) struct Held {
     /// What is said of it.
     pub(crate) named: NamedEffect,
+    /// One entry a window or body.
+    pub(crate) parts: Vec<HeldPart>,
+}
+
+/// One of several pushes, or a body.
+#[derive(Clone, Debug)]
+pub(crate) struct HeldPart {
     /// What it is in a model.
     pub(crate) part: Part,
     /// Where it is.
     pub(crate) windows: Vec<Window>,
+    /// Its torque on the validation set, which was taken out there, by joint and row, N·m.
+    pub(crate) torque: Vec<Vec<f64>>,
 }
 
-/// All logs together, with the base model fitted to them.
+/// All logs together, with the base model fitted to them, and what was found in them.
 struct Pooled<'a> {
     data: Data<'a>,
     folds: Folds,
     fit: Fit,
+    seen: Vec<Seen>,
 }
 
 /// An effect that was found on pooled logs.
+#[derive(Clone, Debug)]
 struct Seen {
     candidate: Candidate,
     coefficients: Vec<f64>,
@@ -56,66 +71,122 @@ pub(crate) fn held_in_validation(
     options: &ExplainOptions<'_>,
     base: &Fit,
     validation: &mut Data<'_>,
-) -> Result<Option<Held>, DataError> {
+) -> Result<Vec<Held>, DataError> {
     let rule = &options.rule;
     let residual = base.residual_on(validation, &[]);
     let odd = |log: usize| oddness(base, validation, &residual, log) > rule.odd_log;
     if !(0..validation.logs.len()).any(odd) {
-        return Ok(None);
+        return Ok(Vec::new());
     }
     let all: Vec<Log> = logs.iter().chain(validate).cloned().collect();
     let data = Data::new(body, &all, &options.data)?;
     let folds = Folds::new(&data);
     let fit = fit(&data, &folds, &[], Some(base));
-    let mut pooled = Pooled { data, folds, fit };
-    let Some(mut seen) = look(rule, &pooled, validate) else { return Ok(None) };
-    settle(rule, &mut pooled, &mut seen);
-    let Seen { candidate, coefficients, p_value, mut fold_gains, margin } = seen;
-    let effect = candidate.effect();
-    let columns = effect.columns(&Context::new(validation, base, &residual, rule), &candidate);
-    if !makes_it_odd(rule, base, validation, &residual, (&candidate.windows, &columns, &coefficients)) {
-        return Ok(None);
+    let mut pooled = Pooled { data, folds, fit, seen: Vec::new() };
+    // What is in fitted logs is found as well, so that it does not hide what is not.
+    while let Some(seen) = look(rule, &pooled).filter(|_| pooled.seen.len() < MOST) {
+        pooled.take(rule, seen);
+    }
+    let new = |seen: &Seen| seen.candidate.windows.iter().all(|w| validation.logs.contains(&w.log));
+    let seen: Vec<Seen> = pooled.seen.iter().filter(|seen| new(seen)).cloned().collect();
+    let mut held = Vec::new();
+    for &effect in effects::all() {
+        let mut own: Vec<&Seen> = seen.iter().filter(|seen| seen.candidate.effect() == effect).collect();
+        own.sort_by(|a, b| a.begins().total_cmp(&b.begins()));
+        held.extend(taken_out(rule, &pooled, base, validation, &own));
+    }
+    Ok(held)
+}
+
+/// Takes what was seen of an effect out of the validation set, where it is what makes its logs odd.
+fn taken_out(
+    rule: &Rule,
+    pooled: &Pooled<'_>,
+    base: &Fit,
+    validation: &mut Data<'_>,
+    seen: &[&Seen],
+) -> Option<Held> {
+    let residual = base.residual_on(validation, &[]);
+    let effect = seen.first()?.candidate.effect();
+    let windows: Vec<Window> = seen.iter().flat_map(|seen| seen.candidate.windows.clone()).collect();
+    let nothing: Vec<Vec<f64>> = residual.iter().map(|r| vec![0.0; r.len()]).collect();
+    let there = Context::new(validation, base, &residual, rule);
+    let torque_of = |seen: &&Seen| {
+        let mut torque = nothing.clone();
+        let columns = effect.columns(&there, &seen.candidate);
+        columns.iter().zip(&seen.coefficients).for_each(|(column, c)| column.add_to(&mut torque, *c));
+        torque
+    };
+    let torques: Vec<Vec<Vec<f64>>> = seen.iter().map(torque_of).collect();
+    let mut torque = nothing.clone();
+    for (j, own) in torques.iter().flat_map(|torques| torques.iter().enumerate()) {
+        torque[j].iter_mut().zip(own).for_each(|(sum, t)| *sum += t);
+    }
+    // An event explains its own time: that was asked of it.
+    let short = seen.iter().all(|seen| matches!(Extent::of(&seen.candidate), Extent::Short(_)));
+    if !makes_it_odd(rule, base, validation, &residual, (&windows, &torque, short)) {
+        return None;
     }
     let before = spread(validation, &residual).rms;
-    take_out(validation, &columns, &coefficients);
+    for (joint, torque) in validation.joints.iter_mut().zip(&torque) {
+        joint.torque.iter_mut().zip(torque).for_each(|(t, own)| *t -= own);
+    }
     let after = spread(validation, &base.residual_on(validation, &[])).rms;
     let context = Context::new(&pooled.data, &pooled.fit, &pooled.fit.residual, rule);
-    let found = Found { candidate: &candidate, coefficients: &coefficients };
-    fold_gains.sort_by(f64::total_cmp);
+    let found: Vec<Found<'_>> = (seen.iter())
+        .map(|seen| Found { candidate: &seen.candidate, coefficients: &seen.coefficients })
+        .collect();
+    let middle = |seen: &&Seen| {
+        let mut gains = seen.fold_gains.clone();
+        gains.sort_by(f64::total_cmp);
+        gains.get(gains.len() / 2).copied()
+    };
+    let mut logs: Vec<String> = Vec::new();
+    windows.iter().for_each(|w| {
+        if !logs.contains(&w.log) {
+            logs.push(w.log.clone());
+        }
+    });
     let named = NamedEffect {
-        probability: options.rule.right,
+        probability: rule.right,
         effect: effect.name().to_string(),
-        joints: candidate.joints.clone(),
-        figures: effect.figures(&context, &[found]),
+        joints: seen[0].candidate.joints.clone(),
+        figures: effect.figures(&context, &found),
         leftover: after.iter().zip(&before).map(|(a, b)| (a / b).powi(2)).sum::<f64>() / before.len() as f64,
         rms_before: before,
         rms_after: after,
-        p_value,
-        held_out_gain: fold_gains.get(fold_gains.len() / 2).copied().into_iter().collect(),
-        logs: candidate.windows.iter().map(|w| w.log.clone()).collect(),
-        margin,
+        p_value: seen.iter().map(|seen| seen.p_value).fold(0.0, f64::max),
+        held_out_gain: seen.iter().filter_map(middle).collect(),
+        logs,
+        margin: seen.iter().map(|seen| seen.margin).fold(f64::INFINITY, f64::min),
         class: effect.class().name().to_string(),
         rivals: Vec::new(),
     };
-    let part = effect.part(&context, &candidate, &coefficients);
-    Ok(Some(Held { named, part, windows: candidate.windows }))
+    let part = |(found, torque): (&Found<'_>, Vec<Vec<f64>>)| HeldPart {
+        part: effect.part(&context, found.candidate, found.coefficients),
+        windows: found.candidate.windows.clone(),
+        torque,
+    };
+    let parts = found.iter().zip(torques).map(part).collect();
+    Some(Held { named, parts })
 }
 
-/// The best candidate on all logs, if it is in validation logs only and the rule accepts it.
-fn look(rule: &Rule, pooled: &Pooled<'_>, validate: &[Log]) -> Option<Seen> {
+/// The best candidate on all logs beside what was seen already, if the rule accepts it.
+fn look(rule: &Rule, pooled: &Pooled<'_>) -> Option<Seen> {
     let context = Context::new(&pooled.data, &pooled.fit, &pooled.fit.residual, rule);
     let screen = Screen::new(&context);
     let (trial, candidate) = effects::all()
         .iter()
         .filter(|effect| effect.may_be_in_validation_only())
         .flat_map(|effect| effect.candidates(&context))
+        .filter(|c| !pooled.seen.iter().any(|seen| seen.candidate.excludes(c)))
         .filter_map(|c| Some((screen.try_candidate(&c)?, c)))
         .max_by(|a, b| a.0.score.total_cmp(&b.0.score))?;
     let found = evidence(&screen, &trial, &candidate.joints, &pooled.folds, Extent::of(&candidate), None);
     let tests = candidate.searched.max(1.0);
-    let new = |name: &String| validate.iter().any(|log| log.file == *name);
-    let elsewhere = candidate.windows.iter().any(|w| !new(&w.log));
-    if elsewhere || refusal(rule, &found, tests, true).is_some() {
+    let short = matches!(Extent::of(&candidate), Extent::Short(_));
+    let is_chance = || short && trial.score <= level_by_chance(&screen, &[&trial], true, SEED);
+    if refusal(rule, &found, tests, true).is_some() || is_chance() {
         return None;
     }
     Some(Seen {
@@ -127,19 +198,38 @@ fn look(rule: &Rule, pooled: &Pooled<'_>, validate: &[Log]) -> Option<Seen> {
     })
 }
 
-/// Fits what was seen beside the base model until its settings follow from its coefficients.
-fn settle(rule: &Rule, pooled: &mut Pooled<'_>, seen: &mut Seen) {
-    for _ in 0..ROUNDS {
-        let context = Context::new(&pooled.data, &pooled.fit, &pooled.fit.residual, rule);
-        let columns = seen.candidate.effect().columns(&context, &seen.candidate);
-        let count = columns.len();
-        let terms: Vec<Term> =
-            columns.into_iter().map(|column| Term { column, non_negative: false }).collect();
-        pooled.fit = fit(&pooled.data, &pooled.folds, &terms, Some(&pooled.fit));
-        seen.coefficients = (0..count).map(|c| pooled.fit.coefficient(c)).collect();
-        match seen.candidate.effect().refined(&seen.candidate, &seen.coefficients) {
-            Some(refined) => seen.candidate = refined,
-            None => break,
+impl Seen {
+    /// When it is there first, on the clock of all logs, s.
+    fn begins(&self) -> f64 {
+        self.candidate.windows.iter().map(|w| w.from + w.offset).fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl Pooled<'_> {
+    /// Takes in what was seen, and fits all of it beside the base model until its settings follow from its
+    /// coefficients.
+    fn take(&mut self, rule: &Rule, seen: Seen) {
+        self.seen.push(seen);
+        for _ in 0..ROUNDS {
+            let context = Context::new(&self.data, &self.fit, &self.fit.residual, rule);
+            let (mut terms, mut counts) = (Vec::new(), Vec::new());
+            for Seen { candidate, .. } in &self.seen {
+                let columns = candidate.effect().columns(&context, candidate);
+                counts.push(columns.len());
+                terms.extend(columns.into_iter().map(|column| Term { column, non_negative: false }));
+            }
+            self.fit = fit(&self.data, &self.folds, &terms, Some(&self.fit));
+            let (mut first, mut moved) = (0, false);
+            for (seen, count) in self.seen.iter_mut().zip(counts) {
+                seen.coefficients = (first..first + count).map(|c| self.fit.coefficient(c)).collect();
+                first += count;
+                if let Some(refined) = seen.candidate.effect().refined(&seen.candidate, &seen.coefficients) {
+                    (seen.candidate, moved) = (refined, true);
+                }
+            }
+            if !moved {
+                break;
+            }
         }
     }
 }
@@ -160,31 +250,24 @@ fn oddness(base: &Fit, other: &Data<'_>, residual: &[Vec<f64>], log: usize) -> f
     ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
 }
 
-/// Whether what was seen is what makes its logs odd: without it little of their excess over the fitted logs is
-/// left, and no joint's error is larger. A base model that errs on a new path makes them odd as well, and what
-/// fits best there only resembles that error.
+/// Whether what was seen is what makes its logs odd: without its torque little of their excess over the fitted logs is
+/// left, but for an event, and no joint's error is larger. A base model that errs on a new path makes them odd as
+/// well, and what fits best there only resembles that error.
 fn makes_it_odd(
     rule: &Rule,
     base: &Fit,
     other: &Data<'_>,
     residual: &[Vec<f64>],
-    (windows, columns, coefficients): (&[Window], &[Column], &[f64]),
+    (windows, torque, event): (&[Window], &[Vec<f64>], bool),
 ) -> bool {
-    let mut left = residual.to_vec();
-    columns.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut left, -c));
+    let less = |(r, t): (&Vec<f64>, &Vec<f64>)| r.iter().zip(t).map(|(r, t)| r - t).collect();
+    let left: Vec<Vec<f64>> = residual.iter().zip(torque).map(less).collect();
     let logs = || (0..other.logs.len()).filter(|log| windows.iter().any(|w| w.log == other.logs[*log]));
     let excess =
         |residual: &[Vec<f64>]| -> f64 { logs().map(|log| oddness(base, other, residual, log) - 1.0).sum() };
     let square = |residual: &[f64]| residual.iter().map(|v| v * v).sum::<f64>();
     let harms =
         |(left, residual): (&Vec<f64>, &Vec<f64>)| square(left) > (1.0 + rule.harm) * square(residual);
-    excess(&left) <= rule.much_left * excess(residual) && !left.iter().zip(residual).any(harms)
-}
-
-fn take_out(other: &mut Data<'_>, columns: &[Column], coefficients: &[f64]) {
-    for (column, c) in columns.iter().zip(coefficients) {
-        for (j, values) in &column.parts {
-            other.joints[*j].torque.iter_mut().zip(values.iter()).for_each(|(t, v)| *t -= c * v);
-        }
-    }
+    let little = event || excess(&left) <= rule.much_left * excess(residual);
+    little && !left.iter().zip(residual).any(harms)
 }

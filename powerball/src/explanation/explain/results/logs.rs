@@ -1,0 +1,212 @@
+//! Log by log: is it like the others, and what is different in it?
+//!
+//! All logs are fitted together here, so that they are judged alike: a log whose path the others do not have would else
+//! be odd by what the model does not know of that path.
+
+use super::super::findings::Findings;
+use super::super::model::{Accepted, Model};
+use super::super::study::Study;
+use crate::controller::JointNumber;
+use crate::explanation::effects::Window;
+use crate::identification::estimate::{Design, Folds, Gram, Solver, friction_columns};
+use crate::logs::regression::Data;
+use serde::Serialize;
+
+/// What is said of one log.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LogResult {
+    /// Its file.
+    pub log: String,
+    /// Whether nothing was found in it that other logs have not, and the model predicts it as well as them.
+    pub like_the_others: bool,
+    /// What a model of all logs leaves of it, squared error, mean over joints, over the most that it leaves of another
+    /// log; what differs is in the model.
+    pub error_ratio: Option<f64>,
+    /// What is in it and not in all others.
+    pub differs: Vec<Difference>,
+}
+
+/// Something that is in a log and not in all others.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Difference {
+    /// The effect's name.
+    pub effect: String,
+    /// The joints that it acts on.
+    pub joints: Vec<JointNumber>,
+    /// From when on, in the log's own t, s.
+    pub start_time: f64,
+    /// Until when, s.
+    pub end_time: f64,
+    /// The share of the log's squared error, beyond that of the other logs, that goes with it.
+    pub share: f64,
+}
+
+/// An effect that is in some logs only: where, and with which torque on the fitted logs and on the validation set.
+struct Local {
+    effect: String,
+    joints: Vec<JointNumber>,
+    windows: Vec<Window>,
+    torque: [Vec<Vec<f64>>; 2],
+}
+
+/// What a log's rows say, mean over joints of squared errors over the joint's variance.
+struct Judged<'a> {
+    data: &'a Data<'a>,
+    side: usize,
+    log: usize,
+    /// What the model leaves, by joint and row.
+    residual: &'a [Vec<f64>],
+}
+
+/// One entry a log, those that were fitted first.
+pub(super) fn logs(findings: &Findings<'_>) -> Vec<LogResult> {
+    let (study, model) = (&findings.study, &findings.model);
+    let mut local: Vec<Local> =
+        model.accepted.iter().enumerate().filter_map(|(k, a)| of_accepted(study, model, k, a)).collect();
+    for held in &findings.beforehand.held {
+        local.extend(held.parts.iter().map(|part| Local {
+            effect: held.named.effect.clone(),
+            joints: held.named.joints.clone(),
+            windows: part.windows.clone(),
+            torque: [zeros(&study.data), part.torque.clone()],
+        }));
+    }
+    let residual = fitted_together(study, model);
+    let sides = [&study.data, &study.validation].into_iter().enumerate();
+    let judged: Vec<Judged<'_>> = sides
+        .flat_map(|(side, data)| (0..data.logs.len()).map(move |log| (side, data, log)))
+        .map(|(side, data, log)| Judged { data, side, log, residual: &residual[side] })
+        .collect();
+    let errors: Vec<Option<f64>> =
+        judged.iter().map(|judged| judged.error(&model.fit.sigma, judged.residual)).collect();
+    let of = |(place, judged): (usize, &Judged<'_>)| {
+        let others = errors.iter().enumerate().filter(|(k, _)| *k != place).filter_map(|(_, error)| *error);
+        judged.result(&model.fit.sigma, &local, others.reduce(f64::max), study.rule().odd_log)
+    };
+    judged.iter().enumerate().map(of).collect()
+}
+
+/// An accepted effect, where it is in some logs only.
+fn of_accepted(study: &Study<'_>, model: &Model, place: usize, accepted: &Accepted) -> Option<Local> {
+    let candidate = &accepted.candidate;
+    if candidate.windows.is_empty() {
+        return None;
+    }
+    let coefficients = model.coefficients().swap_remove(place);
+    let (here, there) = (model.context(study), study.there(&model.fit, &[]));
+    let torque = [(&study.data, &here), (&study.validation, &there)].map(|(data, context)| {
+        let mut torque = zeros(data);
+        let columns = context.columns(candidate);
+        columns.iter().zip(&coefficients).for_each(|(column, c)| column.add_to(&mut torque, *c));
+        torque
+    });
+    let mut windows = accepted.effect().windows(&here, candidate);
+    for window in accepted.effect().windows(&there, candidate) {
+        if !windows.contains(&window) {
+            windows.push(window);
+        }
+    }
+    let (effect, joints) = (accepted.effect().name().to_string(), candidate.joints.clone());
+    Some(Local { effect, joints, windows, torque })
+}
+
+/// What the model leaves where it is fitted to all logs, on the fitted ones and on the validation set.
+fn fitted_together(study: &Study<'_>, model: &Model) -> [Vec<Vec<f64>>; 2] {
+    let (fit, validation) = (&model.fit, &study.validation);
+    let columns = model.columns_on_validation(study);
+    let there = Design::new(validation, &friction_columns(validation, &fit.shapes), &columns);
+    let (mut gram, mut right, _) = fit.gram.fitted(&fit.weights, |_| true);
+    let (more, right_there, _) =
+        Gram::new(validation, &there, &Folds::new(validation)).sum(&fit.weights, |_| true);
+    gram += more;
+    right.iter_mut().zip(right_there).for_each(|(r, more)| *r += more);
+    let theta = Solver::new(&gram, |c| fit.free[c]).solve(&right);
+    let moved: Vec<f64> =
+        (0..theta.len()).map(|c| if fit.free[c] { theta[c] - fit.theta[c] } else { 0.0 }).collect();
+    let before = [fit.residual.clone(), model.residual_on_validation(study)];
+    let mut sides = [&fit.design, &there].into_iter();
+    before.map(|residual| {
+        let design = sides.next().unwrap_or(&fit.design);
+        let less = |(j, residual): (usize, Vec<f64>)| {
+            design.predict(j, &moved).iter().zip(residual).map(|(more, r)| r - more).collect()
+        };
+        residual.into_iter().enumerate().map(less).collect()
+    })
+}
+
+impl Judged<'_> {
+    /// The mean square of some residuals on this log over the joint's variance, mean over joints that move.
+    fn error(&self, sigma: &[f64], residual: &[Vec<f64>]) -> Option<f64> {
+        let of = |j: usize| {
+            let own = |r: &usize| self.data.recordings[*r].log == self.log;
+            let rows = (0..self.data.recordings.len()).filter(own).map(|r| &self.data.joints[j].rows[r]);
+            let (square, count) = rows.fold((0.0, 0), |(square, count), rows| {
+                let more = residual[j][rows.clone()].iter().map(|v| v * v).sum::<f64>();
+                (square + more, count + rows.len())
+            });
+            (count > 0 && sigma[j] > 0.0).then(|| square / count as f64 / sigma[j].powi(2))
+        };
+        let joints: Vec<f64> = (0..self.data.dof()).filter_map(of).collect();
+        (!joints.is_empty()).then(|| joints.iter().sum::<f64>() / joints.len() as f64)
+    }
+
+    fn result(&self, sigma: &[f64], local: &[Local], usual: Option<f64>, odd: f64) -> LogResult {
+        let log = self.data.logs[self.log].clone();
+        let here: Vec<&Local> =
+            local.iter().filter(|local| local.windows.iter().any(|w| w.log == log)).collect();
+        let with = |which: &[&Local]| {
+            let mut residual = self.residual.to_vec();
+            for torque in which.iter().map(|local| &local.torque[self.side]) {
+                for (r, t) in residual.iter_mut().zip(torque) {
+                    r.iter_mut().zip(t).for_each(|(r, t)| *r += t);
+                }
+            }
+            self.error(sigma, &residual).unwrap_or(0.0)
+        };
+        let (after, before) = (with(&[]), with(&here));
+        let excess = (before - usual.unwrap_or(0.0)).max(before - after);
+        let end = self.data.recordings.iter().filter(|r| r.log == self.log);
+        let end = end.map(|r| r.start + r.len() as f64 / r.rate).fold(f64::NEG_INFINITY, f64::max);
+        let mut differs = Vec::new();
+        for local in here {
+            let share = if excess > 0.0 { (with(&[local]) - after) / excess } else { 0.0 };
+            differs.extend(local.windows.iter().filter(|w| w.log == log).map(|w| Difference {
+                effect: local.effect.clone(),
+                joints: local.joints.clone(),
+                start_time: w.from,
+                end_time: w.to.min(end),
+                share: share.clamp(0.0, 1.0),
+            }));
+        }
+        differs.sort_by(|a, b| a.start_time.total_cmp(&b.start_time));
+        let error_ratio = usual.filter(|usual| *usual > 0.0).map(|usual| after / usual);
+        let like_the_others = differs.is_empty() && error_ratio.is_none_or(|ratio| ratio <= odd);
+        LogResult { log, like_the_others, error_ratio, differs }
+    }
+}
+
+impl LogResult {
+    /// One sentence.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        let ratio = |text: &str| match self.error_ratio {
+            Some(ratio) => format!("{text} {ratio:.1} times the squared error of any other log"),
+            None => String::new(),
+        };
+        if self.like_the_others {
+            return format!("{}: like the others", self.log);
+        }
+        if self.differs.is_empty() {
+            return format!("{}: differs, and nothing that was tried says why:{}", self.log, ratio(""));
+        }
+        let of = |d: &Difference| {
+            format!("{} from {:.1} to {:.1} s ({:.0} %)", d.effect, d.start_time, d.end_time, 100.0 * d.share)
+        };
+        let list: Vec<String> = self.differs.iter().map(of).collect();
+        format!("{}: differs: {}", self.log, list.join(", "))
+    }
+}
+
+fn zeros(data: &Data<'_>) -> Vec<Vec<f64>> {
+    data.joints.iter().map(|joint| vec![0.0; joint.len()]).collect()
+}
