@@ -43,6 +43,7 @@ use comparison::{History, withhold, withhold_harmful};
 use findings::Findings;
 use prepare::{Begun, Inertia, prepare};
 use search::Among;
+use special::pushes_at_rest;
 use step::{Outcome, Proposed, accept, propose, settle_beside};
 
 /// Explains what the base model of an arm that is derived already lacks on `logs`, judged on `validate`. The
@@ -113,7 +114,8 @@ fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
     history.steps.extend(search::ripple_above_band(&study, &mut model, 2 * study.rule().most_steps));
     study.say("asking time-shift surrogates");
     let false_positives = search::false_positives(&study, &model);
-    Findings { study, beforehand, model, history, false_positives }
+    let at_rest = pushes_at_rest(&study, &model);
+    Findings { study, beforehand, model, history, at_rest, false_positives }
 }
 
 #[cfg(test)]

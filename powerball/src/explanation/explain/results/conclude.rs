@@ -17,9 +17,10 @@ use super::shown::shown;
 use super::unattributed::{Unattributed, unattributed};
 use super::verdict::verdict;
 use crate::controller::JointNumber;
-use crate::explanation::effects::{Effect, Found};
+use crate::explanation::effects::{Effect, Figures, Found, Settings, contact_wrench};
 use crate::explanation::options::{ExplainError, RuledOut};
 use crate::explanation::rule::Rule;
+use crate::identification::estimate::distribution::f_tail;
 use crate::identification::estimate::{noise_floor, over_blocks, spread};
 use crate::logs::regression::Data;
 use std::ops::Range;
@@ -39,6 +40,7 @@ pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainE
     let left = |joints: &[JointNumber]| leftover(&before.errors.fit.rms, &after.fit.rms, &floor, joints);
     let mut named: Vec<NamedEffect> = held.iter().map(|held| held.named.clone()).collect();
     named.extend(named_effects(study, model, &history.steps, &left));
+    add_pushes_at_rest(&mut named, &findings, &after);
     let (unattributed, unexplained, dependencies) =
         unattributed(study, model, history, &held_out, &floor, &after);
     for effect in &mut named {
@@ -133,6 +135,51 @@ fn named_effect(
         rivals: rivals(&study.options.ruled_out, &first.comparison, effect.name()),
         joints,
     })
+}
+
+/// Pushes while the arm stood still are one effect with those on the way. No error of a row falls by them, since rows
+/// at rest are in no error.
+fn add_pushes_at_rest(named: &mut Vec<NamedEffect>, findings: &Findings<'_>, after: &Spreads) {
+    let pushes = &findings.at_rest;
+    if pushes.is_empty() {
+        return;
+    }
+    let own = contact_wrench::Figures {
+        end_time: pushes.iter().map(|p| p.to).collect(),
+        force: pushes.iter().map(|p| p.force.to_vec()).collect(),
+        start_time: pushes.iter().map(|p| p.from).collect(),
+    };
+    let mut logs: Vec<String> = pushes.iter().map(|p| p.log.clone()).collect();
+    logs.dedup();
+    let known = named.iter_mut().find_map(|effect| match &mut effect.figures {
+        Figures::ContactWrench(figures) => Some((figures, &mut effect.logs)),
+        _ => None,
+    });
+    if let Some((figures, known)) = known {
+        figures.end_time.extend(own.end_time);
+        figures.force.extend(own.force);
+        figures.start_time.extend(own.start_time);
+        known.extend(logs.into_iter().filter(|log| !known.contains(log)).collect::<Vec<_>>());
+        return;
+    }
+    let effect = Settings::from(contact_wrench::Settings::Constant).effect();
+    // By chance: the least of them, in standard deviations beyond what friction hides.
+    let beyond = pushes.iter().map(|p| p.beyond).fold(f64::INFINITY, f64::min);
+    named.push(NamedEffect {
+        effect: effect.name().to_string(),
+        figures: own.into(),
+        rms_before: after.validate.rms.clone(),
+        rms_after: after.validate.rms.clone(),
+        p_value: f_tail(beyond * beyond, 1.0, 100.0),
+        held_out_gain: Vec::new(),
+        logs,
+        probability: f64::NAN,
+        margin: pushes.iter().map(|p| p.size).fold(f64::INFINITY, f64::min),
+        leftover: pushes.iter().map(|p| 1.0 - p.share).sum::<f64>() / pushes.len() as f64,
+        class: effect.class().name().to_string(),
+        rivals: Vec::new(),
+        joints: (0..findings.study.data.dof()).map(JointNumber::from_index).collect(),
+    });
 }
 
 /// How often such a name is right.

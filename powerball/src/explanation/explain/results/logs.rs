@@ -7,7 +7,7 @@ use super::super::findings::Findings;
 use super::super::model::{Accepted, Model};
 use super::super::study::Study;
 use crate::controller::JointNumber;
-use crate::explanation::effects::Window;
+use crate::explanation::effects::{Settings, Window, contact_wrench};
 use crate::identification::estimate::{Design, Folds, Gram, Solver, friction_columns};
 use crate::logs::regression::Data;
 use serde::Serialize;
@@ -37,7 +37,8 @@ pub struct Difference {
     pub start_time: f64,
     /// Until when, s.
     pub end_time: f64,
-    /// The share of the log's squared error, beyond that of the other logs, that goes with it.
+    /// The share of the log's squared error, beyond that of the other logs, that goes with it; of a push on an arm that
+    /// stands still, whose rows are in no error, the share of its torques that one force explains.
     pub share: f64,
 }
 
@@ -83,7 +84,21 @@ pub(super) fn logs(findings: &Findings<'_>) -> Vec<LogResult> {
         let others = errors.iter().enumerate().filter(|(k, _)| *k != place).filter_map(|(_, error)| *error);
         judged.result(&model.fit.sigma, &local, others.reduce(f64::max), study.rule().odd_log)
     };
-    judged.iter().enumerate().map(of).collect()
+    let mut results: Vec<LogResult> = judged.iter().enumerate().map(of).collect();
+    for push in &findings.at_rest {
+        for result in results.iter_mut().filter(|result| result.log == push.log) {
+            result.like_the_others = false;
+            result.differs.push(Difference {
+                effect: Settings::from(contact_wrench::Settings::Constant).effect().name().to_string(),
+                joints: push.joints.clone(),
+                start_time: push.from,
+                end_time: push.to,
+                share: push.share,
+            });
+            result.differs.sort_by(|a, b| a.start_time.total_cmp(&b.start_time));
+        }
+    }
+    results
 }
 
 /// An accepted effect, where it is in some logs only.

@@ -11,11 +11,11 @@ use crate::logs::log::{Log, common_clock};
 use crate::logs::regression::RigidArm;
 use crate::virtual_arm::{Body, Dynamics, Plant, PlantEffect as Effect, Sensors};
 use dyngen::Arm;
-use dyngen::arm::JointKind;
+use dyngen::arm::{JointKind, ParameterKind};
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 const PAYLOAD: f64 = 0.2;
@@ -371,4 +371,57 @@ fn the_zeros_of_parallel_encoders_do_not_outvote_a_body_that_lies_aside() {
     all.push(&found.effect);
     assert!(all.contains(&"broken_symmetry") && all.contains(&"encoder_offset"), "{found:?}");
     at_the_floor(&explained);
+}
+
+/// A force in the plane, N, half a wave from 3 to 4 s after the motion ended; friction of the two joints hides 4 and
+/// 2 N·m either way. A torque that does not come back (a brake that falls in) is no push.
+#[test]
+fn a_push_on_an_arm_that_stands_still_is_seen_and_a_brake_is_not() {
+    const FORCE: f64 = 60.0;
+    let (arm, plant) = planar();
+    let body = RigidArm::new(&arm).unwrap();
+    let mass = [body.last_link(ParameterKind::M)];
+    let mut logs = recorded(&arm, &plant, &[]);
+    let ended: Vec<f64> = logs.iter().map(|log| *log.t.last().unwrap()).collect();
+    for (k, log) in logs.iter_mut().enumerate() {
+        let q: Vec<f64> = log.q.iter().map(|q| *q.last().unwrap()).collect();
+        // A unit force along the base axis that both joints feel most.
+        let levers: Vec<Vec<f64>> =
+            (0..3).map(|axis| body.gravity_columns(axis, &mass, &q).unwrap()).collect();
+        let felt = |lever: &Vec<f64>| lever.iter().map(|l| l.abs()).fold(0.0, f64::max);
+        let lever = levers.iter().max_by(|a, b| felt(a).total_cmp(&felt(b))).unwrap();
+        let usual: Vec<f64> = log.torque.iter().map(|torque| *torque.last().unwrap()).collect();
+        for sample in 1..=1600 {
+            let time = f64::from(sample) / 200.0;
+            let wave = if (3.0..4.0).contains(&time) { ((time - 3.0) * PI).sin() } else { 0.0 };
+            let brake = if time > 5.0 { 1.0 } else { 0.0 };
+            let force = FORCE
+                * if k == 1 || k == 5 {
+                    wave
+                } else if k == 2 {
+                    brake
+                } else {
+                    0.0
+                };
+            log.t.push(ended[k] + time);
+            for j in 0..2 {
+                log.q[j].push(q[j]);
+                log.torque[j]
+                    .push(usual[j] + force * lever[j] + 0.05 * f64::from(sample * (7 + j as u32)).sin());
+            }
+        }
+        log.pieces.last_mut().unwrap().end = log.t.len();
+    }
+    let explained = explained_logs(&arm, logs);
+    assert_eq!(names(&explained), ["contact_wrench"]);
+    for (k, (result, ended)) in explained.logs.iter().zip(&ended).enumerate() {
+        assert_eq!(result.like_the_others, k != 1 && k != 5, "{}", result.sentence());
+        for push in &result.differs {
+            approx::assert_relative_eq!(push.start_time - ended, 3.0, epsilon = 0.2);
+            approx::assert_relative_eq!(push.end_time - ended, 4.0, epsilon = 0.2);
+        }
+    }
+    let force: Vec<f64> = serde_json::from_value(figures(&explained.effects[0])["force"][0].clone()).unwrap();
+    let size = force.iter().map(|f| f * f).sum::<f64>().sqrt();
+    approx::assert_relative_eq!(size, FORCE, max_relative = 0.1);
 }
