@@ -5,6 +5,7 @@ use crate::controller::JointNumber;
 use crate::controller::correction::Law;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// τ = c, τ = d·|q̇|, or both.
 pub(super) struct Asymmetry;
@@ -53,6 +54,10 @@ impl Effect for Asymmetry {
 
     fn shown_by(&self, candidate: &Candidate) -> Axis {
         Axis::Velocity(candidate.joints[0])
+    }
+
+    fn change_of_a_log(&self, candidate: &Candidate) -> Option<(f64, Range<f64>)> {
+        (Settings::of(candidate) == Some(&Settings::Constant)).then_some((1.0, f64::MIN..f64::MAX))
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

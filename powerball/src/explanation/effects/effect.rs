@@ -7,6 +7,7 @@ use crate::explanation::rule::Rule;
 use crate::logs::regression::{Column, Data};
 use dyngen::arm::Parameter;
 use std::fmt;
+use std::ops::Range;
 
 /// Effects of one class look alike: a wrong law of one is easily mended by another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -95,6 +96,12 @@ pub trait Effect: Sync {
     /// Whether it may be in validation logs only, as a body that is held in those: it is then learnt there.
     fn may_be_in_validation_only(&self) -> bool {
         false
+    }
+
+    /// Of a candidate that a single log may have while the others have not (a zero, a delay): by what its coefficient
+    /// is multiplied to be its figure, and the coefficients that are possible.
+    fn change_of_a_log(&self, _candidate: &Candidate) -> Option<(f64, Range<f64>)> {
+        None
     }
 
     /// Whether it is a function of the path alone, so that logs which repeat one path cannot tell it from any

@@ -3,6 +3,7 @@
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found, Part};
 use crate::logs::regression::{Column, Recording};
 use serde::Serialize;
+use std::ops::Range;
 
 /// τ = (τ_rigid(q − o) − τ_rigid(q))/o with coefficient o: logged position = true position + o.
 pub(super) struct EncoderOffset;
@@ -37,6 +38,10 @@ impl Effect for EncoderOffset {
 
     fn shown_by(&self, _: &Candidate) -> Axis {
         Axis::Law
+    }
+
+    fn change_of_a_log(&self, _: &Candidate) -> Option<(f64, Range<f64>)> {
+        Some((1.0, -MOST..MOST))
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

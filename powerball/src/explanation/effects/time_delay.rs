@@ -5,6 +5,7 @@ use crate::controller::JointNumber;
 use crate::explanation::rule::Rule;
 use crate::logs::regression::{Column, Data};
 use serde::Serialize;
+use std::ops::Range;
 
 /// τ = τ_model(t − d) − τ_model(t), its coefficient near 1: all joints alike or one joint.
 ///
@@ -45,6 +46,10 @@ impl Effect for TimeDelay {
     /// The same path is run early or late alike.
     fn is_function_of_path(&self, _: &Candidate, _: &Data<'_>, _: &Rule) -> bool {
         false
+    }
+
+    fn change_of_a_log(&self, candidate: &Candidate) -> Option<(f64, Range<f64>)> {
+        Some((delay(candidate), 0.3..3.0))
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -4,6 +4,7 @@ use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::JointNumber;
 use crate::controller::correction::Law;
 use serde::Serialize;
+use std::ops::Range;
 
 /// τ_measured = τ·(1 + c) or τ·(1 + c·|τ|/τ_max) or τ·(1 + c·(τ/τ_max)²).
 pub(super) struct TorqueConstant;
@@ -50,6 +51,11 @@ impl Effect for TorqueConstant {
 
     fn shown_by(&self, _: &Candidate) -> Axis {
         Axis::Torque
+    }
+
+    fn change_of_a_log(&self, candidate: &Candidate) -> Option<(f64, Range<f64>)> {
+        let constant = Settings::of(candidate).is_some_and(|settings| settings.kind == Kind::Constant);
+        constant.then_some((1.0, -0.8..0.8))
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {

@@ -13,10 +13,12 @@
 //! | `search` | candidates screened and tested; settings refined; backward elimination |
 //! | `comparison` | **whether a name is given**, what stays open, what is taken back |
 //! | `special` | what is special of some logs: one path, another running time, something held |
+//! | `by_log` | what is another in one log than in the others |
 //! | `prepare`, `begin`, `step` | the base model, what the search begins with, and one step of the loop |
 //! | `findings`, `results` | what was found; the model, the report and its figures |
 
 mod begin;
+mod by_log;
 mod comparison;
 mod findings;
 mod model;

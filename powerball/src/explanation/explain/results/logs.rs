@@ -3,12 +3,12 @@
 //! All logs are fitted together here, so that they are judged alike: a log whose path the others do not have would else
 //! be odd by what the model does not know of that path.
 
+use super::super::by_log::{Changed, Together, changes};
 use super::super::findings::Findings;
 use super::super::model::{Accepted, Model};
 use super::super::study::Study;
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Settings, Window, contact_wrench};
-use crate::identification::estimate::{Design, Folds, Gram, Solver, friction_columns};
 use crate::logs::regression::Data;
 use serde::Serialize;
 
@@ -40,6 +40,11 @@ pub struct Difference {
     /// The share of the log's squared error, beyond that of the other logs, that goes with it; of a push on an arm that
     /// stands still, whose rows are in no error, the share of its torques that one force explains.
     pub share: f64,
+    /// By how much it is another one than in the other logs: friction (`temperature`) and gains (`torque_constant`)
+    /// relative, a zero of torques (`asymmetry`) in N·m or N, one of positions (`encoder_offset`) in rad or m, a delay
+    /// in s. Not of a body or a push, whose figures are in the effect.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
 }
 
 /// An effect that is in some logs only: where, and with which torque on the fitted logs and on the validation set.
@@ -72,7 +77,8 @@ pub(super) fn logs(findings: &Findings<'_>) -> Vec<LogResult> {
             torque: [zeros(&study.data), part.torque.clone()],
         }));
     }
-    let residual = fitted_together(study, model);
+    let together = Together::new(study, model);
+    let (changes, residual) = changes(study, model, together);
     let sides = [&study.data, &study.validation].into_iter().enumerate();
     let judged: Vec<Judged<'_>> = sides
         .flat_map(|(side, data)| (0..data.logs.len()).map(move |log| (side, data, log)))
@@ -85,6 +91,19 @@ pub(super) fn logs(findings: &Findings<'_>) -> Vec<LogResult> {
         judged.result(&model.fit.sigma, &local, others.reduce(f64::max), study.rule().odd_log)
     };
     let mut results: Vec<LogResult> = judged.iter().enumerate().map(of).collect();
+    for Changed { log, effect, joints, value, share } in changes {
+        let Some(place) = results.iter().position(|result| result.log == log) else { continue };
+        results[place].like_the_others = false;
+        let [start_time, end_time] = judged[place].span();
+        results[place].differs.push(Difference {
+            effect: effect.to_string(),
+            joints,
+            start_time,
+            end_time,
+            share: share.clamp(0.0, 1.0),
+            value: Some(value),
+        });
+    }
     for push in &findings.at_rest {
         for result in results.iter_mut().filter(|result| result.log == push.log) {
             result.like_the_others = false;
@@ -94,6 +113,7 @@ pub(super) fn logs(findings: &Findings<'_>) -> Vec<LogResult> {
                 start_time: push.from,
                 end_time: push.to,
                 share: push.share,
+                value: None,
             });
             result.differs.sort_by(|a, b| a.start_time.total_cmp(&b.start_time));
         }
@@ -125,30 +145,6 @@ fn of_accepted(study: &Study<'_>, model: &Model, place: usize, accepted: &Accept
     Some(Local { effect, joints, windows, torque })
 }
 
-/// What the model leaves where it is fitted to all logs, on the fitted ones and on the validation set.
-fn fitted_together(study: &Study<'_>, model: &Model) -> [Vec<Vec<f64>>; 2] {
-    let (fit, validation) = (&model.fit, &study.validation);
-    let columns = model.columns_on_validation(study);
-    let there = Design::new(validation, &friction_columns(validation, &fit.shapes), &columns);
-    let (mut gram, mut right, _) = fit.gram.fitted(&fit.weights, |_| true);
-    let (more, right_there, _) =
-        Gram::new(validation, &there, &Folds::new(validation)).sum(&fit.weights, |_| true);
-    gram += more;
-    right.iter_mut().zip(right_there).for_each(|(r, more)| *r += more);
-    let theta = Solver::new(&gram, |c| fit.free[c]).solve(&right);
-    let moved: Vec<f64> =
-        (0..theta.len()).map(|c| if fit.free[c] { theta[c] - fit.theta[c] } else { 0.0 }).collect();
-    let before = [fit.residual.clone(), model.residual_on_validation(study)];
-    let mut sides = [&fit.design, &there].into_iter();
-    before.map(|residual| {
-        let design = sides.next().unwrap_or(&fit.design);
-        let less = |(j, residual): (usize, Vec<f64>)| {
-            design.predict(j, &moved).iter().zip(residual).map(|(more, r)| r - more).collect()
-        };
-        residual.into_iter().enumerate().map(less).collect()
-    })
-}
-
 impl Judged<'_> {
     /// The mean square of some residuals on this log over the joint's variance, mean over joints that move.
     fn error(&self, sigma: &[f64], residual: &[Vec<f64>]) -> Option<f64> {
@@ -163,6 +159,13 @@ impl Judged<'_> {
         };
         let joints: Vec<f64> = (0..self.data.dof()).filter_map(of).collect();
         (!joints.is_empty()).then(|| joints.iter().sum::<f64>() / joints.len() as f64)
+    }
+
+    /// When the log begins and ends, in its own t, s.
+    fn span(&self) -> [f64; 2] {
+        let own = || self.data.recordings.iter().filter(|r| r.log == self.log);
+        let end = own().map(|r| r.start + r.len() as f64 / r.rate).fold(f64::NEG_INFINITY, f64::max);
+        [own().map(|r| r.start).fold(f64::INFINITY, f64::min), end]
     }
 
     fn result(&self, sigma: &[f64], local: &[Local], usual: Option<f64>, odd: f64) -> LogResult {
@@ -180,8 +183,7 @@ impl Judged<'_> {
         };
         let (after, before) = (with(&[]), with(&here));
         let excess = (before - usual.unwrap_or(0.0)).max(before - after);
-        let end = self.data.recordings.iter().filter(|r| r.log == self.log);
-        let end = end.map(|r| r.start + r.len() as f64 / r.rate).fold(f64::NEG_INFINITY, f64::max);
+        let [_, end] = self.span();
         let mut differs = Vec::new();
         for local in here {
             let share = if excess > 0.0 { (with(&[local]) - after) / excess } else { 0.0 };
@@ -191,6 +193,7 @@ impl Judged<'_> {
                 start_time: w.from,
                 end_time: w.to.min(end),
                 share: share.clamp(0.0, 1.0),
+                value: None,
             }));
         }
         differs.sort_by(|a, b| a.start_time.total_cmp(&b.start_time));
@@ -215,7 +218,16 @@ impl LogResult {
             return format!("{}: differs, and nothing that was tried says why:{}", self.log, ratio(""));
         }
         let of = |d: &Difference| {
-            format!("{} from {:.1} to {:.1} s ({:.0} %)", d.effect, d.start_time, d.end_time, 100.0 * d.share)
+            let joints: Vec<String> = d.joints.iter().map(ToString::to_string).collect();
+            let value = d.value.map_or_else(String::new, |value| format!(" of {value:+.4}"));
+            let share = 100.0 * d.share;
+            format!(
+                "{}{value} on joint {} from {:.1} to {:.1} s ({share:.0} % of what it errs more)",
+                d.effect,
+                joints.join(", "),
+                d.start_time,
+                d.end_time
+            )
         };
         let list: Vec<String> = self.differs.iter().map(of).collect();
         format!("{}: differs: {}", self.log, list.join(", "))

@@ -122,7 +122,6 @@ fn taken_out(
     for (j, own) in torques.iter().flat_map(|torques| torques.iter().enumerate()) {
         torque[j].iter_mut().zip(own).for_each(|(sum, t)| *sum += t);
     }
-    // An event explains its own time: that was asked of it.
     let short = seen.iter().all(|seen| matches!(Extent::of(&seen.candidate), Extent::Short(_)));
     if !makes_it_odd(rule, base, validation, &residual, (&windows, &torque, short)) {
         return None;
@@ -251,7 +250,7 @@ fn oddness(base: &Fit, other: &Data<'_>, residual: &[Vec<f64>], log: usize) -> f
 }
 
 /// Whether what was seen is what makes its logs odd: without its torque little of their excess over the fitted logs is
-/// left, but for an event, and no joint's error is larger. A base model that errs on a new path makes them odd as
+/// left, of events half of it, and no joint's error is larger. A base model that errs on a new path makes them odd as
 /// well, and what fits best there only resembles that error.
 fn makes_it_odd(
     rule: &Rule,
@@ -268,6 +267,7 @@ fn makes_it_odd(
     let square = |residual: &[f64]| residual.iter().map(|v| v * v).sum::<f64>();
     let harms =
         |(left, residual): (&Vec<f64>, &Vec<f64>)| square(left) > (1.0 + rule.harm) * square(residual);
-    let little = event || excess(&left) <= rule.much_left * excess(residual);
+    let most = if event { rule.event_left } else { rule.much_left };
+    let little = excess(&left) <= most * excess(residual);
     little && !left.iter().zip(residual).any(harms)
 }

@@ -425,3 +425,44 @@ fn a_push_on_an_arm_that_stands_still_is_seen_and_a_brake_is_not() {
     let size = force.iter().map(|f| f * f).sum::<f64>().sqrt();
     approx::assert_relative_eq!(size, FORCE, max_relative = 0.1);
 }
+
+/// What is another in a single log, fitted or for validation, is told of that log with its figure, and nothing of the
+/// others.
+#[test]
+fn what_is_another_in_one_log_is_told_of_that_log() {
+    let (arm, plant) = planar();
+    let usual = recorded(&arm, &plant, &[]);
+    assert!(explained_logs(&arm, usual.clone()).logs.iter().all(|log| log.like_the_others));
+    let late = 4;
+    let delayed = |torque: &mut Vec<f64>| {
+        let before = torque.clone();
+        (late..before.len()).for_each(|k| torque[k] = before[k - late]);
+    };
+    let moved = |log: &mut Log, joint: usize, of: &dyn Fn(f64) -> f64| {
+        let q = log.q[joint].clone();
+        for (k, torque) in log.torque[joint].iter_mut().enumerate() {
+            let around = k.saturating_sub(2)..(k + 2).min(q.len() - 1);
+            *torque += of((q[around.end] - q[around.start]) * 200.0 / around.len() as f64);
+        }
+    };
+    for (which, effect, value) in
+        [(1, "asymmetry", 0.8), (4, "asymmetry", 0.8), (2, "time_delay", 0.02), (5, "temperature", 0.3)]
+    {
+        let mut logs = usual.clone();
+        match effect {
+            "asymmetry" => moved(&mut logs[which], 0, &|_| value),
+            "time_delay" => logs[which].torque.iter_mut().for_each(delayed),
+            // Three tenths more of the friction that joint 2 has.
+            _ => moved(&mut logs[which], 1, &|v| {
+                0.3 * 2.0 * (0.7 * (60.0 * v).tanh() + 0.3 * (4.0 * v).tanh() + v)
+            }),
+        }
+        let explained = explained_logs(&arm, logs);
+        for (k, log) in explained.logs.iter().enumerate() {
+            assert_eq!(log.like_the_others, k != which, "{effect} in {which}: {}", log.sentence());
+        }
+        let found = &explained.logs[which].differs[0];
+        assert_eq!(found.effect, effect, "{}", explained.logs[which].sentence());
+        approx::assert_relative_eq!(found.value.unwrap(), value, max_relative = 0.15);
+    }
+}

@@ -1,0 +1,174 @@
+//! What is another in one log than in the others: friction, a zero, a gain, a delay.
+
+use super::super::model::Model;
+use super::super::study::Study;
+use super::together::{Asked, SIDES, Together};
+use crate::controller::JointNumber;
+use crate::explanation::effects::{self, Context};
+use crate::identification::estimate::distribution::f_tail;
+use crate::logs::parallel;
+use crate::logs::regression::Column;
+use std::ops::Range;
+
+/// Something that changed in one log.
+#[derive(Clone, Debug)]
+pub(crate) struct Changed {
+    /// The file of the log.
+    pub(crate) log: String,
+    pub(crate) effect: &'static str,
+    pub(crate) joints: Vec<JointNumber>,
+    /// By how much: of friction relative, of a zero N·m (N) or rad (m), of a gain relative, of a delay s.
+    pub(crate) value: f64,
+    /// The share of what the squared error of its joints is larger in this log than in others that goes with it.
+    pub(crate) share: f64,
+}
+
+/// A change that is tried, with its columns on the fitted logs and on the validation set.
+struct Tried {
+    effect: &'static str,
+    joints: Vec<JointNumber>,
+    /// By which its coefficient is multiplied to be a figure.
+    unit: f64,
+    /// Coefficients that are possible.
+    possible: Range<f64>,
+    columns: [Column; SIDES],
+}
+
+/// At most so many are looked for in a log, all logs together.
+const MOST_A_LOG: usize = 3;
+/// With so many other logs, a coefficient must be this many times as far from theirs as they are spread.
+const OTHERS: usize = 3;
+const SPREADS: f64 = 3.0;
+
+/// The changes, surest first, and what stays with them, by side, joint and row.
+pub(crate) fn changes(
+    study: &Study<'_>,
+    model: &Model,
+    mut together: Together<'_>,
+) -> (Vec<Changed>, [Vec<Vec<f64>>; SIDES]) {
+    let tried = tried(study, model);
+    let logs: Vec<(usize, usize)> = (together.data.iter().enumerate())
+        .flat_map(|(side, data)| (0..data.logs.len()).map(move |log| (side, log)))
+        .collect();
+    let (rule, mut found) = (study.rule(), Vec::new());
+    let places: Vec<(usize, usize)> =
+        (0..tried.len()).flat_map(|t| (0..logs.len()).map(move |l| (t, l))).collect();
+    while logs.len() > 1 && found.len() < MOST_A_LOG * logs.len() {
+        let asked: Vec<Option<(f64, f64)>> = parallel::map(&places, |(t, l)| {
+            let (side, log) = logs[*l];
+            together.ask(side, log, &tried[*t].columns[side]).map(|asked| (asked.theta, asked.gain))
+        });
+        let of = |t: usize, l: usize| asked[t * logs.len() + l];
+        // From the largest on, until one is sure.
+        let mut order: Vec<(usize, usize)> = places.clone();
+        let gain = |(t, l): &(usize, usize)| of(*t, *l).map_or(0.0, |(_, gain)| gain);
+        order.retain(|place| {
+            gain(place) >= rule.least_score && !found.iter().any(|(known, _)| known == place)
+        });
+        order.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+        let sure = |&(t, l): &(usize, usize)| -> Option<(Asked, f64)> {
+            let (side, log) = logs[l];
+            let asked = together.ask(side, log, &tried[t].columns[side])?;
+            if !tried[t].possible.contains(&asked.theta) {
+                return None;
+            }
+            let others: Vec<f64> =
+                (0..logs.len()).filter(|k| *k != l).filter_map(|k| Some(of(t, k)?.0)).collect();
+            let share = share(&together, (side, log), &logs, &tried[t].joints, &asked, rule.odd_log)?;
+            let enough = share >= 1.0 - rule.much_left
+                && by_chance(&together, &asked) * places.len() as f64 <= rule.family_wise
+                && stands_out(asked.theta, &others);
+            enough.then_some((asked, share))
+        };
+        let Some((place, (asked, share))) = order.iter().find_map(|place| Some((*place, sure(place)?)))
+        else {
+            break;
+        };
+        together.take(&asked);
+        let (side, log) = logs[place.1];
+        let Tried { effect, joints, unit, .. } = &tried[place.0];
+        let log = together.data[side].logs[log].clone();
+        let value = unit * asked.theta;
+        found.push((place, Changed { log, effect, joints: joints.clone(), value, share }));
+    }
+    (found.into_iter().map(|(_, changed)| changed).collect(), together.residual)
+}
+
+/// What is tried of every log.
+fn tried(study: &Study<'_>, model: &Model) -> Vec<Tried> {
+    let (here, there) = (model.context(study), study.there(&model.fit, &[]));
+    let mut tried = Vec::new();
+    for effect in effects::all() {
+        for candidate in effect.candidates(&here) {
+            let Some((unit, possible)) = effect.change_of_a_log(&candidate) else { continue };
+            let columns =
+                [&here, &there].map(|context| context.columns(&candidate).pop().unwrap_or_default());
+            tried.push(Tried { effect: effect.name(), joints: candidate.joints, unit, possible, columns });
+        }
+    }
+    for j in here.moving_joints() {
+        let columns = [&here, &there].map(|context| friction(context, j));
+        // What warms: friction that is another one in this log.
+        tried.push(Tried {
+            effect: "temperature",
+            joints: vec![j],
+            unit: 1.0,
+            possible: -1.0..10.0,
+            columns,
+        });
+    }
+    tried.retain(|t| t.columns.iter().all(|c| !c.parts.is_empty() && c.is_finite()));
+    tried
+}
+
+/// The friction torque of a joint as the model has it.
+fn friction(context: &Context<'_>, joint: JointNumber) -> Column {
+    let (n, j) = (context.data.dof(), joint.index());
+    let friction = context.friction();
+    context.data.column_on(j, |r, _| friction[r].iter().skip(j).step_by(n).copied().collect())
+}
+
+/// The share of what the squared error of some joints is larger in a log than in any other one that goes with a column;
+/// `None` where it is not `odd_log` times as large. Logs of other paths are predicted more or less well, and what fits
+/// best in one of them only resembles that.
+fn share(
+    together: &Together<'_>,
+    own: (usize, usize),
+    logs: &[(usize, usize)],
+    joints: &[JointNumber],
+    asked: &Asked,
+    odd: f64,
+) -> Option<f64> {
+    let error = |&(side, log): &(usize, usize), with: bool| -> Option<f64> {
+        let (mut square, mut count) = (0.0, 0);
+        for j in joints.iter().map(|j| j.index()) {
+            let rows = together.rows(side, log, j);
+            let theta = if with { asked.theta } else { 0.0 };
+            let left =
+                together.residual[side][j][rows.clone()].iter().zip(&asked.column[side][j][rows.clone()]);
+            square += together.weight(j) * left.map(|(r, c)| (r - theta * c).powi(2)).sum::<f64>();
+            count += rows.len();
+        }
+        (count > 0).then(|| square / count as f64)
+    };
+    let usual = logs.iter().filter(|log| **log != own).filter_map(|log| error(log, true)).reduce(f64::max)?;
+    let (before, after) = (error(&own, false)?, error(&own, true)?);
+    (before > odd * usual).then(|| (before - after) / (before - usual))
+}
+
+/// The probability of such a coefficient by chance: blocks of all logs as clusters.
+fn by_chance(together: &Together<'_>, asked: &Asked) -> f64 {
+    let sums = together.by_block(asked);
+    let meat: f64 = sums.iter().map(|s| s * s).sum();
+    let square = asked.gain / asked.theta.powi(2);
+    let wald = (asked.theta * square).powi(2) / meat.max(f64::MIN_POSITIVE);
+    f_tail(wald, 1.0, sums.len() as f64 - 1.0)
+}
+
+/// Whether a coefficient is unlike those of other logs.
+fn stands_out(theta: f64, others: &[f64]) -> bool {
+    let count = others.len() as f64;
+    let mean = others.iter().sum::<f64>() / count.max(1.0);
+    let spread = (others.iter().map(|o| (o - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0)).sqrt();
+    others.len() < OTHERS || (theta - mean).abs() > SPREADS * spread
+}
