@@ -33,7 +33,8 @@ pub struct Figures {
 impl Effect for Asymmetry {
     /// Every torque sensor has a zero.
     fn beside(&self, context: &Context<'_>) -> Vec<Candidate> {
-        context.moving_joints().map(|j| Candidate::on(j, Settings::Constant, 1)).collect()
+        let both_ways = context.moving_joints().filter(|j| turns_both_ways(context, *j));
+        both_ways.map(|j| Candidate::on(j, Settings::Constant, 1)).collect()
     }
 
     /// A constant torque and one in proportion to |q̇| may both be there.
@@ -62,7 +63,8 @@ impl Effect for Asymmetry {
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
         const ALL: [Settings; 3] = [Settings::Constant, Settings::Viscous, Settings::Both];
-        context.moving_joints().flat_map(|j| ALL.map(|which| Candidate::on(j, which, ALL.len()))).collect()
+        let both_ways = context.moving_joints().filter(|j| turns_both_ways(context, *j));
+        both_ways.flat_map(|j| ALL.map(|which| Candidate::on(j, which, ALL.len()))).collect()
     }
 
     fn laws(&self, _: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {
@@ -91,4 +93,17 @@ impl Effect for Asymmetry {
         let (torque, viscous) = by_joint.into_values().unzip();
         Figures { torque, viscous }.into()
     }
+}
+
+/// A direction that takes less than this share of a joint's motion is none.
+const BOTH_WAYS: f64 = 0.05;
+
+/// Whether a joint turns either way: where it turns one way only, what differs with the direction is its friction.
+fn turns_both_ways(context: &Context<'_>, joint: JointNumber) -> bool {
+    let (data, j) = (context.data, joint.index());
+    let moving =
+        data.recordings.iter().flat_map(|r| r.velocity(j)).filter(|v| v.abs() > data.rest_velocity[j]);
+    let (ahead, back) = moving
+        .fold((0.0, 0.0), |(ahead, back), v| if v > 0.0 { (ahead + 1.0, back) } else { (ahead, back + 1.0) });
+    f64::min(ahead, back) >= BOTH_WAYS * (ahead + back)
 }

@@ -161,6 +161,12 @@ pub trait Effect: Sync {
         true
     }
 
+    /// Whether a model may have it with such coefficients, beside all that it has: friction that warmth changes stays
+    /// friction.
+    fn possible(&self, _context: &Context<'_>, _candidate: &Candidate, _coefficients: &[f64]) -> bool {
+        true
+    }
+
     /// A better candidate near an accepted one: columns that depend on estimates are taken anew from there.
     fn refined(&self, _candidate: &Candidate, _coefficients: &[f64]) -> Option<Candidate> {
         None

@@ -118,6 +118,30 @@ impl Effect for Temperature {
         [0.65, 0.8, 1.25, 1.5].map(near).to_vec()
     }
 
+    /// Friction that is negative in the cold or in the warmth of the logs is none.
+    fn possible(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> bool {
+        let j = candidate.joints[0];
+        let viscous = context.fit.friction(j.index())[4];
+        let degrees = |reference: f64| {
+            let all = context.data.recordings.iter().filter_map(|r| r.temperature.as_ref()?.get(j.index()));
+            let all = all.flatten().map(|t| t - reference);
+            all.fold([0.0f64, 0.0f64], |[low, high], t| [low.min(t), high.max(t)])
+        };
+        match Settings::of(candidate) {
+            Some(Settings { of: Friction::Whole, with: Warmth::RunningTime { .. } }) => c[0] > -1.0,
+            Some(Settings { of: Friction::Viscous, with: Warmth::RunningTime { .. } }) => {
+                viscous + c[0] >= 0.0
+            }
+            Some(Settings { of: Friction::Whole, with: Warmth::Logged { reference } }) => {
+                degrees(*reference).iter().all(|t| 1.0 + c[0] * t > 0.0)
+            }
+            Some(Settings { of: Friction::Viscous, with: Warmth::Logged { reference } }) => {
+                degrees(*reference).iter().all(|t| viscous + c[0] * t >= 0.0)
+            }
+            None => true,
+        }
+    }
+
     fn figures(&self, context: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
         let change = |f: &Found<'_>| {
             let c = f.coefficients[0];

@@ -37,9 +37,14 @@ pub enum Form {
     Waves([JointNumber; 2], [f64; 2]),
     /// cos and sin of qᵢ and of qₖ, and 1.
     Sum([JointNumber; 2]),
+    /// Waves of both positions up to [`SURFACE`], and 1: any smooth function of them.
+    Surface([JointNumber; 2]),
     /// q̇·q̇ₖ and q̇·|q̇ₖ|: losses with both velocities.
     Velocities(JointNumber),
 }
+
+/// The orders of a surface in one position, 1/rad: two waves over a travel of 4 rad.
+const SURFACE: [f64; 2] = [1.5, 3.0];
 
 /// a and b that are tried.
 const ORDERS: [[f64; 2]; 4] = [[1.0, 1.0], [1.0, 2.0], [2.0, 1.0], [2.0, 2.0]];
@@ -121,8 +126,14 @@ impl Effect for UnnamedLaw {
     fn neighbours(&self, candidate: &Candidate, _share: f64) -> Vec<Candidate> {
         let others = match form(candidate) {
             Some(
-                Form::Product(joints) | Form::Wave(joints, _) | Form::Waves(joints, _) | Form::Sum(joints),
-            ) if joints[0] != joints[1] => of_two(joints),
+                Form::Product(joints)
+                | Form::Wave(joints, _)
+                | Form::Waves(joints, _)
+                | Form::Sum(joints)
+                | Form::Surface(joints),
+            ) if joints[0] != joints[1] => {
+                of_two(joints).into_iter().chain(with_and_without(Form::Surface(joints))).collect()
+            }
             _ => Vec::new(),
         };
         others.into_iter().map(|settings| candidate.with(settings)).collect()
@@ -151,6 +162,13 @@ impl Effect for UnnamedLaw {
             Form::Sum([i, k]) => {
                 let alone = |joint| wave([joint, joint], [1.0, 0.0]);
                 [alone(i).as_slice(), &alone(k), &[Law::Constant]].concat()
+            }
+            Form::Surface(joints) => {
+                let alone = SURFACE.iter().map(|b| [0.0, *b]);
+                let of_both =
+                    |a: f64| [-SURFACE[1], -SURFACE[0], 0.0, SURFACE[0], SURFACE[1]].map(|b| [a, b]);
+                let all = alone.chain(SURFACE.into_iter().flat_map(of_both));
+                all.flat_map(|orders| wave(joints, orders)).chain([Law::Constant]).collect()
             }
             Form::Velocities(other) => {
                 let other = other.index();

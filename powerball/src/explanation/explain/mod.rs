@@ -46,7 +46,7 @@ use findings::Findings;
 use prepare::{Begun, Inertia, prepare};
 use search::Among;
 use special::pushes_at_rest;
-use step::{Outcome, Proposed, accept, propose, settle_beside};
+use step::{Outcome, Proposed, accept, drop_words, propose, settle_beside};
 
 /// Explains what the base model of an arm that is derived already lacks on `logs`, judged on `validate`. The
 /// logs are taken as they are: their clocks are joined already, and what is known is taken out of them.
@@ -112,6 +112,7 @@ fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
     while withhold_harmful(&study, &mut model, &mut history).is_some() {}
     study.say("refining settings");
     search::refine(&study, &mut model);
+    drop_words(&study, &mut model);
     study.say("looking for ripple above the band");
     history.steps.extend(search::ripple_above_band(&study, &mut model, 2 * study.rule().most_steps));
     study.say("asking time-shift surrogates");

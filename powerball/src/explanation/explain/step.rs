@@ -227,6 +227,16 @@ fn drop_words_for(study: &Study<'_>, model: &mut Model, number: usize) {
     }
 }
 
+/// The same for all laws, once their settings are what fits best.
+pub(super) fn drop_words(study: &Study<'_>, model: &mut Model) {
+    let law = |a: &Accepted| a.step.filter(|_| !a.effect().has_name());
+    let steps: Vec<usize> = model.accepted.iter().filter_map(law).collect();
+    if !steps.is_empty() {
+        steps.into_iter().for_each(|number| drop_words_for(study, model, number));
+        eliminate(study, model);
+    }
+}
+
 /// Once everything else is known: what was in the model from the start goes out where it is not needed and
 /// gets its name where it is. Returns the step of each name.
 pub(super) fn settle_beside(study: &Study<'_>, model: &mut Model) -> Vec<Step> {

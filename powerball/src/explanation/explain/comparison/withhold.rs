@@ -19,7 +19,9 @@ pub(crate) struct Withheld {
 /// that is missing at some pace; or one that is not told apart from its rivals and beside which much is
 /// left, so that something else is there. It stays as a rival of what comes.
 pub(crate) fn withhold(study: &Study<'_>, model: &mut Model, history: &mut History) -> Option<Withheld> {
-    let (taken, why) = if let Some(a) = inconstant(study, model) {
+    let (taken, why) = if let Some(a) = impossible(study, model) {
+        (vec![model.accepted.remove(a)], IMPOSSIBLE)
+    } else if let Some(a) = inconstant(study, model) {
         (vec![model.accepted.remove(a)], "what it says of some pace of motion is not there")
     } else if let Some(a) = harmful(study, model) {
         (vec![model.accepted.remove(a)], HARMS)
@@ -31,16 +33,22 @@ pub(crate) fn withhold(study: &Study<'_>, model: &mut Model, history: &mut Histo
     take_back(study, model, history, taken, why)
 }
 
-/// Takes back what makes the error on the logs to judge on larger, and nothing else.
+/// Takes back what cannot be and what makes the error on the logs to judge on larger, and nothing else.
 pub(crate) fn withhold_harmful(
     study: &Study<'_>,
     model: &mut Model,
     history: &mut History,
 ) -> Option<Withheld> {
-    let taken = vec![model.accepted.remove(harmful(study, model)?)];
-    take_back(study, model, history, taken, HARMS)
+    let (taken, why) = match impossible(study, model) {
+        Some(a) => (a, IMPOSSIBLE),
+        None => (harmful(study, model)?, HARMS),
+    };
+    let taken = vec![model.accepted.remove(taken)];
+    take_back(study, model, history, taken, why)
 }
 
+/// Why something goes out that cannot be as it would have to be.
+const IMPOSSIBLE: &str = "its figures cannot be";
 /// Why something goes out that makes the error on the logs to judge on larger.
 const HARMS: &str = "with it the error on the logs to judge on is larger";
 
@@ -62,6 +70,13 @@ fn take_back(
     history.questions.extend(gone.filter_map(|s| s.question).map(Question::withheld));
     model.refit(study);
     Some(Withheld { effect, why })
+}
+
+/// The accepted effect that cannot be there with the coefficients that it came to have.
+fn impossible(study: &Study<'_>, model: &Model) -> Option<usize> {
+    let context = model.context(study);
+    let mut found = model.accepted.iter().zip(model.coefficients());
+    found.position(|(a, coefficients)| !a.effect().possible(&context, &a.candidate, &coefficients))
 }
 
 /// The accepted effect without which the logs to judge on are predicted clearly better on its joints.

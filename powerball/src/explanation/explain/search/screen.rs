@@ -103,7 +103,9 @@ impl<'c> Screen<'c> {
         let columns = self.context.columns(candidate);
         let trial = self.try_columns(columns, candidate.searched)?;
         let sound = !(effect.non_negative() && trial.theta.iter().any(|t| *t <= 0.0));
-        (sound && effect.admissible(candidate, &trial.theta)).then_some(trial)
+        let possible = effect.admissible(candidate, &trial.theta)
+            && effect.possible(self.context, candidate, &trial.theta);
+        (sound && possible).then_some(trial)
     }
 
     /// Tries columns, whatever they mean.

@@ -11,11 +11,13 @@ use crate::identification::estimate::{Folds, fit};
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, DataOptions, RigidArm};
 
-/// Adds to joint 2's torque what no effect of the library is: a bump over the product of two positions.
+/// Adds to joint 2's torque what no effect of the library is, and no function of two positions: a bump over the product
+/// of two and a third one.
 fn disturbed(mut logs: Vec<Log>, size: f64) -> Vec<Log> {
     for log in &mut logs {
         for k in 0..log.t.len() {
-            log.torque[1][k] += size * (1.0 - ((log.q[0][k] * log.q[3][k] - 0.2) / 0.5).powi(2)).max(-1.0);
+            log.torque[1][k] += size
+                * (1.0 - ((log.q[0][k] * log.q[3][k] + 0.5 * log.q[4][k] - 0.2) / 0.5).powi(2)).max(-1.0);
         }
     }
     logs

@@ -64,3 +64,18 @@ fn nothing_is_made_a_law_that_is_noise_or_has_a_name() {
     let names: Vec<&str> = spring.effects.iter().map(|e| e.effect.as_str()).collect();
     assert_eq!(names, ["spring"]);
 }
+
+/// A smooth bump over two positions is no name: parts of it look like ripple and a constant torque, and one surface has
+/// all of it.
+#[test]
+fn a_bump_of_two_positions_is_a_surface_and_no_name() {
+    let square = |x: f64| x * x;
+    let bump = |q: &[f64]| 8.0 * (-(square(q[1] - 0.2) + square(q[2] + 0.3)) / (2.0 * square(0.4))).exp();
+    let explained = explained(1, bump);
+    assert!(explained.effects.is_empty(), "{:?}", explained.effects);
+    let [law] = explained.laws.as_slice() else { panic!("{:?}", explained.laws) };
+    assert_eq!(law.joints, numbered(&[2]));
+    assert!(law.formula.contains("1.5·q2 + 1.5·q3"), "{}", law.formula);
+    let (before, after) = (explained.before.validate.rms[1], explained.after.validate.rms[1]);
+    assert!(after < 0.15 * before, "{before} {after}");
+}
