@@ -3,6 +3,7 @@
 mod compare;
 mod conventions;
 mod held_out;
+mod known_truth;
 mod stories;
 mod study;
 mod textbook;
@@ -31,6 +32,8 @@ enum Command {
     Textbook(textbook::Arguments),
     /// How often `compare` calls equal arms different, and sees what changed
     Compare(compare::Arguments),
+    /// What `explain` says of measured logs in which others, or a draw, put something, as a page
+    KnownTruth(known_truth::Arguments),
     /// What `explain` finds in the measured logs, case by case, as a page with figures
     Stories(stories::Arguments),
 }
@@ -43,6 +46,7 @@ fn main() -> ExitCode {
         Command::HeldOut(arguments) => held_out::run(&arguments),
         Command::Textbook(arguments) => textbook::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::KnownTruth(arguments) => known_truth::run(&arguments),
         Command::Stories(arguments) => stories::run(&arguments),
     };
     match done {

@@ -4,7 +4,7 @@
 use dyngen::Arm;
 use faer::Mat;
 use powerball::identification::estimate::{Solver, reduce_in_bands};
-use powerball::logs::log::read_logs;
+use powerball::logs::log::{Log, read_logs};
 use powerball::logs::regression::{DataOptions, RigidArm};
 use powerball::logs::summary::{Bands, Octaves, RFactor, Summary};
 use std::fs;
@@ -31,18 +31,8 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let arm = Arm::read(&arguments.arm).map_err(|e| e.to_string())?;
     let body = RigidArm::new(&arm).map_err(|e| e.to_string())?;
-    let summary = |paths: &[PathBuf]| -> Result<Summary, String> {
-        let (logs, _) = read_logs(paths, &arm).map_err(|e| e.to_string())?;
-        let mut all = Bands::new(&body, &DataOptions::default());
-        for log in &logs {
-            let (bands, _) =
-                reduce_in_bands(&body, log, &DataOptions::default()).map_err(|e| e.to_string())?;
-            all.merge(&bands).map_err(|e| e.to_string())?;
-        }
-        Ok(all.of_joints(&vec![0; arm.dof()]))
-    };
-    let left = Plain::fit(&summary(&arguments.log)?).squares(&summary(&arguments.validate)?);
-    let textbook: Vec<f64> = left.iter().map(|(error, torque)| (error / torque).sqrt()).collect();
+    let read = |paths: &[PathBuf]| read_logs(paths, &arm).map(|(logs, _)| logs).map_err(|e| e.to_string());
+    let textbook = held_out(&body, &read(&arguments.log)?, &read(&arguments.validate)?)?;
     let line = |name: &str, values: &[f64]| {
         // A joint that says nothing has no error.
         let percent =
@@ -66,6 +56,21 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
         println!("median joint {:.0} %, worst {:.0} %", 100.0 * median, 100.0 * ratios[ratios.len() - 1]);
     }
     Ok(())
+}
+
+/// What the fit to some logs leaves of others, as shares of torque, by joint.
+pub(crate) fn held_out(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Result<Vec<f64>, String> {
+    let summary = |logs: &[Log]| -> Result<Summary, String> {
+        let mut all = Bands::new(body, &DataOptions::default());
+        for log in logs {
+            let (bands, _) =
+                reduce_in_bands(body, log, &DataOptions::default()).map_err(|e| e.to_string())?;
+            all.merge(&bands).map_err(|e| e.to_string())?;
+        }
+        Ok(all.of_joints(&vec![0; body.arm().dof()]))
+    };
+    let left = Plain::fit(&summary(logs)?).squares(&summary(validate)?);
+    Ok(left.iter().map(|(error, torque)| (error / torque).sqrt()).collect())
 }
 
 /// The held-out errors of an explained.json, as shares of torque, by joint.
