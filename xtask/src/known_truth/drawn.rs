@@ -107,7 +107,7 @@ pub(super) fn write(page: &mut String, data: &Path, draws: u64, pairs: u64) -> R
         let explained = logs.explained(1)?;
         let odd = explained.logs.iter().filter(|log| !log.like_the_others);
         different.extend(odd.map(|log| log.sentence()));
-        eprintln!("pair {pair} {folder} {name}: {different:?}");
+        eprintln!("pair {pair} {folder} {name}: {} differ so far", different.len());
     }
     let _ = writeln!(
         page,

@@ -1,7 +1,7 @@
 //! From logs to the base model that the search begins with.
 
 use super::named::Spreads;
-use super::special::{Clock, Held, held_in_validation, repeats, settle};
+use super::special::{Clock, Held, held, repeats, settle};
 use super::study::Study;
 use crate::explanation::effects::Made;
 use crate::explanation::options::{ExplainError, ExplainOptions};
@@ -52,12 +52,12 @@ pub(super) fn prepare<'a>(
     validation.set_per_joint(inertia == Inertia::PerJoint);
     options.progress.say("fitting the base model");
     let folds = Folds::new(&data);
-    let base = fit(&data, &folds, &[], None);
+    let mut base = fit(&data, &folds, &[], None);
     let residual = base.residual_on(&validation, &[]);
     let errors = Spreads { fit: spread(&data, &base.residual), validate: spread(&validation, &residual) };
     let held = match inertia {
         Inertia::PerJoint => Vec::new(),
-        Inertia::Shared => held_in_validation(body, (logs, validate), options, &base, &mut validation)
+        Inertia::Shared => held(body, (logs, validate), options, &mut base, (&mut data, &mut validation))
             .map_err(ExplainError::Validate)?,
     };
     let one_path = repeats(rule, &data, &validation);

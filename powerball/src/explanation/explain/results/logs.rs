@@ -9,6 +9,8 @@ use super::super::model::{Accepted, Model};
 use super::super::study::Study;
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Settings, Window, contact_wrench};
+use crate::explanation::rule::Rule;
+use crate::identification::estimate::distribution::f_tail;
 use crate::logs::regression::Data;
 use serde::Serialize;
 
@@ -74,7 +76,7 @@ pub(super) fn logs(findings: &Findings<'_>) -> Vec<LogResult> {
             effect: held.named.effect.clone(),
             joints: held.named.joints.clone(),
             windows: part.windows.clone(),
-            torque: [zeros(&study.data), part.torque.clone()],
+            torque: part.torque.clone(),
         }));
     }
     let together = Together::new(study, model);
@@ -88,7 +90,7 @@ pub(super) fn logs(findings: &Findings<'_>) -> Vec<LogResult> {
         judged.iter().map(|judged| judged.error(&model.fit.sigma, judged.residual)).collect();
     let of = |(place, judged): (usize, &Judged<'_>)| {
         let others = errors.iter().enumerate().filter(|(k, _)| *k != place).filter_map(|(_, error)| *error);
-        judged.result(&model.fit.sigma, &local, others.reduce(f64::max), study.rule().odd_log)
+        judged.result(&model.fit.sigma, &local, others.reduce(f64::max), study.rule())
     };
     let mut results: Vec<LogResult> = judged.iter().enumerate().map(of).collect();
     for Changed { log, effect, joints, value, share } in changes {
@@ -161,6 +163,12 @@ impl Judged<'_> {
         (!joints.is_empty()).then(|| joints.iter().sum::<f64>() / joints.len() as f64)
     }
 
+    /// Whether so many times the error of any other log is more than chance gives, for as many blocks as the log has.
+    fn is_odd(&self, ratio: f64, rule: &Rule) -> bool {
+        let blocks = self.data.blocks.iter().filter(|block| block.log == self.log).count() as f64;
+        ratio > rule.odd_log && f_tail(ratio, blocks, blocks) < rule.family_wise
+    }
+
     /// When the log begins and ends, in its own t, s.
     fn span(&self) -> [f64; 2] {
         let own = || self.data.recordings.iter().filter(|r| r.log == self.log);
@@ -168,7 +176,7 @@ impl Judged<'_> {
         [own().map(|r| r.start).fold(f64::INFINITY, f64::min), end]
     }
 
-    fn result(&self, sigma: &[f64], local: &[Local], usual: Option<f64>, odd: f64) -> LogResult {
+    fn result(&self, sigma: &[f64], local: &[Local], usual: Option<f64>, rule: &Rule) -> LogResult {
         let log = self.data.logs[self.log].clone();
         let here: Vec<&Local> =
             local.iter().filter(|local| local.windows.iter().any(|w| w.log == log)).collect();
@@ -198,7 +206,8 @@ impl Judged<'_> {
         }
         differs.sort_by(|a, b| a.start_time.total_cmp(&b.start_time));
         let error_ratio = usual.filter(|usual| *usual > 0.0).map(|usual| after / usual);
-        let like_the_others = differs.is_empty() && error_ratio.is_none_or(|ratio| ratio <= odd);
+        let like_the_others =
+            differs.is_empty() && !error_ratio.is_some_and(|ratio| self.is_odd(ratio, rule));
         LogResult { log, like_the_others, error_ratio, differs }
     }
 }

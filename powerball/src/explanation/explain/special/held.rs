@@ -18,7 +18,7 @@ const MOST: usize = 16;
 /// Draws their surrogates.
 const SEED: u64 = 7;
 
-/// What is in logs of the validation set only.
+/// What is in logs of the validation set only, or in all that are fitted.
 #[derive(Clone, Debug)]
 pub(crate) struct Held {
     /// What is said of it.
@@ -34,8 +34,8 @@ pub(crate) struct HeldPart {
     pub(crate) part: Part,
     /// Where it is.
     pub(crate) windows: Vec<Window>,
-    /// Its torque on the validation set, which was taken out there, by joint and row, N·m.
-    pub(crate) torque: Vec<Vec<f64>>,
+    /// Its torque on the fitted logs and on the validation set, which was taken out there, by joint and row, N·m.
+    pub(crate) torque: [Vec<Vec<f64>>; 2],
 }
 
 /// All logs together, with the base model fitted to them, and what was found in them.
@@ -57,20 +57,20 @@ struct Seen {
 }
 
 /// Looks for what is in logs of the validation set only (see
-/// [`Effect::may_be_in_validation_only`](crate::explanation::effects::Effect::may_be_in_validation_only)).
+/// [`Effect::may_be_in_validation_only`](crate::explanation::effects::Effect::may_be_in_validation_only)), and for a
+/// body that all fitted logs have and no other one.
 ///
-/// It can be learnt nowhere else than where it is: its few numbers are fitted to all logs together, and the
-/// result says in which log it was seen. Its torque is taken out of `validation`; everything else is judged
-/// on what stays.
+/// It can be learnt nowhere else than where all logs are together: its few numbers are fitted to all of them, and the
+/// result says in which log it was seen. Its torque is taken out; everything else is judged on what stays.
 ///
 /// # Errors
 /// [`DataError`] as for any data.
-pub(crate) fn held_in_validation(
+pub(crate) fn held(
     body: &RigidArm,
     (logs, validate): (&[Log], &[Log]),
     options: &ExplainOptions<'_>,
-    base: &Fit,
-    validation: &mut Data<'_>,
+    base: &mut Fit,
+    (data, validation): (&mut Data<'_>, &mut Data<'_>),
 ) -> Result<Vec<Held>, DataError> {
     let rule = &options.rule;
     let residual = base.residual_on(validation, &[]);
@@ -79,23 +79,60 @@ pub(crate) fn held_in_validation(
         return Ok(Vec::new());
     }
     let all: Vec<Log> = logs.iter().chain(validate).cloned().collect();
-    let data = Data::new(body, &all, &options.data)?;
-    let folds = Folds::new(&data);
-    let fit = fit(&data, &folds, &[], Some(base));
-    let mut pooled = Pooled { data, folds, fit, seen: Vec::new() };
-    // What is in fitted logs is found as well, so that it does not hide what is not.
+    let together = Data::new(body, &all, &options.data)?;
+    let folds = Folds::new(&together);
+    let fit = fit(&together, &folds, &[], Some(base));
+    let mut pooled = Pooled { data: together, folds, fit, seen: Vec::new() };
+    // What is in some fitted logs is found as well, so that it does not hide what is not.
     while let Some(seen) = look(rule, &pooled).filter(|_| pooled.seen.len() < MOST) {
         pooled.take(rule, seen);
     }
-    let new = |seen: &Seen| seen.candidate.windows.iter().all(|w| validation.logs.contains(&w.log));
-    let seen: Vec<Seen> = pooled.seen.iter().filter(|seen| new(seen)).cloned().collect();
+    let whole = |seen: &Seen, log: &String| {
+        seen.candidate.windows.iter().any(|w| w.log == *log && w.to.is_infinite())
+    };
+    let fitted = |seen: &&Seen| {
+        data.logs.iter().all(|log| whole(seen, log)) && seen.candidate.windows.len() == data.logs.len()
+    };
     let mut held = Vec::new();
+    if let Some(seen) = pooled.seen.iter().find(fitted) {
+        held.extend(taken_out_of_fitted(rule, &pooled, base, (data, validation), seen));
+    }
+    let new = |seen: &&Seen| seen.candidate.windows.iter().all(|w| validation.logs.contains(&w.log));
+    let seen: Vec<&Seen> = pooled.seen.iter().filter(new).collect();
     for &effect in effects::all() {
-        let mut own: Vec<&Seen> = seen.iter().filter(|seen| seen.candidate.effect() == effect).collect();
+        let own = seen.iter().copied().filter(|seen| seen.candidate.effect() == effect);
+        let mut own: Vec<&Seen> = own.collect();
         own.sort_by(|a, b| a.begins().total_cmp(&b.begins()));
-        held.extend(taken_out(rule, &pooled, base, validation, &own));
+        held.extend(taken_out(rule, &pooled, base, (data, validation), &own));
     }
     Ok(held)
+}
+
+/// Takes a body that all fitted logs have out of them, where the base model fitted to what stays predicts the validation
+/// set as it predicts the fitted logs.
+fn taken_out_of_fitted(
+    rule: &Rule,
+    pooled: &Pooled<'_>,
+    base: &mut Fit,
+    (data, validation): (&mut Data<'_>, &Data<'_>),
+    seen: &Seen,
+) -> Option<Held> {
+    let excess = |base: &Fit, residual: &[Vec<f64>]| -> f64 {
+        (0..validation.logs.len()).map(|log| oddness(base, validation, residual, log) - 1.0).sum()
+    };
+    let torque = seen.torque(data, base, rule);
+    let residual = base.residual_on(validation, &[]);
+    subtract(data, &torque);
+    let without = fit(data, &Folds::new(data), &[], None);
+    let left = without.residual_on(validation, &[]);
+    if excess(&without, &left) > rule.much_left * excess(base, &residual) {
+        let back: Vec<Vec<f64>> = torque.iter().map(|t| t.iter().map(|t| -t).collect()).collect();
+        subtract(data, &back);
+        return None;
+    }
+    *base = without;
+    let errors = [residual, left].map(|residual| spread(validation, &residual).rms);
+    Some(told(rule, pooled, &[seen], vec![[torque, zeros(validation)]], errors))
 }
 
 /// Takes what was seen of an effect out of the validation set, where it is what makes its logs odd.
@@ -103,22 +140,14 @@ fn taken_out(
     rule: &Rule,
     pooled: &Pooled<'_>,
     base: &Fit,
-    validation: &mut Data<'_>,
+    (data, validation): (&Data<'_>, &mut Data<'_>),
     seen: &[&Seen],
 ) -> Option<Held> {
     let residual = base.residual_on(validation, &[]);
-    let effect = seen.first()?.candidate.effect();
+    seen.first()?;
     let windows: Vec<Window> = seen.iter().flat_map(|seen| seen.candidate.windows.clone()).collect();
-    let nothing: Vec<Vec<f64>> = residual.iter().map(|r| vec![0.0; r.len()]).collect();
-    let there = Context::new(validation, base, &residual, rule);
-    let torque_of = |seen: &&Seen| {
-        let mut torque = nothing.clone();
-        let columns = effect.columns(&there, &seen.candidate);
-        columns.iter().zip(&seen.coefficients).for_each(|(column, c)| column.add_to(&mut torque, *c));
-        torque
-    };
-    let torques: Vec<Vec<Vec<f64>>> = seen.iter().map(torque_of).collect();
-    let mut torque = nothing.clone();
+    let torques: Vec<Vec<Vec<f64>>> = seen.iter().map(|seen| seen.torque(validation, base, rule)).collect();
+    let mut torque = zeros(validation);
     for (j, own) in torques.iter().flat_map(|torques| torques.iter().enumerate()) {
         torque[j].iter_mut().zip(own).for_each(|(sum, t)| *sum += t);
     }
@@ -126,11 +155,22 @@ fn taken_out(
     if !makes_it_odd(rule, base, validation, &residual, (&windows, &torque, short)) {
         return None;
     }
-    let before = spread(validation, &residual).rms;
-    for (joint, torque) in validation.joints.iter_mut().zip(&torque) {
-        joint.torque.iter_mut().zip(torque).for_each(|(t, own)| *t -= own);
-    }
-    let after = spread(validation, &base.residual_on(validation, &[])).rms;
+    subtract(validation, &torque);
+    let left = base.residual_on(validation, &[]);
+    let errors = [residual, left].map(|residual| spread(validation, &residual).rms);
+    let torques = torques.into_iter().map(|there| [zeros(data), there]).collect();
+    Some(told(rule, pooled, seen, torques, errors))
+}
+
+/// What is said of what was seen of an effect, with its torques and the errors on the validation set before and after.
+fn told(
+    rule: &Rule,
+    pooled: &Pooled<'_>,
+    seen: &[&Seen],
+    torques: Vec<[Vec<Vec<f64>>; 2]>,
+    [before, after]: [Vec<f64>; 2],
+) -> Held {
+    let effect = seen[0].candidate.effect();
     let context = Context::new(&pooled.data, &pooled.fit, &pooled.fit.residual, rule);
     let found: Vec<Found<'_>> = (seen.iter())
         .map(|seen| Found { candidate: &seen.candidate, coefficients: &seen.coefficients })
@@ -141,11 +181,11 @@ fn taken_out(
         gains.get(gains.len() / 2).copied()
     };
     let mut logs: Vec<String> = Vec::new();
-    windows.iter().for_each(|w| {
-        if !logs.contains(&w.log) {
-            logs.push(w.log.clone());
+    for window in seen.iter().flat_map(|seen| &seen.candidate.windows) {
+        if !logs.contains(&window.log) {
+            logs.push(window.log.clone());
         }
-    });
+    }
     let named = NamedEffect {
         probability: rule.right,
         effect: effect.name().to_string(),
@@ -161,13 +201,13 @@ fn taken_out(
         class: effect.class().name().to_string(),
         rivals: Vec::new(),
     };
-    let part = |(found, torque): (&Found<'_>, Vec<Vec<f64>>)| HeldPart {
+    let part = |(found, torque): (&Found<'_>, [Vec<Vec<f64>>; 2])| HeldPart {
         part: effect.part(&context, found.candidate, found.coefficients),
         windows: found.candidate.windows.clone(),
         torque,
     };
     let parts = found.iter().zip(torques).map(part).collect();
-    Some(Held { named, parts })
+    Held { named, parts }
 }
 
 /// The best candidate on all logs beside what was seen already, if the rule accepts it.
@@ -198,6 +238,15 @@ fn look(rule: &Rule, pooled: &Pooled<'_>) -> Option<Seen> {
 }
 
 impl Seen {
+    /// Its torque on some logs, by joint and row, N·m.
+    fn torque(&self, data: &Data<'_>, base: &Fit, rule: &Rule) -> Vec<Vec<f64>> {
+        let mut torque = zeros(data);
+        let context = Context::for_columns(data, base, rule);
+        let columns = self.candidate.effect().columns(&context, &self.candidate);
+        columns.iter().zip(&self.coefficients).for_each(|(column, c)| column.add_to(&mut torque, *c));
+        torque
+    }
+
     /// When it is there first, on the clock of all logs, s.
     fn begins(&self) -> f64 {
         self.candidate.windows.iter().map(|w| w.from + w.offset).fold(f64::INFINITY, f64::min)
@@ -270,4 +319,14 @@ fn makes_it_odd(
     let most = if event { rule.event_left } else { rule.much_left };
     let little = excess(&left) <= most * excess(residual);
     little && !left.iter().zip(residual).any(harms)
+}
+
+fn zeros(data: &Data<'_>) -> Vec<Vec<f64>> {
+    data.joints.iter().map(|joint| vec![0.0; joint.len()]).collect()
+}
+
+fn subtract(data: &mut Data<'_>, torque: &[Vec<f64>]) {
+    for (joint, torque) in data.joints.iter_mut().zip(torque) {
+        joint.torque.iter_mut().zip(torque).for_each(|(t, own)| *t -= own);
+    }
 }

@@ -2,7 +2,7 @@
 //!
 //! A validation set that repeats the path of the fitted logs cannot judge functions of that path
 //! (`one_path`); there a fit of each joint by itself may predict better than one multibody model
-//! (`per_joint`). Something may be held in logs of the validation set only (`held`), or push an arm that stands
+//! (`per_joint`). Something may be held in logs of the validation set only, or in all others (`held`), or push an arm that stands
 //! still (`at_rest`). And where the times of
 //! logs do not tell when they were recorded, what warms does (`running_time`).
 
@@ -13,7 +13,7 @@ mod per_joint;
 mod running_time;
 
 pub(super) use at_rest::{RestPush, pushes_at_rest};
-pub(super) use held::{Held, held_in_validation};
+pub(super) use held::{Held, held};
 pub(super) use one_path::repeats;
 pub(super) use per_joint::predicts_better;
 pub(super) use running_time::{Clock, settle};
