@@ -34,43 +34,76 @@ pub(super) fn causes(joints: usize, found: &Differences) -> Vec<Cause> {
     causes
 }
 
-/// Whether ten inertial parameters of the last link explain all that differs: generalised least squares over
-/// the minimal set, whose parameters say in their names what they are sums of.
+/// The link of which ten inertial parameters explain all that differs, where there is one: the last where it does so
+/// nearly as well as the best.
 fn payload(joints: usize, found: &Differences) -> Option<Cause> {
-    let sums: Vec<Vec<(Parameter, f64)>> = found
-        .parameters
-        .iter()
-        .map(|p| Some(parse_sum(&p.name).ok()?.into_iter().map(|(p, c)| (p, to_f64(&c))).collect()))
-        .collect::<Option<_>>()?;
-    let last = joints.checked_sub(1)?;
-    let kinds: Vec<ParameterKind> =
-        ParameterKind::ALL.iter().copied().filter(|kind| *kind != ParameterKind::Im).collect();
-    let columns: Vec<Vec<f64>> = kinds
-        .iter()
-        .map(|kind| {
+    let loads: Vec<Load> = (0..joints).rev().filter_map(|link| Load::of(link, found)).collect();
+    let least = loads.iter().map(|load| load.left).reduce(f64::min)?;
+    let load = loads.iter().find(|load| load.left <= AS_WELL * least)?;
+    load.is_enough(found).then(|| load.cause())
+}
+
+/// What a body on a link explains of the inertial difference.
+struct Load {
+    link: usize,
+    /// By parameter of a body: its value and its variance, where the logs tell it.
+    values: Vec<Option<[f64; 2]>>,
+    /// χ² of the difference, and what of it is left.
+    all: f64,
+    left: f64,
+    /// Degrees of freedom of that.
+    free: f64,
+}
+
+/// A link does as well as another one where it leaves so many times as much.
+const AS_WELL: f64 = 1.1;
+/// The parameters of a body: of a link but for its rotor.
+fn of_a_body() -> impl Iterator<Item = ParameterKind> {
+    ParameterKind::ALL.iter().copied().filter(|kind| *kind != ParameterKind::Im)
+}
+
+impl Load {
+    /// By generalised least squares over the minimal set, whose parameters say in their names what they are sums of.
+    fn of(link: usize, found: &Differences) -> Option<Load> {
+        let sums: Vec<Vec<(Parameter, f64)>> = found
+            .parameters
+            .iter()
+            .map(|p| Some(parse_sum(&p.name).ok()?.into_iter().map(|(p, c)| (p, to_f64(&c))).collect()))
+            .collect::<Option<_>>()?;
+        let column = |kind: ParameterKind| -> Vec<f64> {
             let own = |(p, factor): &(Parameter, f64)| {
-                if p.link == last && p.kind == *kind { *factor } else { 0.0 }
+                if p.link == link && p.kind == kind { *factor } else { 0.0 }
             };
             sums.iter().map(|sum| sum.iter().map(own).sum()).collect()
-        })
-        .collect();
-    let inner = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
-    let Inertia { difference, weights, freedom, .. } = &found.inertia;
-    let weighted: Vec<Vec<f64>> = columns.iter().map(|column| weights.solve(column)).collect();
-    let gram = Mat::from_fn(kinds.len(), kinds.len(), |i, k| inner(&columns[i], &weighted[k]));
-    let right: Vec<f64> = weighted.iter().map(|column| inner(column, difference)).collect();
-    let solver = Solver::new(&gram, |_| true);
-    let load = solver.solve(&right);
-    let all = inner(difference, &weights.solve(difference));
-    let left = all - inner(&load, &right);
-    let free = weights.kept().len().checked_sub(solver.kept().len()).filter(|free| *free > 0)? as f64;
-    if left > PAYLOAD_LEAVES * all && f_tail(left / free, free, *freedom) < found.level {
-        return None;
+        };
+        let columns: Vec<Vec<f64>> = of_a_body().map(column).collect();
+        let inner = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+        let Inertia { difference, weights, .. } = &found.inertia;
+        let weighted: Vec<Vec<f64>> = columns.iter().map(|column| weights.solve(column)).collect();
+        let gram = Mat::from_fn(columns.len(), columns.len(), |i, k| inner(&columns[i], &weighted[k]));
+        let right: Vec<f64> = weighted.iter().map(|column| inner(column, difference)).collect();
+        let solver = Solver::new(&gram, |_| true);
+        let load = solver.solve(&right);
+        let all = inner(difference, &weights.solve(difference));
+        let left = all - inner(&load, &right);
+        let free = weights.kept().len().checked_sub(solver.kept().len()).filter(|free| *free > 0)? as f64;
+        let variances = solver.inverse_diagonal();
+        let value = |k: usize| solver.kept().contains(&k).then(|| [load[k], variances[k]]);
+        Some(Load { link, values: (0..columns.len()).map(value).collect(), all, left, free })
     }
-    let mass = kinds.iter().position(|kind| *kind == ParameterKind::M)?;
-    let known = solver.kept().contains(&mass);
-    let std = solver.inverse_diagonal()[mass].sqrt();
-    Some(Cause::Payload { mass: known.then_some([load[mass], std]) })
+
+    fn is_enough(&self, found: &Differences) -> bool {
+        self.left <= PAYLOAD_LEAVES * self.all
+            || f_tail(self.left / self.free, self.free, found.inertia.freedom) >= found.level
+    }
+
+    fn cause(&self) -> Cause {
+        let value = |kind: ParameterKind| self.values[of_a_body().position(|k| k == kind)?];
+        let mass = value(ParameterKind::M).map(|[mass, variance]| [mass, variance.sqrt()]);
+        let moments = [ParameterKind::Mx, ParameterKind::My, ParameterKind::Mz];
+        let square: f64 = moments.into_iter().filter_map(value).map(|[moment, _]| moment * moment).sum();
+        Cause::Payload { link: self.link + 1, mass, first_moment: square.sqrt() }
+    }
 }
 
 /// A difference in words.
@@ -97,18 +130,22 @@ pub(super) fn sentence(found: &Differences, causes: &[Cause]) -> String {
 
 fn in_words(cause: &Cause) -> String {
     match cause {
-        Cause::Payload { mass: Some([mass, std]) } => {
-            let which = if *mass >= 0.0 { "heavier" } else { "lighter" };
-            format!(
-                "another payload: the last link is {:.3} kg {which} (standard error {std:.3} kg)",
-                mass.abs()
-            )
-        }
-        Cause::Payload { mass: None } => {
-            "another payload: the last link differs; these logs do not tell its mass".into()
+        Cause::Payload { link, mass, first_moment } => {
+            let moment = format!("first moments that the logs tell differ by {first_moment:.3} kg·m");
+            match mass {
+                Some([mass, std]) => {
+                    let which = if *mass >= 0.0 { "heavier" } else { "lighter" };
+                    let mass = mass.abs();
+                    format!(
+                        "another payload: link {link} is {mass:.3} kg {which} (standard error {std:.3} kg); \
+                            its {moment}"
+                    )
+                }
+                None => format!("another payload: on link {link} {moment}; these logs do not tell its mass"),
+            }
         }
         Cause::Inertia { parameters } => format!(
-            "the inertial parameters {} differ, and not as a payload on the last link would make them",
+            "the inertial parameters {} differ, and not as a body on one link would make them",
             parameters.join("; ")
         ),
         Cause::Friction { joint, change: [low, high] } => {

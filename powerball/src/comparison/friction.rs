@@ -56,6 +56,14 @@ impl Curves {
         Curves { joint, points, steeper }
     }
 
+    /// The mean over velocities of squared differences over their variance: 1 where the curves differ as their errors
+    /// say.
+    pub(super) fn surprise(&self) -> Option<f64> {
+        let of = |p: &Point| p.difference.value.powi(2) / p.difference.variance;
+        let all: Vec<f64> = self.points.iter().map(of).filter(|z| z.is_finite()).collect();
+        (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
+    }
+
     /// How many numbers are compared.
     pub(super) fn points(&self) -> usize {
         self.points.len()

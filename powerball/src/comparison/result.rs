@@ -127,12 +127,16 @@ pub struct TorqueDifference {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "cause", rename_all = "snake_case")]
 pub enum Cause {
-    /// Another payload on the last link.
+    /// Another body on a link.
     Payload {
+        /// The link, from 1: the last where the difference is as well one of it.
+        link: usize,
         /// How much heavier `b` is, kg, and its standard error, where the logs tell it.
         mass: Option<[f64; 2]>,
+        /// The size of the difference of first moments about the link's frame, kg·m: of the parts that the logs tell.
+        first_moment: f64,
     },
-    /// Inertial parameters differ, and not as a payload on the last link would make them.
+    /// Inertial parameters differ, and not as a body on one link would make them.
     Inertia {
         /// Which.
         parameters: Vec<String>,

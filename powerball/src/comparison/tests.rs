@@ -99,7 +99,7 @@ fn a_payload_is_told_with_its_mass() {
     (last.mass, last.moment, last.inertia) =
         (last.mass + load.mass, last.moment + load.moment, last.inertia + load.inertia);
     let loaded = compared(a, &fitted(&body, links, table(), 5));
-    let Some(Cause::Payload { mass: Some([mass, std]) }) = loaded.causes.first() else {
+    let Some(Cause::Payload { link: 6, mass: Some([mass, std]), .. }) = loaded.causes.first() else {
         panic!("{}", loaded.sentence)
     };
     assert!((mass - 1.0).abs() < 4.0 * std && *std < 0.2, "{mass} ± {std}");

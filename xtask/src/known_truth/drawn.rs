@@ -103,7 +103,7 @@ pub(super) fn write(page: &mut String, data: &Path, draws: u64, pairs: u64) -> R
         let (folder, names) = CLEAN[pair as usize % CLEAN.len()];
         let name = names[rng.random_range(0..names.len())];
         let mut logs = Logs::read(data, folder, &[name])?;
-        logs.logs = halves(&logs.logs[0]);
+        logs.logs = logs.logs[0].halves().into();
         let explained = logs.explained(1)?;
         let odd = explained.logs.iter().filter(|log| !log.like_the_others);
         different.extend(odd.map(|log| log.sentence()));
@@ -234,27 +234,4 @@ fn along(log: &Log, n: usize, of: impl Fn(&Recording) -> Vec<Vec<f64>>) -> Resul
         }
     }
     Ok(torque)
-}
-
-/// The first and the second half of a log as two.
-fn halves(log: &Log) -> Vec<Log> {
-    let middle = log.t.len() / 2;
-    let half = |name: &str, own: std::ops::Range<usize>| {
-        let cut = |all: &Vec<Vec<f64>>| all.iter().map(|x| x[own.clone()].to_vec()).collect();
-        let clip = |piece: &std::ops::Range<usize>| {
-            let (from, to) = (piece.start.max(own.start), piece.end.min(own.end));
-            (from < to).then(|| from - own.start..to - own.start)
-        };
-        Log {
-            file: format!("{} {name} half", log.file),
-            t: log.t[own.clone()].to_vec(),
-            q: cut(&log.q),
-            torque: cut(&log.torque),
-            temperature: log.temperature.as_ref().map(cut),
-            motor: log.motor.as_ref().map(cut),
-            pieces: log.pieces.iter().filter_map(clip).collect(),
-            clock: log.clock,
-        }
-    };
-    vec![half("first", 0..middle), half("second", middle..log.t.len())]
 }

@@ -5,6 +5,7 @@ use super::{Failure, output};
 use crate::comparison::{CompareError, CompareOptions, Side, compare};
 use crate::identification::{IdentifyOptions, Source, identify};
 use crate::logs::Progress;
+use crate::logs::log::read_log_as;
 use crate::report;
 use clap::Args;
 use dyngen::Arm;
@@ -94,9 +95,19 @@ impl Compare {
         };
         let terminal = output::Progress::new();
         let say = |what: &str| terminal.say(what);
-        let source = Source::file(path).mapped(Arc::new(self.map.read()?));
-        let options = IdentifyOptions { progress: Progress::to(&say), ..IdentifyOptions::default() };
-        Ok(Side::of(&shown, &identify(arm, [source], [], &options)?))
+        let map = self.map.read()?;
+        let options = || IdentifyOptions { progress: Progress::to(&say), ..IdentifyOptions::default() };
+        let fit = |source: Source<'_>| identify(arm, [source], [], &options());
+        let side = Side::of(&shown, &fit(Source::file(path).mapped(Arc::new(map.clone())))?);
+        // A summary has no parts.
+        let Ok(log) = read_log_as(path, arm, &map, &mut Vec::new()) else { return Ok(side) };
+        let halves: Vec<Side> = (log.halves().into_iter())
+            .filter_map(|half| Some(Side::of(&half.file.clone(), &fit(Source::from(half)).ok()?)))
+            .collect();
+        match halves.as_slice() {
+            [first, second] => Ok(side.repeated([first, second])),
+            _ => Ok(side),
+        }
     }
 }
 

@@ -56,5 +56,32 @@ pub struct Log {
     pub clock: f64,
 }
 
+impl Log {
+    /// Its first and its second half by samples, as logs of their own.
+    #[must_use]
+    pub fn halves(&self) -> [Log; 2] {
+        let middle = self.t.len() / 2;
+        [self.part(0..middle, "first half"), self.part(middle..self.t.len(), "second half")]
+    }
+
+    fn part(&self, own: std::ops::Range<usize>, name: &str) -> Log {
+        let cut = |all: &Vec<Vec<f64>>| all.iter().map(|x| x[own.clone()].to_vec()).collect();
+        let clip = |piece: &std::ops::Range<usize>| {
+            let (from, to) = (piece.start.max(own.start), piece.end.min(own.end));
+            (from < to).then(|| from - own.start..to - own.start)
+        };
+        Log {
+            file: format!("{} ({name})", self.file),
+            t: self.t[own.clone()].to_vec(),
+            q: cut(&self.q),
+            torque: cut(&self.torque),
+            temperature: self.temperature.as_ref().map(cut),
+            motor: self.motor.as_ref().map(cut),
+            pieces: self.pieces.iter().filter_map(clip).collect(),
+            clock: self.clock,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests;
