@@ -45,11 +45,14 @@ fn every_path_that_a_page_names_exists() {
     assert!(checked > 30, "only {checked} paths were found: the test reads nothing");
 }
 
-/// The pages of docs/.
+/// The pages of docs/ and of docs/results/.
 fn pages() -> Vec<String> {
-    let entries = std::fs::read_dir(root().join("docs")).unwrap();
-    let names = entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned());
-    names.filter(|name| name.ends_with(".md")).collect()
+    let of = |folder: &str| -> Vec<String> {
+        let entries = std::fs::read_dir(root().join("docs").join(folder)).unwrap();
+        let names = entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned());
+        names.filter(|name| name.ends_with(".md")).map(|name| format!("{folder}{name}")).collect()
+    };
+    [of(""), of("results/")].concat()
 }
 
 #[test]

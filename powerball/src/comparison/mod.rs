@@ -12,6 +12,7 @@ mod cause;
 mod difference;
 mod differences;
 mod friction;
+mod repeated;
 mod result;
 mod side;
 

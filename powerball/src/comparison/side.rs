@@ -1,6 +1,5 @@
 //! One of two fits: its values and how well they are known.
 
-use super::friction::Curves;
 use super::result::CompareError;
 use crate::controller::friction::TanhFriction;
 use crate::identification::Identified;
@@ -79,23 +78,6 @@ impl Side {
         };
         let File { arm, parameters, friction } = model;
         Ok(Side { name, arm, parameters, friction, uncertainty })
-    }
-
-    /// The same with errors so large that fits of two parts of its logs, which are of one arm, differ by no more than
-    /// these: what varies from run to run and from path to path, and what the model lacks, is in no residual's spread.
-    /// One factor for all errors, the mean over joints and velocities of squared differences of friction over their
-    /// variance, 1 at least.
-    #[must_use]
-    pub fn repeated(mut self, [first, second]: [&Side; 2]) -> Side {
-        let factor = Curves::of(first, second).iter().filter_map(Curves::surprise).collect::<Vec<f64>>();
-        let factor = (factor.iter().sum::<f64>() / factor.len().max(1) as f64).max(1.0);
-        if let Some(all) = &mut self.uncertainty {
-            all.covariance.iter_mut().flatten().for_each(|c| *c *= factor);
-        }
-        let larger = |std: &mut Option<f64>| *std = std.map(|std| std * factor.sqrt());
-        self.parameters.iter_mut().for_each(|p| larger(&mut p.std));
-        self.friction.iter_mut().flat_map(|f| &mut f.std).for_each(larger);
-        self
     }
 
     /// The covariance of two parameters of the minimal set.
