@@ -14,3 +14,16 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     }
     sums.iter().sum::<f64>() + tail
 }
+
+/// Standard deviation over median of |x| for normal noise.
+pub(crate) const NORMAL: f64 = 1.4826;
+
+/// The middle one of values in order, the upper of two; 0 where there is none.
+#[must_use]
+pub(crate) fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}

@@ -12,6 +12,7 @@ use crate::logs::log::Log;
 use crate::logs::regression::{DataError, DataOptions, Recording, RigidArm};
 use crate::logs::signal::rest::REST_SPEED;
 use crate::logs::summary::Summary;
+use crate::logs::vector::{NORMAL, median};
 
 /// Misses up to this many deviations are believed.
 const BELIEVED: f64 = 3.0;
@@ -21,8 +22,6 @@ const DISCARDED: f64 = 6.0;
 const GENTLE_ROUNDS: usize = 5;
 /// Rounds at most.
 const ROUNDS: usize = 20;
-/// Standard deviation over median of |x| for normal noise.
-const NORMAL: f64 = 1.4826;
 /// A change of all coefficients below this share of their own size ends the rounds.
 const SETTLED: f64 = 1e-5;
 
@@ -143,12 +142,4 @@ fn reduce(
         Some(error) if summary.logs.is_empty() => Err(error),
         _ => Ok(summary),
     }
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

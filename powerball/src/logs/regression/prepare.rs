@@ -283,6 +283,12 @@ impl<'a> Data<'a> {
         self.joints.len()
     }
 
+    /// No torque, by joint and row.
+    #[must_use]
+    pub fn zeros(&self) -> Vec<Vec<f64>> {
+        self.joints.iter().map(|joint| vec![0.0; joint.len()]).collect()
+    }
+
     /// The velocity that a joint exceeds in 5 % of its samples, rad/s, at least 1e-3.
     #[must_use]
     pub fn top_velocity(&self, joint: usize) -> f64 {

@@ -4,7 +4,7 @@ use super::super::model::Model;
 use super::super::study::Study;
 use super::together::{Asked, SIDES, Together};
 use crate::controller::JointNumber;
-use crate::explanation::effects::{self, Context};
+use crate::explanation::effects::{self, Context, Settings, temperature};
 use crate::identification::estimate::distribution::f_tail;
 use crate::logs::parallel;
 use crate::logs::regression::Column;
@@ -15,6 +15,7 @@ use std::ops::Range;
 pub(crate) struct Changed {
     /// The file of the log.
     pub(crate) log: String,
+    /// The name of the effect that it would be if it were in all logs.
     pub(crate) effect: &'static str,
     pub(crate) joints: Vec<JointNumber>,
     /// By how much: of friction relative, of a zero N·m (N) or rad (m), of a gain relative, of a delay s.
@@ -56,7 +57,7 @@ pub(crate) fn changes(
     while logs.len() > 1 && found.len() < MOST_A_LOG * logs.len() {
         let asked: Vec<Option<(f64, f64)>> = parallel::map(&places, |(t, l)| {
             let (side, log) = logs[*l];
-            together.ask(side, log, &tried[*t].columns[side]).map(|asked| (asked.theta, asked.gain))
+            together.screen(side, log, &tried[*t].columns[side])
         });
         let of = |t: usize, l: usize| asked[t * logs.len() + l];
         // From the largest on, until one is sure.
@@ -106,16 +107,13 @@ fn tried(study: &Study<'_>, model: &Model) -> Vec<Tried> {
             tried.push(Tried { effect: effect.name(), joints: candidate.joints, unit, possible, columns });
         }
     }
+    // What warms: friction that is another one in this log.
+    let with = temperature::Warmth::RunningTime { time_constant: f64::INFINITY };
+    let warmth = Settings::from(temperature::Settings { of: temperature::Friction::Whole, with });
+    let warmth = warmth.effect().name();
     for j in here.moving_joints() {
         let columns = [&here, &there].map(|context| friction(context, j));
-        // What warms: friction that is another one in this log.
-        tried.push(Tried {
-            effect: "temperature",
-            joints: vec![j],
-            unit: 1.0,
-            possible: -1.0..10.0,
-            columns,
-        });
+        tried.push(Tried { effect: warmth, joints: vec![j], unit: 1.0, possible: -1.0..10.0, columns });
     }
     tried.retain(|t| t.columns.iter().all(|c| !c.parts.is_empty() && c.is_finite()));
     tried

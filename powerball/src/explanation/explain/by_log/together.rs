@@ -72,8 +72,27 @@ impl<'s> Together<'s> {
         self.weights[joint]
     }
 
-    /// Asks about a column in one log alone; `None` where the model imitates it wholly.
+    /// The coefficient of a column in one log alone and what it explains, χ²; `None` where the model imitates it wholly.
+    pub(crate) fn screen(&self, side: usize, log: usize, column: &Column) -> Option<(f64, f64)> {
+        self.solve(side, log, column).map(|(theta, gain, _)| (theta, gain))
+    }
+
+    /// The same, with the column itself.
     pub(crate) fn ask(&self, side: usize, log: usize, column: &Column) -> Option<Asked> {
+        let (theta, gain, base) = self.solve(side, log, column)?;
+        let mut freed: [Vec<Vec<f64>>; SIDES] = [0, 1].map(|s: usize| {
+            let negative = |j| self.designs[s].predict(j, &base).iter().map(|v| -v).collect();
+            (0..self.data[s].dof()).map(negative).collect()
+        });
+        for (j, values) in &column.parts {
+            let rows = self.rows(side, log, *j);
+            freed[side][*j][rows.clone()].iter_mut().zip(&values[rows]).for_each(|(f, v)| *f += v);
+        }
+        Some(Asked { theta, gain, column: freed })
+    }
+
+    /// The coefficient, the gain and the model's shares in the column.
+    fn solve(&self, side: usize, log: usize, column: &Column) -> Option<(f64, f64, Vec<f64>)> {
         let mut cross = vec![0.0; self.theta.len()];
         let (mut raw, mut score) = (0.0, 0.0);
         for (j, values) in &column.parts {
@@ -87,19 +106,8 @@ impl<'s> Together<'s> {
         }
         let base = self.solver.solve(&cross);
         let square = raw - dot(&cross, &base);
-        if square <= 1e-6 * raw || !score.is_finite() {
-            return None;
-        }
-        let mut freed: [Vec<Vec<f64>>; SIDES] = [0, 1].map(|s: usize| {
-            let negative = |j| self.designs[s].predict(j, &base).iter().map(|v| -v).collect();
-            (0..self.data[s].dof()).map(negative).collect()
-        });
-        for (j, values) in &column.parts {
-            let rows = self.rows(side, log, *j);
-            freed[side][*j][rows.clone()].iter_mut().zip(&values[rows]).for_each(|(f, v)| *f += v);
-        }
         let theta = score / square;
-        Some(Asked { theta, gain: theta * score, column: freed })
+        (square > 1e-6 * raw && score.is_finite()).then_some((theta, theta * score, base))
     }
 
     /// The sums over blocks of all logs of a column times what would be left with it: by how much they vary tells how

@@ -132,7 +132,7 @@ fn of_accepted(study: &Study<'_>, model: &Model, place: usize, accepted: &Accept
     let coefficients = model.coefficients().swap_remove(place);
     let (here, there) = (model.context(study), study.there(&model.fit, &[]));
     let torque = [(&study.data, &here), (&study.validation, &there)].map(|(data, context)| {
-        let mut torque = zeros(data);
+        let mut torque = data.zeros();
         let columns = context.columns(candidate);
         columns.iter().zip(&coefficients).for_each(|(column, c)| column.add_to(&mut torque, *c));
         torque
@@ -241,8 +241,4 @@ impl LogResult {
         let list: Vec<String> = self.differs.iter().map(of).collect();
         format!("{}: differs: {}", self.log, list.join(", "))
     }
-}
-
-fn zeros(data: &Data<'_>) -> Vec<Vec<f64>> {
-    data.joints.iter().map(|joint| vec![0.0; joint.len()]).collect()
 }

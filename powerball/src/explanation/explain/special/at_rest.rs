@@ -10,6 +10,7 @@ use crate::controller::JointNumber;
 use crate::identification::estimate::Solver;
 use crate::logs::regression::{Data, Recording};
 use crate::logs::signal::rest;
+use crate::logs::vector::{NORMAL, median};
 use dyngen::arm::ParameterKind;
 use faer::Mat;
 use std::ops::Range;
@@ -64,8 +65,9 @@ fn in_data(data: &Data<'_>, friction: &[f64]) -> Vec<RestPush> {
     let stretches: Vec<Stretch<'_>> =
         data.recordings.iter().flat_map(|recording| Stretch::all(data, recording)).collect();
     // Noise of the torque at rest by joint: a median over stretches, most of which nobody touches.
-    let noise: Vec<f64> =
-        (0..data.dof()).map(|j| median(stretches.iter().map(|s| s.noise(j)).collect())).collect();
+    let noise: Vec<f64> = (0..data.dof())
+        .map(|j| median(&mut stretches.iter().map(|s| s.noise(j)).collect::<Vec<_>>()))
+        .collect();
     let limit: Vec<f64> = friction.iter().zip(&noise).map(|(f, n)| 2.0 * f + DEVIATIONS * n).collect();
     stretches.iter().flat_map(|stretch| stretch.pushes(data, &limit, &noise)).collect()
 }
@@ -100,7 +102,7 @@ impl<'r> Stretch<'r> {
         let of = |samples: Range<usize>| {
             let less_median = |torque: &Vec<f64>| {
                 let own = &torque[samples.clone()];
-                let usual = median(own.to_vec());
+                let usual = median(&mut own.to_vec());
                 own.iter().map(|t| t - usual).collect()
             };
             Stretch { recording, torque: torque.iter().map(less_median).collect(), samples }
@@ -110,7 +112,7 @@ impl<'r> Stretch<'r> {
 
     /// The standard deviation of a joint's torque, by the median of its size.
     fn noise(&self, joint: usize) -> f64 {
-        1.4826 * median(self.torque[joint].iter().map(|t| t.abs()).collect())
+        NORMAL * median(&mut self.torque[joint].iter().map(|t| t.abs()).collect::<Vec<_>>())
     }
 
     fn pushes(&self, data: &Data<'_>, limit: &[f64], noise: &[f64]) -> Vec<RestPush> {
@@ -191,9 +193,4 @@ fn runs(values: &[bool], wanted: impl Fn(bool) -> bool) -> Vec<Range<usize>> {
     }
     runs.extend(first.map(|start| start..values.len()));
     runs
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

@@ -132,7 +132,7 @@ fn taken_out_of_fitted(
     }
     *base = without;
     let errors = [residual, left].map(|residual| spread(validation, &residual).rms);
-    Some(told(rule, pooled, &[seen], vec![[torque, zeros(validation)]], errors))
+    Some(told(rule, pooled, &[seen], vec![[torque, validation.zeros()]], errors))
 }
 
 /// Takes what was seen of an effect out of the validation set, where it is what makes its logs odd.
@@ -147,7 +147,7 @@ fn taken_out(
     seen.first()?;
     let windows: Vec<Window> = seen.iter().flat_map(|seen| seen.candidate.windows.clone()).collect();
     let torques: Vec<Vec<Vec<f64>>> = seen.iter().map(|seen| seen.torque(validation, base, rule)).collect();
-    let mut torque = zeros(validation);
+    let mut torque = validation.zeros();
     for (j, own) in torques.iter().flat_map(|torques| torques.iter().enumerate()) {
         torque[j].iter_mut().zip(own).for_each(|(sum, t)| *sum += t);
     }
@@ -158,7 +158,7 @@ fn taken_out(
     subtract(validation, &torque);
     let left = base.residual_on(validation, &[]);
     let errors = [residual, left].map(|residual| spread(validation, &residual).rms);
-    let torques = torques.into_iter().map(|there| [zeros(data), there]).collect();
+    let torques = torques.into_iter().map(|there| [data.zeros(), there]).collect();
     Some(told(rule, pooled, seen, torques, errors))
 }
 
@@ -240,7 +240,7 @@ fn look(rule: &Rule, pooled: &Pooled<'_>) -> Option<Seen> {
 impl Seen {
     /// Its torque on some logs, by joint and row, N·m.
     fn torque(&self, data: &Data<'_>, base: &Fit, rule: &Rule) -> Vec<Vec<f64>> {
-        let mut torque = zeros(data);
+        let mut torque = data.zeros();
         let context = Context::for_columns(data, base, rule);
         let columns = self.candidate.effect().columns(&context, &self.candidate);
         columns.iter().zip(&self.coefficients).for_each(|(column, c)| column.add_to(&mut torque, *c));
@@ -319,10 +319,6 @@ fn makes_it_odd(
     let most = if event { rule.event_left } else { rule.much_left };
     let little = excess(&left) <= most * excess(residual);
     little && !left.iter().zip(residual).any(harms)
-}
-
-fn zeros(data: &Data<'_>) -> Vec<Vec<f64>> {
-    data.joints.iter().map(|joint| vec![0.0; joint.len()]).collect()
 }
 
 fn subtract(data: &mut Data<'_>, torque: &[Vec<f64>]) {
