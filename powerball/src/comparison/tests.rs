@@ -106,6 +106,19 @@ fn a_payload_is_told_with_its_mass() {
     assert!(!loaded.friction.iter().any(|f| f.differs), "{}", loaded.sentence);
 }
 
+/// An arm whose friction differs by a tenth between the halves of its own log is not said to differ by a twentieth from
+/// another one; halves that are alike change nothing to speak of.
+#[test]
+fn what_varies_within_a_log_is_no_difference_of_arms() {
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
+    let (a, other) = (usual(), fitted(&body, lwa4p::links(), viscous(1.05), 12));
+    let [same, warm] =
+        [(2, 1.0), (3, 1.1)].map(|(seed, factor)| fitted(&body, lwa4p::links(), viscous(factor), seed));
+    assert!(compared(&a.clone().repeated([a, &same]), &other).differ);
+    let varies = compared(&a.clone().repeated([a, &warm]), &other);
+    assert!(!varies.differ, "{}", varies.sentence);
+}
+
 #[test]
 fn what_cannot_be_compared_is_told() {
     let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();

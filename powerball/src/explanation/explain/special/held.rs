@@ -9,12 +9,14 @@ use crate::explanation::options::ExplainOptions;
 use crate::explanation::rule::Rule;
 use crate::identification::estimate::{Fit, Folds, Term, fit, spread};
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, DataError, RigidArm};
+use crate::logs::regression::{Column, Data, DataError, RigidArm};
 
 /// Rounds in which the settings are made consistent with the coefficients.
 const ROUNDS: usize = 3;
 /// Effects that are looked for in all logs together, at most.
 const MOST: usize = 16;
+/// What pushes for longer than a hand does, s, may as well be what the base model lacks on a path of its own.
+const LONGEST_PUSH: f64 = 4.0;
 /// Draws their surrogates.
 const SEED: u64 = 7;
 
@@ -97,7 +99,17 @@ pub(crate) fn held(
     if let Some(seen) = pooled.seen.iter().find(fitted) {
         held.extend(taken_out_of_fitted(rule, &pooled, base, (data, validation), seen));
     }
-    let new = |seen: &&Seen| seen.candidate.windows.iter().all(|w| validation.logs.contains(&w.log));
+    let short = |seen: &Seen| matches!(Extent::of(&seen.candidate), Extent::Short(_));
+    // Zeros of torque sensors err on another path as pushes would.
+    let pushed = pooled.seen.iter().any(short) && {
+        let (better, left) = with_zeros(rule, base, (data, validation));
+        (0..validation.logs.len()).any(|log| oddness(&better, validation, &left, log) > rule.odd_log)
+    };
+    let new = |seen: &&Seen| {
+        let there = seen.candidate.windows.iter().all(|w| validation.logs.contains(&w.log));
+        let longest = seen.candidate.windows.iter().map(|w| w.to - w.from).fold(0.0, f64::max);
+        there && (!short(seen) || (pushed && longest <= LONGEST_PUSH))
+    };
     let seen: Vec<&Seen> = pooled.seen.iter().filter(new).collect();
     for &effect in effects::all() {
         let own = seen.iter().copied().filter(|seen| seen.candidate.effect() == effect);
@@ -106,6 +118,21 @@ pub(crate) fn held(
         held.extend(taken_out(rule, &pooled, base, (data, validation), &own));
     }
     Ok(held)
+}
+
+/// The base model with what every arm may have (see [`Effect::beside`](crate::explanation::effects::Effect::beside)), and
+/// what it leaves on the validation set.
+fn with_zeros(rule: &Rule, base: &Fit, (data, validation): (&Data<'_>, &Data<'_>)) -> (Fit, Vec<Vec<f64>>) {
+    let context = Context::new(data, base, &base.residual, rule);
+    let candidates: Vec<Candidate> = effects::all().iter().flat_map(|e| e.beside(&context)).collect();
+    let columns = |context: &Context<'_>| -> Vec<Column> {
+        candidates.iter().flat_map(|c| c.effect().columns(context, c)).collect()
+    };
+    let terms: Vec<Term> =
+        columns(&context).into_iter().map(|column| Term { column, non_negative: false }).collect();
+    let better = fit(data, &Folds::new(data), &terms, Some(base));
+    let left = better.residual_on(validation, &columns(&Context::for_columns(validation, base, rule)));
+    (better, left)
 }
 
 /// Takes a body that all fitted logs have out of them, where the base model fitted to what stays predicts the validation
@@ -151,8 +178,7 @@ fn taken_out(
     for (j, own) in torques.iter().flat_map(|torques| torques.iter().enumerate()) {
         torque[j].iter_mut().zip(own).for_each(|(sum, t)| *sum += t);
     }
-    let short = seen.iter().all(|seen| matches!(Extent::of(&seen.candidate), Extent::Short(_)));
-    if !makes_it_odd(rule, base, validation, &residual, (&windows, &torque, short)) {
+    if !makes_it_odd(rule, base, validation, &residual, (&windows, &torque)) {
         return None;
     }
     subtract(validation, &torque);
@@ -299,14 +325,14 @@ fn oddness(base: &Fit, other: &Data<'_>, residual: &[Vec<f64>], log: usize) -> f
 }
 
 /// Whether what was seen is what makes its logs odd: without its torque little of their excess over the fitted logs is
-/// left, of events half of it, and no joint's error is larger. A base model that errs on a new path makes them odd as
+/// left, and no joint's error is larger. A base model that errs on a new path makes them odd as
 /// well, and what fits best there only resembles that error.
 fn makes_it_odd(
     rule: &Rule,
     base: &Fit,
     other: &Data<'_>,
     residual: &[Vec<f64>],
-    (windows, torque, event): (&[Window], &[Vec<f64>], bool),
+    (windows, torque): (&[Window], &[Vec<f64>]),
 ) -> bool {
     let less = |(r, t): (&Vec<f64>, &Vec<f64>)| r.iter().zip(t).map(|(r, t)| r - t).collect();
     let left: Vec<Vec<f64>> = residual.iter().zip(torque).map(less).collect();
@@ -316,8 +342,7 @@ fn makes_it_odd(
     let square = |residual: &[f64]| residual.iter().map(|v| v * v).sum::<f64>();
     let harms =
         |(left, residual): (&Vec<f64>, &Vec<f64>)| square(left) > (1.0 + rule.harm) * square(residual);
-    let most = if event { rule.event_left } else { rule.much_left };
-    let little = excess(&left) <= most * excess(residual);
+    let little = excess(&left) <= rule.much_left * excess(residual);
     little && !left.iter().zip(residual).any(harms)
 }
 
