@@ -11,7 +11,6 @@ pub mod regression;
 pub mod signal;
 pub mod summary;
 pub mod tables;
-#[cfg(feature = "explain")]
 pub(crate) mod vector;
 
 pub use progress::Progress;
