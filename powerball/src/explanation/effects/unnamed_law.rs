@@ -37,7 +37,7 @@ pub enum Form {
     Waves([JointNumber; 2], [f64; 2]),
     /// cos and sin of qᵢ and of qₖ, and 1.
     Sum([JointNumber; 2]),
-    /// Waves of both positions up to [`SURFACE`], and 1: any smooth function of them.
+    /// Waves of both positions up to order 3, and 1: any smooth function of them.
     Surface([JointNumber; 2]),
     /// q̇·q̇ₖ and q̇·|q̇ₖ|: losses with both velocities.
     Velocities(JointNumber),
