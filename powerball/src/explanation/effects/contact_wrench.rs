@@ -54,7 +54,7 @@ const LONGER: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
 /// … and by which share of that its middle is later.
 const LATE: [f64; 3] = [-0.25, 0.0, 0.25];
 /// What is longer leans on the arm, and does not push it, s.
-const LONGEST_PUSH: f64 = 4.0;
+pub(crate) const LONGEST_PUSH: f64 = 4.0;
 /// Grid of the same push in other logs, s: its force is known there, so that a row more or less can be told.
 const FINE: f64 = 0.1;
 

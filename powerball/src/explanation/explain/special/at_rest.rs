@@ -47,6 +47,8 @@ const LONGEST: f64 = 0.4;
 const FOOT: f64 = 0.25;
 /// Deviations beyond what friction hides, in standard deviations of the torque at rest.
 const DEVIATIONS: f64 = 6.0;
+/// N·m: what divides by noise has some.
+const LEAST_NOISE: f64 = 1e-9;
 /// One force on the last frame explains at least so much of a push.
 const EXPLAINED: f64 = 0.5;
 
@@ -110,9 +112,13 @@ impl<'r> Stretch<'r> {
         long.into_iter().map(of).collect()
     }
 
-    /// The standard deviation of a joint's torque, by the median of its size.
+    /// The standard deviation of a joint's torque, by the median of its size; not 0, where a log holds a torque that
+    /// never changes.
     fn noise(&self, joint: usize) -> f64 {
-        NORMAL * median(&mut self.torque[joint].iter().map(|t| t.abs()).collect::<Vec<_>>())
+        f64::max(
+            LEAST_NOISE,
+            NORMAL * median(&mut self.torque[joint].iter().map(|t| t.abs()).collect::<Vec<_>>()),
+        )
     }
 
     fn pushes(&self, data: &Data<'_>, limit: &[f64], noise: &[f64]) -> Vec<RestPush> {

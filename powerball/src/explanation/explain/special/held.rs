@@ -1,10 +1,10 @@
-//! What is held in logs of the validation set only: it is found and taken out before that set judges
-//! anything.
+//! What is in logs of the validation set only, or a body that all fitted logs have and no other one: it is found and
+//! taken out before that set judges anything.
 
 use super::super::comparison::surprise;
 use super::super::named::NamedEffect;
 use super::super::search::{Extent, Screen, evidence, level_by_chance, refusal};
-use crate::explanation::effects::{self, Candidate, Context, Found, Part, Window};
+use crate::explanation::effects::{self, Candidate, Context, Found, Part, Window, contact_wrench};
 use crate::explanation::options::ExplainOptions;
 use crate::explanation::rule::Rule;
 use crate::identification::estimate::{Fit, Folds, Term, fit, spread};
@@ -15,8 +15,6 @@ use crate::logs::regression::{Column, Data, DataError, RigidArm};
 const ROUNDS: usize = 3;
 /// Effects that are looked for in all logs together, at most.
 const MOST: usize = 16;
-/// What pushes for longer than a hand does, s, may as well be what the base model lacks on a path of its own.
-const LONGEST_PUSH: f64 = 4.0;
 /// Draws their surrogates.
 const SEED: u64 = 7;
 
@@ -108,7 +106,8 @@ pub(crate) fn held(
     let new = |seen: &&Seen| {
         let there = seen.candidate.windows.iter().all(|w| validation.logs.contains(&w.log));
         let longest = seen.candidate.windows.iter().map(|w| w.to - w.from).fold(0.0, f64::max);
-        there && (!short(seen) || (pushed && longest <= LONGEST_PUSH))
+        // What pushes for longer than a hand does may as well be what the base model lacks on a path of its own.
+        there && (!short(seen) || (pushed && longest <= contact_wrench::LONGEST_PUSH))
     };
     let seen: Vec<&Seen> = pooled.seen.iter().filter(new).collect();
     for &effect in effects::all() {
