@@ -97,7 +97,10 @@ pub(crate) fn held(
     if let Some(seen) = pooled.seen.iter().find(fitted) {
         held.extend(taken_out_of_fitted(rule, &pooled, base, (data, validation), seen));
     }
-    let short = |seen: &Seen| matches!(Extent::of(&seen.candidate), Extent::Short(_));
+    // A body that is put down again is there for a while as well, and no push.
+    let short = |seen: &Seen| {
+        matches!(Extent::of(&seen.candidate), Extent::Short(_)) && !seen.candidate.effect().of_the_body()
+    };
     // Zeros of torque sensors err on another path as pushes would.
     let pushed = pooled.seen.iter().any(short) && {
         let (better, left) = with_zeros(rule, base, (data, validation));
