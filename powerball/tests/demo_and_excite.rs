@@ -30,30 +30,56 @@ fn arm(name: &str) -> String {
     format!("{}/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// One demo for the tests of this file: its effect, what it says, and its folder.
-fn demo() -> (&'static str, &'static Value, PathBuf) {
+/// The demo of README.md, for the tests of this file: what it says, and its folder.
+fn demo() -> (&'static Value, PathBuf) {
     static SAID: OnceLock<Value> = OnceLock::new();
-    let (effect, seed) = ("load_friction", "3");
-    let folder = scratch(&format!("demo_{effect}"));
+    let folder = scratch("demo");
     let said = SAID.get_or_init(|| {
-        let out = folder.to_str().unwrap();
-        let run = powerball(&["demo", "--effect", effect, "--seed", seed, "--out", out, "--json"]);
+        let run = powerball(&["demo", "--out", folder.to_str().unwrap(), "--json"]);
         assert!(run.status.success(), "{}", complaint(&run));
         json(&run)
     });
-    (effect, said, folder)
+    (said, folder)
+}
+
+fn numbers(list: &Value) -> Vec<f64> {
+    list.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+}
+
+#[test]
+fn the_readme_shows_what_the_demo_prints() {
+    let (result, _) = demo();
+    let readme = std::fs::read_to_string(arm("../README.md")).unwrap();
+    let (_, shown) = readme.split_once("joint   base model").unwrap();
+    let (shown, _) = shown.split_once("```").unwrap();
+    let explained = &result["explained"];
+    let [before, after] = ["before", "after"].map(|when| numbers(&explained[when]["validate"]["rms"]));
+    let floor = numbers(&explained["noise_floor"]);
+    let rows: Vec<Vec<&str>> = (shown.lines())
+        .map(|line| line.split_whitespace().collect::<Vec<_>>())
+        .filter(|cells| cells.first().is_some_and(|first| first.parse::<usize>().is_ok()))
+        .collect();
+    assert_eq!(rows.len(), 2);
+    for cells in rows {
+        let joint = cells[0].parse::<usize>().unwrap() - 1;
+        for (cell, value) in [(1, before[joint]), (2, after[joint]), (5, floor[joint])] {
+            // Another machine's rounding may be another one.
+            assert!((cells[cell].parse::<f64>().unwrap() - value).abs() < 2e-4, "{cells:?}: {value}");
+        }
+    }
+    let truth = result["verdict"]["truth"].as_str().unwrap();
+    let joint = &result["verdict"]["joints"][0];
+    assert!(shown.contains(&format!("named:         {truth} on joint {joint}\n")), "{}", result["verdict"]);
+    assert!(shown.contains(result["verdict"]["figures"].as_str().unwrap()), "{}", result["verdict"]);
 }
 
 /// Other effects are taken from the demo's session to a controller in `round_trip.rs`.
 #[test]
 fn the_demo_finds_what_it_hid_and_writes_what_it_promises() {
-    let (effect, result, folder) = demo();
-    assert_eq!(result["verdict"]["truth"], effect);
+    let (result, folder) = demo();
+    let effect = result["verdict"]["truth"].as_str().unwrap();
     assert_eq!(result["verdict"]["judgement"], "right", "{}", result["verdict"]);
-    let rms = |when: &str| -> Vec<f64> {
-        let list = result["explained"][when]["validate"]["rms"].as_array().unwrap();
-        list.iter().map(|x| x.as_f64().unwrap()).collect()
-    };
+    let rms = |when: &str| numbers(&result["explained"][when]["validate"]["rms"]);
     let joint = result["verdict"]["joints"][0].as_u64().unwrap() as usize - 1;
     assert!(rms("after")[joint] < 0.5 * rms("before")[joint]);
 
@@ -86,13 +112,25 @@ fn an_experiment_decides_what_logs_leave_open() {
     let held_out: Vec<String> = (1..=3).map(|k| file(format!("held_out_{k}.csv"))).collect();
     let arm = file("arm.toml".to_string());
     let mut arguments =
-        vec!["explain", "--arm", &arm, "--json", "--experiment", "--out", again.to_str().unwrap(), "--log"];
+        vec!["explain", "--arm", &arm, "--experiment", "--out", again.to_str().unwrap(), "--log"];
     arguments.extend(logs.iter().map(String::as_str));
     arguments.push("--validate");
     arguments.extend(held_out.iter().map(String::as_str));
     let run = powerball(&arguments);
     assert!(run.status.success(), "{}", complaint(&run));
-    let result = json(&run);
+    let said = String::from_utf8(run.stdout).unwrap();
+    assert!(said.lines().count() <= 25, "{said}");
+    for what in [
+        "joint        before ",
+        "\nasymmetry on joint 1: ",
+        " N·m constant; right in ",
+        "decides for asymmetry",
+        "\nreport: ",
+    ] {
+        assert!(said.contains(what), "'{what}' not in {said}");
+    }
+    let result: Value =
+        serde_json::from_str(&std::fs::read_to_string(again.join("explained.json")).unwrap()).unwrap();
     assert_eq!(result["experiment"]["decided"], "asymmetry", "{}", result["experiment"]);
     assert_eq!(result["effects"][0]["effect"], "asymmetry");
     assert!(result["effects"][0]["margin"].as_f64().unwrap() > 1.1);
@@ -130,7 +168,7 @@ fn the_same_seed_gives_the_same_logs_and_another_one_others() {
     let first = log(5, "session_a");
     assert!(first == log(5, "session_b"));
     // The demo's seed is another one.
-    let (_, _, folder) = demo();
+    let (_, folder) = demo();
     assert!(first.1 != std::fs::read(folder.join("held_out_2.csv")).unwrap());
 }
 

@@ -93,6 +93,38 @@ fn a_fit_comes_with_a_real_arm_that_costs_next_to_nothing() {
     assert!(String::from_utf8_lossy(&strict.stderr).contains("may exceed 0.1 % of its torque"));
 }
 
+/// Results are written and the reason is said; who knows better accepts them.
+#[test]
+fn a_result_that_should_not_be_built_on_ends_with_3() {
+    let (folder, fit, _) = session("doubtful");
+    let (arm, out) = (folder.join("arm.toml"), folder.join("result"));
+    let (arm, out) = (arm.to_str().unwrap(), out.to_str().unwrap());
+    let identify = |rest: &[&str]| run(&["identify", "--arm", arm, "--out", out], &fit, rest);
+    let reversed = ["--map", "tau.sign = -1"];
+    let said = |output: &Output| String::from_utf8_lossy(&output.stdout).into_owned();
+
+    let doubtful = identify(&reversed);
+    assert_eq!(doubtful.status.code(), Some(3));
+    assert!(
+        said(&doubtful).starts_with("The columns are not what they are said to be."),
+        "{}",
+        said(&doubtful)
+    );
+    let reason = String::from_utf8_lossy(&doubtful.stderr);
+    assert!(reason.contains("not what they are said to be") && reason.contains("--accept"), "{reason}");
+    assert!(Path::new(out).join("identified.json").is_file());
+
+    let accepted = identify(&[&reversed[..], &["--accept", "--quiet"]].concat());
+    assert_eq!((accepted.status.code(), said(&accepted).as_str()), (Some(0), ""));
+
+    // Notes are counted, and all there with --verbose.
+    let sound = identify(&[]);
+    assert_eq!(sound.status.code(), Some(0));
+    assert!(said(&sound).contains(": --verbose or the page\nreport: "), "{}", said(&sound));
+    let verbose = said(&identify(&["--verbose"]));
+    assert!(verbose.contains("\nnote: ") && !verbose.contains("--verbose"), "{verbose}");
+}
+
 #[test]
 fn a_model_of_another_arm_is_not_judged() {
     let (folder, fit, _) = session("verify_wrong");

@@ -3,8 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout)]
 
 use dyngen::Arm;
-use powerball::explanation::explain::{NamedEffect, State};
+use powerball::explanation::explain::{NamedEffect, State, contradictions};
 use powerball::explanation::{ExplainOptions, Explained, explain_body};
+use powerball::identification::conventions::conventions;
 use powerball::logs::log::{common_clock, read_logs};
 use powerball::logs::regression::RigidArm;
 use std::path::PathBuf;
@@ -34,7 +35,9 @@ fn explained(arm: &str, fit: &[String], validate: &[String]) -> Option<Explained
     common_clock(&mut logs);
     let validate = logs.split_off(fit.len());
     let body = RigidArm::new(&arm).unwrap();
-    Some(explain_body(&body, &logs, &validate, &ExplainOptions::default()).unwrap())
+    let explained = explain_body(&body, &logs, &validate, &ExplainOptions::default()).unwrap();
+    assert_eq!(contradictions(&explained), [""; 0], "{}", arm.name);
+    Some(explained)
 }
 
 /// The figures of an effect as explained.json has them.
@@ -245,4 +248,25 @@ fn pushes_in_the_validation_log_only_are_found_and_the_log_differs() {
     let after = &explained.after.validate.rms;
     let before = &explained.before.validate.rms;
     assert!((0..3).all(|j| after[j] < 0.45 * before[j]), "{before:?} {after:?}");
+}
+
+/// What a person writes wrong: each is found in the file, and nothing is in the file as it is.
+#[test]
+fn what_is_wrong_in_the_arm_file_of_the_ur10e_is_told() {
+    let Some(folder) = data().map(|data| data.join("ur10e")) else { return };
+    let text = std::fs::read_to_string(folder.join("arm.toml")).unwrap();
+    let names = ["12a", "7", "8", "12b", "5"];
+    let files = names.map(|name| folder.join(format!("fourier_{name}.csv")));
+    for (right, wrong, line) in [
+        ("", "", None),
+        ("a = -0.613", "a = 0.613", Some("a = -0.613 of joint 2")),
+        ("convention = \"standard\"", "convention = \"modified\"", Some("convention = \"standard\"")),
+    ] {
+        let arm = Arm::parse(&text.replace(right, wrong), "arm.toml").unwrap();
+        let (mut logs, _) = read_logs(&files, &arm).unwrap();
+        let validate = logs.split_off(4);
+        let told = conventions(&RigidArm::new(&arm).unwrap(), &logs, &validate);
+        assert_eq!(told.arm_file.as_deref(), line, "{}", told.evidence);
+        assert_eq!(told.differ(), line.is_some(), "{}", told.evidence);
+    }
 }

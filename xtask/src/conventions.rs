@@ -1,7 +1,9 @@
 //! What the columns of logs are taken to be: as they are, and after one thing was made wrong with them.
 
 use dyngen::Arm;
-use dyngen::exact::rational::to_f64;
+use dyngen::arm::Convention;
+use dyngen::exact::angle::Angle;
+use dyngen::exact::rational::{Rational, integer, to_f64};
 use powerball::identification::conventions::{Conventions, conventions};
 use powerball::identification::excite::{Fourier, Harmonics};
 use powerball::logs::log::{Log, read_logs};
@@ -64,7 +66,69 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
         let mend = told.mend.as_deref().map_or(String::new(), |m| format!("`{}`", m.replace('\n', "` `")));
         println!("| {name} | {} | {mend} | {:.2} |", words(&told), start.elapsed().as_secs_f64());
     }
+    if arguments.plain { Ok(()) } else { of_arm_files(&arm, &logs, &validate) }
+}
+
+/// Prints a table: what was made wrong with the arm file, the line that is told, and what else fits as well.
+fn of_arm_files(arm: &Arm, logs: &[Log], validate: &[Log]) -> Result<(), String> {
+    println!("\n| wrong in the arm file | told | or | s |\n|---|---|---|---|");
+    for (name, wrong) in wrong_files(arm) {
+        let body = RigidArm::new(&wrong).map_err(|e| e.to_string())?;
+        let start = std::time::Instant::now();
+        let told = conventions(&body, logs, validate);
+        let time = start.elapsed().as_secs_f64();
+        let answer = told.answers.iter().find(|a| a.question == "arm file");
+        let or = answer.and_then(|a| a.sentence.split_once("do not tell it from: ")).map_or("", |(_, or)| or);
+        println!("| {name} | {} | {or} | {time:.2} |", told.arm_file.clone().unwrap_or_else(|| words(&told)));
+    }
     Ok(())
+}
+
+/// Arm files with one thing wrong.
+fn wrong_files(arm: &Arm) -> Vec<(String, Arm)> {
+    let mut all = Vec::new();
+    let mut push = |name: String, spoil: &dyn Fn(&mut Arm)| {
+        let mut wrong = arm.clone();
+        spoil(&mut wrong);
+        all.push((name, wrong));
+    };
+    push("convention".into(), &|arm| {
+        arm.convention = match arm.convention {
+            Convention::Standard => Convention::Modified,
+            Convention::Modified => Convention::Standard,
+        };
+    });
+    let minus = |x: &Rational| x * integer(-1);
+    for (k, joint) in arm.joints.iter().enumerate() {
+        let name = k + 1;
+        let (a, d) = (to_f64(&joint.a), to_f64(&joint.d));
+        if a != 0.0 {
+            push(format!("a = {} of joint {name}", -a), &|arm| arm.joints[k].a = minus(&joint.a));
+        }
+        if d != 0.0 {
+            push(format!("d = {} of joint {name}", -d), &|arm| arm.joints[k].d = minus(&joint.d));
+        }
+        let turned = |by: Angle| Angle::sum(&[(joint.theta.clone(), integer(1)), (by, integer(1))]);
+        if joint.alpha.sin_cos().0 != 0.0 {
+            let other = Angle::sum(&[(joint.alpha.clone(), integer(-1))]);
+            push(format!("alpha of joint {name} with the other sign"), &|arm| {
+                arm.joints[k].alpha = other.clone()
+            });
+        }
+        let quarter = Angle::PiMultiple(integer(1) / integer(2));
+        push(format!("theta of joint {name} a quarter turn further"), &|arm| {
+            arm.joints[k].theta = turned(quarter.clone());
+        });
+    }
+    push("gravity upwards".into(), &|arm| arm.gravity.iter_mut().for_each(|g| *g *= integer(-1)));
+    push("gravity from the side".into(), &|arm| arm.gravity.rotate_right(1));
+    push("millimetres".into(), &|arm| {
+        for joint in &mut arm.joints {
+            joint.a = &joint.a * integer(1000);
+            joint.d = &joint.d * integer(1000);
+        }
+    });
+    all
 }
 
 /// What is other than it is said to be; otherwise what is not told.
@@ -153,6 +217,13 @@ fn spoils<'a>(arm: &'a Arm, body: &'a RigidArm, parameters: &'a [f64]) -> Vec<(S
         ));
         all.push((format!("q{a} and q{b} exchanged"), Box::new(move |log| log.q.swap(a - 1, b - 1))));
     }
+    all.push((
+        "joints counted from the tip".into(),
+        Box::new(|log| {
+            log.q.reverse();
+            log.torque.reverse();
+        }),
+    ));
     for by in [0.03, 0.08, 0.15] {
         all.push((format!("torques {:.0} ms late", 1000.0 * by), Box::new(move |log| late(log, by))));
     }

@@ -6,6 +6,7 @@ mod held_out;
 mod known_truth;
 mod stories;
 mod study;
+mod subsets;
 mod textbook;
 
 use clap::{Parser, Subcommand};
@@ -34,6 +35,8 @@ enum Command {
     Compare(compare::Arguments),
     /// What `explain` says of measured logs in which others, or a draw, put something, as a page
     KnownTruth(known_truth::Arguments),
+    /// Whether names that three logs give are taken back by all of them
+    Subsets(subsets::Arguments),
     /// What `explain` finds in the measured logs, case by case, as a page with figures
     Stories(stories::Arguments),
 }
@@ -47,6 +50,7 @@ fn main() -> ExitCode {
         Command::Textbook(arguments) => textbook::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::KnownTruth(arguments) => known_truth::run(&arguments),
+        Command::Subsets(arguments) => subsets::run(&arguments),
         Command::Stories(arguments) => stories::run(&arguments),
     };
     match done {

@@ -7,7 +7,8 @@ use powerball::controller::JointNumber;
 use powerball::explanation::explain::{NamedEffect, Shown};
 use powerball::explanation::{ExplainOptions, Explained, explain};
 use powerball::logs::log::read_logs;
-use powerball::report::explained::{error_bars, figures, sight};
+use powerball::report::explained::{error_bars, sight};
+use powerball::report::size::size;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -156,7 +157,7 @@ fn tell(page: &mut String, case: &Case, explained: &Explained, figures: &Path) -
         let _ = writeln!(page, "\nNothing is named.");
     }
     for effect in &explained.effects {
-        evidence(page, effect);
+        evidence(page, effect, &explained.sliding);
         // One joint stands for all: the first is the one on which the effect explains most.
         if let Some(shown) = explained.shown.iter().find(|s| s.effect == effect.effect && !s.means.is_empty())
         {
@@ -189,13 +190,13 @@ fn tell(page: &mut String, case: &Case, explained: &Explained, figures: &Path) -
     Ok(())
 }
 
-fn evidence(page: &mut String, effect: &NamedEffect) {
+fn evidence(page: &mut String, effect: &NamedEffect, sliding: &[bool]) {
     let _ = writeln!(
         page,
-        "\n**{}** on joint {}: `{}`.",
+        "\n**{}** on joint {}: {}.",
         effect.effect,
         list(&effect.joints),
-        figures(&effect.figures)
+        size(effect, sliding)
     );
     let least = effect.held_out_gain.iter().copied().fold(f64::INFINITY, f64::min);
     let _ = writeln!(

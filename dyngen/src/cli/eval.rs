@@ -157,6 +157,13 @@ impl States {
                 missing.join(", ")
             )));
         }
+        let more = format!("{name}{}", n + 1);
+        if self.header.contains(&more) {
+            return Err(Failure::input(format!(
+                "{}:1: the states have a column {more}; the arm has {n} joints: another arm's states",
+                self.file
+            )));
+        }
         let places: Vec<usize> = places.into_iter().flatten().collect();
         Ok(self.rows.iter().flat_map(|(_, row)| places.iter().map(|p| row[*p])).collect())
     }

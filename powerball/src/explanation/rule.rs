@@ -150,6 +150,9 @@ pub struct Rule {
 
     /// A joint is explained where no more than this share of its torque's rms is left on the validation set.
     pub explained_share: f64,
+    /// What is left of a joint below this share of its torque is little, whatever it depends on: a law that is missing
+    /// often leaves less than [`explained_share`](Self::explained_share).
+    pub little_share: f64,
     /// Where more than this share is left a model predicts next to nothing.
     pub nothing_share: f64,
 
@@ -219,6 +222,7 @@ impl Default for Rule {
             least_share: 0.02,
             correction_bound: 2.0,
             explained_share: 0.1,
+            little_share: 0.05,
             nothing_share: 0.9,
             least_time: 30.0,
             many_accepted: 0.05,

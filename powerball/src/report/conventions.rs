@@ -1,12 +1,17 @@
-//! What the columns of logs are, at the head of a page.
+//! What the columns of logs are, for a page.
 
 use crate::identification::conventions::Conventions;
 use crate::report::{Page, Table, Tone};
 
-/// Adds what is told of the columns: what is wrong with them stands out, the rest is folded.
-pub fn add_to_page(page: &mut Page, conventions: &Conventions) {
+/// What is wrong with the columns or the arm file, or that nothing is.
+pub fn verdict(page: &mut Page, conventions: &Conventions) {
     let tone = if conventions.differ() { Tone::Bad } else { Tone::Plain };
     page.note(tone, &conventions.verdict());
+}
+
+/// Adds the verdict, and every question.
+pub fn add_to_page(page: &mut Page, conventions: &Conventions) {
+    verdict(page, conventions);
     let mut table =
         Table::new(["question", "as said", "held-out error as it is [%]", "as it would be [%]", "evidence"]);
     for answer in &conventions.answers {

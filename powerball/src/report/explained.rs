@@ -1,11 +1,10 @@
 //! An explanation as sections of a page.
 
 use crate::controller::JointNumber;
-use crate::explanation::effects::Figures;
-use crate::explanation::explain::{Explained, NamedEffect, Shown, State, TorqueCurve};
+use crate::explanation::explain::{Change, Explained, NamedEffect, Shown, State, TorqueCurve};
+use crate::report::size::size;
 use crate::report::{BarPairs, Figure, Files, Ink, Page, Panel, Series, Table, Tone, number};
 use crate::report::{conventions, transmission};
-use serde_json::Value;
 
 /// explained.json, model.json and report.html.
 ///
@@ -18,14 +17,14 @@ pub fn files(explained: &Explained) -> Result<Files, String> {
     Ok(files.with("report.html", page.to_html()))
 }
 
-/// Adds everything that an explanation says to a page: what the columns are, errors, effects with their evidence, torques over
-/// time, what stays, and what was found in the logs.
+/// Adds everything that an explanation says to a page: the answer first; then errors, effects with their evidence, torques
+/// over time, what stays, what the columns are, and what was found in the logs.
 pub fn add_to_page(page: &mut Page, explained: &Explained) {
-    if let Some(told) = &explained.conventions {
-        conventions::add_to_page(page, told);
+    if let Some(told) = explained.conventions.as_ref().filter(|c| c.differ() || c.is_unclear()) {
+        conventions::verdict(page, told);
     }
+    answer(page, explained);
     logs(page, explained);
-    verdict(page, explained);
     errors(page, explained);
     effects(page, explained);
     laws(page, explained);
@@ -34,6 +33,11 @@ pub fn add_to_page(page: &mut Page, explained: &Explained) {
     }
     torques(page, explained);
     rest(page, explained);
+    if let Some(told) = &explained.conventions {
+        page.heading("What the columns of the logs are");
+        conventions::add_to_page(page, told);
+    }
+    notes(page, explained);
 }
 
 /// What is different in which log.
@@ -64,15 +68,65 @@ fn logs(page: &mut Page, explained: &Explained) {
     page.table(&table);
 }
 
-/// How far each joint is explained.
-fn verdict(page: &mut Page, explained: &Explained) {
-    page.heading("How far the torque is explained");
-    let mut table = Table::new(["joint", "verdict", "torque left", "what to think of and to do"]);
+/// Each joint's error before and after with how far it is explained, the names, and what to do about the rest.
+fn answer(page: &mut Page, explained: &Explained) {
+    page.heading("The answer");
+    let (before, after) = (&explained.before.validate, &explained.after.validate);
+    let mut table = Table::new([
+        "joint",
+        "error before",
+        "error after",
+        "change, 95 % interval",
+        "torque left",
+        "verdict",
+    ]);
     for v in &explained.verdict {
-        let left = if v.left.is_nan() { String::new() } else { percent(v.left) };
-        table.push([v.joint.to_string(), v.state.to_string(), left, v.advice.clone()]);
+        let j = v.joint.index();
+        let unit = if explained.sliding.get(j).copied().unwrap_or(false) { "N" } else { "N·m" };
+        let changed = explained.held_out_change.iter().find(|c| c.joint == v.joint);
+        table.push([
+            v.joint.to_string(),
+            format!("{} {unit}", number(before.rms[j])),
+            format!("{} {unit}", number(after.rms[j])),
+            changed.map_or_else(String::new, change),
+            if v.left.is_nan() { "–".to_string() } else { percent(v.left) },
+            v.state.to_string(),
+        ]);
     }
     page.table(&table);
+    if explained.effects.is_empty() {
+        page.paragraph(nothing_named(explained));
+    } else {
+        let mut table = Table::new(["what the model lacked", "joints", "size", "right in", "logs"]);
+        for effect in &explained.effects {
+            table.push([
+                effect.effect.clone(),
+                list(&effect.joints),
+                size(effect, &explained.sliding),
+                format!("{:.0} of 100", 100.0 * effect.probability),
+                effect.logs.join(", "),
+            ]);
+        }
+        page.table(&table);
+    }
+    for v in explained.verdict.iter().filter(|v| !v.advice.is_empty()) {
+        page.paragraph(&format!("Joint {}: {}.", v.joint, v.advice));
+    }
+}
+
+/// A change of an error with its interval; an interval that holds 0 is no change that is known.
+#[must_use]
+pub fn change(change: &Change) -> String {
+    let percent = |share: f64| format!("{:+.0}", 100.0 * share).replace('-', "\u{2212}");
+    let [low, high] = change.interval;
+    if low == 0.0 && high == 0.0 {
+        return "none".to_string();
+    }
+    let clear = match low <= 0.0 && high >= 0.0 {
+        true => "unclear".to_string(),
+        false => format!("{} %", percent(change.rms)),
+    };
+    format!("{clear} ({} to {})", percent(low), percent(high))
 }
 
 /// What is said where no effect was named: never more than the logs show.
@@ -91,37 +145,10 @@ pub fn nothing_named(explained: &Explained) -> &'static str {
 
 fn errors(page: &mut Page, explained: &Explained) {
     page.heading("Errors on the held-out path");
-    let (before, after) = (&explained.before.validate, &explained.after.validate);
-    let mut table = Table::new([
-        "joint",
-        "base model [N·m]",
-        "of the torque",
-        "with effects [N·m]",
-        "of the torque",
-        "change, 95 % interval",
-        "noise floor [N·m]",
-    ]);
-    for joint in 0..before.rms.len() {
-        let (b, a) = (before.rms[joint], after.rms[joint]);
-        let floor = explained.noise_floor.get(joint).copied().unwrap_or(f64::NAN);
-        let changed = explained.held_out_change.iter().find(|c| c.joint.index() == joint);
-        table.push([
-            (joint + 1).to_string(),
-            number(b),
-            percent(before.relative[joint]),
-            number(a),
-            percent(after.relative[joint]),
-            changed.map_or_else(String::new, |c| {
-                format!("{} ({} to {})", change(c.rms), change(c.interval[0]), change(c.interval[1]))
-            }),
-            number(floor),
-        ]);
-    }
     page.bars(
         &error_bars(explained),
         "The dashed lines are what white measurement noise alone would leave in the band.",
     );
-    page.table(&table);
 }
 
 /// Held-out errors by joint, before and after.
@@ -137,40 +164,28 @@ pub fn error_bars(explained: &Explained) -> BarPairs {
 }
 
 fn effects(page: &mut Page, explained: &Explained) {
-    page.heading("What the model lacked");
     if explained.effects.is_empty() {
-        page.paragraph(nothing_named(explained));
-    } else {
-        let mut table = Table::new([
-            "effect",
-            "joints",
-            "figures (SI units)",
-            "held-out gain",
-            "p",
-            "margin",
-            "left over",
-        ]);
-        for effect in &explained.effects {
-            let gain = effect.held_out_gain.iter().copied().fold(f64::INFINITY, f64::min);
-            table.push([
-                effect.effect.clone(),
-                list(&effect.joints),
-                figures(&effect.figures),
-                percent(gain),
-                number(effect.p_value),
-                format!("{:.2}", effect.margin),
-                percent(effect.leftover),
-            ]);
-        }
-        page.table(&table);
-        page.paragraph(
-            "Gain: by how much the squared error of folds that were left out falls, on the joint where it \
-                falls least. \
-             Margin: evidence over that of the next best name. Left over: share of the residual's excess \
-             over noise \
-             that stays on these joints.",
-        );
+        return;
     }
+    page.heading("The evidence");
+    let mut table = Table::new(["effect", "joints", "held-out gain", "p", "evidence", "left over"]);
+    for effect in &explained.effects {
+        let gain = effect.held_out_gain.iter().copied().fold(f64::INFINITY, f64::min);
+        table.push([
+            effect.effect.clone(),
+            list(&effect.joints),
+            percent(gain),
+            number(effect.p_value),
+            format!("{:.2} times", effect.margin),
+            percent(effect.leftover),
+        ]);
+    }
+    page.table(&table);
+    page.paragraph(
+        "Gain: by how much the squared error of folds that were left out falls, on the joint where it falls least. \
+         p: probability of as much by chance, over all that was tried. Evidence: against that of the next best name. Left \
+         over: share of the residual's excess over noise that stays on these joints.",
+    );
     for shown in &explained.shown {
         page.figure(&sight(shown), "");
     }
@@ -294,11 +309,33 @@ fn rest(page: &mut Page, explained: &Explained) {
          The residuals are worth {} independent samples.",
         chance.accepted, chance.surrogates, explained.effective_samples
     ));
-    if !explained.warnings.is_empty() {
-        let mut table = Table::new(["found in the logs and the arm file"]);
-        explained.warnings.iter().for_each(|w| table.push([w.clone()]));
-        page.table(&table);
+}
+
+/// What was found in the logs and the arm file; what is said of several logs alike is said once.
+fn notes(page: &mut Page, explained: &Explained) {
+    if explained.warnings.is_empty() {
+        return;
     }
+    let mut counted: Vec<(String, usize)> = Vec::new();
+    for warning in &explained.warnings {
+        let log = explained.logs.iter().find(|log| warning.starts_with(&log.log));
+        let text = log.map_or(warning.as_str(), |log| &warning[log.log.len()..]);
+        match counted.iter_mut().find(|(known, _)| log.is_some() && known == text) {
+            Some((_, count)) => *count += 1,
+            None if log.is_some() => counted.push((text.to_string(), 1)),
+            None => counted.push((warning.clone(), 0)),
+        }
+    }
+    let mut table = Table::new(["found in the logs and the arm file"]);
+    for (text, count) in counted {
+        let whole = || explained.warnings.iter().find(|w| w.ends_with(&text)).cloned().unwrap_or_default();
+        table.push([match count {
+            0 => text,
+            1 => whole(),
+            _ => format!("{count} logs{text}"),
+        }]);
+    }
+    page.folded(&format!("{} notes on the logs and the arm file", explained.warnings.len()), &table);
 }
 
 fn corrections(page: &mut Page, explained: &Explained) {
@@ -332,35 +369,10 @@ fn corrections(page: &mut Page, explained: &Explained) {
     );
 }
 
-/// `{"mass": 1.5, "com": [0, 0, 0.1]}` as `mass 1.50, com (0, 0, 0.100)`.
-#[must_use]
-pub fn figures(figures: &Figures) -> String {
-    serde_json::to_value(figures).map_or_else(|_| String::new(), |tree| in_words(&tree))
-}
-
-/// Every figure by the name that it has in files.
-fn in_words(tree: &Value) -> String {
-    match tree {
-        Value::Object(map) => map
-            .iter()
-            .map(|(name, value)| format!("{name} {}", in_words(value)))
-            .collect::<Vec<_>>()
-            .join(", "),
-        Value::Array(values) => format!("({})", values.iter().map(in_words).collect::<Vec<_>>().join(", ")),
-        Value::Number(value) => value.as_f64().map_or_else(|| value.to_string(), number),
-        Value::String(text) => text.clone(),
-        other => other.to_string(),
-    }
-}
-
 fn list(joints: &[JointNumber]) -> String {
     joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
 fn percent(share: f64) -> String {
     format!("{:.1} %", 100.0 * share)
-}
-
-fn change(share: f64) -> String {
-    format!("{:+.0} %", 100.0 * share).replace('-', "\u{2212}")
 }

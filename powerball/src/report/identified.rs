@@ -47,7 +47,7 @@ pub fn page(result: &Identified) -> Page {
     let mut page = Page::new(format!("Torque model of {}", result.arm));
     let [_, high] = result.band;
     page.lead(&format!(
-        "Minimal inertial set and friction of Eq. 16, weighted least squares, each joint in a band of its \
+        "Minimal inertial set and friction of two tanh steps and a viscous part (Eq. 16), weighted least squares, each joint in a band of its \
             own up to {high} Hz. Standard errors hold for residuals that depend on each other within blocks \
             of two seconds."
     ));
@@ -340,7 +340,7 @@ fn friction(page: &mut Page, result: &Identified, shown: &Along) {
                 Ink::Blue,
                 joint.friction.clone(),
             ))
-            .line("Eq. 16", Ink::Orange, curve);
+            .line("tanh friction (Eq. 16)", Ink::Orange, curve);
         page.figure(
             &Figure::new(format!("Friction of joint {}", f.joint), "velocity [rad/s]").panel(panel),
             "",

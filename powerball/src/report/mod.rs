@@ -31,6 +31,7 @@ pub mod files;
 pub mod identified;
 pub mod inspected;
 mod page;
+pub mod size;
 mod table;
 pub mod transmission;
 pub mod verified;

@@ -27,6 +27,8 @@ class Effect:
     joints: List[int]
     #: Its physical reading, SI units.
     parameters: Dict[str, Any]
+    #: The standard error of its size on each joint, a share of it; None where it is not of the fit.
+    relative_std: List[Optional[float]]
     #: Held-out error of its joints without and with it, N·m.
     rms_before: Array
     rms_after: Array
@@ -144,6 +146,7 @@ class Explained(OfLogs):
                 margin=entry["margin"],
                 leftover=entry["leftover"],
                 logs=entry.get("logs", []),
+                relative_std=entry["relative_std"],
                 rivals=[(rival["effect"], rival["why_not"]) for rival in entry["rivals"]],
             )
 

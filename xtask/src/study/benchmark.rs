@@ -163,6 +163,7 @@ fn outcome(truth: Truth, answer: Answer) -> Outcome {
             .collect(),
         margin: f64::NAN,
         leftover: f64::NAN,
+        own_share: None,
         probability: effect.probability,
     };
     let rms = answer.after.map(|after| after.validate.rms).unwrap_or_default();
@@ -177,7 +178,10 @@ fn outcome(truth: Truth, answer: Answer) -> Outcome {
         sizes: truth.sizes,
         named: answer.effects.into_iter().map(named).collect(),
         unattributed: answer.unattributed.is_some(),
+        left_on: Vec::new(),
+        fitted_time: f64::NAN,
         over_clean: over,
+        contradictions: Vec::new(),
         seconds: f64::NAN,
         settled: None,
     }

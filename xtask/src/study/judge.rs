@@ -3,6 +3,7 @@
 use super::alike::Settled;
 use super::case::Case;
 use powerball::explanation::Explained;
+use powerball::explanation::explain::contradictions;
 use serde::{Deserialize, Serialize};
 
 /// A name that was given.
@@ -14,6 +15,9 @@ pub(super) struct Named {
     pub(super) alike: Vec<String>,
     pub(super) margin: f64,
     pub(super) leftover: f64,
+    /// See [`NamedEffect::own_share`](powerball::explanation::explain::NamedEffect::own_share).
+    #[serde(default)]
+    pub(super) own_share: Option<f64>,
     /// How probable it is said to be.
     #[serde(default)]
     pub(super) probability: Option<f64>,
@@ -23,7 +27,15 @@ impl Named {
     /// What is there beside the truths, on these joints, from 1.
     pub(super) fn beside(effect: &str, joints: Vec<usize>) -> Named {
         let (effect, alike) = (effect.into(), Vec::new());
-        Named { effect, joints, alike, margin: f64::NAN, leftover: f64::NAN, probability: None }
+        Named {
+            effect,
+            joints,
+            alike,
+            margin: f64::NAN,
+            leftover: f64::NAN,
+            own_share: None,
+            probability: None,
+        }
     }
 }
 
@@ -42,8 +54,17 @@ pub(super) struct Outcome {
     pub(super) sizes: Vec<f64>,
     pub(super) named: Vec<Named>,
     pub(super) unattributed: bool,
+    /// Joints on which something is left without a name.
+    #[serde(default)]
+    pub(super) left_on: Vec<usize>,
+    /// Time of motion in the logs to fit, s.
+    #[serde(default)]
+    pub(super) fitted_time: f64,
     /// Held-out error after the additions over that of the model without the effect, worst joint.
     pub(super) over_clean: f64,
+    /// In what the explanation contradicts itself.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) contradictions: Vec<String>,
     pub(super) seconds: f64,
     /// What an experiment did, in the table of names that are alike.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -72,7 +93,12 @@ impl Outcome {
             sizes,
             named: named(explained).into_iter().filter(new).collect(),
             unattributed: explained.unattributed.is_some(),
+            left_on: (explained.unattributed.iter())
+                .flat_map(|rest| rest.joints.iter().map(|j| j.number()))
+                .collect(),
+            fitted_time: explained.fitted_time,
             over_clean,
+            contradictions: contradictions(explained),
             seconds,
             settled: None,
         }
@@ -133,14 +159,10 @@ pub(super) fn named(explained: &Explained) -> Vec<Named> {
         .map(|e| Named {
             effect: e.effect.clone(),
             joints: e.joints.iter().map(|j| j.number()).collect(),
-            alike: e
-                .rivals
-                .iter()
-                .filter(|r| r.why_not.starts_with(AS_WELL))
-                .map(|r| r.effect.clone())
-                .collect(),
+            alike: e.rivals.iter().filter(|r| r.alike).map(|r| r.effect.clone()).collect(),
             margin: e.margin,
             leftover: e.leftover,
+            own_share: Some(e.own_share),
             probability: Some(e.probability),
         })
         .collect()

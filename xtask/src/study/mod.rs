@@ -12,6 +12,7 @@ mod judge;
 mod law;
 mod measured;
 mod page;
+mod probability;
 mod reliability;
 #[cfg(test)]
 mod tests;
@@ -46,6 +47,9 @@ pub(crate) struct Arguments {
     /// Only make the tables of what the file of results holds
     #[arg(long)]
     tables_only: bool,
+    /// Fit the curve of a name's probability to every other case of the results, and judge it on the rest; no tables
+    #[arg(long)]
+    probability: bool,
     /// Write the tables into this page, between its markers
     #[arg(long)]
     write: Option<PathBuf>,
@@ -60,6 +64,10 @@ fn range(text: &str) -> Result<Range<u64>, String> {
 /// Runs what is missing and prints the tables.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let mut outcomes = read(&arguments.results)?;
+    if arguments.probability {
+        print!("{}", probability::curve(&outcomes));
+        return Ok(());
+    }
     if !arguments.tables_only {
         let done: HashSet<String> = outcomes.iter().map(|o| o.case.clone()).collect();
         if let Some(folder) = arguments.results.parent() {

@@ -34,7 +34,7 @@ pub(super) fn table(outcomes: &[&Outcome]) -> String {
 }
 
 /// Wilson's interval of a share, 95 %.
-fn wilson(right: usize, all: usize) -> [f64; 2] {
+pub(super) fn wilson(right: usize, all: usize) -> [f64; 2] {
     const Z: f64 = 1.96;
     let (n, p) = (all as f64, right as f64 / all as f64);
     let (middle, scale) = (p + Z * Z / (2.0 * n), 1.0 + Z * Z / n);

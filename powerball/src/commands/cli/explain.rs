@@ -3,12 +3,12 @@
 use super::Failure;
 use super::bus::{Where, virtual_bus};
 use super::inputs::{Inputs, recorded};
-use super::output::{self, Progress};
+use super::output::{self, Accept, Progress, Verbosity};
+use super::summary::{everything, summary};
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::{Bus, BusUrl};
-use crate::controller::JointNumber;
 use crate::explanation::experiment::{self, TRAJECTORY};
-use crate::explanation::explain::{Change, Explained, FalsePositives, NamedEffect, Unattributed, Verdict};
+use crate::explanation::explain::Explained;
 use crate::explanation::torque_model::TorqueModel;
 use crate::explanation::{ExplainError, ExplainOptions, Prepared};
 use crate::identification::motion::Motion;
@@ -17,7 +17,6 @@ use crate::logs;
 use crate::logs::log::{Log, read_logs};
 use crate::procedure::{Envelope, RecordError, record};
 use crate::report;
-use crate::report::explained::nothing_named;
 use crate::virtual_arm::Undeclared;
 use clap::Args;
 use dyngen::Arm;
@@ -58,6 +57,10 @@ pub(crate) struct Explain {
     /// Print how long each phase took, on standard error.
     #[arg(long)]
     timings: bool,
+    #[command(flatten)]
+    verbosity: Verbosity,
+    #[command(flatten)]
+    accept: Accept,
     /// Where something stays without a name, fit a bounded curve of the one or two signals that it depends on
     /// most; kept where errors fall that it was not fitted to.
     #[arg(long)]
@@ -122,8 +125,14 @@ impl Explain {
     fn write(&self, explained: &Explained) -> Result<(), Failure> {
         let files = report::explained::files(explained).map_err(Failure::Refused)?;
         files.write(&self.inputs.out).map_err(Failure::Unusable)?;
-        output::print(&if self.inputs.json { files.first() } else { summary(explained) });
-        Ok(())
+        let (arm, out) = (&self.inputs.arm, &self.inputs.out);
+        match (self.inputs.json, self.verbosity) {
+            (true, _) => output::print(&files.first()),
+            (_, Verbosity { quiet: true, .. }) => {}
+            (_, Verbosity { verbose: true, .. }) => output::print(&everything(explained, arm, out)),
+            _ => output::print(&summary(explained, arm, out)),
+        }
+        self.accept.judge(explained.conventions.as_ref(), &explained.useless_joints())
     }
 
     /// Why there is no explanation: a known model that cannot be used is a wrong input.
@@ -201,130 +210,4 @@ impl Explain {
             other => Failure::Refused(format!("the experiment was not recorded: {other}")),
         })
     }
-}
-
-/// What the logs leave open and what an experiment decided, in words; empty where there is nothing of the
-/// kind.
-pub(super) fn open_in_words(explained: &Explained) -> String {
-    let mut text = String::new();
-    if let Some(experiment) = &explained.experiment {
-        let why = &experiment.why;
-        match experiment.decided {
-            Some(name) => text.push_str(&format!("\nThe experiment decides for {name}: {why}\n")),
-            None => text.push_str(&format!("\nThe experiment does not decide: {why}\n")),
-        }
-    }
-    if let Some(next) = &explained.next_experiment {
-        text.push_str(&format!("\nNext experiment: {}\n", next.advice));
-    }
-    text
-}
-
-fn summary(explained: &Explained) -> String {
-    let told = explained.conventions.as_ref().map(|told| format!("{}\n", told.verdict()));
-    let mut text = told.unwrap_or_default();
-    text.push_str(&logs_in_words(explained));
-    text.push_str(&verdict_in_words(explained));
-    for warning in &explained.warnings {
-        text.push_str(&format!("note: {warning}\n"));
-    }
-    text.push_str(&errors_in_words(explained));
-    if explained.effects.is_empty() {
-        text.push_str(&format!("\n{}\n", nothing_named(explained)));
-    }
-    for effect in &explained.effects {
-        text.push_str(&effect_in_words(effect));
-    }
-    for law in &explained.laws {
-        text.push_str(&format!("\nno name on joint {}: {}\n", list(&law.joints), law.sentence()));
-    }
-    if let Some(unattributed) = &explained.unattributed {
-        text.push_str(&unattributed_in_words(unattributed));
-    }
-    for joint in explained.transmission.iter().flatten() {
-        text.push_str(&format!("\n{}", joint.sentence()));
-    }
-    text.push_str(&open_in_words(explained));
-    let FalsePositives { accepted, surrogates, without, .. } = &explained.false_positives;
-    text.push_str(&format!("\n{accepted} of {surrogates} surrogates were accepted"));
-    if *without > 0 {
-        text.push_str(&format!(" ({without} more draws were of constants that have none)"));
-    }
-    text
-}
-
-/// Which logs are unlike the others, one line a log.
-fn logs_in_words(explained: &Explained) -> String {
-    let odd = explained.logs.iter().filter(|log| !log.like_the_others);
-    odd.map(|log| format!("{}\n", log.sentence())).collect()
-}
-
-/// How far each joint is explained, one line a joint.
-fn verdict_in_words(explained: &Explained) -> String {
-    let line = |v: &Verdict| {
-        let left = if v.left.is_nan() { String::new() } else { format!(", {:.1} % left", 100.0 * v.left) };
-        let advice = if v.advice.is_empty() { String::new() } else { format!(": {}", v.advice) };
-        format!("joint {} {}{left}{advice}\n", v.joint, v.state)
-    };
-    let lines: String = explained.verdict.iter().map(line).collect();
-    lines + "\n"
-}
-
-fn errors_in_words(explained: &Explained) -> String {
-    let [low, high] = explained.band;
-    let whole = |share: f64| format!("{:+.0}", 100.0 * share);
-    let change = |c: &Change| {
-        format!("joint {} {} % ({} to {})", c.joint, whole(c.rms), whole(c.interval[0]), whole(c.interval[1]))
-    };
-    let changes: Vec<String> = explained.held_out_change.iter().map(change).collect();
-    let (before, after) = (&explained.before.validate, &explained.after.validate);
-    format!(
-        "\nErrors on the other path, {low} to {high} Hz\n{}\nchange with its 95 % interval: {}\n",
-        output::table(&[("before", before), ("after", after)]),
-        changes.join(", ")
-    )
-}
-
-fn effect_in_words(effect: &NamedEffect) -> String {
-    let mut text = format!(
-        "\n{} on joint {}: {}\n  p = {:.1e}, margin {:.2} over the next name, {:.0} % of the excess left\n",
-        effect.effect,
-        list(&effect.joints),
-        serde_json::to_string(&effect.figures).unwrap_or_default(),
-        effect.p_value,
-        effect.margin,
-        100.0 * effect.leftover
-    );
-    for rival in &effect.rivals {
-        text.push_str(&format!("  not {}: {}\n", rival.effect, rival.why_not));
-    }
-    text
-}
-
-fn unattributed_in_words(unattributed: &Unattributed) -> String {
-    let mut text = format!(
-        "\nUnattributed on joint {}: depends on {}\n",
-        list(&unattributed.joints),
-        unattributed.depends_on.join(", ")
-    );
-    for c in unattributed.correction.iter().flatten() {
-        let signals: Vec<&str> = c.curves.iter().map(|curve| curve.signal.as_str()).collect();
-        text.push_str(&format!(
-            "  a curve of {} within ±{:.2} N·m lowers the held-out error of joint {} from {:.4} to {:.4} \
-             N·m\n",
-            signals.join(" and "),
-            c.limit,
-            c.joint,
-            c.rms_before,
-            c.rms_after
-        ));
-    }
-    if unattributed.correction.as_ref().is_some_and(Vec::is_empty) {
-        text.push_str("  no curve of these signals lowers held-out errors: none is kept\n");
-    }
-    text
-}
-
-fn list(joints: &[JointNumber]) -> String {
-    joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }

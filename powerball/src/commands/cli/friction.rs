@@ -121,7 +121,7 @@ impl Friction {
         for joint in &found {
             let chosen = &joint.laws[joint.chosen];
             output::print(&format!(
-                "joint {}: {} fits best on velocities left out ({:.4} N·m); Eq. 16: {}",
+                "joint {}: {} fits best on velocities left out ({:.4} N·m); tanh friction (Eq. 16): {}",
                 joint.joint + 1,
                 chosen.fitted.law.name(),
                 chosen.held_out,
@@ -209,7 +209,7 @@ fn page(arm: &str, found: &[JointFriction], notes: &[String]) -> Page {
     page.lead(
         "Mean torques at constant velocities where gravity does not load the joint. Laws are rated on \
         velocities that were left out of their fit, both directions of a velocity together; of laws that cannot be \
-        told apart Eq. 16 is taken.",
+        told apart tanh friction (Eq. 16) is taken.",
     );
     for note in notes {
         page.paragraph(note);

@@ -3,6 +3,7 @@
 use super::export::Original;
 use super::inputs::MapArgument;
 use super::mounted::MountedLogs;
+use super::output::{Accept, Verbosity};
 use super::{Failure, output};
 use crate::explanation::torque_model::ModelFile;
 use crate::identification::estimate::FrictionKind;
@@ -11,9 +12,10 @@ use crate::logs::Progress;
 use crate::report;
 use clap::{Args, ValueEnum};
 use dyngen::Arm;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Fit the minimal inertial set and the friction of every joint (Eq. 16) to logs.
+/// Fit the minimal inertial set and the friction of every joint (two tanh steps and a viscous
+/// part, Eq. 16) to logs.
 ///
 /// Writes identified.json and report.html; consistent.json: the nearest parameters that a real arm can have,
 /// as values for `dyngen generate --values`; covariance.json: how well all of it is known together, for
@@ -50,6 +52,10 @@ pub(crate) struct Identify {
     /// Print how long each phase took, on standard error.
     #[arg(long)]
     timings: bool,
+    #[command(flatten)]
+    verbosity: Verbosity,
+    #[command(flatten)]
+    accept: Accept,
     /// Folder for the results; made if missing.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -61,10 +67,10 @@ pub(crate) struct Identify {
 /// A friction law by its name on the command line.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 enum Friction {
-    /// Eq. 16: γ1·tanh(γ2·q̇) + γ3·tanh(γ4·q̇) + γ5·q̇.
+    /// Two tanh steps and a viscous part (Eq. 16): γ1·tanh(γ2·q̇) + γ3·tanh(γ4·q̇) + γ5·q̇.
     #[default]
     Symmetric,
-    /// Eq. 16 and a constant torque.
+    /// The same and a constant torque.
     Asymmetric,
 }
 
@@ -113,29 +119,31 @@ impl Identify {
         files.write(&self.out).map_err(Failure::Unusable)?;
         if self.json {
             output::print(&files.first());
-        } else {
-            told(&identified);
+        } else if !self.verbosity.quiet {
+            output::print(&in_words(&identified, self.verbosity.verbose, &self.out));
         }
-        match original {
-            Some(original) => original.write(&arm, &files.first(), &self.out.join("identified.json")),
-            None => Ok(()),
+        if let Some(original) = original {
+            original.write(&arm, &files.first(), &self.out.join("identified.json"))?;
         }
+        let judged = identified.validate.as_ref().unwrap_or(&identified.fit);
+        self.accept.judge(identified.conventions.as_ref(), &judged.useless_joints())
     }
 }
 
-/// Tells a person what was found.
-fn told(identified: &Identified) {
-    if let Some(conventions) = &identified.conventions {
-        output::print(&conventions.verdict());
+/// What was found, for a person: what is wrong first, then the errors.
+fn in_words(identified: &Identified, verbose: bool, out: &Path) -> String {
+    let columns = identified.conventions.as_ref();
+    let wrong = columns.filter(|c| verbose || c.differ() || c.is_unclear()).map(|c| c.verdict());
+    let mut lines: Vec<String> = wrong.into_iter().chain(identified.advice.clone()).collect();
+    if verbose {
+        lines.extend(identified.warnings.iter().map(|warning| format!("note: {warning}")));
     }
-    for warning in &identified.warnings {
-        output::print(&format!("note: {warning}"));
-    }
-    let mut columns = vec![("fit", &identified.fit)];
-    columns.extend(identified.mountings.iter().map(|m| (m.mounting.as_str(), &m.fit)));
-    columns.extend(identified.validate.as_ref().map(|s| ("held out", s)));
-    output::print(&output::table(&columns));
-    for joint in identified.transmission.iter().flatten() {
-        output::print(&joint.sentence());
-    }
+    let mut spreads = vec![("fit", &identified.fit)];
+    spreads.extend(identified.mountings.iter().map(|m| (m.mounting.as_str(), &m.fit)));
+    spreads.extend(identified.validate.as_ref().map(|s| ("held out", s)));
+    lines.push(output::table(&spreads));
+    lines.extend(identified.transmission.iter().flatten().map(|joint| joint.sentence()));
+    lines.extend(output::notes(identified.warnings.len()).filter(|_| !verbose));
+    lines.push(format!("report: {}", out.join("report.html").display()));
+    lines.join("\n")
 }

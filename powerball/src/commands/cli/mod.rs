@@ -19,6 +19,7 @@ mod output;
 mod profile;
 mod record;
 mod summarize;
+mod summary;
 mod verify;
 mod virtual_arm;
 mod warm_up;
@@ -78,6 +79,8 @@ pub(crate) enum Failure {
     Refused(String),
     /// Wrong use or unreadable input: exit code 2.
     Unusable(String),
+    /// The result is written and should not be built on: exit code 3.
+    Doubtful(String),
 }
 
 impl From<IdentifyError> for Failure {
@@ -119,6 +122,10 @@ pub fn main() -> ExitCode {
         Err(Failure::Unusable(reason)) => {
             eprintln!("powerball: {reason}");
             ExitCode::from(2)
+        }
+        Err(Failure::Doubtful(reason)) => {
+            eprintln!("powerball: {reason}");
+            ExitCode::from(3)
         }
     }
 }

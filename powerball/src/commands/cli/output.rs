@@ -2,8 +2,10 @@
 
 use super::Failure;
 use crate::controller::JointNumber;
+use crate::identification::conventions::Conventions;
 use crate::identification::estimate::Spread;
 use crate::report::files;
+use clap::Args;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::Mutex;
@@ -141,6 +143,56 @@ pub(crate) fn write_file(target: &Path, bytes: &[u8]) -> Result<(), Failure> {
 /// Serialises a result.
 pub(crate) fn json(value: &impl serde::Serialize) -> Result<String, Failure> {
     files::json(value).map_err(Failure::Refused)
+}
+
+/// How much a command prints.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct Verbosity {
+    /// Print every note and all evidence.
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub verbose: bool,
+    /// Print nothing but errors.
+    #[arg(short, long, conflicts_with = "json")]
+    pub quiet: bool,
+}
+
+/// The line that stands for notes that are not printed; none where there are none.
+pub(crate) fn notes(count: usize) -> Option<String> {
+    match count {
+        0 => None,
+        1 => Some("1 note: --verbose or the page".to_string()),
+        _ => Some(format!("{count} notes: --verbose or the page")),
+    }
+}
+
+/// Whether a result that should not be built on is taken nevertheless.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct Accept {
+    /// End with 0 instead of 3 where columns or arm file are not what they are said to be, or a joint is predicted no
+    /// better than by its mean.
+    #[arg(long)]
+    accept: bool,
+}
+
+impl Accept {
+    /// The failure that such a result is. `useless` are the joints that are predicted no better than by their mean.
+    pub(crate) fn judge(self, columns: Option<&Conventions>, useless: &[JointNumber]) -> Result<(), Failure> {
+        let mut why: Vec<String> = Vec::new();
+        if columns.is_some_and(Conventions::differ) {
+            why.push("the columns or the arm file are not what they are said to be".to_string());
+        }
+        if !useless.is_empty() {
+            let list: Vec<String> = useless.iter().map(ToString::to_string).collect();
+            why.push(format!(
+                "the torque of joint {} is predicted no better than by its mean",
+                list.join(", ")
+            ));
+        }
+        match self.accept || why.is_empty() {
+            true => Ok(()),
+            false => Err(Failure::Doubtful(format!("{}; --accept takes it as it is", why.join(", and ")))),
+        }
+    }
 }
 
 /// Prints to standard output; a closed pipe is no error.

@@ -52,8 +52,9 @@ pub struct Figures {
     pub time_constant: ByJoint,
 }
 
-/// Time constants tried on a joint.
+/// Time constants tried on a joint, and the least, s: what fades faster is how a log begins, not warmth.
 const TRIED: usize = 7;
+const LEAST: f64 = 15.0;
 
 impl Effect for Temperature {
     fn name(&self) -> &'static str {
@@ -75,8 +76,8 @@ impl Effect for Temperature {
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
         let clock = |r: &Recording| r.clock + r.len() as f64 / r.rate;
         let end = context.data.recordings.iter().map(clock).fold(0.0, f64::max);
-        // From the first seconds to much slower than the logs are long.
-        let constants = geometric(10.0, (2.0 * end).max(40.0), TRIED);
+        // To much slower than the logs are long.
+        let constants = geometric(LEAST, (2.0 * end).max(4.0 * LEAST), TRIED);
         let recordings = &context.data.recordings;
         let measured = recordings.iter().all(|r| r.temperature.is_some());
         let at_start = |j: usize| recordings.first()?.temperature.as_ref()?.get(j)?.first().copied();
@@ -112,7 +113,8 @@ impl Effect for Temperature {
             return Vec::new();
         };
         let near = |f: f64| {
-            let with = Warmth::RunningTime { time_constant: scaled(*time_constant, f, share) };
+            let time_constant = scaled(*time_constant, f, share).max(LEAST);
+            let with = Warmth::RunningTime { time_constant };
             candidate.with(Settings { of: *of, with })
         };
         [0.65, 0.8, 1.25, 1.5].map(near).to_vec()

@@ -33,8 +33,9 @@ mod study;
 pub use comparison::{Hypothesis, Open};
 pub use named::{FalsePositives, NamedEffect, Rival, Spreads};
 pub use results::{
-    Change, Correction, Curve, Difference, Experiment, Explained, LawCoefficient, LogResult, NextExperiment,
-    Shown, State, TorqueCurve, Trajectory, Unattributed, UnnamedLaw, Verdict, curves,
+    Change, Correction, Curve, Difference, Evidence, Experiment, Explained, FEATURES, LawCoefficient,
+    LogResult, NextExperiment, Shown, State, TorqueCurve, Trajectory, Unattributed, UnnamedLaw, Verdict,
+    contradictions, curves,
 };
 
 use crate::explanation::options::{ExplainError, ExplainOptions};
@@ -91,10 +92,7 @@ fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
                 model.given_up.extend(candidates);
             }
             // Only now is it known what is left beside all that fits.
-            Outcome::Nothing(question) => {
-                if among == Among::Names {
-                    history.questions.extend(question);
-                }
+            Outcome::Nothing => {
                 if let Some(taken) = withhold(&study, &mut model, &mut history) {
                     study.say(&format!("{} is not named: {}", taken.effect.name(), taken.why));
                     among = Among::Names;

@@ -42,6 +42,15 @@ impl Accepted {
     }
 }
 
+/// How much of an accepted effect is its own.
+pub(super) struct Own {
+    /// The share of its squared torque that no other column can take over: 1 less R² of its torque over all other
+    /// columns, weighted as in the fit.
+    pub(super) share: f64,
+    /// The standard error of its size, a share of it; `None` where it was measured otherwise.
+    pub(super) relative_std: Option<f64>,
+}
+
 impl Model {
     /// The base model alone.
     pub(super) fn new(base: Fit) -> Model {
@@ -136,6 +145,27 @@ impl Model {
         let (gram, _, _) = self.fit.gram.fitted(&self.fit.weights, |_| true);
         let variances = Solver::new(&gram, |c| self.fit.free[c]).inverse_diagonal();
         move |column| variances.get(column).filter(|v| v.is_finite()).map(|v| v.max(0.0).sqrt())
+    }
+
+    /// How much of each accepted effect is its own.
+    pub(super) fn own(&self) -> Vec<Own> {
+        let (gram, _, _) = self.fit.gram.fitted(&self.fit.weights, |_| true);
+        let share = |((a, place), coefficients): ((&Accepted, Range<usize>), Vec<f64>)| {
+            if a.measured.is_some() {
+                return Own { share: 1.0, relative_std: None };
+            }
+            let torque = |c: usize| place.clone().zip(&coefficients).map(|(e, own)| gram[(c, e)] * own).sum();
+            let products: Vec<f64> = (0..gram.ncols()).map(torque).collect();
+            let square: f64 = place.clone().zip(&coefficients).map(|(e, own)| products[e] * own).sum();
+            let others = Solver::new(&gram, |c| self.fit.free[c] && !place.contains(&c));
+            let taken: f64 = others.whitened(&products).iter().map(|v| v * v).sum();
+            let own = (square - taken).max(0.0);
+            Own {
+                share: if square > 0.0 { own / square } else { 0.0 },
+                relative_std: (own > 0.0).then(|| 1.0 / own.sqrt()),
+            }
+        };
+        self.accepted.iter().zip(self.places()).zip(self.coefficients()).map(share).collect()
     }
 
     /// Measured less predicted torque of the validation set, by joint and row, N·m.

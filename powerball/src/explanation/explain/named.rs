@@ -24,6 +24,8 @@ pub struct NamedEffect {
     /// Its physical reading, SI units.
     #[serde(rename = "parameters")]
     pub figures: Figures,
+    /// The standard error of its size on each joint, a share of it; null where it is not of the fit.
+    pub relative_std: Vec<Option<f64>>,
     /// Held-out error of its joints before it was added, N·m.
     pub rms_before: Vec<f64>,
     /// … and after.
@@ -41,10 +43,20 @@ pub struct NamedEffect {
     pub margin: f64,
     /// Share of the residual's excess over the noise floor that stays on its joints after all effects.
     pub leftover: f64,
+    /// The least share of its squared torque, over its joints, that no other column of the fit can take over.
+    pub own_share: f64,
     /// What it is of: see `rivals` where another name fits as well.
     pub class: String,
     /// Names that were considered for the same residual.
     pub rivals: Vec<Rival>,
+}
+
+impl NamedEffect {
+    /// Whether it is the effect of some name, on one of some joints.
+    #[must_use]
+    pub fn is(&self, name: &str, joints: &[JointNumber]) -> bool {
+        self.effect == name && self.joints.iter().any(|joint| joints.contains(joint))
+    }
 }
 
 /// A name that was considered and not given.
@@ -52,6 +64,10 @@ pub struct NamedEffect {
 pub struct Rival {
     /// The name.
     pub effect: String,
+    /// The joints on which it was considered.
+    pub joints: Vec<JointNumber>,
+    /// Whether it fits as well, so that these logs do not tell.
+    pub alike: bool,
     /// Why it was not given.
     pub why_not: String,
 }

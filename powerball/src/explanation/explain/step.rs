@@ -27,7 +27,7 @@ pub(super) enum Outcome {
     /// What fitted best scored no more than surrogates do.
     Chance(Vec<Candidate>),
     /// Nothing passed; names that fit a part may be open.
-    Nothing(Option<Question>),
+    Nothing,
 }
 
 /// A group that is accepted.
@@ -65,8 +65,7 @@ pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize, among: Am
     let best = most_promising(&mut groups, &tester);
     let refused = refused(&groups);
     let Some(best) = best else {
-        let question = Question::refused(study.rule(), &groups);
-        return Proposed { refused, outcome: Outcome::Nothing(question) };
+        return Proposed { refused, outcome: Outcome::Nothing };
     };
     let chosen = simplest_as_good(&mut groups, best, &tester);
     let above = above_chance(&screen, &groups[chosen], number);
@@ -132,8 +131,10 @@ fn simplest_as_good(groups: &mut [Group], best: usize, tester: &Tester<'_>) -> u
 fn refused(groups: &[Group]) -> Vec<Rival> {
     let nothing = groups.iter().filter(|g| g.potential() == 0.0);
     let why = |g: &Group| {
-        let why_not = g.best()?.refusal.clone()?;
-        Some(Rival { effect: g.name().to_string(), why_not })
+        let best = g.best()?;
+        let joints = best.candidate.joints.clone();
+        let why_not = best.refusal.clone()?;
+        Some(Rival { effect: g.name().to_string(), joints, alike: false, why_not })
     };
     nothing.filter_map(why).collect()
 }

@@ -30,6 +30,11 @@ impl Study<'_> {
         &self.options.rule
     }
 
+    /// How long the fitted logs are, s.
+    pub(super) fn fitted_time(&self) -> f64 {
+        self.data.recordings.iter().map(|r| r.len() as f64 / r.rate).sum()
+    }
+
     /// A model seen on the logs to fit, with what is left of them.
     pub(super) fn here<'c>(&'c self, fit: &'c Fit, residual: &'c [Vec<f64>]) -> Context<'c> {
         Context::new(&self.data, fit, residual, self.rule()).with(&self.made)

@@ -1,5 +1,6 @@
 //! What was found, in words.
 
+use super::arm_file::{Better, LONGEST_ARM};
 use super::change::Change;
 use super::search::{Found, Step};
 use super::sign::Common;
@@ -23,16 +24,16 @@ fn percent(shares: &[f64]) -> Vec<Option<f64>> {
 }
 
 /// Where the error falls most: `held-out error of joint 2 falls from 57 to 1.2 % of its torque`.
-fn falls(step: &Step) -> String {
-    let ratio = |j: &usize| step.after[*j] / step.before[*j];
-    let moving = (0..step.before.len()).filter(|j| ratio(j).is_finite());
+fn falls(before: &[f64], after: &[f64]) -> String {
+    let ratio = |j: &usize| after[*j] / before[*j];
+    let moving = (0..before.len()).filter(|j| ratio(j).is_finite());
     let mut by_fall: Vec<usize> = moving.collect();
     by_fall.sort_by(|a, b| ratio(a).total_cmp(&ratio(b)));
     let one = |j: &usize| {
         format!(
             "{:.1} to {:.1} % on joint {}",
-            100.0 * step.before[*j],
-            100.0 * step.after[*j],
+            100.0 * before[*j],
+            100.0 * after[*j],
             JointNumber::from_index(*j)
         )
     };
@@ -42,7 +43,7 @@ fn falls(step: &Step) -> String {
 
 /// The answer that a change of the reading is.
 fn of_step(step: &Step, unit: &Unit) -> Answer {
-    let why = falls(step);
+    let why = falls(&step.before, &step.after);
     let (question, sentence) = match &step.change {
         Change::TorqueReversed(list) => {
             let them = joints(list);
@@ -114,6 +115,10 @@ fn of_step(step: &Step, unit: &Unit) -> Answer {
                 joints(list)
             ),
         ),
+        Change::FromTip => (
+            "joint order",
+            format!("The columns count the joints from the tip, the arm file from the base: taken so {why}."),
+        ),
         Change::Degrees => ("position unit", format!("Positions are in degrees: taken so {why}.")),
         Change::Factors(factors) => {
             let list: Vec<String> = factors.iter().map(|f| format!("{f:.2}")).collect();
@@ -148,6 +153,56 @@ fn of_step(step: &Step, unit: &Unit) -> Answer {
     }
 }
 
+/// The answer that the arm file is another arm's.
+pub(super) fn of_arm_file(better: &Better) -> Answer {
+    let Better { change, alike, before, after } = better;
+    let or = match alike.as_slice() {
+        [] => String::new(),
+        others => {
+            let lines: Vec<&str> = others.iter().take(3).map(|other| other.line.as_str()).collect();
+            format!(" These logs do not tell it from: {}.", lines.join("; "))
+        }
+    };
+    Answer {
+        question: "arm file",
+        as_said: Some(false),
+        as_it_is: percent(before),
+        as_it_would_be: percent(after),
+        sentence: format!(
+            "With {} in the arm file (now {}) {}.{or}",
+            change.line,
+            change.now,
+            falls(before, after)
+        ),
+    }
+}
+
+/// What is to be said of the arm file where no change of it fits better.
+fn arm_file(facts: &Facts<'_>) -> Answer {
+    let Facts { length, good, .. } = *facts;
+    if length > LONGEST_ARM {
+        return plain(
+            "arm file",
+            Some(false),
+            format!(
+                "The links of the arm file are {length:.0} m long together: its a and d are in metres, not mm."
+            ),
+        );
+    }
+    if good {
+        let fits = "No other convention, sign of a, d or alpha, quarter turn of theta or direction of gravity fits \
+            clearly better.";
+        return plain("arm file", Some(true), fits.into());
+    }
+    plain(
+        "arm file",
+        None,
+        "One rigid arm of this file with textbook friction does not fit, whatever single thing is changed about the \
+            columns or the file: it may be the file of another arm, or the torques hold something else."
+            .into(),
+    )
+}
+
 fn plain(question: &'static str, as_said: Option<bool>, sentence: String) -> Answer {
     Answer { question, as_said, as_it_is: Vec::new(), as_it_would_be: Vec::new(), sentence }
 }
@@ -165,6 +220,8 @@ pub(super) struct Facts<'a> {
     pub(super) delay_would_show: bool,
     /// Whether the fit is good enough to judge by.
     pub(super) good: bool,
+    /// The lengths of the links together, m.
+    pub(super) length: f64,
 }
 
 /// All answers, in the order in which they are read.
@@ -212,6 +269,7 @@ pub(super) fn answers(found: &Found<'_>, facts: &Facts<'_>) -> Vec<Answer> {
     }
     all.push(side(facts));
     all.push(kind(facts));
+    all.push(arm_file(facts));
     all
 }
 
@@ -260,6 +318,14 @@ fn size(facts: &Facts<'_>) -> Answer {
         (None, None) => "these logs show neither weight nor inertia".to_string(),
     };
     match (facts.unit, facts.scale) {
+        _ if facts.length > LONGEST_ARM => plain(
+            "torque unit",
+            None,
+            format!(
+                "The unit of the torques is not told by an arm file whose links are {:.0} m long.",
+                facts.length
+            ),
+        ),
         (Unit::Milli, _) => plain(
             "torque unit",
             Some(false),

@@ -17,6 +17,8 @@ struct Size {
 const WHOLE: Size = Size { seconds: 240.0, rate: 50.0 };
 /// For what is asked of the positions: other rows for each question.
 const FEW: Size = Size { seconds: 60.0, rate: 25.0 };
+/// For what is asked of the arm file: other columns for each question, and small differences.
+const SLOW: Size = Size { seconds: 240.0, rate: 25.0 };
 
 /// Logs with the part that each belongs to; without one its halves are the parts.
 #[derive(Debug)]
@@ -64,11 +66,13 @@ pub(super) struct Asked<'a> {
     pub(super) body: &'a RigidArm,
     whole: Thinned,
     few: Thinned,
+    slow: Thinned,
 }
 
 impl<'a> Asked<'a> {
     pub(super) fn new(body: &'a RigidArm, logs: &[Log], validate: &[Log]) -> Asked<'a> {
-        Asked { body, whole: Thinned::new(logs, validate, WHOLE), few: Thinned::new(logs, validate, FEW) }
+        let of = |size: Size| Thinned::new(logs, validate, size);
+        Asked { body, whole: of(WHOLE), few: of(FEW), slow: of(SLOW) }
     }
 
     /// The rows of a reading of the positions.
@@ -85,5 +89,13 @@ impl<'a> Asked<'a> {
     /// Where too little remains.
     pub(super) fn few(&self, read: &Positions, gravity: Gravity) -> Result<Rows<'a>, DataError> {
         self.few.rows(self.body, read, gravity)
+    }
+
+    /// As many seconds as [`Asked::rows`] at a lower rate, for comparing arms.
+    ///
+    /// # Errors
+    /// Where too little remains.
+    pub(super) fn slow(&self, read: &Positions, gravity: Gravity) -> Result<Rows<'a>, DataError> {
+        self.slow.rows(self.body, read, gravity)
     }
 }

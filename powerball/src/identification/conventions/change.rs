@@ -26,6 +26,8 @@ pub(super) enum Change {
     JointsExchanged(usize, usize),
     /// Positions are in degrees.
     Degrees,
+    /// Joints are counted from the tip.
+    FromTip,
 }
 
 /// A reading of all columns.
@@ -66,6 +68,13 @@ impl Reading {
                 read.positions = read.positions.exchanged(*a, *b);
             }
             Change::Degrees => read.positions.scale *= 1f64.to_radians(),
+            Change::FromTip => {
+                let n = read.positions.column.len();
+                for k in 0..n / 2 {
+                    read.torques = read.torques.exchanged(k, n - 1 - k);
+                    read.positions = read.positions.exchanged(k, n - 1 - k);
+                }
+            }
         }
         read
     }
@@ -89,7 +98,7 @@ impl Change {
             Change::TorquesExchanged(a, b)
             | Change::PositionsExchanged(a, b)
             | Change::JointsExchanged(a, b) => Some(vec![*a, *b]),
-            Change::Factors(_) | Change::Late(_) | Change::Degrees => None,
+            Change::Factors(_) | Change::Late(_) | Change::Degrees | Change::FromTip => None,
         }
     }
 }

@@ -12,9 +12,11 @@
 //! | `physics`, `sign` | energies; the sign of the torques |
 //! | `factors`, `unit` | a factor by joint; the unit of all |
 //! | `gravity`, `side`, `delay`, `kind` | one question each |
+//! | `arm_file` | whether the arm file is this arm's |
 //! | `asked`, `change`, `search` | the logs asked; one change of the reading; the best reading |
 
 mod answers;
+mod arm_file;
 mod asked;
 mod change;
 mod delay;
@@ -56,7 +58,21 @@ pub fn conventions(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventio
         Err(why) => return not_told(&why.to_string()),
     };
     let all: Vec<&Log> = logs.iter().chain(validate).collect();
-    told(&asked, &found, kind::kind(&all))
+    let kind = kind::kind(&all);
+    let Some(better) = arm_file::better(&asked, &found) else { return told(&asked, &found, kind) };
+    // What the columns are is asked of the arm that they fit.
+    let answer = answers::of_arm_file(&better);
+    let of_other = RigidArm::new(&better.change.arm).ok().and_then(|body| {
+        let asked = Asked::new(&body, logs, validate);
+        let found = search(&asked).ok()?;
+        Some(told(&asked, &found, kind))
+    });
+    let mut told = of_other.unwrap_or_default();
+    told.arm_file = Some(better.change.line);
+    told.evidence = [answer.sentence.as_str(), &told.evidence].join(" ");
+    told.answers.retain(|other| other.question != answer.question);
+    told.answers.insert(0, answer);
+    told
 }
 
 fn not_told(why: &str) -> Conventions {
@@ -75,10 +91,18 @@ fn told(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventions
     let read = &found.read;
     let sign = sign::common(&found.judged, &found.energies);
     let size = Size::of(found);
-    let gravity = if size.is_weightless() { Some(GravityIs::TakenOut) } else { gravity_is(asked, found) };
-    let scale = size.scale(gravity);
-    let unit = unit::unit(found, scale);
     let good = found.is_good();
+    // A model that does not fit has no weight, and a balanced arm has little that still shows.
+    let gravity = match (size.is_weightless(), good) {
+        (true, false) => None,
+        (true, true) if search::gravity_helps(asked, found) => Some(GravityIs::Included),
+        (true, true) => Some(GravityIs::TakenOut),
+        (false, _) => gravity_is(asked, found),
+    };
+    let scale = size.scale(gravity);
+    let length = unit::reach(asked.body.arm());
+    // Nothing is too light or too heavy for an arm of another size.
+    let unit = if length > arm_file::LONGEST_ARM { Unit::NotTold } else { unit::unit(found, scale) };
     let share = side::least_share(&found.rows, &read.torques, &found.judged, &found.energies);
     let share = share.filter(|_| good && sign != Common::NotTold);
     let facts = Facts {
@@ -92,6 +116,7 @@ fn told(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventions
         kind,
         delay_would_show: good && delay::would_show(&found.rows, &read.torques, found.ridge, &found.judged),
         good,
+        length,
     };
     let answers = answers(found, &facts);
     let sentences: Vec<&str> = answers.iter().map(|a| a.sentence.as_str()).collect();
@@ -100,6 +125,8 @@ fn told(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventions
         positions: position_columns(found, good),
         evidence: sentences.join(" "),
         mend: mend::mend(read, sign, &unit),
+        arm_file: (length > arm_file::LONGEST_ARM).then(|| "a and d in metres".to_string()),
+        left: search::shares(&found.judged),
         answers,
     }
 }

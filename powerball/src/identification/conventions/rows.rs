@@ -41,6 +41,8 @@ pub(super) struct Part {
 #[derive(Debug)]
 pub(super) struct Rows<'a> {
     pub(super) data: Data<'a>,
+    /// By log: the part that it belongs to; without one its halves are the parts.
+    part: Vec<Option<usize>>,
     /// By joint: where its columns stand among all coefficients.
     pub(super) places: Vec<Vec<usize>>,
     /// By joint and part.
@@ -66,6 +68,16 @@ impl<'a> Rows<'a> {
         if gravity == Gravity::TakenOut {
             take_gravity_out(&mut data);
         }
+        Ok(Rows::of(data, part))
+    }
+
+    /// The same rows with the columns of another arm: `count` parameters, and what they are along a recording,
+    /// samples × n × parameters.
+    pub(super) fn of_columns(&self, count: usize, columns: impl Fn(&Recording) -> Vec<f64>) -> Rows<'a> {
+        Rows::of(self.data.of_other_columns(count, columns), &self.part)
+    }
+
+    fn of(data: Data<'a>, part: &[Option<usize>]) -> Rows<'a> {
         let of_recording =
             |r: &Recording| (0..r.dof).map(|j| data.band.filtered(&r.smooth_torque(j))).collect();
         let torque = data.recordings.iter().map(of_recording).collect();
@@ -75,7 +87,7 @@ impl<'a> Rows<'a> {
             places.push(of_joint);
             joints.push(parts);
         }
-        Ok(Rows { data, places, joints, torque })
+        Rows { data, part: part.to_vec(), places, joints, torque }
     }
 
     pub(super) fn dof(&self) -> usize {
@@ -84,7 +96,7 @@ impl<'a> Rows<'a> {
 
     /// Inertial parameters.
     pub(super) fn inertial(&self) -> usize {
-        self.data.body.names().len()
+        self.data.joints[0].inertial.len()
     }
 
     /// All coefficients: the minimal set, then the friction of each joint.
@@ -136,7 +148,7 @@ fn take_gravity_out(data: &mut Data<'_>) {
 }
 
 fn joint_rows(data: &Data<'_>, joint: usize, part: &[Option<usize>]) -> (Vec<usize>, [Part; 2]) {
-    let (rows, p) = (&data.joints[joint], data.body.names().len());
+    let (rows, p) = (&data.joints[joint], data.joints[joint].inertial.len());
     let step = STEP * data.top_velocity(joint);
     let friction =
         |f: &dyn Fn(f64) -> f64| rows.column(&data.recordings, |_, r| r.velocity(joint).map(f).collect());

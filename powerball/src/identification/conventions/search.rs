@@ -16,12 +16,16 @@ use dyngen::exact::rational::to_f64;
 const FLOOR: f64 = 4e-4;
 /// A change is clear where it lowers squared errors to this share, both ways round.
 const CLEAR: f64 = 0.5;
+/// Gravity helps where squared errors grow to so many times without it.
+const HELPS: f64 = 1.2;
 /// What it may do to the joints that it does not concern.
 const WORSE: f64 = 1.5;
+/// A joint with an error below this share of its torque fits.
+const FITS: f64 = 0.1;
 /// Two joints of three have held-out errors below this share of their torque, or the fit is too poor to tell.
 const GOOD: f64 = 0.35;
 /// A joint with an error above this may have a wrong position column.
-const POOR: f64 = 0.25;
+pub(super) const POOR: f64 = 0.25;
 /// Two changes whose gains differ by less are not told apart.
 const ALIKE: f64 = 0.7;
 /// Changes that are looked for.
@@ -84,13 +88,15 @@ fn is_clear(change: &Change, old: &Judged, new: &Judged) -> bool {
             Some(_) => mean < CLEAR.ln() && own.iter().all(|r| *r < 1.1),
             None => 3 * halved >= own.len() && halved >= own.len().min(2) && mean < 0.35 * CLEAR.ln(),
         };
-        !own.is_empty() && enough && ratios.iter().all(|(_, r)| *r < WORSE)
+        // Read from the tip every joint is another one: it may fit a little worse than what fitted by chance.
+        let fits = |j: usize| *change == Change::FromTip && new.share(j) < FITS;
+        !own.is_empty() && enough && ratios.iter().all(|(j, r)| *r < WORSE || fits(*j))
     };
     part_is_clear(0) && part_is_clear(1)
 }
 
 /// The held-out squared errors of a part over those before, by joint that moves.
-fn ratios(old: &Judged, new: &Judged, part: usize) -> Vec<(usize, f64)> {
+pub(super) fn ratios(old: &Judged, new: &Judged, part: usize) -> Vec<(usize, f64)> {
     let (old, new) = (&old.left[part], &new.left[part]);
     (0..old.len()).filter_map(|j| Some((j, ratio(old[j], new[j])?))).collect()
 }
@@ -188,7 +194,8 @@ fn next<'a>(asked: &Asked<'a>, found: &Found<'a>) -> Result<Option<Found<'a>>, D
     Ok(None)
 }
 
-fn shares(judged: &Judged) -> Vec<f64> {
+/// The held-out error by joint, a share of its torque.
+pub(super) fn shares(judged: &Judged) -> Vec<f64> {
     (0..judged.left[0].len()).map(|j| judged.share(j)).collect()
 }
 
@@ -301,6 +308,12 @@ fn of_positions(
     {
         ask(&other, vec![Change::Degrees]);
     }
+    // Of two joints it is an exchange.
+    if asked.body.dof() > 2
+        && let Some(other) = of(&read.with(&Change::FromTip).positions)
+    {
+        ask(&other, vec![Change::FromTip]);
+    }
     tried
 }
 
@@ -309,9 +322,24 @@ pub(super) fn gravity_is(asked: &Asked<'_>, found: &Found<'_>) -> Option<Gravity
     if found.read.gravity == Gravity::TakenOut || asked.body.gravity().iter().all(|g| *g == 0.0) {
         return Some(GravityIs::TakenOut);
     }
-    let few = |gravity: Gravity| asked.few(&found.read.positions, gravity).ok();
-    let with = judge(&few(Gravity::Included)?, &found.read.torques, found.ridge);
-    let without = judge(&few(Gravity::TakenOut)?, &found.read.torques, found.ridge);
+    let (with, without) = with_and_without_gravity(asked, found)?;
     let worse = |part: usize| ratios(&with, &without, part).iter().any(|(_, r)| *r > 1.0 / CLEAR);
     (worse(0) && worse(1) && gain(&without, &with) > 0.0).then_some(GravityIs::Included)
+}
+
+/// Whether what little weight the torques hold is there nevertheless: without gravity's columns the fit is worse, as the
+/// mean over joints, both ways round.
+pub(super) fn gravity_helps(asked: &Asked<'_>, found: &Found<'_>) -> bool {
+    let Some((with, without)) = with_and_without_gravity(asked, found) else { return false };
+    let mean = |part: usize| {
+        let ratios = ratios(&with, &without, part);
+        ratios.iter().map(|(_, r)| r.ln()).sum::<f64>() / ratios.len().max(1) as f64
+    };
+    [0, 1].iter().all(|part| mean(*part) > HELPS.ln())
+}
+
+fn with_and_without_gravity(asked: &Asked<'_>, found: &Found<'_>) -> Option<(Judged, Judged)> {
+    let few = |gravity: Gravity| asked.few(&found.read.positions, gravity).ok();
+    let of = |gravity: Gravity| Some(judge(&few(gravity)?, &found.read.torques, found.ridge));
+    Some((of(Gravity::Included)?, of(Gravity::TakenOut)?))
 }

@@ -5,6 +5,10 @@ use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::log::Log;
 use crate::logs::regression::RigidArm;
 use crate::virtual_arm::lwa4p;
+use dyngen::Arm;
+use dyngen::arm::Convention;
+use dyngen::exact::angle::Angle;
+use dyngen::exact::rational::integer;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::LazyLock;
@@ -160,4 +164,74 @@ fn logs_that_are_too_short_tell_nothing() {
     let told = conventions(body, &[short], &[]);
     assert_eq!(told.torque, super::TorqueColumns::default());
     assert!(!told.differ() && told.evidence.contains("not told"));
+}
+
+/// What is told where the logs are those of the sound arm and the file is not.
+fn told_of_arm(spoil: impl Fn(&mut Arm)) -> Conventions {
+    let (sound, logs) = &*SOUND;
+    let mut arm = sound.arm().clone();
+    spoil(&mut arm);
+    let (fit, validate) = logs.split_at(4);
+    conventions(&RigidArm::new(&arm).unwrap(), fit, validate)
+}
+
+#[test]
+fn an_arm_file_of_the_other_convention_is_told() {
+    let told = told_of_arm(|arm| arm.convention = Convention::Modified);
+    assert_eq!(told.arm_file.as_deref(), Some("convention = \"standard\""), "{}", told.evidence);
+    // The columns are asked of the arm that they fit.
+    assert_eq!(told.torque.gravity, Some(GravityIs::Included), "{}", told.evidence);
+    assert_eq!((told.torque.sign.as_ref(), told.mend.as_ref()), (Some(&PerJoint::All(1)), None));
+    let first = told.verdict();
+    assert!(first.starts_with("The arm file is not this arm's. With convention = \"standard\""), "{first}");
+}
+
+#[test]
+fn a_zero_that_is_a_quarter_turn_off_is_told() {
+    let quarter = Angle::PiMultiple(integer(1) / integer(2));
+    let told = told_of_arm(|arm| {
+        let theta = &mut arm.joints[1].theta;
+        *theta = Angle::sum(&[(theta.clone(), integer(1)), (quarter.clone(), integer(1))]);
+    });
+    assert_eq!(told.arm_file.as_deref(), Some("theta = \"1/2*pi\" of joint 2"), "{}", told.evidence);
+}
+
+#[test]
+fn gravity_from_another_side_is_told() {
+    let told = told_of_arm(|arm| arm.gravity.rotate_right(1));
+    assert_eq!(told.arm_file.as_deref(), Some("gravity = [0, 0, -9.81]"), "{}", told.evidence);
+}
+
+#[test]
+fn lengths_in_millimetres_are_told() {
+    let told = told_of_arm(|arm| {
+        for joint in &mut arm.joints {
+            joint.a = &joint.a * integer(1000);
+            joint.d = &joint.d * integer(1000);
+        }
+    });
+    assert_eq!(told.arm_file.as_deref(), Some("a and d in metres"), "{}", told.evidence);
+}
+
+#[test]
+fn joints_counted_from_the_tip_are_told() {
+    let told = told(|log| {
+        log.q.reverse();
+        log.torque.reverse();
+    });
+    let order: Vec<usize> = told.torque.order.iter().flatten().map(|j| j.number()).collect();
+    assert_eq!(order, [6, 5, 4, 3, 2, 1], "{}", told.evidence);
+    assert_eq!(told.positions.order, told.torque.order);
+}
+
+#[test]
+fn where_much_is_left_it_is_said() {
+    let (body, logs) = &*SOUND;
+    // A torque that no arm has: another log's.
+    let strange: Vec<Log> =
+        (0..4).map(|k| Log { torque: logs[(k + 1) % 4].torque.clone(), ..logs[k].clone() }).collect();
+    let told = conventions(body, &strange, &[]);
+    assert!(told.is_unclear() && !told.differ(), "{}", told.evidence);
+    let first = told.verdict();
+    assert!(first.starts_with("What the columns are cannot be checked: one rigid arm"), "{first}");
 }

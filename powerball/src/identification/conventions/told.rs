@@ -3,6 +3,9 @@
 use crate::controller::JointNumber;
 use serde::Serialize;
 
+/// Of a joint's torque more than this share is much.
+const MUCH: f64 = 0.5;
+
 /// What the torque and position columns of some logs are. Nothing was changed by it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Conventions {
@@ -15,6 +18,13 @@ pub struct Conventions {
     /// The column map that would set the columns right, TOML for `--map`; `None` where they are as they
     /// should be, or where it is not known how to.
     pub mend: Option<String>,
+    /// The line of the arm file that would set it right; `None` where nothing speaks clearly against the file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub arm_file: Option<String>,
+    /// Held-out error by joint with all that was found set right, a share of the torque; not a number where a joint
+    /// does not move. Not part of the JSON: see each answer.
+    #[serde(skip)]
+    pub left: Vec<f64>,
     /// What was asked, one after another.
     pub answers: Vec<Answer>,
 }
@@ -119,25 +129,49 @@ impl Conventions {
         self.answers.iter().any(|answer| answer.as_said == Some(false))
     }
 
-    /// The line that comes first: what is wrong with the columns, or that they are as they should be.
+    /// Whether so much is left with everything set right that the columns cannot be checked.
+    #[must_use]
+    pub fn is_unclear(&self) -> bool {
+        self.left.iter().any(|left| *left > MUCH)
+    }
+
+    /// The joints of which more than half of the torque is left with all that was found set right, with that share.
+    fn much_left(&self) -> Option<String> {
+        let much = |(j, left): (usize, &f64)| {
+            (*left > MUCH).then(|| format!("{:.0} % of joint {}", 100.0 * left, JointNumber::from_index(j)))
+        };
+        let list: Vec<String> = self.left.iter().enumerate().filter_map(much).collect();
+        (!list.is_empty()).then(|| format!("one rigid arm with textbook friction leaves {}", list.join(", ")))
+    }
+
+    /// The line that comes first: what is wrong with the columns or the arm file, or that they are as they should be.
     #[must_use]
     pub fn verdict(&self) -> String {
         let wrong: Vec<&str> =
             (self.answers.iter()).filter(|a| a.as_said == Some(false)).map(|a| a.sentence.as_str()).collect();
+        let left = self.much_left();
         if !wrong.is_empty() {
             let mend = self
                 .mend
                 .as_ref()
                 .map_or(String::new(), |mend| format!(" A column map (--map) that sets this right:\n{mend}"));
-            let wrong = wrong.join(" ");
-            return format!(
-                "The columns are not what they are said to be. {wrong} Nothing was changed.{mend}"
-            );
+            let what = match (&self.arm_file, self.mend.is_some()) {
+                (Some(_), false) => "The arm file is not this arm's.",
+                (Some(_), true) => "Neither the arm file nor the columns are right.",
+                (None, _) => "The columns are not what they are said to be.",
+            };
+            let left = left.map_or(String::new(), |left| format!(" Even so {left}."));
+            return format!("{what} {}{left} Nothing was changed.{mend}", wrong.join(" "));
         }
         let open: Vec<&str> =
             self.answers.iter().filter(|a| a.as_said.is_none()).map(|a| a.question).collect();
-        let told = "The columns are taken as they are said to be; nothing in these logs speaks clearly \
-            against it";
+        let told = match left {
+            Some(left) => format!(
+                "What the columns are cannot be checked: {left}. Columns and arm file are taken as they stand"
+            ),
+            None => "The columns are taken as they are said to be; nothing in these logs speaks clearly against it"
+                .to_string(),
+        };
         match open.is_empty() {
             true => format!("{told}."),
             false => format!("{told}. Not told by these logs: {}.", open.join(", ")),

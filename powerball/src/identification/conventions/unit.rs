@@ -104,7 +104,7 @@ impl Size {
 }
 
 /// The lengths of the links together, m.
-fn reach(arm: &Arm) -> f64 {
+pub(super) fn reach(arm: &Arm) -> f64 {
     arm.joints.iter().map(|j| to_f64(&j.a).hypot(to_f64(&j.b)).hypot(to_f64(&j.d))).sum()
 }
 

@@ -2,6 +2,7 @@
 
 use super::errors::StandardErrors;
 use super::reduced::Solution;
+use crate::controller::JointNumber;
 use crate::logs::regression::Data;
 use serde::{Deserialize, Serialize};
 
@@ -98,6 +99,10 @@ pub struct Spread {
     pub rms: Vec<f64>,
     /// rms of the error over rms of the measured torque.
     pub relative: Vec<f64>,
+    /// rms of the error over the standard deviation of the measured torque; empty where that is not known. Not part of
+    /// the JSON.
+    #[serde(skip)]
+    pub of_deviation: Vec<f64>,
     /// Samples in the band, of all joints' rows the most.
     pub samples: usize,
 }
@@ -115,13 +120,35 @@ impl Spread {
                 [left + n * error * error, torque + n * measured * measured, rows + n]
             })
         };
+        // As many of the deviations.
+        let deviation = |j: usize| {
+            let (left, variance) = parts.iter().fold((0.0, 0.0), |(left, variance), (spread, count)| {
+                let (n, error) = (count[j] as f64, spread.rms[j]);
+                let ratio = spread.of_deviation.get(j).copied().unwrap_or(0.0);
+                (
+                    left + n * error * error,
+                    variance + if ratio > 0.0 { n * (error / ratio).powi(2) } else { 0.0 },
+                )
+            });
+            if variance > 0.0 { (left / variance).sqrt() } else { 0.0 }
+        };
+        let of_deviation = (0..dof).map(deviation).collect();
         let sums: Vec<[f64; 3]> = (0..dof).map(sums).collect();
         let ratio = |a: f64, b: f64| if b > 0.0 { (a / b).sqrt() } else { 0.0 };
         Some(Spread {
             rms: sums.iter().map(|[left, _, rows]| ratio(*left, *rows)).collect(),
             relative: sums.iter().map(|[left, torque, _]| ratio(*left, *torque)).collect(),
+            of_deviation,
             samples: sums.iter().map(|[_, _, rows]| *rows as usize).max().unwrap_or(0),
         })
+    }
+
+    /// The joints that are predicted no better than by the mean of their torque; where that is not known, than by
+    /// nothing.
+    #[must_use]
+    pub fn useless_joints(&self) -> Vec<JointNumber> {
+        let ratios = if self.of_deviation.is_empty() { &self.relative } else { &self.of_deviation };
+        (0..ratios.len()).filter(|j| ratios[*j] >= 1.0).map(JointNumber::from_index).collect()
     }
 }
 
@@ -139,7 +166,22 @@ pub fn spread(data: &Data<'_>, residual: &[Vec<f64>]) -> Spread {
             if measured > 0.0 { e / measured } else { 0.0 }
         })
         .collect();
-    Spread { rms: errors, relative, samples: data.joints.iter().map(|j| j.len()).max().unwrap_or(0) }
+    let deviation = |x: &[f64]| {
+        let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+        rms(&x.iter().map(|v| v - mean).collect::<Vec<_>>())
+    };
+    let of_deviation = (errors.iter().zip(&data.joints))
+        .map(|(e, joint)| {
+            let deviation = deviation(&joint.torque);
+            if deviation > 0.0 { e / deviation } else { 0.0 }
+        })
+        .collect();
+    Spread {
+        rms: errors,
+        relative,
+        of_deviation,
+        samples: data.joints.iter().map(|j| j.len()).max().unwrap_or(0),
+    }
 }
 
 /// The values of a solution of the minimal set `names`, with their errors.
@@ -200,6 +242,7 @@ pub fn spread_of(solution: &Solution, theta: &[f64]) -> Spread {
             .iter()
             .map(|(left, torque, _)| if *torque > 0.0 { (left / torque).sqrt() } else { 0.0 })
             .collect(),
+        of_deviation: Vec::new(),
         samples: joints.iter().map(|(_, _, rows)| *rows as usize).max().unwrap_or(0),
     }
 }

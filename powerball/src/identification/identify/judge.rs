@@ -38,6 +38,7 @@ fn of_mounting(
         let (all, rows) = judged.get_or_insert_with(|| (own.clone(), vec![0; body.dof()]));
         for j in members {
             (all.rms[j], all.relative[j]) = (own.rms[j], own.relative[j]);
+            all.of_deviation[j] = own.of_deviation[j];
             rows[j] = data.joints[j].len();
         }
     }

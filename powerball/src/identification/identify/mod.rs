@@ -1,9 +1,11 @@
 //! From logs to a model: one function, and what it takes and gives.
 //!
 //! `gather` makes sufficient statistics of logs, by mounting; `fit` fits them; `by_mounting` says what the
-//! fit leaves of each mounting; `judge` what the model leaves of other logs; `along` what a page shows of it.
+//! fit leaves of each mounting; `judge` what the model leaves of other logs; `asymmetry` whether another friction law
+//! would help; `along` what a page shows of it.
 
 mod along;
+mod asymmetry;
 mod by_band;
 mod by_mounting;
 mod error;
@@ -78,7 +80,8 @@ pub fn identify<'a, S: Into<Source<'a>>>(
     let fitted = fit(&gathered, options, &mut warnings)?;
     let mountings = by_mounting::fits(&gathered, &fitted, options, &mut warnings)?;
     let identified = conclude(&gathered, &fitted, mountings, options, warnings)?;
-    Ok(Identified { conventions, transmission, ..identified })
+    let advice = asymmetry::advice(&gathered, &identified, options)?;
+    Ok(Identified { conventions, transmission, advice, ..identified })
 }
 
 /// The sufficient statistics of the logs to fit, and the logs to judge by; without what is known already.
@@ -160,6 +163,7 @@ fn conclude(
         arm: model.arm,
         conventions: None,
         transmission: None,
+        advice: None,
         set: SetKind::Minimal.to_string(),
         parameters: found.parameters,
         friction: found.friction,

@@ -39,11 +39,14 @@ impl Recorded {
     }
 }
 
-/// A file that is fitted cannot judge.
+/// There is a log to fit, and none that is fitted judges.
 ///
 /// # Errors
-/// [`IdentifyError::JudgesItself`].
+/// [`IdentifyError::Setting`] and [`IdentifyError::JudgesItself`].
 pub(super) fn apart(logs: &[Source<'_>], validate: &[Source<'_>]) -> Result<(), IdentifyError> {
+    if logs.is_empty() {
+        return Err(IdentifyError::Setting("there is no log to fit: give at least one".to_string()));
+    }
     match validate.iter().find(|file| logs.iter().any(|log| log.same_file(file))) {
         Some(both) => Err(IdentifyError::JudgesItself(both.name())),
         None => Ok(()),

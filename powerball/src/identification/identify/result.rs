@@ -48,6 +48,9 @@ pub struct Identified {
     pub band_reason: String,
     /// What is to be said of the logs, the arm file and the fit.
     pub warnings: Vec<String>,
+    /// What would lower errors that are large now, where something is known to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub advice: Option<String>,
     /// The model along the validation set, or along the fitted logs where there is none.
     #[serde(skip)]
     pub along: Along,

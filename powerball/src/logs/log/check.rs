@@ -61,7 +61,8 @@ pub(super) fn into_log(
     let step = median_step(&raw.t).unwrap_or(1.0);
     if step >= 0.5 {
         let message = format!(
-            "the median step is {step} s: t must be in seconds (milliseconds or microseconds look like this)"
+            "the median step is {step} s: t must be in seconds (milliseconds or microseconds look like this: --map \
+             't.unit = \"ms\"' or 'us')"
         );
         return Err(LogError(vec![finding(Some(raw.line[1]), "t".into(), message)]));
     }
@@ -228,7 +229,7 @@ fn units(
     if joint.kind == JointKind::Revolute && span > ABSURD * reach.max(PI) && high - low > 2.0 * PI {
         let message = format!(
             "reaches {span:.1}, the joint {reach:.2} rad: angles must be in radians (degrees look like \
-                this); divide by 57.2958"
+                this: --map 'q.unit = \"deg\"')"
         );
         error(format!("q{}", j + 1), message);
     } else if joint
@@ -251,14 +252,14 @@ fn units(
             Effort::Torque if typical > ABSURD * limit => {
                 let message = format!(
                     "is typically {typical:.0}, the joint's limit is {limit} N·m: torques must be in N·m \
-                        (mN·m look like this)"
+                        (mN·m look like this: --map 'tau.unit = \"mN·m\"')"
                 );
                 error(format!("tau{}", j + 1), message);
             }
             Effort::Current(constants) if typical * constants[j].abs() > ABSURD * limit => {
                 let message = format!(
                     "is typically {typical:.0}, which is {:.0} N·m where the joint's limit is {limit}: \
-                        currents must be in A (mA look like this)",
+                        currents must be in A (mA look like this: --map 'i.unit = \"mA\"')",
                     typical * constants[j]
                 );
                 error(format!("i{}", j + 1), message);

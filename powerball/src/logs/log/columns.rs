@@ -199,6 +199,13 @@ impl Columns {
             errors.push(finding("t", message.into()));
         }
         let q = group(names, "q", asked);
+        if let Some(more) = one_too_many(names, asked) {
+            let message = format!(
+                "the header has {more}, the arm has {n} joints: another arm's log; where it holds more than this arm, say \
+                 which columns are its: --map 'q.column = [\"q1\", …]'"
+            );
+            errors.push(finding(&more, message));
+        }
         if let Err(missing) = &q {
             errors.push(finding("q", missing_positions(names, missing, asked)));
         }
@@ -290,6 +297,16 @@ impl Columns {
             .and_then(|k| names.get(*k).cloned())
             .unwrap_or_else(|| "line".into())
     }
+}
+
+/// The position column of a joint after the arm's last one, where columns are numbered and no map says which are meant.
+fn one_too_many(names: &[String], asked: Asked<'_>) -> Option<String> {
+    let is_said = asked.map.q.column.is_some() || !asked.map.joints.is_empty();
+    let next = |stem: &str| format!("{stem}{}", asked.arm.dof() + 1);
+    let last = |stem: &str| format!("{stem}{}", asked.arm.dof());
+    let has = |name: &String| names.contains(name);
+    let numbered = stems("q").into_iter().find(|stem| has(&last(stem)) && has(&next(stem)));
+    numbered.filter(|_| !is_said).map(next)
 }
 
 fn time(names: &[String], asked: Asked<'_>) -> Option<Group> {

@@ -186,12 +186,50 @@ fn what_cannot_be_used_is_refused_with_its_reason() {
             "clock restarts",
         ),
         (HEADER.to_string(), "too few"),
-        (String::new(), "no column t"),
+        (String::new(), "x.csv: file: is empty"),
+        ("\n \n".to_string(), "is empty"),
+        ("\0".repeat(5000), "holds bytes that are no text"),
+        (plain("t,q1,q2,q3,tau1"), "q3: the header has q3, the arm has 2 joints"),
+        (
+            decimal_commas(","),
+            "has 10 fields where the header names 5 columns: decimal commas between commas",
+        ),
     ];
     for (text, reason) in cases {
         let (log, _) = read(&text);
         let said = log.err().map(|e| e.to_string()).unwrap_or_default();
         assert!(said.contains(reason), "'{reason}' not in '{said}'");
+    }
+}
+
+/// A log with decimal commas.
+fn decimal_commas(between: &str) -> String {
+    let line = |_, f: Vec<String>| Some(f.join(between).replace('.', ","));
+    text(&HEADER.replace(',', between), line)
+}
+
+#[test]
+fn decimal_commas_are_read_where_other_signs_stand_between_numbers() {
+    let (plain, _) = read(&text(HEADER, |_, f| Some(f.join(","))));
+    for between in [";", "\t"] {
+        let (log, findings) = read(&decimal_commas(between));
+        let (log, plain) = (log.unwrap(), plain.as_ref().unwrap());
+        assert_eq!((&log.t, &log.q, &log.torque), (&plain.t, &plain.q, &plain.torque));
+        assert!(findings.iter().any(|f| f.message.contains("decimal commas")), "{findings:?}");
+    }
+}
+
+/// What people give by mistake is named by what it is.
+#[test]
+fn files_of_other_kinds_are_named() {
+    let spreadsheet: Vec<u8> = b"\xff\xfe".iter().copied().chain(*b"t\0,\0q\0").collect();
+    for (bytes, what) in [
+        (b"\x89PNG\r\n\x1a\n\0\0".as_slice(), "is no log: it is a PNG picture"),
+        (b"\x1f\x8b\x08\0", "compressed by gzip"),
+        (&spreadsheet, "UTF-16"),
+    ] {
+        let said = parse(bytes, "x.csv", &arm(), &mut Vec::new()).unwrap_err().to_string();
+        assert!(said.contains(what), "'{what}' not in '{said}'");
     }
 }
 

@@ -66,9 +66,9 @@ pub(super) fn look(raw: &Raw, step: f64, doubts: &mut Doubts<'_>) {
         } else if !(0.67..1.5).contains(&ratio) {
             // The ratio is q's slope over dq.
             let (hint, severity) = if (ratio * 57.2958 - 1.0).abs() < 0.25 {
-                ("dq looks like degrees a second", Severity::Told)
+                ("dq looks like degrees a second (--map 'dq.unit = \"deg/s\"')", Severity::Told)
             } else if (ratio / 57.2958 - 1.0).abs() < 0.25 {
-                ("q looks like degrees", Severity::Unusable)
+                ("q looks like degrees (--map 'q.unit = \"deg\"')", Severity::Unusable)
             } else if ratio < 0.0 {
                 ("their signs differ", Severity::Told)
             } else {

@@ -2,7 +2,6 @@
 
 mod hidden;
 mod kept;
-#[cfg(test)]
 pub(crate) mod newton_euler;
 mod per_joint;
 mod prepare;

@@ -1,4 +1,5 @@
-//! A numeric Newton–Euler regressor, independent of the generator: the plant and the check of tests.
+//! A numeric Newton–Euler regressor, independent of the generator: for arms that are tried and not derived, and the
+//! plant and the check of tests.
 
 use dyngen::Arm;
 use dyngen::arm::{Convention, JointKind};

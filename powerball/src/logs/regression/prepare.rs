@@ -212,6 +212,32 @@ impl<'a> Data<'a> {
         let mut recordings = self.recordings.clone();
         recordings.iter_mut().for_each(correct);
         let joints = self.rows_of(&recordings);
+        self.with(recordings, joints)
+    }
+
+    /// The same rows with the columns of another arm: `count` parameters, and their columns along a recording,
+    /// samples × n × parameters.
+    #[must_use]
+    pub(crate) fn of_other_columns(
+        &self,
+        count: usize,
+        columns: impl Fn(&Recording) -> Vec<f64>,
+    ) -> Data<'a> {
+        let (n, mut joints) = (self.dof(), self.joints.clone());
+        let all: Vec<Vec<f64>> = self.recordings.iter().map(columns).collect();
+        for (joint, rows) in joints.iter_mut().enumerate() {
+            let column = |c: usize| {
+                rows.column(&self.recordings, |r, _| {
+                    all[r].iter().skip(joint * count + c).step_by(n * count).copied().collect()
+                })
+            };
+            rows.inertial = (0..count).map(column).collect();
+        }
+        self.with(self.recordings.clone(), joints)
+    }
+
+    /// The same data with other recordings and rows.
+    fn with(&self, recordings: Vec<Recording>, joints: Vec<JointRows>) -> Data<'a> {
         Data {
             body: self.body,
             recordings,

@@ -58,12 +58,16 @@ impl Format {
     /// What the file at a path begins with.
     ///
     /// # Errors
-    /// Where it cannot be read.
+    /// Where it cannot be read, is empty, or is none of these.
     pub fn of_file(path: &Path) -> Result<Format, LogError> {
         let mut head = Vec::new();
-        let read = File::open(path).and_then(|file| file.take(16).read_to_end(&mut head));
+        let read = File::open(path).and_then(|file| file.take(text::HEAD as u64).read_to_end(&mut head));
         read.map_err(|e| LogError::of_file(&shown(path), "file", format!("cannot be read: {e}")))?;
-        Ok(Format::of(&head))
+        let format = Format::of(&head);
+        match text::no_text(&head).filter(|_| format == Format::Csv) {
+            Some(what) => Err(LogError::of_file(&shown(path), "file", what)),
+            None => Ok(format),
+        }
     }
 }
 

@@ -203,7 +203,7 @@ impl Move {
         to[index] = self.to.unwrap_or(from[index] + self.by.unwrap_or(0.0));
         if !allowed(to[index]) {
             return Err(Failure::Refused(match wrong(to[index]) {
-                Failure::Unusable(why) | Failure::Refused(why) => why,
+                Failure::Unusable(why) | Failure::Refused(why) | Failure::Doubtful(why) => why,
             }));
         }
         recorder.way_to(&to, self.velocity, 1.0).map_err(arm)?;

@@ -51,7 +51,8 @@ pub(crate) fn compare(
         .take(LISTED)
         .map(|(f, score)| {
             let group = &groups[*f];
-            let why_not = if own / score < rule.least_margin {
+            let alike = own / score < rule.least_margin;
+            let why_not = if alike {
                 format!(
                     "fits as well within {:.0} %: these logs do not tell the two apart",
                     100.0 * (rule.least_margin - 1.0)
@@ -63,7 +64,7 @@ pub(crate) fn compare(
                     None => format!("explains {share:.0} % as much"),
                 }
             };
-            Rival { effect: group.name().to_string(), why_not }
+            Rival { effect: group.name().to_string(), joints: joints.to_vec(), alike, why_not }
         })
         .collect();
     let explained = explained(screen, &groups[chosen], joints);

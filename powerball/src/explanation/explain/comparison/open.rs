@@ -97,17 +97,19 @@ fn columns(context: &Context<'_>, of: &[Candidate]) -> Vec<Column> {
     of.iter().flat_map(|candidate| context.columns(candidate)).collect()
 }
 
-/// What stays open after all steps: a name with a twin, else a name that was not given, else, where
-/// something is left without a name, what fits a part of it.
+/// What stays open after all steps: a name with a twin, else a name that was not given for what is left on some joints
+/// without one.
 pub(crate) fn open(
     study: &Study<'_>,
     model: &Model,
     history: &History,
-    something_left: bool,
+    left: &[JointNumber],
 ) -> Option<Open> {
     let standing = |q: &&Question| match q.why {
-        Why::Twin => q.proposals[0].iter().any(|c| model.has(c)),
-        Why::Withheld | Why::Refused => something_left,
+        Why::Twin => {
+            q.proposals[0].iter().any(|c| model.has(c)) && !q.proposals[1].iter().any(|c| model.has(c))
+        }
+        Why::Withheld => q.joints.iter().any(|joint| left.contains(joint)),
     };
     let of_names = history.steps.iter().filter_map(|s| s.question.as_ref());
     let question = of_names.chain(&history.questions).filter(standing).min_by_key(|q| q.why)?;

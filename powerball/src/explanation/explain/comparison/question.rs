@@ -1,6 +1,6 @@
 //! A question that logs leave open: which of two names is right.
 
-use super::super::search::{Group, Member};
+use super::super::search::Group;
 use crate::controller::JointNumber;
 use crate::explanation::effects::Candidate;
 use crate::explanation::rule::Rule;
@@ -12,8 +12,6 @@ pub(crate) enum Why {
     Twin,
     /// What fits best was not given.
     Withheld,
-    /// Several fit a part, none passes.
-    Refused,
 }
 
 /// Proposals for the same residual, from one step.
@@ -42,19 +40,6 @@ impl Question {
     /// The same where the name is not given.
     pub(crate) fn withheld(self) -> Question {
         Question { why: Why::Withheld, ..self }
-    }
-
-    /// The two best of the groups that were all refused.
-    pub(crate) fn refused(rule: &Rule, groups: &[Group]) -> Option<Question> {
-        let mut best: Vec<(&Group, &Member)> = (groups.iter())
-            .filter_map(|group| Some((group, group.best()?)))
-            .filter(|(_, best)| best.trial.score >= rule.least_score)
-            .collect();
-        best.sort_by(|a, b| b.1.trial.score.total_cmp(&a.1.trial.score));
-        let (first, own) = *best.first()?;
-        let joints = &own.candidate.joints;
-        let (second, _) = *best.iter().skip(1).find(|(_, other)| other.candidate.is_on(joints))?;
-        Question::of(rule, [first, second], joints, Why::Refused)
     }
 
     fn of(rule: &Rule, which: [&Group; 2], joints: &[JointNumber], why: Why) -> Option<Question> {

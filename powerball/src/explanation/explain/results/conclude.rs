@@ -2,7 +2,7 @@
 
 use super::super::comparison::{Comparison, Step, leftover, open};
 use super::super::findings::Findings;
-use super::super::model::{Accepted, Model};
+use super::super::model::{Accepted, Model, Own};
 use super::super::named::{NamedEffect, Rival, Spreads};
 use super::super::study::Study;
 use super::compose::{Composed, compose, compose_per_joint};
@@ -23,6 +23,7 @@ use crate::explanation::rule::Rule;
 use crate::identification::estimate::distribution::f_tail;
 use crate::identification::estimate::{noise_floor, over_blocks, spread};
 use crate::logs::regression::Data;
+use dyngen::arm::JointKind;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -41,16 +42,19 @@ pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainE
     let mut named: Vec<NamedEffect> = held.iter().map(|held| held.named.clone()).collect();
     named.extend(named_effects(study, model, &history.steps, &left));
     add_pushes_at_rest(&mut named, &findings, &after);
+    not_named_elsewhere(&mut named);
     let (unattributed, unexplained, dependencies) =
-        unattributed(study, model, history, &held_out, &floor, &after);
+        unattributed(study, model, history, &held_out, &floor, &after, &named);
     for effect in &mut named {
         effect.probability = probability(study.rule(), effect, unattributed.as_ref());
     }
-    let open = open(study, model, history, unattributed.is_some());
+    let left = unattributed.as_ref().map_or(&[][..], |rest| &rest.joints);
+    let open = open(study, model, history, left);
     Ok(Explained {
         verdict: verdict(study, &named, &after.validate, &floor, &dependencies),
         logs: logs(&findings),
         arm: study.data.body.arm().name.clone(),
+        sliding: study.data.body.arm().joints.iter().map(|j| j.kind == JointKind::Prismatic).collect(),
         conventions: None,
         transmission: None,
         held_out_change: changes(&study.validation, &before.residual, &held_out),
@@ -60,6 +64,7 @@ pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainE
         laws: laws(study, model, &history.steps),
         band: [0.0, study.data.band.cutoff],
         bands: study.data.joints.iter().map(|joint| joint.band.cutoff).collect(),
+        fitted_time: study.fitted_time(),
         effective_samples: effective_samples(&study.data, &model.fit.residual),
         unattributed,
         next_experiment: open.as_ref().map(|open| NextExperiment::not_designed(open.names())),
@@ -101,12 +106,15 @@ fn named_effect(
     left: &dyn Fn(&[JointNumber]) -> f64,
 ) -> Option<NamedEffect> {
     let coefficients = model.coefficients();
-    let mut own: Vec<(&Accepted, &Vec<f64>)> =
-        model.accepted.iter().zip(&coefficients).filter(|(a, _)| a.effect() == effect).collect();
-    own.sort_by_key(|(a, _)| a.candidate.joints.clone());
+    let shares = model.own();
+    let mut own: Vec<(&Accepted, &Vec<f64>, &Own)> = (model.accepted.iter().zip(&coefficients).zip(&shares))
+        .map(|((a, coefficients), share)| (a, coefficients, share))
+        .filter(|(a, ..)| a.effect() == effect)
+        .collect();
+    own.sort_by_key(|(a, ..)| a.candidate.joints.clone());
     let own = || own.iter().copied();
     let found: Vec<Found<'_>> =
-        own().map(|(a, c)| Found { candidate: &a.candidate, coefficients: c }).collect();
+        own().map(|(a, c, _)| Found { candidate: &a.candidate, coefficients: c }).collect();
     let mut joints: Vec<JointNumber> = found.iter().flat_map(|f| f.candidate.joints.clone()).collect();
     joints.sort_unstable();
     joints.dedup();
@@ -122,19 +130,36 @@ fn named_effect(
     Some(NamedEffect {
         effect: effect.name().to_string(),
         figures: effect.figures(&model.context(study), &found),
+        relative_std: own().map(|(_, _, own)| own.relative_std).collect(),
         rms_before: joints.iter().map(|j| first.before[j.index()]).collect(),
         rms_after: joints.iter().map(|j| last.after[j.index()]).collect(),
-        p_value: own().map(|(a, _)| a.p_value).fold(0.0, f64::max),
-        held_out_gain: own().map(|(a, _)| a.fold_gain).collect(),
+        p_value: own().map(|(a, ..)| a.p_value).fold(0.0, f64::max),
+        held_out_gain: own().map(|(a, ..)| a.fold_gain).collect(),
         logs,
         // What is left is known only when all names are.
         probability: f64::NAN,
         margin: first.comparison.margin,
         leftover: left(&joints),
+        own_share: own().map(|(_, _, own)| own.share).fold(1.0, f64::min),
         class: effect.class().name().to_string(),
         rivals: rivals(&study.options.ruled_out, &first.comparison, effect.name()),
         joints,
     })
+}
+
+/// What is named is no rival of another name on the same joint.
+fn not_named_elsewhere(named: &mut [NamedEffect]) {
+    let names: Vec<(String, Vec<JointNumber>)> =
+        named.iter().map(|effect| (effect.effect.clone(), effect.joints.clone())).collect();
+    for effect in named {
+        let is_named = |rival: &Rival| {
+            let same = |(name, joints): &(String, Vec<JointNumber>)| {
+                *name == rival.effect && joints.iter().any(|joint| effect.joints.contains(joint))
+            };
+            names.iter().any(same)
+        };
+        effect.rivals.retain(|rival| !is_named(rival));
+    }
 }
 
 /// Pushes while the arm stood still are one effect with those on the way. No error of a row falls by them, since rows
@@ -168,6 +193,7 @@ fn add_pushes_at_rest(named: &mut Vec<NamedEffect>, findings: &Findings<'_>, aft
     named.push(NamedEffect {
         effect: effect.name().to_string(),
         figures: own.into(),
+        relative_std: Vec::new(),
         rms_before: after.validate.rms.clone(),
         rms_after: after.validate.rms.clone(),
         p_value: f_tail(beyond * beyond, 1.0, 100.0),
@@ -176,6 +202,7 @@ fn add_pushes_at_rest(named: &mut Vec<NamedEffect>, findings: &Findings<'_>, aft
         probability: f64::NAN,
         margin: pushes.iter().map(|p| p.size).fold(f64::INFINITY, f64::min),
         leftover: pushes.iter().map(|p| 1.0 - p.share).sum::<f64>() / pushes.len() as f64,
+        own_share: 1.0,
         class: effect.class().name().to_string(),
         rivals: Vec::new(),
         joints: (0..findings.study.data.dof()).map(JointNumber::from_index).collect(),
@@ -197,7 +224,10 @@ fn probability(rule: &Rule, effect: &NamedEffect, rest: Option<&Unattributed>) -
 /// The next best names, and what an experiment has ruled out on the same joints.
 fn rivals(ruled_out: &[RuledOut], comparison: &Comparison, name: &str) -> Vec<Rival> {
     let here = |r: &&RuledOut| r.effect != name && r.joints.iter().any(|j| comparison.joints.contains(j));
-    let out = |r: &RuledOut| Rival { effect: r.effect.clone(), why_not: r.why_not.clone() };
+    let out = |r: &RuledOut| {
+        let why_not = r.why_not.clone();
+        Rival { effect: r.effect.clone(), joints: r.joints.clone(), alike: false, why_not }
+    };
     comparison.rivals.iter().cloned().chain(ruled_out.iter().filter(here).map(out)).collect()
 }
 

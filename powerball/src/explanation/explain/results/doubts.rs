@@ -39,7 +39,7 @@ pub(crate) fn doubts(findings: &Findings<'_>) -> Vec<String> {
             unseen.join("; ")
         ));
     }
-    let seconds: f64 = study.data.recordings.iter().map(|r| r.len() as f64 / r.rate).sum();
+    let seconds = study.fitted_time();
     if seconds < rule.least_time {
         doubts.push(format!(
             "the logs to fit hold {seconds:.0} s: too little to tell small effects from chance; record \

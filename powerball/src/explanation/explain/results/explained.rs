@@ -8,7 +8,7 @@ use super::logs::LogResult;
 use super::next::{Experiment, NextExperiment};
 use super::shown::Shown;
 use super::unattributed::Unattributed;
-use super::verdict::Verdict;
+use super::verdict::{State, Verdict};
 use crate::controller::JointNumber;
 use crate::explanation::torque_model::TorqueModel;
 use crate::identification::conventions::Conventions;
@@ -25,6 +25,9 @@ pub struct Explained {
     pub logs: Vec<LogResult>,
     /// The arm's name.
     pub arm: String,
+    /// Whether each joint slides: its torques are forces, N; not part of the JSON.
+    #[serde(skip)]
+    pub sliding: Vec<bool>,
     /// What the columns of the logs are, where they were asked.
     pub conventions: Option<Conventions>,
     /// What is between the motors' torques and the links', by joint, where logs hold both. Its effects are on
@@ -47,6 +50,8 @@ pub struct Explained {
     pub band: [f64; 2],
     /// The upper end of each joint's band, Hz.
     pub bands: Vec<f64>,
+    /// How long the fitted logs are, s.
+    pub fitted_time: f64,
     /// Samples that the residuals are worth, all joints together.
     pub effective_samples: usize,
     /// What no candidate explains.
@@ -73,6 +78,18 @@ pub struct Explained {
     /// The plots that show the effects; not part of the JSON.
     #[serde(skip)]
     pub shown: Vec<Shown>,
+}
+
+impl Explained {
+    /// The joints that the model with what was named predicts no better than their mean does, on the logs to judge on;
+    /// those of which no more than noise is left aside.
+    #[must_use]
+    pub fn useless_joints(&self) -> Vec<JointNumber> {
+        let is_open = |joint: &JointNumber| {
+            self.verdict.iter().any(|v| v.joint == *joint && v.state != State::Explained)
+        };
+        self.after.validate.useless_joints().into_iter().filter(is_open).collect()
+    }
 }
 
 /// The change of a joint's error.

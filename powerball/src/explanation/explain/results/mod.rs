@@ -3,12 +3,13 @@
 //! `conclude` makes the result ([`Explained`]): `compose` the model of what was accepted and what that
 //! leaves, `unattributed` and `dependencies` what stays without a name and what it depends on, `laws` the formulas of what has no name, `logs` what is different in which log, `correction`
 //! the curves that take a part of it off, `doubts` what a reader must know, `verdict` how far each
-//! joint is explained, `curves` and `shown` the figures,
+//! joint is explained, `contradictions` whether all of it agrees, `curves` and `shown` the figures,
 //! `next` what an experiment would decide. JSON is made of these types by whoever writes it, and nothing here
 //! reads it.
 
 mod compose;
 mod conclude;
+mod contradictions;
 pub(super) mod correction;
 mod curves;
 pub(super) mod dependencies;
@@ -17,17 +18,20 @@ mod explained;
 mod laws;
 mod logs;
 mod next;
+mod probability;
 mod shown;
 mod unattributed;
 mod verdict;
 
 pub(super) use conclude::conclude;
+pub use contradictions::contradictions;
 pub use correction::{Correction, Curve};
 pub use curves::{TorqueCurve, curves};
 pub use explained::{Change, Explained};
 pub use laws::{LawCoefficient, UnnamedLaw};
 pub use logs::{Difference, LogResult};
 pub use next::{Experiment, NextExperiment, Trajectory};
+pub use probability::{Evidence, FEATURES};
 pub use shown::Shown;
 pub use unattributed::Unattributed;
 pub use verdict::{State, Verdict};

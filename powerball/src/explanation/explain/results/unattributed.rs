@@ -2,10 +2,11 @@
 
 use super::super::comparison::History;
 use super::super::model::Model;
-use super::super::named::{Rival, Spreads};
+use super::super::named::{NamedEffect, Rival, Spreads};
 use super::super::study::Study;
 use super::correction::{Correction, correct};
 use super::dependencies::depends_on;
+use super::verdict::explained;
 use crate::controller::JointNumber;
 use crate::logs::parallel;
 use serde::Serialize;
@@ -19,7 +20,7 @@ pub struct Unattributed {
     pub depends_on: Vec<String>,
     /// rms of the residual of those joints on the fitted logs, N·m.
     pub rms: Vec<f64>,
-    /// Effects that fit a part of it but not well enough to be named.
+    /// Effects that fit a part of it, but not well enough to be named there.
     pub considered: Vec<Rival>,
     /// Curves that take a part of it off, where they were asked for: those of the joints whose held-out
     /// errors fall by them.
@@ -38,8 +39,8 @@ impl Dependencies {
     }
 }
 
-/// The joints whose residual still depends on something, and what is to be said of those where more than
-/// noise is left that depends on nothing.
+/// The joints that are not explained and whose residual depends on something, and what is to be said of the others on
+/// which more than noise is left.
 pub(crate) fn unattributed(
     study: &Study<'_>,
     model: &Model,
@@ -47,7 +48,8 @@ pub(crate) fn unattributed(
     held_out: &[Vec<f64>],
     floor: &[f64],
     after: &Spreads,
-) -> (Option<Unattributed>, Option<String>, Dependencies) {
+    named: &[NamedEffect],
+) -> (Option<Unattributed>, Vec<String>, Dependencies) {
     let (rule, context) = (study.rule(), model.context(study));
     let rms = &after.fit.rms;
     let is_left =
@@ -61,10 +63,16 @@ pub(crate) fn unattributed(
     });
     let dependencies = Dependencies(candidates.iter().copied().zip(found.iter().cloned()).collect());
     let mut signals: Vec<(String, f64)> = Vec::new();
-    let (mut joints, mut nothing) = (Vec::new(), Vec::new());
+    let explained = explained(study, &after.validate, floor, &dependencies);
+    let (mut joints, mut nothing, mut little) = (Vec::<JointNumber>::new(), Vec::new(), Vec::new());
     for (j, list) in candidates.iter().zip(found) {
-        if list.is_empty() {
+        let Some((strongest, _)) = list.first() else {
             nothing.push(format!("{} ({:.1} times the noise floor)", j + 1, rms[*j] / floor[*j]));
+            continue;
+        };
+        if explained[*j] {
+            let left = 100.0 * after.validate.relative[*j];
+            little.push(format!("{strongest} on joint {} ({left:.1} % of its torque)", j + 1));
             continue;
         }
         joints.push(JointNumber::from_index(*j));
@@ -78,17 +86,30 @@ pub(crate) fn unattributed(
     signals.sort_by(|a, b| b.1.total_cmp(&a.1));
     let unattributed = (!joints.is_empty()).then(|| Unattributed {
         rms: joints.iter().map(|j| rms[j.index()]).collect(),
-        joints,
         depends_on: signals.into_iter().map(|(name, _)| name).collect(),
-        considered: history.refused.clone(),
+        considered: considered(history, &joints, named),
         correction,
+        joints,
     });
-    let unexplained = (!nothing.is_empty()).then(|| {
-        format!(
+    let mut unexplained = Vec::new();
+    if !little.is_empty() {
+        unexplained.push(format!("what little is left depends on {}", little.join(", ")));
+    }
+    if !nothing.is_empty() {
+        unexplained.push(format!(
             "what stays on joint {} is slower than white noise and depends on no position, velocity, \
              acceleration, load or time: slow noise of the sensor, or something that comes and goes",
             nothing.join(", ")
-        )
-    });
+        ));
+    }
     (unattributed, unexplained, dependencies)
+}
+
+/// The effects that were refused on joints without being named on one of them.
+fn considered(history: &History, joints: &[JointNumber], named: &[NamedEffect]) -> Vec<Rival> {
+    let here = |rival: &&Rival| {
+        rival.joints.iter().any(|joint| joints.contains(joint))
+            && !named.iter().any(|effect| effect.is(&rival.effect, &rival.joints))
+    };
+    history.refused.iter().filter(here).cloned().collect()
 }

@@ -4,7 +4,6 @@ use super::super::named::NamedEffect;
 use super::super::study::Study;
 use super::unattributed::Dependencies;
 use crate::controller::JointNumber;
-use crate::explanation::rule::Rule;
 use crate::identification::estimate::Spread;
 use serde::Serialize;
 use std::fmt;
@@ -54,6 +53,7 @@ pub(crate) fn verdict(
     floor: &[f64],
     dependencies: &Dependencies,
 ) -> Vec<Verdict> {
+    let explained = explained(study, after, floor, dependencies);
     let of = |j: usize| {
         let joint = JointNumber::from_index(j);
         let (left, rms) = (after.relative[j], after.rms[j]);
@@ -62,7 +62,7 @@ pub(crate) fn verdict(
                 motion that moves it";
             return Verdict { joint, state: State::Not, left: f64::NAN, advice: advice.to_string() };
         }
-        let state = if is_explained(study.rule(), left, rms, floor[j]) {
+        let state = if explained[j] {
             State::Explained
         } else if named.iter().any(|e| e.joints.contains(&joint)) {
             State::InPart
@@ -78,9 +78,24 @@ pub(crate) fn verdict(
     (0..study.validation.dof()).map(of).collect()
 }
 
-/// Little is left of the torque, or hardly more than measurement noise.
-fn is_explained(rule: &Rule, left: f64, rms: f64, floor: f64) -> bool {
-    left <= rule.explained_share || rms <= rule.above_floor * floor
+/// Of which joints little is left, or hardly more than measurement noise; of one that does not move in the logs to judge
+/// on nothing is known.
+pub(super) fn explained(
+    study: &Study<'_>,
+    after: &Spread,
+    floor: &[f64],
+    dependencies: &Dependencies,
+) -> Vec<bool> {
+    let rule = study.rule();
+    let of = |j: usize| {
+        let little = match dependencies.of(j) {
+            [] => rule.explained_share,
+            _ => rule.little_share,
+        };
+        let is_little = after.relative[j] <= little || after.rms[j] <= rule.above_floor * floor[j];
+        is_little && !study.validation.joints[j].is_empty()
+    };
+    (0..study.validation.dof()).map(of).collect()
 }
 
 /// What to think of and to do where much is left.
@@ -105,7 +120,7 @@ fn advice(study: &Study<'_>, j: usize, left: f64, over_noise: f64, dependencies:
             parts.push(format!("what is left depends on {}: {}", names.join(", "), kind(signals, j)));
         }
     }
-    let seconds: f64 = study.data.recordings.iter().map(|r| r.len() as f64 / r.rate).sum();
+    let seconds = study.fitted_time();
     if seconds < study.rule().least_time {
         parts.push(format!(
             "the logs to fit hold {seconds:.0} s: record several exciting paths of 20 s (powerball excite)"
@@ -125,7 +140,7 @@ fn kind(signals: &[(String, f64)], j: usize) -> String {
         ("q", false) => {
             format!("a hose or a linkage with joint {number}, or the load of the links behind it")
         }
-        ("dq", true) => "friction of another law than Eq. 16".to_string(),
+        ("dq", true) => "friction of another law than tanh steps and a viscous part".to_string(),
         ("dq", false) => format!("a drive, a cable or a bearing that joint {number} moves too"),
         ("ddq", true) => "a rotor's inertia, a delay, or a gear that gives way".to_string(),
         ("ddq", false) => {

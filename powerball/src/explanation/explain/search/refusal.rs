@@ -9,7 +9,7 @@ pub(crate) fn refusal(rule: &Rule, evidence: &Evidence, tests: f64, local: bool)
     if evidence.score < rule.least_score {
         return Some(format!("explains too little (score {:.1} of {})", evidence.score, rule.least_score));
     }
-    let p = evidence.p_value * tests;
+    let p = (evidence.p_value * tests).min(1.0);
     if p > rule.family_wise {
         return Some(format!(
             "not significant between independent blocks (p = {p:.2} over all that was tried)"

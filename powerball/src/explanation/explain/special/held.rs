@@ -226,6 +226,9 @@ fn told(
         held_out_gain: seen.iter().filter_map(middle).collect(),
         logs,
         margin: seen.iter().map(|seen| seen.margin).fold(f64::INFINITY, f64::min),
+        // No other column is fitted to validation logs.
+        own_share: 1.0,
+        relative_std: Vec::new(),
         class: effect.class().name().to_string(),
         rivals: Vec::new(),
     };
