@@ -149,16 +149,9 @@ fn named_effect(
 
 /// What is named is no rival of another name on the same joint.
 fn not_named_elsewhere(named: &mut [NamedEffect]) {
-    let names: Vec<(String, Vec<JointNumber>)> =
-        named.iter().map(|effect| (effect.effect.clone(), effect.joints.clone())).collect();
-    for effect in named {
-        let is_named = |rival: &Rival| {
-            let same = |(name, joints): &(String, Vec<JointNumber>)| {
-                *name == rival.effect && joints.iter().any(|joint| effect.joints.contains(joint))
-            };
-            names.iter().any(same)
-        };
-        effect.rivals.retain(|rival| !is_named(rival));
+    let given = named.to_vec();
+    for NamedEffect { rivals, joints, .. } in named {
+        rivals.retain(|rival| !given.iter().any(|other| other.is(&rival.effect, joints)));
     }
 }
 

@@ -4,6 +4,21 @@ use crate::explanation::effects::Context;
 use crate::logs::regression::Data;
 use rand::{RngExt, SeedableRng};
 
+/// The signals that each joint's residual depends on.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Dependencies(Vec<(usize, Vec<(String, f64)>)>);
+
+impl Dependencies {
+    pub(super) fn new(by_joint: impl Iterator<Item = (usize, Vec<(String, f64)>)>) -> Dependencies {
+        Dependencies(by_joint.collect())
+    }
+
+    /// Those of a joint, the strongest first, with the share of its variance.
+    pub(crate) fn of(&self, joint: usize) -> &[(String, f64)] {
+        self.0.iter().find(|(j, _)| *j == joint).map_or(&[], |(_, list)| list.as_slice())
+    }
+}
+
 /// The number of independent samples with the same information: Σ over joints of N over its autocorrelation
 /// time.
 #[must_use]

@@ -5,7 +5,7 @@ use super::super::model::Model;
 use super::super::named::{NamedEffect, Rival, Spreads};
 use super::super::study::Study;
 use super::correction::{Correction, correct};
-use super::dependencies::depends_on;
+use super::dependencies::{Dependencies, depends_on};
 use super::verdict::explained;
 use crate::controller::JointNumber;
 use crate::logs::parallel;
@@ -26,17 +26,6 @@ pub struct Unattributed {
     /// errors fall by them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correction: Option<Vec<Correction>>,
-}
-
-/// The signals that each joint's residual depends on.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Dependencies(Vec<(usize, Vec<(String, f64)>)>);
-
-impl Dependencies {
-    /// Those of a joint, the strongest first, with the share of its variance.
-    pub(crate) fn of(&self, joint: usize) -> &[(String, f64)] {
-        self.0.iter().find(|(j, _)| *j == joint).map_or(&[], |(_, list)| list.as_slice())
-    }
 }
 
 /// The joints that are not explained and whose residual depends on something, and what is to be said of the others on
@@ -61,7 +50,7 @@ pub(crate) fn unattributed(
         let of = |(j, list): (&usize, &Vec<(String, f64)>)| correct(&context, &there, &study.folds, *j, list);
         candidates.iter().zip(&found).filter_map(of).collect()
     });
-    let dependencies = Dependencies(candidates.iter().copied().zip(found.iter().cloned()).collect());
+    let dependencies = Dependencies::new(candidates.iter().copied().zip(found.iter().cloned()));
     let mut signals: Vec<(String, f64)> = Vec::new();
     let explained = explained(study, &after.validate, floor, &dependencies);
     let (mut joints, mut nothing, mut little) = (Vec::<JointNumber>::new(), Vec::new(), Vec::new());

@@ -2,7 +2,7 @@
 
 use super::super::named::NamedEffect;
 use super::super::study::Study;
-use super::unattributed::Dependencies;
+use super::dependencies::Dependencies;
 use crate::controller::JointNumber;
 use crate::identification::estimate::Spread;
 use serde::Serialize;
