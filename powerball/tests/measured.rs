@@ -270,3 +270,20 @@ fn what_is_wrong_in_the_arm_file_of_the_ur10e_is_told() {
         assert_eq!(told.differ(), line.is_some(), "{}", told.evidence);
     }
 }
+
+/// The arm of the dVRK is balanced, and a mass on it in some logs is no reason to call gravity taken out.
+#[test]
+fn a_balanced_arm_is_not_said_to_have_no_gravity_in_its_torques() {
+    let Some(folder) = data().map(|data| data.join("psm_masses")) else { return };
+    let arm = Arm::read(&folder.join("arm.toml")).unwrap();
+    let body = RigidArm::new(&arm).unwrap();
+    for [fit, validate] in
+        [["clean", "other"], ["ins105", "other"], ["clean", "ins105"], ["other", "par205_half"]]
+    {
+        let files = [fit, validate].map(|name| folder.join(format!("{name}.csv")));
+        let (mut logs, _) = read_logs(&files, &arm).unwrap();
+        let held_out = logs.split_off(1);
+        let told = conventions(&body, &logs, &held_out);
+        assert!(!told.differ(), "{fit}, {validate}: {}", told.evidence);
+    }
+}

@@ -20,7 +20,7 @@ pub fn files(explained: &Explained) -> Result<Files, String> {
 /// Adds everything that an explanation says to a page: the answer first; then errors, effects with their evidence, torques
 /// over time, what stays, what the columns are, and what was found in the logs.
 pub fn add_to_page(page: &mut Page, explained: &Explained) {
-    if let Some(told) = explained.conventions.as_ref().filter(|c| c.differ() || c.is_unclear()) {
+    if let Some(told) = explained.conventions.as_ref().filter(|c| c.is_remarkable()) {
         conventions::verdict(page, told);
     }
     answer(page, explained);

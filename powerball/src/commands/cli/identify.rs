@@ -133,7 +133,7 @@ impl Identify {
 /// What was found, for a person: what is wrong first, then the errors.
 fn in_words(identified: &Identified, verbose: bool, out: &Path) -> String {
     let columns = identified.conventions.as_ref();
-    let wrong = columns.filter(|c| verbose || c.differ() || c.is_unclear()).map(|c| c.verdict());
+    let wrong = columns.filter(|c| verbose || c.is_remarkable()).map(|c| c.verdict());
     let mut lines: Vec<String> = wrong.into_iter().chain(identified.advice.clone()).collect();
     if verbose {
         lines.extend(identified.warnings.iter().map(|warning| format!("note: {warning}")));

@@ -88,7 +88,7 @@ pub(super) fn open_in_words(explained: &Explained) -> String {
 
 /// What comes before everything: columns or an arm file that are not what they are said to be.
 fn wrong_columns(explained: &Explained) -> Option<String> {
-    explained.conventions.as_ref().filter(|c| c.differ() || c.is_unclear()).map(|c| c.verdict())
+    explained.conventions.as_ref().filter(|c| c.is_remarkable()).map(|c| c.verdict())
 }
 
 /// A line a joint: its error before and after on the logs to judge on, the change, what is left, the verdict.

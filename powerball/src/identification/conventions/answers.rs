@@ -360,9 +360,9 @@ fn gravity(facts: &Facts<'_>) -> Answer {
         ),
         Some(GravityIs::TakenOut) if facts.size.is_weightless() => plain(
             "gravity",
-            Some(false),
+            None,
             "Gravity was taken out of the torques, or something balances it: they hold the inertia of an arm \
-                and hardly any weight; set gravity = [0, 0, 0] in the arm file."
+                and hardly any weight. Where it was taken out, set gravity = [0, 0, 0] in the arm file."
                 .into(),
         ),
         Some(GravityIs::TakenOut) => {

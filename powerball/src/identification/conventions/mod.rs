@@ -95,8 +95,7 @@ fn told(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventions
     // A model that does not fit has no weight, and a balanced arm has little that still shows.
     let gravity = match (size.is_weightless(), good) {
         (true, false) => None,
-        (true, true) if search::gravity_helps(asked, found) => Some(GravityIs::Included),
-        (true, true) => Some(GravityIs::TakenOut),
+        (true, true) => search::little_gravity_is(asked, found),
         (false, _) => gravity_is(asked, found),
     };
     let scale = size.scale(gravity);

@@ -18,6 +18,8 @@ const FLOOR: f64 = 4e-4;
 const CLEAR: f64 = 0.5;
 /// Gravity helps where squared errors grow to so many times without it.
 const HELPS: f64 = 1.2;
+/// It does nothing where they grow to less than this.
+const NO_WORSE: f64 = 1.05;
 /// What it may do to the joints that it does not concern.
 const WORSE: f64 = 1.5;
 /// A joint with an error below this share of its torque fits.
@@ -327,15 +329,22 @@ pub(super) fn gravity_is(asked: &Asked<'_>, found: &Found<'_>) -> Option<Gravity
     (worse(0) && worse(1) && gain(&without, &with) > 0.0).then_some(GravityIs::Included)
 }
 
-/// Whether what little weight the torques hold is there nevertheless: without gravity's columns the fit is worse, as the
-/// mean over joints, both ways round.
-pub(super) fn gravity_helps(asked: &Asked<'_>, found: &Found<'_>) -> bool {
-    let Some((with, without)) = with_and_without_gravity(asked, found) else { return false };
-    let mean = |part: usize| {
-        let ratios = ratios(&with, &without, part);
-        ratios.iter().map(|(_, r)| r.ln()).sum::<f64>() / ratios.len().max(1) as f64
+/// Whether torques that hold hardly any weight hold what there is of it: told where without gravity's columns the fit is
+/// worse, as the mean over joints, both ways round; or no worse, both ways round. Between them a balanced arm may carry
+/// something in one part of the logs.
+pub(super) fn little_gravity_is(asked: &Asked<'_>, found: &Found<'_>) -> Option<GravityIs> {
+    let Some((with, without)) = with_and_without_gravity(asked, found) else {
+        return Some(GravityIs::TakenOut);
     };
-    [0, 1].iter().all(|part| mean(*part) > HELPS.ln())
+    let worse = [0, 1].map(|part| {
+        let ratios = ratios(&with, &without, part);
+        (ratios.iter().map(|(_, r)| r.ln()).sum::<f64>() / ratios.len().max(1) as f64).exp()
+    });
+    match worse {
+        [a, b] if a > HELPS && b > HELPS => Some(GravityIs::Included),
+        [a, b] if a < NO_WORSE && b < NO_WORSE => Some(GravityIs::TakenOut),
+        _ => None,
+    }
 }
 
 fn with_and_without_gravity(asked: &Asked<'_>, found: &Found<'_>) -> Option<(Judged, Judged)> {

@@ -129,6 +129,20 @@ impl Conventions {
         self.answers.iter().any(|answer| answer.as_said == Some(false))
     }
 
+    /// What is said of gravity where it may have been taken out of the torques: a balanced arm looks the same.
+    fn doubt(&self) -> Option<&str> {
+        let open = |a: &&Answer| a.question == "gravity" && a.as_said.is_none();
+        let answer =
+            self.answers.iter().find(open).filter(|_| self.torque.gravity == Some(GravityIs::TakenOut));
+        answer.map(|a| a.sentence.as_str())
+    }
+
+    /// Whether the verdict says more than that nothing speaks against the columns.
+    #[must_use]
+    pub fn is_remarkable(&self) -> bool {
+        self.differ() || self.is_unclear() || self.doubt().is_some()
+    }
+
     /// Whether so much is left with everything set right that the columns cannot be checked.
     #[must_use]
     pub fn is_unclear(&self) -> bool {
@@ -172,6 +186,9 @@ impl Conventions {
             None => "The columns are taken as they are said to be; nothing in these logs speaks clearly against it"
                 .to_string(),
         };
+        if let Some(doubt) = self.doubt() {
+            return format!("{told}. {doubt}");
+        }
         match open.is_empty() {
             true => format!("{told}."),
             false => format!("{told}. Not told by these logs: {}.", open.join(", ")),
