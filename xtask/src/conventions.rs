@@ -137,6 +137,9 @@ fn words(told: &Conventions) -> String {
     if told.differ() {
         return of(Some(false)).map(|a| a.sentence.as_str()).collect::<Vec<_>>().join(" ");
     }
+    if told.is_remarkable() {
+        return told.verdict();
+    }
     let open: Vec<&str> = of(None).map(|a| a.question).collect();
     match open.is_empty() {
         true => "as said".into(),

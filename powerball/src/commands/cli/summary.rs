@@ -10,34 +10,40 @@ use crate::report::number;
 use crate::report::size::size;
 use std::path::Path;
 
-/// Names of which each has a line; the rest are counted.
-const NAMES: usize = 6;
+/// Lines of the answer; names that find no room are counted.
+const LINES: usize = 25;
+/// Laws without a name that have a line.
+const LAWS: usize = 2;
 /// Other names that a line lists.
 const RIVALS: usize = 3;
 /// Logs unlike the others that have a line.
 const LOGS: usize = 2;
 
-/// The answer in at most 25 lines for an arm of seven joints. `arm` and `out` are the arm file and the folder of the
+/// The answer in at most [`LINES`] lines for an arm of seven joints. `arm` and `out` are the arm file and the folder of the
 /// results, for the next command.
 pub(super) fn summary(explained: &Explained, arm: &Path, out: &Path) -> String {
-    let mut lines: Vec<String> = wrong_columns(explained).into_iter().collect();
-    lines.push(table(explained));
-    lines.extend(names(explained));
-    let laws = explained.laws.iter();
-    lines.extend(laws.map(|law| format!("no name on joint {}: {}", list(&law.joints), law.sentence())));
-    lines.extend(explained.unattributed.as_ref().map(without_name));
-    lines.extend(odd_logs(explained));
+    let mut head: Vec<String> = wrong_columns(explained).into_iter().collect();
+    head.push(table(explained));
+    let mut tail: Vec<String> = Vec::new();
+    let laws = explained.laws.iter().take(LAWS);
+    tail.extend(laws.map(|law| format!("no name on joint {}: {}", list(&law.joints), law.sentence())));
+    tail.extend(explained.unattributed.as_ref().map(without_name));
+    tail.extend(odd_logs(explained));
     if let Some(joints) = &explained.transmission {
         let count = joints.len();
-        lines.push(format!(
+        tail.push(format!(
             "what is between the motors' torques and the links', {count} joints: --verbose or the page"
         ));
     }
-    lines.extend(decided(explained));
-    lines.extend(notes(explained.warnings.len()));
-    lines.push(format!("report: {}", out.join("report.html").display()));
-    lines.push(format!("next: {}", next(explained, arm, out)));
-    lines.join("\n")
+    tail.extend(decided(explained));
+    tail.extend(notes(explained.warnings.len()));
+    tail.push(format!("report: {}", out.join("report.html").display()));
+    tail.push(format!("next: {}", next(explained, arm, out)));
+    let used: usize = head.iter().chain(&tail).map(|line| line.lines().count()).sum();
+    // One line counts those that have no room.
+    head.extend(names(explained, LINES.saturating_sub(used + 1)));
+    head.extend(tail);
+    head.join("\n")
 }
 
 /// The same with all evidence, rivals and notes.
@@ -113,8 +119,8 @@ fn table(explained: &Explained) -> String {
     text
 }
 
-/// One line a name: its joints, size, probability and what it was not.
-fn names(explained: &Explained) -> Vec<String> {
+/// One line a name, of so many at most: its joints, size, probability and what it was not.
+fn names(explained: &Explained, most: usize) -> Vec<String> {
     if explained.effects.is_empty() {
         return vec![nothing_named(explained).to_string()];
     }
@@ -129,8 +135,8 @@ fn names(explained: &Explained) -> Vec<String> {
             not(effect)
         )
     };
-    let mut lines: Vec<String> = explained.effects.iter().take(NAMES).map(line).collect();
-    let more: Vec<&str> = explained.effects.iter().skip(NAMES).map(|effect| effect.effect.as_str()).collect();
+    let mut lines: Vec<String> = explained.effects.iter().take(most).map(line).collect();
+    let more: Vec<&str> = explained.effects.iter().skip(most).map(|effect| effect.effect.as_str()).collect();
     if !more.is_empty() {
         lines.push(format!("and {} more: {}", more.len(), more.join(", ")));
     }

@@ -33,9 +33,8 @@ mod study;
 pub use comparison::{Hypothesis, Open};
 pub use named::{FalsePositives, NamedEffect, Rival, Spreads};
 pub use results::{
-    Change, Correction, Curve, Difference, Evidence, Experiment, Explained, FEATURES, LawCoefficient,
-    LogResult, NextExperiment, Shown, State, TorqueCurve, Trajectory, Unattributed, UnnamedLaw, Verdict,
-    contradictions, curves,
+    Change, Correction, Curve, Difference, Experiment, Explained, LawCoefficient, LogResult, NextExperiment,
+    Shown, State, TorqueCurve, Trajectory, Unattributed, UnnamedLaw, Verdict, contradictions, curves,
 };
 
 use crate::explanation::options::{ExplainError, ExplainOptions};

@@ -185,13 +185,17 @@ fn arm_file(facts: &Facts<'_>) -> Answer {
             "arm file",
             Some(false),
             format!(
-                "The links of the arm file are {length:.0} m long together: its a and d are in metres, not mm."
+                "The links of the arm file are {length:.0} m long together: give a and d in metres (mm look like this)."
             ),
         );
     }
+    if facts.coupled {
+        let why = "Whether the arm file is this arm's is not asked where a transmission couples joints.";
+        return plain("arm file", None, why.into());
+    }
     if good {
-        let fits = "No other convention, sign of a, d or alpha, quarter turn of theta or direction of gravity fits \
-            clearly better.";
+        let fits = "No other convention and no other sign of an a, d or alpha fits clearly better; where a joint errs by \
+            more than 25 %, no quarter turn of theta and no other direction of gravity does.";
         return plain("arm file", Some(true), fits.into());
     }
     plain(
@@ -222,6 +226,8 @@ pub(super) struct Facts<'a> {
     pub(super) good: bool,
     /// The lengths of the links together, m.
     pub(super) length: f64,
+    /// Whether a transmission couples joints.
+    pub(super) coupled: bool,
 }
 
 /// All answers, in the order in which they are read.

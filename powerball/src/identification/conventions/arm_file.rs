@@ -10,7 +10,7 @@ use super::asked::Asked;
 use super::change::Reading;
 use super::fit::{Judged, judge};
 use super::rows::{Gravity, Rows};
-use super::search::{Found, POOR, ratios, shares};
+use super::search::{Found, POOR, falls, not_worse, shares};
 use crate::controller::JointNumber;
 use crate::logs::parallel;
 use crate::logs::regression::{Recording, newton_euler};
@@ -26,8 +26,6 @@ const LISTED: usize = 20;
 /// A change is clear where squared errors fall to this share, as the geometric mean over joints, both ways round. The
 /// files of eight measured arms have none that is; of the UR10e's the best comes to 0.95 (docs/conventions.md).
 const CLEAR: f64 = 0.8;
-/// What it may do to the squared error of any joint.
-const WORSE: f64 = 1.5;
 /// Changes whose squared errors differ by less, as the mean over joints, are not told apart.
 const ALIKE: f64 = 1.1;
 /// Gravity nearer to the filed direction than this is a tilt of the base: its cosine.
@@ -90,11 +88,7 @@ pub(super) fn better(asked: &Asked<'_>, found: &Found<'_>) -> Option<Better> {
         .zip(all)
         .filter_map(|(change, new)| {
             let fall = falls(&old, &new);
-            let most = [0, 1]
-                .iter()
-                .flat_map(|part| ratios(&old, &new, *part))
-                .fold(0.0, |m, (_, r)| f64::max(m, r));
-            (fall.iter().all(|f| *f < CLEAR.ln()) && most < WORSE)
+            (fall.iter().all(|f| *f < CLEAR.ln()) && not_worse(&old, &new))
                 .then(|| (0.5 * fall.iter().sum::<f64>(), change, new))
         })
         .collect();
@@ -108,14 +102,6 @@ pub(super) fn better(asked: &Asked<'_>, found: &Found<'_>) -> Option<Better> {
     let alike =
         clear.take_while(|(fall, ..)| *fall < best + ALIKE.ln()).map(|(_, change, _)| change).collect();
     Some(Better { change, alike, before: shares(&old), after: shares(&new) })
-}
-
-/// By part: the mean over joints of the logarithm of squared errors over those before.
-fn falls(old: &Judged, new: &Judged) -> [f64; 2] {
-    [0, 1].map(|part| {
-        let ratios = ratios(old, new, part);
-        ratios.iter().map(|(_, r)| r.ln()).sum::<f64>() / ratios.len().max(1) as f64
-    })
 }
 
 /// The columns of an arm's kept parameters along a recording: samples × n × kept.

@@ -116,6 +116,7 @@ fn told(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventions
         delay_would_show: good && delay::would_show(&found.rows, &read.torques, found.ridge, &found.judged),
         good,
         length,
+        coupled: asked.body.motors().is_some(),
     };
     let answers = answers(found, &facts);
     let sentences: Vec<&str> = answers.iter().map(|a| a.sentence.as_str()).collect();

@@ -103,6 +103,14 @@ pub(super) fn ratios(old: &Judged, new: &Judged, part: usize) -> Vec<(usize, f64
     (0..old.len()).filter_map(|j| Some((j, ratio(old[j], new[j])?))).collect()
 }
 
+/// By part: the mean over joints of the logarithm of held-out squared errors over those before.
+pub(super) fn falls(old: &Judged, new: &Judged) -> [f64; 2] {
+    [0, 1].map(|part| {
+        let ratios = ratios(old, new, part);
+        ratios.iter().map(|(_, r)| r.ln()).sum::<f64>() / ratios.len().max(1) as f64
+    })
+}
+
 /// The reading under which the logs fit best, reached by clear changes alone.
 ///
 /// # Errors
@@ -228,7 +236,7 @@ impl Tried {
 }
 
 /// Whether a change raises no joint's error much.
-fn not_worse(old: &Judged, new: &Judged) -> bool {
+pub(super) fn not_worse(old: &Judged, new: &Judged) -> bool {
     [0, 1].iter().all(|part| ratios(old, new, *part).iter().all(|(_, r)| *r < WORSE))
 }
 
@@ -336,11 +344,7 @@ pub(super) fn little_gravity_is(asked: &Asked<'_>, found: &Found<'_>) -> Option<
     let Some((with, without)) = with_and_without_gravity(asked, found) else {
         return Some(GravityIs::TakenOut);
     };
-    let worse = [0, 1].map(|part| {
-        let ratios = ratios(&with, &without, part);
-        (ratios.iter().map(|(_, r)| r.ln()).sum::<f64>() / ratios.len().max(1) as f64).exp()
-    });
-    match worse {
+    match falls(&with, &without).map(f64::exp) {
         [a, b] if a > HELPS && b > HELPS => Some(GravityIs::Included),
         [a, b] if a < NO_WORSE && b < NO_WORSE => Some(GravityIs::TakenOut),
         _ => None,
