@@ -23,7 +23,7 @@ bless:
     DYNGEN_BLESS=1 cargo test -p dyngen-macros --test ui
     POWERBALL_BLESS=1 cargo test --release -p powerball --lib the_committed_table
     POWERBALL_BLESS=1 cargo test --release -p powerball --test bus_faults
-    POWERBALL_BLESS=1 cargo test --release -p powerball-workspace --test firmware
+    POWERBALL_BLESS=1 cargo test --release -p powerball-workspace --test firmware --test docs
 
 # The documentation of the crates and the pages as a site.
 docs:

@@ -80,3 +80,59 @@ fn the_architecture_names_every_folder_of_the_sources() {
         }
     }
 }
+
+/// Python's `Rule` is written from the one of Rust: the same fields, words and defaults. With `POWERBALL_BLESS` set it is
+/// written anew.
+#[test]
+fn the_thresholds_of_python_are_those_of_rust() {
+    let source = std::fs::read_to_string(root().join("powerball/src/explanation/rule.rs")).unwrap();
+    let (fields, rest) = source.split_once("pub struct Rule {\n").unwrap().1.split_once("\n}\n").unwrap();
+    let (_, defaults) = rest.split_once("        Rule {\n").unwrap();
+    let (defaults, _) = defaults.split_once("\n        }\n").unwrap();
+    let default_of = |name: &str| {
+        let given = defaults.lines().find_map(|line| line.trim().strip_prefix(name)?.strip_prefix(": "));
+        given.unwrap_or_else(|| panic!("{name} has no default")).trim_end_matches(',').to_string()
+    };
+    let mut class = String::new();
+    let mut words: Vec<String> = Vec::new();
+    for line in fields.lines().map(str::trim) {
+        if let Some(said) = line.strip_prefix("/// ") {
+            let plain = said.replace("[`", "``").replace("`]", "``");
+            words.extend(plain.split(' ').filter(|w| !w.is_empty()).map(
+                |w| match w.split_once("``(Self::") {
+                    Some((name, link)) => format!("{name}``{}", link.split_once(')').unwrap().1),
+                    None => w.to_string(),
+                },
+            ));
+        } else if let Some((name, kind)) = line.strip_prefix("pub ").and_then(|field| field.split_once(": "))
+        {
+            class += &wrapped(&words);
+            words.clear();
+            let kind = if kind.starts_with("usize") { "int" } else { "float" };
+            class += &format!("    {name}: {kind} = {}\n", default_of(name));
+        }
+    }
+    let path = root().join("python/package/powerball/rule.py");
+    let page = std::fs::read_to_string(&path).unwrap();
+    let (head, now) = page.split_once("    #: ").unwrap();
+    let (_, foot) = now.split_once("\n\n\n").unwrap();
+    let made = format!("{head}{class}\n\n{foot}");
+    if std::env::var_os("POWERBALL_BLESS").is_some() {
+        std::fs::write(&path, &made).unwrap();
+        return;
+    }
+    let run = "POWERBALL_BLESS=1 cargo test --release -p powerball-workspace --test docs";
+    assert!(made == page, "{} is not what rule.rs says; run {run}", path.display());
+}
+
+/// Words as a comment of Python, 108 wide.
+fn wrapped(words: &[String]) -> String {
+    let mut lines = vec![String::from("    #:")];
+    for word in words {
+        if lines.last().unwrap().chars().count() + 1 + word.chars().count() > 108 {
+            lines.push("    #:".into());
+        }
+        *lines.last_mut().unwrap() += &format!(" {word}");
+    }
+    lines.iter().map(|line| format!("{line}\n")).collect()
+}

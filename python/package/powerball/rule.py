@@ -27,8 +27,8 @@ class Rule:
     #: Probability of accepting anything at all where nothing is missing, over all joints and candidates;
     #: above the band that of a ripple, over all joints and orders.
     family_wise: float = 0.01
-    #: The held-out squared error must fall by this share on average over folds: 1 % of the rms, below
-    #: which no user would notice.
+    #: The held-out squared error must fall by this share on average over folds: 1 % of the rms, below which
+    #: no user would notice.
     least_gain: float = 0.02
     #: … and it must fall at all in this share of the folds: four of five.
     folds_that_must_gain: float = 0.8
@@ -50,8 +50,8 @@ class Rule:
     longest_block: float = 2.0
     #: Share of the time-shift surrogates whose score a candidate must exceed.
     surrogate_level: float = 0.99
-    #: The same for events of some seconds: shifted in time they fall onto others of their kind for at most a
-    #: quarter of a log.
+    #: The same for events of some seconds: shifted in time they fall onto others of their kind for at most
+    #: a quarter of a log.
     event_surrogate_level: float = 0.75
     #: Surrogates that a step asks.
     step_surrogates: int = 2000
@@ -79,13 +79,14 @@ class Rule:
     #: Two names whose gains differ by less than this factor cannot be told apart by these data.
     least_margin: float = 1.1
     #: Two names of which one explains this share of what the other does are words for the same part of a
-    #: residual. Names for the same thing share 98 % and more of it, names for different things less than
-    #: 70 % (noise-free trials on other data).
+    #: residual. Names for the same thing share 98 % and more of it, names for different things less than 70
+    #: % (noise-free trials on other data).
     same_part: float = 0.9
     #: A name that is not told apart (``least_margin``) from the next best one for another part
-    #: (``same_part``) is not given where it leaves more than this share of the excess over the noise
-    #: floor: then something else is there, and what fits best only resembles it. The share is that of an
-    #: earlier trial on other data.
+    #: (``same_part``) is not given where it leaves more than this share of the excess over the noise floor:
+    #: then something else is there, and what fits best only resembles it. The share is that of an earlier
+    #: trial on other data. What is in validation logs only must leave no more of their excess over the
+    #: fitted logs.
     much_left: float = 0.35
     #: An event of some seconds (a push) is not given where more than this share of what its time has more
     #: than others of squared error stays: what explains less than half of it is something else.
@@ -106,7 +107,8 @@ class Rule:
     #: How often where another name fits as well: one of two.
     right_with_twin: float = 0.5
     #: A name is taken back where without its effect the squared error on the validation set is smaller by
-    #: this share, on its joints.
+    #: this share, on its joints. What is in validation logs only must not raise that of any joint by this
+    #: share.
     harm: float = 0.1
     #: A setting is refined for more than chance gains by one more coefficient, in units of χ².
     refinement_gain: float = 1.0
@@ -117,19 +119,19 @@ class Rule:
     #: position.
     few_cycles: float = 5.0
     #: On repeats of one path whatever errs alike in all of them is fitted by whoever has more parameters;
-    #: the per-joint fit is taken only where it lowers the held-out squared error by more than this share,
-    #: 5 % of the rms.
+    #: the per-joint fit is taken only where it lowers the held-out squared error by more than this share, 5
+    #: % of the rms.
     clearly_better: float = 0.1
     #: Two runs start at the same place where every joint does to this share of its travel in all logs.
     same_start: float = 0.05
     #: A validation log whose squared error is this many times that of the fitted logs holds something that
     #: they do not.
     odd_log: float = 2.0
-    #: A log has the same payload if that explains this much more, and has it not if that explains this
-    #: much more (in units of χ²). The same for a push.
+    #: A log has the same payload if that explains this much more, and has it not if that explains this much
+    #: more (in units of χ²). The same for a push.
     another_log: float = 10.0
-    #: A log has the same push if that also explains this share of the force's own torque: a push of
-    #: another size or direction is another one.
+    #: A log has the same push if that also explains this share of the force's own torque: a push of another
+    #: size or direction is another one.
     same_force: float = 0.8
     #: … over at least this share of the time that it lasted: another push resembles this one for a moment
     #: only.
@@ -143,9 +145,11 @@ class Rule:
     least_share: float = 0.02
     #: The correction of what has no name stays within so many rms of what is left.
     correction_bound: float = 2.0
-    #: A joint is explained where no more than this share of its torque's rms is left on the validation
-    #: set.
+    #: A joint is explained where no more than this share of its torque's rms is left on the validation set.
     explained_share: float = 0.1
+    #: What is left of a joint below this share of its torque is little, whatever it depends on: a law that
+    #: is missing often leaves less than ``explained_share``.
+    little_share: float = 0.05
     #: Where more than this share is left a model predicts next to nothing.
     nothing_share: float = 0.9
     #: Below this time of motion a reader is warned that the folds are too short to tell much, s.
