@@ -199,7 +199,7 @@ fn check_finds_table_3_impossible_and_real_bodies_possible() {
         "{}",
         text(&out.stdout)
     );
-    // RFactor inequality broken in a parameter that no torque shows.
+    // The triangle inequality broken in a parameter that no torque shows.
     values.insert("Izz1".to_string(), 0.2.into());
     let bad = file("triangle.json", &Value::Object(values).to_string());
     let out = dyngen(&["check", &arm(), "--values", &bad]);
@@ -212,6 +212,7 @@ fn wrong_use_and_wrong_input_end_with_2_and_say_where() {
     let broken = file("broken.toml", "name = \"x\"\nconvention = \"dh\"\n");
     let no_column = file("no_column.csv", "q1,q2\n1,2\n");
     let nan = file("nan.csv", "q1,q2,q3,q4,q5,q6\n1,2,3,NaN,5,6\n");
+    let seven = file("seven.csv", "q1,q2,q3,q4,q5,q6,q7\n1,2,3,4,5,6,7\n");
     let json = file("broken.json", "{\"m1\": ");
     let arm = arm();
     let cases: &[(&[&str], &[&str])] = &[
@@ -223,6 +224,10 @@ fn wrong_use_and_wrong_input_end_with_2_and_say_where() {
             &["no column q3, q4, q5, q6"],
         ),
         (&["eval", &arm, "--function", "forward_kinematics", "--states", &nan], &["nan.csv:2", "q4"]),
+        (
+            &["eval", &arm, "--function", "forward_kinematics", "--states", &seven],
+            &["seven.csv:1", "q7", "6 joints"],
+        ),
         (&["eval", &arm, "--function", "flying", "--states", &nan], &["flying"]),
         (&["check", &arm, "--values", &json], &["broken.json:1:7"]),
         (&["check", &arm], &["--values"]),

@@ -25,6 +25,8 @@ enum Command {
     Conventions(conventions::Arguments),
     /// How often `explain` gives the right name, where the truth is known
     Study(study::Arguments),
+    /// How often names with such evidence are right: fits the curve, and judges it on cases that were not fitted
+    Probability(study::ProbabilityArguments),
     /// Logs with known truth as files, and the score of any program that explains them
     Benchmark(study::BenchmarkArguments),
     /// What the base model leaves of each log when it is fitted to the others
@@ -45,6 +47,7 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Conventions(arguments) => conventions::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
+        Command::Probability(arguments) => study::probability(&arguments),
         Command::Benchmark(arguments) => study::benchmark(&arguments),
         Command::HeldOut(arguments) => held_out::run(&arguments),
         Command::Textbook(arguments) => textbook::run(&arguments),

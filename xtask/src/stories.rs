@@ -7,7 +7,7 @@ use powerball::controller::JointNumber;
 use powerball::explanation::explain::{NamedEffect, Shown};
 use powerball::explanation::{ExplainOptions, Explained, explain};
 use powerball::logs::log::read_logs;
-use powerball::report::explained::{error_bars, sight};
+use powerball::report::explained::{effect_figure, error_bars};
 use powerball::report::size::size;
 use std::fmt::Write as _;
 use std::fs;
@@ -163,7 +163,12 @@ fn tell(page: &mut String, case: &Case, explained: &Explained, figures: &Path) -
         {
             let means = Shown { rows: Vec::new(), ..shown.clone() };
             let words = format!("{} on joint {} over {}", shown.effect, shown.joint, shown.signal);
-            figure(page, &format!("{}_{}", effect.effect, shown.joint), &words, sight(&means).to_file())?;
+            figure(
+                page,
+                &format!("{}_{}", effect.effect, shown.joint),
+                &words,
+                effect_figure(&means).to_file(),
+            )?;
         }
     }
     match &explained.unattributed {

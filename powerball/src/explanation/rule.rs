@@ -97,15 +97,6 @@ pub struct Rule {
     /// [`family_wise`](Self::family_wise) over eight octaves.
     pub missing_errors: f64,
 
-    /// How often a name is right that no other one equals and beside which nothing is left on its joints: 469
-    /// of 472 names in docs/study.md (white noise, pairs, easily confused effects, drawn arms), less some for
-    /// arms unlike those.
-    pub right: f64,
-    /// How often where something without a name is left on its joints: beside a smooth misfit, in other
-    /// friction laws and in measured logs, 101 of 115 names.
-    pub right_beside_rest: f64,
-    /// How often where another name fits as well: one of two.
-    pub right_with_twin: f64,
     /// A name is taken back where without its effect the squared error on the validation set is smaller by this
     /// share, on its joints. What is in validation logs only must not raise that of any joint by this share.
     pub harm: f64,
@@ -204,9 +195,6 @@ impl Default for Rule {
             event_left: 0.5,
             least_missing: 0.5,
             missing_errors: 3.2,
-            right: 0.97,
-            right_beside_rest: 0.88,
-            right_with_twin: 0.5,
             harm: 0.1,
             refinement_gain: 1.0,
             same_path: 0.9,
@@ -289,7 +277,7 @@ impl Rule {
     }
 
     /// What is a probability, a correlation or a share of a whole.
-    fn shares(&self) -> [(&'static str, f64); 11] {
+    fn shares(&self) -> [(&'static str, f64); 8] {
         [
             ("family_wise", self.family_wise),
             ("folds_that_must_gain", self.folds_that_must_gain),
@@ -297,9 +285,6 @@ impl Rule {
             ("surrogate_level", self.surrogate_level),
             ("event_surrogate_level", self.event_surrogate_level),
             ("surrogate_correlation", self.surrogate_correlation),
-            ("right", self.right),
-            ("right_beside_rest", self.right_beside_rest),
-            ("right_with_twin", self.right_with_twin),
             ("same_path", self.same_path),
             ("decision_level", self.decision_level),
         ]

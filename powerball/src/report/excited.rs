@@ -2,10 +2,8 @@
 
 use crate::identification::excite::{Excited, Figures, Fourier, Trajectory};
 use crate::identification::motion::Motion;
-use crate::report::{Figure, Ink, Page, Panel, Series, Table, number};
+use crate::report::{Figure, Ink, JOINTS, Page, Panel, Series, Table, number};
 use serde_json::{Value, json};
-
-const INKS: [Ink; 6] = [Ink::Blue, Ink::Orange, Ink::Green, Ink::Purple, Ink::Sky, Ink::Grey];
 
 /// The page.
 #[must_use]
@@ -47,7 +45,7 @@ fn motion(trajectory: &Trajectory) -> Figure {
         (0..motion.dof()).fold(Panel::new(label), |panel, i| {
             let name = if pick == 0 { format!("joint {}", i + 1) } else { String::new() };
             let points = motion.samples().enumerate().map(|(k, s)| (k as f64 * motion.period, s[pick][i]));
-            panel.line(name, INKS[i % INKS.len()], points.collect())
+            panel.line(name, JOINTS[i % JOINTS.len()], points.collect())
         })
     };
     Figure::new("Motion", "time [s]")
@@ -64,7 +62,7 @@ fn torques(trajectory: &Trajectory) -> Option<Figure> {
     let panel =
         (0..n).filter(|i| load.limits()[*i].is_finite()).fold(Panel::new("share of limit"), |panel, i| {
             let points = (0..motion.len()).map(|k| (k as f64 * motion.period, share(k, i)));
-            panel.line(format!("joint {}", i + 1), INKS[i % INKS.len()], points.collect())
+            panel.line(format!("joint {}", i + 1), JOINTS[i % JOINTS.len()], points.collect())
         });
     Some(Figure::new("Torque", "time [s]").panel(panel))
 }

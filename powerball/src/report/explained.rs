@@ -38,7 +38,48 @@ pub fn add_to_page(page: &mut Page, explained: &Explained) {
         conventions::add_to_page(page, told);
     }
     notes(page, explained);
+    page.words(&WORDS);
 }
+
+/// The words that a reader may not know, in the order of the page.
+const WORDS: [(&str, &str); 12] = [
+    (
+        "base model",
+        "The rigid arm with its rotors and the friction of Eq. 16 (two tanh steps and a viscous part), before anything was added.",
+    ),
+    (
+        "error",
+        "The rms of measured less predicted torque on the logs that were not fitted; before: of the base model, after: with all that was named.",
+    ),
+    (
+        "95 % interval",
+        "Where the change of the error lies in 95 of 100 such logs. Where it holds 0, no change is known.",
+    ),
+    ("torque left", "The error after, as a share of the rms of the joint's torque."),
+    (
+        "verdict",
+        "Explained: little of the torque is left. Named in part: something was named, and more is left than noise. Not explained: much is left, and nothing was named.",
+    ),
+    (
+        "right in",
+        "How often a name with such evidence is right, in 100 names on arms whose effects are known (docs/study.md).",
+    ),
+    (
+        "held-out gain",
+        "By how much the squared error falls on stretches of the fitted logs that took no part in the fit.",
+    ),
+    ("p", "The probability of such an effect by chance, over all that was tried."),
+    (
+        "evidence",
+        "The gain of the name over that of the next best name. Near 1 these logs cannot tell the two apart.",
+    ),
+    ("left over", "The share of what the base model errs beyond noise that is still there with all effects."),
+    ("noise floor", "What white noise of the measurement alone would leave, in the band of the fit."),
+    (
+        "band",
+        "The frequencies up to which measured and modelled torque are compared; both pass the same filter.",
+    ),
+];
 
 /// What is different in which log.
 fn logs(page: &mut Page, explained: &Explained) {
@@ -186,8 +227,10 @@ fn effects(page: &mut Page, explained: &Explained) {
          p: probability of as much by chance, over all that was tried. Evidence: against that of the next best name. Left \
          over: share of the residual's excess over noise that stays on these joints.",
     );
-    for shown in &explained.shown {
-        page.figure(&sight(shown), "");
+    let mut figures: Vec<&Shown> = explained.shown.iter().collect();
+    figures.sort_by_key(|shown| shown.joint);
+    for shown in figures {
+        page.figure(&effect_figure(shown), "");
     }
     if !explained.shown.is_empty() {
         page.paragraph(
@@ -223,7 +266,7 @@ fn laws(page: &mut Page, explained: &Explained) {
 
 /// The residual over the signal that shows an effect.
 #[must_use]
-pub fn sight(shown: &Shown) -> Figure {
+pub fn effect_figure(shown: &Shown) -> Figure {
     let rows = |k: usize| shown.rows.iter().map(|row| (row[0], row[k])).collect();
     let means = |k: usize| shown.means.iter().map(|mean| (mean[0], mean[k])).collect();
     let what = if shown.against_motion { "residual against motion [N·m]" } else { "residual [N·m]" };

@@ -14,11 +14,12 @@ const BETWEEN: f64 = 14.0;
 const BELOW: f64 = 40.0;
 const LEGEND_LINE: f64 = 18.0;
 /// Points of a cloud beyond this number are not told apart by eye.
-const MOST_POINTS: usize = 2_500;
+pub(super) const MOST_POINTS: usize = 2_500;
+/// So few are drawn large.
+const FEW_POINTS: usize = 200;
 
-/// The colour of a curve: the Okabe–Ito palette, which is told apart by colour-blind readers, each with a
-/// lighter twin for dark pages. By convention measured is blue, predicted orange, residuals grey (before) and
-/// green (after).
+/// The colour of a curve, after the Okabe–Ito palette, which colour-blind readers can distinguish, each with a lighter twin
+/// for dark pages. By convention measured is blue, predicted orange, residuals grey (before) and green (after).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Ink {
@@ -27,8 +28,13 @@ pub enum Ink {
     Grey,
     Green,
     Purple,
-    Sky,
+    Gold,
+    Black,
 }
+
+/// The colours of joints, from the first on.
+pub const JOINTS: [Ink; 7] =
+    [Ink::Blue, Ink::Orange, Ink::Green, Ink::Purple, Ink::Gold, Ink::Black, Ink::Grey];
 
 impl Ink {
     pub(super) fn class(self) -> &'static str {
@@ -38,7 +44,8 @@ impl Ink {
             Ink::Grey => "c3",
             Ink::Green => "c4",
             Ink::Purple => "c5",
-            Ink::Sky => "c6",
+            Ink::Gold => "c6",
+            Ink::Black => "c7",
         }
     }
 }
@@ -59,10 +66,10 @@ pub enum Mark {
 /// A named set of points in one colour.
 #[derive(Clone, Debug)]
 pub struct Series {
-    name: String,
-    ink: Ink,
-    mark: Mark,
-    points: Vec<(f64, f64)>,
+    pub(super) name: String,
+    pub(super) ink: Ink,
+    pub(super) mark: Mark,
+    pub(super) points: Vec<(f64, f64)>,
 }
 
 impl Series {
@@ -90,9 +97,9 @@ impl Series {
 /// One pair of axes of a figure.
 #[derive(Clone, Debug)]
 pub struct Panel {
-    y_label: String,
-    height: f64,
-    series: Vec<Series>,
+    pub(super) y_label: String,
+    pub(super) height: f64,
+    pub(super) series: Vec<Series>,
 }
 
 impl Panel {
@@ -125,9 +132,9 @@ impl Panel {
 /// A figure: a title, a common horizontal axis, and panels from top to bottom.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    title: String,
-    x_label: String,
-    panels: Vec<Panel>,
+    pub(super) title: String,
+    pub(super) x_label: String,
+    pub(super) panels: Vec<Panel>,
 }
 
 impl Figure {
@@ -288,7 +295,9 @@ fn draw_series(out: &mut String, series: &Series, place: impl Fn((f64, f64)) -> 
         for (x, y) in thin(&placed, (1.0, 1.0), MOST_POINTS) {
             let _ = write!(d, "M{x:.1} {y:.1}h0");
         }
-        let _ = write!(out, "<path class=\"d {class}\" d=\"{d}\"/>");
+        // A few are measured values of their own, many are a cloud.
+        let size = if placed.len() <= FEW_POINTS { "d big" } else { "d" };
+        let _ = write!(out, "<path class=\"{size} {class}\" d=\"{d}\"/>");
         return;
     }
     let mut pen_down = false;

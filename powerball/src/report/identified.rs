@@ -6,14 +6,13 @@ use crate::explanation::torque_model::Additions;
 use crate::identification::estimate::TorqueCurve;
 use crate::identification::{Along, Identified, JointAlong};
 use crate::logs::signal::turns::Turns;
-use crate::report::{Figure, Files, Ink, Page, Panel, Series, Table, Tone, number};
+use crate::report::{Figure, Files, Ink, JOINTS, Page, Panel, Series, Table, Tone, number};
 use crate::report::{conventions, transmission};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 use dyngen::exact::rational::to_f64;
 use serde::Serialize;
 
-const INKS: [Ink; 6] = [Ink::Blue, Ink::Orange, Ink::Green, Ink::Purple, Ink::Sky, Ink::Grey];
 /// Within this share of its torque a joint is well predicted.
 const GOOD: f64 = 0.1;
 
@@ -91,8 +90,29 @@ pub fn page(result: &Identified) -> Page {
     spectra(&mut page, arm, shown);
     parameters(&mut page, result);
     friction(&mut page, result, shown);
+    page.words(&WORDS);
     page
 }
+
+/// The words that a reader may not know, in the order of the page.
+const WORDS: [(&str, &str); 7] = [
+    (
+        "minimal inertial set",
+        "The fewest combinations of masses, first moments and inertias that the torques depend on (base parameters). What is no part of it no motion can show.",
+    ),
+    (
+        "Eq. 16",
+        "Friction as γ1 tanh(γ2 q̇) + γ3 tanh(γ4 q̇) + γ5 q̇: two smooth steps where the velocity turns, and a viscous part.",
+    ),
+    ("held out", "Of logs that took no part in the fit."),
+    ("of the torque", "The rms of the error over the rms of the joint's measured torque."),
+    ("noise alone", "What white noise of the measurement would leave in the band of the fit."),
+    (
+        "standard error",
+        "The standard deviation that the fitted value would have over many such logs; 95 of 100 times the true value is within 1.96 of them.",
+    ),
+    ("relative", "The standard error over the value. Above some 30 % the logs say little of the parameter."),
+];
 
 /// The fit by mounting of the base, where it was not always as filed.
 fn mountings(page: &mut Page, result: &Identified, shown: &Along) {
@@ -219,7 +239,7 @@ fn of_logs(page: &mut Page, result: &Identified, shown: &Along, held_out: bool) 
             shown.joints.iter().enumerate().fold(Panel::new(label), |panel, (j, joint)| {
                 let name =
                     if named { format!("joint {}", JointNumber::from_index(j)) } else { String::new() };
-                panel.line(name, INKS[j % INKS.len()], of(joint).clone())
+                panel.line(name, JOINTS[j % JOINTS.len()], of(joint).clone())
             })
         };
         page.figure(
@@ -253,7 +273,7 @@ fn spectra(page: &mut Page, arm: &Arm, shown: &Along) {
             count += 1;
             figure.panel(Panel::new(format!("{} [N·m]", JointNumber::from_index(j))).height(0.6).line(
                 "",
-                INKS[j % INKS.len()],
+                JOINTS[j % JOINTS.len()],
                 points,
             ))
         });

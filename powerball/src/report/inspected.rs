@@ -1,9 +1,7 @@
 //! The files of a look into logs: what is in them, what it is taken to be, and how it runs.
 
 use crate::logs::log::{Inspected, InspectedTable, Log};
-use crate::report::{Figure, Files, Ink, Page, Panel, Series, Table, Tone, number};
-
-const INKS: [Ink; 6] = [Ink::Blue, Ink::Orange, Ink::Green, Ink::Purple, Ink::Sky, Ink::Grey];
+use crate::report::{Figure, Files, JOINTS, Page, Panel, Series, Table, Tone, number};
 
 /// log.json and report.html.
 ///
@@ -124,7 +122,7 @@ fn as_it_is(table: &InspectedTable) -> Option<Figure> {
                 let joint = column.joint.as_deref().unwrap_or_default();
                 let name =
                     if joint.parse::<u32>().is_ok() { format!("joint {joint}") } else { joint.to_string() };
-                Series::line(name, INKS[k % INKS.len()], points.collect())
+                Series::line(name, JOINTS[k % JOINTS.len()], points.collect())
             })
             .collect();
         if series.is_empty() {
@@ -133,24 +131,30 @@ fn as_it_is(table: &InspectedTable) -> Option<Figure> {
         any = true;
         let unit = table.columns.iter().find(|c| c.quantity == Some(quantity)).and_then(|c| c.unit.clone());
         let label = unit.map_or(label.to_string(), |unit| format!("{label} [{unit}]"));
-        figure = figure.panel(series.into_iter().fold(Panel::new(label), Panel::series));
+        figure = if ["q", "dq"].contains(&quantity) {
+            figure.panel(series.into_iter().fold(Panel::new(label), Panel::series))
+        } else {
+            // A wrist's torque would be a flat line on the shoulder's axis.
+            series
+                .into_iter()
+                .fold(figure, |figure, one| figure.panel(Panel::new(&label).height(0.5).series(one)))
+        };
     }
     any.then_some(figure)
 }
 
 fn taken(log: &Log) -> Figure {
-    let panel = |label: &str, signals: &[Vec<f64>]| {
-        signals.iter().enumerate().fold(Panel::new(label), |panel, (j, signal)| {
-            let mut points = Vec::new();
-            for piece in &log.pieces {
-                points.extend(piece.clone().map(|k| (log.t[k], signal[k])));
-                // A gap is no line.
-                points.push((f64::NAN, f64::NAN));
-            }
-            panel.line(format!("joint {}", j + 1), INKS[j % INKS.len()], points)
-        })
+    let line = |(j, signal): (usize, &Vec<f64>)| {
+        let mut points = Vec::new();
+        for piece in &log.pieces {
+            points.extend(piece.clone().map(|k| (log.t[k], signal[k])));
+            // A gap is no line.
+            points.push((f64::NAN, f64::NAN));
+        }
+        Series::line(format!("joint {}", j + 1), JOINTS[j % JOINTS.len()], points)
     };
-    Figure::new("", "time [s]")
-        .panel(panel("position [rad]", &log.q))
-        .panel(panel("torque [N·m]", &log.torque))
+    let positions = log.q.iter().enumerate().map(line).fold(Panel::new("position [rad]"), Panel::series);
+    let figure = Figure::new("", "time [s]").panel(positions);
+    let torques = log.torque.iter().enumerate().map(line);
+    torques.fold(figure, |figure, one| figure.panel(Panel::new("torque [N·m]").height(0.5).series(one)))
 }

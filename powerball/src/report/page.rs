@@ -1,6 +1,6 @@
 //! The page: a sequence of headings, paragraphs, notes, tables and figures.
 
-use super::{BarPairs, Figure, Table, escape};
+use super::{BarPairs, Figure, Table, escape, live};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -30,12 +30,14 @@ pub enum Tone {
 pub struct Page {
     title: String,
     body: String,
+    /// Whether it has figures that a script can make charts of.
+    live: bool,
 }
 
 impl Page {
     /// An empty page with a title.
     pub fn new(title: impl Into<String>) -> Self {
-        Page { title: title.into(), body: String::new() }
+        Page { title: title.into(), body: String::new(), live: false }
     }
 
     /// The sentence below the title.
@@ -83,6 +85,16 @@ impl Page {
         self.body.push_str(&table.to_html());
     }
 
+    /// What the words of a page mean, behind a line of text that opens it; printed pages show it.
+    pub fn words(&mut self, words: &[(&str, &str)]) {
+        self.body
+            .push_str("<details class=\"words\"><summary>What the words of this page mean</summary><dl>");
+        for (word, meaning) in words {
+            let _ = write!(self.body, "<dt>{}</dt><dd>{}</dd>", escape(word), escape(meaning));
+        }
+        self.body.push_str("</dl></details>\n");
+    }
+
     /// A table behind a line of text that opens it; printed pages show it.
     pub fn folded(&mut self, summary: &str, table: &Table) {
         let _ = writeln!(
@@ -95,16 +107,17 @@ impl Page {
 
     /// A line or scatter figure with its caption.
     pub fn figure(&mut self, figure: &Figure, caption: &str) {
-        self.captioned(&figure.to_svg(), caption);
+        self.captioned("", &(figure.to_svg() + &live::samples(figure)), caption);
+        self.live = true;
     }
 
     /// A bar figure with its caption.
     pub fn bars(&mut self, bars: &BarPairs, caption: &str) {
-        self.captioned(&bars.to_svg(), caption);
+        self.captioned(" class=\"bars\"", &bars.to_svg(), caption);
     }
 
-    fn captioned(&mut self, svg: &str, caption: &str) {
-        self.body.push_str("<figure>");
+    fn captioned(&mut self, class: &str, svg: &str, caption: &str) {
+        let _ = write!(self.body, "<figure{class}>");
         self.body.push_str(svg);
         if !caption.is_empty() {
             let _ = write!(self.body, "<figcaption>{}</figcaption>", escape(caption));
@@ -117,12 +130,16 @@ impl Page {
         let title = escape(&self.title);
         let foot =
             SIGNATURE.get().map_or(String::new(), |text| format!("<footer>{}</footer>\n", escape(text)));
+        let (mut style, mut scripts) = (super::STYLE.to_string(), String::new());
+        if self.live {
+            style.insert_str(0, live::STYLE);
+            live::SCRIPTS.iter().for_each(|script| scripts += &format!("<script>{script}</script>\n"));
+        }
         format!(
             "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
              <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
              <meta name=\"color-scheme\" content=\"light dark\"><title>{title}</title>\n\
-             <style>\n{}</style></head>\n<body><main>\n<h1>{title}</h1>\n{}{foot}</main></body></html>\n",
-            super::STYLE,
+             <style>\n{style}</style></head>\n<body><main>\n<h1>{title}</h1>\n{}{foot}</main>\n{scripts}</body></html>\n",
             self.body
         )
     }

@@ -62,8 +62,9 @@ const QUESTIONS: [Question; 9] = [
 
 pub(super) fn write(page: &mut String, data: &Path) -> Result<(), String> {
     page.push_str(
-        "## What others put in\n\n| logs: fitted; for validation | truth of their owners | which logs differ, and by what | other names | before → after, % | textbook, % |\n|---|---|---|---|---|---|\n",
+        "## What others put in\n\n| logs: fitted; for validation | truth of their owners | which logs differ, and by what | other names | before → after, % | textbook, % | PySINDy, % (terms) |\n|---|---|---|---|---|---|---|\n",
     );
+    let sparse = Sparse::read()?;
     for Question { folder, fit, validate, truth } in QUESTIONS {
         let logs = Logs::read(data, folder, &[fit, validate].concat())?;
         let explained = logs.explained(fit.len())?;
@@ -72,16 +73,34 @@ pub(super) fn write(page: &mut String, data: &Path) -> Result<(), String> {
         let [before, after] = [&explained.before, &explained.after].map(|e| percent(&e.validate.relative));
         let _ = writeln!(
             page,
-            "| `{folder}`: {}; {} | {truth} | {} | {} | {before} → {after} | {} |",
+            "| `{folder}`: {}; {} | {truth} | {} | {} | {before} → {after} | {} | {} |",
             fit.join(", "),
             validate.join(", "),
             differs(&explained),
             elsewhere(&explained),
-            percent(&textbook)
+            percent(&textbook),
+            sparse.cell(&[folder, &fit.join(" "), &validate.join(" ")])
         );
         eprintln!("{folder} {fit:?} {validate:?}");
     }
     Ok(())
+}
+
+/// What sparse regression leaves of the same questions, as `benches/sindy.py` wrote it.
+struct Sparse(String);
+
+impl Sparse {
+    fn read() -> Result<Sparse, String> {
+        let path = "docs/results/sindy.csv";
+        std::fs::read_to_string(path).map(Sparse).map_err(|e| format!("{path}: {e}"))
+    }
+
+    /// Errors with the sparse law, and how many terms it has, by joint.
+    fn cell(&self, question: &[&str; 3]) -> String {
+        let rows = self.0.lines().map(|line| line.split(',').collect::<Vec<_>>());
+        let mut asked = rows.filter(|row| row.len() == 7 && row[..3] == question[..]);
+        asked.next().map_or_else(|| "–".into(), |row| format!("{} ({})", row[4], row[5]))
+    }
 }
 
 fn percent(shares: &[f64]) -> String {

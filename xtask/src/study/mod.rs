@@ -20,6 +20,7 @@ mod tests;
 pub(crate) use benchmark::{Arguments as BenchmarkArguments, run as benchmark};
 use case::{Case, Table};
 use judge::Outcome;
+pub(crate) use probability::{Arguments as ProbabilityArguments, run as probability};
 use std::collections::HashSet;
 use std::fs::{self, OpenOptions};
 use std::io::Write as _;
@@ -47,9 +48,6 @@ pub(crate) struct Arguments {
     /// Only make the tables of what the file of results holds
     #[arg(long)]
     tables_only: bool,
-    /// Fit the curve of a name's probability to every other case of the results, and judge it on the rest; no tables
-    #[arg(long)]
-    probability: bool,
     /// Write the tables into this page, between its markers
     #[arg(long)]
     write: Option<PathBuf>,
@@ -64,10 +62,6 @@ fn range(text: &str) -> Result<Range<u64>, String> {
 /// Runs what is missing and prints the tables.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let mut outcomes = read(&arguments.results)?;
-    if arguments.probability {
-        print!("{}", probability::curve(&outcomes));
-        return Ok(());
-    }
     if !arguments.tables_only {
         let done: HashSet<String> = outcomes.iter().map(|o| o.case.clone()).collect();
         if let Some(folder) = arguments.results.parent() {

@@ -7,45 +7,10 @@ use super::judge::{Named, Outcome};
 use super::reliability::wilson;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
+use powerball::explanation::explain::{Evidence, FEATURES};
 use std::fmt::Write as _;
-
-/// What is known of a name besides what it is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Evidence {
-    /// Its penalised gain over that of the next best name.
-    margin: f64,
-    /// Whether another name fits as well.
-    alike: bool,
-    /// The share of its squared torque that no other column can take over.
-    own_share: f64,
-    /// Share of the excess over noise that stays on its joints.
-    leftover: f64,
-    /// How long the fitted logs are, s.
-    fitted_time: f64,
-}
-
-/// Numbers that the curve is linear in.
-const FEATURES: usize = 6;
-
-/// A larger margin says no more.
-const LARGEST_MARGIN: f64 = 20.0;
-/// Nor does a smaller share of its own.
-const LEAST_SHARE: f64 = 0.01;
-
-impl Evidence {
-    /// What the logit of the probability is linear in: 1, whether another name fits as well, the logarithms of the margin
-    /// and of the own share, what is left over, the logarithm of the time in minutes.
-    fn features(&self) -> [f64; FEATURES] {
-        [
-            1.0,
-            f64::from(u8::from(self.alike)),
-            self.margin.clamp(1.0, LARGEST_MARGIN).ln(),
-            self.own_share.clamp(LEAST_SHARE, 1.0).ln(),
-            self.leftover.clamp(0.0, 1.0),
-            (self.fitted_time / 60.0).clamp(0.1, 10.0).ln(),
-        ]
-    }
-}
+use std::fs;
+use std::path::PathBuf;
 
 /// Names in a bin of the reliability table.
 const BIN: usize = 20;
@@ -53,45 +18,106 @@ const BIN: usize = 20;
 const STEPS: usize = 50;
 const RIDGE: f64 = 1.0 / 9.0;
 
+/// Where the names come from and go to.
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// Results of `study`, whose names are written to the table first
+    #[arg(long)]
+    results: Option<PathBuf>,
+    /// The table of names
+    #[arg(long, default_value = "docs/results/names.csv")]
+    names: PathBuf,
+}
+
 /// A name with what is known of it, and whether it is right.
 struct Case {
+    evidence: Evidence,
     features: [f64; FEATURES],
-    stated: f64,
+    unattributed: bool,
     right: bool,
 }
 
-/// Fits the curve to the outcomes in odd places, and prints its coefficients and how it does on the others.
-pub(super) fn curve(outcomes: &[Outcome]) -> String {
+const HEAD: &str = "case,effect,right,margin,alike,own_share,leftover,unattributed,fitted_time";
+
+/// Prints the curve that fits the names of every other case, and how it does on the others.
+pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
+    let failed = |e: std::io::Error| format!("{}: {e}", arguments.names.display());
+    if let Some(results) = &arguments.results {
+        let mut outcomes = super::read(results)?;
+        outcomes.sort_by_key(|outcome| {
+            let number = outcome.case.rsplit('/').next().and_then(|seed| seed.parse::<u64>().ok());
+            (outcome.table.clone(), number)
+        });
+        let lines = outcomes.iter().flat_map(|o| o.named.iter().filter_map(|named| line(o, named)));
+        let table: Vec<String> = std::iter::once(HEAD.to_string()).chain(lines).collect();
+        fs::write(&arguments.names, table.join("\n") + "\n").map_err(failed)?;
+    }
+    let text = fs::read_to_string(&arguments.names).map_err(failed)?;
     let mut halves: [Vec<Case>; 2] = [Vec::new(), Vec::new()];
-    for (k, outcome) in outcomes.iter().enumerate() {
-        halves[k % 2].extend(outcome.named.iter().filter_map(|named| case(outcome, named)));
+    let (mut last, mut half) = (String::new(), 0);
+    for (k, line) in text.lines().enumerate().skip(1) {
+        let (name, case) =
+            case(line).ok_or_else(|| format!("{}: line {}: no name", arguments.names.display(), k + 1))?;
+        // The names of one arm are of one half.
+        if name != last {
+            (half, last) = (1 - half, name.to_string());
+        }
+        halves[half].push(case);
     }
     let [judge, fit] = halves;
-    let coefficients = fitted(&fit);
+    print!("{}", curve(&fit, &judge));
+    Ok(())
+}
+
+fn line(outcome: &Outcome, named: &Named) -> Option<String> {
+    let right = u8::from(outcome.names_truth(named));
+    let alike = u8::from(!named.alike.is_empty());
+    let unattributed = u8::from(named.joints.iter().any(|joint| outcome.left_on.contains(joint)));
+    let Named { effect, margin, own_share, leftover, .. } = named;
+    let (own_share, time) = ((*own_share)?, outcome.fitted_time);
+    Some(format!(
+        "{},{effect},{right},{margin:.4},{alike},{own_share:.4},{leftover:.4},{unattributed},{time:.1}",
+        outcome.case
+    ))
+}
+
+/// Its case and what the curve reads of it.
+fn case(line: &str) -> Option<(&str, Case)> {
+    let cells: Vec<&str> = line.split(',').collect();
+    let [name, _, right, margin, alike, _, leftover, ..] = cells[..] else { return None };
+    let evidence =
+        Evidence { margin: margin.parse().ok()?, alike: alike == "1", leftover: leftover.parse().ok()? };
+    let unattributed = *cells.get(7)? == "1";
+    Some((name, Case { evidence, features: evidence.features(), unattributed, right: right == "1" }))
+}
+
+/// The coefficients, and how the curve that they make does on names that were not fitted, beside three constants and
+/// beside one.
+fn curve(fit: &[Case], judge: &[Case]) -> String {
+    let coefficients = fitted(fit);
     let mut out = format!("fitted to {} names: {coefficients:.3?}\n\n", fit.len());
     let curve = |case: &Case| probability(&coefficients, &case.features);
-    out.push_str(&reliability(&judge, &curve));
+    out.push_str(&reliability(judge, &curve));
     let _ = writeln!(
         out,
-        "\nBrier score on the {} names that were not fitted: {:.4}, of what was stated {:.4}, of their mean {:.4}",
+        "\nBrier score on the {} names that were not fitted: {:.4}; of the curve in use {:.4}; of three constants {:.4}; of \
+         one, the share of the other half, {:.4}",
         judge.len(),
-        brier(&judge, &curve),
-        brier(&judge, &|case| case.stated),
-        brier(&judge, &|_| share(&fit))
+        brier(judge, &curve),
+        brier(judge, &|case| case.evidence.probability()),
+        brier(judge, &constants),
+        brier(judge, &|_| share(fit))
     );
     out
 }
 
-fn case(outcome: &Outcome, named: &Named) -> Option<Case> {
-    let evidence = Evidence {
-        margin: named.margin,
-        alike: !named.alike.is_empty(),
-        own_share: named.own_share?,
-        leftover: named.leftover,
-        fitted_time: outcome.fitted_time,
-    };
-    let right = outcome.names_truth(named);
-    Some(Case { features: evidence.features(), stated: named.probability?, right })
+/// What was stated before there was a curve.
+fn constants(case: &Case) -> f64 {
+    match case {
+        Case { evidence: Evidence { alike: true, .. }, .. } => 0.5,
+        Case { unattributed: true, .. } => 0.88,
+        _ => 0.97,
+    }
 }
 
 fn probability(coefficients: &[f64; FEATURES], features: &[f64; FEATURES]) -> f64 {
@@ -173,13 +199,14 @@ mod tests {
             features.iter_mut().for_each(|x| *x = rng.random_range(-1.0..1.0));
             features[0] = 1.0;
             let right = rng.random_bool(probability(&truth, &features));
-            Case { features, stated: 0.9, right }
+            let evidence = Evidence { margin: 1.0, alike: false, leftover: 0.0 };
+            Case { evidence, features, unattributed: false, right }
         };
         let cases: Vec<Case> = (0..4000).map(draw).collect();
         for (found, truth) in fitted(&cases).iter().zip(truth) {
             assert!((found - truth).abs() < 0.25, "{found} {truth}");
         }
         let curve = |case: &Case| probability(&truth, &case.features);
-        assert!(brier(&cases, &curve) < brier(&cases, &|case| case.stated));
+        assert!(brier(&cases, &curve) < brier(&cases, &|_| share(&cases)));
     }
 }

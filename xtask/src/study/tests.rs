@@ -26,3 +26,11 @@ fn a_zero_is_no_spring() {
         "{names:?}"
     );
 }
+
+/// Nor does a base model that lacks something: once its tilt and its warmth are known, the log to judge on needs no body.
+#[test]
+fn what_lacks_an_effect_is_no_body_in_the_log_to_judge_on() {
+    let names = names(Table::Drawn, 127);
+    let there = |name: &str| names.iter().any(|other| other == name);
+    assert!(there("base_tilt") && there("temperature") && !there("payload"), "{names:?}");
+}

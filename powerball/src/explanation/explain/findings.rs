@@ -28,4 +28,24 @@ impl<'a> Findings<'a> {
         let better = predicts_better((&other.study, &other.model), (&self.study, &self.model));
         if better { other } else { self }
     }
+
+    /// These findings where what they took out of the validation set is needed there, else those of the set as it was
+    /// logged. A base model that lacks something errs on a path of its own as if a body were there or a hand pushed; once
+    /// that something is in the model no body is needed. What is needed leaves little of what the other model errs more
+    /// than on its fitted logs.
+    pub(super) fn or_as_logged(self, logged: Findings<'a>) -> Findings<'a> {
+        let sigma = &logged.model.fit.sigma;
+        let joints: Vec<usize> =
+            self.beforehand.held.iter().flat_map(|held| &held.named.joints).map(|j| j.index()).collect();
+        let excess = |findings: &Findings<'_>| -> f64 {
+            let left = findings.model.residual_on_validation(&findings.study);
+            let of = |j: &usize| {
+                let square = left[*j].iter().map(|e| e * e).sum::<f64>();
+                square / left[*j].len().max(1) as f64 / sigma[*j].powi(2) - 1.0
+            };
+            joints.iter().filter(|j| sigma[**j] > 0.0).map(of).sum()
+        };
+        let needed = excess(&self) <= self.study.rule().much_left * excess(&logged);
+        if needed { self } else { logged }
+    }
 }

@@ -33,8 +33,9 @@ mod study;
 pub use comparison::{Hypothesis, Open};
 pub use named::{FalsePositives, NamedEffect, Rival, Spreads};
 pub use results::{
-    Change, Correction, Curve, Difference, Experiment, Explained, LawCoefficient, LogResult, NextExperiment,
-    Shown, State, TorqueCurve, Trajectory, Unattributed, UnnamedLaw, Verdict, contradictions, curves,
+    Change, Correction, Curve, Difference, Evidence, Experiment, Explained, FEATURES, LawCoefficient,
+    LogResult, NextExperiment, Shown, State, TorqueCurve, Trajectory, Unattributed, UnnamedLaw, Verdict,
+    contradictions, curves,
 };
 
 use crate::explanation::options::{ExplainError, ExplainOptions};
@@ -43,7 +44,7 @@ use crate::logs::regression::RigidArm;
 use begin::begin;
 use comparison::{History, withhold, withhold_harmful};
 use findings::Findings;
-use prepare::{Begun, Inertia, prepare};
+use prepare::{Begun, Inertia, ValidationOnly, prepare};
 use search::Among;
 use special::pushes_at_rest;
 use step::{Outcome, Proposed, accept, drop_words, propose, settle_beside};
@@ -60,10 +61,17 @@ pub fn explain_body(
     options: &ExplainOptions<'_>,
 ) -> Result<Explained, ExplainError> {
     options.progress.say("preparing signals");
-    let mut findings = find(prepare(body, (logs, validate), options, Inertia::Shared)?);
+    let found = |inertia, validation_only| -> Result<Findings<'_>, ExplainError> {
+        Ok(find(prepare(body, (logs, validate), options, inertia, validation_only)?))
+    };
+    let mut findings = found(Inertia::Shared, ValidationOnly::TakenOut)?;
+    if !findings.beforehand.held.is_empty() {
+        options.progress.say("the same with the logs to judge on as they are");
+        findings = findings.or_as_logged(found(Inertia::Shared, ValidationOnly::Kept)?);
+    }
     if findings.study.one_path {
         options.progress.say("one path: joints by themselves");
-        findings = findings.or_better(find(prepare(body, (logs, validate), options, Inertia::PerJoint)?));
+        findings = findings.or_better(found(Inertia::PerJoint, ValidationOnly::Kept)?);
     }
     options.progress.say("looking at what is left");
     results::conclude(findings)

@@ -37,7 +37,7 @@ pub struct NamedEffect {
     /// Logs it is in, where it is in some only.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub logs: Vec<String>,
-    /// How often such a name is right, by docs/study.md (see [`Rule::right`](crate::Rule::right)).
+    /// How often a name with such evidence is right ([`Evidence`](super::Evidence), docs/study.md).
     pub probability: f64,
     /// Its penalised gain over that of the next best name on the same joints.
     pub margin: f64,

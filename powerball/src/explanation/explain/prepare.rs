@@ -19,6 +19,15 @@ pub(super) enum Inertia {
     PerJoint,
 }
 
+/// Whether what is in logs of the validation set only is looked for, and taken out of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ValidationOnly {
+    /// It is.
+    TakenOut,
+    /// The validation set is as it was logged.
+    Kept,
+}
+
 /// What is known before anything is looked for.
 pub(super) struct Begun<'a> {
     pub(super) study: Study<'a>,
@@ -45,6 +54,7 @@ pub(super) fn prepare<'a>(
     (logs, validate): (&[Log], &[Log]),
     options: &'a ExplainOptions<'a>,
     inertia: Inertia,
+    validation_only: ValidationOnly,
 ) -> Result<Begun<'a>, ExplainError> {
     let rule = &options.rule;
     let (mut data, mut validation) = in_own_bands(body, (logs, validate), options)?;
@@ -55,10 +65,12 @@ pub(super) fn prepare<'a>(
     let mut base = fit(&data, &folds, &[], None);
     let residual = base.residual_on(&validation, &[]);
     let errors = Spreads { fit: spread(&data, &base.residual), validate: spread(&validation, &residual) };
-    let held = match inertia {
-        Inertia::PerJoint => Vec::new(),
-        Inertia::Shared => held(body, (logs, validate), options, &mut base, (&mut data, &mut validation))
-            .map_err(ExplainError::Validate)?,
+    let held = match (inertia, validation_only) {
+        (Inertia::PerJoint, _) | (_, ValidationOnly::Kept) => Vec::new(),
+        (Inertia::Shared, ValidationOnly::TakenOut) => {
+            held(body, (logs, validate), options, &mut base, (&mut data, &mut validation))
+                .map_err(ExplainError::Validate)?
+        }
     };
     let one_path = repeats(rule, &data, &validation);
     let clock = settle(rule, logs, validate, &mut data, &base, &mut validation);

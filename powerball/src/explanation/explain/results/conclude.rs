@@ -13,13 +13,13 @@ use super::explained::{Change, Explained};
 use super::laws::laws;
 use super::logs::logs;
 use super::next::NextExperiment;
+use super::probability::Evidence;
 use super::shown::shown;
-use super::unattributed::{Unattributed, unattributed};
+use super::unattributed::unattributed;
 use super::verdict::verdict;
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Effect, Figures, Found, Settings, contact_wrench};
 use crate::explanation::options::{ExplainError, RuledOut};
-use crate::explanation::rule::Rule;
 use crate::identification::estimate::distribution::f_tail;
 use crate::identification::estimate::{noise_floor, over_blocks, spread};
 use crate::logs::regression::Data;
@@ -45,10 +45,10 @@ pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainE
     not_named_elsewhere(&mut named);
     let (unattributed, unexplained, dependencies) =
         unattributed(study, model, history, &held_out, &floor, &after, &named);
-    for effect in &mut named {
-        effect.probability = probability(study.rule(), effect, unattributed.as_ref());
-    }
     let left = unattributed.as_ref().map_or(&[][..], |rest| &rest.joints);
+    for effect in &mut named {
+        effect.probability = Evidence::of(effect).probability();
+    }
     let open = open(study, model, history, left);
     Ok(Explained {
         verdict: verdict(study, &named, &after.validate, &floor, &dependencies),
@@ -200,18 +200,6 @@ fn add_pushes_at_rest(named: &mut Vec<NamedEffect>, findings: &Findings<'_>, aft
         rivals: Vec::new(),
         joints: (0..findings.study.data.dof()).map(JointNumber::from_index).collect(),
     });
-}
-
-/// How often such a name is right.
-fn probability(rule: &Rule, effect: &NamedEffect, rest: Option<&Unattributed>) -> f64 {
-    let is_left = |j: &JointNumber| rest.is_some_and(|rest| rest.joints.contains(j));
-    if effect.margin < rule.least_margin {
-        rule.right_with_twin
-    } else if effect.joints.iter().any(is_left) {
-        rule.right_beside_rest
-    } else {
-        rule.right
-    }
 }
 
 /// The next best names, and what an experiment has ruled out on the same joints.

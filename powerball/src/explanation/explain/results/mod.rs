@@ -3,7 +3,7 @@
 //! `conclude` makes the result ([`Explained`]): `compose` the model of what was accepted and what that
 //! leaves, `unattributed` and `dependencies` what stays without a name and what it depends on, `laws` the formulas of what has no name, `logs` what is different in which log, `correction`
 //! the curves that take a part of it off, `doubts` what a reader must know, `verdict` how far each
-//! joint is explained, `contradictions` whether all of it agrees, `curves` and `shown` the figures,
+//! joint is explained, `probability` how often such a name is right, `contradictions` whether all of it agrees, `curves` and `shown` the figures,
 //! `next` what an experiment would decide. JSON is made of these types by whoever writes it, and nothing here
 //! reads it.
 
@@ -18,6 +18,7 @@ mod explained;
 mod laws;
 mod logs;
 mod next;
+mod probability;
 mod shown;
 mod unattributed;
 mod verdict;
@@ -30,6 +31,7 @@ pub use explained::{Change, Explained};
 pub use laws::{LawCoefficient, UnnamedLaw};
 pub use logs::{Difference, LogResult};
 pub use next::{Experiment, NextExperiment, Trajectory};
+pub use probability::{Evidence, FEATURES};
 pub use shown::Shown;
 pub use unattributed::Unattributed;
 pub use verdict::{State, Verdict};

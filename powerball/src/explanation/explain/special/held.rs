@@ -215,7 +215,8 @@ fn told(
         }
     }
     let named = NamedEffect {
-        probability: rule.right,
+        // Known when all that is left is.
+        probability: f64::NAN,
         effect: effect.name().to_string(),
         joints: seen[0].candidate.joints.clone(),
         figures: effect.figures(&context, &found),
