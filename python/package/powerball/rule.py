@@ -97,15 +97,6 @@ class Rule:
     #: See ``least_missing``: standard errors that chance exceeds once in 800, ``family_wise`` over eight
     #: octaves.
     missing_errors: float = 3.2
-    #: How often a name is right that no other one equals and beside which nothing is left on its joints:
-    #: 469 of 472 names in docs/study.md (white noise, pairs, easily confused effects, drawn arms), less
-    #: some for arms unlike those.
-    right: float = 0.97
-    #: How often where something without a name is left on its joints: beside a smooth misfit, in other
-    #: friction laws and in measured logs, 101 of 115 names.
-    right_beside_rest: float = 0.88
-    #: How often where another name fits as well: one of two.
-    right_with_twin: float = 0.5
     #: A name is taken back where without its effect the squared error on the validation set is smaller by
     #: this share, on its joints. What is in validation logs only must not raise that of any joint by this
     #: share.

@@ -164,7 +164,7 @@ fn rotated(values: &[f64], recordings: &[Range<usize>], shift: &Shift) -> Vec<f6
 #[cfg(all(test, feature = "virtual-arm"))]
 mod tests {
     use super::super::super::begin::begin;
-    use super::super::super::prepare::{Inertia, prepare};
+    use super::super::super::prepare::{Inertia, ValidationOnly, prepare};
     use super::super::super::tests::small_arms::planar_with_payload;
     use super::*;
     use crate::explanation::options::ExplainOptions;
@@ -175,7 +175,8 @@ mod tests {
         let (body, logs) = planar_with_payload();
         let (fit, validate) = logs.split_at(4);
         let options = ExplainOptions::default();
-        let begun = prepare(&body, (fit, validate), &options, Inertia::Shared).unwrap();
+        let begun =
+            prepare(&body, (fit, validate), &options, Inertia::Shared, ValidationOnly::TakenOut).unwrap();
         let model = begin(begun.base, &begun.study);
         let context = model.context(&begun.study);
         let screen = Screen::new(&context);
