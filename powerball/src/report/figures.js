@@ -94,7 +94,7 @@
           cursor: { sync: { key: sync.key, setSeries: false }, drag: { x: true, y: false } },
           axes: [
             { ...axis(), label: last ? data.x : undefined, size: last ? 34 : 25, labelSize: 22 },
-            { ...axis(), label: panel.label, size: 58, labelSize: 20 },
+            { ...axis(), label: panel.label, size: 58, labelSize: 20, space: 24 },
           ],
           series: [{ label: data.x, value: (_, value) => digits(value) }, ...panel.series.map(drawn)],
           hooks: { setScale: [follow] },
