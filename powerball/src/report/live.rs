@@ -10,6 +10,8 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
+/// uPlot's licence, which goes with every copy.
+pub(super) const LICENCE: &str = include_str!("uplot/LICENSE");
 /// uPlot and its style, and what makes charts of a page's samples.
 pub(super) const SCRIPTS: [&str; 2] = [include_str!("uplot/uPlot.iife.min.js"), include_str!("figures.js")];
 pub(super) const STYLE: &str = include_str!("uplot/uPlot.min.css");

@@ -133,6 +133,7 @@ impl Page {
         let (mut style, mut scripts) = (super::STYLE.to_string(), String::new());
         if self.live {
             style.insert_str(0, live::STYLE);
+            scripts = format!("<!-- uPlot:\n{}-->\n", live::LICENCE);
             live::SCRIPTS.iter().for_each(|script| scripts += &format!("<script>{script}</script>\n"));
         }
         format!(

@@ -36,7 +36,9 @@ impl Evidence {
     #[must_use]
     pub fn features(&self) -> [f64; FEATURES] {
         let margin = within(self.margin, [1.0, LARGEST_MARGIN]).ln();
-        [1.0, f64::from(u8::from(self.alike)), margin, within(self.leftover, [0.0, 1.0])]
+        // By what is gone, since what is no number counts as the lower end.
+        let leftover = 1.0 - within(1.0 - self.leftover, [0.0, 1.0]);
+        [1.0, f64::from(u8::from(self.alike)), margin, leftover]
     }
 
     /// How often such a name is right, or where another one fits as well, how often one of them is.
@@ -71,7 +73,8 @@ mod tests {
     #[test]
     fn what_is_no_number_is_no_evidence() {
         let nothing = Evidence { margin: f64::NAN, leftover: f64::NAN, ..CLEAR };
-        assert!((0.0..=1.0).contains(&nothing.probability()));
+        let least = Evidence { margin: 1.0, leftover: 1.0, ..CLEAR };
+        assert_eq!(nothing.probability(), least.probability());
         let endless = Evidence { margin: f64::INFINITY, ..CLEAR };
         assert!(endless.probability() >= CLEAR.probability());
     }
