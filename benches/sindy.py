@@ -33,17 +33,8 @@ SLOW = 0.02
 #: Where the smooth sign of a velocity turns, rad/s or m/s.
 TURN = 0.05
 
-QUESTIONS = [
-    ("ur5_pushes", "no7 no8 no9_pushed", "no9"),
-    ("ur5_pushes", "no6 no7 no8", "no9_pushed"),
-    ("ur5_pushes", "no6 no8 no9", "no7"),
-    ("psm_masses", "clean ins105", "other"),
-    ("psm_masses", "clean", "ins105"),
-    ("psm_masses", "clean", "other"),
-    ("ur10e", "fourier_12a fourier_12b fourier_14_load", "fourier_14"),
-    ("ur10e", "fourier_12a fourier_7 fourier_8", "fourier_14_load fourier_5"),
-    ("ur10e", "fourier_12a fourier_7", "fourier_5"),
-]
+#: Logs of a folder, fitted and for validation, that `xtask known-truth` asks too.
+QUESTIONS = Path(__file__).parent.parent / "xtask/src/known_truth/questions.csv"
 
 
 def angle(value):
@@ -183,7 +174,8 @@ def main():
     with out.open("w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["folder", "fit", "validate", "before, %", "after, %", "terms", "largest term"])
-        for folder, fit, validate in QUESTIONS:
+        for question in csv.DictReader(QUESTIONS.open()):
+            folder, fit, validate = (question[name] for name in ("folder", "fit", "validate"))
             before, after, terms, first = answer(data, folder, fit, validate)
             percent = [" ".join(f"{100 * share:.0f}" for share in shares) for shares in (before, after)]
             row = [folder, fit, validate, *percent, " ".join(map(str, terms)), "; ".join(first)]

@@ -18,6 +18,8 @@ def span(place):
 
 
 def first_chart(page):
+    # A figure with samples is a chart once it comes near: on a narrow screen the first one stands far below.
+    page.locator("figure:has(script)").first.scroll_into_view_if_needed()
     page.locator("figure.live .plot").first.wait_for()
     place = page.locator("figure.live .plot").first
     place.scroll_into_view_if_needed()
@@ -110,7 +112,6 @@ def fits_a_telephone(page):
     page.wait_for_timeout(300)
     width = page.evaluate("document.documentElement.scrollWidth")
     assert width <= 400, f"the page is {width} px wide on a screen of 400"
-    # A figure with samples is a chart once it comes near.
     cut = page.evaluate(
         """[...document.querySelectorAll("figure, .table")]
             .filter((e) => e.classList.contains("live") || !e.querySelector("script"))

@@ -115,6 +115,9 @@ mod tests {
             );
         }
         // 1.4 million samples.
-        assert!(page.to_html().len() < 10_000_000, "{}", page.to_html().len());
+        let html = page.to_html();
+        assert!(html.len() < 10_000_000, "{}", html.len());
+        let drawings: usize = html.split("<svg").skip(1).filter_map(|rest| rest.find("</svg>")).sum();
+        assert!(drawings < 2_000_000, "the drawings alone: {drawings}");
     }
 }

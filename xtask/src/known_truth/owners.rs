@@ -3,70 +3,32 @@
 use super::Logs;
 use crate::textbook;
 use powerball::explanation::Explained;
+use serde::Deserialize;
 use std::fmt::Write as _;
 use std::path::Path;
 
+/// Logs of a folder, by file names without `.csv`, and what their owners say of them.
+#[derive(Deserialize)]
 struct Question {
-    folder: &'static str,
-    fit: &'static [&'static str],
-    validate: &'static [&'static str],
-    truth: &'static str,
+    folder: String,
+    fit: String,
+    validate: String,
+    truth: String,
 }
 
-const QUESTIONS: [Question; 9] = [
-    Question {
-        folder: "ur5_pushes",
-        fit: &["no7", "no8", "no9_pushed"],
-        validate: &["no9"],
-        truth: "a hand pushes no9_pushed at 4.4–5.3, 5.9–6.8, 10.4–11.2, 12.0–13.1 and 13.8–14.6 s",
-    },
-    Question {
-        folder: "ur5_pushes",
-        fit: &["no6", "no7", "no8"],
-        validate: &["no9_pushed"],
-        truth: "the same, in the validation log only",
-    },
-    Question { folder: "ur5_pushes", fit: &["no6", "no8", "no9"], validate: &["no7"], truth: "nothing" },
-    Question {
-        folder: "psm_masses",
-        fit: &["clean", "ins105"],
-        validate: &["other"],
-        truth: "105 g on link 2 in ins105, first moment 0.056 kg·m",
-    },
-    Question {
-        folder: "psm_masses",
-        fit: &["clean"],
-        validate: &["ins105"],
-        truth: "the same, in the validation log only",
-    },
-    Question { folder: "psm_masses", fit: &["clean"], validate: &["other"], truth: "nothing" },
-    Question {
-        folder: "ur10e",
-        fit: &["fourier_12a", "fourier_12b", "fourier_14_load"],
-        validate: &["fourier_14"],
-        truth: "about 2.8 kg on the flange in fourier_14_load",
-    },
-    Question {
-        folder: "ur10e",
-        fit: &["fourier_12a", "fourier_7", "fourier_8"],
-        validate: &["fourier_14_load", "fourier_5"],
-        truth: "the same, in a validation log only",
-    },
-    Question {
-        folder: "ur10e",
-        fit: &["fourier_12a", "fourier_7"],
-        validate: &["fourier_5"],
-        truth: "nothing",
-    },
-];
+/// What `benches/sindy.py` asks too.
+const QUESTIONS: &str = include_str!("questions.csv");
 
 pub(super) fn write(page: &mut String, data: &Path) -> Result<(), String> {
     page.push_str(
         "## What others put in\n\n| logs: fitted; for validation | truth of their owners | which logs differ, and by what | other names | before → after, % | textbook, % | PySINDy, % (terms) |\n|---|---|---|---|---|---|---|\n",
     );
     let sparse = Sparse::read()?;
-    for Question { folder, fit, validate, truth } in QUESTIONS {
-        let logs = Logs::read(data, folder, &[fit, validate].concat())?;
+    for question in csv::Reader::from_reader(QUESTIONS.as_bytes()).deserialize() {
+        let question: Question = question.map_err(|e| format!("questions.csv: {e}"))?;
+        let Question { folder, truth, .. } = &question;
+        let [fit, validate] = [&question.fit, &question.validate].map(|files| words(files));
+        let logs = Logs::read(data, folder, &[&fit[..], &validate].concat())?;
         let explained = logs.explained(fit.len())?;
         let (fitted, judged) = logs.logs.split_at(fit.len());
         let textbook = textbook::held_out(&logs.body()?, fitted, judged)?;
@@ -79,28 +41,50 @@ pub(super) fn write(page: &mut String, data: &Path) -> Result<(), String> {
             differs(&explained),
             elsewhere(&explained),
             percent(&textbook),
-            sparse.cell(&[folder, &fit.join(" "), &validate.join(" ")])
+            sparse.cell(&question)?
         );
         eprintln!("{folder} {fit:?} {validate:?}");
     }
     Ok(())
 }
 
-/// What sparse regression leaves of the same questions, as `benches/sindy.py` wrote it.
-struct Sparse(String);
+/// What sparse regression leaves of the same questions.
+struct Sparse(Vec<SparseRow>);
+
+/// Errors in % and terms of the sparse law by joint, as `benches/sindy.py` writes them.
+#[derive(Deserialize)]
+struct SparseRow {
+    folder: String,
+    fit: String,
+    validate: String,
+    #[serde(rename = "after, %")]
+    after: String,
+    terms: String,
+}
 
 impl Sparse {
+    const PATH: &str = "docs/results/sindy.csv";
+
     fn read() -> Result<Sparse, String> {
-        let path = "docs/results/sindy.csv";
-        std::fs::read_to_string(path).map(Sparse).map_err(|e| format!("{path}: {e}"))
+        let wrong = |e: csv::Error| format!("{}: {e}; python benches/sindy.py writes it", Self::PATH);
+        let rows = csv::Reader::from_path(Self::PATH).map_err(wrong)?.into_deserialize();
+        rows.collect::<Result<_, _>>().map(Sparse).map_err(wrong)
     }
 
-    /// Errors with the sparse law, and how many terms it has, by joint.
-    fn cell(&self, question: &[&str; 3]) -> String {
-        let rows = self.0.lines().map(|line| line.split(',').collect::<Vec<_>>());
-        let mut asked = rows.filter(|row| row.len() == 7 && row[..3] == question[..]);
-        asked.next().map_or_else(|| "–".into(), |row| format!("{} ({})", row[4], row[5]))
+    fn cell(&self, asked: &Question) -> Result<String, String> {
+        let same = |row: &&SparseRow| {
+            [&row.folder, &row.fit, &row.validate] == [&asked.folder, &asked.fit, &asked.validate]
+        };
+        let row = self.0.iter().find(same).ok_or_else(|| {
+            let Question { folder, fit, validate, .. } = asked;
+            format!("{} has no row of {folder}: {fit}; {validate}: run python benches/sindy.py", Self::PATH)
+        })?;
+        Ok(format!("{} ({})", row.after, row.terms))
     }
+}
+
+fn words(files: &str) -> Vec<&str> {
+    files.split_whitespace().collect()
 }
 
 fn percent(shares: &[f64]) -> String {

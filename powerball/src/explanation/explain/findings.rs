@@ -6,6 +6,8 @@ use super::named::FalsePositives;
 use super::prepare::Beforehand;
 use super::special::{RestPush, predicts_better};
 use super::study::Study;
+use crate::identification::estimate::spread;
+use std::collections::BTreeSet;
 
 /// Everything that the result says something of.
 pub(super) struct Findings<'a> {
@@ -35,14 +37,12 @@ impl<'a> Findings<'a> {
     /// than on its fitted logs.
     pub(super) fn or_as_logged(self, logged: Findings<'a>) -> Findings<'a> {
         let sigma = &logged.model.fit.sigma;
-        let joints: Vec<usize> =
+        let joints: BTreeSet<usize> =
             self.beforehand.held.iter().flat_map(|held| &held.named.joints).map(|j| j.index()).collect();
         let excess = |findings: &Findings<'_>| -> f64 {
-            let left = findings.model.residual_on_validation(&findings.study);
-            let of = |j: &usize| {
-                let square = left[*j].iter().map(|e| e * e).sum::<f64>();
-                square / left[*j].len().max(1) as f64 / sigma[*j].powi(2) - 1.0
-            };
+            let study = &findings.study;
+            let rms = spread(&study.validation, &findings.model.residual_on_validation(study)).rms;
+            let of = |j: &usize| (rms[*j] / sigma[*j]).powi(2) - 1.0;
             joints.iter().filter(|j| sigma[**j] > 0.0).map(of).sum()
         };
         let needed = excess(&self) <= self.study.rule().much_left * excess(&logged);

@@ -1,11 +1,11 @@
 //! What is said of what was found.
 //!
-//! `conclude` makes the result ([`Explained`]): `compose` the model of what was accepted and what that
-//! leaves, `unattributed` and `dependencies` what stays without a name and what it depends on, `laws` the formulas of what has no name, `logs` what is different in which log, `correction`
-//! the curves that take a part of it off, `doubts` what a reader must know, `verdict` how far each
-//! joint is explained, `probability` how often such a name is right, `contradictions` whether all of it agrees, `curves` and `shown` the figures,
-//! `next` what an experiment would decide. JSON is made of these types by whoever writes it, and nothing here
-//! reads it.
+//! `conclude` makes the result ([`Explained`]): `compose` the model of what was accepted and what that leaves,
+//! `unattributed` and `dependencies` what stays without a name and what it depends on, `laws` the formulas of what has
+//! no name, `logs` what is different in which log, `correction` the curves that take a part of it off, `doubts` what a
+//! reader must know, `verdict` how far each joint is explained, `probability` how often such a name is right,
+//! `contradictions` whether all of it agrees, `curves` and `shown` the figures, `next` what an experiment would decide.
+//! JSON is made of these types by whoever writes it, and nothing here reads it.
 
 mod compose;
 mod conclude;

@@ -1,13 +1,13 @@
 //! What is in logs of the validation set only, or a body that all fitted logs have and no other one: it is found and
 //! taken out before that set judges anything.
 
-use super::super::comparison::surprise;
+use super::super::comparison::{leftover, surprise};
 use super::super::named::NamedEffect;
 use super::super::search::{Extent, Screen, evidence, level_by_chance, refusal};
 use crate::explanation::effects::{self, Candidate, Context, Found, Part, Window, contact_wrench};
 use crate::explanation::options::ExplainOptions;
 use crate::explanation::rule::Rule;
-use crate::identification::estimate::{Fit, Folds, Term, fit, spread};
+use crate::identification::estimate::{Fit, Folds, Term, fit, noise_floor, spread};
 use crate::logs::log::Log;
 use crate::logs::regression::{Column, Data, DataError, RigidArm};
 
@@ -160,8 +160,8 @@ fn taken_out_of_fitted(
         return None;
     }
     *base = without;
-    let errors = [residual, left].map(|residual| spread(validation, &residual).rms);
-    Some(told(rule, pooled, &[seen], vec![[torque, validation.zeros()]], errors))
+    let named = named(rule, pooled, &[seen], validation, [residual, left]);
+    Some(with_torques(rule, pooled, &[seen], named, vec![[torque, validation.zeros()]]))
 }
 
 /// Takes what was seen of an effect out of the validation set, where it is what makes its logs odd.
@@ -185,24 +185,24 @@ fn taken_out(
     }
     subtract(validation, &torque);
     let left = base.residual_on(validation, &[]);
-    let errors = [residual, left].map(|residual| spread(validation, &residual).rms);
+    let named = named(rule, pooled, seen, validation, [residual, left]);
     let torques = torques.into_iter().map(|there| [data.zeros(), there]).collect();
-    Some(told(rule, pooled, seen, torques, errors))
+    Some(with_torques(rule, pooled, seen, named, torques))
 }
 
-/// What is said of what was seen of an effect, with its torques and the errors on the validation set before and after.
-fn told(
+/// What is said of what was seen of an effect, with what is left on the validation set before and after.
+fn named(
     rule: &Rule,
     pooled: &Pooled<'_>,
     seen: &[&Seen],
-    torques: Vec<[Vec<Vec<f64>>; 2]>,
-    [before, after]: [Vec<f64>; 2],
-) -> Held {
+    validation: &Data<'_>,
+    left: [Vec<Vec<f64>>; 2],
+) -> NamedEffect {
+    let Candidate { joints, .. } = &seen[0].candidate;
     let effect = seen[0].candidate.effect();
+    let [before, after] = left.map(|residual| spread(validation, &residual).rms);
     let context = Context::new(&pooled.data, &pooled.fit, &pooled.fit.residual, rule);
-    let found: Vec<Found<'_>> = (seen.iter())
-        .map(|seen| Found { candidate: &seen.candidate, coefficients: &seen.coefficients })
-        .collect();
+    let found: Vec<Found<'_>> = seen.iter().map(|seen| seen.found()).collect();
     let middle = |seen: &&Seen| {
         let mut gains = seen.fold_gains.clone();
         gains.sort_by(f64::total_cmp);
@@ -214,13 +214,13 @@ fn told(
             logs.push(window.log.clone());
         }
     }
-    let named = NamedEffect {
-        // Known when all that is left is.
+    NamedEffect {
+        // Follows from the rest when the result is made.
         probability: f64::NAN,
         effect: effect.name().to_string(),
-        joints: seen[0].candidate.joints.clone(),
+        joints: joints.clone(),
         figures: effect.figures(&context, &found),
-        leftover: after.iter().zip(&before).map(|(a, b)| (a / b).powi(2)).sum::<f64>() / before.len() as f64,
+        leftover: leftover(&before, &after, &noise_floor(validation), joints),
         rms_before: before,
         rms_after: after,
         p_value: seen.iter().map(|seen| seen.p_value).fold(0.0, f64::max),
@@ -232,13 +232,24 @@ fn told(
         relative_std: Vec::new(),
         class: effect.class().name().to_string(),
         rivals: Vec::new(),
-    };
-    let part = |(found, torque): (&Found<'_>, [Vec<Vec<f64>>; 2])| HeldPart {
-        part: effect.part(&context, found.candidate, found.coefficients),
-        windows: found.candidate.windows.clone(),
+    }
+}
+
+/// What was seen of an effect as parts of a model, each with its torques.
+fn with_torques(
+    rule: &Rule,
+    pooled: &Pooled<'_>,
+    seen: &[&Seen],
+    named: NamedEffect,
+    torques: Vec<[Vec<Vec<f64>>; 2]>,
+) -> Held {
+    let context = Context::new(&pooled.data, &pooled.fit, &pooled.fit.residual, rule);
+    let part = |(seen, torque): (&&Seen, [Vec<Vec<f64>>; 2])| HeldPart {
+        part: seen.candidate.effect().part(&context, &seen.candidate, &seen.coefficients),
+        windows: seen.candidate.windows.clone(),
         torque,
     };
-    let parts = found.iter().zip(torques).map(part).collect();
+    let parts = seen.iter().zip(torques).map(part).collect();
     Held { named, parts }
 }
 
@@ -270,6 +281,10 @@ fn look(rule: &Rule, pooled: &Pooled<'_>) -> Option<Seen> {
 }
 
 impl Seen {
+    fn found(&self) -> Found<'_> {
+        Found { candidate: &self.candidate, coefficients: &self.coefficients }
+    }
+
     /// Its torque on some logs, by joint and row, N·m.
     fn torque(&self, data: &Data<'_>, base: &Fit, rule: &Rule) -> Vec<Vec<f64>> {
         let mut torque = data.zeros();
