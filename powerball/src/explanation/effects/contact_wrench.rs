@@ -2,7 +2,7 @@
 
 use super::payload::all_joints;
 use super::window_sums::{Sums, explained};
-use super::windows::{best_run, by_log, cut, window};
+use super::windows::{best_run, by_log, cut, rests, step_start, window};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part, Window};
 use crate::identification::estimate::Solver;
 use crate::logs::regression::Column;
@@ -81,10 +81,7 @@ impl Effect for ContactWrench {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let Some(constant) = search(context) else { return Vec::new() };
-        let pushes = pushes(context, &constant);
-        let searched = constant.searched + pushes.len() as f64;
-        std::iter::once(constant).chain(pushes).map(|c| Candidate { searched, ..c }).collect()
+        search(context).unwrap_or_default()
     }
 
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
@@ -145,9 +142,10 @@ impl Effect for ContactWrench {
     }
 }
 
-/// The window that explains most: the best of all short ones and of longer ones on a coarse grid, with its
-/// ends moved.
-fn search(context: &Context<'_>) -> Option<Candidate> {
+/// A constant force in the window that explains most, and pushes about its middle. Short windows are all tried, longer
+/// ones on a coarse grid, whose ends are then moved. None begins where the arm sets off from rest: what it errs there by is
+/// how it sets off. A push that goes on is found from then on.
+fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
     let (data, fit) = (context.data, context.fit);
     let columns = data.force_columns();
     if columns.len() < 3 {
@@ -156,6 +154,12 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     let (gram, _, _) = fit.gram.fitted(&fit.weights, |_| true);
     let solver = Solver::new(&gram, |c| fit.free[c]);
     let steps = data.blocks_of(GRID);
+    let rests = rests(context, &steps, GRID);
+    let sets_off: Vec<bool> = (steps.iter())
+        .map(|step| {
+            step_start(context, step).is_none_or(|start| sets_off(&rests, &data.logs[step.log], start))
+        })
+        .collect();
     let mut before = vec![Sums::zero(&solver, 3)];
     for step in &steps {
         let mut sum = before[before.len() - 1].clone();
@@ -165,6 +169,9 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
     let mut searched = 0.0;
     let mut best: Option<(f64, Range<usize>)> = None;
     let mut consider = |window: Range<usize>, best: &mut Option<(f64, Range<usize>)>| {
+        if sets_off[window.start] {
+            return;
+        }
         let mut sums = before[window.end].clone();
         sums.add(&before[window.start], -1.0);
         searched += 1.0;
@@ -216,11 +223,20 @@ fn search(context: &Context<'_>) -> Option<Candidate> {
         }
     }
     let windows = vec![window(context, &steps, log, &found)?];
-    Some(Candidate { joints: all_joints(data), settings: Settings::Constant.into(), windows, searched })
+    let constant =
+        Candidate { joints: all_joints(data), settings: Settings::Constant.into(), windows, searched };
+    let pushes = pushes(context, &constant, &rests);
+    let searched = searched + pushes.len() as f64;
+    Some(std::iter::once(constant).chain(pushes).map(|c| Candidate { searched, ..c }).collect())
+}
+
+/// Whether an arm rests or sets off at a time of a log.
+fn sets_off(rests: &[Window], log: &str, time: f64) -> bool {
+    rests.iter().any(|rest| rest.log == log && (rest.from..rest.to + GRID).contains(&time))
 }
 
 /// Pushes about the middle of a constant force, which covers but the height of one.
-fn pushes(context: &Context<'_>, constant: &Candidate) -> Vec<Candidate> {
+fn pushes(context: &Context<'_>, constant: &Candidate, rests: &[Window]) -> Vec<Candidate> {
     let Some(window) = constant.windows.first() else { return Vec::new() };
     let (middle, length) = (0.5 * (window.from + window.to), window.to - window.from);
     let recordings = || context.data.recordings.iter().filter(|r| context.data.logs[r.log] == window.log);
@@ -230,7 +246,7 @@ fn pushes(context: &Context<'_>, constant: &Candidate) -> Vec<Candidate> {
         let (middle, half) = (middle + late * length, 0.5 * longer * length);
         let window = Window { from: middle - half, to: middle + half, ..window.clone() };
         let inside = window.from > starts && window.to < ends && half < 0.5 * LONGEST_PUSH;
-        inside.then(|| Candidate {
+        (inside && !sets_off(rests, &window.log, window.from)).then(|| Candidate {
             windows: vec![window],
             settings: Settings::Push.into(),
             ..constant.clone()

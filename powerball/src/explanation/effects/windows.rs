@@ -80,18 +80,42 @@ pub(super) fn best_run(explains: &[(f64, f64)]) -> Range<usize> {
     best.1
 }
 
+/// Where no joint moves for as long as `rest`, s, before the arm sets off.
+pub(super) fn rests(context: &Context<'_>, steps: &[Block], rest: f64) -> Vec<Window> {
+    let mut before: Option<&Block> = None;
+    let of = |step| {
+        let last = before.replace(step).filter(|other| other.recording == step.recording);
+        let begins = context.data.recordings[step.recording].start;
+        let since = last.map_or(Some(begins), |last| step_end(context, last))?;
+        let until = step_start(context, step)?;
+        (until - since > rest).then(|| Window::new(context.data, step.log, since, until))
+    };
+    steps.iter().filter_map(of).collect()
+}
+
 /// The time of the first row of a step in its log's own t.
-fn step_start(context: &Context<'_>, step: &Block) -> Option<f64> {
+pub(super) fn step_start(context: &Context<'_>, step: &Block) -> Option<f64> {
+    row_times(context, step, |rows| rows.start).min_by(f64::total_cmp)
+}
+
+/// That of its last row.
+fn step_end(context: &Context<'_>, step: &Block) -> Option<f64> {
+    row_times(context, step, |rows| rows.end - 1).max_by(f64::total_cmp)
+}
+
+/// The times of one row of a step by joint that has any.
+fn row_times(
+    context: &Context<'_>,
+    step: &Block,
+    row: impl Fn(&Range<usize>) -> usize,
+) -> impl Iterator<Item = f64> {
     let data = context.data;
     let recording = &data.recordings[step.recording];
-    (0..data.dof())
-        .filter(|j| !step.rows[*j].is_empty())
-        .map(|j| {
-            let joint = &data.joints[j];
-            let k = joint.kept[step.recording][step.rows[j].start - joint.rows[step.recording].start];
-            recording.start + joint.band.kept(recording.len())[k] as f64 / recording.rate
-        })
-        .min_by(f64::total_cmp)
+    (0..data.dof()).filter(|j| !step.rows[*j].is_empty()).map(move |j| {
+        let joint = &data.joints[j];
+        let k = joint.kept[step.recording][row(&step.rows[j]) - joint.rows[step.recording].start];
+        recording.start + joint.band.kept(recording.len())[k] as f64 / recording.rate
+    })
 }
 
 fn end_of_log(context: &Context<'_>, log: usize) -> f64 {

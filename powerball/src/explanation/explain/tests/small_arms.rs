@@ -198,6 +198,29 @@ fn the_same_push_is_seen_in_other_logs_and_another_one_is_not() {
     assert!(after < 0.1 * before, "{before} {after}");
 }
 
+/// What is wrong only as an arm sets off is how it sets off, and no hand; the same in the middle of a motion is one.
+#[test]
+fn no_push_is_seen_where_an_arm_sets_off() {
+    const REST: usize = 400;
+    let named = |start| {
+        let (arm, plant) = planar();
+        let push = Effect::ContactWrench { force: [3.0, 6.0, 0.0], start, length: 0.4, every: 1e3 };
+        let mut logs = recorded(&arm, &plant, &[(push, &[2])]);
+        for log in &mut logs {
+            let later = REST as f64 / 200.0;
+            log.t = (0..REST).map(|k| k as f64 / 200.0).chain(log.t.iter().map(|t| t + later)).collect();
+            for signal in log.q.iter_mut().chain(&mut log.torque) {
+                let first = signal[0];
+                signal.splice(0..0, vec![first; REST]);
+            }
+            log.pieces.last_mut().unwrap().end = log.t.len();
+        }
+        names(&explained_logs(&arm, logs)).join(" ")
+    };
+    assert_eq!(named(0.1), "");
+    assert_eq!(named(6.1), "contact_wrench");
+}
+
 /// Two pushes with a pause of 0.7 s are two, each with its own force.
 #[test]
 fn pushes_close_to_each_other_are_told_apart() {
