@@ -43,7 +43,7 @@ fn cases() -> Vec<Case> {
     let mut cases = vec![
         Case {
             name: "ur10e",
-            title: "UR10e: what a rigid arm with Eq. 16 friction lacks",
+            title: "UR10e: what a rigid arm with tanh friction (Eq. 16) lacks",
             question: "Five exciting trajectories are fitted, two others are held out. Currents stand for \
                 torques.",
             folder: "ur10e",
