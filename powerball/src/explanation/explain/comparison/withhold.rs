@@ -79,18 +79,20 @@ fn impossible(study: &Study<'_>, model: &Model) -> Option<usize> {
     found.position(|(a, coefficients)| !a.effect().possible(&context, &a.candidate, &coefficients))
 }
 
-/// The accepted effect without which the logs to judge on are predicted clearly better on its joints.
+/// The accepted effect without which the logs to judge on are predicted clearly better, on its joints or on all: what one
+/// joint gains others may lose, since they share their parameters.
 fn harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
     let error = |left: &[Vec<f64>], joints: &[JointNumber]| -> f64 {
         let square = |j: &JointNumber| left[j.index()].iter().map(|e| e * e).sum::<f64>();
         joints.iter().map(square).filter(|s| *s > 0.0).map(f64::ln).sum::<f64>() / joints.len() as f64
     };
+    let all: Vec<JointNumber> = (0..study.data.dof()).map(JointNumber::from_index).collect();
     let with = model.residual_on_validation(study);
     let found = (0..model.accepted.len()).rev().filter(|k| model.accepted[*k].step.is_some());
     found.into_iter().find(|k| {
         let joints = &model.accepted[*k].candidate.joints;
         let without = model.without(study, *k).residual_on_validation(study);
-        error(&without, joints) < error(&with, joints) - study.rule().harm
+        [joints, &all].iter().any(|on| error(&without, on) < error(&with, on) - study.rule().harm)
     })
 }
 

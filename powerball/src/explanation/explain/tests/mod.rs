@@ -1,5 +1,6 @@
 mod correction;
 mod laws;
+mod measured;
 mod model;
 mod names;
 #[cfg(feature = "virtual-arm")]
