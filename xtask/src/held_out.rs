@@ -4,7 +4,7 @@
 use super::textbook::{Plain, Squares};
 use dyngen::Arm;
 use powerball::identification::estimate::{
-    FrictionKind, Spread, reduce_in_bands, solve_in_band, solve_reduced, spread_of,
+    FrictionKind, ResidualStats, reduce_in_bands, solve_in_band, solve_reduced, stats_of,
 };
 use powerball::logs::log::read_logs;
 use powerball::logs::regression::{DataOptions, RigidArm};
@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
             let (others, held_out) = (others.of_joints(&bands), held_out.of_joints(&bands));
             let solution = solve_reduced(&others, FrictionKind::Symmetric);
             let there = solution.on(&held_out).map_err(|e| e.to_string())?;
-            base.push(squares(&spread_of(&there, &there.theta), &held_out));
+            base.push(squares(&stats_of(&there, &there.theta), &held_out));
             rival.push(Plain::fit(&others).squares(&held_out));
         }
     }
@@ -82,7 +82,7 @@ fn told(name: &str, others: &Bands, asked: &[usize]) {
     println!("{:<40}{} Hz", "", ends.join(" "));
 }
 
-fn squares(spread: &Spread, held_out: &Summary) -> Squares {
+fn squares(spread: &ResidualStats, held_out: &Summary) -> Squares {
     let joints = spread.rms.iter().zip(&spread.relative).zip(&held_out.joints);
     let of_joint = |((rms, share), octaves): ((&f64, &f64), &Octaves)| {
         let rows = octaves.rows() as f64;

@@ -4,7 +4,7 @@
 mod accuracy;
 mod angles;
 mod batch;
-pub mod c_door;
+pub mod c_api;
 mod code;
 mod docs;
 mod friction;

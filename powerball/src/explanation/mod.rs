@@ -7,7 +7,7 @@
 //! | [`experiment`] | where names stay open: the path on which they differ most, and what its log decides |
 //! | [`torque_model`] | a model with its effects: its file, its torque along logs, its controller's code |
 //!
-//! [`explain()`] is the door, and [`Rule`] holds every threshold.
+//! [`explain()`] is the API, and [`Rule`] holds every threshold.
 //!
 //! ```no_run
 //! use powerball::logs::log::read_logs;
@@ -26,7 +26,7 @@
 //! # }
 //! ```
 
-mod door;
+mod api;
 pub mod effects;
 pub mod experiment;
 pub mod explain;
@@ -34,7 +34,7 @@ mod options;
 mod rule;
 pub mod torque_model;
 
-pub use door::{Prepared, explain};
+pub use api::{Prepared, explain};
 pub use explain::{Explained, explain_body};
 pub use options::{ExplainError, ExplainOptions, RuledOut};
 pub use rule::{Rule, RuleError};

@@ -33,7 +33,7 @@ pub struct Rule {
     /// round, needs no folds: a tenth of the rms.
     pub large_gain: f64,
     /// … where either way adds the same: their correlation.
-    pub alike: f64,
+    pub least_correlation: f64,
     /// The zeros of torque sensors are in the model from the start where so many joints gain
     /// [`large_gain`](Self::large_gain) by them, both ways round: one joint alone is an effect like any other.
     pub joints_with_zeros: usize,
@@ -63,9 +63,9 @@ pub struct Rule {
 
     /// A term of the class of an accepted one, on the same joint, that gains less than this share of it mends
     /// that one's law and is no effect of its own.
-    pub mends_only: f64,
+    pub only_corrects_class: f64,
     /// The same for a term of another class: laws are wrong by a few percent, and that shows in any guise.
-    pub mends_any: f64,
+    pub only_corrects_any: f64,
     /// Two events this close count as one whose time is a little off, s.
     pub same_event: f64,
 
@@ -85,7 +85,7 @@ pub struct Rule {
     /// excess over the noise floor: then something else is there, and what fits best only resembles it. The
     /// share is that of an earlier trial on other data. What is in validation logs only must leave no more of
     /// their excess over the fitted logs.
-    pub much_left: f64,
+    pub max_unexplained: f64,
     /// An event of some seconds (a push) is not given where more than this share of what its time has more than others
     /// of squared error stays: what explains less than half of it is something else.
     pub event_left: f64,
@@ -99,7 +99,7 @@ pub struct Rule {
 
     /// A name is taken back where without its effect the squared error on the validation set is smaller by this
     /// share, on its joints. What is in validation logs only must not raise that of any joint by this share.
-    pub harm: f64,
+    pub max_validation_loss: f64,
 
     /// A setting is refined for more than chance gains by one more coefficient, in units of χ².
     pub refinement_gain: f64,
@@ -172,7 +172,7 @@ impl Default for Rule {
             folds_that_must_gain: 0.8,
             worst_fold: -0.05,
             large_gain: 0.19,
-            alike: 0.5,
+            least_correlation: 0.5,
             joints_with_zeros: 2,
             block_memories: 3.0,
             shortest_block: 0.5,
@@ -184,18 +184,18 @@ impl Default for Rule {
             final_surrogates: 2000,
             peak_surrogates: 200,
             surrogate_correlation: 0.4,
-            mends_only: 0.15,
-            mends_any: 0.05,
+            only_corrects_class: 0.15,
+            only_corrects_any: 0.05,
             same_event: 2.0,
             as_good: 0.02,
             as_good_score: 3.0,
             least_margin: 1.1,
             same_part: 0.9,
-            much_left: 0.35,
+            max_unexplained: 0.35,
             event_left: 0.5,
             least_missing: 0.5,
             missing_errors: 3.2,
-            harm: 0.1,
+            max_validation_loss: 0.1,
             refinement_gain: 1.0,
             same_path: 0.9,
             few_cycles: 5.0,
@@ -281,7 +281,7 @@ impl Rule {
         [
             ("family_wise", self.family_wise),
             ("folds_that_must_gain", self.folds_that_must_gain),
-            ("alike", self.alike),
+            ("least_correlation", self.least_correlation),
             ("surrogate_level", self.surrogate_level),
             ("event_surrogate_level", self.event_surrogate_level),
             ("surrogate_correlation", self.surrogate_correlation),

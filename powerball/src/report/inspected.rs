@@ -34,7 +34,7 @@ fn of_file(page: &mut Page, file: &Inspected) {
         );
     }
     file.refused.iter().for_each(|why| page.note(Tone::Bad, why));
-    file.doubts.iter().for_each(|doubt| page.note(Tone::Plain, doubt));
+    file.warnings.iter().for_each(|doubt| page.note(Tone::Plain, doubt));
     for table in &file.tables {
         of_table(page, table);
     }

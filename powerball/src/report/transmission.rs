@@ -18,7 +18,7 @@ pub fn add_to_page(page: &mut Page, joints: &[JointTransmission]) {
     ]);
     for joint in joints {
         match joint {
-            JointTransmission::Told(told) => table.push(row(told)),
+            JointTransmission::Known(result) => table.push(row(result)),
             JointTransmission::Unknown(unknown) => {
                 let nothing = std::iter::repeat_n(String::new(), 6);
                 let first = std::iter::once(unknown.joint.to_string());
@@ -34,17 +34,17 @@ pub fn add_to_page(page: &mut Page, joints: &[JointTransmission]) {
     );
 }
 
-fn row(told: &Transmission) -> [String; 8] {
+fn row(result: &Transmission) -> [String; 8] {
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-    let effects: Vec<String> = told.effects.iter().map(TransmissionEffect::in_words).collect();
+    let effects: Vec<String> = result.effects.iter().map(TransmissionEffect::in_words).collect();
     [
-        told.joint.to_string(),
-        format!("{:.4e} ± {}", told.ratio, percent(told.relative_std())),
-        number(told.coulomb),
-        number(told.viscous),
-        number(told.rotor_inertia),
-        percent(told.left),
-        percent(told.left_with),
+        result.joint.to_string(),
+        format!("{:.4e} ± {}", result.ratio, percent(result.relative_std())),
+        number(result.coulomb),
+        number(result.viscous),
+        number(result.rotor_inertia),
+        percent(result.left),
+        percent(result.left_with),
         effects.join(", "),
     ]
 }

@@ -40,7 +40,7 @@ def read_log(arm: Arm, log: LogLike, *, map: Optional[Map] = None) -> Recording:
 
 
 def inspect(file: PathLike, *, arm: Optional[Arm] = None, map: Optional[Map] = None) -> Dict[str, Any]:
-    """What ``powerball log --json`` says of a file: topics, columns, units, rates, gaps, doubts.
+    """What ``powerball log --json`` says of a file: topics, columns, units, rates, gaps, warnings.
 
     With ``arm`` also the log that ``identify`` would read, or why it is none.
     """

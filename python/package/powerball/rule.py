@@ -38,7 +38,7 @@ class Rule:
     #: round, needs no folds: a tenth of the rms.
     large_gain: float = 0.19
     #: … where either way adds the same: their correlation.
-    alike: float = 0.5
+    least_correlation: float = 0.5
     #: The zeros of torque sensors are in the model from the start where so many joints gain ``large_gain``
     #: by them, both ways round: one joint alone is an effect like any other.
     joints_with_zeros: int = 2
@@ -66,9 +66,9 @@ class Rule:
     surrogate_correlation: float = 0.4
     #: A term of the class of an accepted one, on the same joint, that gains less than this share of it
     #: mends that one's law and is no effect of its own.
-    mends_only: float = 0.15
+    only_corrects_class: float = 0.15
     #: The same for a term of another class: laws are wrong by a few percent, and that shows in any guise.
-    mends_any: float = 0.05
+    only_corrects_any: float = 0.05
     #: Two events this close count as one whose time is a little off, s.
     same_event: float = 2.0
     #: A group with fewer columns is preferred where the better one's score is larger by less than this
@@ -87,7 +87,7 @@ class Rule:
     #: then something else is there, and what fits best only resembles it. The share is that of an earlier
     #: trial on other data. What is in validation logs only must leave no more of their excess over the
     #: fitted logs.
-    much_left: float = 0.35
+    max_unexplained: float = 0.35
     #: An event of some seconds (a push) is not given where more than this share of what its time has more
     #: than others of squared error stays: what explains less than half of it is something else.
     event_left: float = 0.5
@@ -100,7 +100,7 @@ class Rule:
     #: A name is taken back where without its effect the squared error on the validation set is smaller by
     #: this share, on its joints. What is in validation logs only must not raise that of any joint by this
     #: share.
-    harm: float = 0.1
+    max_validation_loss: float = 0.1
     #: A setting is refined for more than chance gains by one more coefficient, in units of χ².
     refinement_gain: float = 1.0
     #: Two recordings are one path where their positions over time correlate more than this: a path that

@@ -8,7 +8,7 @@ use super::law::{ExtraTorque, Misfit, OtherFriction, OtherLaw, Outside, OutsideL
 use dyngen::{Arm, Model, SetKind};
 use powerball::controller::friction::TanhFriction;
 use powerball::explanation::{ExplainOptions, explain_body};
-use powerball::identification::estimate::{Folds, fit, spread};
+use powerball::identification::estimate::{Folds, fit, residual_stats};
 use powerball::identification::excite::{Settings, optimise};
 use powerball::identification::motion::Motion;
 use powerball::logs::log::{Log, common_clock};
@@ -393,7 +393,7 @@ impl Bench {
         let data = Data::new(&self.body, to_fit, options).map_err(|e| e.to_string())?;
         let other = Data::new(&self.body, held_out, options).map_err(|e| e.to_string())?;
         let base = fit(&data, &Folds::new(&data), &[], None);
-        Ok(spread(&other, &base.residual_on(&other, &[])).rms)
+        Ok(residual_stats(&other, &base.residual_on(&other, &[])).rms)
     }
 }
 

@@ -79,7 +79,7 @@ impl BusError {
     }
 }
 
-/// One participant's door to a CAN bus.
+/// One participant's side of a CAN bus.
 pub trait Bus: fmt::Debug {
     /// Time on the bus's clock, µs since it was opened.
     fn now(&self) -> Micros;

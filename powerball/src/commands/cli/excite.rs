@@ -235,8 +235,8 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     }
 }
 
-fn in_json(told: &Excited, files: &[PathBuf]) -> Value {
-    let mut object = excited::json(told);
+fn in_json(result: &Excited, files: &[PathBuf]) -> Value {
+    let mut object = excited::json(result);
     match object.get_mut("trajectories").and_then(Value::as_array_mut) {
         Some(list) => list.iter_mut().zip(files).for_each(|(entry, file)| entry["out"] = json!(file)),
         None => object["out"] = json!(files.first()),
@@ -244,10 +244,10 @@ fn in_json(told: &Excited, files: &[PathBuf]) -> Value {
     object
 }
 
-fn in_words(told: &Excited, files: &[PathBuf]) -> String {
+fn in_words(result: &Excited, files: &[PathBuf]) -> String {
     let mut out = String::new();
-    let (good, usual) = (&told.found.figures, &told.found.usual);
-    for (trajectory, file) in told.trajectories.iter().zip(files) {
+    let (good, usual) = (&result.found.figures, &result.found.usual);
+    for (trajectory, file) in result.trajectories.iter().zip(files) {
         let motion = &trajectory.motion;
         let _ = writeln!(
             out,
@@ -264,15 +264,15 @@ fn in_words(told: &Excited, files: &[PathBuf]) -> String {
          as optimised (rows over torque limits, columns over their usual size): {:.2} (a random path: \
          {:.1}), \
          smallest singular value {:.3} ({:.3})",
-        told.parameters.0,
-        told.conditions.raw,
-        told.conditions.normalised,
+        result.parameters.0,
+        result.conditions.raw,
+        result.conditions.normalised,
         good.condition,
         usual.condition,
         good.least,
         usual.least
     );
-    for trajectory in &told.trajectories {
+    for trajectory in &result.trajectories {
         let _ = writeln!(
             out,
             "\njoint   position [rad]     of limit        velocity  of limit   acceleration  of limit   torque  of limit"
@@ -297,7 +297,7 @@ fn in_words(told: &Excited, files: &[PathBuf]) -> String {
         }
     }
     out.push('\n');
-    told.assumed.iter().for_each(|line| {
+    result.assumed.iter().for_each(|line| {
         let _ = writeln!(out, "assumed: {line}");
     });
     out

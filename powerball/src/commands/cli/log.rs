@@ -147,7 +147,7 @@ fn text(file: &Inspected) -> String {
             ));
         }
     }
-    lines.extend(file.doubts.iter().map(|doubt| format!("  note: {doubt}")));
+    lines.extend(file.warnings.iter().map(|doubt| format!("  note: {doubt}")));
     lines.join("\n")
 }
 

@@ -3,7 +3,7 @@
 use super::Failure;
 use crate::controller::JointNumber;
 use crate::identification::conventions::Conventions;
-use crate::identification::estimate::Spread;
+use crate::identification::estimate::ResidualStats;
 use crate::report::files;
 use clap::Args;
 use std::io::{IsTerminal, Write};
@@ -231,7 +231,7 @@ fn date(days: u64) -> (u64, u64, u64) {
 }
 
 /// Errors by joint as a table; several spreads side by side.
-pub(crate) fn table(columns: &[(&str, &Spread)]) -> String {
+pub(crate) fn table(columns: &[(&str, &ResidualStats)]) -> String {
     let mut text = String::from("joint");
     for (name, _) in columns {
         text.push_str(&format!("  {name:>26}"));

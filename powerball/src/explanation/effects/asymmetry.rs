@@ -32,7 +32,7 @@ pub struct Figures {
 
 impl Effect for Asymmetry {
     /// Every torque sensor has a zero.
-    fn beside(&self, context: &Context<'_>) -> Vec<Candidate> {
+    fn baseline(&self, context: &Context<'_>) -> Vec<Candidate> {
         let both_ways = context.moving_joints().filter(|j| turns_both_ways(context, *j));
         both_ways.map(|j| Candidate::on(j, Settings::Constant, 1)).collect()
     }

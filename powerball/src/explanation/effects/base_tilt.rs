@@ -22,7 +22,7 @@ pub(super) struct BaseTilt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Whether the parameters that level gravity does not show are fitted too
-    /// ([`RigidArm::hidden`](crate::logs::regression::RigidArm::hidden)).
+    /// ([`RigidArm::gravity_unobservable`](crate::logs::regression::RigidArm::hidden)).
     pub unshown: bool,
 }
 
@@ -56,7 +56,8 @@ impl Effect for BaseTilt {
         if joints.is_empty() || weightless {
             return Vec::new();
         }
-        let kinds: &[bool] = if context.data.body.hidden().is_empty() { &[false] } else { &[false, true] };
+        let kinds: &[bool] =
+            if context.data.body.gravity_unobservable().is_empty() { &[false] } else { &[false, true] };
         let with = |unshown: &bool| Candidate::on_all(joints.clone(), Settings { unshown: *unshown }, 1);
         kinds.iter().map(with).collect()
     }
@@ -64,7 +65,7 @@ impl Effect for BaseTilt {
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
         let body = context.data.body;
         let (turns, all) = (turns(context), body.carried(context.fit.inertial()));
-        let unshown: &[Vec<f64>] = if with_unshown(candidate) { body.hidden() } else { &[] };
+        let unshown: &[Vec<f64>] = if with_unshown(candidate) { body.gravity_unobservable() } else { &[] };
         let known = turns.iter().map(|turn| pulled(context, turn, &all));
         // A turn about the other axis has the same columns, of other parameters.
         let unknown = unshown.iter().map(|direction| pulled(context, &turns[0], direction));
@@ -119,14 +120,14 @@ fn pulled(context: &Context<'_>, gravity: &[f64; 3], all: &[f64]) -> Option<Colu
 /// What all parameters gain where the unshown ones' torques are those found: under the whole tilt they are
 /// those of so much of each direction.
 fn moments(context: &Context<'_>, tilt: &[f64], found: &[f64]) -> Vec<f64> {
-    let hidden = context.data.body.hidden();
+    let gravity_unobservable = context.data.body.gravity_unobservable();
     let turns = turns(context);
     let whole = [0, 1, 2].map(|k| turns.iter().zip(tilt).map(|(turn, t)| t * turn[k]).sum::<f64>());
     let under = |gravity: &[f64; 3]| -> Vec<Column> {
-        hidden.iter().filter_map(|direction| pulled(context, gravity, direction)).collect()
+        gravity_unobservable.iter().filter_map(|direction| pulled(context, gravity, direction)).collect()
     };
     let (own, unit) = (under(&whole), under(&turns[0]));
-    if own.len() < hidden.len() || unit.len() < hidden.len() {
+    if own.len() < gravity_unobservable.len() || unit.len() < gravity_unobservable.len() {
         return Vec::new();
     }
     let product = |a: &Column, b: &Column| -> f64 {
@@ -136,7 +137,7 @@ fn moments(context: &Context<'_>, tilt: &[f64], found: &[f64]) -> Vec<f64> {
     let right: Vec<f64> =
         own.iter().map(|column| unit.iter().zip(found).map(|(u, c)| c * product(column, u)).sum()).collect();
     let much = Solver::new(&gram, |_| true).solve(&right);
-    let gain = |k: usize| hidden.iter().zip(&much).map(|(direction, m)| m * direction[k]).sum();
+    let gain = |k: usize| gravity_unobservable.iter().zip(&much).map(|(direction, m)| m * direction[k]).sum();
     (0..ParameterKind::ALL.len() * context.data.dof()).map(gain).collect()
 }
 

@@ -121,7 +121,7 @@ pub trait Effect: Sync {
 
     /// What is in the model from the start, so that no other effect is judged without it: what every
     /// arm may have, as the zero of a torque sensor. It is named at the end, where it is needed.
-    fn beside(&self, _context: &Context<'_>) -> Vec<Candidate> {
+    fn baseline(&self, _context: &Context<'_>) -> Vec<Candidate> {
         Vec::new()
     }
 

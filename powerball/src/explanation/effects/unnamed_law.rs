@@ -9,7 +9,7 @@ use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::controller::JointNumber;
 use crate::controller::correction::Law;
 use crate::explanation::rule::Rule;
-use crate::identification::estimate::{noise_floor, spread};
+use crate::identification::estimate::{noise_floor, residual_stats};
 use crate::logs::regression::Data;
 use serde::Serialize;
 
@@ -97,7 +97,7 @@ impl Effect for UnnamedLaw {
 
     /// On the joints where more than noise is left.
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let (rms, floor) = (spread(context.data, context.residual).rms, noise_floor(context.data));
+        let (rms, floor) = (residual_stats(context.data, context.residual).rms, noise_floor(context.data));
         let joints: Vec<JointNumber> = context.moving_joints().collect();
         let is_left = |j: &&JointNumber| {
             let (rule, j) = (context.rule, j.index());

@@ -90,9 +90,9 @@ pub fn learn(
     };
     options.progress.say("asking the new log which of the open names is right");
     let decision = decide(body, open, &fit, &held_out, options)?;
-    let mut told = options.clone();
-    told.ruled_out.extend(ruled_out(open, &decision));
-    let mut explained = explain_body(body, &fit, &held_out, &told)?;
+    let mut result = options.clone();
+    result.ruled_out.extend(ruled_out(open, &decision));
+    let mut explained = explain_body(body, &fit, &held_out, &result)?;
     explained.experiment = Some(Experiment {
         to_tell_apart: open.names(),
         log: file,

@@ -3,17 +3,17 @@
 use super::comparison::History;
 use super::model::Model;
 use super::named::FalsePositives;
-use super::prepare::Beforehand;
+use super::prepare::InitialFit;
 use super::special::{RestPush, predicts_better};
 use super::study::Study;
-use crate::identification::estimate::spread;
+use crate::identification::estimate::residual_stats;
 use std::collections::BTreeSet;
 
 /// Everything that the result says something of.
 pub(super) struct Findings<'a> {
     pub(super) study: Study<'a>,
     /// What was known before the search.
-    pub(super) beforehand: Beforehand,
+    pub(super) initial_fit: InitialFit,
     /// What the search accepted.
     pub(super) model: Model,
     /// What its steps decided.
@@ -37,15 +37,20 @@ impl<'a> Findings<'a> {
     /// than on its fitted logs.
     pub(super) fn or_as_logged(self, logged: Findings<'a>) -> Findings<'a> {
         let sigma = &logged.model.fit.sigma;
-        let joints: BTreeSet<usize> =
-            self.beforehand.held.iter().flat_map(|held| &held.named.joints).map(|j| j.index()).collect();
+        let joints: BTreeSet<usize> = self
+            .initial_fit
+            .validation_only
+            .iter()
+            .flat_map(|effect| &effect.named.joints)
+            .map(|j| j.index())
+            .collect();
         let excess = |findings: &Findings<'_>| -> f64 {
             let study = &findings.study;
-            let rms = spread(&study.validation, &findings.model.residual_on_validation(study)).rms;
+            let rms = residual_stats(&study.validation, &findings.model.residual_on_validation(study)).rms;
             let of = |j: &usize| (rms[*j] / sigma[*j]).powi(2) - 1.0;
             joints.iter().filter(|j| sigma[**j] > 0.0).map(of).sum()
         };
-        let needed = excess(&self) <= self.study.rule().much_left * excess(&logged);
+        let needed = excess(&self) <= self.study.rule().max_unexplained * excess(&logged);
         if needed { self } else { logged }
     }
 }

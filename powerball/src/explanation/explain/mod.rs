@@ -14,13 +14,13 @@
 //! | `comparison` | **whether a name is given**, what stays open, what is taken back |
 //! | `special` | what is special of some logs: one path, another running time, something held |
 //! | `by_log` | what is another in one log than in the others |
-//! | `prepare`, `begin`, `step` | the base model, what the search begins with, and one step of the loop |
+//! | `prepare`, `initial_model`, `step` | the base model, what the search begins with, and one step of the loop |
 //! | `findings`, `results` | what was found; the model, the report and its figures |
 
-mod begin;
 mod by_log;
 mod comparison;
 mod findings;
+mod initial_model;
 mod model;
 mod named;
 mod prepare;
@@ -31,7 +31,7 @@ mod step;
 mod study;
 
 pub use comparison::{Hypothesis, Open};
-pub use named::{FalsePositives, NamedEffect, Rival, Spreads};
+pub use named::{FalsePositives, FitErrors, NamedEffect, Rival};
 pub use results::{
     Change, Correction, Curve, Difference, Evidence, Experiment, Explained, FEATURES, LawCoefficient,
     LogResult, NextExperiment, Shown, State, TorqueCurve, Trajectory, Unattributed, UnnamedLaw, Verdict,
@@ -41,13 +41,13 @@ pub use results::{
 use crate::explanation::options::{ExplainError, ExplainOptions};
 use crate::logs::log::Log;
 use crate::logs::regression::RigidArm;
-use begin::begin;
 use comparison::{History, withhold, withhold_harmful};
 use findings::Findings;
-use prepare::{Begun, Inertia, ValidationOnly, prepare};
-use search::Among;
+use initial_model::initial_model;
+use prepare::{Inertia, Prepared, ValidationOnly, prepare};
+use search::CandidateKind;
 use special::pushes_at_rest;
-use step::{Outcome, Proposed, accept, drop_words, propose, settle_beside};
+use step::{Outcome, Proposed, accept, drop_words, judge_baseline, propose};
 
 /// Explains what the base model of an arm that is derived already lacks on `logs`, judged on `validate`. The
 /// logs are taken as they are: their clocks are joined already, and what is known is taken out of them.
@@ -65,7 +65,7 @@ pub fn explain_body(
         Ok(find(prepare(body, (logs, validate), options, inertia, validation_only)?))
     };
     let mut findings = found(Inertia::Shared, ValidationOnly::TakenOut)?;
-    if !findings.beforehand.held.is_empty() {
+    if !findings.initial_fit.validation_only.is_empty() {
         options.progress.say("the same with the logs to judge on as they are");
         findings = findings.or_as_logged(found(Inertia::Shared, ValidationOnly::Kept)?);
     }
@@ -79,12 +79,13 @@ pub fn explain_body(
 
 /// Adds one effect after the other until nothing passes and nothing is taken back; laws without a name where
 /// no name passes.
-fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
-    let (mut model, mut history, mut among) = (begin(base, &study), History::default(), Among::Names);
+fn find(Prepared { study, base, initial_fit }: Prepared<'_>) -> Findings<'_> {
+    let (mut model, mut history, mut among) =
+        (initial_model(base, &study), History::default(), CandidateKind::Names);
     for number in 0..study.rule().most_steps {
         study.say(&format!("step {}: screening candidates", number + 1));
         let Proposed { refused, outcome } = propose(&study, &model, number, among);
-        if among == Among::Names {
+        if among == CandidateKind::Names {
             history.refused = refused;
         }
         match outcome {
@@ -92,7 +93,7 @@ fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
                 let step = accept(&study, &mut model, *choice, number);
                 study.say(&format!("step {}: {} accepted", number + 1, step.effect.name()));
                 history.steps.push(step);
-                among = Among::Names;
+                among = CandidateKind::Names;
             }
             Outcome::Chance(candidates) => {
                 study.say(&format!("step {}: what fits best fits no better than by chance", number + 1));
@@ -102,9 +103,9 @@ fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
             Outcome::Nothing => {
                 if let Some(taken) = withhold(&study, &mut model, &mut history) {
                     study.say(&format!("{} is not named: {}", taken.effect.name(), taken.why));
-                    among = Among::Names;
-                } else if among == Among::Names && search::is_left(&study, &model) {
-                    among = Among::Laws;
+                    among = CandidateKind::Names;
+                } else if among == CandidateKind::Names && search::is_left(&study, &model) {
+                    among = CandidateKind::Laws;
                 } else {
                     break;
                 }
@@ -113,7 +114,7 @@ fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
     }
     while withhold(&study, &mut model, &mut history).is_some() {}
     study.say("judging the zeros of the torques");
-    history.steps.extend(settle_beside(&study, &mut model));
+    history.steps.extend(judge_baseline(&study, &mut model));
     while withhold_harmful(&study, &mut model, &mut history).is_some() {}
     study.say("refining settings");
     search::refine(&study, &mut model);
@@ -123,7 +124,7 @@ fn find(Begun { study, base, beforehand }: Begun<'_>) -> Findings<'_> {
     study.say("asking time-shift surrogates");
     let false_positives = search::false_positives(&study, &model);
     let at_rest = pushes_at_rest(&study, &model);
-    Findings { study, beforehand, model, history, at_rest, false_positives }
+    Findings { study, initial_fit, model, history, at_rest, false_positives }
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ pub(super) struct Accepted {
     pub(super) fold_gain: f64,
     /// Squared error that fell when it was accepted, by joint, (N·m)² summed over rows.
     pub(super) explained: Vec<f64>,
-    /// The step that accepted it; none where it is in the model from the start (see [`Effect::beside`]).
+    /// The step that accepted it; none where it is in the model from the start (see [`Effect::baseline`]).
     pub(super) step: Option<usize>,
     /// Its coefficients where they were measured above the band of the fit: it has no column there.
     pub(super) measured: Option<Vec<f64>>,
@@ -57,8 +57,8 @@ impl Model {
         Model { accepted: Vec::new(), given_up: Vec::new(), fit: base }
     }
 
-    /// The base model with what every arm may have (see [`Effect::beside`]). Its friction is looked for anew.
-    pub(super) fn beside(&self, study: &Study<'_>) -> Model {
+    /// The base model with what every arm may have (see [`Effect::baseline`]). Its friction is looked for anew.
+    pub(super) fn baseline(&self, study: &Study<'_>) -> Model {
         let context = self.context(study);
         let mut terms: Vec<Term> = Vec::new();
         let accepted = |candidate: Candidate| {
@@ -76,7 +76,7 @@ impl Model {
                 measured: None,
             }
         };
-        let candidates = effects::all().iter().flat_map(|effect| effect.beside(&context));
+        let candidates = effects::all().iter().flat_map(|effect| effect.baseline(&context));
         let accepted: Vec<Accepted> = candidates.map(accepted).collect();
         Model { accepted, given_up: Vec::new(), fit: fit(&study.data, &study.folds, &terms, None) }
     }
@@ -91,7 +91,7 @@ impl Model {
 
     /// Takes in what was measured above the band of the fit.
     pub(super) fn add_measured(&mut self, study: &Study<'_>, accepted: Accepted) {
-        let columns = study.here(&self.fit, &[]).columns(&accepted.candidate);
+        let columns = study.on_fitted(&self.fit, &[]).columns(&accepted.candidate);
         take_measured_out(&accepted, &columns, &mut self.fit.residual);
         self.accepted.push(accepted);
     }
@@ -109,7 +109,7 @@ impl Model {
 
     /// The model seen on the logs that it was fitted to.
     pub(super) fn context<'c>(&'c self, study: &'c Study<'_>) -> Context<'c> {
-        study.here(&self.fit, &self.fit.residual)
+        study.on_fitted(&self.fit, &self.fit.residual)
     }
 
     /// Whether a candidate or one that excludes it was accepted.
@@ -171,7 +171,7 @@ impl Model {
     /// Measured less predicted torque of the validation set, by joint and row, N·m.
     pub(super) fn residual_on_validation(&self, study: &Study<'_>) -> Vec<Vec<f64>> {
         let mut residual = self.fit.residual_on(&study.validation, &self.columns_on_validation(study));
-        let context = study.there(&self.fit, &[]);
+        let context = study.on_validation(&self.fit, &[]);
         for a in self.accepted.iter().filter(|a| a.measured.is_some()) {
             take_measured_out(a, &context.columns(&a.candidate), &mut residual);
         }
@@ -180,7 +180,7 @@ impl Model {
 
     /// The columns of what was accepted, as the fit has them, on the validation set.
     pub(super) fn columns_on_validation(&self, study: &Study<'_>) -> Vec<Column> {
-        let context = study.there(&self.fit, &[]);
+        let context = study.on_validation(&self.fit, &[]);
         let columns = |a: &Accepted| context.columns(&a.candidate);
         self.accepted.iter().filter(|a| a.measured.is_none()).flat_map(columns).collect()
     }
@@ -203,10 +203,10 @@ impl Model {
         }
         let coefficients = &self.coefficients()[k];
         let mut without = self.residual_on_validation(study);
-        let context = study.there(&self.fit, &[]);
+        let context = study.on_validation(&self.fit, &[]);
         let own = context.columns(&a.candidate);
         own.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut without, *c));
-        let context = study.there(&self.fit, &without);
+        let context = study.on_validation(&self.fit, &without);
         a.effect().seen_in(&context, &a.candidate, coefficients)
     }
 }
@@ -220,7 +220,7 @@ fn fitted_again(study: &Study<'_>, accepted: &mut [Accepted], start: &Fit) -> Fi
     for (a, candidate) in own.iter_mut().zip(candidates) {
         a.candidate = candidate;
     }
-    let context = study.here(start, &[]);
+    let context = study.on_fitted(start, &[]);
     for a in accepted.iter().filter(|a| a.measured.is_some()) {
         take_measured_out(a, &context.columns(&a.candidate), &mut fit.residual);
     }

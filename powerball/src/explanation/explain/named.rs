@@ -2,16 +2,16 @@
 
 use crate::controller::JointNumber;
 use crate::explanation::effects::Figures;
-use crate::identification::estimate::Spread;
+use crate::identification::estimate::ResidualStats;
 use serde::Serialize;
 
 /// Errors on the fitted logs and on the validation set.
 #[derive(Clone, Debug, Serialize)]
-pub struct Spreads {
+pub struct FitErrors {
     /// On the logs that were fitted.
-    pub fit: Spread,
+    pub fit: ResidualStats,
     /// On the validation set.
-    pub validate: Spread,
+    pub validate: ResidualStats,
 }
 
 /// An effect with its evidence.

@@ -1,11 +1,11 @@
 //! From logs to the base model that the search begins with.
 
-use super::named::Spreads;
-use super::special::{Clock, Held, held, repeats, settle};
+use super::named::FitErrors;
+use super::special::{Clock, ValidationOnlyEffect, choose_clock, repeats, validation_only_effects};
 use super::study::Study;
 use crate::explanation::effects::Made;
 use crate::explanation::options::{ExplainError, ExplainOptions};
-use crate::identification::estimate::{Fit, Folds, bands_of, fit, spread};
+use crate::identification::estimate::{Fit, Folds, bands_of, fit, residual_stats};
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, RigidArm};
 use crate::logs::summary::BANDS;
@@ -29,21 +29,21 @@ pub(super) enum ValidationOnly {
 }
 
 /// What is known before anything is looked for.
-pub(super) struct Begun<'a> {
+pub(super) struct Prepared<'a> {
     pub(super) study: Study<'a>,
     /// The base model.
     pub(super) base: Fit,
-    pub(super) beforehand: Beforehand,
+    pub(super) initial_fit: InitialFit,
 }
 
 /// What the result says of the time before the search.
-pub(super) struct Beforehand {
+pub(super) struct InitialFit {
     /// Errors of the base model.
-    pub(super) errors: Spreads,
+    pub(super) errors: FitErrors,
     /// What the base model leaves on the validation set, by joint and row, N·m.
     pub(super) residual: Vec<Vec<f64>>,
     /// What is in logs of the validation set only; its torque is taken out of them.
-    pub(super) held: Vec<Held>,
+    pub(super) validation_only: Vec<ValidationOnlyEffect>,
     /// When the logs are taken to have been recorded.
     pub(super) clock: Clock,
 }
@@ -55,7 +55,7 @@ pub(super) fn prepare<'a>(
     options: &'a ExplainOptions<'a>,
     inertia: Inertia,
     validation_only: ValidationOnly,
-) -> Result<Begun<'a>, ExplainError> {
+) -> Result<Prepared<'a>, ExplainError> {
     let rule = &options.rule;
     let (mut data, mut validation) = in_own_bands(body, (logs, validate), options)?;
     data.set_per_joint(inertia == Inertia::PerJoint);
@@ -64,19 +64,22 @@ pub(super) fn prepare<'a>(
     let folds = Folds::new(&data);
     let mut base = fit(&data, &folds, &[], None);
     let residual = base.residual_on(&validation, &[]);
-    let errors = Spreads { fit: spread(&data, &base.residual), validate: spread(&validation, &residual) };
-    let held = match (inertia, validation_only) {
+    let errors = FitErrors {
+        fit: residual_stats(&data, &base.residual),
+        validate: residual_stats(&validation, &residual),
+    };
+    let found = match (inertia, validation_only) {
         (Inertia::PerJoint, _) | (_, ValidationOnly::Kept) => Vec::new(),
         (Inertia::Shared, ValidationOnly::TakenOut) => {
-            held(body, (logs, validate), options, &mut base, (&mut data, &mut validation))
+            validation_only_effects(body, (logs, validate), options, &mut base, (&mut data, &mut validation))
                 .map_err(ExplainError::Validate)?
         }
     };
     let one_path = repeats(rule, &data, &validation);
-    let clock = settle(rule, logs, validate, &mut data, &base, &mut validation);
-    let [made, made_there] = [Made::default(), Made::default()];
-    let study = Study { data, made, validation, made_there, folds, one_path, options };
-    Ok(Begun { study, base, beforehand: Beforehand { errors, residual, held, clock } })
+    let clock = choose_clock(rule, logs, validate, &mut data, &base, &mut validation);
+    let [made, made_on_validation] = [Made::default(), Made::default()];
+    let study = Study { data, made, validation, made_on_validation, folds, one_path, options };
+    Ok(Prepared { study, base, initial_fit: InitialFit { errors, residual, validation_only: found, clock } })
 }
 
 /// The logs as rows, each joint in the band in which they speak of it.
@@ -95,7 +98,7 @@ fn in_own_bands<'a>(
         return Ok((data, validation));
     }
     let fit = fit(&data, &Folds::new(&data), &[], None);
-    let left = spread(&data, &fit.residual).relative;
+    let left = residual_stats(&data, &fit.residual).relative;
     let much = |(j, band): (usize, usize)| if left[j] > options.rule.explained_share { band } else { 0 };
     let mut which: Vec<usize> = bands_of(&data, &fit).into_iter().enumerate().map(much).collect();
     if which.iter().all(|band| *band == 0) {

@@ -4,13 +4,13 @@ use super::comparison::{Comparison, Question, Step, compare};
 use super::model::{Accepted, Model};
 use super::named::Rival;
 use super::search::{
-    Among, Extent, Group, Member, Screen, Tester, Trial, Validation, eliminate, gains, groups, is_beside,
-    keep_needed, level_by_chance, level_of_search,
+    CandidateKind, Extent, Group, Member, Screen, Tester, Trial, Validation, eliminate, gains, groups,
+    is_baseline, keep_needed, level_by_chance, level_of_search,
 };
 use super::study::Study;
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Candidate, Effect, Placed};
-use crate::identification::estimate::{Design, Fit, friction_columns, spread};
+use crate::identification::estimate::{Design, Fit, friction_columns, residual_stats};
 use std::sync::OnceLock;
 
 /// What a step found, before anything is changed.
@@ -43,7 +43,7 @@ pub(super) struct Choice {
 }
 
 /// Screens, tests and compares; changes nothing.
-pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize, among: Among) -> Proposed {
+pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize, among: CandidateKind) -> Proposed {
     let context = model.context(study);
     let screen = Screen::new(&context);
     let (mut groups, tests) = groups(study, model, &screen, among);
@@ -52,13 +52,13 @@ pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize, among: Am
     let design =
         Design::new(&study.validation, &friction_columns(&study.validation, &model.fit.shapes), &columns);
     let validation = Validation { data: &study.validation, design, residual: residual.clone() };
-    let there = study.there(&model.fit, &residual);
+    let on_validation = study.on_validation(&model.fit, &residual);
     let tester = Tester {
         study,
         screen: &screen,
         tests,
         validation: &validation,
-        there: &there,
+        on_validation: &on_validation,
         model,
         swapped: OnceLock::new(),
     };
@@ -84,7 +84,7 @@ pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize, among: Am
     let question = question.filter(|_| groups[chosen].effect.has_name());
     let Group { effect, members } = groups.swap_remove(chosen);
     let kept = members.into_iter().enumerate().filter(|(m, _)| above.contains(m)).map(|(_, member)| member);
-    let before = spread(&study.validation, &residual).rms;
+    let before = residual_stats(&study.validation, &residual).rms;
     let choice = Choice { effect, members: kept.collect(), comparison, question, tested: tests, before };
     Proposed { refused, outcome: Outcome::Named(Box::new(choice)) }
 }
@@ -187,7 +187,7 @@ pub(super) fn accept(study: &Study<'_>, model: &mut Model, choice: Choice, numbe
     // What does not last is not tried again: it would be accepted and taken out for ever.
     let gone = added.into_iter().filter(|candidate| !model.has(candidate)).collect::<Vec<_>>();
     model.given_up.extend(gone);
-    let after = spread(&study.validation, &model.residual_on_validation(study)).rms;
+    let after = residual_stats(&study.validation, &model.residual_on_validation(study)).rms;
     Step { number, effect, square_before, comparison, question, before, after }
 }
 
@@ -197,7 +197,7 @@ fn drop_covered(study: &Study<'_>, model: &mut Model, first: usize) {
     let context = model.context(study);
     let laws = |a: &Accepted| a.effect().placed_laws(&context, &a.candidate);
     let new: Vec<Vec<Placed>> = model.accepted[first..].iter().flat_map(laws).collect();
-    let covered = |a: &Accepted| is_beside(a) && laws(a).iter().all(|column| new.contains(column));
+    let covered = |a: &Accepted| is_baseline(a) && laws(a).iter().all(|column| new.contains(column));
     let kept: Vec<bool> = model.accepted.iter().map(|a| !covered(a)).collect();
     let mut kept = kept.into_iter();
     model.accepted.retain(|_| kept.next().unwrap_or(true));
@@ -213,7 +213,7 @@ fn drop_words_for(study: &Study<'_>, model: &mut Model, number: usize) {
             let of = |j: &JointNumber| law.explained[j.index()] * model.fit.weights[j.index()];
             law.candidate.joints.iter().map(of).sum()
         };
-        laws.iter().filter(on).any(|law| gain < study.rule().mends_only * explained(law))
+        laws.iter().filter(on).any(|law| gain < study.rule().only_corrects_class * explained(law))
     };
     let gains = gains(model);
     let gone: Vec<bool> = (model.accepted.iter().zip(gains))
@@ -240,10 +240,10 @@ pub(super) fn drop_words(study: &Study<'_>, model: &mut Model) {
 
 /// Once everything else is known: what was in the model from the start goes out where it is not needed and
 /// gets its name where it is. Returns the step of each name.
-pub(super) fn settle_beside(study: &Study<'_>, model: &mut Model) -> Vec<Step> {
+pub(super) fn judge_baseline(study: &Study<'_>, model: &mut Model) -> Vec<Step> {
     keep_needed(study, model);
     let mut effects: Vec<&'static dyn Effect> = Vec::new();
-    for a in model.accepted.iter().filter(|a| is_beside(a)) {
+    for a in model.accepted.iter().filter(|a| is_baseline(a)) {
         if !effects.contains(&a.effect()) {
             effects.push(a.effect());
         }
@@ -257,15 +257,15 @@ pub(super) fn settle_beside(study: &Study<'_>, model: &mut Model) -> Vec<Step> {
 }
 
 fn name_beside(study: &Study<'_>, model: &mut Model, effect: &'static dyn Effect, number: usize) -> Step {
-    let own = |a: &Accepted| is_beside(a) && a.effect() == effect;
+    let own = |a: &Accepted| is_baseline(a) && a.effect() == effect;
     let which: Vec<usize> = (0..model.accepted.len()).filter(|k| own(&model.accepted[*k])).collect();
-    let after = spread(&study.validation, &model.residual_on_validation(study)).rms;
+    let after = residual_stats(&study.validation, &model.residual_on_validation(study)).rms;
     let fitted: Vec<Accepted> = model.accepted.clone();
     model.accepted.retain(|a| !own(a));
     model.refit(study);
     let context = model.context(study);
     let screen = Screen::new(&context);
-    let (mut groups, _) = groups(study, model, &screen, Among::Names);
+    let (mut groups, _) = groups(study, model, &screen, CandidateKind::Names);
     groups.retain(|g| g.effect != effect);
     // What has it as a part and explains no more is no rival: a spring at rest elsewhere has the zero in it.
     let own: Vec<Vec<Placed>> =
@@ -284,7 +284,7 @@ fn name_beside(study: &Study<'_>, model: &mut Model, effect: &'static dyn Effect
     joints.sort_unstable();
     groups.push(Group { effect, members });
     let comparison = compare(&screen, &groups, groups.len() - 1, &joints);
-    let before = spread(&study.validation, &model.residual_on_validation(study)).rms;
+    let before = residual_stats(&study.validation, &model.residual_on_validation(study)).rms;
     let square_before = model.fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect();
     model.accepted = fitted;
     which.iter().for_each(|k| model.accepted[*k].step = Some(number));

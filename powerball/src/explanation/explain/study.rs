@@ -15,7 +15,7 @@ pub(super) struct Study<'a> {
     /// The validation set: logs of another path, on which additions must hold.
     pub(super) validation: Data<'a>,
     /// Its columns that were made already.
-    pub(super) made_there: Made,
+    pub(super) made_on_validation: Made,
     /// How the logs to fit are held out.
     pub(super) folds: Folds,
     /// Whether the validation set repeats the path of the fitted logs.
@@ -36,13 +36,13 @@ impl Study<'_> {
     }
 
     /// A model seen on the logs to fit, with what is left of them.
-    pub(super) fn here<'c>(&'c self, fit: &'c Fit, residual: &'c [Vec<f64>]) -> Context<'c> {
+    pub(super) fn on_fitted<'c>(&'c self, fit: &'c Fit, residual: &'c [Vec<f64>]) -> Context<'c> {
         Context::new(&self.data, fit, residual, self.rule()).with(&self.made)
     }
 
     /// The same on the validation set.
-    pub(super) fn there<'c>(&'c self, fit: &'c Fit, residual: &'c [Vec<f64>]) -> Context<'c> {
-        Context::new(&self.validation, fit, residual, self.rule()).with(&self.made_there)
+    pub(super) fn on_validation<'c>(&'c self, fit: &'c Fit, residual: &'c [Vec<f64>]) -> Context<'c> {
+        Context::new(&self.validation, fit, residual, self.rule()).with(&self.made_on_validation)
     }
 
     /// Says what is being done.

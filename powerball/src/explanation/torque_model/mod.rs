@@ -6,7 +6,7 @@
 
 mod along;
 mod as_known;
-mod c_door;
+mod c_api;
 mod changes;
 mod file;
 mod known;

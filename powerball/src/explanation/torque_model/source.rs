@@ -1,12 +1,12 @@
 //! The model as one Rust file for a controller: no `std`, no allocation, nothing needed but nalgebra.
 
-use super::c_door::Behind;
+use super::c_api::Behind;
 use super::changes::with_open_hand;
 use super::{TorqueModel, Unchanged};
 use crate::controller::{correction, friction};
 use crate::logs::log::Motors;
 use dyngen::arm::{Parameter, ParameterKind};
-use dyngen::emit::c_door::checked_prefix;
+use dyngen::emit::c_api::checked_prefix;
 use dyngen::emit::{self, Options};
 use dyngen::{Arm, Function, Model, SetKind};
 use std::fmt::{self, Write};
@@ -30,7 +30,7 @@ impl fmt::Display for Scalar {
     }
 }
 
-/// A model's code with a door for callers in C.
+/// A model's code with an API for callers in C.
 #[derive(Clone, Debug)]
 pub struct ForC {
     /// The file in Rust, with the `extern "C"` functions.
@@ -121,7 +121,7 @@ impl TorqueModel {
         let motors = Motors::of(&arm);
         text.push_str(&motors.as_ref().map(coordinates).unwrap_or_default());
         let moves = self.terms().iter().any(|t| t.term.law.moves_link());
-        text.push_str(&door(payload.is_some(), moves, motors.is_some()));
+        text.push_str(&api(payload.is_some(), moves, motors.is_some()));
         let module = |doc: &str, name: &str, body: &str| format!("\n{doc}pub mod {name} {{\n{body}}}\n");
         text.push_str(&module("/// The rigid arm.\n", "rigid", &rigid));
         if let Some(payload) = payload {
@@ -156,8 +156,8 @@ impl TorqueModel {
             payload: !self.additions.payloads.is_empty(),
             functions,
         };
-        let door = behind.door(prefix);
-        Ok(ForC { source: source + &door.module, header: door.header })
+        let api = behind.api(prefix);
+        Ok(ForC { source: source + &api.module, header: api.header })
     }
 
     fn head(&self, arm: &Arm) -> String {
@@ -274,7 +274,7 @@ fn transposed_times(matrix: &[[Real; JOINTS]; JOINTS], x: &SVector<Real, JOINTS>
 }
 
 /// The struct that a controller calls; `coupled`: a transmission couples joints.
-fn door(payload: bool, moves: bool, coupled: bool) -> String {
+fn api(payload: bool, moves: bool, coupled: bool) -> String {
     let field = "\n    /// Whether the last link holds the payload.\n    pub holds_payload: bool,";
     let (field, held) = if payload { (field, ", holds_payload: false") } else { ("", "") };
     let rigid = match payload {

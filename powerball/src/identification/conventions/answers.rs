@@ -2,9 +2,9 @@
 
 use super::arm_file::{Better, LONGEST_ARM};
 use super::change::Change;
+use super::result::{Answer, GravityIs, Kind, Side};
 use super::search::{Found, Step};
 use super::sign::Common;
-use super::told::{Answer, GravityIs, Kind, Side};
 use super::unit::{Scale, Size, Unit};
 use crate::controller::JointNumber;
 

@@ -1,8 +1,8 @@
 //! The logs that are asked, and the rows of any reading of their positions.
 
+use super::decimate::decimate;
 use super::reading::Positions;
 use super::rows::{Gravity, Rows};
-use super::thin::thin;
 use crate::logs::log::Log;
 use crate::logs::regression::{DataError, RigidArm};
 
@@ -30,9 +30,9 @@ struct Thinned {
 impl Thinned {
     fn new(logs: &[Log], validate: &[Log], size: Size) -> Thinned {
         let half = Size { seconds: 0.5 * size.seconds, ..size };
-        let other = thin(validate, half.seconds, size.rate);
+        let other = decimate(validate, half.seconds, size.rate);
         let whole = if other.is_empty() { size } else { half };
-        let mut all = thin(logs, whole.seconds, size.rate);
+        let mut all = decimate(logs, whole.seconds, size.rate);
         let mut parts = vec![(!other.is_empty()).then_some(0); all.len()];
         parts.extend(vec![Some(1); other.len()]);
         all.extend(other);

@@ -3,7 +3,7 @@
 //! Two recordings never measure the same: torques that repeat bit by bit while the positions do not were
 //! commanded. Noise that no position column shares was measured.
 
-use super::told::Kind;
+use super::result::Kind;
 use crate::logs::log::Log;
 
 /// Samples that must repeat.

@@ -7,8 +7,8 @@
 //!
 //! | | |
 //! |---|---|
-//! | `told`, `answers`, `mend` | what is told, its words, the column map |
-//! | `thin`, `reading`, `rows`, `fit` | logs made small; a way to read columns; its rows; what it leaves |
+//! | `result`, `answers`, `mend` | what is told, its words, the column map |
+//! | `decimate`, `reading`, `rows`, `fit` | logs made small; a way to read columns; its rows; what it leaves |
 //! | `physics`, `sign` | energies; the sign of the torques |
 //! | `factors`, `unit` | a factor by joint; the unit of all |
 //! | `gravity`, `side`, `delay`, `kind` | one question each |
@@ -19,6 +19,7 @@ mod answers;
 mod arm_file;
 mod asked;
 mod change;
+mod decimate;
 mod delay;
 mod factors;
 mod fit;
@@ -27,15 +28,14 @@ mod kind;
 mod mend;
 mod physics;
 mod reading;
+mod result;
 mod rows;
 mod search;
 mod side;
 mod sign;
-mod thin;
-mod told;
 mod unit;
 
-pub use told::{Answer, Conventions, GravityIs, Kind, PerJoint, PositionColumns, Side, TorqueColumns};
+pub use result::{Answer, Conventions, GravityIs, Kind, PerJoint, PositionColumns, Side, TorqueColumns};
 
 use crate::controller::JointNumber;
 use crate::logs::log::Log;
@@ -59,20 +59,20 @@ pub fn conventions(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventio
     };
     let all: Vec<&Log> = logs.iter().chain(validate).collect();
     let kind = kind::kind(&all);
-    let Some(better) = arm_file::better(&asked, &found) else { return told(&asked, &found, kind) };
+    let Some(better) = arm_file::better(&asked, &found) else { return result(&asked, &found, kind) };
     // What the columns are is asked of the arm that they fit.
     let answer = answers::of_arm_file(&better);
     let of_other = RigidArm::new(&better.change.arm).ok().and_then(|body| {
         let asked = Asked::new(&body, logs, validate);
         let found = search(&asked).ok()?;
-        Some(told(&asked, &found, kind))
+        Some(result(&asked, &found, kind))
     });
-    let mut told = of_other.unwrap_or_default();
-    told.arm_file = Some(better.change.line);
-    told.evidence = [answer.sentence.as_str(), &told.evidence].join(" ");
-    told.answers.retain(|other| other.question != answer.question);
-    told.answers.insert(0, answer);
-    told
+    let mut result = of_other.unwrap_or_default();
+    result.arm_file = Some(better.change.line);
+    result.evidence = [answer.sentence.as_str(), &result.evidence].join(" ");
+    result.answers.retain(|other| other.question != answer.question);
+    result.answers.insert(0, answer);
+    result
 }
 
 fn not_told(why: &str) -> Conventions {
@@ -87,7 +87,7 @@ fn not_told(why: &str) -> Conventions {
     Conventions { evidence: sentence, answers: vec![answer], ..Conventions::default() }
 }
 
-fn told(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventions {
+fn result(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventions {
     let read = &found.read;
     let sign = sign::common(&found.judged, &found.energies);
     let size = Size::of(found);
@@ -164,11 +164,11 @@ fn torque_columns(found: &Found<'_>, facts: &Facts<'_>) -> TorqueColumns {
 
 fn position_columns(found: &Found<'_>, good: bool) -> PositionColumns {
     let read = &found.read.positions;
-    let told = good || !read.is_plain();
+    let result = good || !read.is_plain();
     let unit = if read.scale == 1.0 { "rad" } else { "deg" };
     PositionColumns {
-        sign: told.then(|| read.sign.iter().map(|s| if *s < 0.0 { -1 } else { 1 }).collect()),
-        unit: told.then(|| unit.to_string()),
+        sign: result.then(|| read.sign.iter().map(|s| if *s < 0.0 { -1 } else { 1 }).collect()),
+        unit: result.then(|| unit.to_string()),
         order: order(&read.column),
     }
 }

@@ -3,8 +3,8 @@
 use super::fit::Judged;
 use super::physics::Energies;
 use super::reading::Torques;
+use super::result::Side;
 use super::rows::Rows;
-use super::told::Side;
 
 /// Of the power that goes into the joint with the least friction, friction takes at most this share on the
 /// link side. Sensors of a Kinova Gen3, a Panda and an xMate: 2 to 8 %.

@@ -8,8 +8,8 @@
 use super::change::FACTOR;
 use super::factors::median;
 use super::gravity::{acts, weight};
+use super::result::GravityIs;
 use super::search::Found;
-use super::told::GravityIs;
 use dyngen::Arm;
 use dyngen::exact::rational::to_f64;
 

@@ -1,7 +1,7 @@
 //! A fit whose parameters a real arm can have, and what that costs.
 
 use super::consistent::{Consistent, nearest};
-use super::estimates::{Spread, spread_of};
+use super::estimates::{ResidualStats, stats_of};
 use super::reduced::Solution;
 use super::solve::{Solver, bounded};
 use crate::logs::regression::RigidArm;
@@ -27,7 +27,7 @@ pub struct ConsistentReport {
     /// γ1 … γ5 by joint.
     pub friction: Vec<[f64; 5]>,
     /// Error of the fit.
-    pub fit: Spread,
+    pub fit: ResidualStats,
     /// rms of this fit over rms of the unconstrained one, less one, by joint.
     pub cost: Vec<f64>,
     /// How far the unconstrained parameters are from any real arm's, in units of χ².
@@ -72,8 +72,8 @@ impl ConsistentFit {
     /// In the words of a report.
     #[must_use]
     pub fn report(&self, body: &RigidArm, solution: &Solution) -> ConsistentReport {
-        let error = spread_of(solution, &self.theta);
-        let free = spread_of(solution, &solution.theta);
+        let error = stats_of(solution, &self.theta);
+        let free = stats_of(solution, &solution.theta);
         let ratio = |(a, b): (&f64, &f64)| if *b > 0.0 { a / b - 1.0 } else { 0.0 };
         ConsistentReport {
             parameters: body

@@ -20,7 +20,7 @@ use super::distribution::t_quantile_975;
 use super::normal_equations::zeros;
 use super::reduced::Solution;
 use super::solve::Solver;
-use super::spectrum::{Power, sharpened};
+use super::spectrum::{Power, deconvolved};
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 
@@ -107,7 +107,7 @@ fn without_leaks(groups: &[Group], powers: &[(f64, f64)]) -> Vec<(f64, f64)> {
                 mean: *mean,
                 freedom: *freedom,
             };
-            let sharp = sharpened(&joint.iter().map(seen).collect::<Vec<_>>());
+            let sharp = deconvolved(&joint.iter().map(seen).collect::<Vec<_>>());
             sharp.into_iter().zip(joint).map(|(power, (_, (_, freedom)))| (power, *freedom))
         })
         .collect()

@@ -94,7 +94,7 @@ pub struct Estimates {
 
 /// How large an error is, by joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Spread {
+pub struct ResidualStats {
     /// rms of the error, N·m.
     pub rms: Vec<f64>,
     /// rms of the error over rms of the measured torque.
@@ -107,10 +107,10 @@ pub struct Spread {
     pub samples: usize,
 }
 
-impl Spread {
+impl ResidualStats {
     /// That of several data together; each with the rows of every joint.
     #[must_use]
-    pub fn pooled(parts: &[(Spread, Vec<usize>)]) -> Option<Spread> {
+    pub fn pooled(parts: &[(ResidualStats, Vec<usize>)]) -> Option<ResidualStats> {
         let dof = parts.first()?.0.rms.len();
         // Sums of squares of the errors and of the torques, and rows.
         let sums = |j: usize| {
@@ -135,7 +135,7 @@ impl Spread {
         let of_deviation = (0..dof).map(deviation).collect();
         let sums: Vec<[f64; 3]> = (0..dof).map(sums).collect();
         let ratio = |a: f64, b: f64| if b > 0.0 { (a / b).sqrt() } else { 0.0 };
-        Some(Spread {
+        Some(ResidualStats {
             rms: sums.iter().map(|[left, _, rows]| ratio(*left, *rows)).collect(),
             relative: sums.iter().map(|[left, torque, _]| ratio(*left, *torque)).collect(),
             of_deviation,
@@ -154,7 +154,7 @@ impl Spread {
 
 /// The spread of residuals on their data.
 #[must_use]
-pub fn spread(data: &Data<'_>, residual: &[Vec<f64>]) -> Spread {
+pub fn residual_stats(data: &Data<'_>, residual: &[Vec<f64>]) -> ResidualStats {
     // A sum over nothing is -0 and would print so.
     let rms = |x: &[f64]| (x.iter().fold(0.0, |sum, v| sum + v * v) / x.len().max(1) as f64).sqrt();
     let errors: Vec<f64> = residual.iter().map(|r| rms(r)).collect();
@@ -176,7 +176,7 @@ pub fn spread(data: &Data<'_>, residual: &[Vec<f64>]) -> Spread {
             if deviation > 0.0 { e / deviation } else { 0.0 }
         })
         .collect();
-    Spread {
+    ResidualStats {
         rms: errors,
         relative,
         of_deviation,
@@ -233,10 +233,10 @@ pub fn estimates(names: &[String], solution: &Solution, errors: &StandardErrors)
 
 /// The spread of what coefficients leave on the reduced logs.
 #[must_use]
-pub fn spread_of(solution: &Solution, theta: &[f64]) -> Spread {
+pub fn stats_of(solution: &Solution, theta: &[f64]) -> ResidualStats {
     let joints: Vec<(f64, f64, u64)> =
         (0..solution.layout.dof).map(|j| solution.mean_squares(j, theta)).collect();
-    Spread {
+    ResidualStats {
         rms: joints.iter().map(|(left, _, _)| left.sqrt()).collect(),
         relative: joints
             .iter()

@@ -1,7 +1,7 @@
 //! Torque columns that were exchanged between joints, or have the wrong sign: where the fit is bad, and is
 //! good with them put right.
 
-use super::{FrictionKind, Spread, solve_reduced, spread_of};
+use super::{FrictionKind, ResidualStats, solve_reduced, stats_of};
 use crate::logs::log::Log;
 use crate::logs::regression::{DataOptions, RigidArm};
 use crate::logs::summary::Summary;
@@ -14,7 +14,12 @@ const RIGHT: f64 = 0.5;
 /// What is wrong with the torques of the logs, in words; `None` where nothing is suspected, or no exchange of
 /// two joints and no change of one sign mends it. `found` are the errors of the fit to them.
 #[must_use]
-pub fn exchanged(body: &RigidArm, logs: &[Log], options: &DataOptions, found: &Spread) -> Option<String> {
+pub fn exchanged(
+    body: &RigidArm,
+    logs: &[Log],
+    options: &DataOptions,
+    found: &ResidualStats,
+) -> Option<String> {
     let suspects: Vec<usize> = (0..body.dof()).filter(|j| found.relative[*j] > SUSPECT).collect();
     let changes = suspects.iter().enumerate().flat_map(|(k, j)| suspects[k..].iter().map(|l| (*j, *l)));
     let mut best: Option<(f64, (usize, usize))> = None;
@@ -32,7 +37,7 @@ pub fn exchanged(body: &RigidArm, logs: &[Log], options: &DataOptions, found: &S
             let _ = summary.push(body, log, options);
         }
         let solution = solve_reduced(&summary, FrictionKind::Symmetric);
-        let errors = spread_of(&solution, &solution.theta);
+        let errors = stats_of(&solution, &solution.theta);
         let share = [j, k].map(|i| errors.relative[i] / found.relative[i]).into_iter().fold(0.0, f64::max);
         if share < RIGHT && best.is_none_or(|(least, _)| share < least) {
             best = Some((share, (j, k)));
@@ -74,7 +79,7 @@ mod tests {
             let mut summary = Summary::new(&body, &options);
             summary.push(&body, log, &options).unwrap();
             let solution = solve_reduced(&summary, FrictionKind::Symmetric);
-            exchanged(&body, std::slice::from_ref(log), &options, &spread_of(&solution, &solution.theta))
+            exchanged(&body, std::slice::from_ref(log), &options, &stats_of(&solution, &solution.theta))
         };
         assert_eq!(said(&sound), None);
         for (j, k) in [(1, 2), (0, 3), (2, 4)] {

@@ -6,7 +6,7 @@ use super::friction_shape;
 use super::normal_equations::Products;
 use super::normal_equations::dot;
 use super::rows::{FRICTION, Layout, Rows, Scatter, Trials};
-use super::vary::{Start, vary};
+use super::variable_projection::{Start, variable_projection};
 use crate::logs::parallel;
 use crate::logs::regression::{Column, Data, RigidArm};
 use faer::Mat;
@@ -100,7 +100,7 @@ pub fn fit(data: &Data<'_>, folds: &Folds, terms: &[Term], start: Option<&Fit>) 
     let non_negative: Vec<usize> =
         (0..terms.len()).filter(|t| terms[*t].non_negative).map(|t| layout.extra(t)).collect();
     let start = start.map(|fit| Start { shapes: &fit.shapes, weights: &fit.weights });
-    let done = vary(&rows, &non_negative, start);
+    let done = variable_projection(&rows, &non_negative, start);
     let (design, gram) = done.at;
     Fit {
         residual: residuals(data, &design, &done.theta),

@@ -16,7 +16,7 @@ use super::errors::StandardErrors;
 use super::friction_shape;
 use super::normal_equations::dot;
 use super::reduced::{Part, Solution};
-use super::spectrum::{Power, sharpened};
+use super::spectrum::{Power, deconvolved};
 use crate::logs::log::{Log, logs_of_motors};
 use crate::logs::regression::{Data, DataOptions, Recording, RigidArm};
 use crate::logs::summary::{Octaves, RFactor, parts};
@@ -81,7 +81,7 @@ pub fn solve_instrumental(
                 (level, Power { octave, mean: level.part.left(&theta) / freedom, freedom })
             })
             .collect();
-        let sharp = sharpened(&known.iter().map(|(_, power)| *power).collect::<Vec<_>>());
+        let sharp = deconvolved(&known.iter().map(|(_, power)| *power).collect::<Vec<_>>());
         for ((level, Power { freedom, .. }), power) in known.into_iter().zip(sharp) {
             let spread = &inverse * level.instrument_products(&place, size) * inverse.transpose();
             for (i, (variance, doubt)) in sums.iter_mut().enumerate() {

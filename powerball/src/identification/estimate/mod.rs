@@ -26,7 +26,7 @@ mod spectrum;
 mod stream;
 mod torque_metric;
 mod uncertainty;
-mod vary;
+mod variable_projection;
 mod verdict;
 
 pub use band::{InBand, bands_of, reduce_in_bands, solve_in_band};
@@ -38,7 +38,9 @@ pub use consistent_fit::{ConsistentFit, ConsistentReport, consistent_fit};
 pub use curves::{TorqueCurve, curves};
 pub use design::{Design, Gram, runs};
 pub use errors::{StandardErrors, standard_errors};
-pub use estimates::{Estimates, JointFriction, ParameterEstimate, Spread, estimates, spread, spread_of};
+pub use estimates::{
+    Estimates, JointFriction, ParameterEstimate, ResidualStats, estimates, residual_stats, stats_of,
+};
 pub use exchanged::exchanged;
 pub use fit::{Fit, Term, fit, friction_columns};
 #[cfg(feature = "explain")]

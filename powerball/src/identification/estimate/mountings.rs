@@ -5,9 +5,9 @@
 //! parameters are combinations of its ones. Factors are put into its columns and joined there, so that a
 //! summary need not know which others it will meet.
 
-use super::estimates::Spread;
+use super::estimates::ResidualStats;
 use super::reduced::{Solution, solve_reduced};
-use super::{FrictionKind, spread_of};
+use super::{FrictionKind, stats_of};
 use crate::identification::mounting::together;
 use crate::logs::regression::RigidArm;
 use crate::logs::summary::{Bands, SummaryError};
@@ -52,10 +52,14 @@ impl Together {
     ///
     /// # Errors
     /// As [`Solution::on`].
-    pub fn spreads(&self, solution: &Solution, in_band: &[usize]) -> Result<Vec<Spread>, SummaryError> {
+    pub fn spreads(
+        &self,
+        solution: &Solution,
+        in_band: &[usize],
+    ) -> Result<Vec<ResidualStats>, SummaryError> {
         let of = |bands: &Bands| {
             let on = solution.on(&bands.of_joints(in_band))?;
-            Ok(spread_of(&on, &on.theta))
+            Ok(stats_of(&on, &on.theta))
         };
         self.each.iter().map(of).collect()
     }
@@ -66,13 +70,13 @@ impl Together {
     #[must_use]
     pub fn contradictions(
         &self,
-        spreads: &[Spread],
+        spreads: &[ResidualStats],
         in_band: &[usize],
         law: FrictionKind,
     ) -> Vec<Vec<usize>> {
-        let of = |(bands, together): (&Bands, &Spread)| {
+        let of = |(bands, together): (&Bands, &ResidualStats)| {
             let alone = solve_reduced(&bands.of_joints(in_band), law);
-            let alone = spread_of(&alone, &alone.theta);
+            let alone = stats_of(&alone, &alone.theta);
             (1..=alone.rms.len()).filter(|j| together.rms[j - 1] > CONTRADICTS * alone.rms[j - 1]).collect()
         };
         self.each.iter().zip(spreads).map(of).collect()

@@ -2,7 +2,7 @@
 
 use super::normal_equations::{Products, add_columns, dot, zeros};
 use super::rows::{FRICTION, Layout, Rows, Scatter, Trials};
-use super::vary::vary;
+use super::variable_projection::variable_projection;
 use crate::logs::summary::{
     Columns, Identity, NODES, OCTAVES, RFactor, SLOW, Steepness, Summary, SummaryError,
 };
@@ -106,7 +106,7 @@ fn parts_at(reduced: &Reduced<'_>, shapes: &[[f64; 2]]) -> Vec<Vec<Part>> {
 #[must_use]
 pub fn solve_reduced(summary: &Summary, law: FrictionKind) -> Solution {
     let reduced = Reduced::new(summary, law);
-    let done = vary(&reduced, &[], None);
+    let done = variable_projection(&reduced, &[], None);
     Solution {
         layout: reduced.layout,
         identity: summary.identity.clone(),

@@ -59,7 +59,7 @@ fn leaks() -> [[f64; OCTAVES]; OCTAVES] {
 }
 
 /// The μ of a noise with these powers, in their order.
-pub(super) fn sharpened(powers: &[Power]) -> Vec<f64> {
+pub(super) fn deconvolved(powers: &[Power]) -> Vec<f64> {
     let mut sharp: Vec<f64> = powers.iter().map(|p| p.mean).collect();
     if sharp.iter().any(|mean| !(*mean > 0.0 && mean.is_finite())) {
         return sharp;
@@ -153,7 +153,7 @@ mod tests {
                 let mean = (0..count).map(own).sum::<f64>() / count as f64;
                 powers.push(Power { octave, mean, freedom: count as f64 });
             }
-            let sharp = sharpened(&powers);
+            let sharp = deconvolved(&powers);
             for frequency in [0.004, 0.01, 0.02, 0.03] {
                 let (mut truth, mut plain, mut found) = (0.0, 0.0, 0.0);
                 for phase in 0..8 {
@@ -175,14 +175,14 @@ mod tests {
     #[test]
     fn white_noise_stays_as_it_is_and_no_noise_does_no_harm() {
         let of = |mean: f64| (0..OCTAVES).map(move |octave| Power { octave, mean, freedom: 9.0 });
-        for mu in sharpened(&of(0.3).collect::<Vec<_>>()) {
+        for mu in deconvolved(&of(0.3).collect::<Vec<_>>()) {
             approx::assert_relative_eq!(mu, 0.3, max_relative = 1e-9);
         }
         // Octaves without rows are left out.
-        for mu in sharpened(&of(0.3).filter(|p| p.octave % 3 == 1).collect::<Vec<_>>()) {
+        for mu in deconvolved(&of(0.3).filter(|p| p.octave % 3 == 1).collect::<Vec<_>>()) {
             approx::assert_relative_eq!(mu, 0.3, max_relative = 1e-9);
         }
-        assert_eq!(sharpened(&of(0.0).collect::<Vec<_>>()), [0.0; OCTAVES]);
-        assert!(sharpened(&[]).is_empty());
+        assert_eq!(deconvolved(&of(0.0).collect::<Vec<_>>()), [0.0; OCTAVES]);
+        assert!(deconvolved(&[]).is_empty());
     }
 }

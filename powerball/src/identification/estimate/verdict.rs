@@ -2,7 +2,7 @@
 
 use super::noise::noise_floor;
 use super::over_blocks;
-use super::spread;
+use super::residual_stats;
 use crate::logs::regression::{Block, Data};
 use serde::Serialize;
 
@@ -27,7 +27,7 @@ pub struct JointVerdict {
 /// Judges what a model leaves on data: an error up to `tolerance` times the rms torque of a joint passes.
 #[must_use]
 pub fn verdicts(data: &Data<'_>, residual: &[Vec<f64>], tolerance: f64) -> Vec<JointVerdict> {
-    let errors = spread(data, residual);
+    let errors = residual_stats(data, residual);
     let floor = noise_floor(data);
     (0..data.dof())
         .map(|j| {

@@ -7,7 +7,7 @@ use super::judge;
 use super::options::IdentifyOptions;
 use super::result::Identified;
 use crate::controller::JointNumber;
-use crate::identification::estimate::{BaseModel, FrictionKind, Spread, estimates, spread_of};
+use crate::identification::estimate::{BaseModel, FrictionKind, ResidualStats, estimates, stats_of};
 use crate::logs::Progress;
 use crate::logs::summary::BANDS;
 
@@ -43,7 +43,7 @@ pub(super) fn advice(
         return Ok(None);
     }
     let joints: Vec<String> = helped.iter().map(|j| JointNumber::from_index(*j).to_string()).collect();
-    let percent = |of: &Spread| -> Vec<String> {
+    let percent = |of: &ResidualStats| -> Vec<String> {
         helped.iter().map(|j| format!("{:.0}", 100.0 * of.relative[*j])).collect()
     };
     let which = if identified.validate.is_some() { "held-out error" } else { "error of the fit" };
@@ -61,7 +61,7 @@ fn judged(
     gathered: &Gathered,
     identified: &Identified,
     options: &IdentifyOptions<'_>,
-) -> Result<Spread, IdentifyError> {
+) -> Result<ResidualStats, IdentifyError> {
     let fitted = fit(gathered, options, &mut Vec::new())?;
     let solution = &fitted.solution;
     let found = estimates(gathered.body().names(), solution, &fitted.errors);
@@ -69,5 +69,5 @@ fn judged(
     let model = BaseModel { arm, parameters: found.parameters, friction: found.friction };
     let bands: Vec<f64> = fitted.bands.iter().map(|band| BANDS[*band]).collect();
     let held_out = judge::validate(gathered, &model, &bands, options)?;
-    Ok(held_out.unwrap_or_else(|| spread_of(solution, &solution.theta)))
+    Ok(held_out.unwrap_or_else(|| stats_of(solution, &solution.theta)))
 }

@@ -4,7 +4,7 @@ use super::error::IdentifyError;
 use super::fit::Fitted;
 use super::gather::{Gathered, Mounted};
 use super::options::IdentifyOptions;
-use crate::identification::estimate::{Spread, exchanged, spread_of};
+use crate::identification::estimate::{ResidualStats, exchanged, stats_of};
 use crate::identification::mounting::Mounting;
 use serde::Serialize;
 
@@ -18,7 +18,7 @@ pub struct MountedFit {
     /// The logs.
     pub logs: Vec<String>,
     /// What the fit leaves of them.
-    pub fit: Spread,
+    pub fit: ResidualStats,
 }
 
 /// The fit by mounting, where the base did not always stand as filed; what is odd about a mounting's logs is
@@ -29,7 +29,7 @@ pub(super) fn fits(
     options: &IdentifyOptions<'_>,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<MountedFit>, IdentifyError> {
-    let all = spread_of(&fitted.solution, &fitted.solution.theta);
+    let all = stats_of(&fitted.solution, &fitted.solution.theta);
     let spreads = match (&gathered.together, gathered.mounted.as_slice()) {
         (None, [only]) if only.mounting == Mounting::Filed => Vec::new(),
         (None, _) => vec![all.clone()],
@@ -39,7 +39,7 @@ pub(super) fn fits(
         let errors = spreads.get(k).unwrap_or(&all);
         warnings.extend(exchanged(&mounted.body, &mounted.logs, &options.data, errors));
     }
-    let of = |(fit, mounted): (Spread, &Mounted)| MountedFit {
+    let of = |(fit, mounted): (ResidualStats, &Mounted)| MountedFit {
         mounting: mounted.mounting.to_string(),
         gravity: mounted.body.gravity(),
         logs: mounted.bands.widest().logs.iter().map(|(name, _)| name.clone()).collect(),
@@ -54,7 +54,7 @@ fn spreads(
     fitted: &Fitted,
     options: &IdentifyOptions<'_>,
     warnings: &mut Vec<String>,
-) -> Result<Vec<Spread>, IdentifyError> {
+) -> Result<Vec<ResidualStats>, IdentifyError> {
     let Some(together) = &gathered.together else { return Ok(Vec::new()) };
     let spreads = together
         .spreads(&fitted.solution, &fitted.bands)

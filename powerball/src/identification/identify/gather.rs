@@ -9,7 +9,7 @@ use crate::identification::source::{Input, Source, read_summary};
 use crate::identification::transmission::{JointTransmission, transmission};
 use crate::logs::Progress;
 use crate::logs::log::{ColumnMap, Log, LogError, read_log_as};
-use crate::logs::regression::{DataOptions, FEWEST_ROWS, RigidArm, rest_note, silent_joints};
+use crate::logs::regression::{DataOptions, FEWEST_ROWS, RigidArm, inactive_joints, rest_note};
 use crate::logs::summary::{Bands, Octaves, Summary};
 use dyngen::Arm;
 use std::path::Path;
@@ -326,10 +326,10 @@ impl<'a> Gathering<'a> {
 
 /// What is to be said of joints that rested.
 fn rest_notes(arm: &Arm, summary: &Summary, kept: &[Log]) -> Vec<String> {
-    let silent = if kept.is_empty() { Vec::new() } else { silent_joints(arm, kept) };
+    let inactive = if kept.is_empty() { Vec::new() } else { inactive_joints(arm, kept) };
     let note = |(j, octaves): (usize, &Octaves)| {
         let (joint, rows) = (JointNumber::from_index(j), octaves.rows() as usize);
-        let why = || silent.get(j).cloned().flatten().or_else(|| summary.silent[j].clone());
+        let why = || inactive.get(j).cloned().flatten().or_else(|| summary.inactive[j].clone());
         let hardly = rows < FEWEST_ROWS;
         let why = if hardly { why() } else { None };
         why.or_else(|| rest_note(joint, rows, summary.samples as usize, None))

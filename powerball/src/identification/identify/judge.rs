@@ -5,7 +5,7 @@ use super::by_band::by_band;
 use super::error::IdentifyError;
 use super::gather::{Gathered, Mounted};
 use super::options::IdentifyOptions;
-use crate::identification::estimate::{BaseModel, Spread, spread};
+use crate::identification::estimate::{BaseModel, ResidualStats, residual_stats};
 use crate::logs::regression::DataOptions;
 
 /// What the model leaves of the logs to judge by; `None` where there are none.
@@ -14,12 +14,12 @@ pub(super) fn validate(
     model: &BaseModel,
     joint_bands: &[f64],
     options: &IdentifyOptions<'_>,
-) -> Result<Option<Spread>, IdentifyError> {
+) -> Result<Option<ResidualStats>, IdentifyError> {
     let judge = |mounted: &Mounted| of_mounting(mounted, model, joint_bands, &options.data);
     let judged = gathered.judging().map(judge).collect::<Result<Vec<_>, _>>()?;
     Ok(match judged.as_slice() {
         [(only, _)] => Some(only.clone()),
-        several => Spread::pooled(several),
+        several => ResidualStats::pooled(several),
     })
 }
 
@@ -29,12 +29,12 @@ fn of_mounting(
     model: &BaseModel,
     joint_bands: &[f64],
     options: &DataOptions,
-) -> Result<(Spread, Vec<usize>), IdentifyError> {
+) -> Result<(ResidualStats, Vec<usize>), IdentifyError> {
     let body = &mounted.body;
     let model = model.clone().in_set_of(body);
-    let mut judged: Option<(Spread, Vec<usize>)> = None;
+    let mut judged: Option<(ResidualStats, Vec<usize>)> = None;
     for (members, data) in by_band(body, &mounted.held_out, joint_bands, options)? {
-        let own = spread(&data, &model.residual(body, &data));
+        let own = residual_stats(&data, &model.residual(body, &data));
         let (all, rows) = judged.get_or_insert_with(|| (own.clone(), vec![0; body.dof()]));
         for j in members {
             (all.rms[j], all.relative[j]) = (own.rms[j], own.relative[j]);

@@ -28,7 +28,7 @@ pub use recorded::Recorded;
 pub use result::Identified;
 
 use super::conventions::conventions;
-use super::estimate::{BaseModel, Uncertainty, consistent_fit, estimates, spread_of};
+use super::estimate::{BaseModel, Uncertainty, consistent_fit, estimates, stats_of};
 use super::source::Source;
 use super::transmission::transmission;
 use crate::logs::log::notes_of;
@@ -98,7 +98,7 @@ fn gather_logs(
             let mounting = one_mounting(logs.iter().chain(validate), "--model takes")?;
             let mut read = InMemory::read(arm, known, [logs, validate], mounting, options.progress)?;
             options.progress.say("asking what the columns are");
-            let told = conventions(&read.body, &read.fit, &read.validate);
+            let result = conventions(&read.body, &read.fit, &read.validate);
             let between = transmission(read.body.arm(), &read.fit, &read.validate);
             read.known.take_out(&read.body, &mut read.fit);
             read.known.take_out(&read.body, &mut read.validate);
@@ -113,7 +113,7 @@ fn gather_logs(
                 gathered.hold_out(log, mounting, &options.data)?;
             }
             // What is known of the arm is still in the torques that were asked.
-            gathered.conventions = Some(told);
+            gathered.conventions = Some(result);
             gathered.transmission = between;
             gathered
         }
@@ -167,7 +167,7 @@ fn conclude(
         set: SetKind::Minimal.to_string(),
         parameters: found.parameters,
         friction: found.friction,
-        fit: spread_of(solution, &solution.theta),
+        fit: stats_of(solution, &solution.theta),
         validate,
         physically_consistent: reasons.is_empty(),
         consistent: consistent_fit(body, solution)?.report(body, solution),

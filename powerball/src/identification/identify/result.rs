@@ -5,7 +5,7 @@ use super::by_mounting::MountedFit;
 use crate::controller::JointNumber;
 use crate::identification::conventions::Conventions;
 use crate::identification::estimate::{
-    BaseModel, ConsistentReport, JointFriction, ParameterEstimate, Spread, Uncertainty,
+    BaseModel, ConsistentReport, JointFriction, ParameterEstimate, ResidualStats, Uncertainty,
 };
 use crate::identification::transmission::JointTransmission;
 use crate::logs::summary::BANDS;
@@ -29,9 +29,9 @@ pub struct Identified {
     /// Eq. 16 by joint.
     pub friction: Vec<JointFriction>,
     /// What the fit leaves of its own logs.
-    pub fit: Spread,
+    pub fit: ResidualStats,
     /// What the model leaves of the validation set, where there is one.
-    pub validate: Option<Spread>,
+    pub validate: Option<ResidualStats>,
     /// Whether a real arm can have these values.
     pub physically_consistent: bool,
     /// The nearest values that a real arm can have, with what that costs.

@@ -10,7 +10,7 @@
 //!
 //! | | |
 //! |---|---|
-//! | `told` | what is told, and its words |
+//! | `result` | what is told, and its words |
 //! | `effects` | what a transmission may hold beside friction and rotor |
 //! | `columns` | the signals that a motor's torque is compared with |
 //! | `grid`, `products` | logs on even grids; products of columns by block |
@@ -22,16 +22,16 @@ mod effects;
 mod fit;
 mod grid;
 mod products;
+mod result;
 mod search;
-mod told;
 
 pub use effects::{Figures, TransmissionEffect};
-pub use told::{JointTransmission, Transmission, Unknown};
+pub use result::{JointTransmission, Transmission, Unknown};
 
 use crate::controller::JointNumber;
 use crate::logs::log::{Log, logs_of_motors};
 use crate::logs::parallel;
-use crate::logs::regression::silent_joints;
+use crate::logs::regression::inactive_joints;
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 use grid::Grid;
@@ -57,17 +57,17 @@ pub fn transmission<'l>(
     let fitted = if fitted == 0 { all.len() } else { fitted };
     // Beside a motor's torque stands what its gear gives, which where joints are coupled is not one joint's.
     let grid = Grid::new(&logs_of_motors(arm, &all), fitted);
-    let silent = silent_joints(arm, &all);
+    let inactive = inactive_joints(arm, &all);
     let joints: Vec<usize> = (0..arm.dof()).collect();
     Some(parallel::map(&joints, |&j| {
         let joint = JointNumber::from_index(j);
-        let found = match (&silent[j], &grid) {
+        let found = match (&inactive[j], &grid) {
             (Some(why), _) => Err(why.clone()),
             (None, Err(why)) => Err(why.clone()),
             (None, Ok(grid)) => of_joint(arm, grid, joint),
         };
         match found {
-            Ok(told) => JointTransmission::Told(told),
+            Ok(result) => JointTransmission::Known(result),
             Err(why_not) => JointTransmission::Unknown(Unknown { joint, why_not }),
         }
     }))

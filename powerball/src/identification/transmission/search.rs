@@ -4,7 +4,7 @@ use super::columns::{Column, Scales};
 use super::effects::{Candidate, Kind, TransmissionEffect};
 use super::fit::{Fit, noise_share};
 use super::products::{Evidence, Products};
-use super::told::Transmission;
+use super::result::Transmission;
 use crate::controller::JointNumber;
 use crate::identification::estimate::distribution::t_critical;
 

@@ -26,8 +26,8 @@ const TRUTH: [[f64; 6]; 6] = [
 static LOGS: LazyLock<(Arm, Vec<(Motion, Log)>)> = LazyLock::new(|| {
     // On a wall, so that its first joint carries a load too.
     let plant = lwa4p::mounted([0.0, -9.81, 0.0]).unwrap();
-    let silent = Sensors { white: vec![0.0; 6], coloured: vec![0.0; 6], ..plant.sensors().clone() };
-    let plant = Plant::new(plant.dynamics().clone(), plant.friction().to_vec(), silent);
+    let inactive = Sensors { white: vec![0.0; 6], coloured: vec![0.0; 6], ..plant.sensors().clone() };
+    let plant = Plant::new(plant.dynamics().clone(), plant.friction().to_vec(), inactive);
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let log = |k: u64| {
         let mut draw = |scale: f64| (0..5).map(|_| scale * rng.random_range(-1.0..1.0)).collect();
@@ -47,7 +47,7 @@ static LOGS: LazyLock<(Arm, Vec<(Motion, Log)>)> = LazyLock::new(|| {
 
 /// What is told of logs with the motors' torques of [`TRUTH`], with what `extra` gives of a joint along a log
 /// on top, N·m at the link, and white noise of `noise` N·m on the link's torques.
-fn told(extra: impl Fn(usize, &Motion, &Log) -> Option<Vec<f64>>, noise: f64) -> Vec<JointTransmission> {
+fn result(extra: impl Fn(usize, &Motion, &Log) -> Option<Vec<f64>>, noise: f64) -> Vec<JointTransmission> {
     let (arm, logs) = &*LOGS;
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let of_joint = |j: usize, motion: &Motion, log: &Log| -> Vec<f64> {
@@ -76,7 +76,7 @@ fn told(extra: impl Fn(usize, &Motion, &Log) -> Option<Vec<f64>>, noise: f64) ->
 
 fn known(joint: &JointTransmission) -> &Transmission {
     match joint {
-        JointTransmission::Told(told) => told,
+        JointTransmission::Known(result) => result,
         JointTransmission::Unknown(unknown) => panic!("{}", unknown.why_not),
     }
 }
@@ -84,25 +84,25 @@ fn known(joint: &JointTransmission) -> &Transmission {
 /// The effects by joint and name.
 fn effects(all: &[JointTransmission]) -> Vec<(usize, &'static str)> {
     let of = |joint: &JointTransmission| -> Vec<(usize, &'static str)> {
-        let JointTransmission::Told(told) = joint else { return Vec::new() };
-        told.effects.iter().map(|e| (told.joint.number(), e.effect)).collect()
+        let JointTransmission::Known(result) = joint else { return Vec::new() };
+        result.effects.iter().map(|e| (result.joint.number(), e.effect)).collect()
     };
     all.iter().flat_map(of).collect()
 }
 
 #[test]
 fn ratio_sign_friction_and_rotor_come_back() {
-    let all = told(|_, _, _| None, 0.02);
+    let all = result(|_, _, _| None, 0.02);
     for (joint, [k, rotor, viscous, coulomb, _, offset]) in all.iter().zip(TRUTH).take(5) {
-        let told = known(joint);
+        let result = known(joint);
         let near = |found: f64, truth: f64, within: f64| (found - truth).abs() < within * truth.abs();
-        assert!(near(told.ratio, k, 0.01), "{}", joint.sentence());
-        assert!(near(told.viscous, viscous, 0.05), "{}", joint.sentence());
-        assert!(near(told.coulomb, coulomb, 0.05), "{}", joint.sentence());
-        assert!(near(told.rotor_inertia, rotor, 0.1), "{}", joint.sentence());
-        assert!((told.offset - offset).abs() < 0.1, "{}", joint.sentence());
-        assert!(told.std > 0.0 && (told.ratio - k).abs() < 4.0 * told.std, "{}", joint.sentence());
-        assert!(told.left < 0.1 && told.left_with <= told.left, "{}", joint.sentence());
+        assert!(near(result.ratio, k, 0.01), "{}", joint.sentence());
+        assert!(near(result.viscous, viscous, 0.05), "{}", joint.sentence());
+        assert!(near(result.coulomb, coulomb, 0.05), "{}", joint.sentence());
+        assert!(near(result.rotor_inertia, rotor, 0.1), "{}", joint.sentence());
+        assert!((result.offset - offset).abs() < 0.1, "{}", joint.sentence());
+        assert!(result.std > 0.0 && (result.ratio - k).abs() < 4.0 * result.std, "{}", joint.sentence());
+        assert!(result.left < 0.1 && result.left_with <= result.left, "{}", joint.sentence());
     }
     assert_eq!(effects(&all), []);
     // The last link's torque is that of its rotor alone, as a motor's would be.
@@ -113,9 +113,9 @@ fn ratio_sign_friction_and_rotor_come_back() {
 /// smaller ratio.
 #[test]
 fn noise_of_the_link_torque_does_not_draw_the_ratio_to_zero() {
-    let all = told(|_, _, _| None, 0.3);
-    let told = known(&all[4]);
-    assert!((told.ratio / TRUTH[4][0] - 1.0).abs() < 0.03, "{}", all[4].sentence());
+    let all = result(|_, _, _| None, 0.3);
+    let result = known(&all[4]);
+    assert!((result.ratio / TRUTH[4][0] - 1.0).abs() < 0.03, "{}", all[4].sentence());
 }
 
 #[test]
@@ -125,13 +125,13 @@ fn load_friction_is_named_on_its_joint_alone() {
         let rubs = samples.map(|([_, dq, _], torque)| 0.08 * torque.abs() * (dq[1] / TRUTH[1][4]).tanh());
         (j == 1).then(|| rubs.collect())
     };
-    let all = told(load, 0.02);
+    let all = result(load, 0.02);
     assert_eq!(effects(&all), [(2, "load_friction")]);
-    let told = known(&all[1]);
-    let effect = &told.effects[0];
+    let result = known(&all[1]);
+    let effect = &result.effects[0];
     assert!((effect.parameters["coefficient"] / 0.08 - 1.0).abs() < 0.05, "{effect:?}");
     assert!(effect.gain.len() == 3 && effect.gain.iter().all(|gain| *gain > 0.5), "{effect:?}");
-    assert!((told.coulomb / 10.0 - 1.0).abs() < 0.05 && told.left_with < 0.5 * told.left);
+    assert!((result.coulomb / 10.0 - 1.0).abs() < 0.05 && result.left_with < 0.5 * result.left);
     let json = serde_json::to_value(&all).unwrap();
     assert_eq!(json[1]["joint"], 2);
     assert_eq!(json[1]["effects"][0]["effect"], "load_friction");
@@ -158,7 +158,7 @@ fn presliding_and_a_delay_are_named_each_on_its_joint() {
         }
         _ => None,
     };
-    let all = told(extra, 0.02);
+    let all = result(extra, 0.02);
     let said: Vec<String> = all.iter().map(JointTransmission::sentence).collect();
     assert_eq!(effects(&all), [(2, "hysteresis"), (3, "time_delay")], "{said:#?}");
     let delay = known(&all[2]).effects[0].parameters["delay"];
@@ -224,9 +224,9 @@ fn the_transmissions_of_a_rokae_are_found() {
     }
     // What other fits of these logs give: 110 139 115 111 77 87 46.
     for (joint, inverse) in all.iter().zip([110.0, 139.0, 115.0, 111.0, 77.0, 87.0, 46.0]) {
-        let told = known(joint);
-        assert!((1.0 / told.ratio / inverse - 1.0).abs() < 0.2, "{}", joint.sentence());
-        assert!(told.left < 0.25 && told.left_with < 0.2, "{}", joint.sentence());
+        let result = known(joint);
+        assert!((1.0 / result.ratio / inverse - 1.0).abs() < 0.2, "{}", joint.sentence());
+        assert!(result.left < 0.25 && result.left_with < 0.2, "{}", joint.sentence());
     }
     let load = known(&all[1]).effects.iter().find(|e| e.effect == "load_friction").unwrap();
     assert!((0.06..0.11).contains(&load.parameters["coefficient"]), "{load:?}");

@@ -1,7 +1,7 @@
 //! What can be wrong with numbers that are there: time, wraps, units, dead and saturated signals.
 
 use super::raw::{Effort, Raw};
-use super::{Doubts, Finding, Log, LogError, Motors, Severity, levels, signs, velocities};
+use super::{Finding, Log, LogError, Motors, Severity, Warnings, levels, signs, velocities};
 use crate::logs::signal::resample::median_step;
 use dyngen::Arm;
 use dyngen::arm::JointKind;
@@ -84,15 +84,15 @@ pub(super) fn into_log(
         units(&raw, j, effort, arm, file, findings, &mut errors);
     }
     let name = if matches!(effort, Effort::Torque) { "tau" } else { "i" };
-    let mut doubts = Doubts { file, line: &raw.line, t: &raw.t, findings, errors: &mut errors };
+    let mut warnings = Warnings { file, line: &raw.line, t: &raw.t, findings, errors: &mut errors };
     for (j, (q, effort)) in raw.q.iter().zip(&raw.effort).enumerate() {
-        levels::effort(effort, &format!("{name}{}", j + 1), &mut doubts);
-        levels::steps(effort, &format!("{name}{}", j + 1), false, &mut doubts);
-        levels::steps(q, &format!("q{}", j + 1), true, &mut doubts);
+        levels::effort(effort, &format!("{name}{}", j + 1), &mut warnings);
+        levels::steps(effort, &format!("{name}{}", j + 1), false, &mut warnings);
+        levels::steps(q, &format!("q{}", j + 1), true, &mut warnings);
     }
-    velocities::look(&raw, step, &mut doubts);
-    signs::look(&raw, step, name, &mut doubts);
-    rate(&raw.t, &mut doubts);
+    velocities::look(&raw, step, &mut warnings);
+    signs::look(&raw, step, name, &mut warnings);
+    rate(&raw.t, &mut warnings);
     if !errors.is_empty() {
         return Err(LogError(errors));
     }
@@ -155,7 +155,7 @@ fn of_motors(arm: &Arm, motors: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
 }
 
 /// A clock that changes its pace: the mean step of the last third of the samples against the first.
-fn rate(t: &[f64], doubts: &mut Doubts<'_>) {
+fn rate(t: &[f64], warnings: &mut Warnings<'_>) {
     let third = t.len() / 3;
     let (first, last) = (t[third] - t[0], t[t.len() - 1] - t[t.len() - 1 - third]);
     // A gap is no drift.
@@ -167,7 +167,7 @@ fn rate(t: &[f64], doubts: &mut Doubts<'_>) {
                 drifts, or samples were lost evenly",
             100.0 * change
         );
-        doubts.add(Some(t.len() - 1 - third), "t".into(), message, Severity::Told);
+        warnings.add(Some(t.len() - 1 - third), "t".into(), message, Severity::Warning);
     }
 }
 

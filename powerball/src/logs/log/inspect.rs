@@ -31,7 +31,8 @@ pub struct Inspected {
     /// Why it is none.
     pub refused: Vec<String>,
     /// What is odd about it.
-    pub doubts: Vec<String>,
+    #[serde(rename = "doubts")]
+    pub warnings: Vec<String>,
     /// The log itself, for figures.
     #[serde(skip)]
     pub log: Option<Log>,
@@ -141,11 +142,11 @@ pub fn inspect(path: &Path, map: &ColumnMap, arm: Option<&Arm>) -> Result<Inspec
         alignment: aligned(&tables, map),
         taken_as: None,
         refused: Vec::new(),
-        doubts: Vec::new(),
+        warnings: Vec::new(),
         log: None,
     };
     let Some(arm) = arm else {
-        inspected.doubts = shown(&notes);
+        inspected.warnings = shown(&notes);
         return Ok(inspected);
     };
     drop(tables);
@@ -157,7 +158,7 @@ pub fn inspect(path: &Path, map: &ColumnMap, arm: Option<&Arm>) -> Result<Inspec
         }
         Err(LogError(reasons)) => inspected.refused = shown(&reasons),
     }
-    inspected.doubts = shown(&findings);
+    inspected.warnings = shown(&findings);
     Ok(inspected)
 }
 

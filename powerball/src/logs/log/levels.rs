@@ -1,7 +1,7 @@
 //! The levels of a signal: coarse steps, and tops that are flat because something saturates.
 
-use super::Doubts;
 use super::Severity;
+use super::Warnings;
 
 /// A saturated signal rests at its extreme at least so many samples one after another.
 const FLAT: usize = 4;
@@ -15,11 +15,11 @@ const STEPS_POSITION: f64 = 500.0;
 const STEPS_EFFORT: f64 = 40.0;
 
 /// Whether a torque or current signal never changes, or is cut off at an extreme.
-pub(super) fn effort(x: &[f64], name: &str, doubts: &mut Doubts<'_>) {
+pub(super) fn effort(x: &[f64], name: &str, warnings: &mut Warnings<'_>) {
     let (low, high) = x.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
     if high - low <= 1e-12 * high.abs().max(low.abs()) {
         let message = "never changes: the joint's sensor or drive is dead, or it was not recorded";
-        doubts.add(None, name.into(), message.into(), Severity::Told);
+        warnings.add(None, name.into(), message.into(), Severity::Warning);
         return;
     }
     for (edge, sign) in [(low, -1.0), (high, 1.0)] {
@@ -44,13 +44,13 @@ pub(super) fn effort(x: &[f64], name: &str, doubts: &mut Doubts<'_>) {
                 "stays at its extreme {edge} for {resting} samples (first here): it looks saturated, and the \
                     model cannot explain torque that was not delivered"
             );
-            doubts.add(Some(*first), name.into(), message, Severity::Told);
+            warnings.add(Some(*first), name.into(), message, Severity::Warning);
         }
     }
 }
 
 /// Whether a signal has few levels.
-pub(super) fn steps(x: &[f64], name: &str, position: bool, doubts: &mut Doubts<'_>) {
+pub(super) fn steps(x: &[f64], name: &str, position: bool, warnings: &mut Warnings<'_>) {
     let mut sorted = x.to_vec();
     sorted.sort_by(f64::total_cmp);
     let range = sorted[sorted.len() - 1] - sorted[0];
@@ -70,6 +70,6 @@ pub(super) fn steps(x: &[f64], name: &str, position: bool, doubts: &mut Doubts<'
             false => "errors below that step mean nothing",
         };
         let message = format!("has {:.0} levels, {step:.3e} apart: {consequence}", count + 1.0);
-        doubts.add(None, name.into(), message, Severity::Told);
+        warnings.add(None, name.into(), message, Severity::Warning);
     }
 }

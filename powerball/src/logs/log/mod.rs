@@ -8,7 +8,6 @@ mod arrays;
 mod check;
 mod clock;
 mod columns;
-mod doubts;
 mod file;
 mod inspect;
 mod levels;
@@ -21,18 +20,19 @@ mod shift;
 mod signs;
 mod topics;
 mod velocities;
+mod warnings;
 mod write;
 
 pub use crate::logs::tables::{Finding, LogError};
 pub use arrays::{Arrays, Sample};
 pub use clock::common_clock;
-use doubts::{Doubts, Severity};
 pub use file::LogFile;
 pub use inspect::{Aligned, Inspected, InspectedColumn, InspectedTable, TakenAs, inspect};
 pub use map::{ByJoint, Clock, ColumnMap, Mapped};
 pub use motors::{Motors, logs_of_motors, notes_of};
 pub use read::{read_log, read_log_as, read_logs, read_logs_as};
 pub use topics::{Alignment, alignment};
+use warnings::{Severity, Warnings};
 
 /// One recording as it was logged, after its faults were taken out.
 #[derive(Clone, Debug)]

@@ -6,7 +6,7 @@
 //! sign. On sound logs of a UR10e the difference is 1 to 40 standard errors above zero.
 
 use super::raw::Raw;
-use super::{Doubts, Severity};
+use super::{Severity, Warnings};
 
 /// Half swings in either direction, at least.
 const SWINGS: usize = 4;
@@ -16,7 +16,7 @@ const CLEAR: f64 = 5.0;
 const MOVES: f64 = 0.1;
 
 /// Looks at each joint's torque or current.
-pub(super) fn look(raw: &Raw, step: f64, name: &str, doubts: &mut Doubts<'_>) {
+pub(super) fn look(raw: &Raw, step: f64, name: &str, warnings: &mut Warnings<'_>) {
     for (j, (q, effort)) in raw.q.iter().zip(&raw.effort).enumerate() {
         let range = q.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
         if range.1 - range.0 < MOVES {
@@ -55,7 +55,7 @@ pub(super) fn look(raw: &Raw, step: f64, name: &str, doubts: &mut Doubts<'_>) {
                 (b - f) / error,
                 j + 1
             );
-            doubts.add(None, format!("{name}{}", j + 1), message, Severity::Told);
+            warnings.add(None, format!("{name}{}", j + 1), message, Severity::Warning);
         }
     }
 }

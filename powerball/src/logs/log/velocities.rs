@@ -7,7 +7,7 @@
 //! correlation of 1.0000.
 
 use super::raw::Raw;
-use super::{Doubts, Severity};
+use super::{Severity, Warnings};
 
 /// Length of the stretches that are compared, s.
 const STRETCH: f64 = 0.5;
@@ -26,7 +26,7 @@ struct Stretches {
 }
 
 /// Looks at the velocities of a log.
-pub(super) fn look(raw: &Raw, step: f64, doubts: &mut Doubts<'_>) {
+pub(super) fn look(raw: &Raw, step: f64, warnings: &mut Warnings<'_>) {
     let n = raw.q.len();
     if raw.dq.iter().any(|dq| dq.len() != raw.t.len()) {
         return;
@@ -51,9 +51,9 @@ pub(super) fn look(raw: &Raw, step: f64, doubts: &mut Doubts<'_>) {
                 j + 1,
                 other + 1
             );
-            doubts.add(None, name, message, Severity::Told);
+            warnings.add(None, name, message, Severity::Warning);
         } else if own.abs() < OTHER || ratio.abs() < 1e-9 {
-            doubts.add(
+            warnings.add(
                 None,
                 name,
                 format!(
@@ -61,35 +61,35 @@ pub(super) fn look(raw: &Raw, step: f64, doubts: &mut Doubts<'_>) {
                 columns. Velocities are computed from q; dq is not used",
                     j + 1
                 ),
-                Severity::Told,
+                Severity::Warning,
             );
         } else if !(0.67..1.5).contains(&ratio) {
             // The ratio is q's slope over dq.
             let (hint, severity) = if (ratio * 57.2958 - 1.0).abs() < 0.25 {
-                ("dq looks like degrees a second (--map 'dq.unit = \"deg/s\"')", Severity::Told)
+                ("dq looks like degrees a second (--map 'dq.unit = \"deg/s\"')", Severity::Warning)
             } else if (ratio / 57.2958 - 1.0).abs() < 0.25 {
                 ("q looks like degrees (--map 'q.unit = \"deg\"')", Severity::Unusable)
             } else if ratio < 0.0 {
-                ("their signs differ", Severity::Told)
+                ("their signs differ", Severity::Warning)
             } else {
-                ("check units and order of columns", Severity::Told)
+                ("check units and order of columns", Severity::Warning)
             };
             let message = format!(
                 "is {:.3} times the slope of q{}: {hint}. Velocities are computed from q; dq is not used",
                 1.0 / ratio,
                 j + 1
             );
-            doubts.add(None, name, message, severity);
+            warnings.add(None, name, message, severity);
         } else if own > SAME {
             ratios.push((j, ratio));
         }
     }
-    clocks(raw, &joints, &ratios, doubts);
+    clocks(raw, &joints, &ratios, warnings);
 }
 
 /// Drives integrate their velocities on their own clocks: where all joints disagree with `t` alike, it is `t`
 /// that is off.
-fn clocks(raw: &Raw, joints: &[Stretches], ratios: &[(usize, f64)], doubts: &mut Doubts<'_>) {
+fn clocks(raw: &Raw, joints: &[Stretches], ratios: &[(usize, f64)], warnings: &mut Warnings<'_>) {
     let mut all: Vec<f64> = ratios.iter().map(|(_, ratio)| *ratio).collect();
     all.sort_by(f64::total_cmp);
     let (Some(least), Some(most)) = (all.first(), all.last()) else { return };
@@ -101,7 +101,7 @@ fn clocks(raw: &Raw, joints: &[Stretches], ratios: &[(usize, f64)], doubts: &mut
             100.0 * (common - 1.0).abs(),
             if common > 1.0 { "slowly" } else { "fast" }
         );
-        doubts.add(None, "t".into(), message, Severity::Told);
+        warnings.add(None, "t".into(), message, Severity::Warning);
     }
     // The same in the first and the last third.
     let third = |from: usize, to: usize| -> Vec<f64> {
@@ -128,7 +128,7 @@ fn clocks(raw: &Raw, joints: &[Stretches], ratios: &[(usize, f64)], doubts: &mut
             "drifts against the joints' velocities: by {:.1} % from the first third of the log to the last",
             100.0 * (b - a)
         );
-        doubts.add(Some(begin), "t".into(), message, Severity::Told);
+        warnings.add(Some(begin), "t".into(), message, Severity::Warning);
     }
 }
 

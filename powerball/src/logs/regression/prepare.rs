@@ -1,8 +1,8 @@
 //! Logs of an arm into rows: even grid, derivatives, band, rest removed, blocks laid out.
 
-use super::kept::kept_samples;
+use super::inactive::inactive_joints;
 use super::rest_notes::{FEWEST_ROWS, notes};
-use super::silent::silent_joints;
+use super::row_selection::kept_samples;
 use super::{Block, Column, JointRows, Recording, RigidArm};
 use crate::logs::log::{Log, logs_of_motors};
 use crate::logs::parallel;
@@ -80,7 +80,7 @@ pub struct Data<'a> {
     /// The velocity below which a joint rests, by joint, rad/s.
     pub rest_velocity: Vec<f64>,
     /// By joint: why its samples say nothing, in words.
-    pub silent: Vec<Option<String>>,
+    pub inactive: Vec<Option<String>>,
     /// Pieces of logs, and joints of some logs, that were left out, in words.
     pub left_out: Vec<String>,
     /// What was left out or done, in words.
@@ -142,7 +142,7 @@ impl<'a> Data<'a> {
         correct: impl FnMut(&mut Recording),
     ) -> Result<Vec<Result<Data<'a>, DataError>>, DataError> {
         let n = body.dof();
-        let silent = silent_joints(body.arm(), logs);
+        let inactive = inactive_joints(body.arm(), logs);
         let logs = &*logs_of_motors(body.arm(), logs);
         let mut steps: Vec<f64> = logs.iter().filter_map(|log| median_step(&log.t)).collect();
         steps.sort_by(f64::total_cmp);
@@ -175,24 +175,24 @@ impl<'a> Data<'a> {
             })
             .collect();
         let top_velocity: Vec<f64> = (0..n).map(|j| top_velocity(&recordings, j)).collect();
-        let (kept, without) = kept_samples(logs, &recordings, &bands, &rest_velocity, &silent);
+        let (kept, without) = kept_samples(logs, &recordings, &bands, &rest_velocity, &inactive);
         left_out.extend(without);
         let joints = joint_rows(body, &recordings, &bands, kept);
         let logs: Vec<String> = logs.iter().map(|log| log.file.clone()).collect();
         let of_band = |(band, joints): (Band, Vec<JointRows>)| {
             if joints.iter().all(|j| j.len() < FEWEST_ROWS) {
-                return Err(DataError::NoMotion(silent.iter().flatten().cloned().collect()));
+                return Err(DataError::NoMotion(inactive.iter().flatten().cloned().collect()));
             }
             Ok(Data {
                 body,
-                notes: notes(&left_out, &recordings, &band, &joints, &silent, &rest_velocity),
+                notes: notes(&left_out, &recordings, &band, &joints, &inactive, &rest_velocity),
                 blocks: blocks_of(&recordings, &joints, &band, options.block),
                 recordings: recordings.clone(),
                 band,
                 joints,
                 logs: logs.clone(),
                 rest_velocity: rest_velocity.clone(),
-                silent: silent.clone(),
+                inactive: inactive.clone(),
                 left_out: left_out.clone(),
                 per_joint: false,
                 top_velocity: top_velocity.clone(),
@@ -246,7 +246,7 @@ impl<'a> Data<'a> {
             blocks: self.blocks.clone(),
             logs: self.logs.clone(),
             rest_velocity: self.rest_velocity.clone(),
-            silent: self.silent.clone(),
+            inactive: self.inactive.clone(),
             left_out: self.left_out.clone(),
             notes: self.notes.clone(),
             per_joint: false,

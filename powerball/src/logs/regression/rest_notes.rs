@@ -40,13 +40,13 @@ pub(super) fn notes(
     recordings: &[Recording],
     band: &Band,
     joints: &[JointRows],
-    silent: &[Option<String>],
+    inactive: &[Option<String>],
     rest_velocity: &[f64],
 ) -> Vec<String> {
     let samples: usize = recordings.iter().map(|r| band.kept(r.len()).len()).sum();
     let of_joint = |(j, rows): (usize, &JointRows)| {
         let rest = || rest_note(JointNumber::from_index(j), rows.len(), samples, Some(rest_velocity[j]));
-        silent[j].clone().or_else(rest)
+        inactive[j].clone().or_else(rest)
     };
     left_out.iter().cloned().chain(joints.iter().enumerate().filter_map(of_joint)).collect()
 }

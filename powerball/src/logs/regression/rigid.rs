@@ -1,6 +1,6 @@
 //! The rigid arm of a file at run time: columns of its minimal set and of what lies outside it.
 
-use super::hidden::hidden;
+use super::gravity_unobservable::gravity_unobservable;
 use crate::logs::log::Motors;
 use dyngen::arm::ParameterKind;
 use dyngen::base::span::combinations;
@@ -26,8 +26,8 @@ pub struct RigidArm {
     unconstrained: OnceLock<Option<Wide>>,
     /// The same at unit gravity along x, y and z of the base.
     unit_gravity: OnceLock<Option<[Wide; 3]>>,
-    /// See [`RigidArm::hidden`].
-    hidden: OnceLock<Vec<Vec<f64>>>,
+    /// See [`RigidArm::gravity_unobservable`].
+    gravity_unobservable: OnceLock<Vec<Vec<f64>>>,
 }
 
 /// A regressor with every parameter of a modified arm.
@@ -83,7 +83,7 @@ impl RigidArm {
             filed: filed.gravity.clone(),
             unconstrained: OnceLock::new(),
             unit_gravity: OnceLock::new(),
-            hidden: OnceLock::new(),
+            gravity_unobservable: OnceLock::new(),
         })
     }
 
@@ -238,8 +238,8 @@ impl RigidArm {
     /// Directions in the space of all parameters, eleven a link in the order of [`Arm::all_parameters`], that
     /// no motion under the arm's own gravity shows and that a gravity from another side does: how far from an
     /// upright first axis its link's weight is, say.
-    pub fn hidden(&self) -> &[Vec<f64>] {
-        self.hidden.get_or_init(|| hidden(self).unwrap_or_default())
+    pub fn gravity_unobservable(&self) -> &[Vec<f64>] {
+        self.gravity_unobservable.get_or_init(|| gravity_unobservable(self).unwrap_or_default())
     }
 
     /// The index among [`Arm::all_parameters`] of a parameter of the last link.

@@ -55,7 +55,8 @@ struct Head {
     logs: Vec<(String, f64)>,
     samples: u64,
     /// By joint: why a log said nothing of it.
-    silent: Vec<Option<String>>,
+    #[serde(rename = "silent")]
+    inactive: Vec<Option<String>>,
     /// By joint and octave.
     rows: Vec<Vec<u64>>,
     spectrum: Vec<Powers>,
@@ -126,7 +127,7 @@ impl Summary {
             octaves: OCTAVES,
             logs: self.logs.clone(),
             samples: self.samples,
-            silent: self.silent.clone(),
+            inactive: self.inactive.clone(),
             rows: self.joints.iter().map(|j| j.levels().iter().map(RFactor::rows).collect()).collect(),
             spectrum: self.spectrum.clone(),
             bytes: numbers.len(),
@@ -175,7 +176,7 @@ impl Summary {
             && head.parameters.len() <= 16 * MOST_JOINTS
             && head.octaves == OCTAVES
             && head.rows.len() == joints
-            && head.silent.len() == joints
+            && head.inactive.len() == joints
             && head.spectrum.len() == joints
             && head.rows.iter().all(|r| r.len() == OCTAVES)
             && numbers.len() == head.bytes;
@@ -193,7 +194,7 @@ impl Summary {
             smoothing: head.smoothing,
             steepness: head.steepness.iter().map(|[low, high]| Steepness::between(*low, *high)).collect(),
         };
-        let (logs, samples, silent, spectrum) = (head.logs, head.samples, head.silent, head.spectrum);
-        Ok((Summary { identity, logs, samples, silent, joints, spectrum }, after))
+        let (logs, samples, inactive, spectrum) = (head.logs, head.samples, head.inactive, head.spectrum);
+        Ok((Summary { identity, logs, samples, inactive, joints, spectrum }, after))
     }
 }

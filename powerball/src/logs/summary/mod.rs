@@ -53,7 +53,7 @@ pub struct Summary {
     /// Samples in the band, resting joints among them.
     pub samples: u64,
     /// By joint: why a log said nothing of it, in words.
-    pub silent: Vec<Option<String>>,
+    pub inactive: Vec<Option<String>>,
     /// The rows of each joint.
     pub joints: Vec<Octaves>,
     /// Of the widest of several bands: see [`Bands::spectrum`].
@@ -95,7 +95,7 @@ impl Summary {
             identity,
             logs: Vec::new(),
             samples: 0,
-            silent: vec![None; dof],
+            inactive: vec![None; dof],
             joints: vec![Octaves::new(columns.width()); dof],
             spectrum: vec![Powers::default(); dof],
         }
@@ -139,8 +139,8 @@ impl Summary {
         for (octaves, other) in self.joints.iter_mut().zip(&other.joints) {
             octaves.merge(other);
         }
-        for (silent, other) in self.silent.iter_mut().zip(&other.silent) {
-            *silent = other.clone().or(silent.take());
+        for (inactive, other) in self.inactive.iter_mut().zip(&other.inactive) {
+            *inactive = other.clone().or(inactive.take());
         }
         for (sum, other) in self.spectrum.iter_mut().flatten().zip(other.spectrum.iter().flatten()) {
             (sum[0], sum[1]) = (sum[0] + other[0], sum[1] + other[1]);

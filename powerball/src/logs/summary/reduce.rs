@@ -97,8 +97,8 @@ impl Summary {
     /// Counts what is known of a log in the band beside its rows.
     fn count(&mut self, data: &Data<'_>) {
         self.samples += data.recordings.iter().map(|r| data.band.kept(r.len()).len() as u64).sum::<u64>();
-        for (silent, why) in self.silent.iter_mut().zip(&data.silent) {
-            *silent = why.clone().or(silent.take());
+        for (inactive, why) in self.inactive.iter_mut().zip(&data.inactive) {
+            *inactive = why.clone().or(inactive.take());
         }
     }
 }

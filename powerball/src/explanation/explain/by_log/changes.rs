@@ -76,7 +76,7 @@ pub(crate) fn changes(
             let others: Vec<f64> =
                 (0..logs.len()).filter(|k| *k != l).filter_map(|k| Some(of(t, k)?.0)).collect();
             let share = share(&together, (side, log), &logs, &tried[t].joints, &asked, rule.odd_log)?;
-            let enough = share >= 1.0 - rule.much_left
+            let enough = share >= 1.0 - rule.max_unexplained
                 && by_chance(&together, &asked) * places.len() as f64 <= rule.family_wise
                 && stands_out(asked.theta, &others);
             enough.then_some((asked, share))
@@ -97,13 +97,13 @@ pub(crate) fn changes(
 
 /// What is tried of every log.
 fn tried(study: &Study<'_>, model: &Model) -> Vec<Tried> {
-    let (here, there) = (model.context(study), study.there(&model.fit, &[]));
+    let (on_fitted, on_validation) = (model.context(study), study.on_validation(&model.fit, &[]));
     let mut tried = Vec::new();
     for effect in effects::all() {
-        for candidate in effect.candidates(&here) {
+        for candidate in effect.candidates(&on_fitted) {
             let Some((unit, possible)) = effect.change_of_a_log(&candidate) else { continue };
-            let columns =
-                [&here, &there].map(|context| context.columns(&candidate).pop().unwrap_or_default());
+            let columns = [&on_fitted, &on_validation]
+                .map(|context| context.columns(&candidate).pop().unwrap_or_default());
             tried.push(Tried { effect: effect.name(), joints: candidate.joints, unit, possible, columns });
         }
     }
@@ -111,8 +111,8 @@ fn tried(study: &Study<'_>, model: &Model) -> Vec<Tried> {
     let with = temperature::Warmth::RunningTime { time_constant: f64::INFINITY };
     let warmth = Settings::from(temperature::Settings { of: temperature::Friction::Whole, with });
     let warmth = warmth.effect().name();
-    for j in here.moving_joints() {
-        let columns = [&here, &there].map(|context| friction(context, j));
+    for j in on_fitted.moving_joints() {
+        let columns = [&on_fitted, &on_validation].map(|context| friction(context, j));
         tried.push(Tried { effect: warmth, joints: vec![j], unit: 1.0, possible: -1.0..10.0, columns });
     }
     tried.retain(|t| t.columns.iter().all(|c| !c.parts.is_empty() && c.is_finite()));

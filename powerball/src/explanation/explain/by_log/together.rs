@@ -36,18 +36,19 @@ impl<'s> Together<'s> {
     pub(crate) fn new(study: &'s Study<'_>, model: &Model) -> Together<'s> {
         let (fit, validation) = (&model.fit, &study.validation);
         let columns = model.columns_on_validation(study);
-        let there = Design::new(validation, &friction_columns(validation, &fit.shapes), &columns);
+        let on_validation = Design::new(validation, &friction_columns(validation, &fit.shapes), &columns);
         let (mut gram, mut right, _) = fit.gram.fitted(&fit.weights, |_| true);
         let folds = Folds::new(validation);
-        let (more, right_there, _) = Gram::new(validation, &there, &folds).sum(&fit.weights, |_| true);
+        let (more, right_on_validation, _) =
+            Gram::new(validation, &on_validation, &folds).sum(&fit.weights, |_| true);
         gram += more;
-        right.iter_mut().zip(right_there).for_each(|(r, more)| *r += more);
+        right.iter_mut().zip(right_on_validation).for_each(|(r, more)| *r += more);
         let solver = Solver::new(&gram, |c| fit.free[c]);
         let solved = solver.solve(&right);
         let theta: Vec<f64> =
             (0..solved.len()).map(|c| if fit.free[c] { solved[c] } else { fit.theta[c] }).collect();
         let moved: Vec<f64> = theta.iter().zip(&fit.theta).map(|(new, old)| new - old).collect();
-        let designs = [fit.design.clone(), there];
+        let designs = [fit.design.clone(), on_validation];
         let mut residual = [fit.residual.clone(), model.residual_on_validation(study)];
         for (residual, design) in residual.iter_mut().zip(&designs) {
             for (j, residual) in residual.iter_mut().enumerate() {

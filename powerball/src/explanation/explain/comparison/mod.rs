@@ -14,7 +14,7 @@ mod question;
 mod withhold;
 
 pub(super) use history::{History, Step};
-pub(super) use naming::{Comparison, compare, surprise};
+pub(super) use naming::{Comparison, compare, relative_score};
 pub(super) use open::open;
 pub use open::{Hypothesis, Open};
 pub(super) use question::Question;

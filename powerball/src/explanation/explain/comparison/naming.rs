@@ -19,7 +19,7 @@ pub(crate) struct Comparison {
     /// Its score over that of the next best name that explains something else of the same residual. A name
     /// that explains the same part is another word for it; one that explains another part as well as this one
     /// is a sign that neither is true.
-    pub(crate) apart: f64,
+    pub(crate) distinct_margin: f64,
     /// The joints on which they were compared.
     pub(crate) joints: Vec<JointNumber>,
 }
@@ -45,7 +45,7 @@ pub(crate) fn compare(
         .collect();
     others.sort_by(|a, b| b.1.total_cmp(&a.1));
     let next = others.first().map_or(0.0, |(_, score)| *score);
-    let margin = if next > rule.least_score / 2.0 { own / next } else { surprise(rule, own) };
+    let margin = if next > rule.least_score / 2.0 { own / next } else { relative_score(rule, own) };
     let rivals = others
         .iter()
         .take(LISTED)
@@ -74,12 +74,12 @@ pub(crate) fn compare(
     let other = close
         .map(|(f, score)| (score, self::explained(screen, &groups[*f], joints)))
         .find(|(_, theirs)| shared(&explained, theirs) < rule.same_part);
-    let apart = other.map_or(surprise(rule, own), |(score, _)| own / score);
+    let distinct_margin = other.map_or(relative_score(rule, own), |(score, _)| own / score);
     let twin = others
         .first()
         .filter(|(_, score)| own / score < rule.least_margin)
         .map(|(f, _)| groups[*f].name().to_string());
-    Comparison { margin, rivals, twin, apart, joints: joints.to_vec() }
+    Comparison { margin, rivals, twin, distinct_margin, joints: joints.to_vec() }
 }
 
 /// The share of a rival's score that speaks against a choice.
@@ -142,6 +142,6 @@ fn shared(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
 
 /// The margin of a name without a rival: its score over the least that could have counted.
 #[must_use]
-pub(crate) fn surprise(rule: &Rule, score: f64) -> f64 {
+pub(crate) fn relative_score(rule: &Rule, score: f64) -> f64 {
     score / (rule.least_score / 2.0)
 }

@@ -7,7 +7,7 @@ use super::history::{History, Step};
 use super::question::Question;
 use crate::controller::JointNumber;
 use crate::explanation::effects::Effect;
-use crate::identification::estimate::{noise_floor, spread};
+use crate::identification::estimate::{noise_floor, residual_stats};
 
 /// What was taken back, and why.
 pub(crate) struct Withheld {
@@ -92,15 +92,17 @@ fn harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
     found.into_iter().find(|k| {
         let joints = &model.accepted[*k].candidate.joints;
         let without = model.without(study, *k).residual_on_validation(study);
-        [joints, &all].iter().any(|on| error(&without, on) < error(&with, on) - study.rule().harm)
+        [joints, &all]
+            .iter()
+            .any(|on| error(&without, on) < error(&with, on) - study.rule().max_validation_loss)
     })
 }
 
 /// Whether a step's name is not told apart from others and leaves much.
 fn is_weak(study: &Study<'_>, model: &Model, step: &Step) -> bool {
-    step.comparison.apart < study.rule().least_margin
+    step.comparison.distinct_margin < study.rule().least_margin
         && model.accepted.iter().any(|a| a.step == Some(step.number))
-        && share_left(study, model, step) > study.rule().much_left
+        && share_left(study, model, step) > study.rule().max_unexplained
 }
 
 /// The share of the excess over the noise floor that stayed on a step's joints, each counting alike: a name
@@ -108,7 +110,7 @@ fn is_weak(study: &Study<'_>, model: &Model, step: &Step) -> bool {
 fn share_left(study: &Study<'_>, model: &Model, step: &Step) -> f64 {
     let rms = |j: usize, square: f64| (square / study.data.joints[j].len().max(1) as f64).sqrt();
     let before: Vec<f64> = step.square_before.iter().enumerate().map(|(j, s)| rms(j, *s)).collect();
-    let after = spread(&study.data, &model.fit.residual).rms;
+    let after = residual_stats(&study.data, &model.fit.residual).rms;
     let floor = noise_floor(&study.data);
     let joints = &step.comparison.joints;
     let shares: f64 = joints.iter().map(|j| leftover(&before, &after, &floor, &[*j])).sum();

@@ -1,7 +1,7 @@
 //! From the accepted effects to a model of the arm, and what that model leaves.
 
 use super::super::model::Model;
-use super::super::special::Held;
+use super::super::special::ValidationOnlyEffect;
 use super::super::study::Study;
 use crate::controller::JointNumber;
 use crate::controller::correction::Term;
@@ -39,9 +39,13 @@ struct Parts {
 ///
 /// The residuals are those of the whole model put together, not of the sum of columns that it was fitted
 /// with: what is reported is what a controller computes. They differ by products of small effects.
-pub(crate) fn compose(study: &Study<'_>, found: &Model, held: &[Held]) -> Result<Composed, ExplainError> {
+pub(crate) fn compose(
+    study: &Study<'_>,
+    found: &Model,
+    validation_only: &[ValidationOnlyEffect],
+) -> Result<Composed, ExplainError> {
     let body = study.data.body;
-    let Parts { additions, gained, held, events } = parts(study, found, held);
+    let Parts { additions, gained, held, events } = parts(study, found, validation_only);
     let mut model = TorqueModel {
         arm: body.arm().name.clone(),
         set: SetKind::Minimal.to_string(),
@@ -88,13 +92,13 @@ fn set_per_joint(study: &mut Study<'_>, per_joint: bool) {
 }
 
 /// The accepted effects, each as what it is in a model.
-fn parts(study: &Study<'_>, found: &Model, held: &[Held]) -> Parts {
+fn parts(study: &Study<'_>, found: &Model, validation_only: &[ValidationOnlyEffect]) -> Parts {
     let context = found.context(study);
-    let there = study.there(&found.fit, &[]);
+    let on_validation = study.on_validation(&found.fit, &[]);
     let n = study.data.dof();
     let (mut offset, mut delay) = (vec![0.0; n], vec![0.0; n]);
     let mut parts = Parts::default();
-    let of_held = held.iter().flat_map(|held| &held.parts);
+    let of_held = validation_only.iter().flat_map(|effect| &effect.parts);
     let of_held = of_held.filter_map(|held| payload(&held.part, &held.windows));
     parts.additions.payloads.extend(of_held);
     let (errors, places) = (found.errors(), found.places());
@@ -125,7 +129,7 @@ fn parts(study: &Study<'_>, found: &Model, held: &[Held]) -> Parts {
             }
             Part::Payload(..) => {
                 parts.additions.payloads.extend(payload(&part, &candidate.windows));
-                parts.held = [&context, &there].map(|c| effect.windows(c, candidate));
+                parts.held = [&context, &on_validation].map(|c| effect.windows(c, candidate));
             }
             Part::EncoderOffset(by) => add(&mut offset, by),
             Part::Delay(by) => add(&mut delay, by),

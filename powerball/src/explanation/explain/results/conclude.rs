@@ -3,12 +3,11 @@
 use super::super::comparison::{Comparison, Step, leftover, open};
 use super::super::findings::Findings;
 use super::super::model::{Accepted, Model, Own};
-use super::super::named::{NamedEffect, Rival, Spreads};
+use super::super::named::{FitErrors, NamedEffect, Rival};
 use super::super::study::Study;
 use super::compose::{Composed, compose, compose_per_joint};
 use super::curves::curves;
 use super::dependencies::effective_samples;
-use super::doubts::doubts;
 use super::explained::{Change, Explained};
 use super::laws::laws;
 use super::logs::logs;
@@ -17,11 +16,12 @@ use super::probability::Evidence;
 use super::shown::shown;
 use super::unattributed::unattributed;
 use super::verdict::verdict;
+use super::warnings::warnings;
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Effect, Figures, Found, Settings, contact_wrench};
 use crate::explanation::options::{ExplainError, RuledOut};
 use crate::identification::estimate::distribution::f_tail;
-use crate::identification::estimate::{noise_floor, over_blocks, spread};
+use crate::identification::estimate::{noise_floor, over_blocks, residual_stats};
 use crate::logs::regression::Data;
 use dyngen::arm::JointKind;
 use std::ops::Range;
@@ -29,17 +29,20 @@ use std::sync::Arc;
 
 /// Makes the result.
 pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainError> {
-    let held = &findings.beforehand.held;
+    let validation_only = &findings.initial_fit.validation_only;
     let Composed { model: torque_model, fitted, held_out } = match findings.study.data.per_joint {
         true => compose_per_joint(&mut findings.study, &findings.model)?,
-        false => compose(&findings.study, &findings.model, held)?,
+        false => compose(&findings.study, &findings.model, validation_only)?,
     };
     let (study, model, history) = (&findings.study, &findings.model, &findings.history);
-    let before = &findings.beforehand;
-    let after = Spreads { fit: spread(&study.data, &fitted), validate: spread(&study.validation, &held_out) };
+    let before = &findings.initial_fit;
+    let after = FitErrors {
+        fit: residual_stats(&study.data, &fitted),
+        validate: residual_stats(&study.validation, &held_out),
+    };
     let floor = noise_floor(&study.data);
     let left = |joints: &[JointNumber]| leftover(&before.errors.fit.rms, &after.fit.rms, &floor, joints);
-    let mut named: Vec<NamedEffect> = held.iter().map(|held| held.named.clone()).collect();
+    let mut named: Vec<NamedEffect> = validation_only.iter().map(|effect| effect.named.clone()).collect();
     named.extend(named_effects(study, model, &history.steps, &left));
     add_pushes_at_rest(&mut named, &findings, &after);
     not_named_elsewhere(&mut named);
@@ -71,7 +74,7 @@ pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainE
         experiment: None,
         // An experiment moves a body.
         open: open.filter(|_| !study.data.per_joint).map(Arc::new),
-        warnings: doubts(&findings).into_iter().chain(unexplained).collect(),
+        warnings: warnings(&findings).into_iter().chain(unexplained).collect(),
         curves: curves(&study.validation, &before.residual, &held_out),
         shown: shown(study, model),
         model: torque_model,
@@ -157,7 +160,7 @@ fn not_named_elsewhere(named: &mut [NamedEffect]) {
 
 /// Pushes while the arm stood still are one effect with those on the way. No error of a row falls by them, since rows
 /// at rest are in no error.
-fn add_pushes_at_rest(named: &mut Vec<NamedEffect>, findings: &Findings<'_>, after: &Spreads) {
+fn add_pushes_at_rest(named: &mut Vec<NamedEffect>, findings: &Findings<'_>, after: &FitErrors) {
     let pushes = &findings.at_rest;
     if pushes.is_empty() {
         return;
@@ -204,12 +207,12 @@ fn add_pushes_at_rest(named: &mut Vec<NamedEffect>, findings: &Findings<'_>, aft
 
 /// The next best names, and what an experiment has ruled out on the same joints.
 fn rivals(ruled_out: &[RuledOut], comparison: &Comparison, name: &str) -> Vec<Rival> {
-    let here = |r: &&RuledOut| r.effect != name && r.joints.iter().any(|j| comparison.joints.contains(j));
+    let on_these = |r: &&RuledOut| r.effect != name && r.joints.iter().any(|j| comparison.joints.contains(j));
     let out = |r: &RuledOut| {
         let why_not = r.why_not.clone();
         Rival { effect: r.effect.clone(), joints: r.joints.clone(), alike: false, why_not }
     };
-    comparison.rivals.iter().cloned().chain(ruled_out.iter().filter(here).map(out)).collect()
+    comparison.rivals.iter().cloned().chain(ruled_out.iter().filter(on_these).map(out)).collect()
 }
 
 /// How the errors change, by joint that moves.

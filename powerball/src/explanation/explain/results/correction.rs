@@ -78,7 +78,7 @@ impl Correction {
 /// not lower the errors of left-out folds and of the validation set.
 #[must_use]
 pub(crate) fn correct(
-    here: &Context<'_>,
+    on_fitted: &Context<'_>,
     other: &Context<'_>,
     folds: &Folds,
     joint: usize,
@@ -90,14 +90,14 @@ pub(crate) fn correct(
         let all = signals(context, joint);
         lasting.iter().filter_map(|n| Some(all.iter().find(|(name, _)| name == n)?.1.clone())).collect()
     };
-    let (values, others) = (pick(here), pick(other));
-    let residual = &here.residual[joint];
+    let (values, others) = (pick(on_fitted), pick(other));
+    let residual = &on_fitted.residual[joint];
     let knots: Vec<Vec<f64>> = values.iter().map(|v| knots(v)).collect();
     if knots.is_empty() || knots.iter().any(|k| k.len() < 3) || residual.is_empty() {
         return None;
     }
     let rms = |r: &[f64]| (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
-    let limit = here.rule.correction_bound * rms(residual);
+    let limit = on_fitted.rule.correction_bound * rms(residual);
     let fitted_without = |left_out: &dyn Fn(usize) -> bool| -> Correction {
         let torque = ridge(&knots, &values, residual, left_out);
         let curve = |(s, torque): (usize, Vec<f64>)| Curve {
@@ -118,7 +118,7 @@ pub(crate) fn correct(
         residual[row] - c.torque(values.iter().map(|v| v[row]))
     };
     let mut cell_of_row = vec![0; residual.len()];
-    for (block, cell) in here.data.blocks.iter().zip(&folds.cell_of_block) {
+    for (block, cell) in on_fitted.data.blocks.iter().zip(&folds.cell_of_block) {
         cell_of_row[block.rows[joint].clone()].fill(*cell);
     }
     let (held, left_out) = folds.folds(false);
@@ -136,7 +136,8 @@ pub(crate) fn correct(
     let judged = &other.residual[joint];
     let after: Vec<f64> = (0..judged.len()).map(|row| rest(&whole, judged, &others, row)).collect();
     let (rms_before, rms_after) = (rms(judged), rms(&after));
-    let helps = mean >= here.rule.least_gain && fold_gains.iter().all(|g| *g > 0.0) && rms_after < rms_before;
+    let helps =
+        mean >= on_fitted.rule.least_gain && fold_gains.iter().all(|g| *g > 0.0) && rms_after < rms_before;
     helps.then_some(Correction { rms_before, rms_after, fold_gains, ..whole })
 }
 

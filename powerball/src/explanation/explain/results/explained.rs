@@ -1,7 +1,7 @@
 //! What an explanation says; serialized it is explained.json.
 
 use super::super::comparison::Open;
-use super::super::named::{FalsePositives, NamedEffect, Spreads};
+use super::super::named::{FalsePositives, FitErrors, NamedEffect};
 use super::curves::TorqueCurve;
 use super::laws::UnnamedLaw;
 use super::logs::LogResult;
@@ -35,9 +35,9 @@ pub struct Explained {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transmission: Option<Vec<JointTransmission>>,
     /// Errors of the base model.
-    pub before: Spreads,
+    pub before: FitErrors,
     /// Errors with all accepted effects.
-    pub after: Spreads,
+    pub after: FitErrors,
     /// How the error of each joint that moves changes on the validation set.
     pub held_out_change: Vec<Change>,
     /// What white measurement noise alone would leave in the band, by joint, N·m.

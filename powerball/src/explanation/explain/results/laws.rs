@@ -5,7 +5,7 @@ use super::super::model::{Accepted, Model};
 use super::super::study::Study;
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Figures, Found};
-use crate::identification::estimate::spread;
+use crate::identification::estimate::residual_stats;
 use serde::Serialize;
 
 /// A torque without a name that joints feel, as a formula that holds on logs that were not fitted.
@@ -63,14 +63,15 @@ pub struct LawCoefficient {
 /// The laws without a name, in the order in which they were found.
 pub(crate) fn laws(study: &Study<'_>, model: &Model, steps: &[Step]) -> Vec<UnnamedLaw> {
     let context = model.context(study);
-    let with = spread(&study.validation, &model.residual_on_validation(study)).rms;
+    let with = residual_stats(&study.validation, &model.residual_on_validation(study)).rms;
     let errors = model.errors();
     let of = |(k, (a, place)): (usize, (&Accepted, std::ops::Range<usize>))| {
         let coefficients = &model.fit.theta[place.clone()];
         let found = Found { candidate: &a.candidate, coefficients };
         let Figures::UnnamedLaw(figures) = a.effect().figures(&context, &[found]) else { return None };
         let formula = figures.formulas.into_iter().next()?;
-        let without = spread(&study.validation, &model.without(study, k).residual_on_validation(study)).rms;
+        let without =
+            residual_stats(&study.validation, &model.without(study, k).residual_on_validation(study)).rms;
         let step = steps.iter().find(|step| Some(step.number) == a.step);
         let coefficient = |(n, (value, unit)): (usize, (&f64, &'static str))| LawCoefficient {
             name: format!("c{}", n + 1),

@@ -71,10 +71,10 @@ pub(super) fn logs(findings: &Findings<'_>) -> Vec<LogResult> {
     let (study, model) = (&findings.study, &findings.model);
     let mut local: Vec<Local> =
         model.accepted.iter().enumerate().filter_map(|(k, a)| of_accepted(study, model, k, a)).collect();
-    for held in &findings.beforehand.held {
-        local.extend(held.parts.iter().map(|part| Local {
-            effect: held.named.effect.clone(),
-            joints: held.named.joints.clone(),
+    for effect in &findings.initial_fit.validation_only {
+        local.extend(effect.parts.iter().map(|part| Local {
+            effect: effect.named.effect.clone(),
+            joints: effect.named.joints.clone(),
             windows: part.windows.clone(),
             torque: part.torque.clone(),
         }));
@@ -130,15 +130,15 @@ fn of_accepted(study: &Study<'_>, model: &Model, place: usize, accepted: &Accept
         return None;
     }
     let coefficients = model.coefficients().swap_remove(place);
-    let (here, there) = (model.context(study), study.there(&model.fit, &[]));
-    let torque = [(&study.data, &here), (&study.validation, &there)].map(|(data, context)| {
+    let (on_fitted, on_validation) = (model.context(study), study.on_validation(&model.fit, &[]));
+    let torque = [(&study.data, &on_fitted), (&study.validation, &on_validation)].map(|(data, context)| {
         let mut torque = data.zeros();
         let columns = context.columns(candidate);
         columns.iter().zip(&coefficients).for_each(|(column, c)| column.add_to(&mut torque, *c));
         torque
     });
-    let mut windows = accepted.effect().windows(&here, candidate);
-    for window in accepted.effect().windows(&there, candidate) {
+    let mut windows = accepted.effect().windows(&on_fitted, candidate);
+    for window in accepted.effect().windows(&on_validation, candidate) {
         if !windows.contains(&window) {
             windows.push(window);
         }
@@ -178,7 +178,7 @@ impl Judged<'_> {
 
     fn result(&self, sigma: &[f64], local: &[Local], usual: Option<f64>, rule: &Rule) -> LogResult {
         let log = self.data.logs[self.log].clone();
-        let here: Vec<&Local> =
+        let locals: Vec<&Local> =
             local.iter().filter(|local| local.windows.iter().any(|w| w.log == log)).collect();
         let with = |which: &[&Local]| {
             let mut residual = self.residual.to_vec();
@@ -189,11 +189,11 @@ impl Judged<'_> {
             }
             self.error(sigma, &residual).unwrap_or(0.0)
         };
-        let (after, before) = (with(&[]), with(&here));
+        let (after, before) = (with(&[]), with(&locals));
         let excess = (before - usual.unwrap_or(0.0)).max(before - after);
         let [_, end] = self.span();
         let mut differs = Vec::new();
-        for local in here {
+        for local in locals {
             let share = if excess > 0.0 { (with(&[local]) - after) / excess } else { 0.0 };
             differs.extend(local.windows.iter().filter(|w| w.log == log).map(|w| Difference {
                 effect: local.effect.clone(),

@@ -2,7 +2,7 @@
 //!
 //! `conclude` makes the result ([`Explained`]): `compose` the model of what was accepted and what that leaves,
 //! `unattributed` and `dependencies` what stays without a name and what it depends on, `laws` the formulas of what has
-//! no name, `logs` what is different in which log, `correction` the curves that take a part of it off, `doubts` what a
+//! no name, `logs` what is different in which log, `correction` the curves that take a part of it off, `warnings` what a
 //! reader must know, `verdict` how far each joint is explained, `probability` how often such a name is right,
 //! `contradictions` whether all of it agrees, `curves` and `shown` the figures, `next` what an experiment would decide.
 //! JSON is made of these types by whoever writes it, and nothing here reads it.
@@ -13,7 +13,6 @@ mod contradictions;
 pub(super) mod correction;
 mod curves;
 pub(super) mod dependencies;
-mod doubts;
 mod explained;
 mod laws;
 mod logs;
@@ -22,6 +21,7 @@ mod probability;
 mod shown;
 mod unattributed;
 mod verdict;
+mod warnings;
 
 pub(super) use conclude::conclude;
 pub use contradictions::contradictions;

@@ -2,7 +2,7 @@
 
 use super::super::comparison::History;
 use super::super::model::Model;
-use super::super::named::{NamedEffect, Rival, Spreads};
+use super::super::named::{FitErrors, NamedEffect, Rival};
 use super::super::study::Study;
 use super::correction::{Correction, correct};
 use super::dependencies::{Dependencies, depends_on};
@@ -36,7 +36,7 @@ pub(crate) fn unattributed(
     history: &History,
     held_out: &[Vec<f64>],
     floor: &[f64],
-    after: &Spreads,
+    after: &FitErrors,
     named: &[NamedEffect],
 ) -> (Option<Unattributed>, Vec<String>, Dependencies) {
     let (rule, context) = (study.rule(), model.context(study));
@@ -45,9 +45,11 @@ pub(crate) fn unattributed(
         |j: &usize| rms[*j] > rule.above_floor * floor[*j] && model.fit.inflation[*j] > rule.coloured;
     let candidates: Vec<usize> = context.moving_joints().map(JointNumber::index).filter(is_left).collect();
     let found = parallel::map(&candidates, |j| depends_on(&context, *j));
-    let there = study.there(&model.fit, held_out);
+    let on_validation = study.on_validation(&model.fit, held_out);
     let correction = study.options.correct_unattributed.then(|| {
-        let of = |(j, list): (&usize, &Vec<(String, f64)>)| correct(&context, &there, &study.folds, *j, list);
+        let of = |(j, list): (&usize, &Vec<(String, f64)>)| {
+            correct(&context, &on_validation, &study.folds, *j, list)
+        };
         candidates.iter().zip(&found).filter_map(of).collect()
     });
     let dependencies = Dependencies::new(candidates.iter().copied().zip(found.iter().cloned()));
@@ -96,9 +98,9 @@ pub(crate) fn unattributed(
 
 /// The effects that were refused on joints without being named on one of them.
 fn considered(history: &History, joints: &[JointNumber], named: &[NamedEffect]) -> Vec<Rival> {
-    let here = |rival: &&Rival| {
+    let on_these = |rival: &&Rival| {
         rival.joints.iter().any(|joint| joints.contains(joint))
             && !named.iter().any(|effect| effect.is(&rival.effect, &rival.joints))
     };
-    history.refused.iter().filter(here).cloned().collect()
+    history.refused.iter().filter(on_these).cloned().collect()
 }

@@ -4,7 +4,7 @@ use super::super::named::NamedEffect;
 use super::super::study::Study;
 use super::dependencies::Dependencies;
 use crate::controller::JointNumber;
-use crate::identification::estimate::Spread;
+use crate::identification::estimate::ResidualStats;
 use serde::Serialize;
 use std::fmt;
 
@@ -49,7 +49,7 @@ impl fmt::Display for State {
 pub(crate) fn verdict(
     study: &Study<'_>,
     named: &[NamedEffect],
-    after: &Spread,
+    after: &ResidualStats,
     floor: &[f64],
     dependencies: &Dependencies,
 ) -> Vec<Verdict> {
@@ -82,7 +82,7 @@ pub(crate) fn verdict(
 /// on nothing is known.
 pub(super) fn explained(
     study: &Study<'_>,
-    after: &Spread,
+    after: &ResidualStats,
     floor: &[f64],
     dependencies: &Dependencies,
 ) -> Vec<bool> {

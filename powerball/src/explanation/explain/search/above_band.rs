@@ -6,7 +6,7 @@
 //! seen at other positions: the single-step test of Westfall and Young (1993) at one level for all joints and
 //! orders. It must then lower the error above the band on the validation set, with the same phase.
 
-use super::super::comparison::{Comparison, Step, surprise};
+use super::super::comparison::{Comparison, Step, relative_score};
 use super::super::model::{Accepted, Model};
 use super::super::study::Study;
 use super::screen::penalty;
@@ -14,7 +14,7 @@ use super::traces::{APART, Trace, Wave, heights_by_chance, highest, refined, tra
 use crate::controller::JointNumber;
 use crate::explanation::effects::position_ripple::{BINS, PositionRipple, Settings};
 use crate::explanation::effects::{Candidate, Context, Effect};
-use crate::identification::estimate::spread;
+use crate::identification::estimate::residual_stats;
 use crate::logs::parallel;
 use crate::logs::regression::Data;
 
@@ -25,7 +25,7 @@ const LOWEST: f64 = 8.0;
 
 /// Finds the ripples and takes them into the model. Returns the step that names them, if any.
 pub(crate) fn ripple_above_band(study: &Study<'_>, model: &mut Model, number: usize) -> Option<Step> {
-    let before = spread(&study.validation, &model.residual_on_validation(study)).rms;
+    let before = residual_stats(&study.validation, &model.residual_on_validation(study)).rms;
     let square_before = model.fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect();
     let found = search(study, model);
     let score = found.iter().map(|f| f.score).fold(0.0, f64::max);
@@ -34,10 +34,15 @@ pub(crate) fn ripple_above_band(study: &Study<'_>, model: &mut Model, number: us
     for ripple in found {
         model.add_measured(study, Accepted { step: Some(number), ..ripple.accepted });
     }
-    let after = spread(&study.validation, &model.residual_on_validation(study)).rms;
-    let margin = surprise(study.rule(), score);
-    let comparison =
-        Comparison { margin, rivals: Vec::new(), twin: None, apart: margin, joints: joints.clone() };
+    let after = residual_stats(&study.validation, &model.residual_on_validation(study)).rms;
+    let margin = relative_score(study.rule(), score);
+    let comparison = Comparison {
+        margin,
+        rivals: Vec::new(),
+        twin: None,
+        distinct_margin: margin,
+        joints: joints.clone(),
+    };
     let effect: &'static dyn Effect = &PositionRipple;
     let step = Step { number, effect, square_before, comparison, question: None, before, after };
     (!joints.is_empty()).then_some(step)
@@ -117,11 +122,11 @@ fn is_the_same(a: &Candidate, b: &Candidate) -> bool {
 /// there changes little.
 fn raises_error(study: &Study<'_>, model: &Model, ripple: &Accepted) -> bool {
     let joint = ripple.candidate.joints[0].index();
-    let columns = study.there(&model.fit, &[]).columns(&ripple.candidate);
+    let columns = study.on_validation(&model.fit, &[]).columns(&ripple.candidate);
     let square = |residual: &[Vec<f64>]| residual[joint].iter().map(|e| e * e).sum::<f64>();
     let mut residual = model.residual_on_validation(study);
     let before = square(&residual);
     let with = columns.iter().zip(ripple.measured.iter().flatten());
     with.for_each(|(column, c)| column.add_to(&mut residual, -c));
-    square(&residual) > study.rule().harm.exp() * before
+    square(&residual) > study.rule().max_validation_loss.exp() * before
 }

@@ -29,13 +29,13 @@ pub(crate) fn eliminate(study: &Study<'_>, model: &mut Model) {
 }
 
 /// The place of an accepted effect of which only a part is needed, one that a model may have from the start
-/// (see [`Effect::beside`](effects::Effect::beside)), and that part.
+/// (see [`Effect::baseline`](effects::Effect::beside)), and that part.
 fn more_than_needed(study: &Study<'_>, model: &Model) -> Option<(usize, Candidate)> {
     let rule = study.rule();
     let context = model.context(study);
     let laws = |c: &Candidate| c.effect().placed_laws(&context, c);
     let parts: Vec<(Candidate, Vec<Placed>)> = (effects::all().iter())
-        .flat_map(|effect| effect.beside(&context))
+        .flat_map(|effect| effect.baseline(&context))
         .filter_map(|part| Some((part.clone(), laws(&part).pop()?)))
         .collect();
     let found = model.accepted.iter().zip(model.places()).enumerate().filter(|(_, (a, _))| a.step.is_some());

@@ -3,7 +3,7 @@
 
 use super::super::model::{Accepted, Model};
 use super::super::study::Study;
-use super::both_ways::Swapped;
+use super::cross_validation::CrossValidation;
 use super::evidence::{Evidence, Extent, Validation, evidence};
 use super::refusal::refusal;
 use super::screen::{Screen, Trial};
@@ -84,7 +84,7 @@ fn best<'m>(members: impl Iterator<Item = &'m Member>) -> Option<&'m Member> {
 
 /// What is looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Among {
+pub(crate) enum CandidateKind {
     /// Effects that have a name.
     Names,
     /// Laws without one as well, where no name passes.
@@ -102,11 +102,11 @@ pub(crate) fn groups(
     study: &Study<'_>,
     model: &Model,
     screen: &Screen<'_>,
-    among: Among,
+    among: CandidateKind,
 ) -> (Vec<Group>, f64) {
     let mut tests = 0.0;
     let mut groups = Vec::new();
-    let asked = effects::all().iter().filter(|e| e.has_name() || among == Among::Laws);
+    let asked = effects::all().iter().filter(|e| e.has_name() || among == CandidateKind::Laws);
     let lists: Vec<_> = asked.map(|e| (*e, e.candidates(screen.context))).collect();
     for (effect, candidates) in lists {
         if study.data.per_joint && effect.of_the_body() {
@@ -230,22 +230,22 @@ fn untested_refusal(
     if model.gave_up(candidate) {
         return Some(("did not last, or could not be told from its rivals".to_string(), true));
     }
-    if let Some(name) = would_swallow(model, screen, member) {
+    if let Some(name) = would_absorb(model, screen, member) {
         return Some((format!("gains too little to take the place of {name}"), true));
     }
-    mends(model, screen, member).map(|name| (format!("only mends the law of {name}"), true))
+    only_corrects(model, screen, member).map(|name| (format!("only mends the law of {name}"), true))
 }
 
 /// The accepted effect that would be a part of a law without a name, where it leaves too little to be a false
 /// name.
-fn would_swallow(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<&'static str> {
+fn would_absorb(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<&'static str> {
     let Member { candidate, trial, .. } = member;
     if candidate.effect().has_name() {
         return None;
     }
     let laws = |c: &Candidate| c.effect().placed_laws(screen.context, c);
     let own = laws(candidate);
-    let share = screen.context.rule.much_left;
+    let share = screen.context.rule.max_unexplained;
     let joint = candidate.joints[0];
     let swallowed = |a: &&Accepted| {
         let part = a.candidate.is_on(&[joint]) && laws(&a.candidate).iter().any(|law| own.contains(law));
@@ -272,18 +272,18 @@ fn begins_beside(earlier: &Candidate, event: &Candidate, same_event: f64) -> boo
 
 /// The accepted effect of which a member would only mend the law: on the joints where no accepted effect
 /// is large beside it, it would not count.
-fn mends(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<&'static str> {
+fn only_corrects(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<&'static str> {
     let (rule, effect) = (screen.context.rule, member.candidate.effect());
     // An event mends nothing that lasts; but an event beside the beginning of another one mends its time.
-    let beside = |a: &Accepted| begins_beside(&a.candidate, &member.candidate, rule.same_event);
+    let baseline = |a: &Accepted| begins_beside(&a.candidate, &member.candidate, rule.same_event);
     let lasting: Vec<&Accepted> =
-        model.accepted.iter().filter(|a| a.candidate.windows.is_empty() || beside(a)).collect();
+        model.accepted.iter().filter(|a| a.candidate.windows.is_empty() || baseline(a)).collect();
     let mut mended = None;
     let mut rest = 0.0;
     for (joint, gain) in screen.gains(&member.trial, &member.candidate.joints) {
         let small = lasting.iter().find(|a| {
             let alike = a.effect().class() == effect.class() && a.effect() != effect;
-            let share = if alike { rule.mends_only } else { rule.mends_any };
+            let share = if alike { rule.only_corrects_class } else { rule.only_corrects_any };
             let explained = a.explained.get(joint.index()).copied().unwrap_or(0.0);
             gain < share * explained * model.fit.weights[joint.index()]
         });
@@ -303,11 +303,11 @@ pub(crate) struct Tester<'t> {
     pub(crate) tests: f64,
     pub(crate) validation: &'t Validation<'t>,
     /// The model seen on the validation set.
-    pub(crate) there: &'t Context<'t>,
+    pub(crate) on_validation: &'t Context<'t>,
     /// The model that is judged.
     pub(crate) model: &'t Model,
     /// The same fitted to the validation set, once it is asked for.
-    pub(crate) swapped: OnceLock<Swapped>,
+    pub(crate) swapped: OnceLock<CrossValidation>,
 }
 
 impl Tester<'_> {
@@ -322,13 +322,13 @@ impl Tester<'_> {
         let spoken_for = self.study.options.ruled_out.iter().any(|r| r.in_favour_of == group.name());
         let found = parallel::map(&open, |m| {
             let Member { candidate, trial, .. } = &group.members[*m];
-            let columns = self.there.columns(candidate);
+            let columns = self.on_validation.columns(candidate);
             let extent = match Extent::of(candidate) {
                 Extent::Everywhere if spoken_for => Extent::SomeLogs,
                 extent => extent,
             };
-            let there = Some((self.validation, columns.as_slice()));
-            evidence(self.screen, trial, &candidate.joints, &self.study.folds, extent, there)
+            let on_validation = Some((self.validation, columns.as_slice()));
+            evidence(self.screen, trial, &candidate.joints, &self.study.folds, extent, on_validation)
         });
         for (m, evidence) in open.into_iter().zip(found) {
             let member = &mut group.members[m];
@@ -339,7 +339,7 @@ impl Tester<'_> {
     }
 
     fn judge(&self, candidate: &Candidate, trial: &Trial, evidence: &mut Evidence) -> Option<String> {
-        let swap = || Swapped::new(self.study, self.model, None);
+        let swap = || CrossValidation::new(self.study, self.model, None);
         let Tester { study, screen, tests, swapped, .. } = self;
         Judge { study, screen, tests: *tests, swapped, swap: &swap }.judge(candidate, trial, evidence)
     }
@@ -352,9 +352,9 @@ pub(crate) struct Judge<'j> {
     /// What was tried in all.
     pub(crate) tests: f64,
     /// The model without the candidate, fitted to the validation set …
-    pub(crate) swapped: &'j OnceLock<Swapped>,
+    pub(crate) swapped: &'j OnceLock<CrossValidation>,
     /// … and how it is fitted, once it is asked for.
-    pub(crate) swap: &'j (dyn Fn() -> Swapped + Sync),
+    pub(crate) swap: &'j (dyn Fn() -> CrossValidation + Sync),
 }
 
 impl Judge<'_> {

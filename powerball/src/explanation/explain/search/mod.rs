@@ -9,8 +9,8 @@
 //! above it, by a test of its own (`above_band`, `traces`).
 
 mod above_band;
-mod beside;
-mod both_ways;
+mod baseline;
+mod cross_validation;
 mod elimination;
 mod evidence;
 mod fold_base;
@@ -24,11 +24,11 @@ mod surrogates;
 mod traces;
 
 pub(super) use above_band::ripple_above_band;
-pub(super) use beside::{is_beside, keep_needed};
-pub(super) use both_ways::Swapped;
+pub(super) use baseline::{is_baseline, keep_needed};
+pub(super) use cross_validation::CrossValidation;
 pub(super) use elimination::{eliminate, gains};
 pub(super) use evidence::{Extent, Validation, evidence, validation_gain};
-pub(super) use groups::{Among, Group, Member, Tester, groups, is_left};
+pub(super) use groups::{CandidateKind, Group, Member, Tester, groups, is_left};
 pub(super) use refinement::refine;
 pub(super) use refusal::refusal;
 pub(super) use screen::{Screen, Trial};

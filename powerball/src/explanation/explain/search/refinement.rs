@@ -64,7 +64,7 @@ fn moved(
     let mut without = model.fit.residual.clone();
     let columns = model.context(study).columns(&accepted.candidate);
     columns.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut without, *c));
-    let context = study.here(&model.fit, &without);
+    let context = study.on_fitted(&model.fit, &without);
     let screen = Screen::without(&context, own);
     let mut candidate = accepted.candidate.clone();
     let mut best = screen.try_candidate(&candidate)?;

@@ -5,7 +5,7 @@ use super::super::model::Model;
 use super::super::named::FalsePositives;
 use super::super::study::Study;
 use super::evidence::{Extent, evidence};
-use super::groups::{Among, groups};
+use super::groups::{CandidateKind, groups};
 use super::refusal::refusal;
 use super::screen::{Products, Screen, Trial};
 use super::shifts::{Shift, products, unlike};
@@ -106,7 +106,7 @@ pub(crate) fn level_of_search(context: &Context<'_>, effect: &dyn Effect, seed: 
 pub(crate) fn false_positives(study: &Study<'_>, model: &Model) -> FalsePositives {
     let context = model.context(study);
     let screen = Screen::new(&context);
-    let (groups, tests) = groups(study, model, &screen, Among::Names);
+    let (groups, tests) = groups(study, model, &screen, CandidateKind::Names);
     let trials: Vec<(&Trial, &[JointNumber])> = groups
         .iter()
         .flat_map(|f| &f.members)
@@ -163,7 +163,7 @@ fn rotated(values: &[f64], recordings: &[Range<usize>], shift: &Shift) -> Vec<f6
 
 #[cfg(all(test, feature = "virtual-arm"))]
 mod tests {
-    use super::super::super::begin::begin;
+    use super::super::super::initial_model::initial_model;
     use super::super::super::prepare::{Inertia, ValidationOnly, prepare};
     use super::super::super::tests::small_arms::planar_with_payload;
     use super::*;
@@ -177,10 +177,10 @@ mod tests {
         let options = ExplainOptions::default();
         let begun =
             prepare(&body, (fit, validate), &options, Inertia::Shared, ValidationOnly::TakenOut).unwrap();
-        let model = begin(begun.base, &begun.study);
+        let model = initial_model(begun.base, &begun.study);
         let context = model.context(&begun.study);
         let screen = Screen::new(&context);
-        let (groups, _) = groups(&begun.study, &model, &screen, Among::Names);
+        let (groups, _) = groups(&begun.study, &model, &screen, CandidateKind::Names);
         let shifts = [(0.2, [1.0; 4]), (0.51, [1.0, -1.0, 1.0, -1.0]), (0.84, [1.0, 1.0, 1.0, -1.0])]
             .map(|(fraction, signs)| Shift { fraction, signs: signs.to_vec() });
         let close = |a: f64, b: f64, size: f64| assert!((a - b).abs() <= 1e-9 * size, "{a} {b} of {size}");

@@ -344,8 +344,8 @@ mod tests {
         }
         // Other logs have it, others do not, and others have it with another phase.
         let (gain, other) = (wave.gain(&traces), swinging(2, ripple));
-        let there = wave.gain_on(&other, 0.01).unwrap();
-        assert!(gain > 0.02 && (there / gain - 1.0).abs() < 0.5, "{gain} {there}");
+        let on_validation = wave.gain_on(&other, 0.01).unwrap();
+        assert!(gain > 0.02 && (on_validation / gain - 1.0).abs() < 0.5, "{gain} {on_validation}");
         assert!(wave.gain_on(&swinging(3, |_| 0.0), 0.01).is_none());
         assert!(wave.gain_on(&swinging(2, |q| -ripple(q)), 0.01).is_none());
     }

@@ -7,13 +7,13 @@
 //! logs do not tell when they were recorded, what warms does (`running_time`).
 
 mod at_rest;
-mod held;
 mod one_path;
 mod per_joint;
 mod running_time;
+mod validation_only;
 
 pub(super) use at_rest::{RestPush, pushes_at_rest};
-pub(super) use held::{Held, held};
 pub(super) use one_path::repeats;
 pub(super) use per_joint::predicts_better;
-pub(super) use running_time::{Clock, settle};
+pub(super) use running_time::{Clock, choose_clock};
+pub(super) use validation_only::{ValidationOnlyEffect, validation_only_effects};

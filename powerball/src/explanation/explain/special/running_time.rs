@@ -47,7 +47,7 @@ impl Clock {
 
 /// Sets the clocks of recordings where the order of the files is all that is known of their time. Returns
 /// what was taken.
-pub(crate) fn settle(
+pub(crate) fn choose_clock(
     rule: &Rule,
     logs: &[Log],
     validate: &[Log],
@@ -64,12 +64,12 @@ pub(crate) fn settle(
     };
     let clocks = |d: &Data<'_>| -> Vec<f64> { d.recordings.iter().map(|r| r.clock).collect() };
     let given = [clocks(data), clocks(other)];
-    let beside = [in_series(data, other, |_, _| true), in_series(other, data, |_, _| true)];
+    let baseline = [in_series(data, other, |_, _| true), in_series(other, data, |_, _| true)];
     let same = same_start(rule, data, other);
     let cold = [in_series(data, other, &same), in_series(other, data, &same)];
     let mut best = (Clock::AsGiven, 0.0);
     for (clock, [own, others]) in
-        [(Clock::AsGiven, &given), (Clock::Beside, &beside), (Clock::ColdSeries, &cold)]
+        [(Clock::AsGiven, &given), (Clock::Beside, &baseline), (Clock::ColdSeries, &cold)]
     {
         set(data, own);
         set(other, others);
@@ -81,7 +81,7 @@ pub(crate) fn settle(
     }
     let [own, others] = match best.0 {
         Clock::AsGiven => given,
-        Clock::Beside => beside,
+        Clock::Beside => baseline,
         Clock::ColdSeries => cold,
     };
     set(data, &own);

@@ -4,7 +4,7 @@ use super::plant::{Noise, Truth, arm, record};
 use crate::explanation::explain::{Explained, explain_body};
 use crate::explanation::torque_model::{Additions, Scalar, TorqueModel};
 use crate::explanation::{ExplainError, ExplainOptions, explain};
-use crate::identification::estimate::{Folds, fit, spread};
+use crate::identification::estimate::{Folds, fit, residual_stats};
 use crate::logs::log::common_clock;
 use crate::logs::regression::{Data, DataOptions, RigidArm};
 
@@ -26,7 +26,7 @@ fn a_base_model_beside_what_is_known_does_as_well_as_the_whole_at_length() {
 
 fn beside_what_is_known(wanted: impl Fn(Truth) -> bool) {
     let body = RigidArm::new(&arm()).unwrap();
-    let (told, options) = (ExplainOptions::default(), DataOptions::default());
+    let (result, options) = (ExplainOptions::default(), DataOptions::default());
     let given = |list: &[f64]| list.iter().any(|x| *x != 0.0);
     let parts: [(Truth, Holds); 5] = [
         (Truth::EncoderOffset, |a| a.log_changes.encoder_offset.iter().any(|o| (o - 0.03).abs() < 0.003)),
@@ -37,7 +37,7 @@ fn beside_what_is_known(wanted: impl Fn(Truth) -> bool) {
     ];
     for (truth, part) in parts.into_iter().filter(|(truth, _)| wanted(*truth)) {
         let mut logs = record(body.arm(), truth, 1.0, Noise::White, 7, 22.0, 3);
-        let explained = explain_body(&body, &logs[..5], &logs[5..], &told).unwrap();
+        let explained = explain_body(&body, &logs[..5], &logs[5..], &result).unwrap();
         assert_eq!(explained.effects[0].effect, truth.name());
         let model = &explained.model;
         assert!(part(&model.additions), "{truth:?}: {:?}", model.additions);
@@ -48,7 +48,7 @@ fn beside_what_is_known(wanted: impl Fn(Truth) -> bool) {
         model.take_out(&changed, &mut logs);
         let [data, other] = [&logs[..5], &logs[5..]].map(|logs| Data::new(&changed, logs, &options).unwrap());
         let next = fit(&data, &Folds::new(&data), &[], None);
-        let rms = spread(&other, &next.residual_on(&other, &[])).rms;
+        let rms = residual_stats(&other, &next.residual_on(&other, &[])).rms;
         let (before, after) = (&explained.before.validate.rms, &explained.after.validate.rms);
         for j in 0..body.dof() {
             assert!(rms[j] < 1.03 * after[j], "{truth:?}, joint {}: {} {}", j + 1, rms[j], after[j]);
@@ -60,14 +60,14 @@ fn beside_what_is_known(wanted: impl Fn(Truth) -> bool) {
     }
 }
 
-/// The door joins the clocks of logs and takes out what is known, and what is known comes back into the
+/// `explain` joins the clocks of logs and takes out what is known, and what is known comes back into the
 /// model.
 #[test]
-fn the_door_needs_nothing_prepared() {
+fn explain_needs_nothing_prepared() {
     let body = RigidArm::new(&arm()).unwrap();
     let mut logs = record(body.arm(), Truth::Temperature, 1.0, Noise::White, 7, 22.0, 3);
     common_clock(&mut logs);
-    // The door asks besides what the columns are.
+    // It asks besides what the columns are.
     let json = |explained: &Explained| Explained { conventions: None, ..explained.clone() };
     let json = |explained: &Explained| serde_json::to_value(json(explained)).unwrap();
     let prepared = explain_body(&body, &logs[..5], &logs[5..], &ExplainOptions::default()).unwrap();
@@ -75,19 +75,19 @@ fn the_door_needs_nothing_prepared() {
     assert!(is_warm(&prepared));
 
     logs.iter_mut().for_each(|log| log.clock = 0.0);
-    let door = |known: Option<TorqueModel>| {
+    let api = |known: Option<TorqueModel>| {
         let options = ExplainOptions { known, ..ExplainOptions::default() };
         explain(body.arm(), &logs[..5], &logs[5..], &options)
     };
-    let explained = door(None).unwrap();
+    let explained = api(None).unwrap();
     assert!(explained.conventions.is_some());
     assert_eq!(json(&explained), json(&prepared));
 
-    let again = door(Some(explained.model.clone())).unwrap();
+    let again = api(Some(explained.model.clone())).unwrap();
     assert!(!is_warm(&again), "{:?}", again.effects);
     assert!(again.model.additions.terms.iter().any(|t| t.effect == "temperature"));
 
     let mut another = explained.model;
     another.parameters.truncate(1);
-    assert!(matches!(door(Some(another)), Err(ExplainError::Known(_))));
+    assert!(matches!(api(Some(another)), Err(ExplainError::Known(_))));
 }

@@ -79,7 +79,10 @@ fn ripple_above_the_band_is_named() {
     // Missing in the band, it is no ripple of the joint: its law would raise the error there.
     let strict = explain_body(&body, fit, validate, &ExplainOptions::default()).unwrap();
     assert_eq!(names(&strict), Vec::<String>::new());
-    let options = ExplainOptions { rule: Rule { harm: 1e3, ..Rule::default() }, ..ExplainOptions::default() };
+    let options = ExplainOptions {
+        rule: Rule { max_validation_loss: 1e3, ..Rule::default() },
+        ..ExplainOptions::default()
+    };
     let explained = explain_body(&body, fit, validate, &options).unwrap();
     let [ripple] = explained.effects.as_slice() else { panic!("{:?}", names(&explained)) };
     assert_eq!((ripple.effect.as_str(), ripple.joints[0].number()), ("position_ripple", 3));

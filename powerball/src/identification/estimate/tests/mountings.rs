@@ -2,7 +2,7 @@
 
 use super::plant::{record_mounted, sensors};
 use crate::identification::estimate::{
-    Estimates, FrictionKind, Solution, Spread, Together, estimates, reduce_in_bands, solve_in_band,
+    Estimates, FrictionKind, ResidualStats, Solution, Together, estimates, reduce_in_bands, solve_in_band,
     standard_errors,
 };
 use crate::identification::mounting::Mounting;
@@ -41,7 +41,7 @@ fn together(parts: &[(RigidArm, Bands)]) -> Together {
     Together::new(&parts.iter().map(|(body, bands)| (body, bands)).collect::<Vec<_>>()).unwrap()
 }
 
-fn fitted(all: &Together) -> (Estimates, Solution, Vec<Spread>, Vec<Vec<usize>>) {
+fn fitted(all: &Together) -> (Estimates, Solution, Vec<ResidualStats>, Vec<Vec<usize>>) {
     let found = solve_in_band(&all.bands, LAW);
     let identified = estimates(all.body.names(), &found.solution, &standard_errors(&found.solution));
     let spreads = all.spreads(&found.solution, &found.bands).unwrap();
@@ -99,7 +99,7 @@ fn friction_comes_from_the_mounting_in_which_a_joint_moves() {
 fn a_wrong_mounting_contradicts_the_others() {
     let right = reduced("filed", "filed", 1, &[]);
     let own = solve_in_band(&right.1, LAW);
-    let own = crate::identification::estimate::spread_of(&own.solution, &own.solution.theta);
+    let own = crate::identification::estimate::stats_of(&own.solution, &own.solution.theta);
     let (_, _, spreads, contradictions) = fitted(&together(&[right, reduced("90,0", "0,90", 2, &[])]));
     assert!(contradictions.iter().any(|joints| !joints.is_empty()));
     assert!(spreads[1].rms[1] > 5.0 * own.rms[1], "{:?} {:?}", spreads[1].rms, own.rms);

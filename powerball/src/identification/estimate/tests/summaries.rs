@@ -2,7 +2,7 @@
 
 use super::plant::{record, sensors, truth};
 use crate::identification::estimate::{
-    Folds, FrictionKind, Solution, fit, reduce_in_bands, solve_in_band, solve_reduced, spread_of,
+    Folds, FrictionKind, Solution, fit, reduce_in_bands, solve_in_band, solve_reduced, stats_of,
 };
 use crate::logs::regression::{Data, DataOptions};
 use crate::logs::signal::Band;
@@ -85,7 +85,7 @@ fn a_noisy_joint_asks_for_a_narrower_band() {
     assert_eq!(read, noisy);
     assert_eq!(solve_in_band(&read, FrictionKind::Symmetric).solution.theta, found.solution.theta);
     // White noise of the rows is what the narrower band leaves of it.
-    let rms = |solution: &Solution| spread_of(solution, &solution.theta).rms[4];
+    let rms = |solution: &Solution| stats_of(solution, &solution.theta).rms[4];
     let wide = solve_reduced(noisy.widest(), FrictionKind::Symmetric);
     let share = (BANDS[found.bands[4]] / BANDS[0]).sqrt();
     approx::assert_relative_eq!(rms(&found.solution), share * rms(&wide), max_relative = 0.1);
@@ -97,7 +97,7 @@ fn a_noisy_joint_asks_for_a_narrower_band() {
 #[test]
 fn a_log_that_took_no_part_judges_the_fit() {
     use crate::explanation::torque_model::{Additions, TorqueModel};
-    use crate::identification::estimate::{JointFriction, ParameterEstimate, spread};
+    use crate::identification::estimate::{JointFriction, ParameterEstimate, residual_stats};
     use dyngen::SetKind;
 
     let (body, _) = truth();
@@ -110,7 +110,7 @@ fn a_log_that_took_no_part_judges_the_fit() {
     };
     let solution = solve_reduced(&one(0), FrictionKind::Symmetric);
     let there = solution.on(&one(1)).unwrap();
-    let reduced = spread_of(&there, &there.theta);
+    let reduced = stats_of(&there, &there.theta);
     let data = Data::new(&body, &logs[1..], &options).unwrap();
     let names = body.names().iter().zip(solution.inertial());
     let model = TorqueModel {
@@ -120,7 +120,7 @@ fn a_log_that_took_no_part_judges_the_fit() {
         friction: (0..6).map(|j| JointFriction::plain(j, solution.friction(j))).collect(),
         additions: Additions::default(),
     };
-    let direct = spread(&data, &model.residual(&body, &data, &[]));
+    let direct = residual_stats(&data, &model.residual(&body, &data, &[]));
     for j in 0..6 {
         approx::assert_relative_eq!(reduced.rms[j], direct.rms[j], max_relative = 1e-3);
         approx::assert_relative_eq!(reduced.relative[j], direct.relative[j], max_relative = 1e-3);

@@ -17,7 +17,7 @@ use crate::logs::vector::dot;
 
 /// The model fitted to the validation set.
 #[derive(Debug)]
-pub(crate) struct Swapped {
+pub(crate) struct CrossValidation {
     fit: Fit,
     /// Its columns on the logs that the model was fitted to.
     design: Design,
@@ -27,29 +27,29 @@ pub(crate) struct Swapped {
 
 /// What both ways say.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct BothWays {
+pub(crate) struct CrossValidated {
     /// The share by which the squared error of the candidate's joints falls on the logs that took no part in
     /// the fit, the lesser of both ways.
     pub(crate) gain: f64,
     /// The probability of such coefficients by chance, both ways together.
     pub(crate) p_value: f64,
     /// The correlation of what either way adds.
-    pub(crate) alike: f64,
+    pub(crate) correlation: f64,
     /// By how much the logarithm of the squared error changes on the logs, mean over joints.
     pub(crate) log_change: f64,
 }
 
-impl Swapped {
+impl CrossValidation {
     /// Fits the model to the validation set, all of it or without one accepted effect.
-    pub(crate) fn new(study: &Study<'_>, model: &Model, without: Option<usize>) -> Swapped {
-        let there = study.there(&model.fit, &[]);
-        let terms = model.terms(&there, without);
+    pub(crate) fn new(study: &Study<'_>, model: &Model, without: Option<usize>) -> CrossValidation {
+        let on_validation = study.on_validation(&model.fit, &[]);
+        let terms = model.terms(&on_validation, without);
         let fit = fit(&study.validation, &Folds::new(&study.validation), &terms, Some(&model.fit));
-        let here: Vec<_> =
+        let on_fitted: Vec<_> =
             model.terms(&model.context(study), without).into_iter().map(|t| t.column).collect();
-        let residual = fit.residual_on(&study.data, &here);
-        let design = Design::new(&study.data, &friction_columns(&study.data, &fit.shapes), &here);
-        Swapped { fit, design, residual }
+        let residual = fit.residual_on(&study.data, &on_fitted);
+        let design = Design::new(&study.data, &friction_columns(&study.data, &fit.shapes), &on_fitted);
+        CrossValidation { fit, design, residual }
     }
 
     /// What it leaves on the logs that the model was fitted to, by joint and row, N·m.
@@ -63,10 +63,10 @@ impl Swapped {
         study: &Study<'_>,
         screen: &Screen<'_>,
         (candidate, trial, forward): (&Candidate, &Trial, f64),
-    ) -> Option<BothWays> {
-        let there = study.there(&self.fit, &self.fit.residual);
-        let back = Screen::new(&there);
-        let swapped = back.try_columns(there.columns(candidate), candidate.searched)?;
+    ) -> Option<CrossValidated> {
+        let on_validation = study.on_validation(&self.fit, &self.fit.residual);
+        let back = Screen::new(&on_validation);
+        let swapped = back.try_columns(on_validation.columns(candidate), candidate.searched)?;
         let columns = screen.context.columns(candidate);
         let judged =
             Validation { data: &study.data, design: self.design.clone(), residual: self.residual.clone() };
@@ -74,11 +74,11 @@ impl Swapped {
         let [p, q] =
             [(screen, trial), (&back, &swapped)].map(|(screen, trial)| by_blocks(screen, trial, candidate));
         let product = (p * q).max(f64::MIN_POSITIVE);
-        Some(BothWays {
+        Some(CrossValidated {
             gain: forward.min(gain),
             // Fisher: −2 ln(p·q) is χ² with four degrees of freedom.
             p_value: (product * (1.0 - product.ln())).min(1.0),
-            alike: alike(screen, trial, &swapped.theta),
+            correlation: correlation(screen, trial, &swapped.theta),
             log_change: log_change(&back, &swapped, &judged, &columns),
         })
     }
@@ -115,7 +115,7 @@ fn memory(data: &Data<'_>, joint: usize, residual: &[f64]) -> f64 {
 }
 
 /// The correlation of what two sets of coefficients add on the logs.
-fn alike(screen: &Screen<'_>, trial: &Trial, other: &[f64]) -> f64 {
+fn correlation(screen: &Screen<'_>, trial: &Trial, other: &[f64]) -> f64 {
     let (mut cross, mut own, mut theirs) = (0.0, 0.0, 0.0);
     for (j, columns) in screen.residualised(trial).iter().enumerate() {
         let added = |theta: &[f64]| {
@@ -133,9 +133,11 @@ fn alike(screen: &Screen<'_>, trial: &Trial, other: &[f64]) -> f64 {
     if own > 0.0 && theirs > 0.0 { cross / (own * theirs).sqrt() } else { 0.0 }
 }
 
-impl BothWays {
+impl CrossValidated {
     /// Whether it is enough; `tests` counts what was tried.
     pub(crate) fn is_enough(&self, rule: &crate::explanation::rule::Rule, tests: f64) -> bool {
-        self.gain >= rule.large_gain && self.p_value * tests <= rule.family_wise && self.alike >= rule.alike
+        self.gain >= rule.large_gain
+            && self.p_value * tests <= rule.family_wise
+            && self.correlation >= rule.least_correlation
     }
 }

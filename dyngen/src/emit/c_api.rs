@@ -34,7 +34,7 @@ pub struct CFunction {
 
 /// What is emitted for callers in C.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct CDoor {
+pub struct CApi {
     /// The module `c`, to be put behind the functions.
     pub module: String,
     /// The header.
@@ -174,17 +174,17 @@ fn function(prefix: &str, f: &CFunction) -> String {
     )
 }
 
-/// The door: `first` stands before the functions in the module and in the header, `scalar` is f32 or f64, and
+/// The C API: `first` stands before the functions in the module and in the header, `scalar` is f32 or f64, and
 /// `about` says in the header what all of it is.
 #[must_use]
-pub fn door(
+pub fn api(
     prefix: &str,
     scalar: &str,
     joints: usize,
     about: &str,
-    first: &CDoor,
+    first: &CApi,
     functions: &[CFunction],
-) -> CDoor {
+) -> CApi {
     let guard = prefix.to_uppercase();
     let real = if scalar == "f32" { "float" } else { "double" };
     let flat = if functions.iter().any(|f| f.result.starts_with("flat(")) {
@@ -250,7 +250,7 @@ typedef {real} {prefix}_real;
         comment(about),
         first.header
     );
-    CDoor { module, header }
+    CApi { module, header }
 }
 
 #[cfg(test)]

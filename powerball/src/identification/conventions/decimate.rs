@@ -14,7 +14,7 @@ const STRETCH: f64 = 10.0;
 
 /// The logs on even grids of about `rate` samples a second, at most `most` seconds of them in all, evenly
 /// chosen; one piece a log. Every signal passes the same filter.
-pub(super) fn thin(logs: &[Log], most: f64, rate: f64) -> Vec<Log> {
+pub(super) fn decimate(logs: &[Log], most: f64, rate: f64) -> Vec<Log> {
     let length = |log: &Log, piece: &Range<usize>| log.t[piece.end - 1] - log.t[piece.start];
     let whole: f64 = logs.iter().flat_map(|log| log.pieces.iter().map(move |piece| length(log, piece))).sum();
     let mut out = Vec::new();

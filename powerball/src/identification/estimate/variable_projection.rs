@@ -16,7 +16,7 @@ pub(super) struct Start<'a> {
 }
 
 /// A fit of any rows.
-pub(super) struct Varied<A> {
+pub(super) struct Projected<A> {
     pub shapes: Vec<[f64; 2]>,
     pub theta: Vec<f64>,
     pub weights: Vec<f64>,
@@ -34,7 +34,11 @@ const SHAPE_STEPS: usize = 6;
 const SETTLED: f64 = 1e-5;
 
 /// Fits rows; the coefficients of `non_negative` columns and of friction's levels stay at or above zero.
-pub(super) fn vary<R: Rows>(rows: &R, non_negative: &[usize], start: Option<Start<'_>>) -> Varied<R::At> {
+pub(super) fn variable_projection<R: Rows>(
+    rows: &R,
+    non_negative: &[usize],
+    start: Option<Start<'_>>,
+) -> Projected<R::At> {
     let layout = rows.layout();
     let n = layout.dof;
     let mut bounds = layout.levels();
@@ -71,7 +75,7 @@ pub(super) fn vary<R: Rows>(rows: &R, non_negative: &[usize], start: Option<Star
     weights = new_weights(rows, &scatter);
     state.solve(rows, &bounds, &weights);
     let free = state.free(layout);
-    Varied { shapes, theta: state.theta, weights, scatter, at: state.at, free }
+    Projected { shapes, theta: state.theta, weights, scatter, at: state.at, free }
 }
 
 /// A model at given shapes.

@@ -1,19 +1,19 @@
 //! The model that the search begins with.
 
 use super::model::Model;
-use super::search::Swapped;
+use super::search::CrossValidation;
 use super::study::Study;
 use crate::identification::estimate::Fit;
 
 /// The base model, with what every arm may have where this one shows it plainly (see
-/// [`Effect::beside`](crate::explanation::effects::Effect::beside)): every effect is then judged beside that.
-pub(super) fn begin<'a>(base: Fit, study: &Study<'a>) -> Model {
+/// [`Effect::baseline`](crate::explanation::effects::Effect::beside)): every effect is then judged beside that.
+pub(super) fn initial_model<'a>(base: Fit, study: &Study<'a>) -> Model {
     let plain = Model::new(base);
     // Per-joint fits have an offset already.
     if study.data.per_joint {
         return plain;
     }
-    let with = plain.beside(study);
+    let with = plain.baseline(study);
     if is_plainly_better(&with, &plain, study) { with } else { plain }
 }
 
@@ -23,7 +23,7 @@ fn is_plainly_better(model: &Model, other: &Model, study: &Study<'_>) -> bool {
     let square =
         |left: &[Vec<f64>]| -> Vec<f64> { left.iter().map(|r| r.iter().map(|e| e * e).sum()).collect() };
     let errors = |model: &Model| {
-        let back = Swapped::new(study, model, None);
+        let back = CrossValidation::new(study, model, None);
         [square(&model.residual_on_validation(study)), square(back.residual())]
     };
     let ([ours, back], [theirs, their_back]) = (errors(model), errors(other));

@@ -6,13 +6,13 @@ use super::Finding;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Severity {
     /// Its user should know.
-    Told,
+    Warning,
     /// It cannot be used.
     Unusable,
 }
 
 /// Findings about one log, each with the line and the time of its sample.
-pub(super) struct Doubts<'a> {
+pub(super) struct Warnings<'a> {
     pub file: &'a str,
     pub line: &'a [usize],
     pub t: &'a [f64],
@@ -20,7 +20,7 @@ pub(super) struct Doubts<'a> {
     pub errors: &'a mut Vec<Finding>,
 }
 
-impl Doubts<'_> {
+impl Warnings<'_> {
     /// Adds a finding; `sample` is the one that it begins at, where it is not about the whole log.
     pub(super) fn add(
         &mut self,
@@ -37,7 +37,7 @@ impl Doubts<'_> {
             message: format!("{when}{message}"),
         };
         match severity {
-            Severity::Told => self.findings.push(finding),
+            Severity::Warning => self.findings.push(finding),
             Severity::Unusable => self.errors.push(finding),
         }
     }

@@ -179,7 +179,7 @@ impl Conventions {
         }
         let open: Vec<&str> =
             self.answers.iter().filter(|a| a.as_said.is_none()).map(|a| a.question).collect();
-        let told = match left {
+        let result = match left {
             Some(left) => format!(
                 "What the columns are cannot be checked: {left}. Columns and arm file are taken as they stand"
             ),
@@ -187,11 +187,11 @@ impl Conventions {
                 .to_string(),
         };
         if let Some(doubt) = self.doubt() {
-            return format!("{told}. {doubt}");
+            return format!("{result}. {doubt}");
         }
         match open.is_empty() {
-            true => format!("{told}."),
-            false => format!("{told}. Not told by these logs: {}.", open.join(", ")),
+            true => format!("{result}."),
+            false => format!("{result}. Not told by these logs: {}.", open.join(", ")),
         }
     }
 }

@@ -9,7 +9,7 @@ use serde::Serialize;
 #[serde(untagged)]
 pub enum JointTransmission {
     /// It is known.
-    Told(Transmission),
+    Known(Transmission),
     /// These logs do not tell it.
     Unknown(Unknown),
 }
@@ -58,7 +58,7 @@ impl JointTransmission {
     #[must_use]
     pub fn joint(&self) -> JointNumber {
         match self {
-            JointTransmission::Told(told) => told.joint,
+            JointTransmission::Known(result) => result.joint,
             JointTransmission::Unknown(unknown) => unknown.joint,
         }
     }
@@ -67,7 +67,7 @@ impl JointTransmission {
     #[must_use]
     pub fn sentence(&self) -> String {
         match self {
-            JointTransmission::Told(told) => told.sentence(),
+            JointTransmission::Known(result) => result.sentence(),
             JointTransmission::Unknown(Unknown { joint, why_not }) => {
                 format!("transmission of joint {joint}: not told: {why_not}")
             }

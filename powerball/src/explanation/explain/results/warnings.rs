@@ -17,12 +17,12 @@ const ONE_PATH: &str = "the logs of --validate run the same path as those of --l
 const FEW: usize = 2;
 
 /// Everything that a reader should know before believing the result.
-pub(crate) fn doubts(findings: &Findings<'_>) -> Vec<String> {
+pub(crate) fn warnings(findings: &Findings<'_>) -> Vec<String> {
     let (study, fit, rule) = (&findings.study, &findings.model.fit, findings.study.rule());
-    let mut doubts: Vec<String> = Vec::new();
+    let mut warnings: Vec<String> = Vec::new();
     for note in study.data.notes.iter().chain(&study.validation.notes) {
-        if !doubts.contains(note) {
-            doubts.push(note.clone());
+        if !warnings.contains(note) {
+            warnings.push(note.clone());
         }
     }
     // What is known beforehand of an arm is no measurement.
@@ -33,7 +33,7 @@ pub(crate) fn doubts(findings: &Findings<'_>) -> Vec<String> {
     let names = study.data.body.names().iter().enumerate();
     let unseen: Vec<&str> = names.filter(|(c, _)| !is_seen(*c)).map(|(_, name)| name.as_str()).collect();
     if !unseen.is_empty() {
-        doubts.push(format!(
+        warnings.push(format!(
             "these logs do not determine {}: an effect that resembles them cannot be told from them; \
              record a motion that excites them (powerball excite)",
             unseen.join("; ")
@@ -41,26 +41,26 @@ pub(crate) fn doubts(findings: &Findings<'_>) -> Vec<String> {
     }
     let seconds = study.fitted_time();
     if seconds < rule.least_time {
-        doubts.push(format!(
+        warnings.push(format!(
             "the logs to fit hold {seconds:.0} s: too little to tell small effects from chance; record \
              several paths of 20 s or more"
         ));
     }
     if study.data.per_joint {
-        doubts.push(PER_JOINT.to_string());
+        warnings.push(PER_JOINT.to_string());
     }
     if study.one_path {
-        doubts.push(ONE_PATH.to_string());
+        warnings.push(ONE_PATH.to_string());
     }
-    doubts.extend(findings.beforehand.clock.note().map(str::to_string));
+    warnings.extend(findings.initial_fit.clock.note().map(str::to_string));
     let chance = &findings.false_positives;
     if chance.accepted as f64 > rule.many_accepted * chance.surrogates as f64 && chance.accepted > FEW {
-        doubts.push(format!(
+        warnings.push(format!(
             "{} of {} effects that cannot be there were accepted: what the model leaves on these logs is \
              large and smooth, and names given here may be wrong; see what is unattributed, and whether \
              the logs and the arm file belong together",
             chance.accepted, chance.surrogates
         ));
     }
-    doubts
+    warnings
 }

@@ -1,4 +1,4 @@
-//! The door: from an arm and logs to an explanation.
+//! The API: from an arm and logs to an explanation.
 
 use super::experiment::propose;
 use super::explain::{Explained, explain_body};

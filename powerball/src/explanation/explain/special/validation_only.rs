@@ -1,13 +1,13 @@
 //! What is in logs of the validation set only, or a body that all fitted logs have and no other one: it is found and
 //! taken out before that set judges anything.
 
-use super::super::comparison::{leftover, surprise};
+use super::super::comparison::{leftover, relative_score};
 use super::super::named::NamedEffect;
 use super::super::search::{Extent, Screen, evidence, level_by_chance, refusal};
 use crate::explanation::effects::{self, Candidate, Context, Found, Part, Window, contact_wrench};
 use crate::explanation::options::ExplainOptions;
 use crate::explanation::rule::Rule;
-use crate::identification::estimate::{Fit, Folds, Term, fit, noise_floor, spread};
+use crate::identification::estimate::{Fit, Folds, Term, fit, noise_floor, residual_stats};
 use crate::logs::log::Log;
 use crate::logs::regression::{Column, Data, DataError, RigidArm};
 
@@ -20,16 +20,16 @@ const SEED: u64 = 7;
 
 /// What is in logs of the validation set only, or in all that are fitted.
 #[derive(Clone, Debug)]
-pub(crate) struct Held {
+pub(crate) struct ValidationOnlyEffect {
     /// What is said of it.
     pub(crate) named: NamedEffect,
     /// One entry a window or body.
-    pub(crate) parts: Vec<HeldPart>,
+    pub(crate) parts: Vec<ValidationOnlyPart>,
 }
 
 /// One of several pushes, or a body.
 #[derive(Clone, Debug)]
-pub(crate) struct HeldPart {
+pub(crate) struct ValidationOnlyPart {
     /// What it is in a model.
     pub(crate) part: Part,
     /// Where it is.
@@ -65,13 +65,13 @@ struct Seen {
 ///
 /// # Errors
 /// [`DataError`] as for any data.
-pub(crate) fn held(
+pub(crate) fn validation_only_effects(
     body: &RigidArm,
     (logs, validate): (&[Log], &[Log]),
     options: &ExplainOptions<'_>,
     base: &mut Fit,
     (data, validation): (&mut Data<'_>, &mut Data<'_>),
-) -> Result<Vec<Held>, DataError> {
+) -> Result<Vec<ValidationOnlyEffect>, DataError> {
     let rule = &options.rule;
     let residual = base.residual_on(validation, &[]);
     let odd = |log: usize| oddness(base, validation, &residual, log) > rule.odd_log;
@@ -93,9 +93,9 @@ pub(crate) fn held(
     let fitted = |seen: &&Seen| {
         data.logs.iter().all(|log| whole(seen, log)) && seen.candidate.windows.len() == data.logs.len()
     };
-    let mut held = Vec::new();
+    let mut found = Vec::new();
     if let Some(seen) = pooled.seen.iter().find(fitted) {
-        held.extend(taken_out_of_fitted(rule, &pooled, base, (data, validation), seen));
+        found.extend(taken_out_of_fitted(rule, &pooled, base, (data, validation), seen));
     }
     // A body that is put down again is there for a while as well, and no push.
     let short = |seen: &Seen| {
@@ -107,26 +107,26 @@ pub(crate) fn held(
         (0..validation.logs.len()).any(|log| oddness(&better, validation, &left, log) > rule.odd_log)
     };
     let new = |seen: &&Seen| {
-        let there = seen.candidate.windows.iter().all(|w| validation.logs.contains(&w.log));
+        let in_validation = seen.candidate.windows.iter().all(|w| validation.logs.contains(&w.log));
         let longest = seen.candidate.windows.iter().map(|w| w.to - w.from).fold(0.0, f64::max);
         // What pushes for longer than a hand does may as well be what the base model lacks on a path of its own.
-        there && (!short(seen) || (pushed && longest <= contact_wrench::LONGEST_PUSH))
+        in_validation && (!short(seen) || (pushed && longest <= contact_wrench::LONGEST_PUSH))
     };
     let seen: Vec<&Seen> = pooled.seen.iter().filter(new).collect();
     for &effect in effects::all() {
         let own = seen.iter().copied().filter(|seen| seen.candidate.effect() == effect);
         let mut own: Vec<&Seen> = own.collect();
         own.sort_by(|a, b| a.begins().total_cmp(&b.begins()));
-        held.extend(taken_out(rule, &pooled, base, (data, validation), &own));
+        found.extend(taken_out(rule, &pooled, base, (data, validation), &own));
     }
-    Ok(held)
+    Ok(found)
 }
 
-/// The base model with what every arm may have (see [`Effect::beside`](crate::explanation::effects::Effect::beside)), and
+/// The base model with what every arm may have (see [`Effect::baseline`](crate::explanation::effects::Effect::beside)), and
 /// what it leaves on the validation set.
 fn with_zeros(rule: &Rule, base: &Fit, (data, validation): (&Data<'_>, &Data<'_>)) -> (Fit, Vec<Vec<f64>>) {
     let context = Context::new(data, base, &base.residual, rule);
-    let candidates: Vec<Candidate> = effects::all().iter().flat_map(|e| e.beside(&context)).collect();
+    let candidates: Vec<Candidate> = effects::all().iter().flat_map(|e| e.baseline(&context)).collect();
     let columns = |context: &Context<'_>| -> Vec<Column> {
         candidates.iter().flat_map(|c| c.effect().columns(context, c)).collect()
     };
@@ -145,7 +145,7 @@ fn taken_out_of_fitted(
     base: &mut Fit,
     (data, validation): (&mut Data<'_>, &Data<'_>),
     seen: &Seen,
-) -> Option<Held> {
+) -> Option<ValidationOnlyEffect> {
     let excess = |base: &Fit, residual: &[Vec<f64>]| -> f64 {
         (0..validation.logs.len()).map(|log| oddness(base, validation, residual, log) - 1.0).sum()
     };
@@ -154,7 +154,7 @@ fn taken_out_of_fitted(
     subtract(data, &torque);
     let without = fit(data, &Folds::new(data), &[], None);
     let left = without.residual_on(validation, &[]);
-    if excess(&without, &left) > rule.much_left * excess(base, &residual) {
+    if excess(&without, &left) > rule.max_unexplained * excess(base, &residual) {
         let back: Vec<Vec<f64>> = torque.iter().map(|t| t.iter().map(|t| -t).collect()).collect();
         subtract(data, &back);
         return None;
@@ -171,7 +171,7 @@ fn taken_out(
     base: &Fit,
     (data, validation): (&Data<'_>, &mut Data<'_>),
     seen: &[&Seen],
-) -> Option<Held> {
+) -> Option<ValidationOnlyEffect> {
     let residual = base.residual_on(validation, &[]);
     seen.first()?;
     let windows: Vec<Window> = seen.iter().flat_map(|seen| seen.candidate.windows.clone()).collect();
@@ -186,7 +186,7 @@ fn taken_out(
     subtract(validation, &torque);
     let left = base.residual_on(validation, &[]);
     let named = named(rule, pooled, seen, validation, [residual, left]);
-    let torques = torques.into_iter().map(|there| [data.zeros(), there]).collect();
+    let torques = torques.into_iter().map(|torque| [data.zeros(), torque]).collect();
     Some(with_torques(rule, pooled, seen, named, torques))
 }
 
@@ -200,7 +200,7 @@ fn named(
 ) -> NamedEffect {
     let Candidate { joints, .. } = &seen[0].candidate;
     let effect = seen[0].candidate.effect();
-    let [before, after] = left.map(|residual| spread(validation, &residual).rms);
+    let [before, after] = left.map(|residual| residual_stats(validation, &residual).rms);
     let context = Context::new(&pooled.data, &pooled.fit, &pooled.fit.residual, rule);
     let found: Vec<Found<'_>> = seen.iter().map(|seen| seen.found()).collect();
     let middle = |seen: &&Seen| {
@@ -242,15 +242,15 @@ fn with_torques(
     seen: &[&Seen],
     named: NamedEffect,
     torques: Vec<[Vec<Vec<f64>>; 2]>,
-) -> Held {
+) -> ValidationOnlyEffect {
     let context = Context::new(&pooled.data, &pooled.fit, &pooled.fit.residual, rule);
-    let part = |(seen, torque): (&&Seen, [Vec<Vec<f64>>; 2])| HeldPart {
+    let part = |(seen, torque): (&&Seen, [Vec<Vec<f64>>; 2])| ValidationOnlyPart {
         part: seen.candidate.effect().part(&context, &seen.candidate, &seen.coefficients),
         windows: seen.candidate.windows.clone(),
         torque,
     };
     let parts = seen.iter().zip(torques).map(part).collect();
-    Held { named, parts }
+    ValidationOnlyEffect { named, parts }
 }
 
 /// The best candidate on all logs beside what was seen already, if the rule accepts it.
@@ -276,7 +276,7 @@ fn look(rule: &Rule, pooled: &Pooled<'_>) -> Option<Seen> {
         coefficients: Vec::new(),
         p_value: (found.p_value * tests).min(1.0),
         fold_gains: found.fold_gains,
-        margin: surprise(rule, trial.score),
+        margin: relative_score(rule, trial.score),
     })
 }
 
@@ -361,9 +361,10 @@ fn makes_it_odd(
     let excess =
         |residual: &[Vec<f64>]| -> f64 { logs().map(|log| oddness(base, other, residual, log) - 1.0).sum() };
     let square = |residual: &[f64]| residual.iter().map(|v| v * v).sum::<f64>();
-    let harms =
-        |(left, residual): (&Vec<f64>, &Vec<f64>)| square(left) > (1.0 + rule.harm) * square(residual);
-    let little = excess(&left) <= rule.much_left * excess(residual);
+    let harms = |(left, residual): (&Vec<f64>, &Vec<f64>)| {
+        square(left) > (1.0 + rule.max_validation_loss) * square(residual)
+    };
+    let little = excess(&left) <= rule.max_unexplained * excess(residual);
     little && !left.iter().zip(residual).any(harms)
 }
 

@@ -12,7 +12,7 @@ const LEAST_TRAVEL: [f64; 2] = [0.05, 0.01];
 
 /// Why a joint's samples cannot be used.
 #[derive(Clone, Debug, PartialEq)]
-enum Silent {
+enum Inactive {
     /// It does not move.
     Still,
     /// It moves by so little, with the least that would do.
@@ -24,17 +24,17 @@ enum Silent {
 /// For each joint why nothing can be said of it from these logs, and what to record instead; `None` where
 /// there can. Where a transmission couples joints it is their motors that must move.
 #[must_use]
-pub fn silent_joints(arm: &Arm, logs: &[Log]) -> Vec<Option<String>> {
+pub fn inactive_joints(arm: &Arm, logs: &[Log]) -> Vec<Option<String>> {
     let logs = &*logs_of_motors(arm, logs);
     let why = |(j, joint): (usize, &dyngen::arm::Joint)| {
         let unit = if joint.kind == JointKind::Prismatic { "m" } else { "rad" };
-        Silent::of(logs, j, joint.kind).map(|silent| silent.note(j + 1, unit))
+        Inactive::of(logs, j, joint.kind).map(|inactive| inactive.note(j + 1, unit))
     };
     arm.joints.iter().enumerate().map(why).collect()
 }
 
-impl Silent {
-    fn of(logs: &[Log], joint: usize, kind: JointKind) -> Option<Silent> {
+impl Inactive {
+    fn of(logs: &[Log], joint: usize, kind: JointKind) -> Option<Inactive> {
         // Within a log: that a joint was elsewhere in another one is no motion.
         let within = |log: &Log| {
             let ends = [f64::INFINITY, f64::NEG_INFINITY];
@@ -45,11 +45,11 @@ impl Silent {
         let least = LEAST_TRAVEL[usize::from(kind == JointKind::Prismatic)];
         let changes = |log: &Log| log.torque[joint].windows(2).any(|pair| pair[0] != pair[1]);
         if travel < 1e-4 * least {
-            Some(Silent::Still)
+            Some(Inactive::Still)
         } else if travel < least {
-            Some(Silent::HardlyMoves(travel, least))
+            Some(Inactive::HardlyMoves(travel, least))
         } else if !logs.iter().any(changes) {
-            Some(Silent::Dead)
+            Some(Inactive::Dead)
         } else {
             None
         }
@@ -59,17 +59,17 @@ impl Silent {
     fn note(&self, joint: usize, unit: &str) -> String {
         let lost = "neither its friction nor any effect on it can be judged, and its torque was not used";
         match self {
-            Silent::Still => format!(
+            Inactive::Still => format!(
                 "joint {joint} does not move in these logs: {lost}; record paths on which it swings \
                     (powerball excite). If it did \
                  move, its encoder is dead and the other joints are judged wrongly too"
             ),
-            Silent::HardlyMoves(travel, least) => format!(
+            Inactive::HardlyMoves(travel, least) => format!(
                 "joint {joint} moves by {travel:.4} {unit} at most in a log: {lost}; record paths on which \
                     it moves by {least} {unit} or more and \
                  turns back several times (powerball excite)"
             ),
-            Silent::Dead => format!(
+            Inactive::Dead => format!(
                 "joint {joint} moves, but its torque never changes: its sensor or drive is dead, or it was \
                     not recorded; {lost}; \
                  mend it and record again"

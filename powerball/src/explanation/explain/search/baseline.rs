@@ -2,7 +2,7 @@
 
 use super::super::model::{Accepted, Model};
 use super::super::study::Study;
-use super::both_ways::Swapped;
+use super::cross_validation::CrossValidation;
 use super::evidence::{Evidence, Extent, Validation, evidence, log_change};
 use super::screen::Screen;
 use crate::identification::estimate::{Design, friction_columns};
@@ -32,11 +32,11 @@ pub(crate) fn keep_needed(study: &Study<'_>, model: &mut Model) {
     let rule = study.rule();
     let mut risen = [0.0; 2];
     loop {
-        let beside: Vec<usize> =
-            (0..model.accepted.len()).filter(|k| is_beside(&model.accepted[*k])).collect();
+        let baseline: Vec<usize> =
+            (0..model.accepted.len()).filter(|k| is_baseline(&model.accepted[*k])).collect();
         let mut found: Vec<Needed> = Vec::new();
         let mut useless = None;
-        for &place in &beside {
+        for &place in &baseline {
             match needed(study, model, place) {
                 Some(needed) => found.push(needed),
                 // It cannot be told from the rest.
@@ -52,7 +52,7 @@ pub(crate) fn keep_needed(study: &Study<'_>, model: &mut Model) {
         }
         let Some(out) = useless.or(least.map(|n| n.place)) else {
             for Needed { place, evidence, .. } in found {
-                model.accepted[place].p_value = (evidence.p_value * beside.len() as f64).min(1.0);
+                model.accepted[place].p_value = (evidence.p_value * baseline.len() as f64).min(1.0);
                 model.accepted[place].fold_gain = evidence.median_gain();
             }
             return;
@@ -63,7 +63,7 @@ pub(crate) fn keep_needed(study: &Study<'_>, model: &mut Model) {
 }
 
 /// Whether something was in the model from the start.
-pub(crate) fn is_beside(accepted: &Accepted) -> bool {
+pub(crate) fn is_baseline(accepted: &Accepted) -> bool {
     accepted.step.is_none()
 }
 
@@ -73,20 +73,20 @@ fn needed(study: &Study<'_>, model: &Model, place: usize) -> Option<Needed> {
     let mut residual = model.fit.residual.clone();
     let columns = model.context(study).columns(candidate);
     columns.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut residual, *c));
-    let context = study.here(&model.fit, &residual);
+    let context = study.on_fitted(&model.fit, &residual);
     let screen = Screen::without(&context, own);
     let trial = screen.try_candidate(candidate)?;
     let all = model.columns_on_validation(study);
-    let mut there = model.fit.residual_on(&study.validation, &all);
-    let context = study.there(&model.fit, &[]);
+    let mut on_validation = model.fit.residual_on(&study.validation, &all);
+    let context = study.on_validation(&model.fit, &[]);
     let columns = context.columns(candidate);
-    columns.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut there, *c));
+    columns.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut on_validation, *c));
     let design =
         Design::new(&study.validation, &friction_columns(&study.validation, &model.fit.shapes), &all);
-    let validation = Validation { data: &study.validation, design, residual: there };
+    let validation = Validation { data: &study.validation, design, residual: on_validation };
     let set = Some((&validation, columns.as_slice()));
     let mut evidence = evidence(&screen, &trial, &candidate.joints, &study.folds, Extent::Everywhere, set);
-    let swapped = Swapped::new(study, model, Some(place));
+    let swapped = CrossValidation::new(study, model, Some(place));
     let back = swapped.ask(study, &screen, (candidate, &trial, evidence.validation_gain));
     let mut rise = [-log_change(&screen, &trial, &validation, &columns), 0.0];
     if let Some(back) = back {

@@ -1,8 +1,8 @@
 //! Which samples of a joint become rows: those in which it moves and its torque says something.
 
 use super::Recording;
+use super::inactive::dead;
 use super::saturated::{saturated, saturation_notes};
-use super::silent::dead;
 use crate::logs::log::Log;
 use crate::logs::signal::{Band, rest};
 
@@ -15,9 +15,9 @@ pub(super) fn kept_samples(
     recordings: &[Recording],
     bands: &[Band],
     rest_velocity: &[f64],
-    silent: &[Option<String>],
+    inactive: &[Option<String>],
 ) -> (Kept, Vec<String>) {
-    let n = silent.len();
+    let n = inactive.len();
     let mut left_out = Vec::new();
     let mut kept = keep_moving(recordings, bands, rest_velocity, n);
     for j in 0..n {
@@ -31,10 +31,10 @@ pub(super) fn kept_samples(
         }
         for (r, recording) in recordings.iter().enumerate() {
             let is_dead = dead(recording, j);
-            if is_dead || silent[j].is_some() {
+            if is_dead || inactive[j].is_some() {
                 kept.iter_mut().for_each(|kept| kept[j][r].clear());
             }
-            if is_dead && silent[j].is_none() {
+            if is_dead && inactive[j].is_none() {
                 left_out.push(format!(
                     "{}: the torque of joint {} never changes: the joint was left out of this log",
                     logs[recording.log].file,

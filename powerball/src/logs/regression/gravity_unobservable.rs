@@ -7,8 +7,8 @@ use faer::{Mat, Side};
 /// Poses at which it is seen whether a gravity from another side shows a parameter.
 const HIDDEN_POSES: usize = 8;
 
-/// See [`RigidArm::hidden`].
-pub(super) fn hidden(body: &RigidArm) -> Option<Vec<Vec<f64>>> {
+/// See [`RigidArm::gravity_unobservable`].
+pub(super) fn gravity_unobservable(body: &RigidArm) -> Option<Vec<Vec<f64>>> {
     let arm = body.arm();
     let kept: Vec<usize> = arm.kept_parameters().iter().map(|p| p.index()).collect();
     let mut shown = Mat::<f64>::zeros(body.names().len(), kept.len());
@@ -62,18 +62,21 @@ mod tests {
 
     #[test]
     fn what_gravity_from_the_side_shows_is_known() {
-        let hidden = |text: &str, gravity: &str| {
+        let gravity_unobservable = |text: &str, gravity: &str| {
             let text = text.replace("[0, 0, -9.81]", gravity).replace("[0.0, 0.0, -9.81]", gravity);
-            RigidArm::new(&Arm::parse(&text, "arm.toml").unwrap()).unwrap().hidden().len()
+            RigidArm::new(&Arm::parse(&text, "arm.toml").unwrap()).unwrap().gravity_unobservable().len()
         };
         let ur5e = include_str!("../../../../tests/arms/ur5e.toml");
         // The weight of all that turns about the upright first axis: how far from it, and whereto. Hung on a
         // wall, it shows.
-        assert_eq!(hidden(ur5e, "[0, 0, -9.81]"), 2);
-        assert_eq!(hidden(ur5e, "[0, -9.81, 0]"), 0);
-        assert_eq!(hidden(include_str!("../../../../tests/arms/scara.toml"), "[0, 0, -9.81]"), 2);
+        assert_eq!(gravity_unobservable(ur5e, "[0, 0, -9.81]"), 2);
+        assert_eq!(gravity_unobservable(ur5e, "[0, -9.81, 0]"), 0);
+        assert_eq!(
+            gravity_unobservable(include_str!("../../../../tests/arms/scara.toml"), "[0, 0, -9.81]"),
+            2
+        );
         let planar = include_str!("../../../../tests/arms/planar2r.toml");
-        assert_eq!(hidden(planar, "[0, -9.81, 0]"), 0);
+        assert_eq!(gravity_unobservable(planar, "[0, -9.81, 0]"), 0);
         // The numbers of base parameters say the same.
         let count = |gravity: &str| {
             let arm = Arm::parse(&ur5e.replace("[0, 0, -9.81]", gravity), "arm.toml").unwrap();
