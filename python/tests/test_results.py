@@ -115,8 +115,8 @@ def test_columns_that_are_no_numbers_are_told(session, arm):
 def test_maps_and_options(session, arm, identified):
     log = table(session.log[0])
     flipped = {key: -value if key.startswith("tau") else value for key, value in log.items()}
-    plain, mended = pb.identify(arm, log), pb.identify(arm, flipped, map="tau.sign = -1")
-    assert plain.values == mended.values != pb.identify(arm, flipped).values
+    plain, corrected = pb.identify(arm, log), pb.identify(arm, flipped, map="tau.sign = -1")
+    assert plain.values == corrected.values != pb.identify(arm, flipped).values
     assert pb.identify(arm, log, friction="asymmetric").friction[0].offset is not None
     assert pb.identify(arm, [pb.Mounted(log, "filed")], estimator="robust").values != plain.values
     with pytest.raises(ValueError, match="estimator must be"):

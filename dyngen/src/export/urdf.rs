@@ -40,7 +40,7 @@ pub fn urdf(
     let parsing = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, parsing).map_err(|e| {
         ImportError::Unreadable(format!(
-            "{file}: line {}: {e}: mend it before values are written",
+            "{file}: line {}: {e}: correct it before values are written",
             e.pos().row
         ))
     })?;

@@ -61,7 +61,7 @@ pub struct Rule {
     /// surrogate.
     pub surrogate_correlation: f64,
 
-    /// A term of the class of an accepted one, on the same joint, that gains less than this share of it mends
+    /// A term of the class of an accepted one, on the same joint, that gains less than this share of it corrects
     /// that one's law and is no effect of its own.
     pub only_corrects_class: f64,
     /// The same for a term of another class: laws are wrong by a few percent, and that shows in any guise.

@@ -64,7 +64,7 @@ class OfLogs(Result):
 
     @property
     def conventions(self) -> Optional[Dict[str, Any]]:
-        """What the columns of the logs are: signs, units, gravity, delay; and the map that mends them."""
+        """What the columns of the logs are: signs, units, gravity, delay; and the map that corrects them."""
         told: Optional[Dict[str, Any]] = self._told.get("conventions")
         return told
 

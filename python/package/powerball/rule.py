@@ -65,7 +65,7 @@ class Rule:
     #: surrogate.
     surrogate_correlation: float = 0.4
     #: A term of the class of an accepted one, on the same joint, that gains less than this share of it
-    #: mends that one's law and is no effect of its own.
+    #: corrects that one's law and is no effect of its own.
     only_corrects_class: float = 0.15
     #: The same for a term of another class: laws are wrong by a few percent, and that shows in any guise.
     only_corrects_any: float = 0.05

@@ -9,7 +9,7 @@ use dyngen::arm::Parameter;
 use std::fmt;
 use std::ops::Range;
 
-/// Effects of one class look alike: a wrong law of one is easily mended by another.
+/// Effects of one class look alike: a wrong law of one is easily corrected by another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Class {
     /// Of a joint's velocity and its history.

@@ -245,12 +245,12 @@ pub(super) fn answers(found: &Found<'_>, facts: &Facts<'_>) -> Vec<Answer> {
         (
             "joint order",
             "No exchange of columns lowers the held-out error.",
-            "No exchange of columns mends the fit, which is poor.",
+            "No exchange of columns corrects the fit, which is poor.",
         ),
         (
             "position sign",
             "No other sign of a position lowers the held-out error.",
-            "No other sign of a position mends the fit, which is poor.",
+            "No other sign of a position corrects the fit, which is poor.",
         ),
         (
             "position unit",

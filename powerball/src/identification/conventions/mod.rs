@@ -7,7 +7,7 @@
 //!
 //! | | |
 //! |---|---|
-//! | `result`, `answers`, `mend` | what is told, its words, the column map |
+//! | `result`, `answers`, `suggested_map` | what is told, its words, the column map |
 //! | `decimate`, `reading`, `rows`, `fit` | logs made small; a way to read columns; its rows; what it leaves |
 //! | `physics`, `sign` | energies; the sign of the torques |
 //! | `factors`, `unit` | a factor by joint; the unit of all |
@@ -25,7 +25,6 @@ mod factors;
 mod fit;
 mod gravity;
 mod kind;
-mod mend;
 mod physics;
 mod reading;
 mod result;
@@ -33,6 +32,7 @@ mod rows;
 mod search;
 mod side;
 mod sign;
+mod suggested_map;
 mod unit;
 
 pub use result::{Answer, Conventions, GravityIs, Kind, PerJoint, PositionColumns, Side, TorqueColumns};
@@ -124,7 +124,7 @@ fn result(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventio
         torque: torque_columns(found, &facts),
         positions: position_columns(found, good),
         evidence: sentences.join(" "),
-        mend: mend::mend(read, sign, &unit),
+        suggested_map: suggested_map::suggested_map(read, sign, &unit),
         arm_file: (length > arm_file::LONGEST_ARM).then(|| "a and d in metres".to_string()),
         left: search::shares(&found.judged),
         answers,

@@ -17,7 +17,8 @@ pub struct Conventions {
     pub evidence: String,
     /// The column map that would set the columns right, TOML for `--map`; `None` where they are as they
     /// should be, or where it is not known how to.
-    pub mend: Option<String>,
+    #[serde(rename = "mend")]
+    pub suggested_map: Option<String>,
     /// The line of the arm file that would set it right; `None` where nothing speaks clearly against the file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub arm_file: Option<String>,
@@ -165,17 +166,16 @@ impl Conventions {
             (self.answers.iter()).filter(|a| a.as_said == Some(false)).map(|a| a.sentence.as_str()).collect();
         let left = self.much_left();
         if !wrong.is_empty() {
-            let mend = self
-                .mend
-                .as_ref()
-                .map_or(String::new(), |mend| format!(" A column map (--map) that sets this right:\n{mend}"));
-            let what = match (&self.arm_file, self.mend.is_some()) {
+            let suggested_map = self.suggested_map.as_ref().map_or(String::new(), |suggested_map| {
+                format!(" A column map (--map) that sets this right:\n{suggested_map}")
+            });
+            let what = match (&self.arm_file, self.suggested_map.is_some()) {
                 (Some(_), false) => "The arm file is not this arm's.",
                 (Some(_), true) => "Neither the arm file nor the columns are right.",
                 (None, _) => "The columns are not what they are said to be.",
             };
             let left = left.map_or(String::new(), |left| format!(" Even so {left}."));
-            return format!("{what} {}{left} Nothing was changed.{mend}", wrong.join(" "));
+            return format!("{what} {}{left} Nothing was changed.{suggested_map}", wrong.join(" "));
         }
         let open: Vec<&str> =
             self.answers.iter().filter(|a| a.as_said.is_none()).map(|a| a.question).collect();

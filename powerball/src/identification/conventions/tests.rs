@@ -50,7 +50,7 @@ fn scale(columns: &mut [Vec<f64>], by: f64) {
 fn sound_columns_are_told_as_they_are_said_to_be() {
     let result = result(|_| ());
     assert!(!result.differ(), "{}", result.evidence);
-    assert_eq!(result.mend, None);
+    assert_eq!(result.suggested_map, None);
     assert_eq!(result.torque.sign, Some(PerJoint::All(1)));
     assert_eq!(result.torque.unit.as_deref(), Some("N·m"));
     assert_eq!(result.torque.gravity, Some(GravityIs::Included));
@@ -67,33 +67,33 @@ fn sound_columns_are_told_as_they_are_said_to_be() {
 fn reversed_signs_are_told() {
     let all = result(|log| scale(&mut log.torque, -1.0));
     assert_eq!(all.torque.sign, Some(PerJoint::All(-1)), "{}", all.evidence);
-    assert_eq!(all.mend.as_deref(), Some("tau = { sign = -1 }"));
+    assert_eq!(all.suggested_map.as_deref(), Some("tau = { sign = -1 }"));
     let one = result(|log| scale(&mut log.torque[2..3], -1.0));
     assert_eq!(one.torque.sign, Some(PerJoint::Each(vec![1, 1, -1, 1, 1, 1])), "{}", one.evidence);
-    assert_eq!(one.mend.as_deref(), Some("tau = { sign = [1, 1, -1, 1, 1, 1] }"));
+    assert_eq!(one.suggested_map.as_deref(), Some("tau = { sign = [1, 1, -1, 1, 1, 1] }"));
     let position = result(|log| scale(&mut log.q[1..2], -1.0));
     assert_eq!(position.positions.sign, Some(vec![1, -1, 1, 1, 1, 1]), "{}", position.evidence);
     assert_eq!(position.torque.sign, Some(PerJoint::All(1)));
-    assert_eq!(position.mend.as_deref(), Some("q = { sign = [1, -1, 1, 1, 1, 1] }"));
+    assert_eq!(position.suggested_map.as_deref(), Some("q = { sign = [1, -1, 1, 1, 1, 1] }"));
 }
 
 #[test]
 fn other_units_are_told() {
     let milli = result(|log| scale(&mut log.torque, 1000.0));
     assert_eq!(milli.torque.unit.as_deref(), Some("mN·m"), "{}", milli.evidence);
-    assert_eq!(milli.mend.as_deref(), Some("tau = { unit = \"mN·m\" }"));
+    assert_eq!(milli.suggested_map.as_deref(), Some("tau = { unit = \"mN·m\" }"));
     let degrees = result(|log| scale(&mut log.q, 1f64.to_degrees()));
     assert_eq!(degrees.positions.unit.as_deref(), Some("deg"), "{}", degrees.evidence);
-    assert_eq!(degrees.mend.as_deref(), Some("q = { unit = \"deg\" }"));
+    assert_eq!(degrees.suggested_map.as_deref(), Some("q = { unit = \"deg\" }"));
     let small = result(|log| scale(&mut log.torque, 0.01));
     assert_eq!(small.torque.unit.as_deref(), Some("N·m before the gear, or A"), "{}", small.evidence);
-    assert_eq!(small.mend, None);
+    assert_eq!(small.suggested_map, None);
     let ampere = result(|log| {
         let constants = [24.0, 24.0, 18.0, 12.0, 9.0, 9.0];
         log.torque.iter_mut().zip(constants).for_each(|(x, k)| x.iter_mut().for_each(|x| *x /= k));
     });
     assert_ne!(ampere.torque.unit.as_deref(), Some("N·m"), "{}", ampere.evidence);
-    assert_eq!(ampere.mend, None);
+    assert_eq!(ampere.suggested_map, None);
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn exchanged_columns_are_told() {
     assert_eq!(order(&torques.torque.order), [1, 3, 2, 4, 5, 6], "{}", torques.evidence);
     assert_eq!(torques.positions.order, None);
     assert_eq!(
-        torques.mend.as_deref(),
+        torques.suggested_map.as_deref(),
         Some("tau = { column = [\"tau1\", \"tau3\", \"tau2\", \"tau4\", \"tau5\", \"tau6\"] }")
     );
     let positions = result(|log| log.q.swap(3, 4));
@@ -181,7 +181,7 @@ fn an_arm_file_of_the_other_convention_is_told() {
     assert_eq!(result.arm_file.as_deref(), Some("convention = \"standard\""), "{}", result.evidence);
     // The columns are asked of the arm that they fit.
     assert_eq!(result.torque.gravity, Some(GravityIs::Included), "{}", result.evidence);
-    assert_eq!((result.torque.sign.as_ref(), result.mend.as_ref()), (Some(&PerJoint::All(1)), None));
+    assert_eq!((result.torque.sign.as_ref(), result.suggested_map.as_ref()), (Some(&PerJoint::All(1)), None));
     let first = result.verdict();
     assert!(first.starts_with("The arm file is not this arm's. With convention = \"standard\""), "{first}");
 }

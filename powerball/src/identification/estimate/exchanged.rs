@@ -12,7 +12,7 @@ const SUSPECT: f64 = 0.3;
 const RIGHT: f64 = 0.5;
 
 /// What is wrong with the torques of the logs, in words; `None` where nothing is suspected, or no exchange of
-/// two joints and no change of one sign mends it. `found` are the errors of the fit to them.
+/// two joints and no change of one sign corrects it. `found` are the errors of the fit to them.
 #[must_use]
 pub fn exchanged(
     body: &RigidArm,

@@ -72,7 +72,7 @@ impl Inactive {
             Inactive::Dead => format!(
                 "joint {joint} moves, but its torque never changes: its sensor or drive is dead, or it was \
                     not recorded; {lost}; \
-                 mend it and record again"
+                 correct it and record again"
             ),
         }
     }

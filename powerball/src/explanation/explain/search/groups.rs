@@ -233,7 +233,7 @@ fn untested_refusal(
     if let Some(name) = would_absorb(model, screen, member) {
         return Some((format!("gains too little to take the place of {name}"), true));
     }
-    only_corrects(model, screen, member).map(|name| (format!("only mends the law of {name}"), true))
+    only_corrects(model, screen, member).map(|name| (format!("only corrects the law of {name}"), true))
 }
 
 /// The accepted effect that would be a part of a law without a name, where it leaves too little to be a false
@@ -274,11 +274,11 @@ fn begins_beside(earlier: &Candidate, event: &Candidate, same_event: f64) -> boo
 /// is large beside it, it would not count.
 fn only_corrects(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<&'static str> {
     let (rule, effect) = (screen.context.rule, member.candidate.effect());
-    // An event mends nothing that lasts; but an event beside the beginning of another one mends its time.
+    // An event corrects nothing that lasts; but an event beside the beginning of another one corrects its time.
     let baseline = |a: &Accepted| begins_beside(&a.candidate, &member.candidate, rule.same_event);
     let lasting: Vec<&Accepted> =
         model.accepted.iter().filter(|a| a.candidate.windows.is_empty() || baseline(a)).collect();
-    let mut mended = None;
+    let mut corrected = None;
     let mut rest = 0.0;
     for (joint, gain) in screen.gains(&member.trial, &member.candidate.joints) {
         let small = lasting.iter().find(|a| {
@@ -288,11 +288,11 @@ fn only_corrects(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<
             gain < share * explained * model.fit.weights[joint.index()]
         });
         match small {
-            Some(a) => mended = Some(a.effect().name()),
+            Some(a) => corrected = Some(a.effect().name()),
             None => rest += gain.max(0.0),
         }
     }
-    mended.filter(|_| rest < rule.least_score)
+    corrected.filter(|_| rest < rule.least_score)
 }
 
 /// What the evidence for members is asked of.

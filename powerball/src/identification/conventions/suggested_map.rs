@@ -21,7 +21,7 @@ fn short(x: f64) -> f64 {
 }
 
 /// TOML for `--map`; `None` where nothing is to be changed, or where it is not known by how much.
-pub(super) fn mend(read: &Reading, sign: Common, unit: &Unit) -> Option<String> {
+pub(super) fn suggested_map(read: &Reading, sign: Common, unit: &Unit) -> Option<String> {
     let n = read.torques.column.len();
     let scales: Vec<f64> = match unit {
         Unit::NewtonMetre | Unit::Milli | Unit::NotTold => vec![1.0; n],
