@@ -63,7 +63,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
         let validate: Vec<Log> = validate.iter().map(spoiled).collect();
         let start = std::time::Instant::now();
         let told = conventions(&body, &logs, &validate);
-        let map = told.suggested_map.as_deref().map_or(String::new(), |m| format!("`{}`", m.replace('\n', "` `")));
+        let map =
+            told.suggested_map.as_deref().map_or(String::new(), |m| format!("`{}`", m.replace('\n', "` `")));
         println!("| {name} | {} | {map} | {:.2} |", words(&told), start.elapsed().as_secs_f64());
     }
     if arguments.plain { Ok(()) } else { of_arm_files(&arm, &logs, &validate) }

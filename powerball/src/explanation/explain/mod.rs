@@ -14,13 +14,12 @@
 //! | `comparison` | **whether a name is given**, what stays open, what is taken back |
 //! | `special` | what is special of some logs: one path, another running time, something held |
 //! | `by_log` | what is another in one log than in the others |
-//! | `prepare`, `initial_model`, `step` | the base model, what the search begins with, and one step of the loop |
+//! | `prepare`, `prepare`, `step` | the base model, what the search begins with, and one step of the loop |
 //! | `findings`, `results` | what was found; the model, the report and its figures |
 
 mod by_log;
 mod comparison;
 mod findings;
-mod initial_model;
 mod model;
 mod named;
 mod prepare;
@@ -30,21 +29,19 @@ mod special;
 mod step;
 mod study;
 
+use crate::explanation::options::{ExplainError, ExplainOptions};
+use crate::logs::log::Log;
+use crate::logs::regression::RigidArm;
+use comparison::{History, withhold, withhold_harmful};
 pub use comparison::{Hypothesis, Open};
+use findings::Findings;
 pub use named::{FalsePositives, FitErrors, NamedEffect, Rival};
+use prepare::{Inertia, Prepared, ValidationOnly, initial_model, prepare};
 pub use results::{
     Change, Correction, Curve, Difference, Evidence, Experiment, Explained, FEATURES, LawCoefficient,
     LogResult, NextExperiment, Shown, State, TorqueCurve, Trajectory, Unattributed, UnnamedLaw, Verdict,
     contradictions, curves,
 };
-
-use crate::explanation::options::{ExplainError, ExplainOptions};
-use crate::logs::log::Log;
-use crate::logs::regression::RigidArm;
-use comparison::{History, withhold, withhold_harmful};
-use findings::Findings;
-use initial_model::initial_model;
-use prepare::{Inertia, Prepared, ValidationOnly, prepare};
 use search::CandidateKind;
 use special::pushes_at_rest;
 use step::{Outcome, Proposed, accept, drop_words, judge_baseline, propose};

@@ -14,13 +14,20 @@
 //! The certificate is the barrier's: the value found exceeds the least possible one by at most μ times the
 //! number of barrier dimensions.
 
-use super::normal_equations::dot;
+use super::estimates::{ResidualStats, stats_of};
+use super::reduced::Solution;
+use super::solve::{Solver, bounded, dot};
+use crate::logs::regression::RigidArm;
 use dyngen::arm::{Arm, Convention, Parameter, ParameterKind};
 use dyngen::consistency::pseudo_inertia;
-use dyngen::{Error, Model, SetKind};
+use dyngen::{Error, Evaluator, Function, Model, SetKind};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use nalgebra::Matrix4;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Dynamic parameters of a link.
 const PER_LINK: usize = ParameterKind::ALL.len();
@@ -272,6 +279,161 @@ fn times(a: &Mat<f64>, x: &[f64]) -> Vec<f64> {
 
 fn times_transposed(a: &Mat<f64>, x: &[f64]) -> Vec<f64> {
     (0..a.ncols()).map(|k| (0..a.nrows()).map(|i| a[(i, k)] * x[i]).sum()).collect()
+}
+
+// A fit whose parameters a real arm can have, and what that costs.
+
+/// A physically consistent fit.
+#[derive(Debug)]
+pub struct ConsistentFit {
+    /// The parameters and their certificate.
+    pub consistent: Consistent,
+    /// All coefficients in the order of the design: the consistent set, and the friction refitted beside it.
+    pub theta: Vec<f64>,
+}
+
+/// The consistent fit as it is reported.
+#[derive(Clone, Debug, Serialize)]
+pub struct ConsistentReport {
+    /// Every parameter of the arm: a body for each link.
+    pub parameters: BTreeMap<String, f64>,
+    /// γ1 … γ5 by joint.
+    pub friction: Vec<[f64; 5]>,
+    /// Error of the fit.
+    pub fit: ResidualStats,
+    /// rms of this fit over rms of the unconstrained one, less one, by joint.
+    pub cost: Vec<f64>,
+    /// How far the unconstrained parameters are from any real arm's, in units of χ².
+    pub distance: f64,
+    /// How much nearer a real arm could be at most, in the same units.
+    pub gap: f64,
+    /// Smallest eigenvalue of each link's pseudo-inertia: above zero where a body exists.
+    pub eigenvalues: Vec<f64>,
+    /// Links, from 1, whose declared symmetries no body can have.
+    pub without_body: Vec<usize>,
+}
+
+/// The consistent parameters nearest to a solution in its own χ², friction refitted with every step:
+/// dissipative, as in the fit.
+///
+/// # Errors
+/// As [`nearest`].
+pub fn consistent_fit(body: &RigidArm, solution: &Solution) -> Result<ConsistentFit, Error> {
+    let layout = solution.layout;
+    let (p, size) = (layout.inertial, layout.size());
+    let (gram, right, _) = solution.products();
+    // χ² as a function of the inertial parameters alone, all other columns refitted: a Schur complement.
+    let others = Solver::new(&gram, |c| c >= p && solution.free[c]);
+    let mut metric = Mat::<f64>::zeros(p, p);
+    for k in 0..p {
+        let column: Vec<f64> = (0..size).map(|c| if c >= p { gram[(c, k)] } else { 0.0 }).collect();
+        let moved = others.solve(&column);
+        for i in 0..p {
+            metric[(i, k)] = gram[(i, k)] - (p..size).map(|c| gram[(c, i)] * moved[c]).sum::<f64>();
+        }
+    }
+    let metric = Mat::from_fn(p, p, |i, k| 0.5 * (metric[(i, k)] + metric[(k, i)]));
+    let consistent = nearest(body.model(), SetKind::Minimal, solution.inertial(), &metric)?;
+    let rest: Vec<f64> =
+        (0..size).map(|c| right[c] - (0..p).map(|k| gram[(c, k)] * consistent.set[k]).sum::<f64>()).collect();
+    let (mut theta, _) = bounded(&gram, &rest, |c| c >= p && !layout.is_tangent(c), &layout.levels());
+    theta[..p].copy_from_slice(&consistent.set);
+    Ok(ConsistentFit { consistent, theta })
+}
+
+impl ConsistentFit {
+    /// In the words of a report.
+    #[must_use]
+    pub fn report(&self, body: &RigidArm, solution: &Solution) -> ConsistentReport {
+        let error = stats_of(solution, &self.theta);
+        let free = stats_of(solution, &solution.theta);
+        let ratio = |(a, b): (&f64, &f64)| if *b > 0.0 { a / b - 1.0 } else { 0.0 };
+        ConsistentReport {
+            parameters: body
+                .arm()
+                .kept_parameters()
+                .iter()
+                .map(|p| (p.to_string(), self.consistent.all[p.index()]))
+                .collect(),
+            friction: (0..solution.layout.dof)
+                .map(|j| solution.layout.gamma(&self.theta, j, solution.shapes[j]))
+                .collect(),
+            cost: error.rms.iter().zip(&free.rms).map(ratio).collect(),
+            fit: error,
+            distance: self.consistent.distance,
+            gap: self.consistent.gap,
+            eigenvalues: self.consistent.eigenvalues.clone(),
+            without_body: self.consistent.without_body.iter().map(|l| l + 1).collect(),
+        }
+    }
+}
+
+// How far apart values of a parameter set are, in torque.
+
+/// States over which torques are compared.
+const STATES: usize = 400;
+/// Velocities and accelerations where the arm file gives no limit.
+const SPEED: f64 = 1.0;
+const ACCELERATION: f64 = 3.0;
+/// What a unit of a parameter counts beside a N·m: directions that no torque shows are held by it alone.
+const UNSEEN: f64 = 1e-2;
+
+/// Torque differences of a parameter set's values over random states within an arm's limits.
+#[derive(Clone, Debug)]
+pub struct TorqueMetric {
+    /// By joint: mean of YᵀY over the states, (N·m)² for each unit².
+    joints: Vec<Mat<f64>>,
+}
+
+impl TorqueMetric {
+    /// For a set of an arm; the states are the same at every call.
+    ///
+    /// # Errors
+    /// As [`Evaluator::new`].
+    pub fn new(model: &Model, kind: SetKind) -> Result<TorqueMetric, Error> {
+        let evaluator = Evaluator::new(model, Function::Regressor, kind)?;
+        let arm = model.arm();
+        let n = arm.dof();
+        let p = evaluator.outputs() / n.max(1);
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let [mut q, mut v, mut a] = [const { Vec::new() }; 3];
+        for _ in 0..STATES {
+            for joint in &arm.joints {
+                let [low, high] = joint.position.unwrap_or([-std::f64::consts::PI, std::f64::consts::PI]);
+                q.push(low + (high - low) * rng.random_range(0.0..1.0));
+                v.push(joint.velocity.unwrap_or(SPEED) * rng.random_range(-1.0..1.0));
+                a.push(joint.acceleration.unwrap_or(ACCELERATION) * rng.random_range(-1.0..1.0));
+            }
+        }
+        let mut y = vec![0.0; STATES * n * p];
+        evaluator.evaluate(&q, &v, &a, &[], &mut y);
+        let joint = |j: usize| {
+            let rows = Mat::from_fn(STATES, p, |s, c| y[(s * n + j) * p + c]);
+            rows.transpose() * &rows * faer::Scale(1.0 / STATES as f64)
+        };
+        Ok(TorqueMetric { joints: (0..n).map(joint).collect() })
+    }
+
+    /// As the metric of [`super::nearest`], where a torque of `spectrum` N·m counts 1.
+    #[must_use]
+    pub fn matrix(&self, noise: f64) -> Mat<f64> {
+        let p = self.joints.first().map_or(0, Mat::ncols);
+        Mat::from_fn(p, p, |i, k| {
+            let seen: f64 = self.joints.iter().map(|g| g[(i, k)]).sum();
+            (seen + if i == k { UNSEEN * UNSEEN } else { 0.0 }) / (noise * noise)
+        })
+    }
+
+    /// rms of the torque that a difference of values makes, by joint, N·m.
+    #[must_use]
+    pub fn rms(&self, difference: &[f64]) -> Vec<f64> {
+        let square = |g: &Mat<f64>| -> f64 {
+            (0..g.nrows())
+                .map(|i| difference[i] * (0..g.ncols()).map(|k| g[(i, k)] * difference[k]).sum::<f64>())
+                .sum()
+        };
+        self.joints.iter().map(|g| square(g).max(0.0).sqrt()).collect()
+    }
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! The columns of all joints and their cross products, from which every fit is a small solve.
 
 use super::Folds;
-use super::normal_equations::{Products, add_products, zeros};
 use super::rows::{FRICTION, Layout};
+use super::solve::{Products, add_products, zeros};
 use crate::logs::parallel;
 use crate::logs::regression::{Column, Data};
 use faer::linalg::matmul::matmul;

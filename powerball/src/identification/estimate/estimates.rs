@@ -1,9 +1,12 @@
 //! A fit in the words of a model: values with standard errors that hold for coloured residuals.
 
-use super::errors::StandardErrors;
 use super::reduced::Solution;
+use super::uncertainty::StandardErrors;
 use crate::controller::JointNumber;
-use crate::logs::regression::Data;
+use crate::controller::friction::TanhFriction;
+use crate::logs::parallel;
+use crate::logs::regression::{Data, Recording, RigidArm};
+use dyngen::{SetKind, Values};
 use serde::{Deserialize, Serialize};
 
 /// A parameter with its standard error.
@@ -245,4 +248,132 @@ pub fn stats_of(solution: &Solution, theta: &[f64]) -> ResidualStats {
         of_deviation: Vec::new(),
         samples: joints.iter().map(|(_, _, rows)| *rows as usize).max().unwrap_or(0),
     }
+}
+
+// The base model along logs: the rigid arm in its minimal set and the friction of Eq. 16, nothing else.
+
+/// What an identification finds: τ = rigid(q, q̇, q̈) + Eq. 16 friction.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BaseModel {
+    /// The arm's name.
+    pub arm: String,
+    /// The minimal set's values, SI units.
+    pub parameters: Vec<ParameterEstimate>,
+    /// Eq. 16 by joint.
+    pub friction: Vec<JointFriction>,
+}
+
+impl BaseModel {
+    /// The model in the minimal set of a body, whose parameters its own determine. As it is where they do
+    /// not.
+    #[must_use]
+    pub fn in_set_of(mut self, body: &RigidArm) -> BaseModel {
+        if let Some(parameters) = in_set_of(&self.parameters, &self.arm, body) {
+            self.parameters = parameters;
+        }
+        self
+    }
+
+    /// Measured less predicted torque, by joint and row, N·m.
+    #[must_use]
+    pub fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Vec<Vec<f64>> {
+        data.residual(&parallel::map(&data.recordings, |recording| self.torque(body, recording)))
+    }
+
+    /// The torque along one recording, n a sample, N·m.
+    fn torque(&self, body: &RigidArm, recording: &Recording) -> Vec<f64> {
+        let parameters: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
+        let mut torque = body.torque(&recording.q, &recording.v, &recording.a, &parameters);
+        let law = |f: &JointFriction| (TanhFriction::new(f.gamma()), f.offset.unwrap_or(0.0));
+        let laws: Vec<(TanhFriction<f64>, f64)> = self.friction.iter().map(law).collect();
+        for (row, velocities) in
+            torque.chunks_exact_mut(recording.dof).zip(recording.v.chunks_exact(recording.dof))
+        {
+            for ((torque, velocity), (law, offset)) in row.iter_mut().zip(velocities).zip(&laws) {
+                *torque += law.torque(*velocity);
+                *torque += offset;
+            }
+        }
+        torque
+    }
+}
+
+/// Parameters in the minimal set of a body, which they determine: those that logs of several mountings
+/// determine together, say. Errors of converted values are not known. `None` where nothing is to be
+/// converted, or cannot be.
+#[must_use]
+pub(crate) fn in_set_of(
+    parameters: &[ParameterEstimate],
+    arm: &str,
+    body: &RigidArm,
+) -> Option<Vec<ParameterEstimate>> {
+    let names = body.names();
+    if names.iter().all(|name| parameters.iter().any(|p| p.name == *name)) {
+        return None;
+    }
+    let values = Values::named(parameters.iter().map(|p| (p.name.as_str(), p.value)), arm);
+    let model = body.model();
+    let values = values.of_set(model, model.set(SetKind::Minimal).ok()?).ok()?;
+    let plain = |(name, value): (&String, f64)| ParameterEstimate::plain(name, value);
+    Some(names.iter().zip(values).map(plain).collect())
+}
+
+// Torques over time, for people to look at.
+
+/// Between two recordings on the axis of a figure, s.
+const BETWEEN: f64 = 1.0;
+
+/// What one joint's torque was and what was predicted, in the band, by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TorqueCurve {
+    /// Time along the logs, one after the other without their pauses, s.
+    pub t: Vec<f64>,
+    /// Measured torque, N·m.
+    pub measured: Vec<f64>,
+    /// Measured minus predicted by one model (the base model, where two are compared), N·m.
+    pub before: Vec<f64>,
+    /// Measured minus predicted by the other one (with all accepted effects), N·m.
+    pub after: Vec<f64>,
+    /// Places where rows are missing before a row: the end of a log, or a rest phase.
+    pub breaks: Vec<usize>,
+}
+
+impl TorqueCurve {
+    /// The points of one quantity, with a point that is not a number wherever rows are missing.
+    #[must_use]
+    pub fn points(&self, value: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
+        let mut points = Vec::with_capacity(self.t.len() + self.breaks.len());
+        let mut breaks = self.breaks.iter().peekable();
+        for (row, t) in self.t.iter().enumerate() {
+            if breaks.next_if(|at| **at == row).is_some() {
+                points.push((*t, f64::NAN));
+            }
+            points.push((*t, value(row)));
+        }
+        points
+    }
+}
+
+/// The curves of every joint from the residuals of both models.
+#[must_use]
+pub fn curves(data: &Data<'_>, before: &[Vec<f64>], after: &[Vec<f64>]) -> Vec<TorqueCurve> {
+    (0..data.dof())
+        .map(|j| {
+            let rows = &data.joints[j];
+            let (mut t, mut breaks) = (Vec::with_capacity(rows.len()), Vec::new());
+            let mut start = 0.0;
+            for (recording, kept) in data.recordings.iter().zip(&rows.kept) {
+                let sample = rows.band.kept(recording.len());
+                for (i, k) in kept.iter().enumerate() {
+                    if i == 0 || kept[i - 1] + 1 != *k {
+                        breaks.push(t.len());
+                    }
+                    t.push(start + sample[*k] as f64 / recording.rate);
+                }
+                start += recording.len() as f64 / recording.rate + BETWEEN;
+            }
+            let (before, after) = (before[j].clone(), after[j].clone());
+            TorqueCurve { t, measured: rows.torque.clone(), before, after, breaks }
+        })
+        .collect()
 }

@@ -2,10 +2,9 @@
 
 use super::design::{Design, Gram, runs};
 use super::folds::Folds;
-use super::friction_shape;
-use super::normal_equations::Products;
-use super::normal_equations::dot;
 use super::rows::{FRICTION, Layout, Rows, Scatter, Trials};
+use super::solve::{Products, dot};
+use super::variable_projection;
 use super::variable_projection::{Start, variable_projection};
 use crate::logs::parallel;
 use crate::logs::regression::{Column, Data, RigidArm};
@@ -135,7 +134,7 @@ impl Rows for InMemory<'_> {
     }
 
     fn range(&self, joint: usize) -> (f64, f64) {
-        friction_shape::range(self.data.top_velocity(joint))
+        variable_projection::range(self.data.top_velocity(joint))
     }
 
     fn power(&self, joint: usize) -> f64 {
@@ -202,7 +201,8 @@ impl Rows for InMemory<'_> {
 #[must_use]
 pub fn friction_columns(data: &Data<'_>, shapes: &[[f64; 2]]) -> Vec<Arc<[Vec<f64>; FRICTION]>> {
     let joints: Vec<usize> = (0..shapes.len()).collect();
-    let of = |j: usize| data.friction_columns(j, shapes[j], || friction_shape::columns(data, j, shapes[j]));
+    let of =
+        |j: usize| data.friction_columns(j, shapes[j], || variable_projection::columns(data, j, shapes[j]));
     parallel::map(&joints, |&j| of(j))
 }
 

@@ -12,11 +12,11 @@
 //! starts from.
 
 use super::distribution::t_quantile_975;
-use super::errors::StandardErrors;
-use super::friction_shape;
-use super::normal_equations::dot;
 use super::reduced::{Part, Solution};
+use super::solve::dot;
 use super::spectrum::{Power, deconvolved};
+use super::uncertainty::StandardErrors;
+use super::variable_projection;
 use crate::logs::log::{Log, logs_of_motors};
 use crate::logs::regression::{Data, DataOptions, Recording, RigidArm};
 use crate::logs::summary::{Octaves, RFactor, parts};
@@ -152,7 +152,7 @@ fn columns(data: &Data<'_>, start: &Solution, joint: usize) -> (Vec<usize>, Vec<
     let rows = &data.joints[joint];
     let mut global: Vec<usize> = (0..layout.inertial).collect();
     let mut columns = rows.inertial.clone();
-    let [g2, g4, viscous, ..] = friction_shape::columns(data, joint, start.shapes[joint]);
+    let [g2, g4, viscous, ..] = variable_projection::columns(data, joint, start.shapes[joint]);
     for (k, column) in [g2, g4, viscous].into_iter().enumerate() {
         global.push(layout.friction(joint, k));
         columns.push(column);

@@ -1,6 +1,6 @@
 //! Rows of a regression whose friction steepnesses are free, whatever they are kept in.
 
-use super::normal_equations::Products;
+use super::solve::Products;
 use crate::logs::regression::Data;
 pub(super) use crate::logs::regression::FRICTION;
 use faer::Mat;

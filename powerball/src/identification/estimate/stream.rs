@@ -3,8 +3,7 @@
 //! For states of a simulation, or of logs that were filtered elsewhere. Steepnesses of friction are given;
 //! logs as they were recorded go through [`crate::logs::summary`] instead.
 
-use super::normal_equations::{add_columns, zeros};
-use super::solve::Solver;
+use super::solve::{Solver, add_columns, zeros};
 use crate::logs::parallel;
 use crate::logs::regression::RigidArm;
 use crate::logs::summary::RFactor;

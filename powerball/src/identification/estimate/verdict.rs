@@ -1,8 +1,8 @@
 //! A model that is there already, judged on logs that it has not seen.
 
-use super::noise::noise_floor;
 use super::over_blocks;
 use super::residual_stats;
+use super::spectrum::noise_floor;
 use crate::logs::regression::{Block, Data};
 use serde::Serialize;
 

@@ -1,8 +1,6 @@
-//! What differs between logs: all of them, fitted or for validation, under one model (`together`), and what is another
+//! What differs between logs: all of them, fitted or for validation, under one model (`changes`), and what is another
 //! in one of them (`changes`). What all logs share falls out: a model that errs in all of them alike makes none odd.
 
 mod changes;
-mod together;
 
-pub(super) use changes::{Changed, changes};
-pub(super) use together::Together;
+pub(super) use changes::{Changed, Together, changes};

@@ -1,21 +1,18 @@
 //! Which name a residual gets: **here it is decided that a name is given, and where it is taken back.**
 //!
 //! The candidate group that a step chose is compared with all others on its joints (`naming`). Two names that
-//! fit alike are a question for an experiment (`question`, `open`). What the steps decided is kept in the
+//! fit alike are a question for an experiment (`history`, `open`). What the steps decided is kept in the
 //! `history`. Once everything that fits is in the model, a name is taken back that says something of a pace
-//! of motion that is not there (`constancy`), or that is not told apart from others while much is left
+//! of motion that is not there (`withhold`), or that is not told apart from others while much is left
 //! (`withhold`).
 
-mod constancy;
 mod history;
 mod naming;
 mod open;
-mod question;
 mod withhold;
 
-pub(super) use history::{History, Step};
+pub(super) use history::{History, Question, Step};
 pub(super) use naming::{Comparison, compare, relative_score};
 pub(super) use open::open;
 pub use open::{Hypothesis, Open};
-pub(super) use question::Question;
 pub(super) use withhold::{leftover, withhold, withhold_harmful};

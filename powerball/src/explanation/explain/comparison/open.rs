@@ -2,8 +2,7 @@
 
 use super::super::model::{Accepted, Model, refitted};
 use super::super::study::Study;
-use super::history::History;
-use super::question::{Question, Why};
+use super::history::{History, Question, Why};
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Candidate, Context};
 use crate::explanation::rule::Rule;

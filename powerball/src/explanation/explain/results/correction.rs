@@ -2,7 +2,7 @@
 //! where it lowers errors that it was not fitted to. It is a number for the controller and no finding:
 //! nothing is named by it.
 
-use super::dependencies::signals;
+use super::unattributed::signals;
 use crate::controller::JointNumber;
 use crate::explanation::effects::Context;
 use crate::identification::estimate::{Folds, Solver};

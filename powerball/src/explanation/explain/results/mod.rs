@@ -1,30 +1,26 @@
 //! What is said of what was found.
 //!
 //! `conclude` makes the result ([`Explained`]): `compose` the model of what was accepted and what that leaves,
-//! `unattributed` and `dependencies` what stays without a name and what it depends on, `laws` the formulas of what has
-//! no name, `logs` what is different in which log, `correction` the curves that take a part of it off, `warnings` what a
+//! `unattributed` what stays without a name and what it depends on, `laws` the formulas of what has
+//! no name, `logs` what is different in which log, `correction` the curves that take a part of it off, `conclude` what a
 //! reader must know, `verdict` how far each joint is explained, `probability` how often such a name is right,
-//! `contradictions` whether all of it agrees, `curves` and `shown` the figures, `next` what an experiment would decide.
+//! `verdict` whether all of it agrees, `curves` and `shown` the figures, `next` what an experiment would decide.
 //! JSON is made of these types by whoever writes it, and nothing here reads it.
 
 mod compose;
 mod conclude;
-mod contradictions;
 pub(super) mod correction;
 mod curves;
-pub(super) mod dependencies;
 mod explained;
 mod laws;
 mod logs;
 mod next;
 mod probability;
 mod shown;
-mod unattributed;
+pub(in super::super) mod unattributed;
 mod verdict;
-mod warnings;
 
 pub(super) use conclude::conclude;
-pub use contradictions::contradictions;
 pub use correction::{Correction, Curve};
 pub use curves::{TorqueCurve, curves};
 pub use explained::{Change, Explained};
@@ -34,4 +30,4 @@ pub use next::{Experiment, NextExperiment, Trajectory};
 pub use probability::{Evidence, FEATURES};
 pub use shown::Shown;
 pub use unattributed::Unattributed;
-pub use verdict::{State, Verdict};
+pub use verdict::{State, Verdict, contradictions};

@@ -3,7 +3,7 @@
 
 use super::super::model::Model;
 use super::super::study::Study;
-use super::dependencies::quantile_bins;
+use super::unattributed::quantile_bins;
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Axis, Context};
 

@@ -4,8 +4,7 @@
 use super::super::model::{Accepted, Model};
 use super::super::study::Study;
 use super::cross_validation::CrossValidation;
-use super::evidence::{Evidence, Extent, Validation, evidence};
-use super::refusal::refusal;
+use super::evidence::{Evidence, Extent, Validation, evidence, refusal};
 use super::screen::{Screen, Trial};
 use crate::controller::JointNumber;
 use crate::explanation::effects::{self, Candidate, Context, Effect};

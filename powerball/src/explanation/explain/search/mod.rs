@@ -2,34 +2,28 @@
 //!
 //! A screen refits the base model with each candidate (`screen`); the best ones of each effect are a
 //! candidate group (`groups`); for the group that could reach most the evidence is gathered from independent
-//! blocks, from held-out folds and from the validation set (`evidence`, `folds`), and judged (`refusal`);
+//! blocks, from held-out folds and from the validation set (`evidence`, `folds`), and judged (`evidence`);
 //! time-shift surrogates say how often these very data agree by chance (`surrogates`). What stays in the
 //! model is moved to where everything together fits best (`refinement`), and what later additions made
 //! unneeded goes out again (`elimination`). Ripple that is too fast for the band of the fit is looked for
 //! above it, by a test of its own (`above_band`, `traces`).
 
 mod above_band;
-mod baseline;
 mod cross_validation;
 mod elimination;
 mod evidence;
-mod fold_base;
 mod folds;
 mod groups;
 mod refinement;
-mod refusal;
 mod screen;
-mod shifts;
 mod surrogates;
 mod traces;
 
 pub(super) use above_band::ripple_above_band;
-pub(super) use baseline::{is_baseline, keep_needed};
 pub(super) use cross_validation::CrossValidation;
-pub(super) use elimination::{eliminate, gains};
-pub(super) use evidence::{Extent, Validation, evidence, validation_gain};
+pub(super) use elimination::{eliminate, gains, is_baseline, keep_needed};
+pub(super) use evidence::{Extent, Validation, evidence, refusal, validation_gain};
 pub(super) use groups::{CandidateKind, Group, Member, Tester, groups, is_left};
 pub(super) use refinement::refine;
-pub(super) use refusal::refusal;
 pub(super) use screen::{Screen, Trial};
 pub(super) use surrogates::{false_positives, level_by_chance, level_of_search};

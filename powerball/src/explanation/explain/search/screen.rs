@@ -1,6 +1,6 @@
 //! What a candidate would explain with the base refitted: a small solve a candidate.
 
-use super::fold_base::FoldBase;
+use super::folds::FoldBase;
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Candidate, Context};
 use crate::explanation::rule::Rule;

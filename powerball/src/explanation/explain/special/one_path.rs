@@ -1,7 +1,14 @@
 //! Whether the logs to judge on run the same path as the fitted ones: then what is a
 //! function of the path cannot be judged.
 
+use super::super::model::Model;
+use super::super::search::{Screen, Trial, Validation, validation_gain};
+use super::super::study::Study;
+use crate::explanation::effects::{self, Candidate, Context, Effect};
 use crate::explanation::rule::Rule;
+use crate::identification::estimate::{Design, Fit, friction_columns};
+use crate::logs::log::Log;
+use crate::logs::parallel;
 use crate::logs::regression::{Data, Recording};
 
 /// Whether every recording of `other` repeats one of `data`.
@@ -30,4 +37,177 @@ fn same_path(rule: &Rule, a: &Recording, b: &Recording) -> bool {
         }
     }
     common > rule.same_path * (own[0] * own[1]).sqrt()
+}
+
+// On a repeated path: one multibody model for all joints (the joint fit), or inertial parameters for each
+// joint by itself (the per-joint fit, see [`Data::set_per_joint`]).
+//
+// [`Data::set_per_joint`]: crate::logs::regression::Data::set_per_joint
+
+/// Whether the first model's squared errors on the validation set are clearly below the second's: the
+/// geometric mean over all rows, which no joint's unit rules.
+pub(crate) fn predicts_better(model: (&Study<'_>, &Model), rival: (&Study<'_>, &Model)) -> bool {
+    let square = |(study, model): (&Study<'_>, &Model)| -> Vec<(f64, f64)> {
+        let left = model.residual_on_validation(study);
+        left.iter().map(|r| (r.len() as f64, r.iter().map(|e| e * e).sum::<f64>())).collect()
+    };
+    let (mut log_ratio, mut rows) = (0.0, 0.0);
+    for ((n, own), (_, theirs)) in square(model).into_iter().zip(square(rival)) {
+        if own > 0.0 && theirs > 0.0 {
+            log_ratio += n * (own / theirs).ln();
+            rows += n;
+        }
+    }
+    log_ratio < rows * (1.0 - model.0.rule().clearly_better).ln()
+}
+
+// When logs were recorded, where their times do not tell.
+//
+// Times that start anew in each file say nothing of when a file was recorded; the order of the files is
+// taken for it, and the logs of `--validate` then come after those of `--log`. But they may as well have
+// been recorded in between (every other repeat is held out, say), and a series of repeats that starts from
+// another place may have been begun with a cold arm. What warms up tells these apart: the one that it fits
+// best is taken.
+
+/// When logs were recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Clock {
+    /// As their times or their order say.
+    AsGiven,
+    /// Those to judge on in between the fitted ones.
+    Beside,
+    /// Every series of repeats from the same place began with a cold arm, and those to judge on were recorded
+    /// in between.
+    ColdSeries,
+}
+
+impl Clock {
+    /// What a reader must know.
+    pub(crate) fn note(self) -> Option<&'static str> {
+        match self {
+            Clock::AsGiven => None,
+            Clock::Beside => Some(
+                "the times of the logs start anew in each file: those of --validate are taken to have been \
+                    recorded in between those of --log, because \
+                 what warms up fits that better than their order does",
+            ),
+            Clock::ColdSeries => Some(
+                "the times of the logs start anew in each file: every series of runs from the same start is \
+                    taken to have begun with a cold arm, \
+                 because what warms up fits that better than one running time through all files does",
+            ),
+        }
+    }
+}
+
+/// Sets the clocks of recordings where the order of the files is all that is known of their time. Returns
+/// what was taken.
+pub(crate) fn choose_clock(
+    rule: &Rule,
+    logs: &[Log],
+    validate: &[Log],
+    data: &mut Data<'_>,
+    fit: &Fit,
+    other: &mut Data<'_>,
+) -> Clock {
+    let known = |clock: f64| logs.iter().chain(validate).all(|log| (log.clock - clock).abs() < 1e-9);
+    if logs.first().is_none_or(|first| known(first.clock)) {
+        return Clock::AsGiven;
+    }
+    let Some(effect) = effects::all().iter().find(|e| e.needs_running_time()) else {
+        return Clock::AsGiven;
+    };
+    let clocks = |d: &Data<'_>| -> Vec<f64> { d.recordings.iter().map(|r| r.clock).collect() };
+    let given = [clocks(data), clocks(other)];
+    let baseline = [in_series(data, other, |_, _| true), in_series(other, data, |_, _| true)];
+    let same = same_start(rule, data, other);
+    let cold = [in_series(data, other, &same), in_series(other, data, &same)];
+    let mut best = (Clock::AsGiven, 0.0);
+    for (clock, [own, others]) in
+        [(Clock::AsGiven, &given), (Clock::Beside, &baseline), (Clock::ColdSeries, &cold)]
+    {
+        set(data, own);
+        set(other, others);
+        let gain = gain(rule, *effect, data, fit, other);
+        // Equal clocks are equally good; the first is the simplest.
+        if gain > best.1 * (1.0 + 1e-9) {
+            best = (clock, gain);
+        }
+    }
+    let [own, others] = match best.0 {
+        Clock::AsGiven => given,
+        Clock::Beside => baseline,
+        Clock::ColdSeries => cold,
+    };
+    set(data, &own);
+    set(other, &others);
+    best.0
+}
+
+fn set(data: &mut Data<'_>, clocks: &[f64]) {
+    data.recordings.iter_mut().zip(clocks).for_each(|(r, c)| r.clock = *c);
+}
+
+/// What warmth explains of both sets of logs.
+fn gain(rule: &Rule, effect: &dyn Effect, data: &Data<'_>, fit: &Fit, other: &Data<'_>) -> f64 {
+    let context = Context::new(data, fit, &fit.residual, rule);
+    let screen = Screen::new(&context);
+    let candidates = effect.candidates(&context);
+    let trials = parallel::map(&candidates, |c| screen.try_candidate(c));
+    // The best one of each joint.
+    let mut best: Vec<(&Candidate, Trial)> = Vec::new();
+    for (candidate, trial) in candidates.iter().zip(trials) {
+        let Some(trial) = trial.filter(|t| t.score >= rule.least_score) else { continue };
+        match best.iter_mut().find(|(c, _)| c.joints == candidate.joints) {
+            Some((_, t)) if t.score >= trial.score => {}
+            Some(known) => *known = (candidate, trial),
+            None => best.push((candidate, trial)),
+        }
+    }
+    let residual = fit.residual_on(other, &[]);
+    let design = Design::new(other, &friction_columns(other, &fit.shapes), &[]);
+    let validation = Validation { data: other, design, residual: residual.clone() };
+    let context = Context::new(other, fit, &residual, rule);
+    let of = |(candidate, trial): &(&Candidate, Trial)| {
+        let columns = effect.columns(&context, candidate);
+        let gain = validation_gain(&screen, trial, &candidate.joints, &validation, &columns);
+        trial.score * gain.clamp(-1.0, 1.0)
+    };
+    best.iter().map(of).sum()
+}
+
+/// Whether two runs start at the same place.
+fn same_start(
+    rule: &Rule,
+    data: &Data<'_>,
+    other: &Data<'_>,
+) -> impl Fn(&Recording, &Recording) -> bool + use<> {
+    let reach = |j: usize| {
+        let positions = data.recordings.iter().chain(&other.recordings).flat_map(|r| r.position(j));
+        let (low, high) = positions.fold((f64::MAX, f64::MIN), |(l, h): (f64, f64), q| (l.min(q), h.max(q)));
+        rule.same_start * (high - low).max(1e-9)
+    };
+    let reach: Vec<f64> = (0..data.dof()).map(reach).collect();
+    move |a, b| reach.iter().enumerate().all(|(j, reach)| (a.q[j] - b.q[j]).abs() <= *reach)
+}
+
+/// Clocks that begin anew with every series of runs that are `same`; runs of one set are taken to alternate
+/// with those of the other.
+fn in_series(data: &Data<'_>, other: &Data<'_>, same: impl Fn(&Recording, &Recording) -> bool) -> Vec<f64> {
+    let lasting = |r: &Recording| r.len() as f64 / r.rate;
+    let mut clocks = Vec::with_capacity(data.recordings.len());
+    for (at, r) in data.recordings.iter().enumerate() {
+        // The first recording of a log stands for its run.
+        let run = data.recordings[..at].iter().find(|first| first.log == r.log).unwrap_or(r);
+        let of_series = |d: &Data<'_>, until: usize| -> f64 {
+            let runs = d.recordings.iter().filter(|x| x.log < until);
+            runs.filter(|x| d.recordings.iter().find(|f| f.log == x.log).is_some_and(|f| same(f, run)))
+                .map(lasting)
+                .sum()
+        };
+        let (own, theirs) = (of_series(data, usize::MAX), of_series(other, usize::MAX));
+        let before = of_series(data, run.log) * (own + theirs) / own;
+        clocks.push(before + r.clock - run.clock);
+    }
+    clocks
 }

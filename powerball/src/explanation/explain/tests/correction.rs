@@ -5,7 +5,7 @@ use super::plant::{Noise, Truth, arm, record};
 use crate::explanation::effects::Context;
 use crate::explanation::explain::explain_body;
 use crate::explanation::explain::results::correction::correct;
-use crate::explanation::explain::results::dependencies::depends_on;
+use crate::explanation::explain::results::unattributed::depends_on;
 use crate::explanation::{ExplainOptions, Rule};
 use crate::identification::estimate::{Folds, fit};
 use crate::logs::log::Log;
