@@ -1,11 +1,9 @@
 //! What was found, in words.
 
-use super::arm_file::{Better, LONGEST_ARM};
-use super::change::Change;
+use super::arm_file::{Better, Change, LONGEST_ARM};
+use super::properties::{Common, Scale, Size, Unit};
 use super::result::{Answer, GravityIs, Kind, Side};
 use super::search::{Found, Step};
-use super::sign::Common;
-use super::unit::{Scale, Size, Unit};
 use crate::controller::JointNumber;
 
 /// `joint 2`, `joints 2 and 5`.

@@ -7,44 +7,31 @@
 //!
 //! | | |
 //! |---|---|
-//! | `result`, `answers`, `suggested_map` | what is told, its words, the column map |
-//! | `decimate`, `reading`, `rows`, `fit` | logs made small; a way to read columns; its rows; what it leaves |
-//! | `physics`, `sign` | energies; the sign of the torques |
-//! | `factors`, `unit` | a factor by joint; the unit of all |
-//! | `gravity`, `side`, `delay`, `kind` | one question each |
+//! | `result`, `answers`, `result` | what is told, its words, the column map |
+//! | `asked`, `asked`, `fit`, `fit` | logs made small; a way to read columns; its rows; what it leaves |
+//! | `physics`, `unit` | energies; the sign of the torques |
+//! | `asked`, `unit` | a factor by joint; the unit of all |
+//! | `unit`, `unit`, `unit`, `unit` | one question each |
 //! | `arm_file` | whether the arm file is this arm's |
-//! | `asked`, `change`, `search` | the logs asked; one change of the reading; the best reading |
+//! | `asked`, `arm_file`, `search` | the logs asked; one change of the reading; the best reading |
 
 mod answers;
 mod arm_file;
 mod asked;
-mod change;
-mod decimate;
-mod delay;
-mod factors;
 mod fit;
-mod gravity;
-mod kind;
 mod physics;
-mod reading;
+mod properties;
 mod result;
-mod rows;
 mod search;
-mod side;
-mod sign;
-mod suggested_map;
-mod unit;
-
-pub use result::{Answer, Conventions, GravityIs, Kind, PerJoint, PositionColumns, Side, TorqueColumns};
 
 use crate::controller::JointNumber;
 use crate::logs::log::Log;
 use crate::logs::regression::RigidArm;
 use answers::{Facts, answers};
 use asked::Asked;
+use properties::{Common, Size, Unit};
+pub use result::{Answer, Conventions, GravityIs, Kind, PerJoint, PositionColumns, Side, TorqueColumns};
 use search::{Found, gravity_is, search};
-use sign::Common;
-use unit::{Size, Unit};
 
 /// What the columns of some logs of an arm are. `validate` are logs of another path, if there are any; without
 /// them the halves of each log judge each other.
@@ -58,7 +45,7 @@ pub fn conventions(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventio
         Err(why) => return not_told(&why.to_string()),
     };
     let all: Vec<&Log> = logs.iter().chain(validate).collect();
-    let kind = kind::kind(&all);
+    let kind = properties::kind(&all);
     let Some(better) = arm_file::better(&asked, &found) else { return result(&asked, &found, kind) };
     // What the columns are is asked of the arm that they fit.
     let answer = answers::of_arm_file(&better);
@@ -89,7 +76,7 @@ fn not_told(why: &str) -> Conventions {
 
 fn result(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventions {
     let read = &found.read;
-    let sign = sign::common(&found.judged, &found.energies);
+    let sign = properties::common(&found.judged, &found.energies);
     let size = Size::of(found);
     let good = found.is_good();
     // A model that does not fit has no weight, and a balanced arm has little that still shows.
@@ -99,10 +86,10 @@ fn result(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventio
         (false, _) => gravity_is(asked, found),
     };
     let scale = size.scale(gravity);
-    let length = unit::reach(asked.body.arm());
+    let length = properties::reach(asked.body.arm());
     // Nothing is too light or too heavy for an arm of another size.
-    let unit = if length > arm_file::LONGEST_ARM { Unit::NotTold } else { unit::unit(found, scale) };
-    let share = side::least_share(&found.rows, &read.torques, &found.judged, &found.energies);
+    let unit = if length > arm_file::LONGEST_ARM { Unit::NotTold } else { properties::unit(found, scale) };
+    let share = properties::least_share(&found.rows, &read.torques, &found.judged, &found.energies);
     let share = share.filter(|_| good && sign != Common::NotTold);
     let facts = Facts {
         sign,
@@ -110,10 +97,11 @@ fn result(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventio
         size,
         scale,
         gravity,
-        side: share.and_then(side::side),
+        side: share.and_then(properties::side),
         friction_share: share,
         kind,
-        delay_would_show: good && delay::would_show(&found.rows, &read.torques, found.ridge, &found.judged),
+        delay_would_show: good
+            && properties::would_show(&found.rows, &read.torques, found.ridge, &found.judged),
         good,
         length,
         coupled: asked.body.motors().is_some(),
@@ -124,7 +112,7 @@ fn result(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventio
         torque: torque_columns(found, &facts),
         positions: position_columns(found, good),
         evidence: sentences.join(" "),
-        suggested_map: suggested_map::suggested_map(read, sign, &unit),
+        suggested_map: result::suggested_map(read, sign, &unit),
         arm_file: (length > arm_file::LONGEST_ARM).then(|| "a and d in metres".to_string()),
         left: search::shares(&found.judged),
         answers,

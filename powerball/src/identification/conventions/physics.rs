@@ -3,8 +3,7 @@
 //! Both are linear in the coefficients of a fit, so each comes with a standard error. A reading of the torques
 //! with the wrong sign fits as well as the right one; these two tell them apart.
 
-use super::fit::Fit;
-use super::rows::{FRICTION, Rows};
+use super::fit::{FRICTION, Fit, Rows};
 
 /// Samples of a part that are looked at.
 const SAMPLES: usize = 300;

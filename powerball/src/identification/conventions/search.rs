@@ -1,14 +1,11 @@
 //! The reading under which one rigid arm fits best: one change after another, as long as each is clear.
 
-use super::asked::Asked;
-use super::change::{Change, Reading};
-use super::factors::{factors, filed};
-use super::fit::{Judged, judge};
+use super::arm_file::{Change, Reading};
+use super::asked::{Asked, Positions, factors, filed};
+use super::fit::{Gravity, Judged, Rows, judge};
 use super::physics::Energies;
-use super::reading::Positions;
+use super::properties;
 use super::result::GravityIs;
-use super::rows::{Gravity, Rows};
-use super::{delay, gravity, sign};
 use crate::logs::regression::DataError;
 use dyngen::exact::rational::to_f64;
 
@@ -141,7 +138,7 @@ pub(super) fn search<'a>(asked: &Asked<'a>) -> Result<Found<'a>, DataError> {
 fn next<'a>(asked: &Asked<'a>, found: &Found<'a>) -> Result<Option<Found<'a>>, DataError> {
     let Found { rows, read, judged, energies, ridge, .. } = found;
     let n = asked.body.dof();
-    let driven = sign::driven_by_friction(rows, &read.torques, energies);
+    let driven = properties::driven_by_friction(rows, &read.torques, energies);
     let mut tried = of_torques(rows, read, judged, *ridge);
     if driven.len() > 1 {
         tried.extend(Tried::asked(Change::TorqueReversed(driven.clone()), rows, read, judged, *ridge));
@@ -267,7 +264,7 @@ fn of_torques(rows: &Rows<'_>, read: &Reading, old: &Judged, ridge: f64) -> Vec<
         let free = [0, 1].into_iter().filter_map(|part| factors(rows, &read.torques, part, ridge));
         changes.extend(ratios.into_iter().chain(constants).chain(free).map(Change::Factors));
     }
-    changes.extend(delay::common(rows, &read.torques, ridge).map(Change::Late));
+    changes.extend(properties::common_delay(rows, &read.torques, ridge).map(Change::Late));
     changes.into_iter().filter_map(|change| Tried::asked(change, rows, read, old, ridge)).collect()
 }
 
@@ -296,7 +293,7 @@ fn of_positions(
         && let Ok(other) = asked.few(&read.positions, Gravity::TakenOut)
     {
         let new = judge(&other, &read.torques, ridge);
-        let joints = gravity::acts_on(&other, &new.fits[0].theta, &new.power);
+        let joints = properties::acts_on(&other, &new.fits[0].theta, &new.power);
         ask(&other, vec![Change::GravityOut(joints)]);
     }
     let of = |positions: &Positions| asked.few(positions, read.gravity).ok();

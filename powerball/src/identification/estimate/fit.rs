@@ -1,7 +1,6 @@
 //! The fit of rows in memory, with the columns of further terms.
 
-use super::design::{Design, Gram, runs};
-use super::folds::Folds;
+use super::design::{Design, Folds, Gram, runs};
 use super::rows::{FRICTION, Layout, Rows, Scatter, Trials};
 use super::solve::{Products, dot};
 use super::variable_projection;

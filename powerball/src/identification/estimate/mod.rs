@@ -5,9 +5,7 @@ mod consistent;
 mod design;
 pub mod distribution;
 mod estimates;
-mod exchanged;
 mod fit;
-mod folds;
 mod instrumental;
 mod mountings;
 mod reduced;
@@ -22,20 +20,18 @@ mod verdict;
 
 pub use band::{InBand, bands_of, reduce_in_bands, solve_in_band};
 pub use consistent::{Consistent, ConsistentFit, ConsistentReport, TorqueMetric, consistent_fit, nearest};
-pub use design::{Design, Gram, runs};
+pub use design::{Design, Folds, Gram, runs};
 #[cfg(feature = "explain")]
 pub(crate) use estimates::in_set_of;
 pub use estimates::{
     BaseModel, Estimates, JointFriction, ParameterEstimate, ResidualStats, TorqueCurve, curves, estimates,
     residual_stats, stats_of,
 };
-pub use exchanged::exchanged;
 pub use fit::{Fit, Term, fit, friction_columns};
 #[cfg(feature = "explain")]
 pub(crate) use fit::{MEAN_OVER, variance_inflation};
-pub use folds::Folds;
 pub use instrumental::solve_instrumental;
-pub use mountings::Together;
+pub use mountings::{Together, exchanged};
 pub use reduced::{FrictionKind, Solution, solve_reduced};
 pub(crate) use robust::over_blocks;
 pub use robust::{Robust, solve_robust};

@@ -2,7 +2,7 @@
 
 use super::columns::Asked;
 use super::map::ColumnMap;
-use super::samples::Samples;
+use super::read::Samples;
 use super::{Finding, Log, LogError};
 use crate::logs::tables::Rows;
 use dyngen::Arm;

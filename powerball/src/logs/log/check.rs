@@ -1,7 +1,7 @@
 //! What can be wrong with numbers that are there: time, wraps, units, dead and saturated signals.
 
-use super::raw::{Effort, Raw};
-use super::{Finding, Log, LogError, Motors, Severity, Warnings, levels, signs, velocities};
+use super::read::{Effort, Raw};
+use super::{Finding, Log, LogError, Motors, Severity, Warnings, velocities};
 use crate::logs::signal::resample::median_step;
 use dyngen::Arm;
 use dyngen::arm::JointKind;
@@ -86,12 +86,12 @@ pub(super) fn into_log(
     let name = if matches!(effort, Effort::Torque) { "tau" } else { "i" };
     let mut warnings = Warnings { file, line: &raw.line, t: &raw.t, findings, errors: &mut errors };
     for (j, (q, effort)) in raw.q.iter().zip(&raw.effort).enumerate() {
-        levels::effort(effort, &format!("{name}{}", j + 1), &mut warnings);
-        levels::steps(effort, &format!("{name}{}", j + 1), false, &mut warnings);
-        levels::steps(q, &format!("q{}", j + 1), true, &mut warnings);
+        velocities::effort(effort, &format!("{name}{}", j + 1), &mut warnings);
+        velocities::steps(effort, &format!("{name}{}", j + 1), false, &mut warnings);
+        velocities::steps(q, &format!("q{}", j + 1), true, &mut warnings);
     }
     velocities::look(&raw, step, &mut warnings);
-    signs::look(&raw, step, name, &mut warnings);
+    velocities::look_at_signs(&raw, step, name, &mut warnings);
     rate(&raw.t, &mut warnings);
     if !errors.is_empty() {
         return Err(LogError(errors));

@@ -1,6 +1,8 @@
 //! One running time through several logs: what warms up knows no files.
 
 use super::Log;
+use super::map::Mapped;
+use crate::logs::signal::resample::linear_at;
 
 /// Sets [`Log::clock`] so that `t + clock` runs through all logs.
 ///
@@ -22,5 +24,67 @@ pub fn common_clock(logs: &mut [Log]) {
         let (first, last) = span(log);
         log.clock = end - first;
         end += last - first;
+    }
+}
+
+// Torques whose time stamps are known to be off.
+
+impl Log {
+    /// The log with torques whose stamps are moved as a map says. What lies within the longest shift of an
+    /// end of a piece is left out there: its torque is not known any more.
+    #[must_use]
+    pub(super) fn shifted(mut self, map: &Mapped) -> Log {
+        let shifts: Vec<f64> = (0..self.torque.len()).map(|j| map.shift_of(j)).collect();
+        let longest = shifts.iter().fold(0.0f64, |most, s| most.max(s.abs()));
+        if longest == 0.0 {
+            return self;
+        }
+        for (torque, shift) in self.torque.iter_mut().zip(&shifts) {
+            let logged = torque.clone();
+            for piece in &self.pieces {
+                let (t, x) = (&self.t[piece.clone()], &logged[piece.clone()]);
+                for (k, to) in piece.clone().zip(t) {
+                    torque[k] = linear_at(t, x, to - shift);
+                }
+            }
+        }
+        for piece in &mut self.pieces {
+            let t = &self.t[piece.clone()];
+            let (from, to) = (t[0] + longest, t[t.len() - 1] - longest);
+            let start = piece.start;
+            *piece = start + t.partition_point(|t| *t < from)..start + t.partition_point(|t| *t <= to);
+        }
+        self.pieces.retain(|piece| piece.len() >= 2);
+        self
+    }
+}
+
+#[cfg(test)]
+mod shift_tests {
+    use super::super::map::ColumnMap;
+    use super::*;
+
+    #[test]
+    fn a_shift_moves_torques_and_nothing_else() {
+        let t: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
+        let wave = |late: f64| -> Vec<f64> { t.iter().map(|t| (2.0 * (t - late)).sin()).collect() };
+        let log = Log {
+            file: "log.csv".into(),
+            q: vec![wave(0.0); 2],
+            torque: vec![wave(0.08), wave(0.0)],
+            temperature: None,
+            motor: None,
+            pieces: vec![0..400, 400..1000],
+            clock: 0.0,
+            t: t.clone(),
+        };
+        let map = ColumnMap::parse("tau.shift = [-0.08, 0]", "--map").unwrap();
+        let shifted = log.clone().shifted(&map.tau);
+        assert_eq!((shifted.pieces.clone(), &shifted.q), (vec![8..392, 408..992], &log.q));
+        for k in shifted.pieces.into_iter().flatten() {
+            approx::assert_abs_diff_eq!(shifted.torque[0][k], log.torque[1][k], epsilon = 1e-4);
+            approx::assert_abs_diff_eq!(shifted.torque[1][k], log.torque[1][k], epsilon = 1e-12);
+        }
+        assert!(ColumnMap::parse("q.shift = 0.1", "--map").unwrap_err().contains("only `tau` and `i`"));
     }
 }

@@ -1,7 +1,7 @@
 //! A log's quantities found by the names of its columns.
 
 use super::map::{ByJoint, ColumnMap};
-use super::raw::Effort;
+use super::read::Effort;
 use super::{Finding, LogError};
 use dyngen::Arm;
 use std::collections::HashMap;

@@ -10,18 +10,11 @@ mod clock;
 mod columns;
 mod file;
 mod inspect;
-mod levels;
 mod map;
 mod motors;
-mod raw;
 mod read;
-mod samples;
-mod shift;
-mod signs;
 mod topics;
 mod velocities;
-mod warnings;
-mod write;
 
 pub use crate::logs::tables::{Finding, LogError};
 pub use arrays::{Arrays, Sample};
@@ -32,7 +25,7 @@ pub use map::{ByJoint, Clock, ColumnMap, Mapped};
 pub use motors::{Motors, logs_of_motors, notes_of};
 pub use read::{read_log, read_log_as, read_logs, read_logs_as};
 pub use topics::{Alignment, alignment};
-use warnings::{Severity, Warnings};
+use velocities::{Severity, Warnings};
 
 /// One recording as it was logged, after its faults were taken out.
 #[derive(Clone, Debug)]

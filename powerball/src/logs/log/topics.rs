@@ -3,7 +3,7 @@
 
 use super::columns::{self, Asked};
 use super::map::{Clock, ColumnMap};
-use super::samples::Samples;
+use super::read::Samples;
 use super::{Finding, Log, LogError};
 use crate::logs::signal::resample::{cubic_at, median_step};
 use crate::logs::tables::{Rows, Table};

@@ -6,8 +6,8 @@
 //! encoder steps and noise hardly count. On sound logs of real arms the two agree within 0.1 % with a
 //! correlation of 1.0000.
 
-use super::raw::Raw;
-use super::{Severity, Warnings};
+use super::Finding;
+use super::read::Raw;
 
 /// Length of the stretches that are compared, s.
 const STRETCH: f64 = 0.5;
@@ -162,4 +162,189 @@ fn slope(y: &[f64], x: &[f64]) -> (f64, f64) {
         yy += y * y;
     }
     if xx <= 0.0 || yy <= 0.0 { (0.0, 0.0) } else { (xy / xx, xy / (xx * yy).sqrt()) }
+}
+
+// The levels of a signal: coarse steps, and tops that are flat because something saturates.
+
+/// A saturated signal rests at its extreme at least so many samples one after another.
+const FLAT: usize = 4;
+/// … and for this share of the log in all.
+const FLAT_SHARE: f64 = 2e-3;
+/// … and so many times more often than just below it: a signal that turns there is at most 2.4 times as often
+/// in its last step as in the one before.
+const PILED: f64 = 4.0;
+/// Fewer steps than these across what a signal covers are worth telling.
+const STEPS_POSITION: f64 = 500.0;
+const STEPS_EFFORT: f64 = 40.0;
+
+/// Whether a torque or current signal never changes, or is cut off at an extreme.
+pub(super) fn effort(x: &[f64], name: &str, warnings: &mut Warnings<'_>) {
+    let (low, high) = x.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+    if high - low <= 1e-12 * high.abs().max(low.abs()) {
+        let message = "never changes: the joint's sensor or drive is dead, or it was not recorded";
+        warnings.add(None, name.into(), message.into(), Severity::Warning);
+        return;
+    }
+    for (edge, sign) in [(low, -1.0), (high, 1.0)] {
+        let runs = x.chunk_by(|a, b| a == b).scan(0, |at, run| {
+            *at += run.len();
+            Some((*at - run.len(), run))
+        });
+        let flat: Vec<(usize, usize)> = runs
+            .filter(|(_, run)| run[0] == edge && run.len() >= FLAT)
+            .map(|(at, run)| (at, run.len()))
+            .collect();
+        let resting: usize = flat.iter().map(|(_, length)| length).sum();
+        // The band below the edge: as wide as 2 % of the range, or to the next level.
+        let next = x.iter().filter(|v| **v != edge).map(|v| sign * (edge - v)).fold(f64::INFINITY, f64::min);
+        let width = (0.02 * (high - low)).max(1.001 * next);
+        let below = x.iter().filter(|v| **v != edge && sign * (edge - **v) <= width).count();
+        let piled = resting as f64 > PILED * below.max(1) as f64;
+        if let Some((first, _)) = flat.first().filter(|_| edge != 0.0 && piled)
+            && resting as f64 > FLAT_SHARE * x.len() as f64
+        {
+            let message = format!(
+                "stays at its extreme {edge} for {resting} samples (first here): it looks saturated, and the \
+                    model cannot explain torque that was not delivered"
+            );
+            warnings.add(Some(*first), name.into(), message, Severity::Warning);
+        }
+    }
+}
+
+/// Whether a signal has few levels.
+pub(super) fn steps(x: &[f64], name: &str, position: bool, warnings: &mut Warnings<'_>) {
+    let mut sorted = x.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let range = sorted[sorted.len() - 1] - sorted[0];
+    let least = if position { 0.05 } else { 0.0 };
+    if range <= least {
+        return;
+    }
+    let gaps = || sorted.windows(2).map(|w| w[1] - w[0]).filter(|gap| *gap > 1e-9 * range);
+    let step = gaps().fold(f64::INFINITY, f64::min);
+    let count = range / step;
+    // Every difference of levels is a number of steps, or there are none.
+    let off = gaps().filter(|gap| (gap / step - (gap / step).round()).abs() > 0.1).count();
+    let most = if position { STEPS_POSITION } else { STEPS_EFFORT };
+    if count < most && off == 0 {
+        let consequence = match position {
+            true => "accelerations computed from it are mostly noise: log the encoder's full resolution",
+            false => "errors below that step mean nothing",
+        };
+        let message = format!("has {:.0} levels, {step:.3e} apart: {consequence}", count + 1.0);
+        warnings.add(None, name.into(), message, Severity::Warning);
+    }
+}
+
+// Whether torques have the signs of their joints: friction only ever takes.
+//
+// Between one reversal of a joint and the next its mean torque holds gravity, inertia and friction. Over
+// many half swings the first two come out alike in both directions, friction does not: forward swings take
+// more torque than backward ones. Where it is clearly the other way round, torque or position has the wrong
+// sign. On sound logs of a UR10e the difference is 1 to 40 standard errors above zero.
+
+/// Half swings in either direction, at least.
+const SWINGS: usize = 4;
+/// Standard errors below zero.
+const CLEAR: f64 = 5.0;
+/// Range of a joint that moves, rad.
+const MOVES: f64 = 0.1;
+
+/// Looks at each joint's torque or current.
+pub(super) fn look_at_signs(raw: &Raw, step: f64, name: &str, warnings: &mut Warnings<'_>) {
+    for (j, (q, effort)) in raw.q.iter().zip(&raw.effort).enumerate() {
+        let range = q.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+        if range.1 - range.0 < MOVES {
+            continue;
+        }
+        let stride = ((0.05 / step) as usize).max(1);
+        let velocities: Vec<f64> = (stride..q.len().saturating_sub(stride))
+            .map(|k| (q[k + stride] - q[k - stride]) / (raw.t[k + stride] - raw.t[k - stride]))
+            .collect();
+        let top = velocities.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        // Mean effort of every half swing; what is slow belongs to none.
+        let direction = |v: f64| if v.abs() < 0.1 * top { 0.0 } else { v.signum() };
+        let mut swings: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
+        let (mut sum, mut count, mut now) = (0.0, 0usize, 0.0);
+        for (k, v) in velocities.iter().enumerate() {
+            let next = direction(*v);
+            if next != 0.0 && next != now {
+                if count as f64 * step > 0.1 {
+                    swings[usize::from(now > 0.0)].push(sum / count as f64);
+                }
+                (sum, count, now) = (0.0, 0, next);
+            }
+            if next != 0.0 {
+                sum += effort[k + stride];
+                count += 1;
+            }
+        }
+        let [backward, forward] = swings.map(|means| mean(&means));
+        let (Some((b, eb)), Some((f, ef))) = (backward, forward) else { continue };
+        let error = (eb + ef).sqrt();
+        if f - b < -CLEAR * error && error > 0.0 {
+            let message = format!(
+                "is {:.3} less on the way forward than on the way back, {:.0} standard errors: friction \
+                    would have to drive the joint. Its sign, or that of q{}, is wrong",
+                b - f,
+                (b - f) / error,
+                j + 1
+            );
+            warnings.add(None, format!("{name}{}", j + 1), message, Severity::Warning);
+        }
+    }
+}
+
+/// Mean and the square of its standard error; `None` with too few.
+fn mean(x: &[f64]) -> Option<(f64, f64)> {
+    if x.len() < SWINGS {
+        return None;
+    }
+    let n = x.len() as f64;
+    let mean = x.iter().sum::<f64>() / n;
+    Some((mean, x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n))
+}
+
+// Where the checks put what they find.
+
+/// What a finding means for the log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Severity {
+    /// Its user should know.
+    Warning,
+    /// It cannot be used.
+    Unusable,
+}
+
+/// Findings about one log, each with the line and the time of its sample.
+pub(super) struct Warnings<'a> {
+    pub file: &'a str,
+    pub line: &'a [usize],
+    pub t: &'a [f64],
+    pub findings: &'a mut Vec<Finding>,
+    pub errors: &'a mut Vec<Finding>,
+}
+
+impl Warnings<'_> {
+    /// Adds a finding; `sample` is the one that it begins at, where it is not about the whole log.
+    pub(super) fn add(
+        &mut self,
+        sample: Option<usize>,
+        quantity: String,
+        message: String,
+        severity: Severity,
+    ) {
+        let when = sample.and_then(|k| self.t.get(k)).map_or(String::new(), |t| format!("at {t:.3} s: "));
+        let finding = Finding {
+            file: self.file.to_string(),
+            line: sample.and_then(|k| self.line.get(k).copied()),
+            quantity,
+            message: format!("{when}{message}"),
+        };
+        match severity {
+            Severity::Warning => self.findings.push(finding),
+            Severity::Unusable => self.errors.push(finding),
+        }
+    }
 }

@@ -1,8 +1,6 @@
 //! Logs of an arm into rows: even grid, derivatives, band, rest removed, blocks laid out.
 
-use super::inactive::inactive_joints;
-use super::rest_notes::{FEWEST_ROWS, notes};
-use super::row_selection::kept_samples;
+use super::row_selection::{FEWEST_ROWS, inactive_joints, kept_samples, notes};
 use super::{Block, Column, JointRows, Recording, RigidArm};
 use crate::logs::log::{Log, logs_of_motors};
 use crate::logs::parallel;

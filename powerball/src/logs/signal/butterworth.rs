@@ -1,7 +1,6 @@
 //! Butterworth low-pass filters of any even order, as biquads, and their zero-phase use.
 
-use super::biquad::Biquad;
-use super::lanes;
+use super::filter;
 use std::f64::consts::PI;
 
 /// Filters samples in place through `N` sections, which start settled on the first sample, so a constant
@@ -60,7 +59,7 @@ impl Butterworth {
             })
             .collect();
         let padding = (3.0 * rate / cutoff).ceil() as usize;
-        let memory = lanes::memory(&sections);
+        let memory = filter::memory(&sections);
         Some(Butterworth { sections, padding, memory })
     }
 
@@ -78,8 +77,8 @@ impl Butterworth {
         y.extend((1..=pad).rev().map(|k| 2.0 * x[0] - x[k]));
         y.extend_from_slice(x);
         y.extend((1..=pad).map(|k| 2.0 * x[n - 1] - x[n - 1 - k]));
-        if lanes::worthwhile(y.len(), self.memory) {
-            y = lanes::there_and_back(&self.sections, self.memory, &y);
+        if filter::worthwhile(y.len(), self.memory) {
+            y = filter::there_and_back(&self.sections, self.memory, &y);
         } else {
             self.there_and_back(&mut y);
         }
@@ -119,6 +118,41 @@ impl Butterworth {
             .map(|s| square(s.b[0], s.b[1], s.b[2]) / square(1.0, s.a[0], s.a[1]))
             .product::<f64>()
             .powi(2)
+    }
+}
+
+// A recursive filter of second order.
+
+/// One second-order section with a0 = 1: y = b0·x + b1·x₋₁ + b2·x₋₂ − a1·y₋₁ − a2·y₋₂.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Biquad {
+    /// b0, b1, b2.
+    pub b: [f64; 3],
+    /// a1, a2.
+    pub a: [f64; 2],
+}
+
+impl Biquad {
+    /// The state that a long constant input of 1 leaves behind (transposed direct form II).
+    pub(super) fn settled(&self) -> [f64; 2] {
+        let [b0, b1, b2] = self.b;
+        let [a1, a2] = self.a;
+        let gain = (b0 + b1 + b2) / (1.0 + a1 + a2);
+        [gain - b0, b2 - a2 * gain]
+    }
+
+    /// One sample through the section in the given state.
+    ///
+    /// The next state is written in the present one alone, not in the output: a sample waits for one product
+    /// and one sum of the sample before it.
+    #[inline(always)]
+    pub(super) fn step(&self, [s1, s2]: &mut [f64; 2], x: f64) -> f64 {
+        let [b0, b1, b2] = self.b;
+        let [a1, a2] = self.a;
+        let (state, y) = (*s1, b0 * x + *s1);
+        *s1 = ((b1 - a1 * b0) * x + *s2) - a1 * state;
+        *s2 = (b2 - a2 * b0) * x - a2 * state;
+        y
     }
 }
 
@@ -220,10 +254,10 @@ mod tests {
             let filter = Butterworth::low_pass(order, cutoff, 200.0).unwrap();
             let x: Vec<f64> =
                 (0..n).map(|k| f64::from(k > n / 3) * 5.0 + 100.0 + rng.random_range(-1.0..1.0)).collect();
-            in_pieces += usize::from(lanes::worthwhile(n, filter.memory));
+            in_pieces += usize::from(filter::worthwhile(n, filter.memory));
             let mut whole = x.clone();
             filter.there_and_back(&mut whole);
-            for (a, b) in whole.iter().zip(lanes::there_and_back(&filter.sections, filter.memory, &x)) {
+            for (a, b) in whole.iter().zip(filter::there_and_back(&filter.sections, filter.memory, &x)) {
                 approx::assert_abs_diff_eq!(*a, b, epsilon = 1e-11);
             }
         }

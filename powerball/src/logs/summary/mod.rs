@@ -8,21 +8,17 @@
 mod bands;
 mod file;
 mod octaves;
-mod packed;
 mod r_factor;
 mod reduce;
-mod steepness;
 
+use crate::logs::parallel;
+use crate::logs::regression::{DataOptions, RigidArm};
 pub use bands::{BANDS, Bands, Powers};
 pub use file::SummaryError;
 pub use octaves::{OCTAVES, Octaves, SLOW, halved};
 pub use r_factor::RFactor;
-pub use reduce::Columns;
 pub(crate) use reduce::parts;
-pub use steepness::{NODES, Steepness};
-
-use crate::logs::parallel;
-use crate::logs::regression::{DataOptions, RigidArm};
+pub use reduce::{Columns, NODES, Steepness};
 
 /// What must agree for summaries to be of the same thing.
 #[derive(Clone, Debug, PartialEq)]

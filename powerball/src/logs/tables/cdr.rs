@@ -1,7 +1,7 @@
 //! Messages of ROS as their bytes are: CDR (ROS 2) and the serialisation of ROS 1.
 
 /// A number of values or letters beyond this is no message of joints.
-const MOST: usize = 1 << 16;
+const MOST_OF_A_TYPE: usize = 1 << 16;
 
 /// The bytes of a message, read from the front.
 pub(super) struct Cdr<'a> {
@@ -54,7 +54,7 @@ impl<'a> Cdr<'a> {
 
     fn count(&mut self) -> Result<usize, String> {
         let count = self.u32()? as usize;
-        if count > MOST { Err("is torn".into()) } else { Ok(count) }
+        if count > MOST_OF_A_TYPE { Err("is torn".into()) } else { Ok(count) }
     }
 
     pub(super) fn string(&mut self) -> Result<String, String> {

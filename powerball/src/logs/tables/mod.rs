@@ -6,7 +6,6 @@ mod arrays;
 mod cdr;
 pub(crate) mod columnar;
 mod contents;
-mod finding;
 #[cfg(feature = "parquet")]
 mod lists;
 #[cfg(feature = "mat")]
@@ -28,8 +27,7 @@ pub(crate) mod text;
 #[cfg(feature = "parquet")]
 mod zstd_pages;
 
-pub use contents::{Contents, Format, read_contents};
-pub use finding::{Finding, LogError};
+pub use contents::{Contents, Finding, Format, LogError, read_contents};
 #[cfg(feature = "mcap")]
 pub(crate) use mcap_out::from_csv as mcap_from_csv;
 #[cfg(feature = "mcap")]
