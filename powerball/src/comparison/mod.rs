@@ -9,10 +9,7 @@
 //! velocity does not.
 
 mod cause;
-mod difference;
 mod differences;
-mod friction;
-mod repeated;
 mod result;
 mod side;
 

@@ -12,7 +12,6 @@ pub mod motion;
 pub mod mounting;
 mod nearest;
 mod source;
-mod summarize;
 pub mod transmission;
 mod verify;
 
@@ -22,7 +21,6 @@ pub use identify::{
 };
 pub use known::KnownModel;
 pub use nearest::{NearestArm, NearestError, ValueChange, nearest_arm};
-pub use source::{Input, Source};
-pub use summarize::{Summarized, summarize};
+pub use source::{Input, Source, Summarized, summarize};
 pub use transmission::{JointTransmission, transmission};
 pub use verify::{Verified, VerifyOptions, verify};

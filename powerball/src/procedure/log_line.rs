@@ -2,6 +2,7 @@
 
 use crate::bus::canopen::Micros;
 use crate::bus::driver::{Counters, Driver};
+use std::fmt;
 use std::fmt::Write as _;
 
 /// The time of a log: so many s at the first of its SYNCs, and from there on what the bus's clock measures.
@@ -80,5 +81,35 @@ impl Columns {
             counts.iter().for_each(|count| cell(format_args!("{count}")));
         }
         line.push('\n');
+    }
+}
+
+// What a person is told while the arm moves.
+
+/// How far a motion has come.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Told {
+    /// Samples that were given, and all there are.
+    pub samples: [usize; 2],
+    /// Where the joints are, rad.
+    pub position: Vec<f64>,
+    /// The greatest distance of a joint from its set-point now, rad.
+    pub error: f64,
+    /// SYNCs that were late since the master began.
+    pub late: u64,
+    /// Joints' data that was missing since then, in cycles.
+    pub missing: u64,
+}
+
+impl fmt::Display for Told {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [done, all] = self.samples;
+        let share = 100 * done / all.max(1);
+        write!(f, "{share:3} % of {all} samples, at (")?;
+        for (j, q) in self.position.iter().enumerate() {
+            write!(f, "{}{q:.3}", if j == 0 { "" } else { ", " })?;
+        }
+        let Told { error, late, missing, .. } = self;
+        write!(f, ") rad, {:.1} mrad off, {late} cycles late, {missing} without data", 1e3 * error)
     }
 }

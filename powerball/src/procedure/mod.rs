@@ -9,16 +9,12 @@ pub mod gravity_free;
 pub mod laws;
 pub mod log_line;
 pub mod record;
-mod record_error;
 pub mod resume;
 pub mod settling;
-mod told;
 pub mod warm_up;
 
 pub use approach::approach;
 pub use behind::Behind;
 pub use envelope::{Cleared, Envelope};
-pub use log_line::{Columns, LogTime};
-pub use record::{Record, Recorder, record, way};
-pub use record_error::RecordError;
-pub use told::Told;
+pub use log_line::{Columns, LogTime, Told};
+pub use record::{Record, RecordError, Recorder, record, way};

@@ -3,13 +3,13 @@
 //! Every line of a log is written whole, by one call, when its cycle is over: whatever moment the program
 //! dies at, the file can be read up to there.
 
-use super::{Cleared, Columns, Envelope, LogTime, RecordError, Told, approach};
-use crate::bus::driver::{ControlMode, Phase, Profile};
+use super::{Cleared, Columns, Envelope, LogTime, Told, approach};
+use crate::bus::driver::{ControlMode, Phase, Profile, Rejection};
 use crate::bus::transport::{ArmError, Bus, Master, Moment};
 use crate::identification::motion::Motion;
 use serde::Serialize;
-use std::fmt;
 use std::io::Write;
+use std::{fmt, io};
 
 /// Share of the joints' velocities and accelerations on the way to where a motion begins.
 const APPROACH: f64 = 0.25;
@@ -60,7 +60,7 @@ impl<B: Bus, const N: usize> fmt::Debug for Recorder<B, N> {
 }
 
 impl<B: Bus, const N: usize> Recorder<B, N> {
-    /// Tells `told` twice a second how far a motion has come.
+    /// Tells `log_line` twice a second how far a motion has come.
     #[must_use]
     pub fn telling(mut self, told: impl FnMut(&Told) + 'static) -> Self {
         self.told = Box::new(told);
@@ -305,7 +305,7 @@ fn beginning<const N: usize>(motion: &Motion) -> Option<[f64; N]> {
 }
 
 /// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its velocity, follows the
-/// motion, writes the log, and stops; `told` hears how far it has come. The motion is looked at before anything
+/// motion, writes the log, and stops; `log_line` hears how far it has come. The motion is looked at before anything
 /// is sent, the way to where it begins before the arm is enabled.
 ///
 /// # Errors
@@ -332,6 +332,42 @@ pub fn record<B: Bus, const N: usize>(
     let done = done?;
     stopped?;
     Ok(done)
+}
+
+// Why an arm is not recorded.
+
+/// Why a recording ended early, or did not begin.
+#[derive(Debug)]
+pub enum RecordError {
+    /// The arm.
+    Arm(ArmError),
+    /// A set-point was rejected.
+    Rejected(Rejection),
+    /// The motion does not fit the arm or its rate.
+    Motion(String),
+    /// The arm must not go where it would have to: why.
+    Barred(String),
+    /// The log could not be written.
+    Write(io::Error),
+}
+
+impl fmt::Display for RecordError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            RecordError::Arm(e) => e.fmt(f),
+            RecordError::Rejected(rejection) => write!(f, "the motion cannot be followed: {rejection}"),
+            RecordError::Motion(what) | RecordError::Barred(what) => f.write_str(what),
+            RecordError::Write(e) => write!(f, "the log cannot be written: {e}"),
+        }
+    }
+}
+
+impl std::error::Error for RecordError {}
+
+impl<E: Into<ArmError>> From<E> for RecordError {
+    fn from(e: E) -> Self {
+        RecordError::Arm(e.into())
+    }
 }
 
 #[cfg(test)]

@@ -4,8 +4,7 @@
 //! (Leon Sorokin, MIT, in `uplot/`): it reduces what is drawn to the lowest and highest value of each column of the screen, so a
 //! long log is an envelope from afar and samples from near.
 
-use super::decimate::envelope;
-use super::figure::{Figure, MOST_POINTS, Mark, Panel, Series};
+use super::figure::{Figure, MOST_POINTS, Mark, Panel, Series, envelope};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};

@@ -24,7 +24,6 @@ mod axis;
 mod bars;
 pub mod compared;
 pub mod conventions;
-mod decimate;
 pub mod excited;
 pub mod explained;
 mod figure;

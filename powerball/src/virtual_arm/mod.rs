@@ -9,17 +9,12 @@ mod dynamics;
 mod effect;
 pub mod lwa4p;
 mod plant;
-mod servo;
 mod simulation;
 pub mod slave;
-mod undeclared;
 
 pub use body::{Body, PER_LINK, bodies};
-
 pub use dynamics::{Dynamics, solve_positive_definite};
 pub use effect::{Gear, Instant, Places, PlantEffect, State};
-pub use plant::{Plant, Sensors, SimulatedLog};
-pub use servo::{Gains, Servo};
-pub use simulation::Simulation;
+pub use plant::{Plant, Sensors, SimulatedLog, Undeclared};
+pub use simulation::{Gains, Servo, Simulation};
 pub use slave::VirtualArm;
-pub use undeclared::Undeclared;

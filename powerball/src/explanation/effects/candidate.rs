@@ -3,6 +3,7 @@
 use super::{Effect, Settings};
 use crate::controller::JointNumber;
 use crate::logs::regression::Data;
+use serde::{Serialize, Serializer};
 
 /// A time span of one log.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,4 +112,64 @@ pub(super) fn geometric(low: f64, high: f64, count: usize) -> Vec<f64> {
 #[must_use]
 pub(super) fn scaled(setting: f64, factor: f64, share: f64) -> f64 {
     setting + share * (setting * factor - setting)
+}
+
+// The signal that an effect depends on: the horizontal axis of the plot that shows it.
+
+/// What a residual is to be drawn over to see an effect on a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Axis {
+    /// A joint's position.
+    Position(JointNumber),
+    /// The place within a cycle of the joint's own position, with so many cycles a turn.
+    Cycle(f64),
+    /// A joint's velocity.
+    Velocity(JointNumber),
+    /// The torque that the rigid arm asks of the joint.
+    Torque,
+    /// Its size, where the residual is taken against the direction of motion.
+    Load,
+    /// How far the joint has come since it turned back, up to several times this way, rad or m; the residual
+    /// is taken against the direction of motion.
+    Travel(f64),
+    /// How fast the rigid arm's torque changes.
+    TorqueRate,
+    /// Running time; the residual is taken against the direction of motion.
+    Warmth,
+    /// Time.
+    Time,
+    /// What the effect itself adds: for those that depend on many signals at once.
+    Law,
+}
+
+// A figure of several joints.
+
+/// A figure for each joint that an effect is on, in the order of the joints found; as JSON the number alone
+/// where it is on one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ByJoint(pub Vec<f64>);
+
+impl ByJoint {
+    /// A figure of everything that was found.
+    pub(super) fn of(found: &[Found<'_>], figure: impl Fn(&Found<'_>) -> f64) -> ByJoint {
+        ByJoint(found.iter().map(figure).collect())
+    }
+
+    /// The figure of the only joint; `None` where there are several.
+    #[must_use]
+    pub fn single(&self) -> Option<f64> {
+        match self.0.as_slice() {
+            [one] => Some(*one),
+            _ => None,
+        }
+    }
+}
+
+impl Serialize for ByJoint {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        match self.single() {
+            Some(one) => one.serialize(to),
+            None => self.0.serialize(to),
+        }
+    }
 }

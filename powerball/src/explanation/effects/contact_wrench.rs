@@ -1,8 +1,7 @@
 //! An outside force on the last link during some time: a touch, a push, a thing leaned on.
 
 use super::payload::all_joints;
-use super::window_sums::{Sums, explained};
-use super::windows::{best_run, by_log, cut, rests, step_start, window};
+use super::windows::{Sums, best_run, by_log, cut, explained, rests, step_start, window};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part, Window};
 use crate::identification::estimate::Solver;
 use crate::logs::regression::Column;

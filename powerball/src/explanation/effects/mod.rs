@@ -13,11 +13,9 @@
 //! below, once as a module and once in the list. The list is in the order in which equals are preferred.
 
 pub mod asymmetry;
-mod axis;
 pub mod backlash;
 pub mod base_tilt;
 pub mod broken_symmetry;
-mod by_joint;
 mod candidate;
 pub mod contact_wrench;
 mod context;
@@ -38,12 +36,9 @@ pub mod time_delay;
 pub mod torque_constant;
 pub mod unnamed_law;
 pub mod velocity_nonlinearity;
-mod window_sums;
 mod windows;
 
-pub use axis::Axis;
-pub use by_joint::ByJoint;
-pub use candidate::{Candidate, Found, Window};
+pub use candidate::{Axis, ByJoint, Candidate, Found, Window};
 pub use context::Context;
 pub(crate) use context::{PASSES, SOFT, each_instant, move_link};
 pub use effect::{Class, Effect, Part, Placed};

@@ -2,8 +2,7 @@
 //! end or to some time.
 
 use super::link_body::{self, Body};
-use super::window_sums::{Sums, explained};
-use super::windows::{best_run, by_log, cut, lasting_window};
+use super::windows::{Sums, best_run, by_log, cut, explained, lasting_window};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part, Window};
 use crate::controller::JointNumber;
 use crate::identification::estimate::Solver;

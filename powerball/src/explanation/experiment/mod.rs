@@ -5,17 +5,14 @@
 
 mod decide;
 mod design;
-mod new_log;
-
-pub use decide::{Decision, decide};
-pub use design::{DesignedExperiment, design};
-pub use new_log::{HELD_OUT, split_off};
 
 use super::explain::{Experiment, Explained, Hypothesis, Open, Trajectory, explain_body};
 use super::options::{ExplainError, ExplainOptions, RuledOut};
 use crate::identification::motion::Motion;
 use crate::logs::log::Log;
 use crate::logs::regression::RigidArm;
+pub use decide::{Decision, HELD_OUT, decide, split_off};
+pub use design::{DesignedExperiment, design};
 
 /// Name of the trajectory's file beside explained.json.
 pub const TRAJECTORY: &str = "next_experiment.csv";

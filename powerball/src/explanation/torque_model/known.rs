@@ -1,11 +1,20 @@
 //! The next identification: what is known is taken out of the logs, and what is found comes to it.
 
-use super::{Additions, LogChanges, NamedTerm, TorqueModel};
+use super::file::read_text;
+use super::{Additions, ArmChanges, FileError, LogChanges, NamedTerm, TorqueModel};
 use crate::controller::JointNumber;
 use crate::controller::correction::{Law, Term};
+use crate::identification::KnownModel;
+use crate::identification::mounting::Mounting;
 use crate::logs::log::Log;
-use crate::logs::regression::{DataOptions, Recording, RigidArm};
+use crate::logs::regression::{Data, DataOptions, Recording, RigidArm};
 use crate::logs::signal::resample::median_step;
+use dyngen::Arm;
+use dyngen::arm::{Parameter, ParameterKind};
+use dyngen::exact::rational::Rational;
+use serde_json::Value;
+use std::fmt;
+use std::path::{Path, PathBuf};
 
 impl TorqueModel {
     /// Leaves in logs what a base model is to be fitted to: true positions, torques at their own time,
@@ -170,4 +179,137 @@ fn between(t: &[f64], x: &[f64], at: f64) -> f64 {
         }
         _ => x[next - 1],
     }
+}
+
+// A model of an arm as what the next identification or verification knows.
+
+/// A model from a file, which errors name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelFile {
+    /// The model.
+    pub model: TorqueModel,
+    /// Its file.
+    pub file: PathBuf,
+    /// The end of each joint's band, Hz, where it is an identified.json.
+    pub joint_bands: Vec<f64>,
+}
+
+impl ModelFile {
+    /// Reads `model.json` or `identified.json`.
+    ///
+    /// # Errors
+    /// As [`TorqueModel::read`].
+    pub fn read(file: &Path) -> Result<ModelFile, FileError> {
+        ModelFile::parse(&read_text(file)?, file)
+    }
+
+    /// The same from the text of a file, which `file` names in errors.
+    ///
+    /// # Errors
+    /// As [`TorqueModel::parse`].
+    pub fn parse(text: &str, file: &Path) -> Result<ModelFile, FileError> {
+        let model = TorqueModel::parse(text, file)?;
+        let said: Option<Value> = serde_json::from_str(text).ok();
+        let bands = said.as_ref().and_then(|json| json.get("joint_bands")?.as_array());
+        let bands = bands.map(|bands| bands.iter().map(|band| band.as_f64().unwrap_or(0.0)).collect());
+        Ok(ModelFile { model, file: file.to_path_buf(), joint_bands: bands.unwrap_or_default() })
+    }
+
+    /// The model with its parameters and joints in the order of a body's.
+    ///
+    /// # Errors
+    /// As [`TorqueModel::checked`].
+    pub fn checked(self, body: &RigidArm) -> Result<TorqueModel, FileError> {
+        self.model.in_set_of(body).checked(body.names(), body.dof(), &self.file)
+    }
+}
+
+impl KnownModel for ModelFile {
+    fn arm(&self, arm: &Arm, mounting: Mounting) -> Result<Arm, String> {
+        let changes = &self.model.additions.arm_changes;
+        if mounting != Mounting::Filed && changes.gravity.is_some() {
+            return Err(format!(
+                "{}: says how the base is tilted where it stands as filed, and nothing of it mounted otherwise",
+                self.file.display()
+            ));
+        }
+        changes.of(arm).map_err(|e| format!("{}: {e}", self.file.display()))
+    }
+
+    fn in_set_of(&self, body: &RigidArm) -> Result<Box<dyn KnownModel>, String> {
+        let model = self.clone().checked(body).map_err(|e| e.to_string())?;
+        Ok(Box::new(ModelFile { model, ..self.clone() }))
+    }
+
+    fn take_out(&self, body: &RigidArm, logs: &mut [Log]) {
+        self.model.take_out(body, logs);
+    }
+
+    fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Vec<Vec<f64>> {
+        self.model.residual(body, data, &[])
+    }
+}
+
+// The arm of the file as a model has it.
+
+/// Why an arm cannot be changed as a model says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Unchanged {
+    /// A name that is none of the arm's parameters.
+    NoParameter(String),
+    /// Gravity that is no number.
+    Gravity,
+}
+
+impl fmt::Display for Unchanged {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Unchanged::NoParameter(name) => {
+                write!(f, "arm_changes.not_zero: '{name}' is no parameter of this arm")
+            }
+            Unchanged::Gravity => f.write_str("arm_changes.gravity must be three finite numbers"),
+        }
+    }
+}
+
+impl std::error::Error for Unchanged {}
+
+impl ArmChanges {
+    /// The arm as it is.
+    ///
+    /// # Errors
+    /// [`Unchanged`] where the changes are another arm's.
+    pub fn of(&self, arm: &Arm) -> Result<Arm, Unchanged> {
+        let mut arm = arm.clone();
+        if let Some(gravity) = self.gravity {
+            let [x, y, z] = gravity.map(Rational::from_float);
+            let (Some(x), Some(y), Some(z)) = (x, y, z) else { return Err(Unchanged::Gravity) };
+            arm.gravity = [x, y, z];
+        }
+        for name in &self.not_zero {
+            let parameter = Parameter::parse(name).filter(|p| p.link < arm.dof());
+            let Parameter { link, kind } = parameter.ok_or_else(|| Unchanged::NoParameter(name.clone()))?;
+            arm.joints[link].zero.retain(|zero| *zero != kind);
+            // A published grouping does not know the parameter.
+            arm.groupings.clear();
+        }
+        Ok(arm)
+    }
+
+    /// Whether the arm is as its file says.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        *self == ArmChanges::default()
+    }
+}
+
+/// The arm with nothing declared zero at its last link that a payload may fill.
+#[must_use]
+pub(super) fn with_open_hand(arm: &Arm) -> Arm {
+    let mut arm = arm.clone();
+    if let Some(last) = arm.joints.last_mut() {
+        last.zero.retain(|kind| *kind == ParameterKind::Im);
+    }
+    arm.groupings.clear();
+    arm
 }

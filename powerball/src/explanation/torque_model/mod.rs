@@ -5,9 +5,7 @@
 //! the logs, at true positions: an encoder's offset is taken off first.
 
 mod along;
-mod as_known;
 mod c_api;
-mod changes;
 mod file;
 mod known;
 mod ros;
@@ -15,16 +13,14 @@ mod source;
 #[cfg(test)]
 mod tests;
 
-pub use as_known::ModelFile;
-pub use changes::Unchanged;
-pub use file::FileError;
-pub use source::{ForC, Scalar, SourceError};
-
 use crate::controller::JointNumber;
 use crate::controller::correction::{Law, Term};
 use crate::identification::estimate::{JointFriction, ParameterEstimate, in_set_of};
 use crate::logs::regression::RigidArm;
+pub use file::FileError;
+pub use known::{ModelFile, Unchanged};
 use serde::{Deserialize, Serialize};
+pub use source::{ForC, Scalar, SourceError};
 
 /// The model of one arm; as JSON the keys are those of `identified.json` and more.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

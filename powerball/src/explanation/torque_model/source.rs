@@ -1,7 +1,7 @@
 //! The model as one Rust file for a controller: no `std`, no allocation, nothing needed but nalgebra.
 
 use super::c_api::Behind;
-use super::changes::with_open_hand;
+use super::known::with_open_hand;
 use super::{TorqueModel, Unchanged};
 use crate::controller::{correction, friction};
 use crate::logs::log::Motors;

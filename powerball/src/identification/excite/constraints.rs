@@ -1,10 +1,12 @@
 //! What a path must keep beside its joints' limits: torque, floor, and its own links.
 
+use super::Mounting;
 use super::fourier::Fourier;
-use super::limits::Limits;
 use super::load::Load;
 use super::shape::{Floor, Nearness, Shape};
 use crate::identification::motion::Motion;
+use dyngen::Arm;
+use std::fmt;
 
 /// Instants a second at which the search looks at a path: between two of them a wrist at 40 m/s² comes at
 /// most two millimetres nearer than at either.
@@ -165,4 +167,109 @@ fn whole(path: &Fourier, ends: bool) -> Motion {
         }
     }
     motion
+}
+
+// What the joints may do, from the arm file.
+
+/// The limits of one joint, rad (m for prismatic joints) and s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointLimits {
+    /// Lowest and highest position.
+    pub position: [f64; 2],
+    /// Highest velocity.
+    pub velocity: f64,
+    /// Highest acceleration.
+    pub acceleration: f64,
+    /// Highest torque, N·m (N), where the file gives one.
+    pub torque: Option<f64>,
+}
+
+/// The limits of every joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits(pub Vec<JointLimits>);
+
+/// The arm file misses limits: one text for each joint.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MissingLimits(pub Vec<String>);
+
+impl Limits {
+    /// The limits of an arm, drawn in by `margin`: 0.05 leaves 5 % of the range, the velocity, the
+    /// acceleration and the torque unused.
+    ///
+    /// # Errors
+    /// Every limit that the arm file misses, joint by joint.
+    pub fn of(arm: &Arm, margin: f64) -> Result<Limits, MissingLimits> {
+        let mut missing = Vec::new();
+        let share = 1.0 - margin;
+        let mut limits = Vec::new();
+        for (i, joint) in arm.joints.iter().enumerate() {
+            let keys = [
+                ("`position`", joint.position.is_some()),
+                ("`velocity`", joint.velocity.is_some()),
+                ("`acceleration`", joint.acceleration.is_some()),
+            ];
+            let absent: Vec<&str> = keys.iter().filter(|(_, there)| !there).map(|(key, _)| *key).collect();
+            if !absent.is_empty() {
+                missing.push(format!("joint {}: {}", i + 1, absent.join(", ")));
+            }
+            let [low, high] = joint.position.unwrap_or_default();
+            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+            limits.push(JointLimits {
+                position: [middle - share * half, middle + share * half],
+                velocity: share * joint.velocity.unwrap_or_default(),
+                acceleration: share * joint.acceleration.unwrap_or_default(),
+                torque: joint.torque.map(|torque| share * torque),
+            });
+        }
+        if missing.is_empty() { Ok(Limits(limits)) } else { Err(MissingLimits(missing)) }
+    }
+}
+
+impl fmt::Display for MissingLimits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "an exciting trajectory needs limits that the arm file does not give: {}",
+            self.0.join("; ")
+        )
+    }
+}
+
+impl std::error::Error for MissingLimits {}
+
+// What stands around an arm: the floor, and the arm's own links as capsules.
+
+/// Radius of the links' capsules, m, where nothing is said.
+pub const RADIUS: f64 = 0.06;
+/// The distance that capsules keep from each other and from the floor, m, where nothing is said.
+pub const CLEARANCE: f64 = 0.02;
+
+/// A floor at its base that blocks more than this share of an arm's poses is not what it was built on.
+const HANGS: f64 = 0.95;
+
+/// A floor's height above the base frame's origin, m; or that there is none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FloorAt(pub Option<f64>);
+
+/// The links and the floor of an arm in a mounting, and the floor's height: at the base where nothing is said
+/// of it, the base stands upright and the arm can be above it, as an arm that is below its base wherever it
+/// is hangs over something.
+#[must_use]
+pub fn surroundings(
+    arm: &Arm,
+    mounting: &Mounting,
+    shape: &Shape,
+    floor: Option<FloorAt>,
+    clearance: f64,
+    limits: &Limits,
+) -> (Space, Option<f64>) {
+    let up = mounting.up(arm);
+    let free =
+        |height: &f64| shape.blocked(&shape.floor(up, *height, &limits.0), clearance, &limits.0) < HANGS;
+    let height = match floor {
+        Some(FloorAt(height)) => height,
+        None => (up.z > 0.5).then_some(0.0).filter(free),
+    };
+    let floor = height.map(|height| shape.floor(up, height, &limits.0));
+    (Space { shape: shape.clone(), floor, clearance }, height)
 }

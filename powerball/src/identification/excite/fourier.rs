@@ -1,6 +1,6 @@
 //! Finite Fourier series, Eq. 18 to 20, that start from rest and stop at rest.
 
-use super::limits::JointLimits;
+use super::constraints::JointLimits;
 use crate::identification::motion::Motion;
 
 /// Share of a peak that is left free because samples may miss it.

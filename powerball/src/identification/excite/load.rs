@@ -1,7 +1,7 @@
 //! The torque that a path takes, against the joints' limits.
 
 use super::Error;
-use super::limits::JointLimits;
+use super::constraints::JointLimits;
 use super::shape::{Shape, poses};
 use crate::controller::friction::TanhFriction;
 use crate::logs::log::Motors;
@@ -168,7 +168,7 @@ pub struct Load {
 }
 
 impl Load {
-    /// The torques of a model (its gravity is the mounting's); `limits` already leave their margin.
+    /// The torques of a model (its gravity is the mounting's); `constraints` already leave their margin.
     ///
     /// # Errors
     /// As [`Evaluator::new`].

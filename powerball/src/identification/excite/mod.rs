@@ -5,27 +5,25 @@
 mod capsule;
 mod constraints;
 mod fourier;
-mod limits;
 mod load;
 mod objective;
 mod search;
 mod shape;
-mod surroundings;
 mod trajectories;
 
 pub use crate::identification::mounting::Mounting;
 pub use capsule::Segment;
-pub use constraints::{Constraints, Space, Tightest};
+pub use constraints::{
+    CLEARANCE, Constraints, FloorAt, JointLimits, Limits, MissingLimits, RADIUS, Space, Tightest,
+    surroundings,
+};
 pub use fourier::{Fourier, Harmonics};
-pub use limits::{JointLimits, Limits, MissingLimits};
 pub use load::{Load, Masses};
 pub use objective::{Conditions, Criterion, Figures, Objective};
 pub use search::{Excitation, SEARCH, Settings, Task, optimise, optimise_all, search, search_all, searches};
 pub use shape::{Contact, Floor, Nearness, Shape};
-pub use surroundings::{CLEARANCE, FloorAt, RADIUS, surroundings};
-pub use trajectories::{Collision, ExciteOptions, Excited, MassSource, Trajectory, excite};
-
 use std::fmt;
+pub use trajectories::{Collision, ExciteOptions, Excited, MassSource, Trajectory, excite};
 
 /// Why there is no exciting trajectory.
 #[derive(Clone, Debug)]

@@ -2,9 +2,8 @@
 //! path.
 
 use super::Error;
-use super::constraints::Constraints;
+use super::constraints::{Constraints, Limits};
 use super::fourier::{Fourier, Harmonics};
-use super::limits::Limits;
 use super::objective::{Criterion, Figures, Objective};
 use super::shape::poses;
 use crate::logs::parallel;

@@ -7,7 +7,7 @@
 //! for.
 
 use super::capsule::Segment;
-use super::limits::JointLimits;
+use super::constraints::JointLimits;
 use crate::identification::chain::Chain;
 use dyngen::Arm;
 use dyngen::arm::{Convention, Joint, JointKind};
@@ -252,7 +252,7 @@ pub(super) fn poses(limits: &[JointLimits]) -> impl Iterator<Item = Vec<f64>> + 
 
 #[cfg(test)]
 mod tests {
-    use super::super::limits::Limits;
+    use super::super::constraints::Limits;
     use super::*;
     use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 

@@ -1,14 +1,15 @@
 //! Logs and summaries, taken in one after another: the sufficient statistics of each mounting of the base.
 
-use super::error::IdentifyError;
+use super::result::IdentifyError;
 use crate::controller::JointNumber;
 use crate::identification::conventions::{Conventions, conventions};
 use crate::identification::estimate::{Together, reduce_in_bands};
+use crate::identification::known::KnownModel;
 use crate::identification::mounting::Mounting;
 use crate::identification::source::{Input, Source, read_summary};
 use crate::identification::transmission::{JointTransmission, transmission};
 use crate::logs::Progress;
-use crate::logs::log::{ColumnMap, Log, LogError, read_log_as};
+use crate::logs::log::{ColumnMap, Log, LogError, common_clock, notes_of, read_log_as};
 use crate::logs::regression::{DataOptions, FEWEST_ROWS, RigidArm, inactive_joints, rest_note};
 use crate::logs::summary::{Bands, Octaves, Summary};
 use dyngen::Arm;
@@ -335,4 +336,150 @@ fn rest_notes(arm: &Arm, summary: &Summary, kept: &[Log]) -> Vec<String> {
         why.or_else(|| rest_note(joint, rows, summary.samples as usize, None))
     };
     summary.joints.iter().enumerate().filter_map(note).collect()
+}
+
+// Arm and logs of one mounting, read at once: what a known model is applied to.
+
+/// An arm, as a model has it, and its logs on one clock.
+#[derive(Debug)]
+pub(crate) struct InMemory {
+    /// The arm of the file with the model's changes.
+    pub arm: Arm,
+    /// The same, mounted as for the logs.
+    pub body: RigidArm,
+    pub fit: Vec<Log>,
+    pub validate: Vec<Log>,
+    /// The model in the set of the body.
+    pub known: Box<dyn KnownModel>,
+    pub warnings: Vec<String>,
+}
+
+/// The one mounting of all logs; `what` takes no others.
+///
+/// # Errors
+/// [`IdentifyError::SeveralMountings`].
+pub(crate) fn one_mounting<'s>(
+    sources: impl IntoIterator<Item = &'s Source<'s>>,
+    what: &'static str,
+) -> Result<Mounting, IdentifyError> {
+    let mut mountings = sources.into_iter().map(|s| s.mounting.unwrap_or_default());
+    let mounting = mountings.next().unwrap_or_default();
+    match mountings.any(|other| other != mounting) {
+        true => Err(IdentifyError::SeveralMountings(what)),
+        false => Ok(mounting),
+    }
+}
+
+impl InMemory {
+    /// Reads and checks everything before any work is done. The logs are as they are: nothing is taken out.
+    ///
+    /// # Errors
+    /// A model of another arm, logs that cannot be read, summaries.
+    pub(crate) fn read(
+        arm: &Arm,
+        known: &dyn KnownModel,
+        [fit, validate]: [&[Source<'_>]; 2],
+        mounting: Mounting,
+        progress: Progress<'_>,
+    ) -> Result<InMemory, IdentifyError> {
+        let arm = known.arm(arm, mounting).map_err(IdentifyError::Known)?;
+        let mounted = mounting.of(&arm).map_err(IdentifyError::Mounting)?;
+        let mut warnings = notes_of(&mounted);
+        progress.say("reading logs");
+        let Recorded { fit, validate, warnings: found } = Recorded::read(&arm, fit, validate)?;
+        warnings.extend(found);
+        progress.say("deriving and proving the arm's dynamics");
+        let body = RigidArm::mounted(&mounted, &arm)?;
+        let known = known.in_set_of(&body).map_err(IdentifyError::Known)?;
+        Ok(InMemory { arm, body, fit, validate, known, warnings })
+    }
+}
+
+/// The log of each source to judge by, with its mounting.
+///
+/// # Errors
+/// [`IdentifyError::Unusable`] with every reason.
+pub(crate) fn held_out(
+    sources: &[Source<'_>],
+    arm: &Arm,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<(Log, Mounting)>, IdentifyError> {
+    let (mut logs, mut unusable) = (Vec::new(), Vec::new());
+    for source in sources {
+        match samples(source, arm, warnings) {
+            Ok(log) => logs.push((log, source.mounting.unwrap_or_default())),
+            Err(reasons) => unusable.extend(reasons),
+        }
+    }
+    if unusable.is_empty() { Ok(logs) } else { Err(IdentifyError::Unusable(unusable)) }
+}
+
+// The samples of all logs of a computation, read at once.
+
+/// Logs to fit and logs to judge by, on a common clock, and what was found in them.
+#[derive(Clone, Debug)]
+pub struct Recorded {
+    /// Logs to fit.
+    pub fit: Vec<Log>,
+    /// Logs of other paths.
+    pub validate: Vec<Log>,
+    /// What is odd about the files.
+    pub warnings: Vec<String>,
+}
+
+impl Recorded {
+    /// Reads logs of an arm, each from its file or as it is.
+    ///
+    /// # Errors
+    /// Every log that cannot be read or is a summary, and a file that is to be fitted and to judge.
+    pub fn read(arm: &Arm, logs: &[Source<'_>], validate: &[Source<'_>]) -> Result<Recorded, IdentifyError> {
+        apart(logs, validate)?;
+        let (mut all, mut warnings, mut unusable) = (Vec::new(), Vec::new(), Vec::new());
+        for source in logs.iter().chain(validate) {
+            match samples(source, arm, &mut warnings) {
+                Ok(log) => all.push(log),
+                Err(reasons) => unusable.extend(reasons),
+            }
+        }
+        if !unusable.is_empty() {
+            return Err(IdentifyError::Unusable(unusable));
+        }
+        common_clock(&mut all);
+        let validate = all.split_off(logs.len());
+        Ok(Recorded { fit: all, validate, warnings })
+    }
+}
+
+/// There is a log to fit, and none that is fitted judges.
+///
+/// # Errors
+/// [`IdentifyError::Setting`] and [`IdentifyError::JudgesItself`].
+pub(super) fn apart(logs: &[Source<'_>], validate: &[Source<'_>]) -> Result<(), IdentifyError> {
+    if logs.is_empty() {
+        return Err(IdentifyError::Setting("there is no log to fit: give at least one".to_string()));
+    }
+    match validate.iter().find(|file| logs.iter().any(|log| log.same_file(file))) {
+        Some(both) => Err(IdentifyError::JudgesItself(both.name())),
+        None => Ok(()),
+    }
+}
+
+/// The samples of a source; what is odd about a file is added to `warnings`.
+pub(super) fn samples(
+    source: &Source<'_>,
+    arm: &Arm,
+    warnings: &mut Vec<String>,
+) -> Result<Log, Vec<String>> {
+    match &source.input {
+        Input::Log(log) => Ok(log.as_ref().clone()),
+        Input::Summary(_) => {
+            Err(vec![format!("{}: single samples are needed: give the log itself", source.name())])
+        }
+        Input::File(path) => {
+            let mut findings = Vec::new();
+            let read = read_log_as(path, arm, &source.map, &mut findings);
+            warnings.extend(findings.iter().map(ToString::to_string));
+            read.map_err(|LogError(reasons)| reasons.iter().map(ToString::to_string).collect())
+        }
+    }
 }

@@ -1,12 +1,19 @@
 //! What a model leaves of the validation set, each joint in the band in which it was fitted.
 
-use super::along::Along;
-use super::by_band::by_band;
-use super::error::IdentifyError;
+use super::fit::{Along, Fitted, fit};
 use super::gather::{Gathered, Mounted};
 use super::options::IdentifyOptions;
-use crate::identification::estimate::{BaseModel, ResidualStats, residual_stats};
-use crate::logs::regression::DataOptions;
+use super::result::{Identified, IdentifyError};
+use crate::controller::JointNumber;
+use crate::identification::estimate::{
+    BaseModel, FrictionKind, ResidualStats, estimates, exchanged, residual_stats, stats_of,
+};
+use crate::identification::mounting::Mounting;
+use crate::logs::Progress;
+use crate::logs::log::Log;
+use crate::logs::regression::{Data, DataOptions, RigidArm};
+use crate::logs::summary::BANDS;
+use serde::Serialize;
 
 /// What the model leaves of the logs to judge by; `None` where there are none.
 pub(super) fn validate(
@@ -58,4 +65,154 @@ pub(super) fn along(
     let logs = if held_out.is_some() { &shown.held_out } else { &shown.logs };
     let model = model.clone().in_set_of(&shown.body);
     Along::new(&shown.body, logs, shown.mounting, &options.data, joint_bands, &model)
+}
+
+// What one set of parameters leaves of the logs of each mounting.
+
+/// The logs of one mounting in the fit.
+#[derive(Clone, Debug, Serialize)]
+pub struct MountedFit {
+    /// How the base stood, in words.
+    pub mounting: String,
+    /// Gravity in the base frame, m/s².
+    pub gravity: [f64; 3],
+    /// The logs.
+    pub logs: Vec<String>,
+    /// What the fit leaves of them.
+    pub fit: ResidualStats,
+}
+
+/// The fit by mounting, where the base did not always stand as filed; what is odd about a mounting's logs is
+/// added to `warnings`.
+pub(super) fn fits(
+    gathered: &Gathered,
+    fitted: &Fitted,
+    options: &IdentifyOptions<'_>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<MountedFit>, IdentifyError> {
+    let all = stats_of(&fitted.solution, &fitted.solution.theta);
+    let spreads = match (&gathered.together, gathered.mounted.as_slice()) {
+        (None, [only]) if only.mounting == Mounting::Filed => Vec::new(),
+        (None, _) => vec![all.clone()],
+        (Some(_), _) => spreads(gathered, fitted, options, warnings)?,
+    };
+    for (k, mounted) in gathered.mounted.iter().enumerate() {
+        let errors = spreads.get(k).unwrap_or(&all);
+        warnings.extend(exchanged(&mounted.body, &mounted.logs, &options.data, errors));
+    }
+    let of = |(fit, mounted): (ResidualStats, &Mounted)| MountedFit {
+        mounting: mounted.mounting.to_string(),
+        gravity: mounted.body.gravity(),
+        logs: mounted.bands.widest().logs.iter().map(|(name, _)| name.clone()).collect(),
+        fit,
+    };
+    Ok(spreads.into_iter().zip(&gathered.mounted).map(of).collect())
+}
+
+/// Several mountings: what the common parameters leave of each, and which logs contradict the others.
+fn spreads(
+    gathered: &Gathered,
+    fitted: &Fitted,
+    options: &IdentifyOptions<'_>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<ResidualStats>, IdentifyError> {
+    let Some(together) = &gathered.together else { return Ok(Vec::new()) };
+    let spreads = together
+        .spreads(&fitted.solution, &fitted.bands)
+        .map_err(|e| IdentifyError::Together(e.to_string()))?;
+    let contradictions = together.contradictions(&spreads, &fitted.bands, options.friction);
+    for (joints, mounted) in contradictions.iter().zip(&gathered.mounted).filter(|(j, _)| !j.is_empty()) {
+        let joints: Vec<String> = joints.iter().map(ToString::to_string).collect();
+        warnings.push(format!(
+            "one set of parameters leaves more than twice as much of the logs with the base {} on joint {} \
+                as a set of their own: is the mounting of each log told right, and was it one arm with one \
+                load?",
+            mounted.mounting,
+            joints.join(", ")
+        ));
+    }
+    Ok(spreads)
+}
+
+// Whether friction that differs with the direction is what a poor fit lacks.
+
+/// A joint of whose torque more is left than this share is fitted poorly.
+const POOR: f64 = 0.5;
+/// Friction of two directions helps a poor joint where its error falls to this share,
+const HELPS: f64 = 0.7;
+/// and does not where another joint's grows to so many times.
+const HARMS: f64 = 1.1;
+
+/// What `--friction asymmetric` would do to a fit that leaves more than half of a joint's torque; `None` where nothing is
+/// that poor, or it would not help.
+pub(super) fn advice(
+    gathered: &Gathered,
+    identified: &Identified,
+    options: &IdentifyOptions<'_>,
+) -> Result<Option<String>, IdentifyError> {
+    let now = identified.validate.as_ref().unwrap_or(&identified.fit);
+    let poor: Vec<usize> = (0..now.relative.len()).filter(|j| now.relative[*j] > POOR).collect();
+    if poor.is_empty() || options.friction == FrictionKind::Asymmetric {
+        return Ok(None);
+    }
+    options.progress.say("trying friction that differs with the direction");
+    let other = IdentifyOptions {
+        friction: FrictionKind::Asymmetric,
+        progress: Progress::default(),
+        ..options.clone()
+    };
+    let with = judged(gathered, identified, &other)?;
+    let ratio = |j: usize| with.relative[j] / now.relative[j];
+    let helped: Vec<usize> = poor.into_iter().filter(|j| ratio(*j) < HELPS).collect();
+    if helped.is_empty() || (0..now.relative.len()).any(|j| ratio(j) > HARMS) {
+        return Ok(None);
+    }
+    let joints: Vec<String> = helped.iter().map(|j| JointNumber::from_index(*j).to_string()).collect();
+    let percent = |of: &ResidualStats| -> Vec<String> {
+        helped.iter().map(|j| format!("{:.0}", 100.0 * of.relative[*j])).collect()
+    };
+    let which = if identified.validate.is_some() { "held-out error" } else { "error of the fit" };
+    Ok(Some(format!(
+        "Friction that differs with the direction (--friction asymmetric) lowers the {which} of joint {} from {} to {} % \
+         of the torque.",
+        joints.join(", "),
+        percent(now).join(", "),
+        percent(&with).join(", ")
+    )))
+}
+
+/// What a fit with other options leaves.
+fn judged(
+    gathered: &Gathered,
+    identified: &Identified,
+    options: &IdentifyOptions<'_>,
+) -> Result<ResidualStats, IdentifyError> {
+    let fitted = fit(gathered, options, &mut Vec::new())?;
+    let solution = &fitted.solution;
+    let found = estimates(gathered.body().names(), solution, &fitted.errors);
+    let arm = identified.arm.clone();
+    let model = BaseModel { arm, parameters: found.parameters, friction: found.friction };
+    let bands: Vec<f64> = fitted.bands.iter().map(|band| BANDS[*band]).collect();
+    let held_out = validate(gathered, &model, &bands, options)?;
+    Ok(held_out.unwrap_or_else(|| stats_of(solution, &solution.theta)))
+}
+
+// Logs prepared in the band of each joint.
+
+/// Logs prepared in every band that a joint has, widest first, with the joints of that band, from 0.
+pub(crate) fn by_band<'a>(
+    body: &'a RigidArm,
+    logs: &[Log],
+    joint_bands: &[f64],
+    options: &DataOptions,
+) -> Result<Vec<(Vec<usize>, Data<'a>)>, IdentifyError> {
+    let members =
+        |band: f64| -> Vec<usize> { (0..joint_bands.len()).filter(|j| joint_bands[*j] == band).collect() };
+    let with = |band: f64| DataOptions { cutoff: band, ..options.clone() };
+    BANDS
+        .iter()
+        .map(|band| (members(*band), *band))
+        .filter(|(members, _)| !members.is_empty())
+        .map(|(members, band)| Ok((members, Data::new(body, logs, &with(band))?)))
+        .collect()
 }

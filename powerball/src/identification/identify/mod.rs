@@ -1,31 +1,14 @@
 //! From logs to a model: one function, and what it takes and gives.
 //!
-//! `gather` makes sufficient statistics of logs, by mounting; `fit` fits them; `by_mounting` says what the
-//! fit leaves of each mounting; `judge` what the model leaves of other logs; `asymmetry` whether another friction law
-//! would help; `along` what a page shows of it.
+//! `gather` makes sufficient statistics of logs, by mounting; `fit` fits them; `judge` says what the
+//! fit leaves of each mounting; `judge` what the model leaves of other logs; `judge` whether another friction law
+//! would help; `fit` what a page shows of it.
 
-mod along;
-mod asymmetry;
-mod by_band;
-mod by_mounting;
-mod error;
 mod fit;
 mod gather;
-mod in_memory;
 mod judge;
 mod options;
-mod recorded;
 mod result;
-
-pub use along::{Along, JointAlong, LogFacts};
-pub(crate) use by_band::by_band;
-pub use by_mounting::MountedFit;
-pub use error::IdentifyError;
-pub(crate) use gather::Gathering;
-pub(crate) use in_memory::{InMemory, one_mounting};
-pub use options::{Estimator, IdentifyOptions};
-pub use recorded::Recorded;
-pub use result::Identified;
 
 use super::conventions::conventions;
 use super::estimate::{BaseModel, Uncertainty, consistent_fit, estimates, stats_of};
@@ -34,8 +17,15 @@ use super::transmission::transmission;
 use crate::logs::log::notes_of;
 use crate::logs::summary::BANDS;
 use dyngen::{Arm, SetKind};
+pub use fit::{Along, JointAlong, LogFacts};
 use fit::{Fitted, fit};
+pub use gather::Recorded;
 use gather::{Gathered, Mounted};
+pub(crate) use gather::{Gathering, InMemory, one_mounting};
+pub use judge::MountedFit;
+pub(crate) use judge::by_band;
+pub use options::{Estimator, IdentifyOptions};
+pub use result::{Identified, IdentifyError};
 
 /// Fits the minimal inertial set and the friction of every joint (Eq. 16) to logs, and judges them on the
 /// logs of another path, `validate`, where there are any.
@@ -59,7 +49,7 @@ use gather::{Gathered, Mounted};
 /// let (log, _findings) = Log::from_arrays("swing", &arm, &arrays)?;
 /// let model = identify(&arm, [&log], [], &IdentifyOptions::default())?;
 /// assert!((model.friction[0].gamma1 + model.friction[0].gamma3 - 0.3).abs() < 0.01);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// # Ok::<(), Box<dyn std::result::Error>>(())
 /// ```
 ///
 /// # Errors
@@ -78,9 +68,9 @@ pub fn identify<'a, S: Into<Source<'a>>>(
     let transmission = gathered.transmission.take().or_else(|| gathered.transmission(options.progress));
     options.progress.say("fitting");
     let fitted = fit(&gathered, options, &mut warnings)?;
-    let mountings = by_mounting::fits(&gathered, &fitted, options, &mut warnings)?;
+    let mountings = judge::fits(&gathered, &fitted, options, &mut warnings)?;
     let identified = conclude(&gathered, &fitted, mountings, options, warnings)?;
-    let advice = asymmetry::advice(&gathered, &identified, options)?;
+    let advice = judge::advice(&gathered, &identified, options)?;
     Ok(Identified { conventions, transmission, advice, ..identified })
 }
 
@@ -91,7 +81,7 @@ fn gather_logs(
     validate: &[Source<'_>],
     options: &IdentifyOptions<'_>,
 ) -> Result<Gathered, IdentifyError> {
-    recorded::apart(logs, validate)?;
+    gather::apart(logs, validate)?;
     let needs_samples = options.estimator.needs_samples();
     let mut gathered = match options.known {
         Some(known) => {
@@ -121,7 +111,7 @@ fn gather_logs(
             let mut gathered = Gathering::new(arm, &options.data, needs_samples, options.progress)
                 .said(notes_of(arm))
                 .all(logs)?;
-            for (log, mounting) in in_memory::held_out(validate, arm, &mut gathered.warnings)? {
+            for (log, mounting) in gather::held_out(validate, arm, &mut gathered.warnings)? {
                 gathered.hold_out(log, mounting, &options.data)?;
             }
             gathered

@@ -7,9 +7,8 @@
 //! section 2.2). Total least squares would need the ratio of both noises, and would take what the law lacks
 //! for noise.
 
-use super::columns::Column;
-use super::effects::Candidate;
-use super::products::{Evidence, Products};
+use super::products::{Column, Evidence, Products};
+use super::search::Candidate;
 use crate::identification::estimate::{Solver, bounded};
 use faer::Mat;
 

@@ -11,22 +11,19 @@
 //! | | |
 //! |---|---|
 //! | `result` | what is told, and its words |
-//! | `effects` | what a transmission may hold beside friction and rotor |
-//! | `columns` | the signals that a motor's torque is compared with |
-//! | `grid`, `products` | logs on even grids; products of columns by block |
+//! | `search` | what a transmission may hold beside friction and rotor |
+//! | `products` | the signals that a motor's torque is compared with |
+//! | `products`, `products` | logs on even grids; products of columns by block |
 //! | `fit` | ratio and friction from products; standard errors |
 //! | `search` | which effects are there, judged on logs that took no part in a fit |
 
-mod columns;
-mod effects;
 mod fit;
-mod grid;
 mod products;
 mod result;
 mod search;
 
-pub use effects::{Figures, TransmissionEffect};
 pub use result::{JointTransmission, Transmission, Unknown};
+pub use search::{Figures, TransmissionEffect};
 
 use crate::controller::JointNumber;
 use crate::logs::log::{Log, logs_of_motors};
@@ -34,7 +31,7 @@ use crate::logs::parallel;
 use crate::logs::regression::inactive_joints;
 use dyngen::Arm;
 use dyngen::arm::JointKind;
-use grid::Grid;
+use products::Grid;
 
 /// The transmission of each joint from the logs that hold both torques, judged on those of `validate`;
 /// without them parts of the logs judge each other. `None` where no log holds the motors' torques.

@@ -1,6 +1,6 @@
 //! What is told of a transmission: the `transmission` of identified.json and explained.json.
 
-use super::effects::TransmissionEffect;
+use super::search::TransmissionEffect;
 use crate::controller::JointNumber;
 use serde::Serialize;
 

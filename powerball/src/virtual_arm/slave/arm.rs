@@ -1,9 +1,9 @@
 //! All nodes over one plant: the other end of a bus.
 
-use super::module::Module;
+use super::dictionary::Identity;
 use super::node::Node;
 use super::{Fault, Sample};
-use crate::bus::canopen::{Frame, Micros, NodeId};
+use crate::bus::canopen::{Frame, Micros, NodeId, Object};
 use crate::bus::transport::{Bus, BusError, Event, Peer};
 use crate::virtual_arm::{Plant, PlantEffect, Simulation};
 use rand::SeedableRng;
@@ -214,4 +214,41 @@ fn speak(arm: &mut impl Peer, bus: &mut impl Bus) -> Result<(), BusError> {
         }
     }
     Ok(())
+}
+
+// What a joint's module is: the facts that its drive is set up with.
+
+/// A mode in which the set-point is a current. The maker's public files have none, so this is told and not
+/// known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CurrentMode {
+    /// Its number in 0x6060.
+    pub mode: i8,
+    /// Where its set-point goes: i16, per mille of the rated current.
+    pub target: Object,
+}
+
+/// One joint's module.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Module {
+    /// Its node.
+    pub node: NodeId,
+    /// Who it says that it is.
+    pub identity: Identity,
+    /// Software limits, rad.
+    pub limits: [f64; 2],
+    /// Greatest velocity, rad/s.
+    pub velocity: f64,
+    /// Greatest acceleration, rad/s².
+    pub acceleration: f64,
+    /// Torque at the current limit, N·m.
+    pub torque: f64,
+    /// Rated current, mA.
+    pub rated_current: u32,
+    /// Torque at the rated current, N·m; negative where the motor turns against the joint.
+    pub rated_torque: f64,
+    /// Whether the motor's commutation is found already.
+    pub commutated: bool,
+    /// A current mode, where there is one.
+    pub current_mode: Option<CurrentMode>,
 }

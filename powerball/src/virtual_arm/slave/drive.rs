@@ -1,9 +1,9 @@
 //! The drive behind the bus: CiA 402 state machine, modes, brake, commutation search.
 
-use super::module::Module;
+use super::arm::Module;
 use super::motion::{Reference, spline};
 use crate::bus::cia402::{Command, Controlword, Mode, State, Statusword};
-use crate::virtual_arm::servo::{Gains, Servo};
+use crate::virtual_arm::simulation::{Gains, Servo};
 
 /// A brake bites and lets go after this time, s.
 const BRAKE_TIME: f64 = 0.02;

@@ -12,7 +12,6 @@
 mod arm;
 mod dictionary;
 mod drive;
-mod module;
 mod motion;
 mod node;
 mod process;
@@ -20,12 +19,10 @@ mod server;
 #[cfg(test)]
 mod tests;
 
-pub use arm::{Setup, VirtualArm, serve};
-pub use dictionary::{Dictionary, Entry, Identity, Value};
-pub use module::{CurrentMode, Module};
-pub use node::Node;
-
 use crate::bus::cia402::Mode;
+pub use arm::{CurrentMode, Module, Setup, VirtualArm, serve};
+pub use dictionary::{Dictionary, Entry, Identity, Value};
+pub use node::Node;
 
 /// Radians in a milli-degree, the drives' unit of angles.
 const DEGREE: f64 = std::f64::consts::PI / 180_000.0;

@@ -1,8 +1,8 @@
 //! One node: network management, heartbeats, emergencies, and the drive's dictionary brought to life.
 
+use super::arm::Module;
 use super::dictionary::{Dictionary, Value};
 use super::drive::{Drive, Inputs, Trip};
-use super::module::Module;
 use super::process::{self, Pdos};
 use super::server::{Objects, Server};
 use super::{DEGREE, Fault, Sample};
