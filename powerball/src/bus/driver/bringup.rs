@@ -2,14 +2,12 @@
 
 use super::budget::worst_bits;
 use super::cause::Hindrance;
-use super::progress::Progress;
-use super::script::{Write, configuration, questions};
+use super::script::{Progress, Write, configuration, questions};
 use super::{Cause, Driver, Phase, Transmit};
 use crate::bus::canopen::client::{SdoError, Value};
-use crate::bus::canopen::nmt;
 use crate::bus::canopen::objects::{PRODUCT_CODE, REVISION, SERIAL_NUMBER, VENDOR_ID};
 use crate::bus::canopen::sdo::AbortCode;
-use crate::bus::canopen::{Frame, Micros, Object};
+use crate::bus::canopen::{Frame, Micros, Object, nmt};
 use crate::bus::cia402::{State, objects, schunk};
 
 /// How often the nodes were reset since the start.

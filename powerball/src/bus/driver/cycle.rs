@@ -1,7 +1,7 @@
 //! The SYNC cycle: what is judged when a cycle ends, when set-points leave, and which word goes with them.
 
 use super::guard::Guard;
-use super::progress::Progress;
+use super::script::Progress;
 use super::stop::{ResetStage, StopStage};
 use super::{Cause, ControlMode, Driver, Phase, Rejection, Transmit};
 use crate::bus::canopen::sync::Tick;

@@ -1,9 +1,8 @@
 //! What a set-point must be to leave for the arm, and a whole path before the arm moves.
 
-use super::control_mode::ControlMode;
-use super::demand::{Demand, rest};
+use super::cause::Rejection;
 use super::profile::{JointProfile, Profile, Reactions};
-use super::rejection::Rejection;
+use super::torque::{ControlMode, Demand, rest};
 use crate::controller::JointNumber;
 
 /// The guard of one joint in one cycle.

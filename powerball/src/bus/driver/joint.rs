@@ -1,17 +1,15 @@
 //! One joint while the driver runs: what its drive says, and what it is told.
 
-use super::control_mode::ControlMode;
-use super::demand::Demand;
 use super::profile::{JointProfile, ModeProfile};
-use super::progress::Progress;
+use super::script::Progress;
+use super::torque::{ControlMode, Demand};
 use super::units::{JointUnits, Saturated, to_i16};
 use super::watch::Watched;
 use crate::bus::canopen::client::Client;
 use crate::bus::canopen::emcy::Emcy;
-use crate::bus::canopen::nmt;
 use crate::bus::canopen::pdo::{Mapping, sign_extend};
 use crate::bus::canopen::sync::HeartbeatConsumer;
-use crate::bus::canopen::{Cob, Frame, Micros};
+use crate::bus::canopen::{Cob, Frame, Micros, nmt};
 use crate::bus::cia402::{Command, Controlword, Mode, State, Statusword, objects};
 
 /// Counts of what went wrong and did no harm, or not yet.

@@ -54,11 +54,8 @@
 mod bringup;
 pub mod budget;
 pub mod cause;
-mod control_mode;
 mod cycle;
-mod demand;
 pub mod dictionary;
-mod foreign;
 mod guard;
 #[cfg(feature = "bus")]
 pub mod import;
@@ -66,31 +63,26 @@ mod joint;
 mod link;
 pub mod lwa4p;
 pub mod profile;
-mod progress;
 mod receive;
-mod rejection;
 mod script;
 mod stop;
 mod torque;
 pub mod units;
 mod watch;
 
+use crate::bus::canopen::sync::{HeartbeatProducer, SyncProducer};
+use crate::bus::canopen::{Frame, Micros, NodeId};
+use bringup::BringUp;
 pub use budget::{Budget, Verdict};
-pub use cause::{Cause, Details, Refusal};
-pub use control_mode::ControlMode;
-pub use foreign::Foreign;
+pub use cause::{Cause, Details, Refusal, Rejection};
+use core::fmt;
 pub use guard::check_path;
 pub use joint::{Joint, JointCounters};
 pub use link::{BusEvent, QueueFull, Transmit};
 pub use profile::{JointProfile, Profile};
-pub use rejection::Rejection;
-pub use torque::TorqueGuard;
-
-use crate::bus::canopen::sync::{HeartbeatProducer, SyncProducer};
-use crate::bus::canopen::{Frame, Micros, NodeId};
-use bringup::BringUp;
-use core::fmt;
+pub use receive::Foreign;
 use stop::{ResetStage, StopStage};
+pub use torque::{ControlMode, TorqueGuard};
 
 /// What the driver is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -342,7 +334,7 @@ impl<const N: usize> Driver<N> {
     pub fn enable(&mut self) -> Result<(), Refusal> {
         match self.phase {
             Phase::Ready => {
-                self.joints.iter_mut().for_each(|joint| joint.progress = progress::Progress::Waiting);
+                self.joints.iter_mut().for_each(|joint| joint.progress = script::Progress::Waiting);
                 self.enter(Phase::Enabling);
                 Ok(())
             }

@@ -3,7 +3,7 @@
 //! LWA 4P).
 
 use super::cause::Refusal;
-use super::control_mode::ControlMode;
+use super::torque::ControlMode;
 use super::units::{JointUnits, VelocityScale};
 use crate::bus::canopen::pdo::Mapping;
 use crate::bus::canopen::{Micros, NodeId, Object};

@@ -1,15 +1,15 @@
 //! What is read from and written to each drive before it may move, as lists without memory of their own.
 
-use super::control_mode::ControlMode;
 use super::profile::{ModeProfile, Profile};
+use super::torque::ControlMode;
 use crate::bus::canopen::client::Value;
 use crate::bus::canopen::objects::{
     CONSUMER_HEARTBEAT, PRODUCER_HEARTBEAT, PRODUCT_CODE, REVISION, SERIAL_NUMBER, VENDOR_ID, rpdo_mapping,
     rpdo_parameter, tpdo_mapping, tpdo_parameter,
 };
 use crate::bus::canopen::pdo::{EVERY_SYNC, INVALID, Mapping};
-use crate::bus::canopen::{Cob, NodeId, Object};
-use crate::bus::cia402::{objects, schunk};
+use crate::bus::canopen::{Cob, Micros, NodeId, Object};
+use crate::bus::cia402::{State, objects, schunk};
 
 /// One write, and how it is verified.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -173,6 +173,24 @@ pub(super) fn questions(mode: &ModeProfile, control: ControlMode) -> impl Iterat
     let scaled = control == ControlMode::Velocity;
     // The target itself: a drive that has it not says so now, and not in the middle of its mapping.
     always.chain(velocity.into_iter().filter(move |_| scaled)).chain([mode.setpoint])
+}
+
+// How far a joint is on its way to its operation.
+
+/// How far a joint is on its way to "operation enabled".
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Progress {
+    /// Its turn has not come.
+    Waiting,
+    /// Through the drive's states; in `state` until `deadline`.
+    Walking { state: State, deadline: Micros },
+    /// Enabled; the extended status was read `reads` times, next at `next`. From the second read on the brake
+    /// is open.
+    Commutating { reads: u8, next: Micros },
+    /// Commutated just now: the supply recovers.
+    Settling { until: Micros },
+    /// Enabled and commutated, halted until all are.
+    Done,
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! bits of the statusword beside its state. The master watches always, whatever the drives watch themselves.
 
 use super::cause::Hindrance;
-use super::progress::Progress;
+use super::script::Progress;
 use super::{Cause, ControlMode, Driver, Phase, Transmit};
 use crate::bus::canopen::{Micros, NodeId};
 use crate::bus::cia402::{State, Statusword};

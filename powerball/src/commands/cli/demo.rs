@@ -100,7 +100,7 @@ impl DemoCommand {
                 explained.noise_floor[joint]
             );
         }
-        out.push_str(&super::summary::open_in_words(explained));
+        out.push_str(&super::explain::open_in_words(explained));
         let _ = writeln!(
             out,
             "\nnamed:         {}\nin the plant:  {}\n\n{}\n\n{} and the logs beside it, {seconds:.1} s",

@@ -1,17 +1,19 @@
 //! `powerball identify`: from logs to identified.json.
 
-use super::export::Original;
-use super::inputs::MapArgument;
-use super::mounted::MountedLogs;
+use super::inputs::{MapArgument, MountedLogs};
 use super::output::{Accept, Verbosity};
 use super::{Failure, output};
 use crate::explanation::torque_model::ModelFile;
 use crate::identification::estimate::FrictionKind;
-use crate::identification::{Estimator, Identified, IdentifyOptions, KnownModel, identify};
+use crate::identification::{
+    Estimator, Identified, IdentifyOptions, KnownModel, NearestError, identify, nearest_arm,
+};
 use crate::logs::Progress;
 use crate::report;
 use clap::{Args, ValueEnum};
-use dyngen::Arm;
+use dyngen::export::{self, Known};
+use dyngen::import::{ImportError, Options, Source};
+use dyngen::{Arm, Values};
 use std::path::{Path, PathBuf};
 
 /// Fit the minimal inertial set and the friction of every joint (two tanh steps and a viscous
@@ -146,4 +148,104 @@ fn in_words(identified: &Identified, verbose: bool, out: &Path) -> String {
     lines.extend(output::notes(identified.warnings.len()).filter(|_| !verbose));
     lines.push(format!("report: {}", out.join("report.html").display()));
     lines.join("\n")
+}
+
+// `powerball consistent`: published values made those of a real arm.
+
+/// Find the nearest parameters that a real arm can have.
+///
+/// Values of any parameter set (a paper's, or those of identified.json) need not be a body's. Of all real
+/// arms the one is found whose torques come nearest to theirs, over states within the arm's limits. Writes
+/// its parameters as values for `dyngen generate --values`, and says how far they are.
+#[derive(Args, Debug)]
+#[command(after_help = "Example:\n  powerball consistent --arm arm.toml --values table3.json --out \
+        consistent.json\n  dyngen generate arm.toml -o arm.rs --values consistent.json")]
+pub(crate) struct ConsistentCommand {
+    /// The arm file (TOML).
+    #[arg(long, value_name = "ARM.toml")]
+    arm: PathBuf,
+    /// The values: {"parameter": number, …}, or identified.json.
+    #[arg(long, value_name = "FILE.json")]
+    values: PathBuf,
+    /// The values to write.
+    #[arg(long, value_name = "FILE.json")]
+    out: PathBuf,
+    /// Print the result as one JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+impl ConsistentCommand {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let arm = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let values = Values::read(&self.values).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let terminal = output::Progress::new();
+        let say = |what: &str| terminal.say(what);
+        let found = nearest_arm(&arm, &values, Progress::to(&say)).map_err(|e| match e {
+            NearestError::Values(e) => Failure::Unusable(e.to_string()),
+            NearestError::Model(e) => Failure::Refused(e.to_string()),
+        })?;
+        output::write_file(&self.out, output::json(&found.parameters)?.as_bytes())?;
+        if self.json {
+            output::print(&output::json(&found)?);
+            return Ok(());
+        }
+        for reason in &found.reasons {
+            output::print(&format!("no real arm can have the given values: {reason}"));
+        }
+        let distance: Vec<String> = found.distance.iter().map(|d| format!("{d:.3}")).collect();
+        output::print(&format!(
+            "torque between the given values and the nearest real arm's, rms by joint: {} N·m",
+            distance.join(", ")
+        ));
+        for link in &found.without_body {
+            output::print(&format!(
+                "note: no body can have the symmetries that the file declares of link {link}"
+            ));
+        }
+        Ok(())
+    }
+}
+
+// What was identified, in a copy of the robot description that the arm was imported from.
+
+/// A URDF or a MuJoCo model, and where its copy goes.
+pub(super) struct Original {
+    source: Source,
+    copy: PathBuf,
+}
+
+impl Original {
+    /// Reads a robot description; the copy has its name, in `folder`.
+    pub(super) fn read(path: &Path, folder: &Path) -> Result<Original, Failure> {
+        let source = Source::read(path).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let copy = folder.join(path.file_name().unwrap_or_default());
+        if matches!((copy.canonicalize(), path.canonicalize()), (Ok(copy), Ok(own)) if copy == own) {
+            return Err(Failure::Unusable(format!(
+                "{}: --export would write over it: choose another folder for --out",
+                path.display()
+            )));
+        }
+        Ok(Original { source, copy })
+    }
+
+    /// Writes the copy with the values, friction and effects of `identified`, a result as JSON that stands in `file`.
+    pub(super) fn write(&self, arm: &Arm, identified: &str, file: &Path) -> Result<(), Failure> {
+        let file = file.display().to_string();
+        let known = Known::read(arm, (identified, &file), Some((identified, &file)));
+        let known = known.map_err(Failure::Refused)?;
+        let exported = export::source(&self.source, arm, &known, &Options::default());
+        let exported = exported.map_err(|e| {
+            let said = format!("{e}\n{file} is written; `dyngen export` has --base, --tip and --lock");
+            match e {
+                ImportError::Unreadable(_) => Failure::Unusable(said),
+                ImportError::Refused(_) => Failure::Refused(said),
+            }
+        })?;
+        for note in &exported.notes {
+            // Standard output may be the result as JSON.
+            eprintln!("{}: note: {note}", self.source.file);
+        }
+        output::write_file(&self.copy, &self.source.bytes(&exported.text))
+    }
 }

@@ -1,13 +1,16 @@
 //! `powerball log`: what is in a file and what it is taken to be.
 
 use super::inputs::MapArgument;
-use super::{Failure, log_out, output};
-use crate::logs::log::{Inspected, InspectedTable, inspect};
+use super::{Failure, output};
+use crate::explanation::torque_model::ModelFile;
+use crate::identification::{Source, VerifyOptions, verify};
+use crate::logs::log::{Inspected, InspectedTable, Log, inspect};
+use crate::logs::tables::{JointState, McapWriter};
 use crate::report::inspected;
 use clap::{Args, ValueEnum};
 use dyngen::Arm;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Show what is in log files and what they are taken to be: topics, columns, units, rates, gaps, doubts;
 /// with --out as a page with figures.
@@ -103,7 +106,7 @@ impl LogCommand {
             _ => {}
         }
         match &file.log {
-            Some(log) => log_out::write(log, arm, self.model.as_deref(), out),
+            Some(log) => write(log, arm, self.model.as_deref(), out),
             // Why it is none is told below.
             None => Ok(()),
         }
@@ -196,4 +199,54 @@ fn table_lines(table: &InspectedTable, lines: &mut Vec<String>) {
     if !aside.is_empty() {
         lines.push(format!("    left aside: {}", aside.join(", ")));
     }
+}
+
+// `powerball log --to`: a log as another file, with what a model predicts beside it.
+
+/// Writes a log; with a model as MCAP that has measured, predicted and residual torque beside each other.
+pub(super) fn write(log: &Log, arm: &Arm, model: Option<&Path>, out: &Path) -> Result<(), Failure> {
+    let failed = |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", out.display()));
+    let Some(model) = model else { return log.write(out).map_err(failed) };
+    let model = ModelFile::read(model).map_err(|e| Failure::Unusable(e.to_string()))?;
+    // Times along the log, and measured, predicted and residual torque there, by joint.
+    let mut torque: Vec<Vec<[f64; 4]>> = vec![Vec::new(); arm.dof()];
+    for piece in log.whole_pieces() {
+        let start = piece.t.first().copied().unwrap_or(0.0);
+        let verified = verify(arm, &model, [Source::from(piece)], &VerifyOptions::default())?;
+        for (rows, curve) in torque.iter_mut().zip(&verified.curves) {
+            let at = curve.t.iter().zip(&curve.measured).zip(&curve.before);
+            rows.extend(at.map(|((t, measured), left)| [start + t, *measured, measured - left, *left]));
+        }
+    }
+    let mut bytes = Vec::new();
+    mcap(log, &torque, &mut bytes).map_err(failed)?;
+    super::output::write_file(out, &bytes)
+}
+
+fn mcap(log: &Log, torque: &[Vec<[f64; 4]>], out: &mut Vec<u8>) -> std::io::Result<()> {
+    let joints: Vec<String> = (1..=log.q.len()).map(|j| format!("joint{j}")).collect();
+    let members = ["measured", "predicted", "residual"];
+    let mut writer = McapWriter::new(out)?;
+    let states = writer.joint_states("/joint_states")?;
+    let channels: Vec<_> = joints
+        .iter()
+        .map(|joint| writer.numbers(&format!("/torque/{joint}"), "Torque", &members))
+        .collect::<Result<_, _>>()?;
+    for (k, t) in log.t.iter().enumerate() {
+        let of = |signals: &[Vec<f64>]| signals.iter().map(|x| x[k]).collect::<Vec<f64>>();
+        let (position, effort) = (of(&log.q), of(&log.torque));
+        writer.state(
+            states,
+            *t,
+            &joints,
+            &JointState { position: &position, velocity: &[], effort: &effort },
+        )?;
+    }
+    for (channel, rows) in channels.into_iter().zip(torque) {
+        for [t, measured, predicted, residual] in rows {
+            let values = members.into_iter().zip([*measured, *predicted, *residual]);
+            writer.object(channel, *t, values)?;
+        }
+    }
+    writer.finish().map(|_| ())
 }

@@ -2,24 +2,19 @@
 
 mod bus;
 mod compare;
-mod consistent;
 mod demo;
 mod envelope;
 mod excite;
 mod explain;
-mod export;
 mod friction;
 mod generate;
 mod identify;
 mod inputs;
 mod log;
-mod log_out;
-mod mounted;
 mod output;
 mod profile;
 mod record;
 mod summarize;
-mod summary;
 mod verify;
 mod virtual_arm;
 mod warm_up;
@@ -59,7 +54,7 @@ enum Command {
     /// Fit the minimal inertial set and the friction of every joint to logs.
     Identify(identify::Identify),
     /// Find the nearest parameters that a real arm can have to given values.
-    Consistent(consistent::ConsistentCommand),
+    Consistent(identify::ConsistentCommand),
     /// Reduce logs to triangular factors, which `identify` takes in place of the logs.
     Summarize(summarize::Summarize),
     /// Judge an identified model on logs that it has not seen.

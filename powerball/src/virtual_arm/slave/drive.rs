@@ -1,7 +1,7 @@
 //! The drive behind the bus: CiA 402 state machine, modes, brake, commutation search.
 
 use super::arm::Module;
-use super::motion::{Reference, spline};
+use super::process::{Reference, spline};
 use crate::bus::cia402::{Command, Controlword, Mode, State, Statusword};
 use crate::virtual_arm::simulation::{Gains, Servo};
 

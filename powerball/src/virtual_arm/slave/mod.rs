@@ -5,14 +5,13 @@
 //! | `dictionary` | the drive's objects, exactly those of the maker's DCF |
 //! | `server` | SDO |
 //! | `process` | PDOs and the device's rules for changing them |
-//! | `motion`, `drive` | set-points, state machine, modes, brake, commutation search |
+//! | `process`, `drive` | set-points, state machine, modes, brake, commutation search |
 //! | `node` | network management, heartbeats, emergencies; ties the others together |
 //! | `arm` | all nodes with the plant and its sensors, as the other end of a bus |
 
 mod arm;
 mod dictionary;
 mod drive;
-mod motion;
 mod node;
 mod process;
 mod server;
