@@ -1,5 +1,5 @@
 //! ARCHITECTURE.md is true: every folder that it lists is there, every folder of the sources is listed, code uses what
-//! stands further up and nothing that stands further down, and files do not use each other in a circle.
+//! stands further up and nothing that stands further down, and folders do not use each other in a circle.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -54,8 +54,9 @@ fn module(source: &Path, file: &Path) -> Option<Vec<String>> {
 /// The code of a file without comments and without its unit tests.
 fn code(file: &Path) -> String {
     let text = fs::read_to_string(file).unwrap();
-    let text = text.split("\nmod tests {").next().unwrap_or_default();
-    text.lines().filter(|line| !line.trim_start().starts_with("//")).map(|line| format!("{line}\n")).collect()
+    let begins_tests = |line: &&str| line.starts_with("mod ") && line.ends_with("tests {");
+    let code = text.lines().take_while(|line| !begins_tests(line));
+    code.filter(|line| !line.trim_start().starts_with("//")).map(|line| format!("{line}\n")).collect()
 }
 
 /// Every path that begins with `start` (`crate`, `super`), as its segments after that; groups in braces are followed.
@@ -145,7 +146,7 @@ fn code_uses_what_stands_above_it_on_the_page() {
 
 type Arrows = BTreeMap<Vec<String>, BTreeSet<Vec<String>>>;
 
-/// Whether a way along the arrows leads from one file to another.
+/// Whether a way along the arrows leads from one folder to another.
 fn reaches(arrows: &Arrows, from: &Vec<String>, goal: &Vec<String>) -> bool {
     let (mut seen, mut open) = (BTreeSet::new(), vec![from]);
     while let Some(next) = open.pop() {
@@ -159,38 +160,77 @@ fn reaches(arrows: &Arrows, from: &Vec<String>, goal: &Vec<String>) -> bool {
     false
 }
 
+/// All modules that a file names, as paths below the crate; `parent` is the folder's.
+fn used(code: &str, parent: &[String]) -> Vec<Vec<String>> {
+    let relative = paths(code, "super").into_iter().filter_map(|path| {
+        let up = path.iter().take_while(|p| *p == "super").count();
+        let from = parent.get(..parent.len().checked_sub(up)?)?;
+        Some(from.iter().chain(&path[up..]).cloned().collect())
+    });
+    paths(code, "crate").into_iter().chain(relative).collect()
+}
+
+/// Files of one folder tell one thing together and may use each other; a folder and what lies in it as well.
 #[test]
-fn files_do_not_use_each_other_in_a_circle() {
+fn folders_do_not_use_each_other_in_a_circle() {
     let mut circles = Vec::new();
     for name in CRATES {
         let source = root().join(name).join("src");
         let mut arrows = Arrows::new();
         let files: Vec<(Vec<String>, PathBuf)> =
             sources(&source).into_iter().filter_map(|f| Some((module(&source, &f)?, f))).collect();
-        // A folder's `mod.rs` says what lives in it: arrows to and from it are those of the folder.
-        let leaf = |path: &[String]| {
-            let own = |(m, f): &&(Vec<String>, PathBuf)| path.starts_with(m) && !f.ends_with("mod.rs");
-            files.iter().filter(own).map(|(m, _)| m).max_by_key(|m| m.len()).cloned()
+        let folder = |(module, file): &(Vec<String>, PathBuf)| match file.ends_with("mod.rs") {
+            true => module.clone(),
+            false => module[..module.len() - 1].to_vec(),
         };
-        for (own, file) in files.iter().filter(|(_, f)| !f.ends_with("mod.rs")) {
-            let code = code(file);
-            let absolute = paths(&code, "crate");
-            let parent = own[..own.len() - 1].to_vec();
-            let relative = paths(&code, "super").into_iter().filter_map(|path| {
-                let up = path.iter().take_while(|p| *p == "super").count();
-                let from = parent.get(..parent.len().checked_sub(up)?)?;
-                Some(from.iter().chain(&path[up..]).cloned().collect())
-            });
-            let used = absolute.into_iter().chain(relative).filter_map(|path: Vec<String>| leaf(&path));
-            arrows.entry(own.clone()).or_default().extend(used.filter(|other| other != own));
+        // That of the longest module which a path begins with.
+        let folder_of = |path: &[String]| {
+            let own = files.iter().filter(|(module, _)| path.starts_with(module));
+            own.max_by_key(|(module, _)| module.len()).map(folder)
+        };
+        for file in files.iter().filter(|(_, f)| !f.ends_with("mod.rs")) {
+            let own = folder(file);
+            let others = used(&code(&file.1), &own).into_iter().filter_map(|path| folder_of(&path));
+            let apart = |other: &Vec<String>| !other.starts_with(&own) && !own.starts_with(other);
+            arrows.entry(own.clone()).or_default().extend(others.filter(apart));
         }
         for (from, to) in &arrows {
             for to in to.iter().filter(|to| reaches(&arrows, to, from)) {
-                circles.push(format!("{name}: {} uses {}", from.join("::"), to.join("::")));
+                circles.push(format!("{name}: {} uses {}", from.join("/"), to.join("/")));
             }
         }
     }
     assert!(circles.is_empty(), "each of these arrows is part of a circle:\n{}", circles.join("\n"));
+}
+
+/// The table of `explain/mod.rs` says who decides what in which order, and that nothing uses what stands below it.
+#[test]
+fn an_explanation_runs_in_the_order_of_its_table() {
+    let folder = root().join("powerball/src/explanation/explain");
+    let page = fs::read_to_string(folder.join("mod.rs")).unwrap();
+    let rows = page.lines().filter_map(|line| line.strip_prefix("//! |")?.split('|').next());
+    let order: Vec<String> =
+        rows.flat_map(|cell| cell.split('`').skip(1).step_by(2)).map(str::to_string).collect();
+    let mut wrong = BTreeSet::new();
+    for file in sources(&folder) {
+        let Some(own) = module(&folder, &file).filter(|own| !own.is_empty()) else { continue };
+        let Some(here) = order.iter().position(|name| *name == own[0]) else {
+            wrong.insert(format!("{} has no row", own[0]));
+            continue;
+        };
+        let parent = if file.ends_with("mod.rs") { &own[..] } else { &own[..own.len() - 1] };
+        for path in used(&code(&file), parent) {
+            let there = path.first().and_then(|name| order.iter().position(|other| other == name));
+            if let Some(there) = there.filter(|there| *there > here) {
+                wrong.insert(format!("{} uses {}, which stands below it", own.join("/"), order[there]));
+            }
+        }
+    }
+    assert!(
+        order.len() > 5 && wrong.is_empty(),
+        "{order:?}:\n{}",
+        wrong.into_iter().collect::<Vec<_>>().join("\n")
+    );
 }
 
 #[test]

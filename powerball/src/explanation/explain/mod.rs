@@ -12,11 +12,13 @@
 //! | `named` | what is said of an effect |
 //! | `search` | candidates screened and tested; settings refined; backward elimination |
 //! | `comparison` | **whether a name is given**, what stays open, what is taken back |
+//! | `above_band` | ripple that is too fast for the band of the fit, by a test of its own |
 //! | `special` | what is special of some logs: one path, another running time, something held |
 //! | `by_log` | what is another in one log than in the others |
-//! | `prepare`, `prepare`, `step` | the base model, what the search begins with, and one step of the loop |
+//! | `prepare`, `step` | the base model, what the search begins with, and one step of the loop |
 //! | `findings`, `results` | what was found; the model, the report and its figures |
 
+mod above_band;
 mod by_log;
 mod comparison;
 mod findings;
@@ -32,6 +34,7 @@ mod study;
 use crate::explanation::options::{ExplainError, ExplainOptions};
 use crate::logs::log::Log;
 use crate::logs::regression::RigidArm;
+use above_band::ripple_above_band;
 use comparison::{History, withhold, withhold_harmful};
 pub use comparison::{Hypothesis, Open};
 use findings::Findings;
@@ -117,7 +120,7 @@ fn find(Prepared { study, base, initial_fit }: Prepared<'_>) -> Findings<'_> {
     search::refine(&study, &mut model);
     drop_words(&study, &mut model);
     study.say("looking for ripple above the band");
-    history.steps.extend(search::ripple_above_band(&study, &mut model, 2 * study.rule().most_steps));
+    history.steps.extend(ripple_above_band(&study, &mut model, 2 * study.rule().most_steps));
     study.say("asking time-shift surrogates");
     let false_positives = search::false_positives(&study, &model);
     let at_rest = pushes_at_rest(&study, &model);

@@ -5,10 +5,8 @@
 //! blocks, from held-out folds and from the validation set (`evidence`, `folds`), and judged (`evidence`);
 //! time-shift surrogates say how often these very data agree by chance (`surrogates`). What stays in the
 //! model is moved to where everything together fits best (`refinement`), and what later additions made
-//! unneeded goes out again (`elimination`). Ripple that is too fast for the band of the fit is looked for
-//! above it, by a test of its own (`above_band`, `traces`).
+//! unneeded goes out again (`elimination`).
 
-mod above_band;
 mod cross_validation;
 mod elimination;
 mod evidence;
@@ -17,13 +15,11 @@ mod groups;
 mod refinement;
 mod screen;
 mod surrogates;
-mod traces;
 
-pub(super) use above_band::ripple_above_band;
 pub(super) use cross_validation::CrossValidation;
 pub(super) use elimination::{eliminate, gains, is_baseline, keep_needed};
 pub(super) use evidence::{Extent, Validation, evidence, refusal, validation_gain};
 pub(super) use groups::{CandidateKind, Group, Member, Tester, groups, is_left};
 pub(super) use refinement::refine;
-pub(super) use screen::{Screen, Trial};
+pub(super) use screen::{Screen, Trial, penalty};
 pub(super) use surrogates::{false_positives, level_by_chance, level_of_search};
