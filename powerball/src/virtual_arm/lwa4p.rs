@@ -1,7 +1,6 @@
 //! The virtual LWA 4P: bodies, friction and sensors that a real one could have.
 
-use super::body::Body;
-use super::dynamics::Dynamics;
+use super::dynamics::{Body, Dynamics};
 use super::effect::{Places, PlantEffect};
 use super::plant::{Plant, Sensors};
 use super::slave::{Identity, Module, Setup};

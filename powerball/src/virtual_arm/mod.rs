@@ -3,8 +3,6 @@
 //! Nothing here uses the generator's symbolics, so these numbers are an independent reference for generated
 //! code.
 
-mod body;
-
 mod dynamics;
 mod effect;
 pub mod lwa4p;
@@ -12,8 +10,7 @@ mod plant;
 mod simulation;
 pub mod slave;
 
-pub use body::{Body, PER_LINK, bodies};
-pub use dynamics::{Dynamics, solve_positive_definite};
+pub use dynamics::{Body, Dynamics, PER_LINK, bodies, solve_positive_definite};
 pub use effect::{Gear, Instant, Places, PlantEffect, State};
 pub use plant::{Plant, Sensors, SimulatedLog, Undeclared};
 pub use simulation::{Gains, Servo, Simulation};

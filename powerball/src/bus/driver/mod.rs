@@ -60,7 +60,6 @@ mod guard;
 #[cfg(feature = "bus")]
 pub mod import;
 mod joint;
-mod link;
 pub mod lwa4p;
 pub mod profile;
 mod receive;
@@ -77,8 +76,7 @@ pub use budget::{Budget, Verdict};
 pub use cause::{Cause, Details, Refusal, Rejection};
 use core::fmt;
 pub use guard::check_path;
-pub use joint::{Joint, JointCounters};
-pub use link::{BusEvent, QueueFull, Transmit};
+pub use joint::{BusEvent, Joint, JointCounters, QueueFull, Transmit};
 pub use profile::{JointProfile, Profile};
 pub use receive::Foreign;
 use stop::{ResetStage, StopStage};

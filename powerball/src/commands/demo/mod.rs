@@ -1,29 +1,25 @@
 //! The whole loop on the virtual arm: an effect that the model is not told of, found again from the logs
 //! alone.
 
-mod page;
 mod session;
 mod verdict;
-
-pub use page::page;
-pub use session::{Session, SessionError};
-pub use verdict::{Judgement, Verdict};
 
 use crate::bus::driver::Driver;
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::{Master, Memory};
-use crate::explanation::effects;
 use crate::explanation::experiment::{self, TRAJECTORY};
 use crate::explanation::explain::Explained;
-use crate::explanation::{ExplainError, ExplainOptions, Prepared, explain_body};
+use crate::explanation::{ExplainError, ExplainOptions, Prepared, effects, explain_body};
 use crate::identification::motion::Motion;
 use crate::logs::Progress;
 use crate::logs::log::{LogError, read_logs};
 use crate::procedure::{Envelope, record};
 use crate::virtual_arm::PlantEffect as Effect;
 use dyngen::Arm;
+pub use session::{Session, SessionError};
 use std::fmt;
 use std::path::{Path, PathBuf};
+pub use verdict::{Judgement, Verdict, page};
 
 /// What was in the plant, what was found, and whether that is right.
 #[derive(Debug)]

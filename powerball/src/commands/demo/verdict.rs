@@ -1,6 +1,9 @@
 //! Whether what was found is what is there.
 
+use super::Demo;
 use crate::explanation::explain::Explained;
+use crate::report::explained::add_to_page;
+use crate::report::{Page, Tone};
 use crate::virtual_arm::PlantEffect as Effect;
 use serde::Serialize;
 
@@ -90,4 +93,38 @@ fn at(joints: &[usize]) -> String {
         1 => format!(" on joint {}", list[0]),
         _ => format!(" on joints {}", list.join(", ")),
     }
+}
+
+// The demo as a page.
+
+/// The page of a demo.
+pub fn page(demo: &Demo) -> Page {
+    let (session, explained, verdict) = (&demo.session, &demo.explained, &demo.verdict);
+    let mut page = Page::new("What is wrong with this arm?");
+    page.lead(
+        "A virtual LWA 4P has an effect that its model was not told of. It was recorded along exciting \
+            paths, its base \
+         model was identified, and the residual was explained from the logs alone.",
+    );
+    let tone = match verdict.judgement {
+        Judgement::Right => Tone::Good,
+        Judgement::RightAmongOthers => Tone::Plain,
+        Judgement::Wrong | Judgement::NotNamed => Tone::Bad,
+    };
+    let truth = format!(
+        "In the plant: {}. Named: {}. {}",
+        verdict.truth_in_words(),
+        verdict.named_in_words(),
+        verdict.sentence()
+    );
+    page.note(tone, &truth);
+    let paths = session.fit.len() + session.held_out.len();
+    page.facts([
+        ("paths recorded".to_string(), format!("{paths}")),
+        ("to fit / held out".to_string(), format!("{} / {}", session.fit.len(), session.held_out.len())),
+        ("recorded".to_string(), format!("{:.0} s", session.recorded)),
+        ("band of the errors".to_string(), format!("{} to {} Hz", explained.band[0], explained.band[1])),
+    ]);
+    add_to_page(&mut page, explained);
+    page
 }

@@ -1,7 +1,7 @@
 //! The columns of all joints and their cross products, from which every fit is a small solve.
 
-use super::rows::{FRICTION, Layout};
 use super::solve::{Products, add_products, zeros};
+use super::variable_projection::{FRICTION, Layout};
 use crate::logs::parallel;
 use crate::logs::regression::{Column, Data};
 use faer::linalg::matmul::matmul;

@@ -1,10 +1,9 @@
 //! The fit of rows in memory, with the columns of further terms.
 
 use super::design::{Design, Folds, Gram, runs};
-use super::rows::{FRICTION, Layout, Rows, Scatter, Trials};
 use super::solve::{Products, dot};
 use super::variable_projection;
-use super::variable_projection::{Start, variable_projection};
+use super::variable_projection::{FRICTION, Layout, Rows, Scatter, Start, Trials, variable_projection};
 use crate::logs::parallel;
 use crate::logs::regression::{Column, Data, RigidArm};
 use faer::Mat;

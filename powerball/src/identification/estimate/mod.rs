@@ -10,7 +10,6 @@ mod instrumental;
 mod mountings;
 mod reduced;
 mod robust;
-mod rows;
 mod solve;
 mod spectrum;
 mod stream;
@@ -35,12 +34,12 @@ pub use mountings::{Together, exchanged};
 pub use reduced::{FrictionKind, Solution, solve_reduced};
 pub(crate) use robust::over_blocks;
 pub use robust::{Robust, solve_robust};
-pub use rows::Layout;
 pub use solve::{Solver, bounded};
 pub use spectrum::noise_floor;
 pub(crate) use spectrum::noise_in_band;
 pub use stream::{States, Stream, StreamFit};
 pub use uncertainty::{Path, StandardErrors, Uncertainty, friction_row, standard_errors};
+pub use variable_projection::Layout;
 pub use verdict::{JointVerdict, verdicts};
 
 #[cfg(test)]

@@ -1,8 +1,7 @@
 //! The fit of reduced logs.
 
-use super::rows::{FRICTION, Layout, Rows, Scatter, Trials};
 use super::solve::{Products, add_columns, dot, zeros};
-use super::variable_projection::variable_projection;
+use super::variable_projection::{FRICTION, Layout, Rows, Scatter, Trials, variable_projection};
 use crate::logs::summary::{
     Columns, Identity, NODES, OCTAVES, RFactor, SLOW, Steepness, Summary, SummaryError,
 };

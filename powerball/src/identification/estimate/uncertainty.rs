@@ -3,11 +3,9 @@
 
 use super::distribution::{freedom_of, t_quantile_975};
 use super::reduced::Solution;
-use super::rows::FRICTION;
-use super::solve::Solver;
-use super::solve::zeros;
+use super::solve::{Solver, zeros};
 use super::spectrum::{Power, deconvolved};
-use super::variable_projection::tangent;
+use super::variable_projection::{FRICTION, tangent};
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,6 @@
 //! limits, off the floor and clear of the arm itself, for one mounting of the base or several. Eq. 17 to 20
 //! of the paper. [`excite`] is the whole way from an arm to trajectories.
 
-mod capsule;
 mod constraints;
 mod fourier;
 mod load;
@@ -12,9 +11,8 @@ mod shape;
 mod trajectories;
 
 pub use crate::identification::mounting::Mounting;
-pub use capsule::Segment;
 pub use constraints::{
-    CLEARANCE, Constraints, FloorAt, JointLimits, Limits, MissingLimits, RADIUS, Space, Tightest,
+    CLEARANCE, Constraints, FloorAt, JointLimits, Limits, MissingLimits, RADIUS, Segment, Space, Tightest,
     surroundings,
 };
 pub use fourier::{Fourier, Harmonics};

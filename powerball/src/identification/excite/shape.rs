@@ -6,8 +6,7 @@
 //! all an arm file tells of a shape: joints that bulge, and cables, are what the radius and the clearance are
 //! for.
 
-use super::capsule::Segment;
-use super::constraints::JointLimits;
+use super::constraints::{JointLimits, Segment};
 use crate::identification::chain::Chain;
 use dyngen::Arm;
 use dyngen::arm::{Convention, Joint, JointKind};

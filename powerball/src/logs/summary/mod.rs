@@ -5,7 +5,6 @@
 //! counts (see [`Bands`]), friction's steepnesses (see [`Steepness`]), the joints' weights, and the colour of
 //! the noise (see [`Octaves`]).
 
-mod bands;
 mod file;
 mod octaves;
 mod r_factor;
@@ -13,12 +12,11 @@ mod reduce;
 
 use crate::logs::parallel;
 use crate::logs::regression::{DataOptions, RigidArm};
-pub use bands::{BANDS, Bands, Powers};
 pub use file::SummaryError;
 pub use octaves::{OCTAVES, Octaves, SLOW, halved};
 pub use r_factor::RFactor;
 pub(crate) use reduce::parts;
-pub use reduce::{Columns, NODES, Steepness};
+pub use reduce::{BANDS, Bands, Columns, NODES, Powers, Steepness};
 
 /// What must agree for summaries to be of the same thing.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,11 +7,9 @@
 mod draw;
 mod torque;
 
-pub use draw::Places;
-
-use super::body::Body;
-use super::dynamics::Dynamics;
+use super::dynamics::{Body, Dynamics};
 use crate::controller::friction::TanhFriction;
+pub use draw::Places;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 

@@ -2,7 +2,6 @@
 
 use super::super::comparison::Open;
 use super::super::named::{FalsePositives, FitErrors, NamedEffect};
-use super::curves::TorqueCurve;
 use super::laws::UnnamedLaw;
 use super::logs::LogResult;
 use super::next::{Experiment, NextExperiment};
@@ -12,6 +11,7 @@ use super::verdict::{State, Verdict};
 use crate::controller::JointNumber;
 use crate::explanation::torque_model::TorqueModel;
 use crate::identification::conventions::Conventions;
+pub use crate::identification::estimate::{TorqueCurve, curves};
 use crate::identification::transmission::JointTransmission;
 use serde::Serialize;
 use std::sync::Arc;
@@ -102,3 +102,5 @@ pub struct Change {
     /// Its 95 % interval, from blocks that count as independent.
     pub interval: [f64; 2],
 }
+
+// Torques over time on the validation set, for people to look at.

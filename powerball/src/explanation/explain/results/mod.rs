@@ -4,13 +4,12 @@
 //! `unattributed` what stays without a name and what it depends on, `laws` the formulas of what has
 //! no name, `logs` what is different in which log, `correction` the curves that take a part of it off, `conclude` what a
 //! reader must know, `verdict` how far each joint is explained, `probability` how often such a name is right,
-//! `verdict` whether all of it agrees, `curves` and `shown` the figures, `next` what an experiment would decide.
+//! `verdict` whether all of it agrees, `explained` and `shown` the figures, `next` what an experiment would decide.
 //! JSON is made of these types by whoever writes it, and nothing here reads it.
 
 mod compose;
 mod conclude;
 pub(super) mod correction;
-mod curves;
 mod explained;
 mod laws;
 mod logs;
@@ -22,8 +21,7 @@ mod verdict;
 
 pub(super) use conclude::conclude;
 pub use correction::{Correction, Curve};
-pub use curves::{TorqueCurve, curves};
-pub use explained::{Change, Explained};
+pub use explained::{Change, Explained, TorqueCurve, curves};
 pub use laws::{LawCoefficient, UnnamedLaw};
 pub use logs::{Difference, LogResult};
 pub use next::{Experiment, NextExperiment, Trajectory};
