@@ -1,4 +1,7 @@
 //! Number by number: what differs, and how surely.
+//!
+//! Also here: a number of one fit against the same number of another one; what varies from run to run; one joint's
+//! friction curves side by side.
 
 use super::result::{
     CompareError, CompareOptions, ConstantDifference, FrictionDifference, ParameterDifference,

@@ -1,4 +1,6 @@
 //! What an identification takes: logs and summaries of logs, in memory or in files, each with its mounting.
+//!
+//! Also here: logs as sufficient statistics, which [`identify`](super::identify) takes in their place.
 
 use super::identify::{Gathering, IdentifyError};
 use super::mounting::Mounting;

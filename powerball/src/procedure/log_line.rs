@@ -1,4 +1,6 @@
 //! What a line of a recording says of its cycle.
+//!
+//! Also here: what a person is told while the arm moves.
 
 use crate::bus::canopen::Micros;
 use crate::bus::driver::{Counters, Driver};

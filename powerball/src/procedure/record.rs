@@ -2,6 +2,8 @@
 //!
 //! Every line of a log is written whole, by one call, when its cycle is over: whatever moment the program
 //! dies at, the file can be read up to there.
+//!
+//! Also here: why an arm is not recorded.
 
 use super::{Cleared, Columns, Envelope, LogTime, Told, approach};
 use crate::bus::driver::{ControlMode, Phase, Profile, Rejection};

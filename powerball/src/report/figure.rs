@@ -1,4 +1,6 @@
 //! Line and scatter figures: one or several panels over a common horizontal axis.
+//!
+//! Also here: fewer points for the same picture.
 
 use super::axis::Axis;
 use super::escape;

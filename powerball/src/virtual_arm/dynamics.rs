@@ -2,6 +2,8 @@
 //!
 //! This is the virtual arm's own physics. It shares no code with the generator, so that each can test the
 //! other. Everything is in SI units; forces and moments of link i are expressed in frame i, about its origin.
+//!
+//! Also here: the mass of a link and its rotor, as the eleven parameters of Eq.
 
 use crate::identification::chain::Chain;
 use nalgebra::{Matrix3, Vector3};

@@ -1,4 +1,6 @@
 //! The plant: an arm that follows a motion, and the log that its drives would give.
+//!
+//! Also here: the virtual arm with what no model is told of it, as a file.
 
 use super::dynamics::Dynamics;
 use super::effect::{Instant, PlantEffect, State};

@@ -6,6 +6,8 @@
 //! takes the secant's place: where friction has saturated, it no longer follows the velocity. A gear that gives
 //! way is a spring and a damper between two masses, taken at the end of the step. Everything else is taken at
 //! its start.
+//!
+//! Also here: a drive's servo.
 
 use super::dynamics::{Dynamics, solve_positive_definite};
 use super::effect::{Gear, Instant, State};

@@ -1,4 +1,6 @@
 //! Why the arm was stopped, or may not start: typed, with the node and what was seen.
+//!
+//! Also here: why a set-point does not leave.
 
 use super::receive::Foreign;
 use super::torque::ControlMode;

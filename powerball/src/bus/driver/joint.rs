@@ -1,4 +1,6 @@
 //! One joint while the driver runs: what its drive says, and what it is told.
+//!
+//! Also here: what the driver asks of a transport, and what a transport tells it.
 
 use super::profile::{JointProfile, ModeProfile};
 use super::script::Progress;

@@ -1,4 +1,6 @@
 //! Frames from the arm: stored, and judged by what the phase expects.
+//!
+//! Also here: frames that only a master sends, and that this one did not.
 
 use super::script::Progress;
 use super::{Cause, Driver, Phase, Transmit};

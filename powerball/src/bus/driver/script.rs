@@ -1,4 +1,6 @@
 //! What is read from and written to each drive before it may move, as lists without memory of their own.
+//!
+//! Also here: how far a joint is on its way to its operation.
 
 use super::profile::{ModeProfile, Profile};
 use super::torque::ControlMode;

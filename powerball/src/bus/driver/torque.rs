@@ -1,4 +1,6 @@
 //! The torque that set-points ask of the joints, from a model of the arm: what no limit of one joint can see.
+//!
+//! Also here: what one joint was told last; how the joints are commanded.
 
 use super::cause::Rejection;
 use super::joint::Joint;

@@ -1,4 +1,6 @@
 //! Real-time priority for the thread that runs the cycle, where the system allows it.
+//!
+//! Also here: signals that end a program, as a wish that the arm's master fulfils first.
 
 use std::io;
 use std::sync::Arc;

@@ -1,4 +1,6 @@
 //! `powerball explain`: the residual loop, from logs to explained.json and report.html.
+//!
+//! Also here: what `explain` prints.
 
 use super::Failure;
 use super::bus::{Where, virtual_bus};

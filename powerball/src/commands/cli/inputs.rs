@@ -1,4 +1,6 @@
 //! What `explain` reads: an arm, logs, what is known already; and a folder for results.
+//!
+//! Also here: logs with the mounting of the base that each was recorded in.
 
 use super::Failure;
 use super::output::{self, Progress};

@@ -1,4 +1,6 @@
 //! Whether what was found is what is there.
+//!
+//! Also here: the demo as a page.
 
 use super::Demo;
 use crate::explanation::explain::Explained;

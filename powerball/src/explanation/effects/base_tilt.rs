@@ -22,7 +22,7 @@ pub(super) struct BaseTilt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Whether the parameters that level gravity does not show are fitted too
-    /// ([`RigidArm::gravity_unobservable`](crate::logs::regression::RigidArm::hidden)).
+    /// ([`RigidArm::gravity_unobservable`](crate::logs::regression::RigidArm::gravity_unobservable)).
     pub unshown: bool,
 }
 

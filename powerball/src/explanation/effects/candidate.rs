@@ -1,4 +1,6 @@
 //! One way in which an effect could show.
+//!
+//! Also here: the signal that an effect depends on; a figure of several joints.
 
 use super::{Effect, Settings};
 use crate::controller::JointNumber;

@@ -1,4 +1,6 @@
 //! Windows of logs: which rows are in them, and steps of time of which they are made.
+//!
+//! Also here: cross products of a few columns with the base by stretch of time.
 
 use super::{Context, Window};
 use crate::identification::estimate::Solver;

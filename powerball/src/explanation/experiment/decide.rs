@@ -4,6 +4,8 @@
 //! other; blocks count as independent, so their sum has an honest error whatever colour the residual has
 //! (Vuong, Likelihood ratio tests for model selection and non-nested hypotheses, Econometrica 1989, with
 //! blocks in the place of samples).
+//!
+//! Also here: the log of an experiment beside those that were there before.
 
 use crate::explanation::explain::{Hypothesis, Open};
 use crate::explanation::options::{ExplainError, ExplainOptions};

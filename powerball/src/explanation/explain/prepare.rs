@@ -1,4 +1,6 @@
 //! From logs to the base model that the search begins with.
+//!
+//! Also here: the model that the search begins with.
 
 use super::model::Model;
 use super::named::FitErrors;
@@ -133,7 +135,7 @@ const LEAST: usize = 50;
 // The model that the search begins with.
 
 /// The base model, with what every arm may have where this one shows it plainly (see
-/// [`Effect::baseline`](crate::explanation::effects::Effect::beside)): every effect is then judged beside that.
+/// [`Effect::baseline`](crate::explanation::effects::Effect::baseline)): every effect is then judged beside that.
 pub(super) fn initial_model<'a>(base: Fit, study: &Study<'a>) -> Model {
     let plain = Model::new(base);
     // Per-joint fits have an offset already.

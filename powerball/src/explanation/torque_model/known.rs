@@ -1,4 +1,7 @@
 //! The next identification: what is known is taken out of the logs, and what is found comes to it.
+//!
+//! Also here: a model of an arm as what the next identification or verification knows; the arm of the file as a model
+//! has it.
 
 use super::file::read_text;
 use super::{Additions, ArmChanges, FileError, LogChanges, NamedTerm, TorqueModel};

@@ -5,6 +5,8 @@
 //! friction, fitted to one part of the logs and judged by the other. Its columns are numeric Newton–Euler: to derive
 //! every such arm would take half a minute. What is told is derived then, and its columns are asked like those of any
 //! other arm.
+//!
+//! Also here: one thing that may be other than it is said to be about a log's columns.
 
 use super::asked::{Asked, Positions, Torques};
 use super::fit::{Gravity, Judged, Rows, judge};

@@ -1,4 +1,6 @@
 //! The logs that are asked, and the rows of any reading of their positions.
+//!
+//! Also here: logs made small; a way to read the columns of a log; a factor by joint.
 
 use super::arm_file::FACTOR;
 use super::fit::{Gravity, Rows, factors_of_body};

@@ -1,5 +1,8 @@
 //! A reading judged: the shared rigid arm and textbook friction, fitted to one part of the logs and judged by
 //! the other, both ways round.
+//!
+//! Also here: the rows of a regression for one reading of the positions; every reading of the torques is judged on
+//! them.
 
 use super::asked::Torques;
 use crate::identification::estimate::Solver;

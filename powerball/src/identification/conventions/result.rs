@@ -1,4 +1,6 @@
 //! What is told of a log's columns: the `conventions` of identified.json and explained.json.
+//!
+//! Also here: the column map that would set columns right.
 
 use super::arm_file::Reading;
 use super::properties::{Common, Unit};

@@ -13,6 +13,9 @@
 //! the values leave open towards an ordinary body P₀ (entropic regularisation, Lee, Wensing and Park 2019).
 //! The certificate is the barrier's: the value found exceeds the least possible one by at most μ times the
 //! number of barrier dimensions.
+//!
+//! Also here: a fit whose parameters a real arm can have, and what that costs; how far apart values of a parameter set
+//! are, in torque.
 
 use super::estimates::{ResidualStats, stats_of};
 use super::reduced::Solution;

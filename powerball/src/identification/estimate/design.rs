@@ -1,4 +1,6 @@
 //! The columns of all joints and their cross products, from which every fit is a small solve.
+//!
+//! Also here: which blocks are held out together.
 
 use super::solve::{Products, add_products, zeros};
 use super::variable_projection::{FRICTION, Layout};

@@ -1,4 +1,6 @@
 //! A fit in the words of a model: values with standard errors that hold for coloured residuals.
+//!
+//! Also here: the base model along logs; torques over time, for people to look at.
 
 use super::reduced::Solution;
 use super::uncertainty::StandardErrors;

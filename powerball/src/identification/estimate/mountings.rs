@@ -4,6 +4,8 @@
 //! gravity in a general direction an arm has a set that determines those of all its mountings: their
 //! parameters are combinations of its ones. Factors are put into its columns and joined there, so that a
 //! summary need not know which others it will meet.
+//!
+//! Also here: torque columns that were exchanged between joints, or have the wrong sign.
 
 use super::estimates::ResidualStats;
 use super::reduced::{Solution, solve_reduced};

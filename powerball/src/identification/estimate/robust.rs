@@ -5,6 +5,8 @@
 //! neighbours; then the logs are fitted as ever, and again until nothing changes. What is believed: all of a
 //! miss up to three deviations, less of it beyond, nothing from six on (Hampel's ψ). The deviation is the
 //! median one of each joint, which outliers do not move.
+//!
+//! Also here: ratios of sums over blocks that count as independent.
 
 use super::distribution::t_quantile_975;
 use super::reduced::{FrictionKind, Solution, solve_reduced};

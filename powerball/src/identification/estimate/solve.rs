@@ -1,4 +1,6 @@
 //! Normal equations that may be short of rank or bounded from below.
+//!
+//! Also here: normal equations, summed over joints and parts of logs.
 
 use faer::Mat;
 

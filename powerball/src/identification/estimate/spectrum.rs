@@ -12,6 +12,8 @@
 //! and their powers were the μ. These are the most likely ones for powers λ that are known with some degrees of
 //! freedom each (Whittle's likelihood), by multiplicative steps (Févotte, Bertin and Durrieu 2009, Neural Computation
 //! 21: Itakura–Saito's divergence), which keep them positive.
+//!
+//! Also here: the error that no model can avoid.
 
 use crate::logs::regression::Data;
 use crate::logs::signal::Band;

@@ -1,5 +1,7 @@
 //! How well a fit is known, all coefficients together, and what they weigh along its logs: what a comparison
 //! of two fits needs beside their values.
+//!
+//! Also here: standard errors under coloured noise.
 
 use super::distribution::{freedom_of, t_quantile_975};
 use super::reduced::Solution;

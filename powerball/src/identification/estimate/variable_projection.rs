@@ -3,6 +3,9 @@
 //!
 //! It asks of its rows only their cross products at given steepnesses, so rows in memory and reduced logs are
 //! fitted alike.
+//!
+//! Also here: the steepnesses γ2, γ4 of the tanh model; rows of a regression whose friction steepnesses are free, whatever they are
+//! kept in.
 
 use super::solve::{Products, Solver, bounded};
 pub(super) use crate::logs::regression::FRICTION;

@@ -1,4 +1,6 @@
 //! What a path must keep beside its joints' limits: torque, floor, and its own links.
+//!
+//! Also here: what the joints may do, from the arm file; what stands around an arm; capsules.
 
 use super::Mounting;
 use super::fourier::Fourier;

@@ -1,4 +1,7 @@
 //! What the logs say of one joint's transmission: products of its columns, by block.
+//!
+//! Also here: the signals that a motor's torque is compared with; logs with both torques on even grids, and which part
+//! each belongs to.
 
 use crate::controller::JointNumber;
 use crate::controller::correction::{Instant, Law, Memory};

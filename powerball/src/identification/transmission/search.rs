@@ -1,4 +1,6 @@
 //! Which effects a transmission holds, judged on logs that took no part in a fit.
+//!
+//! Also here: what a transmission may hold beside friction and rotor.
 
 use super::fit::{Fit, noise_share};
 use super::products::{Column, Evidence, Products, Scales};

@@ -1,4 +1,6 @@
 //! One running time through several logs: what warms up knows no files.
+//!
+//! Also here: torques whose time stamps are known to be off.
 
 use super::Log;
 use super::map::Mapped;

@@ -4,6 +4,8 @@
 //! lines: they are written to `NAME.parquet.csv`, and closing the log makes `NAME.parquet` of them, whole or
 //! not at all. Where a program died before that, the lines are still there, a log like any other; the next
 //! log of that name puts them into a Parquet file of their own first. So it is with MCAP.
+//!
+//! Also here: logs as files.
 
 use super::Log;
 use std::ffi::OsString;

@@ -1,4 +1,6 @@
 //! The rigid arm of a file at run time: columns of its minimal set and of what lies outside it.
+//!
+//! Also here: what level gravity hides.
 
 use crate::logs::log::Motors;
 use dyngen::arm::ParameterKind;

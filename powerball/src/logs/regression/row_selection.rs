@@ -1,4 +1,6 @@
 //! Which samples of a joint become rows: those in which it moves and its torque says something.
+//!
+//! Also here: joints whose samples say nothing, and why; what is to be said of joints that rest in the logs.
 
 use super::rows::{saturated, saturation_notes};
 use super::{JointRows, Recording};

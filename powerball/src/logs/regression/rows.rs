@@ -1,4 +1,7 @@
 //! The rows of each joint: which samples count, and where blocks and logs begin.
+//!
+//! Also here: stretches in which a joint's torque stays at its limit; a fit of each joint by itself, for logs that
+//! repeat one path.
 
 use super::Recording;
 use super::prepare::Data;

@@ -1,4 +1,6 @@
 //! Butterworth low-pass filters of any even order, as biquads, and their zero-phase use.
+//!
+//! Also here: a recursive filter of second order.
 
 use super::filter;
 use std::f64::consts::PI;

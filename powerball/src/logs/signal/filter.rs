@@ -1,4 +1,6 @@
 //! The band of an analysis: one low-pass filter and one decimation for every signal and every column alike.
+//!
+//! Also here: a recursive filter over the pieces of one long signal at the same time.
 
 use super::Butterworth;
 use super::butterworth::Biquad;

@@ -1,4 +1,6 @@
 //! Summaries on disk: one line of JSON that says what it is, then the factors, packed.
+//!
+//! Also here: factors as bits.
 
 use super::{Columns, Identity, NODES, OCTAVES, Octaves, Powers, RFactor, Steepness, Summary, fnv};
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,6 @@
 //! Logs into factors: one log after another, a long one part by part, so memory does not grow.
+//!
+//! Also here: columns tanh(γ·q̇) for every γ at once; logs reduced in several bands.
 
 use super::{Octaves, Summary, SummaryError};
 use crate::logs::log::Log;

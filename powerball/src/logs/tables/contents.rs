@@ -1,4 +1,6 @@
 //! A file's format, by what it begins with, and its tables.
+//!
+//! Also here: what is odd about a log, and why one cannot be used.
 
 use super::table::Table;
 use super::{columnar, text};

@@ -1,4 +1,6 @@
 //! All nodes over one plant: the other end of a bus.
+//!
+//! Also here: what a joint's module is.
 
 use super::dictionary::Identity;
 use super::node::Node;

@@ -2,6 +2,8 @@
 //!
 //! As on the real drive a PDO is changed in pre-operational only, after its COB-ID was made invalid; its
 //! mapping only while it maps nothing.
+//!
+//! Also here: where a drive wants its joint to be.
 
 use super::dictionary::Dictionary;
 use crate::bus::canopen::pdo::{Entry, INVALID, Mapping};

@@ -1,4 +1,6 @@
 //! What is another in one log than in the others: friction, a zero, a gain, a delay.
+//!
+//! Also here: the accepted model fitted to all logs together.
 
 use super::super::model::Model;
 use super::super::study::Study;

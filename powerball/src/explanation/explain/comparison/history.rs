@@ -1,4 +1,6 @@
 //! What the steps of the search decided.
+//!
+//! Also here: a question that logs leave open.
 
 use super::super::named::Rival;
 use super::super::search::Group;

@@ -1,4 +1,6 @@
 //! Names that are taken back: they turn out not to be told apart or not to be there.
+//!
+//! Also here: whether an effect is there at every pace.
 
 use super::super::model::{Accepted, Model};
 use super::super::study::Study;

@@ -1,4 +1,6 @@
 //! From what was found to the result.
+//!
+//! Also here: what these logs cannot show, and what to record instead.
 
 use super::super::comparison::{Comparison, Step, leftover, open};
 use super::super::findings::Findings;

@@ -1,4 +1,6 @@
 //! What an explanation says; serialized it is explained.json.
+//!
+//! Also here: torques over time on the validation set, for people to look at.
 
 use super::super::comparison::Open;
 use super::super::named::{FalsePositives, FitErrors, NamedEffect};

@@ -1,4 +1,6 @@
 //! What stays without a name.
+//!
+//! Also here: dependencies of a residual.
 
 use super::super::comparison::History;
 use super::super::model::Model;

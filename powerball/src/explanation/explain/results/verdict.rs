@@ -1,4 +1,6 @@
 //! The first line of every answer: how much of each joint's torque is explained, and what to do about the rest.
+//!
+//! Also here: whether an explanation contradicts itself.
 
 use super::super::named::NamedEffect;
 use super::super::study::Study;

@@ -1,4 +1,6 @@
 //! Backward elimination: what later additions made unneeded goes out again.
+//!
+//! Also here: what is in the model from the start.
 
 use super::super::model::{Accepted, Model};
 use super::super::study::Study;
@@ -31,7 +33,7 @@ pub(crate) fn eliminate(study: &Study<'_>, model: &mut Model) {
 }
 
 /// The place of an accepted effect of which only a part is needed, one that a model may have from the start
-/// (see [`Effect::baseline`](effects::Effect::beside)), and that part.
+/// (see [`Effect::baseline`](effects::Effect::baseline)), and that part.
 fn more_than_needed(study: &Study<'_>, model: &Model) -> Option<(usize, Candidate)> {
     let rule = study.rule();
     let context = model.context(study);

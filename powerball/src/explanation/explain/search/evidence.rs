@@ -1,4 +1,6 @@
 //! What speaks for a candidate: blocks that agree, folds that gain, a validation set that gains.
+//!
+//! Also here: whether the evidence for a candidate is enough.
 
 use super::folds::fold_gains;
 use super::screen::{Screen, Trial};

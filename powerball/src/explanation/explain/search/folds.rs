@@ -1,4 +1,6 @@
 //! Held-out gains: the base is fitted once without each fold, a candidate then costs a small solve.
+//!
+//! Also here: the base model fitted once without each fold.
 
 use super::screen::{Screen, Trial};
 use crate::controller::JointNumber;

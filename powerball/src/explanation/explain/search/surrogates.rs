@@ -1,5 +1,7 @@
 //! Surrogates: candidates shifted in time, or with the signs of recordings drawn, that cannot be true, asked the same
 //! questions. They tell how often these very data say yes by chance.
+//!
+//! Also here: columns shifted in time, thousands of times.
 
 use super::super::model::Model;
 use super::super::named::FalsePositives;

@@ -1,5 +1,7 @@
 //! Whether the logs to judge on run the same path as the fitted ones: then what is a
 //! function of the path cannot be judged.
+//!
+//! Also here: on a repeated path, the joint fit or one fit a joint; when logs were recorded, where their times do not tell.
 
 use super::super::model::Model;
 use super::super::search::{Screen, Trial, Validation, validation_gain};

@@ -122,7 +122,7 @@ pub(crate) fn validation_only_effects(
     Ok(found)
 }
 
-/// The base model with what every arm may have (see [`Effect::baseline`](crate::explanation::effects::Effect::beside)), and
+/// The base model with what every arm may have (see [`Effect::baseline`](crate::explanation::effects::Effect::baseline)), and
 /// what it leaves on the validation set.
 fn with_zeros(rule: &Rule, base: &Fit, (data, validation): (&Data<'_>, &Data<'_>)) -> (Fit, Vec<Vec<f64>>) {
     let context = Context::new(data, base, &base.residual, rule);
