@@ -49,7 +49,7 @@ pub use result::{Identified, IdentifyError};
 /// let (log, _findings) = Log::from_arrays("swing", &arm, &arrays)?;
 /// let model = identify(&arm, [&log], [], &IdentifyOptions::default())?;
 /// assert!((model.friction[0].gamma1 + model.friction[0].gamma3 - 0.3).abs() < 0.01);
-/// # Ok::<(), Box<dyn std::result::Error>>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
