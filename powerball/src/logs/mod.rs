@@ -11,6 +11,8 @@ pub mod regression;
 pub mod signal;
 pub mod summary;
 pub mod tables;
+#[cfg(test)]
+pub(crate) mod tests;
 pub(crate) mod vector;
 
 pub use progress::Progress;

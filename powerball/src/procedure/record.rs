@@ -62,7 +62,7 @@ impl<B: Bus, const N: usize> fmt::Debug for Recorder<B, N> {
 }
 
 impl<B: Bus, const N: usize> Recorder<B, N> {
-    /// Tells `log_line` twice a second how far a motion has come.
+    /// Tells `told` twice a second how far a motion has come.
     #[must_use]
     pub fn telling(mut self, told: impl FnMut(&Told) + 'static) -> Self {
         self.told = Box::new(told);
@@ -307,7 +307,7 @@ fn beginning<const N: usize>(motion: &Motion) -> Option<[f64; N]> {
 }
 
 /// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its velocity, follows the
-/// motion, writes the log, and stops; `log_line` hears how far it has come. The motion is looked at before anything
+/// motion, writes the log, and stops; `told` hears how far it has come. The motion is looked at before anything
 /// is sent, the way to where it begins before the arm is enabled.
 ///
 /// # Errors

@@ -7,13 +7,11 @@
 //!
 //! | | |
 //! |---|---|
-//! | `result`, `answers`, `result` | what is told, its words, the column map |
-//! | `asked`, `asked`, `fit`, `fit` | logs made small; a way to read columns; its rows; what it leaves |
-//! | `physics`, `unit` | energies; the sign of the torques |
-//! | `asked`, `unit` | a factor by joint; the unit of all |
-//! | `unit`, `unit`, `unit`, `unit` | one question each |
-//! | `arm_file` | whether the arm file is this arm's |
-//! | `asked`, `arm_file`, `search` | the logs asked; one change of the reading; the best reading |
+//! | `result`, `answers` | the result with the column map that would set it right; its words |
+//! | `asked`, `fit` | logs made small, and a way to read their columns; its rows, and what it leaves |
+//! | `physics`, `properties` | energies; unit, sign, side, kind, gravity and delay of the torques |
+//! | `arm_file` | one change of the reading; whether the arm file is this arm's |
+//! | `search` | the best reading |
 
 mod answers;
 mod arm_file;

@@ -417,7 +417,7 @@ impl TorqueMetric {
         Ok(TorqueMetric { joints: (0..n).map(joint).collect() })
     }
 
-    /// As the metric of [`super::nearest`], where a torque of `spectrum` N·m counts 1.
+    /// As the metric of [`super::nearest`], where a torque of `noise` N·m counts 1.
     #[must_use]
     pub fn matrix(&self, noise: f64) -> Mat<f64> {
         let p = self.joints.first().map_or(0, Mat::ncols);

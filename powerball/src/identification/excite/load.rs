@@ -168,7 +168,7 @@ pub struct Load {
 }
 
 impl Load {
-    /// The torques of a model (its gravity is the mounting's); `constraints` already leave their margin.
+    /// The torques of a model (its gravity is the mounting's); `limits` already leave their margin.
     ///
     /// # Errors
     /// As [`Evaluator::new`].

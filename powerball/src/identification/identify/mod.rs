@@ -1,8 +1,8 @@
 //! From logs to a model: one function, and what it takes and gives.
 //!
-//! `gather` makes sufficient statistics of logs, by mounting; `fit` fits them; `judge` says what the
-//! fit leaves of each mounting; `judge` what the model leaves of other logs; `judge` whether another friction law
-//! would help; `fit` what a page shows of it.
+//! `gather` makes sufficient statistics of logs, by mounting; `fit` fits them and makes what a page
+//! shows of the fit; `judge` says what it leaves of each mounting and of other logs, and whether another friction law
+//! would help; `result` holds all of it.
 
 mod fit;
 mod gather;

@@ -10,12 +10,10 @@
 //!
 //! | | |
 //! |---|---|
-//! | `result` | what is told, and its words |
-//! | `search` | what a transmission may hold beside friction and rotor |
-//! | `products` | the signals that a motor's torque is compared with |
-//! | `products`, `products` | logs on even grids; products of columns by block |
+//! | `result` | the result, and its words |
+//! | `products` | logs on even grids; the signals that a motor's torque is compared with, and their products by block |
 //! | `fit` | ratio and friction from products; standard errors |
-//! | `search` | which effects are there, judged on logs that took no part in a fit |
+//! | `search` | what a transmission may hold beside friction and rotor, and which of it is there, judged on logs that took no part in a fit |
 
 mod fit;
 mod products;

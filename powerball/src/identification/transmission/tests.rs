@@ -4,6 +4,7 @@ use super::{JointTransmission, Transmission, transmission};
 use crate::identification::excite::{Fourier, Harmonics};
 use crate::identification::motion::Motion;
 use crate::logs::log::{Log, read_logs};
+use crate::logs::tests::measured;
 use crate::virtual_arm::{Plant, Sensors, lwa4p};
 use dyngen::Arm;
 use rand::{RngExt, SeedableRng};
@@ -206,13 +207,7 @@ fn a_column_that_is_not_the_motor_is_refused_in_words() {
 /// Torque sensors and motors of a Rokae xMate on one path of 20 s in three parts.
 #[test]
 fn the_transmissions_of_a_rokae_are_found() {
-    let folder = std::env::var_os("POWERBALL_DATA")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from)
-        .join("rokae");
-    if !folder.join("arm.toml").exists() {
-        println!("skipped: no measured logs in {}", folder.display());
-        return;
-    }
+    let Some(folder) = measured("rokae") else { return };
     let arm = Arm::read(&folder.join("arm.toml")).unwrap();
     let files: Vec<PathBuf> = (1..=3).map(|k| folder.join(format!("part_{k}.csv"))).collect();
     let (logs, _) = read_logs(&files, &arm).unwrap();

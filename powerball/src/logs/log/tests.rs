@@ -294,16 +294,9 @@ fn each_doubt_finds_its_fault_and_no_other() {
 /// Sound logs of real arms are not doubted beyond what is so: uneven steps and columns that are not known.
 #[test]
 fn measured_logs_give_no_false_findings() {
-    let folder = std::env::var_os("POWERBALL_DATA").map_or_else(
-        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
-        std::path::PathBuf::from,
-    );
     for (name, most) in [("ur10e", 11), ("lwa4p_rollouts", 74)] {
-        let folder = folder.join(name);
-        let Ok(arm) = Arm::read(&folder.join("arm.toml")) else {
-            println!("skipped: there are no measured logs in {}", folder.display());
-            return;
-        };
+        let Some(folder) = crate::logs::tests::measured(name) else { return };
+        let arm = Arm::read(&folder.join("arm.toml")).unwrap();
         let mut count = 0;
         for entry in std::fs::read_dir(&folder).unwrap() {
             let path = entry.unwrap().path();

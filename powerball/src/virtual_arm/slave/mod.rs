@@ -4,8 +4,8 @@
 //! |---|---|
 //! | `dictionary` | the drive's objects, exactly those of the maker's DCF |
 //! | `server` | SDO |
-//! | `process` | PDOs and the device's rules for changing them |
-//! | `process`, `drive` | set-points, state machine, modes, brake, commutation search |
+//! | `process` | PDOs and the device's rules for changing them; where a drive wants its joint to be |
+//! | `drive` | set-points, state machine, modes, brake, commutation search |
 //! | `node` | network management, heartbeats, emergencies; ties the others together |
 //! | `arm` | all nodes with the plant and its sensors, as the other end of a bus |
 

@@ -1,10 +1,10 @@
 //! Which name a residual gets: **here it is decided that a name is given, and where it is taken back.**
 //!
 //! The candidate group that a step chose is compared with all others on its joints (`naming`). Two names that
-//! fit alike are a question for an experiment (`history`, `open`). What the steps decided is kept in the
-//! `history`. Once everything that fits is in the model, a name is taken back that says something of a pace
-//! of motion that is not there (`withhold`), or that is not told apart from others while much is left
-//! (`withhold`).
+//! fit alike are a question for an experiment (`open`). What the steps decided and left open is kept in the
+//! `history`. Once everything that fits is in the model, a name is taken back (`withhold`) that says something of a pace
+//! of motion that is not there, that is not told apart from others while much is left, or that does harm on logs to
+//! judge on.
 
 mod history;
 mod naming;

@@ -1,10 +1,10 @@
 //! What is said of what was found.
 //!
-//! `conclude` makes the result ([`Explained`]): `compose` the model of what was accepted and what that leaves,
-//! `unattributed` what stays without a name and what it depends on, `laws` the formulas of what has
-//! no name, `logs` what is different in which log, `correction` the curves that take a part of it off, `conclude` what a
-//! reader must know, `verdict` how far each joint is explained, `probability` how often such a name is right,
-//! `verdict` whether all of it agrees, `explained` and `shown` the figures, `next` what an experiment would decide.
+//! `conclude` makes the result ([`Explained`], in `explained`) and the warnings that a reader must know: `compose` the model
+//! of what was accepted and what that leaves, `unattributed` what stays without a name and what it depends on, `laws` the
+//! formulas of what has no name, `logs` what is different in which log, `correction` the curves that take a part of it off,
+//! `verdict` how far each joint is explained, and whether all of it agrees, `probability` how often such a name is right,
+//! `shown` the figures, `next` what an experiment would decide.
 //! JSON is made of these types by whoever writes it, and nothing here reads it.
 
 mod compose;

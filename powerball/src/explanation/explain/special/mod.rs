@@ -1,10 +1,9 @@
 //! What is special of some logs, found before and beside the search.
 //!
 //! A validation set that repeats the path of the fitted logs cannot judge functions of that path
-//! (`one_path`); there a fit of each joint by itself may predict better than one multibody model
-//! (`one_path`). Something may be held in logs of the validation set only, or in all others (`held`), or push an arm that stands
-//! still (`at_rest`). And where the times of
-//! logs do not tell when they were recorded, what warms does (`one_path`).
+//! (`one_path`); there a fit of each joint by itself may predict better than one multibody model, and where the times of
+//! logs do not tell when they were recorded, what warms does. Something may be held in logs of the validation set only, or
+//! in all others (`validation_only`), or push an arm that stands still (`at_rest`).
 
 mod at_rest;
 mod one_path;

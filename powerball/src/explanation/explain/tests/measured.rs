@@ -4,6 +4,7 @@ use crate::explanation::ExplainOptions;
 use crate::explanation::explain::explain_body;
 use crate::logs::log::{common_clock, read_logs};
 use crate::logs::regression::RigidArm;
+use crate::logs::tests::measured;
 use dyngen::Arm;
 use std::path::PathBuf;
 
@@ -11,13 +12,7 @@ use std::path::PathBuf;
 /// on the third part three times as large.
 #[test]
 fn what_one_joint_gains_others_do_not_lose() {
-    let folder = std::env::var_os("POWERBALL_DATA")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from)
-        .join("rokae");
-    if !folder.join("arm.toml").exists() {
-        println!("skipped: no measured logs in {}", folder.display());
-        return;
-    }
+    let Some(folder) = measured("rokae") else { return };
     let arm = Arm::read(&folder.join("arm.toml")).unwrap();
     let files: Vec<PathBuf> = (1..=3).map(|k| folder.join(format!("part_{k}.csv"))).collect();
     let (mut logs, _) = read_logs(&files, &arm).unwrap();
