@@ -4,6 +4,7 @@
 //! the bus, so that a bus in memory can run faster than real time.
 
 pub mod blocking;
+mod interrupt;
 mod master;
 mod memory;
 #[cfg(unix)]
@@ -18,9 +19,9 @@ mod socketcan;
 mod udp;
 mod url;
 
+pub use interrupt::Interrupt;
 pub use master::{ArmError, Master, Moment};
 pub use memory::{Memory, Peer};
-pub use realtime::Interrupt;
 #[cfg(unix)]
 pub use slcan::Slcan;
 #[cfg(all(target_os = "linux", feature = "socketcan"))]

@@ -1,10 +1,5 @@
 //! Real-time priority for the thread that runs the cycle, where the system allows it.
-//!
-//! Also here: signals that end a program, as a wish that the arm's master fulfils first.
 
-use std::io;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use thread_priority::{
     RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
     set_thread_priority_and_policy, thread_native_id,
@@ -50,60 +45,3 @@ pub fn resign() {
     // A thread that never had more keeps what it has.
     let _ = set_thread_priority_and_policy(thread_native_id(), priority, policy);
 }
-
-// Signals that end a program, as a wish that the arm's master fulfils first.
-
-/// Whether this process was asked to end: Ctrl-C, SIGTERM, SIGHUP, SIGQUIT.
-///
-/// While a [`Master`](super::Master) with it lives, such a signal stops the arm: quick stop, brakes, no torque. A
-/// second signal asks for the same again and does not skip it, nor what the process then does to end: its log is
-/// closed. Once the master is gone and no signal came, signals end the process as usual. A file-size limit (SIGXFSZ) is an error of the write, and no end of the process.
-#[derive(Clone, Debug, Default)]
-pub struct Interrupt {
-    asked: Arc<AtomicBool>,
-    /// No arm is moved and none was stopped by a signal: a signal ends the process.
-    idle: Arc<AtomicBool>,
-}
-
-impl Interrupt {
-    /// One that listens to the process's signals.
-    ///
-    /// # Errors
-    /// Where the system does not let them be listened to.
-    pub fn install() -> io::Result<Interrupt> {
-        use signal_hook::consts;
-        use signal_hook::flag;
-        let interrupt = Interrupt::default();
-        #[cfg(unix)]
-        let ending = [consts::SIGINT, consts::SIGTERM, consts::SIGHUP, consts::SIGQUIT];
-        #[cfg(not(unix))]
-        let ending = [consts::SIGINT, consts::SIGTERM];
-        for signal in ending {
-            flag::register_conditional_default(signal, Arc::clone(&interrupt.idle))?;
-            flag::register(signal, Arc::clone(&interrupt.asked))?;
-        }
-        #[cfg(target_os = "linux")]
-        flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
-        Ok(interrupt)
-    }
-
-    /// Asks for the end, as a signal does.
-    pub fn ask(&self) {
-        self.asked.store(true, Ordering::SeqCst);
-    }
-
-    /// Whether the end was asked for.
-    #[must_use]
-    pub fn is_asked(&self) -> bool {
-        self.asked.load(Ordering::SeqCst)
-    }
-
-    /// Whether an arm is moved from now on. A process that was asked to end closes its files without being asked twice.
-    pub(super) fn guard(&self, moved: bool) {
-        self.idle.store(!moved && !self.is_asked(), Ordering::SeqCst);
-    }
-}
-
-/// A file would become larger than it may; the number on Linux (signal(7)), the same on all of its common machines.
-#[cfg(target_os = "linux")]
-const SIGXFSZ: i32 = 25;
