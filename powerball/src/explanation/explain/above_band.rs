@@ -7,7 +7,7 @@
 //! orders. It must then lower the error above the band on the validation set, with the same phase.
 
 use super::comparison::{Comparison, Step, relative_score};
-use super::model::{Accepted, Model};
+use super::model::{Accepted, Model, Origin};
 use super::search::penalty;
 use super::study::Study;
 use crate::controller::JointNumber;
@@ -33,10 +33,10 @@ pub(crate) fn ripple_above_band(study: &Study<'_>, model: &mut Model, number: us
     let square_before = model.fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect();
     let found = search(study, model);
     let score = found.iter().map(|f| f.score).fold(0.0, f64::max);
-    let mut joints: Vec<JointNumber> = found.iter().map(|f| f.accepted.candidate.joints[0]).collect();
+    let mut joints: Vec<JointNumber> = found.iter().map(|f| f.candidate.joints[0]).collect();
     joints.dedup();
     for ripple in found {
-        model.add_measured(study, Accepted { step: Some(number), ..ripple.accepted });
+        model.add_above_band(study, ripple.accepted_by(number, study.data.dof()));
     }
     let after = residual_stats(&study.validation, &model.residual_on_validation(study)).rms;
     let margin = relative_score(study.rule(), score);
@@ -54,8 +54,26 @@ pub(crate) fn ripple_above_band(study: &Study<'_>, model: &mut Model, number: us
 
 /// A ripple that passed.
 struct Ripple {
-    accepted: Accepted,
+    candidate: Candidate,
+    /// Of its cosine and sine, N·m.
+    coefficients: Vec<f64>,
+    p_value: f64,
+    gain: f64,
     score: f64,
+}
+
+impl Ripple {
+    /// It, accepted by a step, in the model of an arm with `dof` joints.
+    fn accepted_by(self, number: usize, dof: usize) -> Accepted {
+        let Ripple { candidate, coefficients, p_value, gain, .. } = self;
+        Accepted {
+            candidate,
+            origin: Origin::AboveBand { number, coefficients },
+            p_value,
+            fold_gain: gain,
+            explained: vec![0.0; dof],
+        }
+    }
 }
 
 fn search(study: &Study<'_>, model: &Model) -> Vec<Ripple> {
@@ -79,8 +97,8 @@ fn search(study: &Study<'_>, model: &Model) -> Vec<Ripple> {
             let joint = JointNumber::from_index(j);
             let candidate = Candidate::on(joint, Settings { order }, BINS / 2);
             let wave = Wave::of(&fitted[j], order);
-            let mut named = model.accepted.iter().chain(found.iter().map(|f| &f.accepted));
-            if named.any(|a| is_the_same(&a.candidate, &candidate)) {
+            let accepted = model.accepted.iter().map(|a| &a.candidate);
+            if accepted.chain(found.iter().map(|f| &f.candidate)).any(|c| is_the_same(c, &candidate)) {
                 fitted[j].iter_mut().for_each(|trace| trace.take_out(order, wave.coefficients));
                 continue;
             }
@@ -96,20 +114,12 @@ fn search(study: &Study<'_>, model: &Model) -> Vec<Ripple> {
             }
             let coefficients = wave.coefficients;
             fitted[j].iter_mut().for_each(|trace| trace.take_out(order, coefficients));
-            let accepted = Accepted {
-                candidate,
-                columns: 0,
-                p_value,
-                fold_gain: gain,
-                explained: vec![0.0; study.data.dof()],
-                step: None,
-                measured: Some(coefficients.to_vec()),
-            };
             let score = 2.0 * peak.height - penalty(rule, 2, BINS as f64 / 2.0);
-            if raises_error(study, model, &accepted) {
+            let ripple = Ripple { candidate, coefficients: coefficients.to_vec(), p_value, gain, score };
+            if raises_error(study, model, &ripple) {
                 break;
             }
-            found.push(Ripple { accepted, score });
+            found.push(ripple);
         }
     }
     found
@@ -124,13 +134,13 @@ fn is_the_same(a: &Candidate, b: &Candidate) -> bool {
 
 /// Whether the error on the validation set rises in the band so much that a name is taken back for it: a ripple that is
 /// there changes little.
-fn raises_error(study: &Study<'_>, model: &Model, ripple: &Accepted) -> bool {
+fn raises_error(study: &Study<'_>, model: &Model, ripple: &Ripple) -> bool {
     let joint = ripple.candidate.joints[0].index();
     let columns = study.on_validation(&model.fit, &[]).columns(&ripple.candidate);
     let square = |residual: &[Vec<f64>]| residual[joint].iter().map(|e| e * e).sum::<f64>();
     let mut residual = model.residual_on_validation(study);
     let before = square(&residual);
-    let with = columns.iter().zip(ripple.measured.iter().flatten());
+    let with = columns.iter().zip(&ripple.coefficients);
     with.for_each(|(column, c)| column.add_to(&mut residual, -c));
     square(&residual) > study.rule().max_validation_loss.exp() * before
 }

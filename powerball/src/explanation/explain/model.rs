@@ -12,16 +12,22 @@ use std::ops::Range;
 pub(super) struct Accepted {
     /// The effect with its settings.
     pub(super) candidate: Candidate,
-    /// How many columns of the fit it has.
-    pub(super) columns: usize,
+    pub(super) origin: Origin,
     pub(super) p_value: f64,
     pub(super) fold_gain: f64,
     /// Squared error that fell when it was accepted, by joint, (N·m)² summed over rows.
     pub(super) explained: Vec<f64>,
-    /// The step that accepted it; none where it is in the model from the start (see [`Effect::baseline`]).
-    pub(super) step: Option<usize>,
-    /// Its coefficients where they were measured above the band of the fit: it has no column there.
-    pub(super) measured: Option<Vec<f64>>,
+}
+
+/// How an effect came into the model, and with how many columns of the fit.
+#[derive(Clone, Debug)]
+pub(super) enum Origin {
+    /// It is in the model from the start (see [`Effect::baseline`]).
+    Baseline { columns: usize },
+    /// A step accepted it.
+    Step { number: usize, columns: usize },
+    /// A step accepted it above the band of the fit: its coefficients were measured there, and it has no columns.
+    AboveBand { number: usize, coefficients: Vec<f64> },
 }
 
 /// The model in the making.
@@ -39,6 +45,44 @@ impl Accepted {
     /// The effect.
     pub(super) fn effect(&self) -> &'static dyn Effect {
         self.candidate.effect()
+    }
+
+    /// The step that accepted it; `None` where it is in the model from the start.
+    pub(super) fn step(&self) -> Option<usize> {
+        match self.origin {
+            Origin::Baseline { .. } => None,
+            Origin::Step { number, .. } | Origin::AboveBand { number, .. } => Some(number),
+        }
+    }
+
+    /// Whether it is in the model from the start.
+    pub(super) fn is_baseline(&self) -> bool {
+        self.step().is_none()
+    }
+
+    /// How many columns of the fit it has.
+    pub(super) fn columns(&self) -> usize {
+        match self.origin {
+            Origin::Baseline { columns } | Origin::Step { columns, .. } => columns,
+            Origin::AboveBand { .. } => 0,
+        }
+    }
+
+    /// Its coefficients where they were measured above the band of the fit.
+    pub(super) fn above_band(&self) -> Option<&[f64]> {
+        match &self.origin {
+            Origin::AboveBand { coefficients, .. } => Some(coefficients),
+            Origin::Baseline { .. } | Origin::Step { .. } => None,
+        }
+    }
+
+    /// Puts another candidate of the same origin in its place, which has `count` columns of the fit.
+    pub(super) fn replace(&mut self, candidate: Candidate, count: usize) {
+        self.candidate = candidate;
+        match &mut self.origin {
+            Origin::Baseline { columns } | Origin::Step { columns, .. } => *columns = count,
+            Origin::AboveBand { .. } => {}
+        }
     }
 }
 
@@ -68,12 +112,10 @@ impl Model {
             terms.extend(columns.into_iter().map(|column| Term { column, non_negative }));
             Accepted {
                 candidate,
-                columns: count,
+                origin: Origin::Baseline { columns: count },
                 p_value: 1.0,
                 fold_gain: 0.0,
                 explained: Vec::new(),
-                step: None,
-                measured: None,
             }
         };
         let candidates = effects::all().iter().flat_map(|effect| effect.baseline(&context));
@@ -90,9 +132,9 @@ impl Model {
     }
 
     /// Takes in what was measured above the band of the fit.
-    pub(super) fn add_measured(&mut self, study: &Study<'_>, accepted: Accepted) {
+    pub(super) fn add_above_band(&mut self, study: &Study<'_>, accepted: Accepted) {
         let columns = study.on_fitted(&self.fit, &[]).columns(&accepted.candidate);
-        take_measured_out(&accepted, &columns, &mut self.fit.residual);
+        take_above_band_out(&accepted, &columns, &mut self.fit.residual);
         self.accepted.push(accepted);
     }
 
@@ -103,7 +145,7 @@ impl Model {
             let columns = context.columns(&a.candidate).into_iter();
             columns.map(move |column| Term { column, non_negative }).collect::<Vec<_>>()
         };
-        let fitted = |(k, a): &(usize, &Accepted)| Some(*k) != without && a.measured.is_none();
+        let fitted = |(k, a): &(usize, &Accepted)| Some(*k) != without && a.above_band().is_none();
         self.accepted.iter().enumerate().filter(fitted).flat_map(term).collect()
     }
 
@@ -126,17 +168,16 @@ impl Model {
     pub(super) fn places(&self) -> Vec<Range<usize>> {
         let mut first = 0;
         let place = |a: &Accepted| {
-            first += a.columns;
-            self.fit.design.extra(first - a.columns)..self.fit.design.extra(first)
+            first += a.columns();
+            self.fit.design.extra(first - a.columns())..self.fit.design.extra(first)
         };
         self.accepted.iter().map(place).collect()
     }
 
     /// The coefficients of each accepted effect.
     pub(super) fn coefficients(&self) -> Vec<Vec<f64>> {
-        let of = |(a, place): (&Accepted, Range<usize>)| {
-            a.measured.clone().unwrap_or_else(|| self.fit.theta[place].to_vec())
-        };
+        let of =
+            |(a, place): (&Accepted, Range<usize>)| a.above_band().unwrap_or(&self.fit.theta[place]).to_vec();
         self.accepted.iter().zip(self.places()).map(of).collect()
     }
 
@@ -151,7 +192,7 @@ impl Model {
     pub(super) fn own(&self) -> Vec<Own> {
         let (gram, _, _) = self.fit.gram.fitted(&self.fit.weights, |_| true);
         let share = |((a, place), coefficients): ((&Accepted, Range<usize>), Vec<f64>)| {
-            if a.measured.is_some() {
+            if a.above_band().is_some() {
                 return Own { share: 1.0, relative_std: None };
             }
             let torque = |c: usize| place.clone().zip(&coefficients).map(|(e, own)| gram[(c, e)] * own).sum();
@@ -172,8 +213,8 @@ impl Model {
     pub(super) fn residual_on_validation(&self, study: &Study<'_>) -> Vec<Vec<f64>> {
         let mut residual = self.fit.residual_on(&study.validation, &self.columns_on_validation(study));
         let context = study.on_validation(&self.fit, &[]);
-        for a in self.accepted.iter().filter(|a| a.measured.is_some()) {
-            take_measured_out(a, &context.columns(&a.candidate), &mut residual);
+        for a in self.accepted.iter().filter(|a| a.above_band().is_some()) {
+            take_above_band_out(a, &context.columns(&a.candidate), &mut residual);
         }
         residual
     }
@@ -182,7 +223,7 @@ impl Model {
     pub(super) fn columns_on_validation(&self, study: &Study<'_>) -> Vec<Column> {
         let context = study.on_validation(&self.fit, &[]);
         let columns = |a: &Accepted| context.columns(&a.candidate);
-        self.accepted.iter().filter(|a| a.measured.is_none()).flat_map(columns).collect()
+        self.accepted.iter().filter(|a| a.above_band().is_none()).flat_map(columns).collect()
     }
 
     /// Fits everything again, and asks the validation logs whether they have what is in some logs only.
@@ -213,7 +254,7 @@ impl Model {
 
 /// The fit with what was accepted; candidates move to where it fits best.
 fn fitted_again(study: &Study<'_>, accepted: &mut [Accepted], start: &Fit) -> Fit {
-    let mut own: Vec<&mut Accepted> = accepted.iter_mut().filter(|a| a.measured.is_none()).collect();
+    let mut own: Vec<&mut Accepted> = accepted.iter_mut().filter(|a| a.above_band().is_none()).collect();
     let mut candidates: Vec<Candidate> = own.iter().map(|a| a.candidate.clone()).collect();
     let mut fit =
         refitted(&study.data, &study.folds, &mut candidates, start, study.rule(), Some(&study.made));
@@ -221,15 +262,15 @@ fn fitted_again(study: &Study<'_>, accepted: &mut [Accepted], start: &Fit) -> Fi
         a.candidate = candidate;
     }
     let context = study.on_fitted(start, &[]);
-    for a in accepted.iter().filter(|a| a.measured.is_some()) {
-        take_measured_out(a, &context.columns(&a.candidate), &mut fit.residual);
+    for a in accepted.iter().filter(|a| a.above_band().is_some()) {
+        take_above_band_out(a, &context.columns(&a.candidate), &mut fit.residual);
     }
     fit
 }
 
 /// Takes the torque of what was measured above the band out of a residual.
-fn take_measured_out(a: &Accepted, columns: &[Column], residual: &mut [Vec<f64>]) {
-    for (column, coefficient) in columns.iter().zip(a.measured.iter().flatten()) {
+fn take_above_band_out(a: &Accepted, columns: &[Column], residual: &mut [Vec<f64>]) {
+    for (column, coefficient) in columns.iter().zip(a.above_band().into_iter().flatten()) {
         column.add_to(residual, -coefficient);
     }
 }

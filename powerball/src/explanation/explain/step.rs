@@ -1,11 +1,11 @@
 //! One step of the search: screen all candidates, test the groups that could be best, compare names, accept.
 
 use super::comparison::{Comparison, Question, Step, compare};
-use super::model::{Accepted, Model};
+use super::model::{Accepted, Model, Origin};
 use super::named::Rival;
 use super::search::{
     CandidateKind, Extent, Group, Member, Screen, Tester, Trial, Validation, eliminate, gains, groups,
-    is_baseline, keep_needed, level_by_chance, level_of_search,
+    keep_needed, level_by_chance, level_of_search,
 };
 use super::study::Study;
 use crate::controller::JointNumber;
@@ -165,13 +165,11 @@ pub(super) fn accept(study: &Study<'_>, model: &mut Model, choice: Choice, numbe
     for member in members {
         let Some(evidence) = member.evidence else { continue };
         model.accepted.push(Accepted {
-            columns: member.trial.columns.len(),
             candidate: member.candidate,
+            origin: Origin::Step { number, columns: member.trial.columns.len() },
             p_value: (evidence.p_value * tested).min(1.0),
             fold_gain: evidence.median_gain(),
             explained: Vec::new(),
-            step: Some(number),
-            measured: None,
         });
     }
     drop_covered(study, model, first);
@@ -197,7 +195,7 @@ fn drop_covered(study: &Study<'_>, model: &mut Model, first: usize) {
     let context = model.context(study);
     let laws = |a: &Accepted| a.effect().placed_laws(&context, &a.candidate);
     let new: Vec<Vec<Placed>> = model.accepted[first..].iter().flat_map(laws).collect();
-    let covered = |a: &Accepted| is_baseline(a) && laws(a).iter().all(|column| new.contains(column));
+    let covered = |a: &Accepted| a.is_baseline() && laws(a).iter().all(|column| new.contains(column));
     let kept: Vec<bool> = model.accepted.iter().map(|a| !covered(a)).collect();
     let mut kept = kept.into_iter();
     model.accepted.retain(|_| kept.next().unwrap_or(true));
@@ -206,7 +204,7 @@ fn drop_covered(study: &Study<'_>, model: &mut Model, first: usize) {
 /// Takes out the names that a law without a name has made small on its joints: they were words for a part of
 /// it.
 fn drop_words_for(study: &Study<'_>, model: &mut Model, number: usize) {
-    let laws: Vec<Accepted> = model.accepted.iter().filter(|a| a.step == Some(number)).cloned().collect();
+    let laws: Vec<Accepted> = model.accepted.iter().filter(|a| a.step() == Some(number)).cloned().collect();
     let word = |(a, gain): (&Accepted, f64)| {
         let on = |law: &&Accepted| a.candidate.is_on(&law.candidate.joints);
         let explained = |law: &Accepted| -> f64 {
@@ -217,7 +215,7 @@ fn drop_words_for(study: &Study<'_>, model: &mut Model, number: usize) {
     };
     let gains = gains(model);
     let gone: Vec<bool> = (model.accepted.iter().zip(gains))
-        .map(|(a, gain)| a.effect().has_name() && a.step.is_some() && word((a, gain)))
+        .map(|(a, gain)| a.effect().has_name() && !a.is_baseline() && word((a, gain)))
         .collect();
     if gone.contains(&true) {
         let mut gone = gone.into_iter();
@@ -230,7 +228,7 @@ fn drop_words_for(study: &Study<'_>, model: &mut Model, number: usize) {
 
 /// The same for all laws, once their settings are what fits best.
 pub(super) fn drop_words(study: &Study<'_>, model: &mut Model) {
-    let law = |a: &Accepted| a.step.filter(|_| !a.effect().has_name());
+    let law = |a: &Accepted| a.step().filter(|_| !a.effect().has_name());
     let steps: Vec<usize> = model.accepted.iter().filter_map(law).collect();
     if !steps.is_empty() {
         steps.into_iter().for_each(|number| drop_words_for(study, model, number));
@@ -243,7 +241,7 @@ pub(super) fn drop_words(study: &Study<'_>, model: &mut Model) {
 pub(super) fn judge_baseline(study: &Study<'_>, model: &mut Model) -> Vec<Step> {
     keep_needed(study, model);
     let mut effects: Vec<&'static dyn Effect> = Vec::new();
-    for a in model.accepted.iter().filter(|a| is_baseline(a)) {
+    for a in model.accepted.iter().filter(|a| a.is_baseline()) {
         if !effects.contains(&a.effect()) {
             effects.push(a.effect());
         }
@@ -257,7 +255,7 @@ pub(super) fn judge_baseline(study: &Study<'_>, model: &mut Model) -> Vec<Step> 
 }
 
 fn name_beside(study: &Study<'_>, model: &mut Model, effect: &'static dyn Effect, number: usize) -> Step {
-    let own = |a: &Accepted| is_baseline(a) && a.effect() == effect;
+    let own = |a: &Accepted| a.is_baseline() && a.effect() == effect;
     let which: Vec<usize> = (0..model.accepted.len()).filter(|k| own(&model.accepted[*k])).collect();
     let after = residual_stats(&study.validation, &model.residual_on_validation(study)).rms;
     let fitted: Vec<Accepted> = model.accepted.clone();
@@ -287,7 +285,10 @@ fn name_beside(study: &Study<'_>, model: &mut Model, effect: &'static dyn Effect
     let before = residual_stats(&study.validation, &model.residual_on_validation(study)).rms;
     let square_before = model.fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect();
     model.accepted = fitted;
-    which.iter().for_each(|k| model.accepted[*k].step = Some(number));
+    which.iter().for_each(|k| {
+        let columns = model.accepted[*k].columns();
+        model.accepted[*k].origin = Origin::Step { number, columns };
+    });
     model.refit(study);
     Step { number, effect, square_before, comparison, question: None, before, after }
 }

@@ -31,7 +31,7 @@ pub(crate) fn withhold(study: &Study<'_>, model: &mut Model, history: &mut Histo
         (vec![model.accepted.remove(a)], HARMS)
     } else {
         let step = history.steps.iter().rev().find(|s| is_weak(study, model, s))?.number;
-        let taken = model.accepted.extract_if(.., |a| a.step == Some(step)).collect();
+        let taken = model.accepted.extract_if(.., |a| a.step() == Some(step)).collect();
         (taken, "others fit as well and much is left")
     };
     take_back(study, model, history, taken, why)
@@ -63,13 +63,13 @@ fn take_back(
     taken: Vec<Accepted>,
     why: &'static str,
 ) -> Option<Withheld> {
-    let Accepted { step, .. } = *taken.first()?;
+    let step = taken.first()?.step();
     let effect = taken.first()?.effect();
     // What was found beside it on its joints may be there because of it, and is asked again.
     let joints: Vec<JointNumber> = taken.iter().flat_map(|a| a.candidate.joints.clone()).collect();
-    model.accepted.retain(|a| a.step <= step || !a.candidate.is_on(&joints));
+    model.accepted.retain(|a| a.step() <= step || !a.candidate.is_on(&joints));
     model.given_up.extend(taken.into_iter().map(|a| a.candidate));
-    let stands = |s: &Step| model.accepted.iter().any(|a| a.step == Some(s.number));
+    let stands = |s: &Step| model.accepted.iter().any(|a| a.step() == Some(s.number));
     let gone = history.steps.extract_if(.., |s| !stands(s));
     history.questions.extend(gone.filter_map(|s| s.question).map(Question::withheld));
     model.refit(study);
@@ -92,7 +92,7 @@ fn harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
     };
     let all: Vec<JointNumber> = (0..study.data.dof()).map(JointNumber::from_index).collect();
     let with = model.residual_on_validation(study);
-    let found = (0..model.accepted.len()).rev().filter(|k| model.accepted[*k].step.is_some());
+    let found = (0..model.accepted.len()).rev().filter(|k| !model.accepted[*k].is_baseline());
     found.into_iter().find(|k| {
         let joints = &model.accepted[*k].candidate.joints;
         let without = model.without(study, *k).residual_on_validation(study);
@@ -105,7 +105,7 @@ fn harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
 /// Whether a step's name is not told apart from others and leaves much.
 fn is_weak(study: &Study<'_>, model: &Model, step: &Step) -> bool {
     step.comparison.distinct_margin < study.rule().least_margin
-        && model.accepted.iter().any(|a| a.step == Some(step.number))
+        && model.accepted.iter().any(|a| a.step() == Some(step.number))
         && share_left(study, model, step) > study.rule().max_unexplained
 }
 
@@ -166,7 +166,7 @@ pub(crate) fn inconstant(study: &Study<'_>, model: &Model) -> Option<usize> {
         let least = rule.least_missing.max(rule.missing_errors * error);
         (least..2.0 - rule.least_missing).contains(&-change)
     };
-    let judged = |a: &usize| model.accepted[*a].step.is_some() && !model.accepted[*a].effect().abrupt();
+    let judged = |a: &usize| !model.accepted[*a].is_baseline() && !model.accepted[*a].effect().abrupt();
     (0..sizes.len()).rev().filter(judged).find(|a| sizes[*a].iter().any(missing))
 }
 

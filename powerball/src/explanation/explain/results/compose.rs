@@ -104,7 +104,7 @@ fn parts(study: &Study<'_>, found: &Model, validation_only: &[ValidationOnlyEffe
     let (errors, places) = (found.errors(), found.places());
     for (k, (a, coefficients)) in found.accepted.iter().zip(found.coefficients()).enumerate() {
         // What was measured above the band has no column.
-        let error = |c: usize| errors(places[k].start + c).filter(|_| a.measured.is_none());
+        let error = |c: usize| errors(places[k].start + c).filter(|_| a.above_band().is_none());
         let (effect, candidate) = (a.effect(), &a.candidate);
         let add = |to: &mut [f64], by: f64| candidate.joints.iter().for_each(|j| to[j.index()] += by);
         let part = effect.part(&context, candidate, &coefficients);

@@ -91,7 +91,7 @@ fn named_effects(
 ) -> Vec<NamedEffect> {
     let mut order: Vec<&'static dyn Effect> = Vec::new();
     let mut accepted: Vec<&Accepted> = model.accepted.iter().collect();
-    accepted.sort_by_key(|a| a.step);
+    accepted.sort_by_key(|a| a.step());
     for effect in accepted.into_iter().map(Accepted::effect).filter(|effect| effect.has_name()) {
         if !order.contains(&effect) {
             order.push(effect);

@@ -72,7 +72,7 @@ pub(crate) fn laws(study: &Study<'_>, model: &Model, steps: &[Step]) -> Vec<Unna
         let formula = figures.formulas.into_iter().next()?;
         let without =
             residual_stats(&study.validation, &model.without(study, k).residual_on_validation(study)).rms;
-        let step = steps.iter().find(|step| Some(step.number) == a.step);
+        let step = steps.iter().find(|step| Some(step.number) == a.step());
         let coefficient = |(n, (value, unit)): (usize, (&f64, &'static str))| LawCoefficient {
             name: format!("c{}", n + 1),
             value: *value,

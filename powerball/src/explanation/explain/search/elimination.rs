@@ -2,7 +2,7 @@
 //!
 //! Also here: what is in the model from the start.
 
-use super::super::model::{Accepted, Model};
+use super::super::model::{Model, Origin};
 use super::super::study::Study;
 use super::cross_validation::CrossValidation;
 use super::evidence::{Evidence, Extent, Validation, evidence, log_change};
@@ -21,8 +21,7 @@ pub(crate) fn eliminate(study: &Study<'_>, model: &mut Model) {
             model.accepted.remove(weakest);
         } else if let Some((k, part)) = more_than_needed(study, model) {
             let accepted = &mut model.accepted[k];
-            accepted.columns = 1;
-            accepted.step = None;
+            accepted.origin = Origin::Baseline { columns: 1 };
             let whole = mem::replace(&mut accepted.candidate, part);
             model.given_up.push(whole);
         } else {
@@ -42,7 +41,7 @@ fn more_than_needed(study: &Study<'_>, model: &Model) -> Option<(usize, Candidat
         .flat_map(|effect| effect.baseline(&context))
         .filter_map(|part| Some((part.clone(), laws(&part).pop()?)))
         .collect();
-    let found = model.accepted.iter().zip(model.places()).enumerate().filter(|(_, (a, _))| a.step.is_some());
+    let found = model.accepted.iter().zip(model.places()).enumerate().filter(|(_, (a, _))| !a.is_baseline());
     for (k, (a, place)) in found {
         let whole = laws(&a.candidate);
         let Some((part, law)) = parts.iter().find(|(_, law)| whole.len() > 1 && whole.contains(law)) else {
@@ -63,9 +62,9 @@ fn weakest(study: &Study<'_>, model: &Model) -> Option<usize> {
     let rule = study.rule();
     let mut weakest: Option<(usize, f64)> = None;
     // What is in the model from the start stays until everything else is known.
-    let found = model.accepted.iter().enumerate().zip(gains(model)).filter(|((_, a), _)| a.step.is_some());
+    let found = model.accepted.iter().enumerate().zip(gains(model)).filter(|((_, a), _)| !a.is_baseline());
     for ((k, a), gain) in found {
-        let score = gain - penalty(rule, a.columns, a.candidate.searched);
+        let score = gain - penalty(rule, a.columns(), a.candidate.searched);
         if score < rule.least_score && weakest.is_none_or(|(_, w)| score < w) {
             weakest = Some((k, score));
         }
@@ -118,7 +117,7 @@ pub(crate) fn keep_needed(study: &Study<'_>, model: &mut Model) {
     let mut risen = [0.0; 2];
     loop {
         let baseline: Vec<usize> =
-            (0..model.accepted.len()).filter(|k| is_baseline(&model.accepted[*k])).collect();
+            (0..model.accepted.len()).filter(|k| model.accepted[*k].is_baseline()).collect();
         let mut found: Vec<Needed> = Vec::new();
         let mut useless = None;
         for &place in &baseline {
@@ -145,11 +144,6 @@ pub(crate) fn keep_needed(study: &Study<'_>, model: &mut Model) {
         model.accepted.remove(out);
         model.refit(study);
     }
-}
-
-/// Whether something was in the model from the start.
-pub(crate) fn is_baseline(accepted: &Accepted) -> bool {
-    accepted.step.is_none()
 }
 
 fn needed(study: &Study<'_>, model: &Model, place: usize) -> Option<Needed> {

@@ -251,7 +251,7 @@ fn would_absorb(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<&
         let explained = a.explained.get(joint.index()).copied().unwrap_or(0.0);
         part && trial.gain < share / (1.0 - share) * explained * model.fit.weights[joint.index()]
     };
-    model.accepted.iter().filter(|a| a.step.is_some()).find(swallowed).map(Accepted::effect).map(|e| e.name())
+    model.accepted.iter().filter(|a| !a.is_baseline()).find(swallowed).map(Accepted::effect).map(|e| e.name())
 }
 
 fn is_ruled_out(study: &Study<'_>, candidate: &Candidate) -> bool {

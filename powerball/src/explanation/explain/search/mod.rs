@@ -17,7 +17,7 @@ mod screen;
 mod surrogates;
 
 pub(super) use cross_validation::CrossValidation;
-pub(super) use elimination::{eliminate, gains, is_baseline, keep_needed};
+pub(super) use elimination::{eliminate, gains, keep_needed};
 pub(super) use evidence::{Extent, Validation, evidence, refusal, validation_gain};
 pub(super) use groups::{CandidateKind, Group, Member, Tester, groups, is_left};
 pub(super) use refinement::refine;

@@ -40,7 +40,7 @@ pub(crate) fn refine(study: &Study<'_>, model: &mut Model) {
         };
         let (before, old) = (error(model), model.accepted.clone());
         for (k, candidate, columns) in moved {
-            (model.accepted[k].candidate, model.accepted[k].columns) = (candidate, columns);
+            model.accepted[k].replace(candidate, columns);
         }
         model.refit(study);
         // Moved together they may disturb each other.
