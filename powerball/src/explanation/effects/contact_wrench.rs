@@ -162,7 +162,7 @@ fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
     let mut before = vec![Sums::zero(&solver, 3)];
     for step in &steps {
         let mut sum = before[before.len() - 1].clone();
-        sum.add(&Sums::of_block(context, &solver, columns, step), 1.0);
+        sum.add(&Sums::of_block(context, &solver, columns, step));
         before.push(sum);
     }
     let mut searched = 0.0;
@@ -172,7 +172,7 @@ fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
             return;
         }
         let mut sums = before[window.end].clone();
-        sums.add(&before[window.start], -1.0);
+        sums.subtract(&before[window.start]);
         searched += 1.0;
         let (gain, force) = sums.gain();
         if gain > best.as_ref().map_or(0.0, |(g, _)| *g) && force.iter().all(|f| f.abs() < MOST) {

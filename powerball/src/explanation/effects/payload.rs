@@ -320,7 +320,7 @@ impl Search {
         let mut before = vec![empty.clone()];
         for step in steps {
             let mut sum = before[before.len() - 1].clone();
-            sum.add(&Sums::of_block(context, base, columns, step), 1.0);
+            sum.add(&Sums::of_block(context, base, columns, step));
             before.push(sum);
         }
         Search { before, found: empty, coefficients: Vec::new(), explained: 0.0, searched: 0.0, positive }
@@ -329,8 +329,8 @@ impl Search {
     /// What was found and a run of steps, summed.
     fn with(&self, run: &Range<usize>) -> Sums {
         let mut sum = self.found.clone();
-        sum.add(&self.before[run.end], 1.0);
-        sum.add(&self.before[run.start], -1.0);
+        sum.add(&self.before[run.end]);
+        sum.subtract(&self.before[run.start]);
         sum
     }
 

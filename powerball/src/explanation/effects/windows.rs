@@ -3,7 +3,7 @@
 //! Also here: cross products of a few columns with the base by stretch of time.
 
 use super::{Context, Window};
-use crate::identification::estimate::Solver;
+use crate::identification::estimate::{Added, Solver};
 use crate::logs::regression::{Block, Column, Recording};
 use crate::logs::vector::dot;
 use faer::Mat;
@@ -131,78 +131,42 @@ fn end_of_log(context: &Context<'_>, log: usize) -> f64 {
 // Cross products of a few columns with the base by stretch of time: any window is then a sum. What a known
 // torque explains of a stretch.
 
-/// Weighted cross products of k columns over some rows.
+/// Products of a few columns over some rows, with L⁻¹ A'C in place of A'C, L the base's factor (see
+/// [`Solver::whitened`]): that is linear in the rows, so that a window costs no solve.
 #[derive(Clone, Debug)]
-pub(super) struct Sums {
-    k: usize,
-    /// L⁻¹ A'C, L the base's factor: by column of C (see [`Solver::whitened`]). It is linear in the rows, so that a
-    /// window costs no solve.
-    cross: Vec<Vec<f64>>,
-    /// C'C, k × k.
-    square: Vec<f64>,
-    /// C'r.
-    score: Vec<f64>,
-}
+pub(super) struct Sums(Added);
 
 impl Sums {
     pub(super) fn zero(base: &Solver, k: usize) -> Sums {
-        Sums {
-            k,
-            cross: vec![vec![0.0; base.kept().len()]; k],
-            square: vec![0.0; k * k],
-            score: vec![0.0; k],
-        }
+        Sums(Added::zero(base.kept().len(), k))
     }
 
     /// The sums over one block.
     pub(super) fn of_block(context: &Context<'_>, base: &Solver, columns: &[Column], block: &Block) -> Sums {
-        let (fit, k) = (context.fit, columns.len());
-        let mut sums = Sums::zero(base, k);
-        let mut cross = vec![vec![0.0; fit.design.size]; k];
+        let fit = context.fit;
+        let mut products = Added::zero(fit.design.size, columns.len());
         for (j, rows) in block.rows.iter().enumerate() {
-            let w = fit.weights[j];
-            let parts: Vec<&[f64]> = columns.iter().filter_map(|c| c.at(j)).collect();
-            if rows.is_empty() || w == 0.0 || parts.len() < k {
-                continue;
-            }
-            for (g, values) in fit.design.cross(j, rows, &parts) {
-                for c in 0..k {
-                    cross[c][g] += w * values[c];
-                }
-            }
-            let over = |a: &[f64], b: &[f64]| dot(&a[rows.clone()], &b[rows.clone()]);
-            for a in 0..k {
-                for b in 0..k {
-                    sums.square[a * k + b] += w * over(parts[a], parts[b]);
-                }
-                sums.score[a] += w * over(parts[a], &context.residual[j]);
-            }
+            products.add_rows(&fit.design, (j, rows), columns, &context.residual[j], fit.weights[j]);
         }
-        sums.cross = cross.iter().map(|c| base.whitened(c)).collect();
-        sums
+        products.cross.iter_mut().for_each(|c| *c = base.whitened(c));
+        Sums(products)
     }
 
-    pub(super) fn add(&mut self, other: &Sums, sign: f64) {
-        let add = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| *t += sign * f);
-        self.cross.iter_mut().zip(&other.cross).for_each(|(to, from)| add(to, from));
-        add(&mut self.square, &other.square);
-        add(&mut self.score, &other.score);
+    pub(super) fn add(&mut self, other: &Sums) {
+        self.0.add(&other.0, 1.0);
+    }
+
+    pub(super) fn subtract(&mut self, other: &Sums) {
+        self.0.add(&other.0, -1.0);
     }
 
     /// χ² that the columns explain over these rows with the base refitted, and their coefficients.
     pub(super) fn gain(&self) -> (f64, Vec<f64>) {
-        let k = self.k;
-        let mut gram = Mat::zeros(k, k);
-        for i in 0..k {
-            for c in 0..k {
-                let shared = dot(&self.cross[i], &self.cross[c]);
-                gram[(i, c)] = self.square[i * k + c] - shared;
-            }
-        }
-        // What the base takes over almost wholly says nothing.
-        let solver = Solver::new(&gram, |i| gram[(i, i)] > 1e-6 * self.square[i * k + i]);
-        let x = solver.solve(&self.score);
-        (dot(&x, &self.score), x)
+        let Added { cross, square, right } = &self.0;
+        let k = right.len();
+        let rest = Mat::from_fn(k, k, |a, b| square[(a, b)] - dot(&cross[a], &cross[b]));
+        let x = self.0.solver(&rest).solve(right);
+        (dot(&x, right), x)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Weighted least squares in the minimal set, friction shapes included, with honest standard errors.
 
+mod added;
 mod band;
 mod consistent;
 mod design;
@@ -17,6 +18,7 @@ mod uncertainty;
 mod variable_projection;
 mod verdict;
 
+pub use added::Added;
 pub use band::{InBand, bands_of, reduce_in_bands, solve_in_band};
 pub use consistent::{Consistent, ConsistentFit, ConsistentReport, TorqueMetric, consistent_fit, nearest};
 pub use design::{Design, Folds, Gram, runs};

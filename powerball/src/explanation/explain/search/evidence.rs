@@ -200,8 +200,7 @@ fn event_gains(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) ->
     let mut parts = vec![(Mat::<f64>::zeros(k, k), vec![0.0; k], 0.0); EVENT_PARTS];
     for j in 0..fit.design.dof() {
         let (w, residual) = (fit.weights[j], &screen.context.residual[j]);
-        let Some(values) = trial.columns[0].at(j) else { continue };
-        let rows: Vec<usize> = (0..values.len())
+        let rows: Vec<usize> = (0..residual.len())
             .filter(|i| trial.columns.iter().any(|c| c.at(j).is_some_and(|v| v[*i] != 0.0)))
             .collect();
         for (n, i) in rows.iter().enumerate() {

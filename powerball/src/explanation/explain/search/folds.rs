@@ -4,41 +4,9 @@
 
 use super::screen::{Screen, Trial};
 use crate::controller::JointNumber;
-use crate::identification::estimate::{Fit, Folds, Solver, runs};
+use crate::identification::estimate::{Added, Fit, Folds, Solver, runs};
 use crate::logs::vector::dot;
 use faer::Mat;
-
-/// A candidate's weighted cross products in one cell, all joints together.
-#[derive(Clone, Debug)]
-struct Cross {
-    /// A'C by column of C.
-    base: Vec<Vec<f64>>,
-    /// C'C.
-    square: Vec<f64>,
-    /// C'y.
-    right: Vec<f64>,
-}
-
-impl Cross {
-    fn zero(size: usize, k: usize) -> Cross {
-        Cross { base: vec![vec![0.0; size]; k], square: vec![0.0; k * k], right: vec![0.0; k] }
-    }
-
-    /// The sum over some cells; a difference from all of them would leave rounding where nothing is left.
-    fn sum<'c>(cells: impl Iterator<Item = &'c Cross>, size: usize, k: usize) -> Cross {
-        cells.fold(Cross::zero(size, k), |mut sum, cell| {
-            sum.add(cell);
-            sum
-        })
-    }
-
-    fn add(&mut self, other: &Cross) {
-        let add = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| *t += f);
-        self.base.iter_mut().zip(&other.base).for_each(|(t, f)| add(t, f));
-        add(&mut self.square, &other.square);
-        add(&mut self.right, &other.right);
-    }
-}
 
 /// Share by which the held-out squared error of the given joints falls with a candidate, by fold; the base
 /// and the candidate are fitted to the rest.
@@ -52,33 +20,20 @@ pub(crate) fn fold_gains(
 ) -> Vec<f64> {
     let (data, fit) = (screen.context.data, screen.context.fit);
     let (size, k) = (fit.design.size, trial.columns.len());
-    let mut cells: Vec<Option<Cross>> = vec![None; folds.cells];
-    for j in 0..fit.design.dof() {
-        let parts: Vec<&[f64]> = trial.columns.iter().filter_map(|c| c.at(j)).collect();
-        let w = fit.weights[j];
-        if parts.len() < k || w == 0.0 {
-            continue;
-        }
+    let mut cells: Vec<Option<Added>> = vec![None; folds.cells];
+    for j in screen.joints_of(&trial.columns) {
         for (cell, rows) in runs(data, folds, j) {
-            let cross = cells[cell].get_or_insert_with(|| Cross::zero(size, k));
-            for (g, values) in fit.design.cross(j, &rows, &parts) {
-                for c in 0..k {
-                    cross.base[c][g] += w * values[c];
-                }
-            }
-            let y = &data.joints[j].torque[rows.clone()];
-            for a in 0..k {
-                let own = &parts[a][rows.clone()];
-                for b in 0..k {
-                    cross.square[a * k + b] += w * dot(own, &parts[b][rows.clone()]);
-                }
-                cross.right[a] += w * dot(own, y);
-            }
+            let cell = cells[cell].get_or_insert_with(|| Added::zero(size, k));
+            cell.add_rows(&fit.design, (j, &rows), &trial.columns, &data.joints[j].torque, fit.weights[j]);
         }
     }
+    // A difference from the sum over all cells would leave rounding where nothing is left.
     let sum = |wanted: &dyn Fn(usize) -> bool| {
         let own = cells.iter().enumerate().filter(|(cell, _)| wanted(*cell));
-        Cross::sum(own.filter_map(|(_, cross)| cross.as_ref()), size, k)
+        own.filter_map(|(_, products)| products.as_ref()).fold(Added::zero(size, k), |mut sum, cell| {
+            sum.add(cell, 1.0);
+            sum
+        })
     };
     screen
         .folds(folds, local)
@@ -87,33 +42,28 @@ pub(crate) fn fold_gains(
             let scale: f64 = joints.iter().map(|j| fold.error[j.index()]).sum();
             let fitted = sum(&|cell| !fold.left_out.contains(&cell));
             let held = sum(&|cell| fold.held.contains(&cell));
-            (scale > 0.0).then(|| change(fold, &fitted, &held, k) / scale)
+            (scale > 0.0).then(|| change(fold, &fitted, &held) / scale)
         })
         .collect()
 }
 
 /// By how much the held squared error falls.
-fn change(fold: &FoldBase, fitted: &Cross, held: &Cross, k: usize) -> f64 {
-    let base: Vec<Vec<f64>> = fitted.base.iter().map(|c| fold.solver.solve(c)).collect();
-    let mut gram = Mat::<f64>::zeros(k, k);
-    for a in 0..k {
-        for b in 0..k {
-            gram[(a, b)] = fitted.square[a * k + b] - dot(&fitted.base[a], &base[b]);
-        }
-    }
-    let right: Vec<f64> = (0..k).map(|a| fitted.right[a] - dot(&fitted.base[a], &fold.theta)).collect();
-    let x = Solver::new(&gram, |a| gram[(a, a)] > 1e-6 * fitted.square[a * k + a]).solve(&right);
+fn change(fold: &FoldBase, fitted: &Added, held: &Added) -> f64 {
+    let (base, rest) = fitted.without_base(&fold.solver);
+    let right: Vec<f64> =
+        fitted.right.iter().zip(&fitted.cross).map(|(own, cross)| own - dot(cross, &fold.theta)).collect();
+    let x = fitted.solver(&rest).solve(&right);
     // What the candidate adds to the prediction: C x − A s.
     let mut shift = vec![0.0; fold.theta.len()];
     for (b, x) in base.iter().zip(&x) {
         shift.iter_mut().zip(b).for_each(|(s, b)| *s += x * b);
     }
     let mut change = -2.0 * dot(&shift, &fold.slope);
-    for a in 0..k {
-        change += 2.0 * x[a] * (held.right[a] - dot(&held.base[a], &fold.theta));
-        change += 2.0 * x[a] * dot(&held.base[a], &shift);
-        for b in 0..k {
-            change -= x[a] * x[b] * held.square[a * k + b];
+    for a in 0..x.len() {
+        change += 2.0 * x[a] * (held.right[a] - dot(&held.cross[a], &fold.theta));
+        change += 2.0 * x[a] * dot(&held.cross[a], &shift);
+        for b in 0..x.len() {
+            change -= x[a] * x[b] * held.square[(a, b)];
         }
     }
     change - (0..shift.len()).map(|i| shift[i] * times(&fold.gram, i, &shift)).sum::<f64>()

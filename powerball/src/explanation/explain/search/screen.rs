@@ -4,10 +4,9 @@ use super::folds::FoldBase;
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Candidate, Context};
 use crate::explanation::rule::Rule;
-use crate::identification::estimate::{Folds, Solver};
+use crate::identification::estimate::{Added, Folds, Solver};
 use crate::logs::regression::Column;
 use crate::logs::vector::dot;
-use faer::Mat;
 use std::ops::Range;
 use std::sync::OnceLock;
 
@@ -39,17 +38,6 @@ pub(crate) struct Trial {
     pub(crate) gain: f64,
     /// Gain after penalties for coefficients and search.
     pub(crate) score: f64,
-}
-
-/// Weighted products of a candidate's columns.
-#[derive(Clone, Debug)]
-pub(super) struct Products {
-    /// By column: with the columns of the base.
-    pub(super) cross: Vec<Vec<f64>>,
-    /// With each other, the lower triangle.
-    pub(super) square: Mat<f64>,
-    /// By column: with the residual.
-    pub(super) score: Vec<f64>,
 }
 
 /// What columns explain beside the base; a [`Trial`] without its columns.
@@ -122,52 +110,27 @@ impl<'c> Screen<'c> {
     pub(super) fn joints_of(&self, columns: &[Column]) -> impl Iterator<Item = usize> {
         let fit = self.context.fit;
         (0..fit.design.dof())
-            .filter(move |j| fit.weights[*j] != 0.0 && columns.iter().all(|c| c.at(*j).is_some()))
+            .filter(move |j| fit.weights[*j] != 0.0 && columns.iter().any(|c| c.at(*j).is_some()))
     }
 
     /// The products of columns with the base, with each other and with the residual.
-    pub(super) fn products(&self, columns: &[Column]) -> Products {
+    pub(super) fn products(&self, columns: &[Column]) -> Added {
         let fit = self.context.fit;
-        let k = columns.len();
-        let mut cross = vec![vec![0.0; fit.design.size]; k];
-        let (mut square, mut score) = (Mat::<f64>::zeros(k, k), vec![0.0; k]);
-        for j in self.joints_of(columns) {
-            let parts: Vec<&[f64]> = columns.iter().filter_map(|c| c.at(j)).collect();
-            let w = fit.weights[j];
-            let residual = &self.context.residual[j];
-            for (g, values) in fit.design.cross(j, &(0..residual.len()), &parts) {
-                for c in 0..k {
-                    cross[c][g] += w * values[c];
-                }
-            }
-            for a in 0..k {
-                for b in 0..=a {
-                    square[(a, b)] += w * dot(parts[a], parts[b]);
-                }
-                score[a] += w * dot(parts[a], residual);
-            }
+        let mut products = Added::zero(fit.design.size, columns.len());
+        for (j, residual) in self.context.residual.iter().enumerate() {
+            products.add_rows(&fit.design, (j, &(0..residual.len())), columns, residual, fit.weights[j]);
         }
-        Products { cross, square, score }
+        products
     }
 
     /// What columns explain beside the base, from their products.
-    pub(super) fn solve(&self, products: &Products, searched: f64) -> Option<Solved> {
-        let Products { cross, square, score } = products;
-        let (mut square, mut score) = (square.clone(), score.clone());
-        let k = cross.len();
-        let base: Vec<Vec<f64>> = cross.iter().map(|c| self.solver.solve(c)).collect();
-        let raw: Vec<f64> = (0..k).map(|a| square[(a, a)]).collect();
-        for a in 0..k {
-            for b in 0..=a {
-                square[(a, b)] -= dot(&cross[a], &base[b]);
-                square[(b, a)] = square[(a, b)];
-            }
-            score[a] -= dot(&base[a], &self.slope);
-        }
+    pub(super) fn solve(&self, products: &Added, searched: f64) -> Option<Solved> {
+        let (base, rest) = products.without_base(&self.solver);
+        let score: Vec<f64> =
+            products.right.iter().zip(&base).map(|(own, shares)| own - dot(shares, &self.slope)).collect();
         // A column that the base can imitate wholly is no candidate; nor is one that this arm never feels, as
         // a planar arm a force across its plane.
-        let new = |a: usize| square[(a, a)] > 1e-6 * raw[a];
-        let solver = Solver::new(&square, new);
+        let solver = products.solver(&rest);
         if solver.kept().is_empty() {
             return None;
         }

@@ -8,9 +8,10 @@ use super::super::named::FalsePositives;
 use super::super::study::Study;
 use super::evidence::{Extent, evidence, refusal};
 use super::groups::{CandidateKind, groups};
-use super::screen::{Products, Screen, Trial};
+use super::screen::{Screen, Trial};
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Context, Effect};
+use crate::identification::estimate::Added;
 use crate::logs::parallel;
 use crate::logs::regression::{Column, JointRows};
 use rand::{RngExt, SeedableRng};
@@ -71,7 +72,7 @@ fn draw(screen: &Screen<'_>, trials: &[&Trial], count: usize, seed: u64) -> Vec<
         let mut outcomes: Vec<Option<Surrogate>> =
             unlike.iter().filter(|shift| shift.is_none()).map(|_| None).collect();
         let shifts: Vec<Shift> = unlike.into_iter().flatten().collect();
-        let asked: Vec<(Shift, Products)> =
+        let asked: Vec<(Shift, Added)> =
             shifts.iter().cloned().zip(products(screen, columns, &shifts)).collect();
         outcomes.extend(parallel::map(&asked, |(shift, products)| {
             let score = screen.solve(products, 1.0)?.score;
@@ -241,7 +242,7 @@ fn likeness(column: &Column, joints: &[JointRows], shifts: &[Shift]) -> Vec<Like
 }
 
 /// The products of the shifted columns with the base, with each other and with the residual, by shift.
-pub(super) fn products(screen: &Screen<'_>, columns: &[Column], shifts: &[Shift]) -> Vec<Products> {
+pub(super) fn products(screen: &Screen<'_>, columns: &[Column], shifts: &[Shift]) -> Vec<Added> {
     let (fit, data) = (screen.context.fit, screen.context.data);
     let joints: Vec<usize> = screen.joints_of(columns).collect();
     // By column and shift: with the base, and, last, with the residual.
@@ -270,8 +271,8 @@ pub(super) fn products(screen: &Screen<'_>, columns: &[Column], shifts: &[Shift]
             let (cross, score) = sums[s].split_at(fit.design.size);
             (cross.to_vec(), score[0])
         };
-        let (cross, score) = by_column.iter().map(split).unzip();
-        Products { cross, score, square: square.clone() }
+        let (cross, right) = by_column.iter().map(split).unzip();
+        Added { cross, right, square: square.clone() }
     };
     (0..shifts.len()).map(of).collect()
 }
@@ -358,7 +359,7 @@ mod tests {
                     close(fast.square[(a, a)], slow.square[(a, a)], size * size);
                     let residual = (context.residual.iter().zip(&context.fit.weights))
                         .map(|(r, w)| w * r.iter().map(|v| v * v).sum::<f64>());
-                    close(fast.score[a], slow.score[a], size * residual.sum::<f64>().sqrt());
+                    close(fast.right[a], slow.right[a], size * residual.sum::<f64>().sqrt());
                 }
             }
         }
