@@ -49,7 +49,7 @@ fn called_from_cpp(arm: &str, model: &str) -> Option<PathBuf> {
 fn disagreement(program: &Path, data: &Data<'_>, explained: &Explained) -> Vec<f64> {
     let n = data.dof();
     let mut input = String::new();
-    for recording in &data.recordings {
+    for recording in data.recordings.iter() {
         for k in 0..recording.len() {
             for signal in [&recording.q, &recording.v, &recording.a] {
                 signal[k * n..(k + 1) * n].iter().for_each(|x| write!(input, "{x:?},").unwrap());

@@ -5,7 +5,7 @@
 use super::model::Model;
 use super::named::FitErrors;
 use super::search::CrossValidation;
-use super::special::{Clock, ValidationOnlyEffect, choose_clock, repeats, validation_only_effects};
+use super::special::{Baseline, Clock, ValidationOnlyEffect, choose_clock, repeats, validation_only_effects};
 use super::study::Study;
 use crate::explanation::effects::Made;
 use crate::explanation::options::{ExplainError, ExplainOptions};
@@ -62,25 +62,28 @@ pub(super) fn prepare<'a>(
 ) -> Result<Prepared<'a>, ExplainError> {
     let rule = &options.rule;
     let (mut data, mut validation) = in_own_bands(body, (logs, validate), options)?;
-    data.set_per_joint(inertia == Inertia::PerJoint);
-    validation.set_per_joint(inertia == Inertia::PerJoint);
+    if inertia == Inertia::PerJoint {
+        (data, validation) = (data.per_joint_fit(), validation.per_joint_fit());
+    }
     options.progress.say("fitting the base model");
     let folds = Folds::new(&data);
-    let mut base = fit(&data, &folds, &[], None);
+    let base = fit(&data, &folds, &[], None);
     let residual = base.residual_on(&validation, &[]);
     let errors = FitErrors {
         fit: residual_stats(&data, &base.residual),
         validate: residual_stats(&validation, &residual),
     };
-    let found = match (inertia, validation_only) {
-        (Inertia::PerJoint, _) | (_, ValidationOnly::Kept) => Vec::new(),
+    let baseline = Baseline { data, validation, base };
+    let (Baseline { data, validation, base }, found) = match (inertia, validation_only) {
+        (Inertia::PerJoint, _) | (_, ValidationOnly::Kept) => (baseline, Vec::new()),
         (Inertia::Shared, ValidationOnly::TakenOut) => {
-            validation_only_effects(body, (logs, validate), options, &mut base, (&mut data, &mut validation))
+            validation_only_effects(body, (logs, validate), options, baseline)
                 .map_err(ExplainError::Validate)?
         }
     };
     let one_path = repeats(rule, &data, &validation);
-    let clock = choose_clock(rule, logs, validate, &mut data, &base, &mut validation);
+    let (clock, sets) = choose_clock(rule, logs, validate, &base, (&data, &validation));
+    let [data, validation] = sets.unwrap_or([data, validation]);
     let [made, made_on_validation] = [Made::default(), Made::default()];
     let study = Study { data, made, validation, made_on_validation, folds, one_path, options };
     Ok(Prepared { study, base, initial_fit: InitialFit { errors, residual, validation_only: found, clock } })

@@ -24,7 +24,15 @@ pub(super) struct Study<'a> {
     pub(super) options: &'a ExplainOptions<'a>,
 }
 
-impl Study<'_> {
+impl<'a> Study<'a> {
+    /// The same logs with one multibody model for all joints.
+    pub(super) fn joint_fit(&self) -> Study<'a> {
+        let [made, made_on_validation] = [Made::default(), Made::default()];
+        let (data, validation) = (self.data.joint_fit(), self.validation.joint_fit());
+        let Study { ref folds, one_path, options, .. } = *self;
+        Study { data, made, validation, made_on_validation, folds: folds.clone(), one_path, options }
+    }
+
     /// The thresholds.
     pub(super) fn rule(&self) -> &Rule {
         &self.options.rule

@@ -263,10 +263,11 @@ impl<'a> Rows<'a> {
         gravity: Gravity,
     ) -> Result<Rows<'a>, DataError> {
         let options = DataOptions { cutoff: BAND, block: 1.0, ..DataOptions::default() };
-        let mut data = Data::new(body, logs, &options)?;
-        if gravity == Gravity::TakenOut {
-            take_gravity_out(&mut data);
-        }
+        let data = Data::new(body, logs, &options)?;
+        let data = match gravity {
+            Gravity::Included => data,
+            Gravity::TakenOut => without_gravity(&data),
+        };
         Ok(Rows::of(data, part))
     }
 
@@ -329,21 +330,13 @@ fn between(x: &[f64], at: f64) -> f64 {
 }
 
 /// The columns of the same parameters without what gravity does.
-fn take_gravity_out(data: &mut Data<'_>) {
-    let (n, p) = (data.dof(), data.body.names().len());
-    let of_gravity = |r: &Recording| {
+fn without_gravity<'a>(data: &Data<'a>) -> Data<'a> {
+    data.of_other_columns(data.body.names().len(), |r| {
         let still = vec![0.0; r.q.len()];
-        data.body.regressor(&r.q, &still, &still)
-    };
-    let all: Vec<Vec<f64>> = data.recordings.iter().map(of_gravity).collect();
-    for joint in 0..n {
-        for c in 0..p {
-            let gravity = data.joints[joint].column(&data.recordings, |r, _| {
-                all[r].iter().skip(joint * p + c).step_by(n * p).copied().collect()
-            });
-            data.joints[joint].inertial[c].iter_mut().zip(gravity).for_each(|(x, g)| *x -= g);
-        }
-    }
+        let mut columns = data.body.regressor(&r.q, &r.v, &r.a);
+        columns.iter_mut().zip(data.body.regressor(&r.q, &still, &still)).for_each(|(c, g)| *c -= g);
+        columns
+    })
 }
 
 fn joint_rows(data: &Data<'_>, joint: usize, part: &[Option<usize>]) -> (Vec<usize>, [Part; 2]) {

@@ -73,7 +73,7 @@ impl Size {
         let (_, largest) = weight(rows, &fit.theta);
         let over = |x: f64| (x.is_finite() && x > 0.0).then_some(x);
         let mut squares = (0.0, 0usize);
-        for recording in &rows.data.recordings {
+        for recording in rows.data.recordings.iter() {
             squares.0 += recording.v.iter().map(|v| v * v).sum::<f64>();
             squares.1 += recording.len();
         }
@@ -323,7 +323,7 @@ pub(super) fn weight(rows: &Rows<'_>, theta: &[f64]) -> (Vec<f64>, f64) {
     let all: usize = rows.data.recordings.iter().map(|r| r.len()).sum();
     let every = all.div_ceil(SAMPLES).max(1);
     let mut q = Vec::new();
-    for recording in &rows.data.recordings {
+    for recording in rows.data.recordings.iter() {
         recording.q.chunks_exact(n).step_by(every).for_each(|sample| q.extend_from_slice(sample));
     }
     let still = vec![0.0; q.len()];

@@ -66,7 +66,7 @@ pub struct Data<'a> {
     /// The arm's rigid-body functions.
     pub body: &'a RigidArm,
     /// The pieces of all logs.
-    pub recordings: Vec<Recording>,
+    pub recordings: Arc<Vec<Recording>>,
     /// The band.
     pub band: Band,
     /// The rows by joint.
@@ -83,7 +83,7 @@ pub struct Data<'a> {
     pub left_out: Vec<String>,
     /// What was left out or done, in words.
     pub notes: Vec<String>,
-    /// Whether each joint has a fit of its own (see [`Data::set_per_joint`]).
+    /// Whether each joint has a fit of its own (see [`Data::per_joint_fit`]).
     pub per_joint: bool,
     top_velocity: Vec<f64>,
     links: Vec<OnceLock<Vec<Column>>>,
@@ -177,6 +177,7 @@ impl<'a> Data<'a> {
         left_out.extend(without);
         let joints = joint_rows(body, &recordings, &bands, kept);
         let logs: Vec<String> = logs.iter().map(|log| log.file.clone()).collect();
+        let recordings = Arc::new(recordings);
         let of_band = |(band, joints): (Band, Vec<JointRows>)| {
             if joints.iter().all(|j| j.len() < FEWEST_ROWS) {
                 return Err(DataError::NoMotion(inactive.iter().flatten().cloned().collect()));
@@ -185,7 +186,7 @@ impl<'a> Data<'a> {
                 body,
                 notes: notes(&left_out, &recordings, &band, &joints, &inactive, &rest_velocity),
                 blocks: blocks_of(&recordings, &joints, &band, options.block),
-                recordings: recordings.clone(),
+                recordings: Arc::clone(&recordings),
                 band,
                 joints,
                 logs: logs.clone(),
@@ -207,10 +208,28 @@ impl<'a> Data<'a> {
     /// The same rows with other signals: samples, band and blocks stay as they are.
     #[must_use]
     pub fn seen_otherwise(&self, correct: impl FnMut(&mut Recording)) -> Data<'a> {
-        let mut recordings = self.recordings.clone();
+        let mut recordings = self.recordings.to_vec();
         recordings.iter_mut().for_each(correct);
         let joints = self.rows_of(&recordings);
-        self.with(recordings, joints)
+        self.with(Arc::new(recordings), joints)
+    }
+
+    /// The same rows without a known torque, by joint and row, N·m.
+    #[must_use]
+    pub fn without_torque(&self, torque: &[Vec<f64>]) -> Data<'a> {
+        let mut joints = self.joints.clone();
+        for (joint, torque) in joints.iter_mut().zip(torque) {
+            joint.torque.iter_mut().zip(torque).for_each(|(t, own)| *t -= own);
+        }
+        Data { per_joint: self.per_joint, ..self.with(Arc::clone(&self.recordings), joints) }
+    }
+
+    /// The same rows, recorded at other times: the common clock at the first sample of each recording, s.
+    #[must_use]
+    pub fn with_clocks(&self, clocks: &[f64]) -> Data<'a> {
+        let mut recordings = self.recordings.to_vec();
+        recordings.iter_mut().zip(clocks).for_each(|(recording, clock)| recording.clock = *clock);
+        Data { per_joint: self.per_joint, ..self.with(Arc::new(recordings), self.joints.clone()) }
     }
 
     /// The same rows with the columns of another arm: `count` parameters, and their columns along a recording,
@@ -231,11 +250,11 @@ impl<'a> Data<'a> {
             };
             rows.inertial = (0..count).map(column).collect();
         }
-        self.with(self.recordings.clone(), joints)
+        self.with(Arc::clone(&self.recordings), joints)
     }
 
     /// The same data with other recordings and rows.
-    fn with(&self, recordings: Vec<Recording>, joints: Vec<JointRows>) -> Data<'a> {
+    pub(super) fn with(&self, recordings: Arc<Vec<Recording>>, joints: Vec<JointRows>) -> Data<'a> {
         Data {
             body: self.body,
             recordings,

@@ -183,18 +183,9 @@ pub(super) fn saturation_notes(logs: &[Log], joint: usize, spans: &[Vec<[f64; 2]
 // alone can explain is taken to be explained, and only what goes beyond is asked for.
 
 impl Data<'_> {
-    /// Gives every joint columns of its own for the minimal set, an offset and its position; `false` takes
-    /// that back.
-    pub fn set_per_joint(&mut self, per_joint: bool) {
-        if per_joint == self.per_joint {
-            return;
-        }
-        self.per_joint = per_joint;
-        let set = self.body.names().len();
-        if !per_joint {
-            self.joints.iter_mut().for_each(|joint| joint.inertial.truncate(set));
-            return;
-        }
+    /// The same logs with columns of its own for every joint: the minimal set, an offset and its position.
+    #[must_use]
+    pub fn per_joint_fit(mut self) -> Self {
         let joints: Vec<usize> = (0..self.dof()).collect();
         let added = parallel::map(&joints, |&j| {
             let column = |signal: &dyn Fn(usize) -> Vec<f64>| {
@@ -207,6 +198,16 @@ impl Data<'_> {
         for (joint, columns) in self.joints.iter_mut().zip(added) {
             joint.inertial.extend(columns);
         }
+        self.per_joint = true;
+        self
+    }
+
+    /// The same logs with the columns of one minimal set for all joints.
+    #[must_use]
+    pub fn joint_fit(&self) -> Self {
+        let mut joints = self.joints.clone();
+        joints.iter_mut().for_each(|joint| joint.inertial.truncate(self.body.names().len()));
+        self.with(Arc::clone(&self.recordings), joints)
     }
 
     /// Inertial columns of a joint: the minimal set, and where each joint has its own fit what stands beside it.

@@ -75,20 +75,16 @@ pub(crate) fn compose(
 }
 
 /// What the per-joint fit leaves, and a model of one body with the effects that were found by it.
-pub(crate) fn compose_per_joint(study: &mut Study<'_>, found: &Model) -> Result<Composed, ExplainError> {
-    let held_out = found.residual_on_validation(study);
-    set_per_joint(study, false);
-    let base = fit(&study.data, &study.folds, &[], None);
+pub(crate) fn compose_per_joint(study: &Study<'_>, found: &Model) -> Result<Composed, ExplainError> {
+    let of_body = study.joint_fit();
+    let base = fit(&of_body.data, &of_body.folds, &[], None);
     let mut shared = Model { accepted: found.accepted.clone(), ..Model::new(base) };
-    shared.refit(study);
-    let composed = compose(study, &shared, &[]);
-    set_per_joint(study, true);
-    Ok(Composed { model: composed?.model, fitted: found.fit.residual.clone(), held_out })
-}
-
-fn set_per_joint(study: &mut Study<'_>, per_joint: bool) {
-    study.data.set_per_joint(per_joint);
-    study.validation.set_per_joint(per_joint);
+    shared.refit(&of_body);
+    Ok(Composed {
+        model: compose(&of_body, &shared, &[])?.model,
+        fitted: found.fit.residual.clone(),
+        held_out: found.residual_on_validation(study),
+    })
 }
 
 /// The accepted effects, each as what it is in a model.

@@ -27,10 +27,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// Makes the result.
-pub(crate) fn conclude(mut findings: Findings<'_>) -> Result<Explained, ExplainError> {
+pub(crate) fn conclude(findings: Findings<'_>) -> Result<Explained, ExplainError> {
     let validation_only = &findings.initial_fit.validation_only;
     let Composed { model: torque_model, fitted, held_out } = match findings.study.data.per_joint {
-        true => compose_per_joint(&mut findings.study, &findings.model)?,
+        true => compose_per_joint(&findings.study, &findings.model)?,
         false => compose(&findings.study, &findings.model, validation_only)?,
     };
     let (study, model, history) = (&findings.study, &findings.model, &findings.history);

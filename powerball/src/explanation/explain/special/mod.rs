@@ -11,4 +11,4 @@ mod validation_only;
 
 pub(super) use at_rest::{RestPush, pushes_at_rest};
 pub(super) use one_path::{Clock, choose_clock, predicts_better, repeats};
-pub(super) use validation_only::{ValidationOnlyEffect, validation_only_effects};
+pub(super) use validation_only::{Baseline, ValidationOnlyEffect, validation_only_effects};

@@ -42,9 +42,7 @@ fn same_path(rule: &Rule, a: &Recording, b: &Recording) -> bool {
 }
 
 // On a repeated path: one multibody model for all joints (the joint fit), or inertial parameters for each
-// joint by itself (the per-joint fit, see [`Data::set_per_joint`]).
-//
-// [`Data::set_per_joint`]: crate::logs::regression::Data::set_per_joint
+// joint by itself (the per-joint fit, see [`Data::per_joint_fit`]).
 
 /// Whether the first model's squared errors on the validation set are clearly below the second's: the
 /// geometric mean over all rows, which no joint's unit rules.
@@ -102,52 +100,36 @@ impl Clock {
     }
 }
 
-/// Sets the clocks of recordings where the order of the files is all that is known of their time. Returns
-/// what was taken.
-pub(crate) fn choose_clock(
+/// When recordings were made, where the order of the files is all that is known of their time: what was taken, and
+/// both sets with it, where that is not as given.
+pub(crate) fn choose_clock<'a>(
     rule: &Rule,
     logs: &[Log],
     validate: &[Log],
-    data: &mut Data<'_>,
     fit: &Fit,
-    other: &mut Data<'_>,
-) -> Clock {
+    (data, other): (&Data<'a>, &Data<'a>),
+) -> (Clock, Option<[Data<'a>; 2]>) {
     let known = |clock: f64| logs.iter().chain(validate).all(|log| (log.clock - clock).abs() < 1e-9);
     if logs.first().is_none_or(|first| known(first.clock)) {
-        return Clock::AsGiven;
+        return (Clock::AsGiven, None);
     }
     let Some(effect) = effects::all().iter().find(|e| e.needs_running_time()) else {
-        return Clock::AsGiven;
+        return (Clock::AsGiven, None);
     };
-    let clocks = |d: &Data<'_>| -> Vec<f64> { d.recordings.iter().map(|r| r.clock).collect() };
-    let given = [clocks(data), clocks(other)];
     let baseline = [in_series(data, other, |_, _| true), in_series(other, data, |_, _| true)];
     let same = same_start(rule, data, other);
     let cold = [in_series(data, other, &same), in_series(other, data, &same)];
-    let mut best = (Clock::AsGiven, 0.0);
-    for (clock, [own, others]) in
-        [(Clock::AsGiven, &given), (Clock::Beside, &baseline), (Clock::ColdSeries, &cold)]
-    {
-        set(data, own);
-        set(other, others);
-        let gain = gain(rule, *effect, data, fit, other);
+    let mut best = (Clock::AsGiven, None);
+    let mut most = gain(rule, *effect, data, fit, other).max(0.0);
+    for (clock, [own, others]) in [(Clock::Beside, &baseline), (Clock::ColdSeries, &cold)] {
+        let sets = [data.with_clocks(own), other.with_clocks(others)];
+        let gain = gain(rule, *effect, &sets[0], fit, &sets[1]);
         // Equal clocks are equally good; the first is the simplest.
-        if gain > best.1 * (1.0 + 1e-9) {
-            best = (clock, gain);
+        if gain > most * (1.0 + 1e-9) {
+            (best, most) = ((clock, Some(sets)), gain);
         }
     }
-    let [own, others] = match best.0 {
-        Clock::AsGiven => given,
-        Clock::Beside => baseline,
-        Clock::ColdSeries => cold,
-    };
-    set(data, &own);
-    set(other, &others);
-    best.0
-}
-
-fn set(data: &mut Data<'_>, clocks: &[f64]) {
-    data.recordings.iter_mut().zip(clocks).for_each(|(r, c)| r.clock = *c);
+    best
 }
 
 /// What warmth explains of both sets of logs.
@@ -185,7 +167,7 @@ fn same_start(
     other: &Data<'_>,
 ) -> impl Fn(&Recording, &Recording) -> bool + use<> {
     let reach = |j: usize| {
-        let positions = data.recordings.iter().chain(&other.recordings).flat_map(|r| r.position(j));
+        let positions = data.recordings.iter().chain(other.recordings.iter()).flat_map(|r| r.position(j));
         let (low, high) = positions.fold((f64::MAX, f64::MIN), |(l, h): (f64, f64), q| (l.min(q), h.max(q)));
         rule.same_start * (high - low).max(1e-9)
     };

@@ -38,6 +38,14 @@ pub(crate) struct ValidationOnlyPart {
     pub(crate) torque: [Vec<Vec<f64>>; 2],
 }
 
+/// The base model, the logs that it is fitted to and those that it is judged on, as rows.
+#[derive(Debug)]
+pub(crate) struct Baseline<'a> {
+    pub(crate) data: Data<'a>,
+    pub(crate) validation: Data<'a>,
+    pub(crate) base: Fit,
+}
+
 /// All logs together, with the base model fitted to them, and what was found in them.
 struct Pooled<'a> {
     data: Data<'a>,
@@ -61,22 +69,23 @@ struct Seen {
 /// body that all fitted logs have and no other one.
 ///
 /// It can be learnt nowhere else than where all logs are together: its few numbers are fitted to all of them, and the
-/// result says in which log it was seen. Its torque is taken out; everything else is judged on what stays.
+/// result says in which log it was seen. Returned are the rows without its torque and the base model of these:
+/// everything else is judged on them.
 ///
 /// # Errors
 /// [`DataError`] as for any data.
-pub(crate) fn validation_only_effects(
+pub(crate) fn validation_only_effects<'a>(
     body: &RigidArm,
     (logs, validate): (&[Log], &[Log]),
     options: &ExplainOptions<'_>,
-    base: &mut Fit,
-    (data, validation): (&mut Data<'_>, &mut Data<'_>),
-) -> Result<Vec<ValidationOnlyEffect>, DataError> {
+    mut baseline: Baseline<'a>,
+) -> Result<(Baseline<'a>, Vec<ValidationOnlyEffect>), DataError> {
     let rule = &options.rule;
+    let Baseline { validation, base, .. } = &baseline;
     let residual = base.residual_on(validation, &[]);
     let odd = |log: usize| oddness(base, validation, &residual, log) > rule.odd_log;
     if !(0..validation.logs.len()).any(odd) {
-        return Ok(Vec::new());
+        return Ok((baseline, Vec::new()));
     }
     let all: Vec<Log> = logs.iter().chain(validate).cloned().collect();
     let together = Data::new(body, &all, &options.data)?;
@@ -91,17 +100,23 @@ pub(crate) fn validation_only_effects(
         seen.candidate.windows.iter().any(|w| w.log == *log && w.to.is_infinite())
     };
     let fitted = |seen: &&Seen| {
-        data.logs.iter().all(|log| whole(seen, log)) && seen.candidate.windows.len() == data.logs.len()
+        let logs = &baseline.data.logs;
+        logs.iter().all(|log| whole(seen, log)) && seen.candidate.windows.len() == logs.len()
     };
     let mut found = Vec::new();
-    if let Some(seen) = pooled.seen.iter().find(fitted) {
-        found.extend(taken_out_of_fitted(rule, &pooled, base, (data, validation), seen));
+    let of_fitted = pooled.seen.iter().find(fitted);
+    if let Some((effect, data, base)) =
+        of_fitted.and_then(|s| taken_out_of_fitted(rule, &pooled, &baseline, s))
+    {
+        found.push(effect);
+        baseline = Baseline { data, base, ..baseline };
     }
     // A body that is put down again is there for a while as well, and no push.
     let short = |seen: &Seen| {
         matches!(Extent::of(&seen.candidate), Extent::Short(_)) && !seen.candidate.effect().of_the_body()
     };
     // Zeros of torque sensors err on another path as pushes would.
+    let Baseline { data, validation, base } = &baseline;
     let pushed = pooled.seen.iter().any(short) && {
         let (better, left) = with_zeros(rule, base, (data, validation));
         (0..validation.logs.len()).any(|log| oddness(&better, validation, &left, log) > rule.odd_log)
@@ -117,9 +132,12 @@ pub(crate) fn validation_only_effects(
         let own = seen.iter().copied().filter(|seen| seen.candidate.effect() == effect);
         let mut own: Vec<&Seen> = own.collect();
         own.sort_by(|a, b| a.begins().total_cmp(&b.begins()));
-        found.extend(taken_out(rule, &pooled, base, (data, validation), &own));
+        if let Some((effect, without)) = taken_out(rule, &pooled, &baseline, &own) {
+            found.push(effect);
+            baseline.validation = without;
+        }
     }
-    Ok(found)
+    Ok((baseline, found))
 }
 
 /// The base model with what every arm may have (see [`Effect::baseline`](crate::explanation::effects::Effect::baseline)), and
@@ -138,40 +156,37 @@ fn with_zeros(rule: &Rule, base: &Fit, (data, validation): (&Data<'_>, &Data<'_>
 }
 
 /// Takes a body that all fitted logs have out of them, where the base model fitted to what stays predicts the validation
-/// set as it predicts the fitted logs.
-fn taken_out_of_fitted(
+/// set as it predicts the fitted logs. Returned with it are the fitted logs without it, and their base model.
+fn taken_out_of_fitted<'a>(
     rule: &Rule,
     pooled: &Pooled<'_>,
-    base: &mut Fit,
-    (data, validation): (&mut Data<'_>, &Data<'_>),
+    Baseline { data, validation, base }: &Baseline<'a>,
     seen: &Seen,
-) -> Option<ValidationOnlyEffect> {
+) -> Option<(ValidationOnlyEffect, Data<'a>, Fit)> {
     let excess = |base: &Fit, residual: &[Vec<f64>]| -> f64 {
         (0..validation.logs.len()).map(|log| oddness(base, validation, residual, log) - 1.0).sum()
     };
     let torque = seen.torque(data, base, rule);
     let residual = base.residual_on(validation, &[]);
-    subtract(data, &torque);
-    let without = fit(data, &Folds::new(data), &[], None);
-    let left = without.residual_on(validation, &[]);
-    if excess(&without, &left) > rule.max_unexplained * excess(base, &residual) {
-        let back: Vec<Vec<f64>> = torque.iter().map(|t| t.iter().map(|t| -t).collect()).collect();
-        subtract(data, &back);
+    let without = data.without_torque(&torque);
+    let fitted = fit(&without, &Folds::new(&without), &[], None);
+    let left = fitted.residual_on(validation, &[]);
+    if excess(&fitted, &left) > rule.max_unexplained * excess(base, &residual) {
         return None;
     }
-    *base = without;
     let named = named(rule, pooled, &[seen], validation, [residual, left]);
-    Some(with_torques(rule, pooled, &[seen], named, vec![[torque, validation.zeros()]]))
+    let effect = with_torques(rule, pooled, &[seen], named, vec![[torque, validation.zeros()]]);
+    Some((effect, without, fitted))
 }
 
-/// Takes what was seen of an effect out of the validation set, where it is what makes its logs odd.
-fn taken_out(
+/// Takes what was seen of an effect out of the validation set, where it is what makes its logs odd. Returned with it is
+/// that set without it.
+fn taken_out<'a>(
     rule: &Rule,
     pooled: &Pooled<'_>,
-    base: &Fit,
-    (data, validation): (&Data<'_>, &mut Data<'_>),
+    Baseline { data, validation, base }: &Baseline<'a>,
     seen: &[&Seen],
-) -> Option<ValidationOnlyEffect> {
+) -> Option<(ValidationOnlyEffect, Data<'a>)> {
     let residual = base.residual_on(validation, &[]);
     seen.first()?;
     let windows: Vec<Window> = seen.iter().flat_map(|seen| seen.candidate.windows.clone()).collect();
@@ -183,11 +198,11 @@ fn taken_out(
     if !makes_it_odd(rule, base, validation, &residual, (&windows, &torque)) {
         return None;
     }
-    subtract(validation, &torque);
-    let left = base.residual_on(validation, &[]);
-    let named = named(rule, pooled, seen, validation, [residual, left]);
+    let without = validation.without_torque(&torque);
+    let left = base.residual_on(&without, &[]);
+    let named = named(rule, pooled, seen, &without, [residual, left]);
     let torques = torques.into_iter().map(|torque| [data.zeros(), torque]).collect();
-    Some(with_torques(rule, pooled, seen, named, torques))
+    Some((with_torques(rule, pooled, seen, named, torques), without))
 }
 
 /// What is said of what was seen of an effect, with what is left on the validation set before and after.
@@ -366,10 +381,4 @@ fn makes_it_odd(
     };
     let little = excess(&left) <= rule.max_unexplained * excess(residual);
     little && !left.iter().zip(residual).any(harms)
-}
-
-fn subtract(data: &mut Data<'_>, torque: &[Vec<f64>]) {
-    for (joint, torque) in data.joints.iter_mut().zip(torque) {
-        joint.torque.iter_mut().zip(torque).for_each(|(t, own)| *t -= own);
-    }
 }

@@ -105,16 +105,16 @@ fn repeats_of_a_body_that_do_not_change_lack_nothing_at_length() {
 fn joints_fitted_by_themselves_fit_what_no_body_does_and_come_together_again() {
     let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let logs = without_a_body(runs(3, 0.0, 9));
-    let mut data = Data::new(&body, &logs, &DataOptions::default()).unwrap();
+    let data = Data::new(&body, &logs, &DataOptions::default()).unwrap();
     let folds = Folds::new(&data);
     let together = fit(&data, &folds, &[], None);
-    data.set_per_joint(true);
+    let data = data.per_joint_fit();
     let apart = fit(&data, &folds, &[], None);
     assert!(apart.sigma[1] < 0.7 * together.sigma[1], "{:?} {:?}", apart.sigma, together.sigma);
     for (a, t) in apart.sigma.iter().zip(&together.sigma) {
         assert!(*a < 1.001 * t);
     }
-    data.set_per_joint(false);
+    let data = data.joint_fit();
     let again = fit(&data, &folds, &[], None);
     assert_eq!(again.theta, together.theta);
 }
