@@ -8,7 +8,6 @@ use powerball::explanation::explain::{NamedEffect, Shown};
 use powerball::explanation::{ExplainOptions, Explained, explain};
 use powerball::logs::log::read_logs;
 use powerball::report::explained::{effect_figure, error_bars};
-use powerball::report::size::size;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -201,7 +200,7 @@ fn evidence(page: &mut String, effect: &NamedEffect, sliding: &[bool]) {
         "\n**{}** on joint {}: {}.",
         effect.effect,
         list(&effect.joints),
-        size(effect, sliding)
+        effect.size(sliding)
     );
     let least = effect.held_out_gain.iter().copied().fold(f64::INFINITY, f64::min);
     let _ = writeln!(

@@ -1,4 +1,6 @@
-//! Axes: ranges, ticks at round numbers, and numbers as text.
+//! Axes: ranges, ticks at round numbers.
+
+use crate::explanation::effects::words::typographic;
 
 /// A linear axis over a range, with ticks at multiples of 1, 2 or 5 times a power of ten.
 #[derive(Clone, Copy, Debug)]
@@ -74,29 +76,6 @@ fn round_step(rough: f64) -> f64 {
     factor * power
 }
 
-/// A real minus sign, which has the width of a digit.
-fn typographic(text: &str) -> String {
-    text.replace('-', "\u{2212}")
-}
-
-/// A number with three significant digits, as a reader wants it in a table: `0.0123`, `1.23`, `123`.
-pub fn number(value: f64) -> String {
-    if !value.is_finite() {
-        return "–".to_string();
-    }
-    if value == 0.0 {
-        return "0".to_string();
-    }
-    let magnitude = value.abs().log10().floor();
-    let text = if (-4.0..5.0).contains(&magnitude) {
-        let decimals = (2.0 - magnitude).max(0.0) as usize;
-        format!("{value:.decimals$}")
-    } else {
-        format!("{value:.2e}")
-    };
-    typographic(&text)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -122,20 +101,6 @@ mod tests {
             let axis = Axis::over(values.into_iter(), 0.05, 5);
             assert!(axis.high() > axis.low());
             assert!(!axis.ticks().is_empty());
-        }
-    }
-
-    #[test]
-    fn numbers_keep_three_digits() {
-        for (value, text) in [
-            (0.0123456, "0.0123"),
-            (-1.0, "−1.00"),
-            (123.4, "123"),
-            (4e-7, "4.00e−7"),
-            (f64::NAN, "–"),
-            (0.0, "0"),
-        ] {
-            assert_eq!(number(value), text);
         }
     }
 }

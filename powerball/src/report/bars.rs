@@ -1,8 +1,9 @@
 //! Pairs of bars: a quantity before and after, for each of several items.
 
-use super::axis::{Axis, number};
+use super::axis::Axis;
 use super::escape;
 use super::figure::{WIDTH, draw_grid, file, svg, text_width, title};
+use super::number;
 use std::fmt::Write as _;
 
 const LEFT: f64 = 62.0;

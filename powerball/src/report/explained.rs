@@ -2,7 +2,6 @@
 
 use crate::controller::JointNumber;
 use crate::explanation::explain::{Change, Explained, NamedEffect, Shown, State, TorqueCurve};
-use crate::report::size::size;
 use crate::report::{BarPairs, Figure, Files, Ink, Page, Panel, Series, Table, Tone, number};
 use crate::report::{conventions, transmission};
 
@@ -143,7 +142,7 @@ fn answer(page: &mut Page, explained: &Explained) {
             table.push([
                 effect.effect.clone(),
                 list(&effect.joints),
-                size(effect, &explained.sliding),
+                effect.size(&explained.sliding),
                 format!("{:.0} of 100", 100.0 * effect.probability),
                 effect.logs.join(", "),
             ]);

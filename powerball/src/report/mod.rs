@@ -32,12 +32,11 @@ pub mod identified;
 pub mod inspected;
 mod live;
 mod page;
-pub mod size;
 mod table;
 pub mod transmission;
 pub mod verified;
 
-pub use axis::number;
+pub use crate::explanation::effects::words::number;
 pub use bars::BarPairs;
 pub use figure::{Figure, Ink, JOINTS, Mark, Panel, Series};
 pub use files::Files;

@@ -21,7 +21,6 @@ use crate::logs::log::{Log, read_logs};
 use crate::procedure::{Envelope, RecordError, record};
 use crate::report::explained::{change, nothing_named};
 use crate::report::number;
-use crate::report::size::size;
 use crate::virtual_arm::Undeclared;
 use crate::{logs, report};
 use clap::Args;
@@ -339,7 +338,7 @@ fn names(explained: &Explained, most: usize) -> Vec<String> {
             "{} on {}: {}; right in {:.0} of 100{}{}",
             effect.effect,
             on(&effect.joints, explained.verdict.len()),
-            size(effect, &explained.sliding),
+            effect.size(&explained.sliding),
             100.0 * effect.probability,
             in_logs(effect),
             not(effect)
@@ -433,7 +432,7 @@ fn evidence(effect: &NamedEffect, sliding: &[bool]) -> String {
          right in {:.0} of 100\n",
         effect.effect,
         list(&effect.joints),
-        size(effect, sliding),
+        effect.size(sliding),
         effect.p_value,
         effect.margin,
         100.0 * effect.leftover,

@@ -1,5 +1,6 @@
 //! Friction that differs with the direction, or a constant torque: an offset of the current looks the same.
 
+use super::words::{Words, list, number};
 use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::controller::JointNumber;
 use crate::controller::correction::Law;
@@ -28,6 +29,28 @@ pub struct Figures {
     pub torque: Vec<f64>,
     /// The torque over |q̇|, N·m·s/rad.
     pub viscous: Vec<f64>,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
+        let (torque, position) = (words.torque(), words.position());
+        let one = |(k, (constant, viscous)): (usize, (&f64, &f64))| {
+            // A joint's two parts may be one effect or two: the standard error is that of a part which stands alone.
+            let alone =
+                words.relative_std.len() == self.torque.len() && (*constant == 0.0 || *viscous == 0.0);
+            let size = |value: f64| if alone { words.size(k, value) } else { number(value) };
+            let constant_in_words = || format!("{} {torque} constant", size(*constant));
+            let viscous_in_words = || format!("{} {torque}·s/{position} of |dq|", size(*viscous));
+            match (*constant != 0.0, *viscous != 0.0) {
+                (true, true) => format!("{} and {}", constant_in_words(), viscous_in_words()),
+                (false, true) => viscous_in_words(),
+                _ => constant_in_words(),
+            }
+        };
+        list(self.torque.iter().zip(&self.viscous).enumerate().map(one))
+    }
 }
 
 impl Effect for Asymmetry {

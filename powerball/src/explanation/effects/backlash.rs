@@ -1,6 +1,7 @@
 //! Backlash in a gear: after a reversal the motor turns through a gap before it drives the link again.
 
 use super::candidate::{geometric, scaled};
+use super::words::{Words, numbers};
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
 use serde::Serialize;
@@ -36,6 +37,14 @@ pub enum Settings {
 pub struct Figures {
     /// The gap, rad.
     pub gap: ByJoint,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
+        format!("{} {}", numbers(&self.gap), words.position())
+    }
 }
 
 /// Gaps tried on a joint, and the largest, rad.

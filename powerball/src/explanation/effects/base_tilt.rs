@@ -1,5 +1,6 @@
 //! Gravity that does not point where the arm file says: the base is not level.
 
+use super::words::{Words, number};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
 use crate::controller::JointNumber;
 use crate::identification::estimate::Solver;
@@ -31,6 +32,14 @@ pub struct Settings {
 pub struct Figures {
     /// The turn of the base about its x and y axes, rad.
     pub tilt: [f64; 2],
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, _: &Words<'_>) -> String {
+        format!("{} rad about x, {} rad about y", number(self.tilt[0]), number(self.tilt[1]))
+    }
 }
 
 impl Effect for BaseTilt {

@@ -1,5 +1,6 @@
 //! An inertial parameter that the arm file declares zero and that is not.
 
+use super::words::{Words, list};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
 use crate::controller::JointNumber;
 use crate::logs::regression::Column;
@@ -23,6 +24,16 @@ pub struct Figures {
     pub parameters: Vec<String>,
     /// Their values, SI units.
     pub values: Vec<f64>,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
+        let one =
+            |(k, (name, value)): (usize, (&String, &f64))| format!("{name} = {}", words.size(k, *value));
+        format!("{} (SI units)", list(self.parameters.iter().zip(&self.values).enumerate().map(one)))
+    }
 }
 
 impl Effect for BrokenSymmetry {

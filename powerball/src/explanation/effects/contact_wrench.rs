@@ -2,8 +2,8 @@
 
 use super::payload::all_joints;
 use super::windows::{Sums, best_run, by_log, cut, explained, rests, step_start, window};
+use super::words::{Words, list, number};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part, Window};
-use crate::identification::estimate::Solver;
 use crate::logs::regression::Column;
 use serde::Serialize;
 use std::f64::consts::PI;
@@ -32,6 +32,29 @@ pub struct Figures {
     pub force: Vec<Vec<f64>>,
     /// When it began, in the log's own t, s.
     pub start_time: Vec<f64>,
+}
+
+/// Of so many pushes each is shown; of more the range.
+const EACH: usize = 3;
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, _: &Words<'_>) -> String {
+        let size = |force: &Vec<f64>| force.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let sizes: Vec<f64> = self.force.iter().map(size).collect();
+        let times = self.start_time.iter().zip(&self.end_time);
+        if sizes.len() <= EACH {
+            let one = |(size, (from, to)): (&f64, (&f64, &f64))| {
+                format!("{} N from {from:.1} to {to:.1} s", number(*size))
+            };
+            return list(sizes.iter().zip(times).map(one));
+        }
+        let [least, most] =
+            [f64::min, f64::max].map(|of| sizes.iter().copied().reduce(of).unwrap_or(f64::NAN));
+        let seconds: f64 = times.map(|(from, to)| to - from).sum();
+        format!("{} pushes of {} to {} N, {seconds:.1} s together", sizes.len(), number(least), number(most))
+    }
 }
 
 /// Windows begin and end on a grid of this, s.
@@ -150,8 +173,7 @@ fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
     if columns.len() < 3 {
         return None;
     }
-    let (gram, _, _) = fit.gram.fitted(&fit.weights, |_| true);
-    let solver = Solver::new(&gram, |c| fit.free[c]);
+    let solver = fit.solver();
     let steps = data.blocks_of(GRID);
     let rests = rests(context, &steps, GRID);
     let sets_off: Vec<bool> = (steps.iter())

@@ -1,5 +1,6 @@
 //! A joint whose zero is off: the arm is not where the log says.
 
+use super::words::Words;
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found, Part};
 use crate::logs::regression::{Column, Recording};
 use serde::Serialize;
@@ -20,6 +21,14 @@ pub struct Settings {
 pub struct Figures {
     /// Logged less true position, rad.
     pub offset: ByJoint,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
+        format!("{} {}", words.sizes(&self.offset.0, 1.0), words.position())
+    }
 }
 
 /// The offset at which the first secant is taken, rad.

@@ -1,6 +1,7 @@
 //! Presliding: after a reversal friction does not jump but winds up over a small distance.
 
 use super::candidate::{geometric, scaled};
+use super::words::{Words, numbers};
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
 use serde::Serialize;
@@ -22,6 +23,15 @@ pub struct Figures {
     pub distance: ByJoint,
     /// c, N·m.
     pub level: ByJoint,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
+        let (level, distance) = (words.sizes(&self.level.0, 1.0), numbers(&self.distance));
+        format!("{level} {} within {distance} {} of a reversal", words.torque(), words.position())
+    }
 }
 
 /// Distances tried on a joint.

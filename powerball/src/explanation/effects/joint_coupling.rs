@@ -2,6 +2,7 @@
 //! turn with two joints.
 
 use super::candidate::scaled;
+use super::words::{Words, list, number};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Placed};
 use crate::controller::JointNumber;
 use crate::controller::correction::Law;
@@ -90,6 +91,17 @@ pub struct Figures {
     /// The motors that turn with two joints.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub transmissions: Vec<Transmission>,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, _: &Words<'_>) -> String {
+        let one = |((law, from), c): ((&&str, &JointNumber), &f64)| {
+            format!("{law} of joint {from}: {}", number(*c))
+        };
+        format!("{} (SI units)", list(self.law.iter().zip(&self.from_joint).zip(&self.coefficient).map(one)))
+    }
 }
 
 /// A motor that turns with two joints, as found.

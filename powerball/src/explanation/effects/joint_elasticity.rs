@@ -1,5 +1,6 @@
 //! A joint that gives way under its torque: the link is not where the motor's encoder says.
 
+use super::words::Words;
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
 use crate::logs::regression::Column;
@@ -21,6 +22,14 @@ pub struct Settings {
 pub struct Figures {
     /// K, N·m/rad.
     pub stiffness: ByJoint,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
+        format!("{} {}/{}", words.sizes(&self.stiffness.0, 1.0), words.torque(), words.position())
+    }
 }
 
 impl Effect for JointElasticity {

@@ -1,5 +1,6 @@
 //! Friction that grows with the torque a joint transmits: gears are pressed together harder.
 
+use super::words::Words;
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
 use serde::Serialize;
@@ -16,6 +17,15 @@ pub struct Settings;
 pub struct Figures {
     /// c, N·m of friction for each N·m of load.
     pub coefficient: ByJoint,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
+        let unit = words.torque();
+        format!("{} {unit} per {unit}", words.sizes(&self.coefficient.0, 1.0))
+    }
 }
 
 /// A gear that loses more than this share of its torque would not be used.

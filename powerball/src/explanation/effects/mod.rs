@@ -9,7 +9,7 @@
 //! one joint, its [`Effect::laws`] are enough: the same laws run in a controller.
 //!
 //! **Adding an effect** means adding a file with three types: its `Settings` (what a search tries), its
-//! `Figures` (what a reader is told) and a unit struct that implements [`Effect`]; and naming that file
+//! `Figures` (what a reader gets, as numbers and in words) and a unit struct that implements [`Effect`]; and naming that file
 //! below, once as a module and once in the list. The list is in the order in which equals are preferred.
 
 pub mod asymmetry;
@@ -37,6 +37,7 @@ pub mod torque_constant;
 pub mod unnamed_law;
 pub mod velocity_nonlinearity;
 mod windows;
+pub mod words;
 
 pub use candidate::{Axis, ByJoint, Candidate, Found, Window};
 pub use context::Context;
@@ -59,6 +60,16 @@ macro_rules! library {
         #[serde(untagged)]
         pub enum Figures {
             $(#[doc = concat!("Of [`", stringify!($module), "`].")] $Effect($module::Figures),)*
+        }
+
+        impl Figures {
+            /// In words, with units.
+            #[must_use]
+            pub fn in_words(&self, words: &words::Words<'_>) -> String {
+                match self {
+                    $(Figures::$Effect(figures) => figures.in_words(words),)*
+                }
+            }
         }
 
         impl Settings {

@@ -3,6 +3,7 @@
 
 use super::link_body::{self, Body};
 use super::windows::{Sums, best_run, by_log, cut, explained, lasting_window};
+use super::words::{Words, list, number};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part, Window};
 use crate::controller::JointNumber;
 use crate::identification::estimate::Solver;
@@ -51,6 +52,30 @@ pub struct Figures {
     pub mass: Option<f64>,
     /// From when on, one for each log that has it, in the log's own t, s.
     pub start_time: Vec<f64>,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, _: &Words<'_>) -> String {
+        let vector = |x: &[f64; 3]| format!("({})", x.map(number).join(", "));
+        let what = match (self.mass, &self.com, &self.first_moment) {
+            (Some(mass), Some(com), _) => format!("{} kg at {} m", number(mass), vector(com)),
+            (Some(mass), None, _) => format!("{} kg", number(mass)),
+            (None, _, Some(moment)) => format!("first moment {} kg·m", vector(moment)),
+            (None, ..) => "a body".to_string(),
+        };
+        let link = self.link.map_or_else(|| "the last link".to_string(), |link| format!("link {link}"));
+        let times = self.start_time.iter().enumerate().map(|(k, from)| {
+            match self.end_time.get(k).copied().flatten() {
+                Some(to) => format!("{} to {} s", number(*from), number(to)),
+                None => format!("from {} s on", number(*from)),
+            }
+        });
+        let times = list(times);
+        let when = if times.is_empty() { String::new() } else { format!(", {times}") };
+        format!("{what} of {link}{when}")
+    }
 }
 
 /// A body is held for steps of this, s …
@@ -254,11 +279,10 @@ fn search(context: &Context<'_>, link: Option<usize>) -> Option<Candidate> {
     if columns.is_empty() {
         return None;
     }
-    let (gram, _, _) = fit.gram.fitted(&fit.weights, |_| true);
     let steps = data.blocks_of(GRID);
     // A first moment has no sign: what a log lacks would be as good a body as what another one has.
     let positive = if link.is_some() { link_body::INERTIA } else { 0 };
-    let mut held = Search::new(context, &columns, &steps, &Solver::new(&gram, |c| fit.free[c]), positive);
+    let mut held = Search::new(context, &columns, &steps, &fit.solver(), positive);
     let mut open = by_log(&steps);
     let mut chosen: Vec<(Range<usize>, Range<usize>)> = Vec::new();
     // The log that shows it best, then every other one that explains more with it.

@@ -1,5 +1,6 @@
 //! Torque that is periodic in a joint's or its motor's position: gear teeth, wave generators, cogging.
 
+use super::words::{Words, number};
 use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::controller::JointNumber;
 use crate::controller::correction::Law;
@@ -32,6 +33,23 @@ pub struct Figures {
     pub joints: Vec<JointNumber>,
     /// Cycles a joint turn.
     pub orders: Vec<f64>,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
+        // Of a joint that slides the order counts on 2π m.
+        let (way, orders) = if words.slides { ("m", 1.0 / std::f64::consts::TAU) } else { ("turn", 1.0) };
+        let several = self.joints.iter().any(|joint| *joint != self.joints[0]);
+        let one = |(k, ((amplitude, joint), order)): (usize, ((&f64, &JointNumber), &f64))| {
+            let of = if several { format!(" (joint {joint})") } else { String::new() };
+            let size = words.size(k, *amplitude);
+            format!("{size} {}, {} cycles a {way}{of}", words.torque(), number(orders * order))
+        };
+        let all = self.amplitudes.iter().zip(&self.joints).zip(&self.orders).enumerate().map(one);
+        all.collect::<Vec<_>>().join("; ")
+    }
 }
 
 /// Whole orders up to here are tried one by one, higher ones are found by a scan.

@@ -1,5 +1,6 @@
 //! A torque that grows with position: a hose, a cable, a balancer.
 
+use super::words::{Words, numbers};
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
 use serde::Serialize;
@@ -18,6 +19,16 @@ pub struct Figures {
     pub rest: ByJoint,
     /// k, N·m/rad.
     pub stiffness: ByJoint,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
+        let (torque, position) = (words.torque(), words.position());
+        let (stiffness, rest) = (words.sizes(&self.stiffness.0, 1.0), numbers(&self.rest));
+        format!("{stiffness} {torque}/{position}, at rest at {rest} {position}")
+    }
 }
 
 impl Effect for Spring {

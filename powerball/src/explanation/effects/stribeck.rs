@@ -1,6 +1,7 @@
 //! Friction that falls with rising velocity where a film of lubricant builds up.
 
 use super::candidate::{geometric, scaled};
+use super::words::{Words, numbers};
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
 use serde::Serialize;
@@ -22,6 +23,16 @@ pub struct Figures {
     pub level: ByJoint,
     /// v_s, rad/s.
     pub velocity: ByJoint,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
+        let (torque, position) = (words.torque(), words.position());
+        let (level, velocity) = (words.sizes(&self.level.0, 1.0), numbers(&self.velocity));
+        format!("{level} {torque} more at rest, gone beyond {velocity} {position}/s")
+    }
 }
 
 /// Velocities tried on a joint.

@@ -1,6 +1,7 @@
 //! Friction that changes as the joint warms: lubricant thins.
 
 use super::candidate::{geometric, scaled};
+use super::words::{Words, list, number};
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
 use crate::logs::regression::Recording;
@@ -50,6 +51,21 @@ pub struct Figures {
     pub change: ByJoint,
     /// T, s; 0 where the change follows a logged temperature.
     pub time_constant: ByJoint,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
+        let one = |(k, (change, time)): (usize, (&f64, &f64))| {
+            let change = words.size(k, 100.0 * change);
+            match *time > 0.0 {
+                true => format!("{change} % of the friction when cold, within {} s", number(*time)),
+                false => format!("{change} % for 10 K"),
+            }
+        };
+        list(self.change.0.iter().zip(&self.time_constant.0).enumerate().map(one))
+    }
 }
 
 /// Time constants tried on a joint, and the least, s: what fades faster is how a log begins, not warmth.

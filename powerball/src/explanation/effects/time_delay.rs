@@ -1,5 +1,6 @@
 //! Torque and position that were not sampled at the same time.
 
+use super::words::Words;
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found, Part};
 use crate::controller::JointNumber;
 use crate::explanation::rule::Rule;
@@ -24,6 +25,14 @@ pub struct Settings {
 pub struct Figures {
     /// By how much the logged torque is late, s.
     pub delay: ByJoint,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
+        format!("{} ms", words.sizes(&self.delay.0, 1e3))
+    }
 }
 
 /// Starting values, s; the coefficient makes each a third to three times as long. Filters and gateways make

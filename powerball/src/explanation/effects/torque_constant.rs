@@ -1,5 +1,6 @@
 //! A wrong factor between current and torque, or one that falls as the motor saturates.
 
+use super::words::{Words, list, number};
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use crate::controller::JointNumber;
 use crate::controller::correction::Law;
@@ -38,6 +39,24 @@ pub struct Figures {
     pub gain: ByJoint,
     /// τ_max, N·m.
     pub torque: ByJoint,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
+        let one = |k: usize| {
+            let (gain, change) = (self.gain.0[k] - 1.0, self.change_at_torque.0[k]);
+            match change == 0.0 {
+                true => format!("{} %", words.size(k, 100.0 * gain)),
+                false => {
+                    let at = number(self.torque.0[k]);
+                    format!("{} % at {at} {}", words.size(k, 100.0 * change), words.torque())
+                }
+            }
+        };
+        list((0..self.gain.0.len()).map(one))
+    }
 }
 
 impl Effect for TorqueConstant {

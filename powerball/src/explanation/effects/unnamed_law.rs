@@ -5,6 +5,7 @@
 //! of two positions, or of the joint's own velocity and another one's, and the first terms of its series
 //! describe it.
 
+use super::words::Words;
 use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::controller::JointNumber;
 use crate::controller::correction::Law;
@@ -54,6 +55,14 @@ const ORDERS: [[f64; 2]; 4] = [[1.0, 1.0], [1.0, 2.0], [2.0, 1.0], [2.0, 2.0]];
 pub struct Figures {
     /// The formulas.
     pub formulas: Vec<Formula>,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, _: &Words<'_>) -> String {
+        self.formulas.iter().map(|f| f.formula.clone()).collect::<Vec<_>>().join("; ")
+    }
 }
 
 /// The torque of a joint in words of mathematics.

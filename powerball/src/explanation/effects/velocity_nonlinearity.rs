@@ -1,5 +1,6 @@
 //! Friction at velocity that Eq. 16 cannot bend to: growing faster or slower than in proportion.
 
+use super::words::{Words, list, number};
 use super::{Axis, Candidate, Class, Context, Effect, Found};
 use crate::controller::correction::Law;
 use serde::Serialize;
@@ -21,6 +22,18 @@ pub struct Figures {
     pub coefficient: Vec<f64>,
     /// The power of q̇.
     pub power: Vec<f64>,
+}
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
+        let (torque, position) = (words.torque(), words.position());
+        let one = |(k, (c, power)): (usize, (&f64, &f64))| {
+            format!("{} {torque}·|dq|^{} (dq in {position}/s)", words.size(k, *c), number(*power))
+        };
+        list(self.coefficient.iter().zip(&self.power).enumerate().map(one))
+    }
 }
 
 const POWERS: [f64; 3] = [2.0, 3.0, 0.5];

@@ -103,7 +103,7 @@ fn duels(open: &Open) -> Vec<Duel<'_>> {
     pairs
         .map(|(truth, rival)| {
             let (other, fit) = (&all[truth].fit, &all[rival].fit);
-            let gram = fit.gram.sum(&fit.weights, |_| true).0;
+            let gram = fit.gram.sum(&fit.weights, |_| true).gram;
             let apart = |(r, t): (&Vec<f64>, &Vec<f64>)| r.iter().zip(t).map(|(r, t)| r - t).collect();
             let difference: Vec<Vec<f64>> = fit.residual.iter().zip(&other.residual).map(apart).collect();
             let mut signals: Vec<Vec<Vec<f64>>> = vec![difference];
@@ -183,7 +183,7 @@ fn judge(
                 truth.iter().zip(rival).map(|(t, r)| t - r).collect()
             })
             .collect();
-        let gram = &duel.gram + &Gram::new(&data, design, &folds).sum(&fit.weights, |_| true).0;
+        let gram = &duel.gram + &Gram::new(&data, design, &folds).sum(&fit.weights, |_| true).gram;
         let stays = |signal: &[Vec<f64>], old: &Signal| {
             let (right, square) = products(design, &fit.weights, signal);
             let right: Vec<f64> = right.iter().zip(&old.right).map(|(a, b)| a + b).collect();

@@ -3,7 +3,7 @@
 use super::study::Study;
 use crate::explanation::effects::{self, Candidate, Context, Effect, Made};
 use crate::explanation::rule::Rule;
-use crate::identification::estimate::{Fit, Folds, Solver, Term, fit};
+use crate::identification::estimate::{Fit, Folds, NormalEquations, Solver, Term, fit};
 use crate::logs::regression::{Column, Data};
 use std::ops::Range;
 
@@ -183,14 +183,13 @@ impl Model {
 
     /// Standard errors of the fit's columns by their place; none of a column that is not free.
     pub(super) fn errors(&self) -> impl Fn(usize) -> Option<f64> {
-        let (gram, _, _) = self.fit.gram.fitted(&self.fit.weights, |_| true);
-        let variances = Solver::new(&gram, |c| self.fit.free[c]).inverse_diagonal();
+        let variances = self.fit.solver().inverse_diagonal();
         move |column| variances.get(column).filter(|v| v.is_finite()).map(|v| v.max(0.0).sqrt())
     }
 
     /// How much of each accepted effect is its own.
     pub(super) fn own(&self) -> Vec<Own> {
-        let (gram, _, _) = self.fit.gram.fitted(&self.fit.weights, |_| true);
+        let NormalEquations { gram, .. } = self.fit.normal_equations();
         let share = |((a, place), coefficients): ((&Accepted, Range<usize>), Vec<f64>)| {
             if a.above_band().is_some() {
                 return Own { share: 1.0, relative_std: None };

@@ -2,6 +2,7 @@
 
 use crate::controller::JointNumber;
 use crate::explanation::effects::Figures;
+use crate::explanation::effects::words::Words;
 use crate::identification::estimate::ResidualStats;
 use serde::Serialize;
 
@@ -56,6 +57,14 @@ impl NamedEffect {
     #[must_use]
     pub fn is(&self, name: &str, joints: &[JointNumber]) -> bool {
         self.effect == name && self.joints.iter().any(|joint| joints.contains(joint))
+    }
+
+    /// Its size in words; `sliding` says of each joint of the arm whether it slides, so that its torques are forces.
+    #[must_use]
+    pub fn size(&self, sliding: &[bool]) -> String {
+        let first = self.joints.first().and_then(|joint| sliding.get(joint.index()));
+        let slides = first.copied().unwrap_or(false);
+        self.figures.in_words(&Words { slides, relative_std: &self.relative_std })
     }
 }
 

@@ -5,7 +5,7 @@
 //! them.
 
 use super::asked::Torques;
-use crate::identification::estimate::Solver;
+use crate::identification::estimate::{NormalEquations, Solver};
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, DataError, DataOptions, Recording, RigidArm};
 use faer::Mat;
@@ -18,16 +18,27 @@ const PASSES: usize = 4;
 const STEPS: usize = 20;
 const HELD: f64 = 3e-3;
 
-/// The sums of a joint's rows in a part with a reading of its torque.
+/// A joint's rows in a part with a reading of its torque.
 struct Sums {
-    right: Vec<f64>,
-    square: f64,
+    normal: NormalEquations,
     rows: f64,
+}
+
+impl Sums {
+    /// Mean square of the torque.
+    fn power(&self) -> f64 {
+        self.normal.square / self.rows.max(1.0)
+    }
+
+    /// Mean square of what coefficients, by column of the joint, leave of it.
+    fn left(&self, theta: &[f64]) -> f64 {
+        self.normal.left(theta).max(0.0) / self.rows.max(1.0)
+    }
 }
 
 /// A fit to one part.
 #[derive(Clone, Debug)]
-pub(super) struct Fit {
+pub(super) struct PartFit {
     /// All coefficients.
     pub(super) theta: Vec<f64>,
     /// The normal equations with their weights.
@@ -43,7 +54,7 @@ pub(super) struct Judged {
     /// Mean square of the torque by joint, both parts together.
     pub(super) power: Vec<f64>,
     /// By part that is fitted.
-    pub(super) fits: [Fit; 2],
+    pub(super) fits: [PartFit; 2],
 }
 
 impl Judged {
@@ -66,13 +77,14 @@ pub(super) fn judge(rows: &Rows<'_>, read: &Torques, ridge: f64) -> Judged {
                 return f64::NAN;
             }
             let of = &sums[joint][part];
-            squares(rows, of, joint, part, &fits[1 - part].theta) / of.square.max(f64::MIN_POSITIVE)
+            let power = of.power().max(f64::MIN_POSITIVE);
+            of.left(&rows.of_joint(joint, &fits[1 - part].theta)) / power
         };
         (0..rows.dof()).map(judged).collect()
     });
     let power = |of: &[Sums; 2]| {
         let total = |f: fn(&Sums) -> f64| of.iter().map(f).sum::<f64>();
-        total(|s| s.square) / total(|s| s.rows).max(1.0)
+        total(|s| s.normal.square) / total(|s| s.rows).max(1.0)
     };
     Judged { left, power: sums.iter().map(power).collect(), fits }
 }
@@ -80,47 +92,34 @@ pub(super) fn judge(rows: &Rows<'_>, read: &Torques, ridge: f64) -> Judged {
 fn sums(rows: &Rows<'_>, read: &Torques, joint: usize, part: usize) -> Sums {
     let torque = rows.torque(read, joint, part);
     let dot = |x: &Vec<f64>| x.iter().zip(&torque).map(|(x, y)| x * y).sum::<f64>();
-    let columns = &rows.joints[joint][part].columns;
-    Sums { right: columns.iter().map(dot).collect(), square: dot(&torque), rows: torque.len() as f64 }
+    let Part { columns, gram, .. } = &rows.joints[joint][part];
+    let normal = NormalEquations {
+        gram: gram.clone(),
+        right: columns.iter().map(dot).collect(),
+        square: dot(&torque),
+    };
+    Sums { normal, rows: torque.len() as f64 }
 }
 
-/// The sum of squares that coefficients leave of a joint's rows.
-fn squares(rows: &Rows<'_>, sums: &Sums, joint: usize, part: usize, theta: &[f64]) -> f64 {
-    let (places, gram) = (&rows.places[joint], &rows.joints[joint][part].gram);
-    let mut square = sums.square;
-    for (i, at) in places.iter().enumerate() {
-        let inner: f64 = places.iter().enumerate().map(|(k, to)| gram[(k, i)] * theta[*to]).sum();
-        square += theta[*at] * (inner - 2.0 * sums.right[i]);
-    }
-    square.max(0.0)
-}
-
-fn fit(rows: &Rows<'_>, sums: &[[Sums; 2]], part: usize, ridge: f64) -> Fit {
+fn fit(rows: &Rows<'_>, sums: &[[Sums; 2]], part: usize, ridge: f64) -> PartFit {
     let (n, size, inertial) = (rows.dof(), rows.size(), rows.inertial());
-    let power = |joint: usize| sums[joint][part].square / sums[joint][part].rows.max(1.0);
-    let mut variance: Vec<f64> = (0..n).map(power).collect();
+    let mut variance: Vec<f64> = sums.iter().map(|of| of[part].power()).collect();
     let mut fitted = (vec![0.0; size], Solver::new(&Mat::zeros(size, size), |_| false));
     for _ in 0..PASSES {
-        let (mut gram, mut right) = (Mat::<f64>::zeros(size, size), vec![0.0; size]);
+        let mut normal = NormalEquations::zero(size);
         for joint in (0..n).filter(|j| variance[*j] > 0.0 && rows.moves(*j)) {
-            let (places, own) = (&rows.places[joint], &rows.joints[joint][part].gram);
-            let weight = 1.0 / variance[joint];
-            for (i, at) in places.iter().enumerate() {
-                right[*at] += weight * sums[joint][part].right[i];
-                places.iter().enumerate().for_each(|(k, to)| gram[(*to, *at)] += weight * own[(k, i)]);
-            }
+            normal.add(&rows.places[joint], &sums[joint][part].normal, 1.0 / variance[joint]);
         }
-        (0..inertial).for_each(|c| gram[(c, c)] *= 1.0 + ridge);
-        let solver = Solver::new(&gram, |_| true);
-        fitted = (solver.solve(&right), solver);
+        (0..inertial).for_each(|c| normal.gram[(c, c)] *= 1.0 + ridge);
+        let solver = normal.solver(|_| true);
+        fitted = (solver.solve(&normal.right), solver);
         for (joint, variance) in variance.iter_mut().enumerate() {
             let of = &sums[joint][part];
-            let left = squares(rows, of, joint, part, &fitted.0) / of.rows.max(1.0);
-            *variance = left.max(FLOOR * FLOOR * power(joint));
+            *variance = of.left(&rows.of_joint(joint, &fitted.0)).max(FLOOR * FLOOR * of.power());
         }
     }
     let (theta, solver) = fitted;
-    Fit { theta, solver }
+    PartFit { theta, solver }
 }
 
 /// The factors κ by joint with which the inertial torque of one body comes nearest to every joint's torque in
@@ -130,20 +129,20 @@ pub(super) fn factors_of_body(rows: &Rows<'_>, read: &Torques, part: usize, ridg
     let (n, size, inertial) = (rows.dof(), rows.size(), rows.inertial());
     let sums: Vec<[Sums; 2]> = (0..n).map(|joint| [0, 1].map(|part| sums(rows, read, joint, part))).collect();
     let mut theta = fit(rows, &sums, part, ridge).theta;
-    let power = |joint: usize| sums[joint][part].square / sums[joint][part].rows.max(1.0);
-    let mut variance: Vec<f64> = (0..n).map(power).collect();
+    let mut variance: Vec<f64> = sums.iter().map(|of| of[part].power()).collect();
     let mut kappa = vec![1.0; n];
     for step in 0..STEPS {
         let (mut gram, mut right) = (Mat::<f64>::zeros(size + n, size + n), vec![0.0; size + n]);
         for joint in (0..n).filter(|j| variance[*j] > 0.0 && rows.moves(*j)) {
-            let (places, own) = (&rows.places[joint], &rows.joints[joint][part].gram);
+            let (places, NormalEquations { gram: own, right: of_torque, .. }) =
+                (&rows.places[joint], &sums[joint][part].normal);
             let (weight, to_body) = (1.0 / variance[joint], places.len() - FRICTION);
             let of = |i: usize| if i < to_body { kappa[joint] } else { 1.0 };
             // The torque of the body as it is so far is the column of the factor.
             let column = |i: usize| (0..to_body).map(|k| own[(k, i)] * theta[places[k]]).sum::<f64>();
             let mut square = 0.0;
             for (i, at) in places.iter().enumerate() {
-                right[*at] += weight * of(i) * sums[joint][part].right[i];
+                right[*at] += weight * of(i) * of_torque[i];
                 for (k, to) in places.iter().enumerate() {
                     gram[(*to, *at)] += weight * of(i) * of(k) * own[(k, i)];
                 }
@@ -152,7 +151,7 @@ pub(super) fn factors_of_body(rows: &Rows<'_>, read: &Torques, part: usize, ridg
                 gram[(*at, size + joint)] += weight * of(i) * with;
                 if i < to_body {
                     square += with * theta[*at];
-                    right[size + joint] += weight * sums[joint][part].right[i] * theta[*at];
+                    right[size + joint] += weight * of_torque[i] * theta[*at];
                 }
             }
             gram[(size + joint, size + joint)] += weight * square * (1.0 + HELD);
@@ -174,32 +173,25 @@ pub(super) fn factors_of_body(rows: &Rows<'_>, read: &Torques, part: usize, ridg
             let of = &sums[joint][part];
             let mut own = theta.clone();
             own[..inertial].iter_mut().for_each(|x| *x *= kappa[joint]);
-            let (left, rows_count) = (squares(rows, of, joint, part, &own), of.rows.max(1.0));
-            *variance = (left / rows_count).max(FLOOR * FLOOR * of.square / rows_count);
+            *variance = of.left(&rows.of_joint(joint, &own)).max(FLOOR * FLOOR * of.power());
         }
     }
     kappa
 }
 
 /// The fit of one joint by itself, over both parts: its own inertial parameters, nothing shared.
-pub(super) fn apart(rows: &Rows<'_>, read: &Torques, joint: usize, part: usize) -> Fit {
+pub(super) fn apart(rows: &Rows<'_>, read: &Torques, joint: usize, part: usize) -> PartFit {
     let sums = sums(rows, read, joint, part);
-    let (places, own) = (&rows.places[joint], &rows.joints[joint][part].gram);
-    let size = rows.size();
     let solve = |weight: f64| {
-        let (mut gram, mut right) = (Mat::<f64>::zeros(size, size), vec![0.0; size]);
-        for (i, at) in places.iter().enumerate() {
-            right[*at] = weight * sums.right[i];
-            places.iter().enumerate().for_each(|(k, to)| gram[(*to, *at)] = weight * own[(k, i)]);
-        }
-        let solver = Solver::new(&gram, |_| true);
-        (solver.solve(&right), solver)
+        let mut normal = NormalEquations::zero(rows.size());
+        normal.add(&rows.places[joint], &sums.normal, weight);
+        let solver = normal.solver(|_| true);
+        (solver.solve(&normal.right), solver)
     };
-    let (theta, _) = solve(1.0);
-    let left = squares(rows, &sums, joint, part, &theta) / sums.rows.max(1.0);
-    let variance = left.max(FLOOR * FLOOR * sums.square / sums.rows.max(1.0)).max(f64::MIN_POSITIVE);
+    let left = sums.left(&rows.of_joint(joint, &solve(1.0).0));
+    let variance = left.max(FLOOR * FLOOR * sums.power()).max(f64::MIN_POSITIVE);
     let (theta, solver) = solve(1.0 / variance);
-    Fit { theta, solver }
+    PartFit { theta, solver }
 }
 
 // The rows of a regression for one reading of the positions; every reading of the torques is judged on them.
@@ -304,6 +296,11 @@ impl<'a> Rows<'a> {
         self.inertial() + FRICTION * self.dof()
     }
 
+    /// Of all coefficients those of a joint's columns.
+    fn of_joint(&self, joint: usize, theta: &[f64]) -> Vec<f64> {
+        self.places[joint].iter().map(|place| theta[*place]).collect()
+    }
+
     /// Whether a joint has enough rows to be judged.
     pub(super) fn moves(&self, joint: usize) -> bool {
         self.joints[joint].iter().all(|part| part.at.len() >= FEWEST)
@@ -366,19 +363,8 @@ fn joint_rows(data: &Data<'_>, joint: usize, part: &[Option<usize>]) -> (Vec<usi
         }
     }
     for part in &mut parts {
-        part.gram = products(&part.columns);
+        // The torque comes with each reading.
+        part.gram = NormalEquations::of(&part.columns, &[]).gram;
     }
     (places, parts)
-}
-
-fn products(columns: &[Vec<f64>]) -> Mat<f64> {
-    let mut gram = Mat::zeros(columns.len(), columns.len());
-    for (i, a) in columns.iter().enumerate() {
-        for (k, b) in columns.iter().enumerate().take(i + 1) {
-            let value: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
-            gram[(i, k)] = value;
-            gram[(k, i)] = value;
-        }
-    }
-    gram
 }

@@ -3,7 +3,7 @@
 //! Both are linear in the coefficients of a fit, so each comes with a standard error. A reading of the torques
 //! with the wrong sign fits as well as the right one; these two tell them apart.
 
-use super::fit::{FRICTION, Fit, Rows};
+use super::fit::{FRICTION, PartFit, Rows};
 
 /// Samples of a part that are looked at.
 const SAMPLES: usize = 300;
@@ -77,24 +77,24 @@ impl Energies {
     }
 
     /// The energy of motion of the arm by a fit.
-    pub(super) fn kinetic(&self, fit: &Fit) -> Estimate {
+    pub(super) fn kinetic(&self, fit: &PartFit) -> Estimate {
         estimate(&self.kinetic, fit)
     }
 
     /// The power that friction takes of a joint.
-    pub(super) fn friction(&self, fit: &Fit, joint: usize) -> Estimate {
+    pub(super) fn friction(&self, fit: &PartFit, joint: usize) -> Estimate {
         estimate(&self.friction[joint], fit)
     }
 
     /// The power that friction takes of all joints.
-    pub(super) fn all_friction(&self, fit: &Fit) -> Estimate {
+    pub(super) fn all_friction(&self, fit: &PartFit) -> Estimate {
         let size = self.kinetic.len();
         let sum = (0..size).map(|c| self.friction.iter().map(|f| f[c]).sum()).collect::<Vec<f64>>();
         estimate(&sum, fit)
     }
 }
 
-fn estimate(share: &[f64], fit: &Fit) -> Estimate {
+fn estimate(share: &[f64], fit: &PartFit) -> Estimate {
     let dot = |x: &[f64]| share.iter().zip(x).map(|(a, b)| a * b).sum::<f64>();
     let seen = fit.solver.solve(share);
     // What no kept column shows is not determined.

@@ -18,8 +18,9 @@
 //! are, in torque.
 
 use super::estimates::{ResidualStats, stats_of};
+use super::normal::{NormalEquations, dot};
 use super::reduced::Solution;
-use super::solve::{Solver, bounded, dot};
+use super::solve::{Solver, bounded};
 use crate::logs::regression::RigidArm;
 use dyngen::arm::{Arm, Convention, Parameter, ParameterKind};
 use dyngen::consistency::pseudo_inertia;
@@ -324,7 +325,7 @@ pub struct ConsistentReport {
 pub fn consistent_fit(body: &RigidArm, solution: &Solution) -> Result<ConsistentFit, Error> {
     let layout = solution.layout;
     let (p, size) = (layout.inertial, layout.size());
-    let (gram, right, _) = solution.products();
+    let NormalEquations { gram, right, .. } = solution.products();
     // χ² as a function of the inertial parameters alone, all other columns refitted: a Schur complement.
     let others = Solver::new(&gram, |c| c >= p && solution.free[c]);
     let mut metric = Mat::<f64>::zeros(p, p);

@@ -2,7 +2,7 @@
 //!
 //! Also here: which blocks are held out together.
 
-use super::solve::{Products, add_products, zeros};
+use super::normal::NormalEquations;
 use super::variable_projection::{FRICTION, Layout};
 use crate::logs::parallel;
 use crate::logs::regression::{Column, Data};
@@ -147,8 +147,8 @@ fn pack(columns: &[&[f64]], rows: &Range<usize>) -> Vec<f64> {
 /// Cross products of a design with itself and the torques, by joint and cell of folds.
 #[derive(Debug)]
 pub struct Gram {
-    /// `[joint][cell]`: (A'A, A'y, y'y), local.
-    parts: Vec<Vec<Products>>,
+    /// `[joint][cell]`, over the joint's own columns.
+    parts: Vec<Vec<NormalEquations>>,
     globals: Vec<Vec<usize>>,
     size: usize,
     /// By column the precision with which it is known before anything is measured.
@@ -163,11 +163,11 @@ impl Gram {
         let parts = parallel::map(&joints, |&j| {
             let local = &design.joints[j];
             let d = local.global.len();
-            let mut cells = vec![zeros(d); folds.cells];
+            let mut cells = vec![NormalEquations::zero(d); folds.cells];
             for (cell, rows) in runs(data, folds, j) {
                 let a = design.matrix(j, &rows);
                 let y = &data.joints[j].torque[rows.clone()];
-                let (gram, right, square) = &mut cells[cell];
+                let NormalEquations { gram, right, square } = &mut cells[cell];
                 matmul(gram.as_mut(), Accum::Add, a.transpose(), a, 1.0, Par::Seq);
                 for (c, r) in right.iter_mut().enumerate() {
                     let column = &local.values[c * local.rows + rows.start..c * local.rows + rows.end];
@@ -186,21 +186,21 @@ impl Gram {
     /// torque on a joint than was measured there. What logs determine does not move by that; what
     /// they hardly determine stays where a real arm may be, and the model does not run away on other paths.
     #[must_use]
-    pub fn fitted(&self, weights: &[f64], wanted: impl Fn(usize) -> bool) -> (Mat<f64>, Vec<f64>, f64) {
-        let (mut gram, right, square) = self.sum(weights, wanted);
+    pub fn fitted(&self, weights: &[f64], wanted: impl Fn(usize) -> bool) -> NormalEquations {
+        let mut sum = self.sum(weights, wanted);
         for (c, precision) in self.prior.iter().enumerate() {
-            gram[(c, c)] += precision;
+            sum.gram[(c, c)] += precision;
         }
-        (gram, right, square)
+        sum
     }
 
-    /// Σ w A'A, Σ w A'y and Σ w y'y over the cells for which `wanted` holds.
+    /// The normal equations over the cells for which `wanted` holds.
     #[must_use]
-    pub fn sum(&self, weights: &[f64], wanted: impl Fn(usize) -> bool) -> (Mat<f64>, Vec<f64>, f64) {
-        let mut sum = zeros(self.size);
+    pub fn sum(&self, weights: &[f64], wanted: impl Fn(usize) -> bool) -> NormalEquations {
+        let mut sum = NormalEquations::zero(self.size);
         for ((cells, global), w) in self.parts.iter().zip(&self.globals).zip(weights) {
-            for (_, products) in cells.iter().enumerate().filter(|(cell, _)| wanted(*cell)) {
-                add_products(&mut sum, global, products, *w);
+            for (_, own) in cells.iter().enumerate().filter(|(cell, _)| wanted(*cell)) {
+                sum.add(global, own, *w);
             }
         }
         sum
@@ -209,12 +209,12 @@ impl Gram {
 
 /// By column 1/s², where s is the value at which it alone would make as much torque on some joint as was
 /// measured there.
-fn prior(parts: &[Vec<Products>], globals: &[Vec<usize>], design: &Design) -> Vec<f64> {
+fn prior(parts: &[Vec<NormalEquations>], globals: &[Vec<usize>], design: &Design) -> Vec<f64> {
     let mut prior = vec![0.0f64; design.size];
     for (cells, global) in parts.iter().zip(globals) {
-        let measured: f64 = cells.iter().map(|(_, _, square)| square).sum();
+        let measured: f64 = cells.iter().map(|own| own.square).sum();
         for (local, g) in global.iter().enumerate() {
-            let alone: f64 = cells.iter().map(|(gram, _, _)| gram[(local, local)]).sum();
+            let alone: f64 = cells.iter().map(|own| own.gram[(local, local)]).sum();
             if measured > 0.0 {
                 prior[*g] = prior[*g].max(alone / measured);
             }

@@ -1,9 +1,12 @@
 //! The fit of rows in memory, with the columns of further terms.
 
 use super::design::{Design, Folds, Gram, runs};
-use super::solve::{Products, dot};
+use super::normal::{NormalEquations, dot};
+use super::solve::Solver;
 use super::variable_projection;
-use super::variable_projection::{FRICTION, Layout, Rows, Scatter, Start, Trials, variable_projection};
+use super::variable_projection::{
+    FRICTION, Layout, Scatter, SeparableRows, Start, Trials, variable_projection,
+};
 use crate::logs::parallel;
 use crate::logs::regression::{Column, Data, RigidArm};
 use faer::Mat;
@@ -80,6 +83,18 @@ impl Fit {
         self.theta[self.design.extra(term)]
     }
 
+    /// The normal equations of all rows, with what is known beforehand of an arm (see [`Gram::fitted`]).
+    #[must_use]
+    pub fn normal_equations(&self) -> NormalEquations {
+        self.gram.fitted(&self.weights, |_| true)
+    }
+
+    /// Them factored over the free columns.
+    #[must_use]
+    pub fn solver(&self) -> Solver {
+        self.normal_equations().solver(|c| self.free[c])
+    }
+
     /// The prediction of this model on other data with the same kind of columns.
     #[must_use]
     pub fn residual_on(&self, data: &Data<'_>, extra: &[Column]) -> Vec<Vec<f64>> {
@@ -120,7 +135,7 @@ struct InMemory<'a> {
     extra: Vec<Column>,
 }
 
-impl Rows for InMemory<'_> {
+impl SeparableRows for InMemory<'_> {
     type At = (Design, Gram);
 
     fn layout(&self) -> Layout {
@@ -146,7 +161,7 @@ impl Rows for InMemory<'_> {
         (design, gram)
     }
 
-    fn products(&self, (_, gram): &(Design, Gram), weights: &[f64]) -> Products {
+    fn products(&self, (_, gram): &(Design, Gram), weights: &[f64]) -> NormalEquations {
         gram.fitted(weights, |_| true)
     }
 

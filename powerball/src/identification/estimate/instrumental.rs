@@ -12,8 +12,8 @@
 //! starts from.
 
 use super::distribution::t_quantile_975;
+use super::normal::dot;
 use super::reduced::{Part, Solution};
-use super::solve::dot;
 use super::spectrum::{Power, deconvolved};
 use super::uncertainty::StandardErrors;
 use super::variable_projection;

@@ -1,7 +1,7 @@
 //! The fit of reduced logs.
 
-use super::solve::{Products, add_columns, dot, zeros};
-use super::variable_projection::{FRICTION, Layout, Rows, Scatter, Trials, variable_projection};
+use super::normal::{NormalEquations, dot};
+use super::variable_projection::{FRICTION, Layout, Scatter, SeparableRows, Trials, variable_projection};
 use crate::logs::summary::{
     Columns, Identity, NODES, OCTAVES, RFactor, SLOW, Steepness, Summary, SummaryError,
 };
@@ -56,9 +56,9 @@ impl Solution {
         &self.theta[..self.layout.inertial]
     }
 
-    /// Σ w·A'A, Σ w·A'y, Σ w·y'y.
-    pub(super) fn products(&self) -> Products {
-        let mut sum = zeros(self.layout.size());
+    /// The normal equations of all joints.
+    pub(super) fn products(&self) -> NormalEquations {
+        let mut sum = NormalEquations::zero(self.layout.size());
         for (parts, weight) in self.parts.iter().zip(&self.weights) {
             parts.iter().for_each(|part| part.add_to(&mut sum, *weight));
         }
@@ -142,9 +142,9 @@ impl Part {
     }
 
     /// Adds the products times a weight.
-    pub(super) fn add_to(&self, products: &mut Products, weight: f64) {
+    pub(super) fn add_to(&self, sum: &mut NormalEquations, weight: f64) {
         let Some((torque, columns)) = self.columns.split_last() else { return };
-        add_columns(products, &self.global, columns, torque, weight);
+        sum.add_columns(&self.global, columns, torque, weight);
     }
 }
 
@@ -221,7 +221,7 @@ impl Reduced<'_> {
     }
 }
 
-impl Rows for Reduced<'_> {
+impl SeparableRows for Reduced<'_> {
     /// By joint: all rows, and the slow ones.
     type At = Vec<[Part; 2]>;
 
@@ -251,8 +251,8 @@ impl Rows for Reduced<'_> {
             .collect()
     }
 
-    fn products(&self, at: &Vec<[Part; 2]>, weights: &[f64]) -> Products {
-        let mut sum = zeros(self.layout.size());
+    fn products(&self, at: &Vec<[Part; 2]>, weights: &[f64]) -> NormalEquations {
+        let mut sum = NormalEquations::zero(self.layout.size());
         for ([all, _], weight) in at.iter().zip(weights) {
             all.add_to(&mut sum, *weight);
         }

@@ -3,7 +3,7 @@
 //! For states of a simulation, or of logs that were filtered elsewhere. Steepnesses of friction are given;
 //! logs as they were recorded go through [`crate::logs::summary`] instead.
 
-use super::solve::{Solver, add_columns, zeros};
+use super::normal::NormalEquations;
 use crate::logs::parallel;
 use crate::logs::regression::RigidArm;
 use crate::logs::summary::RFactor;
@@ -143,16 +143,15 @@ impl<'a> Stream<'a> {
         let mut rms = vec![1.0; n];
         let mut theta = vec![0.0; size];
         for _ in 0..3 {
-            let mut products = zeros(size);
+            let mut sum = NormalEquations::zero(size);
             for (j, factor) in self.factors.iter().enumerate().filter(|(j, _)| rms[*j] > 0.0) {
                 let last = factor.width() - 1;
                 let columns: Vec<&[f64]> = (0..last).map(|k| factor.column(k)).collect();
                 let places: Vec<usize> = (0..last).map(|k| global(j, k)).collect();
                 let weight = 1.0 / (rms[j] * rms[j]);
-                add_columns(&mut products, &places, &columns, factor.column(last), weight);
+                sum.add_columns(&places, &columns, factor.column(last), weight);
             }
-            let (gram, right, _) = &products;
-            theta = Solver::new(gram, |_| true).solve(right);
+            theta = sum.solve();
             for (j, factor) in self.factors.iter().enumerate() {
                 let last = factor.width() - 1;
                 let mut left = factor.column(last).to_vec();

@@ -4,8 +4,8 @@
 //! Also here: standard errors under coloured noise.
 
 use super::distribution::{freedom_of, t_quantile_975};
+use super::normal::NormalEquations;
 use super::reduced::Solution;
-use super::solve::{Solver, zeros};
 use super::spectrum::{Power, deconvolved};
 use super::variable_projection::{FRICTION, tangent};
 use faer::Mat;
@@ -106,9 +106,9 @@ fn path(solution: &Solution, joint: usize) -> Path {
     if rows == 0 {
         return Path::default();
     }
-    let mut sum = super::solve::zeros(solution.layout.size());
+    let mut sum = NormalEquations::zero(solution.layout.size());
     parts.iter().for_each(|part| part.add_to(&mut sum, 1.0 / rows as f64));
-    let (gram, _, torque) = sum;
+    let NormalEquations { gram, square: torque, .. } = sum;
     let columns: Vec<usize> = (0..solution.layout.size()).filter(|c| gram[(*c, *c)] > 0.0).collect();
     let row = |i: usize| (0..=i).map(|k| gram[(columns[i], columns[k])]).collect();
     let products = (0..columns.len()).map(row).collect();
@@ -162,8 +162,7 @@ struct Group {
 #[must_use]
 pub fn standard_errors(solution: &Solution) -> StandardErrors {
     let size = solution.layout.size();
-    let (gram, _, _) = solution.products();
-    let solver = Solver::new(&gram, |c| solution.free[c]);
+    let solver = solution.products().solver(|c| solution.free[c]);
     let mut inverse = Mat::<f64>::zeros(size, size);
     for &c in solver.kept() {
         let mut unit = vec![0.0; size];
@@ -175,9 +174,9 @@ pub fn standard_errors(solution: &Solution) -> StandardErrors {
     let mut groups = Vec::new();
     for (joint, (parts, weight)) in solution.parts.iter().zip(&solution.weights).enumerate() {
         for (octave, part) in parts.iter().enumerate().filter(|(_, p)| p.rows > 0 && *weight > 0.0) {
-            let mut products = zeros(size);
+            let mut products = NormalEquations::zero(size);
             part.add_to(&mut products, 1.0);
-            let turned = &inverse * &products.0;
+            let turned = &inverse * &products.gram;
             let spread = (0..size)
                 .map(|i| (0..size).map(|k| turned[(i, k)] * inverse[(k, i)]).sum::<f64>().max(0.0))
                 .collect();

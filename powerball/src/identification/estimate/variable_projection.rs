@@ -7,7 +7,8 @@
 //! Also here: the steepnesses γ2, γ4 of the tanh model; rows of a regression whose friction steepnesses are free, whatever they are
 //! kept in.
 
-use super::solve::{Products, Solver, bounded};
+use super::normal::NormalEquations;
+use super::solve::Solver;
 pub(super) use crate::logs::regression::FRICTION;
 use crate::logs::regression::{Data, Recording};
 use crate::logs::summary::{NODES, Steepness};
@@ -38,7 +39,7 @@ const SHAPE_STEPS: usize = 6;
 const SETTLED: f64 = 1e-5;
 
 /// Fits rows; the coefficients of `non_negative` columns and of friction's levels stay at or above zero.
-pub(super) fn variable_projection<R: Rows>(
+pub(super) fn variable_projection<R: SeparableRows>(
     rows: &R,
     non_negative: &[usize],
     start: Option<Start<'_>>,
@@ -91,7 +92,12 @@ struct State<A> {
 }
 
 impl<A> State<A> {
-    fn new<R: Rows<At = A>>(rows: &R, bounds: &[usize], shapes: &[[f64; 2]], weights: &[f64]) -> State<A> {
+    fn new<R: SeparableRows<At = A>>(
+        rows: &R,
+        bounds: &[usize],
+        shapes: &[[f64; 2]],
+        weights: &[f64],
+    ) -> State<A> {
         let at = rows.at(shapes);
         let solver = Solver::new(&Mat::zeros(0, 0), |_| false);
         let mut state = State { at, theta: Vec::new(), solver, error: f64::INFINITY };
@@ -99,15 +105,10 @@ impl<A> State<A> {
         state
     }
 
-    fn solve<R: Rows<At = A>>(&mut self, rows: &R, bounds: &[usize], weights: &[f64]) {
-        let (gram, right, square) = rows.products(&self.at, weights);
-        let layout = rows.layout();
-        let (theta, solver) = bounded(&gram, &right, |c| !layout.is_tangent(c), bounds);
-        let explained: f64 = theta.iter().zip(&right).map(|(x, r)| x * r).sum::<f64>();
-        let quadratic: f64 = (0..theta.len())
-            .map(|i| theta[i] * (0..theta.len()).map(|k| gram[(k, i)] * theta[k]).sum::<f64>())
-            .sum();
-        self.error = square - 2.0 * explained + quadratic;
+    fn solve<R: SeparableRows<At = A>>(&mut self, rows: &R, bounds: &[usize], weights: &[f64]) {
+        let (normal, layout) = (rows.products(&self.at, weights), rows.layout());
+        let (theta, solver) = normal.solve_bounded(|c| !layout.is_tangent(c), bounds);
+        self.error = normal.left(&theta);
         (self.theta, self.solver) = (theta, solver);
     }
 
@@ -128,7 +129,7 @@ impl<A> State<A> {
 
 /// Gauss–Newton on ln γ2, ln γ4 of all joints with every linear parameter projected out, steps halved until
 /// they help.
-fn descend<R: Rows>(
+fn descend<R: SeparableRows>(
     mut state: State<R::At>,
     rows: &R,
     bounds: &[usize],
@@ -138,8 +139,8 @@ fn descend<R: Rows>(
     let layout = rows.layout();
     for _ in 0..SHAPE_STEPS {
         let free = state.free(layout);
-        let (gram, right, _) = rows.products(&state.at, weights);
-        let theta = Solver::new(&gram, |c| free[c]).solve(&right);
+        let normal = rows.products(&state.at, weights);
+        let theta = normal.solver(|c| free[c]).solve(&normal.right);
         let mut moved = false;
         let mut scale = 1.0;
         for _ in 0..4 {
@@ -172,7 +173,7 @@ fn descend<R: Rows>(
 }
 
 /// 1/(σ²·inflation) by joint, 0 for a joint without rows.
-fn new_weights<R: Rows>(rows: &R, scatter: &Scatter) -> Vec<f64> {
+fn new_weights<R: SeparableRows>(rows: &R, scatter: &Scatter) -> Vec<f64> {
     let top = scatter.sigma.iter().fold(0.0f64, |m, s| m.max(*s));
     (0..scatter.sigma.len())
         .map(|j| {
@@ -235,7 +236,7 @@ pub(super) fn first((low, high): (f64, f64)) -> [f64; 2] {
 /// holds the joint's steepnesses, they are among those tried, with their tangents: a bend beside a step that
 /// is known is then not outdone by a second step that corrects the first.
 #[must_use]
-pub(super) fn search<R: Rows>(
+pub(super) fn search<R: SeparableRows>(
     rows: &R,
     at: &R::At,
     weights: &[f64],
@@ -258,9 +259,9 @@ pub(super) fn search<R: Rows>(
             which == 2 || (which < 2 && j != joint) || (which > 2 && j == joint && present.is_some())
         })
     };
-    let (gram, right, _) = rows.products(at, weights);
-    let solver = Solver::new(&gram, nuisance);
-    let base = solver.solve(&right);
+    let normal = rows.products(at, weights);
+    let solver = normal.solver(nuisance);
+    let base = solver.solve(&normal.right);
     let weight = weights[joint];
     // Columns at a few nodes hold those of all steepnesses between them.
     let nodes = Steepness::between(low, high);
@@ -383,8 +384,8 @@ pub(super) struct Trials {
     pub score: Vec<f64>,
 }
 
-/// Rows of a regression whose friction steepnesses are free.
-pub(super) trait Rows: Sync {
+/// Rows of a regression that is linear but for the steepnesses of friction (separable least squares).
+pub(super) trait SeparableRows: Sync {
     /// The columns at given steepnesses.
     type At;
     /// Their order.
@@ -397,8 +398,8 @@ pub(super) trait Rows: Sync {
     fn power(&self, joint: usize) -> f64;
     /// The columns at γ2, γ4 of each joint.
     fn at(&self, shapes: &[[f64; 2]]) -> Self::At;
-    /// Their cross products, summed over joints.
-    fn products(&self, at: &Self::At, weights: &[f64]) -> Products;
+    /// Their normal equations, summed over joints.
+    fn products(&self, at: &Self::At, weights: &[f64]) -> NormalEquations;
     /// Cross products of one joint's columns tanh(γ·q̇) for some γ with all others, with each other and with
     /// the torque.
     fn trials(&self, at: &Self::At, joint: usize, steep: &[f64]) -> Trials;

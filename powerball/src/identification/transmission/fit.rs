@@ -9,12 +9,11 @@
 
 use super::products::{Column, Evidence, Products};
 use super::search::Candidate;
-use crate::identification::estimate::{Solver, bounded};
-use faer::Mat;
+use crate::identification::estimate::NormalEquations;
 
 /// The law of a transmission with its coefficients.
 #[derive(Clone, Debug)]
-pub(super) struct Fit {
+pub(super) struct FittedLaw {
     /// The link's torque, the acceleration, the velocity, the constant and Coulomb friction; then what was
     /// added.
     pub columns: Vec<Column>,
@@ -30,44 +29,41 @@ pub(super) struct Fit {
     cost: f64,
 }
 
-/// The normal equations without the noise of the link's torque.
-fn normal(products: &Products, columns: &[Column], noise: f64) -> (Mat<f64>, Vec<f64>) {
-    let (mut gram, right) = products.normal(columns);
-    gram[(0, 0)] -= noise * products.rows;
-    (gram, right)
+/// The normal equations without the noise of the link's torque; the motor's torque times a sign.
+fn normal(products: &Products, columns: &[Column], noise: f64, sign: f64) -> NormalEquations {
+    let mut normal = products.normal(columns, sign);
+    normal.gram[(0, 0)] -= noise * products.rows;
+    normal
 }
 
-impl Fit {
+impl FittedLaw {
     /// Of the widths, and of `options` beside what is `fixed`, those that leave the least.
     pub(super) fn best(
         products: &Products,
         noise: f64,
         fixed: &[Candidate],
         options: &[Candidate],
-    ) -> Option<Fit> {
+    ) -> Option<FittedLaw> {
         let middle = columns(Column::WIDTHS / 2, &[]);
-        let (gram, right) = normal(products, &middle, noise);
-        let sign = if Solver::new(&gram, |_| true).solve(&right)[0] < 0.0 { -1.0 } else { 1.0 };
+        let sign = if normal(products, &middle, noise, 1.0).solve()[0] < 0.0 { -1.0 } else { 1.0 };
         let lists: Vec<Vec<Candidate>> = match options {
             [] => vec![fixed.to_vec()],
             options => options.iter().map(|o| fixed.iter().copied().chain([*o]).collect()).collect(),
         };
         let widths = 0..Column::WIDTHS;
         let fits = lists.iter().flat_map(|effects| {
-            widths.clone().map(|width| Fit::new(products, noise, sign, width, effects.clone()))
+            widths.clone().map(|width| FittedLaw::new(products, noise, sign, width, effects.clone()))
         });
         fits.filter(|fit| fit.cost.is_finite()).min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
-    fn new(products: &Products, noise: f64, sign: f64, width: usize, effects: Vec<Candidate>) -> Fit {
+    fn new(products: &Products, noise: f64, sign: f64, width: usize, effects: Vec<Candidate>) -> FittedLaw {
         let columns = columns(width, &effects);
-        let (gram, mut right) = normal(products, &columns, noise);
-        right.iter_mut().for_each(|x| *x *= sign);
+        let normal = normal(products, &columns, noise, sign);
         let bounds: Vec<usize> = (0..columns.len()).filter(|c| columns[*c].is_non_negative()).collect();
-        let (theta, _) = bounded(&gram, &right, |_| true, &bounds);
-        let square = products.of(Column::Motor, Column::Motor);
-        let cost = left(square, &gram, &right, &theta);
-        Fit { columns, theta, width, effects, sign, cost }
+        let (theta, _) = normal.solve_bounded(|_| true, &bounds);
+        let cost = normal.left(&theta);
+        FittedLaw { columns, theta, width, effects, sign, cost }
     }
 
     /// k.
@@ -87,9 +83,7 @@ impl Fit {
 
     /// Sum of squares that it leaves of some rows.
     pub(super) fn left(&self, products: &Products) -> f64 {
-        let (gram, mut right) = products.normal(&self.columns);
-        right.iter_mut().for_each(|x| *x *= self.sign);
-        left(products.of(Column::Motor, Column::Motor), &gram, &right, &self.theta)
+        products.normal(&self.columns, self.sign).left(&self.theta)
     }
 
     /// Standard errors of the coefficients, from blocks that count as independent; infinite where a
@@ -97,18 +91,19 @@ impl Fit {
     pub(super) fn standard_errors(&self, evidence: &Evidence, wanted: impl Fn(usize) -> bool) -> Vec<f64> {
         let used: Vec<&Products> =
             evidence.blocks.iter().filter(|b| wanted(b.part)).map(|b| &b.products).collect();
-        let (gram, _) = normal(&Products::sum(used.iter().copied()), &self.columns, evidence.noise);
+        let all = Products::sum(used.iter().copied());
         let free = |c: usize| !self.columns[c].is_non_negative() || self.theta[c] > 0.0;
-        let solver = Solver::new(&gram, free);
+        let solver = normal(&all, &self.columns, evidence.noise, self.sign).solver(free);
         let size = self.columns.len();
         let rows: Vec<Vec<f64>> = (0..size)
             .map(|c| solver.solve(&(0..size).map(|k| f64::from(u8::from(k == c))).collect::<Vec<_>>()))
             .collect();
         let mut variance = vec![0.0; size];
         for products in &used {
-            let (gram, right) = normal(products, &self.columns, evidence.noise);
+            let NormalEquations { gram, right, .. } =
+                normal(products, &self.columns, evidence.noise, self.sign);
             let score: Vec<f64> = (0..size)
-                .map(|r| self.sign * right[r] - (0..size).map(|c| gram[(r, c)] * self.theta[c]).sum::<f64>())
+                .map(|r| right[r] - (0..size).map(|c| gram[(r, c)] * self.theta[c]).sum::<f64>())
                 .collect();
             for (sum, row) in variance.iter_mut().zip(&rows) {
                 *sum += row.iter().zip(&score).map(|(a, b)| a * b).sum::<f64>().powi(2);
@@ -131,15 +126,9 @@ fn columns(width: usize, effects: &[Candidate]) -> Vec<Column> {
     columns
 }
 
-fn left(square: f64, gram: &Mat<f64>, right: &[f64], theta: &[f64]) -> f64 {
-    let size = theta.len();
-    let predicted = |r: usize| (0..size).map(|c| gram[(r, c)] * theta[c]).sum::<f64>();
-    square + (0..size).map(|r| theta[r] * (predicted(r) - 2.0 * right[r])).sum::<f64>()
-}
-
 /// The share of the link torque's square, beyond what the other columns say, that is noise.
 pub(super) fn noise_share(products: &Products, noise: f64) -> f64 {
-    let (gram, _) = products.normal(&columns(Column::WIDTHS / 2, &[]));
+    let normal = products.normal(&columns(Column::WIDTHS / 2, &[]), 1.0);
     // The first of the inverse's diagonal is one over what of the link's square the others do not say.
-    noise * products.rows * Solver::new(&gram, |_| true).inverse_diagonal()[0]
+    noise * products.rows * normal.solver(|_| true).inverse_diagonal()[0]
 }

@@ -5,7 +5,7 @@
 
 use crate::controller::JointNumber;
 use crate::controller::correction::{Instant, Law, Memory};
-use crate::identification::estimate::noise_in_band;
+use crate::identification::estimate::{NormalEquations, noise_in_band};
 use crate::logs::log::Log;
 use crate::logs::regression::{Recording, top_velocity};
 use crate::logs::signal::resample::{linear, median_step};
@@ -72,10 +72,14 @@ impl Products {
         self.gram[a.index() * Column::COUNT + b.index()]
     }
 
-    /// Of some columns with each other, and with the motor's torque.
-    pub(super) fn normal(&self, columns: &[Column]) -> (Mat<f64>, Vec<f64>) {
-        let gram = Mat::from_fn(columns.len(), columns.len(), |r, c| self.of(columns[r], columns[c]));
-        (gram, columns.iter().map(|c| self.of(*c, Column::Motor)).collect())
+    /// The normal equations of some columns and the motor's torque, times a sign.
+    pub(super) fn normal(&self, columns: &[Column], sign: f64) -> NormalEquations {
+        let size = columns.len();
+        NormalEquations {
+            gram: Mat::from_fn(size, size, |r, c| self.of(columns[r], columns[c])),
+            right: columns.iter().map(|c| sign * self.of(*c, Column::Motor)).collect(),
+            square: self.of(Column::Motor, Column::Motor),
+        }
     }
 }
 

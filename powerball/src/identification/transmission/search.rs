@@ -2,7 +2,7 @@
 //!
 //! Also here: what a transmission may hold beside friction and rotor.
 
-use super::fit::{Fit, noise_share};
+use super::fit::{FittedLaw, noise_share};
 use super::products::{Column, Evidence, Products, Scales};
 use super::result::Transmission;
 use crate::controller::JointNumber;
@@ -42,7 +42,7 @@ pub(super) struct Found {
 fn held_out(evidence: &Evidence, fixed: &[Candidate], options: &[Candidate]) -> Option<Vec<f64>> {
     let left = |part: usize| {
         let others = evidence.of(|k| k != part);
-        Some(Fit::best(&others, evidence.noise, fixed, options)?.left(&evidence.parts[part]))
+        Some(FittedLaw::best(&others, evidence.noise, fixed, options)?.left(&evidence.parts[part]))
     };
     (0..evidence.parts.len()).map(left).collect()
 }
@@ -51,7 +51,7 @@ fn held_out(evidence: &Evidence, fixed: &[Candidate], options: &[Candidate]) -> 
 ///
 /// # Errors
 /// In words, where the motor's torque is not that of the joint, or the ratio is not told.
-pub(super) fn base(evidence: &Evidence, joint: JointNumber) -> Result<Fit, String> {
+pub(super) fn base(evidence: &Evidence, joint: JointNumber) -> Result<FittedLaw, String> {
     let all = evidence.of(|_| true);
     if noise_share(&all, evidence.noise) > NOISE {
         return Err(format!(
@@ -60,8 +60,8 @@ pub(super) fn base(evidence: &Evidence, joint: JointNumber) -> Result<Fit, Strin
         ));
     }
     let no_fit = || format!("motor{joint} and tau{joint} do not fit together: check both columns");
-    let fit = Fit::best(&evidence.fitted(), evidence.noise, &[], &[]).ok_or_else(no_fit)?;
-    let whole = Fit::best(&all, evidence.noise, &[], &[]).ok_or_else(no_fit)?;
+    let fit = FittedLaw::best(&evidence.fitted(), evidence.noise, &[], &[]).ok_or_else(no_fit)?;
+    let whole = FittedLaw::best(&all, evidence.noise, &[], &[]).ok_or_else(no_fit)?;
     let left = share(evidence, &[]).ok_or_else(no_fit)?;
     let sure = whole.standard_errors(evidence, |_| true)[0] * critical(evidence, whole.columns.len());
     if left > UNRELATED || whole.ratio().abs() < sure || fit.ratio() * whole.ratio() <= 0.0 {
@@ -128,12 +128,12 @@ fn step(evidence: &Evidence, fixed: &[Candidate]) -> Option<Found> {
 
 /// The setting of a kind that fits best, where its coefficient is sure and the fitted logs hold it as well.
 fn sure(evidence: &Evidence, fixed: &[Candidate], kind: Kind) -> Option<Candidate> {
-    let fit = |products: &Products| Fit::best(products, evidence.noise, fixed, &kind.candidates());
+    let fit = |products: &Products| FittedLaw::best(products, evidence.noise, fixed, &kind.candidates());
     let whole = fit(&evidence.of(|_| true))?;
     let (last, error) = (whole.theta.last()?, *whole.standard_errors(evidence, |_| true).last()?);
     let fitted = fit(&evidence.fitted())?;
-    let moves = |with: &Fit, wanted: &dyn Fn(usize) -> bool| {
-        let without = Fit::best(&evidence.of(wanted), evidence.noise, fixed, &[])?;
+    let moves = |with: &FittedLaw, wanted: &dyn Fn(usize) -> bool| {
+        let without = FittedLaw::best(&evidence.of(wanted), evidence.noise, fixed, &[])?;
         let allowed =
             (2.0 * without.standard_errors(evidence, wanted)[0]).max(SAME_RATIO * without.ratio().abs());
         Some((with.ratio() - without.ratio()).abs() > allowed)
@@ -150,12 +150,12 @@ pub(super) fn tell(
     evidence: &Evidence,
     scales: &Scales,
     (joint, unit): (JointNumber, &'static str),
-    base: &Fit,
+    base: &FittedLaw,
     found: &[Found],
 ) -> Transmission {
     let candidates: Vec<Candidate> = found.iter().map(|f| f.candidate).collect();
     let fitted = evidence.fitted();
-    let with = Fit::best(&fitted, evidence.noise, &candidates, &[]).unwrap_or_else(|| base.clone());
+    let with = FittedLaw::best(&fitted, evidence.noise, &candidates, &[]).unwrap_or_else(|| base.clone());
     let effect = |(which, f): (usize, &Found)| TransmissionEffect {
         effect: f.candidate.kind.name(),
         parameters: f.candidate.figures(scales, with.effect(which)),

@@ -4,7 +4,7 @@ use super::columns::Asked;
 use super::map::ColumnMap;
 use super::read::Samples;
 use super::{Finding, Log, LogError};
-use crate::logs::tables::Rows;
+use crate::logs::tables::RowSink;
 use dyngen::Arm;
 
 /// The signals of a log in memory, each by joint: as many values as times.

@@ -5,7 +5,7 @@
 use super::columns::{Asked, Columns};
 use super::map::ColumnMap;
 use super::{Finding, Log, LogError, check, topics};
-use crate::logs::tables::{Format, Rows, columnar, read_contents, text};
+use crate::logs::tables::{Format, RowSink, columnar, read_contents, text};
 use dyngen::Arm;
 use std::path::Path;
 
@@ -237,7 +237,7 @@ impl<'a> Samples<'a> {
     }
 }
 
-impl Rows for Samples<'_> {
+impl RowSink for Samples<'_> {
     fn begin(&mut self, names: &[String]) -> Result<(), LogError> {
         let columns = Columns::find(names, self.asked, self.findings)?;
         let raw = Raw::new(self.asked.arm.dof(), columns.temperature.is_some(), columns.motor.is_some());

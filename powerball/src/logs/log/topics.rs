@@ -6,7 +6,7 @@ use super::map::{Clock, ColumnMap};
 use super::read::Samples;
 use super::{Finding, Log, LogError};
 use crate::logs::signal::resample::{cubic_at, median_step};
-use crate::logs::tables::{Rows, Table};
+use crate::logs::tables::{RowSink, Table};
 
 /// Header stamps count where at least this share of them is there and rises.
 const MOST_STAMPS: f64 = 0.95;

@@ -2,14 +2,14 @@
 
 #[cfg(feature = "parquet")]
 use super::lists::Flattened;
-use super::table::Rows;
+use super::table::RowSink;
 use super::{Finding, LogError};
 #[cfg(feature = "parquet")]
 use std::path::Path;
 
 /// Hands the rows of a Parquet file over. They take the place of lines in findings.
 #[cfg(feature = "parquet")]
-pub(crate) fn read(bytes: &[u8], file: &str, rows: &mut impl Rows) -> Result<(), LogError> {
+pub(crate) fn read(bytes: &[u8], file: &str, rows: &mut impl RowSink) -> Result<(), LogError> {
     use super::zstd_pages::RowGroup;
     use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 
@@ -53,7 +53,7 @@ pub(crate) fn read(bytes: &[u8], file: &str, rows: &mut impl Rows) -> Result<(),
 
 /// Hands the rows of a Parquet file over.
 #[cfg(not(feature = "parquet"))]
-pub(crate) fn read(_: &[u8], file: &str, _: &mut impl Rows) -> Result<(), LogError> {
+pub(crate) fn read(_: &[u8], file: &str, _: &mut impl RowSink) -> Result<(), LogError> {
     Err(LogError(vec![Finding {
         file: file.to_string(),
         line: None,

@@ -32,5 +32,5 @@ pub use contents::{Contents, Finding, Format, LogError, read_contents};
 pub(crate) use mcap_out::from_csv as mcap_from_csv;
 #[cfg(feature = "mcap")]
 pub use mcap_out::{Channel, JointState, McapWriter};
-pub(crate) use table::Rows;
+pub(crate) use table::RowSink;
 pub use table::{Column, Table};

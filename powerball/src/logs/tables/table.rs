@@ -1,7 +1,7 @@
 //! Named columns of numbers.
 
 /// Who takes the rows of a file one after the other.
-pub(crate) trait Rows {
+pub(crate) trait RowSink {
     /// The names of the columns, once and first.
     ///
     /// # Errors
@@ -86,7 +86,7 @@ impl Table {
     }
 }
 
-impl Rows for Table {
+impl RowSink for Table {
     fn begin(&mut self, names: &[String]) -> Result<(), super::LogError> {
         let column = |name: &String| Column { name: name.clone(), values: Vec::new() };
         self.columns = names.iter().map(column).collect();

@@ -1,7 +1,7 @@
 //! Logs as CSV with a header line, between whose names stand commas, semicolons, tabs or blanks. Where no commas stand
 //! there, numbers may have decimal commas.
 
-use super::table::Rows;
+use super::table::RowSink;
 use super::{Finding, LogError};
 use std::cell::Cell;
 
@@ -41,7 +41,7 @@ pub(super) fn no_text(head: &[u8]) -> Option<String> {
 pub(crate) fn read(
     bytes: &[u8],
     file: &str,
-    rows: &mut impl Rows,
+    rows: &mut impl RowSink,
     findings: &mut Vec<Finding>,
 ) -> Result<bool, LogError> {
     if let Some(what) = no_text(&bytes[..bytes.len().min(HEAD)]) {

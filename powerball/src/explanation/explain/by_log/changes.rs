@@ -206,14 +206,12 @@ impl<'s> Together<'s> {
         let (fit, validation) = (&model.fit, &study.validation);
         let columns = model.columns_on_validation(study);
         let on_validation = Design::new(validation, &friction_columns(validation, &fit.shapes), &columns);
-        let (mut gram, mut right, _) = fit.gram.fitted(&fit.weights, |_| true);
+        let mut normal = fit.normal_equations();
         let folds = Folds::new(validation);
-        let (more, right_on_validation, _) =
-            Gram::new(validation, &on_validation, &folds).sum(&fit.weights, |_| true);
-        gram += more;
-        right.iter_mut().zip(right_on_validation).for_each(|(r, more)| *r += more);
-        let solver = Solver::new(&gram, |c| fit.free[c]);
-        let solved = solver.solve(&right);
+        let more = Gram::new(validation, &on_validation, &folds).sum(&fit.weights, |_| true);
+        normal.add(&(0..fit.design.size).collect::<Vec<_>>(), &more, 1.0);
+        let solver = normal.solver(|c| fit.free[c]);
+        let solved = solver.solve(&normal.right);
         let theta: Vec<f64> =
             (0..solved.len()).map(|c| if fit.free[c] { solved[c] } else { fit.theta[c] }).collect();
         let moved: Vec<f64> = theta.iter().zip(&fit.theta).map(|(new, old)| new - old).collect();

@@ -7,7 +7,7 @@ use super::super::study::Study;
 use super::history::{History, Question, Step};
 use crate::controller::JointNumber;
 use crate::explanation::effects::Effect;
-use crate::identification::estimate::{Solver, noise_floor, residual_stats};
+use crate::identification::estimate::{NormalEquations, Solver, noise_floor, residual_stats};
 use crate::logs::summary::{OCTAVES, halved};
 use crate::logs::vector::dot;
 use faer::Mat;
@@ -159,7 +159,7 @@ fn octaves(signal: &[f64]) -> [Vec<f64>; OCTAVES] {
 /// itself is not its own.)
 pub(crate) fn inconstant(study: &Study<'_>, model: &Model) -> Option<usize> {
     let rule = study.rule();
-    let (gram, _, _) = model.fit.gram.fitted(&model.fit.weights, |_| true);
+    let NormalEquations { gram, .. } = model.fit.normal_equations();
     let sizes: Vec<ByOctave> =
         model.places().into_iter().map(|own| by_octave(study, model, &gram, own)).collect();
     let missing = |(change, error): &(f64, f64)| {

@@ -20,7 +20,7 @@ use crate::controller::JointNumber;
 use crate::explanation::effects::{Effect, Figures, Found, Settings, contact_wrench};
 use crate::explanation::options::{ExplainError, RuledOut};
 use crate::identification::estimate::distribution::f_tail;
-use crate::identification::estimate::{Solver, noise_floor, over_blocks, residual_stats};
+use crate::identification::estimate::{noise_floor, over_blocks, residual_stats};
 use crate::logs::regression::Data;
 use dyngen::arm::JointKind;
 use std::ops::Range;
@@ -252,8 +252,7 @@ pub(crate) fn warnings(findings: &Findings<'_>) -> Vec<String> {
         }
     }
     // What is known beforehand of an arm is no measurement.
-    let (gram, _, _) = fit.gram.sum(&fit.weights, |_| true);
-    let measured = Solver::new(&gram, |c| fit.free[c]);
+    let measured = fit.gram.sum(&fit.weights, |_| true).solver(|c| fit.free[c]);
     let is_seen =
         |c: usize| measured.kept().iter().any(|k| *k < fit.design.inertial && k % fit.design.set == c);
     let names = study.data.body.names().iter().enumerate();

@@ -8,7 +8,7 @@ use super::cross_validation::CrossValidation;
 use super::evidence::{Evidence, Extent, Validation, evidence, log_change};
 use super::screen::{Screen, penalty};
 use crate::explanation::effects::{self, Candidate, Placed};
-use crate::identification::estimate::{Design, Solver, friction_columns};
+use crate::identification::estimate::{Design, friction_columns};
 use crate::logs::vector::dot;
 use std::{mem, slice};
 
@@ -80,10 +80,10 @@ pub(crate) fn gains(model: &Model) -> Vec<f64> {
 
 /// The same for sets of columns.
 fn falls(model: &Model, sets: &[Vec<usize>]) -> Vec<f64> {
-    let (gram, right, square) = model.fit.gram.fitted(&model.fit.weights, |_| true);
+    let normal = model.fit.normal_equations();
     let error = |without: &dyn Fn(usize) -> bool| {
-        let theta = Solver::new(&gram, |c| model.fit.free[c] && !without(c)).solve(&right);
-        square - dot(&theta, &right)
+        let theta = normal.solver(|c| model.fit.free[c] && !without(c)).solve(&normal.right);
+        normal.square - dot(&theta, &normal.right)
     };
     let full = error(&|_| false);
     sets.iter().map(|columns| error(&|c| columns.contains(&c)) - full).collect()

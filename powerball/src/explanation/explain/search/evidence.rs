@@ -8,7 +8,9 @@ use crate::controller::JointNumber;
 use crate::explanation::effects::Candidate;
 use crate::explanation::rule::Rule;
 use crate::identification::estimate::distribution::f_tail;
-use crate::identification::estimate::{Design, Folds, MEAN_OVER, Solver, variance_inflation};
+use crate::identification::estimate::{
+    Design, Folds, MEAN_OVER, NormalEquations, Solver, variance_inflation,
+};
 use crate::logs::regression::{Block, Column, Data};
 use crate::logs::vector::dot;
 use faer::Mat;
@@ -197,37 +199,28 @@ const EVENT_PARTS: usize = 5;
 fn event_gains(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) -> Vec<f64> {
     let fit = screen.context.fit;
     let k = trial.columns.len();
-    let mut parts = vec![(Mat::<f64>::zeros(k, k), vec![0.0; k], 0.0); EVENT_PARTS];
+    let places: Vec<usize> = (0..k).collect();
+    let mut parts = vec![NormalEquations::zero(k); EVENT_PARTS];
     for j in 0..fit.design.dof() {
-        let (w, residual) = (fit.weights[j], &screen.context.residual[j]);
+        let residual = &screen.context.residual[j];
         let rows: Vec<usize> = (0..residual.len())
             .filter(|i| trial.columns.iter().any(|c| c.at(j).is_some_and(|v| v[*i] != 0.0)))
             .collect();
-        for (n, i) in rows.iter().enumerate() {
-            let (gram, right, square) = &mut parts[n % EVENT_PARTS];
-            for a in 0..k {
-                for b in 0..k {
-                    gram[(a, b)] += w * columns[j][a][*i] * columns[j][b][*i];
-                }
-                right[a] += w * columns[j][a][*i] * residual[*i];
-            }
-            *square += w * residual[*i] * residual[*i];
+        for (n, part) in parts.iter_mut().enumerate() {
+            let own = |x: &Vec<f64>| -> Vec<f64> {
+                rows.iter().skip(n).step_by(EVENT_PARTS).map(|row| x[*row]).collect()
+            };
+            let columns: Vec<Vec<f64>> = columns[j].iter().map(own).collect();
+            part.add_columns(&places, &columns, &own(residual), fit.weights[j]);
         }
     }
-    (0..EVENT_PARTS)
-        .filter_map(|held| {
-            let (mut gram, mut right) = (Mat::<f64>::zeros(k, k), vec![0.0; k]);
-            for (_, (g, r, _)) in parts.iter().enumerate().filter(|(p, _)| *p != held) {
-                gram += g;
-                right.iter_mut().zip(r).for_each(|(t, f)| *t += f);
-            }
-            let x = Solver::new(&gram, |_| true).solve(&right);
-            let (gram, right, square) = &parts[held];
-            let quadratic: f64 =
-                (0..k).map(|a| x[a] * (0..k).map(|b| gram[(a, b)] * x[b]).sum::<f64>()).sum();
-            (*square > 0.0).then(|| (2.0 * dot(&x, right) - quadratic) / square)
-        })
-        .collect()
+    let gain = |held: usize| {
+        let mut others = NormalEquations::zero(k);
+        parts.iter().enumerate().filter(|(n, _)| *n != held).for_each(|(_, p)| others.add(&places, p, 1.0));
+        let part = &parts[held];
+        (part.square > 0.0).then(|| 1.0 - part.left(&others.solve()) / part.square)
+    };
+    (0..EVENT_PARTS).filter_map(gain).collect()
 }
 
 /// See [`Evidence::event_left`]. Other times are told by the median over blocks, so that other events do not count.

@@ -4,7 +4,7 @@
 
 use super::screen::{Screen, Trial};
 use crate::controller::JointNumber;
-use crate::identification::estimate::{Added, Fit, Folds, Solver, runs};
+use crate::identification::estimate::{Added, Fit, Folds, NormalEquations, Solver, runs};
 use crate::logs::vector::dot;
 use faer::Mat;
 
@@ -95,19 +95,16 @@ impl FoldBase {
         held.iter()
             .zip(left_out)
             .map(|(held, left_out)| {
-                let (gram, right, _) = fit.gram.fitted(&fit.weights, |c| !left_out.contains(&c));
-                let solver = Solver::new(&gram, |c| free[c]);
-                let theta = solver.solve(&right);
-                let (gram, right, _) = fit.gram.sum(&fit.weights, |c| held.contains(&c));
+                let fitted = fit.gram.fitted(&fit.weights, |c| !left_out.contains(&c));
+                let solver = fitted.solver(|c| free[c]);
+                let theta = solver.solve(&fitted.right);
+                let NormalEquations { gram, right, .. } = fit.gram.sum(&fit.weights, |c| held.contains(&c));
                 let slope = (0..theta.len()).map(|i| right[i] - times(&gram, i, &theta)).collect();
                 let error = (0..fit.design.dof())
                     .map(|j| {
                         let mut own = vec![0.0; fit.design.dof()];
                         own[j] = fit.weights[j];
-                        let (gram, right, square) = fit.gram.sum(&own, |c| held.contains(&c));
-                        let quadratic: f64 =
-                            (0..theta.len()).map(|i| theta[i] * times(&gram, i, &theta)).sum();
-                        square - 2.0 * dot(&theta, &right) + quadratic
+                        fit.gram.sum(&own, |c| held.contains(&c)).left(&theta)
                     })
                     .collect();
                 FoldBase { held: held.clone(), left_out: left_out.clone(), solver, theta, gram, slope, error }

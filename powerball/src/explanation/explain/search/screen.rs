@@ -65,10 +65,9 @@ impl<'c> Screen<'c> {
     #[must_use]
     pub(crate) fn without(context: &'c Context<'c>, columns: Range<usize>) -> Screen<'c> {
         let fit = context.fit;
-        let (gram, _, _) = fit.gram.fitted(&fit.weights, |_| true);
         let free: Vec<bool> =
             fit.free.iter().enumerate().map(|(c, free)| *free && !columns.contains(&c)).collect();
-        let solver = Solver::new(&gram, |c| free[c]);
+        let solver = fit.normal_equations().solver(|c| free[c]);
         let mut slope = vec![0.0; fit.design.size];
         for (j, residual) in context.residual.iter().enumerate() {
             for (g, value) in fit.design.cross(j, &(0..residual.len()), &[residual.as_slice()]) {
