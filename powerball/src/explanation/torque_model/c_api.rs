@@ -66,26 +66,7 @@ impl Behind<'_> {
         let (room, n) = (self.room(), self.joints);
         let null = c_api::any_null(["model", "q", "dq", "ddq", "torque"].into_iter());
         let read = c_api::read(motion);
-        let hold = if self.payload {
-            format!(
-                "
-    /// Whether the last link holds the payload.
-    ///
-    /// # Safety
-    /// `model` is null or a caller's own room, which nobody else uses now.
-    #[unsafe(no_mangle)]
-    pub unsafe extern \"C\" fn {prefix}_hold_payload(model: *mut Room, holds: i32) -> i32 {{
-        // SAFETY: the caller's promise.
-        let Some(room) = (unsafe {{ model.as_mut() }}) else {{ return NULL }};
-        let Some(model) = room.model() else {{ return NOT_BEGUN }};
-        model.holds_payload = holds != 0;
-        OK
-    }}
-"
-            )
-        } else {
-            String::new()
-        };
+        let hold = self.hold_payload(prefix);
         format!(
             "    /// The model was not begun: nothing was written.
     const NOT_BEGUN: i32 = 2;
@@ -159,6 +140,29 @@ impl Behind<'_> {
         OK
     }}
 {hold}"
+        )
+    }
+
+    /// The function that tells a model whether the payload is held, where it knows one.
+    fn hold_payload(&self, prefix: &str) -> String {
+        if !self.payload {
+            return String::new();
+        }
+        format!(
+            "
+    /// Whether the last link holds the payload.
+    ///
+    /// # Safety
+    /// `model` is null or a caller's own room, which nobody else uses now.
+    #[unsafe(no_mangle)]
+    pub unsafe extern \"C\" fn {prefix}_hold_payload(model: *mut Room, holds: i32) -> i32 {{
+        // SAFETY: the caller's promise.
+        let Some(room) = (unsafe {{ model.as_mut() }}) else {{ return NULL }};
+        let Some(model) = room.model() else {{ return NOT_BEGUN }};
+        model.holds_payload = holds != 0;
+        OK
+    }}
+"
         )
     }
 

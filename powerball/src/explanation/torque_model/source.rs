@@ -273,19 +273,63 @@ fn transposed_times(matrix: &[[Real; JOINTS]; JOINTS], x: &SVector<Real, JOINTS>
     )
 }
 
-/// The struct that a controller calls; `coupled`: a transmission couples joints.
-fn api(payload: bool, moves: bool, coupled: bool) -> String {
-    let field = "\n    /// Whether the last link holds the payload.\n    pub holds_payload: bool,";
-    let (field, held) = if payload { (field, ", holds_payload: false") } else { ("", "") };
-    let rigid = match payload {
-        true => {
-            "match self.holds_payload {
+/// The field of the payload, its value at the start, and the torque of the rigid arm with it.
+fn payload_pieces(payload: bool) -> (&'static str, &'static str, &'static str) {
+    if !payload {
+        return ("", "", "rigid::inverse_dynamics(q, dq, ddq)");
+    }
+    let rigid = "match self.holds_payload {
             true => rigid::inverse_dynamics(q, dq, ddq) + payload::inverse_dynamics(q, dq, ddq),
             false => rigid::inverse_dynamics(q, dq, ddq),
-        }"
-        }
-        false => "rigid::inverse_dynamics(q, dq, ddq)",
-    };
+        }";
+    (
+        "\n    /// Whether the last link holds the payload.\n    pub holds_payload: bool,",
+        ", holds_payload: false",
+        rigid,
+    )
+}
+
+/// Where a transmission couples joints, the terms are of motors and the rigid arm of joints.
+struct MotorPieces {
+    /// From the motion of the joints to that of the motors.
+    to_motors: &'static str,
+    /// From the motors' torque to the joints'.
+    to_joints: &'static str,
+    /// From the motion of the motors to that of the joints, and what comes before the rigid arm's torque.
+    of_motors: &'static str,
+    /// Whose torque it is, in words.
+    whose: &'static str,
+    /// From the rigid arm's torque on the joints to that on the motors.
+    on_motors: &'static str,
+}
+
+fn motor_pieces(coupled: bool) -> MotorPieces {
+    if !coupled {
+        return MotorPieces {
+            to_motors: "",
+            to_joints: "torque",
+            of_motors: "\n        ",
+            whose: "rigid arm at true positions",
+            on_motors: "",
+        };
+    }
+    MotorPieces {
+        to_motors: "
+        let [q, dq, ddq] = [q, dq, ddq].map(|x| times(&MOTOR_VELOCITIES, x));
+        let (dq, ddq) = (&dq, &ddq);",
+        to_joints: "transposed_times(&MOTOR_VELOCITIES, &torque)",
+        of_motors: "
+        let [q, dq, ddq] = [q, dq, ddq].map(|x| times(&JOINT_VELOCITIES, x));
+        let (q, dq, ddq) = (&q, &dq, &ddq);
+        let torque = ",
+        whose: "rigid arm on its motors, at their true positions",
+        on_motors: ";\n        transposed_times(&JOINT_VELOCITIES, &torque)",
+    }
+}
+
+/// The struct that a controller calls; `coupled`: a transmission couples joints.
+fn api(payload: bool, moves: bool, coupled: bool) -> String {
+    let (field, held, rigid) = payload_pieces(payload);
     let again = match moves {
         true => {
             "
@@ -295,26 +339,7 @@ fn api(payload: bool, moves: bool, coupled: bool) -> String {
         }
         false => "",
     };
-    let (to_motors, to_joints, of_motors) = match coupled {
-        true => (
-            "
-        let [q, dq, ddq] = [q, dq, ddq].map(|x| times(&MOTOR_VELOCITIES, x));
-        let (dq, ddq) = (&dq, &ddq);",
-            "transposed_times(&MOTOR_VELOCITIES, &torque)",
-            "
-        let [q, dq, ddq] = [q, dq, ddq].map(|x| times(&JOINT_VELOCITIES, x));
-        let (q, dq, ddq) = (&q, &dq, &ddq);
-        let torque = ",
-        ),
-        false => ("", "torque", "\n        "),
-    };
-    let (whose, on_motors) = match coupled {
-        true => (
-            "rigid arm on its motors, at their true positions",
-            ";\n        transposed_times(&JOINT_VELOCITIES, &torque)",
-        ),
-        false => ("rigid arm at true positions", ""),
-    };
+    let MotorPieces { to_motors, to_joints, of_motors, whose, on_motors } = motor_pieces(coupled);
     format!(
         "
 /// The torque model with what its terms remember from sample to sample.

@@ -42,74 +42,63 @@ fn falls(before: &[f64], after: &[f64]) -> String {
 /// The answer that a change of the reading is.
 fn of_step(step: &Step, unit: &Unit) -> Answer {
     let why = falls(&step.before, &step.after);
-    let (question, sentence) = match &step.change {
-        Change::TorqueReversed(list) => {
-            let them = joints(list);
-            let also = match step.rival {
-                Some(_) => ", or the sign of its position: these logs do not tell which",
-                None => "",
-            };
-            (
-                "torque sign",
-                format!(
-                    "The torque of {them} has the wrong sign{also}: friction would drive it otherwise, and \
-                        {why}."
-                ),
-            )
-        }
-        Change::PositionReversed(j) => {
-            let also = match step.rival {
-                Some(_) => ", or the sign of its torque: these logs do not tell which",
-                None => "",
-            };
-            (
-                "position sign",
-                format!(
-                    "The position of {} has the wrong sign{also}: with the other one {why}.",
-                    joints(&[*j])
-                ),
-            )
-        }
+    let (question, sentence) = in_words(&step.change, step.rival.is_some(), unit, &why);
+    Answer {
+        question,
+        as_said: Some(false),
+        as_it_is: percent(&step.before),
+        as_it_would_be: percent(&step.after),
+        sentence,
+    }
+}
+
+/// The question that a change answers, and what it says; `rival` is whether another change fits as well.
+fn in_words(change: &Change, rival: bool, unit: &Unit, why: &str) -> (&'static str, String) {
+    let or =
+        |what: &str| if rival { format!(", or {what}: these logs do not tell which") } else { String::new() };
+    let exchanged = |what: &str, [a, b]: [usize; 2]| {
+        format!("{what} of {} are exchanged: the other way round {why}.", joints(&[a, b]))
+    };
+    match change {
+        Change::TorqueReversed(list) => (
+            "torque sign",
+            format!(
+                "The torque of {} has the wrong sign{}: friction would drive it otherwise, and {why}.",
+                joints(list),
+                or("the sign of its position")
+            ),
+        ),
+        Change::PositionReversed(j) => (
+            "position sign",
+            format!(
+                "The position of {} has the wrong sign{}: with the other one {why}.",
+                joints(&[*j]),
+                or("the sign of its torque")
+            ),
+        ),
         Change::AxisReversed(j) => (
             "position sign",
             format!(
                 "Position and torque of {} count against the axis of the arm file: with the other sign of \
-                    both {why}.",
+                 both {why}.",
                 joints(&[*j])
             ),
         ),
-        Change::TorquesExchanged(a, b) => (
-            "joint order",
-            format!("The torque columns of {} are exchanged: the other way round {why}.", joints(&[*a, *b])),
-        ),
-        Change::PositionsExchanged(a, b) => (
-            "joint order",
-            format!(
-                "The position columns of {} are exchanged: the other way round {why}.",
-                joints(&[*a, *b])
-            ),
-        ),
-        Change::JointsExchanged(a, b) => (
-            "joint order",
-            format!(
-                "Positions and torques of {} are exchanged: the other way round {why}.",
-                joints(&[*a, *b])
-            ),
-        ),
+        Change::TorquesExchanged(a, b) => ("joint order", exchanged("The torque columns", [*a, *b])),
+        Change::PositionsExchanged(a, b) => ("joint order", exchanged("The position columns", [*a, *b])),
+        Change::JointsExchanged(a, b) => ("joint order", exchanged("Positions and torques", [*a, *b])),
         Change::Late(by) => {
             let (by, word) = (1000.0 * by.abs(), if *by > 0.0 { "late" } else { "early" });
-            (
-                "delay",
-                format!(
-                    "The torque columns are about {by:.0} ms {word} beside the positions: without that {why}."
-                ),
-            )
+            let text = format!(
+                "The torque columns are about {by:.0} ms {word} against the positions: without that {why}."
+            );
+            ("delay", text)
         }
         Change::GravityOut(list) => (
             "gravity",
             format!(
                 "Gravity was taken out of the torques of {}: without it in the model {why}; set gravity = \
-                    [0, 0, 0] in the arm file.",
+                 [0, 0, 0] in the arm file.",
                 joints(list)
             ),
         ),
@@ -120,34 +109,25 @@ fn of_step(step: &Step, unit: &Unit) -> Answer {
         Change::Degrees => ("position unit", format!("Positions are in degrees: taken so {why}.")),
         Change::Factors(factors) => {
             let list: Vec<String> = factors.iter().map(|f| format!("{f:.2}")).collect();
-            let list = list.join(", ");
-            let what = match unit {
-                Unit::BeforeGear(_) => {
-                    "The torque columns are before the gear: the factors that one body asks for are those \
-                        of rotor_ratio"
-                }
-                Unit::Ampere(Some(_)) => {
-                    "The torque columns are currents: the factors that one body asks for are those of \
-                        torque_constant"
-                }
-                Unit::Ampere(None) => {
-                    "Each torque column has a unit of its own (currents, counts or % of rated): one body \
-                        asks for other factors by joint"
-                }
-                _ => {
-                    "Some torque columns are in another unit than most: one body asks for other factors by \
-                        joint"
-                }
-            };
-            ("torque unit", format!("{what} ({list}), and {why}."))
+            ("torque unit", format!("{} ({}), and {why}.", factors_in_words(unit), list.join(", ")))
         }
-    };
-    Answer {
-        question,
-        as_said: Some(false),
-        as_it_is: percent(&step.before),
-        as_it_would_be: percent(&step.after),
-        sentence,
+    }
+}
+
+/// What factors by joint say of the torque columns.
+fn factors_in_words(unit: &Unit) -> &'static str {
+    match unit {
+        Unit::BeforeGear(_) => {
+            "The torque columns are before the gear: the factors that one body asks for are those of rotor_ratio"
+        }
+        Unit::Ampere(Some(_)) => {
+            "The torque columns are currents: the factors that one body asks for are those of torque_constant"
+        }
+        Unit::Ampere(None) => {
+            "Each torque column has a unit of its own (currents, counts or % of rated): one body asks for other \
+             factors by joint"
+        }
+        _ => "Some torque columns are in another unit than most: one body asks for other factors by joint",
     }
 }
 

@@ -33,7 +33,7 @@ pub use fit::{Fit, Term, fit, friction_columns};
 #[cfg(feature = "explain")]
 pub(crate) use fit::{MEAN_OVER, variance_inflation};
 pub use instrumental::solve_instrumental;
-pub use mountings::{Together, exchanged};
+pub use mountings::Together;
 pub use normal::NormalEquations;
 pub use reduced::{FrictionKind, Solution, solve_reduced};
 pub(crate) use robust::over_blocks;

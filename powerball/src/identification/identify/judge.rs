@@ -8,8 +8,9 @@ use super::gather::{Gathered, Mounted};
 use super::options::IdentifyOptions;
 use super::result::{Identified, IdentifyError};
 use crate::controller::JointNumber;
+use crate::identification::conventions::conventions;
 use crate::identification::estimate::{
-    BaseModel, FrictionKind, ResidualStats, estimates, exchanged, residual_stats, stats_of,
+    BaseModel, FrictionKind, ResidualStats, estimates, residual_stats, stats_of,
 };
 use crate::identification::mounting::Mounting;
 use crate::logs::Progress;
@@ -99,9 +100,11 @@ pub(super) fn fits(
         (None, _) => vec![all.clone()],
         (Some(_), _) => spreads(gathered, fitted, options, warnings)?,
     };
-    for (k, mounted) in gathered.mounted.iter().enumerate() {
-        let errors = spreads.get(k).unwrap_or(&all);
-        warnings.extend(exchanged(&mounted.body, &mounted.logs, &options.data, errors));
+    // The columns of the first mounting's logs are asked in any case (see `Gathered::conventions`).
+    for (mounted, errors) in gathered.mounted.iter().zip(&spreads).skip(1) {
+        if errors.relative.iter().any(|share| *share > SUSPECT) {
+            warnings.extend(wrong_columns(mounted));
+        }
     }
     let of = |(fit, mounted): (ResidualStats, &Mounted)| MountedFit {
         mounting: mounted.mounting.to_string(),
@@ -110,6 +113,18 @@ pub(super) fn fits(
         fit,
     };
     Ok(spreads.into_iter().zip(&gathered.mounted).map(of).collect())
+}
+
+/// A joint of which more than this share of its torque is left is suspected.
+const SUSPECT: f64 = 0.3;
+
+/// What speaks against the columns of a mounting's logs, in words.
+fn wrong_columns(mounted: &Mounted) -> Option<String> {
+    let asked = conventions(&mounted.body, &mounted.logs, &mounted.held_out);
+    let against = asked.answers.iter().filter(|answer| answer.as_said == Some(false));
+    let sentences: Vec<&str> = against.map(|answer| answer.sentence.as_str()).collect();
+    let said = format!("the logs with the base {}: {}", mounted.mounting, sentences.join(" "));
+    (!sentences.is_empty()).then_some(said)
 }
 
 /// Several mountings: what the common parameters leave of each, and which logs contradict the others.

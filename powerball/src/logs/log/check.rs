@@ -1,11 +1,12 @@
 //! What can be wrong with numbers that are there: time, wraps, units, dead and saturated signals.
 
 use super::read::{Effort, Raw};
-use super::{Finding, Log, LogError, Motors, Severity, Warnings, velocities};
+use super::{Finding, Log, LogError, Motors, Severity, Warnings, signal_checks};
 use crate::logs::signal::resample::median_step;
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// A step between samples longer than this, s, or than [`GAP_STEPS`] median steps, is a gap.
 const GAP: f64 = 0.1;
@@ -25,106 +26,10 @@ pub(super) fn into_log(
     arm: &Arm,
     findings: &mut Vec<Finding>,
 ) -> Result<Log, LogError> {
-    let mut errors = Vec::new();
-    let finding = |line: Option<usize>, quantity: String, message: String| Finding {
-        file: file.to_string(),
-        line,
-        quantity,
-        message,
-    };
-
-    // Time that stands still or runs back.
-    let mut keep = vec![true; raw.t.len()];
-    let (mut latest, mut stale, mut first_stale) = (f64::NEG_INFINITY, 0usize, None);
-    for (k, &t) in raw.t.iter().enumerate() {
-        if t > latest {
-            latest = t;
-        } else {
-            keep[k] = false;
-            stale += 1;
-            first_stale.get_or_insert((raw.line[k], t, latest));
-        }
-    }
-    if let Some((line, t, latest)) = first_stale {
-        let found = format!("{stale} of {} time stamps do not rise (first: {t} after {latest})", raw.t.len());
-        if stale as f64 > MOST_STALE * raw.t.len() as f64 {
-            let message = format!("{found}: split the file where its clock restarts");
-            return Err(LogError(vec![finding(Some(line), "t".into(), message)]));
-        }
-        findings.push(finding(Some(line), "t".into(), format!("{found}; those samples were left out")));
-        raw.retain(&keep);
-    }
-    if raw.t.len() < FEWEST {
-        let message = format!("{} usable samples are too few: at least {FEWEST} are needed", raw.t.len());
-        return Err(LogError(vec![finding(None, "samples".into(), message)]));
-    }
-    let step = median_step(&raw.t).unwrap_or(1.0);
-    if step >= 0.5 {
-        let message = format!(
-            "the median step is {step} s: t must be in seconds (milliseconds or microseconds look like this: --map \
-             't.unit = \"ms\"' or 'us')"
-        );
-        return Err(LogError(vec![finding(Some(raw.line[1]), "t".into(), message)]));
-    }
-    let uneven = raw.t.windows(2).filter(|w| (w[1] - w[0] - step).abs() > 0.05 * step).count();
-    if uneven as f64 > 0.01 * raw.t.len() as f64 {
-        let share = 100.0 * uneven as f64 / raw.t.len() as f64;
-        findings.push(finding(
-            None,
-            "t".into(),
-            format!(
-                "{share:.0} % of the steps differ from the median \
-            {step:.4} s; samples are interpolated onto an even grid of that step"
-            ),
-        ));
-    }
-
-    for j in 0..arm.dof() {
-        unwrap(&mut raw.q[j], &raw.line, &raw.t, j, arm, file, findings);
-        units(&raw, j, effort, arm, file, findings, &mut errors);
-    }
-    let name = if matches!(effort, Effort::Torque) { "tau" } else { "i" };
-    let mut warnings = Warnings { file, line: &raw.line, t: &raw.t, findings, errors: &mut errors };
-    for (j, (q, effort)) in raw.q.iter().zip(&raw.effort).enumerate() {
-        velocities::effort(effort, &format!("{name}{}", j + 1), &mut warnings);
-        velocities::steps(effort, &format!("{name}{}", j + 1), false, &mut warnings);
-        velocities::steps(q, &format!("q{}", j + 1), true, &mut warnings);
-    }
-    velocities::look(&raw, step, &mut warnings);
-    velocities::look_at_signs(&raw, step, name, &mut warnings);
-    rate(&raw.t, &mut warnings);
-    if !errors.is_empty() {
-        return Err(LogError(errors));
-    }
-
-    // Pieces between gaps and jumps.
-    let (mut pieces, mut start) = (Vec::new(), 0);
-    for k in 1..=raw.t.len() {
-        if k < raw.t.len() {
-            let gap = raw.t[k] - raw.t[k - 1];
-            let jump = (0..arm.dof()).find(|&j| {
-                let limit = 5.0 * arm.joints[j].velocity.unwrap_or(10.0);
-                (raw.q[j][k] - raw.q[j][k - 1]).abs() > (limit * gap).max(0.02)
-            });
-            if gap > GAP.max(GAP_STEPS * step) {
-                let message =
-                    format!("at {:.3} s: a gap of {gap:.3} s: the log is used as two pieces", raw.t[k - 1]);
-                findings.push(finding(Some(raw.line[k]), "t".into(), message));
-            } else if let Some(j) = jump {
-                let by = raw.q[j][k] - raw.q[j][k - 1];
-                let message = format!(
-                    "at {:.3} s: jumps by {by:.4} in {gap:.4} s, faster than the joint can move: the log is \
-                        split there",
-                    raw.t[k]
-                );
-                findings.push(finding(Some(raw.line[k]), format!("q{}", j + 1), message));
-            } else {
-                continue;
-            }
-        }
-        pieces.push(start..k);
-        start = k;
-    }
+    drop_stale(&mut raw, file, findings)?;
+    let step = sound_step(&raw, file, findings)?;
+    check_signals(&mut raw, effort, step, file, arm, findings)?;
+    let pieces = pieces(&raw, step, file, arm, findings);
     let torque = match effort {
         Effort::Torque => raw.effort,
         Effort::Current(constants) => {
@@ -143,6 +48,118 @@ pub(super) fn into_log(
         pieces,
         clock: 0.0,
     })
+}
+
+fn finding(file: &str, line: Option<usize>, quantity: impl Into<String>, message: String) -> Finding {
+    Finding { file: file.to_string(), line, quantity: quantity.into(), message }
+}
+
+/// Leaves out samples whose time stands still or runs back.
+fn drop_stale(raw: &mut Raw, file: &str, findings: &mut Vec<Finding>) -> Result<(), LogError> {
+    let mut keep = vec![true; raw.t.len()];
+    let (mut latest, mut stale, mut first_stale) = (f64::NEG_INFINITY, 0usize, None);
+    for (k, &t) in raw.t.iter().enumerate() {
+        if t > latest {
+            latest = t;
+        } else {
+            keep[k] = false;
+            stale += 1;
+            first_stale.get_or_insert((raw.line[k], t, latest));
+        }
+    }
+    let Some((line, t, latest)) = first_stale else { return Ok(()) };
+    let found = format!("{stale} of {} time stamps do not rise (first: {t} after {latest})", raw.t.len());
+    if stale as f64 > MOST_STALE * raw.t.len() as f64 {
+        let message = format!("{found}: split the file where its clock restarts");
+        return Err(LogError(vec![finding(file, Some(line), "t", message)]));
+    }
+    findings.push(finding(file, Some(line), "t", format!("{found}; those samples were left out")));
+    raw.retain(&keep);
+    Ok(())
+}
+
+/// The median step between samples, s, where there are enough of them and their time can be in seconds.
+fn sound_step(raw: &Raw, file: &str, findings: &mut Vec<Finding>) -> Result<f64, LogError> {
+    if raw.t.len() < FEWEST {
+        let message = format!("{} usable samples are too few: at least {FEWEST} are needed", raw.t.len());
+        return Err(LogError(vec![finding(file, None, "samples", message)]));
+    }
+    let step = median_step(&raw.t).unwrap_or(1.0);
+    if step >= 0.5 {
+        let message = format!(
+            "the median step is {step} s: t must be in seconds (milliseconds or microseconds look like this: --map \
+             't.unit = \"ms\"' or 'us')"
+        );
+        return Err(LogError(vec![finding(file, Some(raw.line[1]), "t", message)]));
+    }
+    let uneven = raw.t.windows(2).filter(|w| (w[1] - w[0] - step).abs() > 0.05 * step).count();
+    if uneven as f64 > 0.01 * raw.t.len() as f64 {
+        let share = 100.0 * uneven as f64 / raw.t.len() as f64;
+        let message = format!(
+            "{share:.0} % of the steps differ from the median \
+             {step:.4} s; samples are interpolated onto an even grid of that step"
+        );
+        findings.push(finding(file, None, "t", message));
+    }
+    Ok(step)
+}
+
+/// Unwraps angles, and asks each signal for what only another unit, sign or sensor explains.
+fn check_signals(
+    raw: &mut Raw,
+    effort: &Effort,
+    step: f64,
+    file: &str,
+    arm: &Arm,
+    findings: &mut Vec<Finding>,
+) -> Result<(), LogError> {
+    let mut errors = Vec::new();
+    for j in 0..arm.dof() {
+        unwrap(&mut raw.q[j], &raw.line, &raw.t, j, arm, file, findings);
+        units(raw, j, effort, arm, file, findings, &mut errors);
+    }
+    let name = if matches!(effort, Effort::Torque) { "tau" } else { "i" };
+    let mut warnings = Warnings { file, line: &raw.line, t: &raw.t, findings, errors: &mut errors };
+    for (j, (q, effort)) in raw.q.iter().zip(&raw.effort).enumerate() {
+        signal_checks::effort(effort, &format!("{name}{}", j + 1), &mut warnings);
+        signal_checks::steps(effort, &format!("{name}{}", j + 1), false, &mut warnings);
+        signal_checks::steps(q, &format!("q{}", j + 1), true, &mut warnings);
+    }
+    signal_checks::velocities(raw, step, &mut warnings);
+    signal_checks::torque_signs(raw, step, name, &mut warnings);
+    rate(&raw.t, &mut warnings);
+    if errors.is_empty() { Ok(()) } else { Err(LogError(errors)) }
+}
+
+/// The pieces of a log between gaps of time and jumps of position.
+fn pieces(raw: &Raw, step: f64, file: &str, arm: &Arm, findings: &mut Vec<Finding>) -> Vec<Range<usize>> {
+    let (mut pieces, mut start) = (Vec::new(), 0);
+    for k in 1..raw.t.len() {
+        let gap = raw.t[k] - raw.t[k - 1];
+        let jump = (0..arm.dof()).find(|&j| {
+            let limit = 5.0 * arm.joints[j].velocity.unwrap_or(10.0);
+            (raw.q[j][k] - raw.q[j][k - 1]).abs() > (limit * gap).max(0.02)
+        });
+        if gap > GAP.max(GAP_STEPS * step) {
+            let message =
+                format!("at {:.3} s: a gap of {gap:.3} s: the log is used as two pieces", raw.t[k - 1]);
+            findings.push(finding(file, Some(raw.line[k]), "t", message));
+        } else if let Some(j) = jump {
+            let by = raw.q[j][k] - raw.q[j][k - 1];
+            let message = format!(
+                "at {:.3} s: jumps by {by:.4} in {gap:.4} s, faster than the joint can move: the log is \
+                 split there",
+                raw.t[k]
+            );
+            findings.push(finding(file, Some(raw.line[k]), format!("q{}", j + 1), message));
+        } else {
+            continue;
+        }
+        pieces.push(start..k);
+        start = k;
+    }
+    pieces.push(start..raw.t.len());
+    pieces
 }
 
 /// The joints' torques of those that the motors' currents make: where a transmission couples joints a motor's

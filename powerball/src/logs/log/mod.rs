@@ -13,8 +13,8 @@ mod inspect;
 mod map;
 mod motors;
 mod read;
+mod signal_checks;
 mod topics;
-mod velocities;
 
 pub use crate::logs::tables::{Finding, LogError};
 pub use arrays::{Arrays, Sample};
@@ -24,8 +24,8 @@ pub use inspect::{Aligned, Inspected, InspectedColumn, InspectedTable, TakenAs, 
 pub use map::{ByJoint, Clock, ColumnMap, Mapped};
 pub use motors::{Motors, logs_of_motors, notes_of};
 pub use read::{read_log, read_log_as, read_logs, read_logs_as};
+use signal_checks::{Severity, Warnings};
 pub use topics::{Alignment, alignment};
-use velocities::{Severity, Warnings};
 
 /// One recording as it was logged, after its faults were taken out.
 #[derive(Clone, Debug)]

@@ -75,18 +75,7 @@ pub(crate) fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3])
         (r, p) = (r_next, p_next);
 
         let local = r.transpose();
-        let (lw, ldw, la) = (local * w, local * dw, local * acc);
-        let mut columns = vec![(la, Vector3::zeros())];
-        for e in [Vector3::x(), Vector3::y(), Vector3::z()] {
-            columns.push((ldw.cross(&e) + lw.cross(&lw.cross(&e)), e.cross(&la)));
-        }
-        for (m, k) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
-            let mut inertia = Matrix3::zeros();
-            let sign = if m == k { 1.0 } else { -1.0 };
-            inertia[(m, k)] = sign;
-            inertia[(k, m)] = sign;
-            columns.push((Vector3::zeros(), inertia * ldw + lw.cross(&(inertia * lw))));
-        }
+        let columns = link_columns(local * w, local * dw, local * acc);
         for j in 0..=i {
             let z = local * axes[j];
             let lever = local * (p - points[j]);
@@ -99,4 +88,21 @@ pub(crate) fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3])
         }
     }
     y
+}
+
+/// Force on a link and moment about the origin of its frame for unit mass, first moments and inertias, from its angular
+/// velocity, angular acceleration and acceleration (gravity taken off), all in its frame.
+fn link_columns(w: Vector3<f64>, dw: Vector3<f64>, acc: Vector3<f64>) -> Vec<(Vector3<f64>, Vector3<f64>)> {
+    let mut columns = vec![(acc, Vector3::zeros())];
+    for e in [Vector3::x(), Vector3::y(), Vector3::z()] {
+        columns.push((dw.cross(&e) + w.cross(&w.cross(&e)), e.cross(&acc)));
+    }
+    for (m, k) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
+        let mut inertia = Matrix3::zeros();
+        let sign = if m == k { 1.0 } else { -1.0 };
+        inertia[(m, k)] = sign;
+        inertia[(k, m)] = sign;
+        columns.push((Vector3::zeros(), inertia * dw + w.cross(&(inertia * w))));
+    }
+    columns
 }

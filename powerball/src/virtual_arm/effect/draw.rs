@@ -1,6 +1,7 @@
 //! Effects drawn by lot, of sizes that matter and that happen.
 
 use super::PlantEffect;
+use crate::controller::friction::TanhFriction;
 use crate::virtual_arm::plant::Plant;
 use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt};
@@ -29,6 +30,156 @@ pub struct Places {
 /// `None` where there is none.
 fn one_of<T: Clone>(from: &[T], rng: &mut impl Rng) -> Option<T> {
     if from.is_empty() { None } else { from.get(rng.random_range(0..from.len())).cloned() }
+}
+
+/// What is drawn for any effect, and where it may sit.
+struct Lot<'a> {
+    plant: &'a Plant,
+    places: &'a Places,
+    /// The time within which the logs are recorded, s.
+    session: f64,
+    sign: f64,
+    /// A joint that has what any joint may have.
+    any: usize,
+    /// One whose friction at low and at high velocity can be seen.
+    large: usize,
+    /// When what starts at some time starts, s.
+    moment: f64,
+}
+
+impl Lot<'_> {
+    fn friction(&self, joint: usize) -> TanhFriction<f64> {
+        self.plant.friction()[joint]
+    }
+
+    /// Coulomb friction of a joint, N·m.
+    fn coulomb(&self, joint: usize) -> f64 {
+        self.friction(joint).gamma1 + self.friction(joint).gamma3
+    }
+
+    fn noise(&self) -> f64 {
+        self.plant.sensors().white[self.any]
+    }
+
+    /// A usual way of a joint, rad or m.
+    fn unit(&self, joint: usize) -> f64 {
+        self.plant.dynamics().usual_way(joint)
+    }
+
+    /// Effects that depend on velocity and its history.
+    fn friction_effect(&self, name: &str, rng: &mut impl Rng) -> Option<PlantEffect> {
+        Some(match name {
+            "load_friction" => PlantEffect::LoadFriction {
+                joint: one_of(&self.places.loaded, rng)?,
+                coefficient: rng.random_range(0.05..0.11),
+            },
+            "stribeck" => PlantEffect::Stribeck {
+                joint: self.large,
+                level: self.friction(self.large).gamma1 * rng.random_range(0.3..0.6),
+                velocity: self.unit(self.large) * rng.random_range(0.03..0.07),
+            },
+            "velocity_nonlinearity" => {
+                let share = rng.random_range(0.35..0.7);
+                let exponent: f64 = rng.random_range(2.2..3.0);
+                let torque =
+                    self.friction(self.large).gamma5 * share * self.unit(self.large).powf(1.0 - exponent);
+                PlantEffect::VelocityNonlinearity { joint: self.large, torque, exponent }
+            }
+            "asymmetry" => PlantEffect::Asymmetry {
+                joint: self.any,
+                share: rng.random_range(0.1..0.3),
+                constant: self.coulomb(self.any) * rng.random_range(0.0..0.15),
+            },
+            "hysteresis" => PlantEffect::Hysteresis {
+                joint: self.any,
+                level: self.coulomb(self.any) * rng.random_range(0.3..0.6),
+                way: self.unit(self.any) * rng.random_range(0.010..0.030),
+            },
+            "temperature" => PlantEffect::Temperature {
+                change: -rng.random_range(0.15..0.30),
+                time_constant: self.session * rng.random_range(0.3..0.6),
+            },
+            "joint_coupling" => {
+                let ([from, onto], scale) = one_of(&self.places.coupled, rng)?;
+                PlantEffect::JointCoupling { from, onto, share: scale * rng.random_range(0.06..0.15) }
+            }
+            _ => return None,
+        })
+    }
+
+    /// Effects that depend on position, and of the arm itself.
+    fn body_effect(&self, name: &str, rng: &mut impl Rng) -> Option<PlantEffect> {
+        Some(match name {
+            "spring" => PlantEffect::Spring {
+                joint: self.any,
+                stiffness: 6.0 * self.noise() / self.unit(self.any) * rng.random_range(0.5..1.2),
+                rest: if self.unit(self.any) < 1.0 {
+                    rng.random_range(0.2..0.5)
+                } else {
+                    rng.random_range(-0.5..0.5)
+                },
+            },
+            "position_ripple" => PlantEffect::PositionRipple {
+                joint: self.any,
+                // Teeth and wave generator turn with the motor, bearings and cables with the joint.
+                order: *[5.0, 9.0, 14.0, 100.0, 160.0].choose(rng)? / self.unit(self.any),
+                amplitude: self.noise() * rng.random_range(1.2..2.5),
+                phase: rng.random_range(-PI..PI),
+            },
+            "encoder_offset" => {
+                let joint = one_of(&self.places.loaded, rng)?;
+                PlantEffect::EncoderOffset {
+                    joint,
+                    offset: self.sign * self.unit(joint) * rng.random_range(0.03..0.08),
+                }
+            }
+            "base_tilt" => {
+                PlantEffect::BaseTilt { tilt: [0, 1].map(|_| self.sign * rng.random_range(0.02..0.06)) }
+            }
+            "broken_symmetry" => {
+                let (link, aside) = one_of(&self.places.symmetric, rng)?;
+                PlantEffect::BrokenSymmetry { link, aside: self.sign * aside * rng.random_range(0.8..1.5) }
+            }
+            // What the arm can still carry on an exciting path.
+            "payload" => {
+                let aside = [0, 1].map(|_| rng.random_range(-0.04..0.04));
+                let mass = rng.random_range(0.6..1.2);
+                PlantEffect::Payload {
+                    mass,
+                    centre: [aside[0], aside[1], self.places.flange + rng.random_range(0.03..0.10)],
+                    start: self.moment,
+                }
+            }
+            _ => return None,
+        })
+    }
+
+    /// Effects of the torque and its timing, and events.
+    fn torque_effect(&self, name: &str, rng: &mut impl Rng) -> Option<PlantEffect> {
+        Some(match name {
+            "torque_constant" => PlantEffect::TorqueConstant {
+                joint: one_of(&self.places.loaded, rng)?,
+                gain: 1.0 + self.sign * rng.random_range(0.04..0.1),
+            },
+            "time_delay" => PlantEffect::TimeDelay { delay: rng.random_range(0.006..0.018) },
+            "contact_wrench" => PlantEffect::ContactWrench {
+                force: [0, 1, 2].map(|_| self.sign * rng.random_range(5.0..15.0)),
+                start: self.session * rng.random_range(0.0..0.1),
+                length: rng.random_range(2.0..5.0),
+                every: rng.random_range(17.0..29.0),
+            },
+            "joint_elasticity" => {
+                let joint = one_of(&self.places.loaded, rng)?;
+                let stiffness = self.places.stiffness.get(joint).filter(|range| !range.is_empty())?.clone();
+                PlantEffect::JointElasticity { joint, stiffness: rng.random_range(stiffness) }
+            }
+            "backlash" => {
+                let joint = one_of(&self.places.loaded, rng)?;
+                PlantEffect::Backlash { joint, gap: self.unit(joint) * rng.random_range(0.01..0.03) }
+            }
+            _ => return None,
+        })
+    }
 }
 
 impl PlantEffect {
@@ -67,106 +218,28 @@ impl PlantEffect {
         begins: Range<f64>,
         rng: &mut impl Rng,
     ) -> Option<PlantEffect> {
-        let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
-        let any = one_of(&places.any, rng)?;
-        let large = one_of(&places.large, rng)?;
-        let moment = rng.random_range(begins);
-        let friction = |joint: usize| plant.friction()[joint];
-        let coulomb = |joint: usize| friction(joint).gamma1 + friction(joint).gamma3;
-        let noise = plant.sensors().white[any];
-        let unit = |joint: usize| plant.dynamics().usual_way(joint);
-        Some(match name {
-            "load_friction" => PlantEffect::LoadFriction {
-                joint: one_of(&places.loaded, rng)?,
-                coefficient: rng.random_range(0.05..0.11),
-            },
-            "stribeck" => PlantEffect::Stribeck {
-                joint: large,
-                level: friction(large).gamma1 * rng.random_range(0.3..0.6),
-                velocity: unit(large) * rng.random_range(0.03..0.07),
-            },
-            "velocity_nonlinearity" => {
-                let share = rng.random_range(0.35..0.7);
-                let exponent: f64 = rng.random_range(2.2..3.0);
-                let torque = friction(large).gamma5 * share * unit(large).powf(1.0 - exponent);
-                PlantEffect::VelocityNonlinearity { joint: large, torque, exponent }
+        let lot = Lot {
+            plant,
+            places,
+            session,
+            sign: if rng.random_bool(0.5) { 1.0 } else { -1.0 },
+            any: one_of(&places.any, rng)?,
+            large: one_of(&places.large, rng)?,
+            moment: rng.random_range(begins),
+        };
+        match name {
+            "load_friction"
+            | "stribeck"
+            | "velocity_nonlinearity"
+            | "asymmetry"
+            | "hysteresis"
+            | "temperature"
+            | "joint_coupling" => lot.friction_effect(name, rng),
+            "spring" | "position_ripple" | "encoder_offset" | "base_tilt" | "broken_symmetry" | "payload" => {
+                lot.body_effect(name, rng)
             }
-            "asymmetry" => PlantEffect::Asymmetry {
-                joint: any,
-                share: rng.random_range(0.1..0.3),
-                constant: coulomb(any) * rng.random_range(0.0..0.15),
-            },
-            "hysteresis" => PlantEffect::Hysteresis {
-                joint: any,
-                level: coulomb(any) * rng.random_range(0.3..0.6),
-                way: unit(any) * rng.random_range(0.010..0.030),
-            },
-            // What the arm can still carry on an exciting path.
-            "payload" => {
-                let aside = [0, 1].map(|_| rng.random_range(-0.04..0.04));
-                let mass = rng.random_range(0.6..1.2);
-                PlantEffect::Payload {
-                    mass,
-                    centre: [aside[0], aside[1], places.flange + rng.random_range(0.03..0.10)],
-                    start: moment,
-                }
-            }
-            "spring" => PlantEffect::Spring {
-                joint: any,
-                stiffness: 6.0 * noise / unit(any) * rng.random_range(0.5..1.2),
-                rest: if unit(any) < 1.0 { rng.random_range(0.2..0.5) } else { rng.random_range(-0.5..0.5) },
-            },
-            "position_ripple" => PlantEffect::PositionRipple {
-                joint: any,
-                // Teeth and wave generator turn with the motor, bearings and cables with the joint.
-                order: *[5.0, 9.0, 14.0, 100.0, 160.0].choose(rng)? / unit(any),
-                amplitude: noise * rng.random_range(1.2..2.5),
-                phase: rng.random_range(-PI..PI),
-            },
-            "temperature" => PlantEffect::Temperature {
-                change: -rng.random_range(0.15..0.30),
-                time_constant: session * rng.random_range(0.3..0.6),
-            },
-            "torque_constant" => PlantEffect::TorqueConstant {
-                joint: one_of(&places.loaded, rng)?,
-                gain: 1.0 + sign * rng.random_range(0.04..0.1),
-            },
-            "time_delay" => PlantEffect::TimeDelay { delay: rng.random_range(0.006..0.018) },
-            "encoder_offset" => {
-                let joint = one_of(&places.loaded, rng)?;
-                PlantEffect::EncoderOffset {
-                    joint,
-                    offset: sign * unit(joint) * rng.random_range(0.03..0.08),
-                }
-            }
-            "base_tilt" => {
-                PlantEffect::BaseTilt { tilt: [0, 1].map(|_| sign * rng.random_range(0.02..0.06)) }
-            }
-            "contact_wrench" => PlantEffect::ContactWrench {
-                force: [0, 1, 2].map(|_| sign * rng.random_range(5.0..15.0)),
-                start: session * rng.random_range(0.0..0.1),
-                length: rng.random_range(2.0..5.0),
-                every: rng.random_range(17.0..29.0),
-            },
-            "broken_symmetry" => {
-                let (link, aside) = one_of(&places.symmetric, rng)?;
-                PlantEffect::BrokenSymmetry { link, aside: sign * aside * rng.random_range(0.8..1.5) }
-            }
-            "joint_elasticity" => {
-                let joint = one_of(&places.loaded, rng)?;
-                let stiffness = places.stiffness.get(joint).filter(|range| !range.is_empty())?.clone();
-                PlantEffect::JointElasticity { joint, stiffness: rng.random_range(stiffness) }
-            }
-            "backlash" => {
-                let joint = one_of(&places.loaded, rng)?;
-                PlantEffect::Backlash { joint, gap: unit(joint) * rng.random_range(0.01..0.03) }
-            }
-            "joint_coupling" => {
-                let ([from, onto], scale) = one_of(&places.coupled, rng)?;
-                PlantEffect::JointCoupling { from, onto, share: scale * rng.random_range(0.06..0.15) }
-            }
-            _ => return None,
-        })
+            _ => lot.torque_effect(name, rng),
+        }
     }
 
     /// The same effect about `factor` times as large, where and when it is.

@@ -6,6 +6,7 @@ use crate::identification::estimate::{
     standard_errors,
 };
 use crate::identification::mounting::Mounting;
+use crate::identification::{IdentifyOptions, Source, identify};
 use crate::logs::log::Log;
 use crate::logs::regression::{DataOptions, RigidArm};
 use crate::logs::summary::Bands;
@@ -103,4 +104,24 @@ fn a_wrong_mounting_contradicts_the_others() {
     let (_, _, spreads, contradictions) = fitted(&together(&[right, reduced("90,0", "0,90", 2, &[])]));
     assert!(contradictions.iter().any(|joints| !joints.is_empty()));
     assert!(spreads[1].rms[1] > 5.0 * own.rms[1], "{:?} {:?}", spreads[1].rms, own.rms);
+}
+
+/// The torque columns of two joints are exchanged in the logs of the second mounting alone: its warning says so.
+#[test]
+fn columns_that_are_exchanged_in_one_mounting_are_named() {
+    let arm = lwa4p::arm().unwrap();
+    let mounting: Mounting = "90,0".parse().unwrap();
+    let mut sources: Vec<Source<'_>> = Vec::new();
+    for (stood, seed) in [(Mounting::Filed, 1), (mounting, 2)] {
+        for mut log in record_mounted(stood.gravity(&arm), links(), &sensors(), 2, 4, seed, &[]) {
+            if stood == mounting {
+                log.torque.swap(1, 2);
+            }
+            sources.push(Source::from(log).mounted(stood));
+        }
+    }
+    let found = identify(&arm, sources, Vec::<Source<'_>>::new(), &IdentifyOptions::default()).unwrap();
+    let warning = found.warnings.iter().find(|w| w.starts_with("the logs with the base rolled by 90°"));
+    let text = warning.unwrap_or_else(|| panic!("{:?}", found.warnings));
+    assert!(text.contains("The torque columns of joints 2 and 3 are exchanged"), "{text}");
 }

@@ -1,16 +1,15 @@
-//! Logged velocities against logged positions: units, signs, columns that were exchanged, and clocks that
-//! disagree.
-//!
-//! Velocities are computed from positions; logged ones are used for these doubts alone. What a joint moves
-//! within half a second is held against the integral of its logged velocity: no derivative is taken, so
-//! encoder steps and noise hardly count. On sound logs of real arms the two agree within 0.1 % with a
-//! correlation of 1.0000.
-//!
-//! Also here: the levels of a signal; whether torques have the signs of their joints; where the checks put what they
-//! find.
+//! What one log's signals say against themselves, before an arm is asked: logged velocities against positions, levels,
+//! and the signs of torques. What an arm says against the columns is asked by `identification::conventions`.
 
 use super::Finding;
 use super::read::Raw;
+
+// Logged velocities against logged positions: units, signs, columns that were exchanged, and clocks that disagree.
+//
+// Velocities are computed from positions; logged ones are used for these checks alone. What a joint moves
+// within half a second is held against the integral of its logged velocity: no derivative is taken, so
+// encoder steps and noise hardly count. On sound logs of real arms the two agree within 0.1 % with a
+// correlation of 1.0000.
 
 /// Length of the stretches that are compared, s.
 const STRETCH: f64 = 0.5;
@@ -29,7 +28,7 @@ struct Stretches {
 }
 
 /// Looks at the velocities of a log.
-pub(super) fn look(raw: &Raw, step: f64, warnings: &mut Warnings<'_>) {
+pub(super) fn velocities(raw: &Raw, step: f64, warnings: &mut Warnings<'_>) {
     let n = raw.q.len();
     if raw.dq.iter().any(|dq| dq.len() != raw.t.len()) {
         return;
@@ -255,7 +254,7 @@ const CLEAR: f64 = 5.0;
 const MOVES: f64 = 0.1;
 
 /// Looks at each joint's torque or current.
-pub(super) fn look_at_signs(raw: &Raw, step: f64, name: &str, warnings: &mut Warnings<'_>) {
+pub(super) fn torque_signs(raw: &Raw, step: f64, name: &str, warnings: &mut Warnings<'_>) {
     for (j, (q, effort)) in raw.q.iter().zip(&raw.effort).enumerate() {
         let range = q.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
         if range.1 - range.0 < MOVES {
