@@ -3,7 +3,7 @@
 use super::estimate::BaseModel;
 use super::mounting::Mounting;
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, RigidArm};
+use crate::logs::regression::{Data, RigidArm, Signals};
 use dyngen::Arm;
 use std::fmt;
 
@@ -25,7 +25,7 @@ pub trait KnownModel: fmt::Debug + Sync {
     fn take_out(&self, body: &RigidArm, logs: &mut [Log]);
 
     /// Measured less predicted torque, by joint and row, N·m.
-    fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Vec<Vec<f64>>;
+    fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Signals;
 }
 
 /// What was identified goes beyond nothing: it can be judged on other logs as it is.
@@ -57,7 +57,7 @@ impl KnownModel for BaseModel {
 
     fn take_out(&self, _: &RigidArm, _: &mut [Log]) {}
 
-    fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Vec<Vec<f64>> {
+    fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Signals {
         BaseModel::residual(self, body, data)
     }
 }

@@ -12,7 +12,7 @@ use powerball::identification::estimate::{Folds, fit, residual_stats};
 use powerball::identification::excite::{Settings, optimise};
 use powerball::identification::motion::Motion;
 use powerball::logs::log::{Log, common_clock};
-use powerball::logs::regression::{Data, DataOptions, RigidArm};
+use powerball::logs::regression::{Data, DataOptions, RigidArm, Signals};
 use powerball::virtual_arm::{Plant, PlantEffect as Effect, Sensors, lwa4p};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -382,7 +382,7 @@ impl Bench {
     }
 
     /// The residual of the base model on the fitted logs, without noise and in a wide band.
-    fn base(&self, session: &Session, truths: &[Truth]) -> Result<Vec<Vec<f64>>, String> {
+    fn base(&self, session: &Session, truths: &[Truth]) -> Result<Signals, String> {
         let logs = session.logs(truths, false);
         let data = Data::new(&self.body, &logs[..session.fitted], &WIDE).map_err(|e| e.to_string())?;
         Ok(fit(&data, &Folds::new(&data), &[], None).residual)

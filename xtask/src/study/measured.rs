@@ -10,7 +10,7 @@ use powerball::identification::chain::Chain;
 use powerball::identification::estimate::{Folds, FrictionKind, consistent_fit, fit, solve_reduced};
 use powerball::identification::motion::Motion;
 use powerball::logs::log::{Log, common_clock, read_logs};
-use powerball::logs::regression::{Data, DataOptions, Recording, RigidArm};
+use powerball::logs::regression::{Data, DataOptions, Recording, RigidArm, Signals};
 use powerball::logs::summary::Summary;
 use powerball::virtual_arm::{Dynamics, Plant, PlantEffect as Effect, Sensors, bodies, lwa4p};
 use std::path::{Path, PathBuf};
@@ -164,7 +164,7 @@ impl Measured {
     /// What of the change is left when the base model was refitted, over what is left after all that is
     /// known, worst joint.
     fn visible(&self, logs: &[Log]) -> Result<f64, String> {
-        let residual = |logs: &[Log]| -> Result<Vec<Vec<f64>>, String> {
+        let residual = |logs: &[Log]| -> Result<Signals, String> {
             let data = Data::new(&self.body, &logs[..FIT.len()], &DataOptions::default())
                 .map_err(|e| e.to_string())?;
             Ok(fit(&data, &Folds::new(&data), &[], None).residual)

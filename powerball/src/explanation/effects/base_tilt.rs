@@ -4,7 +4,7 @@ use super::words::{Words, number};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part};
 use crate::controller::JointNumber;
 use crate::identification::estimate::Solver;
-use crate::logs::regression::{Column, PULLED};
+use crate::logs::regression::{Column, PULLED, Signals};
 use crate::logs::vector::dot;
 use dyngen::arm::ParameterKind;
 use dyngen::exact::rational;
@@ -110,7 +110,7 @@ fn with_unshown(candidate: &Candidate) -> bool {
 /// The static torque of some parameters under some gravity.
 fn pulled(context: &Context<'_>, gravity: &[f64; 3], all: &[f64]) -> Option<Column> {
     let data = context.data;
-    let mut torque: Vec<Vec<f64>> = data.joints.iter().map(|rows| vec![0.0; rows.len()]).collect();
+    let mut torque = Signals::zeros(data);
     for (axis, g) in gravity.iter().enumerate().filter(|(_, g)| **g != 0.0) {
         let columns = data.pull_columns(axis);
         let values = all.chunks_exact(ParameterKind::ALL.len()).flat_map(|link| &link[..PULLED]);
@@ -123,7 +123,7 @@ fn pulled(context: &Context<'_>, gravity: &[f64; 3], all: &[f64]) -> Option<Colu
             .filter(|(_, v)| **v != 0.0)
             .for_each(|(c, v)| c.add_to(&mut torque, g * v));
     }
-    Some(Column { parts: torque.into_iter().map(Arc::new).enumerate().collect() })
+    Some(Column { parts: torque.0.into_iter().map(Arc::new).enumerate().collect() })
 }
 
 /// What all parameters gain where the unshown ones' torques are those found: under the whole tilt they are

@@ -12,7 +12,7 @@ use crate::explanation::options::{ExplainError, ExplainOptions};
 use crate::identification::estimate::Folds;
 use crate::identification::estimate::distribution::f_tail;
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, RigidArm};
+use crate::logs::regression::{Data, RigidArm, Signals};
 
 /// What was decided.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,7 +96,7 @@ pub fn decide(
 
 /// χ² of `b` less that of `a`, by block.
 fn leads(data: &Data<'_>, a: &Hypothesis, b: &Hypothesis) -> Vec<f64> {
-    let residual = |h: &Hypothesis| -> Vec<Vec<f64>> {
+    let residual = |h: &Hypothesis| -> Signals {
         let design = h.design(data);
         let rest = |j: usize| {
             let predicted = design.predict(j, &h.fit.theta);

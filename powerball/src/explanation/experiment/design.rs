@@ -11,7 +11,7 @@ use crate::identification::estimate::{Design, Folds, Gram, Solver};
 use crate::identification::excite::{Error, Fourier, Limits, Settings, search};
 use crate::identification::motion::Motion;
 use crate::logs::log::Log;
-use crate::logs::regression::{Column, Data, DataOptions, RigidArm};
+use crate::logs::regression::{Column, Data, DataOptions, RigidArm, Signals};
 use crate::logs::vector::dot;
 use faer::Mat;
 
@@ -104,9 +104,8 @@ fn duels(open: &Open) -> Vec<Duel<'_>> {
         .map(|(truth, rival)| {
             let (other, fit) = (&all[truth].fit, &all[rival].fit);
             let gram = fit.gram.sum(&fit.weights, |_| true).gram;
-            let apart = |(r, t): (&Vec<f64>, &Vec<f64>)| r.iter().zip(t).map(|(r, t)| r - t).collect();
-            let difference: Vec<Vec<f64>> = fit.residual.iter().zip(&other.residual).map(apart).collect();
-            let mut signals: Vec<Vec<Vec<f64>>> = vec![difference];
+            let difference = fit.residual.without(&other.residual);
+            let mut signals: Vec<Signals> = vec![difference];
             let rows: Vec<usize> = fit.residual.iter().map(Vec::len).collect();
             signals.extend(all[truth].fitted_columns.iter().map(|c| by_joint(c, &rows)));
             let signals = (signals.iter())
@@ -122,7 +121,7 @@ fn duels(open: &Open) -> Vec<Duel<'_>> {
 }
 
 /// A column's values on every joint.
-fn by_joint(column: &Column, rows: &[usize]) -> Vec<Vec<f64>> {
+fn by_joint(column: &Column, rows: &[usize]) -> Signals {
     let on = |(j, rows): (usize, &usize)| column.at(j).map_or_else(|| vec![0.0; *rows], <[f64]>::to_vec);
     rows.iter().enumerate().map(on).collect()
 }
@@ -177,7 +176,7 @@ fn judge(
     let predict = |h: usize, j: usize| designs[h].predict(j, &open.hypotheses[h].fit.theta);
     let shows = |duel: &Duel<'_>| {
         let (fit, design) = (&duel.model.fit, &designs[duel.rival]);
-        let difference: Vec<Vec<f64>> = (0..n)
+        let difference: Signals = (0..n)
             .map(|j| {
                 let (truth, rival) = (predict(duel.truth, j), predict(duel.rival, j));
                 truth.iter().zip(rival).map(|(t, r)| t - r).collect()

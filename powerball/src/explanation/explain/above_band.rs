@@ -30,7 +30,7 @@ const LOWEST: f64 = 8.0;
 /// Finds the ripples and takes them into the model. Returns the step that names them, if any.
 pub(crate) fn ripple_above_band(study: &Study<'_>, model: &mut Model, number: usize) -> Option<Step> {
     let before = residual_stats(&study.validation, &model.residual_on_validation(study)).rms;
-    let square_before = model.fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect();
+    let square_before = model.fit.residual.squares();
     let found = search(study, model);
     let score = found.iter().map(|f| f.score).fold(0.0, f64::max);
     let mut joints: Vec<JointNumber> = found.iter().map(|f| f.candidate.joints[0]).collect();
@@ -137,12 +137,10 @@ fn is_the_same(a: &Candidate, b: &Candidate) -> bool {
 fn raises_error(study: &Study<'_>, model: &Model, ripple: &Ripple) -> bool {
     let joint = ripple.candidate.joints[0].index();
     let columns = study.on_validation(&model.fit, &[]).columns(&ripple.candidate);
-    let square = |residual: &[Vec<f64>]| residual[joint].iter().map(|e| e * e).sum::<f64>();
     let mut residual = model.residual_on_validation(study);
-    let before = square(&residual);
-    let with = columns.iter().zip(&ripple.coefficients);
-    with.for_each(|(column, c)| column.add_to(&mut residual, -c));
-    square(&residual) > study.rule().max_validation_loss.exp() * before
+    let before = residual.squares()[joint];
+    residual.subtract(&columns, &ripple.coefficients);
+    residual.squares()[joint] > study.rule().max_validation_loss.exp() * before
 }
 
 // What a model leaves of a joint's torque above the band of the fit: along each recording, by order of the joint's

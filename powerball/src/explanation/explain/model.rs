@@ -4,7 +4,7 @@ use super::study::Study;
 use crate::explanation::effects::{self, Candidate, Context, Effect, Made};
 use crate::explanation::rule::Rule;
 use crate::identification::estimate::{Fit, Folds, NormalEquations, Solver, Term, fit};
-use crate::logs::regression::{Column, Data};
+use crate::logs::regression::{Column, Data, Signals};
 use std::ops::Range;
 
 /// An accepted effect on its joints.
@@ -209,7 +209,7 @@ impl Model {
     }
 
     /// Measured less predicted torque of the validation set, by joint and row, N·m.
-    pub(super) fn residual_on_validation(&self, study: &Study<'_>) -> Vec<Vec<f64>> {
+    pub(super) fn residual_on_validation(&self, study: &Study<'_>) -> Signals {
         let mut residual = self.fit.residual_on(&study.validation, &self.columns_on_validation(study));
         let context = study.on_validation(&self.fit, &[]);
         for a in self.accepted.iter().filter(|a| a.above_band().is_some()) {
@@ -245,7 +245,7 @@ impl Model {
         let mut without = self.residual_on_validation(study);
         let context = study.on_validation(&self.fit, &[]);
         let own = context.columns(&a.candidate);
-        own.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut without, *c));
+        without.add(&own, coefficients);
         let context = study.on_validation(&self.fit, &without);
         a.effect().seen_in(&context, &a.candidate, coefficients)
     }
@@ -268,10 +268,8 @@ fn fitted_again(study: &Study<'_>, accepted: &mut [Accepted], start: &Fit) -> Fi
 }
 
 /// Takes the torque of what was measured above the band out of a residual.
-fn take_above_band_out(a: &Accepted, columns: &[Column], residual: &mut [Vec<f64>]) {
-    for (column, coefficient) in columns.iter().zip(a.above_band().into_iter().flatten()) {
-        column.add_to(residual, -coefficient);
-    }
+fn take_above_band_out(a: &Accepted, columns: &[Column], residual: &mut Signals) {
+    residual.subtract(columns, a.above_band().unwrap_or_default());
 }
 
 /// Fits the base model with some candidates; columns that depend on estimates are taken anew, twice. `made` has columns

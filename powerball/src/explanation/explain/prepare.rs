@@ -11,7 +11,7 @@ use crate::explanation::effects::Made;
 use crate::explanation::options::{ExplainError, ExplainOptions};
 use crate::identification::estimate::{Fit, Folds, bands_of, fit, residual_stats};
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, RigidArm};
+use crate::logs::regression::{Data, RigidArm, Signals};
 use crate::logs::summary::BANDS;
 
 /// Whose inertial parameters are fitted.
@@ -45,7 +45,7 @@ pub(super) struct InitialFit {
     /// Errors of the base model.
     pub(super) errors: FitErrors,
     /// What the base model leaves on the validation set, by joint and row, N·m.
-    pub(super) residual: Vec<Vec<f64>>,
+    pub(super) residual: Signals,
     /// What is in logs of the validation set only; its torque is taken out of them.
     pub(super) validation_only: Vec<ValidationOnlyEffect>,
     /// When the logs are taken to have been recorded.
@@ -152,11 +152,9 @@ pub(super) fn initial_model<'a>(base: Fit, study: &Study<'a>) -> Model {
 /// Whether several joints are predicted much better than by another model, on logs that took no part in the
 /// fit, both ways round.
 fn is_plainly_better(model: &Model, other: &Model, study: &Study<'_>) -> bool {
-    let square =
-        |left: &[Vec<f64>]| -> Vec<f64> { left.iter().map(|r| r.iter().map(|e| e * e).sum()).collect() };
     let errors = |model: &Model| {
         let back = CrossValidation::new(study, model, None);
-        [square(&model.residual_on_validation(study)), square(back.residual())]
+        [model.residual_on_validation(study).squares(), back.residual().squares()]
     };
     let ([ours, back], [theirs, their_back]) = (errors(model), errors(other));
     let moving: Vec<usize> = (0..study.data.dof()).filter(|j| theirs[*j] > 0.0).collect();

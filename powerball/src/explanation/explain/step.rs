@@ -10,7 +10,7 @@ use super::search::{
 use super::study::Study;
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Candidate, Effect, Placed};
-use crate::identification::estimate::{Design, Fit, friction_columns, residual_stats};
+use crate::identification::estimate::{Design, friction_columns, residual_stats};
 use std::sync::OnceLock;
 
 /// What a step found, before anything is changed.
@@ -156,9 +156,7 @@ fn above_chance(screen: &Screen<'_>, group: &Group, number: usize) -> Vec<usize>
 /// Takes a choice into the model: everything is refitted, and what it made unneeded goes out.
 pub(super) fn accept(study: &Study<'_>, model: &mut Model, choice: Choice, number: usize) -> Step {
     let Choice { effect, members, comparison, question, tested, before } = choice;
-    let squares =
-        |fit: &Fit| -> Vec<f64> { fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect() };
-    let square_before = squares(&model.fit);
+    let square_before = model.fit.residual.squares();
     let added: Vec<Candidate> = members.iter().map(|m| m.candidate.clone()).collect();
     let first = model.accepted.len();
     let count = members.iter().filter(|m| m.evidence.is_some()).count();
@@ -175,7 +173,7 @@ pub(super) fn accept(study: &Study<'_>, model: &mut Model, choice: Choice, numbe
     drop_covered(study, model, first);
     let first = model.accepted.len() - count;
     model.refit(study);
-    let fell = square_before.iter().zip(squares(&model.fit)).map(|(b, a)| (b - a).max(0.0));
+    let fell = square_before.iter().zip(model.fit.residual.squares()).map(|(b, a)| (b - a).max(0.0));
     let fell: Vec<f64> = fell.collect();
     model.accepted[first..].iter_mut().for_each(|a| a.explained.clone_from(&fell));
     eliminate(study, model);
@@ -283,7 +281,7 @@ fn name_beside(study: &Study<'_>, model: &mut Model, effect: &'static dyn Effect
     groups.push(Group { effect, members });
     let comparison = compare(&screen, &groups, groups.len() - 1, &joints);
     let before = residual_stats(&study.validation, &model.residual_on_validation(study)).rms;
-    let square_before = model.fit.residual.iter().map(|r| r.iter().map(|v| v * v).sum()).collect();
+    let square_before = model.fit.residual.squares();
     model.accepted = fitted;
     which.iter().for_each(|k| {
         let columns = model.accepted[*k].columns();

@@ -6,14 +6,14 @@ use crate::controller::correction::{Law, Memory, Term, add_torques};
 use crate::controller::friction::TanhFriction;
 use crate::explanation::effects::{PASSES, SOFT, Window, each_instant, move_link, time_delay};
 use crate::logs::parallel;
-use crate::logs::regression::{Data, Recording, RigidArm};
+use crate::logs::regression::{Data, Recording, RigidArm, Signals};
 use dyngen::arm::ParameterKind;
 
 impl TorqueModel {
     /// Measured less predicted torque, by joint and row, N·m. `body` is the arm with the model's changes; the
     /// last link holds the model's latest payload during the windows `held`.
     #[must_use]
-    pub fn residual(&self, body: &RigidArm, data: &Data<'_>, held: &[Window]) -> Vec<Vec<f64>> {
+    pub fn residual(&self, body: &RigidArm, data: &Data<'_>, held: &[Window]) -> Signals {
         let recordings: Vec<usize> = (0..data.recordings.len()).collect();
         let torque = parallel::map(&recordings, |r| {
             let recording = &data.recordings[*r];

@@ -10,7 +10,7 @@ use crate::controller::correction::{Law, Term};
 use crate::identification::KnownModel;
 use crate::identification::mounting::Mounting;
 use crate::logs::log::Log;
-use crate::logs::regression::{Data, DataOptions, Recording, RigidArm};
+use crate::logs::regression::{Data, DataOptions, Recording, RigidArm, Signals};
 use crate::logs::signal::resample::median_step;
 use dyngen::Arm;
 use dyngen::arm::{Parameter, ParameterKind};
@@ -248,7 +248,7 @@ impl KnownModel for ModelFile {
         self.model.take_out(body, logs);
     }
 
-    fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Vec<Vec<f64>> {
+    fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Signals {
         self.model.residual(body, data, &[])
     }
 }

@@ -7,7 +7,7 @@ use super::uncertainty::StandardErrors;
 use crate::controller::JointNumber;
 use crate::controller::friction::TanhFriction;
 use crate::logs::parallel;
-use crate::logs::regression::{Data, Recording, RigidArm};
+use crate::logs::regression::{Data, Recording, RigidArm, Signals};
 use dyngen::{SetKind, Values};
 use serde::{Deserialize, Serialize};
 
@@ -278,7 +278,7 @@ impl BaseModel {
 
     /// Measured less predicted torque, by joint and row, N·m.
     #[must_use]
-    pub fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Vec<Vec<f64>> {
+    pub fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Signals {
         data.residual(&parallel::map(&data.recordings, |recording| self.torque(body, recording)))
     }
 

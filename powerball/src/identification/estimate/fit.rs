@@ -8,7 +8,7 @@ use super::variable_projection::{
     FRICTION, Layout, Scatter, SeparableRows, Start, Trials, variable_projection,
 };
 use crate::logs::parallel;
-use crate::logs::regression::{Column, Data, RigidArm};
+use crate::logs::regression::{Column, Data, RigidArm, Signals};
 use faer::Mat;
 use std::sync::Arc;
 
@@ -37,7 +37,7 @@ pub struct Fit {
     /// The velocity that each joint exceeds in 5 % of the samples, rad/s.
     pub top_velocity: Vec<f64>,
     /// Residual by joint.
-    pub residual: Vec<Vec<f64>>,
+    pub residual: Signals,
     /// The columns at these shapes.
     pub design: Design,
     /// Their cross products.
@@ -97,7 +97,7 @@ impl Fit {
 
     /// The prediction of this model on other data with the same kind of columns.
     #[must_use]
-    pub fn residual_on(&self, data: &Data<'_>, extra: &[Column]) -> Vec<Vec<f64>> {
+    pub fn residual_on(&self, data: &Data<'_>, extra: &[Column]) -> Signals {
         let friction = friction_columns(data, &self.shapes);
         let design = Design::new(data, &friction, extra);
         residuals(data, &design, &self.theta)
@@ -197,10 +197,7 @@ impl SeparableRows for InMemory<'_> {
     fn scatter(&self, (design, _): &(Design, Gram), theta: &[f64]) -> Scatter {
         let residual = residuals(self.data, design, theta);
         Scatter {
-            sigma: residual
-                .iter()
-                .map(|r| (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt())
-                .collect(),
+            sigma: residual.rms(),
             inflation: residual
                 .iter()
                 .enumerate()
@@ -219,11 +216,11 @@ pub fn friction_columns(data: &Data<'_>, shapes: &[[f64; 2]]) -> Vec<Arc<[Vec<f6
     parallel::map(&joints, |&j| of(j))
 }
 
-fn residuals(data: &Data<'_>, design: &Design, theta: &[f64]) -> Vec<Vec<f64>> {
+fn residuals(data: &Data<'_>, design: &Design, theta: &[f64]) -> Signals {
     let joints: Vec<usize> = (0..data.dof()).collect();
-    parallel::map(&joints, |&j| {
+    Signals(parallel::map(&joints, |&j| {
         data.joints[j].torque.iter().zip(design.predict(j, theta)).map(|(y, p)| y - p).collect()
-    })
+    }))
 }
 
 /// Seconds over which means are taken for [`variance_inflation`].

@@ -6,6 +6,7 @@ mod recording;
 mod rigid;
 mod row_selection;
 mod rows;
+mod signals;
 
 pub use prepare::{Data, DataError, DataOptions, PULLED, column_in_bands};
 pub(crate) use prepare::{FRICTION, top_velocity};
@@ -14,3 +15,4 @@ pub use rigid::RigidArm;
 pub use row_selection::inactive_joints;
 pub(crate) use row_selection::{FEWEST_ROWS, rest_note};
 pub use rows::{Block, Column, JointRows};
+pub use signals::Signals;

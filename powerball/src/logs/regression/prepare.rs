@@ -1,7 +1,7 @@
 //! Logs of an arm into rows: even grid, derivatives, band, rest removed, blocks laid out.
 
 use super::row_selection::{FEWEST_ROWS, inactive_joints, kept_samples, notes};
-use super::{Block, Column, JointRows, Recording, RigidArm};
+use super::{Block, Column, JointRows, Recording, RigidArm, Signals};
 use crate::logs::log::{Log, logs_of_motors};
 use crate::logs::parallel;
 use crate::logs::signal::resample::median_step;
@@ -326,12 +326,6 @@ impl<'a> Data<'a> {
         self.joints.len()
     }
 
-    /// No torque, by joint and row.
-    #[must_use]
-    pub fn zeros(&self) -> Vec<Vec<f64>> {
-        self.joints.iter().map(|joint| vec![0.0; joint.len()]).collect()
-    }
-
     /// The velocity that a joint exceeds in 5 % of its samples, rad/s, at least 1e-3.
     #[must_use]
     pub fn top_velocity(&self, joint: usize) -> f64 {
@@ -467,7 +461,7 @@ impl<'a> Data<'a> {
 
     /// Measured less predicted torque by joint and row, from torques along the recordings, n a sample.
     #[must_use]
-    pub fn residual(&self, predicted: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    pub fn residual(&self, predicted: &[Vec<f64>]) -> Signals {
         let of_joint = |(rows, (_, predicted)): (&JointRows, &(usize, Arc<Vec<f64>>))| {
             rows.torque.iter().zip(predicted.iter()).map(|(y, p)| y - p).collect()
         };

@@ -9,7 +9,7 @@ use crate::explanation::effects::{self, Context, Settings, temperature};
 use crate::identification::estimate::distribution::f_tail;
 use crate::identification::estimate::{Design, Folds, Gram, Solver, friction_columns};
 use crate::logs::parallel;
-use crate::logs::regression::{Column, Data};
+use crate::logs::regression::{Column, Data, Signals};
 use crate::logs::vector::dot;
 use std::ops::Range;
 
@@ -49,7 +49,7 @@ pub(crate) fn changes(
     study: &Study<'_>,
     model: &Model,
     mut together: Together<'_>,
-) -> (Vec<Changed>, [Vec<Vec<f64>>; SIDES]) {
+) -> (Vec<Changed>, [Signals; SIDES]) {
     let tried = tried(study, model);
     let logs: Vec<(usize, usize)> = (together.data.iter().enumerate())
         .flat_map(|(side, data)| (0..data.logs.len()).map(move |log| (side, log)))
@@ -183,7 +183,7 @@ pub(crate) const SIDES: usize = 2;
 pub(crate) struct Together<'s> {
     pub(crate) data: [&'s Data<'s>; SIDES],
     /// What it leaves, by side, joint and row, N·m.
-    pub(crate) residual: [Vec<Vec<f64>>; SIDES],
+    pub(crate) residual: [Signals; SIDES],
     /// Its coefficients.
     pub(crate) theta: Vec<f64>,
     designs: [Design; SIDES],
@@ -198,7 +198,7 @@ pub(crate) struct Asked {
     /// χ² explained.
     pub(crate) gain: f64,
     /// The column less what the model imitates of it, by side, joint and row.
-    pub(crate) column: [Vec<Vec<f64>>; SIDES],
+    pub(crate) column: [Signals; SIDES],
 }
 
 impl<'s> Together<'s> {
@@ -248,7 +248,7 @@ impl<'s> Together<'s> {
     /// The same, with the column itself.
     pub(crate) fn ask(&self, side: usize, log: usize, column: &Column) -> Option<Asked> {
         let (theta, gain, base) = self.solve(side, log, column)?;
-        let mut freed: [Vec<Vec<f64>>; SIDES] = [0, 1].map(|s: usize| {
+        let mut freed: [Signals; SIDES] = [0, 1].map(|s: usize| {
             let negative = |j| self.designs[s].predict(j, &base).iter().map(|v| -v).collect();
             (0..self.data[s].dof()).map(negative).collect()
         });
@@ -298,9 +298,7 @@ impl<'s> Together<'s> {
     /// Takes a column in.
     pub(crate) fn take(&mut self, asked: &Asked) {
         for (residual, column) in self.residual.iter_mut().zip(&asked.column) {
-            for (residual, column) in residual.iter_mut().zip(column) {
-                residual.iter_mut().zip(column).for_each(|(r, c)| *r -= asked.theta * c);
-            }
+            residual.add_signal(column, -asked.theta);
         }
     }
 }

@@ -5,6 +5,7 @@ use super::super::search::{Extent, Group, Member, Screen};
 use crate::controller::JointNumber;
 use crate::explanation::effects::{Window, mask};
 use crate::explanation::rule::Rule;
+use crate::logs::regression::Signals;
 use crate::logs::vector::dot;
 
 /// How a chosen group compares with the others on its joints.
@@ -120,8 +121,8 @@ fn share_within(screen: &Screen<'_>, group: &Group, windows: &[Window]) -> f64 {
 }
 
 /// What a group's members on the given joints explain of each joint's residual, in standard deviations.
-fn explained(screen: &Screen<'_>, group: &Group, joints: &[JointNumber]) -> Vec<Vec<f64>> {
-    let mut sum: Vec<Vec<f64>> = screen.context.residual.iter().map(|r| vec![0.0; r.len()]).collect();
+fn explained(screen: &Screen<'_>, group: &Group, joints: &[JointNumber]) -> Signals {
+    let mut sum = Signals::zeros(screen.context.data);
     for member in group.on(joints) {
         for (j, columns) in screen.residualised(&member.trial).iter().enumerate() {
             let weight = screen.context.fit.weights[j].sqrt();

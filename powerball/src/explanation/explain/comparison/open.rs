@@ -7,7 +7,7 @@ use crate::controller::JointNumber;
 use crate::explanation::effects::{Candidate, Context};
 use crate::explanation::rule::Rule;
 use crate::identification::estimate::{Design, Fit, Folds, friction_columns};
-use crate::logs::regression::{Column, Data};
+use crate::logs::regression::{Column, Data, Signals};
 
 /// Names for the same residual that the logs do not tell apart, the preferred one first.
 #[derive(Debug)]
@@ -61,16 +61,12 @@ impl Hypothesis {
 
     /// What this name explains alone on some data, by joint, N·m.
     #[must_use]
-    pub fn own_torque(&self, data: &Data<'_>) -> Vec<Vec<f64>> {
+    pub fn own_torque(&self, data: &Data<'_>) -> Signals {
         let columns = self.own_columns(data);
         let first = self.fit.design.size - self.fit.design.extra(0) - columns.len();
-        let mut torque: Vec<Vec<f64>> = data.joints.iter().map(|rows| vec![0.0; rows.len()]).collect();
-        for (k, column) in columns.iter().enumerate() {
-            let coefficient = self.fit.coefficient(first + k);
-            for (j, values) in &column.parts {
-                torque[*j].iter_mut().zip(values.iter()).for_each(|(t, v)| *t += coefficient * v);
-            }
-        }
+        let own: Vec<f64> = (first..first + columns.len()).map(|k| self.fit.coefficient(k)).collect();
+        let mut torque = Signals::zeros(data);
+        torque.add(&columns, &own);
         torque
     }
 

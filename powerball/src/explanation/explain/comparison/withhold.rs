@@ -8,6 +8,7 @@ use super::history::{History, Question, Step};
 use crate::controller::JointNumber;
 use crate::explanation::effects::Effect;
 use crate::identification::estimate::{NormalEquations, Solver, noise_floor, residual_stats};
+use crate::logs::regression::Signals;
 use crate::logs::summary::{OCTAVES, halved};
 use crate::logs::vector::dot;
 use faer::Mat;
@@ -86,9 +87,10 @@ fn impossible(study: &Study<'_>, model: &Model) -> Option<usize> {
 /// The accepted effect without which the logs to judge on are predicted clearly better, on its joints or on all: what one
 /// joint gains others may lose, since they share their parameters.
 fn harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
-    let error = |left: &[Vec<f64>], joints: &[JointNumber]| -> f64 {
-        let square = |j: &JointNumber| left[j.index()].iter().map(|e| e * e).sum::<f64>();
-        joints.iter().map(square).filter(|s| *s > 0.0).map(f64::ln).sum::<f64>() / joints.len() as f64
+    let error = |left: &Signals, joints: &[JointNumber]| -> f64 {
+        let squares = left.squares();
+        joints.iter().map(|j| squares[j.index()]).filter(|s| *s > 0.0).map(f64::ln).sum::<f64>()
+            / joints.len() as f64
     };
     let all: Vec<JointNumber> = (0..study.data.dof()).map(JointNumber::from_index).collect();
     let with = model.residual_on_validation(study);

@@ -9,7 +9,7 @@ use crate::explanation::effects::{Context, Part, Window};
 use crate::explanation::options::ExplainError;
 use crate::explanation::torque_model::{Additions, ArmChanges, LogChanges, NamedTerm, Payload, TorqueModel};
 use crate::identification::estimate::{JointFriction, ParameterEstimate, fit};
-use crate::logs::regression::{Data, RigidArm};
+use crate::logs::regression::{Data, RigidArm, Signals};
 use dyngen::SetKind;
 use dyngen::arm::Parameter;
 
@@ -17,9 +17,9 @@ use dyngen::arm::Parameter;
 pub(crate) struct Composed {
     pub(crate) model: TorqueModel,
     /// On the fitted logs.
-    pub(crate) fitted: Vec<Vec<f64>>,
+    pub(crate) fitted: Signals,
     /// On the validation set.
-    pub(crate) held_out: Vec<Vec<f64>>,
+    pub(crate) held_out: Signals,
 }
 
 /// What the accepted effects are.
@@ -160,12 +160,12 @@ fn payload(part: &Part, windows: &[Window]) -> Option<Payload> {
 }
 
 /// Takes the torque of some accepted effects out of residuals.
-fn take_out(found: &Model, which: &[usize], context: &Context<'_>, residual: &mut [Vec<f64>]) {
+fn take_out(found: &Model, which: &[usize], context: &Context<'_>, residual: &mut Signals) {
     let coefficients = found.coefficients();
     for k in which {
         let a = &found.accepted[*k];
         let columns = context.columns(&a.candidate);
-        columns.iter().zip(&coefficients[*k]).for_each(|(column, c)| column.add_to(residual, -c));
+        residual.subtract(&columns, &coefficients[*k]);
     }
 }
 

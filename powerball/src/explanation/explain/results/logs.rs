@@ -11,7 +11,7 @@ use crate::controller::JointNumber;
 use crate::explanation::effects::{Settings, Window, contact_wrench};
 use crate::explanation::rule::Rule;
 use crate::identification::estimate::distribution::f_tail;
-use crate::logs::regression::Data;
+use crate::logs::regression::{Data, Signals};
 use serde::Serialize;
 
 /// What is said of one log.
@@ -54,7 +54,7 @@ struct Local {
     effect: String,
     joints: Vec<JointNumber>,
     windows: Vec<Window>,
-    torque: [Vec<Vec<f64>>; 2],
+    torque: [Signals; 2],
 }
 
 /// What a log's rows say, mean over joints of squared errors over the joint's variance.
@@ -63,7 +63,7 @@ struct Judged<'a> {
     side: usize,
     log: usize,
     /// What the model leaves, by joint and row.
-    residual: &'a [Vec<f64>],
+    residual: &'a Signals,
 }
 
 /// One entry a log, those that were fitted first.
@@ -132,9 +132,9 @@ fn of_accepted(study: &Study<'_>, model: &Model, place: usize, accepted: &Accept
     let coefficients = model.coefficients().swap_remove(place);
     let (on_fitted, on_validation) = (model.context(study), study.on_validation(&model.fit, &[]));
     let torque = [(&study.data, &on_fitted), (&study.validation, &on_validation)].map(|(data, context)| {
-        let mut torque = data.zeros();
+        let mut torque = Signals::zeros(data);
         let columns = context.columns(candidate);
-        columns.iter().zip(&coefficients).for_each(|(column, c)| column.add_to(&mut torque, *c));
+        torque.add(&columns, &coefficients);
         torque
     });
     let mut windows = accepted.effect().windows(&on_fitted, candidate);
@@ -149,7 +149,7 @@ fn of_accepted(study: &Study<'_>, model: &Model, place: usize, accepted: &Accept
 
 impl Judged<'_> {
     /// The mean square of some residuals on this log over the joint's variance, mean over joints that move.
-    fn error(&self, sigma: &[f64], residual: &[Vec<f64>]) -> Option<f64> {
+    fn error(&self, sigma: &[f64], residual: &Signals) -> Option<f64> {
         let of = |j: usize| {
             let own = |r: &usize| self.data.recordings[*r].log == self.log;
             let rows = (0..self.data.recordings.len()).filter(own).map(|r| &self.data.joints[j].rows[r]);
@@ -181,12 +181,8 @@ impl Judged<'_> {
         let locals: Vec<&Local> =
             local.iter().filter(|local| local.windows.iter().any(|w| w.log == log)).collect();
         let with = |which: &[&Local]| {
-            let mut residual = self.residual.to_vec();
-            for torque in which.iter().map(|local| &local.torque[self.side]) {
-                for (r, t) in residual.iter_mut().zip(torque) {
-                    r.iter_mut().zip(t).for_each(|(r, t)| *r += t);
-                }
-            }
+            let mut residual = self.residual.clone();
+            which.iter().for_each(|local| residual.add_signal(&local.torque[self.side], 1.0));
             self.error(sigma, &residual).unwrap_or(0.0)
         };
         let (after, before) = (with(&[]), with(&locals));

@@ -12,7 +12,7 @@ use super::evidence::{Validation, left, log_change, validation_gain, wald};
 use super::screen::{Screen, Trial};
 use crate::explanation::effects::Candidate;
 use crate::identification::estimate::{Design, Fit, Folds, fit, friction_columns};
-use crate::logs::regression::Data;
+use crate::logs::regression::{Data, Signals};
 use crate::logs::vector::dot;
 
 /// The model fitted to the validation set.
@@ -22,7 +22,7 @@ pub(crate) struct CrossValidation {
     /// Its columns on the logs that the model was fitted to.
     design: Design,
     /// What it leaves there.
-    residual: Vec<Vec<f64>>,
+    residual: Signals,
 }
 
 /// What both ways say.
@@ -53,7 +53,7 @@ impl CrossValidation {
     }
 
     /// What it leaves on the logs that the model was fitted to, by joint and row, N·m.
-    pub(crate) fn residual(&self) -> &[Vec<f64>] {
+    pub(crate) fn residual(&self) -> &Signals {
         &self.residual
     }
 

@@ -151,7 +151,7 @@ fn needed(study: &Study<'_>, model: &Model, place: usize) -> Option<Needed> {
     let coefficients = &model.coefficients()[place];
     let mut residual = model.fit.residual.clone();
     let columns = model.context(study).columns(candidate);
-    columns.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut residual, *c));
+    residual.add(&columns, coefficients);
     let context = study.on_fitted(&model.fit, &residual);
     let screen = Screen::without(&context, own);
     let trial = screen.try_candidate(candidate)?;
@@ -159,7 +159,7 @@ fn needed(study: &Study<'_>, model: &Model, place: usize) -> Option<Needed> {
     let mut on_validation = model.fit.residual_on(&study.validation, &all);
     let context = study.on_validation(&model.fit, &[]);
     let columns = context.columns(candidate);
-    columns.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut on_validation, *c));
+    on_validation.add(&columns, coefficients);
     let design =
         Design::new(&study.validation, &friction_columns(&study.validation, &model.fit.shapes), &all);
     let validation = Validation { data: &study.validation, design, residual: on_validation };

@@ -11,7 +11,7 @@ use crate::identification::estimate::distribution::f_tail;
 use crate::identification::estimate::{
     Design, Folds, MEAN_OVER, NormalEquations, Solver, variance_inflation,
 };
-use crate::logs::regression::{Block, Column, Data};
+use crate::logs::regression::{Block, Column, Data, Signals};
 use crate::logs::vector::dot;
 use faer::Mat;
 
@@ -70,7 +70,7 @@ pub(crate) struct Validation<'p> {
     /// The base's columns on it.
     pub(crate) design: Design,
     /// What the base leaves on it.
-    pub(crate) residual: Vec<Vec<f64>>,
+    pub(crate) residual: Signals,
 }
 
 /// Gathers the evidence for a trial. `validation` holds the validation set and the candidate's columns there.
@@ -160,7 +160,7 @@ pub(crate) fn wald(screen: &Screen<'_>, trial: &Trial, blocks: &[Block]) -> f64 
 }
 
 /// What a trial leaves, given its columns with the base's shares taken out.
-pub(super) fn left(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
+pub(super) fn left(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) -> Signals {
     let of = |(columns, residual): (&Vec<Vec<f64>>, &Vec<f64>)| {
         let mut e = residual.clone();
         for (column, theta) in columns.iter().zip(&trial.theta) {

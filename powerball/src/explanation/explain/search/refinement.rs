@@ -34,10 +34,7 @@ pub(crate) fn refine(study: &Study<'_>, model: &mut Model) {
             continue;
         }
         let weights = model.fit.weights.clone();
-        let error = |model: &Model| -> f64 {
-            let square = |r: &Vec<f64>| r.iter().map(|e| e * e).sum::<f64>();
-            model.fit.residual.iter().zip(&weights).map(|(r, w)| w * square(r)).sum()
-        };
+        let error = |model: &Model| model.fit.residual.weighted_square(&weights);
         let (before, old) = (error(model), model.accepted.clone());
         for (k, candidate, columns) in moved {
             model.accepted[k].replace(candidate, columns);
@@ -63,7 +60,7 @@ fn moved(
     let effect = accepted.effect();
     let mut without = model.fit.residual.clone();
     let columns = model.context(study).columns(&accepted.candidate);
-    columns.iter().zip(coefficients).for_each(|(column, c)| column.add_to(&mut without, *c));
+    without.add(&columns, coefficients);
     let context = study.on_fitted(&model.fit, &without);
     let screen = Screen::without(&context, own);
     let mut candidate = accepted.candidate.clone();

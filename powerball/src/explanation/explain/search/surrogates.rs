@@ -13,7 +13,7 @@ use crate::controller::JointNumber;
 use crate::explanation::effects::{Context, Effect};
 use crate::identification::estimate::Added;
 use crate::logs::parallel;
-use crate::logs::regression::{Column, JointRows};
+use crate::logs::regression::{Column, JointRows, Signals};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rustfft::num_complex::Complex;
@@ -92,7 +92,7 @@ pub(crate) fn level_of_search(context: &Context<'_>, effect: &dyn Effect, seed: 
     let shift = |rng: &mut ChaCha8Rng| Shift { fraction: rng.random_range(0.15..0.85), signs: Vec::new() };
     let shifts: Vec<Shift> = (0..context.rule.searched_surrogates).map(|_| shift(&mut rng)).collect();
     let scores = parallel::map(&shifts, |shift| {
-        let residual: Vec<Vec<f64>> = (context.residual.iter().enumerate())
+        let residual: Signals = (context.residual.iter().enumerate())
             .map(|(j, values)| rotated(values, &context.data.joints[j].rows, shift))
             .collect();
         let context = context.seen_with(&residual);

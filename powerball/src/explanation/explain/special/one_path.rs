@@ -49,7 +49,7 @@ fn same_path(rule: &Rule, a: &Recording, b: &Recording) -> bool {
 pub(crate) fn predicts_better(model: (&Study<'_>, &Model), rival: (&Study<'_>, &Model)) -> bool {
     let square = |(study, model): (&Study<'_>, &Model)| -> Vec<(f64, f64)> {
         let left = model.residual_on_validation(study);
-        left.iter().map(|r| (r.len() as f64, r.iter().map(|e| e * e).sum::<f64>())).collect()
+        left.iter().zip(left.squares()).map(|(r, square)| (r.len() as f64, square)).collect()
     };
     let (mut log_ratio, mut rows) = (0.0, 0.0);
     for ((n, own), (_, theirs)) in square(model).into_iter().zip(square(rival)) {

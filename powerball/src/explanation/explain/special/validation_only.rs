@@ -9,7 +9,7 @@ use crate::explanation::options::ExplainOptions;
 use crate::explanation::rule::Rule;
 use crate::identification::estimate::{Fit, Folds, Term, fit, noise_floor, residual_stats};
 use crate::logs::log::Log;
-use crate::logs::regression::{Column, Data, DataError, RigidArm};
+use crate::logs::regression::{Column, Data, DataError, RigidArm, Signals};
 
 /// Rounds in which the settings are made consistent with the coefficients.
 const ROUNDS: usize = 3;
@@ -35,7 +35,7 @@ pub(crate) struct ValidationOnlyPart {
     /// Where it is.
     pub(crate) windows: Vec<Window>,
     /// Its torque on the fitted logs and on the validation set, which was taken out there, by joint and row, N·m.
-    pub(crate) torque: [Vec<Vec<f64>>; 2],
+    pub(crate) torque: [Signals; 2],
 }
 
 /// The base model, the logs that it is fitted to and those that it is judged on, as rows.
@@ -142,7 +142,7 @@ pub(crate) fn validation_only_effects<'a>(
 
 /// The base model with what every arm may have (see [`Effect::baseline`](crate::explanation::effects::Effect::baseline)), and
 /// what it leaves on the validation set.
-fn with_zeros(rule: &Rule, base: &Fit, (data, validation): (&Data<'_>, &Data<'_>)) -> (Fit, Vec<Vec<f64>>) {
+fn with_zeros(rule: &Rule, base: &Fit, (data, validation): (&Data<'_>, &Data<'_>)) -> (Fit, Signals) {
     let context = Context::new(data, base, &base.residual, rule);
     let candidates: Vec<Candidate> = effects::all().iter().flat_map(|e| e.baseline(&context)).collect();
     let columns = |context: &Context<'_>| -> Vec<Column> {
@@ -175,7 +175,7 @@ fn taken_out_of_fitted<'a>(
         return None;
     }
     let named = named(rule, pooled, &[seen], validation, [residual, left]);
-    let effect = with_torques(rule, pooled, &[seen], named, vec![[torque, validation.zeros()]]);
+    let effect = with_torques(rule, pooled, &[seen], named, vec![[torque, Signals::zeros(validation)]]);
     Some((effect, without, fitted))
 }
 
@@ -190,18 +190,16 @@ fn taken_out<'a>(
     let residual = base.residual_on(validation, &[]);
     seen.first()?;
     let windows: Vec<Window> = seen.iter().flat_map(|seen| seen.candidate.windows.clone()).collect();
-    let torques: Vec<Vec<Vec<f64>>> = seen.iter().map(|seen| seen.torque(validation, base, rule)).collect();
-    let mut torque = validation.zeros();
-    for (j, own) in torques.iter().flat_map(|torques| torques.iter().enumerate()) {
-        torque[j].iter_mut().zip(own).for_each(|(sum, t)| *sum += t);
-    }
+    let torques: Vec<Signals> = seen.iter().map(|seen| seen.torque(validation, base, rule)).collect();
+    let mut torque = Signals::zeros(validation);
+    torques.iter().for_each(|own| torque.add_signal(own, 1.0));
     if !makes_it_odd(rule, base, validation, &residual, (&windows, &torque)) {
         return None;
     }
     let without = validation.without_torque(&torque);
     let left = base.residual_on(&without, &[]);
     let named = named(rule, pooled, seen, &without, [residual, left]);
-    let torques = torques.into_iter().map(|torque| [data.zeros(), torque]).collect();
+    let torques = torques.into_iter().map(|torque| [Signals::zeros(data), torque]).collect();
     Some((with_torques(rule, pooled, seen, named, torques), without))
 }
 
@@ -211,7 +209,7 @@ fn named(
     pooled: &Pooled<'_>,
     seen: &[&Seen],
     validation: &Data<'_>,
-    left: [Vec<Vec<f64>>; 2],
+    left: [Signals; 2],
 ) -> NamedEffect {
     let Candidate { joints, .. } = &seen[0].candidate;
     let effect = seen[0].candidate.effect();
@@ -256,10 +254,10 @@ fn with_torques(
     pooled: &Pooled<'_>,
     seen: &[&Seen],
     named: NamedEffect,
-    torques: Vec<[Vec<Vec<f64>>; 2]>,
+    torques: Vec<[Signals; 2]>,
 ) -> ValidationOnlyEffect {
     let context = Context::new(&pooled.data, &pooled.fit, &pooled.fit.residual, rule);
-    let part = |(seen, torque): (&&Seen, [Vec<Vec<f64>>; 2])| ValidationOnlyPart {
+    let part = |(seen, torque): (&&Seen, [Signals; 2])| ValidationOnlyPart {
         part: seen.candidate.effect().part(&context, &seen.candidate, &seen.coefficients),
         windows: seen.candidate.windows.clone(),
         torque,
@@ -301,11 +299,11 @@ impl Seen {
     }
 
     /// Its torque on some logs, by joint and row, N·m.
-    fn torque(&self, data: &Data<'_>, base: &Fit, rule: &Rule) -> Vec<Vec<f64>> {
-        let mut torque = data.zeros();
+    fn torque(&self, data: &Data<'_>, base: &Fit, rule: &Rule) -> Signals {
+        let mut torque = Signals::zeros(data);
         let context = Context::for_columns(data, base, rule);
         let columns = self.candidate.effect().columns(&context, &self.candidate);
-        columns.iter().zip(&self.coefficients).for_each(|(column, c)| column.add_to(&mut torque, *c));
+        torque.add(&columns, &self.coefficients);
         torque
     }
 
@@ -367,18 +365,15 @@ fn makes_it_odd(
     rule: &Rule,
     base: &Fit,
     other: &Data<'_>,
-    residual: &[Vec<f64>],
-    (windows, torque): (&[Window], &[Vec<f64>]),
+    residual: &Signals,
+    (windows, torque): (&[Window], &Signals),
 ) -> bool {
-    let less = |(r, t): (&Vec<f64>, &Vec<f64>)| r.iter().zip(t).map(|(r, t)| r - t).collect();
-    let left: Vec<Vec<f64>> = residual.iter().zip(torque).map(less).collect();
+    let left = residual.without(torque);
     let logs = || (0..other.logs.len()).filter(|log| windows.iter().any(|w| w.log == other.logs[*log]));
     let excess =
         |residual: &[Vec<f64>]| -> f64 { logs().map(|log| oddness(base, other, residual, log) - 1.0).sum() };
-    let square = |residual: &[f64]| residual.iter().map(|v| v * v).sum::<f64>();
-    let harms = |(left, residual): (&Vec<f64>, &Vec<f64>)| {
-        square(left) > (1.0 + rule.max_validation_loss) * square(residual)
-    };
     let little = excess(&left) <= rule.max_unexplained * excess(residual);
-    little && !left.iter().zip(residual).any(harms)
+    let (after, before) = (left.squares(), residual.squares());
+    little
+        && !after.iter().zip(before).any(|(after, before)| *after > (1.0 + rule.max_validation_loss) * before)
 }
