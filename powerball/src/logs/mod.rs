@@ -6,7 +6,6 @@
 pub mod batch;
 pub mod log;
 pub(crate) mod parallel;
-mod progress;
 pub mod regression;
 pub mod signal;
 pub mod summary;
@@ -15,4 +14,29 @@ pub mod tables;
 pub(crate) mod tests;
 pub(crate) mod vector;
 
-pub use progress::Progress;
+use std::fmt;
+
+/// Who reads, in a few words, what a long computation is doing now; by default nobody.
+#[derive(Clone, Copy, Default)]
+pub struct Progress<'a>(Option<&'a (dyn Fn(&str) + Sync)>);
+
+impl<'a> Progress<'a> {
+    /// Calls this function.
+    #[must_use]
+    pub fn to(listener: &'a (dyn Fn(&str) + Sync)) -> Self {
+        Progress(Some(listener))
+    }
+
+    /// Says what is being done now.
+    pub fn say(&self, what: &str) {
+        if let Some(listener) = self.0 {
+            listener(what);
+        }
+    }
+}
+
+impl fmt::Debug for Progress<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.0.is_some() { "Progress(somebody)" } else { "Progress(nobody)" })
+    }
+}

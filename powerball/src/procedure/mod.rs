@@ -1,7 +1,5 @@
 //! The paper's procedure (§II.C, §III): what is done with an arm, and what its records say.
 
-mod approach;
-pub mod behind;
 pub mod constant_velocity;
 pub mod envelope;
 pub mod friction;
@@ -13,8 +11,7 @@ pub mod resume;
 pub mod settling;
 pub mod warm_up;
 
-pub use approach::approach;
-pub use behind::Behind;
 pub use envelope::{Cleared, Envelope};
-pub use log_line::{Columns, LogTime, Told};
+pub use log_line::{Behind, Columns, LogTime, Told};
 pub use record::{Record, RecordError, Recorder, record, way};
+pub use settling::approach;

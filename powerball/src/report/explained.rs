@@ -2,8 +2,8 @@
 
 use crate::controller::JointNumber;
 use crate::explanation::explain::{Change, Explained, NamedEffect, Shown, State, TorqueCurve};
+use crate::report::sections;
 use crate::report::{BarPairs, Figure, Files, Ink, Page, Panel, Series, Table, Tone, number};
-use crate::report::{conventions, transmission};
 
 /// explained.json, model.json and report.html.
 ///
@@ -20,7 +20,7 @@ pub fn files(explained: &Explained) -> Result<Files, String> {
 /// over time, what stays, what the columns are, and what was found in the logs.
 pub fn add_to_page(page: &mut Page, explained: &Explained) {
     if let Some(told) = explained.conventions.as_ref().filter(|c| c.is_remarkable()) {
-        conventions::verdict(page, told);
+        sections::columns_verdict(page, told);
     }
     answer(page, explained);
     logs(page, explained);
@@ -28,13 +28,13 @@ pub fn add_to_page(page: &mut Page, explained: &Explained) {
     effects(page, explained);
     laws(page, explained);
     if let Some(joints) = &explained.transmission {
-        transmission::add_to_page(page, joints);
+        sections::add_transmissions(page, joints);
     }
     torques(page, explained);
     rest(page, explained);
     if let Some(told) = &explained.conventions {
         page.heading("What the columns of the logs are");
-        conventions::add_to_page(page, told);
+        sections::add_conventions(page, told);
     }
     notes(page, explained);
     page.words(&WORDS);

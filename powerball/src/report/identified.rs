@@ -5,9 +5,9 @@ use crate::controller::friction::TanhFriction;
 use crate::explanation::torque_model::Additions;
 use crate::identification::estimate::TorqueCurve;
 use crate::identification::{Along, Identified, JointAlong};
-use crate::logs::signal::turns::Turns;
+use crate::logs::signal::motion::Turns;
+use crate::report::sections;
 use crate::report::{Figure, Files, Ink, JOINTS, Page, Panel, Series, Table, Tone, number};
-use crate::report::{conventions, transmission};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 use dyngen::exact::rational::to_f64;
@@ -51,7 +51,7 @@ pub fn page(result: &Identified) -> Page {
             of two seconds."
     ));
     if let Some(told) = &result.conventions {
-        conventions::add_to_page(&mut page, told);
+        sections::add_conventions(&mut page, told);
     }
     verdict(&mut page, result);
     page.paragraph(&format!("The {}.", result.band_reason));
@@ -78,7 +78,7 @@ pub fn page(result: &Identified) -> Page {
     }
     page.table(&table);
     if let Some(joints) = &result.transmission {
-        transmission::add_to_page(&mut page, joints);
+        sections::add_transmissions(&mut page, joints);
     }
     mountings(&mut page, result, shown);
     of_arm(&mut page, arm);

@@ -23,7 +23,6 @@
 mod axis;
 mod bars;
 pub mod compared;
-pub mod conventions;
 pub mod excited;
 pub mod explained;
 mod figure;
@@ -32,16 +31,14 @@ pub mod identified;
 pub mod inspected;
 mod live;
 mod page;
-mod table;
-pub mod transmission;
+pub mod sections;
 pub mod verified;
 
 pub use crate::explanation::effects::words::number;
 pub use bars::BarPairs;
 pub use figure::{Figure, Ink, JOINTS, Mark, Panel, Series};
 pub use files::Files;
-pub use page::{Page, Tone, sign};
-pub use table::Table;
+pub use page::{Page, Table, Tone, sign};
 
 /// The style of pages and figures.
 const STYLE: &str = include_str!("page.css");

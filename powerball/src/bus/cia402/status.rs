@@ -1,4 +1,4 @@
-//! The statusword 0x6041.
+//! The statusword 0x6041, the controlword 0x6040 that answers it, and the modes of operation.
 
 use core::fmt;
 
@@ -122,6 +122,176 @@ impl fmt::Debug for Statusword {
     }
 }
 
+// The controlword 0x6040.
+
+/// Commands of the state machine, by the bits 7, 3, 2, 1, 0 that they need.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Command {
+    /// To ready to switch on.
+    Shutdown,
+    /// To switched on (also: disable operation).
+    SwitchOn,
+    /// To operation enabled.
+    EnableOperation,
+    /// To switch on disabled, at once: the motor loses its torque, the arm sags until the brake bites.
+    DisableVoltage,
+    /// Brake on the quick-stop ramp.
+    QuickStop,
+    /// Leave fault: acts on a rising edge of bit 7.
+    FaultReset,
+}
+
+/// The controlword.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub struct Controlword(pub u16);
+
+impl Controlword {
+    /// Bit 4: new set-point (profile position), enable interpolation (interpolated position), enable ramp
+    /// (velocity).
+    pub const MODE_4: u16 = 1 << 4;
+    /// Bit 5: change set immediately (profile position), unlock ramp (velocity).
+    pub const MODE_5: u16 = 1 << 5;
+    /// Bit 6: relative (profile position), reference ramp (velocity).
+    pub const MODE_6: u16 = 1 << 6;
+    /// Bit 8: halt. On this arm it also closes the brakes.
+    pub const HALT: u16 = 1 << 8;
+
+    /// The word of a command, with no bit of a mode.
+    pub const fn command(command: Command) -> Controlword {
+        Controlword(match command {
+            Command::Shutdown => 0x06,
+            Command::SwitchOn => 0x07,
+            Command::EnableOperation => 0x0F,
+            Command::DisableVoltage => 0x00,
+            Command::QuickStop => 0x02,
+            Command::FaultReset => 0x80,
+        })
+    }
+
+    /// With `bits` set.
+    #[must_use]
+    pub const fn with(self, bits: u16) -> Controlword {
+        Controlword(self.0 | bits)
+    }
+
+    /// Whether all of `bits` are set.
+    pub const fn has(self, bits: u16) -> bool {
+        self.0 & bits == bits
+    }
+
+    /// The command that a drive reads in these bits, with the word that it had before (for the edge of bit
+    /// 7). While bit 7 stays high without an edge, the other bits decide, as in the standard.
+    pub const fn decode(self, before: Controlword) -> Command {
+        if self.has(0x80) && !before.has(0x80) {
+            return Command::FaultReset;
+        }
+        match self.0 & 0x0F {
+            0x0F => Command::EnableOperation,
+            0x07 => Command::SwitchOn,
+            bits if bits & 0x07 == 0x06 => Command::Shutdown,
+            bits if bits & 0x02 == 0 => Command::DisableVoltage,
+            // Bit 1 set and bit 2 clear: all others are taken.
+            _ => Command::QuickStop,
+        }
+    }
+}
+
+impl fmt::Debug for Controlword {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "0x{:04X}", self.0)
+    }
+}
+
+// Modes of operation: 0x6060, shown in 0x6061, offered in 0x6502.
+
+/// A mode of operation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Mode {
+    /// 0.
+    None,
+    /// 1, profile position.
+    ProfilePosition,
+    /// 2, velocity ("VL", frequency converters').
+    Velocity,
+    /// 3, profile velocity.
+    ProfileVelocity,
+    /// 4, profile torque.
+    ProfileTorque,
+    /// 6, homing.
+    Homing,
+    /// 7, interpolated position.
+    InterpolatedPosition,
+    /// 8, cyclic synchronous position.
+    CyclicPosition,
+    /// 9, cyclic synchronous velocity.
+    CyclicVelocity,
+    /// 10, cyclic synchronous torque.
+    CyclicTorque,
+    /// Any other number: the vendor's, where negative.
+    Other(i8),
+}
+
+impl Mode {
+    /// The mode's number in 0x6060 and 0x6061.
+    pub const fn code(self) -> i8 {
+        match self {
+            Mode::None => 0,
+            Mode::ProfilePosition => 1,
+            Mode::Velocity => 2,
+            Mode::ProfileVelocity => 3,
+            Mode::ProfileTorque => 4,
+            Mode::Homing => 6,
+            Mode::InterpolatedPosition => 7,
+            Mode::CyclicPosition => 8,
+            Mode::CyclicVelocity => 9,
+            Mode::CyclicTorque => 10,
+            Mode::Other(code) => code,
+        }
+    }
+
+    /// The mode of a number.
+    pub const fn from_code(code: i8) -> Mode {
+        match code {
+            0 => Mode::None,
+            1 => Mode::ProfilePosition,
+            2 => Mode::Velocity,
+            3 => Mode::ProfileVelocity,
+            4 => Mode::ProfileTorque,
+            6 => Mode::Homing,
+            7 => Mode::InterpolatedPosition,
+            8 => Mode::CyclicPosition,
+            9 => Mode::CyclicVelocity,
+            10 => Mode::CyclicTorque,
+            other => Mode::Other(other),
+        }
+    }
+
+    /// Whether the supported drive modes 0x6502 contain this mode (bit n − 1 for mode n). A vendor's mode
+    /// (negative) has no bit of the standard: `None`.
+    pub const fn is_in(self, supported: u32) -> Option<bool> {
+        let code = self.code();
+        if code >= 1 && code <= 16 { Some(supported >> (code - 1) & 1 == 1) } else { None }
+    }
+}
+
+impl fmt::Display for Mode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Mode::None => "no mode",
+            Mode::ProfilePosition => "profile position",
+            Mode::Velocity => "velocity",
+            Mode::ProfileVelocity => "profile velocity",
+            Mode::ProfileTorque => "profile torque",
+            Mode::Homing => "homing",
+            Mode::InterpolatedPosition => "interpolated position",
+            Mode::CyclicPosition => "cyclic synchronous position",
+            Mode::CyclicVelocity => "cyclic synchronous velocity",
+            Mode::CyclicTorque => "cyclic synchronous torque",
+            Mode::Other(code) => return write!(f, "mode {code}"),
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -167,5 +337,55 @@ mod tests {
         assert_eq!(Statusword(0x0001).state(), State::Unknown(0x01));
         assert_eq!(Statusword(0xFFFF).state(), State::Unknown(0x6F));
         assert_eq!(Statusword(0x006F).state(), State::Unknown(0x6F));
+    }
+}
+
+#[cfg(test)]
+mod control_tests {
+    use super::*;
+
+    const ALL: [Command; 6] = [
+        Command::Shutdown,
+        Command::SwitchOn,
+        Command::EnableOperation,
+        Command::DisableVoltage,
+        Command::QuickStop,
+        Command::FaultReset,
+    ];
+
+    #[test]
+    fn a_drive_reads_what_the_master_writes_whatever_the_modes_bits() {
+        for command in ALL {
+            for bits in [0, Controlword::MODE_4, Controlword::HALT, 0x0170] {
+                let word = Controlword::command(command).with(bits);
+                assert_eq!(word.decode(Controlword::default()), command, "{word:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn fault_reset_needs_an_edge() {
+        let reset = Controlword::command(Command::FaultReset);
+        assert_eq!(reset.decode(reset), Command::DisableVoltage);
+    }
+}
+
+#[cfg(test)]
+mod mode_tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_modes_are_inverse() {
+        for code in i8::MIN..=i8::MAX {
+            assert_eq!(Mode::from_code(code).code(), code);
+        }
+    }
+
+    /// The DCF's 0x43: profile position, velocity and interpolated position, and nothing else.
+    #[test]
+    fn the_arms_modes() {
+        let offered: Vec<i8> = (1..=16).filter(|&n| Mode::from_code(n).is_in(0x43) == Some(true)).collect();
+        assert_eq!(offered, [1, 2, 7]);
+        assert_eq!(Mode::Other(-1).is_in(0x43), None);
     }
 }

@@ -7,7 +7,7 @@
 //!
 //! | | |
 //! |---|---|
-//! | `study` | the rows and what was told: what does not change while effects are looked for |
+//! | `study` | the rows and the options: what does not change while effects are looked for |
 //! | `model` | what was accepted, and the fit with it: what does |
 //! | `named` | what is said of an effect |
 //! | `search` | candidates screened and tested; settings refined; backward elimination |

@@ -12,7 +12,7 @@ use super::fit::{Fit, friction_columns};
 use super::reduced::{FrictionKind, Solution, solve_reduced};
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, DataError, DataOptions, RigidArm};
-use crate::logs::signal::occupied::between;
+use crate::logs::signal::motion::between;
 use crate::logs::summary::{BANDS, Bands, Powers, Summary, parts};
 
 /// A model fitted in the bands in which the logs speak of it.

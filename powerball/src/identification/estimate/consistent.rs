@@ -18,9 +18,8 @@
 //! are, in torque.
 
 use super::estimates::{ResidualStats, stats_of};
-use super::normal::{NormalEquations, dot};
 use super::reduced::Solution;
-use super::solve::{Solver, bounded};
+use super::solve::{NormalEquations, Solver, bounded, dot};
 use crate::logs::regression::RigidArm;
 use dyngen::arm::{Arm, Convention, Parameter, ParameterKind};
 use dyngen::consistency::pseudo_inertia;

@@ -1,13 +1,15 @@
 //! A fit in the words of a model: values with standard errors that hold for coloured residuals.
 //!
-//! Also here: the base model along logs; torques over time, for people to look at.
+//! Also here: the base model along logs; torques over time, for people to look at; the verdict on each joint.
 
+use super::over_blocks;
 use super::reduced::Solution;
+use super::spectrum::noise_floor;
 use super::uncertainty::StandardErrors;
 use crate::controller::JointNumber;
 use crate::controller::friction::TanhFriction;
 use crate::logs::parallel;
-use crate::logs::regression::{Data, Recording, RigidArm, Signals};
+use crate::logs::regression::{Block, Data, Recording, RigidArm, Signals};
 use dyngen::{SetKind, Values};
 use serde::{Deserialize, Serialize};
 
@@ -378,4 +380,60 @@ pub fn curves(data: &Data<'_>, before: &[Vec<f64>], after: &[Vec<f64>]) -> Vec<T
             TorqueCurve { t, measured: rows.torque.clone(), before, after, breaks }
         })
         .collect()
+}
+
+// A model that is there already, judged on logs that it has not seen.
+
+/// How a joint's prediction does.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct JointVerdict {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// rms of the error, N·m.
+    pub rms: f64,
+    /// 95 % interval of the rms, from blocks that count as independent, N·m.
+    pub interval: [f64; 2],
+    /// rms of the error over rms of the measured torque.
+    pub relative: f64,
+    /// What white measurement noise alone would leave, N·m.
+    pub noise_floor: f64,
+    /// Whether even the upper end of the interval is within the tolerance; `None` where the joint does not
+    /// move in these logs.
+    pub within: Option<bool>,
+}
+
+/// Judges what a model leaves on data: an error up to `tolerance` times the rms torque of a joint passes.
+#[must_use]
+pub fn verdicts(data: &Data<'_>, residual: &[Vec<f64>], tolerance: f64) -> Vec<JointVerdict> {
+    let errors = residual_stats(data, residual);
+    let floor = noise_floor(data);
+    (0..data.dof())
+        .map(|j| {
+            let rms = errors.rms[j];
+            let interval = interval(data, j, &residual[j]);
+            let torque = if errors.relative[j] > 0.0 { rms / errors.relative[j] } else { 0.0 };
+            let moves = !data.joints[j].is_empty();
+            JointVerdict {
+                joint: j + 1,
+                rms,
+                interval,
+                relative: errors.relative[j],
+                noise_floor: floor[j],
+                within: moves.then_some(interval[1] <= tolerance * torque),
+            }
+        })
+        .collect()
+}
+
+/// The interval of the mean square over blocks.
+fn interval(data: &Data<'_>, joint: usize, residual: &[f64]) -> [f64; 2] {
+    let of = |block: &Block| {
+        let rows = block.rows[joint].clone();
+        (residual[rows.clone()].iter().map(|r| r * r).sum(), rows.len() as f64)
+    };
+    let (mean, half) = over_blocks(&data.blocks.iter().map(of).collect::<Vec<_>>());
+    if half.is_infinite() {
+        return [0.0, f64::MAX];
+    }
+    [(mean - half).max(0.0).sqrt(), (mean + half).sqrt()]
 }

@@ -1,8 +1,7 @@
 //! The fit of rows in memory, with the columns of further terms.
 
 use super::design::{Design, Folds, Gram, runs};
-use super::normal::{NormalEquations, dot};
-use super::solve::Solver;
+use super::solve::{NormalEquations, Solver, dot};
 use super::variable_projection;
 use super::variable_projection::{
     FRICTION, Layout, Scatter, SeparableRows, Start, Trials, variable_projection,

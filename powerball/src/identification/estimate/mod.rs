@@ -1,15 +1,12 @@
 //! Weighted least squares in the minimal set, friction shapes included, with honest standard errors.
 
-mod added;
 mod band;
 mod consistent;
 mod design;
 pub mod distribution;
 mod estimates;
 mod fit;
-mod instrumental;
 mod mountings;
-mod normal;
 mod reduced;
 mod robust;
 mod solve;
@@ -17,34 +14,29 @@ mod spectrum;
 mod stream;
 mod uncertainty;
 mod variable_projection;
-mod verdict;
 
-pub use added::Added;
 pub use band::{InBand, bands_of, reduce_in_bands, solve_in_band};
 pub use consistent::{Consistent, ConsistentFit, ConsistentReport, TorqueMetric, consistent_fit, nearest};
-pub use design::{Design, Folds, Gram, runs};
+pub use design::{Added, Design, Folds, Gram, runs};
 #[cfg(feature = "explain")]
 pub(crate) use estimates::in_set_of;
 pub use estimates::{
-    BaseModel, Estimates, JointFriction, ParameterEstimate, ResidualStats, TorqueCurve, curves, estimates,
-    residual_stats, stats_of,
+    BaseModel, Estimates, JointFriction, JointVerdict, ParameterEstimate, ResidualStats, TorqueCurve, curves,
+    estimates, residual_stats, stats_of, verdicts,
 };
 pub use fit::{Fit, Term, fit, friction_columns};
 #[cfg(feature = "explain")]
 pub(crate) use fit::{MEAN_OVER, variance_inflation};
-pub use instrumental::solve_instrumental;
 pub use mountings::Together;
-pub use normal::NormalEquations;
 pub use reduced::{FrictionKind, Solution, solve_reduced};
 pub(crate) use robust::over_blocks;
-pub use robust::{Robust, solve_robust};
-pub use solve::{Solver, bounded};
+pub use robust::{Robust, solve_instrumental, solve_robust};
+pub use solve::{NormalEquations, Solver, bounded};
 pub use spectrum::noise_floor;
 pub(crate) use spectrum::noise_in_band;
 pub use stream::{States, Stream, StreamFit};
 pub use uncertainty::{Path, StandardErrors, Uncertainty, friction_row, standard_errors};
 pub use variable_projection::Layout;
-pub use verdict::{JointVerdict, verdicts};
 
 #[cfg(test)]
 #[cfg(feature = "virtual-arm")]

@@ -1,6 +1,6 @@
 //! The fit of reduced logs.
 
-use super::normal::{NormalEquations, dot};
+use super::solve::{NormalEquations, dot};
 use super::variable_projection::{FRICTION, Layout, Scatter, SeparableRows, Trials, variable_projection};
 use crate::logs::summary::{
     Columns, Identity, NODES, OCTAVES, RFactor, SLOW, Steepness, Summary, SummaryError,

@@ -3,7 +3,7 @@
 //! For states of a simulation, or of logs that were filtered elsewhere. Steepnesses of friction are given;
 //! logs as they were recorded go through [`crate::logs::summary`] instead.
 
-use super::normal::NormalEquations;
+use super::solve::NormalEquations;
 use crate::logs::parallel;
 use crate::logs::regression::RigidArm;
 use crate::logs::summary::RFactor;

@@ -4,8 +4,8 @@
 //! Also here: standard errors under coloured noise.
 
 use super::distribution::{freedom_of, t_quantile_975};
-use super::normal::NormalEquations;
 use super::reduced::Solution;
+use super::solve::NormalEquations;
 use super::spectrum::{Power, deconvolved};
 use super::variable_projection::{FRICTION, tangent};
 use faer::Mat;

@@ -7,8 +7,7 @@
 //! Also here: the steepnesses γ2, γ4 of the tanh model; rows of a regression whose friction steepnesses are free, whatever they are
 //! kept in.
 
-use super::normal::NormalEquations;
-use super::solve::Solver;
+use super::solve::{NormalEquations, Solver};
 pub(super) use crate::logs::regression::FRICTION;
 use crate::logs::regression::{Data, Recording};
 use crate::logs::summary::{NODES, Steepness};

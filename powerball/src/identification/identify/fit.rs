@@ -4,8 +4,8 @@
 
 use super::gather::Gathered;
 use super::judge::by_band;
-use super::options::{Estimator, IdentifyOptions};
 use super::result::IdentifyError;
+use super::{Estimator, IdentifyOptions};
 use crate::controller::JointNumber;
 use crate::controller::friction::TanhFriction;
 use crate::identification::estimate::{
@@ -15,8 +15,8 @@ use crate::identification::estimate::{
 use crate::identification::mounting::Mounting;
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, DataOptions, Recording, RigidArm};
-use crate::logs::signal::occupied::occupied;
-use crate::logs::signal::turns::{Turns, turns};
+use crate::logs::signal::motion::occupied;
+use crate::logs::signal::motion::{Turns, turns};
 use dyngen::exact::rational::to_f64;
 
 /// A fit with its errors.

@@ -3,9 +3,9 @@
 //! Also here: what one set of parameters leaves of the logs of each mounting; whether friction that differs with the
 //! direction is what a poor fit lacks; logs prepared in the band of each joint.
 
+use super::IdentifyOptions;
 use super::fit::{Along, Fitted, fit};
 use super::gather::{Gathered, Mounted};
-use super::options::IdentifyOptions;
 use super::result::{Identified, IdentifyError};
 use crate::controller::JointNumber;
 use crate::identification::conventions::conventions;

@@ -7,14 +7,17 @@
 mod fit;
 mod gather;
 mod judge;
-mod options;
 mod result;
 
 use super::conventions::conventions;
 use super::estimate::{BaseModel, Uncertainty, consistent_fit, estimates, stats_of};
 use super::source::Source;
 use super::transmission::transmission;
+use crate::identification::estimate::FrictionKind;
+use crate::identification::known::KnownModel;
+use crate::logs::Progress;
 use crate::logs::log::notes_of;
+use crate::logs::regression::DataOptions;
 use crate::logs::summary::BANDS;
 use dyngen::{Arm, SetKind};
 pub use fit::{Along, JointAlong, LogFacts};
@@ -24,7 +27,6 @@ use gather::{Gathered, Mounted};
 pub(crate) use gather::{Gathering, InMemory, one_mounting};
 pub use judge::MountedFit;
 pub(crate) use judge::by_band;
-pub use options::{Estimator, IdentifyOptions};
 pub use result::{Identified, IdentifyError};
 
 /// Fits the minimal inertial set and the friction of every joint (Eq. 16) to logs, and judges them on the
@@ -170,4 +172,44 @@ fn conclude(
         uncertainty: Uncertainty::of(body.names(), solution, &fitted.errors),
         described: body.filed(),
     })
+}
+
+// How logs are identified.
+
+/// All settings of [`identify`].
+#[derive(Clone, Debug, Default)]
+pub struct IdentifyOptions<'a> {
+    /// The friction of every joint.
+    pub friction: FrictionKind,
+    /// How samples are counted.
+    pub estimator: Estimator,
+    /// How logs are filtered and cut into blocks. Its band counts where the estimator looks at single
+    /// samples; else every joint has its own.
+    pub data: DataOptions,
+    /// What is known already: taken out of the logs as it stands. Logs of one mounting alone, no summaries.
+    pub known: Option<&'a dyn KnownModel>,
+    /// Who is told what is being done.
+    pub progress: Progress<'a>,
+}
+
+/// How samples are counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Estimator {
+    /// Least squares, every joint weighted by its noise.
+    #[default]
+    Weighted,
+    /// The same, and torque samples that the model cannot believe (knocks, spikes, brief collisions) count
+    /// less or nothing.
+    Robust,
+    /// Instrumental variables: unbiased where positions are noisy. The regressor from every second sample of
+    /// the positions, its instruments from those between.
+    Instrumental,
+}
+
+impl Estimator {
+    /// Whether it looks at single samples, which a summary does not hold.
+    #[must_use]
+    pub fn needs_samples(self) -> bool {
+        self != Estimator::Weighted
+    }
 }

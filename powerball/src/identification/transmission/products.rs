@@ -9,7 +9,7 @@ use crate::identification::estimate::{NormalEquations, noise_in_band};
 use crate::logs::log::Log;
 use crate::logs::regression::{Recording, top_velocity};
 use crate::logs::signal::resample::{linear, median_step};
-use crate::logs::signal::{Band, difference, rest};
+use crate::logs::signal::{Band, difference, motion};
 use dyngen::Arm;
 use faer::Mat;
 
@@ -114,7 +114,7 @@ pub(super) fn evidence(arm: &Arm, grid: &Grid, joint: JointNumber) -> Result<(Ev
     let recordings: Vec<&Recording> = used().map(|piece| &piece.recording).collect();
     let top = top_velocity(recordings.iter().copied(), j);
     let velocities = recordings.iter().flat_map(|r| r.velocity(j).map(f64::abs)).collect();
-    let rest_velocity = rest::rest_velocity(velocities, arm.joints[j].velocity);
+    let rest_velocity = motion::rest_velocity(velocities, arm.joints[j].velocity);
     let scales = Scales::new(top);
     let torques: Vec<&[f64]> = recordings.iter().map(|r| r.torque[j].as_slice()).collect();
     let noise = noise_in_band(&torques, &grid.band, grid.rate).powi(2);
@@ -122,7 +122,8 @@ pub(super) fn evidence(arm: &Arm, grid: &Grid, joint: JointNumber) -> Result<(Ev
     let mut blocks: Vec<Block> = Vec::new();
     for piece in used() {
         let recording = &piece.recording;
-        let moving = rest::moving(&recording.velocity(j).collect::<Vec<_>>(), recording.rate, rest_velocity);
+        let moving =
+            motion::moving(&recording.velocity(j).collect::<Vec<_>>(), recording.rate, rest_velocity);
         let kept = grid.band.kept(recording.len());
         let in_band = |column: Column| match column {
             Column::Motor => grid.band.pass(piece.motor(j)),

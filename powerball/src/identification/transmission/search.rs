@@ -2,9 +2,9 @@
 //!
 //! Also here: what a transmission may hold beside friction and rotor.
 
+use super::Transmission;
 use super::fit::{FittedLaw, noise_share};
 use super::products::{Column, Evidence, Products, Scales};
-use super::result::Transmission;
 use crate::controller::JointNumber;
 use crate::identification::estimate::distribution::t_critical;
 use serde::Serialize;

@@ -6,7 +6,6 @@
 
 mod arrays;
 mod check;
-mod clock;
 mod columns;
 mod file;
 mod inspect;
@@ -18,10 +17,9 @@ mod topics;
 
 pub use crate::logs::tables::{Finding, LogError};
 pub use arrays::{Arrays, Sample};
-pub use clock::common_clock;
 pub use file::LogFile;
 pub use inspect::{Aligned, Inspected, InspectedColumn, InspectedTable, TakenAs, inspect};
-pub use map::{ByJoint, Clock, ColumnMap, Mapped};
+pub use map::{ByJoint, Clock, ColumnMap, Mapped, common_clock};
 pub use motors::{Motors, logs_of_motors, notes_of};
 pub use read::{read_log, read_log_as, read_logs, read_logs_as};
 use signal_checks::{Severity, Warnings};

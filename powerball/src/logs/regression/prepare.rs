@@ -5,7 +5,7 @@ use super::{Block, Column, JointRows, Recording, RigidArm, Signals};
 use crate::logs::log::{Log, logs_of_motors};
 use crate::logs::parallel;
 use crate::logs::signal::resample::median_step;
-use crate::logs::signal::{BANDS, Band, rest};
+use crate::logs::signal::{BANDS, Band, motion};
 use dyngen::arm::{Parameter, ParameterKind};
 use std::fmt;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -169,7 +169,7 @@ impl<'a> Data<'a> {
         let rest_velocity: Vec<f64> = (0..n)
             .map(|j| {
                 let velocities = recordings.iter().flat_map(|r| r.velocity(j).map(f64::abs)).collect();
-                rest::rest_velocity(velocities, body.velocity_limit(j))
+                motion::rest_velocity(velocities, body.velocity_limit(j))
             })
             .collect();
         let top_velocity: Vec<f64> = (0..n).map(|j| top_velocity(&recordings, j)).collect();

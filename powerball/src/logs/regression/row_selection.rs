@@ -6,7 +6,7 @@ use super::rows::{saturated, saturation_notes};
 use super::{JointRows, Recording};
 use crate::controller::JointNumber;
 use crate::logs::log::{Log, logs_of_motors};
-use crate::logs::signal::{Band, rest};
+use crate::logs::signal::{Band, motion};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 
@@ -55,7 +55,7 @@ fn keep_moving(recordings: &[Recording], bands: &[Band], limit: &[f64], n: usize
     let mut all = vec![vec![Vec::with_capacity(recordings.len()); n]; bands.len()];
     for j in 0..n {
         for r in recordings {
-            let moving = rest::moving(&r.velocity(j).collect::<Vec<_>>(), r.rate, limit[j]);
+            let moving = motion::moving(&r.velocity(j).collect::<Vec<_>>(), r.rate, limit[j]);
             for (of_band, band) in all.iter_mut().zip(bands) {
                 // A joint that never moves has the limit 0 and is never below it.
                 let kept = if limit[j] < 1e-5 { Vec::new() } else { band.kept(r.len()) };
@@ -197,7 +197,7 @@ pub(crate) fn rest_note(
             "joint {joint} rests in {:.0} % of the samples ({limit}{} s or longer, or at an end of a log); \
                 they were left out",
             100.0 * rested as f64 / samples as f64,
-            rest::LONGEST_REVERSAL
+            motion::LONGEST_REVERSAL
         )
     })
 }

@@ -3,10 +3,8 @@
 pub mod butterworth;
 pub mod difference;
 pub mod filter;
-pub mod occupied;
+pub mod motion;
 pub mod resample;
-pub mod rest;
-pub mod turns;
 
 pub use butterworth::{Biquad, Butterworth};
 pub use filter::{BANDS, Band};

@@ -4,7 +4,7 @@
 
 use super::super::model::{Accepted, Model};
 use super::super::study::Study;
-use super::history::{History, Question, Step};
+use super::open::{History, Question, Step};
 use crate::controller::JointNumber;
 use crate::explanation::effects::Effect;
 use crate::identification::estimate::{NormalEquations, Solver, noise_floor, residual_stats};

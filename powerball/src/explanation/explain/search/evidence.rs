@@ -2,8 +2,7 @@
 //!
 //! Also here: whether the evidence for a candidate is enough.
 
-use super::folds::fold_gains;
-use super::screen::{Screen, Trial};
+use super::screen::{Screen, Trial, fold_gains};
 use crate::controller::JointNumber;
 use crate::explanation::effects::Candidate;
 use crate::explanation::rule::Rule;

@@ -2,24 +2,20 @@
 //!
 //! A screen refits the base model with each candidate (`screen`); the best ones of each effect are a
 //! candidate group (`groups`); for the group that could reach most the evidence is gathered from independent
-//! blocks, from held-out folds and from the validation set (`evidence`, `folds`), and judged (`evidence`);
-//! time-shift surrogates say how often these very data agree by chance (`surrogates`). What stays in the
-//! model is moved to where everything together fits best (`refinement`), and what later additions made
-//! unneeded goes out again (`elimination`).
+//! blocks, from held-out folds and from the validation set, and judged (`evidence`); time-shift surrogates say how
+//! often these very data agree by chance (`surrogates`). What stays in the model is moved to where everything together
+//! fits best, and what later additions made unneeded goes out again (`elimination`).
 
 mod cross_validation;
 mod elimination;
 mod evidence;
-mod folds;
 mod groups;
-mod refinement;
 mod screen;
 mod surrogates;
 
 pub(super) use cross_validation::CrossValidation;
-pub(super) use elimination::{eliminate, gains, keep_needed};
+pub(super) use elimination::{eliminate, gains, keep_needed, refine};
 pub(super) use evidence::{Extent, Validation, evidence, refusal, validation_gain};
 pub(super) use groups::{CandidateKind, Group, Member, Tester, groups, is_left};
-pub(super) use refinement::refine;
 pub(super) use screen::{Screen, Trial, penalty};
 pub(super) use surrogates::{false_positives, level_by_chance, level_of_search};

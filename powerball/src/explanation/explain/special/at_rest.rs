@@ -9,7 +9,7 @@ use super::super::study::Study;
 use crate::controller::JointNumber;
 use crate::identification::estimate::Solver;
 use crate::logs::regression::{Data, Recording};
-use crate::logs::signal::rest;
+use crate::logs::signal::motion;
 use crate::logs::vector::{NORMAL, median};
 use dyngen::arm::ParameterKind;
 use faer::Mat;
@@ -87,7 +87,7 @@ impl<'r> Stretch<'r> {
         let mut moves = vec![false; recording.len()];
         for j in 0..data.dof() {
             let v: Vec<f64> = recording.velocity(j).collect();
-            let moving = rest::moving(&v, recording.rate, data.rest_velocity[j]);
+            let moving = motion::moving(&v, recording.rate, data.rest_velocity[j]);
             moves.iter_mut().zip(moving).for_each(|(all, moving)| *all |= moving);
         }
         let runs = runs(&moves, |moves| !moves);

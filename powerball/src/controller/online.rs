@@ -1,4 +1,4 @@
-//! A recursive least-squares estimator in square-root form.
+//! Least squares that runs along, for controllers, in square-root form: no allocation, no clock, constant time for each row.
 
 use nalgebra::{RealField, SMatrix, SVector};
 

@@ -1,10 +1,44 @@
-//! The transmissions between two torques, as a table of a page.
+//! Sections that several pages have: what the columns of logs are, and the transmissions between two torques.
 
+use crate::identification::conventions::Conventions;
 use crate::identification::transmission::{JointTransmission, Transmission, TransmissionEffect};
-use crate::report::{Page, Table, number};
+use crate::report::{Page, Table, Tone, number};
+
+/// What is wrong with the columns or the arm file, or that nothing is.
+pub fn columns_verdict(page: &mut Page, conventions: &Conventions) {
+    let tone = if conventions.differ() { Tone::Bad } else { Tone::Plain };
+    page.note(tone, &conventions.verdict());
+}
+
+/// Adds the verdict, and every question.
+pub fn add_conventions(page: &mut Page, conventions: &Conventions) {
+    columns_verdict(page, conventions);
+    let mut table =
+        Table::new(["question", "as said", "held-out error as it is [%]", "as it would be [%]", "evidence"]);
+    for answer in &conventions.answers {
+        let said = match answer.as_said {
+            Some(true) => "yes",
+            Some(false) => "no",
+            None => "not told by these logs",
+        };
+        table.push([
+            answer.question.to_string(),
+            said.to_string(),
+            errors(&answer.as_it_is),
+            errors(&answer.as_it_would_be),
+            answer.sentence.clone(),
+        ]);
+    }
+    page.folded("What the columns of the logs are, question by question", &table);
+}
+
+fn errors(list: &[Option<f64>]) -> String {
+    let one = |x: &Option<f64>| x.map_or("–".to_string(), |x| format!("{x:.1}"));
+    list.iter().map(one).collect::<Vec<_>>().join(", ")
+}
 
 /// Adds what is told of the transmissions.
-pub fn add_to_page(page: &mut Page, joints: &[JointTransmission]) {
+pub fn add_transmissions(page: &mut Page, joints: &[JointTransmission]) {
     page.heading("Between the motors' torques and the links'");
     let mut table = Table::new([
         "joint",

@@ -1,9 +1,10 @@
 //! What is another in one log than in the others: friction, a zero, a gain, a delay.
 //!
-//! Also here: the accepted model fitted to all logs together.
+//! All logs are taken, fitted or for validation, under one model. What all of them share falls out: a model that errs in
+//! all of them alike makes none odd.
 
-use super::super::model::Model;
-use super::super::study::Study;
+use super::model::Model;
+use super::study::Study;
 use crate::controller::JointNumber;
 use crate::explanation::effects::{self, Context, Settings, temperature};
 use crate::identification::estimate::distribution::f_tail;
