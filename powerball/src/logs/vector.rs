@@ -1,7 +1,6 @@
 //! Arithmetic of long vectors.
 
 /// The scalar product.
-#[cfg(feature = "explain")]
 #[must_use]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four sums let the compiler use wide registers.

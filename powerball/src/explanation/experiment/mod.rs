@@ -6,8 +6,8 @@
 mod decide;
 mod design;
 
-use super::options::{ExplainError, ExplainOptions, RuledOut};
 use super::explain::{Experiment, Explained, Hypothesis, Open, Trajectory, explain_body};
+use super::options::{ExplainError, ExplainOptions, RuledOut};
 use crate::identification::motion::Motion;
 use crate::logs::log::Log;
 use crate::logs::regression::RigidArm;
