@@ -34,9 +34,9 @@ fn read(file: &Path) -> Log {
 /// Runs a command and kills it (SIGKILL) as soon as a file has so many bytes.
 fn kill_when(arguments: &[&str], file: &Path, bytes: u64) {
     let mut child = powerball(arguments).spawn().unwrap();
-    let begun = Instant::now();
+    let started = Instant::now();
     while std::fs::metadata(file).map_or(0, |m| m.len()) < bytes {
-        assert!(begun.elapsed() < Duration::from_secs(120) && child.try_wait().unwrap().is_none());
+        assert!(started.elapsed() < Duration::from_secs(120) && child.try_wait().unwrap().is_none());
         std::thread::sleep(Duration::from_millis(2));
     }
     child.kill().unwrap();
@@ -140,9 +140,9 @@ fn a_signal_stops_the_arm_and_closes_the_log() {
         trajectory(Path::new(&motion), 600);
         let lines = PathBuf::from(format!("{log}.csv"));
         let child = powerball(&["record", "--trajectory", &motion, "--out", &log]).spawn().unwrap();
-        let begun = Instant::now();
+        let started = Instant::now();
         while std::fs::metadata(&lines).map_or(0, |m| m.len()) < 20_000 {
-            assert!(begun.elapsed() < Duration::from_secs(120));
+            assert!(started.elapsed() < Duration::from_secs(120));
             std::thread::sleep(Duration::from_millis(2));
         }
         for _ in 0..2 {

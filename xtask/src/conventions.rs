@@ -62,10 +62,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
         let logs: Vec<Log> = logs.iter().map(spoiled).collect();
         let validate: Vec<Log> = validate.iter().map(spoiled).collect();
         let start = std::time::Instant::now();
-        let told = conventions(&body, &logs, &validate);
+        let asked = conventions(&body, &logs, &validate);
         let map =
-            told.suggested_map.as_deref().map_or(String::new(), |m| format!("`{}`", m.replace('\n', "` `")));
-        println!("| {name} | {} | {map} | {:.2} |", words(&told), start.elapsed().as_secs_f64());
+            asked.suggested_map.as_deref().map_or(String::new(), |m| format!("`{}`", m.replace('\n', "` `")));
+        println!("| {name} | {} | {map} | {:.2} |", words(&asked), start.elapsed().as_secs_f64());
     }
     if arguments.plain { Ok(()) } else { of_arm_files(&arm, &logs, &validate) }
 }
@@ -76,11 +76,14 @@ fn of_arm_files(arm: &Arm, logs: &[Log], validate: &[Log]) -> Result<(), String>
     for (name, wrong) in wrong_files(arm) {
         let body = RigidArm::new(&wrong).map_err(|e| e.to_string())?;
         let start = std::time::Instant::now();
-        let told = conventions(&body, logs, validate);
+        let asked = conventions(&body, logs, validate);
         let time = start.elapsed().as_secs_f64();
-        let answer = told.answers.iter().find(|a| a.question == "arm file");
+        let answer = asked.answers.iter().find(|a| a.question == "arm file");
         let or = answer.and_then(|a| a.sentence.split_once("do not tell it from: ")).map_or("", |(_, or)| or);
-        println!("| {name} | {} | {or} | {time:.2} |", told.arm_file.clone().unwrap_or_else(|| words(&told)));
+        println!(
+            "| {name} | {} | {or} | {time:.2} |",
+            asked.arm_file.clone().unwrap_or_else(|| words(&asked))
+        );
     }
     Ok(())
 }
@@ -133,13 +136,13 @@ fn wrong_files(arm: &Arm) -> Vec<(String, Arm)> {
 }
 
 /// What is other than it is said to be; otherwise what is not told.
-fn words(told: &Conventions) -> String {
-    let of = |said: Option<bool>| told.answers.iter().filter(move |a| a.as_said == said);
-    if told.differ() {
+fn words(asked: &Conventions) -> String {
+    let of = |said: Option<bool>| asked.answers.iter().filter(move |a| a.as_said == said);
+    if asked.differ() {
         return of(Some(false)).map(|a| a.sentence.as_str()).collect::<Vec<_>>().join(" ");
     }
-    if told.is_remarkable() {
-        return told.verdict();
+    if asked.is_remarkable() {
+        return asked.verdict();
     }
     let open: Vec<&str> = of(None).map(|a| a.question).collect();
     match open.is_empty() {

@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
             others.merge(other).map_err(|e| e.to_string())?;
         }
         let asked = solve_in_band(&others, FrictionKind::Symmetric).bands;
-        told(&names[k], &others, &asked);
+        print_row(&names[k], &others, &asked);
         let common = (0..BANDS.len()).map(|band| vec![band; arm.dof()]);
         for (bands, [base, rival]) in std::iter::once(asked).chain(common).zip(&mut tables) {
             let (others, held_out) = (others.of_joints(&bands), held_out.of_joints(&bands));
@@ -67,7 +67,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
 }
 
 /// Prints what the bands were chosen by.
-fn told(name: &str, others: &Bands, asked: &[usize]) {
+fn print_row(name: &str, others: &Bands, asked: &[usize]) {
     for octave in 0..BANDS.len() - 1 {
         let ratio = |powers: &Powers| format!("{:5.1}", powers[octave][0] / powers[octave][1]);
         let ratios: Vec<String> = others.spectrum().iter().map(ratio).collect();

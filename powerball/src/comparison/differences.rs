@@ -306,7 +306,8 @@ impl Side {
     /// variance, 1 at least.
     #[must_use]
     pub fn repeated(mut self, [first, second]: [&Side; 2]) -> Side {
-        let factor = Curves::of(first, second).iter().filter_map(Curves::surprise).collect::<Vec<f64>>();
+        let factor =
+            Curves::of(first, second).iter().filter_map(Curves::relative_change).collect::<Vec<f64>>();
         let factor = (factor.iter().sum::<f64>() / factor.len().max(1) as f64).max(1.0);
         if let Some(all) = &mut self.uncertainty {
             all.covariance.iter_mut().flatten().for_each(|c| *c *= factor);
@@ -372,7 +373,7 @@ impl Curves {
 
     /// The mean over velocities of squared differences over their variance: 1 where the curves differ as their errors
     /// say.
-    pub(super) fn surprise(&self) -> Option<f64> {
+    pub(super) fn relative_change(&self) -> Option<f64> {
         let of = |p: &Point| p.difference.value.powi(2) / p.difference.variance;
         let all: Vec<f64> = self.points.iter().map(of).filter(|z| z.is_finite()).collect();
         (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)

@@ -147,8 +147,8 @@ impl Plan {
                 .map(|c| c.iter().sum::<f64>() / length as f64)
                 .collect();
             let mean = means.iter().sum::<f64>() / PARTS as f64;
-            let spread = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (PARTS - 1) as f64;
-            Some(Point { velocity: plateau.velocity, torque: mean, error: (spread / PARTS as f64).sqrt() })
+            let deviation = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (PARTS - 1) as f64;
+            Some(Point { velocity: plateau.velocity, torque: mean, error: (deviation / PARTS as f64).sqrt() })
         };
         let mut points: Vec<Point> = self.plateaus.iter().filter_map(of).collect();
         // Five means know their own spread badly: none is taken for much better than the others.

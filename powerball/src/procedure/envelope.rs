@@ -196,7 +196,7 @@ mod tests {
     fn velocities_of_a_file_are_not_believed() {
         let mut motion = way(&LWA4P, &[0.0, 1.7, 0.0, 0.0, 0.0, 0.0], &[0.0; 6], 0.9, 1.0);
         motion.dq.iter_mut().chain(&mut motion.ddq).for_each(|x| *x = 0.0);
-        let told = envelope(None, 60.0).check(&LWA4P, &motion).unwrap_err().to_string();
-        assert!(told.contains("joint 2 takes"), "{told}");
+        let text = envelope(None, 60.0).check(&LWA4P, &motion).unwrap_err().to_string();
+        assert!(text.contains("joint 2 takes"), "{text}");
     }
 }

@@ -243,8 +243,8 @@ pub fn choose(points: &[Point]) -> Option<(Vec<Rated>, usize)> {
         let n = velocities.len() as f64;
         let differences: Vec<f64> = squares[*k].iter().zip(&squares[best]).map(|(a, b)| a - b).collect();
         let mean = differences.iter().sum::<f64>() / n;
-        let spread = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        mean <= ALIKE * (spread / n).sqrt()
+        let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        mean <= ALIKE * (variance / n).sqrt()
     };
     let chosen = (0..rated.len()).find(alike).unwrap_or(best);
     Some((rated, chosen))

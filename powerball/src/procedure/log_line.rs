@@ -93,7 +93,7 @@ impl Columns {
 
 /// How far a motion has come.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Told {
+pub struct RecordProgress {
     /// Samples that were given, and all there are.
     pub samples: [usize; 2],
     /// Where the joints are, rad.
@@ -106,7 +106,7 @@ pub struct Told {
     pub missing: u64,
 }
 
-impl fmt::Display for Told {
+impl fmt::Display for RecordProgress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [done, all] = self.samples;
         let share = 100 * done / all.max(1);
@@ -114,7 +114,7 @@ impl fmt::Display for Told {
         for (j, q) in self.position.iter().enumerate() {
             write!(f, "{}{q:.3}", if j == 0 { "" } else { ", " })?;
         }
-        let Told { error, late, missing, .. } = self;
+        let RecordProgress { error, late, missing, .. } = self;
         write!(f, ") rad, {:.1} mrad off, {late} cycles late, {missing} without data", 1e3 * error)
     }
 }
@@ -217,8 +217,8 @@ mod behind_tests {
     #[test]
     fn a_full_disk_is_told() {
         let mut log = Behind::new(Full(10));
-        let told = (0..100_000).find_map(|_| log.write_all(b"1234\n").err()).unwrap();
-        assert_eq!(told.kind(), io::ErrorKind::StorageFull);
+        let reported = (0..100_000).find_map(|_| log.write_all(b"1234\n").err()).unwrap();
+        assert_eq!(reported.kind(), io::ErrorKind::StorageFull);
         assert!(log.write_all(b"5").is_err());
     }
 }

@@ -12,6 +12,6 @@ pub mod settling;
 pub mod warm_up;
 
 pub use envelope::{Cleared, Envelope};
-pub use log_line::{Behind, Columns, LogTime, Told};
+pub use log_line::{Behind, Columns, LogTime, RecordProgress};
 pub use record::{Record, RecordError, Recorder, record, way};
 pub use settling::approach;

@@ -5,7 +5,7 @@
 //!
 //! Also here: why an arm is not recorded.
 
-use super::{Cleared, Columns, Envelope, LogTime, Told, approach};
+use super::{Cleared, Columns, Envelope, LogTime, RecordProgress, approach};
 use crate::bus::driver::{ControlMode, Phase, Profile, Rejection};
 use crate::bus::transport::{ArmError, Bus, Master, Moment};
 use crate::identification::motion::Motion;
@@ -46,7 +46,7 @@ pub struct Recorder<B: Bus, const N: usize> {
     envelope: Envelope<N>,
     /// The set-point that is held.
     target: [f64; N],
-    told: Box<dyn FnMut(&Told)>,
+    progress: Box<dyn FnMut(&RecordProgress)>,
 }
 
 /// Cycles between two words on how far a motion has come: half a second.
@@ -62,10 +62,10 @@ impl<B: Bus, const N: usize> fmt::Debug for Recorder<B, N> {
 }
 
 impl<B: Bus, const N: usize> Recorder<B, N> {
-    /// Tells `told` twice a second how far a motion has come.
+    /// Tells `progress` twice a second how far a motion has come.
     #[must_use]
-    pub fn telling(mut self, told: impl FnMut(&Told) + 'static) -> Self {
-        self.told = Box::new(told);
+    pub fn with_progress(mut self, progress: impl FnMut(&RecordProgress) + 'static) -> Self {
+        self.progress = Box::new(progress);
         self
     }
 
@@ -80,7 +80,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         master.driver_mut().start(ControlMode::InterpolatedPosition, false).map_err(ArmError::from)?;
         master.wait_for(Phase::Ready, PATIENCE)?;
         let target = master.driver().positions();
-        Ok(Recorder { master, envelope, target, told: Box::new(|_| ()) })
+        Ok(Recorder { master, envelope, target, progress: Box::new(|_| ()) })
     }
 
     /// Enables the arm and holds it where it is.
@@ -159,8 +159,8 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
                     if let Some(sample) = waiting.take() {
                         each(sample, Some(&self.master))?;
                         if sample % TELL == 0 {
-                            let told = self.how_far(sample, motion.len());
-                            (self.told)(&told);
+                            let progress = self.how_far(sample, motion.len());
+                            (self.progress)(&progress);
                         }
                     }
                 }
@@ -169,11 +169,11 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         }
     }
 
-    fn how_far(&self, sample: usize, all: usize) -> Told {
+    fn how_far(&self, sample: usize, all: usize) -> RecordProgress {
         let driver = self.master.driver();
         let position = driver.positions();
         let errors = position.iter().zip(driver.setpoints()).map(|(q, reference)| (q - reference).abs());
-        Told {
+        RecordProgress {
             samples: [sample, all],
             error: errors.fold(0.0, f64::max),
             position: position.to_vec(),
@@ -307,7 +307,7 @@ fn beginning<const N: usize>(motion: &Motion) -> Option<[f64; N]> {
 }
 
 /// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its velocity, follows the
-/// motion, writes the log, and stops; `told` hears how far it has come. The motion is looked at before anything
+/// motion, writes the log, and stops; `progress` hears how far it has come. The motion is looked at before anything
 /// is sent, the way to where it begins before the arm is enabled.
 ///
 /// # Errors
@@ -316,14 +316,14 @@ pub fn record<B: Bus, const N: usize>(
     master: Master<B, N>,
     motion: &Motion,
     envelope: Envelope<N>,
-    told: impl FnMut(&Told) + 'static,
+    progress: impl FnMut(&RecordProgress) + 'static,
     log: &mut impl Write,
 ) -> Result<Record, RecordError> {
     let cleared = envelope.clear(master.driver().profile(), motion.clone()).map_err(|e| match e {
         RecordError::Barred(why) => RecordError::Barred(format!("on the trajectory {why}")),
         other => other,
     })?;
-    let mut recorder = Recorder::bring_up(master, envelope)?.telling(told);
+    let mut recorder = Recorder::bring_up(master, envelope)?.with_progress(progress);
     if let Some(begin) = beginning(motion) {
         recorder.way_to(&begin, APPROACH, 1.0)?;
     }
@@ -487,8 +487,8 @@ mod tests {
         assert!(refused.to_string().starts_with("on the trajectory"), "{refused}");
         assert!(log.is_empty());
         let (tell, heard) = std::sync::mpsc::channel();
-        let told = move |told: &Told| tell.send(told.to_string()).unwrap();
-        assert_eq!(record(arm(), &motion, open(), told, &mut log).unwrap().samples, motion.len());
+        let progress = move |progress: &RecordProgress| tell.send(progress.to_string()).unwrap();
+        assert_eq!(record(arm(), &motion, open(), progress, &mut log).unwrap().samples, motion.len());
         let heard: Vec<String> = heard.iter().collect();
         assert!(heard.iter().any(|line| line.starts_with(" 49 % of 1201 samples, at (0.")), "{heard:?}");
     }

@@ -153,7 +153,7 @@ impl Seen {
 /// Passes the lines of a log on, the header where the log begins alone, and keeps their numbers.
 struct Lines<'a, W> {
     log: &'a mut W,
-    begun: bool,
+    started: bool,
     rows: Vec<Vec<f64>>,
 }
 
@@ -162,8 +162,8 @@ impl<W: Write> Write for Lines<'_, W> {
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
         match std::str::from_utf8(line).ok().and_then(resume::row) {
             Some(row) => self.rows.push(row),
-            None if self.begun => return Ok(line.len()),
-            None => self.begun = true,
+            None if self.started => return Ok(line.len()),
+            None => self.started = true,
         }
         self.log.write_all(line)?;
         Ok(line.len())
@@ -195,7 +195,7 @@ pub fn warm_up<B: Bus, const N: usize>(
         recorder.go(&begin, 0.25, 1.0)?;
     }
     let mut time = LogTime::from(start);
-    let mut lines = Lines { log, begun: start > 0.0, rows: Vec::new() };
+    let mut lines = Lines { log, started: start > 0.0, rows: Vec::new() };
     loop {
         recorder.record(&motion, &mut time, Columns::Everything, &mut lines)?;
         seen.take(&std::mem::take(&mut lines.rows));

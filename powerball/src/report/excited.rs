@@ -7,19 +7,19 @@ use serde_json::{Value, json};
 
 /// The page.
 #[must_use]
-pub fn page(told: &Excited) -> Page {
-    let mut page = Page::new(format!("Exciting trajectory of {}", told.arm));
-    let (good, usual) = (&told.found.figures, &told.found.usual);
+pub fn page(excited: &Excited) -> Page {
+    let mut page = Page::new(format!("Exciting trajectory of {}", excited.arm));
+    let (good, usual) = (&excited.found.figures, &excited.found.usual);
     page.lead(
         "Finite Fourier series (Eq. 18 to 20) from rest to rest, searched for a well conditioned regressor.",
     );
     page.facts([
-        ("parameters", told.parameters.0.to_string()),
-        ("condition number, raw", number(told.conditions.raw)),
-        ("with normalised columns", number(told.conditions.normalised)),
+        ("parameters", excited.parameters.0.to_string()),
+        ("condition number, raw", number(excited.conditions.raw)),
+        ("with normalised columns", number(excited.conditions.normalised)),
         ("as optimised", format!("{} (a random path: {})", number(good.condition), number(usual.condition))),
     ]);
-    for trajectory in &told.trajectories {
+    for trajectory in &excited.trajectories {
         page.heading(&format!("Base {}", trajectory.mounting));
         page.figure(&motion(trajectory), "Positions, velocities and accelerations of all joints.");
         if let Some(figure) = torques(trajectory) {
@@ -34,7 +34,7 @@ pub fn page(told: &Excited) -> Page {
     }
     page.heading("Assumed");
     let mut table = Table::new(["what the file does not say"]);
-    told.assumed.iter().for_each(|line| table.push([line.clone()]));
+    excited.assumed.iter().for_each(|line| table.push([line.clone()]));
     page.table(&table);
     page
 }
@@ -85,7 +85,7 @@ fn distances(trajectory: &Trajectory) -> Option<Figure> {
 
 /// One JSON object of all that is told; the list `trajectories` where there are several.
 #[must_use]
-pub fn json(told: &Excited) -> Value {
+pub fn json(excited: &Excited) -> Value {
     let figures = |f: &Figures| json!({"condition": f.condition, "least_singular_value": f.least, "mean_singular_value": f.mean});
     let trajectory = |(trajectory, path): (&Trajectory, &Fourier)| {
         let torque = trajectory.tightest.torque.as_ref();
@@ -106,12 +106,13 @@ pub fn json(told: &Excited) -> Value {
             "duration": trajectory.motion.duration(), "fundamental": path.fundamental, "nearest": nearest, "joints": joints})
     };
     let mut object = json!({
-        "parameters": told.parameters.0, "rank": told.parameters.1,
-        "figures": figures(&told.found.figures), "random_start": figures(&told.found.usual),
-        "conditions": {"raw": told.conditions.raw, "normalised": told.conditions.normalised},
-        "assumed": told.assumed,
+        "parameters": excited.parameters.0, "rank": excited.parameters.1,
+        "figures": figures(&excited.found.figures), "random_start": figures(&excited.found.usual),
+        "conditions": {"raw": excited.conditions.raw, "normalised": excited.conditions.normalised},
+        "assumed": excited.assumed,
     });
-    let mut list: Vec<Value> = told.trajectories.iter().zip(&told.found.paths).map(trajectory).collect();
+    let mut list: Vec<Value> =
+        excited.trajectories.iter().zip(&excited.found.paths).map(trajectory).collect();
     if let ([Value::Object(only)], Value::Object(object)) = (list.as_mut_slice(), &mut object) {
         object.append(only);
     } else {

@@ -19,8 +19,8 @@ pub fn files(explained: &Explained) -> Result<Files, String> {
 /// Adds everything that an explanation says to a page: the answer first; then errors, effects with their evidence, torques
 /// over time, what stays, what the columns are, and what was found in the logs.
 pub fn add_to_page(page: &mut Page, explained: &Explained) {
-    if let Some(told) = explained.conventions.as_ref().filter(|c| c.is_remarkable()) {
-        sections::columns_verdict(page, told);
+    if let Some(conventions) = explained.conventions.as_ref().filter(|c| c.is_remarkable()) {
+        sections::columns_verdict(page, conventions);
     }
     answer(page, explained);
     logs(page, explained);
@@ -32,9 +32,9 @@ pub fn add_to_page(page: &mut Page, explained: &Explained) {
     }
     torques(page, explained);
     rest(page, explained);
-    if let Some(told) = &explained.conventions {
+    if let Some(conventions) = &explained.conventions {
         page.heading("What the columns of the logs are");
-        sections::add_conventions(page, told);
+        sections::add_conventions(page, conventions);
     }
     notes(page, explained);
     page.words(&WORDS);

@@ -294,7 +294,7 @@ fn draw_series(out: &mut String, series: &Series, place: impl Fn((f64, f64)) -> 
     let class = series.ink.class();
     let mut d = String::new();
     if series.mark == Mark::Points {
-        for (x, y) in thin(&placed, (1.0, 1.0), MOST_POINTS) {
+        for (x, y) in decimate(&placed, (1.0, 1.0), MOST_POINTS) {
             let _ = write!(d, "M{x:.1} {y:.1}h0");
         }
         // A few are measured values of their own, many are a cloud.
@@ -363,7 +363,7 @@ pub(super) fn envelope(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)>
 }
 
 /// A cloud in which each cell of a grid holds at most one point, and at most `most` points in all.
-pub(super) fn thin(points: &[(f64, f64)], cell: (f64, f64), most: usize) -> Vec<(f64, f64)> {
+pub(super) fn decimate(points: &[(f64, f64)], cell: (f64, f64), most: usize) -> Vec<(f64, f64)> {
     let mut seen = HashSet::new();
     let distinct: Vec<(f64, f64)> = points
         .iter()
@@ -426,7 +426,7 @@ mod decimate_tests {
     #[test]
     fn a_cloud_is_thinned() {
         let points: Vec<(f64, f64)> = (0..50_000).map(|k| ((k % 97) as f64, (k % 89) as f64)).collect();
-        assert!(thin(&points, (1.0, 1.0), 2_000).len() <= 2_000);
-        assert_eq!(thin(&points, (1e3, 1e3), 2_000).len(), 1);
+        assert!(decimate(&points, (1.0, 1.0), 2_000).len() <= 2_000);
+        assert_eq!(decimate(&points, (1e3, 1e3), 2_000).len(), 1);
     }
 }

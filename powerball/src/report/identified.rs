@@ -50,8 +50,8 @@ pub fn page(result: &Identified) -> Page {
             own up to {high} Hz. Standard errors hold for residuals that depend on each other within blocks \
             of two seconds."
     ));
-    if let Some(told) = &result.conventions {
-        sections::add_conventions(&mut page, told);
+    if let Some(conventions) = &result.conventions {
+        sections::add_conventions(&mut page, conventions);
     }
     verdict(&mut page, result);
     page.paragraph(&format!("The {}.", result.band_reason));

@@ -8,8 +8,8 @@ use crate::report::{Figure, Files, JOINTS, Page, Panel, Series, Table, Tone, num
 /// # Errors
 /// A result that is no JSON.
 pub fn files(files: &[Inspected]) -> Result<Files, String> {
-    let told = serde_json::json!({ "files": files });
-    Ok(Files::default().json("log.json", &told)?.with("report.html", page(files).to_html()))
+    let asked = serde_json::json!({ "files": files });
+    Ok(Files::default().json("log.json", &asked)?.with("report.html", page(files).to_html()))
 }
 
 /// The page.

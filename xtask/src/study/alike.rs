@@ -35,31 +35,31 @@ pub(super) struct Settled {
 }
 
 /// Where an explanation leaves names open: designs the experiment, has it recorded, and explains again.
-pub(super) fn settle(
+pub(super) fn refine(
     body: &RigidArm,
     (to_fit, held_out): (&[Log], &[Log]),
     mut explained: Explained,
     record: impl FnOnce(&Motion) -> Log,
 ) -> Result<(Explained, Settled), String> {
     let options = ExplainOptions::default();
-    let mut settled =
+    let mut refined =
         Settled { before: named(&explained), open: Vec::new(), decided: None, expected: 0.0, evidence: 0.0 };
     let Some(motion) = propose(body, &mut explained, &options) else {
-        return Ok((explained, settled));
+        return Ok((explained, refined));
     };
     if let Some(Trajectory::Designed { expected_evidence, .. }) =
         explained.next_experiment.as_ref().map(|next| &next.trajectory)
     {
-        settled.expected = *expected_evidence;
+        refined.expected = *expected_evidence;
     }
-    settled.open = explained.open.iter().flat_map(|o| o.names()).map(ToString::to_string).collect();
+    refined.open = explained.open.iter().flat_map(|o| o.names()).map(ToString::to_string).collect();
     let new = record(&motion);
     let explained = learn(body, (to_fit, held_out), new, &explained, &options).map_err(|e| e.to_string())?;
     if let Some(experiment) = &explained.experiment {
-        settled.evidence = experiment.evidence;
-        settled.decided = experiment.decided.map(ToString::to_string);
+        refined.evidence = experiment.evidence;
+        refined.decided = experiment.decided.map(ToString::to_string);
     }
-    Ok((explained, settled))
+    Ok((explained, refined))
 }
 
 /// The table of what experiments did.
@@ -77,12 +77,12 @@ pub(super) fn table(outcomes: &[&Outcome]) -> String {
         for (truth, other) in [(pair[0], pair[1]), (pair[1], pair[0])] {
             let mut row = [0; 10];
             for outcome in outcomes.iter().filter(|o| o.truth.iter().any(|t| t == truth)) {
-                let Some(settled) = &outcome.settled else { continue };
+                let Some(refined) = &outcome.refined else { continue };
                 row[0] += 1;
-                row[1 + answer(&settled.before, truth)] += 1;
-                if !settled.open.is_empty() {
+                row[1 + answer(&refined.before, truth)] += 1;
+                if !refined.open.is_empty() {
                     row[4] += 1;
-                    if let Some(name) = &settled.decided {
+                    if let Some(name) = &refined.decided {
                         row[if name == truth { 5 } else { 6 }] += 1;
                     }
                 }

@@ -183,7 +183,7 @@ fn outcome(truth: Truth, answer: Answer) -> Outcome {
         over_clean: over,
         contradictions: Vec::new(),
         seconds: f64::NAN,
-        settled: None,
+        refined: None,
     }
 }
 

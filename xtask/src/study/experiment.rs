@@ -152,10 +152,10 @@ impl Bench {
         let start = Instant::now();
         let explained = explain_body(&self.body, to_fit, held_out, &ExplainOptions::default())
             .map_err(|e| e.to_string())?;
-        let (explained, settled) = if case.table == Table::Alike {
+        let (explained, refined) = if case.table == Table::Alike {
             let record = |motion: &Motion| session.new_log(motion, &truths);
-            let (again, settled) = alike::settle(&self.body, (to_fit, held_out), explained, record)?;
-            (again, Some(settled))
+            let (again, refined) = alike::refine(&self.body, (to_fit, held_out), explained, record)?;
+            (again, Some(refined))
         } else {
             (explained, None)
         };
@@ -165,7 +165,7 @@ impl Bench {
         let words = truths.iter().map(Truth::words).collect();
         let outcome =
             Outcome::new(case, words, sizes, &explained, &session.known(&case.kinds), over, seconds);
-        Ok(Some(Outcome { settled, ..outcome }))
+        Ok(Some(Outcome { refined, ..outcome }))
     }
 
     /// What a case's logs are made of; `None` where no truth of its kind can be seen on the arm that was drawn.

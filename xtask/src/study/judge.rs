@@ -68,7 +68,7 @@ pub(super) struct Outcome {
     pub(super) seconds: f64,
     /// What an experiment did, in the table of names that are alike.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) settled: Option<Settled>,
+    pub(super) refined: Option<Settled>,
 }
 
 impl Outcome {
@@ -100,7 +100,7 @@ impl Outcome {
             over_clean,
             contradictions: contradictions(explained),
             seconds,
-            settled: None,
+            refined: None,
         }
     }
 

@@ -28,7 +28,7 @@ pub(super) fn tables(outcomes: &[Outcome]) -> String {
             let _ = writeln!(out, "| {} | {} |", table.words(), counts(&mine));
         }
     }
-    let alike: Vec<&Outcome> = outcomes.iter().filter(|o| o.settled.is_some()).collect();
+    let alike: Vec<&Outcome> = outcomes.iter().filter(|o| o.refined.is_some()).collect();
     if !alike.is_empty() {
         let _ = writeln!(out, "\n### {}\n\n{}", capital(Table::Alike.words()), super::alike::table(&alike));
     }

@@ -111,12 +111,12 @@ enum Phase {
     /// Write asked for; `sent` bytes of the value are out (all of them where expedited).
     Download {
         sent: usize,
-        begun: bool,
+        started: bool,
         toggle: bool,
     },
     Upload {
         size: Option<u32>,
-        begun: bool,
+        started: bool,
         toggle: bool,
     },
 }
@@ -153,7 +153,7 @@ impl Client {
     pub fn read(&mut self, object: Object, now: Micros) -> Frame {
         self.object = object;
         self.value = Value::EMPTY;
-        self.phase = Phase::Upload { size: None, begun: false, toggle: false };
+        self.phase = Phase::Upload { size: None, started: false, toggle: false };
         self.send(Request::Upload { object }, now)
     }
 
@@ -166,7 +166,7 @@ impl Client {
             1..=4 => (Transfer::Expedited(Chunk::first(bytes, 4)), bytes.len()),
             len => (Transfer::Segmented(Some(len as u32)), 0),
         };
-        self.phase = Phase::Download { sent, begun: false, toggle: false };
+        self.phase = Phase::Download { sent, started: false, toggle: false };
         self.send(Request::Download { object, transfer }, now)
     }
 
@@ -199,7 +199,7 @@ impl Client {
             (Response::Abort { object, code }, _) if object == self.object => {
                 self.finish(Err(SdoError::Aborted(code)))
             }
-            (Response::Download { object }, Phase::Download { sent, begun: false, .. })
+            (Response::Download { object }, Phase::Download { sent, started: false, .. })
                 if object == self.object =>
             {
                 if sent == self.value.len && sent > 0 {
@@ -207,7 +207,7 @@ impl Client {
                 }
                 self.next_segment(sent, false, now)
             }
-            (Response::DownloadSegment { toggle }, Phase::Download { sent, begun: true, toggle: ours }) => {
+            (Response::DownloadSegment { toggle }, Phase::Download { sent, started: true, toggle: ours }) => {
                 if toggle != ours {
                     self.violated(AbortCode::TOGGLE)
                 } else if sent == self.value.len {
@@ -216,7 +216,7 @@ impl Client {
                     self.next_segment(sent, !toggle, now)
                 }
             }
-            (Response::Upload { object, transfer }, Phase::Upload { begun: false, .. })
+            (Response::Upload { object, transfer }, Phase::Upload { started: false, .. })
                 if object == self.object =>
             {
                 match transfer {
@@ -232,7 +232,7 @@ impl Client {
             }
             (
                 Response::UploadSegment { toggle, chunk, last },
-                Phase::Upload { size, begun: true, toggle: ours },
+                Phase::Upload { size, started: true, toggle: ours },
             ) => {
                 if toggle != ours {
                     self.violated(AbortCode::TOGGLE)
@@ -259,13 +259,13 @@ impl Client {
     fn next_segment(&mut self, sent: usize, toggle: bool, now: Micros) -> Step {
         let chunk = Chunk::first(self.value.as_slice().get(sent..).unwrap_or(&[]), 7);
         let sent = sent + chunk.as_slice().len();
-        self.phase = Phase::Download { sent, begun: true, toggle };
+        self.phase = Phase::Download { sent, started: true, toggle };
         let last = sent == self.value.len;
         Step { send: Some(self.send(Request::DownloadSegment { toggle, chunk, last }, now)), done: None }
     }
 
     fn ask_segment(&mut self, size: Option<u32>, toggle: bool, now: Micros) -> Step {
-        self.phase = Phase::Upload { size, begun: true, toggle };
+        self.phase = Phase::Upload { size, started: true, toggle };
         Step { send: Some(self.send(Request::UploadSegment { toggle }, now)), done: None }
     }
 

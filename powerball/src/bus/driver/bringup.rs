@@ -213,9 +213,9 @@ impl<const N: usize> Driver<N> {
         }
         // A drive need not tell it; the profile's limit counts then.
         if object == objects::MAX_CURRENT {
-            let told = number.ok().filter(|n| (1..=u32::from(u16::MAX)).contains(n));
+            let stated = number.ok().filter(|n| (1..=u32::from(u16::MAX)).contains(n));
             joint.current_limit =
-                told.map(|n| joint.units.current(n as i32).abs()).filter(|limit| *limit > 0.0);
+                stated.map(|n| joint.units.current(n as i32).abs()).filter(|limit| *limit > 0.0);
             return match number {
                 Ok(_) | Err(SdoError::Aborted(_)) => Ok(()),
                 Err(error) => Err(failed(error)),

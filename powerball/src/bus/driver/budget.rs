@@ -189,8 +189,8 @@ mod tests {
             };
             let (half, full) = (at(500_000), at(1_000_000));
             let found = [half.worst_load(), half.nominal_load(), full.worst_load(), full.nominal_load()];
-            for (found, told) in found.iter().zip(loads) {
-                assert!((100.0 * found - told).abs() < 0.06, "{lengths:?}: {found} {told}");
+            for (found, stated) in found.iter().zip(loads) {
+                assert!((100.0 * found - stated).abs() < 0.06, "{lengths:?}: {found} {stated}");
             }
             assert_eq!(half.duration(cycle.worst), (busy * 1000.0) as u64);
             assert_eq!(half.verdict() == Verdict::TooMuch, busy > 5.0);

@@ -256,9 +256,9 @@ impl<const N: usize> Driver<N> {
             _ => return false,
         };
         // What is stopped already is told once.
-        let told = matches!(self.phase, Phase::Stopping | Phase::Faulted | Phase::Resetting)
+        let known = matches!(self.phase, Phase::Stopping | Phase::Faulted | Phase::Resetting)
             && matches!(self.cause, Some(Cause::OtherMaster(_)));
-        if !told {
+        if !known {
             self.trip(Cause::OtherMaster(foreign), tx);
         }
         true

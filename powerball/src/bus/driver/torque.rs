@@ -213,8 +213,8 @@ mod tests {
         setpoints[0] = value;
         match PENDULUM.check(&profile, mode, joints, &setpoints) {
             Ok(()) => None,
-            Err(Rejection::Torque(j, torque, told)) => {
-                assert_eq!((j.index(), told), (0, limit));
+            Err(Rejection::Torque(j, torque, reported)) => {
+                assert_eq!((j.index(), reported), (0, limit));
                 Some(torque)
             }
             Err(other) => panic!("{other}"),
@@ -224,9 +224,9 @@ mod tests {
     /// Torques by hand: differences of positions, of velocities, and none.
     #[test]
     fn the_torque_is_that_of_the_motion_that_the_set_points_describe() {
-        let near = |told: Option<f64>, expected: f64| {
-            let told = told.unwrap_or_else(|| panic!("{expected} N·m were let through"));
-            assert!((told - expected).abs() < 1e-6, "{told} {expected}");
+        let near = |reported: Option<f64>, expected: f64| {
+            let reported = reported.unwrap_or_else(|| panic!("{expected} N·m were let through"));
+            assert!((reported - expected).abs() < 1e-6, "{reported} {expected}");
         };
         let (q, v, a) = (0.3f64, 0.2, 3.0);
         let (last, before) = (q - v * 0.005, q - 2.0 * v * 0.005 + a * 0.005 * 0.005);

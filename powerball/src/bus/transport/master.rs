@@ -21,7 +21,7 @@ pub struct Master<B: Bus, const N: usize> {
     driver: Driver<N>,
     bus: B,
     cycle: u64,
-    told: bool,
+    reported: bool,
     interrupt: Interrupt,
 }
 
@@ -103,7 +103,7 @@ impl<B: Bus> Transmit for Out<'_, B> {
 impl<B: Bus, const N: usize> Master<B, N> {
     /// A driver and the bus of its arm.
     pub fn new(driver: Driver<N>, bus: B) -> Self {
-        Master { driver, bus, cycle: 0, told: true, interrupt: Interrupt::default() }
+        Master { driver, bus, cycle: 0, reported: true, interrupt: Interrupt::default() }
     }
 
     /// The same, stopped by signals: the stop leaves within 10 ms of one.
@@ -161,11 +161,11 @@ impl<B: Bus, const N: usize> Master<B, N> {
         }
         let cycle = self.driver.counters().cycles;
         if cycle != self.cycle {
-            (self.cycle, self.told) = (cycle, false);
+            (self.cycle, self.reported) = (cycle, false);
             return Ok(Moment::Cycle);
         }
-        if !self.told && self.driver.cycle_complete() {
-            self.told = true;
+        if !self.reported && self.driver.cycle_complete() {
+            self.reported = true;
             return Ok(Moment::Data);
         }
         Ok(if received.is_none() && self.bus.now() >= until { Moment::Over } else { Moment::Other })
@@ -204,13 +204,13 @@ impl<B: Bus, const N: usize> Master<B, N> {
             Some(cause) => {
                 let cause = *cause;
                 let others = self.driver.notes().filter(|note| note.cause != cause);
-                let told = self.driver.details().to_string();
-                let told: Vec<String> = (!told.is_empty())
-                    .then_some(told)
+                let reported = self.driver.details().to_string();
+                let reported: Vec<String> = (!reported.is_empty())
+                    .then_some(reported)
                     .into_iter()
                     .chain(others.map(|note| format!("also {}", note.cause)))
                     .collect();
-                Err(ArmError::Stopped(cause, told.join("; ")))
+                Err(ArmError::Stopped(cause, reported.join("; ")))
             }
             None => Ok(()),
         }
@@ -360,8 +360,8 @@ mod tests {
         }
         assert!(master.bus().now() - asked <= 10_000);
         interrupt.ask();
-        let told = master.wait_for(Phase::Running, 5_000_000).unwrap_err();
-        assert!(matches!(told, ArmError::Stopped(Cause::Interrupted, _)), "{told}");
+        let reported = master.wait_for(Phase::Running, 5_000_000).unwrap_err();
+        assert!(matches!(reported, ArmError::Stopped(Cause::Interrupted, _)), "{reported}");
         assert!(master.driver_mut().enable().is_err());
         drop(master);
         rests(&bus);

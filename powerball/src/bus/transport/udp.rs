@@ -202,8 +202,8 @@ mod tests {
     fn an_interface_is_found_by_its_name() {
         let group: SocketAddr = "239.74.163.9:43197".parse().unwrap();
         let open = |name: &str| UdpMulticast::open_on(group, Some(&Interface::Name(name.to_string())));
-        let told = open("nonet7").unwrap_err().to_string();
-        assert!(told.contains("@nonet7") && told.contains("no such interface"), "{told}");
+        let text = open("nonet7").unwrap_err().to_string();
+        assert!(text.contains("@nonet7") && text.contains("no such interface"), "{text}");
         let names = std::fs::read_dir("/sys/class/net").into_iter().flatten().flatten();
         let met = names.filter_map(|name| name.file_name().into_string().ok()).any(|name| {
             let (Ok(mut a), Ok(mut b)) = (open(&name), open(&name)) else { return false };

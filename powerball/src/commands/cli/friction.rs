@@ -167,8 +167,9 @@ impl Friction {
                 _ => self.place.open()?,
             };
             let refused = |e: RecordError| Failure::Refused(e.to_string());
-            let mut recorder =
-                Recorder::enable(self.place.driver(bus)?, envelope).map_err(refused)?.telling(output::live());
+            let mut recorder = Recorder::enable(self.place.driver(bus)?, envelope)
+                .map_err(refused)?
+                .with_progress(output::live());
             let joints = open.iter().map(|experiment| experiment.plan.joint);
             // The first that fails is the last. No log is waited for before the arm stands.
             let mut done = Ok(());

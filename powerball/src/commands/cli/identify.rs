@@ -142,10 +142,10 @@ fn in_words(identified: &Identified, verbose: bool, out: &Path) -> String {
     if verbose {
         lines.extend(identified.warnings.iter().map(|warning| format!("note: {warning}")));
     }
-    let mut spreads = vec![("fit", &identified.fit)];
-    spreads.extend(identified.mountings.iter().map(|m| (m.mounting.as_str(), &m.fit)));
-    spreads.extend(identified.validate.as_ref().map(|s| ("held out", s)));
-    lines.push(output::table(&spreads));
+    let mut errors = vec![("fit", &identified.fit)];
+    errors.extend(identified.mountings.iter().map(|m| (m.mounting.as_str(), &m.fit)));
+    errors.extend(identified.validate.as_ref().map(|s| ("held out", s)));
+    lines.push(output::table(&errors));
     lines.extend(identified.transmission.iter().flatten().map(|joint| joint.sentence()));
     lines.extend(output::notes(identified.warnings.len()).filter(|_| !verbose));
     lines.push(format!("report: {}", out.join("report.html").display()));

@@ -99,27 +99,27 @@ fn times(phases: &[Phase]) -> String {
 /// A line on standard error, where a person looks at it, that is written over by the next one: how far a motion has
 /// come. A line feed ends it when nothing more is told.
 pub(crate) fn live<T: std::fmt::Display>() -> impl FnMut(&T) {
-    let mut line = Line { shown: std::io::stderr().is_terminal(), begun: false };
-    move |told| line.show(told)
+    let mut line = Line { shown: std::io::stderr().is_terminal(), started: false };
+    move |what| line.show(what)
 }
 
 struct Line {
     shown: bool,
-    begun: bool,
+    started: bool,
 }
 
 impl Line {
-    fn show(&mut self, told: &impl std::fmt::Display) {
+    fn show(&mut self, what: &impl std::fmt::Display) {
         if self.shown {
-            self.begun = true;
-            let _ = write!(std::io::stderr(), "\r\x1b[K  {told}");
+            self.started = true;
+            let _ = write!(std::io::stderr(), "\r\x1b[K  {what}");
         }
     }
 }
 
 impl Drop for Line {
     fn drop(&mut self) {
-        if self.begun {
+        if self.started {
             let _ = writeln!(std::io::stderr());
         }
     }
@@ -239,8 +239,8 @@ pub(crate) fn table(columns: &[(&str, &ResidualStats)]) -> String {
     let joints = columns.iter().map(|(_, s)| s.rms.len()).max().unwrap_or(0);
     for j in 0..joints {
         text.push_str(&format!("\n{:>5}", JointNumber::from_index(j).number()));
-        for (_, spread) in columns {
-            let cell = format!("{:.4} N·m  {:5.1} %", spread.rms[j], 100.0 * spread.relative[j]);
+        for (_, stats) in columns {
+            let cell = format!("{:.4} N·m  {:5.1} %", stats.rms[j], 100.0 * stats.relative[j]);
             text.push_str(&format!("  {cell:>26}"));
         }
     }

@@ -211,7 +211,7 @@ pub struct Term<T> {
 /// What a law remembers from sample to sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Memory<T> {
-    begun: bool,
+    started: bool,
     /// The last position, the farthest one in the present direction, or the link's in its play.
     place: T,
     /// Presliding state, the direction of the last reversal's end, or the link's velocity in its play.
@@ -222,7 +222,7 @@ pub struct Memory<T> {
 
 impl<T: RealField + Copy> Default for Memory<T> {
     fn default() -> Self {
-        Memory { begun: false, place: T::zero(), wound: T::zero(), turned: None }
+        Memory { started: false, place: T::zero(), wound: T::zero(), turned: None }
     }
 }
 
@@ -258,7 +258,7 @@ impl<T: RealField + Copy> Law<T> {
 
     /// Whether its torque is the same on whichever joint it acts: it depends on joints that it names itself.
     #[must_use]
-    pub fn is_alike_on_all(&self) -> bool {
+    pub fn is_equal_on_all(&self) -> bool {
         matches!(
             self,
             Law::Constant
@@ -354,8 +354,8 @@ impl<T: RealField + Copy> Law<T> {
 impl<T: RealField + Copy> Memory<T> {
     /// Dahl's state at the next position, exact for a step of any size.
     fn wind(&mut self, q: T, distance: T) -> T {
-        let step = if self.begun { q - self.place } else { T::zero() };
-        (self.begun, self.place) = (true, q);
+        let step = if self.started { q - self.place } else { T::zero() };
+        (self.started, self.place) = (true, q);
         if step != T::zero() {
             let side = step.signum();
             self.wound = side + (self.wound - side) * (-step.abs() / distance).exp();
@@ -367,9 +367,9 @@ impl<T: RealField + Copy> Memory<T> {
     /// in flight, so J·ẍ = −load; a flank stops it within a sample.
     fn fly(&mut self, load: T, reach: T, time: T) -> T {
         let flank = reach * number(0.5);
-        if !self.begun {
+        if !self.started {
             // The motor pushes: the link is behind it.
-            (self.begun, self.place) = (true, -load.signum() * flank);
+            (self.started, self.place) = (true, -load.signum() * flank);
         }
         let step = self.turned.replace(time).map_or_else(T::zero, |before| time - before);
         if step <= T::zero() {
@@ -386,8 +386,8 @@ impl<T: RealField + Copy> Memory<T> {
 
     /// Whether the motor has moved less than the gap since its motion last reversed.
     fn crosses(&mut self, q: T, gap: T) -> bool {
-        if !self.begun {
-            (self.begun, self.place) = (true, q);
+        if !self.started {
+            (self.started, self.place) = (true, q);
         }
         let step = q - self.place;
         let along = step * self.wound;

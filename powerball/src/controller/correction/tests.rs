@@ -151,6 +151,6 @@ fn laws_that_are_alike_on_all_joints_have_one_value() {
         Law::Load { steepness },
     ] {
         let [a, b] = [0, 1].map(|j| law.value(j, &now, &mut Memory::default()));
-        assert_eq!(law.is_alike_on_all(), a == b, "{law:?}");
+        assert_eq!(law.is_equal_on_all(), a == b, "{law:?}");
     }
 }

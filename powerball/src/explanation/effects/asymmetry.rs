@@ -56,8 +56,8 @@ impl Figures {
 impl Effect for Asymmetry {
     /// Every torque sensor has a zero.
     fn baseline(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let both_ways = context.moving_joints().filter(|j| turns_both_ways(context, *j));
-        both_ways.map(|j| Candidate::on(j, Settings::Constant, 1)).collect()
+        let two_way = context.moving_joints().filter(|j| turns_both_ways(context, *j));
+        two_way.map(|j| Candidate::on(j, Settings::Constant, 1)).collect()
     }
 
     /// A constant torque and one in proportion to |q̇| may both be there.
@@ -86,8 +86,8 @@ impl Effect for Asymmetry {
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
         const ALL: [Settings; 3] = [Settings::Constant, Settings::Viscous, Settings::Both];
-        let both_ways = context.moving_joints().filter(|j| turns_both_ways(context, *j));
-        both_ways.flat_map(|j| ALL.map(|which| Candidate::on(j, which, ALL.len()))).collect()
+        let two_way = context.moving_joints().filter(|j| turns_both_ways(context, *j));
+        two_way.flat_map(|j| ALL.map(|which| Candidate::on(j, which, ALL.len()))).collect()
     }
 
     fn laws(&self, _: &Context<'_>, candidate: &Candidate) -> Vec<Law<f64>> {

@@ -155,7 +155,7 @@ impl<'a> Context<'a> {
                     (0..self.data.recordings.len()).map(of).collect()
                 };
                 // What is the same on every joint passes a band once.
-                let values = || match law.is_alike_on_all() {
+                let values = || match law.is_equal_on_all() {
                     true => rows.passed_rows(&made.passed.get((rows.band.cutoff, law), pass)),
                     false => make(),
                 };

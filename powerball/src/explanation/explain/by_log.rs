@@ -43,7 +43,7 @@ struct Tried {
 const MOST_A_LOG: usize = 3;
 /// With so many other logs, a coefficient must be this many times as far from theirs as they are spread.
 const OTHERS: usize = 3;
-const SPREADS: f64 = 3.0;
+const FAR: f64 = 3.0;
 
 /// The changes, surest first, and what stays with them, by side, joint and row.
 pub(crate) fn changes(
@@ -171,8 +171,8 @@ fn by_chance(together: &Together<'_>, asked: &Asked) -> f64 {
 fn stands_out(theta: f64, others: &[f64]) -> bool {
     let count = others.len() as f64;
     let mean = others.iter().sum::<f64>() / count.max(1.0);
-    let spread = (others.iter().map(|o| (o - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0)).sqrt();
-    others.len() < OTHERS || (theta - mean).abs() > SPREADS * spread
+    let std = (others.iter().map(|o| (o - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0)).sqrt();
+    others.len() < OTHERS || (theta - mean).abs() > FAR * std
 }
 
 // The accepted model fitted to all logs together.

@@ -60,7 +60,7 @@ pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize, among: Ca
         validation: &validation,
         on_validation: &on_validation,
         model,
-        swapped: OnceLock::new(),
+        cross_validation: OnceLock::new(),
     };
     let best = most_promising(&mut groups, &tester);
     let refused = refused(&groups);
@@ -248,11 +248,11 @@ pub(super) fn judge_baseline(study: &Study<'_>, model: &mut Model) -> Vec<Step> 
     effects
         .into_iter()
         .zip(numbers)
-        .map(|(effect, number)| name_beside(study, model, effect, number))
+        .map(|(effect, number)| name_baseline(study, model, effect, number))
         .collect()
 }
 
-fn name_beside(study: &Study<'_>, model: &mut Model, effect: &'static dyn Effect, number: usize) -> Step {
+fn name_baseline(study: &Study<'_>, model: &mut Model, effect: &'static dyn Effect, number: usize) -> Step {
     let own = |a: &Accepted| a.is_baseline() && a.effect() == effect;
     let which: Vec<usize> = (0..model.accepted.len()).filter(|k| own(&model.accepted[*k])).collect();
     let after = residual_stats(&study.validation, &model.residual_on_validation(study)).rms;

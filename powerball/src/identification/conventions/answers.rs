@@ -276,7 +276,7 @@ fn common_sign(found: &Found<'_>, facts: &Facts<'_>) -> Answer {
                     can be negative."
             ),
         ),
-        Common::NotTold => plain(
+        Common::Unknown => plain(
             "torque sign",
             None,
             format!(
@@ -324,7 +324,7 @@ fn size(facts: &Facts<'_>) -> Answer {
                     like this."
             ),
         ),
-        (_, Scale::NotTold) => plain(
+        (_, Scale::Unknown) => plain(
             "torque unit",
             None,
             format!("The unit of the torques is not told by these logs: {figure}."),

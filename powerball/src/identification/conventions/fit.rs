@@ -180,7 +180,7 @@ pub(super) fn factors_of_body(rows: &Rows<'_>, read: &Torques, part: usize, ridg
 }
 
 /// The fit of one joint by itself, over both parts: its own inertial parameters, nothing shared.
-pub(super) fn apart(rows: &Rows<'_>, read: &Torques, joint: usize, part: usize) -> PartFit {
+pub(super) fn of_joint_alone(rows: &Rows<'_>, read: &Torques, joint: usize, part: usize) -> PartFit {
     let sums = sums(rows, read, joint, part);
     let solve = |weight: f64| {
         let mut normal = NormalEquations::zero(rows.size());

@@ -86,9 +86,9 @@ fn result(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventio
     let scale = size.scale(gravity);
     let length = properties::reach(asked.body.arm());
     // Nothing is too light or too heavy for an arm of another size.
-    let unit = if length > arm_file::LONGEST_ARM { Unit::NotTold } else { properties::unit(found, scale) };
+    let unit = if length > arm_file::LONGEST_ARM { Unit::Unknown } else { properties::unit(found, scale) };
     let share = properties::least_share(&found.rows, &read.torques, &found.judged, &found.energies);
-    let share = share.filter(|_| good && sign != Common::NotTold);
+    let share = share.filter(|_| good && sign != Common::Unknown);
     let facts = Facts {
         sign,
         unit: &unit,
@@ -134,10 +134,10 @@ fn torque_columns(found: &Found<'_>, facts: &Facts<'_>) -> TorqueColumns {
         Unit::Ampere(Some(_)) => Some("A"),
         Unit::Ampere(None) => Some("A, counts or % of rated"),
         Unit::GearOrAmpere => Some("N·m before the gear, or A"),
-        Unit::NotTold => None,
+        Unit::Unknown => None,
     };
     TorqueColumns {
-        sign: (facts.sign != Common::NotTold).then_some(sign),
+        sign: (facts.sign != Common::Unknown).then_some(sign),
         unit: unit.map(str::to_string),
         side: facts.side,
         gravity: facts.gravity,

@@ -3,7 +3,7 @@
 
 use super::arm_file::FACTOR;
 use super::asked::{Torques, median};
-use super::fit::{Judged, LONGEST, Rows, apart, judge};
+use super::fit::{Judged, LONGEST, Rows, judge, of_joint_alone};
 use super::physics::Energies;
 use super::result::{GravityIs, Kind, Side};
 use super::search::Found;
@@ -37,7 +37,7 @@ pub(super) enum Scale {
     Plausible,
     TooLarge,
     TooSmall,
-    NotTold,
+    Unknown,
 }
 
 /// The unit that torques seem to be in.
@@ -53,7 +53,7 @@ pub(super) enum Unit {
     GearOrAmpere,
     /// Some columns are in another unit than most.
     OfItsOwn(Vec<f64>),
-    NotTold,
+    Unknown,
 }
 
 /// Weight and inertia over reach, kg/m³, and the largest share of a joint's torque limit.
@@ -93,7 +93,7 @@ impl Size {
 
     /// What the size of the torques says, with what is known of gravity in them.
     pub(super) fn scale(&self, gravity: Option<GravityIs>) -> Scale {
-        let (Some(inertia), weight) = (self.inertia, self.weight) else { return Scale::NotTold };
+        let (Some(inertia), weight) = (self.inertia, self.weight) else { return Scale::Unknown };
         let heavy = match weight.filter(|_| !self.is_weightless()) {
             Some(weight) => (weight * inertia).sqrt() > HEAVIEST,
             None => inertia > HEAVIEST_INERTIA,
@@ -138,14 +138,14 @@ pub(super) fn unit(found: &Found<'_>, scale: Scale) -> Unit {
     let constants = filed(&|j| arm.joints[j].torque_constant.map(f64::abs));
     let agree = |numbers: &Option<Vec<f64>>| {
         numbers.as_ref().is_some_and(|numbers| {
-            let apart: Vec<f64> = numbers.iter().zip(&gains).map(|(n, g)| (n / g).ln()).collect();
-            let common = median(apart.clone());
-            apart.iter().all(|x| (x - common).abs() < AGREE.ln())
+            let ratios_in_log: Vec<f64> = numbers.iter().zip(&gains).map(|(n, g)| (n / g).ln()).collect();
+            let common = median(ratios_in_log.clone());
+            ratios_in_log.iter().all(|x| (x - common).abs() < AGREE.ln())
         })
     };
     if found.read.torques.is_scaled() {
         if agree(&ratios) {
-            return ratios.map_or(Unit::NotTold, Unit::BeforeGear);
+            return ratios.map_or(Unit::Unknown, Unit::BeforeGear);
         }
         if agree(&constants) {
             return Unit::Ampere(constants);
@@ -159,7 +159,7 @@ pub(super) fn unit(found: &Found<'_>, scale: Scale) -> Unit {
     }
     match scale {
         Scale::Plausible => Unit::NewtonMetre,
-        Scale::NotTold => Unit::NotTold,
+        Scale::Unknown => Unit::Unknown,
         Scale::TooLarge => Unit::Milli,
         Scale::TooSmall => Unit::GearOrAmpere,
     }
@@ -177,8 +177,8 @@ const AGAINST: f64 = 3.0;
 pub(super) fn driven_by_friction(rows: &Rows<'_>, read: &Torques, energies: &[Energies; 2]) -> Vec<usize> {
     let moving: Vec<usize> = (0..rows.dof()).filter(|j| rows.moves(*j)).collect();
     let sign_of = |joint: usize| {
-        let clear =
-            [0, 1].map(|part| energies[part].friction(&apart(rows, read, joint, part), joint).clear());
+        let clear = [0, 1]
+            .map(|part| energies[part].friction(&of_joint_alone(rows, read, joint, part), joint).clear());
         match clear {
             [a, b] if a < -SURE && b < -SURE => -1,
             [a, b] if a > SURE && b > SURE => 1,
@@ -197,7 +197,7 @@ pub(super) fn driven_by_friction(rows: &Rows<'_>, read: &Torques, energies: &[En
 pub(super) enum Common {
     AsSaid,
     Reversed,
-    NotTold,
+    Unknown,
 }
 
 /// The common sign of all torques: 1 or −1 where friction or the energy of motion tells it in both parts.
@@ -213,7 +213,7 @@ pub(super) fn common(judged: &Judged, energies: &[Energies; 2]) -> Common {
     match (says(1.0), says(-1.0)) {
         (true, false) => Common::AsSaid,
         (false, true) => Common::Reversed,
-        _ => Common::NotTold,
+        _ => Common::Unknown,
     }
 }
 

@@ -155,7 +155,7 @@ impl Conventions {
     }
 
     /// The joints of which more than half of the torque is left with all that was found set right, with that share.
-    fn much_left(&self) -> Option<String> {
+    fn joints_with_much_left(&self) -> Option<String> {
         let much = |(j, left): (usize, &f64)| {
             (*left > MUCH).then(|| format!("{:.0} % of joint {}", 100.0 * left, JointNumber::from_index(j)))
         };
@@ -168,7 +168,7 @@ impl Conventions {
     pub fn verdict(&self) -> String {
         let wrong: Vec<&str> =
             (self.answers.iter()).filter(|a| a.as_said == Some(false)).map(|a| a.sentence.as_str()).collect();
-        let left = self.much_left();
+        let left = self.joints_with_much_left();
         if !wrong.is_empty() {
             let suggested_map = self.suggested_map.as_ref().map_or(String::new(), |suggested_map| {
                 format!(" A column map (--map) that sets this right:\n{suggested_map}")
@@ -222,7 +222,7 @@ fn short(x: f64) -> f64 {
 pub(super) fn suggested_map(read: &Reading, sign: Common, unit: &Unit) -> Option<String> {
     let n = read.torques.column.len();
     let scales: Vec<f64> = match unit {
-        Unit::NewtonMetre | Unit::Milli | Unit::NotTold => vec![1.0; n],
+        Unit::NewtonMetre | Unit::Milli | Unit::Unknown => vec![1.0; n],
         Unit::BeforeGear(factors) | Unit::Ampere(Some(factors)) | Unit::OfItsOwn(factors) => factors.clone(),
         Unit::Ampere(None) | Unit::GearOrAmpere => return None,
     };

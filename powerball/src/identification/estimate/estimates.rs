@@ -121,17 +121,17 @@ impl ResidualStats {
         let dof = parts.first()?.0.rms.len();
         // Sums of squares of the errors and of the torques, and rows.
         let sums = |j: usize| {
-            parts.iter().fold([0.0; 3], |[left, torque, rows], (spread, count)| {
-                let (n, error) = (count[j] as f64, spread.rms[j]);
-                let measured = if spread.relative[j] > 0.0 { error / spread.relative[j] } else { 0.0 };
+            parts.iter().fold([0.0; 3], |[left, torque, rows], (stats, count)| {
+                let (n, error) = (count[j] as f64, stats.rms[j]);
+                let measured = if stats.relative[j] > 0.0 { error / stats.relative[j] } else { 0.0 };
                 [left + n * error * error, torque + n * measured * measured, rows + n]
             })
         };
         // As many of the deviations.
         let deviation = |j: usize| {
-            let (left, variance) = parts.iter().fold((0.0, 0.0), |(left, variance), (spread, count)| {
-                let (n, error) = (count[j] as f64, spread.rms[j]);
-                let ratio = spread.of_deviation.get(j).copied().unwrap_or(0.0);
+            let (left, variance) = parts.iter().fold((0.0, 0.0), |(left, variance), (stats, count)| {
+                let (n, error) = (count[j] as f64, stats.rms[j]);
+                let ratio = stats.of_deviation.get(j).copied().unwrap_or(0.0);
                 (
                     left + n * error * error,
                     variance + if ratio > 0.0 { n * (error / ratio).powi(2) } else { 0.0 },

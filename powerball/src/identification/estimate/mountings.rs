@@ -52,11 +52,7 @@ impl Together {
     ///
     /// # Errors
     /// As [`Solution::on`].
-    pub fn spreads(
-        &self,
-        solution: &Solution,
-        in_band: &[usize],
-    ) -> Result<Vec<ResidualStats>, SummaryError> {
+    pub fn errors(&self, solution: &Solution, in_band: &[usize]) -> Result<Vec<ResidualStats>, SummaryError> {
         let of = |bands: &Bands| {
             let on = solution.on(&bands.of_joints(in_band))?;
             Ok(stats_of(&on, &on.theta))
@@ -70,7 +66,7 @@ impl Together {
     #[must_use]
     pub fn contradictions(
         &self,
-        spreads: &[ResidualStats],
+        errors: &[ResidualStats],
         in_band: &[usize],
         law: FrictionKind,
     ) -> Vec<Vec<usize>> {
@@ -79,6 +75,6 @@ impl Together {
             let alone = stats_of(&alone, &alone.theta);
             (1..=alone.rms.len()).filter(|j| together.rms[j - 1] > CONTRADICTS * alone.rms[j - 1]).collect()
         };
-        self.each.iter().zip(spreads).map(of).collect()
+        self.each.iter().zip(errors).map(of).collect()
     }
 }

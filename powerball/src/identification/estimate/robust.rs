@@ -269,14 +269,14 @@ pub fn solve_instrumental(
             .collect();
         let sharp = deconvolved(&known.iter().map(|(_, power)| *power).collect::<Vec<_>>());
         for ((level, Power { freedom, .. }), power) in known.into_iter().zip(sharp) {
-            let spread = &inverse * level.instrument_products(&place, size) * inverse.transpose();
+            let inverse_square = &inverse * level.instrument_products(&place, size) * inverse.transpose();
             for (i, (variance, doubt)) in sums.iter_mut().enumerate() {
-                let share = weight * weight * power * spread[(i, i)].max(0.0);
+                let share = weight * weight * power * inverse_square[(i, i)].max(0.0);
                 *variance += share;
                 *doubt += share * share / freedom;
             }
             for (i, k) in (0..size).flat_map(|i| (0..size).map(move |k| (i, k))) {
-                covariance[(free[i], free[k])] += weight * weight * power * spread[(i, k)];
+                covariance[(free[i], free[k])] += weight * weight * power * inverse_square[(i, k)];
             }
         }
     }

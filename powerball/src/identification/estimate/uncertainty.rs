@@ -155,7 +155,7 @@ struct Group {
     /// H⁻¹·D.
     turned: Mat<f64>,
     /// The diagonal of H⁻¹·D·H⁻¹.
-    spread: Vec<f64>,
+    inverse_square: Vec<f64>,
 }
 
 /// The errors of a solution.
@@ -177,12 +177,12 @@ pub fn standard_errors(solution: &Solution) -> StandardErrors {
             let mut products = NormalEquations::zero(size);
             part.add_to(&mut products, 1.0);
             let turned = &inverse * &products.gram;
-            let spread = (0..size)
+            let inverse_square = (0..size)
                 .map(|i| (0..size).map(|k| turned[(i, k)] * inverse[(k, i)]).sum::<f64>().max(0.0))
                 .collect();
             let left = part.left(&solution.theta);
             let rows = part.rows as f64;
-            groups.push(Group { joint, octave, weight: *weight, rows, left, turned, spread });
+            groups.push(Group { joint, octave, weight: *weight, rows, left, turned, inverse_square });
         }
     }
     let powers = without_leaks(&groups, &powers(&groups));
@@ -190,7 +190,7 @@ pub fn standard_errors(solution: &Solution) -> StandardErrors {
     for &c in solver.kept() {
         let (mut variance, mut doubt) = (0.0, 0.0);
         for (group, (power, freedom)) in groups.iter().zip(&powers) {
-            let share = group.weight * group.weight * power * group.spread[c];
+            let share = group.weight * group.weight * power * group.inverse_square[c];
             variance += share;
             doubt += share * share / freedom;
         }

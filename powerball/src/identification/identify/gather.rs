@@ -435,7 +435,7 @@ impl Recorded {
     /// # Errors
     /// Every log that cannot be read or is a summary, and a file that is to be fitted and to judge.
     pub fn read(arm: &Arm, logs: &[Source<'_>], validate: &[Source<'_>]) -> Result<Recorded, IdentifyError> {
-        apart(logs, validate)?;
+        no_log_in_both(logs, validate)?;
         let (mut all, mut warnings, mut unusable) = (Vec::new(), Vec::new(), Vec::new());
         for source in logs.iter().chain(validate) {
             match samples(source, arm, &mut warnings) {
@@ -456,7 +456,7 @@ impl Recorded {
 ///
 /// # Errors
 /// [`IdentifyError::Setting`] and [`IdentifyError::JudgesItself`].
-pub(super) fn apart(logs: &[Source<'_>], validate: &[Source<'_>]) -> Result<(), IdentifyError> {
+pub(super) fn no_log_in_both(logs: &[Source<'_>], validate: &[Source<'_>]) -> Result<(), IdentifyError> {
     if logs.is_empty() {
         return Err(IdentifyError::Setting("there is no log to fit: give at least one".to_string()));
     }

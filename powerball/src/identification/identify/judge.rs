@@ -95,13 +95,13 @@ pub(super) fn fits(
     warnings: &mut Vec<String>,
 ) -> Result<Vec<MountedFit>, IdentifyError> {
     let all = stats_of(&fitted.solution, &fitted.solution.theta);
-    let spreads = match (&gathered.together, gathered.mounted.as_slice()) {
+    let errors = match (&gathered.together, gathered.mounted.as_slice()) {
         (None, [only]) if only.mounting == Mounting::Filed => Vec::new(),
         (None, _) => vec![all.clone()],
-        (Some(_), _) => spreads(gathered, fitted, options, warnings)?,
+        (Some(_), _) => errors(gathered, fitted, options, warnings)?,
     };
     // The columns of the first mounting's logs are asked in any case (see `Gathered::conventions`).
-    for (mounted, errors) in gathered.mounted.iter().zip(&spreads).skip(1) {
+    for (mounted, errors) in gathered.mounted.iter().zip(&errors).skip(1) {
         if errors.relative.iter().any(|share| *share > SUSPECT) {
             warnings.extend(wrong_columns(mounted));
         }
@@ -112,7 +112,7 @@ pub(super) fn fits(
         logs: mounted.bands.widest().logs.iter().map(|(name, _)| name.clone()).collect(),
         fit,
     };
-    Ok(spreads.into_iter().zip(&gathered.mounted).map(of).collect())
+    Ok(errors.into_iter().zip(&gathered.mounted).map(of).collect())
 }
 
 /// A joint of which more than this share of its torque is left is suspected.
@@ -128,17 +128,17 @@ fn wrong_columns(mounted: &Mounted) -> Option<String> {
 }
 
 /// Several mountings: what the common parameters leave of each, and which logs contradict the others.
-fn spreads(
+fn errors(
     gathered: &Gathered,
     fitted: &Fitted,
     options: &IdentifyOptions<'_>,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<ResidualStats>, IdentifyError> {
     let Some(together) = &gathered.together else { return Ok(Vec::new()) };
-    let spreads = together
-        .spreads(&fitted.solution, &fitted.bands)
+    let errors = together
+        .errors(&fitted.solution, &fitted.bands)
         .map_err(|e| IdentifyError::Together(e.to_string()))?;
-    let contradictions = together.contradictions(&spreads, &fitted.bands, options.friction);
+    let contradictions = together.contradictions(&errors, &fitted.bands, options.friction);
     for (joints, mounted) in contradictions.iter().zip(&gathered.mounted).filter(|(j, _)| !j.is_empty()) {
         let joints: Vec<String> = joints.iter().map(ToString::to_string).collect();
         warnings.push(format!(
@@ -149,7 +149,7 @@ fn spreads(
             joints.join(", ")
         ));
     }
-    Ok(spreads)
+    Ok(errors)
 }
 
 // Whether friction that differs with the direction is what a poor fit lacks.

@@ -83,7 +83,7 @@ fn gather_logs(
     validate: &[Source<'_>],
     options: &IdentifyOptions<'_>,
 ) -> Result<Gathered, IdentifyError> {
-    gather::apart(logs, validate)?;
+    gather::no_log_in_both(logs, validate)?;
     let needs_samples = options.estimator.needs_samples();
     let mut gathered = match options.known {
         Some(known) => {

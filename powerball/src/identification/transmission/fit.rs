@@ -110,11 +110,11 @@ impl FittedLaw {
             }
         }
         let count = used.len() as f64;
-        let spread = |(c, sum): (usize, f64)| match solver.kept().contains(&c) {
+        let std = |(c, sum): (usize, f64)| match solver.kept().contains(&c) {
             true => (sum * count / (count - 1.0)).sqrt(),
             false => f64::INFINITY,
         };
-        variance.into_iter().enumerate().map(spread).collect()
+        variance.into_iter().enumerate().map(std).collect()
     }
 }
 

@@ -19,7 +19,7 @@ pub struct LogFile {
     path: PathBuf,
     lines: PathBuf,
     file: File,
-    begun: bool,
+    started: bool,
 }
 
 impl LogFile {
@@ -44,7 +44,7 @@ impl LogFile {
         let lines = if made.is_some() { with_more(path, ".csv") } else { path.to_path_buf() };
         let recovered = if made.is_some() { recover(path, &lines)? } else { None };
         let file = OpenOptions::new().create(true).append(true).open(&lines)?;
-        Ok((LogFile { path: path.to_path_buf(), lines, file, begun: false }, recovered))
+        Ok((LogFile { path: path.to_path_buf(), lines, file, started: false }, recovered))
     }
 
     /// Ends the log.
@@ -53,7 +53,7 @@ impl LogFile {
     /// What the file system says (the lines are then still there), and where nothing was written.
     pub fn close(mut self) -> io::Result<()> {
         self.file.flush()?;
-        if !self.begun {
+        if !self.started {
             if self.file.metadata()?.len() == 0 {
                 fs::remove_file(&self.lines)?;
             }
@@ -69,9 +69,9 @@ impl LogFile {
 
 impl Write for LogFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if !self.begun {
+        if !self.started {
             self.file.set_len(0)?;
-            self.begun = true;
+            self.started = true;
         }
         self.file.write(bytes)
     }

@@ -102,8 +102,8 @@ pub(super) fn log(tables: &[Table], asked: Asked<'_>, findings: &mut Vec<Finding
         true => (None, "sample"),
         false => {
             let (time, _, doubt) = clock(&table, asked.map.clock);
-            let told = doubt.map(|doubt| format!("{doubt}: the times of receipt count"));
-            findings.extend(told.map(|told| Finding::of_file(asked.file, "t", told)));
+            let text = doubt.map(|doubt| format!("{doubt}: the times of receipt count"));
+            findings.extend(text.map(|text| Finding::of_file(asked.file, "t", text)));
             (Some(time), "message")
         }
     };
@@ -234,7 +234,7 @@ fn join(
         let Ok(group) = columns::group(&table.names(), key, asked) else { continue };
         let (times, own) = time(table);
         if !std::ptr::eq(table, torques) && key == "q" {
-            findings.push(Finding::of_file(asked.file, "topics", told(positions, torques, &base, &times)));
+            findings.push(Finding::of_file(asked.file, "topics", text(positions, torques, &base, &times)));
         }
         for (j, column) in group.at.iter().enumerate() {
             let values: Vec<f64> = own.iter().map(|k| table.columns[*column].values[*k]).collect();
@@ -256,7 +256,7 @@ fn join(
     Ok(joined)
 }
 
-fn told(positions: &Table, torques: &Table, base: &[f64], times: &[f64]) -> String {
+fn text(positions: &Table, torques: &Table, base: &[f64], times: &[f64]) -> String {
     let lies = alignment(base, times).map_or("have no sample in common".to_string(), |a| {
         format!(
             "overlap for {:.2} s; the nearest samples are {:.1} ms apart (median), {:.1} ms at most",

@@ -42,9 +42,9 @@ impl Flattened {
         let info = if lists.contains(&true) { description(file) } else { None };
         let mut names = Vec::new();
         for ((name, list), width) in fields.iter().zip(lists).zip(&widths) {
-            let told = info.as_ref().and_then(|info| told(&info["features"][name]["names"]));
-            match told.filter(|told| list && told.len() == *width) {
-                Some(told) => names.extend(told.iter().map(|own| format!("{name}.{own}"))),
+            let listed = info.as_ref().and_then(|info| listed(&info["features"][name]["names"]));
+            match listed.filter(|listed| list && listed.len() == *width) {
+                Some(listed) => names.extend(listed.iter().map(|own| format!("{name}.{own}"))),
                 None if list => names.extend((1..=*width).map(|k| format!("{name}{k}"))),
                 None => names.push(name.clone()),
             }
@@ -128,7 +128,7 @@ fn description(file: &Path) -> Option<Value> {
 }
 
 /// Names of the numbers of a list: a list of them, or one within a group such as "motors".
-fn told(names: &Value) -> Option<Vec<String>> {
+fn listed(names: &Value) -> Option<Vec<String>> {
     let list = names.as_array().or_else(|| names.as_object()?.values().find_map(Value::as_array))?;
     let names: Vec<&str> = list.iter().map(Value::as_str).collect::<Option<_>>()?;
     // "shoulder_pan.pos", "elbow.pos": what all end with is the quantity, and the rest the joint.

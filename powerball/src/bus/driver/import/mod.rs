@@ -113,11 +113,11 @@ fn mapping(drive: &Dcf, mapped: &[Mapped], what: &str) -> Result<Mapping, Import
                     item.object
                 ));
             }
-            (Some(variable), told) => match (variable.bits(), told) {
+            (Some(variable), stated) => match (variable.bits(), stated) {
                 (Some(bits), None) => bits,
-                (Some(bits), Some(told)) if bits == told => bits,
-                (bits, told) => {
-                    return mismatch(format!("{what}: {} has {bits:?} bits, not {told:?}", item.object));
+                (Some(bits), Some(stated)) if bits == stated => bits,
+                (bits, stated) => {
+                    return mismatch(format!("{what}: {} has {bits:?} bits, not {stated:?}", item.object));
                 }
             },
             (None, Some(bits)) => bits,

@@ -197,7 +197,7 @@ impl Move {
         let arm = |e: RecordError| refused(e);
         let envelope = self.surroundings.envelope(&self.surroundings.arm()?, &self.mounting)?;
         let mut recorder =
-            Recorder::bring_up(master(&self.place)?, envelope).map_err(arm)?.telling(output::live());
+            Recorder::bring_up(master(&self.place)?, envelope).map_err(arm)?.with_progress(output::live());
         let from = recorder.master().driver().positions();
         let mut to = from;
         to[index] = self.to.unwrap_or(from[index] + self.by.unwrap_or(0.0));

@@ -78,7 +78,7 @@ enum Kind {
 
 impl Address {
     fn data_type(&self) -> Option<DataType> {
-        let told = self.kind.map(|kind| match kind {
+        let given = self.kind.map(|kind| match kind {
             Kind::U8 => DataType::Unsigned8,
             Kind::U16 => DataType::Unsigned16,
             Kind::U32 => DataType::Unsigned32,
@@ -88,7 +88,7 @@ impl Address {
             Kind::F32 => DataType::Real32,
             Kind::Text => DataType::VisibleString,
         });
-        told.or_else(|| find(DICTIONARY, self.object).map(|entry| entry.data_type))
+        given.or_else(|| find(DICTIONARY, self.object).map(|entry| entry.data_type))
     }
 }
 

@@ -66,20 +66,20 @@ impl CrossValidation {
     ) -> Option<CrossValidated> {
         let on_validation = study.on_validation(&self.fit, &self.fit.residual);
         let back = Screen::new(&on_validation);
-        let swapped = back.try_columns(on_validation.columns(candidate), candidate.searched)?;
+        let cross_validation = back.try_columns(on_validation.columns(candidate), candidate.searched)?;
         let columns = screen.context.columns(candidate);
         let judged =
             Validation { data: &study.data, design: self.design.clone(), residual: self.residual.clone() };
-        let gain = validation_gain(&back, &swapped, &candidate.joints, &judged, &columns);
-        let [p, q] =
-            [(screen, trial), (&back, &swapped)].map(|(screen, trial)| by_blocks(screen, trial, candidate));
+        let gain = validation_gain(&back, &cross_validation, &candidate.joints, &judged, &columns);
+        let [p, q] = [(screen, trial), (&back, &cross_validation)]
+            .map(|(screen, trial)| by_blocks(screen, trial, candidate));
         let product = (p * q).max(f64::MIN_POSITIVE);
         Some(CrossValidated {
             gain: forward.min(gain),
             // Fisher: −2 ln(p·q) is χ² with four degrees of freedom.
             p_value: (product * (1.0 - product.ln())).min(1.0),
-            correlation: correlation(screen, trial, &swapped.theta),
-            log_change: log_change(&back, &swapped, &judged, &columns),
+            correlation: correlation(screen, trial, &cross_validation.theta),
+            log_change: log_change(&back, &cross_validation, &judged, &columns),
         })
     }
 }

@@ -167,8 +167,8 @@ fn needed(study: &Study<'_>, model: &Model, place: usize) -> Option<Needed> {
     let validation = Validation { data: &study.validation, design, residual: on_validation };
     let set = Some((&validation, columns.as_slice()));
     let mut evidence = evidence(&screen, &trial, &candidate.joints, &study.folds, Extent::Everywhere, set);
-    let swapped = CrossValidation::new(study, model, Some(place));
-    let back = swapped.ask(study, &screen, (candidate, &trial, evidence.validation_gain));
+    let cross_validation = CrossValidation::new(study, model, Some(place));
+    let back = cross_validation.ask(study, &screen, (candidate, &trial, evidence.validation_gain));
     let mut rise = [-log_change(&screen, &trial, &validation, &columns), 0.0];
     if let Some(back) = back {
         evidence.p_value = evidence.p_value.min(back.p_value);

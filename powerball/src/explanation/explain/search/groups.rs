@@ -246,12 +246,12 @@ fn would_absorb(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<&
     let own = laws(candidate);
     let share = screen.context.rule.max_unexplained;
     let joint = candidate.joints[0];
-    let swallowed = |a: &&Accepted| {
+    let absorbed = |a: &&Accepted| {
         let part = a.candidate.is_on(&[joint]) && laws(&a.candidate).iter().any(|law| own.contains(law));
         let explained = a.explained.get(joint.index()).copied().unwrap_or(0.0);
         part && trial.gain < share / (1.0 - share) * explained * model.fit.weights[joint.index()]
     };
-    model.accepted.iter().filter(|a| !a.is_baseline()).find(swallowed).map(Accepted::effect).map(|e| e.name())
+    model.accepted.iter().filter(|a| !a.is_baseline()).find(absorbed).map(Accepted::effect).map(|e| e.name())
 }
 
 fn is_ruled_out(study: &Study<'_>, candidate: &Candidate) -> bool {
@@ -261,7 +261,7 @@ fn is_ruled_out(study: &Study<'_>, candidate: &Candidate) -> bool {
 
 /// Whether one of `event`'s windows begins or ends within `same_event` s of the beginning of one of
 /// `earlier`'s.
-fn begins_beside(earlier: &Candidate, event: &Candidate, same_event: f64) -> bool {
+fn begins_with(earlier: &Candidate, event: &Candidate, same_event: f64) -> bool {
     let near = |a: f64, b: f64| (a - b).abs() < same_event;
     earlier.windows.iter().any(|e| {
         let mut same_log = event.windows.iter().filter(|w| w.log == e.log);
@@ -274,7 +274,7 @@ fn begins_beside(earlier: &Candidate, event: &Candidate, same_event: f64) -> boo
 fn only_corrects(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<&'static str> {
     let (rule, effect) = (screen.context.rule, member.candidate.effect());
     // An event corrects nothing that lasts; but an event beside the beginning of another one corrects its time.
-    let baseline = |a: &Accepted| begins_beside(&a.candidate, &member.candidate, rule.same_event);
+    let baseline = |a: &Accepted| begins_with(&a.candidate, &member.candidate, rule.same_event);
     let lasting: Vec<&Accepted> =
         model.accepted.iter().filter(|a| a.candidate.windows.is_empty() || baseline(a)).collect();
     let mut corrected = None;
@@ -306,7 +306,7 @@ pub(crate) struct Tester<'t> {
     /// The model that is judged.
     pub(crate) model: &'t Model,
     /// The same fitted to the validation set, once it is asked for.
-    pub(crate) swapped: OnceLock<CrossValidation>,
+    pub(crate) cross_validation: OnceLock<CrossValidation>,
 }
 
 impl Tester<'_> {
@@ -339,8 +339,9 @@ impl Tester<'_> {
 
     fn judge(&self, candidate: &Candidate, trial: &Trial, evidence: &mut Evidence) -> Option<String> {
         let swap = || CrossValidation::new(self.study, self.model, None);
-        let Tester { study, screen, tests, swapped, .. } = self;
-        Judge { study, screen, tests: *tests, swapped, swap: &swap }.judge(candidate, trial, evidence)
+        let Tester { study, screen, tests, cross_validation, .. } = self;
+        Judge { study, screen, tests: *tests, cross_validation, swap: &swap }
+            .judge(candidate, trial, evidence)
     }
 }
 
@@ -351,7 +352,7 @@ pub(crate) struct Judge<'j> {
     /// What was tried in all.
     pub(crate) tests: f64,
     /// The model without the candidate, fitted to the validation set …
-    pub(crate) swapped: &'j OnceLock<CrossValidation>,
+    pub(crate) cross_validation: &'j OnceLock<CrossValidation>,
     /// … and how it is fitted, once it is asked for.
     pub(crate) swap: &'j (dyn Fn() -> CrossValidation + Sync),
 }
@@ -369,8 +370,9 @@ impl Judge<'_> {
         if local || evidence.score < rule.least_score || evidence.validation_gain < rule.large_gain {
             return Some(refusal);
         }
-        let swapped = self.swapped.get_or_init(self.swap);
-        let both = swapped.ask(self.study, self.screen, (candidate, trial, evidence.validation_gain));
+        let cross_validation = self.cross_validation.get_or_init(self.swap);
+        let both =
+            cross_validation.ask(self.study, self.screen, (candidate, trial, evidence.validation_gain));
         let Some(both) = both.filter(|both| both.is_enough(rule, self.tests)) else { return Some(refusal) };
         evidence.p_value = both.p_value;
         None

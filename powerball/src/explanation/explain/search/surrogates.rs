@@ -335,12 +335,12 @@ mod tests {
         let (body, logs) = planar_with_payload();
         let (fit, validate) = logs.split_at(4);
         let options = ExplainOptions::default();
-        let begun =
+        let started =
             prepare(&body, (fit, validate), &options, Inertia::Shared, ValidationOnly::TakenOut).unwrap();
-        let model = initial_model(begun.base, &begun.study);
-        let context = model.context(&begun.study);
+        let model = initial_model(started.base, &started.study);
+        let context = model.context(&started.study);
         let screen = Screen::new(&context);
-        let (groups, _) = groups(&begun.study, &model, &screen, CandidateKind::Names);
+        let (groups, _) = groups(&started.study, &model, &screen, CandidateKind::Names);
         let shifts = [(0.2, [1.0; 4]), (0.51, [1.0, -1.0, 1.0, -1.0]), (0.84, [1.0, 1.0, 1.0, -1.0])]
             .map(|(fraction, signs)| Shift { fraction, signs: signs.to_vec() });
         let close = |a: f64, b: f64, size: f64| assert!((a - b).abs() <= 1e-9 * size, "{a} {b} of {size}");

@@ -75,7 +75,7 @@ pub(crate) enum Clock {
     /// As their times or their order say.
     AsGiven,
     /// Those to judge on in between the fitted ones.
-    Beside,
+    InBetween,
     /// Every series of repeats from the same place began with a cold arm, and those to judge on were recorded
     /// in between.
     ColdSeries,
@@ -86,7 +86,7 @@ impl Clock {
     pub(crate) fn note(self) -> Option<&'static str> {
         match self {
             Clock::AsGiven => None,
-            Clock::Beside => Some(
+            Clock::InBetween => Some(
                 "the times of the logs start anew in each file: those of --validate are taken to have been \
                     recorded in between those of --log, because \
                  what warms up fits that better than their order does",
@@ -121,7 +121,7 @@ pub(crate) fn choose_clock<'a>(
     let cold = [in_series(data, other, &same), in_series(other, data, &same)];
     let mut best = (Clock::AsGiven, None);
     let mut most = gain(rule, *effect, data, fit, other).max(0.0);
-    for (clock, [own, others]) in [(Clock::Beside, &baseline), (Clock::ColdSeries, &cold)] {
+    for (clock, [own, others]) in [(Clock::InBetween, &baseline), (Clock::ColdSeries, &cold)] {
         let sets = [data.with_clocks(own), other.with_clocks(others)];
         let gain = gain(rule, *effect, &sets[0], fit, &sets[1]);
         // Equal clocks are equally good; the first is the simplest.

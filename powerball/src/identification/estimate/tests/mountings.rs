@@ -25,10 +25,10 @@ fn links() -> Vec<Body> {
 }
 
 /// Logs as the base stood, reduced for the mounting that they are told to be of.
-fn reduced(stood: &str, told: &str, seed: u64, still: &[usize]) -> (RigidArm, Bands) {
+fn reduced(stood: &str, stated: &str, seed: u64, still: &[usize]) -> (RigidArm, Bands) {
     let arm = lwa4p::arm().unwrap();
-    let [stood, told] = [stood, told].map(|text| text.parse::<Mounting>().unwrap());
-    let body = RigidArm::mounted(&told.of(&arm).unwrap(), &arm).unwrap();
+    let [stood, stated] = [stood, stated].map(|text| text.parse::<Mounting>().unwrap());
+    let body = RigidArm::mounted(&stated.of(&arm).unwrap(), &arm).unwrap();
     let options = DataOptions::default();
     let mut bands = Bands::new(&body, &options);
     let logs: Vec<Log> = record_mounted(stood.gravity(&arm), links(), &sensors(), 2, 4, seed, still);
@@ -45,9 +45,9 @@ fn together(parts: &[(RigidArm, Bands)]) -> Together {
 fn fitted(all: &Together) -> (Estimates, Solution, Vec<ResidualStats>, Vec<Vec<usize>>) {
     let found = solve_in_band(&all.bands, LAW);
     let identified = estimates(all.body.names(), &found.solution, &standard_errors(&found.solution));
-    let spreads = all.spreads(&found.solution, &found.bands).unwrap();
-    let contradictions = all.contradictions(&spreads, &found.bands, LAW);
-    (identified, found.solution, spreads, contradictions)
+    let errors = all.errors(&found.solution, &found.bands).unwrap();
+    let contradictions = all.contradictions(&errors, &found.bands, LAW);
+    (identified, found.solution, errors, contradictions)
 }
 
 /// Upright only a sum of Ixz2 and of moments is seen; with the base on its side as well, all of them apart.
@@ -55,7 +55,7 @@ fn fitted(all: &Together) -> (Estimates, Solution, Vec<ResidualStats>, Vec<Vec<u
 fn two_mountings_determine_what_one_does_not() {
     let parts = [reduced("filed", "filed", 1, &[]), reduced("90,0", "90,0", 2, &[])];
     let all = together(&parts);
-    let (found, solution, spreads, contradictions) = fitted(&all);
+    let (found, solution, errors, contradictions) = fitted(&all);
     let links: Vec<f64> = links().iter().flat_map(Body::parameters).collect();
     let truth = all.body.model().set_values(all.body.model().set(SetKind::Minimal).unwrap(), &links);
     let upright = parts[0].0.names();
@@ -77,7 +77,7 @@ fn two_mountings_determine_what_one_does_not() {
     // In the columns of the set that both have in common the logs of one mounting are fitted as in their own.
     let alone = solve_in_band(&parts[0].1, LAW).solution;
     let own = alone.mean_squares(1, &alone.theta).0.sqrt();
-    approx::assert_relative_eq!(spreads[0].rms[1], own, max_relative = 0.02);
+    approx::assert_relative_eq!(errors[0].rms[1], own, max_relative = 0.02);
     assert_eq!(solution.inertial().len(), 24);
 }
 
@@ -101,9 +101,9 @@ fn a_wrong_mounting_contradicts_the_others() {
     let right = reduced("filed", "filed", 1, &[]);
     let own = solve_in_band(&right.1, LAW);
     let own = crate::identification::estimate::stats_of(&own.solution, &own.solution.theta);
-    let (_, _, spreads, contradictions) = fitted(&together(&[right, reduced("90,0", "0,90", 2, &[])]));
+    let (_, _, errors, contradictions) = fitted(&together(&[right, reduced("90,0", "0,90", 2, &[])]));
     assert!(contradictions.iter().any(|joints| !joints.is_empty()));
-    assert!(spreads[1].rms[1] > 5.0 * own.rms[1], "{:?} {:?}", spreads[1].rms, own.rms);
+    assert!(errors[1].rms[1] > 5.0 * own.rms[1], "{:?} {:?}", errors[1].rms, own.rms);
 }
 
 /// The torque columns of two joints are exchanged in the logs of the second mounting alone: its warning says so.
