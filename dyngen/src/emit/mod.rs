@@ -113,8 +113,8 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     let (n, p) =
         (Literal::usize_unsuffixed(model.arm().dof()), Literal::usize_unsuffixed(set.parameters.len()));
     let names = set.names();
-    let trig = angles::trig_struct(model.arm());
-    let angle_functions = angles::angle_functions(model.arm(), &built);
+    let trig = angles::trig_struct(model);
+    let angle_functions = angles::angle_functions(model, &built);
     let trigonometry = angles::trigonometry(model.arm());
     let values = options.values.as_ref().map(|values| {
         let values = values.iter().map(|x| Literal::f64_suffixed(*x));
