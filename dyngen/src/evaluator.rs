@@ -2,9 +2,8 @@
 
 use crate::base::SetKind;
 use crate::dynamics::Function;
-use crate::dynamics::build::trig_offset;
+use crate::dynamics::angles::Angles;
 use crate::dynamics::function::Argument;
-use crate::exact::rational::to_f64;
 use crate::graph::tape::{LANES, Lane, Tape};
 use crate::graph::{Input, JointSum, Preparation};
 use crate::model::{Error, Model};
@@ -53,8 +52,7 @@ pub struct Evaluator {
     shape: (usize, usize),
     dof: usize,
     parameters: usize,
-    /// Of each joint: its coordinate, what its angle is for a unit of that, and what is added.
-    angles: Vec<(usize, f64, f64)>,
+    angles: Angles,
     /// What depends on the parameters alone, run once for all samples.
     preparation: Tape,
     tape: Tape,
@@ -67,9 +65,9 @@ impl Evaluator {
     /// As [`Model::function`].
     pub fn new(model: &Model, function: Function, kind: SetKind) -> Result<Evaluator, Error> {
         let built = model.function(function, kind)?;
-        let angles = &model.symbols().angles;
+        let constants = &model.symbols().angles;
         let symbol = |index: usize, sine: bool| {
-            let (s, c) = angles[index].sin_cos();
+            let (s, c) = constants[index].sin_cos();
             if sine { s } else { c }
         };
         let dof = model.arm().dof();
@@ -80,9 +78,7 @@ impl Evaluator {
             shape: built.shape,
             dof,
             parameters: model.set(kind)?.parameters.len(),
-            angles: (model.arm().drives().iter().enumerate())
-                .map(|(i, drive)| (drive.coordinate, to_f64(&drive.ratio), trig_offset(model.arm(), i)))
-                .collect(),
+            angles: model.angles().clone(),
             preparation: Tape::compile(&preparation.graph(), preparation.values(), symbol),
             tape: Tape::compile(&built.graph, &built.outputs, symbol),
         })
@@ -140,10 +136,7 @@ impl Evaluator {
             };
             let gather_angle = |sum: JointSum, to: &mut Lane| {
                 for (lane, x) in to.iter_mut().enumerate() {
-                    *x = sum.value(|i| {
-                        let (coordinate, ratio, offset) = self.angles[i];
-                        ratio * samples.q[at(lane) + coordinate] + offset
-                    });
+                    *x = self.angles.value(sum, |i| samples.q[at(lane) + i]);
                 }
             };
             self.tape.run(

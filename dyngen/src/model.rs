@@ -2,6 +2,7 @@
 
 use crate::arm::{Arm, Parameter};
 use crate::base::Sets;
+use crate::dynamics::angles::Angles;
 use crate::dynamics::build::{self, Subject};
 use crate::dynamics::function::Kind;
 use crate::dynamics::regroup::{Known, Order, Regrouping};
@@ -21,6 +22,7 @@ use std::sync::OnceLock;
 #[derive(Clone, Debug)]
 pub struct Model {
     arm: Arm,
+    angles: Angles,
     symbols: AngleSymbols,
     sets: Sets,
     /// For each kind of set the ways in which functions sum its parameters up, once they are asked for.
@@ -87,7 +89,7 @@ impl Model {
     pub fn derive(arm: Arm) -> Result<Model, Error> {
         let symbols = angle_symbols(&arm);
         let sets = Sets::derive(&arm, &symbols)?;
-        Ok(Model { arm, symbols, sets, regroupings: Default::default() })
+        Ok(Model { angles: Angles::new(&arm), arm, symbols, sets, regroupings: Default::default() })
     }
 
     /// An arm of which only kinematics is asked: no parameter set is derived but `full`, so that it is there
@@ -96,12 +98,17 @@ impl Model {
     pub fn kinematic(arm: Arm) -> Model {
         let symbols = angle_symbols(&arm);
         let sets = Sets::underived(&arm, &symbols);
-        Model { arm, symbols, sets, regroupings: Default::default() }
+        Model { angles: Angles::new(&arm), arm, symbols, sets, regroupings: Default::default() }
     }
 
     /// The arm.
     pub fn arm(&self) -> &Arm {
         &self.arm
+    }
+
+    /// Of which angles functions take sine and cosine.
+    pub fn angles(&self) -> &Angles {
+        &self.angles
     }
 
     /// All sets with the relations between parameters.
@@ -182,6 +189,7 @@ impl Model {
         }
         let subject = Subject {
             arm: &self.arm,
+            angles: &self.angles,
             symbols: &self.symbols,
             field: &self.sets.field,
             minimal: &self.sets.minimal,

@@ -92,18 +92,20 @@ impl Arm {
         let Some(mimic) = &self.joints[joint].mimic else { return Angle::zero() };
         let leader = &self.joints[mimic.joint];
         let minus_ratio = -&mimic.ratio;
-        let mut parts = vec![(in_input(&self.joints[joint]), Rational::one())];
+        let mut parts = vec![(self.joints[joint].theta_in_angle(), Rational::one())];
         if leader.kind == JointKind::Revolute {
-            parts.push((in_input(leader), minus_ratio));
+            parts.push((leader.theta_in_angle(), minus_ratio));
         }
         parts.push((Angle::from_radians(mimic.offset.clone()), Rational::one()));
         Angle::sum(&parts)
     }
 }
 
-/// What the sine's input holds beside q: theta where it is no multiple of pi/2.
-fn in_input(joint: &Joint) -> Angle {
-    if joint.theta.quarter_turns().is_some() { Angle::zero() } else { joint.theta.clone() }
+impl Joint {
+    /// What the joint's angle, as sines and cosines take it, holds beside q: theta where it is no multiple of pi/2.
+    pub(crate) fn theta_in_angle(&self) -> Angle {
+        if self.theta.quarter_turns().is_some() { Angle::zero() } else { self.theta.clone() }
+    }
 }
 
 /// Reads the table `mimic` of a joint; `dof` joints are in the file.

@@ -112,18 +112,7 @@ impl Reader<'_> {
         self.unknown_keys(t, &JOINT_KEYS);
         let place = t.place.clone();
         let name = self.optional(t, "name", |r, v| r.text(v, &format!("{place}: name")));
-        let kind = self.required(t, "kind").and_then(|v| match v.get_ref().as_str() {
-            Some("revolute") => Some(JointKind::Revolute),
-            Some("prismatic") => Some(JointKind::Prismatic),
-            _ => {
-                let found = describe(v);
-                self.errors.error(
-                    v.span(),
-                    format!("{place}: kind must be \"revolute\" or \"prismatic\", found {found}"),
-                );
-                None
-            }
-        });
+        let kind = self.required(t, "kind").and_then(|v| self.kind(v, &place));
         let a = self.required(t, "a").and_then(|v| self.number(v, &format!("{place}: a"), "m"));
         let b = self.optional(t, "b", |r, v| r.number(v, &format!("{place}: b"), "m"));
         let alpha = self.required(t, "alpha").and_then(|v| self.angle(v, &format!("{place}: alpha")));
@@ -133,27 +122,10 @@ impl Reader<'_> {
             Some(v) => self.symmetries(v, &place),
             None => Some(Vec::new()),
         };
-        let rotor_ratio = self.optional(t, "rotor_ratio", |r, v| {
-            let ratio = r.number(v, &format!("{place}: rotor_ratio"), "1")?;
-            if ratio.is_zero() {
-                r.errors.error(
-                    v.span(),
-                    format!("{place}: rotor_ratio is zero: leave the key out where the joint has no rotor"),
-                );
-                return None;
-            }
-            Some(ratio)
-        });
+        let rotor_ratio = self.optional(t, "rotor_ratio", |r, v| r.rotor_ratio(v, &place));
         let position = self.optional(t, "position", |r, v| r.position(v, &place));
         let mut limit = |key: &str, unit: &str| {
-            self.optional(t, key, |r, v| {
-                let value = r.number(v, &format!("{place}: {key}"), unit)?;
-                if !value.is_positive() {
-                    r.errors.error(v.span(), format!("{place}: {key} must be greater than zero"));
-                    return None;
-                }
-                Some(rational::to_f64(&value))
-            })
+            self.optional(t, key, |r, v| r.limit(v, &format!("{place}: {key}"), unit))
         };
         let velocity = limit("velocity", "rad/s or m/s");
         let acceleration = limit("acceleration", "rad/s² or m/s²");
@@ -177,6 +149,43 @@ impl Reader<'_> {
             torque_constant: torque_constant?,
             mimic: mimic?,
         })
+    }
+
+    fn kind(&mut self, v: &Value<'_>, place: &str) -> Option<JointKind> {
+        match v.get_ref().as_str() {
+            Some("revolute") => Some(JointKind::Revolute),
+            Some("prismatic") => Some(JointKind::Prismatic),
+            _ => {
+                let found = describe(v);
+                self.errors.error(
+                    v.span(),
+                    format!("{place}: kind must be \"revolute\" or \"prismatic\", found {found}"),
+                );
+                None
+            }
+        }
+    }
+
+    fn rotor_ratio(&mut self, v: &Value<'_>, place: &str) -> Option<Rational> {
+        let ratio = self.number(v, &format!("{place}: rotor_ratio"), "1")?;
+        if ratio.is_zero() {
+            self.errors.error(
+                v.span(),
+                format!("{place}: rotor_ratio is zero: leave the key out where the joint has no rotor"),
+            );
+            return None;
+        }
+        Some(ratio)
+    }
+
+    /// A limit of a joint, in its unit.
+    fn limit(&mut self, v: &Value<'_>, quantity: &str, unit: &str) -> Option<f64> {
+        let value = self.number(v, quantity, unit)?;
+        if !value.is_positive() {
+            self.errors.error(v.span(), format!("{quantity} must be greater than zero"));
+            return None;
+        }
+        Some(rational::to_f64(&value))
     }
 
     fn symmetries(&mut self, v: &Value<'_>, place: &str) -> Option<Vec<ParameterKind>> {

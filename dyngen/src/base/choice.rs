@@ -8,6 +8,7 @@
 use super::plain::full_set;
 use super::preference::Preference;
 use crate::arm::Arm;
+use crate::dynamics::angles::Angles;
 use crate::dynamics::build::{self, Subject};
 use crate::dynamics::chain::Origins;
 use crate::dynamics::stage::Form;
@@ -45,7 +46,7 @@ pub fn cheapest(
 ) -> Result<(Dependence, Vec<Candidate>), Unproven> {
     let [first, others @ ..] = Preference::ALL;
     let start = eliminate(first)?;
-    let all = AllColumns::build(&Subject { arm, symbols, field, minimal: &start });
+    let all = AllColumns::build(&Subject { arm, angles: &Angles::new(arm), symbols, field, minimal: &start });
     let search = !has_joint_symbols(arm);
     let (mut best, candidate) = all.improved(field, start, first, search);
     let mut candidates = vec![candidate];

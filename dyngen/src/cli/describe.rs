@@ -3,13 +3,14 @@
 use super::digits::Digits;
 use super::{Failure, Progress, model, print};
 use dyngen::Model;
-use dyngen::arm::{Convention, Joint, JointKind, Placement};
+use dyngen::arm::{Arm, Convention, Joint, JointKind, Placement};
 use dyngen::base::choice;
 use dyngen::base::sets::{Class, combination_text};
 use dyngen::base::symmetry::{Removed, Symmetry};
 use dyngen::base::{ParameterSet, SetKind};
-use dyngen::describe::{Description, exact_rows};
-use dyngen::exact::rational;
+use dyngen::describe::{Description, Weak, exact_rows};
+use dyngen::exact::rational::{self, Rational};
+use dyngen::graph::Operations;
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -42,10 +43,29 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Everything that is known of an arm, section by section.
 fn table(model: &Model, description: &Description, digits: Digits) -> String {
     let Description { operations, symmetries, weak } = description;
     let arm = model.arm();
     let mut t = String::new();
+    heading(&mut t, arm, digits);
+    joint_table(&mut t, arm, digits);
+    frames(&mut t, arm, digits);
+    followers(&mut t, arm, digits);
+    transmissions(&mut t, arm);
+    classes(&mut t, model);
+    symmetry_table(&mut t, model, symmetries, digits);
+    weak_sums(&mut t, weak);
+    for set in model.sets().sets.iter().filter(|s| s.kind != SetKind::Full) {
+        set_table(&mut t, model, set, digits);
+    }
+    choice_of_columns(&mut t, model);
+    operation_table(&mut t, operations);
+    t
+}
+
+/// The arm's name, size, convention and gravity.
+fn heading(t: &mut String, arm: &Arm, digits: Digits) {
     let gravity: Vec<String> = arm.gravity.iter().map(|g| digits.number(rational::to_f64(g))).collect();
     let convention = match arm.convention {
         Convention::Standard => "standard",
@@ -60,7 +80,10 @@ fn table(model: &Model, description: &Description, digits: Digits) -> String {
         if arm.has_mimics() { format!(", {} of them coordinates", arm.dof()) } else { String::new() },
         gravity.join(", ")
     );
-    // Names where the file has some.
+}
+
+/// The Denavit–Hartenberg rows; names and offsets b have columns where the file has some.
+fn joint_table(t: &mut String, arm: &Arm, digits: Digits) {
     let name = |joint: &Joint| joint.name.clone().unwrap_or_default();
     let names: Vec<String> = arm.joints.iter().map(name).collect();
     let width = match arm.has_joint_names() {
@@ -86,7 +109,7 @@ fn table(model: &Model, description: &Description, digits: Digits) -> String {
             JointKind::Revolute => "revolute",
             JointKind::Prismatic => "prismatic",
         };
-        let number = |r: &rational::Rational| digits.number(rational::to_f64(r));
+        let number = |r: &Rational| digits.number(rational::to_f64(r));
         let beside = if offsets { format!("  {:>8}", number(&joint.b)) } else { String::new() };
         let rotor = joint.rotor_ratio.as_ref().map_or("-".to_string(), number);
         let zero: Vec<&str> = joint.zero.iter().map(|k| k.name()).collect();
@@ -101,16 +124,23 @@ fn table(model: &Model, description: &Description, digits: Digits) -> String {
             zero.join(" ")
         );
     }
-    for (name, frame) in
-        [("base: frame 0 in the root link", &arm.base), ("tool: in the last frame", &arm.tool)]
-    {
+}
+
+/// Where frame 0 and the tool are.
+fn frames(t: &mut String, arm: &Arm, digits: Digits) {
+    let frames = [("base: frame 0 in the root link", &arm.base), ("tool: in the last frame", &arm.tool)];
+    for (name, frame) in frames {
         if let Some(frame) = frame {
             let _ = writeln!(t, "  {name}: {}", placement_text(frame, digits));
         }
     }
+}
+
+/// Joints that have no coordinate, and what they follow.
+fn followers(t: &mut String, arm: &Arm, digits: Digits) {
+    let number = |x: &Rational| digits.number(rational::to_f64(x));
     for (i, joint) in arm.joints.iter().enumerate() {
         if let Some(mimic) = &joint.mimic {
-            let number = |x: &rational::Rational| digits.number(rational::to_f64(x));
             let _ = writeln!(
                 t,
                 "  joint {} follows joint {}: {}·q + {}; it has no coordinate",
@@ -121,11 +151,20 @@ fn table(model: &Model, description: &Description, digits: Digits) -> String {
             );
         }
     }
+}
+
+/// How motors turn with several joints.
+fn transmissions(t: &mut String, arm: &Arm) {
     for block in &arm.transmissions {
         let rows: Vec<String> = exact_rows(block).iter().map(|row| format!("[{}]", row.join(", "))).collect();
         let joints: Vec<String> = block.joints.iter().map(|j| (j + 1).to_string()).collect();
         let _ = writeln!(t, "  motors {0} = [{1}] · joints {0}", joints.join(", "), rows.join(", "));
     }
+}
+
+/// The kept parameters by what torques show of them.
+fn classes(t: &mut String, model: &Model) {
+    let arm = model.arm();
     let kept = arm.kept_parameters();
     let _ = writeln!(t, "\n{} of {} parameters are kept:", kept.len(), arm.all_parameters().len());
     for class in [Class::Unidentifiable, Class::Alone, Class::InCombination] {
@@ -133,23 +172,25 @@ fn table(model: &Model, description: &Description, digits: Digits) -> String {
             kept.iter().filter(|p| model.sets().class(**p) == class).map(ToString::to_string).collect();
         let _ = writeln!(t, "  {:<30} {:>2}: {}", class.name(), names.len(), names.join(" "));
     }
-    if !symmetries.is_empty() {
-        let _ = writeln!(t, "\nwhat each declared symmetry removed:");
-        symmetry_table(&mut t, model, symmetries, digits);
+}
+
+/// Sums of parameters that torques hardly show.
+fn weak_sums(t: &mut String, weak: &[Weak]) {
+    if weak.is_empty() {
+        return;
     }
-    if !weak.is_empty() {
-        let _ = writeln!(
-            t,
-            "\nhardly identifiable, through residues of the file's numbers alone (an angle such as 1.5708, or axes \
-             that almost\nmeet), with the singular value of the scaled regressor:"
-        );
-        for w in weak {
-            let _ = writeln!(t, "  {:.1e}: sums of {}", w.singular_value, w.parameters.join(" "));
-        }
+    let _ = writeln!(
+        t,
+        "\nhardly identifiable, through residues of the file's numbers alone (an angle such as 1.5708, or axes \
+         that almost\nmeet), with the singular value of the scaled regressor:"
+    );
+    for w in weak {
+        let _ = writeln!(t, "  {:.1e}: sums of {}", w.singular_value, w.parameters.join(" "));
     }
-    for set in model.sets().sets.iter().filter(|s| s.kind != SetKind::Full) {
-        set_table(&mut t, model, set, digits);
-    }
+}
+
+/// By which rule the minimal set's columns were chosen, and what the others cost.
+fn choice_of_columns(t: &mut String, model: &Model) {
     let candidates = &model.sets().candidates;
     if let Some(chosen) = choice::chosen(candidates) {
         let counts: Vec<String> = candidates.iter().map(|c| c.operations.to_string()).collect();
@@ -161,12 +202,15 @@ fn table(model: &Model, description: &Description, digits: Digits) -> String {
             counts.join(", ")
         );
     }
+}
+
+/// What each function costs.
+fn operation_table(t: &mut String, operations: &[(&'static str, Operations)]) {
     let _ = writeln!(t, "\noperations with the minimal set as arguments:");
     let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", "function", "mul", "add", "div", "sin_cos");
     for (function, o) in operations {
         let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", function, o.mul, o.add, o.div, o.sin_cos);
     }
-    t
 }
 
 fn placement_text(frame: &Placement, digits: Digits) -> String {
@@ -175,7 +219,12 @@ fn placement_text(frame: &Placement, digits: Digits) -> String {
     format!("xyz = [{}] m, rpy = [{}] rad", xyz.join(", "), rpy.join(", "))
 }
 
+/// What each declared symmetry removed.
 fn symmetry_table(t: &mut String, model: &Model, symmetries: &[Symmetry], digits: Digits) {
+    if symmetries.is_empty() {
+        return;
+    }
+    let _ = writeln!(t, "\nwhat each declared symmetry removed:");
     let names = |wanted: fn(&Removed) -> bool| -> Vec<String> {
         let some = symmetries.iter().filter(|s| wanted(&s.removed));
         some.map(|s| s.parameter.to_string()).collect()
@@ -196,6 +245,7 @@ fn symmetry_table(t: &mut String, model: &Model, symmetries: &[Symmetry], digits
     }
 }
 
+/// A set: its sums, what they lose, and the relations between its columns.
 fn set_table(t: &mut String, model: &Model, set: &ParameterSet, digits: Digits) {
     let meaning = match set.kind {
         SetKind::Minimal => "exact for the numbers in the file",

@@ -1,20 +1,21 @@
 //! A function of an arm as a graph, in the form that costs least.
 
-use super::chain::{self, Origins};
+use super::angles::Angles;
+use super::chain::{self, LinkGeometry, Origins};
 use super::followers::Followers;
 use super::function::{Argument, Function, Kind};
 use super::motion;
-use super::regroup::Regrouping;
+use super::regroup::{LinkBody, Regrouping};
 use super::stage::{Chain, Form};
 use super::{composite, coriolis, energy, forward, inverse, momentum, pose, regressor};
 use crate::arm::{Arm, Placement};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
 use crate::exact::elimination::Dependence;
-use crate::exact::rational::{Rational, to_f64};
+use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::differentiate::{self, Direction};
-use crate::graph::{Builder, Expr, Graph, Input, JointSum, Operations, Preparation};
+use crate::graph::{Builder, Expr, Graph, Input, Operations, Preparation};
 use crate::lagrangian::elements::{ArmElements, PlacementElements, Source};
 use crate::optimize::{self, COMPARED, Pass};
 use crate::parameters::ParameterSet;
@@ -63,7 +64,9 @@ impl FunctionGraph {
 pub struct Subject<'a> {
     /// The arm.
     pub arm: &'a Arm,
-    /// Its angles that are kept as symbols.
+    /// Of which angles functions take sine and cosine.
+    pub angles: &'a Angles,
+    /// Its constant angles that are kept as symbols.
     pub symbols: &'a AngleSymbols,
     /// The field of its constants.
     pub field: &'a ConstantField,
@@ -125,142 +128,232 @@ pub fn build_in(
     baked: Option<&[Rational]>,
     passes: &[(&str, Pass)],
 ) -> FunctionGraph {
-    let Subject { arm, symbols, field, .. } = *subject;
     let b = Builder::new();
-    let value = |i: usize| match baked {
-        Some(values) => b.constant(&values[i]),
-        None => b.input(Input::Parameter(i)),
-    };
-    // Of the chain; joints that follow others are links of it. Its functions become those of the coordinates.
-    let (n, dof) = (arm.links(), arm.dof());
-    let followers = Followers::new(arm);
-    let rows = |matrix: Vec<Expr>| followers.rows(&b, matrix);
-    let square = |matrix: Vec<Expr>| rows(followers.columns(&b, matrix));
-    let elements = ArmElements::build(&b, arm, symbols, &mut Inputs { b: &b, arm });
-    let chain = Chain::build(&b, arm, &elements, form);
-    let mut bodies = regrouping.map_or(Vec::new(), |r| r.bodies(&b, arm, symbols, field, set, value));
-    if let Some(last) = bodies.last_mut() {
-        last.moments = last.moments.turned_back_z(&b, &chain.last_turn.0, &chain.last_turn.1);
+    let followers = Followers::new(subject.arm, subject.angles);
+    let outputs = Parts::new(&b, &followers, form, regrouping, *subject, set, baked).outputs(function);
+    let (graph, outputs) = followers.of_coordinates(b.finish(), outputs);
+    let (graph, outputs) = optimize::optimize(graph, outputs, subject.field, passes);
+    let (joints, parameters) = (subject.arm.dof(), set.parameters.len());
+    let shape = function.shape(joints, parameters);
+    FunctionGraph { function, graph, outputs, shape, joints, parameters, baked: baked.is_some() }
+}
+
+/// What functions are made of in one form, as expressions of one graph: the chain, its links' bodies and rates. All of
+/// it is of the chain, whose joints that follow others are links of it; what is linear in rates or torques becomes
+/// that of the coordinates at once, angles and positions when a function is done.
+struct Parts<'a> {
+    b: &'a Builder,
+    followers: &'a Followers<'a>,
+    subject: Subject<'a>,
+    set: &'a ParameterSet,
+    /// The parameters' values where they are baked in.
+    baked: Option<&'a [Rational]>,
+    form: Form,
+    elements: ArmElements<Expr>,
+    chain: Chain,
+    /// Where the file's frames lie in the chain's.
+    geometry: Vec<LinkGeometry<Expr>>,
+    /// None where the function takes no body of a link.
+    bodies: Vec<LinkBody>,
+    velocities: Vec<Expr>,
+}
+
+impl<'a> Parts<'a> {
+    fn new(
+        b: &'a Builder,
+        followers: &'a Followers<'a>,
+        form: Form,
+        regrouping: Option<&Regrouping>,
+        subject: Subject<'a>,
+        set: &'a ParameterSet,
+        baked: Option<&'a [Rational]>,
+    ) -> Self {
+        let Subject { arm, angles, symbols, field, .. } = subject;
+        let elements = ArmElements::build(b, arm, symbols, &mut Inputs { b, arm, angles });
+        let chain = Chain::build(b, arm, angles, &elements, form);
+        let value = |i: usize| parameter(b, baked, i);
+        let mut bodies = regrouping.map_or(Vec::new(), |r| r.bodies(b, arm, symbols, field, set, value));
+        if let Some(last) = bodies.last_mut() {
+            last.moments = last.moments.turned_back_z(b, &chain.last_turn.0, &chain.last_turn.1);
+        }
+        let velocities = (0..arm.links()).map(|i| b.input(Input::Velocity(i))).collect();
+        let geometry = chain::geometry(b, arm, form.origins, &elements);
+        Parts { b, followers, subject, set, baked, form, elements, chain, geometry, bodies, velocities }
     }
-    let velocities: Vec<Expr> = (0..n).map(|i| b.input(Input::Velocity(i))).collect();
-    let input = |of: fn(usize) -> Input| -> Vec<Expr> { (0..n).map(|i| b.input(of(i))).collect() };
-    let none = vec![Expr::ZERO; n];
-    let torque = |accelerations: &[Expr], gravity: bool| {
-        let drive = motion::Drive {
-            velocities: velocities.clone(),
-            reference: velocities.clone(),
-            accelerations: accelerations.to_vec(),
-            gravity,
+
+    /// A function's result, row-major.
+    fn outputs(&self, function: Function) -> Vec<Expr> {
+        let Parts { b, chain, bodies, velocities, elements, set, .. } = self;
+        let Subject { arm, field, .. } = self.subject;
+        match function {
+            Function::InverseDynamics => self.torque(self.each(Input::Acceleration), true),
+            Function::InverseDynamicsWithoutGravity => self.torque(self.each(Input::Acceleration), false),
+            Function::Regressor => self.regressor(&self.motion()),
+            Function::RegressorTransposeTimes => {
+                self.transposed_times_errors(&self.regressor(&self.motion()))
+            }
+            Function::SlotineLiRegressor => self.regressor(&self.reference_motion()),
+            Function::SlotineLiTransposeTimes => {
+                self.transposed_times_errors(&self.regressor(&self.reference_motion()))
+            }
+            Function::MassMatrix => self.mass_matrix(),
+            Function::MassMatrixInverse => forward::inverse_symmetric(b, &self.mass_matrix(), arm.dof()),
+            Function::CoriolisMatrix => self.square(coriolis::coriolis_matrix(b, chain, bodies, velocities)),
+            Function::CoriolisTimesVelocity => self.torque(self.at_rest(), false),
+            Function::CoriolisTransposeTimesVelocity => {
+                self.rows(momentum::coriolis_transpose_times_velocity(b, chain, bodies, velocities))
+            }
+            Function::Gravity => self.rows(composite::gravity(b, chain, bodies)),
+            Function::ForwardDynamics => self.forward_dynamics(),
+            Function::ForwardKinematics => pose::forward_kinematics(b, elements, &self.ends()),
+            Function::Jacobian => self.followers.columns(b, pose::jacobian(b, elements, &self.ends())),
+            Function::JacobianRateTimesVelocity => self.jacobian_rate_times_velocity(),
+            Function::KineticEnergy => vec![momentum::kinetic_energy(b, chain, bodies, velocities)],
+            Function::PotentialEnergy => vec![self.potential_energy()],
+            Function::KineticEnergyRegressor => energy::kinetic_regressor(b, arm, elements, set, field),
+            Function::PotentialEnergyRegressor => energy::potential_regressor(b, arm, elements, set, field),
+            Function::Momentum => self.rows(momentum::momentum(b, chain, bodies, velocities)),
+            Function::TorqueByPosition => self.torque_derivatives(Direction::Position),
+            Function::TorqueByVelocity => self.torque_derivatives(Direction::Velocity),
+        }
+    }
+
+    /// An input of each joint of the chain.
+    fn each(&self, input: fn(usize) -> Input) -> Vec<Expr> {
+        (0..self.subject.arm.links()).map(|i| self.b.input(input(i))).collect()
+    }
+
+    /// Zero for each joint of the chain.
+    fn at_rest(&self) -> Vec<Expr> {
+        vec![Expr::ZERO; self.subject.arm.links()]
+    }
+
+    /// Gᵀ·A: a row for each coordinate in place of each joint of the chain.
+    fn rows(&self, matrix: Vec<Expr>) -> Vec<Expr> {
+        self.followers.rows(self.b, matrix)
+    }
+
+    /// GᵀAG
+    fn square(&self, matrix: Vec<Expr>) -> Vec<Expr> {
+        self.rows(self.followers.columns(self.b, matrix))
+    }
+
+    /// The joints' velocities with some accelerations.
+    fn drive(&self, accelerations: Vec<Expr>, gravity: bool) -> motion::Drive {
+        let velocities = self.velocities.clone();
+        motion::Drive { reference: velocities.clone(), velocities, accelerations, gravity }
+    }
+
+    /// The motion q̇, q̈ under gravity.
+    fn motion(&self) -> motion::Drive {
+        self.drive(self.each(Input::Acceleration), true)
+    }
+
+    /// The reference motion q̇ᵣ, q̈ᵣ of Slotine and Li beside q̇, under gravity.
+    fn reference_motion(&self) -> motion::Drive {
+        motion::Drive {
+            velocities: self.velocities.clone(),
+            reference: self.each(Input::ReferenceVelocity),
+            accelerations: self.each(Input::ReferenceAcceleration),
+            gravity: true,
+        }
+    }
+
+    /// The torques τ of a motion.
+    fn torque(&self, accelerations: Vec<Expr>, gravity: bool) -> Vec<Expr> {
+        let drive = self.drive(accelerations, gravity);
+        self.rows(inverse::inverse_dynamics(self.b, &self.chain, &self.bodies, &drive))
+    }
+
+    /// Y of a motion, n × p.
+    fn regressor(&self, drive: &motion::Drive) -> Vec<Expr> {
+        let columns = regressor::Columns {
+            set: self.set,
+            field: self.subject.field,
+            links: &self.geometry,
+            forces_home: self.form.forces_home,
         };
-        rows(inverse::inverse_dynamics(&b, &chain, &bodies, &drive))
-    };
-    let geometry = chain::geometry(&b, arm, form.origins, &elements);
-    let regressor = |drive: &motion::Drive| {
-        let columns = regressor::Columns { set, field, links: &geometry, forces_home: form.forces_home };
-        rows(regressor::regressor(&b, &chain, &columns, drive))
-    };
-    let motion = || motion::Drive {
-        velocities: velocities.clone(),
-        reference: velocities.clone(),
-        accelerations: input(Input::Acceleration),
-        gravity: true,
-    };
-    let reference = || motion::Drive {
-        velocities: velocities.clone(),
-        reference: input(Input::ReferenceVelocity),
-        accelerations: input(Input::ReferenceAcceleration),
-        gravity: true,
-    };
-    let transposed = |y: Vec<Expr>| -> Vec<Expr> {
-        let p = set.parameters.len();
+        self.rows(regressor::regressor(self.b, &self.chain, &columns, drive))
+    }
+
+    /// Yᵀ·e for the errors e of the coordinates.
+    fn transposed_times_errors(&self, y: &[Expr]) -> Vec<Expr> {
+        let (b, p) = (self.b, self.set.parameters.len());
         let product = |c: usize| {
             let times = |i: usize| b.mul(&y[i * p + c], &b.input(Input::Error(i)));
-            (0..dof).fold(Expr::ZERO, |sum, i| b.add(&sum, &times(i)))
+            (0..self.subject.arm.dof()).fold(Expr::ZERO, |sum, i| b.add(&sum, &times(i)))
         };
         (0..p).map(product).collect()
-    };
-    let derivatives = |direction: fn(usize) -> Direction| -> Vec<Expr> {
-        let torques = torque(&input(Input::Acceleration), true);
-        let columns: Vec<Vec<Expr>> =
-            (0..n).map(|j| differentiate::derivative(&b, &torques, direction(j))).collect();
-        followers.columns(&b, (0..dof * n).map(|k| columns[k % n][k / n]).collect())
-    };
-    let placed = |frame: &Option<Placement>| {
+    }
+
+    fn mass_matrix(&self) -> Vec<Expr> {
+        self.square(composite::mass_matrix(self.b, &self.chain, &self.bodies))
+    }
+
+    /// M⁻¹·(τ − C·q̇ − g)
+    fn forward_dynamics(&self) -> Vec<Expr> {
+        let b = self.b;
+        let bias = self.torque(self.at_rest(), true);
+        let torques: Vec<Expr> = (0..self.subject.arm.dof()).map(|i| b.input(Input::Torque(i))).collect();
+        let right: Vec<Expr> = torques.iter().zip(&bias).map(|(t, c)| b.sub(t, c)).collect();
+        forward::solve_symmetric(b, &self.mass_matrix(), &right)
+    }
+
+    /// Where frame 0 and the tool are.
+    fn ends(&self) -> pose::Ends {
+        let b = self.b;
         let symbol = |index, sine| b.symbol(index, sine);
-        PlacementElements::build(&b, frame.as_ref(), symbols, |x| b.constant(x), symbol)
-    };
-    let mass_matrix = || square(composite::mass_matrix(&b, &chain, &bodies));
-    let ends = || pose::Ends { base: placed(&arm.base), tool: placed(&arm.tool) };
-    let outputs = match function {
-        Function::InverseDynamics => torque(&input(Input::Acceleration), true),
-        Function::InverseDynamicsWithoutGravity => torque(&input(Input::Acceleration), false),
-        Function::Regressor => regressor(&motion()),
-        Function::RegressorTransposeTimes => transposed(regressor(&motion())),
-        Function::SlotineLiRegressor => regressor(&reference()),
-        Function::SlotineLiTransposeTimes => transposed(regressor(&reference())),
-        Function::MassMatrix => mass_matrix(),
-        Function::MassMatrixInverse => forward::inverse_symmetric(&b, &mass_matrix(), dof),
-        Function::CoriolisMatrix => square(coriolis::coriolis_matrix(&b, &chain, &bodies, &velocities)),
-        Function::CoriolisTimesVelocity => torque(&none, false),
-        Function::CoriolisTransposeTimesVelocity => {
-            rows(momentum::coriolis_transpose_times_velocity(&b, &chain, &bodies, &velocities))
-        }
-        Function::Gravity => rows(composite::gravity(&b, &chain, &bodies)),
-        Function::ForwardDynamics => {
-            let bias = torque(&none, true);
-            let torques: Vec<Expr> = (0..dof).map(|i| b.input(Input::Torque(i))).collect();
-            let right: Vec<Expr> = torques.iter().zip(&bias).map(|(t, c)| b.sub(t, c)).collect();
-            forward::solve_symmetric(&b, &mass_matrix(), &right)
-        }
-        Function::ForwardKinematics => pose::forward_kinematics(&b, &elements, &ends()),
-        Function::Jacobian => followers.columns(&b, pose::jacobian(&b, &elements, &ends())),
-        Function::JacobianRateTimesVelocity => {
-            let drive = motion::Drive {
-                velocities: velocities.clone(),
-                reference: velocities.clone(),
-                accelerations: none,
-                gravity: false,
-            };
-            let straight = Chain::build(&b, arm, &elements, Form { last_in_frame_before: false, ..form });
-            pose::jacobian_rate_times_velocity(&b, &elements, &straight, &geometry[n - 1], &ends(), &drive)
-        }
-        Function::KineticEnergy => vec![momentum::kinetic_energy(&b, &chain, &bodies, &velocities)],
-        Function::PotentialEnergy => {
-            let row = energy::potential_regressor(&b, arm, &elements, set, field);
-            let term = |(i, column): (usize, &Expr)| b.mul(column, &value(i));
-            let terms: Vec<Expr> = row.iter().enumerate().map(term).collect();
-            vec![terms.iter().fold(Expr::ZERO, |sum, t| b.add(&sum, t))]
-        }
-        Function::KineticEnergyRegressor => energy::kinetic_regressor(&b, arm, &elements, set, field),
-        Function::PotentialEnergyRegressor => energy::potential_regressor(&b, arm, &elements, set, field),
-        Function::Momentum => rows(momentum::momentum(&b, &chain, &bodies, &velocities)),
-        Function::TorqueByPosition => derivatives(Direction::Position),
-        Function::TorqueByVelocity => derivatives(Direction::Velocity),
-    };
-    let parameters = set.parameters.len();
-    let (graph, outputs) = followers.of_coordinates(b.finish(), outputs);
-    let (graph, outputs) = optimize::optimize(graph, outputs, field, passes);
-    let shape = function.shape(dof, parameters);
-    FunctionGraph { function, graph, outputs, shape, joints: dof, parameters, baked: baked.is_some() }
+        let placed = |frame: &Option<Placement>| {
+            PlacementElements::build(b, frame.as_ref(), self.subject.symbols, |x| b.constant(x), symbol)
+        };
+        pose::Ends { base: placed(&self.subject.arm.base), tool: placed(&self.subject.arm.tool) }
+    }
+
+    /// J̇·q̇: the tool's acceleration without q̈, from the recursion along a chain whose last link has axes of its own.
+    fn jacobian_rate_times_velocity(&self) -> Vec<Expr> {
+        let Subject { arm, angles, .. } = self.subject;
+        let drive = self.drive(self.at_rest(), false);
+        let form = Form { last_in_frame_before: false, ..self.form };
+        let chain = Chain::build(self.b, arm, angles, &self.elements, form);
+        let last = &self.geometry[arm.links() - 1];
+        pose::jacobian_rate_times_velocity(self.b, &self.elements, &chain, last, &self.ends(), &drive)
+    }
+
+    /// The regressor's row of the potential energy times the parameters.
+    fn potential_energy(&self) -> Expr {
+        let b = self.b;
+        let Subject { arm, field, .. } = self.subject;
+        let row = energy::potential_regressor(b, arm, &self.elements, self.set, field);
+        let term = |(i, column): (usize, &Expr)| b.mul(column, &parameter(b, self.baked, i));
+        let terms: Vec<Expr> = row.iter().enumerate().map(term).collect();
+        terms.iter().fold(Expr::ZERO, |sum, t| b.add(&sum, t))
+    }
+
+    /// ∂τ/∂q or ∂τ/∂q̇, n × n.
+    fn torque_derivatives(&self, direction: fn(usize) -> Direction) -> Vec<Expr> {
+        let (n, dof) = (self.subject.arm.links(), self.subject.arm.dof());
+        let torques = self.torque(self.each(Input::Acceleration), true);
+        let columns: Vec<Vec<Expr>> =
+            (0..n).map(|j| differentiate::derivative(self.b, &torques, direction(j))).collect();
+        self.followers.columns(self.b, (0..dof * n).map(|k| columns[k % n][k / n]).collect())
+    }
+}
+
+/// A parameter of the set as an input, or its value.
+fn parameter(b: &Builder, baked: Option<&[Rational]>, i: usize) -> Expr {
+    baked.map_or_else(|| b.input(Input::Parameter(i)), |values| b.constant(&values[i]))
 }
 
 /// The arm's quantities as inputs and constants of a graph.
 struct Inputs<'a> {
     b: &'a Builder,
     arm: &'a Arm,
+    angles: &'a Angles,
 }
 
 impl Source<Expr> for Inputs<'_> {
     fn joint_trig(&mut self, joint: usize) -> (Expr, Expr) {
-        let sum = JointSum::joint(joint);
-        let (s, c) = (self.b.input(Input::Sin(sum)), self.b.input(Input::Cos(sum)));
-        // A constant of quarter turns only swaps and signs; any other is added to the angle itself.
-        match self.arm.joints[joint].theta.quarter_turns() {
-            Some(1) => (c, -s),
-            Some(2) => (-s, -c),
-            Some(3) => (-c, s),
-            _ => (s, c),
-        }
+        self.angles.of_chain(self.b, &[(joint, false)])
     }
     fn position(&mut self, joint: usize) -> Expr {
         self.b.input(Input::Position(joint))
@@ -289,12 +382,4 @@ impl Source<Expr> for Inputs<'_> {
     fn symbol(&mut self, index: usize, sine: bool) -> Expr {
         self.b.symbol(index, sine)
     }
-}
-
-/// What is added to q before its sine and cosine are taken: theta where it is no multiple of pi/2; of a joint
-/// that follows another, to its ratio times the other's q, its offset too.
-pub fn trig_offset(arm: &Arm, joint: usize) -> f64 {
-    let joint = &arm.joints[joint];
-    let offset = joint.mimic.as_ref().map_or(0.0, |mimic| to_f64(&mimic.offset));
-    if joint.theta.quarter_turns().is_some() { offset } else { joint.theta.radians() + offset }
 }

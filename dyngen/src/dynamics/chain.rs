@@ -8,7 +8,6 @@
 
 use crate::arm::{Arm, Convention, JointKind};
 use crate::exact::algebra::Algebra;
-use crate::graph::JointSum;
 use crate::lagrangian::elements::{ArmElements, JointElements};
 use num_traits::Zero;
 
@@ -39,18 +38,6 @@ pub fn stages(arm: &Arm) -> Vec<std::ops::Range<usize>> {
         }
     }
     stages
-}
-
-/// Every sum of joint angles whose sine and cosine the recursions may use, beside the joints' own.
-pub fn sums(arm: &Arm) -> Vec<JointSum> {
-    let reversed = reversed(arm);
-    let mut sums = Vec::new();
-    for stage in stages(arm) {
-        for end in stage.clone().skip(1) {
-            sums.push(JointSum::of((stage.start..=end).map(|i| (i, reversed[i]))).0);
-        }
-    }
-    sums
 }
 
 /// The twist about x before a joint.

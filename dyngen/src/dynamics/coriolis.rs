@@ -13,7 +13,7 @@ use super::moments::Moments;
 use super::motion::{Drive, StageMotion, motions};
 use super::regroup::LinkBody;
 use super::spin::turned_tensor;
-use super::stage::{Chain, STRAIGHT, Stage, back_x, back_z, plus, scaled};
+use super::stage::{Chain, Member, STRAIGHT, Stage, back_x, back_z, plus, scaled};
 use super::wrench::{Wrench, lever};
 use crate::arm::JointKind;
 use crate::exact::algebra::Algebra;
@@ -92,19 +92,32 @@ pub fn coriolis_matrix(b: &Builder, chain: &Chain, bodies: &[LinkBody], velociti
         chain.stages.iter().flat_map(|s| s.members.iter().map(|m| m.reversed)).collect();
     let signed = |k: usize| if reversed[k / n] == reversed[k % n] { matrix[k] } else { -matrix[k] };
     let mut matrix: Vec<Expr> = (0..n * n).map(signed).collect();
-    for (s, member, rotor) in coupled {
-        // About the chain's z, which the joints of its own stage do not turn.
-        let mut wheel = Share::NONE;
-        wheel.add_wheel(b, rotor, &motions[s]);
-        let (mut row, mut column) = (vec![Expr::ZERO; n], vec![Expr::ZERO; n]);
-        let inner = (&chain.stages[..s], &motions[..s]);
-        project(b, inner, chain.form.link_to_link, &chain.stages[s], wheel, |j, upper, lower| {
-            let sign = |x: Expr| if reversed[j] { -x } else { x };
-            (column[j], row[j]) = (sign(upper), sign(lower));
-        });
-        add_coupled(b, member, Expr::ZERO, (&row, &column), &mut matrix);
+    for motor in coupled {
+        add_coupled_motor(b, chain, &motions, &reversed, motor, &mut matrix);
     }
     matrix
+}
+
+/// Adds what the rotor of a member of a stage makes of C where its motor turns with several joints.
+fn add_coupled_motor(
+    b: &Builder,
+    chain: &Chain,
+    motions: &[StageMotion],
+    reversed: &[bool],
+    (s, member, rotor): (usize, &Member, Expr),
+    matrix: &mut [Expr],
+) {
+    // About the chain's z, which the joints of its own stage do not turn.
+    let mut wheel = Share::NONE;
+    wheel.add_wheel(b, rotor, &motions[s]);
+    let n = reversed.len();
+    let (mut row, mut column) = (vec![Expr::ZERO; n], vec![Expr::ZERO; n]);
+    let inner = (&chain.stages[..s], &motions[..s]);
+    project(b, inner, chain.form.link_to_link, &chain.stages[s], wheel, |j, upper, lower| {
+        let sign = |x: Expr| if reversed[j] { -x } else { x };
+        (column[j], row[j]) = (sign(upper), sign(lower));
+    });
+    add_coupled(b, member, Expr::ZERO, (&row, &column), matrix);
 }
 
 /// The stage's own entries for its joints from those for its links: a joint moves its link and all after it.

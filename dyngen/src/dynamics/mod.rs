@@ -1,5 +1,6 @@
 //! Kinematics and the recursions that are emitted, as graphs, one file a function.
 
+pub mod angles;
 pub mod body;
 pub mod build;
 pub mod chain;

@@ -5,7 +5,7 @@ use super::chain::LinkGeometry;
 use super::inverse::entry_wrench;
 use super::motion::{Drive, LinkMotion, StageMotion, axis_rate, motions};
 use super::spin::{Spin, turned_tensor};
-use super::stage::{Chain, STRAIGHT, SinCos, Stage, back_x, back_z, plus, scaled};
+use super::stage::{Chain, Member, STRAIGHT, SinCos, Stage, back_x, back_z, plus, scaled};
 use super::wrench::Wrench;
 use crate::arm::{JointKind, Parameter, ParameterKind};
 use crate::exact::algebra::Algebra;
@@ -92,7 +92,6 @@ fn views(b: &Builder, chain: &Chain, motions: &[StageMotion]) -> (Vec<LinkView>,
     let mut seen: Vec<Axis> = Vec::new();
     let (mut views, mut before_stages) = (Vec::with_capacity(chain.dof()), Vec::new());
     let mut home: Option<(Vec<Turn>, Vec<Vector>)> = None;
-    let turn_z = |(s, c): SinCos, v: &Vector| crate::lagrangian::elements::turn_z(b, &s, &c, v);
     for (stage, motion) in chain.stages.iter().zip(motions) {
         let (s, c) = stage.twist;
         for axis in &mut seen {
@@ -107,20 +106,8 @@ fn views(b: &Builder, chain: &Chain, motions: &[StageMotion]) -> (Vec<LinkView>,
         let before = seen.clone();
         for (k, member) in stage.members.iter().enumerate() {
             let unit = [Expr::ZERO, Expr::ZERO, Expr::ONE];
-            let in_axes = |axis: &Axis| Axis {
-                angular: turn_z(member.angle, &axis.angular),
-                linear: turn_z(member.angle, &axis.linear),
-            };
-            // The linear parts of earlier coordinates grow from member to member, their angular parts stay.
-            let mut axes: Vec<Axis> = if k == 0 || !chain.form.link_to_link {
-                let base = if k == 0 { &before } else { &seen };
-                base.iter().map(in_axes).collect()
-            } else {
-                let angular = before.iter().map(|axis| turn_z(member.angle, &axis.angular));
-                let within = std::iter::repeat_n(ZERO, k);
-                let linear = seen.iter().map(|axis| turn_z(member.step, &axis.linear));
-                angular.chain(within).zip(linear).map(|(angular, linear)| Axis { angular, linear }).collect()
-            };
+            let link_to_link = chain.form.link_to_link && k > 0;
+            let mut axes = seen_from(b, member, &seen, link_to_link.then_some(&before));
             let own = match stage.kind {
                 JointKind::Revolute => Axis { angular: unit, linear: ZERO },
                 JointKind::Prismatic => {
@@ -158,6 +145,23 @@ fn views(b: &Builder, chain: &Chain, motions: &[StageMotion]) -> (Vec<LinkView>,
         }
     }
     (views, before_stages)
+}
+
+/// The axes of earlier coordinates in a member's own axes. From link to link only their linear parts grow: their
+/// angular parts stay those from before the stage, where members of the stage have none.
+fn seen_from(b: &Builder, member: &Member, seen: &[Axis], link_to_link: Option<&Vec<Axis>>) -> Vec<Axis> {
+    let turn_z = |(s, c): SinCos, v: &Vector| crate::lagrangian::elements::turn_z(b, &s, &c, v);
+    let Some(before) = link_to_link else {
+        let in_axes = |axis: &Axis| Axis {
+            angular: turn_z(member.angle, &axis.angular),
+            linear: turn_z(member.angle, &axis.linear),
+        };
+        return seen.iter().map(in_axes).collect();
+    };
+    let angular = before.iter().map(|axis| turn_z(member.angle, &axis.angular));
+    let within = std::iter::repeat(ZERO);
+    let linear = seen.iter().map(|axis| turn_z(member.step, &axis.linear));
+    angular.chain(within).zip(linear).map(|(angular, linear)| Axis { angular, linear }).collect()
 }
 
 /// The torques of a unit of one inertial parameter.

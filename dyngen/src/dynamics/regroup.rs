@@ -251,6 +251,18 @@ impl<'a> Map<'a> {
     }
 }
 
+/// What a link's body may take, whatever the set.
+fn columns_of_link(link: usize) -> impl Iterator<Item = Column> {
+    let entries = (0..ENTRIES).map(move |entry| Column::Entry(link, entry));
+    entries.chain([Column::EndMass(link), Column::Rotor(link), Column::Flywheel(link)])
+}
+
+/// Of each link its stage, and the link before that.
+fn stages_of_links(arm: &Arm) -> (Vec<usize>, Vec<Option<usize>>) {
+    let stages = chain::stages(arm).into_iter().enumerate();
+    stages.flat_map(|(s, stage)| stage.clone().map(move |_| (s, stage.start.checked_sub(1)))).unzip()
+}
+
 /// What is known exactly of how an arm's columns depend.
 #[derive(Clone, Copy, Debug)]
 pub struct Known<'a> {
@@ -289,23 +301,10 @@ impl Regrouping {
                 minimal_coordinates(field, dependence, &sum)
             }
         };
-        let n = arm.links();
-        let mut before_stage = vec![None; n];
-        let mut stage_of = vec![0; n];
-        for (s, stage) in chain::stages(arm).into_iter().enumerate() {
-            for i in stage.clone() {
-                before_stage[i] = stage.start.checked_sub(1);
-                stage_of[i] = s;
-            }
-        }
-        let mut columns: Vec<Column> = (0..n)
-            .flat_map(|link| {
-                let entries = (0..ENTRIES).map(move |entry| Column::Entry(link, entry));
-                entries.chain([Column::EndMass(link), Column::Rotor(link), Column::Flywheel(link)])
-            })
-            .collect();
+        let (stage_of, before_stage) = stages_of_links(arm);
         let given = (0..set.parameters.len()).map(Column::Given);
-        columns.extend(given.clone());
+        let mut columns: Vec<Column> =
+            (0..arm.links()).flat_map(columns_of_link).chain(given.clone()).collect();
         columns.sort_by_key(|c| order.rank(arm, &stage_of, *c));
         let coordinates: Vec<Option<Vec<(usize, Constant)>>> = columns
             .iter()

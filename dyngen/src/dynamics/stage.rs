@@ -1,11 +1,12 @@
 //! The chain in expressions: stages of parallel axes with their angles, ready for a recursion.
 
+use super::angles::Angles;
 use super::body::{Vector, ZERO};
 use super::chain::{self, LinkGeometry, Origins};
 use crate::arm::{Arm, JointKind};
 use crate::exact::algebra::Algebra;
 use crate::exact::rational::Rational;
-use crate::graph::{Builder, Expr, Input, JointSum};
+use crate::graph::{Builder, Expr};
 use crate::lagrangian::elements::ArmElements;
 
 /// Sine and cosine.
@@ -91,11 +92,11 @@ pub struct Chain {
 
 impl Chain {
     /// The chain of an arm.
-    pub fn build(b: &Builder, arm: &Arm, elements: &ArmElements<Expr>, form: Form) -> Chain {
+    pub fn build(b: &Builder, arm: &Arm, angles: &Angles, elements: &ArmElements<Expr>, form: Form) -> Chain {
         let links = chain::geometry(b, arm, form.origins, elements);
         let stages = chain::stages(arm);
         let mut stages: Vec<Stage> =
-            stages.into_iter().map(|joints| stage(b, arm, elements, &links, joints)).collect();
+            stages.into_iter().map(|joints| stage(b, arm, angles, elements, &links, joints)).collect();
         let mut last_turn = STRAIGHT;
         if let Some(last) =
             stages.last_mut().filter(|s| form.last_in_frame_before && s.kind == JointKind::Revolute)
@@ -119,24 +120,30 @@ impl Chain {
     }
 }
 
+/// One stage, of joints that follow each other in the chain.
 fn stage(
     b: &Builder,
     arm: &Arm,
+    angles: &Angles,
     elements: &ArmElements<Expr>,
     links: &[LinkGeometry<Expr>],
     joints: std::ops::Range<usize>,
 ) -> Stage {
     let first = joints.start;
     let kind = arm.joints[first].kind;
+    let turn = |joints: std::ops::RangeInclusive<usize>| {
+        let signs: Vec<(usize, bool)> = joints.map(|i| (i, links[i].reversed)).collect();
+        angles.of_chain(b, &signs)
+    };
     let members = joints
         .map(|i| {
             let angle = match kind {
-                JointKind::Revolute => sum_of_angles(b, arm, links, first..i + 1),
+                JointKind::Revolute => turn(first..=i),
                 JointKind::Prismatic => {
                     signed(links[i].reversed, (elements.joints[i].sin, elements.joints[i].cos))
                 }
             };
-            let step = if i == first { angle } else { sum_of_angles(b, arm, links, i..i + 1) };
+            let step = if i == first { angle } else { turn(i..=i) };
             let LinkGeometry { reversed, reach, .. } = links[i];
             let about_z = |(joint, factor): (usize, Rational)| {
                 (joint, b.constant(&if reversed { -factor } else { factor }))
@@ -155,30 +162,6 @@ fn stage(
 
 fn signed(negative: bool, (s, c): SinCos) -> SinCos {
     (if negative { -s } else { s }, c)
-}
-
-/// Sine and cosine of the sum of some joints' angles q + theta about the chain's z. Quarter turns swap and
-/// sign; any other theta is in the input.
-fn sum_of_angles(
-    b: &Builder,
-    arm: &Arm,
-    links: &[LinkGeometry<Expr>],
-    joints: std::ops::Range<usize>,
-) -> SinCos {
-    let (sum, negative) = JointSum::of(joints.clone().map(|i| (i, links[i].reversed)));
-    let (s, c) = signed(negative, (b.input(Input::Sin(sum)), b.input(Input::Cos(sum))));
-    let quarters: u8 = joints
-        .map(|i| {
-            let turns = arm.joints[i].theta.quarter_turns().unwrap_or(0);
-            if links[i].reversed { 4 - turns } else { turns }
-        })
-        .sum();
-    match quarters % 4 {
-        1 => (c, -s),
-        2 => (-s, -c),
-        3 => (-c, s),
-        _ => (s, c),
-    }
 }
 
 impl Member {

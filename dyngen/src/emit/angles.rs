@@ -1,12 +1,10 @@
 //! What functions take of joint positions: sines and cosines, all angles of a function at once.
 
 use super::lanes::{lane_name, used};
-use crate::arm::{Arm, Drive, Joint, JointKind};
+use crate::arm::{Arm, Joint, JointKind};
 use crate::dynamics::FunctionGraph;
-use crate::dynamics::build::trig_offset;
-use crate::dynamics::followers::angles;
+use crate::dynamics::angles::{Angles, JointAngle};
 use crate::dynamics::function::Argument;
-use crate::exact::rational;
 use crate::graph::{Input, JointSum};
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
@@ -14,38 +12,10 @@ use quote::{ToTokens, format_ident, quote};
 use std::collections::BTreeSet;
 
 /// The struct of sines and cosines that functions share.
-pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
-    let (bindings, fields) = trig_fields(arm, &all_inputs(arm));
-    let drives = arm.drives();
-    let term = |i: usize| {
-        let Drive { coordinate, joint, ratio, .. } = &drives[i];
-        let q = format!("q{}", coordinate + 1);
-        if *joint == i { q } else { format!("{}·{q}", rational::to_f64(ratio)) }
-    };
-    let sums: Vec<String> = (angles(arm).iter().enumerate().skip(arm.dof()))
-        .map(|(k, sum)| {
-            let text: String = sum
-                .joints()
-                .enumerate()
-                .map(|(k, (i, negative))| {
-                    let sign = if k == 0 {
-                        ""
-                    } else if negative {
-                        " − "
-                    } else {
-                        " + "
-                    };
-                    format!("{sign}{}", term(i))
-                })
-                .collect();
-            format!(" Angle {}: {text}, across parallel axes.", k + 1)
-        })
-        .collect();
-    let count = Literal::usize_unsuffixed(angles(arm).len());
-    let shifted: Vec<String> = (arm.coordinates().into_iter().enumerate())
-        .filter(|(_, joint)| trig_offset(arm, *joint) != 0.0)
-        .map(|(i, joint)| format!(" Joint {}: of q + {} rad.", i + 1, trig_offset(arm, joint)))
-        .collect();
+pub(super) fn trig_struct(model: &Model) -> TokenStream {
+    let (bindings, fields) = trig_fields(model, &all_inputs(model));
+    let count = Literal::usize_unsuffixed(model.angles().taken().len());
+    let (shifted, sums) = (shifted_docs(model), sum_docs(model));
     quote! {
         /// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
         pub const ANGLES: usize = #count;
@@ -75,28 +45,59 @@ pub(super) fn trig_struct(arm: &Arm) -> TokenStream {
     }
 }
 
+/// Lines that say of which joints the angle is not q alone.
+fn shifted_docs(model: &Model) -> Vec<String> {
+    let joints = model.arm().coordinates().into_iter().enumerate();
+    let offsets = joints.map(|(i, joint)| (i, model.angles().joint(joint).offset));
+    offsets
+        .filter(|(_, offset)| *offset != 0.0)
+        .map(|(i, offset)| format!(" Joint {}: of q + {offset} rad.", i + 1))
+        .collect()
+}
+
+/// Lines that say what the angles behind those of the coordinates are.
+fn sum_docs(model: &Model) -> Vec<String> {
+    let term = |joint: usize| {
+        let JointAngle { coordinate, ratio, .. } = model.angles().joint(joint);
+        ratio.map_or(String::new(), |ratio| format!("{ratio}·")) + &format!("q{}", coordinate + 1)
+    };
+    let sign = |k: usize, negative: bool| match (k, negative) {
+        (0, _) => "",
+        (_, true) => " − ",
+        (_, false) => " + ",
+    };
+    let line = |(k, sum): (usize, &JointSum)| {
+        let terms = sum.joints().enumerate();
+        let text: String =
+            terms.map(|(k, (joint, negative))| format!("{}{}", sign(k, negative), term(joint))).collect();
+        format!(" Angle {}: {text}, across parallel axes.", k + 1)
+    };
+    model.angles().taken().iter().enumerate().skip(model.arm().dof()).map(line).collect()
+}
+
 /// Everything that is made of q.
-fn all_inputs(arm: &Arm) -> BTreeSet<Input> {
-    let turning = angles(arm).into_iter().flat_map(|sum| [Input::Sin(sum), Input::Cos(sum)]);
-    let read = (0..arm.dof()).filter(|i| is_read(arm, *i));
+fn all_inputs(model: &Model) -> BTreeSet<Input> {
+    let turning = model.angles().taken().iter().flat_map(|sum| [Input::Sin(*sum), Input::Cos(*sum)]);
+    let read = (0..model.arm().dof()).filter(|i| is_read(model, *i));
     turning.chain(read.map(Input::Position)).collect()
 }
 
 /// Whether a coordinate may be read as it is: where it, or a joint that follows it, is prismatic.
-fn is_read(arm: &Arm, coordinate: usize) -> bool {
-    let slides = |(joint, drive): (&Joint, &Drive)| {
-        drive.coordinate == coordinate && joint.kind == JointKind::Prismatic
+fn is_read(model: &Model, coordinate: usize) -> bool {
+    let slides = |(i, joint): (usize, &Joint)| {
+        model.angles().joint(i).coordinate == coordinate && joint.kind == JointKind::Prismatic
     };
-    arm.joints.iter().zip(&arm.drives()).any(slides)
+    model.arm().joints.iter().enumerate().any(slides)
 }
 
+/// Whether a function takes anything of q.
 pub(super) fn uses_positions(used: &BTreeSet<Input>) -> bool {
     used.iter().any(|i| matches!(i, Input::Sin(_) | Input::Cos(_) | Input::Position(_)))
 }
 
 /// `let trig = …` with what a function uses; the rest is zero, because nobody reads it.
-pub(super) fn trig_of(arm: &Arm, used: &BTreeSet<Input>) -> TokenStream {
-    let (bindings, fields) = trig_fields(arm, used);
+pub(super) fn trig_of(model: &Model, used: &BTreeSet<Input>) -> TokenStream {
+    let (bindings, fields) = trig_fields(model, used);
     if uses_positions(used) { quote!(#bindings let trig = #fields;) } else { quote!(let trig = #fields;) }
 }
 
@@ -112,12 +113,13 @@ struct Positions {
 
 impl Positions {
     /// `position` is how a joint's position is read.
-    fn new(arm: &Arm, used: &BTreeSet<Input>, position: impl Fn(usize) -> TokenStream) -> Positions {
+    fn new(model: &Model, used: &BTreeSet<Input>, position: impl Fn(usize) -> TokenStream) -> Positions {
+        let arm = model.arm();
         let zero = quote!(T::zero());
         let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
         let places: Vec<bool> = (0..arm.dof()).map(|i| used.contains(&Input::Position(i))).collect();
         let (mut found, mut sines, mut cosines) = (Vec::new(), Vec::new(), Vec::new());
-        for sum in angles(arm) {
+        for sum in model.angles().taken().iter().copied() {
             let turns = sum.joints().all(|(i, _)| revolute(i));
             let name = |input: Input| {
                 (turns && used.contains(&input)).then(|| format_ident!("{}", input.to_string()))
@@ -138,43 +140,32 @@ impl Positions {
     }
 }
 
-/// An angle of the joints for the coordinates' positions.
-fn angle(arm: &Arm, sum: JointSum, position: impl Fn(usize) -> TokenStream) -> TokenStream {
-    let drives = arm.drives();
-    let terms = sum.joints().enumerate().map(|(k, (i, negative))| {
-        let Drive { coordinate, joint, ratio, .. } = &drives[i];
+/// An angle for the coordinates' positions.
+fn angle(angles: &Angles, sum: JointSum, position: impl Fn(usize) -> TokenStream) -> TokenStream {
+    let number = |x: f64| {
+        let number = Literal::f64_suffixed(x);
+        quote!(nalgebra::convert::<f64, T>(#number))
+    };
+    let terms = sum.joints().enumerate().map(|(k, (joint, negative))| {
+        let JointAngle { coordinate, ratio, .. } = angles.joint(joint);
+        let ratio = ratio.map(number).map(|ratio| quote!(#ratio *));
         let q = position(*coordinate);
-        let q = if *joint == i {
-            q
-        } else {
-            let ratio = Literal::f64_suffixed(rational::to_f64(ratio));
-            quote!(nalgebra::convert::<f64, T>(#ratio) * #q)
-        };
         match (k, negative) {
-            (0, _) => q,
-            (_, false) => quote!(+ #q),
-            (_, true) => quote!(- #q),
+            (0, _) => quote!(#ratio #q),
+            (_, false) => quote!(+ #ratio #q),
+            (_, true) => quote!(- #ratio #q),
         }
     });
-    let offset = sum.value(|i| trig_offset(arm, i));
-    let offset = (offset != 0.0).then(|| {
-        let offset = Literal::f64_suffixed(offset);
-        quote!(+ nalgebra::convert::<f64, T>(#offset))
-    });
+    let offset = angles.offset(sum);
+    let offset = (offset != 0.0).then(|| number(offset)).map(|offset| quote!(+ #offset));
     quote!(#(#terms)* #offset)
-}
-
-/// The coordinates that an angle depends on.
-fn coordinates_of(arm: &Arm, sum: JointSum) -> BTreeSet<usize> {
-    let drives = arm.drives();
-    sum.joints().map(|(i, _)| drives[i].coordinate).collect()
 }
 
 /// Computes all sines and cosines together, and builds a `Trig` of the inputs that are used. A pattern over
 /// the storage needs no bounds check and cannot panic.
-fn trig_fields(arm: &Arm, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
+fn trig_fields(model: &Model, used: &BTreeSet<Input>) -> (TokenStream, TokenStream) {
     let position = |i: usize| lane_name(Argument::Positions, i).into_token_stream();
-    let Positions { places, angles, trig } = Positions::new(arm, used, position);
+    let Positions { places, angles, trig } = Positions::new(model, used, position);
     let taken = places.contains(&true).then(|| {
         let patterns = places.iter().enumerate().map(|(i, read)| if *read { position(i) } else { quote!(_) });
         quote!(let [[#(#patterns),*]] = q.data.0;)
@@ -193,20 +184,20 @@ fn angles_name(sums: impl Iterator<Item = JointSum>) -> Ident {
 }
 
 /// The functions that make of q the angles whose sines and cosines are taken together, each once.
-pub(super) fn angle_functions(arm: &Arm, functions: &[FunctionGraph]) -> TokenStream {
+pub(super) fn angle_functions(model: &Model, functions: &[FunctionGraph]) -> TokenStream {
     let position = |i: usize| lane_name(Argument::Positions, i).into_token_stream();
     let used = functions.iter().map(|built| used(built, &built.graph.needed(&built.outputs)));
     let sets: BTreeSet<Vec<JointSum>> = used
-        .chain([all_inputs(arm)])
-        .map(|used| Positions::new(arm, &used, position).angles.into_iter().map(|a| a.0).collect())
+        .chain([all_inputs(model)])
+        .map(|used| Positions::new(model, &used, position).angles.into_iter().map(|a| a.0).collect())
         .filter(|sums: &Vec<JointSum>| !sums.is_empty())
         .collect();
     let items = sets.iter().map(|sums| {
         let (name, count) = (angles_name(sums.iter().copied()), Literal::usize_unsuffixed(sums.len()));
-        let read: BTreeSet<usize> = sums.iter().flat_map(|sum| coordinates_of(arm, *sum)).collect();
+        let read: BTreeSet<usize> = sums.iter().flat_map(|sum| model.angles().coordinates(*sum)).collect();
         let reads = |i: usize| read.contains(&i);
-        let patterns = (0..arm.dof()).map(|i| if reads(i) { position(i) } else { quote!(_) });
-        let values = sums.iter().map(|sum| angle(arm, *sum, position));
+        let patterns = (0..model.arm().dof()).map(|i| if reads(i) { position(i) } else { quote!(_) });
+        let values = sums.iter().map(|sum| angle(model.angles(), *sum, position));
         quote! {
             #[inline(always)]
             fn #name<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; #count] {
@@ -230,15 +221,14 @@ pub(super) struct TrigOfLane {
 
 impl TrigOfLane {
     pub(super) fn new(model: &Model, built: &FunctionGraph) -> TrigOfLane {
-        let arm = model.arm();
         let used = used(built, &built.graph.needed(&built.outputs));
         let position = |i: usize| {
             let q = lane_name(Argument::Positions, i);
             quote!(#q[lane])
         };
-        let Positions { places, angles, trig } = Positions::new(arm, &used, position);
+        let Positions { places, angles, trig } = Positions::new(model, &used, position);
         let lines = angles.iter().map(|(sum, sine, cosine)| {
-            let angle = angle(arm, *sum, position);
+            let angle = angle(model.angles(), *sum, position);
             quote!(let (#sine, #cosine) = trigonometry::near(#angle);)
         });
         let lines = quote! {
@@ -246,8 +236,8 @@ impl TrigOfLane {
             let trig = #trig;
         };
         let turning: BTreeSet<usize> =
-            angles.iter().flat_map(|(sum, ..)| coordinates_of(arm, *sum)).collect();
-        let read = (0..arm.dof()).map(|i| places[i] || turning.contains(&i)).collect();
+            angles.iter().flat_map(|(sum, ..)| model.angles().coordinates(*sum)).collect();
+        let read = (0..model.arm().dof()).map(|i| places[i] || turning.contains(&i)).collect();
         TrigOfLane { lines, turning, read }
     }
 }
@@ -269,7 +259,7 @@ pub(super) fn trigonometry(arm: &Arm) -> TokenStream {
 }
 
 /// Names for what is read of a `Trig`.
-pub(super) fn positions(arm: &Arm, used: &BTreeSet<Input>) -> TokenStream {
+pub(super) fn positions(model: &Model, used: &BTreeSet<Input>) -> TokenStream {
     let take = |field: &str, inputs: Vec<Input>| {
         let field = Ident::new(field, Span::call_site());
         let any = inputs.iter().any(|input| used.contains(input));
@@ -279,10 +269,11 @@ pub(super) fn positions(arm: &Arm, used: &BTreeSet<Input>) -> TokenStream {
         });
         any.then(|| quote!(let [#(#names),*] = trig.#field;))
     };
+    let angles = model.angles().taken();
     let lines = [
-        take("sin", angles(arm).into_iter().map(Input::Sin).collect()),
-        take("cos", angles(arm).into_iter().map(Input::Cos).collect()),
-        take("position", (0..arm.dof()).map(Input::Position).collect()),
+        take("sin", angles.iter().copied().map(Input::Sin).collect()),
+        take("cos", angles.iter().copied().map(Input::Cos).collect()),
+        take("position", (0..model.arm().dof()).map(Input::Position).collect()),
     ];
     let lines = lines.iter().flatten();
     quote!(#(#lines)*)

@@ -185,29 +185,17 @@ pub fn api(
     first: &CApi,
     functions: &[CFunction],
 ) -> CApi {
-    let guard = prefix.to_uppercase();
-    let real = if scalar == "f32" { "float" } else { "double" };
-    let flat = if functions.iter().any(|f| f.result.starts_with("flat(")) {
-        "
-    /// Numbers of a matrix, column by column.
-    fn flat<const N: usize>(values: &[Real]) -> [Real; N] {
-        let mut numbers = [0.0; N];
-        numbers.iter_mut().zip(values).for_each(|(to, from)| *to = *from);
-        numbers
+    CApi {
+        module: module(prefix, &first.module, functions),
+        header: header(prefix, scalar, joints, about, &first.header, functions),
     }
-"
-    } else {
-        ""
-    };
-    let functions_in_rust: String = functions.iter().map(|f| function(prefix, f)).collect();
-    let in_header: String = functions
-        .iter()
-        .map(|f| {
-            let prototype = format!("int {prefix}_{}({})", f.name, in_c(prefix, &f.inputs, &f.output));
-            declared(&f.what, &f.inputs, &f.output, &prototype)
-        })
-        .collect();
-    let module = format!(
+}
+
+/// The module `c`, in Rust.
+fn module(prefix: &str, first: &str, functions: &[CFunction]) -> String {
+    let flat = if functions.iter().any(|f| f.result.starts_with("flat(")) { FLAT } else { "" };
+    let functions: String = functions.iter().map(|f| function(prefix, f)).collect();
+    format!(
         "
 /// The same for callers in C: `{prefix}.h` says what each function does.
 #[allow(unsafe_code)]
@@ -218,12 +206,40 @@ pub mod c {{
     const OK: i32 = 0;
     /// A pointer is null: nothing was written.
     const NULL: i32 = 1;
-{flat}{}{functions_in_rust}}}
-",
-        first.module
-    );
-    let header = format!(
-        "{}#ifndef {guard}_H
+{flat}{first}{functions}}}
+"
+    )
+}
+
+/// What the results of functions that give a matrix are read with.
+const FLAT: &str = "
+    /// Numbers of a matrix, column by column.
+    fn flat<const N: usize>(values: &[Real]) -> [Real; N] {
+        let mut numbers = [0.0; N];
+        numbers.iter_mut().zip(values).for_each(|(to, from)| *to = *from);
+        numbers
+    }
+";
+
+/// The header, in C.
+fn header(
+    prefix: &str,
+    scalar: &str,
+    joints: usize,
+    about: &str,
+    first: &str,
+    functions: &[CFunction],
+) -> String {
+    let guard = prefix.to_uppercase();
+    let real = if scalar == "f32" { "float" } else { "double" };
+    let about = comment(about);
+    let of = |f: &CFunction| {
+        let prototype = format!("int {prefix}_{}({})", f.name, in_c(prefix, &f.inputs, &f.output));
+        declared(&f.what, &f.inputs, &f.output, &prototype)
+    };
+    let functions: String = functions.iter().map(of).collect();
+    format!(
+        "{about}#ifndef {guard}_H
 #define {guard}_H
 
 #include <stdint.h>
@@ -241,16 +257,13 @@ typedef {real} {prefix}_real;
 #define {guard}_NULL 1
 #define {guard}_NOT_BEGUN 2
 
-{}{in_header}#ifdef __cplusplus
+{first}{functions}#ifdef __cplusplus
 }}
 #endif
 
 #endif
-",
-        comment(about),
-        first.header
-    );
-    CApi { module, header }
+"
+    )
 }
 
 #[cfg(test)]

@@ -14,7 +14,6 @@ use std::collections::BTreeSet;
 
 /// A function's items: one that takes q, and one that takes [`Trig`] in its place.
 pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) -> TokenStream {
-    let arm = model.arm();
     let needed = built.graph.needed(&built.outputs);
     let used = used(built, &needed);
     let name = Ident::new(built.function.name(), Span::call_site());
@@ -26,8 +25,8 @@ pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) ->
         others.iter().map(|a| argument(built, prepared, *a, &used)).unzip();
     let passed = others.iter().map(|a| Ident::new(a.name(), Span::call_site()));
     let plain = others.iter().map(|a| parameter(*a, a.name()));
-    let positions = positions(arm, &used);
-    let trig = trig_of(arm, &used);
+    let positions = positions(model, &used);
+    let trig = trig_of(model, &used);
     let (q, trig_name) = match uses_positions(&used) {
         true => (quote!(q), quote!(trig)),
         false => (quote!(_q), quote!(_trig)),

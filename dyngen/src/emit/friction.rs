@@ -99,12 +99,80 @@ pub(super) fn items(terms: &[FrictionTerm], arm: &Arm) -> TokenStream {
     if terms.is_empty() {
         return quote!();
     }
-    let n = arm.dof();
-    let motors = motor_velocities(arm);
-    let is_coupled = !arm.transmissions.is_empty();
     let count = Literal::usize_unsuffixed(terms.len());
-    let list: String = terms.iter().enumerate().map(|(k, term)| format!("\n{}. `{term}`", k + 1)).collect();
-    let shapes = |what: &str| format!("{what}, one for each column:\n{list}");
+    let coupled = (!arm.transmissions.is_empty()).then(|| motor_velocities(arm));
+    let matrix = coupled.as_deref().map(matrix_constant);
+    let sign = terms.contains(&FrictionTerm::Coulomb).then(sign_function);
+    let columns = columns_function(terms, arm.dof(), coupled.as_deref());
+    let friction = friction_function(arm.dof(), coupled.as_deref());
+    quote! {
+        /// Number of friction terms of a joint.
+        pub const FRICTION_TERMS: usize = #count;
+
+        #matrix
+
+        #sign
+
+        #columns
+
+        #friction
+    }
+}
+
+/// The constant that says how coupled motors turn.
+fn matrix_constant(motors: &[Vec<f64>]) -> TokenStream {
+    let rows = motors.iter().map(|row| {
+        let row = row.iter().map(|x| Literal::f64_suffixed(*x));
+        quote!([#(#row),*])
+    });
+    quote! {
+        /// Motor i turns at the sum over joints j of `MOTOR_VELOCITIES[i][j]` times their velocities, on the
+        /// joint's side of its gear.
+        pub const MOTOR_VELOCITIES: [[f64; JOINTS]; JOINTS] = [#(#rows),*];
+    }
+}
+
+/// The sign that Coulomb's term takes.
+fn sign_function() -> TokenStream {
+    quote! {
+        /// −1, 0 or 1.
+        fn sign<T: SimdRealField + Copy>(x: T) -> T {
+            let (zero, one) = (T::zero(), T::one());
+            one.select(x.simd_gt(zero), (-one).select(x.simd_lt(zero), zero))
+        }
+    }
+}
+
+/// `name1` to `nameN`
+fn names(name: &str, n: usize) -> Vec<Ident> {
+    (0..n).map(|i| format_ident!("{name}{}", i + 1)).collect()
+}
+
+/// The function of every motor's columns for n joints, n × terms; with the matrix of coupled motors.
+fn columns_function(terms: &[FrictionTerm], n: usize, coupled: Option<&[Vec<f64>]>) -> TokenStream {
+    let doc = docs::lines(&columns_doc(terms, coupled.is_some()));
+    let joints = names("dq", n);
+    let velocities = if coupled.is_some() { names("motor", n) } else { joints.clone() };
+    let turned = coupled.map(|motors| {
+        let of = motors.iter().map(|row| sum(row.iter().copied().zip(&joints)));
+        quote!(#(let #velocities = #of;)*)
+    });
+    let columns = terms.iter().map(|term| column(term, &velocities));
+    quote! {
+        #(#[doc = #doc])*
+        #[must_use]
+        pub fn friction_columns<T: SimdRealField + Copy>(
+            dq: &SVector<T, JOINTS>,
+        ) -> SMatrix<T, JOINTS, FRICTION_TERMS> {
+            let [[#(#joints),*]] = dq.data.0;
+            #turned
+            SMatrix::from_array_storage(ArrayStorage([#(#columns),*]))
+        }
+    }
+}
+
+/// What the columns are, and how a regression takes them.
+fn columns_doc(terms: &[FrictionTerm], is_coupled: bool) -> String {
     let (title, rows) = if is_coupled {
         (
             "Friction columns of every motor",
@@ -119,77 +187,38 @@ pub(super) fn items(terms: &[FrictionTerm], arm: &Arm) -> TokenStream {
              regression they stand beside the regressor, each in its own joint's rows.",
         )
     };
-    let columns_doc = docs::lines(&format!(
-        "{}\n\n* `dq`: joint velocities, rad/s\n\nReturns n × terms: {rows}",
-        shapes(title)
-    ));
-    let names = |name: &str| (0..n).map(|i| format_ident!("{name}{}", i + 1)).collect::<Vec<_>>();
-    let (joints, torques) = (names("dq"), names("f"));
-    let velocities = if is_coupled { names("motor") } else { joints.clone() };
-    let turned = is_coupled.then(|| {
-        let of = motors.iter().map(|row| sum(row.iter().copied().zip(&joints)));
-        quote!(#(let #velocities = #of;)*)
-    });
-    let matrix = is_coupled.then(|| {
-        let rows = motors.iter().map(|row| {
-            let row = row.iter().map(|x| Literal::f64_suffixed(*x));
-            quote!([#(#row),*])
-        });
-        quote! {
-            /// Motor i turns at the sum over joints j of `MOTOR_VELOCITIES[i][j]` times their velocities, on the
-            /// joint's side of its gear.
-            pub const MOTOR_VELOCITIES: [[f64; JOINTS]; JOINTS] = [#(#rows),*];
+    let list: String = terms.iter().enumerate().map(|(k, term)| format!("\n{}. `{term}`", k + 1)).collect();
+    format!(
+        "{title}, one for each column:\n{list}\n\n* `dq`: joint velocities, rad/s\n\nReturns n × terms: {rows}"
+    )
+}
+
+/// One term of motors with some velocities.
+fn column(term: &FrictionTerm, velocities: &[Ident]) -> TokenStream {
+    let entries = velocities.iter().enumerate().map(|(i, v)| match term {
+        FrictionTerm::Viscous => quote!(#v),
+        FrictionTerm::Coulomb => quote!(sign(#v)),
+        FrictionTerm::Tanh(shapes) => {
+            let shape = shapes.get(i).or(shapes.first()).copied().unwrap_or_default();
+            let shape = Literal::f64_suffixed(shape);
+            quote!((#v * nalgebra::convert::<f64, T>(#shape)).simd_tanh())
         }
     });
-    let spent = if is_coupled {
+    quote!([#(#entries),*])
+}
+
+/// The function of the joints' friction torques, N·m; with coupled motors Mᵀ times theirs.
+fn friction_function(n: usize, coupled: Option<&[Vec<f64>]>) -> TokenStream {
+    let of_motors = quote!(friction_columns(dq).component_mul(coefficients).column_sum());
+    let spent = coupled.map_or(of_motors.clone(), |motors| {
+        let torques = names("f", n);
         let of = (0..n).map(|j| sum(motors.iter().map(|row| row[j]).zip(&torques)));
         quote! {
-            let [[#(#torques),*]] = friction_columns(dq).component_mul(coefficients).column_sum().data.0;
+            let [[#(#torques),*]] = #of_motors.data.0;
             SVector::from_array_storage(ArrayStorage([[#(#of),*]]))
-        }
-    } else {
-        quote!(friction_columns(dq).component_mul(coefficients).column_sum())
-    };
-    let column = |term: &FrictionTerm| -> TokenStream {
-        let entries = velocities.iter().enumerate().map(|(i, v)| match term {
-            FrictionTerm::Viscous => quote!(#v),
-            FrictionTerm::Coulomb => quote!(sign(#v)),
-            FrictionTerm::Tanh(shapes) => {
-                let shape = shapes.get(i).or(shapes.first()).copied().unwrap_or_default();
-                let shape = Literal::f64_suffixed(shape);
-                quote!((#v * nalgebra::convert::<f64, T>(#shape)).simd_tanh())
-            }
-        });
-        quote!([#(#entries),*])
-    };
-    let columns = terms.iter().map(column);
-    let sign = terms.contains(&FrictionTerm::Coulomb).then(|| {
-        quote! {
-            /// −1, 0 or 1.
-            fn sign<T: SimdRealField + Copy>(x: T) -> T {
-                let (zero, one) = (T::zero(), T::one());
-                one.select(x.simd_gt(zero), (-one).select(x.simd_lt(zero), zero))
-            }
         }
     });
     quote! {
-        /// Number of friction terms of a joint.
-        pub const FRICTION_TERMS: usize = #count;
-
-        #matrix
-
-        #sign
-
-        #(#[doc = #columns_doc])*
-        #[must_use]
-        pub fn friction_columns<T: SimdRealField + Copy>(
-            dq: &SVector<T, JOINTS>,
-        ) -> SMatrix<T, JOINTS, FRICTION_TERMS> {
-            let [[#(#joints),*]] = dq.data.0;
-            #turned
-            SMatrix::from_array_storage(ArrayStorage([#(#columns),*]))
-        }
-
         /// Friction torques of all joints: each row of [`friction_columns`] times the same row of
         /// coefficients.
         ///

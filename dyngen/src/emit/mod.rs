@@ -21,7 +21,7 @@ use crate::dynamics::function::Argument;
 use crate::dynamics::{Function, FunctionGraph};
 use crate::graph::Preparation;
 use crate::model::{Error, Model};
-use crate::parameters::SetKind;
+use crate::parameters::{ParameterSet, SetKind};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
@@ -94,64 +94,26 @@ pub fn source(model: &Model, options: &Options) -> Result<String, Error> {
 /// As [`Model::function`], and friction terms that do not fit the arm.
 pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     let set = model.set(options.parameters)?;
-    let functions = Function::ALL.into_iter().filter(|f| options.functions.contains(f));
     let mut preparation = Preparation::default();
-    let built: Vec<FunctionGraph> = functions
-        .map(|function| {
-            let built = match &options.values {
-                Some(values) => model.baked_function(function, options.parameters, values)?,
-                None => model.function(function, options.parameters)?,
-            };
-            Ok(built.without_preparation(&mut preparation))
-        })
-        .collect::<Result<_, Error>>()?;
+    let built = built(model, options, &mut preparation)?;
     let prepared = preparation.values().len();
     let takes_parameters = built.iter().any(|f| f.arguments().any(|a| a == Argument::Parameters));
     let functions = built.iter().map(|built| code::function(model, built, prepared));
     let batch = options.batch.then(|| batch::module(model, &built));
     let preparation = takes_parameters.then(|| code::preparation(model, &preparation));
-    let (n, p) =
-        (Literal::usize_unsuffixed(model.arm().dof()), Literal::usize_unsuffixed(set.parameters.len()));
-    let names = set.names();
-    let trig = angles::trig_struct(model.arm());
-    let angle_functions = angles::angle_functions(model.arm(), &built);
+    let constants = constants(model.arm(), set, options);
+    let trig = angles::trig_struct(model);
+    let angle_functions = angles::angle_functions(model, &built);
     let trigonometry = angles::trigonometry(model.arm());
-    let values = options.values.as_ref().map(|values| {
-        let values = values.iter().map(|x| Literal::f64_suffixed(*x));
-        quote! {
-            /// The parameters' values that are baked into the functions, SI units.
-            pub const PARAMETER_VALUES: [f64; PARAMETERS] = [#(#values),*];
-        }
-    });
     for term in &options.friction {
         term.check(model.arm().dof()).map_err(Error::Friction)?;
     }
     let friction = friction::items(&options.friction, model.arm());
     let tests = if options.tests { tests::module(model, options)? } else { quote!() };
-    let joint_names = model.arm().has_joint_names().then(|| {
-        let names = model.arm().joint_names();
-        quote! {
-            /// The joints' names, in the order of q; where the arm file gives none, the joint's number from
-            /// 1.
-            pub const JOINT_NAMES: [&str; JOINTS] = [#(#names),*];
-        }
-    });
-    let names_doc = docs::lines(&docs::parameters(set));
     Ok(quote! {
         use nalgebra::{ArrayStorage, SMatrix, SVector, SimdRealField};
 
-        /// Number of joints.
-        pub const JOINTS: usize = #n;
-
-        #joint_names
-
-        /// Number of parameters.
-        pub const PARAMETERS: usize = #p;
-
-        #(#[doc = #names_doc])*
-        pub const PARAMETER_NAMES: [&str; PARAMETERS] = [#(#names),*];
-
-        #values
+        #constants
 
         #trig
 
@@ -169,4 +131,57 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
 
         #tests
     })
+}
+
+/// The functions that are wished, proven, without what `preparation` takes of them.
+fn built(
+    model: &Model,
+    options: &Options,
+    preparation: &mut Preparation,
+) -> Result<Vec<FunctionGraph>, Error> {
+    let functions = Function::ALL.into_iter().filter(|f| options.functions.contains(f));
+    functions
+        .map(|function| {
+            let built = match &options.values {
+                Some(values) => model.baked_function(function, options.parameters, values)?,
+                None => model.function(function, options.parameters)?,
+            };
+            Ok(built.without_preparation(preparation))
+        })
+        .collect()
+}
+
+/// How many joints and parameters there are, their names, and values that are baked in.
+fn constants(arm: &Arm, set: &ParameterSet, options: &Options) -> TokenStream {
+    let (n, p) = (Literal::usize_unsuffixed(arm.dof()), Literal::usize_unsuffixed(set.parameters.len()));
+    let joint_names = arm.has_joint_names().then(|| {
+        let names = arm.joint_names();
+        quote! {
+            /// The joints' names, in the order of q; where the arm file gives none, the joint's number from
+            /// 1.
+            pub const JOINT_NAMES: [&str; JOINTS] = [#(#names),*];
+        }
+    });
+    let (names, names_doc) = (set.names(), docs::lines(&docs::parameters(set)));
+    let values = options.values.as_ref().map(|values| {
+        let values = values.iter().map(|x| Literal::f64_suffixed(*x));
+        quote! {
+            /// The parameters' values that are baked into the functions, SI units.
+            pub const PARAMETER_VALUES: [f64; PARAMETERS] = [#(#values),*];
+        }
+    });
+    quote! {
+        /// Number of joints.
+        pub const JOINTS: usize = #n;
+
+        #joint_names
+
+        /// Number of parameters.
+        pub const PARAMETERS: usize = #p;
+
+        #(#[doc = #names_doc])*
+        pub const PARAMETER_NAMES: [&str; PARAMETERS] = [#(#names),*];
+
+        #values
+    }
 }

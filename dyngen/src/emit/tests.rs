@@ -22,109 +22,26 @@ pub(super) fn module(model: &Model, options: &Options) -> Result<TokenStream, Er
     };
     // Forward dynamics and definiteness are for values that a real arm can have.
     let possible = consistency::check(model, options.parameters, &values)?.possible;
-    let has = |needed: &[Function]| needed.iter().all(|f| options.functions.contains(f));
     let baked = options.values.is_some();
     let p = if baked { quote!() } else { quote!(, &parameters()) };
-    let mut tests = Vec::new();
-    let mut test = |needed: &[Function], body: TokenStream| {
-        if has(needed) {
-            tests.push(quote!(#[test] #body));
-        }
-    };
-    test(
-        &[InverseDynamics, MassMatrix, CoriolisMatrix, Gravity],
-        quote! {
-            fn the_torque_is_the_sum_of_its_parts() {
-                for [q, dq, ddq] in states() {
-                    let parts = mass_matrix(&q #p) * ddq + coriolis_matrix(&q, &dq #p) * dq + gravity(&q #p);
-                    assert_close(&inverse_dynamics(&q, &dq, &ddq #p), &parts, 1e-9);
-                }
-            }
-        },
-    );
-    if has(&[InverseDynamics, Regressor]) {
-        let values = if baked { quote!(SVector::from(PARAMETER_VALUES)) } else { quote!(parameters()) };
-        test(
-            &[],
-            quote! {
-                fn the_torque_is_the_regressor_times_the_parameters() {
-                    for [q, dq, ddq] in states() {
-                        let product = regressor(&q, &dq, &ddq) * #values;
-                        assert_close(&inverse_dynamics(&q, &dq, &ddq #p), &product, 1e-9);
-                    }
-                }
-            },
-        );
-    }
-    test(
-        &[MassMatrix, CoriolisMatrix],
-        quote! {
-            fn the_rate_of_the_mass_matrix_less_twice_the_coriolis_matrix_is_skew() {
-                let step = 1e-5;
-                for [q, dq, _] in states() {
-                    let ahead = mass_matrix(&(q + dq * step) #p);
-                    let behind = mass_matrix(&(q - dq * step) #p);
-                    let rate = (ahead - behind) / (2.0 * step);
-                    let coriolis = coriolis_matrix(&q, &dq #p);
-                    assert_close(&(coriolis + coriolis.transpose()), &rate, 1e-6);
-                }
-            }
-        },
-    );
-    test(
-        &[InverseDynamics, KineticEnergy, PotentialEnergy],
-        quote! {
-            fn the_power_of_the_torques_is_the_change_of_energy() {
-                let step = 1e-5;
-                for [q, dq, ddq] in states() {
-                    let energy = |t: f64| {
-                        let (place, velocity) = (q + dq * t + ddq * (0.5 * t * t), dq + ddq * t);
-                        kinetic_energy(&place, &velocity #p) + potential_energy(&place #p)
-                    };
-                    let rate = SVector::<f64, 1>::new((energy(step) - energy(-step)) / (2.0 * step));
-                    let power = SVector::<f64, 1>::new(dq.dot(&inverse_dynamics(&q, &dq, &ddq #p)));
-                    assert_close(&power, &rate, 1e-6);
-                }
-            }
-        },
-    );
-    if possible {
-        test(
-            &[MassMatrix],
-            quote! {
-                fn the_mass_matrix_is_symmetric_and_positive_definite() {
-                    for [q, ..] in states() {
-                        let mass = mass_matrix(&q #p);
-                        assert_close(&mass, &mass.transpose(), 1e-12);
-                        assert!(mass.cholesky().is_some(), "not positive definite at {q}");
-                    }
-                }
-            },
-        );
-        test(
-            &[InverseDynamics, ForwardDynamics],
-            quote! {
-                fn inverse_after_forward_dynamics_gives_the_torque_back() {
-                    for [q, dq, tau] in states() {
-                        let ddq = forward_dynamics(&q, &dq, &tau #p);
-                        assert_close(&inverse_dynamics(&q, &dq, &ddq #p), &tau, 1e-7);
-                    }
-                }
-            },
-        );
-    }
+    let of_any_values: [(&[Function], TokenStream); 4] = [
+        (&[InverseDynamics, MassMatrix, CoriolisMatrix, Gravity], sum_of_parts(&p)),
+        (&[InverseDynamics, Regressor], regressor_times_parameters(&p, baked)),
+        (&[MassMatrix, CoriolisMatrix], skewness(&p)),
+        (&[InverseDynamics, KineticEnergy, PotentialEnergy], energy_balance(&p)),
+    ];
+    let of_real_arms: [(&[Function], TokenStream); 2] =
+        [(&[MassMatrix], definiteness(&p)), (&[InverseDynamics, ForwardDynamics], inverse_after_forward(&p))];
+    let all = of_any_values.into_iter().chain(of_real_arms.into_iter().filter(|_| possible));
+    let tests: Vec<TokenStream> = all
+        .filter(|(needed, _)| needed.iter().all(|f| options.functions.contains(f)))
+        .map(|(_, test)| quote!(#[test] #test))
+        .collect();
     if tests.is_empty() {
         return Ok(quote!());
     }
-    let parameters = (!baked).then(|| {
-        let values = values.iter().map(|x| Literal::f64_suffixed(*x));
-        quote! {
-            /// Values that a body of each link can have.
-            fn parameters() -> SVector<f64, PARAMETERS> {
-                SVector::from([#(#values),*])
-            }
-        }
-    });
+    let parameters = (!baked).then(|| parameters(&values));
+    let support = support();
     Ok(quote! {
         #[cfg(test)]
         mod tests {
@@ -132,32 +49,134 @@ pub(super) fn module(model: &Model, options: &Options) -> Result<TokenStream, Er
 
             #parameters
 
-            /// Positions, velocities, and accelerations or torques.
-            fn states() -> impl Iterator<Item = [SVector<f64, JOINTS>; 3]> {
-                (0..5_u8).map(|k| {
-                    [0.3, 1.7, 2.9].map(|phase| {
-                        let mut angle = f64::from(k) * 2.1 + phase;
-                        SVector::from_fn(|_, _| {
-                            angle += 1.3;
-                            1.5 * nalgebra::ComplexField::sin(angle)
-                        })
-                    })
-                })
-            }
-
-            fn assert_close<const R: usize, const C: usize>(
-                a: &SMatrix<f64, R, C>,
-                b: &SMatrix<f64, R, C>,
-                tolerance: f64,
-            ) {
-                let scale = a.abs().max().max(b.abs().max()).max(1.0);
-                let error = (a - b).abs().max();
-                assert!(error <= tolerance * scale, "{a} and {b} differ by {error}");
-            }
+            #support
 
             #(#tests)*
         }
     })
+}
+
+/// τ = M·q̈ + C·q̇ + g; `p` is how functions are given the parameters.
+fn sum_of_parts(p: &TokenStream) -> TokenStream {
+    quote! {
+        fn the_torque_is_the_sum_of_its_parts() {
+            for [q, dq, ddq] in states() {
+                let parts = mass_matrix(&q #p) * ddq + coriolis_matrix(&q, &dq #p) * dq + gravity(&q #p);
+                assert_close(&inverse_dynamics(&q, &dq, &ddq #p), &parts, 1e-9);
+            }
+        }
+    }
+}
+
+/// τ = Y·π
+fn regressor_times_parameters(p: &TokenStream, baked: bool) -> TokenStream {
+    let values = if baked { quote!(SVector::from(PARAMETER_VALUES)) } else { quote!(parameters()) };
+    quote! {
+        fn the_torque_is_the_regressor_times_the_parameters() {
+            for [q, dq, ddq] in states() {
+                let product = regressor(&q, &dq, &ddq) * #values;
+                assert_close(&inverse_dynamics(&q, &dq, &ddq #p), &product, 1e-9);
+            }
+        }
+    }
+}
+
+/// Ṁ = C + Cᵀ
+fn skewness(p: &TokenStream) -> TokenStream {
+    quote! {
+        fn the_rate_of_the_mass_matrix_less_twice_the_coriolis_matrix_is_skew() {
+            let step = 1e-5;
+            for [q, dq, _] in states() {
+                let ahead = mass_matrix(&(q + dq * step) #p);
+                let behind = mass_matrix(&(q - dq * step) #p);
+                let rate = (ahead - behind) / (2.0 * step);
+                let coriolis = coriolis_matrix(&q, &dq #p);
+                assert_close(&(coriolis + coriolis.transpose()), &rate, 1e-6);
+            }
+        }
+    }
+}
+
+/// q̇·τ is the rate of the energy.
+fn energy_balance(p: &TokenStream) -> TokenStream {
+    quote! {
+        fn the_power_of_the_torques_is_the_change_of_energy() {
+            let step = 1e-5;
+            for [q, dq, ddq] in states() {
+                let energy = |t: f64| {
+                    let (place, velocity) = (q + dq * t + ddq * (0.5 * t * t), dq + ddq * t);
+                    kinetic_energy(&place, &velocity #p) + potential_energy(&place #p)
+                };
+                let rate = SVector::<f64, 1>::new((energy(step) - energy(-step)) / (2.0 * step));
+                let power = SVector::<f64, 1>::new(dq.dot(&inverse_dynamics(&q, &dq, &ddq #p)));
+                assert_close(&power, &rate, 1e-6);
+            }
+        }
+    }
+}
+
+/// M = Mᵀ > 0
+fn definiteness(p: &TokenStream) -> TokenStream {
+    quote! {
+        fn the_mass_matrix_is_symmetric_and_positive_definite() {
+            for [q, ..] in states() {
+                let mass = mass_matrix(&q #p);
+                assert_close(&mass, &mass.transpose(), 1e-12);
+                assert!(mass.cholesky().is_some(), "not positive definite at {q}");
+            }
+        }
+    }
+}
+
+/// Inverse dynamics of what forward dynamics makes of τ is τ.
+fn inverse_after_forward(p: &TokenStream) -> TokenStream {
+    quote! {
+        fn inverse_after_forward_dynamics_gives_the_torque_back() {
+            for [q, dq, tau] in states() {
+                let ddq = forward_dynamics(&q, &dq, &tau #p);
+                assert_close(&inverse_dynamics(&q, &dq, &ddq #p), &tau, 1e-7);
+            }
+        }
+    }
+}
+
+/// The function that gives tests their parameters.
+fn parameters(values: &[f64]) -> TokenStream {
+    let values = values.iter().map(|x| Literal::f64_suffixed(*x));
+    quote! {
+        /// Values that a body of each link can have.
+        fn parameters() -> SVector<f64, PARAMETERS> {
+            SVector::from([#(#values),*])
+        }
+    }
+}
+
+/// The states that tests take, and how they compare.
+fn support() -> TokenStream {
+    quote! {
+        /// Positions, velocities, and accelerations or torques.
+        fn states() -> impl Iterator<Item = [SVector<f64, JOINTS>; 3]> {
+            (0..5_u8).map(|k| {
+                [0.3, 1.7, 2.9].map(|phase| {
+                    let mut angle = f64::from(k) * 2.1 + phase;
+                    SVector::from_fn(|_, _| {
+                        angle += 1.3;
+                        1.5 * nalgebra::ComplexField::sin(angle)
+                    })
+                })
+            })
+        }
+
+        fn assert_close<const R: usize, const C: usize>(
+            a: &SMatrix<f64, R, C>,
+            b: &SMatrix<f64, R, C>,
+            tolerance: f64,
+        ) {
+            let scale = a.abs().max().max(b.abs().max()).max(1.0);
+            let error = (a - b).abs().max();
+            assert!(error <= tolerance * scale, "{a} and {b} differ by {error}");
+        }
+    }
 }
 
 /// Eleven parameters a link of bodies that keep the declared symmetries: a compact body whose mass shrinks

@@ -2,7 +2,7 @@
 //! every other byte stays.
 
 use super::body::Body;
-use super::dcmotor::{self, Motor, Spring};
+use super::dcmotor::{self, Motor, Motors, Spring};
 use super::edit::{Edits, child, comment, escaped, indentation, shortest};
 use super::known::{Friction, Known};
 use super::share::{self, Share};
@@ -10,8 +10,9 @@ use super::term::Term;
 use super::urdf::Exported;
 use crate::arm::{Arm, Joint, JointKind};
 use crate::exact::rational::{Rational, to_f64};
-use crate::import::chain;
+use crate::import::chain::{self, ChainJoint};
 use crate::import::mjcf::{angles_are_radians, read};
+use crate::import::urdf::Robot;
 use crate::import::{ImportError, Options};
 use roxmltree::{Document, Node};
 
@@ -33,54 +34,27 @@ pub fn mjcf(
     let options = share::options(&robot, arm, options);
     let chain = chain::chain(&robot, &options).map_err(refused)?;
     let document = Document::parse(text).map_err(|e| unreadable(e.to_string()))?;
-    let mut writer = Writer { text, document: &document, edits: Edits::default() };
-    let lines = |name: &str| robot.links.iter().find(|link| link.name == name).map_or(0, |link| link.line);
-    let holds = |name: &str| writer.element("body", name, lines(name)).is_some();
-    let shares = share::shares(arm, &chain, &robot, known, &holds).map_err(|e| refused(vec![e]))?;
     let degrees = !angles_are_radians(&document);
-    let mut notes = Vec::new();
-    let mut actuators = Actuators::default();
-    let mut tendons = Vec::new();
-    for (i, Share { link, body, emptied, note }) in shares.into_iter().enumerate() {
-        writer.inertial(&link, lines(&link), &body, &known.words[i]);
-        let none = Body::of_parameters(&[0.0; 10]);
-        for other in &emptied {
-            writer.inertial(other, lines(other), &none, &[format!("its inertia is part of body '{link}'")]);
-        }
-        notes.extend(note);
+    let mut writer = Writer { text, robot: &robot, document: &document, degrees, edits: Edits::default() };
+    let holds = |name: &str| writer.body(name).is_some();
+    let shares = share::shares(arm, &chain, &robot, known, &holds).map_err(|e| refused(vec![e]))?;
+    let (mut notes, mut actuators, mut tendons) = (Vec::new(), Actuators::default(), Vec::new());
+    for (i, share) in shares.into_iter().enumerate() {
+        writer.inertials(&share, &known.words[i]);
+        notes.extend(share.note);
+        let (held, effects) = held(arm, known, i);
         let joint = &chain.joints[i];
-        let line = robot.joints.iter().find(|j| j.name == joint.name).map_or(0, |j| j.line);
-        let rotor = known.values[11 * i + 10];
-        let armature = arm.joints[i].rotor_ratio.as_ref().map(|k| to_f64(k).powi(2) * rotor);
-        let mut friction = known.friction.as_ref().and_then(|f| f[i]);
-        let terms: Vec<&Term> = known.terms.iter().filter(|term| term.link == i).collect();
-        let effects = dcmotor::motors(arm.joints[i].kind, friction, &terms);
-        if let Some(friction) = friction.as_mut().filter(|_| effects.has_coulomb) {
-            friction.coulomb = 0.0;
-        }
-        let old = (joint.position, degrees);
-        let held = Held { friction, armature, spring: effects.spring };
         let turns = match arm.coupled_motor(i) {
             None => {
-                writer.joint((&joint.name, line), &arm.joints[i], &held, old);
+                writer.joint(joint, &arm.joints[i], &held);
                 format!("joint=\"{}\"", escaped(&joint.name))
             }
             Some(joints) => {
-                let tendon = format!("{OURS}motor {}", joint.name);
-                let none = Held {
-                    friction: held.friction.map(|_| Friction { viscous: 0.0, coulomb: 0.0, std: [None; 2] }),
-                    armature: armature.map(|_| 0.0),
-                    spring: None,
-                };
-                writer.joint((&joint.name, line), &arm.joints[i], &none, old);
+                writer.joint(joint, &arm.joints[i], &held.moved_away());
                 let of = |(j, factor): (usize, Rational)| (chain.joints[j].name.as_str(), to_f64(&factor));
                 let joints: Vec<(&str, f64)> = joints.into_iter().map(of).collect();
-                for (name, _) in &joints {
-                    writer.name_joint(
-                        name,
-                        robot.joints.iter().find(|j| j.name == *name).map_or(0, |j| j.line),
-                    );
-                }
+                joints.iter().for_each(|(name, _)| writer.name_joint(name));
+                let tendon = format!("{OURS}motor {}", joint.name);
                 notes.push(format!(
                     "joint '{}': its motor turns with several joints: friction and rotor are on the tendon '{tendon}', \
                      whose length is the motor's position",
@@ -91,17 +65,27 @@ pub fn mjcf(
             }
         };
         if !effects.motors.is_empty() {
-            writer.name_joint(&joint.name, line);
+            writer.name_joint(&joint.name);
         }
-        let left_out = effects.left_out.into_iter().map(|why| format!("joint '{}': {why}", joint.name));
-        actuators.left_out.extend(left_out);
-        let placed = |motor| Placed { joint: joint.name.clone(), turns: turns.clone(), motor };
-        actuators.motors.extend(effects.motors.into_iter().map(placed));
+        actuators.add(&joint.name, &turns, effects);
     }
     notes.extend(actuators.left_out.iter().map(|what| format!("left out: {what}")));
     writer.tendons(&tendons);
     writer.actuators(&actuators);
     Ok(Exported { text: writer.edits.apply(text), notes })
+}
+
+/// What is known of a joint: what it, or its motor's tendon, holds, and the effects beside that.
+fn held(arm: &Arm, known: &Known, i: usize) -> (Held, Motors) {
+    let rotor = known.values[11 * i + 10];
+    let armature = arm.joints[i].rotor_ratio.as_ref().map(|k| to_f64(k).powi(2) * rotor);
+    let mut friction = known.friction.as_ref().and_then(|f| f[i]);
+    let terms: Vec<&Term> = known.terms.iter().filter(|term| term.link == i).collect();
+    let mut effects = dcmotor::motors(arm.joints[i].kind, friction, &terms);
+    if let Some(friction) = friction.as_mut().filter(|_| effects.has_coulomb) {
+        friction.coulomb = 0.0;
+    }
+    (Held { friction, armature, spring: effects.spring.take() }, effects)
 }
 
 /// What a joint holds beside its range, or the tendon of a motor that turns with several joints.
@@ -111,11 +95,31 @@ struct Held {
     spring: Option<Spring>,
 }
 
+impl Held {
+    /// What is left on the joint where a tendon holds this.
+    fn moved_away(&self) -> Held {
+        Held {
+            friction: self.friction.map(|_| Friction { viscous: 0.0, coulomb: 0.0, std: [None; 2] }),
+            armature: self.armature.map(|_| 0.0),
+            spring: None,
+        }
+    }
+}
+
 /// Effects of all joints.
 #[derive(Default)]
 struct Actuators {
     motors: Vec<Placed>,
     left_out: Vec<String>,
+}
+
+impl Actuators {
+    /// Adds the effects of a joint, whose torque acts on what `turns` says.
+    fn add(&mut self, joint: &str, turns: &str, effects: Motors) {
+        self.left_out.extend(effects.left_out.into_iter().map(|why| format!("joint '{joint}': {why}")));
+        let placed = |motor| Placed { joint: joint.to_string(), turns: turns.to_string(), motor };
+        self.motors.extend(effects.motors.into_iter().map(placed));
+    }
 }
 
 struct Placed {
@@ -163,7 +167,10 @@ const OURS: &str = "dyngen ";
 
 struct Writer<'t, 'd> {
     text: &'t str,
+    robot: &'d Robot,
     document: &'d Document<'t>,
+    /// Whether its angles are degrees, not radians.
+    degrees: bool,
     edits: Edits,
 }
 
@@ -178,8 +185,27 @@ impl<'t, 'd> Writer<'t, 'd> {
         })
     }
 
-    fn inertial(&mut self, name: &str, line: u32, body: &Body, words: &[String]) {
-        let Some(node) = self.element("body", name, line) else { return };
+    fn body(&self, name: &str) -> Option<Node<'d, 't>> {
+        let link = self.robot.links.iter().find(|link| link.name == name);
+        self.element("body", name, link.map_or(0, |link| link.line))
+    }
+
+    fn joint_element(&self, name: &str) -> Option<Node<'d, 't>> {
+        let joint = self.robot.joints.iter().find(|joint| joint.name == name);
+        self.element("joint", name, joint.map_or(0, |joint| joint.line))
+    }
+
+    /// A link's inertia, and none for those whose inertia is in it.
+    fn inertials(&mut self, Share { link, body, emptied, .. }: &Share, words: &[String]) {
+        self.inertial(link, body, words);
+        let none = Body::of_parameters(&[0.0; 10]);
+        for other in emptied {
+            self.inertial(other, &none, &[format!("its inertia is part of body '{link}'")]);
+        }
+    }
+
+    fn inertial(&mut self, name: &str, body: &Body, words: &[String]) {
+        let Some(node) = self.body(name) else { return };
         let old = child(node, "inertial");
         let at = old.map_or(node.range().start, |inertial| inertial.range().start);
         let margin = indentation(self.text, at);
@@ -202,14 +228,9 @@ impl<'t, 'd> Writer<'t, 'd> {
         }
     }
 
-    fn joint(
-        &mut self,
-        (name, line): (&str, u32),
-        joint: &Joint,
-        held: &Held,
-        (old, degrees): (Option<[f64; 2]>, bool),
-    ) {
-        let Some(node) = self.element("joint", name, line) else { return };
+    /// What a joint of the chain holds, and its range where that is another one now.
+    fn joint(&mut self, old: &ChainJoint, joint: &Joint, held: &Held) {
+        let Some(node) = self.joint_element(&old.name) else { return };
         if let Some(friction) = &held.friction {
             if friction.viscous != 0.0 || friction.coulomb != 0.0 || friction.std != [None; 2] {
                 self.edits.insert(node.range().start, comment(&format!("dyngen: {}", errors(friction))));
@@ -220,22 +241,24 @@ impl<'t, 'd> Writer<'t, 'd> {
         if let Some(armature) = held.armature {
             self.attribute(node, "armature", shortest(armature));
         }
-        let unit =
-            if degrees && joint.kind == JointKind::Revolute { 180.0 / std::f64::consts::PI } else { 1.0 };
+        let unit = if self.degrees && joint.kind == JointKind::Revolute {
+            180.0 / std::f64::consts::PI
+        } else {
+            1.0
+        };
         if let Some(spring) = &held.spring {
             self.edits.insert(node.range().start, comment(&format!("dyngen: {}", spring.words)));
             self.attribute(node, "stiffness", shortest(spring.stiffness));
             self.attribute(node, "springref", shortest(spring.rest * unit));
         }
-        if let Some([low, high]) = joint.position.filter(|p| Some(*p) != old) {
+        if let Some([low, high]) = joint.position.filter(|p| Some(*p) != old.position) {
             self.attribute(node, "range", format!("{} {}", shortest(low * unit), shortest(high * unit)));
         }
     }
 
     /// A joint that an actuator turns has a name.
-    fn name_joint(&mut self, name: &str, line: u32) {
-        if let Some(node) = self.element("joint", name, line).filter(|node| node.attribute("name").is_none())
-        {
+    fn name_joint(&mut self, name: &str) {
+        if let Some(node) = self.joint_element(name).filter(|node| node.attribute("name").is_none()) {
             self.attribute(node, "name", escaped(name));
         }
     }

@@ -61,18 +61,7 @@ pub(crate) struct Mass {
 /// Reads the chain, or says every reason why there is none.
 pub(crate) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<String>> {
     let tree = Tree::new(robot, options)?;
-    let tip = match &options.tip {
-        Some(name) => {
-            tree.link(name).ok_or_else(|| vec![format!("there is no link '{name}' to be the tip")])?
-        }
-        None => tree.only_tip().map_err(|reason| vec![reason])?,
-    };
-    let Some(path) = tree.path(tip) else {
-        let (base, tip) = (&robot.links[tree.root].name, &robot.links[tip].name);
-        return Err(vec![format!(
-            "the tip '{tip}' is not behind the base '{base}': choose another --base or --tip"
-        )]);
-    };
+    let (tip, path) = tip_and_path(&tree, options).map_err(|reason| vec![reason])?;
     let mut walk = Walk {
         tree: &tree,
         options,
@@ -91,51 +80,70 @@ pub(crate) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<Strin
             walk.body(child, &pose);
         }
     }
-    let Walk { mut joints, mut refused, notes, .. } = walk;
-    let names: Vec<String> = joints.iter().map(|joint| joint.name.clone()).collect();
-    for joint in &mut joints {
-        let mimic = robot.joints.iter().find(|j| j.name == joint.name).and_then(|j| j.mimic.clone());
-        joint.follows = mimic.and_then(|m| Some((names.iter().position(|n| *n == m.joint)?, m)));
-    }
-    match joints.len() {
-        1..=MAX_JOINTS => {}
-        0 if refused.is_empty() => refused.push(format!(
-            "no joint moves between the root link '{}' and the tip '{}'",
-            robot.links[tree.root].name, robot.links[tip].name
-        )),
-        count if count > MAX_JOINTS => {
-            refused.push(format!(
-                "{count} joints move, from '{}' to '{}': an arm may have 1 to {MAX_JOINTS}",
-                joints[0].name,
-                joints[count - 1].name
-            ));
-        }
-        _ => {}
+    let Walk { mut joints, mut refused, mut notes, .. } = walk;
+    let (root, tip) = (robot.links[tree.root].name.clone(), robot.links[tip].name.clone());
+    if refused.is_empty() || joints.len() > MAX_JOINTS {
+        refused.extend(wrong_count(&joints, &root, &tip));
     }
     if !refused.is_empty() {
         return Err(refused);
     }
-    let mut notes: Vec<String> = notes.into_iter().chain(robot.notes.iter().cloned()).collect();
+    find_leaders(&mut joints, robot);
+    notes.extend(robot.notes.iter().cloned());
+    notes.extend(without_mass(&joints));
+    let gravity = robot.gravity.map_or(GRAVITY, Vector3::from);
+    Ok(Chain { name: robot.name.clone(), root, gravity, tip, tip_pose: pose, joints, path, notes })
+}
+
+/// The link at the chain's end, and the joints from the root to it; why there is none.
+fn tip_and_path(tree: &Tree<'_>, options: &Options) -> Result<(usize, Vec<usize>), String> {
+    let tip = match &options.tip {
+        Some(name) => tree.link(name).ok_or_else(|| format!("there is no link '{name}' to be the tip"))?,
+        None => tree.only_tip()?,
+    };
+    let path = tree.path(tip).ok_or_else(|| {
+        let (base, tip) = (&tree.robot.links[tree.root].name, &tree.robot.links[tip].name);
+        format!("the tip '{tip}' is not behind the base '{base}': choose another --base or --tip")
+    })?;
+    Ok((tip, path))
+}
+
+/// Where an arm may not have as many joints: why.
+fn wrong_count(joints: &[ChainJoint], root: &str, tip: &str) -> Option<String> {
+    match joints {
+        [] => Some(format!("no joint moves between the root link '{root}' and the tip '{tip}'")),
+        [first, .., last] if joints.len() > MAX_JOINTS => Some(format!(
+            "{} joints move, from '{}' to '{}': an arm may have 1 to {MAX_JOINTS}",
+            joints.len(),
+            first.name,
+            last.name
+        )),
+        _ => None,
+    }
+}
+
+/// Lets every joint that follows another one say which of the chain's.
+fn find_leaders(joints: &mut [ChainJoint], robot: &Robot) {
+    let names: Vec<String> = joints.iter().map(|joint| joint.name.clone()).collect();
+    for joint in joints {
+        let mimic = robot.joints.iter().find(|j| j.name == joint.name).and_then(|j| j.mimic.clone());
+        joint.follows = mimic.and_then(|m| Some((names.iter().position(|n| *n == m.joint)?, m)));
+    }
+}
+
+/// What to say of joints behind which no link has mass.
+fn without_mass(joints: &[ChainJoint]) -> Option<String> {
     let massless = joints.iter().filter(|joint| joint.masses.is_empty());
     let massless: Vec<String> = massless.map(|joint| format!("'{}'", joint.name)).collect();
     if massless.len() == joints.len() {
-        notes.push("no link has an inertia: there are no parameter values".to_string());
-    } else if !massless.is_empty() {
-        notes.push(format!(
+        return Some("no link has an inertia: there are no parameter values".to_string());
+    }
+    (!massless.is_empty()).then(|| {
+        format!(
             "behind {} no link has an inertia of its own: where nothing heavier follows, the mass matrix is \
              singular",
             massless.join(", ")
-        ));
-    }
-    Ok(Chain {
-        name: robot.name.clone(),
-        root: robot.links[tree.root].name.clone(),
-        gravity: robot.gravity.map_or(GRAVITY, Vector3::from),
-        tip: robot.links[tip].name.clone(),
-        tip_pose: pose,
-        joints,
-        path,
-        notes,
+        )
     })
 }
 

@@ -277,21 +277,11 @@ impl<'d, 'i> Reader<'d, 'i> {
         };
         let class = node.attribute("class").unwrap_or(class);
         let all = self.all_attributes(node, class, JOINT);
-        let place = format!("joint '{name}'");
-        let mut list = |key: &str, count: usize| -> Option<Vec<f64>> {
-            let text = all.get(key)?;
-            let found = finite(text).filter(|n| n.len() == count);
-            if found.is_none() {
-                self.errors
-                    .push(format!("line {line}: {place}: {key} must be {count} numbers, found '{text}'"));
-            }
-            found
-        };
-        let three = |v: Option<Vec<f64>>, missing: [f64; 3]| v.map_or(missing, |v| [v[0], v[1], v[2]]);
-        let axis = three(list("axis", 3), [0.0, 0.0, 1.0]);
-        let point = Vector3::from(three(list("pos", 3), [0.0; 3]));
-        let range = list("range", 2);
-        let mut number = |key: &str| list(key, 1).map_or(0.0, |v| v[0]);
+        let place = format!("line {line}: joint '{name}'");
+        let axis = self.numbers_among(&all, "axis", &place).unwrap_or([0.0, 0.0, 1.0]);
+        let point = Vector3::from(self.numbers_among(&all, "pos", &place).unwrap_or([0.0; 3]));
+        let range = self.numbers_among::<2>(&all, "range", &place);
+        let mut number = |key: &str| self.numbers_among(&all, key, &place).map_or(0.0, |[x]| x);
         let (armature, damping, loss, reference, stiffness) = (
             number("armature"),
             number("damping"),
@@ -299,25 +289,18 @@ impl<'d, 'i> Reader<'d, 'i> {
             number("ref"),
             number("stiffness"),
         );
-        let force = list("actuatorfrcrange", 2);
-        let free = node.has_tag_name("freejoint");
-        let kind = match all.get("type").map(String::as_str) {
-            _ if free => "floating",
-            None | Some("hinge") => "revolute",
-            Some("slide") => "prismatic",
-            Some("free") => "floating",
-            Some(other) => other,
-        };
+        let force = self.numbers_among(&all, "actuatorfrcrange", &place);
+        let kind = kind_of_joint(node, &all);
         let limited = match all.get("limited").map(String::as_str) {
             Some("true") => true,
             Some("false") => false,
             _ => !self.compiler.no_auto_limits,
         };
         let unit = if kind == "revolute" { self.compiler.angles.unit() } else { 1.0 };
-        let range = range.filter(|r| limited && r[0] < r[1]).map(|r| [r[0] * unit, r[1] * unit]);
+        let range = range.filter(|[low, high]| limited && low < high).map(|r| r.map(|x| x * unit));
         let motor = Motor { armature, damping, friction: loss, gear: self.gears.get(&name).copied() };
         let note = (stiffness != 0.0)
-            .then(|| format!("line {line}: {place}: its spring of {stiffness} N·m/rad (or N/m) is left out"));
+            .then(|| format!("{place}: its spring of {stiffness} N·m/rad (or N/m) is left out"));
         let reference = reference * unit;
         if reference != 0.0 {
             self.references.insert(name.clone(), reference);
@@ -335,13 +318,28 @@ impl<'d, 'i> Reader<'d, 'i> {
             axis,
             lower: range.map_or(0.0, |r| r[0]),
             upper: range.map_or(0.0, |r| r[1]),
-            effort: force.map_or(0.0, |f| f[0].abs().min(f[1].abs())),
+            effort: force.map_or(0.0, |[low, high]: [f64; 2]| low.abs().min(high.abs())),
             velocity: 0.0,
             mimic: None,
             motor: Some(motor),
             note,
         });
         Pose { rotation: Matrix3::identity(), origin: -point }
+    }
+
+    /// The numbers of an attribute among those of an element and its class.
+    fn numbers_among<const N: usize>(
+        &mut self,
+        all: &BTreeMap<String, String>,
+        key: &str,
+        place: &str,
+    ) -> Option<[f64; N]> {
+        let text = all.get(key)?;
+        let found = finite(text).and_then(|n| <[f64; N]>::try_from(n).ok());
+        if found.is_none() {
+            self.errors.push(format!("{place}: {key} must be {N} numbers, found '{text}'"));
+        }
+        found
     }
 
     /// An element's attributes, with those of its class.
@@ -488,4 +486,15 @@ fn fixed(parent: &str, child: &str, at: &Pose, line: u32) -> Joint {
 
 fn origin(pose: &Pose) -> Origin {
     Origin { xyz: pose.origin.into(), rpy: pose.rpy() }
+}
+
+/// A URDF's word for the kind of a joint; a model's own where there is none.
+fn kind_of_joint<'a>(node: Node<'_, '_>, all: &'a BTreeMap<String, String>) -> &'a str {
+    match all.get("type").map(String::as_str) {
+        _ if node.has_tag_name("freejoint") => "floating",
+        None | Some("hinge") => "revolute",
+        Some("slide") => "prismatic",
+        Some("free") => "floating",
+        Some(other) => other,
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::Options;
 use super::chain::{Chain, ChainJoint};
-use super::frames::Frames;
+use super::frames::{Frames, Row};
 use super::pose::{Pose, twelfths};
 use crate::arm::{Convention, JointKind, Parameter, ParameterKind};
 use crate::consistency::parameters_of_body;
@@ -17,6 +17,21 @@ const RATIO: f64 = 100.0;
 /// The arm file, with comments that say where everything comes from and what an arm file cannot hold.
 pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Options) -> String {
     let mut text = String::new();
+    heading(&mut text, chain, frames, file, options.convention);
+    for (joint, row) in chain.joints.iter().zip(&frames.rows) {
+        table_of_joint(&mut text, joint, row, options.angle_tolerance);
+        drive(&mut text, joint);
+        limits(&mut text, joint);
+    }
+    let (base, tool) =
+        (format!("frame 0 in link '{}'", chain.root), format!("link '{}' in the last frame", chain.tip));
+    placement(&mut text, &base, "base", &frames.base, options);
+    placement(&mut text, &tool, "tool", &tip(chain, frames), options);
+    text
+}
+
+/// Where the arm comes from, what the import says of it, and what holds for all joints.
+fn heading(text: &mut String, chain: &Chain, frames: &Frames, file: &str, convention: Convention) {
     let mut comment = |line: String| {
         // A String takes every write.
         let _ = writeln!(text, "# {}", plain(&line));
@@ -24,7 +39,7 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
     comment(format!("Imported by dyngen from {file}: link '{}' to link '{}'.", chain.root, chain.tip));
     comment("Gravity is that of frame 0. Friction and meshes are left out.".to_string());
     chain.notes.iter().for_each(|note| comment(format!("Note: {note}.")));
-    let convention = match options.convention {
+    let convention = match convention {
         Convention::Standard => "standard",
         Convention::Modified => "modified",
     };
@@ -37,65 +52,60 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
         quoted(name),
         gravity.join(", ")
     );
-    for (joint, row) in chain.joints.iter().zip(&frames.rows) {
-        let angle = |value: f64| angle(value, options.angle_tolerance);
-        let kind = match joint.kind {
-            JointKind::Revolute => "revolute",
-            JointKind::Prismatic => "prismatic",
-        };
-        let beside = match length(row.b).as_str() {
-            "0" => String::new(),
-            b => format!("b = {b}\n"),
-        };
-        let _ = write!(
-            text,
-            "\n# links {}\n[[joint]]\nname = \"{}\"\nkind = \"{kind}\"\na = {}\n{beside}alpha = {}\nd = \
-             {}\ntheta = {}\n",
-            plain(&joint.links.iter().map(|l| format!("'{l}'")).collect::<Vec<_>>().join(", ")),
-            quoted(&joint.name),
-            length(row.a),
-            angle(row.alpha),
-            length(row.d),
-            angle(row.theta),
-        );
-        if let Some((leader, mimic)) = &joint.follows {
-            let (ratio, offset) = (mimic.ratio, mimic.offset);
-            let _ = writeln!(
-                text,
-                "mimic = {{ joint = {}, ratio = {ratio:?}, offset = {offset:?} }}",
-                leader + 1
-            );
-        }
-        if let Some(motor) = joint.motor {
-            if let Some(ratio) = ratio(joint) {
-                let _ = writeln!(text, "rotor_ratio = {ratio:?}  # armature {:?}", motor.armature);
-            }
-            if motor.damping != 0.0 || motor.friction != 0.0 {
-                let (damping, friction) = (motor.damping, motor.friction);
-                let _ = writeln!(
-                    text,
-                    "# damping {damping:?} N·m·s/rad, frictionloss {friction:?} N·m (or N·s/m, N)"
-                );
-            }
-        }
-        if let Some([lower, upper]) = joint.position {
-            let _ = writeln!(text, "position = [{lower:?}, {upper:?}]");
-        }
-        for (key, limit) in [("velocity", joint.velocity), ("torque", joint.torque)] {
-            if let Some(limit) = limit {
-                let _ = writeln!(text, "{key} = {limit:?}");
-            }
+}
+
+/// A joint's name, kind and Denavit–Hartenberg row, and what it follows.
+fn table_of_joint(text: &mut String, joint: &ChainJoint, row: &Row, tolerance: f64) {
+    let angle = |value: f64| angle(value, tolerance);
+    let kind = match joint.kind {
+        JointKind::Revolute => "revolute",
+        JointKind::Prismatic => "prismatic",
+    };
+    let beside = match length(row.b).as_str() {
+        "0" => String::new(),
+        b => format!("b = {b}\n"),
+    };
+    let _ = write!(
+        text,
+        "\n# links {}\n[[joint]]\nname = \"{}\"\nkind = \"{kind}\"\na = {}\n{beside}alpha = {}\nd = \
+         {}\ntheta = {}\n",
+        plain(&joint.links.iter().map(|l| format!("'{l}'")).collect::<Vec<_>>().join(", ")),
+        quoted(&joint.name),
+        length(row.a),
+        angle(row.alpha),
+        length(row.d),
+        angle(row.theta),
+    );
+    if let Some((leader, mimic)) = &joint.follows {
+        let (ratio, offset) = (mimic.ratio, mimic.offset);
+        let _ =
+            writeln!(text, "mimic = {{ joint = {}, ratio = {ratio:?}, offset = {offset:?} }}", leader + 1);
+    }
+}
+
+/// The ratio of a joint's gear, and what the file says of its friction.
+fn drive(text: &mut String, joint: &ChainJoint) {
+    let Some(motor) = joint.motor else { return };
+    if let Some(ratio) = ratio(joint) {
+        let _ = writeln!(text, "rotor_ratio = {ratio:?}  # armature {:?}", motor.armature);
+    }
+    if motor.damping != 0.0 || motor.friction != 0.0 {
+        let (damping, friction) = (motor.damping, motor.friction);
+        let _ =
+            writeln!(text, "# damping {damping:?} N·m·s/rad, frictionloss {friction:?} N·m (or N·s/m, N)");
+    }
+}
+
+/// The limits of a joint that the file gives.
+fn limits(text: &mut String, joint: &ChainJoint) {
+    if let Some([lower, upper]) = joint.position {
+        let _ = writeln!(text, "position = [{lower:?}, {upper:?}]");
+    }
+    for (key, limit) in [("velocity", joint.velocity), ("torque", joint.torque)] {
+        if let Some(limit) = limit {
+            let _ = writeln!(text, "{key} = {limit:?}");
         }
     }
-    placement(&mut text, &format!("frame 0 in link '{}'", chain.root), "base", &frames.base, options);
-    placement(
-        &mut text,
-        &format!("link '{}' in the last frame", chain.tip),
-        "tool",
-        &tip(chain, frames),
-        options,
-    );
-    text
 }
 
 /// The table of a fixed frame, where it is another than the one it stands in.

@@ -59,15 +59,20 @@ pub fn input_angles<A: Algebra>(
     angles.into_iter().map(|angle| angle.unwrap_or_else(zero)).collect()
 }
 
-/// Sine and cosine of q + theta of a joint from those of its trigonometric input, which holds theta already where
-/// that is no multiple of pi/2.
-pub fn with_theta<A: Algebra>(alg: &A, theta: &Angle, (s, c): (A::Value, A::Value)) -> (A::Value, A::Value) {
-    match theta.quarter_turns() {
-        Some(1) => (c, alg.neg(&s)),
-        Some(2) => (alg.neg(&s), alg.neg(&c)),
-        Some(3) => (alg.neg(&c), s),
+/// Sine and cosine of an angle and quarter turns, 0 to 3, from those of the angle.
+pub fn quarter_turned<A: Algebra>(alg: &A, turns: u8, (s, c): (A::Value, A::Value)) -> (A::Value, A::Value) {
+    match turns {
+        1 => (c, alg.neg(&s)),
+        2 => (alg.neg(&s), alg.neg(&c)),
+        3 => (alg.neg(&c), s),
         _ => (s, c),
     }
+}
+
+/// Sine and cosine of q + theta of a joint from those of its trigonometric input, which holds theta already where
+/// that is no multiple of pi/2.
+pub fn with_theta<A: Algebra>(alg: &A, theta: &Angle, input: (A::Value, A::Value)) -> (A::Value, A::Value) {
+    quarter_turned(alg, theta.quarter_turns().unwrap_or(0), input)
 }
 
 /// Sine and cosine of a sum of two angles.
