@@ -1,7 +1,7 @@
 //! Generates the code that the tests compile: the arms of `tests/arms` and the paper's arm, for each
 //! parameter set.
 
-use dyngen::{Config, SetKind};
+use dyngen::{Config, Function, SetKind};
 
 fn main() {
     println!("cargo::rerun-if-changed=tests/arms");
@@ -14,6 +14,8 @@ fn main() {
     }
     let rotorless = Config::new("tests/arms/lwa4p_rotorless.toml");
     rotorless.batch(true).build("lwa4p_rotorless_minimal.rs").unwrap_or_else(|e| e.exit());
+    let all = Config::new("tests/arms/lwa4p_rotorless.toml").functions(Function::ALL).batch(true);
+    all.build("lwa4p_rotorless_all.rs").unwrap_or_else(|e| e.exit());
     for set in [SetKind::Full, SetKind::Minimal, SetKind::Symbolic, SetKind::Published] {
         let config = Config::new("powerball/arm.toml").parameters(set).batch(set == SetKind::Minimal);
         config.build(&format!("lwa4p_{set}.rs")).unwrap_or_else(|e| e.exit());

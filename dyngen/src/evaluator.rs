@@ -26,6 +26,8 @@ pub struct Samples<'a> {
     pub tau: &'a [f64],
     /// What a transposed regressor is multiplied with.
     pub e: &'a [f64],
+    /// A wrench on the tool's frame in base axes, six numbers a sample: force, N, above moment, N·m.
+    pub f: &'a [f64],
     /// Parameter values, the same for all samples.
     pub parameters: &'a [f64],
 }
@@ -40,6 +42,7 @@ impl<'a> Samples<'a> {
             Argument::ReferenceAccelerations => self.ddqr,
             Argument::Torques => self.tau,
             Argument::Errors => self.e,
+            Argument::Wrench => self.f,
             Argument::Parameters => self.parameters,
         }
     }
@@ -118,7 +121,7 @@ impl Evaluator {
         for argument in self.function.arguments() {
             let (given, expected) = match argument {
                 Argument::Parameters => (samples.parameters.len(), self.parameters),
-                other => (samples.of(*other).len(), count * n),
+                other => (samples.of(*other).len(), count * other.length(n, self.parameters)),
             };
             assert_eq!(given, expected, "{}: {expected} numbers are needed", argument.name());
         }
@@ -127,16 +130,16 @@ impl Evaluator {
         for first in (0..count).step_by(LANES) {
             let filled = LANES.min(count - first);
             // The lanes past the end repeat the last sample, so that no arithmetic meets stale values.
-            let at = |lane: usize| (first + lane.min(filled - 1)) * n;
+            let at = |lane: usize| first + lane.min(filled - 1);
             let gather = |argument: Argument, i: usize, to: &mut Lane| {
-                let from = samples.of(argument);
+                let (from, length) = (samples.of(argument), argument.length(n, self.parameters));
                 for (lane, x) in to.iter_mut().enumerate() {
-                    *x = from[at(lane) + i];
+                    *x = from[at(lane) * length + i];
                 }
             };
             let gather_angle = |sum: JointSum, to: &mut Lane| {
                 for (lane, x) in to.iter_mut().enumerate() {
-                    *x = self.angles.value(sum, |i| samples.q[at(lane) + i]);
+                    *x = self.angles.value(sum, |i| samples.q[at(lane) * n + i]);
                 }
             };
             self.tape.run(
@@ -157,6 +160,7 @@ impl Evaluator {
                     Input::ReferenceAcceleration(i) => gather(Argument::ReferenceAccelerations, i, lane),
                     Input::Torque(i) => gather(Argument::Torques, i, lane),
                     Input::Error(i) => gather(Argument::Errors, i, lane),
+                    Input::Wrench(i) => gather(Argument::Wrench, i, lane),
                     Input::Parameter(i) => *lane = [samples.parameters[i]; LANES],
                     Input::Prepared(i) => *lane = [prepared[i]; LANES],
                 },

@@ -46,6 +46,8 @@ pub enum Error {
     Disagreement(Disagreement),
     /// Joints that follow others, where every joint must move on its own: which.
     Mimics(String),
+    /// A function of an arm whose tool cannot accelerate in every direction.
+    Missing(Function),
 }
 
 impl fmt::Display for Error {
@@ -63,6 +65,11 @@ impl fmt::Display for Error {
             }
             Error::Values(reason) | Error::Friction(reason) | Error::Mimics(reason) => f.write_str(reason),
             Error::Disagreement(e) => e.fmt(f),
+            Error::Missing(function) => write!(
+                f,
+                "the arm has no {function}: its tool cannot accelerate in every direction, whatever its joints do; \
+                 take task_inertia_inverse, which every arm has"
+            ),
         }
     }
 }
@@ -129,6 +136,16 @@ impl Model {
         self.sets.get(kind).ok_or(Error::NoPublishedSet)
     }
 
+    /// The functions that the arm has.
+    pub fn functions(&self) -> impl Iterator<Item = Function> {
+        let full = self.has_full_rank();
+        Function::ALL.into_iter().filter(move |f| full || !f.needs_full_rank())
+    }
+
+    fn has_full_rank(&self) -> bool {
+        prove::has_full_rank(&self.arm, &self.symbols, &self.sets)
+    }
+
     /// A function for a set as expressions that are proven equal to the Lagrangian.
     ///
     /// # Errors
@@ -183,6 +200,9 @@ impl Model {
         baked: Option<&[Rational]>,
         passes: &[(&str, Pass)],
     ) -> Result<FunctionGraph, Error> {
+        if function.needs_full_rank() && !self.has_full_rank() {
+            return Err(Error::Missing(function));
+        }
         let set = self.set(kind)?;
         if !set.exact {
             return Err(Error::NotExact(set.lost.clone()));

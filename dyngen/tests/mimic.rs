@@ -72,7 +72,9 @@ fn free(text: &str) -> Model {
 #[test]
 fn every_function_is_proven_for_every_size() {
     for text in ARMS {
-        assert_eq!(proven(&model(text), SetKind::Symbolic).len(), Function::ALL.len());
+        let model = model(text);
+        let functions = model.functions().count();
+        assert_eq!(proven(&model, SetKind::Symbolic).len(), functions);
     }
 }
 
@@ -167,6 +169,7 @@ fn of_chain(state: &State, g: &Matrix, o: &[f64]) -> State {
         dqr: of(&state.dqr),
         ddqr: of(&state.ddqr),
         e: of(&state.e),
+        f: state.f.clone(),
         tau: vec![0.0; o.len()],
     }
 }
@@ -218,8 +221,10 @@ fn functions_are_those_of_the_free_chain_projected() {
             let whole = of_chain(&s, &g, &o);
             let free_chain = |function| free.at(&whole, function);
             let mass = times(&back, &times(&free_chain(Function::MassMatrix), &g));
-            for function in Function::ALL {
+            for function in tied.functions().filter(|f| *f <= Function::JacobianTransposeTimesByPosition) {
                 let expected = match function {
+                    // Tied joints accelerate otherwise than free ones: see `derivatives.rs`.
+                    Function::AccelerationByPosition | Function::AccelerationByVelocity => continue,
                     Function::ForwardDynamics => {
                         let still = State { ddq: vec![0.0; g.len()], ..whole.clone() };
                         let bias = free.at(&still, Function::InverseDynamics);

@@ -93,12 +93,17 @@ fn kinematics_needs_no_parameter_sets() {
         evaluator.evaluate(&q[..n], &dq[..n], &[], &none, &mut out);
         out
     };
-    for function in [Function::ForwardKinematics, Function::Jacobian, Function::JacobianRateTimesVelocity] {
+    for function in [
+        Function::ForwardKinematics,
+        Function::Jacobian,
+        Function::JacobianRate,
+        Function::JacobianRateTimesVelocity,
+    ] {
         assert!(function.is_kinematic());
         let derived = Model::derive(arm(2)).unwrap();
         let alone = at(&Model::kinematic(arm(2)), function, SetKind::Full);
         assert_eq!(alone, at(&derived, function, SetKind::Minimal), "{function}");
         assert!(at(&Model::kinematic(arm(8)), function, SetKind::Full).iter().all(|x| x.is_finite()));
     }
-    assert!(Function::ALL.iter().filter(|f| f.is_kinematic()).count() == 3);
+    assert!(Function::ALL.iter().filter(|f| f.is_kinematic()).count() == 6);
 }

@@ -36,12 +36,13 @@ pub(crate) fn evaluate<'py>(
             return Ok(&[]);
         };
         let values = array.as_slice().map_err(|_| value(format!("{name} must be C-contiguous")))?;
+        let length = argument.length(dof, 0);
         match values.iter().position(|x| !x.is_finite()) {
             Some(at) => Err(value(format!(
                 "{name} must be finite, shape {}: {} at {}",
-                expected(dof),
+                expected(length),
                 values[at],
-                place(at, dof, array.ndim())
+                place(at, length, array.ndim())
             ))),
             None => Ok(values),
         }
@@ -54,6 +55,7 @@ pub(crate) fn evaluate<'py>(
         ddqr: slice(Argument::ReferenceAccelerations)?,
         tau: slice(Argument::Torques)?,
         e: slice(Argument::Errors)?,
+        f: slice(Argument::Wrench)?,
         parameters,
     };
     let count = shape[..shape.len() - 1].iter().product::<usize>();
@@ -89,12 +91,13 @@ fn common_shape(function: Function, dof: usize, states: &States<'_>) -> PyResult
         let Some((name, array)) = states.iter().find(|(name, _)| name == argument.name()) else {
             return Err(value(format!("{function} needs {}", argument.name())));
         };
-        let shape = array.shape();
-        if !(1..=2).contains(&shape.len()) || shape.last() != Some(&dof) {
-            return Err(value(format!("{name} must have shape {}, it has {}", expected(dof), shown(shape))));
+        let (shape, length) = (array.shape(), argument.length(dof, 0));
+        if !(1..=2).contains(&shape.len()) || shape.last() != Some(&length) {
+            return Err(value(format!("{name} must have shape {}, it has {}", expected(length), shown(shape))));
         }
         match common {
-            Some((first, as_first)) if as_first != shape => {
+            // As many samples as the others; a wrench has six numbers in each.
+            Some((first, as_first)) if as_first[..as_first.len() - 1] != shape[..shape.len() - 1] => {
                 return Err(value(format!(
                     "{name} must have the shape of {first}, {}, it has {}",
                     shown(as_first),

@@ -37,7 +37,7 @@ pub(crate) fn generate(
     let friction: Result<Vec<FrictionTerm>, String> = friction.iter().map(|term| term.parse()).collect();
     let options = Options {
         parameters: set_kind(parameters)?,
-        functions: functions(names)?.unwrap_or_else(|| Function::ALL.to_vec()),
+        functions: functions(names)?.unwrap_or_else(|| Function::common().collect()),
         values: values.map(|v| v.as_array().to_vec()),
         friction: friction.map_err(value)?,
         batch,

@@ -57,6 +57,13 @@ def compare(text, rng):
     close(np.einsum("kij,kj->ki", arm.coriolis_matrix(q, dq), dq), coriolis)
     close(arm.coriolis_times_velocity(q, dq), coriolis)
     np.testing.assert_allclose(arm.forward_dynamics(q, dq, tau), ddq, rtol=0, atol=1e-8)
+    derivatives = [pin.computeABADerivatives(model, data, *s) for s in zip(q, dq, tau)]
+    for ours, theirs in (
+        (arm.acceleration_by_position(q, dq, tau), [d[0] for d in derivatives]),
+        (arm.acceleration_by_velocity(q, dq, tau), [d[1] for d in derivatives]),
+        (arm.mass_matrix_inverse(q), [upper(d[2]) for d in derivatives]),
+    ):
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-8 * np.abs(theirs).max())
 
     def tip(s):
         pin.forwardKinematics(model, data, s)
@@ -93,6 +100,7 @@ def test_shapes_of_one_sample_and_of_many(rng):
     n, p = arm.dof, len(arm.sets["minimal"])
     every = {"q", "dq", "ddq", "dqr", "ddqr", "tau", "e"}
     given = {name: rng.uniform(-1, 1, (5, n)) for name in every}
+    given["f"] = rng.uniform(-1, 1, (5, 6))
     for name, arguments, _, _ in _core.functions():
         many = getattr(arm, name)(**{a: given[a] for a in arguments if a != "parameters"})
         one = getattr(arm, name)(**{a: given[a][2] for a in arguments if a != "parameters"})

@@ -5,7 +5,7 @@ use nalgebra::SVector;
 /// A state with parameter values: one sample.
 pub type Call<'a> = dyngen::Samples<'a>;
 
-/// The results of every function, row-major, in the order of `dyngen::Function::ALL`.
+/// The results of the functions of `dyngen::Function::common`, row-major, in their order.
 pub type Results = Vec<Vec<f64>>;
 
 /// One generated file.
@@ -76,6 +76,7 @@ files! {
     lwa4p_symbolic = "lwa4p_symbolic.rs";
     lwa4p_published = "lwa4p_published.rs";
     lwa4p_rotorless_minimal = "lwa4p_rotorless_minimal.rs";
+    lwa4p_rotorless_all = "lwa4p_rotorless_all.rs";
     puma560_full = "puma560_full.rs";
     puma560_minimal = "puma560_minimal.rs";
     puma560_symbolic = "puma560_symbolic.rs";

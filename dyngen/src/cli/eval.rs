@@ -19,7 +19,7 @@ pub(super) struct Args {
     #[arg(long, value_parser = generate::function)]
     function: Function,
     /// States: a CSV file with a header line and the columns q1…, dq1…, ddq1… (tau1… for forward dynamics,
-    /// dqr1… and ddqr1… for reference motions, e1… for transposed products).
+    /// dqr1… and ddqr1… for reference motions, e1… for products, f1 to f6 for a wrench on the tool).
     #[arg(long, value_name = "FILE.csv")]
     states: PathBuf,
     /// The parameter set.
@@ -58,6 +58,11 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         (columns(Argument::Positions)?, columns(Argument::Velocities)?, columns(Argument::Accelerations)?);
     let (dqr, ddqr) = (columns(Argument::ReferenceVelocities)?, columns(Argument::ReferenceAccelerations)?);
     let (tau, e) = (columns(Argument::Torques)?, columns(Argument::Errors)?);
+    let f = match function.takes(Argument::Wrench) {
+        true => states
+            .columns(Argument::Wrench.name(), &["fx", "fy", "fz", "mx", "my", "mz"].map(String::from))?,
+        false => Vec::new(),
+    };
     let samples = Samples {
         q: &q,
         dq: &dq,
@@ -66,6 +71,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         ddqr: &ddqr,
         tau: &tau,
         e: &e,
+        f: &f,
         parameters: &parameters,
     };
     let evaluator = Evaluator::new(&model, function, set.kind).map_err(Failure::refused)?;
@@ -152,7 +158,7 @@ impl States {
             (1..=n).filter(|i| places[i - 1].is_none()).map(|i| format!("{name}{i}")).collect();
         if !missing.is_empty() {
             return Err(Failure::input(format!(
-                "{}:1: the states have no column {}; the arm has {n} joints",
+                "{}:1: the states have no column {}; {name} has {n} numbers for this arm",
                 self.file,
                 missing.join(", ")
             )));
@@ -160,7 +166,7 @@ impl States {
         let more = format!("{name}{}", n + 1);
         if self.header.contains(&more) {
             return Err(Failure::input(format!(
-                "{}:1: the states have a column {more}; the arm has {n} joints: another arm's states",
+                "{}:1: the states have a column {more}; {name} has {n} numbers for this arm: another arm's states",
                 self.file
             )));
         }

@@ -47,8 +47,7 @@ pub(super) fn weak(model: &Model) -> Result<Vec<Weak>, Error> {
         }
     }
     let [q, dq, ddq] = &states;
-    let none: &[f64] = &[];
-    let samples = Samples { q, dq, ddq, dqr: none, ddqr: none, tau: none, e: none, parameters: none };
+    let samples = Samples { q, dq, ddq, ..Samples::default() };
     let mut rows = vec![0.0; STATES * n * p];
     evaluator.run(&samples, &mut rows);
     let mut columns: Vec<Vec<f64>> =

@@ -206,7 +206,7 @@ impl<'a> Parts<'a> {
             Function::Gravity => self.rows(composite::gravity(b, chain, bodies)),
             Function::ForwardDynamics => self.forward_dynamics(),
             Function::ForwardKinematics => pose::forward_kinematics(b, elements, &self.ends()),
-            Function::Jacobian => self.followers.columns(b, pose::jacobian(b, elements, &self.ends())),
+            Function::Jacobian => self.jacobian(),
             Function::JacobianRateTimesVelocity => self.jacobian_rate_times_velocity(),
             Function::KineticEnergy => vec![momentum::kinetic_energy(b, chain, bodies, velocities)],
             Function::PotentialEnergy => vec![self.potential_energy()],
@@ -215,6 +215,18 @@ impl<'a> Parts<'a> {
             Function::Momentum => self.rows(momentum::momentum(b, chain, bodies, velocities)),
             Function::TorqueByPosition => self.torque_derivatives(Direction::Position),
             Function::TorqueByVelocity => self.torque_derivatives(Direction::Velocity),
+            Function::AccelerationByPosition => self.acceleration_derivatives(Direction::Position),
+            Function::AccelerationByVelocity => self.acceleration_derivatives(Direction::Velocity),
+            Function::MassMatrixRate => self.rate(&self.mass_matrix()),
+            Function::MassMatrixTimesByPosition => self.by_position(&self.mass_matrix_times_errors()),
+            Function::JacobianRate => self.rate(&self.jacobian()),
+            Function::JacobianTransposeTimes => self.jacobian_transpose_times_wrench(),
+            Function::JacobianTransposeTimesByPosition => {
+                self.by_position(&self.jacobian_transpose_times_wrench())
+            }
+            Function::TaskInertiaInverse => self.task().inertia_inverse,
+            Function::TaskInertia => forward::inverse_symmetric(b, &self.task().inertia_inverse, 6),
+            Function::ConsistentInverse => self.task().consistent_inverse(b),
         }
     }
 
@@ -331,12 +343,104 @@ impl<'a> Parts<'a> {
 
     /// ∂τ/∂q or ∂τ/∂q̇, n × n.
     fn torque_derivatives(&self, direction: fn(usize) -> Direction) -> Vec<Expr> {
-        let (n, dof) = (self.subject.arm.links(), self.subject.arm.dof());
-        let torques = self.torque(self.each(Input::Acceleration), true);
-        let columns: Vec<Vec<Expr>> =
-            (0..n).map(|j| differentiate::derivative(self.b, &torques, direction(j))).collect();
-        self.followers.columns(self.b, (0..dof * n).map(|k| columns[k % n][k / n]).collect())
+        self.derivatives(&self.torque(self.each(Input::Acceleration), true), direction)
     }
+
+    /// −B⁻¹·∂τ/∂q or −B⁻¹·∂τ/∂q̇ at the accelerations that the torques make (Carpentier and Mansard 2018), n × n.
+    fn acceleration_derivatives(&self, direction: fn(usize) -> Direction) -> Vec<Expr> {
+        let (b, n) = (self.b, self.subject.arm.dof());
+        let accelerations = self.followers.of_chain(b, &self.forward_dynamics());
+        let derivatives = self.torque_derivatives(direction);
+        let derivatives = b.replaced(&derivatives, |input| match input {
+            Input::Acceleration(joint) => Some(accelerations[joint]),
+            _ => None,
+        });
+        let right: Vec<Vec<Expr>> =
+            (0..n).map(|j| (0..n).map(|i| -derivatives[i * n + j]).collect()).collect();
+        let right: Vec<&[Expr]> = right.iter().map(Vec::as_slice).collect();
+        let columns = forward::solve_symmetric_each(b, &self.mass_matrix(), n, &right);
+        (0..n * n).map(|k| columns[k % n][k / n]).collect()
+    }
+
+    /// A column for the derivative by each coordinate's q or q̇.
+    fn derivatives(&self, outputs: &[Expr], direction: fn(usize) -> Direction) -> Vec<Expr> {
+        let n = self.subject.arm.links();
+        let columns: Vec<Vec<Expr>> =
+            (0..n).map(|j| differentiate::derivative(self.b, outputs, direction(j))).collect();
+        self.followers.columns(self.b, (0..outputs.len() * n).map(|k| columns[k % n][k / n]).collect())
+    }
+
+    /// A column for the derivative by each coordinate's q.
+    fn by_position(&self, outputs: &[Expr]) -> Vec<Expr> {
+        self.derivatives(outputs, Direction::Position)
+    }
+
+    /// The rates of functions of the positions.
+    fn rate(&self, outputs: &[Expr]) -> Vec<Expr> {
+        let velocity = |joint: usize| self.b.input(Input::Velocity(joint));
+        differentiate::along(self.b, outputs, &velocity, &|_| Expr::ZERO)
+    }
+
+    /// B·e
+    fn mass_matrix_times_errors(&self) -> Vec<Expr> {
+        let (b, n, matrix) = (self.b, self.subject.arm.dof(), self.mass_matrix());
+        let errors: Vec<Expr> = (0..n).map(|i| b.input(Input::Error(i))).collect();
+        matrix.chunks(n).map(|row| sum_of_products(b, row, &errors)).collect()
+    }
+
+    /// J of the coordinates, 6 × n.
+    fn jacobian(&self) -> Vec<Expr> {
+        self.followers.columns(self.b, pose::jacobian(self.b, &self.elements, &self.ends()))
+    }
+
+    /// Jᵀ·f
+    fn jacobian_transpose_times_wrench(&self) -> Vec<Expr> {
+        let (b, n, jacobian) = (self.b, self.subject.arm.dof(), self.jacobian());
+        let wrench: Vec<Expr> = (0..6).map(|i| b.input(Input::Wrench(i))).collect();
+        let column = |j: usize| -> Vec<Expr> { jacobian.iter().skip(j).step_by(n).copied().collect() };
+        (0..n).map(|j| sum_of_products(b, &column(j), &wrench)).collect()
+    }
+
+    /// How the tool's frame moves under forces.
+    fn task(&self) -> Task {
+        Task::new(self.b, &self.mass_matrix(), &self.jacobian(), self.subject.arm.dof())
+    }
+}
+
+/// What a wrench on the tool's frame does.
+struct Task {
+    /// B⁻¹·Jᵀ, n × 6.
+    accelerations: Vec<Expr>,
+    /// Λ⁻¹ = J·B⁻¹·Jᵀ, 6 × 6.
+    inertia_inverse: Vec<Expr>,
+}
+
+impl Task {
+    fn new(b: &Builder, mass_matrix: &[Expr], jacobian: &[Expr], n: usize) -> Task {
+        let rows: Vec<&[Expr]> = jacobian.chunks(n).collect();
+        let columns = forward::solve_symmetric_each(b, mass_matrix, n, &rows);
+        let inertia_inverse = (0..36)
+            .map(|k| {
+                // One triangle is computed, the other is its mirror.
+                let (i, j) = ((k / 6).min(k % 6), (k / 6).max(k % 6));
+                sum_of_products(b, rows[i], &columns[j])
+            })
+            .collect();
+        Task { accelerations: (0..6 * n).map(|k| columns[k % 6][k / 6]).collect(), inertia_inverse }
+    }
+
+    /// J̄ = B⁻¹·Jᵀ·Λ
+    fn consistent_inverse(&self, b: &Builder) -> Vec<Expr> {
+        // Λ is symmetric: its rows are its columns.
+        let inertia = forward::inverse_symmetric(b, &self.inertia_inverse, 6);
+        let rows = self.accelerations.chunks(6);
+        rows.flat_map(|row| inertia.chunks(6).map(|column| sum_of_products(b, row, column))).collect()
+    }
+}
+
+/// Σ xᵢ·yᵢ
+fn sum_of_products(b: &Builder, x: &[Expr], y: &[Expr]) -> Expr {
+    x.iter().zip(y).fold(Expr::ZERO, |sum, (x, y)| b.add(&sum, &b.mul(x, y)))
 }
 
 /// A parameter of the set as an input, or its value.

@@ -56,6 +56,12 @@ impl<'a> Followers<'a> {
         sums
     }
 
+    /// The chain's rates or accelerations of those of the coordinates.
+    pub fn of_chain(&self, b: &Builder, coordinates: &[Expr]) -> Vec<Expr> {
+        let of = |drive: &Drive| b.mul(&b.constant(&drive.ratio), &coordinates[drive.coordinate]);
+        self.drives.iter().map(of).collect()
+    }
+
     /// The outputs with the coordinates in place of the chain's joints.
     pub fn of_coordinates(&self, graph: Graph, outputs: Vec<Expr>) -> (Graph, Vec<Expr>) {
         if !self.arm.has_mimics() {

@@ -52,6 +52,26 @@ pub enum Function {
     TorqueByPosition,
     /// ∂τ/∂q̇, n × n
     TorqueByVelocity,
+    /// ∂q̈/∂q at given torques, n × n
+    AccelerationByPosition,
+    /// ∂q̈/∂q̇ at given torques, n × n
+    AccelerationByVelocity,
+    /// Ḃ(q, q̇), n × n
+    MassMatrixRate,
+    /// ∂(B·e)/∂q, n × n
+    MassMatrixTimesByPosition,
+    /// J̇(q, q̇), 6 × n
+    JacobianRate,
+    /// Jᵀ·f, n × 1
+    JacobianTransposeTimes,
+    /// ∂(Jᵀ·f)/∂q, n × n
+    JacobianTransposeTimesByPosition,
+    /// Λ⁻¹ = J·B⁻¹·Jᵀ, 6 × 6
+    TaskInertiaInverse,
+    /// Λ = (J·B⁻¹·Jᵀ)⁻¹, 6 × 6
+    TaskInertia,
+    /// J̄ = B⁻¹·Jᵀ·Λ, n × 6
+    ConsistentInverse,
 }
 
 /// A length of a result.
@@ -82,6 +102,8 @@ pub enum Argument {
     Torques,
     /// e
     Errors,
+    /// f
+    Wrench,
     /// π
     Parameters,
 }
@@ -97,6 +119,7 @@ impl Argument {
             Argument::ReferenceAccelerations => "ddqr",
             Argument::Torques => "tau",
             Argument::Errors => "e",
+            Argument::Wrench => "f",
             Argument::Parameters => "parameters",
         }
     }
@@ -111,7 +134,19 @@ impl Argument {
             Argument::ReferenceAccelerations => "reference accelerations q̈ᵣ, rad/s²",
             Argument::Torques => "joint torques, N·m (N where prismatic)",
             Argument::Errors => "one number for each joint",
+            Argument::Wrench => {
+                "force, N, above the moment about the origin, N·m, on the tool's frame, in base axes"
+            }
             Argument::Parameters => "the values of [`PARAMETER_NAMES`]",
+        }
+    }
+
+    /// How many numbers it has for n joints and p parameters.
+    pub fn length(self, n: usize, p: usize) -> usize {
+        match self {
+            Argument::Wrench => 6,
+            Argument::Parameters => p,
+            _ => n,
         }
     }
 }
@@ -148,7 +183,7 @@ use Function::*;
 use Size::{Fixed, Joints, Parameters as ByParameter};
 
 /// One row for each function, in the order of [`Function::ALL`].
-const TABLE: [Row; 23] = [
+const TABLE: [Row; 33] = [
     Row {
         function: InverseDynamics,
         name: "inverse_dynamics",
@@ -382,12 +417,115 @@ const TABLE: [Row; 23] = [
         what: "∂τ/∂q̇ of the inverse dynamics.",
         returns: "Returns n × n; column j is the derivative by q̇ of joint j.",
     },
+    Row {
+        function: AccelerationByPosition,
+        name: "acceleration_by_position",
+        letter: "dddq_dq",
+        size: (Joints, Joints),
+        arguments: &[Positions, Velocities, Torques, Parameters],
+        kind: Kind::Dynamics,
+        what: "∂q̈/∂q of the forward dynamics at given torques: −B⁻¹·∂τ/∂q. With ∂q̈/∂τ = B⁻¹ it is the linearisation \
+            of the arm.",
+        returns: "Returns n × n; column j is the derivative by q of joint j.",
+    },
+    Row {
+        function: AccelerationByVelocity,
+        name: "acceleration_by_velocity",
+        letter: "dddq_ddq",
+        size: (Joints, Joints),
+        arguments: &[Positions, Velocities, Torques, Parameters],
+        kind: Kind::Dynamics,
+        what: "∂q̈/∂q̇ of the forward dynamics at given torques: −B⁻¹·∂τ/∂q̇.",
+        returns: "Returns n × n, 1/s; column j is the derivative by q̇ of joint j.",
+    },
+    Row {
+        function: MassMatrixRate,
+        name: "mass_matrix_rate",
+        letter: "dB",
+        size: (Joints, Joints),
+        arguments: &[Positions, Velocities, Parameters],
+        kind: Kind::Dynamics,
+        what: "Rate of the mass matrix, Ḃ(q, q̇) = C + Cᵀ.",
+        returns: "Returns Ḃ, n × n, kg·m²/s.",
+    },
+    Row {
+        function: MassMatrixTimesByPosition,
+        name: "mass_matrix_times_by_position",
+        letter: "dBe_dq",
+        size: (Joints, Joints),
+        arguments: &[Positions, Errors, Parameters],
+        kind: Kind::Dynamics,
+        what: "∂(B(q)·e)/∂q for a vector e that does not depend on q.",
+        returns: "Returns n × n; column j is the derivative by q of joint j.",
+    },
+    Row {
+        function: JacobianRate,
+        name: "jacobian_rate",
+        letter: "dJ",
+        size: (Fixed(6), Joints),
+        arguments: &[Positions, Velocities],
+        kind: Kind::Other,
+        what: "Rate of the geometric Jacobian of the tool's frame, J̇(q, q̇), in base axes.",
+        returns: "Returns J̇, 6 × n.",
+    },
+    Row {
+        function: JacobianTransposeTimes,
+        name: "jacobian_transpose_times",
+        letter: "tau",
+        size: (Joints, Fixed(1)),
+        arguments: &[Positions, Wrench],
+        kind: Kind::Other,
+        what: "Jᵀ(q)·f: the joint torques that hold a wrench f on the tool's frame.",
+        returns: "Returns the torques, N·m (N where prismatic).",
+    },
+    Row {
+        function: JacobianTransposeTimesByPosition,
+        name: "jacobian_transpose_times_by_position",
+        letter: "dtau_dq",
+        size: (Joints, Joints),
+        arguments: &[Positions, Wrench],
+        kind: Kind::Other,
+        what: "∂(Jᵀ(q)·f)/∂q for a wrench f that does not depend on q, in base axes.",
+        returns: "Returns n × n; column j is the derivative by q of joint j.",
+    },
+    Row {
+        function: TaskInertiaInverse,
+        name: "task_inertia_inverse",
+        letter: "Linv",
+        size: (Fixed(6), Fixed(6)),
+        arguments: &[Positions, Parameters],
+        kind: Kind::Dynamics,
+        what: "Inverse of the inertia that a wrench on the tool's frame feels: Λ⁻¹ = J·B⁻¹·Jᵀ (Khatib 1987), in base \
+            axes.",
+        returns: "Returns Λ⁻¹, 6 × 6, symmetric; not finite where the parameters make B singular.",
+    },
+    Row {
+        function: TaskInertia,
+        name: "task_inertia",
+        letter: "L",
+        size: (Fixed(6), Fixed(6)),
+        arguments: &[Positions, Parameters],
+        kind: Kind::Dynamics,
+        what: "Operational-space inertia Λ = (J·B⁻¹·Jᵀ)⁻¹ of the tool's frame (Khatib 1987), in base axes.",
+        returns: "Returns Λ, 6 × 6, symmetric; not finite where the Jacobian loses rank.",
+    },
+    Row {
+        function: ConsistentInverse,
+        name: "dynamically_consistent_inverse",
+        letter: "Jbar",
+        size: (Joints, Fixed(6)),
+        arguments: &[Positions, Parameters],
+        kind: Kind::Dynamics,
+        what: "Dynamically consistent inverse of the Jacobian, J̄ = B⁻¹·Jᵀ·Λ (Khatib 1987): torques of the null space \
+            (I − JᵀJ̄ᵀ)·τ do not accelerate the tool's frame.",
+        returns: "Returns J̄, n × 6; not finite where the Jacobian loses rank.",
+    },
 ];
 
 impl Function {
     /// All of them, in the order in which they are emitted.
-    pub const ALL: [Function; 23] = {
-        let mut all = [InverseDynamics; 23];
+    pub const ALL: [Function; 33] = {
+        let mut all = [InverseDynamics; 33];
         let mut k = 0;
         while k < all.len() {
             all[k] = TABLE[k].function;
@@ -395,6 +533,16 @@ impl Function {
         }
         all
     };
+
+    /// Those that a file has unless others are asked for: what identification and most controllers need.
+    pub fn common() -> impl Iterator<Item = Function> {
+        Self::ALL.into_iter().take_while(|f| *f <= TorqueByVelocity)
+    }
+
+    /// Whether only an arm has it whose tool can accelerate in every direction.
+    pub fn needs_full_rank(self) -> bool {
+        matches!(self, TaskInertia | ConsistentInverse)
+    }
 
     fn row(self) -> &'static Row {
         &TABLE[self as usize]
@@ -443,7 +591,15 @@ impl Function {
 
     /// Whether it depends on kinematics alone, on no parameter.
     pub fn is_kinematic(self) -> bool {
-        matches!(self, Function::ForwardKinematics | Function::Jacobian | Function::JacobianRateTimesVelocity)
+        matches!(
+            self,
+            ForwardKinematics
+                | Jacobian
+                | JacobianRateTimesVelocity
+                | JacobianRate
+                | JacobianTransposeTimes
+                | JacobianTransposeTimesByPosition
+        )
     }
 
     pub(crate) fn kind(self) -> Kind {
@@ -452,7 +608,16 @@ impl Function {
 
     /// Why its result can be no number where states and parameter values are finite, in words.
     pub fn why_not_finite(self) -> &'static str {
-        if matches!(self, ForwardDynamics | MassMatrixInverse) {
+        if matches!(self, TaskInertia | ConsistentInverse) {
+            "the Jacobian loses rank there, or the mass matrix is singular with these parameter values"
+        } else if matches!(
+            self,
+            ForwardDynamics
+                | MassMatrixInverse
+                | AccelerationByPosition
+                | AccelerationByVelocity
+                | TaskInertiaInverse
+        ) {
             "the mass matrix B(q) is singular there with these parameter values; `dyngen check` says which \
              link cannot be real"
         } else {

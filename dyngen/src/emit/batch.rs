@@ -98,13 +98,14 @@ fn parameter(argument: Argument) -> TokenStream {
     let name = argument_name(argument);
     match argument {
         Argument::Parameters => quote!(#name: &impl Parameters<T>),
+        Argument::Wrench => quote!(#name: &[[T; LANES]; 6]),
         _ => quote!(#name: &[[T; LANES]; JOINTS]),
     }
 }
 
 /// The names of an argument's arrays over the samples, one a joint.
 fn lanes(built: &FunctionGraph, argument: Argument) -> Vec<Ident> {
-    (0..built.joints).map(|i| lanes::lane_name(argument, i)).collect()
+    (0..argument.length(built.joints, built.parameters)).map(|i| lanes::lane_name(argument, i)).collect()
 }
 
 /// The line that names those of an argument's arrays that are read.

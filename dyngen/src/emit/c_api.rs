@@ -50,7 +50,7 @@ impl CFunction {
         let arguments = || function.arguments().iter().filter(|a| **a != Argument::Parameters);
         let inputs = arguments().map(|a| CArray {
             name: a.name().to_string(),
-            length: n,
+            length: a.length(n, p),
             meaning: a.meaning().to_string(),
         });
         let (rows, columns) = function.shape(n, p);

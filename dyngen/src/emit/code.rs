@@ -77,13 +77,18 @@ fn input_of(argument: Argument, i: usize) -> Input {
         Argument::ReferenceAccelerations => Input::ReferenceAcceleration(i),
         Argument::Torques => Input::Torque(i),
         Argument::Errors => Input::Error(i),
+        Argument::Wrench => Input::Wrench(i),
         Argument::Parameters => Input::Prepared(i),
     }
 }
 
 /// `name: &SVector<T, …>`
 fn parameter(argument: Argument, name: &str) -> TokenStream {
-    let length = if argument == Argument::Parameters { quote!(PARAMETERS) } else { quote!(JOINTS) };
+    let length = match argument {
+        Argument::Parameters => quote!(PARAMETERS),
+        Argument::Wrench => quote!(6),
+        _ => quote!(JOINTS),
+    };
     let ident = Ident::new(name, Span::call_site());
     quote!(#ident: &SVector<T, #length>)
 }
@@ -105,7 +110,7 @@ fn argument(
     used: &BTreeSet<Input>,
 ) -> (TokenStream, TokenStream) {
     let is_parameters = argument == Argument::Parameters;
-    let length = if is_parameters { prepared } else { built.joints };
+    let length = argument.length(built.joints, prepared);
     let is_used = |i: usize| used.contains(&input_of(argument, i));
     if !(0..length).any(is_used) {
         return (shared_parameter(argument, &format!("_{}", argument.name())), quote!());

@@ -47,7 +47,7 @@ impl Default for Options {
     fn default() -> Self {
         Options {
             parameters: SetKind::Minimal,
-            functions: Function::ALL.to_vec(),
+            functions: Function::common().collect(),
             values: None,
             friction: Vec::new(),
             batch: false,

@@ -89,6 +89,20 @@ impl Builder {
         }
     }
 
+    /// Expressions with others in place of some inputs.
+    pub fn replaced(&self, outputs: &[Expr], by: impl Fn(Input) -> Option<Expr>) -> Vec<Expr> {
+        let graph = self.snapshot();
+        let mut copied = vec![Expr::ZERO; graph.nodes().len()];
+        for node in graph.needed(outputs) {
+            let other = match graph.nodes()[node] {
+                Node::Input(input) => by(input),
+                _ => None,
+            };
+            copied[node] = other.unwrap_or_else(|| self.copy_node(&graph, node, &copied));
+        }
+        outputs.iter().map(|e| if e.is_negative() { -copied[e.node()] } else { copied[e.node()] }).collect()
+    }
+
     fn value_of(&self, a: Expr) -> Option<Rational> {
         let graph = self.graph.borrow();
         let Node::Constant(index) = graph.nodes[a.node()] else { return None };

@@ -1,6 +1,6 @@
 //! Derivatives of expressions, node by node.
 
-use super::{Builder, Expr, Graph, Input, Node};
+use super::{Builder, Expr, Input, JointSum, Node};
 use crate::exact::algebra::Algebra;
 use std::collections::HashMap;
 
@@ -15,10 +15,37 @@ pub enum Direction {
 
 /// The derivative of each output in one direction.
 pub fn derivative(b: &Builder, outputs: &[Expr], direction: Direction) -> Vec<Expr> {
+    let one = |is: bool| if is { Expr::ONE } else { Expr::ZERO };
+    along(b, outputs, &|j| one(direction == Direction::Position(j)), &|j| {
+        one(direction == Direction::Velocity(j))
+    })
+}
+
+/// The derivative of each output where q and q̇ of each joint change at given rates.
+pub fn along(
+    b: &Builder,
+    outputs: &[Expr],
+    position: &dyn Fn(usize) -> Expr,
+    velocity: &dyn Fn(usize) -> Expr,
+) -> Vec<Expr> {
     let graph = b.snapshot();
     let mut rates: HashMap<usize, Expr> = HashMap::new();
     for node in graph.needed(outputs) {
-        let rate = rate(b, &graph, &rates, node, direction);
+        let of = |e: Expr| signed(&rates, e);
+        let rate = match graph.nodes()[node] {
+            Node::Input(Input::Sin(sum)) => b.mul(&angle_rate(b, sum, position), &b.input(Input::Cos(sum))),
+            Node::Input(Input::Cos(sum)) => b.mul(&angle_rate(b, sum, position), &-b.input(Input::Sin(sum))),
+            Node::Input(Input::Position(j)) => position(j),
+            Node::Input(Input::Velocity(j)) => velocity(j),
+            Node::Input(_) | Node::Constant(_) | Node::Symbol(..) => Expr::ZERO,
+            Node::Add(x, y) => b.add(&of(x), &of(y)),
+            Node::Mul(x, y) => b.add(&b.mul(&of(x), &y), &b.mul(&x, &of(y))),
+            // (x/y)' = (x' − (x/y) y')/y
+            Node::Div(x, y) => {
+                let quotient = b.div(x, y);
+                b.div(b.sub(&of(x), &b.mul(&quotient, &of(y))), y)
+            }
+        };
         rates.insert(node, rate);
     }
     outputs.iter().map(|e| signed(&rates, *e)).collect()
@@ -29,40 +56,8 @@ fn signed(rates: &HashMap<usize, Expr>, e: Expr) -> Expr {
     if e.is_negative() { -rate } else { rate }
 }
 
-fn rate(b: &Builder, graph: &Graph, rates: &HashMap<usize, Expr>, node: usize, direction: Direction) -> Expr {
-    let of = |e: Expr| signed(rates, e);
-    match graph.nodes()[node] {
-        Node::Input(input) => match (input, direction) {
-            (Input::Sin(sum), Direction::Position(j)) => times_sign(b.input(Input::Cos(sum)), sum.sign(j)),
-            (Input::Cos(sum), Direction::Position(j)) => times_sign(-b.input(Input::Sin(sum)), sum.sign(j)),
-            (Input::Position(i), Direction::Position(j)) | (Input::Velocity(i), Direction::Velocity(j))
-                if i == j =>
-            {
-                Expr::ONE
-            }
-            _ => Expr::ZERO,
-        },
-        Node::Constant(_) | Node::Symbol(..) => Expr::ZERO,
-        Node::Add(x, y) => b.add(&of(x), &of(y)),
-        Node::Mul(x, y) => b.add(&b.mul(&of(x), &y), &b.mul(&x, &of(y))),
-        // (x/y)' = (x' − (x/y) y')/y
-        Node::Div(x, y) => {
-            let quotient = b.div(x, y);
-            b.div(b.sub(&of(x), &b.mul(&quotient, &of(y))), y)
-        }
-    }
-}
-
-/// The derivative of a function of a sum of angles: `derivative` by the sum, with the joint's sign in it.
-fn times_sign(derivative: Expr, sign: Option<bool>) -> Expr {
-    match sign {
-        None => Expr::ZERO,
-        Some(negative) => {
-            if negative {
-                -derivative
-            } else {
-                derivative
-            }
-        }
-    }
+/// The rate of a sum of angles.
+fn angle_rate(b: &Builder, sum: JointSum, position: &dyn Fn(usize) -> Expr) -> Expr {
+    let term = |(joint, negative): (usize, bool)| if negative { -position(joint) } else { position(joint) };
+    sum.joints().map(term).fold(Expr::ZERO, |sum, term| b.add(&sum, &term))
 }

@@ -77,6 +77,8 @@ pub enum Input {
     ReferenceAcceleration(usize),
     /// A vector of one number a joint that the regressor's transpose is multiplied with.
     Error(usize),
+    /// A wrench on the tool's frame: force above moment.
+    Wrench(usize),
     /// A parameter of the set.
     Parameter(usize),
     /// A value that was prepared of the parameters alone.
@@ -96,6 +98,7 @@ impl fmt::Display for Input {
             Input::ReferenceVelocity(i) => ("dqr", i),
             Input::ReferenceAcceleration(i) => ("ddqr", i),
             Input::Error(i) => ("e", i),
+            Input::Wrench(i) => ("f", i),
             Input::Parameter(i) => ("p", i),
             Input::Prepared(i) => ("z", i),
         };

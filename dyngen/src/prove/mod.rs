@@ -86,6 +86,15 @@ pub fn prove(
     Ok(())
 }
 
+/// Whether the Jacobian of the tool's frame has rank six anywhere: then it has it almost everywhere.
+pub fn has_full_rank(arm: &Arm, symbols: &AngleSymbols, sets: &Sets) -> bool {
+    let point = Point::draw(arm, symbols, sets, &mut Draws::new(0x0072_616e_6b));
+    let jacobian = jacobian(&point);
+    let square = times(&jacobian, &transposed(&jacobian, arm.dof()), arm.dof());
+    // A sum of squares modulo a prime can be zero by chance, in one of 2⁶¹ draws.
+    arm.dof() >= 6 && inverse(square, 6).iter().any(|x| *x != Fp::ZERO)
+}
+
 /// What the Lagrangian says the function's result must be, row-major.
 fn expected(point: &Point<'_>, set: &ParameterSet, function: Function) -> Vec<Fp> {
     let n = point.dof();
@@ -111,11 +120,7 @@ fn expected(point: &Point<'_>, set: &ParameterSet, function: Function) -> Vec<Fp
         Function::Gravity => point.state(&zeros, &zeros, true).torques(),
         Function::ForwardDynamics => point.accelerations.clone(),
         Function::ForwardKinematics => PoseSeries::along(point, &zeros).pose(),
-        Function::Jacobian => {
-            let columns: Vec<Vec<Fp>> =
-                (0..n).map(|j| PoseSeries::along(point, &unit(n, j)).velocity()).collect();
-            transpose(&columns)
-        }
+        Function::Jacobian => jacobian(point),
         Function::JacobianRateTimesVelocity => PoseSeries::along(point, &point.velocities).acceleration(),
         Function::KineticEnergy => point.weigh(&singles(motion(false).values())),
         Function::PotentialEnergy => point.weigh(&singles(potential(point))),
@@ -124,7 +129,82 @@ fn expected(point: &Point<'_>, set: &ParameterSet, function: Function) -> Vec<Fp
         Function::Momentum => motion(false).momentum(),
         Function::TorqueByPosition => torque_derivatives(point, Direction::Position),
         Function::TorqueByVelocity => torque_derivatives(point, Direction::Velocity),
+        Function::AccelerationByPosition => acceleration_derivatives(point, Direction::Position),
+        Function::AccelerationByVelocity => acceleration_derivatives(point, Direction::Velocity),
+        Function::MassMatrixRate => mass_matrix_rate(point),
+        Function::MassMatrixTimesByPosition => {
+            let torques = point.state(&zeros, &point.errors, false);
+            transpose(&(0..n).map(|j| torques.torque_derivative(Direction::Position(j))).collect::<Vec<_>>())
+        }
+        Function::JacobianRate => {
+            let column = |j: usize| PoseSeries::mixed(point, &point.velocities, &unit(n, j));
+            transpose(&(0..n).map(column).collect::<Vec<_>>())
+        }
+        Function::JacobianTransposeTimes => transpose_times(&jacobian(point), &point.wrench),
+        Function::JacobianTransposeTimesByPosition => {
+            let entry = |k: usize| {
+                let second = PoseSeries::mixed(point, &unit(n, k % n), &unit(n, k / n));
+                second.iter().zip(&point.wrench).fold(Fp::ZERO, |sum, (x, f)| sum + *x * *f)
+            };
+            (0..n * n).map(entry).collect()
+        }
+        Function::TaskInertiaInverse => task_inertia_inverse(point),
+        Function::TaskInertia => inverse(task_inertia_inverse(point), 6),
+        Function::ConsistentInverse => {
+            let accelerations = times(&inverse(mass_matrix(point), n), &transposed(&jacobian(point), n), n);
+            times(&accelerations, &inverse(task_inertia_inverse(point), 6), 6)
+        }
     }
+}
+
+/// −B⁻¹ times the derivatives of the torques.
+fn acceleration_derivatives(point: &Point<'_>, direction: fn(usize) -> Direction) -> Vec<Fp> {
+    let n = point.dof();
+    let product = times(&inverse(mass_matrix(point), n), &torque_derivatives(point, direction), n);
+    product.into_iter().map(|x| -x).collect()
+}
+
+/// Σ q̇ₖ·∂B/∂qₖ, column by column.
+fn mass_matrix_rate(point: &Point<'_>) -> Vec<Fp> {
+    let n = point.dof();
+    let zeros = vec![Fp::ZERO; n];
+    let column = |j: usize| {
+        let unit = unit(n, j);
+        let torques = point.state(&zeros, &unit, false);
+        (0..n).fold(vec![Fp::ZERO; n], |sum, k| {
+            let by_position = torques.torque_derivative(Direction::Position(k));
+            sum.iter().zip(by_position).map(|(s, x)| *s + point.velocities[k] * x).collect()
+        })
+    };
+    transpose(&(0..n).map(column).collect::<Vec<_>>())
+}
+
+/// J, 6 × n.
+fn jacobian(point: &Point<'_>) -> Vec<Fp> {
+    let n = point.dof();
+    let column = |j: usize| PoseSeries::along(point, &unit(n, j)).velocity();
+    transpose(&(0..n).map(column).collect::<Vec<_>>())
+}
+
+/// J·B⁻¹·Jᵀ
+fn task_inertia_inverse(point: &Point<'_>) -> Vec<Fp> {
+    let (n, jacobian) = (point.dof(), jacobian(point));
+    times(&times(&jacobian, &inverse(mass_matrix(point), n), n), &transposed(&jacobian, n), n)
+}
+
+/// The product of two row-major matrices; `inner` is the first one's number of columns.
+fn times(a: &[Fp], b: &[Fp], inner: usize) -> Vec<Fp> {
+    let columns = b.len() / inner;
+    let entry = |k: usize| {
+        let (i, j) = (k / columns, k % columns);
+        (0..inner).fold(Fp::ZERO, |sum, l| sum + a[i * inner + l] * b[l * columns + j])
+    };
+    (0..a.len() / inner * columns).map(entry).collect()
+}
+
+/// The transpose of a row-major matrix with so many columns.
+fn transposed(matrix: &[Fp], columns: usize) -> Vec<Fp> {
+    (0..columns).flat_map(|j| matrix.iter().skip(j).step_by(columns).copied()).collect()
 }
 
 /// −L of an arm that stands still.

@@ -28,6 +28,8 @@ pub(super) struct Point<'a> {
     pub(super) reference_velocities: Vec<Fp>,
     pub(super) reference_accelerations: Vec<Fp>,
     pub(super) errors: Vec<Fp>,
+    /// A wrench on the tool's frame.
+    pub(super) wrench: Vec<Fp>,
     /// Values of the arm's kept parameters.
     values: Vec<(Parameter, Fp)>,
 }
@@ -75,6 +77,7 @@ impl<'a> Point<'a> {
             reference_velocities: vector(),
             reference_accelerations: vector(),
             errors: vector(),
+            wrench: (0..6).map(|_| draws.element()).collect(),
             values,
         }
     }
@@ -90,6 +93,7 @@ impl<'a> Point<'a> {
             reference_velocities: self.reference_velocities.clone(),
             reference_accelerations: self.reference_accelerations.clone(),
             errors: self.errors.clone(),
+            wrench: self.wrench.clone(),
             values: self.values.clone(),
             ..*self
         }
@@ -168,6 +172,7 @@ impl<'a> Point<'a> {
             Input::ReferenceVelocity(i) => self.reference_velocities[i],
             Input::ReferenceAcceleration(i) => self.reference_accelerations[i],
             Input::Error(i) => self.errors[i],
+            Input::Wrench(i) => self.wrench[i],
             Input::Torque(i) => torques[i],
             Input::Parameter(i) => sums[i],
             // Proven is the function with its preparation; a value of its own has none here.

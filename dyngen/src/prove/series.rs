@@ -3,7 +3,8 @@
 use super::point::Point;
 use crate::arm::{Convention, Placement};
 use crate::exact::algebra::Algebra;
-use crate::exact::prime::Fp;
+use crate::exact::dual::Duals;
+use crate::exact::prime::{Fp, PrimeField};
 use crate::exact::rational::Rational;
 use crate::lagrangian::elements::{ArmElements, PlacementElements, Source};
 
@@ -32,67 +33,106 @@ impl Algebra for SeriesAlgebra {
     }
 }
 
-type Matrix = [[Series; 4]; 4];
+type Matrix<V> = [[V; 4]; 4];
 
-fn times(a: Matrix, b: &Matrix) -> Matrix {
-    let alg = SeriesAlgebra;
+fn times<A: Algebra>(alg: &A, a: &Matrix<A::Value>, b: &Matrix<A::Value>) -> Matrix<A::Value> {
     let entry = |i: usize, j: usize| {
         (0..4).fold(alg.integer(0), |sum, k| alg.add(&sum, &alg.mul(&a[i][k], &b[k][j])))
     };
     std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
 }
 
+/// A turn about an axis of a frame: rows and columns `i` and `j` turn into each other.
+fn turn<A: Algebra>(alg: &A, (i, j): (usize, usize), sin: &A::Value, cos: &A::Value) -> Matrix<A::Value> {
+    let mut matrix = same(alg);
+    (matrix[i][i], matrix[j][j]) = (cos.clone(), cos.clone());
+    (matrix[i][j], matrix[j][i]) = (alg.neg(sin), sin.clone());
+    matrix
+}
+
+fn same<A: Algebra>(alg: &A) -> Matrix<A::Value> {
+    std::array::from_fn(|i| std::array::from_fn(|j| alg.integer(i64::from(i == j))))
+}
+
+fn shift<A: Algebra>(alg: &A, by: [&A::Value; 3]) -> Matrix<A::Value> {
+    let mut matrix = same(alg);
+    by.into_iter().enumerate().for_each(|(i, x)| matrix[i][3] = x.clone());
+    matrix
+}
+
 /// The transforms that lead to a placed frame, in order; none without one.
-fn fixed(point: &Point<'_>, placement: &Option<Placement>) -> Vec<Matrix> {
+fn fixed<A: Algebra>(
+    alg: &A,
+    point: &Point<'_>,
+    placement: &Option<Placement>,
+    of: &dyn Fn(Fp) -> A::Value,
+) -> Vec<Matrix<A::Value>> {
     let Some(placement) = placement else { return Vec::new() };
-    let alg = SeriesAlgebra;
-    let (zero, one) = (alg.integer(0), alg.integer(1));
-    let symbol = |index, sine| [point.sets.field.modular_symbol(index, sine), Fp::ZERO, Fp::ZERO];
-    let frame = PlacementElements::build(&alg, Some(placement), point.symbols, number, symbol);
-    let [x, y, z] = frame.origin;
-    let [(sr, cr), (sp, cp), (sy, cy)] = frame.rpy;
-    let last = [zero, zero, zero, one];
-    let shift = [[one, zero, zero, x], [zero, one, zero, y], [zero, zero, one, z], last];
-    let yaw = [[cy, alg.neg(&sy), zero, zero], [sy, cy, zero, zero], [zero, zero, one, zero], last];
-    let pitch = [[cp, zero, sp, zero], [zero, one, zero, zero], [alg.neg(&sp), zero, cp, zero], last];
-    let roll = [[one, zero, zero, zero], [zero, cr, alg.neg(&sr), zero], [zero, sr, cr, zero], last];
-    vec![shift, yaw, pitch, roll]
+    let number = |x: &Rational| of(Fp::from_rational(x).unwrap_or(Fp::ZERO));
+    let symbol = |index, sine| of(point.sets.field.modular_symbol(index, sine));
+    let frame = PlacementElements::build(alg, Some(placement), point.symbols, number, symbol);
+    let [x, y, z] = &frame.origin;
+    let [(sr, cr), (sp, cp), (sy, cy)] = &frame.rpy;
+    vec![
+        shift(alg, [x, y, z]),
+        turn(alg, (0, 1), sy, cy),
+        turn(alg, (2, 0), sp, cp),
+        turn(alg, (1, 2), sr, cr),
+    ]
+}
+
+/// The tool frame's transform over an algebra in which positions are given by `source`.
+fn tool<A: Algebra>(
+    alg: &A,
+    point: &Point<'_>,
+    source: &mut impl Source<A::Value>,
+    of: &dyn Fn(Fp) -> A::Value,
+) -> Matrix<A::Value> {
+    let elements = ArmElements::build(alg, point.arm, point.symbols, source);
+    let along = |pose: Matrix<A::Value>, step: &Matrix<A::Value>| times(alg, &pose, step);
+    let mut pose = fixed(alg, point, &point.arm.base, of).iter().fold(same(alg), along);
+    let zero = alg.integer(0);
+    for joint in &elements.joints {
+        let about_z =
+            times(alg, &turn(alg, (0, 1), &joint.sin, &joint.cos), &shift(alg, [&zero, &zero, &joint.shift]));
+        let about_x = times(
+            alg,
+            &shift(alg, [&joint.a, &joint.b, &zero]),
+            &turn(alg, (1, 2), &joint.sin_alpha, &joint.cos_alpha),
+        );
+        let steps = match point.arm.convention {
+            Convention::Standard => [about_z, about_x],
+            Convention::Modified => [about_x, about_z],
+        };
+        pose = steps.iter().fold(pose, along);
+    }
+    fixed(alg, point, &point.arm.tool, of).iter().fold(pose, along)
 }
 
 /// The tool frame's transform along a motion of constant joint velocities.
-pub(super) struct PoseSeries(Matrix);
+pub(super) struct PoseSeries(Matrix<Series>);
 
 impl PoseSeries {
     pub(super) fn along(point: &Point<'_>, velocities: &[Fp]) -> PoseSeries {
-        let alg = SeriesAlgebra;
-        let elements =
-            ArmElements::build(&alg, point.arm, point.symbols, &mut SeriesSource { point, velocities });
-        let (zero, one) = (alg.integer(0), alg.integer(1));
-        let same: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { one } else { zero }));
-        let mut pose = fixed(point, &point.arm.base).iter().fold(same, times);
-        for joint in &elements.joints {
-            let (s, c, sa, ca) = (joint.sin, joint.cos, joint.sin_alpha, joint.cos_alpha);
-            let about_z = [
-                [c, alg.neg(&s), zero, zero],
-                [s, c, zero, zero],
-                [zero, zero, one, joint.shift],
-                [zero, zero, zero, one],
-            ];
-            let about_x = [
-                [one, zero, zero, joint.a],
-                [zero, ca, alg.neg(&sa), joint.b],
-                [zero, sa, ca, zero],
-                [zero, zero, zero, one],
-            ];
-            let steps = match point.arm.convention {
-                Convention::Standard => [about_z, about_x],
-                Convention::Modified => [about_x, about_z],
-            };
-            for step in steps {
-                pose = times(pose, &step);
-            }
-        }
-        PoseSeries(fixed(point, &point.arm.tool).iter().fold(pose, times))
+        let of = |x| [x, Fp::ZERO, Fp::ZERO];
+        PoseSeries(tool(&SeriesAlgebra, point, &mut SeriesSource { point, velocities }, &of))
+    }
+
+    /// ∂/∂s of the tool's velocity under q̇ = v, where q changes by s·u: linear above angular.
+    pub(super) fn mixed(point: &Point<'_>, u: &[Fp], v: &[Fp]) -> Vec<Fp> {
+        let alg = Duals(Duals(PrimeField));
+        let of = |x| ((x, Fp::ZERO), (Fp::ZERO, Fp::ZERO));
+        let pose = tool(&alg, point, &mut MixedSource { point, u, v }, &of);
+        // A value is ((x, ∂x/∂s), (∂x/∂t, ∂²x/∂s∂t)); ω is in ∂R/∂t·Rᵀ.
+        let spin = |i: usize, j: usize| {
+            (0..3).fold(Fp::ZERO, |sum, k| {
+                let (_, (by_t, both)) = pose[i][k];
+                let ((x, by_s), _) = pose[j][k];
+                sum + both * x + by_t * by_s
+            })
+        };
+        let origin = (0..3).map(|i| pose[i][3].1.1);
+        origin.chain([spin(2, 1), spin(0, 2), spin(1, 0)]).collect()
     }
 
     /// The transform itself, row-major.
@@ -126,6 +166,65 @@ impl PoseSeries {
 struct SeriesSource<'p, 'a> {
     point: &'p Point<'a>,
     velocities: &'p [Fp],
+}
+
+/// The arm's quantities where q changes by s·u + t·v.
+struct MixedSource<'p, 'a> {
+    point: &'p Point<'a>,
+    u: &'p [Fp],
+    v: &'p [Fp],
+}
+
+type Mixed = ((Fp, Fp), (Fp, Fp));
+
+impl MixedSource<'_, '_> {
+    fn rates(&self, joint: usize) -> (Fp, Fp) {
+        let drive = &self.point.drives[joint];
+        (drive.ratio * self.u[drive.coordinate], drive.ratio * self.v[drive.coordinate])
+    }
+}
+
+fn mixed(x: Fp) -> Mixed {
+    ((x, Fp::ZERO), (Fp::ZERO, Fp::ZERO))
+}
+
+fn mixed_number(value: &Rational) -> Mixed {
+    mixed(Fp::from_rational(value).unwrap_or(Fp::ZERO))
+}
+
+impl Source<Mixed> for MixedSource<'_, '_> {
+    fn joint_trig(&mut self, joint: usize) -> (Mixed, Mixed) {
+        let ((s, c), (u, v)) = (self.point.joint_trig(joint), self.rates(joint));
+        (((s, c * u), (c * v, -(s * u * v))), ((c, -(s * u)), (-(s * v), -(c * u * v))))
+    }
+    fn position(&mut self, joint: usize) -> Mixed {
+        let (u, v) = self.rates(joint);
+        ((self.point.joint_position(joint), u), (v, Fp::ZERO))
+    }
+    fn velocity(&mut self, _: usize) -> Mixed {
+        mixed(Fp::ZERO)
+    }
+    fn a(&mut self, joint: usize) -> Mixed {
+        mixed_number(&self.point.arm.joints[joint].a)
+    }
+    fn b(&mut self, joint: usize) -> Mixed {
+        mixed_number(&self.point.arm.joints[joint].b)
+    }
+    fn d(&mut self, joint: usize) -> Mixed {
+        mixed_number(&self.point.arm.joints[joint].d)
+    }
+    fn ratio(&mut self, _: usize) -> Mixed {
+        mixed(Fp::ZERO)
+    }
+    fn coupling(&mut self, _: &Rational) -> Mixed {
+        mixed(Fp::ZERO)
+    }
+    fn gravity(&mut self, _: usize) -> Mixed {
+        mixed(Fp::ZERO)
+    }
+    fn symbol(&mut self, index: usize, sine: bool) -> Mixed {
+        mixed(self.point.sets.field.modular_symbol(index, sine))
+    }
 }
 
 fn number(value: &Rational) -> Series {

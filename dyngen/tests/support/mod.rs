@@ -3,7 +3,7 @@
 // Each test uses a part of it.
 #![allow(dead_code)]
 
-use dyngen::{Arm, Evaluator, Function, Model, Samples, SetKind};
+use dyngen::{Arm, Evaluator, Model, Samples, SetKind};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -11,10 +11,10 @@ pub(crate) fn model(text: &str) -> Model {
     Model::derive(Arm::parse(text, "arm.toml").unwrap_or_else(|e| panic!("{e}"))).unwrap()
 }
 
-/// Every function for a set, in the order of [`Function::ALL`]: it is proven, or this panics.
+/// Every function that the arm has for a set, in the order of [`Function::ALL`]: it is proven, or this panics.
 pub(crate) fn proven(model: &Model, kind: SetKind) -> Vec<Evaluator> {
     let evaluator = |f| Evaluator::new(model, f, kind).unwrap_or_else(|e| panic!("{f} {kind}: {e}"));
-    Function::ALL.map(evaluator).into()
+    model.functions().map(evaluator).collect()
 }
 
 /// One sample of everything that functions take but parameters.
@@ -26,19 +26,22 @@ pub(crate) struct State {
     pub(crate) dqr: Vec<f64>,
     pub(crate) ddqr: Vec<f64>,
     pub(crate) e: Vec<f64>,
+    pub(crate) f: Vec<f64>,
     pub(crate) tau: Vec<f64>,
 }
 
 impl State {
     /// Every number between -size and size.
     pub(crate) fn draw(random: &mut ChaCha8Rng, joints: usize, size: f64) -> State {
-        let mut v = || (0..joints).map(|_| random.random_range(-size..size)).collect();
-        State { q: v(), dq: v(), ddq: v(), dqr: v(), ddqr: v(), e: v(), tau: v() }
+        let mut of = |length| (0..length).map(|_| random.random_range(-size..size)).collect();
+        let mut v = || of(joints);
+        let [q, dq, ddq, dqr, ddqr, e, tau] = std::array::from_fn(|_| v());
+        State { q, dq, ddq, dqr, ddqr, e, tau, f: of(6) }
     }
 
     pub(crate) fn samples<'a>(&'a self, parameters: &'a [f64]) -> Samples<'a> {
-        let State { q, dq, ddq, dqr, ddqr, e, tau } = self;
-        Samples { q, dq, ddq, dqr, ddqr, tau, e, parameters }
+        let State { q, dq, ddq, dqr, ddqr, e, f, tau } = self;
+        Samples { q, dq, ddq, dqr, ddqr, tau, e, f, parameters }
     }
 }
 

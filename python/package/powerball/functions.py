@@ -271,3 +271,105 @@ class Functions:
         Returns: (n, n) for one sample, (N, n, n) for N.
         """
         return self._evaluate("torque_by_velocity", parameters, values, {"q": q, "dq": dq, "ddq": ddq})
+
+    def acceleration_by_position(
+        self,
+        q: ArrayLike,
+        dq: ArrayLike,
+        tau: ArrayLike,
+        values: Optional[Values] = None,
+        *,
+        parameters: str = "minimal",
+    ) -> Array:
+        """∂q̈/∂q of the forward dynamics at given torques; column j is the derivative by q of joint j.
+
+        Returns: (n, n) for one sample, (N, n, n) for N.
+        """
+        return self._evaluate(
+            "acceleration_by_position", parameters, values, {"q": q, "dq": dq, "tau": tau}
+        )
+
+    def acceleration_by_velocity(
+        self,
+        q: ArrayLike,
+        dq: ArrayLike,
+        tau: ArrayLike,
+        values: Optional[Values] = None,
+        *,
+        parameters: str = "minimal",
+    ) -> Array:
+        """∂q̈/∂q̇ of the forward dynamics at given torques; column j is the derivative by q̇ of joint j, 1/s.
+
+        Returns: (n, n) for one sample, (N, n, n) for N.
+        """
+        return self._evaluate(
+            "acceleration_by_velocity", parameters, values, {"q": q, "dq": dq, "tau": tau}
+        )
+
+    def mass_matrix_rate(
+        self, q: ArrayLike, dq: ArrayLike, values: Optional[Values] = None, *, parameters: str = "minimal"
+    ) -> Array:
+        """Rate of the mass matrix, Ḃ(q, q̇) = C + Cᵀ, kg·m²/s.
+
+        Returns: (n, n) for one sample, (N, n, n) for N.
+        """
+        return self._evaluate("mass_matrix_rate", parameters, values, {"q": q, "dq": dq})
+
+    def mass_matrix_times_by_position(
+        self, q: ArrayLike, e: ArrayLike, values: Optional[Values] = None, *, parameters: str = "minimal"
+    ) -> Array:
+        """∂(B(q)·e)/∂q for a vector e that does not depend on q; column j is the derivative by q of joint j.
+
+        Returns: (n, n) for one sample, (N, n, n) for N.
+        """
+        return self._evaluate("mass_matrix_times_by_position", parameters, values, {"q": q, "e": e})
+
+    def jacobian_rate(self, q: ArrayLike, dq: ArrayLike) -> Array:
+        """Rate of the geometric Jacobian of the tool's frame, J̇(q, q̇), in base axes.
+
+        Returns: (6, n) for one sample, (N, 6, n) for N.
+        """
+        return self._evaluate("jacobian_rate", "full", None, {"q": q, "dq": dq})
+
+    def jacobian_transpose_times(self, q: ArrayLike, f: ArrayLike) -> Array:
+        """Jᵀ(q)·f: the joint torques that hold a wrench f on the tool's frame; f is the force, N, above the moment
+        about the frame's origin, N·m, in base axes, (6,) or (N, 6).
+
+        Returns: (n,) for one sample, (N, n) for N, N·m (N).
+        """
+        return self._evaluate("jacobian_transpose_times", "full", None, {"q": q, "f": f})
+
+    def jacobian_transpose_times_by_position(self, q: ArrayLike, f: ArrayLike) -> Array:
+        """∂(Jᵀ(q)·f)/∂q for a wrench f that does not depend on q; column j is the derivative by q of joint j.
+
+        Returns: (n, n) for one sample, (N, n, n) for N.
+        """
+        return self._evaluate("jacobian_transpose_times_by_position", "full", None, {"q": q, "f": f})
+
+    def task_inertia_inverse(
+        self, q: ArrayLike, values: Optional[Values] = None, *, parameters: str = "minimal"
+    ) -> Array:
+        """Inverse of the inertia that a wrench on the tool's frame feels: Λ⁻¹ = J·B⁻¹·Jᵀ (Khatib 1987), in base axes.
+
+        Returns: (6, 6) for one sample, (N, 6, 6) for N.
+        """
+        return self._evaluate("task_inertia_inverse", parameters, values, {"q": q})
+
+    def task_inertia(
+        self, q: ArrayLike, values: Optional[Values] = None, *, parameters: str = "minimal"
+    ) -> Array:
+        """Operational-space inertia Λ = (J·B⁻¹·Jᵀ)⁻¹ of the tool's frame (Khatib 1987), in base axes; not finite
+        where the Jacobian loses rank.
+
+        Returns: (6, 6) for one sample, (N, 6, 6) for N.
+        """
+        return self._evaluate("task_inertia", parameters, values, {"q": q})
+
+    def dynamically_consistent_inverse(
+        self, q: ArrayLike, values: Optional[Values] = None, *, parameters: str = "minimal"
+    ) -> Array:
+        """Dynamically consistent inverse of the Jacobian, J̄ = B⁻¹·Jᵀ·Λ (Khatib 1987): torques (I − JᵀJ̄ᵀ)·τ do not accelerate the tool's frame.
+
+        Returns: (n, 6) for one sample, (N, n, 6) for N.
+        """
+        return self._evaluate("dynamically_consistent_inverse", parameters, values, {"q": q})
