@@ -18,8 +18,8 @@ pub(crate) struct Arguments {
     /// The folder of the measured logs
     #[arg(long, default_value = "../shared/data")]
     data: PathBuf,
-    /// The page; its figures go into the folder `figures` beside it
-    #[arg(long, default_value = "docs/measured.md")]
+    /// The page; its figures go into the folder `figures` of the folder above
+    #[arg(long, default_value = "docs/results/measured_cases.md")]
     write: PathBuf,
 }
 
@@ -102,17 +102,17 @@ fn cases() -> Vec<Case> {
 
 /// Explains every case and writes the page.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
-    let figures = arguments.write.with_file_name("figures");
+    let figures = arguments.write.with_file_name("..").join("figures");
     fs::create_dir_all(&figures).map_err(|e| format!("{}: {e}", figures.display()))?;
     let mut page = String::from(
-        "# What measured logs say\n\nEvery case is one run of `powerball explain`; the page is made, figures \
-            and all, by\n\n```sh\ncargo run --release -p xtask -- stories\n```\n\n\
+        "# Measured logs, case by case\n\nEvery case is one run of `powerball explain`; the page is made, \
+            figures and all, by\n\n```sh\ncargo run --release -p xtask -- stories\n```\n\n\
          Figures show means over equal numbers of samples (purple without the effect but with all others, \
          blue with it, orange what it adds), torques \
-         against the direction of motion where that is said. [explain.md](explain.md) says what must be true \
+         against the direction of motion where that is said. [measured.md](../measured.md) has the results in \
+         short and describes the data, [explain.md](../explain.md) says what must be true \
          before a name is given, and \
-         [study.md](study.md) how often a name is right where the truth is known. The data are described in \
-         [explain.md](explain.md#what-it-says-of-measured-logs).\n",
+         [study.md](../study.md) how often a name is right where the truth is known.\n",
     );
     for case in cases() {
         println!("{}", case.title);
@@ -134,7 +134,7 @@ fn explained(case: &Case, data: &Path) -> Result<Explained, String> {
 fn tell(page: &mut String, case: &Case, explained: &Explained, figures: &Path) -> Result<(), String> {
     let figure = |page: &mut String, name: &str, words: &str, text: String| {
         let file = format!("{}_{name}.svg", case.name);
-        let _ = writeln!(page, "\n![{words}](figures/{file})");
+        let _ = writeln!(page, "\n![{words}](../figures/{file})");
         fs::write(figures.join(&file), text).map_err(|e| format!("{file}: {e}"))
     };
     let _ = writeln!(page, "\n## {}\n\n{}\n", case.title, case.question);
