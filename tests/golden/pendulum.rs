@@ -6,19 +6,24 @@
 
 use nalgebra::{ArrayStorage, SMatrix, SVector, SimdRealField};
 /// Number of joints.
+#[allow(dead_code)]
 pub const JOINTS: usize = 1;
 /// Number of parameters.
+#[allow(dead_code)]
 pub const PARAMETERS: usize = 3;
 /// The 3 parameters of the set `minimal`, in order, in SI units.
 ///
 /// Each is the sum that its name says, of masses m, first moments mx, my, mz and inertias of the links about the
 /// origins of their frames, and rotor inertias Im.
+#[allow(dead_code)]
 pub const PARAMETER_NAMES: [&str; PARAMETERS] = ["m1 + 2*mx1", "my1", "Izz1 + 1/2*mx1"];
 /// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
+#[allow(dead_code)]
 pub const ANGLES: usize = 1;
 /// Joint positions with their sines and cosines: computed once and shared between calls, or taken
 /// from wherever the caller has them.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(dead_code)]
 pub struct Trig<T> {
     /// Sine of each angle; not read for prismatic joints.
     pub sin: [T; ANGLES],
@@ -27,6 +32,7 @@ pub struct Trig<T> {
     /// Position of each prismatic joint, m; not read for revolute joints.
     pub position: [T; JOINTS],
 }
+#[allow(dead_code)]
 impl<T: SimdRealField + Copy> Trig<T> {
     /// From joint positions, rad (m where prismatic).
     #[must_use]
@@ -40,6 +46,7 @@ impl<T: SimdRealField + Copy> Trig<T> {
     }
 }
 #[inline(always)]
+#[allow(dead_code)]
 fn angles_1<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 1] {
     let [[q1]] = q.data.0;
     [q1]
@@ -47,6 +54,7 @@ fn angles_1<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 1] {
 /// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of
 /// calls.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(dead_code)]
 pub struct Prepared<T>([T; 6]);
 /// What the functions need of the parameters alone: pass it to those that end in `_with`, in place of
 /// the parameters.
@@ -54,6 +62,7 @@ pub struct Prepared<T>([T; 6]);
 /// Operations: 4 multiplications, 1 additions.
 #[inline]
 #[must_use]
+#[allow(dead_code)]
 pub fn prepare<T: SimdRealField + Copy>(
     parameters: &SVector<T, PARAMETERS>,
 ) -> Prepared<T> {
@@ -74,6 +83,7 @@ pub fn prepare<T: SimdRealField + Copy>(
     Prepared([x11, x12, x10, x5, p2, x13])
 }
 /// Parameters, or what was prepared of them.
+#[allow(dead_code)]
 pub trait Parameters<T> {
     /// What the functions need of them.
     fn prepared(&self) -> Prepared<T>;
@@ -101,6 +111,7 @@ impl<T: Copy> Parameters<T> for Prepared<T> {
 ///
 /// Operations: 3 multiplications, 2 additions, 1 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn inverse_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -118,6 +129,7 @@ pub fn inverse_dynamics<T: SimdRealField + Copy>(
 /// [`inverse_dynamics`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     _dq: &SVector<T, JOINTS>,
@@ -145,6 +157,7 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 4 multiplications, 1 additions, 1 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn regressor<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -161,6 +174,7 @@ pub fn regressor<T: SimdRealField + Copy>(
 /// [`regressor`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn regressor_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     _dq: &SVector<T, JOINTS>,
@@ -187,6 +201,7 @@ pub fn regressor_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 0 multiplications, 0 additions, 0 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn mass_matrix<T: SimdRealField + Copy>(
     _q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
@@ -201,6 +216,7 @@ pub fn mass_matrix<T: SimdRealField + Copy>(
 /// [`mass_matrix`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn mass_matrix_with<T: SimdRealField + Copy>(
     _trig: &Trig<T>,
     parameters: &impl Parameters<T>,
@@ -218,6 +234,7 @@ pub fn mass_matrix_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 0 multiplications, 0 additions, 0 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn coriolis_matrix<T: SimdRealField + Copy>(
     _q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -233,6 +250,7 @@ pub fn coriolis_matrix<T: SimdRealField + Copy>(
 /// [`coriolis_matrix`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
     _trig: &Trig<T>,
     _dq: &SVector<T, JOINTS>,
@@ -250,6 +268,7 @@ pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 2 multiplications, 1 additions, 1 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn gravity<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
@@ -265,6 +284,7 @@ pub fn gravity<T: SimdRealField + Copy>(
 /// [`gravity`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn gravity_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     parameters: &impl Parameters<T>,
@@ -288,6 +308,7 @@ pub fn gravity_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 4 multiplications, 2 additions, 1 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -305,6 +326,7 @@ pub fn forward_dynamics<T: SimdRealField + Copy>(
 /// [`forward_dynamics`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     _dq: &SVector<T, JOINTS>,
@@ -332,6 +354,7 @@ pub fn forward_dynamics_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 2 multiplications, 0 additions, 1 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_kinematics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
 ) -> SMatrix<T, 4, 4> {
@@ -346,6 +369,7 @@ pub fn forward_kinematics<T: SimdRealField + Copy>(
 /// [`forward_kinematics`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_kinematics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
 ) -> SMatrix<T, 4, 4> {
@@ -365,6 +389,7 @@ pub fn forward_kinematics_with<T: SimdRealField + Copy>(
         ]),
     )
 }
+#[allow(dead_code)]
 mod trigonometry {
     //! Sines and cosines of several angles at once, by additions and multiplications alone.
     //!

@@ -6,13 +6,16 @@
 
 use nalgebra::{ArrayStorage, SMatrix, SVector, SimdRealField};
 /// Number of joints.
+#[allow(dead_code)]
 pub const JOINTS: usize = 2;
 /// Number of parameters.
+#[allow(dead_code)]
 pub const PARAMETERS: usize = 7;
 /// The 7 parameters of the set `minimal`, in order, in SI units.
 ///
 /// Each is the sum that its name says, of masses m, first moments mx, my, mz and inertias of the links about the
 /// origins of their frames, and rotor inertias Im.
+#[allow(dead_code)]
 pub const PARAMETER_NAMES: [&str; PARAMETERS] = [
     "m1 + 5/2*mx1 + m2",
     "my1",
@@ -23,11 +26,13 @@ pub const PARAMETER_NAMES: [&str; PARAMETERS] = [
     "Im2",
 ];
 /// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
+#[allow(dead_code)]
 pub const ANGLES: usize = 3;
 /// Joint positions with their sines and cosines: computed once and shared between calls, or taken
 /// from wherever the caller has them.
 /// Angle 3: q1 + q2, across parallel axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(dead_code)]
 pub struct Trig<T> {
     /// Sine of each angle; not read for prismatic joints.
     pub sin: [T; ANGLES],
@@ -36,6 +41,7 @@ pub struct Trig<T> {
     /// Position of each prismatic joint, m; not read for revolute joints.
     pub position: [T; JOINTS],
 }
+#[allow(dead_code)]
 impl<T: SimdRealField + Copy> Trig<T> {
     /// From joint positions, rad (m where prismatic).
     #[must_use]
@@ -49,21 +55,25 @@ impl<T: SimdRealField + Copy> Trig<T> {
     }
 }
 #[inline(always)]
+#[allow(dead_code)]
 fn angles_1_2<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 2] {
     let [[q1, q2]] = q.data.0;
     [q1, q2]
 }
 #[inline(always)]
+#[allow(dead_code)]
 fn angles_1_2_1p2<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 3] {
     let [[q1, q2]] = q.data.0;
     [q1, q2, q1 + q2]
 }
 #[inline(always)]
+#[allow(dead_code)]
 fn angles_1_1p2<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 2] {
     let [[q1, q2]] = q.data.0;
     [q1, q1 + q2]
 }
 #[inline(always)]
+#[allow(dead_code)]
 fn angles_2<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 1] {
     let [[_, q2]] = q.data.0;
     [q2]
@@ -71,6 +81,7 @@ fn angles_2<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 1] {
 /// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of
 /// calls.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(dead_code)]
 pub struct Prepared<T>([T; 13]);
 /// What the functions need of the parameters alone: pass it to those that end in `_with`, in place of
 /// the parameters.
@@ -78,6 +89,7 @@ pub struct Prepared<T>([T; 13]);
 /// Operations: 9 multiplications, 3 additions.
 #[inline]
 #[must_use]
+#[allow(dead_code)]
 pub fn prepare<T: SimdRealField + Copy>(
     parameters: &SVector<T, PARAMETERS>,
 ) -> Prepared<T> {
@@ -111,6 +123,7 @@ pub fn prepare<T: SimdRealField + Copy>(
     Prepared([p4, p5, x17, x6, p2, x11, x19, x22, x23, x24, x25, x26, x27])
 }
 /// Parameters, or what was prepared of them.
+#[allow(dead_code)]
 pub trait Parameters<T> {
     /// What the functions need of them.
     fn prepared(&self) -> Prepared<T>;
@@ -138,6 +151,7 @@ impl<T: Copy> Parameters<T> for Prepared<T> {
 ///
 /// Operations: 26 multiplications, 18 additions, 2 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn inverse_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -155,6 +169,7 @@ pub fn inverse_dynamics<T: SimdRealField + Copy>(
 /// [`inverse_dynamics`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
@@ -225,6 +240,7 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 20 multiplications, 13 additions, 2 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn regressor<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -241,6 +257,7 @@ pub fn regressor<T: SimdRealField + Copy>(
 /// [`regressor`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn regressor_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
@@ -309,6 +326,7 @@ pub fn regressor_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 3 multiplications, 5 additions, 1 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn mass_matrix<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
@@ -324,6 +342,7 @@ pub fn mass_matrix<T: SimdRealField + Copy>(
 /// [`mass_matrix`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn mass_matrix_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     parameters: &impl Parameters<T>,
@@ -352,6 +371,7 @@ pub fn mass_matrix_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 6 multiplications, 3 additions, 1 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn coriolis_matrix<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -368,6 +388,7 @@ pub fn coriolis_matrix<T: SimdRealField + Copy>(
 /// [`coriolis_matrix`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
@@ -399,6 +420,7 @@ pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 4 multiplications, 4 additions, 2 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn gravity<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
@@ -414,6 +436,7 @@ pub fn gravity<T: SimdRealField + Copy>(
 /// [`gravity`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn gravity_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     parameters: &impl Parameters<T>,
@@ -441,6 +464,7 @@ pub fn gravity_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 26 multiplications, 19 additions, 1 divisions, 2 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -458,6 +482,7 @@ pub fn forward_dynamics<T: SimdRealField + Copy>(
 /// [`forward_dynamics`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
@@ -529,6 +554,7 @@ pub fn forward_dynamics_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 8 multiplications, 4 additions, 2 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_kinematics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
 ) -> SMatrix<T, 4, 4> {
@@ -543,6 +569,7 @@ pub fn forward_kinematics<T: SimdRealField + Copy>(
 /// [`forward_kinematics`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_kinematics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
 ) -> SMatrix<T, 4, 4> {
@@ -573,6 +600,7 @@ pub fn forward_kinematics_with<T: SimdRealField + Copy>(
         ]),
     )
 }
+#[allow(dead_code)]
 mod trigonometry {
     //! Sines and cosines of several angles at once, by additions and multiplications alone.
     //!

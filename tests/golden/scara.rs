@@ -6,13 +6,16 @@
 
 use nalgebra::{ArrayStorage, SMatrix, SVector, SimdRealField};
 /// Number of joints.
+#[allow(dead_code)]
 pub const JOINTS: usize = 4;
 /// Number of parameters.
+#[allow(dead_code)]
 pub const PARAMETERS: usize = 8;
 /// The 8 parameters of the set `minimal`, in order, in SI units.
 ///
 /// Each is the sum that its name says, of masses m, first moments mx, my, mz and inertias of the links about the
 /// origins of their frames, and rotor inertias Im.
+#[allow(dead_code)]
 pub const PARAMETER_NAMES: [&str; PARAMETERS] = [
     "Izz1 + 4/25*m1 + 4/5*mx1 - 8/15*mx2 - 8/15*mx3",
     "m2 + 10/3*mx2 + 10/3*mx3",
@@ -24,11 +27,13 @@ pub const PARAMETER_NAMES: [&str; PARAMETERS] = [
     "Izz4",
 ];
 /// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
+#[allow(dead_code)]
 pub const ANGLES: usize = 5;
 /// Joint positions with their sines and cosines: computed once and shared between calls, or taken
 /// from wherever the caller has them.
 /// Angle 5: q1 + q2, across parallel axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(dead_code)]
 pub struct Trig<T> {
     /// Sine of each angle; not read for prismatic joints.
     pub sin: [T; ANGLES],
@@ -37,6 +42,7 @@ pub struct Trig<T> {
     /// Position of each prismatic joint, m; not read for revolute joints.
     pub position: [T; JOINTS],
 }
+#[allow(dead_code)]
 impl<T: SimdRealField + Copy> Trig<T> {
     /// From joint positions, rad (m where prismatic).
     #[must_use]
@@ -54,16 +60,19 @@ impl<T: SimdRealField + Copy> Trig<T> {
     }
 }
 #[inline(always)]
+#[allow(dead_code)]
 fn angles_1_2_4<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 3] {
     let [[q1, q2, _, q4]] = q.data.0;
     [q1, q2, q4]
 }
 #[inline(always)]
+#[allow(dead_code)]
 fn angles_1_2_4_1p2<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 4] {
     let [[q1, q2, _, q4]] = q.data.0;
     [q1, q2, q4, q1 + q2]
 }
 #[inline(always)]
+#[allow(dead_code)]
 fn angles_2_4<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 2] {
     let [[_, q2, _, q4]] = q.data.0;
     [q2, q4]
@@ -71,6 +80,7 @@ fn angles_2_4<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 2] {
 /// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of
 /// calls.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(dead_code)]
 pub struct Prepared<T>([T; 13]);
 /// What the functions need of the parameters alone: pass it to those that end in `_with`, in place of
 /// the parameters.
@@ -78,6 +88,7 @@ pub struct Prepared<T>([T; 13]);
 /// Operations: 7 multiplications, 3 additions.
 #[inline]
 #[must_use]
+#[allow(dead_code)]
 pub fn prepare<T: SimdRealField + Copy>(
     parameters: &SVector<T, PARAMETERS>,
 ) -> Prepared<T> {
@@ -111,6 +122,7 @@ pub fn prepare<T: SimdRealField + Copy>(
     Prepared([p8, p6, p7, p5, x10, p3, x15, x9, x20, x23, x24, x25, x26])
 }
 /// Parameters, or what was prepared of them.
+#[allow(dead_code)]
 pub trait Parameters<T> {
     /// What the functions need of them.
     fn prepared(&self) -> Prepared<T>;
@@ -138,6 +150,7 @@ impl<T: Copy> Parameters<T> for Prepared<T> {
 ///
 /// Operations: 39 multiplications, 30 additions, 2 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn inverse_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -155,6 +168,7 @@ pub fn inverse_dynamics<T: SimdRealField + Copy>(
 /// [`inverse_dynamics`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
@@ -251,6 +265,7 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 32 multiplications, 23 additions, 2 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn regressor<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -267,6 +282,7 @@ pub fn regressor<T: SimdRealField + Copy>(
 /// [`regressor`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn regressor_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
@@ -357,6 +373,7 @@ pub fn regressor_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 14 multiplications, 17 additions, 2 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn mass_matrix<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
@@ -372,6 +389,7 @@ pub fn mass_matrix<T: SimdRealField + Copy>(
 /// [`mass_matrix`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn mass_matrix_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     parameters: &impl Parameters<T>,
@@ -433,6 +451,7 @@ pub fn mass_matrix_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 28 multiplications, 22 additions, 2 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn coriolis_matrix<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -449,6 +468,7 @@ pub fn coriolis_matrix<T: SimdRealField + Copy>(
 /// [`coriolis_matrix`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
@@ -529,6 +549,7 @@ pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 0 multiplications, 0 additions, 0 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn gravity<T: SimdRealField + Copy>(
     _q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
@@ -543,6 +564,7 @@ pub fn gravity<T: SimdRealField + Copy>(
 /// [`gravity`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn gravity_with<T: SimdRealField + Copy>(
     _trig: &Trig<T>,
     parameters: &impl Parameters<T>,
@@ -562,6 +584,7 @@ pub fn gravity_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 52 multiplications, 44 additions, 2 divisions, 2 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -579,6 +602,7 @@ pub fn forward_dynamics<T: SimdRealField + Copy>(
 /// [`forward_dynamics`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
@@ -702,6 +726,7 @@ pub fn forward_dynamics_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 12 multiplications, 7 additions, 3 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_kinematics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
 ) -> SMatrix<T, 4, 4> {
@@ -717,6 +742,7 @@ pub fn forward_kinematics<T: SimdRealField + Copy>(
 /// [`forward_kinematics`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_kinematics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
 ) -> SMatrix<T, 4, 4> {
@@ -756,6 +782,7 @@ pub fn forward_kinematics_with<T: SimdRealField + Copy>(
         ]),
     )
 }
+#[allow(dead_code)]
 mod trigonometry {
     //! Sines and cosines of several angles at once, by additions and multiplications alone.
     //!

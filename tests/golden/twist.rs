@@ -6,13 +6,16 @@
 
 use nalgebra::{ArrayStorage, SMatrix, SVector, SimdRealField};
 /// Number of joints.
+#[allow(dead_code)]
 pub const JOINTS: usize = 3;
 /// Number of parameters.
+#[allow(dead_code)]
 pub const PARAMETERS: usize = 11;
 /// The 11 parameters of the set `minimal`, in order, in SI units.
 ///
 /// Each is the sum that its name says, of masses m, first moments mx, my, mz and inertias of the links about the
 /// origins of their frames, and rotor inertias Im.
+#[allow(dead_code)]
 pub const PARAMETER_NAMES: [&str; PARAMETERS] = [
     "m2 + m3",
     "mx2 + (-2*cos(pi/6)*sin(pi/4))*mz2 + (3/20 - 1/10*cos(pi/6)*sin(pi/4)*cos(0.7))*m3 + (-2*cos(pi/6)*sin(pi/4)*cos(0.7))*mz3",
@@ -27,12 +30,14 @@ pub const PARAMETER_NAMES: [&str; PARAMETERS] = [
     "Izz3",
 ];
 /// Angles of a [`Trig`]: those of the joints, then sums across parallel axes.
+#[allow(dead_code)]
 pub const ANGLES: usize = 3;
 /// Joint positions with their sines and cosines: computed once and shared between calls, or taken
 /// from wherever the caller has them.
 /// Joint 2: of q + 0.7853981633974483 rad.
 /// Joint 3: of q + 0.2 rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(dead_code)]
 pub struct Trig<T> {
     /// Sine of each angle; not read for prismatic joints.
     pub sin: [T; ANGLES],
@@ -41,6 +46,7 @@ pub struct Trig<T> {
     /// Position of each prismatic joint, m; not read for revolute joints.
     pub position: [T; JOINTS],
 }
+#[allow(dead_code)]
 impl<T: SimdRealField + Copy> Trig<T> {
     /// From joint positions, rad (m where prismatic).
     #[must_use]
@@ -55,11 +61,13 @@ impl<T: SimdRealField + Copy> Trig<T> {
     }
 }
 #[inline(always)]
+#[allow(dead_code)]
 fn angles_1_3<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 2] {
     let [[q1, _, q3]] = q.data.0;
     [q1, q3 + nalgebra::convert::<f64, T>(0.2f64)]
 }
 #[inline(always)]
+#[allow(dead_code)]
 fn angles_3<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 1] {
     let [[_, _, q3]] = q.data.0;
     [q3 + nalgebra::convert::<f64, T>(0.2f64)]
@@ -67,6 +75,7 @@ fn angles_3<T: SimdRealField + Copy>(q: &SVector<T, JOINTS>) -> [T; 1] {
 /// Sums of the parameters as the functions use them; [`prepare`] makes them once for any number of
 /// calls.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(dead_code)]
 pub struct Prepared<T>([T; 22]);
 /// What the functions need of the parameters alone: pass it to those that end in `_with`, in place of
 /// the parameters.
@@ -74,6 +83,7 @@ pub struct Prepared<T>([T; 22]);
 /// Operations: 22 multiplications, 9 additions.
 #[inline]
 #[must_use]
+#[allow(dead_code)]
 pub fn prepare<T: SimdRealField + Copy>(
     parameters: &SVector<T, PARAMETERS>,
 ) -> Prepared<T> {
@@ -159,6 +169,7 @@ pub fn prepare<T: SimdRealField + Copy>(
     ])
 }
 /// Parameters, or what was prepared of them.
+#[allow(dead_code)]
 pub trait Parameters<T> {
     /// What the functions need of them.
     fn prepared(&self) -> Prepared<T>;
@@ -186,6 +197,7 @@ impl<T: Copy> Parameters<T> for Prepared<T> {
 ///
 /// Operations: 125 multiplications, 98 additions, 1 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn inverse_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -204,6 +216,7 @@ pub fn inverse_dynamics<T: SimdRealField + Copy>(
 /// [`inverse_dynamics`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
@@ -484,6 +497,7 @@ pub fn inverse_dynamics_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 143 multiplications, 101 additions, 1 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn regressor<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -501,6 +515,7 @@ pub fn regressor<T: SimdRealField + Copy>(
 /// [`regressor`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn regressor_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
@@ -791,6 +806,7 @@ pub fn regressor_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 52 multiplications, 53 additions, 1 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn mass_matrix<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
@@ -807,6 +823,7 @@ pub fn mass_matrix<T: SimdRealField + Copy>(
 /// [`mass_matrix`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn mass_matrix_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     parameters: &impl Parameters<T>,
@@ -966,6 +983,7 @@ pub fn mass_matrix_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 153 multiplications, 106 additions, 1 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn coriolis_matrix<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -983,6 +1001,7 @@ pub fn coriolis_matrix<T: SimdRealField + Copy>(
 /// [`coriolis_matrix`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
@@ -1298,6 +1317,7 @@ pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 9 multiplications, 4 additions, 1 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn gravity<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     parameters: &SVector<T, PARAMETERS>,
@@ -1313,6 +1333,7 @@ pub fn gravity<T: SimdRealField + Copy>(
 /// [`gravity`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn gravity_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     parameters: &impl Parameters<T>,
@@ -1376,6 +1397,7 @@ pub fn gravity_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 166 multiplications, 139 additions, 2 divisions, 1 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_dynamics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
     dq: &SVector<T, JOINTS>,
@@ -1394,6 +1416,7 @@ pub fn forward_dynamics<T: SimdRealField + Copy>(
 /// [`forward_dynamics`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_dynamics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
     dq: &SVector<T, JOINTS>,
@@ -1757,6 +1780,7 @@ pub fn forward_dynamics_with<T: SimdRealField + Copy>(
 ///
 /// Operations: 42 multiplications, 26 additions, 2 sines with cosines.
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_kinematics<T: SimdRealField + Copy>(
     q: &SVector<T, JOINTS>,
 ) -> SMatrix<T, 4, 4> {
@@ -1772,6 +1796,7 @@ pub fn forward_kinematics<T: SimdRealField + Copy>(
 /// [`forward_kinematics`] with the sines and cosines passed in, so that several calls can share them.
 #[inline(always)]
 #[must_use]
+#[allow(dead_code)]
 pub fn forward_kinematics_with<T: SimdRealField + Copy>(
     trig: &Trig<T>,
 ) -> SMatrix<T, 4, 4> {
@@ -1867,6 +1892,7 @@ pub fn forward_kinematics_with<T: SimdRealField + Copy>(
         ]),
     )
 }
+#[allow(dead_code)]
 mod trigonometry {
     //! Sines and cosines of several angles at once, by additions and multiplications alone.
     //!

@@ -41,12 +41,33 @@ pub(super) fn parse(text: &str, file: &str) -> Result<Arm, Diagnostics> {
     let mut reader = Reader { errors: Collector::new(file, text) };
     let (document, errors) = DeTable::parse_recoverable(text);
     let broken = !errors.is_empty();
-    for error in errors {
+    let other = broken.then(|| other_kind(text)).flatten();
+    if let Some(kind) = other {
+        reader.errors.error(0..0, kind);
+    }
+    for error in errors.into_iter().filter(|_| other.is_none()) {
         reader.errors.error(error.span().unwrap_or(0..0), format!("not valid TOML: {}", error.message()));
     }
     // A document that does not parse would only add errors about what the parser skipped.
     let arm = if broken { None } else { reader.arm(document.get_ref()) };
     reader.errors.finish(arm)
+}
+
+/// What a text is that is no arm file, and what to do with it.
+fn other_kind(text: &str) -> Option<&'static str> {
+    let first =
+        text.trim_start_matches('\u{feff}').lines().find(|line| !line.trim().is_empty())?.trim_start();
+    if first.starts_with('<') {
+        return Some(
+            "this is XML and no arm file: `dyngen import FILE -o arm.toml` makes one of a URDF or a MuJoCo model",
+        );
+    }
+    let separated = |by: char| first.matches(by).count() >= 2;
+    let table =
+        !first.contains('=') && !first.starts_with(['#', '[']) && [',', ';', '\t'].into_iter().any(separated);
+    table.then_some(
+        "this is a table and no arm file: a log is given with --log, states of `dyngen eval` with --states",
+    )
 }
 
 impl Reader<'_> {

@@ -51,7 +51,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let states = States::read(&args.states)?;
     let names = model.arm().joint_names();
     let columns = |argument: Argument| match function.takes(argument) {
-        true => states.columns(argument.name(), &names),
+        true => states.columns(argument.name(), &names, "the arm has", "joints"),
         false => Ok(Vec::new()),
     };
     let (q, dq, ddq) =
@@ -59,8 +59,10 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let (dqr, ddqr) = (columns(Argument::ReferenceVelocities)?, columns(Argument::ReferenceAccelerations)?);
     let (tau, e) = (columns(Argument::Torques)?, columns(Argument::Errors)?);
     let f = match function.takes(Argument::Wrench) {
-        true => states
-            .columns(Argument::Wrench.name(), &["fx", "fy", "fz", "mx", "my", "mz"].map(String::from))?,
+        true => {
+            let parts = ["fx", "fy", "fz", "mx", "my", "mz"].map(String::from);
+            states.columns(Argument::Wrench.name(), &parts, "a wrench has", "numbers")?
+        }
         false => Vec::new(),
     };
     let samples = Samples {
@@ -147,7 +149,7 @@ impl States {
     }
 
     /// The columns name1 … of every row, one row after another; a joint's number or its name may say which.
-    fn columns(&self, name: &str, joints: &[String]) -> Result<Vec<f64>, Failure> {
+    fn columns(&self, name: &str, joints: &[String], owner: &str, items: &str) -> Result<Vec<f64>, Failure> {
         let n = joints.len();
         let place = |i: usize| {
             let titles = [format!("{name}{i}"), format!("{name}.{}", joints[i - 1])];
@@ -158,7 +160,7 @@ impl States {
             (1..=n).filter(|i| places[i - 1].is_none()).map(|i| format!("{name}{i}")).collect();
         if !missing.is_empty() {
             return Err(Failure::input(format!(
-                "{}:1: the states have no column {}; {name} has {n} numbers for this arm",
+                "{}:1: the states have no column {}; {owner} {n} {items}",
                 self.file,
                 missing.join(", ")
             )));
@@ -166,7 +168,7 @@ impl States {
         let more = format!("{name}{}", n + 1);
         if self.header.contains(&more) {
             return Err(Failure::input(format!(
-                "{}:1: the states have a column {more}; {name} has {n} numbers for this arm: another arm's states",
+                "{}:1: the states have a column {more}; {owner} {n} {items}: another arm's states",
                 self.file
             )));
         }

@@ -23,7 +23,7 @@ use crate::graph::Preparation;
 use crate::model::{Error, Model};
 use crate::parameters::{ParameterSet, SetKind};
 use proc_macro2::{Literal, TokenStream};
-use quote::quote;
+use quote::{ToTokens, quote};
 
 /// What a generated file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -110,7 +110,7 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     }
     let friction = friction::items(&options.friction, model.arm());
     let tests = if options.tests { tests::module(model, options)? } else { quote!() };
-    Ok(quote! {
+    Ok(allowed_unused(quote! {
         use nalgebra::{ArrayStorage, SMatrix, SVector, SimdRealField};
 
         #constants
@@ -130,7 +130,31 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
         #trigonometry
 
         #tests
-    })
+    }))
+}
+
+/// The items with leave to be of no use: nobody calls all functions of a file, and a file that is included may have no
+/// such attribute of its own.
+fn allowed_unused(tokens: TokenStream) -> TokenStream {
+    let Ok(mut file) = syn::parse2::<syn::File>(tokens.clone()) else { return tokens };
+    for item in &mut file.items {
+        let attributes = match item {
+            syn::Item::Fn(item) => &mut item.attrs,
+            syn::Item::Const(item) => &mut item.attrs,
+            syn::Item::Impl(item) if item.trait_.is_none() => &mut item.attrs,
+            syn::Item::Struct(item) => &mut item.attrs,
+            syn::Item::Trait(item) => &mut item.attrs,
+            syn::Item::Mod(item) => &mut item.attrs,
+            _ => continue,
+        };
+        let mut allowed: syn::Attribute = syn::parse_quote!(#[allow(dead_code)]);
+        // Attributes of a module stand on one side of its brace.
+        if let Some(inner) = attributes.iter().find(|a| matches!(a.style, syn::AttrStyle::Inner(_))) {
+            allowed.style = inner.style;
+        }
+        attributes.push(allowed);
+    }
+    file.to_token_stream()
 }
 
 /// The functions that are wished, proven, without what `preparation` takes of them.
