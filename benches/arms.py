@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Arms of public URDFs through dyngen, against Pinocchio: writes the table of docs/arms.md.
+"""Arms of public URDFs through dyngen, against Pinocchio: writes docs/results/arms.md.
 
     pip install pin numpy          # Pinocchio 4 from PyPI
     cargo build --release -p dyngen
-    python3 benches/arms.py --dyngen target/release/dyngen --urdf FOLDER... --joints 6 > docs/arms.md
+    python3 benches/arms.py --dyngen target/release/dyngen --urdf FOLDER... --joints 6 > docs/results/arms.md
 
 Each FOLDER is searched for URDF files, of which equal ones count once. Of each the longest chain of joints that move on their own
 is taken. Time (the processor's) and memory are those of one `dyngen describe` process, which derives the sets, and builds and
@@ -181,6 +181,7 @@ def main():
     done = [found for found in theirs if found]
     errors = [wrong for *_, wrong in done if wrong is not None]
     print("# Arms of public URDFs\n")
+    print("```sh\npython3 benches/arms.py --dyngen target/release/dyngen --urdf FOLDER... --joints 6 > docs/results/arms.md\n```\n")
     print("The files are those of `example-robot-data`, `pybullet` and `rtb-data` from PyPI, and others of public repositories. Of the")
     print(f"{len(theirs)} of them that Pinocchio reads and that hold a serial chain {len(done)} are imported, derived and proven, each in at most")
     print(f"{largest(s for _, s, _, _ in done):.1f} s and {largest(m for _, _, m, _ in done):.0f} MB. {len(errors)} have inertias; their torques differ from Pinocchio's by at most {largest(errors):.0e}.\n")

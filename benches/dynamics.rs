@@ -1,7 +1,7 @@
 //! The emitted dynamics of the LWA 4P without rotors beside what one writes by hand, in one run.
 //!
-//! `cargo bench -p powerball-benches --bench dynamics -- --write docs/performance.md` writes its tables
-//! into the page.
+//! `cargo bench -p powerball-benches --bench dynamics -- --write docs/results/performance.md` writes its
+//! tables into the page.
 
 #![allow(clippy::unwrap_used, missing_docs)]
 

@@ -1,8 +1,8 @@
 //! How the emitted inverse dynamics and regressor grow with the number of joints: chains of revolute joints
 //! with twists of ±90° in turn and lengths along and across every axis, one to nine joints.
 //!
-//! `cargo bench -p powerball-benches --bench growth -- --write docs/performance.md` writes its table into
-//! the page.
+//! `cargo bench -p powerball-benches --bench growth -- --write docs/results/performance.md` writes its table
+//! into the page.
 
 #![allow(clippy::unwrap_used, missing_docs)]
 

@@ -2,8 +2,8 @@
 //! in the same run.
 //!
 //! `cargo bench -p powerball-benches --bench identify` (`PYTHON=…` names an interpreter that has both;
-//! without one only the stream is timed); `-- --write docs/performance.md` writes how the stream grows with
-//! the length of a log into the page.
+//! without one only the stream is timed); `-- --write docs/results/performance.md` writes how the stream
+//! grows with the length of a log into the page.
 
 #![allow(clippy::unwrap_used, missing_docs)]
 

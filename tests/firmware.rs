@@ -3,7 +3,7 @@
 //!
 //! Sizes, stack and instruction counts do not depend on the machine. `firmware/costs.txt` holds them, and
 //! none may grow. `POWERBALL_BLESS=1 cargo test --release -p powerball-workspace --test firmware` writes it,
-//! and the table in `docs/performance.md`, anew.
+//! and the table in `docs/results/performance.md`, anew.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -243,7 +243,8 @@ fn a_controller_runs_it_without_panic_allocation_or_soft_doubles_and_to_the_same
     let path = root().join("firmware/costs.txt");
     if std::env::var_os("POWERBALL_BLESS").is_some() {
         std::fs::write(&path, written(&costs)).unwrap();
-        document::write_section(&root().join("docs/performance.md"), "firmware", &table(&costs)).unwrap();
+        document::write_section(&root().join("docs/results/performance.md"), "firmware", &table(&costs))
+            .unwrap();
     }
     let [tau, regressor] = ["f32 tau", "f32 regressor"].map(|name| costs[name]);
     assert!(tau[0] <= 1700 && tau[1] <= 256, "{tau:?}");

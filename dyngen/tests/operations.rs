@@ -1,5 +1,5 @@
-//! Operation counts of every test arm's functions: exactly those of docs/performance.md, and within the
-//! bounds that were set.
+//! Operation counts of every test arm's functions: exactly those of docs/results/performance.md, and within
+//! the bounds that were set.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -78,7 +78,7 @@ fn table() -> String {
 
 #[test]
 fn the_counts_are_those_of_the_documentation() {
-    let path = root().join("docs/performance.md");
+    let path = root().join("docs/results/performance.md");
     let page = std::fs::read_to_string(&path).unwrap();
     let (before, rest) = page.split_once(BEGIN).unwrap();
     let (written, after) = rest.split_once(END).unwrap();
@@ -88,7 +88,7 @@ fn the_counts_are_those_of_the_documentation() {
         return;
     }
     for (is, was) in table.lines().zip(written.lines()) {
-        assert_eq!(is, was, "docs/performance.md; if the change is meant, run {BLESS}");
+        assert_eq!(is, was, "docs/results/performance.md; if the change is meant, run {BLESS}");
     }
     assert_eq!(table, written);
 }

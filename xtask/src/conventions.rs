@@ -50,7 +50,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     };
     let body = RigidArm::new(&arm).map_err(|e| e.to_string())?;
     let weight = if arguments.plain { Vec::new() } else { parameters(&arm, &logs)? };
-    println!("| made wrong | told | column map | s |\n|---|---|---|---|");
+    println!("| made wrong | reported | column map | s |\n|---|---|---|---|");
     let spoils = if arguments.plain { Vec::new() } else { spoils(&arm, &body, &weight) };
     let nothing: (String, Spoil<'_>) = ("nothing".into(), Box::new(|_| ()));
     for (name, spoil) in std::iter::once(nothing).chain(spoils) {
@@ -72,7 +72,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
 
 /// Prints a table: what was made wrong with the arm file, the line that is told, and what else fits as well.
 fn of_arm_files(arm: &Arm, logs: &[Log], validate: &[Log]) -> Result<(), String> {
-    println!("\n| wrong in the arm file | told | or | s |\n|---|---|---|---|");
+    println!("\n| wrong in the arm file | reported | or | s |\n|---|---|---|---|");
     for (name, wrong) in wrong_files(arm) {
         let body = RigidArm::new(&wrong).map_err(|e| e.to_string())?;
         let start = std::time::Instant::now();

@@ -1,6 +1,7 @@
 //! Every fault × every mode × every phase: the arm is commanded to stop in time, no set-point leaves
 //! afterwards, the cause is latched, and only an explicit act enables again. Prints the matrix that
-//! `docs/bus.md` holds: `cargo test --release -p powerball --test bus_faults -- --ignored --nocapture`.
+//! `docs/results/bus_faults.md` holds:
+//! `cargo test --release -p powerball --test bus_faults -- --ignored --nocapture`.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test's helpers may stop the test")]
 
@@ -275,15 +276,15 @@ fn every_fault_in_every_mode_and_phase_at_length() {
     }
 }
 
-/// Where `docs/bus.md` shows the matrix.
+/// Where `docs/results/bus_faults.md` shows the matrix.
 const BEGIN: &str = "<!-- matrix -->\n";
 const END: &str = "\n<!-- end of matrix -->";
 
 fn page() -> std::path::PathBuf {
-    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/bus.md")
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/results/bus_faults.md")
 }
 
-/// `docs/bus.md` shows this matrix. With `POWERBALL_BLESS` set, it is written there.
+/// `docs/results/bus_faults.md` shows this matrix. With `POWERBALL_BLESS` set, it is written there.
 fn the_page_holds(matrix: &str) {
     let text = std::fs::read_to_string(page()).unwrap();
     let (head, rest) = text.split_once(BEGIN).unwrap();
@@ -291,6 +292,9 @@ fn the_page_holds(matrix: &str) {
     if std::env::var_os("POWERBALL_BLESS").is_some() {
         std::fs::write(page(), format!("{head}{BEGIN}{matrix}{END}{tail}")).unwrap();
     } else {
-        assert!(shown == matrix, "docs/bus.md shows another matrix; run this test with POWERBALL_BLESS=1");
+        assert!(
+            shown == matrix,
+            "docs/results/bus_faults.md shows another matrix; run this test with POWERBALL_BLESS=1"
+        );
     }
 }

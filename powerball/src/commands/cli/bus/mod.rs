@@ -83,7 +83,7 @@ impl Where {
             if let BusUrl::Udp(_, Some(interface)) = &self.bus {
                 eprintln!(
                     "powerball: whoever reaches the network of {interface} can read this bus and move the arm; \
-                        docs/transports.md says how to fence it"
+                        docs/bus.md says how to fence it"
                 );
             }
             return transport::open(&self.bus).map_err(|e| Failure::Unusable(e.to_string()));
