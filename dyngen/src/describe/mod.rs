@@ -42,7 +42,7 @@ impl Description {
     pub fn with_progress(model: &Model, say: impl Fn(&str)) -> Result<Description, Error> {
         let mut preparation = Preparation::default();
         let mut operations = Vec::new();
-        for function in Function::ALL {
+        for function in model.functions() {
             say(&format!("proving {function}"));
             let built = model.function(function, SetKind::Minimal)?.without_preparation(&mut preparation);
             operations.push((function.name(), built.operations()));
