@@ -7,7 +7,6 @@ pub use weak::Weak;
 use crate::arm::{Arm, Joint, Transmission};
 use crate::base::sets::{Class, combination_text};
 use crate::base::symmetry::{self, Removed, Symmetry};
-use crate::dynamics::Function;
 use crate::exact::rational;
 use crate::graph::{Operations, Preparation};
 use crate::model::{Error, Model};
