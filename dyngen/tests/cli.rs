@@ -331,6 +331,19 @@ fn a_model_is_a_file_of_values() {
     assert!(wrong.to_string().contains("an entry without a name"), "{wrong}");
 }
 
+/// Of several notes of one kind two are shown, and all where all are asked for.
+#[test]
+fn notes_of_an_import_are_few_unless_all_are_wanted() {
+    let rounded = include_str!("urdf/puma.urdf").replace("1.5707963267948966", "1.5708");
+    let (urdf, arm) = (file("rounded.urdf", &rounded), file("rounded.toml", ""));
+    let notes = |extra: &[&str]| {
+        let out = dyngen(&[&["import", &urdf, "-o", &arm, "--force"], extra].concat());
+        text(&out.stderr).matches("taken as meant: joint ").count()
+    };
+    assert!(notes(&["--verbose"]) >= 4);
+    assert_eq!(notes(&[]), 2);
+}
+
 /// Files are replaced only on purpose, and the original never; a result that is no number ends with an error.
 #[test]
 fn nothing_is_lost_and_no_nan_is_printed() {

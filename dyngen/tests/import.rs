@@ -6,7 +6,8 @@
 use dyngen::arm::{Convention, JointKind, Parameter};
 use dyngen::exact::rational::to_f64;
 use dyngen::import::{self, ImportError, Imported, Options};
-use dyngen::{Model, SetKind};
+use dyngen::{Evaluator, Function, Model, Samples, SetKind};
+use rand::{RngExt, SeedableRng};
 
 const LWA4P: &str = include_str!("urdf/lwa4p.urdf");
 const PUMA: &str = include_str!("urdf/puma.urdf");
@@ -86,6 +87,31 @@ fn rounded_numbers_are_taken_as_meant_and_said() {
     said("mm and 3.75e-3 mrad over the joints' ranges");
     let whole = imported(PUMA, None).unwrap();
     assert!(!whole.notes.iter().any(|n| n.contains("rounded")), "{:?}", whole.notes);
+}
+
+/// The torque by which rounded numbers move the arm is what the two arms' own functions say.
+#[test]
+fn the_torque_of_rounded_numbers_is_said() {
+    let rounded = PUMA.replace("1.5707963267948966", "1.5708");
+    let [meant, exact] = [false, true].map(|exact| {
+        let options = Options { exact, ..Options::default() };
+        import::urdf(&rounded, "robot.urdf", &options).unwrap()
+    });
+    let note = meant.notes.iter().find(|n| n.contains("holds the arm still by at most")).unwrap();
+    let said = note.split("still by at most ").nth(1).unwrap().split(' ').next().unwrap();
+    let said: f64 = said.parse().unwrap();
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(4);
+    let q: Vec<f64> = (0..200 * meant.arm.dof()).map(|_| random.random_range(-3.0..3.0)).collect();
+    let [a, b] = [&meant, &exact].map(|imported| {
+        let model = Model::derive(imported.arm.clone()).unwrap();
+        let values: Vec<f64> = imported.values.iter().map(|(_, value)| *value).collect();
+        let gravity = Evaluator::new(&model, Function::Gravity, SetKind::Full).unwrap();
+        let mut out = vec![0.0; q.len()];
+        gravity.run(&Samples { q: &q, parameters: &values, ..Samples::default() }, &mut out);
+        out
+    });
+    let most = a.iter().zip(&b).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+    assert!(said > 1e-8 && most < 1.3 * said && most > 0.5 * said, "{said} said, {most} found");
 }
 
 /// Reasons of a refusal; an unreadable text is none.

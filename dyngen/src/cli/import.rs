@@ -32,6 +32,9 @@ pub(super) struct Args {
     /// Keep every digit: do not take rounded numbers such as 1.5708 for what they were rounded from.
     #[arg(long)]
     exact: bool,
+    /// Show every note: else of several of one kind the first two are shown.
+    #[arg(short, long)]
+    verbose: bool,
     /// Angles this close to a multiple of pi/12 are taken for it, rad.
     #[arg(long, value_name = "RAD", default_value = "1e-9", value_parser = tolerance)]
     angle_tolerance: f64,
@@ -70,7 +73,8 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         exact: args.exact,
     };
     let imported = import::source(&source, &options).map_err(Failure::input)?;
-    for note in imported.notes.iter().chain(&imported.arm.notes()) {
+    let notes: Vec<String> = imported.notes.iter().chain(&imported.arm.notes()).cloned().collect();
+    for note in if args.verbose { notes } else { shortened(notes) } {
         eprintln!("{file}: note: {note}");
     }
     let values = args.output.with_extension("values.json");
@@ -84,6 +88,22 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     }
     write(&files)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Of notes that begin alike, up to a colon, the first two, and how many more there are.
+fn shortened(notes: Vec<String>) -> Vec<String> {
+    const SHOWN: usize = 2;
+    let kind = |note: &str| note.split_once(": ").map(|(kind, _)| kind.to_string());
+    let mut short: Vec<String> = Vec::new();
+    for group in notes.chunk_by(|a, b| kind(a).is_some() && kind(a) == kind(b)) {
+        // One more line that says so saves nothing in place of one note.
+        let shown = if group.len() > SHOWN + 1 { SHOWN } else { group.len() };
+        short.extend_from_slice(&group[..shown]);
+        if let (Some(kind), true) = (kind(&group[0]), shown < group.len()) {
+            short.push(format!("{kind}: {} more (--verbose shows them)", group.len() - shown));
+        }
+    }
+    short
 }
 
 /// Edited files are not lost by accident, and the original is never written over.

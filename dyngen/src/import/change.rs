@@ -19,6 +19,8 @@ pub(super) struct Change {
     pub(super) turn: f64,
     /// Of an element of the mass matrix M, relative to √(M_ii M_jj).
     pub(super) inertia: f64,
+    /// Of the torque of a joint that holds the arm still, gravity along −z of the root link, N·m (N).
+    pub(super) torque: f64,
 }
 
 impl Change {
@@ -34,11 +36,13 @@ impl Change {
                     q[i] = mimic.ratio * q[*leader] + mimic.offset;
                 }
             }
-            let [(a, m), (b, n)] = [one, other].map(|chain| {
+            let [(a, m, g), (b, n, h)] = [one, other].map(|chain| {
                 let moved = displacements(chain, &q);
                 let tip = moved.last().map_or(chain.tip_pose, |last| last.then(&chain.tip_pose));
-                (tip, mass_matrix(chain, &moved))
+                let (matrix, torques) = mass_matrix_and_weight(chain, &moved);
+                (tip, matrix, torques)
             });
+            change.torque = g.iter().zip(&h).fold(change.torque, |most, (g, h)| most.max((g - h).abs()));
             change.distance = change.distance.max((a.origin - b.origin).norm());
             // Of a small rotation the sine of its angle, from the part that is skew.
             let r = a.rotation.transpose() * b.rotation;
@@ -82,10 +86,14 @@ fn displacements(chain: &Chain, q: &[f64]) -> Vec<Pose> {
     chain.joints.iter().zip(q).map(step).collect()
 }
 
-/// The mass matrix: Σ over bodies of m·vᵢ·vⱼ + ωᵢᵀ·I·ωⱼ, with the velocities that unit joint velocities give.
-fn mass_matrix(chain: &Chain, moved: &[Pose]) -> Vec<Vec<f64>> {
+/// m/s²
+const GRAVITY: f64 = 9.81;
+
+/// The mass matrix, Σ over bodies of m·vᵢ·vⱼ + ωᵢᵀ·I·ωⱼ with the velocities that unit joint velocities give; and the
+/// torques that hold the bodies' weight, Σ m·g·v_z.
+fn mass_matrix_and_weight(chain: &Chain, moved: &[Pose]) -> (Vec<Vec<f64>>, Vec<f64>) {
     let n = chain.joints.len();
-    let mut matrix = vec![vec![0.0; n]; n];
+    let (mut matrix, mut torques) = (vec![vec![0.0; n]; n], vec![0.0; n]);
     // A joint's axis is carried by the joints before it, and does not move when it turns itself.
     let axes: Vec<(Vector3<f64>, Vector3<f64>)> = (chain.joints.iter().zip(moved))
         .map(|(joint, pose)| (pose.rotation * joint.direction, pose.point(joint.point)))
@@ -100,11 +108,12 @@ fn mass_matrix(chain: &Chain, moved: &[Pose]) -> Vec<Vec<f64>> {
             };
             let motions: Vec<_> = (0..=k).map(motion).collect();
             for (i, (v, w)) in motions.iter().enumerate() {
+                torques[i] += body.mass * GRAVITY * v.z;
                 for (j, (other_v, other_w)) in motions.iter().enumerate() {
                     matrix[i][j] += body.mass * v.dot(other_v) + w.dot(&(inertia * other_w));
                 }
             }
         }
     }
-    matrix
+    (matrix, torques)
 }

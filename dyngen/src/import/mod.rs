@@ -199,13 +199,15 @@ fn meant(robot: &urdf::Robot, written: chain::Chain, options: &Options) -> Resul
     let (nearest, moved) = rounding::nearest(robot, &written.path);
     let mut chain = chain::chain(&nearest, options)?;
     if !moved.is_empty() {
-        let Change { distance, turn, inertia } = Change::between(&written, &chain);
+        let Change { distance, turn, inertia, torque } = Change::between(&written, &chain);
         chain.notes.extend(moved.into_iter().map(|joint| format!("taken as meant: {joint}")));
         chain.notes.push(format!(
             "these numbers are rounded; taken as meant they move the tip by at most {} mm and {} mrad over \
-             the joints' ranges and change M by at most {} % of √(M_ii M_jj) (--exact keeps every digit)",
+             the joints' ranges and change the torque that holds the arm still by at most {} N·m, M by at most {} % of \
+             √(M_ii M_jj) (--exact keeps every digit)",
             short(1e3 * distance),
             short(1e3 * turn),
+            short(torque),
             short(100.0 * inertia)
         ));
     }
