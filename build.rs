@@ -14,8 +14,10 @@ fn main() {
     }
     let rotorless = Config::new("tests/arms/lwa4p_rotorless.toml");
     rotorless.batch(true).build("lwa4p_rotorless_minimal.rs").unwrap_or_else(|e| e.exit());
-    let all = Config::new("tests/arms/lwa4p_rotorless.toml").functions(Function::ALL).batch(true);
-    all.build("lwa4p_rotorless_all.rs").unwrap_or_else(|e| e.exit());
+    let others: Vec<Function> =
+        Function::ALL.into_iter().filter(|f| Function::common().all(|common| common != *f)).collect();
+    let control = Config::new("tests/arms/lwa4p_rotorless.toml").functions(others).batch(true);
+    control.build("lwa4p_rotorless_control.rs").unwrap_or_else(|e| e.exit());
     for set in [SetKind::Full, SetKind::Minimal, SetKind::Symbolic, SetKind::Published] {
         let config = Config::new("powerball/arm.toml").parameters(set).batch(set == SetKind::Minimal);
         config.build(&format!("lwa4p_{set}.rs")).unwrap_or_else(|e| e.exit());

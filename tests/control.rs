@@ -5,7 +5,7 @@
 use dyngen::{Evaluator, Function, Model, SetKind};
 use nalgebra::SVector;
 use powerball_workspace::arm;
-use powerball_workspace::generated::lwa4p_rotorless_all as lwa4p;
+use powerball_workspace::generated::lwa4p_rotorless_control as lwa4p;
 use rand::SeedableRng;
 use support::{State, evaluate};
 
