@@ -389,7 +389,6 @@ pub fn forward_kinematics_with<T: SimdRealField + Copy>(
         ]),
     )
 }
-#[allow(dead_code)]
 mod trigonometry {
     //! Sines and cosines of several angles at once, by additions and multiplications alone.
     //!
@@ -397,6 +396,7 @@ mod trigonometry {
     //! every lane, and next to whatever other angles. `f32` calls no operation on `f64`. Other scalars, such as
     //! dual numbers, bring their own sine and cosine.
     #![allow(clippy::excessive_precision)]
+    #![allow(dead_code)]
     use core::any::{Any, TypeId};
     use nalgebra::{SimdBool, SimdRealField, convert};
     /// Sines and cosines of the angles that `angles` makes of joint positions, in their order.
