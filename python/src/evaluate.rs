@@ -93,7 +93,11 @@ fn common_shape(function: Function, dof: usize, states: &States<'_>) -> PyResult
         };
         let (shape, length) = (array.shape(), argument.length(dof, 0));
         if !(1..=2).contains(&shape.len()) || shape.last() != Some(&length) {
-            return Err(value(format!("{name} must have shape {}, it has {}", expected(length), shown(shape))));
+            return Err(value(format!(
+                "{name} must have shape {}, it has {}",
+                expected(length),
+                shown(shape)
+            )));
         }
         match common {
             // As many samples as the others; a wrench has six numbers in each.
