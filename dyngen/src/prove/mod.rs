@@ -88,7 +88,7 @@ pub fn prove(
 
 /// Whether the Jacobian of the tool's frame has rank six anywhere: then it has it almost everywhere.
 pub fn has_full_rank(arm: &Arm, symbols: &AngleSymbols, sets: &Sets) -> bool {
-    let point = Point::draw(arm, symbols, sets, &mut Draws::new(0x0072_616e_6b));
+    let point = Point::draw(arm, symbols, sets, &mut Draws::new(0x0000_7261_6e6b));
     let jacobian = jacobian(&point);
     let square = times(&jacobian, &transposed(&jacobian, arm.dof()), arm.dof());
     // A sum of squares modulo a prime can be zero by chance, in one of 2⁶¹ draws.

@@ -170,32 +170,6 @@ pub(crate) fn over_blocks(blocks: &[(f64, f64)]) -> (f64, f64) {
     (ratio, t_quantile_975(count - 1.0) * (squares * count / (count - 1.0)).sqrt() / below)
 }
 
-#[cfg(test)]
-mod ratio_tests {
-    use super::over_blocks;
-    use rand::{RngExt, SeedableRng};
-
-    #[test]
-    fn intervals_hold_the_true_ratio_as_often_as_they_say() {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
-        let held = (0..2000)
-            .filter(|_| {
-                let blocks: Vec<(f64, f64)> = (0..25)
-                    .map(|_| {
-                        let b = rng.random_range(1.0..2.0);
-                        (b * rng.random_range(0.2..1.0), b)
-                    })
-                    .collect();
-                let (ratio, half) = over_blocks(&blocks);
-                (ratio - 0.6).abs() < half
-            })
-            .count();
-        assert!((1860..=1940).contains(&held), "{held} of 2000");
-        assert_eq!(over_blocks(&[(1.0, 2.0)]), (0.5, f64::INFINITY));
-        assert_eq!(over_blocks(&[]).0, 0.0);
-    }
-}
-
 // Instrumental variables: a fit that noise of the positions does not bias.
 //
 // Accelerations are second derivatives of measured positions. Their noise stands in the regressor A, and
@@ -415,4 +389,30 @@ impl Level {
 
 fn weighted<'a>(levels: &'a [Vec<Level>], weights: &'a [f64]) -> impl Iterator<Item = (&'a Level, f64)> {
     levels.iter().zip(weights).flat_map(|(joint, weight)| joint.iter().map(move |level| (level, *weight)))
+}
+
+#[cfg(test)]
+mod ratio_tests {
+    use super::over_blocks;
+    use rand::{RngExt, SeedableRng};
+
+    #[test]
+    fn intervals_hold_the_true_ratio_as_often_as_they_say() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let held = (0..2000)
+            .filter(|_| {
+                let blocks: Vec<(f64, f64)> = (0..25)
+                    .map(|_| {
+                        let b = rng.random_range(1.0..2.0);
+                        (b * rng.random_range(0.2..1.0), b)
+                    })
+                    .collect();
+                let (ratio, half) = over_blocks(&blocks);
+                (ratio - 0.6).abs() < half
+            })
+            .count();
+        assert!((1860..=1940).contains(&held), "{held} of 2000");
+        assert_eq!(over_blocks(&[(1.0, 2.0)]), (0.5, f64::INFINITY));
+        assert_eq!(over_blocks(&[]).0, 0.0);
+    }
 }
