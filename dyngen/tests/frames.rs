@@ -101,7 +101,10 @@ fn frames_that_cannot_be_are_refused_with_their_line() {
         ("[[frame]]\nname = \"a\"\n", "the key 'link' is missing"),
         ("[[frame]]\nlink = 1\n", "the key 'name' is missing"),
         ("[[frame]]\nname = \"Left hand\"\nlink = 1\n", "lowercase letters, digits and _"),
-        ("[[frame]]\nname = \"a\"\nlink = 1\n[[frame]]\nname = \"a\"\nlink = 2\n", "the name of another frame"),
+        (
+            "[[frame]]\nname = \"a\"\nlink = 1\n[[frame]]\nname = \"a\"\nlink = 2\n",
+            "the name of another frame",
+        ),
         ("[[frame]]\nname = \"a\"\nlink = 1\nmass = 2\n", "unknown key 'mass'"),
         ("[[frame]]\nname = \"a\"\nlink = 1\nxyz = [1]\n", "xyz must be three numbers"),
     ] {
