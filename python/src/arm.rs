@@ -213,6 +213,33 @@ impl Arm {
         self.base
     }
 
+    /// The names of its frames.
+    #[getter]
+    fn frames(&self) -> Vec<String> {
+        self.arm.frames.iter().map(|frame| frame.name.clone()).collect()
+    }
+
+    /// The same arm with its tool at one of its frames.
+    fn at_frame(&self, name: &str) -> PyResult<Arm> {
+        let arm = self.arm.at_frame(name).ok_or_else(|| {
+            value(format!("the arm has no frame '{name}': it has {}", self.frames().join(", ")))
+        })?;
+        let model = OnceLock::new();
+        if let Some(derived) = self.model.get().and_then(|model| model.at_frame(name)) {
+            model.get_or_init(|| Arc::new(derived));
+        }
+        Ok(Arm {
+            arm,
+            origin: None,
+            text: self.text.clone(),
+            values: self.values.clone(),
+            base: self.base,
+            notes: self.notes.clone(),
+            model,
+            evaluators: Mutex::default(),
+        })
+    }
+
     /// What `dyngen describe --json` prints.
     fn describe(&self, py: Python<'_>) -> PyResult<String> {
         let model = self.model(py)?;

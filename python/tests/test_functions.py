@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import pickle
 
 import numpy as np
 import pytest
@@ -110,6 +111,23 @@ def test_shapes_of_one_sample_and_of_many(rng):
         assert one.shape == eval(stated, {"n": n, "p": p}), name
         assert many.flags.c_contiguous and many.dtype == np.float64
     assert arm.inverse_dynamics(np.zeros((0, n)), np.zeros((0, n)), np.zeros((0, n))).shape == (0, n)
+
+
+def test_functions_at_a_frame_are_those_of_a_tool_there(rng):
+    text = (ROOT / "tests" / "arms" / "ur5e.toml").read_text()
+    place = "xyz = [0.1, -0.02, 0.3]\nrpy = [0, \"pi/3\", 0]\n"
+    arm = pb.Arm.from_toml(text + '\n[[frame]]\nname = "hand"\nlink = 6\n' + place)
+    tool = pb.Arm.from_toml(text + "\n[tool]\n" + place)
+    assert arm.frames == ["hand"]
+    at = arm.at_frame("hand")
+    q, dq = rng.uniform(-1.5, 1.5, (2, 6))
+    np.testing.assert_array_equal(at.forward_kinematics(q), tool.forward_kinematics(q))
+    np.testing.assert_array_equal(at.jacobian_rate(q, dq), tool.jacobian_rate(q, dq))
+    assert not np.allclose(arm.jacobian(q), at.jacobian(q))
+    again = pickle.loads(pickle.dumps(at))
+    np.testing.assert_array_equal(again.jacobian(q), at.jacobian(q))
+    with pytest.raises(ValueError, match="no frame 'foot': it has hand"):
+        arm.at_frame("foot")
 
 
 def test_lists_integers_and_views_are_taken(rng):

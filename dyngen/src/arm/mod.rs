@@ -120,6 +120,17 @@ pub struct Placement {
     pub rpy: [Angle; 3],
 }
 
+/// A frame that is fixed on a link: where kinematics can be asked for, as at the tool.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Its name.
+    pub name: String,
+    /// The link that carries it, from 0.
+    pub link: usize,
+    /// Where it stands in the link's frame.
+    pub placement: Placement,
+}
+
 /// A serial arm.
 #[derive(Clone, PartialEq)]
 pub struct Arm {
@@ -137,6 +148,10 @@ pub struct Arm {
     /// The tool's frame in the last link's, where it is another: where forward kinematics and the Jacobian
     /// look. It has no inertia of its own.
     pub tool: Option<Placement>,
+    /// The link that carries the tool, from 0, where it is another than the last (see [`Arm::at_frame`]).
+    pub tool_link: Option<usize>,
+    /// Other frames, in the order of the file.
+    pub frames: Vec<Frame>,
     /// A published parameter set, empty where the file has none.
     pub groupings: Vec<Grouping>,
     /// Motors that turn with several joints, empty where each turns with its own.
@@ -160,6 +175,12 @@ impl fmt::Debug for Arm {
         if !self.transmissions.is_empty() {
             text.field("transmissions", &self.transmissions);
         }
+        if let Some(link) = self.tool_link {
+            text.field("tool_link", &link);
+        }
+        if !self.frames.is_empty() {
+            text.field("frames", &self.frames);
+        }
         text.finish()
     }
 }
@@ -182,6 +203,18 @@ impl Arm {
     /// Every error of the text at once, each with its place.
     pub fn parse(text: &str, file: &str) -> Result<Arm, Diagnostics> {
         read::parse(text, file)
+    }
+
+    /// The same arm with its tool at one of its frames: what is asked of the tool is then asked of the frame.
+    pub fn at_frame(&self, name: &str) -> Option<Arm> {
+        let frame = self.frames.iter().find(|frame| frame.name == name)?;
+        let (tool, tool_link) = (Some(frame.placement.clone()), Some(frame.link));
+        Some(Arm { tool, tool_link, ..self.clone() })
+    }
+
+    /// The link that carries the tool, from 0.
+    pub fn tool_carrier(&self) -> usize {
+        self.tool_link.unwrap_or(self.links() - 1)
     }
 
     /// The number of joints that move on their own: of coordinates q. Joints that follow others are links
@@ -249,7 +282,8 @@ impl Arm {
     /// kept: the same axes and the same motion, but its links' parameters are told in other frames. It has no
     /// tool.
     pub(crate) fn on_joints(&self) -> Arm {
-        let mut arm = Arm { convention: Convention::Modified, tool: None, ..self.clone() };
+        let mut arm =
+            Arm { convention: Convention::Modified, tool: None, frames: Vec::new(), ..self.clone() };
         let flat = || (Rational::zero(), Rational::zero(), Angle::PiMultiple(Rational::zero()));
         let rows = self.joints.iter().map(|joint| (joint.a.clone(), joint.b.clone(), joint.alpha.clone()));
         for (joint, row) in arm.joints.iter_mut().zip(std::iter::once(flat()).chain(rows)) {

@@ -2,16 +2,17 @@
 
 use super::table::{Reader, Table, Value, describe};
 use super::{
-    Angle, Arm, Convention, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind, Placement,
-    mimic, sum, transmission,
+    Angle, Arm, Convention, Frame, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind,
+    Placement, mimic, sum, transmission,
 };
 use crate::diagnostic::{Collector, Diagnostics};
 use crate::exact::rational::{self, Rational};
 use num_traits::{Signed, Zero};
 use toml::de::DeTable;
 
-const ARM_KEYS: [&str; 8] =
-    ["name", "convention", "gravity", "joint", "base", "tool", "grouping", "transmission"];
+const ARM_KEYS: [&str; 9] =
+    ["name", "convention", "gravity", "joint", "base", "tool", "frame", "grouping", "transmission"];
+const FRAME_KEYS: [&str; 4] = ["name", "link", "xyz", "rpy"];
 const PLACEMENT_KEYS: [&str; 2] = ["xyz", "rpy"];
 const JOINT_KEYS: [&str; 15] = [
     "name",
@@ -51,6 +52,14 @@ pub(super) fn parse(text: &str, file: &str) -> Result<Arm, Diagnostics> {
     // A document that does not parse would only add errors about what the parser skipped.
     let arm = if broken { None } else { reader.arm(document.get_ref()) };
     reader.errors.finish(arm)
+}
+
+/// Whether a module may have this name.
+fn is_name(name: &str) -> bool {
+    let mut letters = name.chars();
+    letters.next().is_some_and(|c| c.is_ascii_lowercase())
+        && letters.all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+        && !["batch", "trigonometry", "tests"].contains(&name)
 }
 
 /// What a text is that is no arm file, and what to do with it.
@@ -94,6 +103,12 @@ impl Reader<'_> {
         self.same_names(&joint_tables);
         let base = self.optional(&top, "base", |r, v| r.placement(v, "base", "the root link"));
         let tool = self.optional(&top, "tool", |r, v| r.placement(v, "tool", "the last frame"));
+        let frame_tables = self.tables(&top, "frame");
+        let mut frames: Vec<Option<Frame>> = Vec::new();
+        for table in &frame_tables {
+            let frame = self.frame(table, dof, &frames);
+            frames.push(frame);
+        }
         let transmission_tables = self.tables(&top, "transmission");
         let transmissions = transmission::read(self, &transmission_tables, dof);
         let grouping_tables = self.tables(&top, "grouping");
@@ -124,6 +139,8 @@ impl Reader<'_> {
             joints,
             base: base?,
             tool: tool?,
+            tool_link: None,
+            frames: frames.into_iter().collect::<Option<_>>()?,
             groupings: groupings.into_iter().collect::<Option<_>>()?,
             transmissions: transmissions?,
         })
@@ -323,12 +340,49 @@ impl Reader<'_> {
         };
         let t = Table { table, span: v.span(), place: name.to_string() };
         self.unknown_keys(&t, &PLACEMENT_KEYS);
-        let xyz = self.optional(&t, "xyz", |r, v| {
+        self.placed(&t, name, within)
+    }
+
+    /// A frame on a link. Its name becomes that of a module.
+    fn frame(&mut self, t: &Table<'_, '_>, links: usize, before: &[Option<Frame>]) -> Option<Frame> {
+        self.unknown_keys(t, &FRAME_KEYS);
+        let place = t.place.clone();
+        let name = self.required(t, "name").and_then(|v| self.text(v, &format!("{place}: name")));
+        let link = self.required(t, "link").and_then(|v| {
+            let link =
+                v.get_ref().as_integer().and_then(|i| usize::from_str_radix(i.as_str(), i.radix()).ok());
+            let link = link.filter(|link| (1..=links).contains(link));
+            if link.is_none() {
+                let message =
+                    format!("{place}: link must be one of the links 1 to {links}, found {}", describe(v));
+                self.errors.error(v.span(), message);
+            }
+            link
+        });
+        let placement = self.placed(t, &place, "the link's frame");
+        let name = name?;
+        if !is_name(&name) {
+            let message = format!(
+                "{place}: name '{name}' becomes a module's: take lowercase letters, digits and _, a letter first"
+            );
+            self.errors.error(t.span.clone(), message);
+            return None;
+        }
+        if before.iter().flatten().any(|other| other.name == name) {
+            self.errors.error(t.span.clone(), format!("{place}: '{name}' is the name of another frame"));
+            return None;
+        }
+        Some(Frame { name, link: link? - 1, placement: placement? })
+    }
+
+    /// `xyz` and `rpy` of a table.
+    fn placed(&mut self, t: &Table<'_, '_>, name: &str, within: &str) -> Option<Placement> {
+        let xyz = self.optional(t, "xyz", |r, v| {
             let [x, y, z] = r.three(v, &format!("{name}: xyz must be three numbers in m in {within}"))?;
             let [x, y, z] = [x, y, z].map(|c| r.number(c, &format!("{name}: xyz"), "m"));
             Some([x?, y?, z?])
         });
-        let rpy = self.optional(&t, "rpy", |r, v| {
+        let rpy = self.optional(t, "rpy", |r, v| {
             let [x, y, z] = r.three(v, &format!("{name}: rpy must be three angles, roll, pitch and yaw"))?;
             let [x, y, z] = [x, y, z].map(|c| r.angle(c, &format!("{name}: rpy")));
             Some([x?, y?, z?])

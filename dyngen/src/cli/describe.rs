@@ -134,6 +134,10 @@ fn frames(t: &mut String, arm: &Arm, digits: Digits) {
             let _ = writeln!(t, "  {name}: {}", placement_text(frame, digits));
         }
     }
+    for frame in &arm.frames {
+        let place = placement_text(&frame.placement, digits);
+        let _ = writeln!(t, "  frame {}: on link {}: {place}", frame.name, frame.link + 1);
+    }
 }
 
 /// Joints that have no coordinate, and what they follow.

@@ -22,6 +22,9 @@ pub(super) struct Args {
     /// dqr1… and ddqr1… for reference motions, e1… for products, f1 to f6 for a wrench on the tool).
     #[arg(long, value_name = "FILE.csv")]
     states: PathBuf,
+    /// The frame of the arm file at which a function of the tool is asked for.
+    #[arg(long, value_name = "NAME")]
+    frame: Option<String>,
     /// The parameter set.
     #[arg(long, value_enum, default_value = "minimal")]
     parameters: Set,
@@ -35,6 +38,16 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let (model, kind) = match function.is_kinematic() {
         true => (Model::kinematic(arm(&args.arm)?), SetKind::Full),
         false => (model(&args.arm)?, args.parameters.into()),
+    };
+    let model = match &args.frame {
+        None => model,
+        Some(_) if !function.is_of_tool() => {
+            return Err(Failure::input(format!("--frame: {function} is not of a frame")));
+        }
+        Some(name) => model.at_frame(name).ok_or_else(|| {
+            let names: Vec<&str> = model.arm().frames.iter().map(|frame| frame.name.as_str()).collect();
+            Failure::input(format!("--frame: the arm has no frame '{name}': it has {}", names.join(", ")))
+        })?,
     };
     let set = model.set(kind).map_err(Failure::refused)?;
     let parameters = match (&args.values, function.takes(Argument::Parameters)) {

@@ -318,7 +318,8 @@ impl<'a> Parts<'a> {
         let placed = |frame: &Option<Placement>| {
             PlacementElements::build(b, frame.as_ref(), self.subject.symbols, |x| b.constant(x), symbol)
         };
-        pose::Ends { base: placed(&self.subject.arm.base), tool: placed(&self.subject.arm.tool) }
+        let arm = self.subject.arm;
+        pose::Ends { base: placed(&arm.base), tool: placed(&arm.tool), carrier: arm.tool_carrier() }
     }
 
     /// J̇·q̇: the tool's acceleration without q̈, from the recursion along a chain whose last link has axes of its own.
@@ -327,7 +328,7 @@ impl<'a> Parts<'a> {
         let drive = self.drive(self.at_rest(), false);
         let form = Form { last_in_frame_before: false, ..self.form };
         let chain = Chain::build(self.b, arm, angles, &self.elements, form);
-        let last = &self.geometry[arm.links() - 1];
+        let last = &self.geometry[arm.tool_carrier()];
         pose::jacobian_rate_times_velocity(self.b, &self.elements, &chain, last, &self.ends(), &drive)
     }
 

@@ -539,6 +539,11 @@ impl Function {
         Self::ALL.into_iter().take_while(|f| *f <= TorqueByVelocity)
     }
 
+    /// Whether it is of the tool's frame, so that other frames have it too.
+    pub fn is_of_tool(self) -> bool {
+        self.is_kinematic() || matches!(self, TaskInertiaInverse | TaskInertia | ConsistentInverse)
+    }
+
     /// Whether only an arm has it whose tool can accelerate in every direction.
     pub fn needs_full_rank(self) -> bool {
         matches!(self, TaskInertia | ConsistentInverse)

@@ -68,21 +68,23 @@ fn moved(b: &Builder, origin: &Vector, length: Expr, axis: &Vector) -> Vector {
 pub struct Ends {
     /// Frame 0 in the root link's.
     pub base: PlacementElements<Expr>,
-    /// The tool's in the last link's.
+    /// The tool's in its link's.
     pub tool: PlacementElements<Expr>,
+    /// The link that carries the tool.
+    pub carrier: usize,
 }
 
-/// The frame of every joint before its screw about z, and the tool's.
+/// The frame of every joint up to the tool's link before its screw about z, and the tool's.
 fn poses(b: &Builder, arm: &ArmElements<Expr>, ends: &Ends) -> (Vec<Pose>, Pose) {
-    let (joints, last) = links(b, arm, &ends.base);
+    let (joints, last) = links(b, arm, ends);
     (joints, last.placed(b, &ends.tool))
 }
 
-/// The frame of every joint before its screw about z, and of the last link.
-fn links(b: &Builder, arm: &ArmElements<Expr>, base: &PlacementElements<Expr>) -> (Vec<Pose>, Pose) {
-    let mut state = Pose::BASE.placed(b, base);
+/// The frame of every joint up to the tool's link before its screw about z, and of that link.
+fn links(b: &Builder, arm: &ArmElements<Expr>, ends: &Ends) -> (Vec<Pose>, Pose) {
+    let mut state = Pose::BASE.placed(b, &ends.base);
     let mut joints = Vec::with_capacity(arm.joints.len());
-    for joint in &arm.joints {
+    for joint in &arm.joints[..=ends.carrier] {
         if arm.convention == Convention::Modified {
             state = state.about_x(b, joint);
         }
@@ -110,7 +112,8 @@ pub fn forward_kinematics(b: &Builder, arm: &ArmElements<Expr>, ends: &Ends) -> 
 /// axes.
 pub fn jacobian(b: &Builder, arm: &ArmElements<Expr>, ends: &Ends) -> Vec<Expr> {
     let (joints, last) = poses(b, arm, ends);
-    let n = joints.len();
+    // What comes behind the tool's link does not move it.
+    let n = arm.joints.len();
     let mut rows = vec![Expr::ZERO; 6 * n];
     for (j, (pose, joint)) in joints.iter().zip(&arm.joints).enumerate() {
         let z = pose.axes[2];
@@ -138,9 +141,11 @@ pub fn jacobian_rate_times_velocity(
     ends: &Ends,
     drive: &Drive,
 ) -> Vec<Expr> {
-    let (_, last) = links(b, arm, &ends.base);
+    let (_, last) = links(b, arm, ends);
     let motions = motions(b, chain, drive);
-    let Some(motion) = motions.last().and_then(|stage| stage.links.last()) else {
+    let members = chain.stages.iter().flat_map(|stage| &stage.members);
+    let all = members.zip(motions.iter().flat_map(|stage| &stage.links));
+    let Some((_, motion)) = { all }.find(|(member, _)| member.joint == ends.carrier) else {
         return vec![Expr::ZERO; 6];
     };
     let (sin, cos) = link.file_turn;

@@ -16,14 +16,14 @@ mod trigonometry;
 
 pub use friction::FrictionTerm;
 
-use crate::arm::Arm;
+use crate::arm::{Arm, Frame};
 use crate::dynamics::function::Argument;
 use crate::dynamics::{Function, FunctionGraph};
 use crate::graph::Preparation;
 use crate::model::{Error, Model};
 use crate::parameters::{ParameterSet, SetKind};
 use proc_macro2::{Literal, TokenStream};
-use quote::{ToTokens, quote};
+use quote::{ToTokens, format_ident, quote};
 
 /// What a generated file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,15 +95,19 @@ pub fn source(model: &Model, options: &Options) -> Result<String, Error> {
 pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     let set = model.set(options.parameters)?;
     let mut preparation = Preparation::default();
-    let built = built(model, options, &mut preparation)?;
+    let built = built(model, &options.functions, options, &mut preparation)?;
+    let frames = frames(model, options, &mut preparation)?;
     let prepared = preparation.values().len();
-    let takes_parameters = built.iter().any(|f| f.arguments().any(|a| a == Argument::Parameters));
+    let all: Vec<FunctionGraph> =
+        built.iter().chain(frames.iter().flat_map(|(_, built)| built)).cloned().collect();
+    let takes_parameters = all.iter().any(|f| f.arguments().any(|a| a == Argument::Parameters));
     let functions = built.iter().map(|built| code::function(model, built, prepared));
+    let frames = frames.iter().map(|(frame, built)| frame_module(model, options, frame, built, prepared));
     let batch = options.batch.then(|| batch::module(model, &built));
     let preparation = takes_parameters.then(|| code::preparation(model, &preparation));
     let constants = constants(model.arm(), set, options);
     let trig = angles::trig_struct(model);
-    let angle_functions = angles::angle_functions(model, &built);
+    let angle_functions = angles::angle_functions(model, &all);
     let trigonometry = angles::trigonometry(model.arm());
     for term in &options.friction {
         term.check(model.arm().dof()).map_err(Error::Friction)?;
@@ -122,6 +126,8 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
         #preparation
 
         #(#functions)*
+
+        #(#frames)*
 
         #friction
 
@@ -160,10 +166,11 @@ fn allowed_unused(tokens: TokenStream) -> TokenStream {
 /// The functions that are wished, proven, without what `preparation` takes of them.
 fn built(
     model: &Model,
+    functions: &[Function],
     options: &Options,
     preparation: &mut Preparation,
 ) -> Result<Vec<FunctionGraph>, Error> {
-    let functions = Function::ALL.into_iter().filter(|f| options.functions.contains(f));
+    let functions = Function::ALL.into_iter().filter(|f| functions.contains(f));
     functions
         .map(|function| {
             let built = match &options.values {
@@ -173,6 +180,51 @@ fn built(
             Ok(built.without_preparation(preparation))
         })
         .collect()
+}
+
+/// Those of the wished functions that are the tool's, for each frame of the arm; a frame that cannot accelerate in every
+/// direction has fewer.
+fn frames(
+    model: &Model,
+    options: &Options,
+    preparation: &mut Preparation,
+) -> Result<Vec<(String, Vec<FunctionGraph>)>, Error> {
+    let of = |frame: &Frame| {
+        let Some(at) = model.at_frame(&frame.name) else { return Ok((frame.name.clone(), Vec::new())) };
+        let wished = at.functions().filter(|f| f.is_of_tool() && options.functions.contains(f));
+        let functions: Vec<Function> = wished.collect();
+        Ok((frame.name.clone(), built(&at, &functions, options, preparation)?))
+    };
+    let mut of = of;
+    model.arm().frames.iter().map(&mut of).collect()
+}
+
+/// The module of a frame: the tool's functions at the frame, which share the file's angles and prepared parameters.
+fn frame_module(
+    model: &Model,
+    options: &Options,
+    frame: &str,
+    built: &[FunctionGraph],
+    prepared: usize,
+) -> TokenStream {
+    if built.is_empty() {
+        return TokenStream::new();
+    }
+    let name = format_ident!("{frame}");
+    let doc = format!(" The functions of the tool's frame at the frame `{frame}` of the arm file.");
+    let functions = built.iter().map(|built| code::function(model, built, prepared));
+    let batch = options.batch.then(|| batch::module(model, built));
+    quote! {
+        #[doc = #doc]
+        pub mod #name {
+            #[allow(unused_imports)]
+            use super::*;
+
+            #(#functions)*
+
+            #batch
+        }
+    }
 }
 
 /// How many joints and parameters there are, their names, and values that are baked in.

@@ -9,7 +9,8 @@ use num_traits::Zero;
 /// The arm's angles whose sine and cosine are no rationals: twists, the fixed angles of prismatic joints, and
 /// those of the tool and the base.
 pub fn angle_symbols(arm: &Arm) -> AngleSymbols {
-    let fixed = arm.tool.iter().chain(&arm.base).flat_map(|frame| &frame.rpy);
+    let frames = arm.frames.iter().map(|frame| &frame.placement);
+    let fixed = arm.tool.iter().chain(&arm.base).chain(frames).flat_map(|frame| &frame.rpy);
     AngleSymbols::collect(joint_angles(arm).chain(fixed))
 }
 

@@ -92,7 +92,7 @@ fn tool<A: Algebra>(
     let along = |pose: Matrix<A::Value>, step: &Matrix<A::Value>| times(alg, &pose, step);
     let mut pose = fixed(alg, point, &point.arm.base, of).iter().fold(same(alg), along);
     let zero = alg.integer(0);
-    for joint in &elements.joints {
+    for joint in &elements.joints[..=point.arm.tool_carrier()] {
         let about_z =
             times(alg, &turn(alg, (0, 1), &joint.sin, &joint.cos), &shift(alg, [&zero, &zero, &joint.shift]));
         let about_x = times(

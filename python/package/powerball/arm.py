@@ -103,10 +103,14 @@ class Arm(Functions):
     Made by :meth:`from_toml`, :meth:`from_urdf` or :meth:`from_mjcf`.
     """
 
-    def __init__(self, core: _core.Arm, made: Tuple[str, Tuple[Any, ...]]) -> None:
+    def __init__(
+        self, core: _core.Arm, made: Tuple[str, Tuple[Any, ...]], frame: Optional[str] = None
+    ) -> None:
         self._core = core
-        # By which function of the compiled part and of what: copies in other processes are made anew.
+        # By which function of the compiled part and of what, and at which frame: copies in other processes are made
+        # anew.
         self._made = made
+        self._frame = frame
         self._sets: Optional[Dict[str, ParameterSet]] = None
         self._own_values: Dict[str, Array] = {}
 
@@ -239,6 +243,18 @@ class Arm(Functions):
         with open(path, "w", encoding="utf-8") as file:
             file.write(self.text)
 
+    @property
+    def frames(self) -> List[str]:
+        """The names of the ``[[frame]]`` tables of the arm file."""
+        return self._core.frames
+
+    def at_frame(self, name: str) -> Arm:
+        """The same arm with its tool at one of its frames: ``arm.at_frame("wrist").jacobian(q)``.
+
+        Raises: ``ValueError`` where the arm has no such frame.
+        """
+        return _made(*self._made, name)
+
     def describe(self) -> Dict[str, Any]:
         """What ``dyngen describe --json`` prints: sets, classes of parameters, operation counts."""
         described: Dict[str, Any] = json.loads(self._core.describe())
@@ -285,14 +301,15 @@ class Arm(Functions):
         return self._core.evaluate(name, parameters, given, array)
 
     def __reduce__(self) -> Tuple[Any, ...]:
-        return _made, self._made
+        return _made, (*self._made, self._frame)
 
     def __repr__(self) -> str:
         return f"<Arm {self.name}: {self.dof} joints, {len(self.parameters)} parameters>"
 
 
-def _made(function: str, arguments: Tuple[Any, ...]) -> Arm:
-    return Arm(getattr(_core.Arm, function)(*arguments), (function, arguments))
+def _made(function: str, arguments: Tuple[Any, ...], frame: Optional[str] = None) -> Arm:
+    core = getattr(_core.Arm, function)(*arguments)
+    return Arm(core if frame is None else core.at_frame(frame), (function, arguments), frame)
 
 
 _TAKES_VALUES = {name for name, arguments, _, _ in _core.functions() if "parameters" in arguments}
