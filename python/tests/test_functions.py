@@ -115,7 +115,7 @@ def test_shapes_of_one_sample_and_of_many(rng):
 
 def test_functions_at_a_frame_are_those_of_a_tool_there(rng):
     text = (ROOT / "tests" / "arms" / "ur5e.toml").read_text()
-    place = "xyz = [0.1, -0.02, 0.3]\nrpy = [0, \"pi/3\", 0]\n"
+    place = 'xyz = [0.1, -0.02, 0.3]\nrpy = [0, "pi/3", 0]\n'
     arm = pb.Arm.from_toml(text + '\n[[frame]]\nname = "hand"\nlink = 6\n' + place)
     tool = pb.Arm.from_toml(text + "\n[tool]\n" + place)
     assert arm.frames == ["hand"]

@@ -285,9 +285,7 @@ class Functions:
 
         Returns: (n, n) for one sample, (N, n, n) for N.
         """
-        return self._evaluate(
-            "acceleration_by_position", parameters, values, {"q": q, "dq": dq, "tau": tau}
-        )
+        return self._evaluate("acceleration_by_position", parameters, values, {"q": q, "dq": dq, "tau": tau})
 
     def acceleration_by_velocity(
         self,
@@ -302,9 +300,7 @@ class Functions:
 
         Returns: (n, n) for one sample, (N, n, n) for N.
         """
-        return self._evaluate(
-            "acceleration_by_velocity", parameters, values, {"q": q, "dq": dq, "tau": tau}
-        )
+        return self._evaluate("acceleration_by_velocity", parameters, values, {"q": q, "dq": dq, "tau": tau})
 
     def mass_matrix_rate(
         self, q: ArrayLike, dq: ArrayLike, values: Optional[Values] = None, *, parameters: str = "minimal"
