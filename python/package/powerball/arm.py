@@ -107,8 +107,8 @@ class Arm(Functions):
         self, core: _core.Arm, made: Tuple[str, Tuple[Any, ...]], frame: Optional[str] = None
     ) -> None:
         self._core = core
-        # By which function of the compiled part and of what, and at which frame: copies in other processes are made
-        # anew.
+        # By which function of the compiled part and of what, and at which frame: copies in other processes
+        # are made anew.
         self._made = made
         self._frame = frame
         self._sets: Optional[Dict[str, ParameterSet]] = None

@@ -328,8 +328,8 @@ class Functions:
         return self._evaluate("jacobian_rate", "full", None, {"q": q, "dq": dq})
 
     def jacobian_transpose_times(self, q: ArrayLike, f: ArrayLike) -> Array:
-        """Jᵀ(q)·f: the joint torques that hold a wrench f on the tool's frame; f is the force, N, above the moment
-        about the frame's origin, N·m, in base axes, (6,) or (N, 6).
+        """Jᵀ(q)·f: the joint torques that hold a wrench f on the tool's frame; f is the force, N, above the
+        moment about the frame's origin, N·m, in base axes, (6,) or (N, 6).
 
         Returns: (n,) for one sample, (N, n) for N, N·m (N).
         """
@@ -345,7 +345,8 @@ class Functions:
     def task_inertia_inverse(
         self, q: ArrayLike, values: Optional[Values] = None, *, parameters: str = "minimal"
     ) -> Array:
-        """Inverse of the inertia that a wrench on the tool's frame feels: Λ⁻¹ = J·B⁻¹·Jᵀ (Khatib 1987), in base axes.
+        """Inverse of the inertia that a wrench on the tool's frame feels: Λ⁻¹ = J·B⁻¹·Jᵀ (Khatib 1987), in
+        base axes.
 
         Returns: (6, 6) for one sample, (N, 6, 6) for N.
         """
@@ -354,8 +355,8 @@ class Functions:
     def task_inertia(
         self, q: ArrayLike, values: Optional[Values] = None, *, parameters: str = "minimal"
     ) -> Array:
-        """Operational-space inertia Λ = (J·B⁻¹·Jᵀ)⁻¹ of the tool's frame (Khatib 1987), in base axes; not finite
-        where the Jacobian loses rank.
+        """Operational-space inertia Λ = (J·B⁻¹·Jᵀ)⁻¹ of the tool's frame (Khatib 1987), in base axes; not
+        finite where the Jacobian loses rank.
 
         Returns: (6, 6) for one sample, (N, 6, 6) for N.
         """
@@ -364,7 +365,8 @@ class Functions:
     def dynamically_consistent_inverse(
         self, q: ArrayLike, values: Optional[Values] = None, *, parameters: str = "minimal"
     ) -> Array:
-        """Dynamically consistent inverse of the Jacobian, J̄ = B⁻¹·Jᵀ·Λ (Khatib 1987): torques (I − JᵀJ̄ᵀ)·τ do not accelerate the tool's frame.
+        """Dynamically consistent inverse of the Jacobian, J̄ = B⁻¹·Jᵀ·Λ (Khatib 1987): torques
+        (I − JᵀJ̄ᵀ)·τ do not accelerate the tool's frame.
 
         Returns: (n, 6) for one sample, (N, n, 6) for N.
         """
