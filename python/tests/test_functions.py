@@ -58,7 +58,8 @@ def compare(text, rng):
     close(np.einsum("kij,kj->ki", arm.coriolis_matrix(q, dq), dq), coriolis)
     close(arm.coriolis_times_velocity(q, dq), coriolis)
     np.testing.assert_allclose(arm.forward_dynamics(q, dq, tau), ddq, rtol=0, atol=1e-8)
-    derivatives = [pin.computeABADerivatives(model, data, *s) for s in zip(q, dq, tau)]
+    # Its results are views of its data, which the next call writes over.
+    derivatives = [[m.copy() for m in pin.computeABADerivatives(model, data, *s)] for s in zip(q, dq, tau)]
     for ours, theirs in (
         (arm.acceleration_by_position(q, dq, tau), [d[0] for d in derivatives]),
         (arm.acceleration_by_velocity(q, dq, tau), [d[1] for d in derivatives]),
