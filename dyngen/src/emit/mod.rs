@@ -189,13 +189,12 @@ fn frames(
     options: &Options,
     preparation: &mut Preparation,
 ) -> Result<Vec<(String, Vec<FunctionGraph>)>, Error> {
-    let of = |frame: &Frame| {
+    let mut of = |frame: &Frame| {
         let Some(at) = model.at_frame(&frame.name) else { return Ok((frame.name.clone(), Vec::new())) };
         let wished = at.functions().filter(|f| f.is_of_tool() && options.functions.contains(f));
         let functions: Vec<Function> = wished.collect();
         Ok((frame.name.clone(), built(&at, &functions, options, preparation)?))
     };
-    let mut of = of;
     model.arm().frames.iter().map(&mut of).collect()
 }
 

@@ -137,13 +137,13 @@ fn expected(point: &Point<'_>, set: &ParameterSet, function: Function) -> Vec<Fp
             transpose(&(0..n).map(|j| torques.torque_derivative(Direction::Position(j))).collect::<Vec<_>>())
         }
         Function::JacobianRate => {
-            let column = |j: usize| PoseSeries::mixed(point, &point.velocities, &unit(n, j));
+            let column = |j: usize| PoseSeries::mixed(point, &point.velocities, &unit(n, j)).acceleration();
             transpose(&(0..n).map(column).collect::<Vec<_>>())
         }
         Function::JacobianTransposeTimes => transpose_times(&jacobian(point), &point.wrench),
         Function::JacobianTransposeTimesByPosition => {
             let entry = |k: usize| {
-                let second = PoseSeries::mixed(point, &unit(n, k % n), &unit(n, k / n));
+                let second = PoseSeries::mixed(point, &unit(n, k % n), &unit(n, k / n)).acceleration();
                 second.iter().zip(&point.wrench).fold(Fp::ZERO, |sum, (x, f)| sum + *x * *f)
             };
             (0..n * n).map(entry).collect()

@@ -1,4 +1,4 @@
-//! The pose as a power series in time, modulo the prime: what kinematics is proven against.
+//! The pose with its first and mixed second derivatives, modulo the prime: what kinematics is proven against.
 
 use super::point::Point;
 use crate::arm::{Convention, Placement};
@@ -8,30 +8,8 @@ use crate::exact::prime::{Fp, PrimeField};
 use crate::exact::rational::Rational;
 use crate::lagrangian::elements::{ArmElements, PlacementElements, Source};
 
-/// x₀ + x₁ t + x₂ t²
-type Series = [Fp; 3];
-
-/// Power series to second order.
-struct SeriesAlgebra;
-
-impl Algebra for SeriesAlgebra {
-    type Value = Series;
-    fn integer(&self, value: i64) -> Series {
-        [Fp::from_integer(value), Fp::ZERO, Fp::ZERO]
-    }
-    fn is_zero(&self, a: &Series) -> bool {
-        *a == [Fp::ZERO; 3]
-    }
-    fn add(&self, a: &Series, b: &Series) -> Series {
-        [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-    }
-    fn neg(&self, a: &Series) -> Series {
-        a.map(|x| -x)
-    }
-    fn mul(&self, a: &Series, b: &Series) -> Series {
-        [a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[0] * b[2] + a[1] * b[1] + a[2] * b[0]]
-    }
-}
+/// A value where q changes by s·u + t·v: ((x, ∂x/∂s), (∂x/∂t, ∂²x/∂s∂t)).
+type Mixed = ((Fp, Fp), (Fp, Fp));
 
 type Matrix<V> = [[V; 4]; 4];
 
@@ -109,63 +87,42 @@ fn tool<A: Algebra>(
     fixed(alg, point, &point.arm.tool, of).iter().fold(pose, along)
 }
 
-/// The tool frame's transform along a motion of constant joint velocities.
-pub(super) struct PoseSeries(Matrix<Series>);
+/// The tool frame's transform where q changes by s·u + t·v.
+pub(super) struct PoseSeries(Matrix<Mixed>);
 
 impl PoseSeries {
-    pub(super) fn along(point: &Point<'_>, velocities: &[Fp]) -> PoseSeries {
-        let of = |x| [x, Fp::ZERO, Fp::ZERO];
-        PoseSeries(tool(&SeriesAlgebra, point, &mut SeriesSource { point, velocities }, &of))
+    /// Along a motion of constant joint velocities v.
+    pub(super) fn along(point: &Point<'_>, v: &[Fp]) -> PoseSeries {
+        PoseSeries::mixed(point, v, v)
     }
 
-    /// ∂/∂s of the tool's velocity under q̇ = v, where q changes by s·u: linear above angular.
-    pub(super) fn mixed(point: &Point<'_>, u: &[Fp], v: &[Fp]) -> Vec<Fp> {
+    pub(super) fn mixed(point: &Point<'_>, u: &[Fp], v: &[Fp]) -> PoseSeries {
         let alg = Duals(Duals(PrimeField));
-        let of = |x| ((x, Fp::ZERO), (Fp::ZERO, Fp::ZERO));
-        let pose = tool(&alg, point, &mut MixedSource { point, u, v }, &of);
-        // A value is ((x, ∂x/∂s), (∂x/∂t, ∂²x/∂s∂t)); ω is in ∂R/∂t·Rᵀ.
-        let spin = |i: usize, j: usize| {
-            (0..3).fold(Fp::ZERO, |sum, k| {
-                let (_, (by_t, both)) = pose[i][k];
-                let ((x, by_s), _) = pose[j][k];
-                sum + both * x + by_t * by_s
-            })
-        };
-        let origin = (0..3).map(|i| pose[i][3].1.1);
-        origin.chain([spin(2, 1), spin(0, 2), spin(1, 0)]).collect()
+        PoseSeries(tool(&alg, point, &mut MixedSource { point, u, v }, &constant))
     }
 
     /// The transform itself, row-major.
     pub(super) fn pose(&self) -> Vec<Fp> {
-        self.0.iter().flatten().map(|x| x[0]).collect()
+        self.0.iter().flatten().map(|x| x.0.0).collect()
     }
 
-    /// Velocity of the origin and angular velocity: ṗ, and ω from Ṙ·Rᵀ.
+    /// Velocity of the origin and angular velocity under q̇ = v: ∂p/∂t, and ω from ∂R/∂t·Rᵀ.
     pub(super) fn velocity(&self) -> Vec<Fp> {
-        let spin = |i: usize, j: usize| (0..3).fold(Fp::ZERO, |s, k| s + self.0[i][k][1] * self.0[j][k][0]);
-        [self.origin(1).to_vec(), vec![spin(2, 1), spin(0, 2), spin(1, 0)]].concat()
+        self.linear_and_angular(|x| x.1.0, |a, b| a.1.0 * b.0.0)
     }
 
-    /// Acceleration of the origin and angular acceleration: p̈, and from d/dt(Ṙ·Rᵀ).
+    /// ∂/∂s of that velocity; with u = v the acceleration where v is constant.
     pub(super) fn acceleration(&self) -> Vec<Fp> {
-        let two = Fp::from_integer(2);
-        let spin = |i: usize, j: usize| {
-            (0..3).fold(Fp::ZERO, |s, k| {
-                let (a, b) = (self.0[i][k], self.0[j][k]);
-                s + two * a[2] * b[0] + a[1] * b[1]
-            })
-        };
-        [self.origin(2).map(|x| two * x).to_vec(), vec![spin(2, 1), spin(0, 2), spin(1, 0)]].concat()
+        self.linear_and_angular(|x| x.1.1, |a, b| a.1.1 * b.0.0 + a.1.0 * b.0.1)
     }
 
-    fn origin(&self, order: usize) -> [Fp; 3] {
-        std::array::from_fn(|i| self.0[i][3][order])
+    /// A part of the origin, and the axial vector of Σ over columns of products of two rows of R.
+    fn linear_and_angular(&self, part: fn(&Mixed) -> Fp, product: fn(&Mixed, &Mixed) -> Fp) -> Vec<Fp> {
+        let spin =
+            |i: usize, j: usize| (0..3).fold(Fp::ZERO, |sum, k| sum + product(&self.0[i][k], &self.0[j][k]));
+        let origin = (0..3).map(|i| part(&self.0[i][3]));
+        origin.chain([spin(2, 1), spin(0, 2), spin(1, 0)]).collect()
     }
-}
-
-struct SeriesSource<'p, 'a> {
-    point: &'p Point<'a>,
-    velocities: &'p [Fp],
 }
 
 /// The arm's quantities where q changes by s·u + t·v.
@@ -175,8 +132,6 @@ struct MixedSource<'p, 'a> {
     v: &'p [Fp],
 }
 
-type Mixed = ((Fp, Fp), (Fp, Fp));
-
 impl MixedSource<'_, '_> {
     fn rates(&self, joint: usize) -> (Fp, Fp) {
         let drive = &self.point.drives[joint];
@@ -184,12 +139,12 @@ impl MixedSource<'_, '_> {
     }
 }
 
-fn mixed(x: Fp) -> Mixed {
+fn constant(x: Fp) -> Mixed {
     ((x, Fp::ZERO), (Fp::ZERO, Fp::ZERO))
 }
 
-fn mixed_number(value: &Rational) -> Mixed {
-    mixed(Fp::from_rational(value).unwrap_or(Fp::ZERO))
+fn number(value: &Rational) -> Mixed {
+    constant(Fp::from_rational(value).unwrap_or(Fp::ZERO))
 }
 
 impl Source<Mixed> for MixedSource<'_, '_> {
@@ -202,74 +157,27 @@ impl Source<Mixed> for MixedSource<'_, '_> {
         ((self.point.joint_position(joint), u), (v, Fp::ZERO))
     }
     fn velocity(&mut self, _: usize) -> Mixed {
-        mixed(Fp::ZERO)
+        constant(Fp::ZERO)
     }
     fn a(&mut self, joint: usize) -> Mixed {
-        mixed_number(&self.point.arm.joints[joint].a)
-    }
-    fn b(&mut self, joint: usize) -> Mixed {
-        mixed_number(&self.point.arm.joints[joint].b)
-    }
-    fn d(&mut self, joint: usize) -> Mixed {
-        mixed_number(&self.point.arm.joints[joint].d)
-    }
-    fn ratio(&mut self, _: usize) -> Mixed {
-        mixed(Fp::ZERO)
-    }
-    fn coupling(&mut self, _: &Rational) -> Mixed {
-        mixed(Fp::ZERO)
-    }
-    fn gravity(&mut self, _: usize) -> Mixed {
-        mixed(Fp::ZERO)
-    }
-    fn symbol(&mut self, index: usize, sine: bool) -> Mixed {
-        mixed(self.point.sets.field.modular_symbol(index, sine))
-    }
-}
-
-fn number(value: &Rational) -> Series {
-    [Fp::from_rational(value).unwrap_or(Fp::ZERO), Fp::ZERO, Fp::ZERO]
-}
-
-impl SeriesSource<'_, '_> {
-    /// Of a joint of the chain.
-    fn rate(&self, joint: usize) -> Fp {
-        let drive = &self.point.drives[joint];
-        drive.ratio * self.velocities[drive.coordinate]
-    }
-}
-
-impl Source<Series> for SeriesSource<'_, '_> {
-    fn joint_trig(&mut self, joint: usize) -> (Series, Series) {
-        let ((s, c), v) = (self.point.joint_trig(joint), self.rate(joint));
-        let half = v * v * Fp::from_integer(2).inverse().unwrap_or(Fp::ONE);
-        ([s, c * v, -(s * half)], [c, -(s * v), -(c * half)])
-    }
-    fn position(&mut self, joint: usize) -> Series {
-        [self.point.joint_position(joint), self.rate(joint), Fp::ZERO]
-    }
-    fn velocity(&mut self, joint: usize) -> Series {
-        [self.rate(joint), Fp::ZERO, Fp::ZERO]
-    }
-    fn a(&mut self, joint: usize) -> Series {
         number(&self.point.arm.joints[joint].a)
     }
-    fn b(&mut self, joint: usize) -> Series {
+    fn b(&mut self, joint: usize) -> Mixed {
         number(&self.point.arm.joints[joint].b)
     }
-    fn d(&mut self, joint: usize) -> Series {
+    fn d(&mut self, joint: usize) -> Mixed {
         number(&self.point.arm.joints[joint].d)
     }
-    fn ratio(&mut self, _: usize) -> Series {
-        [Fp::ZERO; 3]
+    fn ratio(&mut self, _: usize) -> Mixed {
+        constant(Fp::ZERO)
     }
-    fn coupling(&mut self, _: &Rational) -> Series {
-        [Fp::ZERO; 3]
+    fn coupling(&mut self, _: &Rational) -> Mixed {
+        constant(Fp::ZERO)
     }
-    fn gravity(&mut self, _: usize) -> Series {
-        [Fp::ZERO; 3]
+    fn gravity(&mut self, _: usize) -> Mixed {
+        constant(Fp::ZERO)
     }
-    fn symbol(&mut self, index: usize, sine: bool) -> Series {
-        [self.point.sets.field.modular_symbol(index, sine), Fp::ZERO, Fp::ZERO]
+    fn symbol(&mut self, index: usize, sine: bool) -> Mixed {
+        constant(self.point.sets.field.modular_symbol(index, sine))
     }
 }
