@@ -17,6 +17,8 @@ fn main() {
     let others: Vec<Function> =
         Function::ALL.into_iter().filter(|f| Function::common().all(|common| common != *f)).collect();
     let control = Config::new("tests/arms/lwa4p_rotorless.toml").functions(others).batch(true);
+    // Some of them are the full set's alone.
+    let control = control.parameters(SetKind::Full);
     control.build("lwa4p_rotorless_control.rs").unwrap_or_else(|e| e.exit());
     for set in [SetKind::Full, SetKind::Minimal, SetKind::Symbolic, SetKind::Published] {
         let config = Config::new("powerball/arm.toml").parameters(set).batch(set == SetKind::Minimal);

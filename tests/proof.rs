@@ -13,7 +13,7 @@ use powerball_workspace::{arm, arm_text, paper_arm_with_ratios, parse};
 
 fn prove_all(name: &str, model: &Model) {
     for set in &model.sets().sets {
-        for function in model.functions() {
+        for function in model.functions(set.kind) {
             model.function(function, set.kind).unwrap_or_else(|e| panic!("{name} {}: {e}", set.kind));
         }
     }

@@ -28,6 +28,12 @@ pub struct Samples<'a> {
     pub e: &'a [f64],
     /// A wrench on the tool's frame in base axes, six numbers a sample: force, N, above moment, N·m.
     pub f: &'a [f64],
+    /// A payload on the tool's frame, ten numbers a sample: m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz.
+    pub payload: &'a [f64],
+    /// A direction in which q changes.
+    pub vq: &'a [f64],
+    /// A direction in which q̇ changes.
+    pub vdq: &'a [f64],
     /// Parameter values, the same for all samples.
     pub parameters: &'a [f64],
 }
@@ -43,6 +49,9 @@ impl<'a> Samples<'a> {
             Argument::Torques => self.tau,
             Argument::Errors => self.e,
             Argument::Wrench => self.f,
+            Argument::Payload => self.payload,
+            Argument::PositionDirection => self.vq,
+            Argument::VelocityDirection => self.vdq,
             Argument::Parameters => self.parameters,
         }
     }
@@ -161,6 +170,9 @@ impl Evaluator {
                     Input::Torque(i) => gather(Argument::Torques, i, lane),
                     Input::Error(i) => gather(Argument::Errors, i, lane),
                     Input::Wrench(i) => gather(Argument::Wrench, i, lane),
+                    Input::Payload(i) => gather(Argument::Payload, i, lane),
+                    Input::PositionDirection(i) => gather(Argument::PositionDirection, i, lane),
+                    Input::VelocityDirection(i) => gather(Argument::VelocityDirection, i, lane),
                     Input::Parameter(i) => *lane = [samples.parameters[i]; LANES],
                     Input::Prepared(i) => *lane = [prepared[i]; LANES],
                 },

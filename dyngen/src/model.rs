@@ -48,6 +48,8 @@ pub enum Error {
     Mimics(String),
     /// A function of an arm whose tool cannot accelerate in every direction.
     Missing(Function),
+    /// A function that depends on parameters that no torque shows, for a set that leaves them out.
+    NeedsEveryParameter(Function),
 }
 
 impl fmt::Display for Error {
@@ -69,6 +71,11 @@ impl fmt::Display for Error {
                 f,
                 "the arm has no {function}: its tool cannot accelerate in every direction, whatever its joints do; \
                  take task_inertia_inverse, which every arm has"
+            ),
+            Error::NeedsEveryParameter(function) => write!(
+                f,
+                "{function} depends on masses that no torque shows: ask for the set that has every parameter, \
+                 --parameters full"
             ),
         }
     }
@@ -141,10 +148,11 @@ impl Model {
         self.sets.get(kind).ok_or(Error::NoPublishedSet)
     }
 
-    /// The functions that the arm has.
-    pub fn functions(&self) -> impl Iterator<Item = Function> {
+    /// The functions that the arm has for a set.
+    pub fn functions(&self, kind: SetKind) -> impl Iterator<Item = Function> {
         let full = self.has_full_rank();
-        Function::ALL.into_iter().filter(move |f| full || !f.needs_full_rank())
+        let of_set = move |f: &Function| kind == SetKind::Full || !f.needs_every_parameter();
+        Function::ALL.into_iter().filter(move |f| full || !f.needs_full_rank()).filter(of_set)
     }
 
     fn has_full_rank(&self) -> bool {
@@ -207,6 +215,9 @@ impl Model {
     ) -> Result<FunctionGraph, Error> {
         if function.needs_full_rank() && !self.has_full_rank() {
             return Err(Error::Missing(function));
+        }
+        if function.needs_every_parameter() && kind != SetKind::Full {
+            return Err(Error::NeedsEveryParameter(function));
         }
         let set = self.set(kind)?;
         if !set.exact {

@@ -59,7 +59,7 @@ fn a_frame_moves_as_the_tool_of_an_arm_that_ends_at_its_link() {
             let alone = Model::kinematic(cut(&text, links));
             let n = alone.arm().dof();
             let mut of_cut = state.clone();
-            [&mut of_cut.q, &mut of_cut.dq].into_iter().for_each(|x| x.truncate(n));
+            [&mut of_cut.q, &mut of_cut.dq, &mut of_cut.ddq].into_iter().for_each(|x| x.truncate(n));
             for function in of_tool() {
                 let result = |model: &Model, state: &State| {
                     let evaluator = Evaluator::new(model, function, SetKind::Full).unwrap();

@@ -56,6 +56,9 @@ pub(crate) fn evaluate<'py>(
         tau: slice(Argument::Torques)?,
         e: slice(Argument::Errors)?,
         f: slice(Argument::Wrench)?,
+        payload: slice(Argument::Payload)?,
+        vq: slice(Argument::PositionDirection)?,
+        vdq: slice(Argument::VelocityDirection)?,
         parameters,
     };
     let count = shape[..shape.len() - 1].iter().product::<usize>();

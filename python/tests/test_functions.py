@@ -67,6 +67,16 @@ def compare(text, rng):
     ):
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-8 * np.abs(theirs).max())
 
+    momentum, matrix = arm.total_momentum(q, dq), arm.total_momentum_matrix(q)
+    np.testing.assert_allclose(momentum, np.einsum("kij,kj->ki", matrix, dq), atol=1e-12)
+    for k, (position, velocity) in enumerate(zip(q, dq)):
+        centre = pin.centerOfMass(model, data, position).copy()
+        hg = pin.computeCentroidalMomentum(model, data, position, velocity)
+        close(arm.centre_of_mass(position), centre)
+        close(arm.centre_of_mass_jacobian(position), pin.jacobianCenterOfMass(model, data, position))
+        # Theirs is about the centre of mass.
+        close(momentum[k], np.concatenate([hg.linear, hg.angular + np.cross(centre, hg.linear)]))
+
     def tip(s):
         pin.forwardKinematics(model, data, s)
         return data.oMi[model.njoints - 1]

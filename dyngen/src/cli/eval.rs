@@ -63,30 +63,26 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     };
     let states = States::read(&args.states)?;
     let names = model.arm().joint_names();
-    let columns = |argument: Argument| match function.takes(argument) {
-        true => states.columns(argument.name(), &names, "the arm has", "joints"),
-        false => Ok(Vec::new()),
-    };
-    let (q, dq, ddq) =
-        (columns(Argument::Positions)?, columns(Argument::Velocities)?, columns(Argument::Accelerations)?);
-    let (dqr, ddqr) = (columns(Argument::ReferenceVelocities)?, columns(Argument::ReferenceAccelerations)?);
-    let (tau, e) = (columns(Argument::Torques)?, columns(Argument::Errors)?);
-    let f = match function.takes(Argument::Wrench) {
-        true => {
-            let parts = ["fx", "fy", "fz", "mx", "my", "mz"].map(String::from);
-            states.columns(Argument::Wrench.name(), &parts, "a wrench has", "numbers")?
+    let columns = |argument: Argument| match (function.takes(argument), argument.parts()) {
+        (false, _) => Ok(Vec::new()),
+        (true, None) => states.columns(argument.name(), &names, "the arm has", "joints"),
+        (true, Some(parts)) => {
+            let parts: Vec<String> = parts.iter().map(ToString::to_string).collect();
+            states.columns(argument.name(), &parts, "it has", "numbers")
         }
-        false => Vec::new(),
     };
     let samples = Samples {
-        q: &q,
-        dq: &dq,
-        ddq: &ddq,
-        dqr: &dqr,
-        ddqr: &ddqr,
-        tau: &tau,
-        e: &e,
-        f: &f,
+        q: &columns(Argument::Positions)?,
+        dq: &columns(Argument::Velocities)?,
+        ddq: &columns(Argument::Accelerations)?,
+        dqr: &columns(Argument::ReferenceVelocities)?,
+        ddqr: &columns(Argument::ReferenceAccelerations)?,
+        tau: &columns(Argument::Torques)?,
+        e: &columns(Argument::Errors)?,
+        f: &columns(Argument::Wrench)?,
+        payload: &columns(Argument::Payload)?,
+        vq: &columns(Argument::PositionDirection)?,
+        vdq: &columns(Argument::VelocityDirection)?,
         parameters: &parameters,
     };
     let evaluator = Evaluator::new(&model, function, set.kind).map_err(Failure::refused)?;

@@ -17,7 +17,7 @@ pub(super) struct Args {
     /// The parameter set of every function.
     #[arg(long, value_enum, default_value = "minimal")]
     parameters: Set,
-    /// The functions, separated by commas; all of them where this is left out.
+    /// The functions, separated by commas; those that most controllers need where this is left out.
     #[arg(long, value_delimiter = ',', value_parser = function)]
     functions: Option<Vec<Function>>,
     /// Bake parameter values in: a JSON file {"parameter": number, …}, by the set's names or the arm's.

@@ -41,7 +41,7 @@ impl Description {
     pub fn with_progress(model: &Model, say: impl Fn(&str)) -> Result<Description, Error> {
         let mut preparation = Preparation::default();
         let mut operations = Vec::new();
-        for function in model.functions() {
+        for function in model.functions(SetKind::Minimal) {
             say(&format!("proving {function}"));
             let built = model.function(function, SetKind::Minimal)?.without_preparation(&mut preparation);
             operations.push((function.name(), built.operations()));

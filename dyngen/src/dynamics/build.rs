@@ -4,11 +4,14 @@ use super::angles::Angles;
 use super::chain::{self, LinkGeometry, Origins};
 use super::followers::Followers;
 use super::function::{Argument, Function, Kind};
+use super::moments::{ENTRIES, Moments};
 use super::motion;
 use super::regroup::{LinkBody, Regrouping};
 use super::stage::{Chain, Form};
-use super::{composite, coriolis, energy, forward, inverse, momentum, pose, regressor};
-use crate::arm::{Arm, Placement};
+use super::task::{Task, sum_of_products};
+use super::total::Total;
+use super::{composite, coriolis, energy, forward, inverse, momentum, payload, pose, regressor};
+use crate::arm::{Arm, Parameter, Placement};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
 use crate::exact::elimination::Dependence;
@@ -18,7 +21,7 @@ use crate::graph::differentiate::{self, Direction};
 use crate::graph::{Builder, Expr, Graph, Input, Operations, Preparation};
 use crate::lagrangian::elements::{ArmElements, PlacementElements, Source};
 use crate::optimize::{self, COMPARED, Pass};
-use crate::parameters::ParameterSet;
+use crate::parameters::{ParameterSet, SetParameter};
 
 /// A function as expressions.
 #[derive(Clone, Debug)]
@@ -130,7 +133,13 @@ pub fn build_in(
 ) -> FunctionGraph {
     let b = Builder::new();
     let followers = Followers::new(subject.arm, subject.angles);
-    let outputs = Parts::new(&b, &followers, form, regrouping, *subject, set, baked).outputs(function);
+    let mut parts = Parts::new(&b, &followers, form, regrouping, *subject, (set, baked));
+    if function.takes(Argument::Payload) {
+        let payload = payload::given(&b, parts.carrier(), &parts.ends().tool);
+        parts.load(&payload);
+    }
+    parts.turn_last();
+    let outputs = parts.outputs(function);
     let (graph, outputs) = followers.of_coordinates(b.finish(), outputs);
     let (graph, outputs) = optimize::optimize(graph, outputs, subject.field, passes);
     let (joints, parameters) = (subject.arm.dof(), set.parameters.len());
@@ -141,6 +150,7 @@ pub fn build_in(
 /// What functions are made of in one form, as expressions of one graph: the chain, its links' bodies and rates. All of
 /// it is of the chain, whose joints that follow others are links of it; what is linear in rates or torques becomes
 /// that of the coordinates at once, angles and positions when a function is done.
+#[derive(Clone)]
 struct Parts<'a> {
     b: &'a Builder,
     followers: &'a Followers<'a>,
@@ -165,20 +175,36 @@ impl<'a> Parts<'a> {
         form: Form,
         regrouping: Option<&Regrouping>,
         subject: Subject<'a>,
-        set: &'a ParameterSet,
-        baked: Option<&'a [Rational]>,
+        (set, baked): (&'a ParameterSet, Option<&'a [Rational]>),
     ) -> Self {
         let Subject { arm, angles, symbols, field, .. } = subject;
         let elements = ArmElements::build(b, arm, symbols, &mut Inputs { b, arm, angles });
         let chain = Chain::build(b, arm, angles, &elements, form);
         let value = |i: usize| parameter(b, baked, i);
-        let mut bodies = regrouping.map_or(Vec::new(), |r| r.bodies(b, arm, symbols, field, set, value));
-        if let Some(last) = bodies.last_mut() {
-            last.moments = last.moments.turned_back_z(b, &chain.last_turn.0, &chain.last_turn.1);
-        }
+        let bodies = regrouping.map_or(Vec::new(), |r| r.bodies(b, arm, symbols, field, set, value));
         let velocities = (0..arm.links()).map(|i| b.input(Input::Velocity(i))).collect();
         let geometry = chain::geometry(b, arm, form.origins, &elements);
         Parts { b, followers, subject, set, baked, form, elements, chain, geometry, bodies, velocities }
+    }
+
+    /// The frame of the link that carries the tool.
+    fn carrier(&self) -> &LinkGeometry<Expr> {
+        &self.geometry[self.subject.arm.tool_carrier()]
+    }
+
+    /// Adds a body to the link that carries the tool.
+    fn load(&mut self, body: &Moments<Expr>) {
+        if let Some(carrier) = self.bodies.get_mut(self.subject.arm.tool_carrier()) {
+            carrier.moments = carrier.moments.plus(self.b, body);
+        }
+    }
+
+    /// The last link's body in the axes in which the form sees it.
+    fn turn_last(&mut self) {
+        let (sin, cos) = self.chain.last_turn;
+        if let Some(last) = self.bodies.last_mut() {
+            last.moments = last.moments.turned_back_z(self.b, &sin, &cos);
+        }
     }
 
     /// A function's result, row-major.
@@ -227,6 +253,34 @@ impl<'a> Parts<'a> {
             Function::TaskInertiaInverse => self.task().inertia_inverse,
             Function::TaskInertia => forward::inverse_symmetric(b, &self.task().inertia_inverse, 6),
             Function::ConsistentInverse => self.task().consistent_inverse(b),
+            Function::BodyJacobian => {
+                self.followers.columns(b, pose::body_jacobian(b, elements, &self.ends()))
+            }
+            Function::SpatialJacobian => {
+                self.followers.columns(b, pose::spatial_jacobian(b, elements, &self.ends()))
+            }
+            Function::Twist => self.twist(velocities),
+            Function::TwistRate => {
+                let driven = self.twist(&self.each(Input::Acceleration));
+                driven.iter().zip(&self.jacobian_rate_times_velocity()).map(|(x, y)| b.add(x, y)).collect()
+            }
+            // What differs from the functions without a payload are the bodies.
+            Function::InverseDynamicsWithPayload => self.torque(self.each(Input::Acceleration), true),
+            Function::MassMatrixWithPayload => self.mass_matrix(),
+            Function::CoriolisMatrixWithPayload => {
+                self.square(coriolis::coriolis_matrix(b, chain, bodies, velocities))
+            }
+            Function::GravityWithPayload => self.rows(composite::gravity(b, chain, bodies)),
+            Function::ForwardDynamicsWithPayload => self.forward_dynamics(),
+            Function::PayloadRegressor => self.payload_regressor(),
+            Function::TorqueHessianTimes => self.torque_hessian_times(),
+            Function::CentreOfMass => self.centre_of_mass(),
+            Function::CentreOfMassJacobian => self.centre_of_mass_jacobian(),
+            Function::TotalMomentum => {
+                let matrix = self.total().matrix();
+                matrix.chunks(velocities.len()).map(|row| sum_of_products(b, row, velocities)).collect()
+            }
+            Function::TotalMomentumMatrix => self.followers.columns(b, self.total().matrix()),
         }
     }
 
@@ -402,46 +456,72 @@ impl<'a> Parts<'a> {
         (0..n).map(|j| sum_of_products(b, &column(j), &wrench)).collect()
     }
 
+    /// J·v for rates of the chain's joints.
+    fn twist(&self, rates: &[Expr]) -> Vec<Expr> {
+        let jacobian = pose::jacobian(self.b, &self.elements, &self.ends());
+        jacobian.chunks(rates.len()).map(|row| sum_of_products(self.b, row, rates)).collect()
+    }
+
+    /// For each of a payload's parameters the torques of a motion of an arm that has no other mass, n × 10.
+    fn payload_regressor(&self) -> Vec<Expr> {
+        let (b, links) = (self.b, self.subject.arm.links());
+        let column = |parameter: usize| {
+            let mut only = Parts { bodies: vec![LinkBody::none(b); links], ..self.clone() };
+            only.load(&payload::unit(b, self.carrier(), &self.ends().tool, parameter));
+            only.turn_last();
+            only.torque(self.each(Input::Acceleration), true)
+        };
+        let columns: Vec<Vec<Expr>> = (0..ENTRIES).map(column).collect();
+        (0..self.subject.arm.dof()).flat_map(|i| columns.iter().map(move |c| c[i])).collect()
+    }
+
+    /// The gradient of eᵀτ backwards, then its change in the direction forwards (Griewank and Walther 2008, §5), n × 2.
+    fn torque_hessian_times(&self) -> Vec<Expr> {
+        let (b, n) = (self.b, self.subject.arm.dof());
+        let of_each = |input: fn(usize) -> Input| (0..n).map(|i| b.input(input(i))).collect::<Vec<Expr>>();
+        let torques = self.torque(self.each(Input::Acceleration), true);
+        let product = sum_of_products(b, &torques, &of_each(Input::Error));
+        let gradient = differentiate::gradient(b, product, self.subject.arm.links());
+        let position = self.followers.of_chain(b, &of_each(Input::PositionDirection));
+        let velocity = self.followers.of_chain(b, &of_each(Input::VelocityDirection));
+        let parts = gradient.map(|part| {
+            let change = differentiate::along(b, &part, &|j| position[j], &|j| velocity[j]);
+            self.followers.rows(b, change)
+        });
+        (0..n).flat_map(|i| parts.each_ref().map(|part| part[i])).collect()
+    }
+
+    /// The whole arm, of the set with every parameter.
+    fn total(&self) -> Total {
+        let Subject { arm, .. } = self.subject;
+        let value = |parameter: Parameter| {
+            let is = |p: &SetParameter| matches!(p.terms[..], [(of, _)] if of == parameter);
+            let found = self.set.parameters.iter().position(is);
+            found.map_or(Expr::ZERO, |i| self::parameter(self.b, self.baked, i))
+        };
+        let coupled = |motor: usize| {
+            let factors = arm.coupled_motor(motor)?;
+            Some(factors.into_iter().map(|(joint, factor)| (joint, self.b.constant(&factor))).collect())
+        };
+        Total::build(self.b, &self.elements, &self.ends().base, value, coupled)
+    }
+
+    fn centre_of_mass(&self) -> Vec<Expr> {
+        let body = self.total().body;
+        body.first.iter().map(|x| self.b.div(*x, body.mass)).collect()
+    }
+
+    fn centre_of_mass_jacobian(&self) -> Vec<Expr> {
+        let total = self.total();
+        let linear = &total.matrix()[..3 * self.subject.arm.links()];
+        let columns = self.followers.columns(self.b, linear.to_vec());
+        columns.iter().map(|x| self.b.div(*x, total.body.mass)).collect()
+    }
+
     /// How the tool's frame moves under forces.
     fn task(&self) -> Task {
         Task::new(self.b, &self.mass_matrix(), &self.jacobian(), self.subject.arm.dof())
     }
-}
-
-/// What a wrench on the tool's frame does.
-struct Task {
-    /// B⁻¹·Jᵀ, n × 6.
-    accelerations: Vec<Expr>,
-    /// Λ⁻¹ = J·B⁻¹·Jᵀ, 6 × 6.
-    inertia_inverse: Vec<Expr>,
-}
-
-impl Task {
-    fn new(b: &Builder, mass_matrix: &[Expr], jacobian: &[Expr], n: usize) -> Task {
-        let rows: Vec<&[Expr]> = jacobian.chunks(n).collect();
-        let columns = forward::solve_symmetric_each(b, mass_matrix, n, &rows);
-        let inertia_inverse = (0..36)
-            .map(|k| {
-                // One triangle is computed, the other is its mirror.
-                let (i, j) = ((k / 6).min(k % 6), (k / 6).max(k % 6));
-                sum_of_products(b, rows[i], &columns[j])
-            })
-            .collect();
-        Task { accelerations: (0..6 * n).map(|k| columns[k % 6][k / 6]).collect(), inertia_inverse }
-    }
-
-    /// J̄ = B⁻¹·Jᵀ·Λ
-    fn consistent_inverse(&self, b: &Builder) -> Vec<Expr> {
-        // Λ is symmetric: its rows are its columns.
-        let inertia = forward::inverse_symmetric(b, &self.inertia_inverse, 6);
-        let rows = self.accelerations.chunks(6);
-        rows.flat_map(|row| inertia.chunks(6).map(|column| sum_of_products(b, row, column))).collect()
-    }
-}
-
-/// Σ xᵢ·yᵢ
-fn sum_of_products(b: &Builder, x: &[Expr], y: &[Expr]) -> Expr {
-    x.iter().zip(y).fold(Expr::ZERO, |sum, (x, y)| b.add(&sum, &b.mul(x, y)))
 }
 
 /// A parameter of the set as an input, or its value.

@@ -1,5 +1,6 @@
-//! The functions of an arm: their names, shapes and arguments, in one table.
+//! The functions of an arm: what they take and give.
 
+use super::table::{COUNT, Row, TABLE};
 use std::fmt;
 
 /// A function of the arm's state.
@@ -72,6 +73,36 @@ pub enum Function {
     TaskInertia,
     /// J̄ = B⁻¹·Jᵀ·Λ, n × 6
     ConsistentInverse,
+    /// Jacobian of the tool's frame in its own axes, 6 × n
+    BodyJacobian,
+    /// Jacobian of the tool's frame about the base's origin, 6 × n
+    SpatialJacobian,
+    /// J·q̇, 6 × 1
+    Twist,
+    /// J·q̈ + J̇·q̇, 6 × 1
+    TwistRate,
+    /// τ(q, q̇, q̈) with a payload
+    InverseDynamicsWithPayload,
+    /// The payload's part of τ by its ten parameters, n × 10
+    PayloadRegressor,
+    /// B(q) with a payload, n × n
+    MassMatrixWithPayload,
+    /// C(q, q̇) with a payload, n × n
+    CoriolisMatrixWithPayload,
+    /// g(q) with a payload
+    GravityWithPayload,
+    /// q̈(q, q̇, τ) with a payload
+    ForwardDynamicsWithPayload,
+    /// The Hessian of eᵀτ by (q, q̇) times a vector, n × 2
+    TorqueHessianTimes,
+    /// Centre of mass of the whole arm, 3 × 1
+    CentreOfMass,
+    /// Its Jacobian, 3 × n
+    CentreOfMassJacobian,
+    /// Linear above angular momentum about the base's origin, 6 × 1
+    TotalMomentum,
+    /// Its matrix: momentum = matrix·q̇, 6 × n
+    TotalMomentumMatrix,
 }
 
 /// A length of a result.
@@ -104,6 +135,12 @@ pub enum Argument {
     Errors,
     /// f
     Wrench,
+    /// A payload's ten inertial parameters
+    Payload,
+    /// A direction in which q changes
+    PositionDirection,
+    /// A direction in which q̇ changes
+    VelocityDirection,
     /// π
     Parameters,
 }
@@ -120,6 +157,9 @@ impl Argument {
             Argument::Torques => "tau",
             Argument::Errors => "e",
             Argument::Wrench => "f",
+            Argument::Payload => "payload",
+            Argument::PositionDirection => "vq",
+            Argument::VelocityDirection => "vdq",
             Argument::Parameters => "parameters",
         }
     }
@@ -137,6 +177,12 @@ impl Argument {
             Argument::Wrench => {
                 "force, N, above the moment about the origin, N·m, on the tool's frame, in base axes"
             }
+            Argument::Payload => {
+                "m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz of a body on the tool's frame, in its axes and about its \
+                 origin: kg, kg·m, kg·m²"
+            }
+            Argument::PositionDirection => "a direction in which q changes, one number for each joint",
+            Argument::VelocityDirection => "a direction in which q̇ changes, one number for each joint",
             Argument::Parameters => "the values of [`PARAMETER_NAMES`]",
         }
     }
@@ -144,9 +190,17 @@ impl Argument {
     /// How many numbers it has for n joints and p parameters.
     pub fn length(self, n: usize, p: usize) -> usize {
         match self {
-            Argument::Wrench => 6,
             Argument::Parameters => p,
-            _ => n,
+            _ => self.parts().map_or(n, <[&str]>::len),
+        }
+    }
+
+    /// The names of its numbers where it has not one for each joint or parameter.
+    pub fn parts(self) -> Option<&'static [&'static str]> {
+        match self {
+            Argument::Wrench => Some(&["fx", "fy", "fz", "mx", "my", "mz"]),
+            Argument::Payload => Some(&["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"]),
+            _ => None,
         }
     }
 }
@@ -162,370 +216,13 @@ pub(crate) enum Kind {
     Other,
 }
 
-/// What is known of a function beside its equations.
-struct Row {
-    function: Function,
-    /// On the command line and in the emitted code.
-    name: &'static str,
-    /// Before the numbers of its entries, as a column of a table.
-    letter: &'static str,
-    size: (Size, Size),
-    arguments: &'static [Argument],
-    kind: Kind,
-    /// What it computes.
-    what: &'static str,
-    /// What it returns, with the unit.
-    returns: &'static str,
-}
-
 use Argument::*;
 use Function::*;
-use Size::{Fixed, Joints, Parameters as ByParameter};
-
-/// One row for each function, in the order of [`Function::ALL`].
-const TABLE: [Row; 33] = [
-    Row {
-        function: InverseDynamics,
-        name: "inverse_dynamics",
-        letter: "tau",
-        size: (Joints, Fixed(1)),
-        arguments: &[Positions, Velocities, Accelerations, Parameters],
-        kind: Kind::Dynamics,
-        what: "Joint torques of a motion: τ = B(q)·q̈ + C(q, q̇)·q̇ + g(q), without friction.",
-        returns: "Returns τ, N·m (N where prismatic).",
-    },
-    Row {
-        function: InverseDynamicsWithoutGravity,
-        name: "inverse_dynamics_without_gravity",
-        letter: "tau",
-        size: (Joints, Fixed(1)),
-        arguments: &[Positions, Velocities, Accelerations, Parameters],
-        kind: Kind::Dynamics,
-        what: "Joint torques of a motion without gravity: B(q)·q̈ + C(q, q̇)·q̇.",
-        returns: "Returns the torques, N·m.",
-    },
-    Row {
-        function: Regressor,
-        name: "regressor",
-        letter: "Y",
-        size: (Joints, ByParameter),
-        arguments: &[Positions, Velocities, Accelerations],
-        kind: Kind::Regressor,
-        what: "Regressor Y(q, q̇, q̈): τ = Y·π for the parameters of [`PARAMETER_NAMES`].",
-        returns: "Returns Y, n × p.",
-    },
-    Row {
-        function: RegressorTransposeTimes,
-        name: "regressor_transpose_times",
-        letter: "Yte",
-        size: (ByParameter, Fixed(1)),
-        arguments: &[Positions, Velocities, Accelerations, Errors],
-        kind: Kind::Regressor,
-        what: "Yᵀ(q, q̇, q̈)·e without Y itself.",
-        returns: "Returns one number for each parameter.",
-    },
-    Row {
-        function: SlotineLiRegressor,
-        name: "slotine_li_regressor",
-        letter: "Y",
-        size: (Joints, ByParameter),
-        arguments: &[Positions, Velocities, ReferenceVelocities, ReferenceAccelerations],
-        kind: Kind::Regressor,
-        what: "Regressor of Slotine and Li: Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g, \
-            with C of Christoffel symbols.",
-        returns: "Returns Y, n × p.",
-    },
-    Row {
-        function: SlotineLiTransposeTimes,
-        name: "slotine_li_transpose_times",
-        letter: "Yte",
-        size: (ByParameter, Fixed(1)),
-        arguments: &[Positions, Velocities, ReferenceVelocities, ReferenceAccelerations, Errors],
-        kind: Kind::Regressor,
-        what: "Yᵀ(q, q̇, q̇ᵣ, q̈ᵣ)·e of Slotine and Li's regressor: the direction of their adaptation law.",
-        returns: "Returns one number for each parameter.",
-    },
-    Row {
-        function: MassMatrix,
-        name: "mass_matrix",
-        letter: "B",
-        size: (Joints, Joints),
-        arguments: &[Positions, Parameters],
-        kind: Kind::Dynamics,
-        what: "Mass matrix B(q), symmetric.",
-        returns: "Returns B, n × n, kg·m².",
-    },
-    Row {
-        function: MassMatrixInverse,
-        name: "mass_matrix_inverse",
-        letter: "Binv",
-        size: (Joints, Joints),
-        arguments: &[Positions, Parameters],
-        kind: Kind::Dynamics,
-        what: "Inverse of the mass matrix, B⁻¹(q).",
-        returns: "Returns n × n, symmetric; not finite where the parameters make B singular.",
-    },
-    Row {
-        function: CoriolisMatrix,
-        name: "coriolis_matrix",
-        letter: "C",
-        size: (Joints, Joints),
-        arguments: &[Positions, Velocities, Parameters],
-        kind: Kind::Dynamics,
-        what: "Coriolis matrix C(q, q̇) of Christoffel symbols: Ḃ − 2C is skew-symmetric.",
-        returns: "Returns C, n × n.",
-    },
-    Row {
-        function: CoriolisTimesVelocity,
-        name: "coriolis_times_velocity",
-        letter: "tau",
-        size: (Joints, Fixed(1)),
-        arguments: &[Positions, Velocities, Parameters],
-        kind: Kind::Dynamics,
-        what: "Coriolis and centrifugal torques C(q, q̇)·q̇.",
-        returns: "Returns the torques, N·m.",
-    },
-    Row {
-        function: CoriolisTransposeTimesVelocity,
-        name: "coriolis_transpose_times_velocity",
-        letter: "tau",
-        size: (Joints, Fixed(1)),
-        arguments: &[Positions, Velocities, Parameters],
-        kind: Kind::Dynamics,
-        what: "Cᵀ(q, q̇)·q̇ of the Christoffel matrix, which is ∂T/∂q: what a momentum observer integrates.",
-        returns: "Returns the torques, N·m.",
-    },
-    Row {
-        function: Gravity,
-        name: "gravity",
-        letter: "g",
-        size: (Joints, Fixed(1)),
-        arguments: &[Positions, Parameters],
-        kind: Kind::Dynamics,
-        what: "Joint torques that hold the arm still: g(q).",
-        returns: "Returns g, N·m.",
-    },
-    Row {
-        function: ForwardDynamics,
-        name: "forward_dynamics",
-        letter: "ddq",
-        size: (Joints, Fixed(1)),
-        arguments: &[Positions, Velocities, Torques, Parameters],
-        kind: Kind::Dynamics,
-        what: "Joint accelerations under joint torques: q̈ = B⁻¹·(τ − C·q̇ − g), without friction.",
-        returns: "Returns q̈; not finite where the parameters make B singular.",
-    },
-    Row {
-        function: ForwardKinematics,
-        name: "forward_kinematics",
-        letter: "T",
-        size: (Fixed(4), Fixed(4)),
-        arguments: &[Positions],
-        kind: Kind::Other,
-        what: "Pose of the tool's frame (the last link's where the arm declares no tool) in the base frame.",
-        returns: "Returns the homogeneous transform, 4 × 4, lengths in m.",
-    },
-    Row {
-        function: Jacobian,
-        name: "jacobian",
-        letter: "J",
-        size: (Fixed(6), Joints),
-        arguments: &[Positions],
-        kind: Kind::Other,
-        what: "Geometric Jacobian of the tool's frame (the last link's where the arm declares no tool), \
-            in base axes.",
-        returns: "Returns 6 × n: velocity of the origin, m/s, above the angular velocity, rad/s.",
-    },
-    Row {
-        function: JacobianRateTimesVelocity,
-        name: "jacobian_rate_times_velocity",
-        letter: "a",
-        size: (Fixed(6), Fixed(1)),
-        arguments: &[Positions, Velocities],
-        kind: Kind::Other,
-        what: "J̇(q, q̇)·q̇ of the geometric Jacobian: acceleration of the tool's frame where q̈ = 0.",
-        returns: "Returns six numbers: acceleration of the origin, m/s², \
-            above the angular acceleration, rad/s².",
-    },
-    Row {
-        function: KineticEnergy,
-        name: "kinetic_energy",
-        letter: "T",
-        size: (Fixed(1), Fixed(1)),
-        arguments: &[Positions, Velocities, Parameters],
-        kind: Kind::Dynamics,
-        what: "Kinetic energy T = ½ q̇ᵀ·B·q̇.",
-        returns: "Returns T, J.",
-    },
-    Row {
-        function: PotentialEnergy,
-        name: "potential_energy",
-        letter: "U",
-        size: (Fixed(1), Fixed(1)),
-        arguments: &[Positions, Parameters],
-        kind: Kind::Other,
-        what: "Potential energy U(q) under gravity, up to a constant: ∂U/∂q = g(q).",
-        returns: "Returns U, J.",
-    },
-    Row {
-        function: KineticEnergyRegressor,
-        name: "kinetic_energy_regressor",
-        letter: "T",
-        size: (Fixed(1), ByParameter),
-        arguments: &[Positions, Velocities],
-        kind: Kind::Other,
-        what: "Row of the kinetic energy: T = row·π.",
-        returns: "Returns 1 × p.",
-    },
-    Row {
-        function: PotentialEnergyRegressor,
-        name: "potential_energy_regressor",
-        letter: "U",
-        size: (Fixed(1), ByParameter),
-        arguments: &[Positions],
-        kind: Kind::Other,
-        what: "Row of the potential energy, up to a constant: U = row·π.",
-        returns: "Returns 1 × p.",
-    },
-    Row {
-        function: Momentum,
-        name: "momentum",
-        letter: "p",
-        size: (Joints, Fixed(1)),
-        arguments: &[Positions, Velocities, Parameters],
-        kind: Kind::Dynamics,
-        what: "Generalised momentum B(q)·q̇.",
-        returns: "Returns the momenta, N·m·s.",
-    },
-    Row {
-        function: TorqueByPosition,
-        name: "torque_by_position",
-        letter: "dtau_dq",
-        size: (Joints, Joints),
-        arguments: &[Positions, Velocities, Accelerations, Parameters],
-        kind: Kind::Dynamics,
-        what: "∂τ/∂q of the inverse dynamics.",
-        returns: "Returns n × n; column j is the derivative by q of joint j.",
-    },
-    Row {
-        function: TorqueByVelocity,
-        name: "torque_by_velocity",
-        letter: "dtau_ddq",
-        size: (Joints, Joints),
-        arguments: &[Positions, Velocities, Accelerations, Parameters],
-        kind: Kind::Dynamics,
-        what: "∂τ/∂q̇ of the inverse dynamics.",
-        returns: "Returns n × n; column j is the derivative by q̇ of joint j.",
-    },
-    Row {
-        function: AccelerationByPosition,
-        name: "acceleration_by_position",
-        letter: "dddq_dq",
-        size: (Joints, Joints),
-        arguments: &[Positions, Velocities, Torques, Parameters],
-        kind: Kind::Dynamics,
-        what: "∂q̈/∂q of the forward dynamics at given torques: −B⁻¹·∂τ/∂q. With ∂q̈/∂τ = B⁻¹ it is the linearisation \
-            of the arm.",
-        returns: "Returns n × n; column j is the derivative by q of joint j.",
-    },
-    Row {
-        function: AccelerationByVelocity,
-        name: "acceleration_by_velocity",
-        letter: "dddq_ddq",
-        size: (Joints, Joints),
-        arguments: &[Positions, Velocities, Torques, Parameters],
-        kind: Kind::Dynamics,
-        what: "∂q̈/∂q̇ of the forward dynamics at given torques: −B⁻¹·∂τ/∂q̇.",
-        returns: "Returns n × n, 1/s; column j is the derivative by q̇ of joint j.",
-    },
-    Row {
-        function: MassMatrixRate,
-        name: "mass_matrix_rate",
-        letter: "dB",
-        size: (Joints, Joints),
-        arguments: &[Positions, Velocities, Parameters],
-        kind: Kind::Dynamics,
-        what: "Rate of the mass matrix, Ḃ(q, q̇) = C + Cᵀ.",
-        returns: "Returns Ḃ, n × n, kg·m²/s.",
-    },
-    Row {
-        function: MassMatrixTimesByPosition,
-        name: "mass_matrix_times_by_position",
-        letter: "dBe_dq",
-        size: (Joints, Joints),
-        arguments: &[Positions, Errors, Parameters],
-        kind: Kind::Dynamics,
-        what: "∂(B(q)·e)/∂q for a vector e that does not depend on q.",
-        returns: "Returns n × n; column j is the derivative by q of joint j.",
-    },
-    Row {
-        function: JacobianRate,
-        name: "jacobian_rate",
-        letter: "dJ",
-        size: (Fixed(6), Joints),
-        arguments: &[Positions, Velocities],
-        kind: Kind::Other,
-        what: "Rate of the geometric Jacobian of the tool's frame, J̇(q, q̇), in base axes.",
-        returns: "Returns J̇, 6 × n.",
-    },
-    Row {
-        function: JacobianTransposeTimes,
-        name: "jacobian_transpose_times",
-        letter: "tau",
-        size: (Joints, Fixed(1)),
-        arguments: &[Positions, Wrench],
-        kind: Kind::Other,
-        what: "Jᵀ(q)·f: the joint torques that hold a wrench f on the tool's frame.",
-        returns: "Returns the torques, N·m (N where prismatic).",
-    },
-    Row {
-        function: JacobianTransposeTimesByPosition,
-        name: "jacobian_transpose_times_by_position",
-        letter: "dtau_dq",
-        size: (Joints, Joints),
-        arguments: &[Positions, Wrench],
-        kind: Kind::Other,
-        what: "∂(Jᵀ(q)·f)/∂q for a wrench f that does not depend on q, in base axes.",
-        returns: "Returns n × n; column j is the derivative by q of joint j.",
-    },
-    Row {
-        function: TaskInertiaInverse,
-        name: "task_inertia_inverse",
-        letter: "Linv",
-        size: (Fixed(6), Fixed(6)),
-        arguments: &[Positions, Parameters],
-        kind: Kind::Dynamics,
-        what: "Inverse of the inertia that a wrench on the tool's frame feels: Λ⁻¹ = J·B⁻¹·Jᵀ (Khatib 1987), in base \
-            axes.",
-        returns: "Returns Λ⁻¹, 6 × 6, symmetric; not finite where the parameters make B singular.",
-    },
-    Row {
-        function: TaskInertia,
-        name: "task_inertia",
-        letter: "L",
-        size: (Fixed(6), Fixed(6)),
-        arguments: &[Positions, Parameters],
-        kind: Kind::Dynamics,
-        what: "Operational-space inertia Λ = (J·B⁻¹·Jᵀ)⁻¹ of the tool's frame (Khatib 1987), in base axes.",
-        returns: "Returns Λ, 6 × 6, symmetric; not finite where the Jacobian loses rank.",
-    },
-    Row {
-        function: ConsistentInverse,
-        name: "dynamically_consistent_inverse",
-        letter: "Jbar",
-        size: (Joints, Fixed(6)),
-        arguments: &[Positions, Parameters],
-        kind: Kind::Dynamics,
-        what: "Dynamically consistent inverse of the Jacobian, J̄ = B⁻¹·Jᵀ·Λ (Khatib 1987): torques of the null space \
-            (I − JᵀJ̄ᵀ)·τ do not accelerate the tool's frame.",
-        returns: "Returns J̄, n × 6; not finite where the Jacobian loses rank.",
-    },
-];
 
 impl Function {
     /// All of them, in the order in which they are emitted.
-    pub const ALL: [Function; 33] = {
-        let mut all = [InverseDynamics; 33];
+    pub const ALL: [Function; COUNT] = {
+        let mut all = [InverseDynamics; COUNT];
         let mut k = 0;
         while k < all.len() {
             all[k] = TABLE[k].function;
@@ -541,7 +238,14 @@ impl Function {
 
     /// Whether it is of the tool's frame, so that other frames have it too.
     pub fn is_of_tool(self) -> bool {
-        self.is_kinematic() || matches!(self, TaskInertiaInverse | TaskInertia | ConsistentInverse)
+        self.is_kinematic()
+            || matches!(self, TaskInertiaInverse | TaskInertia | ConsistentInverse | PayloadRegressor)
+            || self.takes(Payload)
+    }
+
+    /// Whether it depends on parameters that no torque shows, so that only the set `full` has it.
+    pub fn needs_every_parameter(self) -> bool {
+        matches!(self, CentreOfMass | CentreOfMassJacobian | TotalMomentum | TotalMomentumMatrix)
     }
 
     /// Whether only an arm has it whose tool can accelerate in every direction.
@@ -604,6 +308,10 @@ impl Function {
                 | JacobianRate
                 | JacobianTransposeTimes
                 | JacobianTransposeTimesByPosition
+                | BodyJacobian
+                | SpatialJacobian
+                | Twist
+                | TwistRate
         )
     }
 
@@ -622,9 +330,12 @@ impl Function {
                 | AccelerationByPosition
                 | AccelerationByVelocity
                 | TaskInertiaInverse
+                | ForwardDynamicsWithPayload
         ) {
             "the mass matrix B(q) is singular there with these parameter values; `dyngen check` says which \
              link cannot be real"
+        } else if self.needs_every_parameter() {
+            "the masses sum up to zero with these parameter values"
         } else {
             "the state or a parameter value is too large"
         }

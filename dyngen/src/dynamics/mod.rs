@@ -14,11 +14,15 @@ pub mod inverse;
 pub mod moments;
 pub mod momentum;
 pub mod motion;
+mod payload;
 pub mod pose;
 pub mod regressor;
 pub mod regroup;
 pub mod spin;
 pub mod stage;
+mod table;
+mod task;
+mod total;
 pub mod wrench;
 
 pub use build::FunctionGraph;

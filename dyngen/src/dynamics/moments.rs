@@ -5,7 +5,7 @@
 //! the moment of each other entry has only two or three components.
 
 use crate::exact::algebra::Algebra;
-use crate::lagrangian::elements::{turn_x, turn_z};
+use crate::lagrangian::elements::{PlacementElements, turn_x, turn_z};
 
 /// A body's moments.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +33,15 @@ impl<V: Clone> Moments<V> {
     pub fn from_entries(v: &[V; ENTRIES]) -> Self {
         let three = |i: usize| [v[i].clone(), v[i + 1].clone(), v[i + 2].clone()];
         Moments { mass: v[0].clone(), first: three(1), square: three(4), mixed: three(7) }
+    }
+
+    /// Of a body with the ten inertial parameters m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz; `half` is ½.
+    pub fn of_parameters<A: Algebra<Value = V>>(alg: &A, half: &V, parameters: &[V; ENTRIES]) -> Self {
+        let [m, x, y, z, xx, xy, xz, yy, yz, zz] = parameters.clone();
+        // J = ½ tr(I) − I
+        let trace = alg.mul(half, &alg.add(&alg.add(&xx, &yy), &zz));
+        let square = [&xx, &yy, &zz].map(|i| alg.sub(&trace, i));
+        Moments { mass: m, first: [x, y, z], square, mixed: [yz, xz, xy] }
     }
 
     /// The entries in order.
@@ -64,6 +73,28 @@ impl<V: Clone> Moments<V> {
             square: [xx.clone(), yy, zz],
             mixed: [yz, xz, xy],
         }
+    }
+
+    /// Seen from a frame that comes to this one by a turn about y: Ry·r.
+    pub fn turned_back_y<A: Algebra<Value = V>>(&self, alg: &A, sin: &V, cos: &V) -> Self {
+        // With the axes renamed y, z, x it is a turn about x.
+        self.renamed(1).turned_back_x(alg, sin, cos).renamed(2)
+    }
+
+    /// With the axes named further by so many places.
+    fn renamed(&self, places: usize) -> Self {
+        let mut renamed = self.clone();
+        for v in [&mut renamed.first, &mut renamed.square, &mut renamed.mixed] {
+            v.rotate_left(places);
+        }
+        renamed
+    }
+
+    /// Seen from a frame in which this one is placed: a shift, then Rz(yaw)·Ry(pitch)·Rx(roll).
+    pub fn placed_back<A: Algebra<Value = V>>(&self, alg: &A, frame: &PlacementElements<V>) -> Self {
+        let [(sr, cr), (sp, cp), (sy, cy)] = &frame.rpy;
+        let turned = self.turned_back_x(alg, sr, cr).turned_back_y(alg, sp, cp).turned_back_z(alg, sy, cy);
+        turned.shifted(alg, &frame.origin)
     }
 
     /// Seen from a frame that comes to this one by a turn about z: Rz·r.

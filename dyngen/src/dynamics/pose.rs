@@ -132,6 +132,36 @@ pub fn jacobian(b: &Builder, arm: &ArmElements<Expr>, ends: &Ends) -> Vec<Expr> 
     rows
 }
 
+/// The Jacobian in the axes of the tool's frame, row-major 6 × n.
+pub fn body_jacobian(b: &Builder, arm: &ArmElements<Expr>, ends: &Ends) -> Vec<Expr> {
+    let (axes, n) = (poses(b, arm, ends).1.axes, arm.joints.len());
+    let jacobian = jacobian(b, arm, ends);
+    let entry = |i: usize, j: usize| {
+        let part = i / 3 * 3;
+        b.dot(&axes[i % 3], &std::array::from_fn(|k| jacobian[(part + k) * n + j]))
+    };
+    (0..6 * n).map(|k| entry(k / n, k % n)).collect()
+}
+
+/// The Jacobian about the base's origin, row-major 6 × n: v + p×ω above ω, for the tool's origin p.
+pub fn spatial_jacobian(b: &Builder, arm: &ArmElements<Expr>, ends: &Ends) -> Vec<Expr> {
+    // A joint's axis passes through its own origin, whatever the tool is.
+    let n = arm.joints.len();
+    let mut rows = vec![Expr::ZERO; 6 * n];
+    for (j, (pose, joint)) in links(b, arm, ends).0.iter().zip(&arm.joints).enumerate() {
+        let z = pose.axes[2];
+        let (linear, angular) = match joint.kind {
+            JointKind::Revolute => (b.cross(&pose.origin, &z), z),
+            JointKind::Prismatic => (z, super::body::ZERO),
+        };
+        for i in 0..3 {
+            rows[i * n + j] = linear[i];
+            rows[(i + 3) * n + j] = angular[i];
+        }
+    }
+    rows
+}
+
 /// J̇·q̇: acceleration of the tool's origin above its angular acceleration where q̈ = 0, in base axes.
 pub fn jacobian_rate_times_velocity(
     b: &Builder,

@@ -31,6 +31,14 @@ pub struct LinkBody {
     pub flywheel: Expr,
 }
 
+impl LinkBody {
+    /// Nothing.
+    pub fn none(b: &Builder) -> Self {
+        let none = Expr::ZERO;
+        LinkBody { moments: Moments::none(b), end_mass: none, rotor: none, flywheel: none }
+    }
+}
+
 /// A column of the dynamics that may carry a sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Column {
@@ -342,13 +350,7 @@ impl Regrouping {
         set: &ParameterSet,
         value: impl Fn(usize) -> Expr,
     ) -> Vec<LinkBody> {
-        let none = LinkBody {
-            moments: Moments::none(b),
-            end_mass: Expr::ZERO,
-            rotor: Expr::ZERO,
-            flywheel: Expr::ZERO,
-        };
-        let mut bodies = vec![none; arm.links()];
+        let mut bodies = vec![LinkBody::none(b); arm.links()];
         let map = Map::new(arm, symbols, field, self.order.origins);
         let term = |factor: &Constant, x: Expr| b.mul(&constant(b, field, factor), &x);
         for (column, sum) in &self.columns {

@@ -210,6 +210,11 @@ pub fn back_x(b: &Builder, (sin, cos): SinCos, v: &Vector) -> Vector {
     crate::lagrangian::elements::turn_x(b, &-sin, &cos, v)
 }
 
+/// A vector's components in the axes before a turn about y.
+pub fn back_y(b: &Builder, (sin, cos): SinCos, v: &Vector) -> Vector {
+    crate::lagrangian::elements::turn_y(b, &-sin, &cos, v)
+}
+
 /// u + v
 pub fn plus(b: &Builder, u: &Vector, v: &Vector) -> Vector {
     std::array::from_fn(|i| b.add(&u[i], &v[i]))

@@ -1,7 +1,7 @@
 //! Forces and moments, or linear and angular momenta, carried inwards along the chain.
 
 use super::body::{Vector, ZERO};
-use super::stage::{SinCos, back_x, plus};
+use super::stage::{SinCos, back_x, back_y, back_z, plus};
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
 
@@ -26,6 +26,16 @@ impl Wrench {
     /// In the axes before a twist about x.
     pub fn turned_back_x(&self, b: &Builder, twist: SinCos) -> Wrench {
         Wrench { force: back_x(b, twist, &self.force), moment: back_x(b, twist, &self.moment) }
+    }
+
+    /// In the axes before a turn about y.
+    pub fn turned_back_y(&self, b: &Builder, turn: SinCos) -> Wrench {
+        Wrench { force: back_y(b, turn, &self.force), moment: back_y(b, turn, &self.moment) }
+    }
+
+    /// In the axes before a turn about z.
+    pub fn turned_back_z(&self, b: &Builder, turn: SinCos) -> Wrench {
+        Wrench { force: back_z(b, turn, &self.force), moment: back_z(b, turn, &self.moment) }
     }
 
     /// About the origin of a frame in which this one's lies at p.

@@ -96,11 +96,11 @@ fn argument_name(argument: Argument) -> Ident {
 /// `name: …`
 fn parameter(argument: Argument) -> TokenStream {
     let name = argument_name(argument);
-    match argument {
-        Argument::Parameters => quote!(#name: &impl Parameters<T>),
-        Argument::Wrench => quote!(#name: &[[T; LANES]; 6]),
-        _ => quote!(#name: &[[T; LANES]; JOINTS]),
+    if argument == Argument::Parameters {
+        return quote!(#name: &impl Parameters<T>);
     }
+    let length = code::length(argument);
+    quote!(#name: &[[T; LANES]; #length])
 }
 
 /// The names of an argument's arrays over the samples, one a joint.

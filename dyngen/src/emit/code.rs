@@ -9,7 +9,7 @@ use crate::exact::rational;
 use crate::graph::{Expr, Graph, Input, Node, Preparation, operands};
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
-use quote::{format_ident, quote};
+use quote::{ToTokens, format_ident, quote};
 use std::collections::BTreeSet;
 
 /// A function's items: one that takes q, and one that takes [`Trig`] in its place.
@@ -78,17 +78,25 @@ fn input_of(argument: Argument, i: usize) -> Input {
         Argument::Torques => Input::Torque(i),
         Argument::Errors => Input::Error(i),
         Argument::Wrench => Input::Wrench(i),
+        Argument::Payload => Input::Payload(i),
+        Argument::PositionDirection => Input::PositionDirection(i),
+        Argument::VelocityDirection => Input::VelocityDirection(i),
         Argument::Parameters => Input::Prepared(i),
+    }
+}
+
+/// How many numbers an argument has, in the names of the file.
+pub(super) fn length(argument: Argument) -> TokenStream {
+    match (argument, argument.parts()) {
+        (Argument::Parameters, _) => quote!(PARAMETERS),
+        (_, Some(parts)) => Literal::usize_unsuffixed(parts.len()).to_token_stream(),
+        _ => quote!(JOINTS),
     }
 }
 
 /// `name: &SVector<T, …>`
 fn parameter(argument: Argument, name: &str) -> TokenStream {
-    let length = match argument {
-        Argument::Parameters => quote!(PARAMETERS),
-        Argument::Wrench => quote!(6),
-        _ => quote!(JOINTS),
-    };
+    let length = length(argument);
     let ident = Ident::new(name, Span::call_site());
     quote!(#ident: &SVector<T, #length>)
 }

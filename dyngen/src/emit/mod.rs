@@ -191,7 +191,8 @@ fn frames(
 ) -> Result<Vec<(String, Vec<FunctionGraph>)>, Error> {
     let mut of = |frame: &Frame| {
         let Some(at) = model.at_frame(&frame.name) else { return Ok((frame.name.clone(), Vec::new())) };
-        let wished = at.functions().filter(|f| f.is_of_tool() && options.functions.contains(f));
+        let wished =
+            at.functions(options.parameters).filter(|f| f.is_of_tool() && options.functions.contains(f));
         let functions: Vec<Function> = wished.collect();
         Ok((frame.name.clone(), built(&at, &functions, options, preparation)?))
     };

@@ -51,6 +51,49 @@ pub fn along(
     outputs.iter().map(|e| signed(&rates, *e)).collect()
 }
 
+/// The derivative of one output by q and by q̇ of each joint of the chain, in one pass backwards.
+pub fn gradient(b: &Builder, output: Expr, joints: usize) -> [Vec<Expr>; 2] {
+    let graph = b.snapshot();
+    let mut weights: HashMap<usize, Expr> = HashMap::from([(output.node(), Expr::ONE)]);
+    let (mut by_position, mut by_velocity) = (vec![Expr::ZERO; joints], vec![Expr::ZERO; joints]);
+    let add = |to: &mut Expr, x: Expr| *to = b.add(to, &x);
+    for node in graph.needed(&[output]).into_iter().rev() {
+        let Some(weight) = weights.get(&node).copied() else { continue };
+        let mut by_angle = |sum: JointSum, weight: Expr| {
+            for (joint, negative) in sum.joints() {
+                add(&mut by_position[joint], if negative { -weight } else { weight });
+            }
+        };
+        let mut give = |e: Expr, weight: Expr| {
+            add(
+                weights.entry(e.node()).or_insert(Expr::ZERO),
+                if e.is_negative() { -weight } else { weight },
+            );
+        };
+        match graph.nodes()[node] {
+            Node::Input(Input::Sin(sum)) => by_angle(sum, b.mul(&weight, &b.input(Input::Cos(sum)))),
+            Node::Input(Input::Cos(sum)) => by_angle(sum, -b.mul(&weight, &b.input(Input::Sin(sum)))),
+            Node::Input(Input::Position(j)) => add(&mut by_position[j], weight),
+            Node::Input(Input::Velocity(j)) => add(&mut by_velocity[j], weight),
+            Node::Input(_) | Node::Constant(_) | Node::Symbol(..) => {}
+            Node::Add(x, y) => [x, y].into_iter().for_each(|e| give(e, weight)),
+            Node::Mul(x, y) => {
+                give(x, b.mul(&weight, &y));
+                give(y, b.mul(&weight, &x));
+            }
+            Node::Div(x, y) => {
+                let by_x = b.div(weight, y);
+                give(x, by_x);
+                give(y, -b.mul(&by_x, &b.div(x, y)));
+            }
+        }
+    }
+    if output.is_negative() {
+        by_position.iter_mut().chain(&mut by_velocity).for_each(|x| *x = -*x);
+    }
+    [by_position, by_velocity]
+}
+
 fn signed(rates: &HashMap<usize, Expr>, e: Expr) -> Expr {
     let rate = rates.get(&e.node()).copied().unwrap_or(Expr::ZERO);
     if e.is_negative() { -rate } else { rate }

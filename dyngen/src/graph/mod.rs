@@ -79,6 +79,12 @@ pub enum Input {
     Error(usize),
     /// A wrench on the tool's frame: force above moment.
     Wrench(usize),
+    /// A payload's inertial parameter.
+    Payload(usize),
+    /// How q changes in a direction.
+    PositionDirection(usize),
+    /// How q̇ changes in a direction.
+    VelocityDirection(usize),
     /// A parameter of the set.
     Parameter(usize),
     /// A value that was prepared of the parameters alone.
@@ -99,6 +105,9 @@ impl fmt::Display for Input {
             Input::ReferenceAcceleration(i) => ("ddqr", i),
             Input::Error(i) => ("e", i),
             Input::Wrench(i) => ("f", i),
+            Input::Payload(i) => ("payload", i),
+            Input::PositionDirection(i) => ("vq", i),
+            Input::VelocityDirection(i) => ("vdq", i),
             Input::Parameter(i) => ("p", i),
             Input::Prepared(i) => ("z", i),
         };

@@ -204,6 +204,12 @@ pub fn turn_x<A: Algebra>(alg: &A, sin: &A::Value, cos: &A::Value, v: &[A::Value
     [v[0].clone(), y, z]
 }
 
+/// Ry(β)ᵀ·v: a vector's components after the frame turned by β about y.
+pub fn turn_y<A: Algebra>(alg: &A, sin: &A::Value, cos: &A::Value, v: &[A::Value; 3]) -> [A::Value; 3] {
+    let (z, x) = turn(alg, sin, cos, &v[2], &v[0]);
+    [x, v[1].clone(), z]
+}
+
 /// Rz(θ)ᵀ·v: a vector's components after the frame turned by θ about z.
 pub fn turn_z<A: Algebra>(alg: &A, sin: &A::Value, cos: &A::Value, v: &[A::Value; 3]) -> [A::Value; 3] {
     let (x, y) = turn(alg, sin, cos, &v[0], &v[1]);

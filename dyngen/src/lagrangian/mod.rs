@@ -6,7 +6,7 @@ pub mod followers;
 
 use crate::arm::{Convention, JointKind, ParameterKind};
 use crate::exact::algebra::Algebra;
-use elements::{ArmElements, JointElements, turn_x, turn_z};
+use elements::{ArmElements, JointElements, PlacementElements, turn_x, turn_y, turn_z};
 
 /// The motion of a link frame relative to the base, in the frame's own axes.
 #[derive(Clone, Debug)]
@@ -27,13 +27,16 @@ pub struct Motion<V> {
 /// Twice, so that integer polynomials stay integer. Positions of frame origins enter the potential
 /// energy U = −gᵀ(m p + m r) of Eq. 6 (p: origin, r: centre of mass).
 pub fn twice_lagrangian<A: Algebra>(alg: &A, arm: &ArmElements<A::Value>) -> Vec<A::Value> {
-    let zero = || alg.integer(0);
-    let mut state = Motion {
-        omega: [zero(), zero(), zero()],
-        velocity: [zero(), zero(), zero()],
-        gravity: arm.gravity.clone(),
-        height: zero(),
-    };
+    twice_lagrangian_on(alg, arm, Motion::base(alg, arm))
+}
+
+/// The same where frame 0 moves.
+pub fn twice_lagrangian_on<A: Algebra>(
+    alg: &A,
+    arm: &ArmElements<A::Value>,
+    base: Motion<A::Value>,
+) -> Vec<A::Value> {
+    let mut state = base;
     let mut columns = Vec::with_capacity(arm.joints.len() * ParameterKind::ALL.len());
     for joint in &arm.joints {
         let axis = step(alg, arm.convention, joint, &mut state);
@@ -41,6 +44,43 @@ pub fn twice_lagrangian<A: Algebra>(alg: &A, arm: &ArmElements<A::Value>) -> Vec
         columns.push(axis.rotor);
     }
     columns
+}
+
+/// Twice the coefficients of the ten inertial parameters of a body that is fixed to the tool's frame of a link.
+pub fn twice_lagrangian_of_tool<A: Algebra>(
+    alg: &A,
+    arm: &ArmElements<A::Value>,
+    carrier: usize,
+    tool: &PlacementElements<A::Value>,
+) -> Vec<A::Value> {
+    let mut state = Motion::base(alg, arm);
+    for joint in &arm.joints[..=carrier] {
+        step(alg, arm.convention, joint, &mut state);
+    }
+    link_columns(alg, &state.placed(alg, tool))
+}
+
+impl<V: Clone> Motion<V> {
+    /// Frame 0 at rest under gravity.
+    pub fn base<A: Algebra<Value = V>>(alg: &A, arm: &ArmElements<V>) -> Self {
+        let zero = || std::array::from_fn(|_| alg.integer(0));
+        Motion { omega: zero(), velocity: zero(), gravity: arm.gravity.clone(), height: alg.integer(0) }
+    }
+
+    /// Of a frame that is fixed in this one: a shift, then Rz(yaw)·Ry(pitch)·Rx(roll).
+    pub fn placed<A: Algebra<Value = V>>(&self, alg: &A, frame: &PlacementElements<V>) -> Self {
+        let shift = alg.cross(&self.omega, &frame.origin);
+        let velocity = std::array::from_fn(|i| alg.add(&self.velocity[i], &shift[i]));
+        let height = alg.add(&self.height, &alg.dot(&self.gravity, &frame.origin));
+        let [(sr, cr), (sp, cp), (sy, cy)] = &frame.rpy;
+        let turned = |v: &[V; 3]| turn_x(alg, sr, cr, &turn_y(alg, sp, cp, &turn_z(alg, sy, cy, v)));
+        Motion {
+            omega: turned(&self.omega),
+            velocity: turned(&velocity),
+            gravity: turned(&self.gravity),
+            height,
+        }
+    }
 }
 
 /// What happens on a joint's axis in the link before it.

@@ -7,6 +7,8 @@
 mod point;
 mod series;
 mod state;
+mod total;
+mod varied;
 
 use crate::arm::Arm;
 use crate::base::Sets;
@@ -101,6 +103,7 @@ fn expected(point: &Point<'_>, set: &ParameterSet, function: Function) -> Vec<Fp
     let zeros = vec![Fp::ZERO; n];
     let motion = |gravity| point.state(&point.velocities, &point.accelerations, gravity);
     let of_set = |columns: &[Vec<Fp>]| point.of_set(set, columns);
+    let loaded = |function| expected(&point.with_payload(), set, function);
     match function {
         Function::InverseDynamics => motion(true).torques(),
         Function::InverseDynamicsWithoutGravity => motion(false).torques(),
@@ -150,6 +153,44 @@ fn expected(point: &Point<'_>, set: &ParameterSet, function: Function) -> Vec<Fp
         }
         Function::TaskInertiaInverse => task_inertia_inverse(point),
         Function::TaskInertia => inverse(task_inertia_inverse(point), 6),
+        Function::BodyJacobian => {
+            series::in_tool_axes(&PoseSeries::along(point, &zeros).pose(), &jacobian(point), n)
+        }
+        Function::SpatialJacobian => {
+            series::about_base(&PoseSeries::along(point, &zeros).pose(), &jacobian(point), n)
+        }
+        Function::Twist => PoseSeries::along(point, &point.velocities).velocity(),
+        Function::TwistRate => {
+            let driven = PoseSeries::along(point, &point.accelerations).velocity();
+            let carried = PoseSeries::along(point, &point.velocities).acceleration();
+            driven.into_iter().zip(carried).map(|(x, y)| x + y).collect()
+        }
+        Function::InverseDynamicsWithPayload => loaded(Function::InverseDynamics),
+        Function::MassMatrixWithPayload => loaded(Function::MassMatrix),
+        Function::CoriolisMatrixWithPayload => loaded(Function::CoriolisMatrix),
+        Function::GravityWithPayload => loaded(Function::Gravity),
+        Function::ForwardDynamicsWithPayload => loaded(Function::ForwardDynamics),
+        Function::PayloadRegressor => {
+            let point = point.with_payload();
+            let columns = point.state(&point.velocities, &point.accelerations, true).columns();
+            transpose(&columns[point.arm.all_parameters().len()..])
+        }
+        Function::TorqueHessianTimes => {
+            let along = (&point.position_direction[..], &point.velocity_direction[..]);
+            let motion = motion(true);
+            let entry = |direction: Direction| {
+                let second = motion.torque_second_derivative(along, direction);
+                second.iter().zip(&point.errors).fold(Fp::ZERO, |sum, (x, e)| sum + *x * *e)
+            };
+            (0..n).flat_map(|j| [entry(Direction::Position(j)), entry(Direction::Velocity(j))]).collect()
+        }
+        Function::CentreOfMass => total::centre_of_mass(point),
+        Function::CentreOfMassJacobian => {
+            let mass = total::mass(point).inverse().unwrap_or(Fp::ZERO);
+            total_momentum_matrix(point)[..3 * n].iter().map(|x| *x * mass).collect()
+        }
+        Function::TotalMomentum => total::momentum(point, &point.velocities),
+        Function::TotalMomentumMatrix => total_momentum_matrix(point),
         Function::ConsistentInverse => {
             let accelerations = times(&inverse(mass_matrix(point), n), &transposed(&jacobian(point), n), n);
             times(&accelerations, &inverse(task_inertia_inverse(point), 6), 6)
@@ -177,6 +218,16 @@ fn mass_matrix_rate(point: &Point<'_>) -> Vec<Fp> {
         })
     };
     transpose(&(0..n).map(column).collect::<Vec<_>>())
+}
+
+/// The momentum of the whole arm for a unit of each joint's velocity, 6 × n.
+fn total_momentum_matrix(point: &Point<'_>) -> Vec<Fp> {
+    let n = point.dof();
+    transpose(&(0..n).map(|j| total::momentum(point, &unit(n, j))).collect::<Vec<_>>())
+}
+
+fn half() -> Fp {
+    Fp::from_integer(2).inverse().unwrap_or(Fp::ONE)
 }
 
 /// J, 6 × n.
@@ -233,7 +284,7 @@ fn mass_matrix(point: &Point<'_>) -> Vec<Fp> {
 /// The velocity terms h(v) = Σ c_ijk vⱼ vₖ with Christoffel symbols, which are symmetric in j and k,
 /// polarised: ½(h(u + v) − h(u) − h(v)) = Σ c_ijk uⱼ vₖ; for each parameter.
 fn polarised(point: &Point<'_>, u: &[Fp], v: &[Fp]) -> Vec<Vec<Fp>> {
-    let half = Fp::from_integer(2).inverse().unwrap_or(Fp::ONE);
+    let half = half();
     let zeros = vec![Fp::ZERO; point.dof()];
     let h = |v: &[Fp]| point.state(v, &zeros, false).columns();
     let sum: Vec<Fp> = u.iter().zip(v).map(|(a, b)| *a + *b).collect();

@@ -13,6 +13,7 @@ use crate::lagrangian::followers::{input_angles, with_theta};
 use crate::parameters::{Combination, ParameterSet};
 
 /// A pose, rates and parameter values.
+#[derive(Clone)]
 pub(super) struct Point<'a> {
     pub(super) arm: &'a Arm,
     pub(super) symbols: &'a AngleSymbols,
@@ -30,6 +31,14 @@ pub(super) struct Point<'a> {
     pub(super) errors: Vec<Fp>,
     /// A wrench on the tool's frame.
     pub(super) wrench: Vec<Fp>,
+    /// A payload's ten parameters in the tool's frame.
+    pub(super) payload: Vec<Fp>,
+    /// Whether the arm carries it.
+    pub(super) loaded: bool,
+    /// A direction in which q changes.
+    pub(super) position_direction: Vec<Fp>,
+    /// A direction in which q̇ changes.
+    pub(super) velocity_direction: Vec<Fp>,
     /// Values of the arm's kept parameters.
     values: Vec<(Parameter, Fp)>,
 }
@@ -77,7 +86,11 @@ impl<'a> Point<'a> {
             reference_velocities: vector(),
             reference_accelerations: vector(),
             errors: vector(),
+            position_direction: vector(),
+            velocity_direction: vector(),
             wrench: (0..6).map(|_| draws.element()).collect(),
+            payload: (0..10).map(|_| draws.element()).collect(),
+            loaded: false,
             values,
         }
     }
@@ -85,18 +98,15 @@ impl<'a> Point<'a> {
     /// The same values at the pose where every coordinate's input angle is zero.
     pub(super) fn at_zero(&self) -> Point<'a> {
         Point {
-            drives: self.drives.clone(),
             angles: angles(self.arm, &mut || (Fp::ZERO, Fp::ONE)),
             positions: vec![Fp::ZERO; self.positions.len()],
-            velocities: self.velocities.clone(),
-            accelerations: self.accelerations.clone(),
-            reference_velocities: self.reference_velocities.clone(),
-            reference_accelerations: self.reference_accelerations.clone(),
-            errors: self.errors.clone(),
-            wrench: self.wrench.clone(),
-            values: self.values.clone(),
-            ..*self
+            ..self.clone()
         }
+    }
+
+    /// The same with the payload on the tool's frame.
+    pub(super) fn with_payload(&self) -> Point<'a> {
+        Point { loaded: true, ..self.clone() }
     }
 
     /// Sets the parameters' values so that a set's sums have given values: each on its carriers.
@@ -136,6 +146,13 @@ impl<'a> Point<'a> {
                 *total = *total + *value * *entry;
             }
         }
+        // The payload's columns come last, where the arm carries it.
+        let payload = columns.iter().skip(self.arm.all_parameters().len());
+        for (value, column) in self.payload.iter().zip(payload) {
+            for (total, entry) in sum.iter_mut().zip(column) {
+                *total = *total + *value * *entry;
+            }
+        }
         sum
     }
 
@@ -160,6 +177,9 @@ impl<'a> Point<'a> {
         let sums: Vec<Fp> = set.parameters.iter().map(|p| self.sum(&p.terms)).collect();
         // Forward dynamics gets the torques of the point's motion and must give its accelerations back.
         let torques = match function.function.takes(Argument::Torques) {
+            true if function.function.takes(Argument::Payload) => {
+                self.with_payload().state(&self.velocities, &self.accelerations, true).torques()
+            }
             true => self.state(&self.velocities, &self.accelerations, true).torques(),
             false => Vec::new(),
         };
@@ -173,6 +193,9 @@ impl<'a> Point<'a> {
             Input::ReferenceAcceleration(i) => self.reference_accelerations[i],
             Input::Error(i) => self.errors[i],
             Input::Wrench(i) => self.wrench[i],
+            Input::Payload(i) => self.payload[i],
+            Input::PositionDirection(i) => self.position_direction[i],
+            Input::VelocityDirection(i) => self.velocity_direction[i],
             Input::Torque(i) => torques[i],
             Input::Parameter(i) => sums[i],
             // Proven is the function with its preparation; a value of its own has none here.

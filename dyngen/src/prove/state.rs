@@ -1,15 +1,17 @@
 //! The Lagrangian's side at a state of the arm, modulo the prime: Euler–Lagrange over jets, without any
 //! recursion.
 
+use super::half;
 use super::point::{Motion, Point};
+use super::varied::{MIXED, OverPrime, Varied, mixed};
 use crate::exact::algebra::Algebra;
 use crate::exact::dual::Duals;
 use crate::exact::jet::{Jet, Jets};
-use crate::exact::prime::Fp;
+use crate::exact::prime::{Fp, PrimeField};
 use crate::exact::rational::Rational;
 use crate::graph::differentiate::Direction;
-use crate::lagrangian::elements::{ArmElements, Source};
-use crate::lagrangian::twice_lagrangian;
+use crate::lagrangian::elements::{ArmElements, PlacementElements, Source};
+use crate::lagrangian::{self, twice_lagrangian};
 
 /// A motion of the arm at a point's pose.
 #[derive(Clone, Copy)]
@@ -18,10 +20,6 @@ pub(super) struct State<'p, 'a> {
     pub(super) velocities: &'p [Fp],
     pub(super) accelerations: &'p [Fp],
     pub(super) gravity: bool,
-}
-
-fn half() -> Fp {
-    Fp::from_integer(2).inverse().unwrap_or(Fp::ONE)
 }
 
 impl<'a> Point<'a> {
@@ -41,22 +39,46 @@ impl<'p, 'a> State<'p, 'a> {
         self.point.dof()
     }
 
-    /// The Lagrangian's columns as jets.
-    fn lagrangian(&self) -> Vec<Jet> {
-        let mut source = JetSource { state: *self };
-        let elements = ArmElements::build(&Jets, self.point.arm, self.point.symbols, &mut source);
-        twice_lagrangian(&Jets, &elements)
+    /// The Lagrangian's columns as jets: those of the arm's parameters, then, where the arm is loaded, the payload's.
+    fn lagrangian<A: OverPrime + Copy>(
+        &self,
+        algebra: A,
+        change: Vec<A::Value>,
+        velocities: Vec<A::Value>,
+    ) -> Vec<Jet<A::Value>> {
+        let jets = Jets(algebra);
+        let kinematics = Varied { algebra, point: self.point, change };
+        let tool = kinematics.placement(&self.point.arm.tool);
+        let accelerations = self.accelerations.iter().map(|x| algebra.element(*x)).collect();
+        let mut source = JetSource { jets, kinematics, velocities, accelerations, gravity: self.gravity };
+        let elements = ArmElements::build(&jets, self.point.arm, self.point.symbols, &mut source);
+        let mut columns = twice_lagrangian(&jets, &elements);
+        if self.point.loaded {
+            let fixed = |x: &A::Value| jets.constant(x.clone());
+            let tool = PlacementElements {
+                origin: tool.origin.each_ref().map(fixed),
+                rpy: tool.rpy.each_ref().map(|(s, c)| (fixed(s), fixed(c))),
+            };
+            let carrier = self.point.arm.tool_carrier();
+            columns.extend(lagrangian::twice_lagrangian_of_tool(&jets, &elements, carrier, &tool));
+        }
+        columns
     }
 
-    /// For each of the arm's parameters its torques.
+    /// The same at the state itself.
+    fn here(&self) -> Vec<Jet<Fp>> {
+        self.lagrangian(PrimeField, vec![Fp::ZERO; self.dof()], self.velocities.to_vec())
+    }
+
+    /// For each parameter its torques.
     pub(super) fn columns(&self) -> Vec<Vec<Fp>> {
-        let torques = |jet: &Jet| (0..self.dof()).map(|i| half() * jet.euler_lagrange(i)).collect();
-        self.lagrangian().iter().map(torques).collect()
+        let torque = |jet: &Jet<Fp>, i: usize| half() * Jets(PrimeField).euler_lagrange(jet, i);
+        self.here().iter().map(|jet| (0..self.dof()).map(|i| torque(jet, i)).collect()).collect()
     }
 
-    /// For each of the arm's parameters the Lagrangian itself.
+    /// For each parameter the Lagrangian itself.
     pub(super) fn values(&self) -> Vec<Fp> {
-        self.lagrangian().iter().map(|jet| half() * jet.value()).collect()
+        self.here().iter().map(|jet| half() * jet.value).collect()
     }
 
     /// The torques with the point's parameter values.
@@ -66,145 +88,107 @@ impl<'p, 'a> State<'p, 'a> {
 
     /// The momentum ∂L/∂q̇.
     pub(super) fn momentum(&self) -> Vec<Fp> {
-        let columns: Vec<Vec<Fp>> = self
-            .lagrangian()
-            .iter()
-            .map(|jet| (0..self.dof()).map(|i| half() * jet.by_velocity(i)).collect())
-            .collect();
-        self.point.weigh(&columns)
+        let by_velocity = |jet: &Jet<Fp>, i: usize| half() * Jets(PrimeField).by_velocity(jet, i);
+        let of = |jet: &Jet<Fp>| (0..self.dof()).map(|i| by_velocity(jet, i)).collect();
+        self.point.weigh(&self.here().iter().map(of).collect::<Vec<_>>())
     }
 
     /// The derivatives of the torques in one direction.
     pub(super) fn torque_derivative(&self, direction: Direction) -> Vec<Fp> {
-        let algebra = Duals(Jets);
-        let mut source = DualSource { inner: JetSource { state: *self }, direction };
-        let elements = ArmElements::build(&algebra, self.point.arm, self.point.symbols, &mut source);
-        let columns: Vec<Vec<Fp>> = twice_lagrangian(&algebra, &elements)
-            .iter()
-            .map(|(_, rate)| (0..self.dof()).map(|i| half() * rate.euler_lagrange(i)).collect())
-            .collect();
-        self.point.weigh(&columns)
+        let algebra = Duals(PrimeField);
+        let one = |is: bool| if is { Fp::ONE } else { Fp::ZERO };
+        let change = |j: usize| (Fp::ZERO, one(direction == Direction::Position(j)));
+        let velocity = |j: usize| (self.velocities[j], one(direction == Direction::Velocity(j)));
+        let n = self.dof();
+        let columns = self.lagrangian(algebra, (0..n).map(change).collect(), (0..n).map(velocity).collect());
+        self.weighed_torques(algebra, &columns, |x| x.1)
+    }
+
+    /// The mixed second derivatives of the torques: in a direction of q and q̇ together, and in one of a single coordinate.
+    pub(super) fn torque_second_derivative(&self, along: (&[Fp], &[Fp]), direction: Direction) -> Vec<Fp> {
+        let one = |is: bool| if is { Fp::ONE } else { Fp::ZERO };
+        let change = |j: usize| mixed(Fp::ZERO, along.0[j], one(direction == Direction::Position(j)));
+        let velocity =
+            |j: usize| mixed(self.velocities[j], along.1[j], one(direction == Direction::Velocity(j)));
+        let n = self.dof();
+        let columns = self.lagrangian(MIXED, (0..n).map(change).collect(), (0..n).map(velocity).collect());
+        self.weighed_torques(MIXED, &columns, |x| x.1.1)
+    }
+
+    /// A part of the torques with the point's parameter values.
+    fn weighed_torques<A: OverPrime>(
+        &self,
+        algebra: A,
+        columns: &[Jet<A::Value>],
+        part: impl Fn(A::Value) -> Fp,
+    ) -> Vec<Fp> {
+        let jets = Jets(algebra);
+        let torque = |jet: &Jet<A::Value>, i: usize| half() * part(jets.euler_lagrange(jet, i));
+        let of = |jet| (0..self.dof()).map(|i| torque(jet, i)).collect();
+        self.point.weigh(&columns.iter().map(of).collect::<Vec<_>>())
     }
 }
 
 /// The arm's quantities as jets along a motion.
-struct JetSource<'p, 'a> {
-    state: State<'p, 'a>,
+struct JetSource<'p, 'a, A: OverPrime> {
+    jets: Jets<A>,
+    kinematics: Varied<'p, 'a, A>,
+    /// Of the coordinates.
+    velocities: Vec<A::Value>,
+    accelerations: Vec<A::Value>,
+    gravity: bool,
 }
 
-impl JetSource<'_, '_> {
-    fn number(&self, value: &Rational) -> Jet {
-        // Numbers with the prime in a denominator were refused when the sets were derived.
-        Jet::constant(Fp::from_rational(value).unwrap_or(Fp::ZERO))
-    }
-
+impl<A: OverPrime> JetSource<'_, '_, A> {
     /// A function of a joint's position with a value and its derivative by that position.
-    fn of_position(&self, joint: usize, value: Fp, derivative: Fp) -> Jet {
-        let Motion { coordinate, ratio, .. } = self.state.point.drives[joint];
-        let velocity = self.state.velocities[coordinate];
-        Jet::of_position(self.state.dof(), coordinate, value, ratio * derivative, velocity)
+    fn of_position(&self, joint: usize, value: A::Value, derivative: A::Value) -> Jet<A::Value> {
+        let Motion { coordinate, ratio, .. } = self.kinematics.point.drives[joint];
+        let algebra = &self.kinematics.algebra;
+        let derivative = algebra.mul(&algebra.element(ratio), &derivative);
+        let place = (self.velocities.len(), coordinate);
+        self.jets.of_position(place, value, derivative, &self.velocities[coordinate])
     }
 }
 
-impl Source<Jet> for JetSource<'_, '_> {
-    fn joint_trig(&mut self, joint: usize) -> (Jet, Jet) {
-        let (s, c) = self.state.point.joint_trig(joint);
-        (self.of_position(joint, s, c), self.of_position(joint, c, -s))
+impl<A: OverPrime> Source<Jet<A::Value>> for JetSource<'_, '_, A> {
+    fn joint_trig(&mut self, joint: usize) -> (Jet<A::Value>, Jet<A::Value>) {
+        let (s, c) = self.kinematics.joint_trig(joint);
+        let back = self.kinematics.algebra.neg(&s);
+        (self.of_position(joint, s, c.clone()), self.of_position(joint, c, back))
     }
-    fn position(&mut self, joint: usize) -> Jet {
-        self.of_position(joint, self.state.point.joint_position(joint), Fp::ONE)
+    fn position(&mut self, joint: usize) -> Jet<A::Value> {
+        let position = self.kinematics.position(joint);
+        self.of_position(joint, position, self.kinematics.algebra.integer(1))
     }
-    fn velocity(&mut self, joint: usize) -> Jet {
-        let State { velocities, accelerations, .. } = self.state;
-        let Motion { coordinate, ratio, .. } = self.state.point.drives[joint];
+    fn velocity(&mut self, joint: usize) -> Jet<A::Value> {
+        let Motion { coordinate, ratio, .. } = self.kinematics.point.drives[joint];
+        let place = (self.velocities.len(), coordinate);
         let velocity =
-            Jet::velocity(self.state.dof(), coordinate, velocities[coordinate], accelerations[coordinate]);
-        Jets.mul(&Jet::constant(ratio), &velocity)
+            self.jets.velocity(place, &self.velocities[coordinate], &self.accelerations[coordinate]);
+        self.jets.mul(&self.jets.constant(self.kinematics.algebra.element(ratio)), &velocity)
     }
-    fn a(&mut self, joint: usize) -> Jet {
-        self.number(&self.state.point.arm.joints[joint].a)
+    fn a(&mut self, joint: usize) -> Jet<A::Value> {
+        self.jets.constant(self.kinematics.a(joint))
     }
-    fn b(&mut self, joint: usize) -> Jet {
-        self.number(&self.state.point.arm.joints[joint].b)
+    fn b(&mut self, joint: usize) -> Jet<A::Value> {
+        self.jets.constant(self.kinematics.b(joint))
     }
-    fn d(&mut self, joint: usize) -> Jet {
-        self.number(&self.state.point.arm.joints[joint].d)
+    fn d(&mut self, joint: usize) -> Jet<A::Value> {
+        self.jets.constant(self.kinematics.d(joint))
     }
-    fn ratio(&mut self, joint: usize) -> Jet {
-        let ratio = self.state.point.arm.joints[joint].rotor_ratio.clone();
-        ratio.map_or(Jet::constant(Fp::ZERO), |k| self.number(&k))
+    fn ratio(&mut self, joint: usize) -> Jet<A::Value> {
+        self.jets.constant(self.kinematics.ratio(joint))
     }
-    fn coupling(&mut self, factor: &Rational) -> Jet {
-        self.number(factor)
+    fn coupling(&mut self, factor: &Rational) -> Jet<A::Value> {
+        self.jets.constant(self.kinematics.coupling(factor))
     }
-    fn gravity(&mut self, axis: usize) -> Jet {
-        match self.state.gravity {
-            true => self.number(&self.state.point.arm.gravity[axis]),
-            false => Jet::constant(Fp::ZERO),
+    fn gravity(&mut self, axis: usize) -> Jet<A::Value> {
+        match self.gravity {
+            true => self.jets.constant(self.kinematics.gravity(axis)),
+            false => self.jets.integer(0),
         }
     }
-    fn symbol(&mut self, index: usize, sine: bool) -> Jet {
-        Jet::constant(self.state.point.sets.field.modular_symbol(index, sine))
-    }
-}
-
-/// The same with the derivative in one direction.
-struct DualSource<'p, 'a> {
-    inner: JetSource<'p, 'a>,
-    direction: Direction,
-}
-
-impl DualSource<'_, '_> {
-    /// The derivative of a function of a joint's position with the given first two derivatives by it.
-    fn derivative(&self, joint: usize, first: Fp, second: Fp) -> Jet {
-        let Motion { coordinate, ratio, .. } = self.inner.state.point.drives[joint];
-        let by_own = match self.direction {
-            Direction::Position(j) if j == coordinate => self.inner.of_position(joint, first, second),
-            // Its rate is first·q̇.
-            Direction::Velocity(j) if j == coordinate => Jet::of_rate(first),
-            _ => return Jets.integer(0),
-        };
-        Jets.mul(&Jet::constant(ratio), &by_own)
-    }
-
-    fn fixed(value: Jet) -> (Jet, Jet) {
-        (value, Jets.integer(0))
-    }
-}
-
-impl Source<(Jet, Jet)> for DualSource<'_, '_> {
-    fn joint_trig(&mut self, joint: usize) -> ((Jet, Jet), (Jet, Jet)) {
-        let (s, c) = self.inner.state.point.joint_trig(joint);
-        let (sin, cos) = self.inner.joint_trig(joint);
-        ((sin, self.derivative(joint, c, -s)), (cos, self.derivative(joint, -s, -c)))
-    }
-    fn position(&mut self, joint: usize) -> (Jet, Jet) {
-        (self.inner.position(joint), self.derivative(joint, Fp::ONE, Fp::ZERO))
-    }
-    fn velocity(&mut self, joint: usize) -> (Jet, Jet) {
-        let Motion { coordinate, ratio, .. } = self.inner.state.point.drives[joint];
-        let own = self.direction == Direction::Velocity(coordinate);
-        (self.inner.velocity(joint), if own { Jet::constant(ratio) } else { Jets.integer(0) })
-    }
-    fn a(&mut self, joint: usize) -> (Jet, Jet) {
-        Self::fixed(self.inner.a(joint))
-    }
-    fn b(&mut self, joint: usize) -> (Jet, Jet) {
-        Self::fixed(self.inner.b(joint))
-    }
-    fn d(&mut self, joint: usize) -> (Jet, Jet) {
-        Self::fixed(self.inner.d(joint))
-    }
-    fn ratio(&mut self, joint: usize) -> (Jet, Jet) {
-        Self::fixed(self.inner.ratio(joint))
-    }
-    fn coupling(&mut self, factor: &Rational) -> (Jet, Jet) {
-        Self::fixed(self.inner.coupling(factor))
-    }
-    fn gravity(&mut self, axis: usize) -> (Jet, Jet) {
-        Self::fixed(self.inner.gravity(axis))
-    }
-    fn symbol(&mut self, index: usize, sine: bool) -> (Jet, Jet) {
-        Self::fixed(self.inner.symbol(index, sine))
+    fn symbol(&mut self, index: usize, sine: bool) -> Jet<A::Value> {
+        self.jets.constant(Source::symbol(&mut self.kinematics, index, sine))
     }
 }

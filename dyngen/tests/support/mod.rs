@@ -3,6 +3,8 @@
 // Each test uses a part of it.
 #![allow(dead_code)]
 
+pub(crate) mod valued;
+
 use dyngen::{Arm, Evaluator, Model, Samples, SetKind};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +16,7 @@ pub(crate) fn model(text: &str) -> Model {
 /// Every function that the arm has for a set, in the order of [`Function::ALL`]: it is proven, or this panics.
 pub(crate) fn proven(model: &Model, kind: SetKind) -> Vec<Evaluator> {
     let evaluator = |f| Evaluator::new(model, f, kind).unwrap_or_else(|e| panic!("{f} {kind}: {e}"));
-    model.functions().map(evaluator).collect()
+    model.functions(kind).map(evaluator).collect()
 }
 
 /// One sample of everything that functions take but parameters.
@@ -28,6 +30,9 @@ pub(crate) struct State {
     pub(crate) e: Vec<f64>,
     pub(crate) f: Vec<f64>,
     pub(crate) tau: Vec<f64>,
+    pub(crate) payload: Vec<f64>,
+    pub(crate) vq: Vec<f64>,
+    pub(crate) vdq: Vec<f64>,
 }
 
 impl State {
@@ -35,13 +40,13 @@ impl State {
     pub(crate) fn draw(random: &mut ChaCha8Rng, joints: usize, size: f64) -> State {
         let mut of = |length| (0..length).map(|_| random.random_range(-size..size)).collect();
         let mut v = || of(joints);
-        let [q, dq, ddq, dqr, ddqr, e, tau] = std::array::from_fn(|_| v());
-        State { q, dq, ddq, dqr, ddqr, e, tau, f: of(6) }
+        let [q, dq, ddq, dqr, ddqr, e, tau, vq, vdq] = std::array::from_fn(|_| v());
+        State { q, dq, ddq, dqr, ddqr, e, tau, vq, vdq, f: of(6), payload: of(10) }
     }
 
     pub(crate) fn samples<'a>(&'a self, parameters: &'a [f64]) -> Samples<'a> {
-        let State { q, dq, ddq, dqr, ddqr, e, f, tau } = self;
-        Samples { q, dq, ddq, dqr, ddqr, tau, e, f, parameters }
+        let State { q, dq, ddq, dqr, ddqr, e, f, tau, payload, vq, vdq } = self;
+        Samples { q, dq, ddq, dqr, ddqr, tau, e, f, payload, vq, vdq, parameters }
     }
 }
 

@@ -371,3 +371,187 @@ class Functions:
         Returns: (n, 6) for one sample, (N, n, 6) for N.
         """
         return self._evaluate("dynamically_consistent_inverse", parameters, values, {"q": q})
+
+    def body_jacobian(self, q: ArrayLike) -> Array:
+        """Jacobian of the tool's frame in its own axes: velocity of the origin above the angular velocity.
+
+        Returns: (6, n) for one sample, (N, 6, n) for N.
+        """
+        return self._evaluate("body_jacobian", "full", None, {"q": q})
+
+    def spatial_jacobian(self, q: ArrayLike) -> Array:
+        """Jacobian of the tool's link about the base's origin, in base axes (Murray, Li and Sastry 1994).
+
+        Returns: (6, n) for one sample, (N, 6, n) for N.
+        """
+        return self._evaluate("spatial_jacobian", "full", None, {"q": q})
+
+    def twist(self, q: ArrayLike, dq: ArrayLike) -> Array:
+        """Velocity of the tool's frame, J(q)·q̇, in base axes: that of the origin, m/s, above the angular
+        velocity, rad/s.
+
+        Returns: (6,) for one sample, (N, 6) for N.
+        """
+        return self._evaluate("twist", "full", None, {"q": q, "dq": dq})
+
+    def twist_rate(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
+        """Acceleration of the tool's frame, J(q)·q̈ + J̇(q, q̇)·q̇, in base axes.
+
+        Returns: (6,) for one sample, (N, 6) for N.
+        """
+        return self._evaluate("twist_rate", "full", None, {"q": q, "dq": dq, "ddq": ddq})
+
+    def inverse_dynamics_with_payload(
+        self,
+        q: ArrayLike,
+        dq: ArrayLike,
+        ddq: ArrayLike,
+        payload: ArrayLike,
+        values: Optional[Values] = None,
+        *,
+        parameters: str = "minimal",
+    ) -> Array:
+        """Joint torques of a motion with a payload on the tool's frame, N·m (N). ``payload`` is m, mx, my, mz,
+        Ixx, Ixy, Ixz, Iyy, Iyz, Izz in the frame's axes and about its origin, (10,) or (N, 10).
+
+        Returns: (n,) for one sample, (N, n) for N.
+        """
+        return self._evaluate(
+            "inverse_dynamics_with_payload", parameters, values, {"q": q, "dq": dq, "ddq": ddq, "payload": payload}
+        )
+
+    def payload_regressor(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
+        """Regressor of a payload on the tool's frame: τ with it is τ without it + Y·payload, for its ten
+        parameters.
+
+        Returns: (n, 10) for one sample, (N, n, 10) for N.
+        """
+        return self._evaluate("payload_regressor", "full", None, {"q": q, "dq": dq, "ddq": ddq})
+
+    def mass_matrix_with_payload(
+        self,
+        q: ArrayLike,
+        payload: ArrayLike,
+        values: Optional[Values] = None,
+        *,
+        parameters: str = "minimal",
+    ) -> Array:
+        """Mass matrix B(q) with a payload on the tool's frame, symmetric. ``payload`` is m, mx, my, mz, Ixx,
+        Ixy, Ixz, Iyy, Iyz, Izz in the frame's axes and about its origin, (10,) or (N, 10).
+
+        Returns: (n, n) for one sample, (N, n, n) for N.
+        """
+        return self._evaluate("mass_matrix_with_payload", parameters, values, {"q": q, "payload": payload})
+
+    def coriolis_matrix_with_payload(
+        self,
+        q: ArrayLike,
+        dq: ArrayLike,
+        payload: ArrayLike,
+        values: Optional[Values] = None,
+        *,
+        parameters: str = "minimal",
+    ) -> Array:
+        """Coriolis matrix C(q, q̇) of Christoffel symbols with a payload on the tool's frame. ``payload`` is
+        m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz in the frame's axes and about its origin, (10,) or (N,
+        10).
+
+        Returns: (n, n) for one sample, (N, n, n) for N.
+        """
+        return self._evaluate(
+            "coriolis_matrix_with_payload", parameters, values, {"q": q, "dq": dq, "payload": payload}
+        )
+
+    def gravity_with_payload(
+        self,
+        q: ArrayLike,
+        payload: ArrayLike,
+        values: Optional[Values] = None,
+        *,
+        parameters: str = "minimal",
+    ) -> Array:
+        """Joint torques that hold the arm with a payload on the tool's frame still, N·m (N). ``payload`` is m,
+        mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz in the frame's axes and about its origin, (10,) or (N, 10).
+
+        Returns: (n,) for one sample, (N, n) for N.
+        """
+        return self._evaluate("gravity_with_payload", parameters, values, {"q": q, "payload": payload})
+
+    def forward_dynamics_with_payload(
+        self,
+        q: ArrayLike,
+        dq: ArrayLike,
+        tau: ArrayLike,
+        payload: ArrayLike,
+        values: Optional[Values] = None,
+        *,
+        parameters: str = "minimal",
+    ) -> Array:
+        """Joint accelerations under joint torques with a payload on the tool's frame, without friction.
+        ``payload`` is m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz in the frame's axes and about its origin,
+        (10,) or (N, 10).
+
+        Returns: (n,) for one sample, (N, n) for N.
+        """
+        return self._evaluate(
+            "forward_dynamics_with_payload", parameters, values, {"q": q, "dq": dq, "tau": tau, "payload": payload}
+        )
+
+    def torque_hessian_times(
+        self,
+        q: ArrayLike,
+        dq: ArrayLike,
+        ddq: ArrayLike,
+        e: ArrayLike,
+        vq: ArrayLike,
+        vdq: ArrayLike,
+        values: Optional[Values] = None,
+        *,
+        parameters: str = "minimal",
+    ) -> Array:
+        """The Hessian of eᵀ·τ(q, q̇, q̈) by (q, q̇) times the direction (vq, vdq): the part of q, then that of
+        q̇.
+
+        Returns: (n, 2) for one sample, (N, n, 2) for N.
+        """
+        return self._evaluate(
+            "torque_hessian_times", parameters, values, {"q": q, "dq": dq, "ddq": ddq, "e": e, "vq": vq, "vdq": vdq}
+        )
+
+    def centre_of_mass(
+        self, q: ArrayLike, values: Optional[Values] = None, *, parameters: str = "full"
+    ) -> Array:
+        """Centre of mass of the whole arm in the base frame, m; asked with ``parameters="full"``, because no
+        torque shows all masses.
+
+        Returns: (3,) for one sample, (N, 3) for N.
+        """
+        return self._evaluate("centre_of_mass", parameters, values, {"q": q})
+
+    def centre_of_mass_jacobian(
+        self, q: ArrayLike, values: Optional[Values] = None, *, parameters: str = "full"
+    ) -> Array:
+        """Jacobian of the centre of mass of the whole arm, in base axes.
+
+        Returns: (3, n) for one sample, (N, 3, n) for N.
+        """
+        return self._evaluate("centre_of_mass_jacobian", parameters, values, {"q": q})
+
+    def total_momentum(
+        self, q: ArrayLike, dq: ArrayLike, values: Optional[Values] = None, *, parameters: str = "full"
+    ) -> Array:
+        """Momentum of the whole arm with its rotors: linear, kg·m/s, above angular about the base's origin,
+        kg·m²/s, in base axes.
+
+        Returns: (6,) for one sample, (N, 6) for N.
+        """
+        return self._evaluate("total_momentum", parameters, values, {"q": q, "dq": dq})
+
+    def total_momentum_matrix(
+        self, q: ArrayLike, values: Optional[Values] = None, *, parameters: str = "full"
+    ) -> Array:
+        """Matrix of the momentum of the whole arm: momentum = A(q)·q̇.
+
+        Returns: (6, n) for one sample, (N, 6, n) for N.
+        """
+        return self._evaluate("total_momentum_matrix", parameters, values, {"q": q})

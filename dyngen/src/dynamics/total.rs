@@ -1,0 +1,99 @@
+//! The whole arm as one body: its centre of mass and its momentum, which depend on every parameter.
+//!
+//! Bodies are those of the arm file, not the sums that torques depend on: moving mass from one link to the next keeps the
+//! torques but not the momentum.
+
+use super::composite::unit_momentum;
+use super::moments::Moments;
+use super::wrench::Wrench;
+use crate::arm::{Convention, Parameter, ParameterKind};
+use crate::exact::algebra::Algebra;
+use crate::exact::rational::Rational;
+use crate::graph::{Builder, Expr};
+use crate::lagrangian::elements::{ArmElements, JointElements, PlacementElements};
+
+/// All links together, about the origin and in the axes of the root link.
+pub(super) struct Total {
+    /// The body of the arm in its pose.
+    pub(super) body: Moments<Expr>,
+    /// The momentum that a unit of each joint's velocity makes: linear as force, angular as moment.
+    pub(super) momenta: Vec<Wrench>,
+}
+
+impl Total {
+    /// From the values of the arm's parameters; `coupled` gives how fast a motor turns with each joint where its
+    /// transmission has several.
+    pub(super) fn build(
+        b: &Builder,
+        arm: &ArmElements<Expr>,
+        base: &PlacementElements<Expr>,
+        value: impl Fn(Parameter) -> Expr,
+        coupled: impl Fn(usize) -> Option<Vec<(usize, Expr)>>,
+    ) -> Total {
+        let half = b.constant(&Rational::new(1.into(), 2.into()));
+        let body = |link: usize| {
+            let of = |i: usize| value(Parameter { link, kind: ParameterKind::ALL[i] });
+            Moments::of_parameters(b, &half, &std::array::from_fn(of))
+        };
+        let n = arm.joints.len();
+        let mut total = Total { body: Moments::none(b), momenta: vec![Wrench::NONE; n] };
+        for (i, joint) in arm.joints.iter().enumerate().rev() {
+            total.body = total.body.plus(b, &body(i));
+            if arm.convention == Convention::Standard {
+                total.before_twist(b, joint);
+            }
+            total.before_screw(b, joint);
+            total.momenta[i] = total.momenta[i].plus(b, &unit_momentum(b, &total.body, joint.kind));
+            if let Some(ratio) = &joint.ratio {
+                let spin = b.mul(ratio, &value(Parameter { link: i, kind: ParameterKind::Im }));
+                for (j, factor) in coupled(i).unwrap_or_else(|| vec![(i, Expr::ONE)]) {
+                    let moment = &mut total.momenta[j].moment[2];
+                    *moment = b.add(moment, &b.mul(&factor, &spin));
+                }
+            }
+            if arm.convention == Convention::Modified {
+                total.before_twist(b, joint);
+            }
+        }
+        total.before_placement(b, base);
+        total
+    }
+
+    /// Before Rz(θ) Tz(d).
+    fn before_screw(&mut self, b: &Builder, joint: &JointElements<Expr>) {
+        let shift = [Expr::ZERO, Expr::ZERO, joint.shift];
+        self.body = self.body.turned_back_z(b, &joint.sin, &joint.cos).shifted(b, &shift);
+        for momentum in &mut self.momenta {
+            *momentum = momentum.turned_back_z(b, (joint.sin, joint.cos)).shifted(b, &shift);
+        }
+    }
+
+    /// Before Tx(a) Ty(b) Rx(α).
+    fn before_twist(&mut self, b: &Builder, joint: &JointElements<Expr>) {
+        let shift = [joint.a, joint.b, Expr::ZERO];
+        let twist = (joint.sin_alpha, joint.cos_alpha);
+        self.body = self.body.turned_back_x(b, &twist.0, &twist.1).shifted(b, &shift);
+        for momentum in &mut self.momenta {
+            *momentum = momentum.turned_back_x(b, twist).shifted(b, &shift);
+        }
+    }
+
+    /// Before a fixed placement.
+    fn before_placement(&mut self, b: &Builder, frame: &PlacementElements<Expr>) {
+        self.body = self.body.placed_back(b, frame);
+        let [roll, pitch, yaw] = frame.rpy;
+        for momentum in &mut self.momenta {
+            let turned = momentum.turned_back_x(b, roll).turned_back_y(b, pitch).turned_back_z(b, yaw);
+            *momentum = turned.shifted(b, &frame.origin);
+        }
+    }
+
+    /// 6 × n: linear above angular.
+    pub(super) fn matrix(&self) -> Vec<Expr> {
+        let entry = |i: usize, momentum: &Wrench| match i {
+            0..3 => momentum.force[i],
+            _ => momentum.moment[i - 3],
+        };
+        (0..6).flat_map(|i| self.momenta.iter().map(move |m| entry(i, m))).collect()
+    }
+}
