@@ -4,7 +4,9 @@
 
 mod support;
 
-use dyngen::{Arm, Evaluator, Function, Model, SetKind};
+use dyngen::import::{self, Imported, Options};
+use dyngen::{Arm, Evaluator, Function, Model, Samples, SetKind};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use rand::SeedableRng;
 use support::{State, evaluate, model};
 
@@ -92,6 +94,77 @@ fn dynamics_do_not_change_and_the_tool_s_inertia_is_asked_at_a_frame() {
     assert!(framed.at_frame("hand").is_none());
 }
 
+/// A turn by a URDF's roll, pitch and yaw, and a shift.
+fn placed(xyz: [f64; 3], rpy: [f64; 3]) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_euler_angles(rpy[0], rpy[1], rpy[2]);
+    Isometry3::from_parts(Translation3::from(xyz), turn)
+}
+
+/// The pose of a frame of an imported arm, and of its tool.
+fn pose(imported: &Imported, frame: Option<&str>, q: &[f64]) -> Vec<f64> {
+    let model = Model::kinematic(imported.arm.clone());
+    let model = frame.map_or(model.clone(), |name| model.at_frame(name).unwrap());
+    let evaluator = Evaluator::new(&model, Function::ForwardKinematics, SetKind::Full).unwrap();
+    evaluate(&evaluator, &Samples { q, ..Samples::default() })
+}
+
+fn close(found: &[f64], expected: &Isometry3<f64>) {
+    let expected = expected.to_homogeneous().transpose();
+    let miss = found.iter().zip(expected.iter()).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+    assert!(miss < 1e-12, "{found:?} is not {expected}");
+}
+
+/// A camera that is fixed to a bracket on the first link, and a flange behind the second joint.
+const URDF: &str = r#"<robot name="r">
+<link name="base"/><link name="upper"/><link name="bracket"/><link name="Camera-1"/><link name="lower"/>
+<link name="flange"/><link name="gauge"/>
+<joint name="j1" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0.1 0.3" rpy="0.2 0 0"/>
+<axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+<joint name="b" type="fixed"><parent link="upper"/><child link="bracket"/><origin xyz="0.1 0.2 0.3"/></joint>
+<joint name="c" type="fixed"><parent link="bracket"/><child link="Camera-1"/><origin xyz="0 0 0.05" rpy="0.3 -0.4 0.5"/></joint>
+<joint name="j2" type="prismatic"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0" rpy="0 0.7 0"/>
+<axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+<joint name="f" type="fixed"><parent link="lower"/><child link="flange"/><origin xyz="0 0 0.1"/></joint>
+<joint name="g" type="fixed"><parent link="lower"/><child link="gauge"/><origin xyz="0.02 0 0" rpy="0 0 1.1"/></joint>
+</robot>"#;
+
+#[test]
+fn fixed_links_of_a_urdf_are_frames() {
+    let options = Options { tip: Some("flange".into()), ..Options::default() };
+    let imported = import::urdf(URDF, "r.urdf", &options).unwrap();
+    let names: Vec<&str> = imported.arm.frames.iter().map(|frame| frame.name.as_str()).collect();
+    // The tip is the tool.
+    assert_eq!(names, ["bracket", "camera_1", "gauge"]);
+    let q = [0.8, -0.3];
+    let upper = placed([0.0, 0.1, 0.3], [0.2, 0.0, 0.0]) * placed([0.0; 3], [0.0, 0.0, q[0]]);
+    let bracket = upper * placed([0.1, 0.2, 0.3], [0.0; 3]);
+    close(&pose(&imported, Some("bracket"), &q), &bracket);
+    let camera = bracket * placed([0.0, 0.0, 0.05], [0.3, -0.4, 0.5]);
+    close(&pose(&imported, Some("camera_1"), &q), &camera);
+    let lower = upper * placed([0.4, 0.0, 0.0], [0.0, 0.7, 0.0]) * placed([0.0, 0.0, q[1]], [0.0; 3]);
+    close(&pose(&imported, Some("gauge"), &q), &(lower * placed([0.02, 0.0, 0.0], [0.0, 0.0, 1.1])));
+    close(&pose(&imported, None, &q), &(lower * placed([0.0, 0.0, 0.1], [0.0; 3])));
+}
+
+#[test]
+fn sites_of_a_mujoco_model_are_frames() {
+    let text = r#"<mujoco model="m"><compiler angle="radian"/><worldbody><site name="world"/><body name="a" pos="0 0 0.5">
+<joint name="j1" axis="0 1 0"/><geom type="sphere" size="0.1" mass="1"/><site name="Wrist Cam" pos="0.1 0 0.2"/><site/>
+<frame pos="0 0.3 0"><site name="move" euler="0 0 0.4"/></frame>
+<body name="b" pos="0.3 0 0"><joint name="j2" axis="0 0 1"/><geom type="sphere" size="0.1" mass="1"/>
+<site name="wrist_cam" pos="0 0 0.1"/></body></body></worldbody></mujoco>"#;
+    let imported = import::mjcf(text, "m.xml", &Options::default()).unwrap();
+    let names: Vec<&str> = imported.arm.frames.iter().map(|frame| frame.name.as_str()).collect();
+    // Neither a word of Rust nor another frame's name.
+    assert_eq!(names, ["wrist_cam", "frame_move", "wrist_cam_2"]);
+    let q = [0.6, -1.2];
+    let a = placed([0.0, 0.0, 0.5], [0.0, q[0], 0.0]);
+    close(&pose(&imported, Some("wrist_cam"), &q), &(a * placed([0.1, 0.0, 0.2], [0.0; 3])));
+    close(&pose(&imported, Some("frame_move"), &q), &(a * placed([0.0, 0.3, 0.0], [0.0, 0.0, 0.4])));
+    let b = a * placed([0.3, 0.0, 0.0], [0.0, 0.0, q[1]]);
+    close(&pose(&imported, Some("wrist_cam_2"), &q), &(b * placed([0.0, 0.0, 0.1], [0.0; 3])));
+}
+
 #[test]
 fn frames_that_cannot_be_are_refused_with_their_line() {
     let error = |frame: &str| Arm::parse(&(ARM.to_string() + frame), "arm.toml").unwrap_err().to_string();
@@ -100,6 +173,7 @@ fn frames_that_cannot_be_are_refused_with_their_line() {
         ("[[frame]]\nname = \"a\"\nlink = 0\n", "link must be one of the links 1 to 5"),
         ("[[frame]]\nname = \"a\"\n", "the key 'link' is missing"),
         ("[[frame]]\nlink = 1\n", "the key 'name' is missing"),
+        ("[[frame]]\nname = \"type\"\nlink = 1\n", "no word of Rust"),
         ("[[frame]]\nname = \"Left hand\"\nlink = 1\n", "lowercase letters, digits and _"),
         (
             "[[frame]]\nname = \"a\"\nlink = 1\n[[frame]]\nname = \"a\"\nlink = 2\n",

@@ -105,5 +105,5 @@ fn kinematics_needs_no_parameter_sets() {
         assert_eq!(alone, at(&derived, function, SetKind::Minimal), "{function}");
         assert!(at(&Model::kinematic(arm(8)), function, SetKind::Full).iter().all(|x| x.is_finite()));
     }
-    assert!(Function::ALL.iter().filter(|f| f.is_kinematic()).count() == 6);
+    assert!(Function::ALL.iter().filter(|f| f.is_kinematic()).count() == 10);
 }

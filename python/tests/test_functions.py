@@ -110,9 +110,9 @@ def test_every_function_of_the_generator_is_a_method_with_its_arguments():
 def test_shapes_of_one_sample_and_of_many(rng):
     arm = pb.Arm.from_urdf(PUMA)
     n, p = arm.dof, len(arm.sets["minimal"])
-    every = {"q", "dq", "ddq", "dqr", "ddqr", "tau", "e"}
+    every = {"q", "dq", "ddq", "dqr", "ddqr", "tau", "e", "vq", "vdq"}
     given = {name: rng.uniform(-1, 1, (5, n)) for name in every}
-    given["f"] = rng.uniform(-1, 1, (5, 6))
+    given["f"], given["payload"] = rng.uniform(-1, 1, (5, 6)), rng.uniform(-1, 1, (5, 10))
     for name, arguments, _, _ in _core.functions():
         many = getattr(arm, name)(**{a: given[a] for a in arguments if a != "parameters"})
         one = getattr(arm, name)(**{a: given[a][2] for a in arguments if a != "parameters"})

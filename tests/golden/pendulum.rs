@@ -389,6 +389,18 @@ pub fn forward_kinematics_with<T: SimdRealField + Copy>(
         ]),
     )
 }
+/// Row and column, from 0, of the 8 entries of [`forward_kinematics`] that are not always zero, column by column.
+#[allow(dead_code)]
+pub const FORWARD_KINEMATICS_NONZERO: [(usize, usize); 8] = [
+    (0, 0),
+    (1, 0),
+    (0, 1),
+    (1, 1),
+    (2, 2),
+    (0, 3),
+    (1, 3),
+    (3, 3),
+];
 mod trigonometry {
     //! Sines and cosines of several angles at once, by additions and multiplications alone.
     //!

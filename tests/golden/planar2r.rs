@@ -317,6 +317,21 @@ pub fn regressor_with<T: SimdRealField + Copy>(
         ]),
     )
 }
+/// Row and column, from 0, of the 11 entries of [`regressor`] that are not always zero, column by column.
+#[allow(dead_code)]
+pub const REGRESSOR_NONZERO: [(usize, usize); 11] = [
+    (0, 0),
+    (0, 1),
+    (0, 2),
+    (0, 3),
+    (1, 3),
+    (0, 4),
+    (1, 4),
+    (0, 5),
+    (1, 5),
+    (0, 6),
+    (1, 6),
+];
 /// Mass matrix B(q), symmetric.
 ///
 /// * `q`: joint positions, rad (m where prismatic)
@@ -411,6 +426,9 @@ pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
     let x17 = x14 - x16;
     SMatrix::from_array_storage(ArrayStorage([[-x17, x16], [-x14, x0]]))
 }
+/// Row and column, from 0, of the 3 entries of [`coriolis_matrix`] that are not always zero, column by column.
+#[allow(dead_code)]
+pub const CORIOLIS_MATRIX_NONZERO: [(usize, usize); 3] = [(0, 0), (1, 0), (0, 1)];
 /// Joint torques that hold the arm still: g(q).
 ///
 /// * `q`: joint positions, rad (m where prismatic)
@@ -600,6 +618,18 @@ pub fn forward_kinematics_with<T: SimdRealField + Copy>(
         ]),
     )
 }
+/// Row and column, from 0, of the 8 entries of [`forward_kinematics`] that are not always zero, column by column.
+#[allow(dead_code)]
+pub const FORWARD_KINEMATICS_NONZERO: [(usize, usize); 8] = [
+    (0, 0),
+    (1, 0),
+    (0, 1),
+    (1, 1),
+    (2, 2),
+    (0, 3),
+    (1, 3),
+    (3, 3),
+];
 mod trigonometry {
     //! Sines and cosines of several angles at once, by additions and multiplications alone.
     //!

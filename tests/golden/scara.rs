@@ -364,6 +364,29 @@ pub fn regressor_with<T: SimdRealField + Copy>(
         ]),
     )
 }
+/// Row and column, from 0, of the 19 entries of [`regressor`] that are not always zero, column by column.
+#[allow(dead_code)]
+pub const REGRESSOR_NONZERO: [(usize, usize); 19] = [
+    (0, 0),
+    (0, 1),
+    (1, 1),
+    (0, 2),
+    (1, 2),
+    (0, 3),
+    (1, 3),
+    (0, 4),
+    (1, 4),
+    (2, 4),
+    (0, 5),
+    (1, 5),
+    (3, 5),
+    (0, 6),
+    (1, 6),
+    (3, 6),
+    (0, 7),
+    (1, 7),
+    (3, 7),
+];
 /// Mass matrix B(q), symmetric.
 ///
 /// * `q`: joint positions, rad (m where prismatic)
@@ -441,6 +464,20 @@ pub fn mass_matrix_with<T: SimdRealField + Copy>(
         ]),
     )
 }
+/// Row and column, from 0, of the 10 entries of [`mass_matrix`] that are not always zero, column by column.
+#[allow(dead_code)]
+pub const MASS_MATRIX_NONZERO: [(usize, usize); 10] = [
+    (0, 0),
+    (1, 0),
+    (3, 0),
+    (0, 1),
+    (1, 1),
+    (3, 1),
+    (2, 2),
+    (0, 3),
+    (1, 3),
+    (3, 3),
+];
 /// Coriolis matrix C(q, q̇) of Christoffel symbols: Ḃ − 2C is skew-symmetric.
 ///
 /// * `q`: joint positions, rad (m where prismatic)
@@ -540,6 +577,18 @@ pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
         ]),
     )
 }
+/// Row and column, from 0, of the 8 entries of [`coriolis_matrix`] that are not always zero, column by column.
+#[allow(dead_code)]
+pub const CORIOLIS_MATRIX_NONZERO: [(usize, usize); 8] = [
+    (0, 0),
+    (1, 0),
+    (3, 0),
+    (0, 1),
+    (1, 1),
+    (3, 1),
+    (0, 3),
+    (1, 3),
+];
 /// Joint torques that hold the arm still: g(q).
 ///
 /// * `q`: joint positions, rad (m where prismatic)
@@ -782,6 +831,19 @@ pub fn forward_kinematics_with<T: SimdRealField + Copy>(
         ]),
     )
 }
+/// Row and column, from 0, of the 9 entries of [`forward_kinematics`] that are not always zero, column by column.
+#[allow(dead_code)]
+pub const FORWARD_KINEMATICS_NONZERO: [(usize, usize); 9] = [
+    (0, 0),
+    (1, 0),
+    (0, 1),
+    (1, 1),
+    (2, 2),
+    (0, 3),
+    (1, 3),
+    (2, 3),
+    (3, 3),
+];
 mod trigonometry {
     //! Sines and cosines of several angles at once, by additions and multiplications alone.
     //!

@@ -803,6 +803,33 @@ pub fn regressor_with<T: SimdRealField + Copy>(
         ]),
     )
 }
+/// Row and column, from 0, of the 23 entries of [`regressor`] that are not always zero, column by column.
+#[allow(dead_code)]
+pub const REGRESSOR_NONZERO: [(usize, usize); 23] = [
+    (0, 0),
+    (1, 0),
+    (0, 1),
+    (1, 1),
+    (0, 2),
+    (1, 2),
+    (0, 3),
+    (0, 4),
+    (1, 4),
+    (2, 4),
+    (0, 5),
+    (1, 5),
+    (2, 5),
+    (0, 6),
+    (2, 6),
+    (0, 7),
+    (2, 7),
+    (0, 8),
+    (2, 8),
+    (0, 9),
+    (2, 9),
+    (0, 10),
+    (2, 10),
+];
 /// Mass matrix B(q), symmetric.
 ///
 /// * `q`: joint positions, rad (m where prismatic)
@@ -1314,6 +1341,17 @@ pub fn coriolis_matrix_with<T: SimdRealField + Copy>(
         ArrayStorage([[x287, -x268, x156], [-x267, x0, -x120], [x153, x95, x0]]),
     )
 }
+/// Row and column, from 0, of the 7 entries of [`coriolis_matrix`] that are not always zero, column by column.
+#[allow(dead_code)]
+pub const CORIOLIS_MATRIX_NONZERO: [(usize, usize); 7] = [
+    (0, 0),
+    (1, 0),
+    (2, 0),
+    (0, 1),
+    (2, 1),
+    (0, 2),
+    (1, 2),
+];
 /// Joint torques that hold the arm still: g(q).
 ///
 /// * `q`: joint positions, rad (m where prismatic)
@@ -1898,6 +1936,23 @@ pub fn forward_kinematics_with<T: SimdRealField + Copy>(
         ]),
     )
 }
+/// Row and column, from 0, of the 13 entries of [`forward_kinematics`] that are not always zero, column by column.
+#[allow(dead_code)]
+pub const FORWARD_KINEMATICS_NONZERO: [(usize, usize); 13] = [
+    (0, 0),
+    (1, 0),
+    (2, 0),
+    (0, 1),
+    (1, 1),
+    (2, 1),
+    (0, 2),
+    (1, 2),
+    (2, 2),
+    (0, 3),
+    (1, 3),
+    (2, 3),
+    (3, 3),
+];
 /// The functions of the tool's frame at the frame `elbow` of the arm file.
 #[allow(dead_code)]
 pub mod elbow {
@@ -1995,6 +2050,22 @@ pub mod elbow {
             ]),
         )
     }
+    /// Row and column, from 0, of the 13 entries of [`forward_kinematics`] that are not always zero, column by column.
+    pub const FORWARD_KINEMATICS_NONZERO: [(usize, usize); 13] = [
+        (0, 0),
+        (1, 0),
+        (2, 0),
+        (0, 1),
+        (1, 1),
+        (2, 1),
+        (0, 2),
+        (1, 2),
+        (2, 2),
+        (0, 3),
+        (1, 3),
+        (2, 3),
+        (3, 3),
+    ];
 }
 mod trigonometry {
     //! Sines and cosines of several angles at once, by additions and multiplications alone.

@@ -77,6 +77,7 @@ files! {
     lwa4p_published = "lwa4p_published.rs";
     lwa4p_rotorless_minimal = "lwa4p_rotorless_minimal.rs";
     lwa4p_rotorless_control = "lwa4p_rotorless_control.rs";
+    lwa4p_rotorless_discrete = "lwa4p_rotorless_discrete.rs";
     puma560_full = "puma560_full.rs";
     puma560_minimal = "puma560_minimal.rs";
     puma560_symbolic = "puma560_symbolic.rs";

@@ -55,11 +55,14 @@ pub(super) fn parse(text: &str, file: &str) -> Result<Arm, Diagnostics> {
 }
 
 /// Whether a module may have this name.
-fn is_name(name: &str) -> bool {
+pub(crate) fn is_name(name: &str) -> bool {
     let mut letters = name.chars();
     letters.next().is_some_and(|c| c.is_ascii_lowercase())
         && letters.all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
-        && !["batch", "trigonometry", "tests"].contains(&name)
+        // What a file has of its own, and what it calls.
+        && !["batch", "discrete", "trigonometry", "tests", "nalgebra", "core", "std"].contains(&name)
+        // No word of the language.
+        && syn::parse_str::<syn::Ident>(name).is_ok()
 }
 
 /// What a text is that is no arm file, and what to do with it.
@@ -363,7 +366,8 @@ impl Reader<'_> {
         let name = name?;
         if !is_name(&name) {
             let message = format!(
-                "{place}: name '{name}' becomes a module's: take lowercase letters, digits and _, a letter first"
+                "{place}: name '{name}' becomes a module's: take lowercase letters, digits and _, a letter first, and no word \
+                 of Rust or of the file's own"
             );
             self.errors.error(t.span.clone(), message);
             return None;

@@ -39,6 +39,7 @@ pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) ->
     };
     let statements = sections(model, &built.graph, &built.outputs, &needed, &signs);
     let (result, value) = result(built, &signs);
+    let structure = structure(built);
     // Where the result is a number, the last `let` is the result.
     let lint = is_number(built).then(|| quote!(#[allow(clippy::let_and_return)]));
     quote! {
@@ -59,7 +60,35 @@ pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) ->
             #(#statements)*
             #value
         }
+
+        #structure
     }
+}
+
+/// Where the entries of a matrix are that are not zero for every state, if not all of them are.
+fn structure(built: &FunctionGraph) -> Option<TokenStream> {
+    let (rows, columns) = built.shape;
+    let is_there = |(i, j): &(usize, usize)| built.outputs[i * columns + j] != Expr::ZERO;
+    let all = (0..columns).flat_map(|j| (0..rows).map(move |i| (i, j)));
+    let entries: Vec<(usize, usize)> = all.filter(is_there).collect();
+    if rows == 1 || columns == 1 || entries.len() == rows * columns {
+        return None;
+    }
+    let name = format_ident!("{}_NONZERO", built.function.name().to_uppercase());
+    let doc = format!(
+        " Row and column, from 0, of the {} entries of [`{}`] that are not always zero, column by column.",
+        entries.len(),
+        built.function
+    );
+    let count = Literal::usize_unsuffixed(entries.len());
+    let entries = entries.into_iter().map(|(i, j)| {
+        let (i, j) = (Literal::usize_unsuffixed(i), Literal::usize_unsuffixed(j));
+        quote!((#i, #j))
+    });
+    Some(quote! {
+        #[doc = #doc]
+        pub const #name: [(usize, usize); #count] = [#(#entries),*];
+    })
 }
 
 /// Whether the result is a number for every arm: where it is a vector, one joint makes it a vector of one.

@@ -6,6 +6,7 @@ mod angles;
 mod batch;
 pub mod c_api;
 mod code;
+mod discrete;
 mod docs;
 mod friction;
 mod lanes;
@@ -105,6 +106,7 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
     let frames = frames.iter().map(|(frame, built)| frame_module(model, options, frame, built, prepared));
     let batch = options.batch.then(|| batch::module(model, &built));
     let preparation = takes_parameters.then(|| code::preparation(model, &preparation));
+    let discrete = discrete::module(options);
     let constants = constants(model.arm(), set, options);
     let trig = angles::trig_struct(model);
     let angle_functions = angles::angle_functions(model, &all);
@@ -128,6 +130,8 @@ pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
         #(#functions)*
 
         #(#frames)*
+
+        #discrete
 
         #friction
 

@@ -44,6 +44,8 @@ pub(crate) struct ChainJoint {
     pub(crate) links: Vec<String>,
     /// The frame of each of them.
     pub(crate) poses: Vec<Pose>,
+    /// Frames that have names of their own on the body: of links that are fixed to its first one, and sites.
+    pub(crate) frames: Vec<(String, Pose)>,
     /// Those of them that have mass.
     pub(crate) masses: Vec<Mass>,
 }
@@ -210,6 +212,7 @@ impl Walk<'_> {
             motor: joint.motor,
             links: Vec::new(),
             poses: Vec::new(),
+            frames: Vec::new(),
             masses: Vec::new(),
         });
         (pose, true)
@@ -263,7 +266,9 @@ impl Walk<'_> {
         let mut rigid = vec![(link, *pose)];
         let mut next = 0;
         while let Some((at, pose)) = rigid.get(next).copied() {
-            self.link(&self.tree.robot.links[at], &pose);
+            let link = &self.tree.robot.links[at];
+            self.link(link, &pose);
+            self.frames(link, &pose, next > 0);
             for j in &self.tree.below[at] {
                 let joint = &self.tree.robot.joints[*j];
                 if !self.tree.moves(*j) {
@@ -282,6 +287,17 @@ impl Walk<'_> {
             }
             next += 1;
         }
+    }
+
+    /// The frames of a link that have names of their own.
+    fn frames(&mut self, link: &Link, pose: &Pose, is_fixed: bool) {
+        let tolerance = self.options.angle_tolerance;
+        let Some(joint) = self.joints.last_mut() else { return };
+        if is_fixed && link.is_named {
+            joint.frames.push((link.name.clone(), *pose));
+        }
+        let site = |(name, at): &(String, Origin)| (name.clone(), pose.then(&Pose::of(at, tolerance)));
+        joint.frames.extend(link.sites.iter().map(site));
     }
 
     fn link(&mut self, link: &Link, pose: &Pose) {

@@ -254,9 +254,28 @@ impl<'d, 'i> Reader<'d, 'i> {
             parent = link;
         }
         self.robot.joints.push(fixed(&parent, &name, &at, line));
-        let link = self.inertial(node, &name, line, &class);
+        let mut link = self.inertial(node, &name, line, &class);
+        link.is_named = joints.is_empty() && node.has_attribute("name");
+        self.sites(node, &Pose::identity(), &mut link.sites);
         self.robot.links.push(link);
         self.children(node, &name, &Pose::identity(), &class);
+    }
+
+    /// The named sites of a body, or of a frame in it, which lies at `pose` in the body.
+    fn sites(&mut self, node: Node<'d, 'i>, pose: &Pose, sites: &mut Vec<(String, Origin)>) {
+        for child in elements(node) {
+            match (child.tag_name().name(), child.attribute("name")) {
+                ("site", Some(name)) => {
+                    let at = pose.then(&self.pose(child));
+                    sites.push((name.to_string(), origin(&at)));
+                }
+                ("frame", _) => {
+                    let inner = pose.then(&self.pose(child));
+                    self.sites(child, &inner, sites);
+                }
+                _ => {}
+            }
+        }
     }
 
     /// Adds a joint of a body that lies at `at` in the link `parent`; gives the body's place in the link
@@ -407,14 +426,7 @@ impl<'d, 'i> Reader<'d, 'i> {
             let [x, y, z] = self.numbers::<3>(inertial, "diaginertia").unwrap_or([0.0; 3]);
             [x, y, z, 0.0, 0.0, 0.0]
         });
-        Link {
-            name: name.to_string(),
-            line,
-            origin: origin(&pose),
-            mass,
-            inertia: [xx, xy, xz, yy, yz, zz],
-            note: None,
-        }
+        Link { origin: origin(&pose), mass, inertia: [xx, xy, xz, yy, yz, zz], ..massless(name, line) }
     }
 
     /// pos with quat, axisangle, euler, xyaxes or zaxis.
@@ -462,7 +474,8 @@ fn back(kind: &str, axis: Vector3<f64>, reference: f64) -> Pose {
 }
 
 fn massless(name: &str, line: u32) -> Link {
-    Link { name: name.to_string(), line, origin: Origin::default(), mass: 0.0, inertia: [0.0; 6], note: None }
+    let (name, origin) = (name.to_string(), Origin::default());
+    Link { name, line, origin, mass: 0.0, inertia: [0.0; 6], is_named: false, sites: Vec::new(), note: None }
 }
 
 fn fixed(parent: &str, child: &str, at: &Pose, line: u32) -> Joint {

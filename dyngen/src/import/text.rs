@@ -4,7 +4,7 @@ use super::Options;
 use super::chain::{Chain, ChainJoint};
 use super::frames::{Frames, Row};
 use super::pose::{Pose, twelfths};
-use crate::arm::{Convention, JointKind, Parameter, ParameterKind};
+use crate::arm::{Convention, JointKind, Parameter, ParameterKind, is_name};
 use crate::consistency::parameters_of_body;
 use crate::exact::angle::Angle;
 use crate::exact::rational;
@@ -27,7 +27,38 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
         (format!("frame 0 in link '{}'", chain.root), format!("link '{}' in the last frame", chain.tip));
     placement(&mut text, &base, "base", &frames.base, options);
     placement(&mut text, &tool, "tool", &tip(chain, frames), options);
+    named_frames(&mut text, chain, frames, options);
     text
+}
+
+/// The frames that have names in the file, but the tip's, which is the tool's.
+fn named_frames(text: &mut String, chain: &Chain, frames: &Frames, options: &Options) {
+    let mut taken: Vec<String> = Vec::new();
+    for (k, (joint, link)) in chain.joints.iter().zip(&frames.links).enumerate() {
+        for (given, pose) in joint.frames.iter().filter(|(name, _)| *name != chain.tip) {
+            let name = module_name(given, &taken);
+            let (xyz, rpy) = numbers(&link.see(pose), options);
+            // A String takes every write.
+            let _ = write!(
+                text,
+                "\n# '{}'\n[[frame]]\nname = \"{name}\"\nlink = {}\nxyz = [{xyz}]\nrpy = [{rpy}]\n",
+                plain(given),
+                k + 1
+            );
+            taken.push(name);
+        }
+    }
+}
+
+/// A name as an arm file's frames have it, that no other one has.
+fn module_name(given: &str, taken: &[String]) -> String {
+    let kept = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' };
+    let mut name: String = given.chars().map(kept).collect();
+    if !is_name(&name) {
+        name.insert_str(0, "frame_");
+    }
+    let again = |count: usize| if count == 1 { name.clone() } else { format!("{name}_{count}") };
+    (1..).map(again).find(|name| !taken.contains(name)).unwrap_or(name.clone())
 }
 
 /// Where the arm comes from, what the import says of it, and what holds for all joints.
@@ -110,13 +141,18 @@ fn limits(text: &mut String, joint: &ChainJoint) {
 
 /// The table of a fixed frame, where it is another than the one it stands in.
 fn placement(text: &mut String, what: &str, table: &str, pose: &Pose, options: &Options) {
-    let xyz: Vec<String> = pose.origin.iter().map(|x| length(*x)).collect();
-    let rpy = pose.rpy().map(|turn| angle(turn, options.angle_tolerance));
-    if xyz.iter().chain(&rpy).any(|number| number != "0") {
-        let (xyz, rpy) = (xyz.join(", "), rpy.join(", "));
+    let (xyz, rpy) = numbers(pose, options);
+    if [&xyz, &rpy].iter().any(|numbers| *numbers != "0, 0, 0") {
         // A String takes every write.
         let _ = write!(text, "\n# {}\n[{table}]\nxyz = [{xyz}]\nrpy = [{rpy}]\n", plain(what));
     }
+}
+
+/// `xyz` and `rpy` of a pose.
+fn numbers(pose: &Pose, options: &Options) -> (String, String) {
+    let xyz: Vec<String> = pose.origin.iter().map(|x| length(*x)).collect();
+    let rpy = pose.rpy().map(|turn| angle(turn, options.angle_tolerance));
+    (xyz.join(", "), rpy.join(", "))
 }
 
 /// The tip link's frame in the last frame.

@@ -27,6 +27,10 @@ pub(crate) struct Link {
     pub(crate) mass: f64,
     /// ixx, ixy, ixz, iyy, iyz, izz, kg·m²
     pub(crate) inertia: [f64; 6],
+    /// Whether it is more than a part of a joint: where it is fixed to another link its frame has a name of its own.
+    pub(crate) is_named: bool,
+    /// Frames on it by their names.
+    pub(crate) sites: Vec<(String, Origin)>,
     /// What may surprise, where it takes part in the dynamics.
     pub(crate) note: Option<String>,
 }
@@ -224,7 +228,8 @@ impl<'d, 'i> Reader<'d, 'i> {
         let tensor = inertial.and_then(|i| child(i, "inertia"));
         let inertia = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
             .map(|key| tensor.map_or(0.0, |t| self.number(t, key, &place)));
-        Some(Link { name, line: self.line(node), origin, mass, inertia, note: None })
+        let line = self.line(node);
+        Some(Link { name, line, origin, mass, inertia, is_named: true, sites: Vec::new(), note: None })
     }
 
     fn joint(&mut self, node: Node<'d, 'i>) -> Option<Joint> {

@@ -411,13 +411,16 @@ class Functions:
         *,
         parameters: str = "minimal",
     ) -> Array:
-        """Joint torques of a motion with a payload on the tool's frame, N·m (N). ``payload`` is m, mx, my, mz,
-        Ixx, Ixy, Ixz, Iyy, Iyz, Izz in the frame's axes and about its origin, (10,) or (N, 10).
+        """Joint torques of a motion with a payload on the tool's frame, N·m (N). ``payload`` is m, mx,
+        my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz in the frame's axes and about its origin, (10,) or (N, 10).
 
         Returns: (n,) for one sample, (N, n) for N.
         """
         return self._evaluate(
-            "inverse_dynamics_with_payload", parameters, values, {"q": q, "dq": dq, "ddq": ddq, "payload": payload}
+            "inverse_dynamics_with_payload",
+            parameters,
+            values,
+            {"q": q, "dq": dq, "ddq": ddq, "payload": payload},
         )
 
     def payload_regressor(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
@@ -470,8 +473,9 @@ class Functions:
         *,
         parameters: str = "minimal",
     ) -> Array:
-        """Joint torques that hold the arm with a payload on the tool's frame still, N·m (N). ``payload`` is m,
-        mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz in the frame's axes and about its origin, (10,) or (N, 10).
+        """Joint torques that hold the arm with a payload on the tool's frame still, N·m (N). ``payload`` is
+        m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz in the frame's axes and about its origin, (10,) or (N,
+        10).
 
         Returns: (n,) for one sample, (N, n) for N.
         """
@@ -494,7 +498,10 @@ class Functions:
         Returns: (n,) for one sample, (N, n) for N.
         """
         return self._evaluate(
-            "forward_dynamics_with_payload", parameters, values, {"q": q, "dq": dq, "tau": tau, "payload": payload}
+            "forward_dynamics_with_payload",
+            parameters,
+            values,
+            {"q": q, "dq": dq, "tau": tau, "payload": payload},
         )
 
     def torque_hessian_times(
@@ -515,7 +522,10 @@ class Functions:
         Returns: (n, 2) for one sample, (N, n, 2) for N.
         """
         return self._evaluate(
-            "torque_hessian_times", parameters, values, {"q": q, "dq": dq, "ddq": ddq, "e": e, "vq": vq, "vdq": vdq}
+            "torque_hessian_times",
+            parameters,
+            values,
+            {"q": q, "dq": dq, "ddq": ddq, "e": e, "vq": vq, "vdq": vdq},
         )
 
     def centre_of_mass(
