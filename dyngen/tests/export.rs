@@ -44,6 +44,20 @@ fn exported(text: &str, arm: &Arm, values: &str, friction: Option<&str>) -> Resu
     export::urdf(text, "robot.urdf", arm, &known, &Options::default())
 }
 
+#[test]
+fn damping_that_is_not_known_stays_as_it_is() {
+    let before = import::mjcf(MIXED, "arm.xml", &Options::default()).unwrap();
+    // Damping 1.5 ± 0.03, but 0.02 ± 0.03 at the first joint.
+    let friction = friction(4).replacen("\"gamma5\": 1.5", "\"gamma5\": 0.02", 1);
+    let mut known =
+        Known::read(&before.arm, (&scaled(&before), "v.json"), Some((&friction, "f.json"))).unwrap();
+    let said = known.without_uncertain_damping(&before.arm);
+    assert_eq!(said.len(), 1, "{said:?}\n{friction}");
+    assert!(said[0].contains("is not larger than its standard error 3.000e-2"), "{said:?}");
+    let new = export::mjcf(MIXED, "arm.xml", &before.arm, &known, &Options::default()).unwrap();
+    assert_eq!(new.text.matches("damping=\"1.5\"").count(), 3, "{}", new.text);
+}
+
 /// The text without the elements that hold values and without comments, and without the space around them.
 fn rest(text: &str) -> String {
     let mut rest = text.to_string();

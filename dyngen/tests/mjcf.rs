@@ -223,9 +223,23 @@ fn what_is_not_read_is_told_with_its_line() {
             "joint 'pan': axis must be 3 numbers",
         ),
         ("mass=\"0.8\"", "mass=\"heavy\"", "mass of <inertial> must be 1 numbers"),
-        ("</mujoco>", "", "not a MuJoCo model: line"),
+        ("</mujoco>", "", "as a MuJoCo model: line"),
     ] {
         let message = error(from, to);
         assert!(message.contains(words) && message.starts_with("arm.xml: "), "{words}: {message}");
     }
+}
+
+/// A ball of 0.1 m and one of 0.2 m are together to have 3 kg.
+#[test]
+fn masses_are_those_that_the_compiler_asks_for() {
+    let text = r#"<mujoco><compiler inertiafromgeom="true" settotalmass="3"/><worldbody><body name="a"><joint name="j" axis="0 1 0"/>
+<inertial pos="0 0 0" mass="50" diaginertia="1 1 1"/><geom type="sphere" size="0.1" pos="0.2 0 0"/>
+<body name="b" pos="0.3 0 0"><joint name="k" axis="0 1 0"/><geom type="sphere" size="0.2"/></body></body></worldbody></mujoco>"#;
+    let imported = imported(text).unwrap();
+    let value = |name: &str| imported.values.iter().find(|(p, _)| p.to_string() == name).unwrap().1;
+    // One to eight by volume.
+    assert!((value("m1") - 1.0 / 3.0).abs() < 1e-12 && (value("m2") - 8.0 / 3.0).abs() < 1e-12);
+    assert!((value("Izz2") - 0.4 * 8.0 / 3.0 * 0.04).abs() < 1e-12);
+    assert!(imported.notes.iter().any(|note| note.starts_with("settotalmass")));
 }

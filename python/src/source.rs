@@ -96,12 +96,14 @@ pub(crate) fn export_imported(
         ));
     };
     let friction = friction.as_ref().map(|(text, file)| (text.as_str(), file.as_str()));
-    let known = Known::read(&arm.arm, (&values.0, &values.1), friction).map_err(refused)?;
+    let mut known = Known::read(&arm.arm, (&values.0, &values.1), friction).map_err(refused)?;
+    let mut notes = known.without_uncertain_damping(&arm.arm);
     let write = if origin.mjcf { export::mjcf } else { export::urdf };
     let exported = write(&origin.text, &origin.file, &arm.arm, &known, &origin.options);
     let exported = exported.map_err(|e| match e {
         ImportError::Unreadable(_) => input(e),
         ImportError::Refused(_) => refused(e),
     })?;
-    Ok((exported.text, exported.notes))
+    notes.extend(exported.notes);
+    Ok((exported.text, notes))
 }

@@ -25,6 +25,9 @@ pub(super) struct Args {
     /// What `powerball identify` or `explain` wrote: damping and friction of the joints, and effects for MuJoCo.
     #[arg(long, value_name = "FILE.json")]
     friction: Option<PathBuf>,
+    /// Write damping too that is not larger than its own standard error; without this the original's stays.
+    #[arg(long)]
+    uncertain: bool,
     /// The format of the original.
     #[arg(long, value_enum)]
     to: Format,
@@ -63,7 +66,8 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let values = read(&args.values)?;
     let friction = args.friction.as_ref().map(|path| Ok((read(path)?, name(path)))).transpose()?;
     let friction = friction.as_ref().map(|(text, file)| (text.as_str(), file.as_str()));
-    let known = Known::read(&arm, (&values, &name(&args.values)), friction).map_err(Failure::refused)?;
+    let mut known = Known::read(&arm, (&values, &name(&args.values)), friction).map_err(Failure::refused)?;
+    let left = if args.uncertain { Vec::new() } else { known.without_uncertain_damping(&arm) };
     let options = Options {
         base: args.base.clone(),
         tip: args.tip.clone(),
@@ -82,7 +86,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         ImportError::Unreadable(_) => Failure::input(e),
         ImportError::Refused(_) => Failure::refused(e),
     })?;
-    for note in &exported.notes {
+    for note in left.iter().chain(&exported.notes) {
         eprintln!("{file}: note: {note}");
     }
     write(&[(&args.output, &source.bytes(&exported.text))])?;

@@ -13,8 +13,8 @@ const ROUNDING: f64 = 1e-10;
 /// A joint's friction in the two terms that URDF and MJCF have, with standard errors where they are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
-    /// N·m·s/rad or N·s/m
-    pub viscous: f64,
+    /// N·m·s/rad or N·s/m; none where it is not to be written.
+    pub viscous: Option<f64>,
     /// N·m or N: what saturating terms come to.
     pub coulomb: f64,
     /// Standard errors of both; where a file does not have that of the sum of saturating terms it is the sum of
@@ -92,6 +92,29 @@ impl Known {
     }
 }
 
+impl Known {
+    /// Without the damping of joints that is not larger than its own standard error, which then stays as it is in the
+    /// robot description; and what is to be said of that.
+    pub fn without_uncertain_damping(&mut self, arm: &Arm) -> Vec<String> {
+        let mut said = Vec::new();
+        let names = arm.joints.iter().enumerate();
+        for ((i, joint), friction) in names.zip(self.friction.iter_mut().flatten()) {
+            let Some(friction) = friction else { continue };
+            if let (Some(viscous), [Some(std), _]) = (friction.viscous, friction.std) {
+                if viscous <= std {
+                    friction.viscous = None;
+                    let name = joint.name.clone().map_or(format!("{}", i + 1), |name| format!("'{name}'"));
+                    said.push(format!(
+                        "joint {name}: its damping {viscous:.3e} is not larger than its standard error {std:.3e} and \
+                         is not written (--uncertain writes it)"
+                    ));
+                }
+            }
+        }
+        said
+    }
+}
+
 fn is_of(arm: &Arm, name: &str) -> bool {
     Parameter::parse(name).is_some_and(|p| p.link < arm.links())
 }
@@ -132,7 +155,7 @@ fn read_friction(arm: &Arm, json: &Value) -> Result<Vec<Option<Friction>>, Strin
         let std = |k: usize| entry.and_then(|e| e["std"][k].as_f64());
         let told = entry.and_then(|e| e["coulomb_std"].as_f64());
         let coulomb_std = told.or_else(|| std(0).map(|s| s + std(2).unwrap_or(0.0)));
-        Ok(Friction { viscous, coulomb: first + second, std: [std(4), coulomb_std] })
+        Ok(Friction { viscous: Some(viscous), coulomb: first + second, std: [std(4), coulomb_std] })
     };
     let coordinates = arm.coordinates();
     let coordinate = |link: usize| coordinates.iter().position(|joint| *joint == link);

@@ -29,7 +29,8 @@ pub fn mjcf(
     options: &Options,
 ) -> Result<Exported, ImportError> {
     let refused = |reasons| ImportError::refused(file, reasons);
-    let unreadable = |e: String| ImportError::Unreadable(format!("{file}: not a MuJoCo model: {e}"));
+    let unreadable =
+        |e: String| ImportError::Unreadable(format!("{file}: cannot be read as a MuJoCo model: {e}"));
     let robot = read(text).map_err(unreadable)?;
     let options = share::options(&robot, arm, options);
     let chain = chain::chain(&robot, &options).map_err(refused)?;
@@ -99,7 +100,7 @@ impl Held {
     /// What is left on the joint where a tendon holds this.
     fn moved_away(&self) -> Held {
         Held {
-            friction: self.friction.map(|_| Friction { viscous: 0.0, coulomb: 0.0, std: [None; 2] }),
+            friction: self.friction.map(|_| Friction { viscous: Some(0.0), coulomb: 0.0, std: [None; 2] }),
             armature: self.armature.map(|_| 0.0),
             spring: None,
         }
@@ -136,7 +137,9 @@ fn tendon_lines(name: &str, joints: &[(&str, f64)], held: &Held) -> Vec<String> 
     let mut add = |key: &str, value: f64| attributes += &format!(" {key}=\"{}\"", shortest(value));
     if let Some(friction) = &held.friction {
         words.push(errors(friction));
-        add("damping", friction.viscous);
+        if let Some(viscous) = friction.viscous {
+            add("damping", viscous);
+        }
         add("frictionloss", friction.coulomb);
     }
     if let Some(armature) = held.armature {
@@ -232,10 +235,12 @@ impl<'t, 'd> Writer<'t, 'd> {
     fn joint(&mut self, old: &ChainJoint, joint: &Joint, held: &Held) {
         let Some(node) = self.joint_element(&old.name) else { return };
         if let Some(friction) = &held.friction {
-            if friction.viscous != 0.0 || friction.coulomb != 0.0 || friction.std != [None; 2] {
+            if friction.viscous != Some(0.0) || friction.coulomb != 0.0 || friction.std != [None; 2] {
                 self.edits.insert(node.range().start, comment(&format!("dyngen: {}", errors(friction))));
             }
-            self.attribute(node, "damping", shortest(friction.viscous));
+            if let Some(viscous) = friction.viscous {
+                self.attribute(node, "damping", shortest(viscous));
+            }
             self.attribute(node, "frictionloss", shortest(friction.coulomb));
         }
         if let Some(armature) = held.armature {

@@ -33,7 +33,8 @@ pub fn urdf(
     options: &Options,
 ) -> Result<Exported, ImportError> {
     let refused = |reasons| ImportError::refused(file, reasons);
-    let robot = read(text).map_err(|e| ImportError::Unreadable(format!("{file}: not a URDF: {e}")))?;
+    let robot =
+        read(text).map_err(|e| ImportError::Unreadable(format!("{file}: cannot be read as a URDF: {e}")))?;
     let options = share::options(&robot, arm, options);
     let chain = chain::chain(&robot, &options).map_err(refused)?;
     let shares = share::shares(arm, &chain, &robot, known, &|_| true).map_err(|e| refused(vec![e]))?;
@@ -140,7 +141,9 @@ impl<'t, 'd> Writer<'t, 'd> {
     fn joint(&mut self, name: &str, joint: &Joint, friction: Option<Friction>) {
         let Some(node) = self.element("joint", name) else { return };
         if let Some(friction) = friction {
-            let values = [("damping", friction.viscous), ("friction", friction.coulomb)];
+            let damping = friction.viscous.map(|viscous| ("damping", viscous));
+            let values: Vec<(&str, f64)> =
+                damping.into_iter().chain([("friction", friction.coulomb)]).collect();
             let error = |k: usize| friction.std[k].map_or("unknown".to_string(), |s| format!("{s:.3e}"));
             let words = format!("dyngen: standard errors: damping {}, friction {}", error(0), error(1));
             self.attributes(node, "dynamics", &values, Some(words));

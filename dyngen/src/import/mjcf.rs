@@ -63,11 +63,21 @@ struct Compiler {
     no_auto_limits: bool,
     /// Of shapes whose mass counts.
     groups: [f64; 2],
+    /// Whether bodies have the inertia of their shapes, whatever `<inertial>` says.
+    of_shapes: bool,
+    /// That of all bodies together, where it is asked for, kg.
+    total_mass: Option<f64>,
 }
 
 impl Default for Compiler {
     fn default() -> Self {
-        Compiler { angles: Angles::default(), no_auto_limits: false, groups: GROUPS }
+        Compiler {
+            angles: Angles::default(),
+            no_auto_limits: false,
+            groups: GROUPS,
+            of_shapes: false,
+            total_mass: None,
+        }
     }
 }
 
@@ -143,8 +153,22 @@ impl<'d, 'i> Reader<'d, 'i> {
         for node in sections("worldbody") {
             self.children(node, WORLD, &Pose::identity(), "main");
         }
+        self.scale_masses();
         for node in sections("equality").flat_map(elements) {
             self.equality(node);
+        }
+    }
+
+    /// Gives all bodies together the mass that the compiler asks for.
+    fn scale_masses(&mut self) {
+        let total: f64 = self.robot.links.iter().map(|link| link.mass).sum();
+        let Some(factor) = self.compiler.total_mass.map(|mass| mass / total).filter(|f| f.is_finite()) else {
+            return;
+        };
+        self.robot.notes.push(format!("settotalmass: masses and inertias are multiplied by {factor:.6}"));
+        for link in &mut self.robot.links {
+            link.mass *= factor;
+            link.inertia.iter_mut().for_each(|x| *x *= factor);
         }
     }
 
@@ -190,14 +214,15 @@ impl<'d, 'i> Reader<'d, 'i> {
             }
         }
         self.compiler.no_auto_limits |= node.attribute("autolimits") == Some("false");
-        for key in ["settotalmass", "boundmass", "boundinertia"] {
+        if let Some([mass]) = self.numbers::<1>(node, "settotalmass") {
+            self.compiler.total_mass = Some(mass).filter(|mass| *mass > 0.0);
+        }
+        for key in ["boundmass", "boundinertia"] {
             if node.attribute(key).and_then(|x| x.trim().parse::<f64>().ok()).is_some_and(|x| x > 0.0) {
                 self.error(node, format!("compiler: {key} changes masses: save the compiled model first"));
             }
         }
-        if node.attribute("inertiafromgeom") == Some("true") {
-            self.error(node, "compiler: inertiafromgeom sets inertials aside: save the compiled model first");
-        }
+        self.compiler.of_shapes |= node.attribute("inertiafromgeom") == Some("true");
         if let Some(groups) = self.numbers::<2>(node, "inertiagrouprange") {
             self.compiler.groups = groups;
         }
@@ -416,7 +441,8 @@ impl<'d, 'i> Reader<'d, 'i> {
     }
 
     fn inertial(&mut self, node: Node<'d, 'i>, name: &str, line: u32, class: &str) -> Link {
-        let Some(inertial) = elements(node).find(|n| n.has_tag_name("inertial")) else {
+        let given = elements(node).find(|n| n.has_tag_name("inertial")).filter(|_| !self.compiler.of_shapes);
+        let Some(inertial) = given else {
             return self.of_shapes(node, name, line, class);
         };
         let pose = self.pose(inertial);

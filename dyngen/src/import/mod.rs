@@ -164,7 +164,8 @@ fn read_as(
 }
 
 fn unreadable(what: &str, file: &str, reasons: &str) -> ImportError {
-    let lines: Vec<String> = reasons.lines().map(|line| format!("{file}: not {what}: {line}")).collect();
+    let lines: Vec<String> =
+        reasons.lines().map(|line| format!("{file}: cannot be read as {what}: {line}")).collect();
     ImportError::Unreadable(lines.join("\n"))
 }
 
