@@ -76,7 +76,7 @@ fn sum(terms: impl Iterator<Item = (f64, String)>) -> String {
     let terms = terms.filter(|(factor, _)| *factor != 0.0);
     let term = |(factor, name): (f64, String)| match factor {
         1.0 => name,
-        _ => format!("{name} * {}", number(factor)),
+        _ => format!("({name} * {})", number(factor)),
     };
     terms.map(term).collect::<Vec<_>>().join(" + ")
 }
@@ -123,7 +123,7 @@ fn friction(names: &Names, terms: usize, n: usize, coupled: Option<&[Vec<f64>]>)
     ];
     for i in 0..n {
         let of: String =
-            (0..terms).map(|k| format!(" + columns[{i}][{k}] * coefficients[{i}][{k}]")).collect();
+            (0..terms).map(|k| format!(" + (columns[{i}][{k}] * coefficients[{i}][{k}])")).collect();
         body.push(format!("const real {} = (real)0.0{of};", torque(i)));
     }
     for j in 0..n {

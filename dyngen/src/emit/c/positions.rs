@@ -81,10 +81,10 @@ fn angle(model: &Model, sum: JointSum) -> String {
             (_, false) => " + ",
             (_, true) => " - ",
         };
-        if let Some(ratio) = ratio {
-            text += &format!("{} * ", number(ratio));
-        }
-        text += &format!("q[{coordinate}]");
+        text += &match ratio {
+            Some(ratio) => format!("({} * q[{coordinate}])", number(ratio)),
+            None => format!("q[{coordinate}]"),
+        };
     }
     offset.map_or(text.clone(), |offset| format!("{text} + {}", number(offset)))
 }
