@@ -147,8 +147,10 @@ typedef double {prefix}_real;
 #ifdef __FAST_MATH__
 #error \"sums must be rounded as they are written: compile without -ffast-math\"
 #endif
+#ifdef FLT_EVAL_METHOD
 #if (FLT_EVAL_METHOD != 0) && (FLT_EVAL_METHOD != 16)
 #error \"numbers must be rounded to their own type: with 32-bit x86 compile with -msse2 -mfpmath=sse\"
+#endif
 #endif
 #ifdef __clang__
 #pragma STDC FP_CONTRACT OFF
