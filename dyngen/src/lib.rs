@@ -26,7 +26,7 @@ pub mod prove;
 mod values;
 
 pub use arm::Arm;
-pub use config::{Config, GenerateError};
+pub use config::{Config, GenerateError, Language};
 pub use diagnostic::{Diagnostic, Diagnostics};
 pub use dynamics::Function;
 pub use emit::FrictionTerm;

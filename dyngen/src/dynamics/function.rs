@@ -116,6 +116,17 @@ pub enum Size {
     Fixed(usize),
 }
 
+impl Size {
+    /// The length for n joints and p parameters.
+    pub fn length(self, n: usize, p: usize) -> usize {
+        match self {
+            Size::Joints => n,
+            Size::Parameters => p,
+            Size::Fixed(length) => length,
+        }
+    }
+}
+
 /// The arguments of a function, in the order in which it takes them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Argument {
@@ -187,12 +198,17 @@ impl Argument {
         }
     }
 
+    /// How many numbers it has.
+    pub fn size(self) -> Size {
+        match self {
+            Argument::Parameters => Size::Parameters,
+            _ => self.parts().map_or(Size::Joints, |parts| Size::Fixed(parts.len())),
+        }
+    }
+
     /// How many numbers it has for n joints and p parameters.
     pub fn length(self, n: usize, p: usize) -> usize {
-        match self {
-            Argument::Parameters => p,
-            _ => self.parts().map_or(n, <[&str]>::len),
-        }
+        self.size().length(n, p)
     }
 
     /// The names of its numbers where it has not one for each joint or parameter.
@@ -284,13 +300,8 @@ impl Function {
 
     /// Rows and columns of the result for n joints and p parameters.
     pub fn shape(self, n: usize, p: usize) -> (usize, usize) {
-        let length = |size: Size| match size {
-            Size::Joints => n,
-            Size::Parameters => p,
-            Size::Fixed(length) => length,
-        };
         let (rows, columns) = self.size();
-        (length(rows), length(columns))
+        (rows.length(n, p), columns.length(n, p))
     }
 
     /// What it takes.

@@ -7,6 +7,15 @@ use crate::parameters::{ParameterSet, SetKind};
 
 /// The comment at the head of the file.
 pub(super) fn head(model: &Model, options: &Options) -> String {
+    let needs = [
+        "Needs: nalgebra 0.35 (default-features = false and feature libm where there is no std).",
+        "Every function is proven equal to the Lagrangian of the arm; none allocates or panics.",
+    ];
+    head_lines(model, options, &needs).iter().map(|line| format!("// {line}\n")).collect()
+}
+
+/// The lines at the head of a file, among them what a language needs.
+pub(super) fn head_lines(model: &Model, options: &Options, needs: &[&str]) -> Vec<String> {
     let arm = model.arm();
     let mut lines = vec![
         format!(
@@ -20,11 +29,11 @@ pub(super) fn head(model: &Model, options: &Options) -> String {
             hash(&format!("{arm:?}")),
             options.parameters
         ),
-        "Needs: nalgebra 0.35 (default-features = false and feature libm where there is no std).".to_string(),
-        "Every function is proven equal to the Lagrangian of the arm; none allocates or panics.".to_string(),
     ];
+    lines.extend(needs.iter().map(|line| (*line).to_string()));
     lines.extend(arm.notes().into_iter().map(|note| format!("Note: {note}")));
-    lines.iter().map(|line| format!("// {line}\n")).collect()
+    // What a name brings of line breaks would end the comment.
+    lines.into_iter().map(|line| line.replace(char::is_control, " ")).collect()
 }
 
 /// FNV-1a, 64 bits: the same on every machine.
@@ -74,4 +83,21 @@ pub(super) fn function(built: &FunctionGraph) -> String {
          Operations: {} multiplications, {} additions{divisions}, {} sines with cosines.",
         operations.mul, operations.add, operations.sin_cos
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm::Arm;
+
+    #[test]
+    fn a_name_of_two_lines_stays_in_the_comment() {
+        let joint = "kind = \"revolute\", a = 1, alpha = 0, d = 0, theta = 0";
+        let text = format!(
+            "name = \"a\\nfn b\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\njoint = [{{ {joint} }}]"
+        );
+        let arm = Arm::parse(&text, "arm.toml");
+        let head = arm.map(|arm| head(&Model::kinematic(arm), &Options::default()));
+        assert!(head.is_ok_and(|head| head.contains("a fn b") && head.lines().all(|l| l.starts_with("//"))));
+    }
 }

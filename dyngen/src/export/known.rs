@@ -100,16 +100,16 @@ impl Known {
         let names = arm.joints.iter().enumerate();
         for ((i, joint), friction) in names.zip(self.friction.iter_mut().flatten()) {
             let Some(friction) = friction else { continue };
-            if let (Some(viscous), [Some(std), _]) = (friction.viscous, friction.std) {
-                if viscous <= std {
-                    friction.viscous = None;
-                    let name = joint.name.clone().map_or(format!("{}", i + 1), |name| format!("'{name}'"));
-                    said.push(format!(
-                        "joint {name}: its damping {viscous:.3e} is not larger than its standard error {std:.3e} and \
-                         is not written (--uncertain writes it)"
-                    ));
-                }
+            let (Some(viscous), [Some(std), _]) = (friction.viscous, friction.std) else { continue };
+            if viscous > std {
+                continue;
             }
+            friction.viscous = None;
+            let name = joint.name.as_ref().map_or(format!("{}", i + 1), |name| format!("'{name}'"));
+            said.push(format!(
+                "joint {name}: its damping {viscous:.3e} is not larger than its standard error {std:.3e} and \
+                 is not written (--uncertain writes it)"
+            ));
         }
         said
     }
