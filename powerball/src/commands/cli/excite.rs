@@ -71,7 +71,8 @@ pub(super) fn floor(text: &str) -> Result<FloorAt, String> {
     one file for each, path_1.csv, path_2.csv and so on, which determine the parameters together."
 )]
 pub(crate) struct Excite {
-    /// The arm file; every joint needs `position`, `velocity` and `acceleration` in it.
+    /// The arm file; every joint needs `position`, `velocity` and `acceleration` in it, or `torque` in place of
+    /// `acceleration` where --values gives the masses.
     #[arg(long)]
     arm: PathBuf,
     /// The parameter set whose regressor is to be well conditioned.

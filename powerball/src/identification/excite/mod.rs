@@ -2,6 +2,7 @@
 //! limits, off the floor and clear of the arm itself, for one mounting of the base or several. Eq. 17 to 20
 //! of the paper. [`excite`] is the whole way from an arm to trajectories.
 
+mod acceleration;
 mod constraints;
 mod fourier;
 mod load;
@@ -50,7 +51,11 @@ pub enum Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Error::Limits(e) => e.fmt(f),
+            Error::Limits(e) => write!(
+                f,
+                "{e}. The acceleration of a joint that has a `torque` limit can be taken from that: give the masses with \
+                 --values (`dyngen import` writes ARM.values.json)"
+            ),
             Error::Model(e) => e.fmt(f),
             Error::Setting(what) => f.write_str(what),
             Error::NoPose => f.write_str(

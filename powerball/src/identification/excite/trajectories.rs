@@ -1,5 +1,6 @@
 //! From an arm to exciting trajectories: what each mounting's path must keep, the search, and a last look.
 
+use super::acceleration;
 use super::{
     CLEARANCE, Conditions, Constraints, Error, Excitation, FloorAt, Limits, Load, Masses, Mounting,
     Objective, RADIUS, Settings, Shape, Task, Tightest, optimise_all, surroundings,
@@ -119,6 +120,8 @@ pub struct Excited {
 /// way to keep the constraints.
 pub fn excite(arm: &Arm, options: &ExciteOptions<'_>) -> Result<Excited, Error> {
     check(arm, options)?;
+    let (limited, proposed) = acceleration::proposed(arm, options.masses.as_ref())?;
+    let arm = &limited;
     options.progress.say("deriving and proving the arm's regressor");
     let mountings = match options.mountings.as_slice() {
         [] => vec![Mounting::Filed],
@@ -128,7 +131,7 @@ pub fn excite(arm: &Arm, options: &ExciteOptions<'_>) -> Result<Excited, Error> 
         Ok(Model::derive(mounting.of(arm).map_err(Error::Setting)?)?)
     };
     let models = mountings.iter().map(derive).collect::<Result<Vec<_>, _>>()?;
-    let mut assumed = Vec::new();
+    let mut assumed: Vec<String> = proposed.into_iter().collect();
     let tasks = tasks(arm, &models, &mountings, options, &mut assumed)?;
     options.progress.say("searching");
     let found = optimise_all(&tasks, options.parameters, &options.search)?;
