@@ -870,16 +870,28 @@ mod trigonometry {
             all(angles(q))
         }
     }
-    /// The sine and cosine of one angle, in `f64` of one up to [`LIMIT`], without a branch.
+    /// The sine and cosine of one angle up to [`limit`], without a branch.
     #[inline(always)]
     pub(super) fn near<T: SimdRealField + Copy>(angle: T) -> (T, T) {
         let element = TypeId::of::<T::Element>();
         if element == TypeId::of::<f64>() {
-            double(angle)
+            of_parts(angle, WHOLE, PARTS, SINE, COSINE)
         } else if element == TypeId::of::<f32>() {
-            single(angle)
+            of_parts(angle, WHOLE_SINGLE, PARTS_SINGLE, SINE_SINGLE, COSINE_SINGLE)
         } else {
             angle.simd_sin_cos()
+        }
+    }
+    /// The largest angle that [`near`] takes.
+    #[inline(always)]
+    pub(super) fn limit<T: SimdRealField + Copy>() -> T {
+        let element = TypeId::of::<T::Element>();
+        if element == TypeId::of::<f64>() {
+            convert(LIMIT)
+        } else if element == TypeId::of::<f32>() {
+            convert(LIMIT_SINGLE)
+        } else {
+            convert(f64::MAX)
         }
     }
     /// Sines or cosines. No vector of them crosses a line of the cache: what does cannot be read before it is
@@ -903,18 +915,14 @@ mod trigonometry {
         for i in N & !1..N {
             (sines[i], cosines[i]) = near(angles[i]);
         }
-        if TypeId::of::<T::Element>() == TypeId::of::<f64>() {
-            let size = angles
-                .iter()
-                .fold(T::zero(), |sum, angle| sum + angle.simd_abs());
-            if !size.simd_le(convert(LIMIT)).all() {
-                for i in 0..N {
-                    let far = angles[i].simd_abs().simd_gt(convert(LIMIT));
-                    if far.any() {
-                        let (sine, cosine) = angles[i].simd_sin_cos();
-                        sines[i] = sine.select(far, sines[i]);
-                        cosines[i] = cosine.select(far, cosines[i]);
-                    }
+        let size = angles.iter().fold(T::zero(), |sum, angle| sum + angle.simd_abs());
+        if !size.simd_le(limit()).all() {
+            for i in 0..N {
+                let beyond = angles[i].simd_abs().simd_gt(limit());
+                if beyond.any() {
+                    let (sine, cosine) = far(angles[i]);
+                    sines[i] = sine.select(beyond, sines[i]);
+                    cosines[i] = cosine.select(beyond, cosines[i]);
                 }
             }
         }
@@ -922,15 +930,25 @@ mod trigonometry {
     }
     /// Up to here a double's quarter turns fit in the 16 bits that [`PARTS`] leave to them.
     const LIMIT: f64 = 1e5;
+    /// Up to here a single's quarter turns fit in the 9 bits that [`PARTS_SINGLE`] leave to them.
+    const LIMIT_SINGLE: f64 = 800.0;
     /// π/2 = 37 + 37 + 53 bits: products of the first two with 16 bits are exact (Cody and Waite).
     const PARTS: [f64; 3] = [
         1.5707963267923333,
         2.5633441515839558e-12,
         1.0562999066987428e-23,
     ];
+    /// π/2 = 15 + 15 + 24 bits.
+    const PARTS_SINGLE: [f64; 3] = [
+        1.57080078125,
+        -4.4545158743858337402e-6,
+        6.0771006282767103812e-11,
+    ];
     /// Added and taken away again, 3·2⁵¹ leaves a double's nearest whole number, and 3·2⁵³ its nearest multiple
     /// of four.
     const WHOLE: f64 = 6_755_399_441_055_744.0;
+    /// 3·2²² and 3·2²⁴ do so in single precision.
+    const WHOLE_SINGLE: f64 = 12_582_912.0;
     /// Coefficients of sin r = r + r³·(…) and cos r = 1 − r²/2 + r⁴·(…) for |r| ≤ π/4 in double precision (Sun's
     /// fdlibm).
     const SINE: [f64; 6] = [
@@ -961,27 +979,35 @@ mod trigonometry {
         -0.0013888300163671374,
         2.4547436623834074e-05,
     ];
-    /// In double precision, up to [`LIMIT`].
+    /// Without a branch, by π/2 in three parts.
     #[inline(always)]
-    fn double<T: SimdRealField + Copy>(angle: T) -> (T, T) {
-        let whole: T = convert(WHOLE);
-        let [first, second, third] = PARTS.map(convert::<f64, T>);
+    fn of_parts<T: SimdRealField + Copy, const K: usize, const M: usize>(
+        angle: T,
+        whole: f64,
+        parts: [f64; 3],
+        sines: [f64; K],
+        cosines: [f64; M],
+    ) -> (T, T) {
+        let (whole, fours): (T, T) = (convert(whole), convert(4.0 * whole));
+        let [first, second, third] = parts.map(convert::<f64, T>);
         let turns = angle * convert(core::f64::consts::FRAC_2_PI) + whole - whole;
         let near = angle - turns * first;
         let part = turns * second;
         let r = near - part;
         let tail = near - r - part - turns * third;
-        let fours: T = convert(4.0 * WHOLE);
         let turns = turns - (turns + fours - fours);
         turned(
             turns,
-            sine(r, tail, SINE.map(convert)),
-            cosine(r, tail, COSINE.map(convert)),
+            sine(r, tail, sines.map(convert)),
+            cosine(r, tail, cosines.map(convert)),
         )
     }
-    /// In single precision.
+    /// Beyond the limit: the scalar's own functions in double precision, integers in single precision.
     #[inline(always)]
-    fn single<T: SimdRealField + Copy>(angle: T) -> (T, T) {
+    fn far<T: SimdRealField + Copy>(angle: T) -> (T, T) {
+        if TypeId::of::<T::Element>() != TypeId::of::<f32>() {
+            return angle.simd_sin_cos();
+        }
         let part = |which: usize| {
             angle
                 .map_lanes(|mut x| {
@@ -1055,14 +1081,14 @@ mod trigonometry {
         0, 0xa2f9_836e, 0x4e44_1529, 0xfc27_57d1, 0xf534_ddc0, 0xdb62_9599, 0x3c43_9041,
         0xfe51_63ab,
     ];
-    /// Quarter turns, −2 … 1, and what is left of an angle in two parts, by integers: exact for every `f32`
+    /// Quarter turns, −2 … 1, and what is left of an angle from π/4 on in two parts, by integers: exact for every `f32`
     /// (Payne and Hanek).
     #[inline(always)]
     fn reduced(angle: f32) -> [f32; 3] {
         let bits = angle.to_bits();
         let size = bits & 0x7fff_ffff;
         if !(0x3f49_0fdb..0x7f80_0000).contains(&size) {
-            return [0.0, if size < 0x3f49_0fdb { angle } else { f32::NAN }, 0.0];
+            return [0.0, f32::NAN, 0.0];
         }
         let mantissa = u64::from((bits & 0x007f_ffff) | 0x0080_0000);
         let exponent = size >> 23;

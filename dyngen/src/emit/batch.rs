@@ -13,14 +13,14 @@ use quote::{format_ident, quote};
 pub(super) fn module(model: &Model, functions: &[FunctionGraph]) -> TokenStream {
     let items: Vec<TokenStream> = functions.iter().map(|built| function(model, built)).collect();
     let has_angles = functions.iter().any(|built| !TrigOfLane::new(model, built).turning.is_empty());
-    // With joints that turn faster than what they follow the angles are larger than q.
-    let limit = Literal::f64_unsuffixed(6000.0 / model.angles().fastest());
+    // Sums of a few of them, with joints that turn faster than what they follow, are larger than q.
+    let share = Literal::f64_unsuffixed(0.06 / model.angles().fastest());
     let are_near = has_angles.then(|| {
         quote! {
             /// Whether sums of a few of these angles are right without a branch.
             #[inline(always)]
             fn are_near<T: SimdRealField + Copy>(angles: &[T]) -> bool {
-                let limit = nalgebra::convert(#limit);
+                let limit = trigonometry::limit::<T>() * nalgebra::convert(#share);
                 // No early end: that would be a branch for each angle.
                 angles
                     .iter()

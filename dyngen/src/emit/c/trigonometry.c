@@ -51,9 +51,9 @@ static uint32_t leading_zeros(uint64_t number)
     return zeros;
 }
 
-/* Quarter turns, -2 ... 1, and what is left of an angle in two parts, by integers: exact for every float (Payne and
- * Hanek). */
-static void reduce(real angle, real *turns, real *r, real *tail)
+/* Quarter turns, -2 ... 1, and what is left of an angle from pi/4 on in two parts, by integers: exact for every float
+ * (Payne and Hanek). */
+static void reduce_by_integers(real angle, real *turns, real *r, real *tail)
 {
     float_bits given;
     uint32_t size;
@@ -90,6 +90,25 @@ static void reduce(real angle, real *turns, real *r, real *tail)
         *turns = ((real)turned - 1.0F) * way;
         *r = (real)(uint32_t)(rest >> 40U) * unit.number * side;
         *tail = (real)(uint32_t)((rest >> 8U) & 0xffffffffU) * (unit.number * 2.3283064e-10F) * side;
+    }
+}
+
+/* Quarter turns, -2 ... 2, and what is left of an angle in two parts: up to 800 products with the first two parts of pi/2
+ * are exact (Cody and Waite). */
+static void reduce(real angle, real *turns, real *r, real *tail)
+{
+    if (fabsf(angle) <= 800.0F) {
+        /* Added and taken away again, they leave the nearest whole number, and the nearest multiple of four. */
+        const real whole = 12582912.0F;
+        const real fours = 50331648.0F;
+        const real quarters = ((angle * 0.63661977236758134308F) + whole) - whole;
+        const real near = angle - (quarters * 1.57080078125F);
+        const real part = quarters * -4.4545158743858337402e-6F;
+        *r = near - part;
+        *tail = ((near - *r) - part) - (quarters * 6.0771006282767103812e-11F);
+        *turns = quarters - ((quarters + fours) - fours);
+    } else {
+        reduce_by_integers(angle, turns, r, tail);
     }
 }
 
