@@ -9,7 +9,6 @@ mod support;
 
 use dyngen::{Model, SetKind, Values};
 use nalgebra::{SMatrix, SVector};
-use powerball::logs::batch::{self, Work};
 use powerball_workspace::arm as arm_file;
 use powerball_workspace::generated::lwa4p_rotorless_minimal as arm;
 use rand::{RngExt, SeedableRng};
@@ -24,16 +23,9 @@ use support::with_nalgebra;
 const FILE: &str = "tests/arms/lwa4p_rotorless.toml";
 const STATES: usize = 256;
 const ROUNDS: usize = 3000;
-/// Samples that a vector holds at most, in a batch.
-const LANES: usize = 8;
 
 type Joints = SVector<f64, 6>;
 type Parameters = SVector<f64, { arm::PARAMETERS }>;
-type Block<T> = [[T; LANES]; arm::JOINTS];
-
-/// Where a line of the cache begins, as the module `batch` asks for.
-#[repr(align(64))]
-struct Aligned<T>(T);
 
 /// The virtual arm's links without rotors: for the functions by hand, and as the minimal set.
 fn links() -> ([Link; 6], Parameters) {
@@ -162,103 +154,6 @@ fn times(links: &[Link; 6], parameters: &Parameters, states: &[[Joints; 3]]) {
     support::publish("dynamics", &table);
 }
 
-/// A function over a block: motion, parameters, result.
-trait Kernel {
-    type Out: Copy;
-    const NOTHING: Self::Out;
-    fn block(motion: &[Block<f64>; 3], parameters: &Parameters, out: &mut Self::Out);
-}
-
-struct Torque;
-impl Kernel for Torque {
-    type Out = Block<f64>;
-    const NOTHING: Block<f64> = [[0.0; LANES]; 6];
-    #[inline(always)]
-    fn block([q, dq, ddq]: &[Block<f64>; 3], p: &Parameters, out: &mut Block<f64>) {
-        arm::batch::inverse_dynamics(q, dq, ddq, p, out);
-    }
-}
-
-struct Regressor;
-impl Kernel for Regressor {
-    type Out = [Block<f64>; arm::PARAMETERS];
-    const NOTHING: Self::Out = [[[0.0; LANES]; 6]; arm::PARAMETERS];
-    #[inline(always)]
-    fn block([q, dq, ddq]: &[Block<f64>; 3], _: &Parameters, out: &mut Self::Out) {
-        arm::batch::regressor(q, dq, ddq, out);
-    }
-}
-
-/// A kernel over all blocks, whose results stay in the cache, as one who sums them up has it.
-struct All<'a, K: Kernel> {
-    blocks: &'a [[Block<f64>; 3]],
-    parameters: &'a Parameters,
-    out: &'a mut K::Out,
-}
-
-impl<K: Kernel> Work for All<'_, K> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        for block in self.blocks {
-            K::block(block, self.parameters, self.out);
-            black_box(&mut *self.out);
-        }
-    }
-}
-
-fn batches(parameters: &Parameters, states: &[[Joints; 3]]) {
-    let (blocks, _) = states.as_chunks::<LANES>();
-    let lane = |k: usize, block: &[[Joints; 3]; LANES]| -> Block<f64> {
-        std::array::from_fn(|i| std::array::from_fn(|lane| block[lane][k][i]))
-    };
-    let blocks: Vec<[Block<f64>; 3]> = blocks.iter().map(|b| std::array::from_fn(|k| lane(k, b))).collect();
-    let (mut torque, mut torque_any) = (Aligned(Torque::NOTHING), Aligned(Torque::NOTHING));
-    let (mut regressor, mut regressor_any) = (Aligned(Regressor::NOTHING), Aligned(Regressor::NOTHING));
-    let best = support::paired(
-        ROUNDS,
-        [
-            &mut || {
-                states.iter().for_each(|[q, dq, ddq]| {
-                    black_box(arm::inverse_dynamics(q, dq, ddq, parameters));
-                })
-            },
-            &mut || All::<Torque> { blocks: &blocks, parameters, out: &mut torque_any.0 }.run(),
-            &mut || batch::run(All::<Torque> { blocks: &blocks, parameters, out: &mut torque.0 }),
-            &mut || {
-                states.iter().for_each(|[q, dq, ddq]| {
-                    black_box(arm::regressor(q, dq, ddq));
-                })
-            },
-            &mut || All::<Regressor> { blocks: &blocks, parameters, out: &mut regressor_any.0 }.run(),
-            &mut || batch::run(All::<Regressor> { blocks: &blocks, parameters, out: &mut regressor.0 }),
-        ],
-    );
-    let best = best.map(|time| time.as_secs_f64() * 1e9 / states.len() as f64);
-    let mut table =
-        "| a sample | one at a time, ns | blocks of 8, any x86-64 | blocks of 8, dispatched | throughput |\n\
-                     |---|---|---|---|---|\n"
-            .to_string();
-    for (what, [one, any, run]) in ["**τ**", "**Y**, 6 × 19"].iter().zip(best.as_chunks::<3>().0) {
-        let _ = writeln!(table, "| {what} | {one:.1} | {any:.1} | {run:.1} | {:.1} × |", one / run);
-    }
-    let _ = writeln!(table, "\nThis run's processor: {}.", vectors());
-    support::publish("batches", &table);
-}
-
-/// What the dispatch found, in words.
-fn vectors() -> &'static str {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if std::is_x86_feature_detected!("avx512f") {
-            return "AVX-512";
-        } else if std::is_x86_feature_detected!("avx2") {
-            return "AVX2";
-        }
-    }
-    "no wider vectors"
-}
-
 /// Single against double precision at the arm's own parameters.
 fn precision(parameters: &Parameters, states: &[[Joints; 3]]) {
     let single = parameters.map(|x| x as f32);
@@ -308,6 +203,5 @@ fn precision(parameters: &Parameters, states: &[[Joints; 3]]) {
 fn main() {
     let (links, parameters) = links();
     times(&links, &parameters, &states(STATES));
-    batches(&parameters, &states(STATES));
     precision(&parameters, &states(100_000));
 }
