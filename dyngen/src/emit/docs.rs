@@ -17,7 +17,7 @@ pub(super) fn head(model: &Model, options: &Options) -> String {
         "generate again.".to_string(),
         format!(
             "Arm: {:016x} (hash of its description). Parameter set: {}.",
-            hash(&format!("{arm:?}")),
+            arm.hash(),
             options.parameters
         ),
         "Needs: nalgebra 0.35 (default-features = false and feature libm where there is no std).".to_string(),
@@ -25,11 +25,6 @@ pub(super) fn head(model: &Model, options: &Options) -> String {
     ];
     lines.extend(arm.notes().into_iter().map(|note| format!("Note: {note}")));
     lines.iter().map(|line| format!("// {line}\n")).collect()
-}
-
-/// FNV-1a, 64 bits: the same on every machine.
-fn hash(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// One doc attribute a line.

@@ -1,0 +1,96 @@
+//! `dyngen verify`.
+
+use super::{Failure, Progress, arm, print};
+use dyngen::Values;
+use dyngen::verify::{Difference, Error, Report, Verifier};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+#[derive(clap::Args)]
+#[command(after_help = "Example: dyngen generate arm.toml -o arm.rs && dyngen verify arm.rs arm.toml")]
+pub(super) struct Args {
+    /// The generated file.
+    file: PathBuf,
+    /// The arm file that it was generated from.
+    arm: PathBuf,
+    /// The values that must be baked into the file: a JSON file {"parameter": number, …}. Without it those that the
+    /// file itself names are taken.
+    #[arg(long, value_name = "FILE.json")]
+    values: Option<PathBuf>,
+    /// One JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
+    let file = args.file.display();
+    let text = std::fs::read_to_string(&args.file)
+        .map_err(|e| Failure::input(format!("{file}: cannot be read: {e}")))?;
+    let failure = |e: Error| match e {
+        Error::Unreadable(e) => Failure::input(format!("{file}:{e}")),
+        e => Failure::refused(format!("{file}, {}: {e}", args.arm.display())),
+    };
+    let arm = arm(&args.arm)?;
+    let progress = Progress::new(&arm);
+    progress.say("deriving, reading and proving");
+    let verifier = Verifier::new(arm, &text).map_err(failure)?;
+    if let Some(path) = &args.values {
+        check_values(&verifier, path)?;
+    }
+    let report = verifier.verify(&text, None).map_err(failure)?;
+    drop(progress);
+    let told = match args.json {
+        true => in_json(args, &report),
+        false => in_words(args, &report),
+    };
+    print(&told)?;
+    Ok(if report.difference.is_none() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// Whether the file's values are those of the JSON file.
+fn check_values(verifier: &Verifier, path: &PathBuf) -> Result<(), Failure> {
+    let set = verifier.model().set(verifier.set()).map_err(Failure::refused)?;
+    let values = Values::read(path).and_then(|v| v.of_set(verifier.model(), set)).map_err(Failure::input)?;
+    match verifier.values() {
+        None => Err(Failure::refused(format!("{}: no values are baked into the file", path.display()))),
+        Some(found) => match found.iter().zip(&values).position(|(a, b)| a != b) {
+            Some(k) => Err(Failure::refused(format!(
+                "{}: {} is {}, and {} is baked into the file",
+                path.display(),
+                set.names()[k],
+                values[k],
+                found[k]
+            ))),
+            None => Ok(()),
+        },
+    }
+}
+
+fn in_words(args: &Args, report: &Report) -> String {
+    let mut text: String = report.proven.iter().map(|name| format!("proven: {name}\n")).collect();
+    text += &report.not_checked.iter().map(|name| format!("not checked: {name}\n")).collect::<String>();
+    if let Some(Difference { function, entry, line, message }) = &report.difference {
+        let entry = entry.map_or(String::new(), |(i, j)| format!(" (row {}, column {})", i + 1, j + 1));
+        text += &format!("{}:{line}: {function}{entry} {message}\n", args.file.display());
+    }
+    text
+}
+
+fn in_json(args: &Args, report: &Report) -> String {
+    let difference = report.difference.as_ref().map(|d| {
+        serde_json::json!({
+            "function": d.function,
+            "entry": d.entry.map(|(i, j)| [i + 1, j + 1]),
+            "line": d.line,
+            "message": d.message,
+        })
+    });
+    let object = serde_json::json!({
+        "file": args.file,
+        "arm": args.arm,
+        "proven": report.proven,
+        "not_checked": report.not_checked,
+        "difference": difference,
+    });
+    format!("{object}\n")
+}
