@@ -3,7 +3,7 @@
 use crate::arm::Arm;
 use crate::diagnostic::Diagnostics;
 use crate::dynamics::Function;
-use crate::emit::{self, FrictionTerm, Options};
+use crate::emit::{self, CFiles, FrictionTerm, Options};
 use crate::model::{Error, Model};
 use crate::parameters::SetKind;
 use crate::values::Values;
@@ -22,7 +22,18 @@ use std::path::{Path, PathBuf};
 pub struct Config {
     arm: PathBuf,
     values: Option<PathBuf>,
+    language: Language,
     options: Options,
+}
+
+/// The language of generated code.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Language {
+    /// `no_std`, generic over the scalar.
+    #[default]
+    Rust,
+    /// C99, `double` or `float`: a source file and its header.
+    C,
 }
 
 /// Why nothing was generated.
@@ -32,6 +43,8 @@ pub enum GenerateError {
     Arm(Diagnostics),
     /// The arm's model is not to be had.
     Model(Error),
+    /// The language does not have what was asked for.
+    Language(String),
     /// A file could not be written, or the build script's environment is not there.
     Write(PathBuf, std::io::Error),
 }
@@ -41,6 +54,7 @@ impl fmt::Display for GenerateError {
         match self {
             GenerateError::Arm(e) => e.fmt(f),
             GenerateError::Model(e) => e.fmt(f),
+            GenerateError::Language(why) => f.write_str(why),
             GenerateError::Write(path, e) => write!(f, "{}: cannot be written: {e}", path.display()),
         }
     }
@@ -61,7 +75,14 @@ impl GenerateError {
 impl Config {
     /// Generation of the minimal set and every function from an arm file.
     pub fn new(arm: impl Into<PathBuf>) -> Self {
-        Config { arm: arm.into(), values: None, options: Options::default() }
+        Config { arm: arm.into(), values: None, language: Language::Rust, options: Options::default() }
+    }
+
+    /// Chooses the language.
+    #[must_use]
+    pub fn language(mut self, language: Language) -> Self {
+        self.language = language;
+        self
     }
 
     /// Chooses the parameter set.
@@ -106,11 +127,21 @@ impl Config {
         self
     }
 
-    /// The generated source text.
+    /// The generated source text; in C that of the `.c`, which includes the arm file's name with `.h`.
     ///
     /// # Errors
     /// Everything that is wrong with the arm file, or what could not be proven.
     pub fn source(&self) -> Result<String, GenerateError> {
+        let texts = self.texts(&self.arm.with_extension("c"))?;
+        Ok(texts.into_iter().next().map(|(_, text)| text).unwrap_or_default())
+    }
+
+    /// The files that [`Config::write`] writes, with their texts: `file`, and in C the header of the same name.
+    ///
+    /// # Errors
+    /// As [`Config::source`].
+    pub fn texts(&self, file: &Path) -> Result<Vec<(PathBuf, String)>, GenerateError> {
+        let files = self.files(file)?;
         let arm = Arm::read(&self.arm).map_err(GenerateError::Arm)?;
         let mut options = self.options.clone();
         let model = match self.values {
@@ -123,18 +154,48 @@ impl Config {
             let values = Values::read(file).and_then(|v| v.of_set(&model, set));
             options.values = Some(values.map_err(GenerateError::Arm)?);
         }
-        emit::source(&model, &options).map_err(GenerateError::Model)
+        let texts = match files.get(1).and_then(|header| header.file_name()) {
+            None => emit::source(&model, &options).map(|source| vec![source]),
+            Some(header) => emit::c_files(&model, &options, &header.to_string_lossy())
+                .map(|CFiles { header, source }| vec![source, header]),
+        };
+        Ok(files.into_iter().zip(texts.map_err(GenerateError::Model)?).collect())
     }
 
-    /// Writes the generated file; a file that is there already is replaced as a whole or not at all.
+    /// `file`, and in C its header.
     ///
     /// # Errors
-    /// As [`Config::source`], and where the file cannot be written.
+    /// What the language does not have.
+    pub fn files(&self, file: &Path) -> Result<Vec<PathBuf>, GenerateError> {
+        if self.language == Language::Rust {
+            return Ok(vec![file.to_path_buf()]);
+        }
+        let only_rust =
+            |what: &str| Err(GenerateError::Language(format!("{what}: only in Rust; leave it out for C")));
+        match file.extension() {
+            _ if self.options.batch => only_rust("batch (functions over blocks of samples)"),
+            _ if self.options.tests => only_rust("tests (the arm's own consistency tests)"),
+            Some(extension) if extension == "c" => Ok(vec![file.to_path_buf(), file.with_extension("h")]),
+            _ => Err(GenerateError::Language(format!(
+                "{}: a file in C ends in .c, and its header, written next to it, in .h",
+                file.display()
+            ))),
+        }
+    }
+
+    /// Writes the generated file, in C with its header; a file that is there already is replaced as a whole or not at
+    /// all.
+    ///
+    /// # Errors
+    /// As [`Config::source`], and where a file cannot be written.
     pub fn write(&self, file: &Path) -> Result<(), GenerateError> {
-        let source = self.source()?;
-        let partial = file.with_extension("rs.partial");
-        let written = std::fs::write(&partial, source).and_then(|()| std::fs::rename(&partial, file));
-        written.map_err(|e| GenerateError::Write(file.to_path_buf(), e))
+        for (file, text) in self.texts(file)? {
+            let mut partial = file.clone().into_os_string();
+            partial.push(".partial");
+            let written = std::fs::write(&partial, text).and_then(|()| std::fs::rename(&partial, &file));
+            written.map_err(|e| GenerateError::Write(file, e))?;
+        }
+        Ok(())
     }
 
     /// From a build script: writes `name` into `OUT_DIR` and tells cargo when to run again.

@@ -27,7 +27,7 @@ mod values;
 pub mod verify;
 
 pub use arm::Arm;
-pub use config::{Config, GenerateError};
+pub use config::{Config, GenerateError, Language};
 pub use diagnostic::{Diagnostic, Diagnostics};
 pub use dynamics::Function;
 pub use emit::FrictionTerm;

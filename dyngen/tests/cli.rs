@@ -111,6 +111,33 @@ fn generate_writes_the_same_bytes_twice_and_notices_a_stale_file() {
 }
 
 #[test]
+fn generate_in_c_writes_a_header_too_and_says_what_c_does_not_have() {
+    let (source, header) = (file("inc.c", ""), file("inc.h", ""));
+    let generate = |more: &[&str]| {
+        let given = ["generate", &arm(), "--language", "c", "--functions", "gravity"];
+        dyngen(&[&given[..], more].concat())
+    };
+    assert!(generate(&["-o", &source]).status.success());
+    let declared = std::fs::read_to_string(&header).unwrap();
+    assert!(std::fs::read_to_string(&source).unwrap().contains("#include \"inc.h\""));
+    assert!(declared.contains("void powerball_lwa4p_gravity("), "{declared}");
+    assert!(generate(&["-o", &source, "--check"]).status.success());
+    std::fs::write(&header, declared.replace("gravity(", "weight(")).unwrap();
+    let stale = generate(&["-o", &source, "--check"]);
+    assert_eq!(stale.status.code(), Some(1));
+    assert!(text(&stale.stderr).contains("inc.h is stale"), "{}", text(&stale.stderr));
+    for (more, words) in [
+        (&["-o", &source, "--batch"][..], "batch"),
+        (&["-o", &source, "--tests"], "tests"),
+        (&["-o", "arm.rs"], "ends in .c"),
+    ] {
+        let refused = generate(more);
+        assert_eq!(refused.status.code(), Some(2), "{more:?}");
+        assert!(text(&refused.stderr).contains(words), "{}", text(&refused.stderr));
+    }
+}
+
+#[test]
 fn eval_gives_the_torque_of_the_regressor_and_takes_values_by_either_name() {
     let states = file(
         "states.csv",

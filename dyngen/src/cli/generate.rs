@@ -1,7 +1,7 @@
 //! `dyngen generate`.
 
 use super::{Failure, Progress, Set, same_file};
-use dyngen::{Arm, Config, FrictionTerm, Function, GenerateError};
+use dyngen::{Arm, Config, FrictionTerm, Function, GenerateError, Language};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -11,9 +11,12 @@ use std::process::ExitCode;
 pub(super) struct Args {
     /// The arm file.
     arm: PathBuf,
-    /// The file to write.
-    #[arg(short, long, value_name = "FILE.rs")]
+    /// The file to write; in C its header FILE.h is written next to it.
+    #[arg(short, long, value_name = "FILE.rs|FILE.c")]
     output: PathBuf,
+    /// The language: c is C99, double, or float with -DNAME_FLOAT.
+    #[arg(long, value_enum, default_value = "rust")]
+    language: In,
     /// The parameter set of every function.
     #[arg(long, value_enum, default_value = "minimal")]
     parameters: Set,
@@ -27,15 +30,22 @@ pub(super) struct Args {
     /// each joint, tanh:216:180:…).
     #[arg(long, value_delimiter = ',', value_name = "TERMS")]
     friction: Vec<FrictionTerm>,
-    /// Emit the module `batch` too: the functions over blocks of samples, for the processor's vectors.
+    /// Emit the module `batch` too: the functions over blocks of samples, for the processor's vectors (Rust).
     #[arg(long)]
     batch: bool,
-    /// Emit the arm's own consistency tests too.
+    /// Emit the arm's own consistency tests too (Rust).
     #[arg(long)]
     tests: bool,
-    /// Write nothing; fail where the file on disk is not what would be written.
+    /// Write nothing; fail where a file on disk is not what would be written.
     #[arg(long)]
     check: bool,
+}
+
+/// A language on the command line.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum In {
+    Rust,
+    C,
 }
 
 /// A function by its name.
@@ -47,6 +57,10 @@ pub(super) fn function(name: &str) -> Result<Function, String> {
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let mut config = Config::new(&args.arm)
         .parameters(args.parameters.into())
+        .language(match args.language {
+            In::Rust => Language::Rust,
+            In::C => Language::C,
+        })
         .friction(args.friction.clone())
         .batch(args.batch)
         .tests(args.tests);
@@ -60,8 +74,9 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         GenerateError::Model(_) => Failure::refused(e),
         _ => Failure::input(e),
     };
+    let files = config.files(&args.output).map_err(failure)?;
     for input in std::iter::once(&args.arm).chain(&args.values) {
-        if same_file(&args.output, input) {
+        if files.iter().any(|file| same_file(file, input)) {
             let file = input.display();
             return Err(Failure::input(format!("{file} is an input: choose another -o")));
         }
@@ -73,15 +88,16 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         config.write(&args.output).map_err(failure)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let expected = config.source().map_err(failure)?;
-    let file = args.output.display();
-    let actual = std::fs::read_to_string(&args.output)
-        .map_err(|e| Failure::input(format!("{file}: cannot be read: {e}")))?;
-    if actual == expected {
-        return Ok(ExitCode::SUCCESS);
+    for (file, expected) in config.texts(&args.output).map_err(failure)? {
+        let name = file.display();
+        let actual = std::fs::read_to_string(&file)
+            .map_err(|e| Failure::input(format!("{name}: cannot be read: {e}")))?;
+        if actual != expected {
+            return Err(Failure::refused(format!(
+                "{name} is stale: it is not what dyngen writes for {}; run the same command without --check",
+                args.arm.display()
+            )));
+        }
     }
-    Err(Failure::refused(format!(
-        "{file} is stale: it is not what dyngen writes for {}; run the same command without --check",
-        args.arm.display()
-    )))
+    Ok(ExitCode::SUCCESS)
 }

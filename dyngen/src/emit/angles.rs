@@ -46,7 +46,7 @@ pub(super) fn trig_struct(model: &Model) -> TokenStream {
 }
 
 /// Lines that say of which joints the angle is not q alone.
-fn shifted_docs(model: &Model) -> Vec<String> {
+pub(super) fn shifted_docs(model: &Model) -> Vec<String> {
     let joints = model.arm().coordinates().into_iter().enumerate();
     let offsets = joints.map(|(i, joint)| (i, model.angles().joint(joint).offset));
     offsets
@@ -56,7 +56,7 @@ fn shifted_docs(model: &Model) -> Vec<String> {
 }
 
 /// Lines that say what the angles behind those of the coordinates are.
-fn sum_docs(model: &Model) -> Vec<String> {
+pub(super) fn sum_docs(model: &Model) -> Vec<String> {
     let term = |joint: usize| {
         let JointAngle { coordinate, ratio, .. } = model.angles().joint(joint);
         ratio.map_or(String::new(), |ratio| format!("{ratio}·")) + &format!("q{}", coordinate + 1)
@@ -76,7 +76,7 @@ fn sum_docs(model: &Model) -> Vec<String> {
 }
 
 /// Everything that is made of q.
-fn all_inputs(model: &Model) -> BTreeSet<Input> {
+pub(super) fn all_inputs(model: &Model) -> BTreeSet<Input> {
     let turning = model.angles().taken().iter().flat_map(|sum| [Input::Sin(*sum), Input::Cos(*sum)]);
     let read = (0..model.arm().dof()).filter(|i| is_read(model, *i));
     turning.chain(read.map(Input::Position)).collect()
@@ -140,24 +140,41 @@ impl Positions {
     }
 }
 
+/// A term of an angle: ± ratio·q of a coordinate.
+pub(super) struct Term {
+    pub(super) negative: bool,
+    pub(super) ratio: Option<f64>,
+    pub(super) coordinate: usize,
+}
+
+/// An angle as a sum of terms, in the order in which they are added, and what is added behind them where it is not
+/// zero.
+pub(super) fn terms(angles: &Angles, sum: JointSum) -> (Vec<Term>, Option<f64>) {
+    let term = |(joint, negative)| {
+        let JointAngle { coordinate, ratio, .. } = *angles.joint(joint);
+        Term { negative, ratio, coordinate }
+    };
+    let offset = angles.offset(sum);
+    (sum.joints().map(term).collect(), (offset != 0.0).then_some(offset))
+}
+
 /// An angle for the coordinates' positions.
 fn angle(angles: &Angles, sum: JointSum, position: impl Fn(usize) -> TokenStream) -> TokenStream {
     let number = |x: f64| {
         let number = Literal::f64_suffixed(x);
         quote!(nalgebra::convert::<f64, T>(#number))
     };
-    let terms = sum.joints().enumerate().map(|(k, (joint, negative))| {
-        let JointAngle { coordinate, ratio, .. } = angles.joint(joint);
+    let (terms, offset) = terms(angles, sum);
+    let terms = terms.into_iter().enumerate().map(|(k, Term { negative, ratio, coordinate })| {
         let ratio = ratio.map(number).map(|ratio| quote!(#ratio *));
-        let q = position(*coordinate);
+        let q = position(coordinate);
         match (k, negative) {
             (0, _) => quote!(#ratio #q),
             (_, false) => quote!(+ #ratio #q),
             (_, true) => quote!(- #ratio #q),
         }
     });
-    let offset = angles.offset(sum);
-    let offset = (offset != 0.0).then(|| number(offset)).map(|offset| quote!(+ #offset));
+    let offset = offset.map(number).map(|offset| quote!(+ #offset));
     quote!(#(#terms)* #offset)
 }
 
@@ -184,9 +201,12 @@ fn angles_name(sums: impl Iterator<Item = JointSum>) -> Ident {
 }
 
 /// The functions that make of q the angles whose sines and cosines are taken together, each once.
-pub(super) fn angle_functions(model: &Model, functions: &[FunctionGraph]) -> TokenStream {
+pub(super) fn angle_functions<'a>(
+    model: &Model,
+    functions: impl Iterator<Item = &'a FunctionGraph>,
+) -> TokenStream {
     let position = |i: usize| lane_name(Argument::Positions, i).into_token_stream();
-    let used = functions.iter().map(|built| used(built, &built.graph.needed(&built.outputs)));
+    let used = functions.map(|built| used(built, &built.graph.needed(&built.outputs)));
     let sets: BTreeSet<Vec<JointSum>> = used
         .chain([all_inputs(model)])
         .map(|used| Positions::new(model, &used, position).angles.into_iter().map(|a| a.0).collect())

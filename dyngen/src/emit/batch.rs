@@ -2,7 +2,7 @@
 //! compiles for.
 
 use super::angles::TrigOfLane;
-use super::{code, docs, lanes};
+use super::{docs, lanes, statement};
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;
 use crate::model::Model;
@@ -148,7 +148,7 @@ fn one_by_one(
     let angles = trig.turning.iter().map(|i| lanes::lane_name(Argument::Positions, *i));
     let q = vector_of_lane(built, Argument::Positions);
     let call = call(built, arguments, &quote!(&Trig::new(&q)));
-    let (flat, value) = match (code::is_number(built), built.shape.1) {
+    let (flat, value) = match (statement::is_number(built), built.shape.1) {
         (true, _) => (quote!(core::iter::once(&mut *out)), quote!(core::iter::once(&result))),
         (_, 1) => (quote!(out.iter_mut()), quote!(result.iter())),
         _ => (quote!(out.iter_mut().flatten()), quote!(result.iter())),
@@ -193,7 +193,7 @@ impl Output {
         };
         let (outs, results) = (nested("out"), nested("x"));
         let (n, m) = (Literal::usize_unsuffixed(rows), Literal::usize_unsuffixed(columns));
-        let (shape, opened, result) = match (code::is_number(built), columns) {
+        let (shape, opened, result) = match (statement::is_number(built), columns) {
             (true, _) => (quote!([T; LANES]), quote!(let out1_1 = &mut *out;), quote!(let x1_1 = #call;)),
             (_, 1) => (
                 quote!([[T; LANES]; #n]),

@@ -1,11 +1,11 @@
 //! One function as tokens: straight-line code, one `let` for each node.
 
 use super::angles::{positions, trig_of, uses_positions};
+use super::docs;
 use super::lanes::used;
-use super::{docs, signs};
+use super::statement::{self, Value, input_of, is_number};
+use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::{Argument, Size};
-use crate::dynamics::{Function, FunctionGraph};
-use crate::exact::rational;
 use crate::graph::{Expr, Graph, Input, Node, Preparation, operands};
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
@@ -31,12 +31,7 @@ pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) ->
         true => (quote!(q), quote!(trig)),
         false => (quote!(_q), quote!(_trig)),
     };
-    // Where it pays, by measurement.
-    let signs = if built.function.size() == (Size::Joints, Size::Fixed(1)) {
-        signs::held(&built.graph, &built.outputs, &needed)
-    } else {
-        vec![false; built.graph.nodes().len()]
-    };
+    let signs = statement::signs_of(built, &needed);
     let statements = sections(model, &built.graph, &built.outputs, &needed, &signs);
     let (result, value) = result(built, &signs);
     // Where the result is a number, the last `let` is the result.
@@ -59,26 +54,6 @@ pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) ->
             #(#statements)*
             #value
         }
-    }
-}
-
-/// Whether the result is a number for every arm: where it is a vector, one joint makes it a vector of one.
-pub(super) fn is_number(built: &FunctionGraph) -> bool {
-    matches!(built.function, Function::KineticEnergy | Function::PotentialEnergy)
-}
-
-/// The inputs that an argument other than q brings.
-fn input_of(argument: Argument, i: usize) -> Input {
-    match argument {
-        Argument::Positions => Input::Position(i),
-        Argument::Velocities => Input::Velocity(i),
-        Argument::Accelerations => Input::Acceleration(i),
-        Argument::ReferenceVelocities => Input::ReferenceVelocity(i),
-        Argument::ReferenceAccelerations => Input::ReferenceAcceleration(i),
-        Argument::Torques => Input::Torque(i),
-        Argument::Errors => Input::Error(i),
-        Argument::Wrench => Input::Wrench(i),
-        Argument::Parameters => Input::Prepared(i),
     }
 }
 
@@ -234,56 +209,50 @@ fn sections(
     blocks
 }
 
-/// The `let` of a node; inputs are bound already. `signs` are those of [`signs::held`].
+/// The `let` of a node; inputs are bound already. `signs` are those of [`super::signs::held`].
 fn statement(model: &Model, graph: &Graph, node: usize, signs: &[bool]) -> Option<TokenStream> {
-    let name = format_ident!("x{node}");
-    let operand = |e: Expr| value_name(graph, e.node());
-    Some(match graph.nodes()[node] {
-        Node::Input(_) => return None,
-        Node::Constant(index) => {
-            let value = Literal::f64_suffixed(rational::to_f64(graph.constant(index)));
-            quote!(let #name: T = nalgebra::convert(#value);)
+    let name = value_name(graph, node);
+    let ident = |name: String| Ident::new(&name, Span::call_site());
+    let two = |x: String, y: String| (ident(x), ident(y));
+    Some(match statement::value(model, graph, node, signs)? {
+        Value::Number(x) => {
+            let x = Literal::f64_suffixed(x);
+            quote!(let #name: T = nalgebra::convert(#x);)
         }
-        Node::Symbol(index, sine) => {
-            let (s, c) = model.symbols().angles[index as usize].sin_cos();
-            let value = Literal::f64_suffixed(if sine { s } else { c });
-            quote!(let #name: T = nalgebra::convert(#value);)
+        Value::Sum(x, y) => {
+            let (x, y) = two(x, y);
+            quote!(let #name = #x + #y;)
         }
-        Node::Add(a, b) => {
-            let (x, y) = (operand(a), operand(b));
-            let [first, second] = [signs[a.node()], signs[b.node()] != b.is_negative()];
-            match (first != signs[node], second != signs[node]) {
-                (false, false) => quote!(let #name = #x + #y;),
-                (false, true) => quote!(let #name = #x - #y;),
-                (true, false) => quote!(let #name = #y - #x;),
-                (true, true) => quote!(let #name = -#x - #y;),
-            }
+        Value::Difference(x, y) => {
+            let (x, y) = two(x, y);
+            quote!(let #name = #x - #y;)
         }
-        Node::Mul(a, b) => {
-            let (x, y) = (operand(a), operand(b));
+        Value::NegativeSum(x, y) => {
+            let (x, y) = two(x, y);
+            quote!(let #name = -#x - #y;)
+        }
+        Value::Product(x, y) => {
+            let (x, y) = two(x, y);
             quote!(let #name = #x * #y;)
         }
-        Node::Div(a, b) => {
-            let (x, y) = (operand(a), operand(b));
+        Value::Quotient(x, y) => {
+            let (x, y) = two(x, y);
             quote!(let #name = #x / #y;)
         }
     })
 }
 
 fn value_name(graph: &Graph, node: usize) -> Ident {
-    match graph.nodes()[node] {
-        Node::Input(input) => format_ident!("{}", input.to_string()),
-        _ => format_ident!("x{node}"),
-    }
+    Ident::new(&statement::value_name(graph, node), Span::call_site())
 }
 
 /// The type of the result and the expression that makes it. nalgebra stores columns.
 fn result(built: &FunctionGraph, signs: &[bool]) -> (TokenStream, TokenStream) {
     let (rows, columns) = built.shape;
     let value = |i: usize, j: usize| {
-        let e = built.outputs[i * columns + j];
-        let name = value_name(&built.graph, e.node());
-        if e.is_negative() != signs[e.node()] { quote!(-#name) } else { quote!(#name) }
+        let (is_negative, name) = statement::result(built, signs, i * columns + j);
+        let name = Ident::new(&name, Span::call_site());
+        if is_negative { quote!(-#name) } else { quote!(#name) }
     };
     let columns_of: Vec<TokenStream> = (0..columns)
         .map(|j| {

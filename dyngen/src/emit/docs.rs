@@ -7,6 +7,15 @@ use crate::parameters::{ParameterSet, SetKind};
 
 /// The comment at the head of the file.
 pub(super) fn head(model: &Model, options: &Options) -> String {
+    let needs = [
+        "Needs: nalgebra 0.35 (default-features = false and feature libm where there is no std).",
+        "Every function is proven equal to the Lagrangian of the arm; none allocates or panics.",
+    ];
+    head_lines(model, options, &needs).iter().map(|line| format!("// {line}\n")).collect()
+}
+
+/// The lines at the head of a file, among them what a language needs.
+pub(super) fn head_lines(model: &Model, options: &Options, needs: &[&str]) -> Vec<String> {
     let arm = model.arm();
     let mut lines = vec![
         format!(
@@ -20,11 +29,10 @@ pub(super) fn head(model: &Model, options: &Options) -> String {
             arm.hash(),
             options.parameters
         ),
-        "Needs: nalgebra 0.35 (default-features = false and feature libm where there is no std).".to_string(),
-        "Every function is proven equal to the Lagrangian of the arm; none allocates or panics.".to_string(),
     ];
+    lines.extend(needs.iter().map(|line| (*line).to_string()));
     lines.extend(arm.notes().into_iter().map(|note| format!("Note: {note}")));
-    lines.iter().map(|line| format!("// {line}\n")).collect()
+    lines
 }
 
 /// One doc attribute a line.

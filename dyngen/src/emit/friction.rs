@@ -72,7 +72,7 @@ impl FromStr for FrictionTerm {
 
 /// How the motors of the joints that move on their own turn with the coordinates, n × n: the identity without
 /// transmissions.
-fn motor_velocities(arm: &Arm) -> Vec<Vec<f64>> {
+pub(super) fn motor_velocities(arm: &Arm) -> Vec<Vec<f64>> {
     let (matrix, drives) = (arm.motor_velocity_matrix(), arm.drives());
     let row = |motor: usize| {
         let mut row = vec![0.0; arm.dof()];
@@ -172,7 +172,7 @@ fn columns_function(terms: &[FrictionTerm], n: usize, coupled: Option<&[Vec<f64>
 }
 
 /// What the columns are, and how a regression takes them.
-fn columns_doc(terms: &[FrictionTerm], is_coupled: bool) -> String {
+pub(super) fn columns_doc(terms: &[FrictionTerm], is_coupled: bool) -> String {
     let (title, rows) = if is_coupled {
         (
             "Friction columns of every motor",
@@ -207,6 +207,11 @@ fn column(term: &FrictionTerm, velocities: &[Ident]) -> TokenStream {
     quote!([#(#entries),*])
 }
 
+/// What the function of the joints' friction torques is.
+pub(super) const FRICTION_DOC: &str = "Friction torques of all joints: each row of [`friction_columns`] times the same \
+     row of\ncoefficients.\n\n* `dq`: joint velocities, rad/s\n* `coefficients`: n × terms, N·m (N·m·s/rad where \
+     viscous)\n\nReturns the torques, N·m, that the drives spend on friction.";
+
 /// The function of the joints' friction torques, N·m; with coupled motors Mᵀ times theirs.
 fn friction_function(n: usize, coupled: Option<&[Vec<f64>]>) -> TokenStream {
     let of_motors = quote!(friction_columns(dq).component_mul(coefficients).column_sum());
@@ -218,14 +223,9 @@ fn friction_function(n: usize, coupled: Option<&[Vec<f64>]>) -> TokenStream {
             SVector::from_array_storage(ArrayStorage([[#(#of),*]]))
         }
     });
+    let doc = docs::lines(FRICTION_DOC);
     quote! {
-        /// Friction torques of all joints: each row of [`friction_columns`] times the same row of
-        /// coefficients.
-        ///
-        /// * `dq`: joint velocities, rad/s
-        /// * `coefficients`: n × terms, N·m (N·m·s/rad where viscous)
-        ///
-        /// Returns the torques, N·m, that the drives spend on friction.
+        #(#[doc = #doc])*
         #[must_use]
         pub fn friction<T: SimdRealField + Copy>(
             dq: &SVector<T, JOINTS>,

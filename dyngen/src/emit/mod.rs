@@ -4,16 +4,19 @@
 mod accuracy;
 mod angles;
 mod batch;
+mod c;
 pub mod c_api;
 mod code;
 mod docs;
 mod friction;
 mod lanes;
 mod signs;
+mod statement;
 mod tests;
 #[cfg(test)]
 mod trigonometry;
 
+pub use c::{CFiles, c_files};
 pub use friction::FrictionTerm;
 
 use crate::arm::{Arm, Frame};
@@ -88,30 +91,53 @@ pub fn source(model: &Model, options: &Options) -> Result<String, Error> {
     Ok(format!("{}\n{body}", docs::head(model, options)))
 }
 
+/// What a file holds, proven, before it is printed in a language.
+struct Parts<'a> {
+    set: &'a ParameterSet,
+    functions: Vec<FunctionGraph>,
+    /// Those at each frame.
+    frames: Vec<(String, Vec<FunctionGraph>)>,
+    /// What all of them need of the parameters alone.
+    preparation: Preparation,
+}
+
+impl<'a> Parts<'a> {
+    fn new(model: &'a Model, options: &Options) -> Result<Parts<'a>, Error> {
+        for term in &options.friction {
+            term.check(model.arm().dof()).map_err(Error::Friction)?;
+        }
+        let set = model.set(options.parameters)?;
+        let mut preparation = Preparation::default();
+        let functions = built(model, &options.functions, options, &mut preparation)?;
+        let frames = frames(model, options, &mut preparation)?;
+        Ok(Parts { set, functions, frames, preparation })
+    }
+
+    fn all(&self) -> impl Iterator<Item = &FunctionGraph> {
+        self.functions.iter().chain(self.frames.iter().flat_map(|(_, built)| built))
+    }
+
+    fn takes_parameters(&self) -> bool {
+        self.all().any(|f| f.arguments().any(|a| a == Argument::Parameters))
+    }
+}
+
 /// The items of a generated file.
 ///
 /// # Errors
 /// As [`Model::function`], and friction terms that do not fit the arm.
 pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
-    let set = model.set(options.parameters)?;
-    let mut preparation = Preparation::default();
-    let built = built(model, &options.functions, options, &mut preparation)?;
-    let frames = frames(model, options, &mut preparation)?;
-    let prepared = preparation.values().len();
-    let all: Vec<FunctionGraph> =
-        built.iter().chain(frames.iter().flat_map(|(_, built)| built)).cloned().collect();
-    let takes_parameters = all.iter().any(|f| f.arguments().any(|a| a == Argument::Parameters));
-    let functions = built.iter().map(|built| code::function(model, built, prepared));
-    let frames = frames.iter().map(|(frame, built)| frame_module(model, options, frame, built, prepared));
-    let batch = options.batch.then(|| batch::module(model, &built));
-    let preparation = takes_parameters.then(|| code::preparation(model, &preparation));
-    let constants = constants(model.arm(), set, options);
+    let parts = Parts::new(model, options)?;
+    let prepared = parts.preparation.values().len();
+    let functions = parts.functions.iter().map(|built| code::function(model, built, prepared));
+    let frames =
+        parts.frames.iter().map(|(frame, built)| frame_module(model, options, frame, built, prepared));
+    let batch = options.batch.then(|| batch::module(model, &parts.functions));
+    let preparation = parts.takes_parameters().then(|| code::preparation(model, &parts.preparation));
+    let constants = constants(model.arm(), parts.set, options);
     let trig = angles::trig_struct(model);
-    let angle_functions = angles::angle_functions(model, &all);
+    let angle_functions = angles::angle_functions(model, parts.all());
     let trigonometry = angles::trigonometry(model.arm());
-    for term in &options.friction {
-        term.check(model.arm().dof()).map_err(Error::Friction)?;
-    }
     let friction = friction::items(&options.friction, model.arm());
     let tests = if options.tests { tests::module(model, options)? } else { quote!() };
     Ok(allowed_unused(quote! {
