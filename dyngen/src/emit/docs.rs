@@ -5,13 +5,13 @@ use crate::dynamics::FunctionGraph;
 use crate::model::Model;
 use crate::parameters::{ParameterSet, SetKind};
 
-/// The comment at the head of the file.
-pub(super) fn head(model: &Model, options: &Options) -> String {
+/// The comment at the head of the file; `rounded` are the lines of its constants.
+pub(super) fn head(model: &Model, options: &Options, rounded: Vec<String>) -> String {
     let needs = [
         "Needs: nalgebra 0.35 (default-features = false and feature libm where there is no std).",
         "Every function is proven equal to the Lagrangian of the arm; none allocates or panics.",
     ];
-    head_lines(model, options, &needs).iter().map(|line| format!("// {line}\n")).collect()
+    head_lines(model, options, &needs).iter().chain(&rounded).map(|line| format!("// {line}\n")).collect()
 }
 
 /// The lines at the head of a file, among them what a language needs.
