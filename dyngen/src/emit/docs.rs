@@ -24,11 +24,7 @@ pub(super) fn head_lines(model: &Model, options: &Options, needs: &[&str]) -> Ve
             arm.name
         ),
         "generate again.".to_string(),
-        format!(
-            "Arm: {:016x} (hash of its description). Parameter set: {}.",
-            arm.hash(),
-            options.parameters
-        ),
+        format!("Arm: {:016x} (hash of its description). Parameter set: {}.", arm.hash(), options.parameters),
     ];
     lines.extend(needs.iter().map(|line| (*line).to_string()));
     lines.extend(arm.notes().into_iter().map(|note| format!("Note: {note}")));

@@ -6,9 +6,9 @@ use super::{Checked, Difference, Report, Source, Unreadable, rust};
 use crate::arm::{Arm, JointKind};
 use crate::dynamics::Function;
 use crate::dynamics::function::Argument;
+use crate::exact::angle::Angle;
 use crate::exact::prime::{Draws, Fp};
 use crate::exact::rational::Rational;
-use crate::exact::angle::Angle;
 use crate::lagrangian::elements::angle_symbols;
 use crate::model::{self, Model};
 use crate::parameters::{ParameterSet, SetKind};
@@ -92,13 +92,15 @@ impl Verifier {
         let kinematic = Function::ALL.iter().filter(|f| has(f)).all(|f| f.is_kinematic());
         let values = source.constants.get("PARAMETER_VALUES");
         // Values that are no numbers are what no file has.
-        let values = values.map(|(_, entries)| entries.iter().map(|x| x.parse().unwrap_or(f64::NAN)).collect());
+        let values =
+            values.map(|(_, entries)| entries.iter().map(|x| x.parse().unwrap_or(f64::NAN)).collect());
         let model = match kinematic && head.set == SetKind::Full && values.is_none() {
             true => Model::kinematic(arm),
             false => Model::derive(arm).map_err(Error::Model)?,
         };
         model.set(head.set).map_err(Error::Model)?;
-        let frames = model.arm().frames.iter().filter_map(|f| Some((f.name.clone(), model.at_frame(&f.name)?)));
+        let frames =
+            model.arm().frames.iter().filter_map(|f| Some((f.name.clone(), model.at_frame(&f.name)?)));
         Ok(Verifier { frames: frames.collect(), model, set: head.set, values, known: RefCell::default() })
     }
 
@@ -124,7 +126,9 @@ impl Verifier {
     pub fn verify(&self, text: &str, only: Option<&[Function]>) -> Result<Report, Error> {
         let source = read(text, self.model.arm())?;
         let set = self.model.set(self.set).map_err(Error::Model)?;
-        if let Some((module, line)) = source.modules.iter().find(|(m, _)| !self.frames.iter().any(|f| f.0 == *m)) {
+        if let Some((module, line)) =
+            source.modules.iter().find(|(m, _)| !self.frames.iter().any(|f| f.0 == *m))
+        {
             return Ok(super::wrong(*line, &format!("the arm has no frame {module}"))?);
         }
         let mut report = Report { not_checked: source.not_checked.clone(), ..Report::default() };
@@ -153,7 +157,8 @@ impl Verifier {
         ];
         let found = |name: &str| source.constants.get(name);
         let differs = right.into_iter().find(|(name, right)| found(name).map(|(_, x)| x) != right.as_ref());
-        let values = found("PARAMETER_VALUES").map(|(_, x)| x.iter().map(|x| x.parse().ok()).collect::<Vec<_>>());
+        let values =
+            found("PARAMETER_VALUES").map(|(_, x)| x.iter().map(|x| x.parse().ok()).collect::<Vec<_>>());
         let same = values == self.values.as_ref().map(|x| x.iter().copied().map(Some).collect());
         let name = differs.map(|(name, _)| name).or((!same).then_some("PARAMETER_VALUES"))?;
         Some(Difference {
@@ -213,7 +218,8 @@ impl Verifier {
                 let name = format!("{module}{function}");
                 let mut right = self.known.borrow().get(&(name.clone(), k)).cloned().unwrap_or_default();
                 if right.is_empty() {
-                    right = compared(function, |zero| Ok(expected(&place.points[zero], set, function))).unwrap_or_default();
+                    right = compared(function, |zero| Ok(expected(&place.points[zero], set, function)))
+                        .unwrap_or_default();
                     self.known.borrow_mut().insert((name.clone(), k), right.clone());
                 }
                 for with in [false, true] {
@@ -227,7 +233,8 @@ impl Verifier {
             }
         }
         if module.is_empty() {
-            let shared = ["Trig::new", "prepare"].into_iter().filter(|name| source.routines.contains_key(*name));
+            let shared =
+                ["Trig::new", "prepare"].into_iter().filter(|name| source.routines.contains_key(*name));
             proven.extend(shared.map(str::to_string));
         }
         for function in functions.into_iter().filter(wished) {
@@ -242,8 +249,9 @@ fn explained(mut difference: Difference, source: &Source) -> Difference {
     let end = source.routines.values().map(|r| r.line).filter(|line| *line > difference.line).min();
     let inside = |line: usize| end.is_none_or(|end| line < end);
     if let Some((line, digits)) = source.unexplained.iter().rev().find(|(line, _)| inside(*line)) {
-        difference.message +=
-            &format!("; the number {digits} in line {line} looks rounded, and no line 'Rounded' of the head explains it");
+        difference.message += &format!(
+            "; the number {digits} in line {line} looks rounded, and no line 'Rounded' of the head explains it"
+        );
     }
     difference
 }
@@ -285,7 +293,8 @@ impl Call<'_> {
             }
         };
         let name = |a: &Argument| if self.with && *a == Argument::Positions { "trig" } else { a.name() };
-        let named = routine.parameters.iter().map(|p| p.trim_start_matches('_')).eq(arguments.iter().map(name));
+        let named =
+            routine.parameters.iter().map(|p| p.trim_start_matches('_')).eq(arguments.iter().map(name));
         if !named {
             return Err(stop("takes other arguments than dyngen writes"));
         }
@@ -303,7 +312,9 @@ fn by_rows(value: &Value, rows: usize, columns: usize) -> Option<Vec<Fp>> {
         _ => None,
     };
     let number = |value: &Value| if let Value::Number(x) = value { Some(*x) } else { None };
-    if (rows, columns) == (1, 1) && let Some(x) = number(value) {
+    if (rows, columns) == (1, 1)
+        && let Some(x) = number(value)
+    {
         return Some(vec![x]);
     }
     let matrix = list(value, columns)?;
@@ -342,11 +353,12 @@ fn trig(world: &World<'_>, model: &Model, set: &ParameterSet, place: &Place<'_>)
         Some(Difference { function: "Trig::new".to_string(), entry: None, line, message })
     };
     let q = place.points[0].argument(set, Argument::Positions);
-    let found = match world.call(routine.line, "Trig::new", vec![Value::list(vec![Value::numbers(q.clone())])], 0) {
-        Ok(Value::Record(fields)) => fields,
-        Ok(_) => return difference(routine.line, "is no record".to_string()),
-        Err(Stop { line, message }) => return difference(line, message),
-    };
+    let found =
+        match world.call(routine.line, "Trig::new", vec![Value::list(vec![Value::numbers(q.clone())])], 0) {
+            Ok(Value::Record(fields)) => fields,
+            Ok(_) => return difference(routine.line, "is no record".to_string()),
+            Err(Stop { line, message }) => return difference(line, message),
+        };
     let entry = |field: &str, k: usize| match found.iter().find(|(name, _)| name == field) {
         Some((_, Value::List(values))) => values.get(k).cloned(),
         _ => None,

@@ -34,7 +34,8 @@ impl Head {
             return wrong(1, "no line '// Arm: …' at the head: dyngen did not write this file");
         };
         let (arm, rest) = rest.split_once(' ').unwrap_or((rest, ""));
-        let set = rest.split_once("Parameter set: ").and_then(|(_, set)| SetKind::parse(set.trim_end_matches('.')));
+        let set =
+            rest.split_once("Parameter set: ").and_then(|(_, set)| SetKind::parse(set.trim_end_matches('.')));
         match set {
             Some(set) => Ok(Head { arm: arm.to_string(), set }),
             None => wrong(line, "no parameter set is named here"),
@@ -60,7 +61,9 @@ impl Literals {
         let rounded = comments(text).filter_map(|(line, text)| Some((line, text.strip_prefix("Rounded: ")?)));
         let meaning = |(line, text): (usize, &str)| {
             let parts = text.split_once(" is ").and_then(|(l, rest)| Some((l.parse::<f64>().ok()?, rest)));
-            let Some((literal, rest)) = parts else { return wrong(line, "'Rounded: LITERAL is NUMBER' is expected") };
+            let Some((literal, rest)) = parts else {
+                return wrong(line, "'Rounded: LITERAL is NUMBER' is expected");
+            };
             let (exact, place) = match rest.split_once(" in ") {
                 Some((exact, place)) => (exact, Some(place.to_string())),
                 None => (rest, None),
@@ -176,7 +179,9 @@ mod tests {
         let symbols = AngleSymbols { angles: vec![Angle::parse("0.7").unwrap()] };
         let of = |text, literal| exact_of(text, literal, &symbols).is_some();
         assert!(of("1/3", 1.0 / 3.0) && !of("1/3", 0.333333333333333));
-        assert!(of("sin(0.7)", 0.7f64.sin()) && !of("cos(0.7)", 0.7f64.sin()) && !of("sin(0.8)", 0.8f64.sin()));
+        assert!(
+            of("sin(0.7)", 0.7f64.sin()) && !of("cos(0.7)", 0.7f64.sin()) && !of("sin(0.8)", 0.8f64.sin())
+        );
         assert!(of("the angle 1/4*pi", 0.25 * std::f64::consts::PI) && !of("the angle 1/4*pi", 0.7853));
         assert!(of("the angle -1/5 + 1/2*pi", -0.2 + 0.5 * std::f64::consts::PI));
         assert!(!of("1/0", 0.0) && of("this f64", 0.1));

@@ -121,7 +121,9 @@ impl<'a> World<'a> {
         depth: usize,
     ) -> Result<Value, Stop> {
         let stop = |message: String| Err(Stop { line, message });
-        let Some(routine) = self.routines.get(name) else { return stop(format!("there is no function {name}")) };
+        let Some(routine) = self.routines.get(name) else {
+            return stop(format!("there is no function {name}"));
+        };
         if routine.parameters.len() != arguments.len() || depth > DEEPEST {
             return stop(format!("{name} cannot be called like this"));
         }

@@ -44,7 +44,12 @@ pub fn c_files(model: &Model, options: &Options, header: &str) -> Result<CFiles,
     let head = |rounded: &[String]| head(&names, model, options, rounded);
     Ok(CFiles {
         header: names.header(&head(&[]), &items),
-        source: names.source(&head(&rounded::lines(model, &parts)), &helpers(&names, model, options), header, &items),
+        source: names.source(
+            &head(&rounded::lines(model, &parts)),
+            &helpers(&names, model, options),
+            header,
+            &items,
+        ),
     })
 }
 
@@ -174,7 +179,10 @@ fn head(names: &Names, model: &Model, options: &Options, rounded: &[String]) -> 
     ];
     let lines = docs::head_lines(model, options, &needs);
     let sizes = format!("Arrays have the lengths that {upper}_JOINTS and {upper}_PARAMETERS say.");
-    comment("/*", lines.iter().map(String::as_str).chain([sizes.as_str()]).chain(rounded.iter().map(String::as_str))) + "\n"
+    comment(
+        "/*",
+        lines.iter().map(String::as_str).chain([sizes.as_str()]).chain(rounded.iter().map(String::as_str)),
+    ) + "\n"
 }
 
 /// Lines as a comment.
