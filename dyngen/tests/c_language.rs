@@ -453,6 +453,24 @@ fn the_file_compiles_without_a_warning() {
     }
 }
 
+/// The reduction of angles stands on sums that are rounded as they are written: a compiler that is told otherwise is
+/// refused.
+#[test]
+fn fast_mathematics_is_refused() {
+    if !has("cc") {
+        eprintln!("skipped: there is no C compiler (apt-get install gcc)");
+        return;
+    }
+    let source = folder().join("fast.c");
+    let config = Config::new(workspace().join("tests/arms/planar2r.toml")).functions([Function::Gravity]);
+    config.language(Language::C).write(&source).unwrap();
+    let with = |flag: &str| Command::new("cc").args([flag, "-fsyntax-only"]).arg(&source).output().unwrap();
+    assert!(with("-O3").status.success());
+    let refused = with("-ffast-math");
+    assert!(!refused.status.success());
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("compile without -ffast-math"));
+}
+
 /// Beyond 10⁵ rad, where Rust and C call functions of their machine, and of tanh: close to f64's own.
 #[test]
 fn what_the_machine_computes_is_close() {

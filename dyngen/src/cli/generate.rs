@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example: dyngen generate arm.toml -o arm.rs --parameters minimal --functions \
-        regressor,mass_matrix")]
+        regressor,mass_matrix\n         dyngen generate arm.toml --language c -o arm.c")]
 pub(super) struct Args {
     /// The arm file.
     arm: PathBuf,

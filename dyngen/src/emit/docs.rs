@@ -28,7 +28,8 @@ pub(super) fn head_lines(model: &Model, options: &Options, needs: &[&str]) -> Ve
     ];
     lines.extend(needs.iter().map(|line| (*line).to_string()));
     lines.extend(arm.notes().into_iter().map(|note| format!("Note: {note}")));
-    lines
+    // What a name brings of line breaks would end the comment.
+    lines.into_iter().map(|line| line.replace(char::is_control, " ")).collect()
 }
 
 /// One doc attribute a line.
@@ -73,4 +74,21 @@ pub(super) fn function(built: &FunctionGraph) -> String {
          Operations: {} multiplications, {} additions{divisions}, {} sines with cosines.",
         operations.mul, operations.add, operations.sin_cos
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm::Arm;
+
+    #[test]
+    fn a_name_of_two_lines_stays_in_the_comment() {
+        let joint = "kind = \"revolute\", a = 1, alpha = 0, d = 0, theta = 0";
+        let text = format!(
+            "name = \"a\\nfn b\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\njoint = [{{ {joint} }}]"
+        );
+        let arm = Arm::parse(&text, "arm.toml");
+        let head = arm.map(|arm| head(&Model::kinematic(arm), &Options::default()));
+        assert!(head.is_ok_and(|head| head.contains("a fn b") && head.lines().all(|l| l.starts_with("//"))));
+    }
 }

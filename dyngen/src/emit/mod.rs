@@ -1,4 +1,4 @@
-//! From graphs to a Rust source file: tokens, docs, formatting.
+//! From graphs to source files: statements, docs, and their print in Rust and in C.
 
 #[cfg(test)]
 mod accuracy;

@@ -100,8 +100,10 @@ fn called(
     let mut body = Vec::new();
     if lines.is_empty() {
         // Nothing of it is read.
+        let zeros = |count: usize| vec!["(real)0.0"; count].join(", ");
+        let (angles, joints) = (zeros(model.angles().taken().len()), zeros(model.arm().dof()));
         body.push(format!(
-            "const {prefix}_trig trig = {{ {{ (real)0.0 }}, {{ (real)0.0 }}, {{ (real)0.0 }} }};"
+            "const {prefix}_trig trig = {{ {{ {angles} }}, {{ {angles} }}, {{ {joints} }} }};"
         ));
     } else {
         body.push(format!("{prefix}_trig trig;"));

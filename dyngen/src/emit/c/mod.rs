@@ -152,8 +152,10 @@ typedef double {prefix}_real;
 #ifdef __FAST_MATH__
 #error \"sums must be rounded as they are written: compile without -ffast-math\"
 #endif
+#ifdef FLT_EVAL_METHOD
 #if (FLT_EVAL_METHOD != 0) && (FLT_EVAL_METHOD != 16)
 #error \"numbers must be rounded to their own type: with 32-bit x86 compile with -msse2 -mfpmath=sse\"
+#endif
 #endif
 #ifdef __clang__
 #pragma STDC FP_CONTRACT OFF
@@ -187,7 +189,8 @@ fn head(names: &Names, model: &Model, options: &Options, rounded: &[String]) -> 
 
 /// Lines as a comment.
 fn comment(open: &str, lines: impl Iterator<Item = impl Display>) -> String {
-    let lines: Vec<String> = lines.map(|line| line.to_string().replace("*/", "* /")).collect();
+    let lines: Vec<String> =
+        lines.map(|line| line.to_string().replace("*/", "* /").replace("/*", "/ *")).collect();
     let end = if lines.len() > 1 { "\n */" } else { " */" };
     let text = lines.join("\n * ").replace(" * \n", " *\n");
     format!("{open} {text}{end}\n")
@@ -213,9 +216,14 @@ fn number(x: f64) -> String {
     format!("(real){x:?}")
 }
 
-/// Text between quotes.
+/// Text between quotes. Two question marks in a row would begin a trigraph.
 fn quoted(text: &str) -> String {
-    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
+    let escaped = |c: char| match c {
+        '"' | '\\' | '?' => format!("\\{c}"),
+        c if c.is_ascii_control() => format!("\\{:03o}", u32::from(c)),
+        c => c.to_string(),
+    };
+    format!("\"{}\"", text.chars().map(escaped).collect::<String>())
 }
 
 /// How many joints and parameters there are, their names, and values that are baked in.
@@ -284,5 +292,11 @@ mod tests {
         assert_eq!(prefix("Schunk Powerball LWA 4P"), "schunk_powerball_lwa_4p");
         assert_eq!(prefix("2R (planar)"), "arm_2r_planar");
         assert_eq!((prefix("ärm-7"), prefix("腕")), ("rm_7".to_string(), "arm".to_string()));
+    }
+
+    #[test]
+    fn no_name_ends_a_text_or_a_comment() {
+        assert_eq!(quoted("a\"b\\c\n??/"), r#""a\"b\\c\012\?\?/""#);
+        assert_eq!(documentation("a */ b /* c"), "/** a * / b / * c */\n");
     }
 }

@@ -13,8 +13,13 @@ pub(super) fn trig(names: &Names, model: &Model) -> Item {
     let about = format!(
         "Joint positions with their sines and cosines: {prefix}_trig_of computes them once for any\nnumber of calls."
     );
-    let extra = shifted_docs(model).into_iter().chain(sum_docs(model));
-    let doc = extra.fold(about, |text, line| format!("{text}\n{}", line.trim_start()));
+    let extra = shifted_docs(model).into_iter().chain(sum_docs(model)).collect::<Vec<_>>();
+    let about = if extra.is_empty() {
+        about
+    } else {
+        about + " Angle k, of joint k or as follows, has the index k - 1."
+    };
+    let doc = extra.into_iter().fold(about, |text, line| format!("{text}\n{}", line.trim_start()));
     let prototype = format!(
         "void {prefix}_trig_of(\n    const {prefix}_real q[{upper}_JOINTS],\n    {prefix}_trig *trig)"
     );
