@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing)]
 
 use dyngen::verify::{Report, Verifier};
-use dyngen::{Arm, Config, Function};
+use dyngen::{Arm, Config, Function, Language};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::{Path, PathBuf};
@@ -38,7 +38,7 @@ impl Subject {
     fn new(arm: &str, functions: &[Function]) -> Subject {
         let path = root().join(arm);
         let text = Config::new(&path).functions(functions).source().unwrap();
-        let verifier = Verifier::new(Arm::read(&path).unwrap(), &text).unwrap();
+        let verifier = Verifier::new(Arm::read(&path).unwrap(), Language::Rust, &text).unwrap();
         Subject { text, verifier }
     }
 

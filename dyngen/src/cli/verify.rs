@@ -1,15 +1,15 @@
 //! `dyngen verify`.
 
 use super::{Failure, Progress, arm, print};
-use dyngen::Values;
 use dyngen::verify::{Difference, Error, Report, Verifier};
+use dyngen::{Language, Values};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example: dyngen generate arm.toml -o arm.rs && dyngen verify arm.rs arm.toml")]
 pub(super) struct Args {
-    /// The generated file.
+    /// The generated file; in C where its name ends in .c.
     file: PathBuf,
     /// The arm file that it was generated from.
     arm: PathBuf,
@@ -33,7 +33,11 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let arm = arm(&args.arm)?;
     let progress = Progress::new(&arm);
     progress.say("deriving, reading and proving");
-    let verifier = Verifier::new(arm, &text).map_err(failure)?;
+    let language = match args.file.extension().is_some_and(|e| e == "c") {
+        true => Language::C,
+        false => Language::Rust,
+    };
+    let verifier = Verifier::new(arm, language, &text).map_err(failure)?;
     if let Some(path) = &args.values {
         check_values(&verifier, path)?;
     }

@@ -2,8 +2,9 @@
 
 use super::head::{Head, Literals};
 use super::language::{Routines, Stop, Value, World};
-use super::{Checked, Difference, Report, Source, Unreadable, rust};
+use super::{Checked, Difference, Report, Source, Unreadable, c, rust};
 use crate::arm::{Arm, JointKind};
+use crate::config::Language;
 use crate::dynamics::Function;
 use crate::dynamics::function::Argument;
 use crate::exact::angle::Angle;
@@ -26,6 +27,7 @@ pub struct Verifier {
     model: Model,
     frames: Vec<(String, Model)>,
     set: SetKind,
+    language: Language,
     values: Option<Vec<f64>>,
     /// What the Lagrangian says, by function and point.
     known: RefCell<BTreeMap<(String, usize), Vec<Fp>>>,
@@ -64,8 +66,15 @@ impl From<Unreadable> for Error {
     }
 }
 
-fn read(text: &str, arm: &Arm) -> Checked<Source> {
-    rust::read(text, &Literals::read(text, &angle_symbols(arm))?)
+fn read(text: &str, language: Language, arm: &Arm) -> Checked<Source> {
+    let literals = Literals::read(text, &angle_symbols(arm))?;
+    match language {
+        Language::Rust => rust::read(text, &literals),
+        Language::C => {
+            let frames: Vec<String> = arm.frames.iter().map(|frame| frame.name.clone()).collect();
+            c::read(text, &literals, &frames)
+        }
+    }
 }
 
 /// A point with what a file's functions are evaluated at.
@@ -81,13 +90,13 @@ impl Verifier {
     ///
     /// # Errors
     /// As [`Error`] says.
-    pub fn new(arm: Arm, text: &str) -> Result<Verifier, Error> {
+    pub fn new(arm: Arm, language: Language, text: &str) -> Result<Verifier, Error> {
         let head = Head::read(text)?;
         let hash = format!("{:016x}", arm.hash());
         if head.arm != hash {
             return Err(Error::OtherArm(head.arm, hash));
         }
-        let source = read(text, &arm)?;
+        let source = read(text, language, &arm)?;
         let has = |f: &Function| source.routines.contains_key(f.name());
         let kinematic = Function::ALL.iter().filter(|f| has(f)).all(|f| f.is_kinematic());
         let values = source.constants.get("PARAMETER_VALUES");
@@ -101,7 +110,14 @@ impl Verifier {
         model.set(head.set).map_err(Error::Model)?;
         let frames =
             model.arm().frames.iter().filter_map(|f| Some((f.name.clone(), model.at_frame(&f.name)?)));
-        Ok(Verifier { frames: frames.collect(), model, set: head.set, values, known: RefCell::default() })
+        Ok(Verifier {
+            frames: frames.collect(),
+            model,
+            set: head.set,
+            language,
+            values,
+            known: RefCell::default(),
+        })
     }
 
     /// The arm's model.
@@ -124,7 +140,7 @@ impl Verifier {
     /// # Errors
     /// Where the text is nothing that dyngen writes.
     pub fn verify(&self, text: &str, only: Option<&[Function]>) -> Result<Report, Error> {
-        let source = read(text, self.model.arm())?;
+        let source = read(text, self.language, self.model.arm())?;
         let set = self.model.set(self.set).map_err(Error::Model)?;
         if let Some((module, line)) =
             source.modules.iter().find(|(m, _)| !self.frames.iter().any(|f| f.0 == *m))
@@ -156,7 +172,11 @@ impl Verifier {
             ("JOINT_NAMES", arm.has_joint_names().then(|| arm.joint_names())),
         ];
         let found = |name: &str| source.constants.get(name);
-        let differs = right.into_iter().find(|(name, right)| found(name).map(|(_, x)| x) != right.as_ref());
+        let here = |(name, _): &(&str, _)| !source.has_header || name.ends_with("_NAMES");
+        let differs = right
+            .into_iter()
+            .filter(here)
+            .find(|(name, right)| found(name).map(|(_, x)| x) != right.as_ref());
         let values =
             found("PARAMETER_VALUES").map(|(_, x)| x.iter().map(|x| x.parse().ok()).collect::<Vec<_>>());
         let same = values == self.values.as_ref().map(|x| x.iter().copied().map(Some).collect());
@@ -224,7 +244,9 @@ impl Verifier {
                 }
                 for with in [false, true] {
                     let name = format!("{name}{}", if with { "_with" } else { "" });
-                    let call = Call { function, name: &name, with, baked: self.values.is_some(), set };
+                    let prepared = with && source.has_header;
+                    let call =
+                        Call { function, name: &name, with, prepared, baked: self.values.is_some(), set };
                     let found = compared(function, |zero| call.result(&worlds[zero], &place.points[zero]));
                     if let Some(difference) = difference(&call, &source.routines, &right, found, model) {
                         return Some(explained(difference, source));
@@ -271,6 +293,8 @@ struct Call<'a> {
     name: &'a str,
     /// Whether sines and cosines are passed in, and what was prepared of the parameters.
     with: bool,
+    /// Whether what was prepared has a name of its own.
+    prepared: bool,
     baked: bool,
     set: &'a ParameterSet,
 }
@@ -292,7 +316,11 @@ impl Call<'_> {
                 _ => Ok(value),
             }
         };
-        let name = |a: &Argument| if self.with && *a == Argument::Positions { "trig" } else { a.name() };
+        let name = |a: &Argument| match a {
+            Argument::Positions if self.with => "trig",
+            Argument::Parameters if self.prepared => "prepared",
+            other => other.name(),
+        };
         let named =
             routine.parameters.iter().map(|p| p.trim_start_matches('_')).eq(arguments.iter().map(name));
         if !named {

@@ -165,7 +165,9 @@ impl<'a> World<'a> {
                 _ => return stop(format!("there is no field {field}")),
             },
             Kind::Index(of, index) => match self.value(of, names, depth)? {
-                Value::List(values) if *index < values.len() => values[*index].clone(),
+                Value::List(values) | Value::Prepared(values) if *index < values.len() => {
+                    values[*index].clone()
+                }
                 _ => return stop(format!("there is no entry {index}")),
             },
             Kind::Call(name, arguments) => {

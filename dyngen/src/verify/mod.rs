@@ -4,6 +4,7 @@
 //! Trusted are this folder, the Lagrangian with the algebra below it, and that a compiler does what the text says. The
 //! recursions, the optimiser and the printer are not.
 
+mod c;
 mod check;
 mod head;
 mod language;
@@ -24,6 +25,8 @@ struct Source {
     /// Modules of frames, with their lines.
     modules: Vec<(String, usize)>,
     not_checked: Vec<String>,
+    /// Whether the numbers of joints, parameters and angles stand in a file of their own.
+    has_header: bool,
     /// Literals of many digits that the head does not explain, with their lines.
     unexplained: Vec<(usize, String)>,
 }
