@@ -337,3 +337,44 @@ fn every_mutant_that_changes_a_value_is_found() {
 fn of_two_thousand_mutants_every_one_that_changes_a_value_is_found() {
     every_mutant_is_found(1000, 2026);
 }
+
+/// A file in C, and single changes of it that a compiler takes.
+#[test]
+fn a_file_in_c_is_proven_and_its_mutants_are_found() {
+    for arm in ["tests/arms/twist.toml", "tests/arms/scara.toml", "powerball/arm.toml"] {
+        let path = root().join(arm);
+        let output = Path::new(env!("CARGO_TARGET_TMPDIR")).join("verified.c");
+        let config = Config::new(&path).language(Language::C).functions(FUNCTIONS.to_vec());
+        config.write(&output).unwrap();
+        let text = std::fs::read_to_string(&output).unwrap();
+        let verifier = Verifier::new(Arm::read(&path).unwrap(), Language::C, &text).unwrap();
+        let report = verifier.verify(&text, None).unwrap();
+        assert_eq!(report.difference, None, "{arm}");
+        assert_eq!(report.not_checked, ["verified.h"]);
+        assert_eq!(report.proven.len() % 2, 0);
+        for (old, new) in [
+            ("result[1] = ", "result[1] = -"),
+            ("= trig->cos[0];", "= trig->sin[0];"),
+            (" * c", " / c"),
+            (" + ", " - "),
+            ("prepared->values[1] = ", "prepared->values[1] = -"),
+            ("= dq[0];", "= dq[1];"),
+            ("&trig.sin[0], &trig.cos[0]", "&trig.cos[0], &trig.sin[0]"),
+            ("(dq, ", "(ddq, "),
+            ("near - part", "near + part"),
+            ("#include <math.h>", "#include <math.h>\n#define dq1 dq2"),
+            ("-1.66666666666666324348e-01", "-1.66666666666666324348e-02"),
+        ] {
+            // Behind the helpers, but where they are meant.
+            let from = if text[..text.find("_prepare(").unwrap()].matches(old).count() == 1 {
+                0
+            } else {
+                text.find("_prepare(").unwrap()
+            };
+            let Some(at) = text[from..].find(old).map(|k| k + from) else { continue };
+            let changed = format!("{}{new}{}", &text[..at], &text[at + old.len()..]);
+            let found = verifier.verify(&changed, None);
+            assert!(found.is_err() || found.unwrap().difference.is_some(), "{arm}: {old} -> {new}");
+        }
+    }
+}

@@ -308,7 +308,12 @@ impl Reader<'_> {
             ("const", _) if !done => {
                 // Nothing of it is read.
                 self.next();
-                self.expect("trig = { { ( real ) 0.0 } , { ( real ) 0.0 } , { ( real ) 0.0 } } ;")
+                self.expect("trig =")?;
+                let zeros = ["{", "(", "real", ")", "0.0", ",", "}"];
+                while self.peek().is_some_and(|token| zeros.contains(&token)) {
+                    self.next();
+                }
+                self.expect(";")
             }
             ("(", _) => {
                 self.expect("void )")?;
@@ -330,8 +335,7 @@ impl Reader<'_> {
                 Ok(())
             }
             ("trig", _) if !done => {
-                self.next();
-                let pattern = self.slot_after(body, line, "position")?;
+                let pattern = self.slot_after(body, line, &["sin", "cos", "position"])?;
                 self.expect("=")?;
                 let value = self.sum()?;
                 body.lets.push(Let { pattern, value });
@@ -396,17 +400,17 @@ impl Reader<'_> {
     fn slot(&mut self, body: &mut Body, field: &str) -> Checked<Pattern> {
         let line = self.line();
         self.expect("trig")?;
-        self.slot_after(body, line, field)
+        self.slot_after(body, line, &[field])
     }
 
-    fn slot_after(&mut self, body: &mut Body, line: usize, field: &str) -> Checked<Pattern> {
-        // `trig->` where it is a pointer.
-        let _ = self.takes("->");
-        let _ = self.takes(".");
-        self.expect(field)?;
+    fn slot_after(&mut self, body: &mut Body, line: usize, fields: &[&str]) -> Checked<Pattern> {
+        let (access, field) = (self.next(), self.next());
+        if !["->", "."].contains(&access.as_str()) || !fields.contains(&field.as_str()) {
+            return wrong(line, "another place than dyngen fills here");
+        }
         let index = self.index()?;
         let name = format!("trig.{field}[{index}]");
-        match body.slots.insert((field.to_string(), index), name.clone()) {
+        match body.slots.insert((field, index), name.clone()) {
             None => Ok(Pattern::Name(name)),
             Some(_) => wrong(line, "a place that is filled twice"),
         }
