@@ -378,3 +378,97 @@ fn a_file_in_c_is_proven_and_its_mutants_are_found() {
         }
     }
 }
+
+/// What the command says of a text as a generated file: its exit code, standard output and error.
+fn command(name: &str, text: &str, arm: &str, more: &[&str]) -> (Option<i32>, String, String) {
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::write(&file, text).unwrap();
+    let arm = root().join(arm);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dyngen"));
+    let out = command.arg("verify").args([&file, &arm]).args(more).output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (out.status.code(), text(&out.stdout), text(&out.stderr))
+}
+
+/// The line, from 1, where a text begins.
+fn line_of(text: &str, part: &str) -> usize {
+    text[..text.find(part).unwrap()].matches('\n').count() + 1
+}
+
+#[test]
+fn the_command_names_function_entry_and_line() {
+    let twist = Subject::new("tests/arms/twist.toml", &[Function::Gravity, Function::ForwardKinematics]).text;
+    let of = |text: &str, more: &[&str]| command("said.rs", text, "tests/arms/twist.toml", more);
+    let (code, out, _) = of(&twist, &[]);
+    assert_eq!(code, Some(0), "{out}");
+    assert!(
+        out.contains("proven: gravity_with\n") && out.contains("proven: elbow::forward_kinematics\n"),
+        "{out}"
+    );
+    // A wrong sign of the second torque.
+    let at = twist.find("pub fn gravity_with").unwrap();
+    let result = at + twist[at..].find("ArrayStorage([[").unwrap() + "ArrayStorage([[".len();
+    let second = result + twist[result..].find(", ").unwrap() + 2;
+    let wrong = match twist[second..].strip_prefix('-') {
+        Some(rest) => format!("{}{rest}", &twist[..second]),
+        None => format!("{}-{}", &twist[..second], &twist[second..]),
+    };
+    let (code, out, _) = of(&wrong, &["--json"]);
+    let object: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(code, Some(1));
+    let difference = &object["difference"];
+    assert_eq!(
+        (&difference["function"], &difference["entry"]),
+        (&"gravity".into(), &serde_json::json!([2, 1]))
+    );
+    let line = difference["line"].as_u64().unwrap() as usize;
+    assert!(
+        line > line_of(&twist, "pub fn gravity_with") && line < line_of(&twist, "pub fn forward_kinematics<")
+    );
+}
+
+#[test]
+fn what_is_no_function_is_looked_at_too() {
+    let twist = Subject::new("tests/arms/twist.toml", &[Function::Gravity, Function::ForwardKinematics]).text;
+    let said = |old: &str, new: &str| {
+        assert!(twist.contains(old), "{old}");
+        command("around.rs", &twist.replacen(old, new, 1), "tests/arms/twist.toml", &[])
+    };
+    for (old, new, code, words) in [
+        // The module of sines and cosines, to the last digit, and without a line.
+        ("1.0562999066987428e-23", "1.0562999066987429e-23", 2, "trigonometry is not the one"),
+        ("let z = r * r;", "let z = r + r;", 2, "trigonometry is not the one"),
+        // What the head says.
+        ("// Rounded: 0.7648421872844885 is cos(0.7)\n", "", 1, "0.7648421872844885 in line"),
+        ("is sin(0.7)", "is cos(0.7)", 2, ":7: 0.644217687237691 is not cos(0.7) rounded"),
+        ("0.644217687237691f64", "0.644217687237692f64", 1, "is not what the Lagrangian says"),
+        ("Parameter set: minimal", "Parameter set: full", 1, "PARAMETERS is not what the arm says"),
+        ("Arm: ", "Arm: 0", 1, "is d65031efd64c2a98"),
+        // Constants, angles, what functions are given.
+        ("JOINTS: usize = 3", "JOINTS: usize = 4", 1, "JOINTS is not what the arm says"),
+        ("\"mx3\"", "\"my3\"", 1, "PARAMETER_NAMES is not what the arm says"),
+        ("(0.2f64)", "(0.3f64)", 1, "an angle that is no sum of the arm's"),
+        ("*self", "Prepared(self.0)", 2, "an item that dyngen does not write"),
+        ("use nalgebra::{", "use other::SMatrix;\nuse nalgebra::{", 2, "an item that dyngen does not write"),
+        ("pub fn gravity<", "#[cfg(test)]\npub fn gravity<", 2, "an attribute that dyngen does not write"),
+        (
+            "q: &SVector<T, JOINTS>,\n    parameters",
+            "q: &SVector<T, 3>,\n    parameters",
+            2,
+            "q has another type",
+        ),
+        ("let x", "let mut x", 2, "a pattern that dyngen does not write"),
+        ("pub mod elbow {", "pub mod wrist {", 2, "the arm has no frame wrist"),
+    ] {
+        let (found, out, error) = said(old, new);
+        assert_eq!(found, Some(code), "{old}: {out}{error}");
+        assert!(out.contains(words) || error.contains(words), "{old}: {out}{error}");
+    }
+    let (code, _, error) = said("pub fn gravity<", "pub fn gravity((<");
+    assert!(
+        code == Some(2) && error.contains(&format!(":{}: ", line_of(&twist, "pub fn gravity<"))),
+        "{error}"
+    );
+    let (code, _, error) = command("other.rs", &twist, "tests/arms/scara.toml", &[]);
+    assert!(code == Some(1) && error.contains("generated for the arm d65031efd64c2a98"), "{error}");
+}

@@ -3,7 +3,7 @@
 use super::{Failure, Progress, arm, print};
 use dyngen::verify::{Difference, Error, Report, Verifier};
 use dyngen::{Language, Values};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
@@ -52,7 +52,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
 }
 
 /// Whether the file's values are those of the JSON file.
-fn check_values(verifier: &Verifier, path: &PathBuf) -> Result<(), Failure> {
+fn check_values(verifier: &Verifier, path: &Path) -> Result<(), Failure> {
     let set = verifier.model().set(verifier.set()).map_err(Failure::refused)?;
     let values = Values::read(path).and_then(|v| v.of_set(verifier.model(), set)).map_err(Failure::input)?;
     match verifier.values() {

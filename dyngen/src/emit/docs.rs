@@ -88,7 +88,7 @@ mod tests {
             "name = \"a\\nfn b\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\njoint = [{{ {joint} }}]"
         );
         let arm = Arm::parse(&text, "arm.toml");
-        let head = arm.map(|arm| head(&Model::kinematic(arm), &Options::default()));
+        let head = arm.map(|arm| head(&Model::kinematic(arm), &Options::default(), Vec::new()));
         assert!(head.is_ok_and(|head| head.contains("a fn b") && head.lines().all(|l| l.starts_with("//"))));
     }
 }

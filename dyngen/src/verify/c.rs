@@ -53,7 +53,7 @@ fn tokens(text: &str) -> Vec<(usize, String)> {
                 let exponent =
                     |k: usize| first.is_ascii_digit() && !rest.starts_with("0x") && rest[..k].ends_with('e');
                 let ends = |(k, c): (usize, char)| !(word(c) || c == '-' && exponent(k));
-                rest.char_indices().position(|c| ends(c)).unwrap_or(rest.len())
+                rest.char_indices().position(ends).unwrap_or(rest.len())
             }
             _ if rest.starts_with("->") => 2,
             other => other.len_utf8(),
@@ -183,7 +183,7 @@ impl Reader<'_> {
     /// An item that is not looked into.
     fn skip(&mut self, name: String, end: &str) -> Checked<()> {
         let mut depth = 0;
-        while let Some((_, token)) = self.tokens.next() {
+        for (_, token) in self.tokens.by_ref() {
             depth += i32::from(token == "{") - i32::from(token == "}");
             if depth == 0 && token == end {
                 break;
@@ -527,10 +527,11 @@ fn matrix(name: &str, end: usize, results: Vec<(Vec<usize>, Expr)>) -> Checked<E
     let of = name.rsplit("::").next().unwrap_or(name).trim_end_matches("_with");
     let is_row = Function::parse(of).is_some_and(|f| f.size().0 == Size::Fixed(1));
     let width = results.iter().filter(|(at, _)| at.len() == 2 && at[0] == 0).count();
-    let mut columns = vec![Vec::new(); if is_row { results.len() } else { width.max(1) }];
+    let (is_matrix, mut columns) =
+        (width > 0, vec![Vec::new(); if is_row { results.len() } else { width.max(1) }]);
     let count = columns.len();
     for (k, (at, value)) in results.into_iter().enumerate() {
-        let right = if width > 0 { vec![k / width, k % width] } else { vec![k] };
+        let right = if is_matrix { vec![k / count, k % count] } else { vec![k] };
         if at != right {
             return wrong(value.line, "an entry of the result that is not the next one");
         }

@@ -268,9 +268,7 @@ impl Verifier {
 
 /// A literal that nothing explains may be why.
 fn explained(mut difference: Difference, source: &Source) -> Difference {
-    let end = source.routines.values().map(|r| r.line).filter(|line| *line > difference.line).min();
-    let inside = |line: usize| end.is_none_or(|end| line < end);
-    if let Some((line, digits)) = source.unexplained.iter().rev().find(|(line, _)| inside(*line)) {
+    if let Some((line, digits)) = source.unexplained.first() {
         difference.message += &format!(
             "; the number {digits} in line {line} looks rounded, and no line 'Rounded' of the head explains it"
         );
