@@ -1,8 +1,9 @@
 //! `dyngen verify`.
 
 use super::{Failure, Progress, arm, print};
+use dyngen::emit::{self, Options};
 use dyngen::verify::{Difference, Error, Report, Verifier};
-use dyngen::{Language, Values};
+use dyngen::{Function, Language, Values};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -41,7 +42,12 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     if let Some(path) = &args.values {
         check_values(&verifier, path)?;
     }
-    let report = verifier.verify(&text, None).map_err(failure)?;
+    let mut report = verifier.verify(&text, None).map_err(failure)?;
+    if let Some(difference) = &mut report.difference
+        && let Some(line) = written_otherwise(&verifier, &text, &difference.function)
+    {
+        difference.line = line;
+    }
     drop(progress);
     let told = match args.json {
         true => in_json(args, &report),
@@ -49,6 +55,39 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     };
     print(&told)?;
     Ok(if report.difference.is_none() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// The first line of a function that is not what dyngen writes, in Rust: no part of the proof, but where to look.
+fn written_otherwise(verifier: &Verifier, text: &str, function: &str) -> Option<usize> {
+    let has = |f: &Function| text.contains(&format!("pub fn {f}_with<"));
+    let options = Options {
+        parameters: verifier.set(),
+        functions: Function::ALL.into_iter().filter(has).collect(),
+        values: verifier.values().map(<[f64]>::to_vec),
+        ..Options::default()
+    };
+    let fresh = emit::source(verifier.model(), &options).ok()?;
+    let (module, name) = function.rsplit_once("::").unwrap_or(("", function));
+    let (module, name) = (format!("pub mod {module} {{"), name.strip_suffix("_with").unwrap_or(name));
+    let inside = if module == "pub mod  {" { "" } else { &module };
+    let (with, plain) = (format!("pub fn {name}_with<"), format!("pub fn {name}<"));
+    [("", "pub fn new("), ("", "pub fn prepare<"), (inside, &with), (inside, &plain)].iter().find_map(
+        |(inside, head)| {
+            let (here, there) = (lines(text, inside, head)?, lines(&fresh, inside, head)?);
+            let other = here.iter().zip(&there).find(|((_, a), (_, b))| a != b);
+            other.map(|((line, _), _)| *line)
+        },
+    )
+}
+
+/// The lines of a function with their numbers, from its head within what begins with `inside`.
+fn lines<'t>(text: &'t str, inside: &str, head: &str) -> Option<Vec<(usize, &'t str)>> {
+    let from = text.find(inside)?;
+    let at = from + text[from..].find(head)?;
+    let indent = text[..at].rsplit('\n').next()?;
+    let first = text[..at].matches('\n').count() + 1;
+    let inner = |line: &&str| line.strip_prefix(indent) != Some("}");
+    Some(text[at..].lines().take_while(inner).enumerate().map(|(k, line)| (first + k, line)).collect())
 }
 
 /// Whether the file's values are those of the JSON file.
