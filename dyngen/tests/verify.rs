@@ -472,3 +472,38 @@ fn what_is_no_function_is_looked_at_too() {
     let (code, _, error) = command("other.rs", &twist, "tests/arms/scara.toml", &[]);
     assert!(code == Some(1) && error.contains("generated for the arm d65031efd64c2a98"), "{error}");
 }
+
+#[test]
+fn values_that_are_baked_in_are_compared() {
+    let (arm, values) = ("examples/new-arm/arm.toml", root().join("examples/new-arm/values.json"));
+    let config = Config::new(root().join(arm)).values(&values).batch(true).tests(true);
+    let text = config.friction(["viscous".parse().unwrap()]).source().unwrap();
+    let given = ["--values", values.to_str().unwrap()];
+    let (code, out, error) = command("baked.rs", &text, arm, &given);
+    assert_eq!((code, error.as_str()), (Some(0), ""));
+    for words in
+        ["proven: forward_dynamics_with", "not checked: batch", "not checked: tests", "not checked: friction"]
+    {
+        assert!(out.lines().any(|line| line == words), "{words}: {out}");
+    }
+    // The file with other values than it says.
+    let list = text.find("PARAMETER_VALUES: ").unwrap();
+    let first = list + text[list..].find("f64,").unwrap();
+    let (code, out, _) = command("baked.rs", &format!("{}5{}", &text[..first], &text[first..]), arm, &[]);
+    assert!(code == Some(1) && out.contains("is not what the Lagrangian says"), "{out}");
+    // Other values than those of the file.
+    let other = std::fs::read_to_string(&values).unwrap().replacen("1.2", "1.25", 1);
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("other.json");
+    std::fs::write(&path, other).unwrap();
+    let (code, _, error) = command("baked.rs", &text, arm, &["--values", path.to_str().unwrap()]);
+    assert!(code == Some(1) && error.contains("is baked into the file"), "{error}");
+}
+
+#[test]
+fn a_file_of_kinematics_alone_is_proven() {
+    let report = Subject::new("tests/arms/ur5e.toml", &[Function::Jacobian]).report();
+    assert_eq!(
+        (report.proven, report.difference),
+        (["Trig::new", "jacobian", "jacobian_with"].map(String::from).into(), None)
+    );
+}
