@@ -24,6 +24,7 @@ pub mod optimize;
 pub mod parameters;
 pub mod prove;
 mod values;
+pub mod verify;
 
 pub use arm::Arm;
 pub use config::{Config, GenerateError, Language};

@@ -3,6 +3,12 @@
 // Arm: d65031efd64c2a98 (hash of its description). Parameter set: minimal.
 // Needs: nalgebra 0.35 (default-features = false and feature libm where there is no std).
 // Every function is proven equal to the Lagrangian of the arm; none allocates or panics.
+// Rounded: 0.49999999999999994 is sin(pi/6)
+// Rounded: 0.644217687237691 is sin(0.7)
+// Rounded: 0.7071067811865475 is sin(pi/4)
+// Rounded: 0.7648421872844885 is cos(0.7)
+// Rounded: 0.7853981633974483 is the angle 0 + 1/4*pi
+// Rounded: 0.8660254037844387 is cos(pi/6)
 
 use nalgebra::{ArrayStorage, SMatrix, SVector, SimdRealField};
 /// Number of joints.

@@ -213,6 +213,12 @@ impl Arm {
         Some(Arm { tool, tool_link, ..self.clone() })
     }
 
+    /// Of the arm's description, the same on every machine (FNV-1a, 64 bits): what a generated file says of its arm.
+    pub fn hash(&self) -> u64 {
+        let step = |h: u64, b: u8| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3);
+        format!("{self:?}").bytes().fold(0xcbf2_9ce4_8422_2325, step)
+    }
+
     /// The link that carries the tool, from 0.
     pub fn tool_carrier(&self) -> usize {
         self.tool_link.unwrap_or(self.links() - 1)

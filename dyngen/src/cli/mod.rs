@@ -8,6 +8,7 @@ mod export;
 mod generate;
 mod import;
 mod inspect;
+mod verify;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use dyngen::base::SetKind;
@@ -42,6 +43,8 @@ enum Command {
     Eval(eval::Args),
     /// Says whether a real arm can have given parameter values, and shows the pose where not.
     Check(check::Args),
+    /// Proves what is printed in a generated file equal to the Lagrangian of its arm.
+    Verify(verify::Args),
 }
 
 /// A parameter set on the command line.
@@ -96,6 +99,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Inspect(args) => inspect::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Check(args) => check::run(&args),
+        Command::Verify(args) => verify::run(&args),
     };
     match result {
         Ok(code) => code,

@@ -19,15 +19,18 @@ pub(super) fn module(options: &Options) -> Option<TokenStream> {
     if !NEEDED.iter().all(|f| options.functions.contains(f)) {
         return None;
     }
-    // Where values are baked in functions take no parameters.
-    let baked = options.values.is_some();
+    Some(text(options.values.is_some()))
+}
+
+/// The text of the module: where values are baked in functions take no parameters.
+pub(crate) fn text(baked: bool) -> TokenStream {
     let signature = if baked { quote!() } else { quote!(, parameters: &impl Parameters<T>) };
     let passed = if baked { quote!() } else { quote!(, parameters) };
     let prepared = if baked { quote!() } else { quote!(let parameters = &parameters.prepared();) };
     let rates = rates(&signature, &passed);
     let semi_implicit = semi_implicit(&signature, &passed);
     let runge_kutta = runge_kutta(&signature, &passed, &prepared);
-    Some(quote! {
+    quote! {
         /// The state x = (q, q̇) after a step of time under torques that stay the same, and its linearisation
         /// x⁺ ≈ A·δx + B·δτ, without friction.
         pub mod discrete {
@@ -49,7 +52,7 @@ pub(super) fn module(options: &Options) -> Option<TokenStream> {
 
             #runge_kutta
         }
-    })
+    }
 }
 
 /// ẋ and its derivatives.

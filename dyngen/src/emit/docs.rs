@@ -5,13 +5,13 @@ use crate::dynamics::FunctionGraph;
 use crate::model::Model;
 use crate::parameters::{ParameterSet, SetKind};
 
-/// The comment at the head of the file.
-pub(super) fn head(model: &Model, options: &Options) -> String {
+/// The comment at the head of the file; `rounded` are the lines of its constants.
+pub(super) fn head(model: &Model, options: &Options, rounded: Vec<String>) -> String {
     let needs = [
         "Needs: nalgebra 0.35 (default-features = false and feature libm where there is no std).",
         "Every function is proven equal to the Lagrangian of the arm; none allocates or panics.",
     ];
-    head_lines(model, options, &needs).iter().map(|line| format!("// {line}\n")).collect()
+    head_lines(model, options, &needs).iter().chain(&rounded).map(|line| format!("// {line}\n")).collect()
 }
 
 /// The lines at the head of a file, among them what a language needs.
@@ -24,21 +24,12 @@ pub(super) fn head_lines(model: &Model, options: &Options, needs: &[&str]) -> Ve
             arm.name
         ),
         "generate again.".to_string(),
-        format!(
-            "Arm: {:016x} (hash of its description). Parameter set: {}.",
-            hash(&format!("{arm:?}")),
-            options.parameters
-        ),
+        format!("Arm: {:016x} (hash of its description). Parameter set: {}.", arm.hash(), options.parameters),
     ];
     lines.extend(needs.iter().map(|line| (*line).to_string()));
     lines.extend(arm.notes().into_iter().map(|note| format!("Note: {note}")));
     // What a name brings of line breaks would end the comment.
     lines.into_iter().map(|line| line.replace(char::is_control, " ")).collect()
-}
-
-/// FNV-1a, 64 bits: the same on every machine.
-fn hash(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// One doc attribute a line.
@@ -97,7 +88,7 @@ mod tests {
             "name = \"a\\nfn b\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\njoint = [{{ {joint} }}]"
         );
         let arm = Arm::parse(&text, "arm.toml");
-        let head = arm.map(|arm| head(&Model::kinematic(arm), &Options::default()));
+        let head = arm.map(|arm| head(&Model::kinematic(arm), &Options::default(), Vec::new()));
         assert!(head.is_ok_and(|head| head.contains("a fn b") && head.lines().all(|l| l.starts_with("//"))));
     }
 }

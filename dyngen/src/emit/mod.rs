@@ -7,10 +7,11 @@ mod batch;
 mod c;
 pub mod c_api;
 mod code;
-mod discrete;
+pub(crate) mod discrete;
 mod docs;
 mod friction;
 mod lanes;
+mod rounded;
 mod signs;
 mod statement;
 mod tests;
@@ -83,13 +84,14 @@ impl Options {
 /// # Errors
 /// As [`Model::function`]: what cannot be proven is not emitted; friction terms that do not fit the arm.
 pub fn source(model: &Model, options: &Options) -> Result<String, Error> {
-    let tokens = tokens(model, options)?;
+    let parts = Parts::new(model, options)?;
+    let tokens = items(model, options, &parts)?;
     // Tokens that quote made of whole items always parse.
     let body = match syn::parse2::<syn::File>(tokens.clone()) {
         Ok(file) => prettyplease::unparse(&file),
         Err(_) => tokens.to_string(),
     };
-    Ok(format!("{}\n{body}", docs::head(model, options)))
+    Ok(format!("{}\n{body}", docs::head(model, options, rounded::lines(model, &parts))))
 }
 
 /// What a file holds, proven, before it is printed in a language.
@@ -128,7 +130,10 @@ impl<'a> Parts<'a> {
 /// # Errors
 /// As [`Model::function`], and friction terms that do not fit the arm.
 pub fn tokens(model: &Model, options: &Options) -> Result<TokenStream, Error> {
-    let parts = Parts::new(model, options)?;
+    items(model, options, &Parts::new(model, options)?)
+}
+
+fn items(model: &Model, options: &Options, parts: &Parts<'_>) -> Result<TokenStream, Error> {
     let prepared = parts.preparation.values().len();
     let functions = parts.functions.iter().map(|built| code::function(model, built, prepared));
     let frames =

@@ -18,7 +18,7 @@ use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::differentiate::Direction;
 use crate::parameters::ParameterSet;
-use point::Point;
+pub(crate) use point::Point;
 use series::PoseSeries;
 use std::fmt;
 
@@ -98,7 +98,7 @@ pub fn has_full_rank(arm: &Arm, symbols: &AngleSymbols, sets: &Sets) -> bool {
 }
 
 /// What the Lagrangian says the function's result must be, row-major.
-fn expected(point: &Point<'_>, set: &ParameterSet, function: Function) -> Vec<Fp> {
+pub(crate) fn expected(point: &Point<'_>, set: &ParameterSet, function: Function) -> Vec<Fp> {
     let n = point.dof();
     let zeros = vec![Fp::ZERO; n];
     let motion = |gravity| point.state(&point.velocities, &point.accelerations, gravity);

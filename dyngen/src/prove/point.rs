@@ -2,8 +2,8 @@
 
 use crate::arm::{Arm, Drive, Parameter};
 use crate::base::Sets;
-use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;
+use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::prime::{Draws, Fp, PrimeField};
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
@@ -14,7 +14,7 @@ use crate::parameters::{Combination, ParameterSet};
 
 /// A pose, rates and parameter values.
 #[derive(Clone)]
-pub(super) struct Point<'a> {
+pub(crate) struct Point<'a> {
     pub(super) arm: &'a Arm,
     pub(super) symbols: &'a AngleSymbols,
     pub(super) sets: &'a Sets,
@@ -69,7 +69,7 @@ fn angles(arm: &Arm, circle: &mut dyn FnMut() -> (Fp, Fp)) -> Vec<(Fp, Fp)> {
 }
 
 impl<'a> Point<'a> {
-    pub(super) fn draw(arm: &'a Arm, symbols: &'a AngleSymbols, sets: &'a Sets, draws: &mut Draws) -> Self {
+    pub(crate) fn draw(arm: &'a Arm, symbols: &'a AngleSymbols, sets: &'a Sets, draws: &mut Draws) -> Self {
         let angles = angles(arm, &mut || draws.element().circle_point());
         let positions = (0..arm.dof()).map(|_| draws.element()).collect();
         let values = arm.kept_parameters().into_iter().map(|p| (p, draws.element())).collect();
@@ -96,12 +96,17 @@ impl<'a> Point<'a> {
     }
 
     /// The same values at the pose where every coordinate's input angle is zero.
-    pub(super) fn at_zero(&self) -> Point<'a> {
+    pub(crate) fn at_zero(&self) -> Point<'a> {
         Point {
             angles: angles(self.arm, &mut || (Fp::ZERO, Fp::ONE)),
             positions: vec![Fp::ZERO; self.positions.len()],
             ..self.clone()
         }
+    }
+
+    /// The point with the payload that a function takes.
+    pub(crate) fn seen_by(&self, function: Function) -> Point<'a> {
+        Point { loaded: function.takes(Argument::Payload), ..self.clone() }
     }
 
     /// The same with the payload on the tool's frame.
@@ -110,7 +115,7 @@ impl<'a> Point<'a> {
     }
 
     /// Sets the parameters' values so that a set's sums have given values: each on its carriers.
-    pub(super) fn carry(&mut self, set: &ParameterSet, values: &[Rational]) {
+    pub(crate) fn carry(&mut self, set: &ParameterSet, values: &[Rational]) {
         self.values.iter_mut().for_each(|(_, value)| *value = Fp::ZERO);
         for (parameter, sum) in set.parameters.iter().zip(values) {
             let sum = residue(sum);
@@ -123,8 +128,13 @@ impl<'a> Point<'a> {
         }
     }
 
-    pub(super) fn dof(&self) -> usize {
+    pub(crate) fn dof(&self) -> usize {
         self.arm.dof()
+    }
+
+    /// Sine and cosine of a joint's trigonometric input.
+    pub(crate) fn input_angle(&self, joint: usize) -> (Fp, Fp) {
+        self.angles[joint]
     }
 
     /// Sine and cosine of q + theta.
@@ -133,7 +143,7 @@ impl<'a> Point<'a> {
     }
 
     /// q of a prismatic joint.
-    pub(super) fn joint_position(&self, joint: usize) -> Fp {
+    pub(crate) fn joint_position(&self, joint: usize) -> Fp {
         let drive = &self.drives[joint];
         drive.ratio * self.positions[drive.coordinate] + drive.offset
     }
@@ -172,15 +182,30 @@ impl<'a> Point<'a> {
         matrix
     }
 
+    /// What a function is given for an argument.
+    pub(crate) fn argument(&self, set: &ParameterSet, argument: Argument) -> Vec<Fp> {
+        match argument {
+            Argument::Positions => self.positions.clone(),
+            Argument::Velocities => self.velocities.clone(),
+            Argument::Accelerations => self.accelerations.clone(),
+            Argument::ReferenceVelocities => self.reference_velocities.clone(),
+            Argument::ReferenceAccelerations => self.reference_accelerations.clone(),
+            Argument::Errors => self.errors.clone(),
+            Argument::Wrench => self.wrench.clone(),
+            Argument::Payload => self.payload.clone(),
+            Argument::PositionDirection => self.position_direction.clone(),
+            Argument::VelocityDirection => self.velocity_direction.clone(),
+            // Forward dynamics gets the torques of the point's motion and must give its accelerations back.
+            Argument::Torques => self.state(&self.velocities, &self.accelerations, true).torques(),
+            Argument::Parameters => set.parameters.iter().map(|p| self.sum(&p.terms)).collect(),
+        }
+    }
+
     /// The function's graph at this point, with the set's sums of the parameter values.
     pub(super) fn evaluate(&self, set: &ParameterSet, function: &FunctionGraph) -> Option<Vec<Fp>> {
-        let sums: Vec<Fp> = set.parameters.iter().map(|p| self.sum(&p.terms)).collect();
-        // Forward dynamics gets the torques of the point's motion and must give its accelerations back.
+        let sums = self.argument(set, Argument::Parameters);
         let torques = match function.function.takes(Argument::Torques) {
-            true if function.function.takes(Argument::Payload) => {
-                self.with_payload().state(&self.velocities, &self.accelerations, true).torques()
-            }
-            true => self.state(&self.velocities, &self.accelerations, true).torques(),
+            true => self.seen_by(function.function).argument(set, Argument::Torques),
             false => Vec::new(),
         };
         let input = |input: Input| match input {

@@ -4,7 +4,7 @@ mod friction;
 mod function;
 mod positions;
 
-use super::{Options, Parts, docs};
+use super::{Options, Parts, docs, rounded};
 use crate::arm::JointKind;
 use crate::dynamics::function::{Argument, Size};
 use crate::graph::Preparation;
@@ -41,10 +41,15 @@ pub fn c_files(model: &Model, options: &Options, header: &str) -> Result<CFiles,
         items.extend(function::items(&names, frame, model, built, prepared));
     }
     items.extend(friction::items(&names, &options.friction, model.arm()));
-    let head = head(&names, model, options);
+    let head = |rounded: &[String]| head(&names, model, options, rounded);
     Ok(CFiles {
-        header: names.header(&head, &items),
-        source: names.source(&head, &helpers(&names, model, options), header, &items),
+        header: names.header(&head(&[]), &items),
+        source: names.source(
+            &head(&rounded::lines(model, &parts)),
+            &helpers(&names, model, options),
+            header,
+            &items,
+        ),
     })
 }
 
@@ -160,8 +165,8 @@ typedef {prefix}_real real;
     }
 }
 
-/// The comment at the head of both files.
-fn head(names: &Names, model: &Model, options: &Options) -> String {
+/// The comment at the head of both files; `rounded` are the lines of constants.
+fn head(names: &Names, model: &Model, options: &Options, rounded: &[String]) -> String {
     let upper = &names.upper;
     let needs = [
         "Needs: C99 (or C++) and <math.h>. -ffp-contract=off gives the same bits on every machine, and those of the",
@@ -171,7 +176,10 @@ fn head(names: &Names, model: &Model, options: &Options) -> String {
     ];
     let lines = docs::head_lines(model, options, &needs);
     let sizes = format!("Arrays have the lengths that {upper}_JOINTS and {upper}_PARAMETERS say.");
-    comment("/*", lines.iter().map(String::as_str).chain([sizes.as_str()])) + "\n"
+    comment(
+        "/*",
+        lines.iter().map(String::as_str).chain([sizes.as_str()]).chain(rounded.iter().map(String::as_str)),
+    ) + "\n"
 }
 
 /// Lines as a comment.

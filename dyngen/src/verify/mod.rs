@@ -1,0 +1,84 @@
+//! What is printed in a generated file against the Lagrangian: the text is read back, evaluated modulo the prime at
+//! points of its own, and compared.
+//!
+//! Trusted are this folder, the Lagrangian with the algebra below it, and that a compiler does what the text says. The
+//! recursions, the optimiser and the printer are not.
+
+mod c;
+mod check;
+mod head;
+mod language;
+mod rust;
+
+pub use check::{Error, Verifier};
+
+use language::Routines;
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// What is in a file.
+#[derive(Debug, Default)]
+struct Source {
+    routines: Routines,
+    /// Lines and entries.
+    constants: BTreeMap<String, (usize, Vec<String>)>,
+    /// Modules of frames, with their lines.
+    modules: Vec<(String, usize)>,
+    not_checked: Vec<String>,
+    /// Whether the numbers of joints, parameters and angles stand in a file of their own.
+    has_header: bool,
+    /// Literals of many digits that the head does not explain, with their lines.
+    unexplained: Vec<(usize, String)>,
+}
+
+/// What the constant with a function's structure is called among a file's constants.
+fn structure_of(function: &str) -> String {
+    format!("{function} structure")
+}
+
+/// What cannot be read, or is no generated file of the arm.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unreadable {
+    /// From 1.
+    pub line: usize,
+    /// What is wrong there.
+    pub message: String,
+}
+
+impl fmt::Display for Unreadable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.line, self.message)
+    }
+}
+
+impl std::error::Error for Unreadable {}
+
+type Checked<T> = Result<T, Unreadable>;
+
+fn wrong<T>(line: usize, message: &str) -> Checked<T> {
+    Err(Unreadable { line, message: message.to_string() })
+}
+
+/// What was found in a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Report {
+    /// Proven functions, in the order of the file's table.
+    pub proven: Vec<String>,
+    /// Items that were not looked into.
+    pub not_checked: Vec<String>,
+    /// The first difference; all is proven that can be where there is none.
+    pub difference: Option<Difference>,
+}
+
+/// Where a file differs from the Lagrangian.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// The function or constant.
+    pub function: String,
+    /// Row and column of its result, from 0; none where it has no value, or another shape.
+    pub entry: Option<(usize, usize)>,
+    /// Line of the file, from 1.
+    pub line: usize,
+    /// What is wrong.
+    pub message: String,
+}
