@@ -89,7 +89,7 @@ fn assert_close(what: &str, got: &[f64], want: &[f64], tolerance: f64) {
 mod lagrangian {
     use super::*;
     use dyngen::arm::{Convention, JointKind};
-    use num_traits::ToPrimitive;
+    use dyngen::exact::rational::to_f64;
 
     fn turn(axis: usize, angle: f64) -> Matrix4<f64> {
         let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
@@ -106,7 +106,7 @@ mod lagrangian {
     fn joint(arm: &Arm, i: usize, q: f64) -> (Matrix4<f64>, Matrix4<f64>) {
         let row = &arm.joints[i];
         let revolute = row.kind == JointKind::Revolute;
-        let (a, d) = (row.a.to_f64().unwrap(), row.d.to_f64().unwrap());
+        let (a, d) = (to_f64(&row.a), to_f64(&row.d));
         let (theta, d) = if revolute { (row.theta.radians() + q, d) } else { (row.theta.radians(), d + q) };
         let (spin, slide) = (turn(2, theta), shift(2, d));
         let mut generator = Matrix4::zeros();
@@ -124,7 +124,7 @@ mod lagrangian {
 
     /// Kinetic minus potential energy.
     pub(super) fn value(arm: &Arm, bodies: &[Body], q: &[f64], dq: &[f64]) -> f64 {
-        let gravity = Vector3::from_iterator(arm.gravity.iter().map(|g| g.to_f64().unwrap()));
+        let gravity = Vector3::from_iterator(arm.gravity.iter().map(to_f64));
         let (mut t, mut t_dot): (Matrix4<f64>, Matrix4<f64>) = (Matrix4::identity(), Matrix4::zeros());
         let mut sum = 0.0;
         for i in 0..bodies.len() {
@@ -137,7 +137,7 @@ mod lagrangian {
                 Convention::Standard => t * Vector4::z(),
                 Convention::Modified => t * turn(0, m.alpha.radians()) * Vector4::z(),
             };
-            let k = m.rotor_ratio.as_ref().map_or(0.0, |k| k.to_f64().unwrap());
+            let k = m.rotor_ratio.as_ref().map_or(0.0, to_f64);
             sum += k * b.rotor * dq[i] * z.xyz().dot(&omega) + 0.5 * k * k * b.rotor * dq[i] * dq[i];
 
             let (j, j_prime) = joint(arm, i, q[i]);

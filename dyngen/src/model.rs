@@ -8,7 +8,7 @@ use crate::dynamics::function::Kind;
 use crate::dynamics::regroup::{Known, Order, Regrouping};
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::elimination::Unproven;
-use crate::exact::rational::Rational;
+use crate::exact::rational::{self, Rational};
 use crate::exact::symbols::AngleSymbols;
 use crate::lagrangian::elements::{angle_symbols, has_joint_symbols};
 use crate::optimize::{PASSES, Pass};
@@ -201,7 +201,7 @@ impl Model {
             )));
         }
         // Every finite f64 is a rational number.
-        let exact: Option<Vec<Rational>> = values.iter().map(|x| Rational::from_float(*x)).collect();
+        let exact: Option<Vec<Rational>> = values.iter().map(|x| rational::from_f64(*x)).collect();
         let exact = exact.ok_or_else(|| Error::Values("a parameter value is not finite".to_string()))?;
         self.proven(function, kind, Some(&exact), PASSES)
     }

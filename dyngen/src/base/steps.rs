@@ -283,7 +283,7 @@ impl<'f> Steps<'f> {
         let mut found = vec![(Functional { moves: true, monomial: *monomial }, rational::integer(1))];
         // The mean of cos² is one half; of all other monomials of q and q̇ it is zero.
         if motion == Monomial::default().with(self.first + COS, 2) {
-            found.push(mean(Rational::new(1.into(), 2.into())));
+            found.push(mean(rational::ratio(1, 2)));
         }
         found
     }

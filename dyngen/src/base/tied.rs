@@ -18,7 +18,7 @@ use crate::exact::symbols::AngleSymbols;
 use crate::lagrangian::elements::{ArmElements, Source};
 use crate::lagrangian::followers::{input_angles, with_theta};
 use crate::lagrangian::twice_lagrangian;
-use num_bigint::BigInt;
+use dashu_int::IBig;
 
 /// Angles that are larger multiples of parts of each other are as good as free.
 const LARGEST: u32 = 12;
@@ -111,7 +111,7 @@ impl Point {
         let circle = (0..arm.links()).map(|_| {
             let (p, q) = (pick(2 * most + 1) as i64 - most as i64, pick(most + 1) as i64);
             let (p, q) = if (p, q) == (0, 0) { (0, 1) } else { (p, q) };
-            let number = |x: i64| Rational::new(BigInt::from(x), BigInt::from(p * p + q * q));
+            let number = |x: i64| rational::ratio(IBig::from(x), IBig::from(p * p + q * q));
             (number(2 * p * q), number(q * q - p * p))
         });
         Point { circle: circle.collect(), positions, velocities, sizes }

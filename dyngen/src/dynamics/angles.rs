@@ -11,7 +11,7 @@ use crate::exact::angle::Angle;
 use crate::exact::rational::{self, Rational, to_f64};
 use crate::graph::{Builder, Expr, Input, JointSum};
 use crate::lagrangian::followers::quarter_turned;
-use num_traits::{One, Signed, Zero};
+use num_traits::{Signed, Zero};
 use std::collections::BTreeSet;
 
 /// The angles of an arm.

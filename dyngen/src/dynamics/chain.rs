@@ -9,7 +9,6 @@
 use crate::arm::{Arm, Convention, JointKind};
 use crate::exact::algebra::Algebra;
 use crate::lagrangian::elements::{ArmElements, JointElements};
-use num_traits::Zero;
 
 /// A link's place in the chain.
 #[derive(Clone, Debug)]

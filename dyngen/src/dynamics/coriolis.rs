@@ -17,7 +17,7 @@ use super::stage::{Chain, Member, STRAIGHT, Stage, back_x, back_z, plus, scaled}
 use super::wrench::{Wrench, lever};
 use crate::arm::JointKind;
 use crate::exact::algebra::Algebra;
-use crate::exact::rational::Rational;
+use crate::exact::rational;
 use crate::graph::{Builder, Expr};
 
 /// A composite body with its momentum relative to the origin.
@@ -374,7 +374,7 @@ impl Moving {
 }
 
 fn half(b: &Builder, x: Expr) -> Expr {
-    b.mul(&b.constant(&Rational::new(1.into(), 2.into())), &x)
+    b.mul(&b.constant(&rational::ratio(1, 2)), &x)
 }
 
 impl Share {

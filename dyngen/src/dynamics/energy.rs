@@ -4,7 +4,7 @@ use super::body::constant;
 use crate::arm::Arm;
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
-use crate::exact::rational::Rational;
+use crate::exact::rational;
 use crate::graph::{Builder, Expr};
 use crate::lagrangian::elements::ArmElements;
 use crate::lagrangian::twice_lagrangian;
@@ -47,7 +47,7 @@ fn of_set(
     negate: bool,
 ) -> Vec<Expr> {
     debug_assert_eq!(arm.links(), elements.joints.len());
-    let half = b.constant(&Rational::new(1.into(), 2.into()));
+    let half = b.constant(&rational::ratio(1, 2));
     let half = if negate { -half } else { half };
     let columns = twice_lagrangian(b, elements);
     let column = |carriers: &crate::parameters::Combination| {

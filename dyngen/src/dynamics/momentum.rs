@@ -12,7 +12,7 @@ use super::spin::Spin;
 use super::stage::{Chain, plus};
 use crate::arm::JointKind;
 use crate::exact::algebra::Algebra;
-use crate::exact::rational::Rational;
+use crate::exact::rational;
 use crate::graph::{Builder, Expr};
 
 fn as_accelerations(velocities: &[Expr]) -> Drive {
@@ -30,7 +30,7 @@ pub fn kinetic_energy(b: &Builder, chain: &Chain, bodies: &[LinkBody], velocitie
     let momentum = momentum(b, chain, bodies, velocities);
     let terms = velocities.iter().zip(&momentum).map(|(velocity, p)| b.mul(velocity, p));
     let twice = terms.fold(Expr::ZERO, |sum, term| b.add(&sum, &term));
-    b.mul(&b.constant(&Rational::new(1.into(), 2.into())), &twice)
+    b.mul(&b.constant(&rational::ratio(1, 2)), &twice)
 }
 
 /// Cᵀ·q̇, which for Christoffel symbols is ∂T/∂q (what a momentum observer needs).

@@ -157,7 +157,7 @@ pub fn axis_rate(b: &Builder, before: &Spin, velocity: Expr, reference: Expr) ->
     if before.omega == before.reference && velocity == reference {
         return [b.mul(&velocity, &before.omega[1]), -b.mul(&velocity, &before.omega[0]), Expr::ZERO];
     }
-    let half = b.constant(&crate::exact::rational::Rational::new(1.into(), 2.into()));
+    let half = b.constant(&crate::exact::rational::ratio(1, 2));
     axis_rate_sum(b, before, velocity, reference).map(|x| b.mul(&half, &x))
 }
 

@@ -3,7 +3,7 @@
 use super::chain::LinkGeometry;
 use super::moments::{ENTRIES, Moments};
 use crate::exact::algebra::Algebra;
-use crate::exact::rational::Rational;
+use crate::exact::rational;
 use crate::graph::{Builder, Expr, Input};
 use crate::lagrangian::elements::PlacementElements;
 
@@ -28,7 +28,7 @@ fn body(
     tool: &PlacementElements<Expr>,
     parameters: &[Expr; ENTRIES],
 ) -> Moments<Expr> {
-    let half = b.constant(&Rational::new(1.into(), 2.into()));
+    let half = b.constant(&rational::ratio(1, 2));
     let in_file_frame = Moments::of_parameters(b, &half, parameters).placed_back(b, tool);
     let (sin, cos) = &link.file_turn;
     in_file_frame.turned_back_x(b, sin, cos).shifted(b, &link.file_origin)

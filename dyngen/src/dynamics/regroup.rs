@@ -12,7 +12,7 @@ use crate::arm::{Arm, JointKind, Parameter, ParameterKind};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{self, Dependence};
-use crate::exact::rational::Rational;
+use crate::exact::rational::{self, Rational};
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::{Builder, Expr};
 use crate::lagrangian::elements::{ArmElements, Source};
@@ -185,7 +185,7 @@ impl<'a> Map<'a> {
         use ParameterKind::*;
         let f = self.field;
         let mut v: [Constant; ENTRIES] = std::array::from_fn(|_| f.integer(0));
-        let half = |x: i64| f.rational(Rational::new(x.into(), 2.into()));
+        let half = |x: i64| f.rational(rational::ratio(x, 2));
         // J = ½ tr(I) − I
         let square = |axis: usize| [4, 5, 6].map(|e| (e, if e == 4 + axis { half(-1) } else { half(1) }));
         match parameter.kind {
@@ -231,7 +231,7 @@ impl<'a> Map<'a> {
 
     fn sphere(&self, link: usize, sign: i64) -> Combination {
         let f = self.field;
-        let half = f.rational(Rational::new(sign.into(), 2.into()));
+        let half = f.rational(rational::ratio(sign, 2));
         let v = std::array::from_fn(|e| if (4..7).contains(&e) { half.clone() } else { f.integer(0) });
         self.of_moments(link, &Moments::from_entries(&v))
     }

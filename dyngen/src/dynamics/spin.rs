@@ -39,7 +39,7 @@ impl Spin {
     /// ω_i ω_j, symmetric in ω and ωᵣ.
     pub fn product(&self, b: &Builder, i: usize, j: usize) -> Expr {
         let twice = self.twice_product(b, i, j);
-        let half = b.constant(&crate::exact::rational::Rational::new(1.into(), 2.into()));
+        let half = b.constant(&crate::exact::rational::ratio(1, 2));
         if self.omega == self.reference || i == j {
             return b.mul(&self.omega[i], &self.reference[j]);
         }

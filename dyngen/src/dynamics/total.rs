@@ -8,7 +8,7 @@ use super::moments::Moments;
 use super::wrench::Wrench;
 use crate::arm::{Convention, Parameter, ParameterKind};
 use crate::exact::algebra::Algebra;
-use crate::exact::rational::Rational;
+use crate::exact::rational;
 use crate::graph::{Builder, Expr};
 use crate::lagrangian::elements::{ArmElements, JointElements, PlacementElements};
 
@@ -30,7 +30,7 @@ impl Total {
         value: impl Fn(Parameter) -> Expr,
         coupled: impl Fn(usize) -> Option<Vec<(usize, Expr)>>,
     ) -> Total {
-        let half = b.constant(&Rational::new(1.into(), 2.into()));
+        let half = b.constant(&rational::ratio(1, 2));
         let body = |link: usize| {
             let of = |i: usize| value(Parameter { link, kind: ParameterKind::ALL[i] });
             Moments::of_parameters(b, &half, &std::array::from_fn(of))

@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used)]
 
 use super::trigonometry;
+use dashu_int::IBig;
 use nalgebra::SimdRealField;
-use num_bigint::BigInt;
 use num_traits::{Signed, ToPrimitive, Zero};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -17,9 +17,9 @@ fn sin_cos<T: SimdRealField + Copy, const N: usize>(angles: [T; N]) -> ([T; N], 
 const BITS: usize = 320;
 
 /// π·2^BITS by Machin's formula.
-fn pi() -> BigInt {
+fn pi() -> IBig {
     let arctangent = |inverse: i64| {
-        let (mut power, mut sum, mut k) = ((BigInt::from(1) << BITS) / inverse, BigInt::zero(), 1i64);
+        let (mut power, mut sum, mut k) = ((IBig::from(1) << BITS) / inverse, IBig::zero(), 1i64);
         while !power.is_zero() {
             sum += if k % 4 == 1 { &power / k } else { -(&power / k) };
             power /= inverse * inverse;
@@ -31,39 +31,39 @@ fn pi() -> BigInt {
 }
 
 /// x·2^BITS, exactly.
-fn fixed(x: f64) -> BigInt {
+fn fixed(x: f64) -> IBig {
     let exponent = ((x.to_bits() >> 52) & 0x7ff) as i64;
     assert!((700..1300).contains(&exponent) || x == 0.0, "{x}");
-    let mantissa = BigInt::from((x.to_bits() & ((1 << 52) - 1)) | (1 << 52));
+    let mantissa = IBig::from((x.to_bits() & ((1 << 52) - 1)) | (1 << 52));
     let shift = exponent - 1075 + BITS as i64;
     let size = if x == 0.0 {
-        BigInt::zero()
+        IBig::zero()
     } else if shift >= 0 {
-        mantissa << shift
+        mantissa << shift as usize
     } else {
-        mantissa >> -shift
+        mantissa >> (-shift) as usize
     };
     if x < 0.0 { -size } else { size }
 }
 
 /// sin x·2^BITS and cos x·2^BITS.
-fn reference(x: f64, pi: &BigInt) -> [BigInt; 2] {
-    let half: BigInt = pi >> 1;
+fn reference(x: f64, pi: &IBig) -> [IBig; 2] {
+    let half: IBig = pi >> 1;
     let x = fixed(x);
-    let nearest: BigInt = &x * 2 + &half;
+    let nearest: IBig = &x * 2 + &half;
     let turns = floor_of(&nearest, &(&half << 1));
     let r = x - &turns * &half;
     let square = (&r * &r) >> BITS;
-    let series = |first: BigInt, mut k: i64| {
-        let (mut term, mut sum) = (first, BigInt::zero());
-        while !term.is_zero() && term != BigInt::from(-1) {
+    let series = |first: IBig, mut k: i64| {
+        let (mut term, mut sum) = (first, IBig::zero());
+        while !term.is_zero() && term != IBig::from(-1) {
             sum += &term;
             term = -((term * &square) >> BITS) / (k * (k + 1));
             k += 2;
         }
         sum
     };
-    let (s, c) = (series(r, 2), series(BigInt::from(1) << BITS, 1));
+    let (s, c) = (series(r, 2), series(IBig::from(1) << BITS, 1));
     match (turns % 4i64).to_i64().unwrap().rem_euclid(4) {
         0 => [s, c],
         1 => [c, -s],
@@ -73,14 +73,14 @@ fn reference(x: f64, pi: &BigInt) -> [BigInt; 2] {
 }
 
 /// ⌊a/b⌋
-fn floor_of(a: &BigInt, b: &BigInt) -> BigInt {
+fn floor_of(a: &IBig, b: &IBig) -> IBig {
     let quotient = a / b;
     if (a - &quotient * b).is_negative() { quotient - 1 } else { quotient }
 }
 
 /// How far `x` is from the true value, in units of its last place.
-fn ulps(x: f64, truth: &BigInt) -> f64 {
-    let error = (fixed(x) - truth).to_f64().unwrap() / 2f64.powi(BITS as i32);
+fn ulps(x: f64, truth: &IBig) -> f64 {
+    let error = (fixed(x) - truth).to_f64().value() / 2f64.powi(BITS as i32);
     let ulp = (x.abs().next_up() - x.abs()).max(f64::MIN_POSITIVE);
     error.abs() / ulp
 }
@@ -110,11 +110,11 @@ fn a_double_is_within_one_unit_of_the_last_place() {
 /// The doubles next to multiples of π/2 lose most when these are taken off.
 #[test]
 fn a_double_next_to_a_zero_is_within_one_unit_of_the_last_place() {
-    let half: BigInt = pi() >> 1;
+    let half: IBig = pi() >> 1;
     let multiples = (1..63_662i64).filter(|k| *k < 1000 || k % 29 == 0);
     worst(multiples.flat_map(|k| {
-        let multiple: BigInt = &half * k;
-        let near = multiple.to_f64().unwrap() / 2f64.powi(BITS as i32);
+        let multiple: IBig = &half * k;
+        let near = multiple.to_f64().value() / 2f64.powi(BITS as i32);
         [near, near.next_down(), -near.next_up()]
     }));
 }

@@ -78,7 +78,7 @@ fn number(literal: f64, exact: &Rational) -> String {
     if parse_rational(&literal.to_string()).as_ref() == Ok(exact) {
         return String::new();
     }
-    match Rational::from_float(literal).as_ref() == Some(exact) {
+    match rational::from_f64(literal).as_ref() == Some(exact) {
         true => "this f64".to_string(),
         false => rational::to_text(exact),
     }

@@ -33,7 +33,7 @@ impl Angle {
             return Angle::PiMultiple(multiple);
         }
         // pi is no rational; what is added to a number of radians is as near to it as a number can be.
-        let turn = Rational::from_float(Angle::PiMultiple(multiple).radians()).unwrap_or_default();
+        let turn = rational::from_f64(Angle::PiMultiple(multiple).radians()).unwrap_or_default();
         Angle::from_radians(radians + turn)
     }
 
@@ -41,11 +41,11 @@ impl Angle {
     pub fn quarter_turns(&self) -> Option<u8> {
         let Angle::PiMultiple(multiple) = self else { return None };
         let quarters = multiple * rational::integer(2);
-        if !quarters.is_integer() {
+        if !rational::is_integer(&quarters) {
             return None;
         }
-        let four = num_bigint::BigInt::from(4);
-        let turns = ((quarters.to_integer() % &four) + &four) % &four;
+        let four = dashu_int::IBig::from(4);
+        let turns = ((quarters.numerator() % &four) + &four) % &four;
         u8::try_from(turns).ok()
     }
 
@@ -133,11 +133,11 @@ impl fmt::Display for Angle {
             Angle::PiMultiple(m) if m.is_zero() => write!(f, "0"),
             Angle::PiMultiple(m) => {
                 let sign = if m.is_negative() { "-" } else { "" };
-                let numerator = m.numer().abs();
+                let numerator = m.numerator().abs();
                 let factor = if numerator == 1.into() { String::new() } else { format!("{numerator}*") };
                 write!(f, "{sign}{factor}pi")?;
-                if *m.denom() != 1.into() {
-                    write!(f, "/{}", m.denom())?;
+                if !rational::is_integer(m) {
+                    write!(f, "/{}", rational::denominator(m))?;
                 }
                 Ok(())
             }

@@ -47,7 +47,7 @@ impl ConstantField {
         for (index, angle) in angles.angles.iter().enumerate() {
             let (sin, cos) = angle.sin_cos();
             let (sin_p, cos_p) = angles.modular(index, draws);
-            let root = |n: i64, d: i64| Square::Constant(Rational::new(n.into(), d.into()));
+            let root = |n: i64, d: i64| Square::Constant(rational::ratio(n, d));
             match angles.kind(index) {
                 SymbolKind::General => {
                     squares.push(Square::OneMinusSquare(squares.len() + 1));
@@ -85,7 +85,7 @@ impl ConstantField {
                 }
                 SymbolKind::Twelfth => {
                     at += 1;
-                    (ring.constant(Rational::new(1.into(), 2.into())), ring.variable(at - 1))
+                    (ring.constant(rational::ratio(1, 2)), ring.variable(at - 1))
                 }
             })
             .collect();
@@ -200,7 +200,7 @@ impl ConstantField {
             }
         }
         if let Some((_, lead)) = denominator.terms().last() {
-            let scale = self.ring.constant(lead.recip());
+            let scale = self.ring.constant(Rational::ONE / lead);
             numerator = self.ring.mul(&numerator, &scale);
             denominator = self.ring.mul(&denominator, &scale);
         }

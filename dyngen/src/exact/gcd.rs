@@ -6,7 +6,6 @@
 use super::algebra::Algebra;
 use super::polynomial::{Monomial, Numerator, PolynomialRing};
 use super::rational::Rational;
-use num_traits::One;
 
 type Ring = PolynomialRing<Rational>;
 
@@ -56,7 +55,7 @@ pub fn exact_quotient(ring: &Ring, a: &Numerator, b: &Numerator) -> Option<Numer
 
 fn monic(ring: &Ring, a: &Numerator) -> Numerator {
     match a.terms().last() {
-        Some((_, lead)) if !lead.is_one() => ring.mul(a, &ring.constant(lead.recip())),
+        Some((_, lead)) if !lead.is_one() => ring.mul(a, &ring.constant(Rational::ONE / lead)),
         _ => a.clone(),
     }
 }

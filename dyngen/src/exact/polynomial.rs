@@ -228,7 +228,7 @@ where
 
 #[cfg(test)]
 mod tests {
-    use super::super::rational::{Rational, integer};
+    use super::super::rational::{integer, ratio};
     use super::*;
 
     #[test]
@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn a_root_squares_to_its_constant() {
-        let half = Rational::new(1.into(), 2.into());
+        let half = ratio(1, 2);
         let ring = PolynomialRing::new(vec![Square::Constant(half.clone())]);
         let h = ring.variable(0);
         assert_eq!(ring.mul(&h, &h), ring.constant(half));

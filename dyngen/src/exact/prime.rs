@@ -4,8 +4,8 @@
 //! (Schwartz–Zippel), so two points already leave less than 2⁻¹⁰⁰ for any formula of an arm.
 
 use super::algebra::Algebra;
-use super::rational::Rational;
-use num_bigint::BigInt;
+use super::rational::{self, Rational};
+use dashu_int::IBig;
 
 /// 2⁶¹ − 465: prime, and ≡ 23 mod 24, so that √2 and √3 (angles that are multiples of pi/4 and pi/6) exist.
 pub const P: u64 = 2_305_843_009_213_693_487;
@@ -28,12 +28,12 @@ impl Fp {
 
     /// The element of a rational; `None` where P divides the denominator.
     pub fn from_rational(value: &Rational) -> Option<Fp> {
-        let residue = |n: &BigInt| {
-            let p = BigInt::from(P);
+        let residue = |n: &IBig| {
+            let p = IBig::from(P);
             let r = ((n % &p) + &p) % &p;
             u64::try_from(r).map(Fp).unwrap_or(Fp::ZERO)
         };
-        Some(residue(value.numer()) * residue(value.denom()).inverse()?)
+        Some(residue(value.numerator()) * residue(&rational::denominator(value)).inverse()?)
     }
 
     /// The residue itself.

@@ -1,11 +1,11 @@
 //! Rational numbers, and decimals read as what they say: 0.305 is 61/200.
 
-use num_bigint::BigInt;
-use num_rational::BigRational;
-use num_traits::{One, Pow, Signed, ToPrimitive, Zero};
+use dashu_int::IBig;
+use dashu_ratio::RBig;
+use num_traits::Signed;
 
 /// An exact rational number of any size.
-pub type Rational = BigRational;
+pub type Rational = RBig;
 
 /// Powers of ten beyond this are no length, mass or angle, and would only fill the memory.
 const LARGEST_EXPONENT: i64 = 60;
@@ -49,30 +49,51 @@ fn parse_decimal(text: &str) -> Result<Rational, String> {
     if exponent.abs() > LARGEST_EXPONENT {
         return Err(format!("the exponent of '{text}' is beyond ±{LARGEST_EXPONENT}"));
     }
-    let value = BigInt::parse_bytes(all.as_bytes(), 10).ok_or_else(not_a_number)? * sign;
+    let value = IBig::from_str_radix(&all, 10).map_err(|_| not_a_number())? * sign;
     let shift = exponent - fraction.len() as i64;
-    let power = BigInt::from(10).pow(shift.unsigned_abs());
-    Ok(if shift >= 0 { Rational::from_integer(value * power) } else { Rational::new(value, power) })
+    // The exponent and the digits are few.
+    let power = IBig::from(10).pow(shift.unsigned_abs() as usize);
+    Ok(if shift >= 0 { Rational::from(value * power) } else { ratio(value, power) })
 }
 
 /// The nearest `f64`.
 pub fn to_f64(value: &Rational) -> f64 {
     // Decimal input stays the f64 that the same literal gives: both round the exact value once.
-    value.to_f64().unwrap_or(f64::NAN)
+    value.to_f64().value()
 }
 
 /// The text of a coefficient: `1`, `-49/400`.
 pub fn to_text(value: &Rational) -> String {
-    if value.is_integer() {
-        value.numer().to_string()
+    if is_integer(value) {
+        value.numerator().to_string()
     } else {
-        format!("{}/{}", value.numer(), value.denom())
+        format!("{}/{}", value.numerator(), value.denominator())
     }
 }
 
 /// Shorthand for small integers.
 pub fn integer(value: i64) -> Rational {
-    Rational::from_integer(BigInt::from(value))
+    Rational::from(value)
+}
+
+/// p/q for q other than zero.
+pub fn ratio(p: impl Into<IBig>, q: impl Into<IBig>) -> Rational {
+    Rational::from_parts_signed(p.into(), q.into())
+}
+
+/// What it is divided by, above zero.
+pub fn denominator(value: &Rational) -> IBig {
+    value.denominator().clone().into()
+}
+
+/// The value of a finite `f64`.
+pub fn from_f64(value: f64) -> Option<Rational> {
+    Rational::try_from(value).ok()
+}
+
+/// Whether it is a whole number.
+pub fn is_integer(value: &Rational) -> bool {
+    value.denominator().is_one()
 }
 
 /// `Some(sign)` where the value is ±1.

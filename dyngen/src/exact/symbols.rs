@@ -2,7 +2,7 @@
 
 use super::angle::Angle;
 use super::prime::{Draws, Fp};
-use super::rational::{self, Rational};
+use super::rational;
 use num_traits::Signed;
 
 /// The sine or cosine of a constant angle.
@@ -94,8 +94,8 @@ impl AngleSymbols {
     /// What is known of a symbol.
     pub fn kind(&self, index: usize) -> SymbolKind {
         match &self.angles[index] {
-            Angle::PiMultiple(m) if *m == Rational::new(1.into(), 4.into()) => SymbolKind::Eighth,
-            Angle::PiMultiple(m) if *m == Rational::new(1.into(), 6.into()) => SymbolKind::Twelfth,
+            Angle::PiMultiple(m) if *m == rational::ratio(1, 4) => SymbolKind::Eighth,
+            Angle::PiMultiple(m) if *m == rational::ratio(1, 6) => SymbolKind::Twelfth,
             _ => SymbolKind::General,
         }
     }
@@ -130,7 +130,7 @@ fn canonical(angle: &Angle) -> (Angle, bool, bool, bool) {
             }
             let swapped = &m * rational::integer(4) > one;
             if swapped {
-                m = Rational::new(1.into(), 2.into()) - m;
+                m = rational::ratio(1, 2) - m;
             }
             (Angle::PiMultiple(m), swapped, sin_negative, cos_negative)
         }

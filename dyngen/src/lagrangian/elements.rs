@@ -4,7 +4,6 @@ use crate::arm::{Angle, Arm, Convention, JointKind, Placement};
 use crate::exact::algebra::Algebra;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::{AngleSymbols, Trig};
-use num_traits::Zero;
 
 /// The arm's angles whose sine and cosine are no rationals: twists, the fixed angles of prismatic joints, and
 /// those of the tool and the base.

@@ -2,8 +2,8 @@
 
 use crate::arm::{Angle, Arm, JointKind};
 use crate::exact::algebra::Algebra;
-use crate::exact::rational::{Rational, to_f64};
-use num_bigint::BigInt;
+use crate::exact::rational::{self, Rational, to_f64};
+use dashu_int::IBig;
 use num_traits::{FromPrimitive, One, Signed, Zero};
 use std::f64::consts::TAU;
 
@@ -21,7 +21,7 @@ pub fn input_angles<A: Algebra>(
     draw: &mut dyn FnMut() -> (A::Value, A::Value),
     largest: Option<u32>,
 ) -> Vec<(A::Value, A::Value)> {
-    let free = |x: &BigInt| largest.is_some_and(|most| x.abs() > BigInt::from(most));
+    let free = |x: &IBig| largest.is_some_and(|most| x.abs() > IBig::from(most));
     let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
     let drives = arm.drives();
     let mut angles: Vec<Option<(A::Value, A::Value)>> = vec![None; arm.links()];
@@ -31,18 +31,20 @@ pub fn input_angles<A: Algebra>(
             .filter(|(i, drive)| drive.joint == leader && revolute(*i))
             .map(|(i, drive)| (i, &drive.ratio))
             .collect();
-        let tied = |ratio: &Rational| !free(ratio.numer()) && !free(ratio.denom());
+        let tied = |ratio: &Rational| !free(ratio.numerator()) && !free(&rational::denominator(ratio));
         // The least common multiple: b/a in lowest terms has in its numerator what a lacks.
-        let common = |a: BigInt, b: &BigInt| Rational::new(b.clone(), a.clone()).numer() * a;
+        let common = |a: IBig, b: &IBig| rational::ratio(b.clone(), a.clone()).numerator() * a;
         let tied_ratios = together.iter().filter(|(_, ratio)| tied(ratio));
-        let parts = tied_ratios.fold(BigInt::one(), |parts, (_, ratio)| common(parts, ratio.denom()));
+        let parts =
+            tied_ratios.fold(IBig::one(), |parts, (_, ratio)| common(parts, &rational::denominator(ratio)));
         for (joint, ratio) in together {
             // What is free has no constant to another angle.
             if !tied(ratio) {
                 angles[joint] = Some(draw());
                 continue;
             }
-            let turned = multiple_of(alg, &(ratio.numer() * &parts / ratio.denom()), &point);
+            let turned =
+                multiple_of(alg, &(ratio.numerator() * &parts / rational::denominator(ratio)), &point);
             let shift = match arm.phase(joint) {
                 phase if phase.quarter_turns().is_some() => {
                     with_theta(alg, &phase, (alg.integer(0), alg.integer(1)))
@@ -89,13 +91,13 @@ fn sum_of_angles<A: Algebra>(
 fn circle_point_near(angle: f64) -> (Rational, Rational) {
     let tangent = (angle.rem_euclid(TAU) / 2.0).tan();
     let mut rest = tangent;
-    let (mut before, mut t) = ([BigInt::zero(), BigInt::one()], [BigInt::one(), BigInt::zero()]);
+    let (mut before, mut t) = ([IBig::zero(), IBig::one()], [IBig::one(), IBig::zero()]);
     for _ in 0..40 {
         let whole = rest.floor();
-        let Some(count) = BigInt::from_f64(whole) else { break };
+        let Some(count) = IBig::from_f64(whole) else { break };
         let next = [&count * &t[0] + &before[0], &count * &t[1] + &before[1]];
         (before, t) = (t, next);
-        let value = to_f64(&Rational::new(t[0].clone(), t[1].clone()));
+        let value = to_f64(&rational::ratio(t[0].clone(), t[1].clone()));
         if (value - tangent).abs() < 4e-13 * (1.0 + tangent * tangent) || rest == whole {
             break;
         }
@@ -103,19 +105,19 @@ fn circle_point_near(angle: f64) -> (Rational, Rational) {
     }
     let [p, q] = t;
     let (square, scale) = (&q * &q - &p * &p, &q * &q + &p * &p);
-    (Rational::new(&p * &q * 2, scale.clone()), Rational::new(square, scale))
+    (rational::ratio(&p * &q * 2, scale.clone()), rational::ratio(square, scale))
 }
 
 /// Sine and cosine of a multiple of an angle, by doubling.
-fn multiple_of<A: Algebra>(alg: &A, count: &BigInt, angle: &(A::Value, A::Value)) -> (A::Value, A::Value) {
+fn multiple_of<A: Algebra>(alg: &A, count: &IBig, angle: &(A::Value, A::Value)) -> (A::Value, A::Value) {
     let mut total = (alg.integer(0), alg.integer(1));
     let mut power = angle.clone();
     let mut rest = count.abs();
     while !rest.is_zero() {
-        if rest.bit(0) {
+        if &rest % 2 != 0 {
             total = sum_of_angles(alg, &total, &power);
         }
-        rest >>= 1u32;
+        rest >>= 1usize;
         if !rest.is_zero() {
             power = sum_of_angles(alg, &power, &power);
         }
@@ -146,9 +148,9 @@ mod tests {
         let point = Draws::new(7).element().circle_point();
         let mut added = (Fp::ZERO, Fp::ONE);
         for count in 0..40 {
-            let (s, c) = multiple_of(&PrimeField, &BigInt::from(count), &point);
+            let (s, c) = multiple_of(&PrimeField, &IBig::from(count), &point);
             assert_eq!((s, c), added);
-            assert_eq!(multiple_of(&PrimeField, &BigInt::from(-count), &point), (-s, c));
+            assert_eq!(multiple_of(&PrimeField, &IBig::from(-count), &point), (-s, c));
             added = sum_of_angles(&PrimeField, &added, &point);
         }
     }

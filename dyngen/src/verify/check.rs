@@ -9,6 +9,7 @@ use crate::dynamics::Function;
 use crate::dynamics::function::Argument;
 use crate::exact::angle::Angle;
 use crate::exact::prime::{Draws, Fp};
+use crate::exact::rational;
 use crate::exact::rational::Rational;
 use crate::lagrangian::elements::angle_symbols;
 use crate::model::{self, Model};
@@ -191,7 +192,7 @@ impl Verifier {
 
     fn places<'p>(&self, model: &'p Model, set: &ParameterSet) -> Vec<Place<'p>> {
         let mut draws = Draws::new(SEED);
-        let exact = |x: &f64| Rational::from_float(*x).unwrap_or_default();
+        let exact = |x: &f64| rational::from_f64(*x).unwrap_or_default();
         let values: Option<Vec<Rational>> = self.values.as_ref().map(|v| v.iter().map(exact).collect());
         let place = |_| {
             let pi = draws.element();

@@ -3,6 +3,7 @@
 use super::language::Exact;
 use super::{Checked, wrong};
 use crate::exact::angle::Angle;
+use crate::exact::rational;
 use crate::exact::rational::{Rational, integer, parse_rational, to_f64};
 use crate::exact::symbols::AngleSymbols;
 use crate::parameters::SetKind;
@@ -97,9 +98,9 @@ impl Literals {
 
 /// The number that a text stands for, where `literal` is that number rounded.
 fn exact_of(text: &str, literal: f64, symbols: &AngleSymbols) -> Option<Exact> {
-    let rounded = Rational::from_float(literal)?;
+    let rounded = rational::from_f64(literal)?;
     let near = |value: &Rational, ulps: i64| {
-        let ulp = Rational::from_float(literal.next_up())? - &rounded;
+        let ulp = rational::from_f64(literal.next_up())? - &rounded;
         ((value - &rounded).abs() <= ulp * integer(ulps)).then_some(())
     };
     if text == "this f64" {
@@ -129,11 +130,11 @@ fn exact_of(text: &str, literal: f64, symbols: &AngleSymbols) -> Option<Exact> {
         return Some(Exact::Number(number, turns));
     }
     let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));
-    let denominator: num_bigint::BigInt = denominator.parse().ok()?;
+    let denominator: dashu_int::IBig = denominator.parse().ok()?;
     if denominator.is_zero() {
         return None;
     }
-    let value = Rational::new(numerator.parse().ok()?, denominator);
+    let value = rational::ratio(numerator.parse::<dashu_int::IBig>().ok()?, denominator);
     (to_f64(&value) == literal).then_some(Exact::Number(value, Rational::zero()))
 }
 

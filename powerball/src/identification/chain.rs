@@ -1,8 +1,8 @@
 //! The geometry of a serial arm in numbers, from its arm file.
 
 use dyngen::arm::{Arm, Convention, Joint, JointKind};
+use dyngen::exact::rational::to_f64;
 use nalgebra::{Matrix3, Vector3};
-use num_traits::ToPrimitive;
 
 /// One joint of a chain: its row of the Denavit–Hartenberg table as numbers.
 #[derive(Clone, Copy, Debug)]
@@ -22,12 +22,12 @@ impl Row {
         Row {
             standard: convention == Convention::Standard,
             revolute: joint.kind == JointKind::Revolute,
-            a: joint.a.to_f64().unwrap_or(f64::NAN),
-            b: joint.b.to_f64().unwrap_or(f64::NAN),
+            a: to_f64(&joint.a),
+            b: to_f64(&joint.b),
             sin_cos_alpha: joint.alpha.sin_cos(),
-            d: joint.d.to_f64().unwrap_or(f64::NAN),
+            d: to_f64(&joint.d),
             theta: joint.theta.radians(),
-            ratio: joint.rotor_ratio.as_ref().and_then(ToPrimitive::to_f64).unwrap_or(0.0),
+            ratio: joint.rotor_ratio.as_ref().map_or(0.0, to_f64),
         }
     }
 
@@ -91,7 +91,7 @@ impl Chain {
         Chain {
             rows: arm.joints.iter().map(|joint| Row::new(joint, arm.convention)).collect(),
             motors: (!arm.transmissions.is_empty()).then(|| arm.motor_velocity_matrix_f64()),
-            gravity: Vector3::from_iterator(arm.gravity.iter().map(|g| g.to_f64().unwrap_or(f64::NAN))),
+            gravity: Vector3::from_iterator(arm.gravity.iter().map(|g| to_f64(g))),
         }
     }
 
