@@ -14,7 +14,7 @@ use crate::logs::regression::{Data, DataOptions, Recording, RigidArm, Signals};
 use crate::logs::signal::resample::median_step;
 use dyngen::Arm;
 use dyngen::arm::{Parameter, ParameterKind};
-use dyngen::exact::rational::Rational;
+use dyngen::exact::rational;
 use serde_json::Value;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -285,7 +285,7 @@ impl ArmChanges {
     pub fn of(&self, arm: &Arm) -> Result<Arm, Unchanged> {
         let mut arm = arm.clone();
         if let Some(gravity) = self.gravity {
-            let [x, y, z] = gravity.map(Rational::from_float);
+            let [x, y, z] = gravity.map(rational::from_f64);
             let (Some(x), Some(y), Some(z)) = (x, y, z) else { return Err(Unchanged::Gravity) };
             arm.gravity = [x, y, z];
         }

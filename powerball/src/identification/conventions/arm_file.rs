@@ -17,7 +17,7 @@ use crate::logs::regression::{Recording, newton_euler};
 use dyngen::Arm;
 use dyngen::arm::{Convention, JointKind};
 use dyngen::exact::angle::Angle;
-use dyngen::exact::rational::{Rational, integer, to_f64};
+use dyngen::exact::rational::{self, integer, to_f64};
 
 /// Where no joint's held-out error is more than this share of its torque, the arm file is this arm's.
 const NOTICED: f64 = 0.02;
@@ -257,7 +257,7 @@ fn gravities(arm: &Arm) -> Vec<ArmChange> {
         if cosine > TILT {
             continue;
         }
-        let exact = g.map(|x| Rational::from_float((1e6 * x).round() / 1e6).unwrap_or_default());
+        let exact = g.map(|x| rational::from_f64((1e6 * x).round() / 1e6).unwrap_or_default());
         all.push(ArmChange {
             arm: Arm { gravity: exact, ..arm.clone() },
             line: format!("gravity = {}", text(g)),
