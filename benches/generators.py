@@ -250,7 +250,8 @@ def table(name, path, held, options, generator, seconds, folder):
     head = (
         f"{name}: {model.nv} joints, {len(parameters)} parameters; results differ by at most",
         f"{worst:.0e} of the largest. Code and constants of all functions: {sizes}",
-        f"(object files: {ours.bytes} B and {theirs.bytes} B), where CasADi's has both forms of the derivatives.\n",
+        f"(object files: {ours.bytes} B and {theirs.bytes} B), where CasADi's has both forms of the",
+        "derivatives.\n",
         "| function | dyngen, ns | CasADi, ns | CasADi / dyngen | operations: dyngen | CasADi |",
         "|---|---|---|---|---|---|",
     )
