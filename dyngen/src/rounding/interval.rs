@@ -12,9 +12,6 @@ pub(super) struct Interval {
 }
 
 impl Interval {
-    /// Zero alone.
-    pub(super) const ZERO: Interval = Interval::point(0.0);
-
     /// One number.
     pub(super) const fn point(x: f64) -> Interval {
         Interval { low: x, high: x }
@@ -48,6 +45,15 @@ impl Interval {
     pub(super) fn widened(self, by: f64) -> Interval {
         let by = by + ROUNDED * self.magnitude() + f64::MIN_POSITIVE;
         Interval { low: self.low - by, high: self.high + by }
+    }
+
+    /// What of it is within ±`most`.
+    #[inline]
+    pub(super) fn clamped(self, most: f64) -> Interval {
+        Interval {
+            low: if self.low < -most { -most } else { self.low },
+            high: if self.high > most { most } else { self.high },
+        }
     }
 
     #[inline]

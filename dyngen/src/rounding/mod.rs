@@ -10,11 +10,14 @@
 //! accumulated rounding error" (1976); with interval or symbolic remainder: Darulova and Kuncak (Rosa, 2014), Solovyev
 //! et al. (FPTaylor, 2015).
 
+mod angle;
 mod interval;
 mod limits;
+mod norms;
 mod precision;
 mod program;
 mod search;
+mod slopes;
 #[cfg(test)]
 mod tests;
 
@@ -48,12 +51,11 @@ pub fn bounds(model: &Model, built: &FunctionGraph, parameters: Option<&[f64]>) 
         return Err(missing);
     }
     let mut bounds = Bounds { single: Vec::new(), double: Vec::new() };
-    let programs: Option<Vec<Program>> = (0..built.outputs.len())
-        .map(|output| Program::new(model, built, output, &|variable| limits.range(variable)))
-        .collect();
-    let programs = programs.ok_or("a parameter has no value")?;
+    let programs: Option<Vec<Program>> =
+        (0..built.outputs.len()).map(|output| Program::new(model, built, output)).collect();
+    let programs = programs.ok_or("its parameters are prepared")?;
     let operations: usize = programs.iter().map(Program::len).sum();
-    let evaluations = (EFFORT / operations.max(1)).clamp(LEAST, MOST);
+    let evaluations = (EFFORT / operations.max(1)).min(MOST);
     for program in &programs {
         let ranges: Option<Vec<_>> = program.variables.iter().map(|v| limits.range(*v)).collect();
         let splits: Vec<bool> = program.variables.iter().map(|v| v.0 != Argument::Parameters).collect();
@@ -65,9 +67,8 @@ pub fn bounds(model: &Model, built: &FunctionGraph, parameters: Option<&[f64]>) 
     Ok(bounds)
 }
 
-/// Operations over intervals for one function: about a tenth of a second.
-const EFFORT: usize = 3_000_000;
+/// Operations over intervals for one function: less than a tenth of a second.
+const EFFORT: usize = 2_000_000;
 
-/// Bounds of parts of the states that an output is worth at least, and at most.
-const LEAST: usize = 64;
+/// Bounds of parts of the states that an output is worth at most.
 const MOST: usize = 4000;

@@ -56,6 +56,9 @@ impl Precision {
     }
 }
 
+/// Both.
+pub(super) const PRECISIONS: [Precision; 2] = [Precision::Single, Precision::Double];
+
 /// Of `f32`: 2⁻¹⁴⁹.
 const SUBNORMAL_SINGLE: f64 = f32::MIN_POSITIVE as f64 * f32::EPSILON as f64;
 

@@ -38,9 +38,15 @@ pub(super) fn bound(program: &Program, all: &[Interval], splits: &[bool], evalua
     let mut workspace = Workspace::default();
     let mut of = |ranges: Vec<Interval>| Part { errors: program.errors(&ranges, &mut workspace), ranges };
     let whole = of(all.to_vec());
-    let mut gains = Gains::new(&whole, splits, &mut of);
+    let mut gains = Gains::new(&whole, splits);
+    // A first guess pays where many splits follow.
+    let slices = splits.iter().filter(|s| **s).count() << HALVINGS;
+    let tried = if evaluations > 4 * slices { slices } else { 0 };
+    if tried > 0 {
+        gains.guess(&whole, &mut of);
+    }
     let mut parts = BinaryHeap::from([whole]);
-    for _ in 0..evaluations / 2 {
+    for _ in 0..(evaluations - tried) / 2 {
         let Some(worst) = parts.pop() else { break };
         let Some(which) = gains.best(&worst) else {
             parts.push(worst);
@@ -67,13 +73,16 @@ struct Gains {
 }
 
 impl Gains {
-    /// First from slices of the whole, each narrow in one variable.
-    fn new(whole: &Part, splits: &[bool], of: &mut impl FnMut(Vec<Interval>) -> Part) -> Gains {
+    fn new(whole: &Part, splits: &[bool]) -> Gains {
         let widths: Vec<f64> = whole.ranges.iter().map(|r| r.width()).collect();
-        let mut gain = |which: usize| {
-            if !splits[which] || widths[which] <= 0.0 {
-                return None;
-            }
+        let gain = |(split, width): (&bool, &f64)| (*split && *width > 0.0).then_some(LEAST);
+        Gains { gains: splits.iter().zip(&widths).map(gain).collect(), widths }
+    }
+
+    /// From slices of the whole, each narrow in one variable.
+    fn guess(&mut self, whole: &Part, of: &mut impl FnMut(Vec<Interval>) -> Part) {
+        for (which, gain) in self.gains.iter_mut().enumerate() {
+            let Some(gain) = gain else { continue };
             let mut slices = vec![whole.ranges[which]];
             for _ in 0..HALVINGS {
                 slices = slices.iter().flat_map(|slice| slice.halves()).collect();
@@ -83,9 +92,8 @@ impl Gains {
                 ranges[which] = slice;
                 of(ranges).errors[0]
             });
-            Some(gained(whole.errors[0], errors.fold(0.0, f64::max)) / f64::from(HALVINGS))
-        };
-        Gains { gains: (0..widths.len()).map(&mut gain).collect(), widths }
+            *gain = gained(whole.errors[0], errors.fold(0.0, f64::max)) / f64::from(HALVINGS);
+        }
     }
 
     /// The variable whose halving promises most; where nothing is known, the widest.
@@ -117,7 +125,7 @@ fn gained(before: f64, after: f64) -> f64 {
 }
 
 /// Of a variable's range for the first guess.
-const HALVINGS: u32 = 3;
+const HALVINGS: u32 = 2;
 
 /// The share of the last split in what is known of a variable.
 const LEARNING: f64 = 0.2;

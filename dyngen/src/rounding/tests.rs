@@ -9,9 +9,9 @@ use crate::arm::Arm;
 use crate::dynamics::function::Argument;
 use crate::dynamics::{Function, FunctionGraph};
 use crate::emit::emitted_sin_cos;
-use crate::exact::rational::{Rational, to_f64};
+use crate::exact::rational::to_f64;
 use crate::graph::evaluate::{Field, evaluate};
-use crate::graph::{Input, JointSum};
+use crate::graph::{Expr, Input, JointSum, Node};
 use crate::model::Model;
 use crate::parameters::SetKind;
 use crate::values::Values;
@@ -20,28 +20,6 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::time::Instant;
 use twice::Twice;
-
-/// A number of a format, rounded as emitted code rounds it.
-#[derive(Clone, Copy)]
-struct Number<T>(T);
-
-impl<T: RealField + Copy> Field for Number<T> {
-    fn add(self, other: Self) -> Self {
-        Number(self.0 + other.0)
-    }
-    fn neg(self) -> Self {
-        Number(-self.0)
-    }
-    fn mul(self, other: Self) -> Self {
-        Number(self.0 * other.0)
-    }
-    fn div(self, other: Self) -> Option<Self> {
-        Some(Number(self.0 / other.0))
-    }
-    fn constant(value: &Rational) -> Option<Self> {
-        Some(Number(convert(to_f64(value))))
-    }
-}
 
 /// What a function is given: one number for each of an argument's.
 struct State(Vec<(Argument, Vec<f64>)>);
@@ -96,38 +74,7 @@ impl State {
         self.of(Argument::Positions, i)
     }
 
-    /// The outputs as emitted code computes them.
-    fn emitted<T: RealField + Copy>(&self, model: &Model, built: &FunctionGraph) -> Vec<T> {
-        let turned = |sum: JointSum| {
-            let mut angle = T::zero();
-            for (k, (joint, negative)) in sum.joints().enumerate() {
-                let of = model.angles().joint(joint);
-                let q: T = convert(self.q(of.coordinate));
-                let term = of.ratio.map_or(q, |ratio| convert::<f64, T>(ratio) * q);
-                angle = if k == 0 {
-                    term
-                } else if negative {
-                    angle - term
-                } else {
-                    angle + term
-                };
-            }
-            let offset = model.angles().offset(sum);
-            emitted_sin_cos(if offset == 0.0 { angle } else { angle + convert(offset) })
-        };
-        let input = |input: Input| match input {
-            Input::Sin(sum) => Number(turned(sum).0),
-            Input::Cos(sum) => Number(turned(sum).1),
-            other => Number(convert(self.input(other))),
-        };
-        let symbol = |index: usize, sine: bool| {
-            let (s, c) = model.symbols().angles[index].sin_cos();
-            Number(convert(if sine { s } else { c }))
-        };
-        evaluate(&built.graph, &built.outputs, input, symbol).unwrap().into_iter().map(|x| x.0).collect()
-    }
-
-    /// The same to twice a double's digits; of arms without offsets and symbols, whose angles are exact sums.
+    /// The outputs to twice a double's digits; of arms without offsets and symbols, whose angles are exact sums.
     fn exact(&self, built: &FunctionGraph) -> Vec<Twice> {
         let turned = |sum: JointSum| {
             let add = |all: Twice, (joint, negative): (usize, bool)| {
@@ -142,6 +89,65 @@ impl State {
             other => Twice::from(self.input(other)),
         };
         evaluate(&built.graph, &built.outputs, input, |_, _| Twice::from(0.0)).unwrap()
+    }
+}
+
+/// A function as emitted code computes it.
+struct Emitted<'a, T> {
+    model: &'a Model,
+    built: &'a FunctionGraph,
+    needed: Vec<usize>,
+    /// The values of all nodes; those of constants are there from the first.
+    values: Vec<T>,
+}
+
+impl<'a, T: RealField + Copy> Emitted<'a, T> {
+    fn new(model: &'a Model, built: &'a FunctionGraph) -> Self {
+        let constant = |node: &Node| match node {
+            Node::Constant(index) => convert(to_f64(built.graph.constant(*index))),
+            Node::Symbol(index, sine) => {
+                let (s, c) = model.symbols().angles[*index as usize].sin_cos();
+                convert(if *sine { s } else { c })
+            }
+            _ => T::zero(),
+        };
+        let values = built.graph.nodes().iter().map(constant).collect();
+        Emitted { model, built, needed: built.graph.needed(&built.outputs), values }
+    }
+
+    fn run(&mut self, state: &State) -> Vec<T> {
+        for node in &self.needed {
+            let of = |e: Expr| if e.is_negative() { -self.values[e.node()] } else { self.values[e.node()] };
+            self.values[*node] = match self.built.graph.nodes()[*node] {
+                Node::Constant(_) | Node::Symbol(..) => continue,
+                Node::Input(Input::Sin(sum)) => self.turned(sum, state).0,
+                Node::Input(Input::Cos(sum)) => self.turned(sum, state).1,
+                Node::Input(input) => convert(state.input(input)),
+                Node::Add(a, b) => of(a) + of(b),
+                Node::Mul(a, b) => of(a) * of(b),
+                Node::Div(a, b) => of(a) / of(b),
+            };
+        }
+        let of = |e: &Expr| if e.is_negative() { -self.values[e.node()] } else { self.values[e.node()] };
+        self.built.outputs.iter().map(of).collect()
+    }
+
+    fn turned(&self, sum: JointSum, state: &State) -> (T, T) {
+        let mut angle = T::zero();
+        for (k, (joint, negative)) in sum.joints().enumerate() {
+            let of = self.model.angles().joint(joint);
+            let q: T = convert(state.q(of.coordinate));
+            let term = of.ratio.map_or(q, |ratio| convert::<f64, T>(ratio) * q);
+            angle = if k == 0 {
+                term
+            } else if negative {
+                angle - term
+            } else {
+                angle + term
+            };
+        }
+        let offset = self.model.angles().offset(sum);
+        emitted_sin_cos(if offset == 0.0 { angle } else { angle + convert(offset) })
     }
 }
 
@@ -168,10 +174,12 @@ impl Seen {
         let parameters: Vec<f64> = values.iter().map(|x| f64::from(*x as f32)).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let [mut single, mut double] = [(); 2].map(|()| vec![0.0f64; built.outputs.len()]);
+        let mut singles = Emitted::<f32>::new(model, built);
+        let mut doubles = Emitted::<f64>::new(model, built);
         for sample in 0..samples {
             let state = State::draw(model.arm(), &parameters, &mut rng);
-            let in_double: Vec<f64> = state.emitted(model, built);
-            for (k, x) in state.emitted::<f32>(model, built).into_iter().enumerate() {
+            let in_double = doubles.run(&state);
+            for (k, x) in singles.run(&state).into_iter().enumerate() {
                 let error = (f64::from(x) - in_double[k]).abs();
                 single[k] = single[k].max(error - bounds.double[k].min(error));
                 assert!(error <= bounds.single[k] + bounds.double[k], "{} {k}: {error:e}", built.function);
@@ -203,26 +211,86 @@ fn no_state_of_the_lwa_4p_is_further_off_than_its_bound() {
         let built = model.function(function, SetKind::Minimal).unwrap();
         let seen = Seen::of(&model, &values, &built, 200, 50);
         // A bound that holds for everything says nothing: those without divisions are near what is seen.
+        let loose = function == Function::JacobianRateTimesVelocity;
         if built.graph.operations(&built.outputs).div == 0 {
             let worst = [
                 most(&seen.bounds.single) / most(&seen.single),
                 most(&seen.bounds.double) / most(&seen.double),
             ];
-            assert!(worst.iter().all(|x| *x < 100.0), "{function}: {worst:?}");
+            let limit = if loose { 1000.0 } else { 50.0 };
+            assert!(worst.iter().all(|x| *x < limit), "{function}: {worst:?}");
         }
     }
+}
+
+/// Angles with offsets and ratios, constants that are symbols, a joint that slides, parameters without values.
+#[test]
+fn no_state_of_a_general_arm_is_further_off_than_its_bound() {
+    let joint = |kind: &str, more: &str| {
+        format!(
+            "{{ kind = \"{kind}\", a = 0.3, alpha = 0.7, d = 0.1, theta = 0.4, position = [-2.5, 3.1], \
+             velocity = 2.5, acceleration = 7, torque = 3{more} }},"
+        )
+    };
+    let joints = [
+        joint("revolute", ""),
+        joint("prismatic", ""),
+        joint("revolute", "").replace("alpha = 0.7", "alpha = 0"),
+        joint("revolute", ", mimic = { joint = 1, ratio = \"-2/3\", offset = 0.2 }"),
+    ];
+    let text = format!(
+        "name = \"a\"\nconvention = \"modified\"\ngravity = [0, 3, -9.81]\njoint = [\n{}\n]",
+        joints.join("\n")
+    );
+    let model = Model::derive(Arm::parse(&text, "arm.toml").unwrap()).unwrap();
+    let parameters = model.set(SetKind::Minimal).unwrap().parameters.len();
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    for function in [Function::InverseDynamics, Function::ForwardKinematics, Function::CoriolisMatrix] {
+        let built = model.function(function, SetKind::Minimal).unwrap();
+        let bounds = bounds(&model, &built, None).unwrap();
+        let mut singles = Emitted::<f32>::new(&model, &built);
+        let mut doubles = Emitted::<f64>::new(&model, &built);
+        let mut seen = vec![0.0f64; built.outputs.len()];
+        for _ in 0..500 {
+            let values: Vec<f64> =
+                (0..parameters).map(|_| f64::from(rng.random_range(-1.0..1.0f32))).collect();
+            let state = State::draw(model.arm(), &values, &mut rng);
+            let double = doubles.run(&state);
+            for (k, x) in singles.run(&state).into_iter().enumerate() {
+                seen[k] = seen[k].max((f64::from(x) - double[k]).abs());
+                assert!(seen[k] <= bounds.single[k] + bounds.double[k], "{function} {k}: {:e}", seen[k]);
+            }
+        }
+        assert!(most(&bounds.single) < 100.0 * most(&seen), "{function}");
+    }
+}
+
+#[test]
+fn a_limit_that_the_file_lacks_is_named() {
+    let text = include_str!("../../../powerball/lwa4p.toml").replacen("torque = 19.0", "", 1);
+    let model = Model::derive(Arm::parse(&text, "lwa4p.toml").unwrap()).unwrap();
+    let of = |function| bounds(&model, &model.function(function, SetKind::Minimal).unwrap(), None);
+    assert_eq!(of(Function::ForwardDynamics).unwrap_err(), "the arm file gives no torque of joint 5");
+    assert!(of(Function::Gravity).is_ok());
 }
 
 #[test]
 #[ignore = "minutes: cargo test --release -p dyngen --lib rounding -- --ignored --nocapture"]
 fn no_state_of_a_million_is_further_off_than_its_bound() {
     let (model, values) = lwa4p();
-    println!("bound / worst seen: of the worst entry, and the largest of all entries; f32 and f64");
+    println!(
+        "function, time, bound in f32; then of f32 and of f64 the bound / the worst error that was seen: of the"
+    );
+    println!("worst entry, and the largest of all entries");
     for function in model.functions() {
         let built = model.function(function, SetKind::Minimal).unwrap();
         let start = Instant::now();
-        bounds(&model, &built, Some(&values)).unwrap();
+        let found = bounds(&model, &built, Some(&values)).unwrap();
         let seconds = start.elapsed().as_secs_f64();
+        if found.single.iter().any(|x| x.is_infinite()) {
+            println!("{:36} {seconds:6.2} s  no bound", function.name());
+            continue;
+        }
         let seen = Seen::of(&model, &values, &built, 1_000_000, 20_000);
         let Seen { bounds, single, double } = &seen;
         let of = |bounds: &[f64], seen: &[f64]| {
