@@ -23,6 +23,7 @@ mod model;
 pub mod optimize;
 pub mod parameters;
 pub mod prove;
+pub mod rounding;
 mod values;
 pub mod verify;
 

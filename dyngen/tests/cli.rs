@@ -63,6 +63,37 @@ fn describe_reports_the_counts_of_the_paper() {
 }
 
 #[test]
+fn describe_bounds_the_rounding_where_the_arm_has_limits() {
+    // The paper's arm has none.
+    assert!(json(&dyngen(&["describe", &arm(), "--json"])).get("rounding").is_none());
+    let path = |file: &str| workspace().join(file).display().to_string();
+    let [geared, values] = ["powerball/lwa4p.toml", "examples/cpp-controller/model.json"].map(path);
+    let unit = json(&dyngen(&["describe", &geared, "--json"]));
+    let given = json(&dyngen(&["describe", &geared, "--json", "--values", &values]));
+    assert!(unit["rounding_parameters"].as_str().unwrap().contains("±1 SI unit"));
+    assert!(given["rounding_parameters"].as_str().unwrap().contains("given values"));
+    let of = |d: &Value, function: &str, format: &str| -> Vec<f64> {
+        let bounds = d["rounding"][function][format].as_array().unwrap();
+        bounds.iter().map(|x| x.as_f64().unwrap()).collect()
+    };
+    for (function, entries) in [("inverse_dynamics", 6), ("mass_matrix", 36), ("forward_kinematics", 16)] {
+        let (single, double) = (of(&given, function, "f32"), of(&given, function, "f64"));
+        assert_eq!((single.len(), double.len()), (entries, entries));
+        // Of unit by unit 2⁻²⁹, apart from constants, which a double has exactly more often.
+        for (s, d) in single.iter().zip(&double) {
+            assert!(*d <= 1.1 * s * 2f64.powi(-29) && *s < 1e-3, "{function}: {s:e} {d:e}");
+        }
+    }
+    // No bound is no number, with the reason.
+    let division = &given["rounding"]["forward_dynamics"];
+    assert!(division["f32"][0].is_null() && division["why"].as_str().unwrap().contains("division"));
+    let table = text(&dyngen(&["describe", &geared]).stdout);
+    assert!(table.contains("rounding: |emitted − exact|") && table.contains("none for "), "{table}");
+    let wrong = dyngen(&["describe", &geared, "--values", &geared]);
+    assert_eq!(wrong.status.code(), Some(2));
+}
+
+#[test]
 fn describe_says_why_the_published_sums_are_not_exact_with_another_ratio() {
     let original = std::fs::read_to_string(arm()).unwrap();
     let at = original.rfind("rotor_ratio = 1").unwrap();

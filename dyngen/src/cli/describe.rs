@@ -2,15 +2,16 @@
 
 use super::digits::Digits;
 use super::{Failure, Progress, model, print};
-use dyngen::Model;
 use dyngen::arm::{Arm, Convention, Joint, JointKind, Placement};
 use dyngen::base::choice;
 use dyngen::base::sets::{Class, combination_text};
 use dyngen::base::symmetry::{Removed, Symmetry};
 use dyngen::base::{ParameterSet, SetKind};
-use dyngen::describe::{Description, Weak, exact_rows};
+use dyngen::describe::{Description, Rounding, Weak, exact_rows, why_unbounded};
 use dyngen::exact::rational::{self, Rational};
 use dyngen::graph::Operations;
+use dyngen::{Model, Values};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -20,6 +21,9 @@ use std::process::ExitCode;
 pub(super) struct Args {
     /// The arm file.
     arm: PathBuf,
+    /// Parameter values, JSON, for which rounding is bounded; without them each parameter is within ±1 SI unit.
+    #[arg(long, value_name = "FILE.json")]
+    values: Option<PathBuf>,
     /// One JSON object on standard output.
     #[arg(long)]
     json: bool,
@@ -30,9 +34,14 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let model = model(&args.arm)?;
+    let set = model.set(SetKind::Minimal).map_err(Failure::refused)?;
+    let values = match &args.values {
+        Some(file) => Some(Values::read(file).and_then(|v| v.of_set(&model, set)).map_err(Failure::input)?),
+        None => None,
+    };
     let progress = Progress::new(model.arm());
-    let description =
-        Description::with_progress(&model, |what| progress.say(what)).map_err(Failure::refused)?;
+    let description = Description::with_progress(&model, values.as_deref(), |what| progress.say(what))
+        .map_err(Failure::refused)?;
     drop(progress);
     let digits = if args.exact { Digits::All } else { Digits::Six };
     let text = match args.json {
@@ -45,7 +54,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
 
 /// Everything that is known of an arm, section by section.
 fn table(model: &Model, description: &Description, digits: Digits) -> String {
-    let Description { operations, symmetries, weak } = description;
+    let Description { operations, symmetries, weak, rounding } = description;
     let arm = model.arm();
     let mut t = String::new();
     heading(&mut t, arm, digits);
@@ -61,6 +70,9 @@ fn table(model: &Model, description: &Description, digits: Digits) -> String {
     }
     choice_of_columns(&mut t, model);
     operation_table(&mut t, operations);
+    if let Some(rounding) = rounding {
+        rounding_table(&mut t, rounding);
+    }
     t
 }
 
@@ -214,6 +226,33 @@ fn operation_table(t: &mut String, operations: &[(&'static str, Operations)]) {
     let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", "function", "mul", "add", "div", "sin_cos");
     for (function, o) in operations {
         let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", function, o.mul, o.add, o.div, o.sin_cos);
+    }
+}
+
+/// By how much the worst entry of each function may be off.
+fn rounding_table(t: &mut String, rounding: &Rounding) {
+    let _ = writeln!(
+        t,
+        "\nrounding: |emitted − exact| of each function's worst entry, in its unit, for every state within the \
+         limits\n(parameters: {}):",
+        rounding.parameters.text()
+    );
+    let _ = writeln!(t, "  {:<36} {:>8} {:>8}", "function", "f32", "f64");
+    for (function, bounds) in &rounding.functions {
+        if let (Ok(of), None) = (bounds, why_unbounded(bounds)) {
+            let worst = |all: &[f64]| all.iter().copied().fold(0.0, f64::max);
+            let name = function.name();
+            let _ = writeln!(t, "  {name:<36} {:>8.1e} {:>8.1e}", worst(&of.single), worst(&of.double));
+        }
+    }
+    let mut none: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for (function, bounds) in &rounding.functions {
+        if let Some(why) = why_unbounded(bounds) {
+            none.entry(why).or_default().push(function.name());
+        }
+    }
+    for (why, functions) in none {
+        let _ = writeln!(t, "  none for {}: {why}", functions.join(", "));
     }
 }
 

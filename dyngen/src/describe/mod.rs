@@ -1,7 +1,9 @@
 //! What is known of an arm, as `dyngen describe --json` prints it.
 
+mod rounding;
 mod weak;
 
+pub use rounding::{ParameterRange, Rounding, why_unbounded};
 pub use weak::Weak;
 
 use crate::arm::{Arm, Joint, Transmission};
@@ -23,6 +25,8 @@ pub struct Description {
     pub symmetries: Vec<Symmetry>,
     /// Sums of the minimal set that torques hardly show, the weakest first.
     pub weak: Vec<Weak>,
+    /// By how much each function may be off; none where the arm file gives no limits.
+    pub rounding: Option<Rounding>,
 }
 
 impl Description {
@@ -31,25 +35,36 @@ impl Description {
     /// # Errors
     /// As [`Model::function`].
     pub fn of(model: &Model) -> Result<Description, Error> {
-        Description::with_progress(model, |_| {})
+        Description::with_progress(model, None, |_| {})
     }
 
-    /// The same, where somebody wants to know what is being done.
+    /// The same, where somebody wants to know what is being done; with bounds of rounding for these `values` of the
+    /// minimal set, where there are any.
     ///
     /// # Errors
     /// As [`Model::function`].
-    pub fn with_progress(model: &Model, say: impl Fn(&str)) -> Result<Description, Error> {
+    pub fn with_progress(
+        model: &Model,
+        values: Option<&[f64]>,
+        say: impl Fn(&str),
+    ) -> Result<Description, Error> {
         let mut preparation = Preparation::default();
         let mut operations = Vec::new();
+        let mut rounding = Rounding::of(model.arm(), values);
         for function in model.functions(SetKind::Minimal) {
             say(&format!("proving {function}"));
-            let built = model.function(function, SetKind::Minimal)?.without_preparation(&mut preparation);
-            operations.push((function.name(), built.operations()));
+            let built = model.function(function, SetKind::Minimal)?;
+            if let Some(rounding) = &mut rounding {
+                say(&format!("rounding in {function}"));
+                rounding.add(model, &built, values);
+            }
+            operations.push((function.name(), built.without_preparation(&mut preparation).operations()));
         }
         operations.push(("prepare", preparation.operations()));
         say("parameters that hardly show");
         let weak = weak::weak(model)?;
-        Ok(Description { operations, symmetries: symmetry::symmetries(model.arm(), model.sets())?, weak })
+        let symmetries = symmetry::symmetries(model.arm(), model.sets())?;
+        Ok(Description { operations, symmetries, weak, rounding })
     }
 
     /// One JSON object of all that is known of a model's arm.
@@ -71,7 +86,7 @@ impl Description {
         let choice: Vec<Value> = (model.sets().candidates.iter())
             .map(|c| json!({"rule": c.preference.to_string(), "operations": c.operations}))
             .collect();
-        json!({
+        let mut object = json!({
             "arm": arm.name,
             "joints": arm.dof(),
             "joint_names": arm.joint_names(),
@@ -87,7 +102,12 @@ impl Description {
             "choice": choice,
             "symmetries": self.symmetries.iter().map(|s| symmetry_json(model, s)).collect::<Vec<_>>(),
             "notes": arm.notes(),
-        })
+        });
+        if let Some(rounding) = &self.rounding {
+            object["rounding"] = rounding.json();
+            object["rounding_parameters"] = json!(rounding.parameters.text());
+        }
+        object
     }
 }
 

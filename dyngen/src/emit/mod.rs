@@ -296,3 +296,9 @@ fn constants(arm: &Arm, set: &ParameterSet, options: &Options) -> TokenStream {
         #values
     }
 }
+
+/// The sine and cosine that emitted code takes, of an angle up to 10⁵ rad.
+#[cfg(test)]
+pub(crate) fn emitted_sin_cos<T: nalgebra::SimdRealField + Copy>(angle: T) -> (T, T) {
+    trigonometry::near(angle)
+}

@@ -1,0 +1,80 @@
+//! By how much emitted code may be off, of every function.
+
+use crate::arm::{Arm, Joint};
+use crate::dynamics::{Function, FunctionGraph};
+use crate::model::Model;
+use crate::rounding::{self, Bounds};
+use serde_json::{Map, Value, json};
+
+/// For which parameters bounds hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParameterRange {
+    /// For given values.
+    Values,
+    /// For every value from −1 to 1.
+    Unit,
+}
+
+impl ParameterRange {
+    /// In words.
+    pub fn text(self) -> &'static str {
+        match self {
+            ParameterRange::Values => "the given values; e and f: each number within ±1",
+            ParameterRange::Unit => {
+                "each within ±1 SI unit, as no values are given; e and f: each number within ±1"
+            }
+        }
+    }
+}
+
+/// Bounds of |emitted − exact| of each function, with the minimal set as arguments.
+#[derive(Clone, Debug)]
+pub struct Rounding {
+    /// For which parameters they hold.
+    pub parameters: ParameterRange,
+    /// Each function with its bounds, or with the limit that the arm file lacks for it.
+    pub functions: Vec<(Function, Result<Bounds, String>)>,
+}
+
+impl Rounding {
+    /// None yet; no bounds are to be had where no joint has limits of its position.
+    pub(super) fn of(arm: &Arm, values: Option<&[f64]>) -> Option<Rounding> {
+        let limited = |joint: &Joint| joint.mimic.is_none() && joint.position.is_some();
+        let parameters = if values.is_some() { ParameterRange::Values } else { ParameterRange::Unit };
+        arm.joints.iter().any(limited).then(|| Rounding { parameters, functions: Vec::new() })
+    }
+
+    /// Adds those of a function.
+    pub(super) fn add(&mut self, model: &Model, built: &FunctionGraph, values: Option<&[f64]>) {
+        self.functions.push((built.function, rounding::bounds(model, built, values)));
+    }
+
+    /// By function, `f32` and `f64` by output; null with the reason where there is no bound.
+    pub(super) fn json(&self) -> Value {
+        let of = |(function, bounds): &(Function, Result<Bounds, String>)| {
+            let mut object = match bounds {
+                Ok(bounds) => json!({"f32": numbers(&bounds.single), "f64": numbers(&bounds.double)}),
+                Err(_) => json!({"f32": null, "f64": null}),
+            };
+            if let Some(why) = why_unbounded(bounds) {
+                object["why"] = json!(why);
+            }
+            (function.name().to_string(), object)
+        };
+        Value::Object(self.functions.iter().map(of).collect::<Map<_, _>>())
+    }
+}
+
+/// Why a function has no bound, or one of its outputs has none.
+pub fn why_unbounded(bounds: &Result<Bounds, String>) -> Option<&str> {
+    match bounds {
+        Err(why) => Some(why),
+        Ok(bounds) if bounds.single.iter().all(|x| x.is_finite()) => None,
+        Ok(_) => Some("intervals of these states do not exclude a division by zero"),
+    }
+}
+
+/// JSON has no infinity.
+fn numbers(bounds: &[f64]) -> Vec<Value> {
+    bounds.iter().map(|x| if x.is_finite() { json!(x) } else { Value::Null }).collect()
+}

@@ -1,0 +1,312 @@
+//! Bounds against what emitted operations do at random states and at corners of the limits.
+
+#![allow(clippy::unwrap_used)]
+
+mod twice;
+
+use super::{Bounds, bounds};
+use crate::arm::Arm;
+use crate::dynamics::function::Argument;
+use crate::dynamics::{Function, FunctionGraph};
+use crate::emit::emitted_sin_cos;
+use crate::exact::rational::to_f64;
+use crate::graph::evaluate::{Field, evaluate};
+use crate::graph::{Expr, Input, JointSum, Node};
+use crate::model::Model;
+use crate::parameters::SetKind;
+use crate::values::Values;
+use nalgebra::{RealField, convert};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::time::Instant;
+use twice::Twice;
+
+/// What a function is given: one number for each of an argument's.
+struct State(Vec<(Argument, Vec<f64>)>);
+
+impl State {
+    /// Numbers of `f32` within the limits: half of the states have velocities, accelerations and torques at their limits.
+    fn draw(arm: &Arm, parameters: &[f64], rng: &mut ChaCha8Rng) -> State {
+        let (corner, end) = (rng.random_range(0..2) == 0, rng.random_range(0..8) == 0);
+        let mut number = |low: f64, high: f64, at_end: bool| {
+            let x: f64 = rng.random_range(low..=high);
+            let x = if at_end { if x < 0.5 * (low + high) { low } else { high } } else { x };
+            // Towards zero, so that it stays within.
+            let single = x as f32;
+            f64::from(if f64::from(single).abs() > x.abs() {
+                single.abs().next_down().copysign(single)
+            } else {
+                single
+            })
+        };
+        let mut all = Vec::new();
+        let joints: Vec<_> = arm.coordinates().into_iter().map(|joint| &arm.joints[joint]).collect();
+        let position = joints.iter().map(|j| j.position.unwrap());
+        all.push((Argument::Positions, position.map(|[low, high]| number(low, high, end)).collect()));
+        let mut within = |argument, limits: Vec<f64>| {
+            all.push((argument, limits.into_iter().map(|x| number(-x, x, corner)).collect()));
+        };
+        let of = |limit: fn(&crate::arm::Joint) -> Option<f64>| -> Vec<f64> {
+            joints.iter().map(|j| limit(j).unwrap()).collect()
+        };
+        within(Argument::Velocities, of(|j| j.velocity));
+        within(Argument::ReferenceVelocities, of(|j| j.velocity));
+        within(Argument::Accelerations, of(|j| j.acceleration));
+        within(Argument::ReferenceAccelerations, of(|j| j.acceleration));
+        within(Argument::Torques, of(|j| j.torque));
+        within(Argument::Errors, vec![1.0; joints.len()]);
+        within(Argument::Wrench, vec![1.0; 6]);
+        within(Argument::Payload, vec![1.0; 10]);
+        within(Argument::PositionDirection, vec![1.0; joints.len()]);
+        within(Argument::VelocityDirection, vec![1.0; joints.len()]);
+        all.push((Argument::Parameters, parameters.to_vec()));
+        State(all)
+    }
+
+    fn of(&self, argument: Argument, i: usize) -> f64 {
+        self.0.iter().find(|(a, _)| *a == argument).unwrap().1[i]
+    }
+
+    /// An input other than a sine or a cosine.
+    fn input(&self, input: Input) -> f64 {
+        let (argument, i) = super::program::variable(input).unwrap();
+        self.of(argument, i)
+    }
+
+    fn q(&self, i: usize) -> f64 {
+        self.of(Argument::Positions, i)
+    }
+
+    /// The outputs to twice a double's digits; of arms without offsets and symbols, whose angles are exact sums.
+    fn exact(&self, built: &FunctionGraph) -> Vec<Twice> {
+        let turned = |sum: JointSum| {
+            let add = |all: Twice, (joint, negative): (usize, bool)| {
+                let q = Twice::from(self.q(joint));
+                all.add(if negative { q.neg() } else { q })
+            };
+            sum.joints().fold(Twice::from(0.0), add).sin_cos()
+        };
+        let input = |input: Input| match input {
+            Input::Sin(sum) => turned(sum).0,
+            Input::Cos(sum) => turned(sum).1,
+            other => Twice::from(self.input(other)),
+        };
+        evaluate(&built.graph, &built.outputs, input, |_, _| Twice::from(0.0)).unwrap()
+    }
+}
+
+/// A function as emitted code computes it.
+struct Emitted<'a, T> {
+    model: &'a Model,
+    built: &'a FunctionGraph,
+    needed: Vec<usize>,
+    /// The values of all nodes; those of constants are there from the first.
+    values: Vec<T>,
+}
+
+impl<'a, T: RealField + Copy> Emitted<'a, T> {
+    fn new(model: &'a Model, built: &'a FunctionGraph) -> Self {
+        let constant = |node: &Node| match node {
+            Node::Constant(index) => convert(to_f64(built.graph.constant(*index))),
+            Node::Symbol(index, sine) => {
+                let (s, c) = model.symbols().angles[*index as usize].sin_cos();
+                convert(if *sine { s } else { c })
+            }
+            _ => T::zero(),
+        };
+        let values = built.graph.nodes().iter().map(constant).collect();
+        Emitted { model, built, needed: built.graph.needed(&built.outputs), values }
+    }
+
+    fn run(&mut self, state: &State) -> Vec<T> {
+        for node in &self.needed {
+            let of = |e: Expr| if e.is_negative() { -self.values[e.node()] } else { self.values[e.node()] };
+            self.values[*node] = match self.built.graph.nodes()[*node] {
+                Node::Constant(_) | Node::Symbol(..) => continue,
+                Node::Input(Input::Sin(sum)) => self.turned(sum, state).0,
+                Node::Input(Input::Cos(sum)) => self.turned(sum, state).1,
+                Node::Input(input) => convert(state.input(input)),
+                Node::Add(a, b) => of(a) + of(b),
+                Node::Mul(a, b) => of(a) * of(b),
+                Node::Div(a, b) => of(a) / of(b),
+            };
+        }
+        let of = |e: &Expr| if e.is_negative() { -self.values[e.node()] } else { self.values[e.node()] };
+        self.built.outputs.iter().map(of).collect()
+    }
+
+    fn turned(&self, sum: JointSum, state: &State) -> (T, T) {
+        let mut angle = T::zero();
+        for (k, (joint, negative)) in sum.joints().enumerate() {
+            let of = self.model.angles().joint(joint);
+            let q: T = convert(state.q(of.coordinate));
+            let term = of.ratio.map_or(q, |ratio| convert::<f64, T>(ratio) * q);
+            angle = if k == 0 {
+                term
+            } else if negative {
+                angle - term
+            } else {
+                angle + term
+            };
+        }
+        let offset = self.model.angles().offset(sum);
+        emitted_sin_cos(if offset == 0.0 { angle } else { angle + convert(offset) })
+    }
+}
+
+fn lwa4p() -> (Model, Vec<f64>) {
+    let arm = Arm::parse(include_str!("../../../powerball/lwa4p.toml"), "lwa4p.toml").unwrap();
+    let model = Model::derive(arm).unwrap();
+    let values = Values::parse(include_str!("../../../examples/cpp-controller/model.json"), "model.json");
+    let values = values.unwrap().of_set(&model, model.set(SetKind::Minimal).unwrap()).unwrap();
+    (model, values)
+}
+
+/// The worst of each output, in single and in double precision; each within its bound.
+struct Seen {
+    bounds: Bounds,
+    single: Vec<f64>,
+    double: Vec<f64>,
+}
+
+impl Seen {
+    /// `exact` of the samples are evaluated with twice the digits too.
+    fn of(model: &Model, values: &[f64], built: &FunctionGraph, samples: usize, exact: usize) -> Seen {
+        let bounds = bounds(model, built, Some(values)).unwrap();
+        // What both formats are given.
+        let parameters: Vec<f64> = values.iter().map(|x| f64::from(*x as f32)).collect();
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let [mut single, mut double] = [(); 2].map(|()| vec![0.0f64; built.outputs.len()]);
+        let mut singles = Emitted::<f32>::new(model, built);
+        let mut doubles = Emitted::<f64>::new(model, built);
+        for sample in 0..samples {
+            let state = State::draw(model.arm(), &parameters, &mut rng);
+            let in_double = doubles.run(&state);
+            for (k, x) in singles.run(&state).into_iter().enumerate() {
+                let error = (f64::from(x) - in_double[k]).abs();
+                single[k] = single[k].max(error - bounds.double[k].min(error));
+                assert!(error <= bounds.single[k] + bounds.double[k], "{} {k}: {error:e}", built.function);
+            }
+            if sample < exact {
+                for (k, x) in state.exact(built).into_iter().enumerate() {
+                    double[k] = double[k].max(x.add(Twice::from(-in_double[k])).high().abs());
+                    assert!(double[k] <= bounds.double[k], "{} {k}: {:e}", built.function, double[k]);
+                }
+            }
+        }
+        Seen { bounds, single, double }
+    }
+
+    /// How many times the worst that was seen each bound is; entries that are exact are left out.
+    fn ratios(bounds: &[f64], seen: &[f64]) -> Vec<f64> {
+        bounds.iter().zip(seen).filter(|(_, seen)| **seen > 0.0).map(|(bound, seen)| bound / seen).collect()
+    }
+}
+
+fn most(all: &[f64]) -> f64 {
+    all.iter().copied().fold(0.0, f64::max)
+}
+
+#[test]
+fn no_state_of_the_lwa_4p_is_further_off_than_its_bound() {
+    let (model, values) = lwa4p();
+    for function in model.functions(SetKind::Minimal) {
+        let built = model.function(function, SetKind::Minimal).unwrap();
+        let seen = Seen::of(&model, &values, &built, 200, 50);
+        // A bound that holds for everything says nothing: those without divisions are near what is seen.
+        let loose = matches!(function, Function::JacobianRateTimesVelocity | Function::TwistRate);
+        if built.graph.operations(&built.outputs).div == 0 {
+            let worst = [
+                most(&seen.bounds.single) / most(&seen.single),
+                most(&seen.bounds.double) / most(&seen.double),
+            ];
+            let limit = if loose { 1000.0 } else { 50.0 };
+            assert!(worst.iter().all(|x| *x < limit), "{function}: {worst:?}");
+        }
+    }
+}
+
+/// Angles with offsets and ratios, constants that are symbols, a joint that slides, parameters without values.
+#[test]
+fn no_state_of_a_general_arm_is_further_off_than_its_bound() {
+    let joint = |kind: &str, more: &str| {
+        format!(
+            "{{ kind = \"{kind}\", a = 0.3, alpha = 0.7, d = 0.1, theta = 0.4, position = [-2.5, 3.1], \
+             velocity = 2.5, acceleration = 7, torque = 3{more} }},"
+        )
+    };
+    let joints = [
+        joint("revolute", ""),
+        joint("prismatic", ""),
+        joint("revolute", "").replace("alpha = 0.7", "alpha = 0"),
+        joint("revolute", ", mimic = { joint = 1, ratio = \"-2/3\", offset = 0.2 }"),
+    ];
+    let text = format!(
+        "name = \"a\"\nconvention = \"modified\"\ngravity = [0, 3, -9.81]\njoint = [\n{}\n]",
+        joints.join("\n")
+    );
+    let model = Model::derive(Arm::parse(&text, "arm.toml").unwrap()).unwrap();
+    let parameters = model.set(SetKind::Minimal).unwrap().parameters.len();
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    for function in [Function::InverseDynamics, Function::ForwardKinematics, Function::CoriolisMatrix] {
+        let built = model.function(function, SetKind::Minimal).unwrap();
+        let bounds = bounds(&model, &built, None).unwrap();
+        let mut singles = Emitted::<f32>::new(&model, &built);
+        let mut doubles = Emitted::<f64>::new(&model, &built);
+        let mut seen = vec![0.0f64; built.outputs.len()];
+        for _ in 0..500 {
+            let values: Vec<f64> =
+                (0..parameters).map(|_| f64::from(rng.random_range(-1.0..1.0f32))).collect();
+            let state = State::draw(model.arm(), &values, &mut rng);
+            let double = doubles.run(&state);
+            for (k, x) in singles.run(&state).into_iter().enumerate() {
+                seen[k] = seen[k].max((f64::from(x) - double[k]).abs());
+                assert!(seen[k] <= bounds.single[k] + bounds.double[k], "{function} {k}: {:e}", seen[k]);
+            }
+        }
+        assert!(most(&bounds.single) < 100.0 * most(&seen), "{function}");
+    }
+}
+
+#[test]
+fn a_limit_that_the_file_lacks_is_named() {
+    let text = include_str!("../../../powerball/lwa4p.toml").replacen("torque = 19.0", "", 1);
+    let model = Model::derive(Arm::parse(&text, "lwa4p.toml").unwrap()).unwrap();
+    let of = |function| bounds(&model, &model.function(function, SetKind::Minimal).unwrap(), None);
+    assert_eq!(of(Function::ForwardDynamics).unwrap_err(), "the arm file gives no torque of joint 5");
+    assert!(of(Function::Gravity).is_ok());
+}
+
+#[test]
+#[ignore = "minutes: cargo test --release -p dyngen --lib rounding -- --ignored --nocapture"]
+fn no_state_of_a_million_is_further_off_than_its_bound() {
+    let (model, values) = lwa4p();
+    println!(
+        "function, time, bound in f32; then of f32 and of f64 the bound / the worst error that was seen: of the"
+    );
+    println!("worst entry, and the largest of all entries");
+    for function in model.functions(SetKind::Minimal) {
+        let built = model.function(function, SetKind::Minimal).unwrap();
+        let start = Instant::now();
+        let found = bounds(&model, &built, Some(&values)).unwrap();
+        let seconds = start.elapsed().as_secs_f64();
+        if found.single.iter().any(|x| x.is_infinite()) {
+            println!("{:36} {seconds:6.2} s  no bound", function.name());
+            continue;
+        }
+        let seen = Seen::of(&model, &values, &built, 1_000_000, 20_000);
+        let Seen { bounds, single, double } = &seen;
+        let of = |bounds: &[f64], seen: &[f64]| {
+            let ratios = Seen::ratios(bounds, seen);
+            let over = ratios.iter().filter(|x| **x > 10.0).count();
+            format!(
+                "{:6.1} {:7.1} ({over:3} of {:3} > 10)",
+                most(bounds) / most(seen),
+                most(&ratios),
+                ratios.len()
+            )
+        };
+        let [f32, f64] = [of(&bounds.single, single), of(&bounds.double, double)];
+        println!("{:36} {seconds:6.2} s  {:8.1e}  {f32}   {f64}", function.name(), most(&bounds.single));
+    }
+}
