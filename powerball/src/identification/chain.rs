@@ -91,7 +91,7 @@ impl Chain {
         Chain {
             rows: arm.joints.iter().map(|joint| Row::new(joint, arm.convention)).collect(),
             motors: (!arm.transmissions.is_empty()).then(|| arm.motor_velocity_matrix_f64()),
-            gravity: Vector3::from_iterator(arm.gravity.iter().map(|g| to_f64(g))),
+            gravity: Vector3::from_iterator(arm.gravity.iter().map(to_f64)),
         }
     }
 
