@@ -3,7 +3,7 @@
 //! Emitted code does the operations of the graph in the graph's order, so what each of them rounds is known: at most
 //! half a unit in the last place of its result. A derivative of the output by that error, over intervals, says what it
 //! does to the output; the sum over all operations is a bound. It is sound without terms of second order, because
-//! intervals hold the rounded values too (the mean value theorem, as in [`program::Program::errors`]). The states are
+//! intervals hold the rounded values too (the mean value theorem, as in `program.rs`). The states are
 //! split where the bound is largest.
 //!
 //! Intervals: Moore, *Interval Analysis* (1966). Rounding errors by derivatives: Linnainmaa, "Taylor expansion of the
