@@ -297,8 +297,9 @@ fn constants(arm: &Arm, set: &ParameterSet, options: &Options) -> TokenStream {
     }
 }
 
-/// The sine and cosine that emitted code takes, of an angle up to 10⁵ rad.
+/// The sine and cosine that emitted code takes.
 #[cfg(test)]
 pub(crate) fn emitted_sin_cos<T: nalgebra::SimdRealField + Copy>(angle: T) -> (T, T) {
-    trigonometry::near(angle)
+    let ([sine], [cosine]) = trigonometry::sin_cos(&angle, |angle| [*angle]);
+    (sine, cosine)
 }

@@ -3,8 +3,7 @@
 use super::language::Exact;
 use super::{Checked, wrong};
 use crate::exact::angle::Angle;
-use crate::exact::rational;
-use crate::exact::rational::{Rational, integer, parse_rational, to_f64};
+use crate::exact::rational::{self, Rational, integer, parse_rational, to_f64};
 use crate::exact::symbols::AngleSymbols;
 use crate::parameters::SetKind;
 use num_traits::{Signed, Zero};

@@ -1,12 +1,9 @@
 //! Accelerations that an arm file does not limit, as an imported one does not: what the torque limits allow.
 
-use super::{Error, MassSource, Masses};
+use super::shape::poses;
+use super::{Error, JointLimits, MassSource, Masses};
 use dyngen::{Arm, Evaluator, Function, Model, SetKind};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
-/// Poses at which the mass matrix is asked.
-const POSES: usize = 500;
 /// Share of a joint's torque that may accelerate it; the rest is for gravity, friction and the other joints.
 const SHARE: f64 = 0.5;
 
@@ -55,10 +52,15 @@ fn largest_inertias(model: &Model, masses: &Masses, ranges: &[[f64; 2]]) -> Resu
     let n = model.arm().dof();
     let values = model.set_values(model.set(SetKind::Minimal)?, &masses.parameters);
     let matrix = Evaluator::new(model, Function::MassMatrix, SetKind::Minimal)?;
-    let mut random = ChaCha8Rng::seed_from_u64(0);
-    let mut draw = |[low, high]: &[f64; 2]| low + random.random_range(0.0..=1.0) * (high - low);
-    let poses: Vec<f64> = (0..POSES).flat_map(|_| ranges.iter().map(&mut draw).collect::<Vec<_>>()).collect();
-    let mut matrices = vec![0.0; POSES * n * n];
+    let within = |position: &[f64; 2]| JointLimits {
+        position: *position,
+        velocity: 0.0,
+        acceleration: 0.0,
+        torque: None,
+    };
+    let limits: Vec<JointLimits> = ranges.iter().map(within).collect();
+    let poses: Vec<f64> = poses(&limits).flatten().collect();
+    let mut matrices = vec![0.0; poses.len() * n];
     matrix.evaluate(&poses, &[], &[], &values, &mut matrices);
     let largest = |i: usize| matrices.chunks(n * n).map(|b| b[i * n + i]).fold(0.0, f64::max);
     Ok((0..n).map(largest).collect())
