@@ -84,11 +84,12 @@ pub(crate) fn description(path: PathBuf) -> PyResult<String> {
 
 /// A copy of the robot description that the arm was imported from, with values; and what is to be said of it.
 #[pyfunction]
-#[pyo3(signature = (arm, values, friction))]
+#[pyo3(signature = (arm, values, friction, uncertain))]
 pub(crate) fn export_imported(
     arm: &Arm,
     values: ModelText,
     friction: Option<ModelText>,
+    uncertain: bool,
 ) -> PyResult<(String, Vec<String>)> {
     let Some(origin) = &arm.origin else {
         return Err(value(
@@ -97,7 +98,7 @@ pub(crate) fn export_imported(
     };
     let friction = friction.as_ref().map(|(text, file)| (text.as_str(), file.as_str()));
     let mut known = Known::read(&arm.arm, (&values.0, &values.1), friction).map_err(refused)?;
-    let mut notes = known.without_uncertain_damping(&arm.arm);
+    let mut notes = if uncertain { Vec::new() } else { known.without_uncertain_damping(&arm.arm) };
     let write = if origin.mjcf { export::mjcf } else { export::urdf };
     let exported = write(&origin.text, &origin.file, &arm.arm, &known, &origin.options);
     let exported = exported.map_err(|e| match e {

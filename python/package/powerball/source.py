@@ -49,6 +49,7 @@ def export(
     values: Union[Identified, PathLike, Mapping[str, float]],
     *,
     friction: Union[None, bool, Identified, Explained, PathLike] = None,
+    uncertain: bool = False,
     output: Optional[PathLike] = None,
 ) -> str:
     """The URDF or MuJoCo model that the arm was imported from, with identified values.
@@ -56,7 +57,8 @@ def export(
     Written to ``output`` too, where that is given. ``values`` are a result of ``identify``, of which the
     nearest real arm is taken, or values of all parameters. ``friction`` is where damping and friction are
     from; a result brings its own, unless it is ``False``. That of ``explain`` has effects, of which a MuJoCo
-    model gets ripple, presliding and Stribeck's friction. What is to be said of the new file is told as a
+    model gets ripple, presliding and Stribeck's friction. Damping that is not larger than its own standard
+    error stays as it was, unless ``uncertain`` asks for it. What is to be said of the new file is given as a
     warning.
     """
     if isinstance(values, Mapping):
@@ -67,7 +69,7 @@ def export(
         of = text if isinstance(values, Identified) else None
     else:
         of = None if friction is False else model_text(friction)
-    exported, notes = _core.export_imported(arm._core, text, of)
+    exported, notes = _core.export_imported(arm._core, text, of, uncertain)
     _warn(notes)
     if output is not None:
         _core.write_whole(output, exported.encode())
