@@ -13,6 +13,7 @@ use crate::exact::rational::{self, Rational};
 pub use mimic::{Drive, Mimic};
 use num_traits::{One, Zero};
 pub use parameter::{Parameter, ParameterKind};
+#[cfg(feature = "urdf")]
 pub(crate) use read::is_name;
 use std::fmt;
 use std::path::Path;
