@@ -56,7 +56,11 @@ impl<const N: usize> ArmModel<f64, N> for NumericArm<N> {
     fn coriolis_times_velocity(&self, q: &SVector<f64, N>, dq: &SVector<f64, N>) -> SVector<f64, N> {
         self.vector(&self.coriolis, q, dq.as_slice())
     }
-    fn coriolis_transpose_times_velocity(&self, q: &SVector<f64, N>, dq: &SVector<f64, N>) -> SVector<f64, N> {
+    fn coriolis_transpose_times_velocity(
+        &self,
+        q: &SVector<f64, N>,
+        dq: &SVector<f64, N>,
+    ) -> SVector<f64, N> {
         self.vector(&self.transposed, q, dq.as_slice())
     }
     fn gravity(&self, q: &SVector<f64, N>) -> SVector<f64, N> {
@@ -89,7 +93,8 @@ mod tests {
         };
         near(arm.mass_matrix(&q).as_slice(), &dynamics.mass_matrix(truth.as_slice()));
         near(arm.gravity(&q).as_slice(), &dynamics.gravity(truth.as_slice()));
-        let c = SMatrix::<f64, 6, 6>::from_row_slice(&dynamics.coriolis_matrix(truth.as_slice(), dq.as_slice()));
+        let c =
+            SMatrix::<f64, 6, 6>::from_row_slice(&dynamics.coriolis_matrix(truth.as_slice(), dq.as_slice()));
         near(arm.coriolis_times_velocity(&q, &dq).as_slice(), (c * dq).as_slice());
         near(arm.coriolis_transpose_times_velocity(&q, &dq).as_slice(), (c.transpose() * dq).as_slice());
     }

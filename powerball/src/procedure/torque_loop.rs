@@ -55,7 +55,8 @@ impl<B: Bus, const N: usize> TorqueLoop<B, N> {
         master.driver_mut().start(ControlMode::Current, accept_unverified).map_err(ArmError::from)?;
         master.wait_for(Phase::Ready, PATIENCE)?;
         let joints = master.driver().joints();
-        let constants = joints.each_ref().map(|joint| joint.units.rated_torque.abs() / joint.units.rated_current);
+        let constants =
+            joints.each_ref().map(|joint| joint.units.rated_torque.abs() / joint.units.rated_current);
         if let Some(j) = constants.iter().position(|constant| !(constant.is_finite() && *constant > 0.0)) {
             let units = joints[j].units;
             return Err(RecordError::Barred(format!(

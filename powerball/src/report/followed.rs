@@ -35,11 +35,12 @@ pub fn page<const N: usize>(followed: &Followed, path: &Path<N>, tracks: &[(&str
     page.heading("Tracking error");
     errors(&mut page, followed, tracks);
     for joint in 0..N {
-        let panel = tracks.iter().enumerate().fold(Panel::new("error [mrad]"), |panel, (k, (name, track))| {
-            let errors = track.errors(path, followed.delay);
-            let points = track.samples.iter().zip(errors).map(|(s, e)| (s.t, 1e3 * e[joint])).collect();
-            panel.line(*name, INKS[k % INKS.len()], points)
-        });
+        let panel =
+            tracks.iter().enumerate().fold(Panel::new("error [mrad]"), |panel, (k, (name, track))| {
+                let errors = track.errors(path, followed.delay);
+                let points = track.samples.iter().zip(errors).map(|(s, e)| (s.t, 1e3 * e[joint])).collect();
+                panel.line(*name, INKS[k % INKS.len()], points)
+            });
         page.figure(&Figure::new(format!("Joint {}", joint + 1), "time [s]").panel(panel), "");
     }
     if let Some((name, track)) = tracks.last() {
@@ -64,18 +65,23 @@ fn errors<const N: usize>(page: &mut Page, followed: &Followed, tracks: &[(&str,
         table.push(std::iter::once((joint + 1).to_string()).chain(cells));
     }
     page.table(&table);
-    let sum = |name: &str| followed.tracking_error.get(name).map(|e| e.iter().map(|x| x * x).sum::<f64>().sqrt());
+    let sum =
+        |name: &str| followed.tracking_error.get(name).map(|e| e.iter().map(|x| x * x).sum::<f64>().sqrt());
     if let (Some(base), Some(explained)) = (sum("base"), sum("explained")) {
         let share = explained / base;
         let tone = if share <= 1.0 { Tone::Good } else { Tone::Bad };
-        page.note(tone, &format!("All joints together: {:.0} % of the error with the base model.", 100.0 * share));
+        page.note(
+            tone,
+            &format!("All joints together: {:.0} % of the error with the base model.", 100.0 * share),
+        );
     }
 }
 
 fn torques<const N: usize>(page: &mut Page, followed: &Followed, name: &str, track: &Track<N>) {
     if let Some(parts) = followed.torque.get(name) {
         let columns = ["joint", "rigid arm", "friction", "effects", "feedback", "external (observer)"];
-        let mut table = Table::new(columns.map(|c| if c == "joint" { c.to_string() } else { format!("{c} [N·m rms]") }));
+        let mut table =
+            Table::new(columns.map(|c| if c == "joint" { c.to_string() } else { format!("{c} [N·m rms]") }));
         for joint in 0..N {
             let of = |list: &[f64]| list.get(joint).map_or_else(String::new, |x| number(*x));
             let external = parts.external.as_deref().map_or_else(String::new, of);

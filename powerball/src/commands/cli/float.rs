@@ -77,9 +77,8 @@ impl FloatCommand {
         let hand = log.lock().map(|log| guided(&model, &log, until)).unwrap_or_default();
         let period = LWA4P.period_seconds();
         let rest = positions.get(((until + SETTLE) / period) as usize..).unwrap_or_default();
-        let drift: Vec<f64> = (0..6)
-            .map(|j| rest.iter().fold(0.0f64, |most, q| most.max((q[j] - rest[0][j]).abs())))
-            .collect();
+        let drift: Vec<f64> =
+            (0..6).map(|j| rest.iter().fold(0.0f64, |most, q| most.max((q[j] - rest[0][j]).abs()))).collect();
         let position = positions.last().map(|q| q.as_slice().to_vec()).unwrap_or_default();
         let result = json!({
             "seconds": positions.len() as f64 * period, "position": position, "drift": drift,
@@ -106,7 +105,8 @@ impl FloatCommand {
         // In interpolated position mode the motors find their commutation while their drives hold the arm.
         let master = Recorder::enable(master, envelope).and_then(Recorder::finish).map_err(refused)?;
         let mut arm = TorqueLoop::bring_up(master, self.on.accepts()).map_err(refused)?;
-        let laws: [TanhFriction<f64>; 6] = std::array::from_fn(|j| TanhFriction::new(model.model.gammas()[j]));
+        let laws: [TanhFriction<f64>; 6] =
+            std::array::from_fn(|j| TanhFriction::new(model.model.gammas()[j]));
         let softening = laws.each_ref().map(|law| Softening { share: self.friction, ..Softening::of(law) });
         let mut law = HandGuiding::new(laws, softening);
         let terms = model.model.holding_terms();
@@ -152,11 +152,14 @@ fn hold(
 
 fn read_push(file: &Path) -> Result<Motion, Failure> {
     let name = file.display();
-    let text =
-        std::fs::read_to_string(file).map_err(|e| Failure::Unusable(format!("{name}: cannot be read: {e}")))?;
+    let text = std::fs::read_to_string(file)
+        .map_err(|e| Failure::Unusable(format!("{name}: cannot be read: {e}")))?;
     let path = Motion::from_csv(&text, 6).map_err(|why| Failure::Unusable(format!("{name}: {why}")))?;
     if path.len() < 2 || path.period <= 0.0 {
-        return Err(failed(crate::procedure::RecordError::Motion("two samples at least are needed".into()), file));
+        return Err(failed(
+            crate::procedure::RecordError::Motion("two samples at least are needed".into()),
+            file,
+        ));
     }
     Ok(path)
 }

@@ -132,7 +132,11 @@ impl FollowCommand {
             }
             With::Impedance => {
                 let inertia = model.numeric.mass_matrix(&start);
-                Law::Impedance(JointImpedance::of_inertia(&inertia, self.bandwidth.unwrap_or(SOFT), self.damping))
+                Law::Impedance(JointImpedance::of_inertia(
+                    &inertia,
+                    self.bandwidth.unwrap_or(SOFT),
+                    self.damping,
+                ))
             }
         })
     }
@@ -174,8 +178,9 @@ impl FollowCommand {
         let limits = SVector::from(LWA4P.joints.map(|joint| joint.torque));
         for entry in entries.iter_mut().filter(|entry| entry.name != "feedback") {
             let planned = entry.model.model.planned(&entry.model.body, path.motion(), self.running);
-            let vectors =
-                |x: &[f64]| x.chunks_exact(6).map(SVector::from_column_slice).collect::<Vec<SVector<f64, 6>>>();
+            let vectors = |x: &[f64]| {
+                x.chunks_exact(6).map(SVector::from_column_slice).collect::<Vec<SVector<f64, 6>>>()
+            };
             let parts = Parts {
                 rigid: vectors(&planned.rigid),
                 friction: vectors(&planned.friction),

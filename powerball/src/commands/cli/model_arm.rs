@@ -101,7 +101,9 @@ impl ModelOnBus {
     /// The arm file and the model, and what motions must keep: with the model's masses where no values were given.
     pub(crate) fn read(&mut self) -> Result<(Arm, ModelArm, Envelope<6>), Failure> {
         if self.plant.is_some() && self.place.bus != BusUrl::Virtual {
-            return Err(Failure::Unusable("--plant is for --bus virtual; elsewhere the arm is what it is".into()));
+            return Err(Failure::Unusable(
+                "--plant is for --bus virtual; elsewhere the arm is what it is".into(),
+            ));
         }
         let arm = self.surroundings.arm()?;
         let model = ModelArm::read(&arm, &self.model)?;

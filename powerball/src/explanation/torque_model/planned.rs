@@ -41,12 +41,8 @@ impl TorqueModel {
         let without = base.torque(body, &recording, &|_| false);
         let all = whole.torque(body, &recording, &|_| held);
         let n = motion.dof();
-        let places: Vec<f64> = motion
-            .q
-            .iter()
-            .enumerate()
-            .map(|(k, q)| q - self.additions.log_changes.offset(k % n))
-            .collect();
+        let places: Vec<f64> =
+            motion.q.iter().enumerate().map(|(k, q)| q - self.additions.log_changes.offset(k % n)).collect();
         let rigid = body.torque(&places, &motion.dq, &motion.ddq, &self.inertial());
         let less = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect();
         PlannedTorque { friction: less(&without, &rigid), effects: less(&all, &without), rigid }

@@ -3,8 +3,8 @@
 //! Also here: what a joint's module is.
 
 use super::dictionary::Identity;
-use super::node::Node;
 use super::hand::Hand;
+use super::node::Node;
 use super::{Fault, Sample};
 use crate::bus::canopen::{Frame, Micros, NodeId, Object};
 use crate::bus::transport::{Bus, BusError, Event, Peer};
