@@ -3,6 +3,7 @@
 use super::Failure;
 use super::bus::{Where, virtual_bus};
 use super::envelope::Surroundings;
+use super::virtual_arm::{built, setup, with_current_mode};
 use crate::bus::driver::Profile;
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::{Bus, BusUrl, Master};
@@ -11,8 +12,8 @@ use crate::identification::mounting::Mounting;
 use crate::identification::{KnownModel, NumericArm};
 use crate::logs::regression::RigidArm;
 use crate::procedure::{Envelope, RecordError};
-use crate::virtual_arm::slave::{CurrentMode, Hand};
-use crate::virtual_arm::{Undeclared, VirtualArm, lwa4p};
+use crate::virtual_arm::slave::Hand;
+use crate::virtual_arm::{Undeclared, VirtualArm};
 use clap::Args;
 use dyngen::Arm;
 use nalgebra::SVector;
@@ -134,16 +135,14 @@ impl ModelOnBus {
     }
 
     fn virtual_arm(&self, start: [f64; 6], hand: Option<Hand>) -> Result<VirtualArm, Failure> {
-        let broken = |e: String| Failure::Refused(format!("the built-in arm: {e}"));
         let setup = match &self.plant {
-            Some(file) => Undeclared::read(file).map_err(Failure::Unusable)?.setup(start, 1),
-            None => lwa4p::setup(start, 1),
+            Some(file) => Undeclared::read(file)
+                .map_err(Failure::Unusable)?
+                .setup(start, 1)
+                .map_err(|e| Failure::Refused(e.to_string()))?,
+            None => setup(start, 1, None)?,
         };
-        let mut setup = setup.map_err(|e| broken(e.to_string()))?;
-        if let Some(mode) = LWA4P.current {
-            setup = setup.with_current_mode(CurrentMode { mode: mode.mode.code(), target: mode.setpoint });
-        }
-        let arm = VirtualArm::new(setup).ok_or_else(|| broken("its parts do not fit".to_string()))?;
+        let arm = built(with_current_mode(setup), false)?;
         Ok(match hand {
             Some(hand) => arm.with_hand(hand),
             None => arm,
