@@ -37,7 +37,33 @@ type OfPosition<R, T, const N: usize> = fn(&SVector<T, N>) -> R;
 /// A function of positions and velocities.
 type OfMotion<R, T, const N: usize> = fn(&SVector<T, N>, &SVector<T, N>) -> R;
 
-/// Generated functions of these names, with the values baked in.
+/// Generated functions of these names, with the values baked in or taken from a constant.
+///
+#[cfg_attr(feature = "lwa4p", doc = "```")]
+#[cfg_attr(not(feature = "lwa4p"), doc = "```ignore")]
+/// use nalgebra::SVector;
+/// use powerball::controller::dynamics::{ArmModel, Functions, Reference, State};
+/// use powerball::controller::laws::ComputedTorque;
+/// use powerball::controller::model::minimal;
+/// // What was identified.
+/// fn values() -> SVector<f64, { minimal::PARAMETERS }> {
+///     SVector::from_element(0.1)
+/// }
+/// let arm = Functions::<f64, 6> {
+///     mass_matrix: |q| minimal::mass_matrix(q, &values()),
+///     coriolis_times_velocity: |q, dq| minimal::coriolis_times_velocity(q, dq, &values()),
+///     coriolis_transpose_times_velocity: |q, dq| minimal::coriolis_transpose_times_velocity(q, dq, &values()),
+///     gravity: |q| minimal::gravity(q, &values()),
+///     forward_kinematics: |q| minimal::forward_kinematics(q),
+///     jacobian: |q| minimal::jacobian(q),
+///     jacobian_rate_times_velocity: |q, dq| minimal::jacobian_rate_times_velocity(q, dq),
+/// };
+/// // In the loop, each 5 ms.
+/// let law = ComputedTorque::for_period(0.005);
+/// let state = State { q: SVector::from_element(0.3), dq: SVector::zeros() };
+/// let goal = Reference::at_rest(state.q);
+/// assert!((law.torque(&arm, &state, &goal) - arm.gravity(&state.q)).norm() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Functions<T: RealField + Copy, const N: usize> {
     /// B(q).

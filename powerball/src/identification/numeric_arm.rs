@@ -14,6 +14,8 @@ pub struct NumericArm<const N: usize> {
     values: Vec<f64>,
     /// What the encoders show too much, rad.
     offset: SVector<f64, N>,
+    /// A body that it holds, as an arm of nothing else.
+    held: Option<Box<NumericArm<N>>>,
 }
 
 impl<const N: usize> NumericArm<N> {
@@ -34,7 +36,22 @@ impl<const N: usize> NumericArm<N> {
             gravity: of(Function::Gravity)?,
             values: values.to_vec(),
             offset: offset.into(),
+            held: None,
         }))
+    }
+
+    /// The same arm with the bodies of another one, which has the same joints: dynamics are linear in the parameters.
+    #[must_use]
+    pub fn holding(self, held: NumericArm<N>) -> Self {
+        NumericArm { held: Some(Box::new(held)), ..self }
+    }
+
+    /// What the held body adds.
+    fn with_held<M: std::ops::Add<Output = M>>(&self, own: M, of: impl Fn(&NumericArm<N>) -> M) -> M {
+        match &self.held {
+            Some(held) => own + of(held),
+            None => own,
+        }
     }
 
     fn vector(&self, function: &Evaluator, q: &SVector<f64, N>, dq: &[f64]) -> SVector<f64, N> {
@@ -48,23 +65,25 @@ impl<const N: usize> NumericArm<N> {
 impl<const N: usize> ArmModel<f64, N> for NumericArm<N> {
     fn mass_matrix(&self, q: &SVector<f64, N>) -> SMatrix<f64, N, N> {
         // Symmetric: rows are columns.
-        let (mut out, q) = (SMatrix::<f64, N, N>::zeros(), q - self.offset);
+        let (mut out, whole, q) = (SMatrix::<f64, N, N>::zeros(), *q, q - self.offset);
         let samples = Samples { q: q.as_slice(), parameters: &self.values, ..Samples::default() };
         self.inertia.run(&samples, out.as_mut_slice());
-        out
+        self.with_held(out, |held| held.mass_matrix(&whole))
     }
     fn coriolis_times_velocity(&self, q: &SVector<f64, N>, dq: &SVector<f64, N>) -> SVector<f64, N> {
-        self.vector(&self.coriolis, q, dq.as_slice())
+        let own = self.vector(&self.coriolis, q, dq.as_slice());
+        self.with_held(own, |held| held.coriolis_times_velocity(q, dq))
     }
     fn coriolis_transpose_times_velocity(
         &self,
         q: &SVector<f64, N>,
         dq: &SVector<f64, N>,
     ) -> SVector<f64, N> {
-        self.vector(&self.transposed, q, dq.as_slice())
+        let own = self.vector(&self.transposed, q, dq.as_slice());
+        self.with_held(own, |held| held.coriolis_transpose_times_velocity(q, dq))
     }
     fn gravity(&self, q: &SVector<f64, N>) -> SVector<f64, N> {
-        self.vector(&self.gravity, q, &[])
+        self.with_held(self.vector(&self.gravity, q, &[]), |held| held.gravity(q))
     }
 }
 

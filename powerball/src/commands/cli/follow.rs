@@ -163,9 +163,9 @@ impl FollowCommand {
         let mut entries = Vec::new();
         for what in &self.compare {
             let (name, other) = match what.as_str() {
-                "feedback" => ("feedback", ModelArm::read(arm, &self.on.model)?),
-                "base" => ("base", ModelArm::base(arm, &self.on.model)?),
-                file => ("base", ModelArm::read(arm, file.as_ref())?),
+                "feedback" => ("feedback", ModelArm::read(arm, &self.on.model, true)?),
+                "base" => ("base", ModelArm::read(arm, &self.on.model, false)?),
+                file => ("base", ModelArm::read(arm, file.as_ref(), true)?),
             };
             if entries.iter().any(|entry: &Entry| entry.name == name) {
                 return Err(Failure::Unusable(format!("--compare: {name} is there twice")));

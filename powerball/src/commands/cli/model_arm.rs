@@ -52,8 +52,8 @@ pub(crate) struct ModelArm {
 }
 
 impl ModelArm {
-    /// Reads a model of the arm of a file.
-    pub(crate) fn read(arm: &Arm, file: &Path) -> Result<ModelArm, Failure> {
+    /// Reads a model of the arm of a file, with its effects or without.
+    pub(crate) fn read(arm: &Arm, file: &Path, effects: bool) -> Result<ModelArm, Failure> {
         let wrong = |what: String| Failure::Unusable(what);
         let read = ModelFile::read(file).map_err(|e| wrong(e.to_string()))?;
         let (named, name) = (read.model.arm.clone(), file.display());
@@ -75,18 +75,10 @@ impl ModelArm {
         let arm = read.arm(arm, Mounting::Filed).map_err(wrong)?;
         let body = RigidArm::new(&arm).map_err(|e| wrong(e.to_string()))?;
         let model = read.checked(&body).map_err(|e| wrong(e.to_string()))?;
-        let offset = std::array::from_fn(|j| model.additions.log_changes.offset(j));
-        let numeric = NumericArm::new(body.model(), &model.inertial(), offset)
-            .map_err(|e| wrong(e.to_string()))?
-            .ok_or_else(|| wrong(format!("{name}: does not fit the arm file")))?;
+        let model = if effects { model } else { model.base() };
+        let numeric = model.numeric_arm(&body).map_err(|e| wrong(e.to_string()))?;
+        let numeric = numeric.ok_or_else(|| wrong(format!("{name}: does not fit the arm file")))?;
         Ok(ModelArm { body, model, numeric })
-    }
-
-    /// The same without its effects.
-    pub(crate) fn base(arm: &Arm, file: &Path) -> Result<ModelArm, Failure> {
-        let mut model = ModelArm::read(arm, file)?;
-        model.model = model.model.base();
-        Ok(model)
     }
 
     /// Poses within the joints' limits, always the same ones.
@@ -107,7 +99,7 @@ impl ModelOnBus {
             ));
         }
         let arm = self.surroundings.arm()?;
-        let model = ModelArm::read(&arm, &self.model)?;
+        let model = ModelArm::read(&arm, &self.model, true)?;
         if model.model.additions.arm_changes.is_empty() {
             self.surroundings.values_or(&self.model);
         }
