@@ -150,7 +150,7 @@ fn what_cannot_work_is_refused_before_the_arm_moves() {
         (&["--model", &other][..], 2, "is a model of the arm 'another'"),
         (&["--model", &fewer], 2, "no friction for joint 6"),
         (&["--model", "no.json"], 2, "no.json"),
-        (&["--model", &lighter, "--with", "torque"], 2, "not positive definite"),
+        (&["--model", &lighter, "--values", &good, "--with", "torque"], 2, "not positive definite"),
         (&["--model", &good, "--with", "torque", "--bandwidth", "-3"], 2, "above 0"),
         (&["--model", &good, "--with", "torque", "--damping", "-1"], 2, "above 0"),
         (&["--model", &good, "--with", "torque", "--bandwidth", "150"], 2, "not stable at 200 Hz"),
