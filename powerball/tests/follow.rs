@@ -188,9 +188,6 @@ fn what_cannot_work_is_refused_before_the_arm_moves() {
     for command in ["follow", "float"] {
         let help = powerball(&[command, "--help"]);
         let help = String::from_utf8_lossy(&help.stdout).into_owned();
-        assert!(
-            help.contains("Example") && help.contains("Nothing of this was run on hardware"),
-            "{command}"
-        );
+        assert!(help.contains("Example") && help.contains("ever run on hardware"), "{command}");
     }
 }

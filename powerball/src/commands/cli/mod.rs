@@ -44,9 +44,9 @@ enum Command {
     VirtualArm(virtual_arm::VirtualArmCommand),
     /// Follow a trajectory on a bus and log it.
     Record(record::RecordCommand),
-    /// Follow a trajectory with a torque model: tracking error with it, and with a base model.
+    /// Follow a trajectory with a torque model; tracking error with it and with a base model. Never run on hardware.
     Follow(follow::FollowCommand),
-    /// Take weight and friction off the hand that guides the arm.
+    /// Take weight and friction off the hand that guides the arm. Never run on hardware.
     Float(float::FloatCommand),
     /// Swing the arm until its friction has settled.
     WarmUp(warm_up::WarmUp),
