@@ -1,8 +1,10 @@
 //! What runs in the control loop of an arm: no `std`, no allocation, no panic.
 
 pub mod correction;
+pub mod dynamics;
 pub mod friction;
 mod joint_number;
+pub mod laws;
 #[cfg(feature = "lwa4p")]
 pub mod model;
 pub mod online;

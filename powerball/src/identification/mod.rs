@@ -11,6 +11,7 @@ mod known;
 pub mod motion;
 pub mod mounting;
 mod nearest;
+mod numeric_arm;
 mod source;
 pub mod transmission;
 mod verify;
@@ -21,6 +22,7 @@ pub use identify::{
 };
 pub use known::KnownModel;
 pub use nearest::{NearestArm, NearestError, ValueChange, nearest_arm};
+pub use numeric_arm::NumericArm;
 pub use source::{Input, Source, Summarized, summarize};
 pub use transmission::{JointTransmission, transmission};
 pub use verify::{Verified, VerifyOptions, verify};

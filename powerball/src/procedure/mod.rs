@@ -2,6 +2,7 @@
 
 pub mod constant_velocity;
 pub mod envelope;
+pub mod follow;
 pub mod friction;
 pub mod gravity_free;
 pub mod laws;
@@ -9,6 +10,7 @@ pub mod log_line;
 pub mod record;
 pub mod resume;
 pub mod settling;
+pub mod torque_loop;
 pub mod warm_up;
 
 pub use envelope::{Cleared, Envelope};

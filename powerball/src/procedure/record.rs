@@ -118,10 +118,12 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
     /// master, `None` where process data is missing.
     ///
     /// Where set-points came too late for their slot, the sample is given again and the motion is a cycle
-    /// longer: a joint is never asked to catch up.
-    fn follow(
+    /// longer: a joint is never asked to catch up. `forward`: the torque that each drive is given with a sample, N·m, where
+    /// there is one.
+    pub(super) fn follow(
         &mut self,
         motion: &Motion,
+        forward: &[[f64; N]],
         mut each: impl FnMut(usize, Option<&Master<B, N>>) -> Result<(), RecordError>,
     ) -> Result<(), RecordError> {
         let mut next = 0usize;
@@ -148,8 +150,12 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
                         self.target.copy_from_slice(q);
                         waiting = Some(sample);
                     }
-                    let target = self.target;
-                    self.master.driver_mut().set(&target).map_err(RecordError::Rejected)?;
+                    let (target, driver) = (self.target, self.master.driver_mut());
+                    let set = match forward.get(sample) {
+                        Some(torque) => driver.set_with_torque(&target, torque),
+                        None => driver.set(&target),
+                    };
+                    set.map_err(RecordError::Rejected)?;
                     if q.is_none() {
                         return Ok(());
                     }
@@ -217,7 +223,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
     /// As [`way_to`](Self::way_to) and [`record`](Self::record).
     pub fn go(&mut self, to: &[f64; N], share: f64, least: f64) -> Result<(), RecordError> {
         let way = self.way_to(to, share, least)?;
-        self.follow(way.motion(), |_, _| Ok(()))
+        self.follow(way.motion(), &[], |_, _| Ok(()))
     }
 
     /// Follows a motion that begins where the arm is, and writes the log with these columns, `t` by `time`. The log is
@@ -244,7 +250,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         log.write_all(columns.header(N).as_bytes()).map_err(RecordError::Write)?;
         let rows: Vec<&[f64]> = motion.samples().map(|[q, ..]| q).collect();
         let mut line = String::new();
-        self.follow(motion, |k, master| {
+        self.follow(motion, &[], |k, master| {
             let Some(master) = master else {
                 record.missing += 1;
                 return Ok(());
@@ -282,9 +288,14 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
     ///
     /// # Errors
     /// Where the arm or the bus fails.
-    pub fn finish(mut self) -> Result<Master<B, N>, RecordError> {
+    pub fn finish(self) -> Result<Master<B, N>, RecordError> {
+        self.finish_with_envelope().map(|(master, _)| master)
+    }
+
+    /// The same; gives back what motions must keep as well.
+    pub(super) fn finish_with_envelope(mut self) -> Result<(Master<B, N>, Envelope<N>), RecordError> {
         self.master.stop()?;
-        Ok(self.master)
+        Ok((self.master, self.envelope))
     }
 }
 
@@ -451,7 +462,7 @@ mod tests {
         let mut recorder = Recorder::enable(arm(), open()).unwrap();
         recorder.go(&START, 0.25, 1.0).unwrap();
         let mut lines = 0;
-        let failed = recorder.follow(&motion, |_, master| {
+        let failed = recorder.follow(&motion, &[], |_, master| {
             lines += usize::from(master.is_some());
             Ok(())
         });

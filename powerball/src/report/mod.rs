@@ -27,6 +27,8 @@ pub mod excited;
 pub mod explained;
 mod figure;
 pub mod files;
+#[cfg(feature = "procedure")]
+pub mod followed;
 pub mod identified;
 pub mod inspected;
 mod live;

@@ -253,11 +253,19 @@ impl Undeclared {
     /// # Errors
     /// None for the arm file that is built in.
     pub fn arm(&self, start: [f64; 6], seed: u64, commutated: bool) -> Result<VirtualArm, Diagnostics> {
-        let mut setup = lwa4p::setup(start, seed)?;
+        let mut setup = self.setup(start, seed)?;
         setup.modules.iter_mut().for_each(|module| module.commutated = commutated);
+        VirtualArm::new(setup).ok_or_else(|| Diagnostics::whole_file("lwa4p.toml", "six joints are needed"))
+    }
+
+    /// What it is made of.
+    ///
+    /// # Errors
+    /// None for the arm file that is built in.
+    pub fn setup(&self, start: [f64; 6], seed: u64) -> Result<Setup, Diagnostics> {
+        let setup = lwa4p::setup(start, seed)?;
         let plant = setup.plant.clone().with(self.effect.clone());
-        VirtualArm::new(Setup { plant, age: self.age, ..setup })
-            .ok_or_else(|| Diagnostics::whole_file("lwa4p.toml", "six joints are needed"))
+        Ok(Setup { plant, age: self.age, ..setup })
     }
 }
 

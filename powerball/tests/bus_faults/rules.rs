@@ -8,7 +8,7 @@ use powerball::bus::cia402::{Controlword, Mode, State, objects, schunk};
 use powerball::bus::driver::cause::Hindrance;
 use powerball::bus::driver::lwa4p::LWA4P;
 use powerball::bus::driver::{
-    BusEvent, Cause, ControlMode, Driver, Phase, Profile, Refusal, Rejection, Verdict,
+    Budget, BusEvent, Cause, ControlMode, Driver, Phase, Profile, Refusal, Rejection, Verdict,
 };
 use powerball::controller::JointNumber;
 use powerball::virtual_arm::slave::Fault;
@@ -181,6 +181,48 @@ fn steps_are_measured_from_what_has_left() {
     assert_eq!(world.driver.set(&here.map(|q| q + 0.0001)), Ok(()));
     let much = world.driver.set(&here.map(|q| q + 1.2 * step));
     assert!(matches!(much, Err(Rejection::Jump(JOINT_1, ..))), "{much:?}");
+}
+
+/// The torque offset goes to the drives with its points, is guarded as they are, and is gone after a stop.
+#[test]
+fn torque_offsets_are_guarded_and_end_with_the_motion() {
+    let profile = LWA4P.with_torque_offset();
+    let mut world = started(ControlMode::InterpolatedPosition, profile, true, Wire::Good);
+    assert!(world.run_until(20_000_000, |w| w.driver.phase() == Phase::Running));
+    world.pilot.enable = false;
+    world.run(100_000);
+    let here = world.driver.setpoints();
+    world.run_until(CYCLE, |w| w.driver.cycle_complete());
+    let mut give = |torques: [f64; 6]| world.driver.set_with_torque(&here, &torques);
+    // The victim's joint.
+    let (third, of) = (JointNumber::from_index(2), |torque: f64| [0.0, 0.0, torque, 0.0, 0.0, 0.0]);
+    assert_eq!(give(of(f64::NAN)), Err(Rejection::NotFinite(third)));
+    assert!(matches!(give(of(65.0)), Err(Rejection::Torque(j, ..)) if j == third));
+    // A quarter of 64 N·m in a cycle.
+    assert!(matches!(give(of(16.1)), Err(Rejection::Jump(j, ..)) if j == third));
+    assert_eq!(give(of(14.0)), Ok(()));
+    // 14 N·m are 2000 ‰ of what 7 N·m are at the rated current.
+    let offset = |w: &World| {
+        let heard = w.bus.peer().heard.iter().rev();
+        let mut ours = heard.filter(|(_, f)| f.raw_id() == Cob::Rpdo(1, VICTIM).id());
+        ours.next().map(|(_, f)| i16::from_le_bytes([f.bytes()[2], f.bytes()[3]]))
+    };
+    world.hold_pilot(CYCLE);
+    assert_eq!(offset(&world), Some(2000));
+    world.stop();
+    world.run(1_000_000);
+    assert_eq!((world.driver.phase(), offset(&world)), (Phase::Ready, Some(0)));
+}
+
+/// Where the receive PDO holds no offset, it would be lost on the way.
+#[test]
+fn torque_offsets_need_their_place_in_the_pdo() {
+    let mut world = running(ControlMode::InterpolatedPosition);
+    let here = world.driver.setpoints();
+    assert_eq!(world.driver.set_with_torque(&here, &[0.0; 6]), Err(Rejection::NoTorqueOffset));
+    let budget = Budget::of(&LWA4P.with_torque_offset(), &LWA4P.with_torque_offset().interpolated_position);
+    assert!((budget.worst_load() - 0.935).abs() < 5e-3, "{budget}");
+    assert_eq!(budget.verdict(), Verdict::Tight);
 }
 
 #[test]

@@ -400,6 +400,8 @@ pub enum Rejection {
     Torque(JointNumber, f64, f64),
     /// Joint whose value the drive's type cannot hold: it would be cut.
     Saturated(JointNumber),
+    /// The receive PDO of this mode holds no torque offset: see [`Profile::with_torque_offset`](super::Profile::with_torque_offset).
+    NoTorqueOffset,
     /// The arm does not follow set-points now.
     NotRunning,
 }
@@ -429,6 +431,7 @@ impl fmt::Display for Rejection {
             Rejection::Saturated(j) => {
                 write!(f, "joint {j}: the drive's number type cannot hold the set-point")
             }
+            Rejection::NoTorqueOffset => f.write_str("the drives get no torque offset in this mode"),
             Rejection::NotRunning => f.write_str("the arm does not follow set-points now"),
         }
     }

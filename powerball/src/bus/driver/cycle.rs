@@ -6,7 +6,7 @@ use super::stop::{ResetStage, StopStage};
 use super::{Cause, ControlMode, Driver, Phase, Rejection, Transmit};
 use crate::bus::canopen::sync::Tick;
 use crate::bus::canopen::{Micros, cob};
-use crate::bus::cia402::{Command, Controlword, State};
+use crate::bus::cia402::{Command, Controlword, State, objects};
 use crate::controller::JointNumber;
 
 impl<const N: usize> Driver<N> {
@@ -29,6 +29,50 @@ impl<const N: usize> Driver<N> {
             Err(rejection) => self.rejection = Some(rejection),
         }
         checked
+    }
+
+    /// The same in interpolated position mode with a torque (N·m) that each drive adds to its own from the next SYNC on:
+    /// feed-forward. It holds until the next one is given, and is 0 whenever the arm does not run.
+    ///
+    /// # Errors
+    /// As [`Driver::set`]; and where a torque is no number, more than the joint has, or further from the last one than
+    /// [`Reactions::current_step`](super::profile::Reactions::current_step) of that.
+    pub fn set_with_torque(&mut self, setpoints: &[f64; N], torques: &[f64; N]) -> Result<(), Rejection> {
+        if self.phase != Phase::Running {
+            return Err(Rejection::NotRunning);
+        }
+        if let Err(rejection) = self.check_offsets(torques) {
+            self.rejection = Some(rejection);
+            return Err(rejection);
+        }
+        self.set(setpoints)?;
+        for (joint, torque) in self.joints.iter_mut().zip(torques) {
+            joint.offset = *torque;
+        }
+        Ok(())
+    }
+
+    fn check_offsets(&self, torques: &[f64; N]) -> Result<(), Rejection> {
+        if !self.mode_profile().rpdo.contains(objects::TORQUE_OFFSET) {
+            return Err(Rejection::NoTorqueOffset);
+        }
+        let part = self.profile.reactions.current_step;
+        for (j, ((profile, joint), torque)) in
+            self.profile.joints.iter().zip(&self.joints).zip(torques).enumerate()
+        {
+            let number = JointNumber::from_index(j);
+            let step = torque - joint.offset;
+            if !torque.is_finite() {
+                return Err(Rejection::NotFinite(number));
+            } else if torque.abs() > profile.torque {
+                return Err(Rejection::Torque(number, *torque, profile.torque));
+            } else if step.abs() > part * profile.torque {
+                return Err(Rejection::Jump(number, step, part * profile.torque));
+            } else if joint.units.per_mille_of_torque(*torque).cut {
+                return Err(Rejection::Saturated(number));
+            }
+        }
+        Ok(())
     }
 
     fn check_setpoints(&mut self, setpoints: &[f64; N]) -> Result<(), Rejection> {

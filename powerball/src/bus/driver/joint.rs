@@ -75,6 +75,8 @@ pub struct Joint {
     /// Accepted set-point, and those that have left; rad, rad/s or A.
     pub(super) target: f64,
     pub(super) demand: Demand,
+    /// Torque offset that goes with the set-points, N·m.
+    pub(super) offset: f64,
     pub(super) watched: Watched,
     /// Greatest current that the drive gives (0x6073), A, where it tells.
     pub(super) current_limit: Option<f64>,
@@ -121,6 +123,7 @@ impl Joint {
             progress: Progress::Waiting,
             target: 0.0,
             demand: Demand::at_rest(0.0),
+            offset: 0.0,
             watched: Watched::default(),
             current_limit: None,
             declined: 0,
@@ -184,6 +187,7 @@ impl Joint {
     pub(super) fn preset(&mut self, control: ControlMode) {
         self.target = self.hold(control);
         self.demand = Demand::at_rest(self.target);
+        self.offset = 0.0;
         self.announced = None;
         self.raised = false;
     }
@@ -223,6 +227,7 @@ impl Joint {
         let (bytes, len) = mode.rpdo.pack(|object| match object {
             objects::CONTROLWORD => i64::from(word.0),
             object if object == mode.setpoint => i64::from(raw),
+            objects::TORQUE_OFFSET => i64::from(self.units.per_mille_of_torque(self.offset).value),
             _ => 0,
         });
         Frame::from_raw(Cob::Rpdo(1, profile.node).id(), bytes.get(..len)?)

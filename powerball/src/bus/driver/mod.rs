@@ -41,6 +41,7 @@
 //! | bus-off | transport | queue discarded, silence (also of the heartbeat, so that the drives stop themselves), [`Cause::BusOff`], restart needed | at once |
 //! | transmit queue full | transport | queue discarded, stop, repeated until it could be queued | at once |
 //! | set-point NaN, jumping, outside the limits, more torque than a joint has | before it leaves | rejected, the last one held, counted; 3 cycles in a row: stop, [`Cause::Setpoints`] | 3 cycles |
+//! | torque offset NaN, beyond the joint's torque, jumping | before it leaves | as a set-point | 3 cycles |
 //! | no new set-point | in the slot | the last one held; 3 cycles in a row: stop, [`Cause::Starved`] (not in profile position) | 3 cycles |
 //! | velocities mean something else | way asked for and way gone, while the scale is not verified on hardware | stop, [`Cause::WrongVelocityScale`] | 0.1 rad |
 //! | joint not where or not as fast as told, stuck, jumping, beyond its limits, at its current limit | each cycle | stop, [`Cause::FollowingError`], [`Cause::VelocityError`], [`Cause::Stuck`], [`Cause::PositionJump`], [`Cause::PositionLimit`], [`Cause::TorqueLimit`] | [`profile::Reactions`] |

@@ -5,7 +5,7 @@
 use super::cause::Refusal;
 use super::torque::ControlMode;
 use super::units::{JointUnits, VelocityScale};
-use crate::bus::canopen::pdo::Mapping;
+use crate::bus::canopen::pdo::{Entry, Mapping};
 use crate::bus::canopen::{Micros, NodeId, Object};
 use crate::bus::cia402::{Controlword, Mode, objects};
 
@@ -230,6 +230,18 @@ impl<const N: usize> Profile<N> {
             ControlMode::InterpolatedPosition => Some(&self.interpolated_position),
             ControlMode::Current => self.current.as_ref(),
         }
+    }
+
+    /// The same with the drives' torque offset (0x60B2) in the receive PDO of interpolated position mode, for
+    /// [`Driver::set_with_torque`](super::Driver::set_with_torque): two bytes more a joint and cycle.
+    #[must_use]
+    pub const fn with_torque_offset(mut self) -> Self {
+        self.interpolated_position.rpdo = Mapping::of(&[
+            Entry::new(objects::CONTROLWORD, 16),
+            Entry::new(objects::TORQUE_OFFSET, 16),
+            Entry::new(self.interpolated_position.setpoint, 32),
+        ]);
+        self
     }
 
     /// Period of SYNC in s.

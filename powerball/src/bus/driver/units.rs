@@ -71,6 +71,11 @@ impl JointUnits {
         to_i16(current / self.rated_current * 1000.0 * self.sign())
     }
 
+    /// Per mille of the rated current for a joint torque in N·m; cut where the torque constant is not known.
+    pub fn per_mille_of_torque(&self, torque: f64) -> Saturated<i32> {
+        to_i16(torque / self.rated_torque * 1000.0)
+    }
+
     fn sign(&self) -> f64 {
         if self.rated_torque < 0.0 { -1.0 } else { 1.0 }
     }

@@ -8,7 +8,7 @@ use crate::procedure::Envelope;
 use crate::virtual_arm::lwa4p;
 use clap::Args;
 use dyngen::Arm;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The shoulder, which is the base frame's origin, stands 205 mm above what the arm is mounted on.
 const FLOOR: f64 = -0.2;
@@ -31,6 +31,11 @@ pub(crate) struct Surroundings {
 }
 
 impl Surroundings {
+    /// Takes the masses of a model where none were given.
+    pub(crate) fn values_or(&mut self, model: &Path) {
+        self.values.get_or_insert_with(|| model.to_path_buf());
+    }
+
     /// The arm file.
     pub(crate) fn arm(&self) -> Result<Arm, Failure> {
         let arm = match &self.arm {

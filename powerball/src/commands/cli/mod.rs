@@ -6,11 +6,14 @@ mod demo;
 mod envelope;
 mod excite;
 mod explain;
+mod float;
+mod follow;
 mod friction;
 mod generate;
 mod identify;
 mod inputs;
 mod log;
+mod model_arm;
 mod output;
 mod profile;
 mod record;
@@ -41,6 +44,10 @@ enum Command {
     VirtualArm(virtual_arm::VirtualArmCommand),
     /// Follow a trajectory on a bus and log it.
     Record(record::RecordCommand),
+    /// Follow a trajectory with a torque model; tracking error with it and with a base model. Never run on hardware.
+    Follow(follow::FollowCommand),
+    /// Take weight and friction off the hand that guides the arm. Never run on hardware.
+    Float(float::FloatCommand),
     /// Swing the arm until its friction has settled.
     WarmUp(warm_up::WarmUp),
     /// Measure every joint's friction at constant velocities and fit its law.
@@ -95,6 +102,8 @@ pub fn main() -> ExitCode {
         Command::Bus(command) => command.run(),
         Command::VirtualArm(command) => command.run(),
         Command::Record(command) => command.run(),
+        Command::Follow(command) => command.run(),
+        Command::Float(command) => command.run(),
         Command::WarmUp(command) => command.run(),
         Command::Friction(command) => command.run(),
         Command::Profile(command) => command.run(),

@@ -2,7 +2,9 @@
 
 use super::Failure;
 use super::output;
+use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::{self, BusUrl};
+use crate::virtual_arm::slave::{CurrentMode, Setup};
 use crate::virtual_arm::{PlantEffect, Undeclared, VirtualArm, lwa4p, slave};
 use clap::Args;
 use rand::SeedableRng;
@@ -32,6 +34,9 @@ pub(crate) struct VirtualArmCommand {
     /// The motors know their commutation already, as after a restart without loss of motor power.
     #[arg(long)]
     commutated: bool,
+    /// The drives have the current mode that the bus profile knows, for `powerball follow` and `float`.
+    #[arg(long)]
+    current_mode: bool,
     /// An effect that no model is told of, by name; see `powerball demo`.
     #[arg(long, value_name = "NAME")]
     effect: Option<String>,
@@ -88,13 +93,25 @@ impl VirtualArmCommand {
             }
             start.copy_from_slice(given);
         }
-        match &self.plant {
+        let mut setup = match &self.plant {
             Some(file) => Undeclared::read(file)
                 .map_err(Failure::Unusable)?
-                .arm(start, self.seed, self.commutated)
-                .map_err(|e| Failure::Refused(e.to_string())),
-            None => virtual_arm(start, self.seed, self.effect.as_deref(), self.commutated),
+                .setup(start, self.seed)
+                .map_err(|e| Failure::Refused(e.to_string()))?,
+            None => setup(start, self.seed, self.effect.as_deref())?,
+        };
+        if self.current_mode {
+            setup = with_current_mode(setup);
         }
+        built(setup, self.commutated)
+    }
+}
+
+/// The drives with the current mode that the bus profile knows.
+pub(crate) fn with_current_mode(setup: Setup) -> Setup {
+    match LWA4P.current {
+        Some(mode) => setup.with_current_mode(CurrentMode { mode: mode.mode.code(), target: mode.setpoint }),
+        None => setup,
     }
 }
 
@@ -105,9 +122,22 @@ pub(crate) fn virtual_arm(
     effect: Option<&str>,
     commutated: bool,
 ) -> Result<VirtualArm, Failure> {
-    let broken = |what: String| Failure::Refused(format!("the built-in arm: {what}"));
-    let mut setup = lwa4p::setup(start, seed).map_err(|e| broken(e.to_string()))?;
+    built(setup(start, seed, effect)?, commutated)
+}
+
+fn broken(what: impl std::fmt::Display) -> Failure {
+    Failure::Refused(format!("the built-in arm: {what}"))
+}
+
+/// An arm of its parts; where `commutated` the motors know their commutation already.
+pub(crate) fn built(mut setup: Setup, commutated: bool) -> Result<VirtualArm, Failure> {
     setup.modules.iter_mut().for_each(|module| module.commutated = commutated);
+    VirtualArm::new(setup).ok_or_else(|| broken("its parts do not fit"))
+}
+
+/// The parts of the built-in arm with an effect by name.
+pub(crate) fn setup(start: [f64; 6], seed: u64, effect: Option<&str>) -> Result<Setup, Failure> {
+    let mut setup = lwa4p::setup(start, seed).map_err(broken)?;
     if let Some(name) = effect {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let effect = lwa4p::draw_effect(name, &setup.plant, 100.0, 1.0..2.0, &mut rng).ok_or_else(|| {
@@ -118,5 +148,5 @@ pub(crate) fn virtual_arm(
         })?;
         setup.plant = setup.plant.with(effect);
     }
-    VirtualArm::new(setup).ok_or_else(|| broken("its parts do not fit".to_string()))
+    Ok(setup)
 }

@@ -7,6 +7,7 @@
 mod c_api;
 mod file;
 mod known;
+mod planned;
 mod ros;
 mod source;
 #[cfg(test)]
@@ -22,6 +23,7 @@ use crate::logs::regression::{Data, Recording, RigidArm, Signals};
 use dyngen::arm::ParameterKind;
 pub use file::FileError;
 pub use known::{ModelFile, Unchanged};
+pub use planned::PlannedTorque;
 use serde::{Deserialize, Serialize};
 pub use source::{ForC, Scalar, SourceError};
 

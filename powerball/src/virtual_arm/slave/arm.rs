@@ -3,6 +3,7 @@
 //! Also here: what a joint's module is.
 
 use super::dictionary::Identity;
+use super::hand::Hand;
 use super::node::Node;
 use super::{Fault, Sample};
 use crate::bus::canopen::{Frame, Micros, NodeId, Object};
@@ -34,6 +35,15 @@ pub struct Setup {
     pub seed: u64,
 }
 
+impl Setup {
+    /// The same with drives that have a current mode.
+    #[must_use]
+    pub fn with_current_mode(mut self, mode: CurrentMode) -> Setup {
+        self.modules.iter_mut().for_each(|module| module.current_mode = Some(mode));
+        self
+    }
+}
+
 /// An arm of CiA 402 drives.
 #[derive(Clone, Debug)]
 pub struct VirtualArm {
@@ -44,6 +54,7 @@ pub struct VirtualArm {
     history: VecDeque<Vec<f64>>,
     offsets: Vec<f64>,
     torque: Vec<f64>,
+    hand: Option<Hand>,
     ticks: u64,
 }
 
@@ -76,7 +87,8 @@ impl VirtualArm {
         }
         let noise = Noise { rng: ChaCha8Rng::seed_from_u64(seed), slow: vec![0.0; n] };
         let torque = vec![0.0; n];
-        Some(VirtualArm { simulation, nodes, noise, history: VecDeque::new(), offsets, torque, ticks: 0 })
+        let history = VecDeque::new();
+        Some(VirtualArm { simulation, nodes, noise, history, offsets, torque, hand: None, ticks: 0 })
     }
 
     /// The nodes, one a joint.
@@ -87,6 +99,13 @@ impl VirtualArm {
     /// The plant as it truly moves.
     pub fn simulation(&self) -> &Simulation {
         &self.simulation
+    }
+
+    /// The same with a hand on its links.
+    #[must_use]
+    pub fn with_hand(mut self, hand: Hand) -> Self {
+        self.hand = Some(hand);
+        self
     }
 
     /// Sets the plant's age, s: what warms has been warming for so long.
@@ -121,7 +140,16 @@ impl VirtualArm {
         for (joint, node) in self.nodes.iter().enumerate() {
             self.simulation.set_brake(joint, node.brake_closed());
         }
-        self.simulation.step(h, &self.torque);
+        let free = self.nodes.iter().all(|node| !node.brake_closed() && node.drive.in_current_mode());
+        match self.hand.as_mut().filter(|_| free) {
+            None => self.simulation.step(h, &self.torque),
+            Some(hand) => {
+                let [q, dq] = [self.simulation.links(), self.simulation.link_velocities()];
+                let push = hand.pull(h, q, dq);
+                let torque: Vec<f64> = self.torque.iter().zip(push).map(|(a, b)| a + b).collect();
+                self.simulation.step(h, &torque);
+            }
+        }
     }
 
     /// What the sensors say at this instant, between two ticks: the current is the mean of `before` and

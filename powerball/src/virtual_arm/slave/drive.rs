@@ -242,7 +242,7 @@ impl Drive {
         self.torque
     }
 
-    fn in_current_mode(&self) -> bool {
+    pub(super) fn in_current_mode(&self) -> bool {
         self.module.current_mode.is_some_and(|current| current.mode == self.mode.code())
     }
 

@@ -7,11 +7,13 @@
 //! | `process` | PDOs and the device's rules for changing them; where a drive wants its joint to be |
 //! | `drive` | set-points, state machine, modes, brake, commutation search |
 //! | `node` | network management, heartbeats, emergencies; ties the others together |
+//! | `hand` | a hand that pulls the links along a path |
 //! | `arm` | all nodes with the plant and its sensors, as the other end of a bus |
 
 mod arm;
 mod dictionary;
 mod drive;
+mod hand;
 mod node;
 mod process;
 mod server;
@@ -21,6 +23,7 @@ mod tests;
 use crate::bus::cia402::Mode;
 pub use arm::{CurrentMode, Module, Setup, VirtualArm, serve};
 pub use dictionary::{Dictionary, Entry, Identity, Value};
+pub use hand::{Hand, HandLog, HandSample};
 pub use node::Node;
 
 /// Radians in a milli-degree, the drives' unit of angles.

@@ -9,8 +9,8 @@ mod timing;
 use super::Failure;
 use super::virtual_arm::virtual_arm;
 use crate::bus::canopen::{Micros, NodeId};
-use crate::bus::driver::Driver;
 use crate::bus::driver::lwa4p::LWA4P;
+use crate::bus::driver::{Driver, Profile};
 use crate::bus::transport::blocking::TransferError;
 use crate::bus::transport::{self, Bus, BusUrl, Event, Interrupt, Master, Memory};
 use crate::virtual_arm::VirtualArm;
@@ -96,7 +96,15 @@ impl Where {
     /// UDP multicast is a bench: nobody promises a program its time slices there, and no arm is hurt by a
     /// late SYNC. The driver then bears what it would not on a real bus; it counts all the same.
     pub(crate) fn driver(&self, bus: Box<dyn Bus>) -> Result<Master<Box<dyn Bus>, 6>, Failure> {
-        let mut profile = LWA4P;
+        self.driver_of(LWA4P, bus)
+    }
+
+    /// The same with another profile.
+    pub(crate) fn driver_of(
+        &self,
+        mut profile: Profile<6>,
+        bus: Box<dyn Bus>,
+    ) -> Result<Master<Box<dyn Bus>, 6>, Failure> {
         if matches!(self.bus, BusUrl::Udp(..)) {
             let reactions = &mut profile.reactions;
             (reactions.late_limit, reactions.skipped_limit, reactions.missing_cycles) = (u8::MAX, 20, 20);

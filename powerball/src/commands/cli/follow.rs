@@ -1,0 +1,243 @@
+//! `powerball follow`: a trajectory with a torque model.
+
+use super::model_arm::{ModelArm, ModelOnBus, failed};
+use super::{Failure, output};
+use crate::bus::driver::lwa4p::LWA4P;
+use crate::controller::dynamics::ArmModel;
+use crate::controller::laws::{ComputedTorque, JointImpedance};
+use crate::identification::motion::Motion;
+use crate::procedure::Envelope;
+use crate::procedure::follow::{Followed, Law, Parts, Path, Run, Track, common_delay};
+use crate::report::followed;
+use clap::{Args, ValueEnum};
+use nalgebra::SVector;
+use std::path::PathBuf;
+
+/// Springs of the joint impedance: swings of the joints, rad/s.
+const SOFT: f64 = 8.0;
+
+/// How the model is used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum With {
+    /// Interpolated positions with the model's torque as the drives' torque offset (0x60B2).
+    Feedforward,
+    /// Computed torque in the drives' current mode.
+    Torque,
+    /// Joint impedance in the drives' current mode.
+    Impedance,
+}
+
+/// Follow a trajectory with a torque model and say how far off the arm was, by joint; with --compare also with a base model
+/// or with no model, one after the other.
+///
+/// Nothing of this was run on hardware by this project: try --bus virtual first. Writes follow.json and report.html.
+/// Before anything moves, the model is held against the arm file, the gains against the cycle (largest pole of the sampled
+/// loop over 300 poses), and the trajectory is looked at as `powerball record` does. Set-points, torque offsets and
+/// currents pass the driver's guards; Ctrl-C stops the arm. THE ARM MOVES.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:\n  powerball demo --effect spring --out demo\n  \
+    powerball excite --arm demo/arm.toml --out path.csv\n  \
+    powerball follow --trajectory path.csv --arm demo/arm.toml --model demo/model.json --plant demo/virtual_arm.json \
+    --with torque --compare base --out followed\n\n\
+    The delay of drives that interpolate (the same for all joints and runs) is found and taken off the error.")]
+pub(crate) struct FollowCommand {
+    /// The trajectory: CSV with t, q1…q6 (rad), as `powerball excite` writes it at the arm's rate.
+    #[arg(long, value_name = "FILE")]
+    trajectory: PathBuf,
+    #[command(flatten)]
+    on: ModelOnBus,
+    /// How the model is used.
+    #[arg(long = "with", value_enum, default_value = "feedforward")]
+    with: With,
+    /// What to compare with: `base` (the model's rigid arm and friction alone), another model's file (reported as
+    /// base), or `feedback` (nothing fed forward). May be repeated.
+    #[arg(long, value_name = "base|FILE.json|feedback")]
+    compare: Vec<String>,
+    /// Bandwidth of the feedback in current mode, rad/s: 20 for computed torque at 200 Hz, 8 for impedance.
+    #[arg(long, value_name = "RAD/S", allow_negative_numbers = true)]
+    bandwidth: Option<f64>,
+    /// Damping ratio of the feedback in current mode.
+    #[arg(long, value_name = "RATIO", default_value_t = 1.0, allow_negative_numbers = true)]
+    damping: f64,
+    /// Time that the arm has been working, s: 3600 counts as warm. For models with a temperature effect.
+    #[arg(long, value_name = "SECONDS", default_value_t = 3600.0)]
+    running: f64,
+    /// Folder for the results; made if missing.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// One of the runs: its name, its model, and what it says of the path.
+struct Entry {
+    name: &'static str,
+    model: ModelArm,
+    parts: Option<Parts<6>>,
+}
+
+impl FollowCommand {
+    pub(crate) fn run(mut self) -> Result<(), Failure> {
+        let file = self.trajectory.clone();
+        let name = file.display();
+        let text = std::fs::read_to_string(&file)
+            .map_err(|e| Failure::Unusable(format!("{name}: cannot be read: {e}")))?;
+        let motion = Motion::from_csv(&text, LWA4P.joints.len())
+            .map_err(|why| Failure::Unusable(format!("{name}: {why}")))?;
+        let (arm, model, mut envelope) = self.on.read()?;
+        let profile = match self.with {
+            With::Feedforward => LWA4P.with_torque_offset(),
+            With::Torque | With::Impedance => LWA4P,
+        };
+        let path = Path::clear(&motion, &envelope, &profile).map_err(|e| failed(e, &file))?;
+        let law = self.law(&model, path.start())?;
+        let pole = self.judge(&law, &model, &path)?;
+        let entries = self.entries(&arm, model, &path)?;
+        output::make_folder(&self.out)?;
+
+        let mut master = self.on.master(profile, [0.0; 6], None)?;
+        let terminal = output::Progress::new();
+        let mut tracks: Vec<(&str, Track<6>)> = Vec::new();
+        for Entry { name, model, parts } in &entries {
+            terminal.say(&format!("following with {name}"));
+            let (path, arm) = (&path, &model.numeric);
+            let run = Run { path, arm, parts: parts.as_ref(), law, accept_unverified: self.on.accepts() };
+            let (back, track, kept): (_, _, Envelope<6>) =
+                run.follow(master, envelope).map_err(|e| Failure::Refused(e.to_string()))?;
+            (master, envelope) = (back, kept);
+            tracks.push((name, track));
+        }
+        drop(master);
+        self.report(&arm.name, &path, &tracks, pole)
+    }
+
+    fn law(&self, model: &ModelArm, start: SVector<f64, 6>) -> Result<Law<6>, Failure> {
+        let period = LWA4P.period_seconds();
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        let bandwidth = self.bandwidth();
+        if bandwidth.is_some_and(|w| !positive(w)) || !positive(self.damping) {
+            return Err(Failure::Unusable(format!(
+                "--bandwidth and --damping must be above 0: a loop with {} rad/s and a ratio of {} is not stable",
+                bandwidth.unwrap_or_default(),
+                self.damping
+            )));
+        }
+        Ok(match self.with {
+            With::Feedforward => Law::Feedforward,
+            With::Torque => {
+                let mut law = match self.bandwidth {
+                    Some(w) => ComputedTorque::of_bandwidth(w),
+                    None => ComputedTorque::for_period(period),
+                };
+                law.derivative *= self.damping;
+                Law::Torque(law)
+            }
+            With::Impedance => {
+                let inertia = model.numeric.mass_matrix(&start);
+                Law::Impedance(JointImpedance::of_inertia(
+                    &inertia,
+                    self.bandwidth.unwrap_or(SOFT),
+                    self.damping,
+                ))
+            }
+        })
+    }
+
+    /// Of the feedback, where this program closes the loop, rad/s.
+    fn bandwidth(&self) -> Option<f64> {
+        match self.with {
+            With::Feedforward => None,
+            With::Torque => Some(self.bandwidth.unwrap_or(0.1 / LWA4P.period_seconds())),
+            With::Impedance => Some(self.bandwidth.unwrap_or(SOFT)),
+        }
+    }
+
+    /// The largest pole of the loop, where this program closes it.
+    fn judge(&self, law: &Law<6>, model: &ModelArm, path: &Path<6>) -> Result<Option<f64>, Failure> {
+        let along = path.motion().samples().step_by(20).map(|[q, ..]| SVector::from_column_slice(q));
+        let poses = model.poses().into_iter().chain(along);
+        let pole = law.judge(&model.numeric, poses, LWA4P.period_seconds()).map_err(Failure::Unusable)?;
+        Ok((*law != Law::Feedforward).then_some(pole))
+    }
+
+    /// What is to be driven, in order.
+    fn entries(&self, arm: &dyngen::Arm, model: ModelArm, path: &Path<6>) -> Result<Vec<Entry>, Failure> {
+        let mut entries = Vec::new();
+        for what in &self.compare {
+            let (name, other) = match what.as_str() {
+                "feedback" => ("feedback", ModelArm::read(arm, &self.on.model, true)?),
+                "base" => ("base", ModelArm::read(arm, &self.on.model, false)?),
+                file => ("base", ModelArm::read(arm, file.as_ref(), true)?),
+            };
+            if entries.iter().any(|entry: &Entry| entry.name == name) {
+                return Err(Failure::Unusable(format!("--compare: {name} is there twice")));
+            }
+            entries.push(Entry { name, model: other, parts: None });
+        }
+        // The least first; the explained model is shown in detail, last.
+        entries.sort_by_key(|entry| entry.name != "feedback");
+        entries.push(Entry { name: "explained", model, parts: None });
+        let limits = SVector::from(LWA4P.joints.map(|joint| joint.torque));
+        for entry in entries.iter_mut().filter(|entry| entry.name != "feedback") {
+            let planned = entry.model.model.planned(&entry.model.body, path.motion(), self.running);
+            let vectors = |x: &[f64]| {
+                x.chunks_exact(6).map(SVector::from_column_slice).collect::<Vec<SVector<f64, 6>>>()
+            };
+            let parts = Parts {
+                rigid: vectors(&planned.rigid),
+                friction: vectors(&planned.friction),
+                effects: vectors(&planned.effects),
+            };
+            if let Some((sample, joint, torque)) = parts.beyond(&limits) {
+                return Err(Failure::Refused(format!(
+                    "by the {} model the trajectory takes {torque:.1} N·m of joint {} at {:.3} s, {:.1} N·m can be",
+                    entry.name,
+                    joint + 1,
+                    sample as f64 * path.motion().period,
+                    limits[joint]
+                )));
+            }
+            entry.parts = Some(parts);
+        }
+        Ok(entries)
+    }
+
+    fn report(
+        &self,
+        arm: &str,
+        path: &Path<6>,
+        tracks: &[(&str, Track<6>)],
+        largest_pole: Option<f64>,
+    ) -> Result<(), Failure> {
+        let tracks: Vec<(&str, &Track<6>)> = tracks.iter().map(|(name, track)| (*name, track)).collect();
+        let only: Vec<&Track<6>> = tracks.iter().map(|(_, track)| *track).collect();
+        let delay = if self.with == With::Feedforward { common_delay(&only, path) } else { 0.0 };
+        let mut result = Followed {
+            arm: arm.to_string(),
+            with: format!("{:?}", self.with).to_lowercase(),
+            delay,
+            bandwidth: self.bandwidth(),
+            largest_pole,
+            cycles: only.iter().map(|track| track.samples.len()).max().unwrap_or(0),
+            ..Followed::default()
+        };
+        for (name, track) in &tracks {
+            let error = track.error(path, delay);
+            result.tracking_error.insert((*name).to_string(), error.rms);
+            result.largest_error.insert((*name).to_string(), error.max);
+            result.torque.insert((*name).to_string(), track.torques());
+        }
+        let files = followed::files(&result, path, &tracks).map_err(Failure::Refused)?;
+        files.write(&self.out).map_err(Failure::Unusable)?;
+        if self.on.place.json {
+            output::print(&files.first());
+            return Ok(());
+        }
+        for joint in 0..6 {
+            let of = |(name, _): &(&str, _)| {
+                format!("{name} {:.3}", 1e3 * result.tracking_error.get(*name).map_or(f64::NAN, |e| e[joint]))
+            };
+            let errors: Vec<String> = tracks.iter().map(of).collect();
+            output::print(&format!("joint {}: off by {} mrad rms", joint + 1, errors.join(", ")));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,151 @@
+//! What `follow` and `float` are told: an arm with a torque model, and the bus that it is on.
+
+use super::Failure;
+use super::bus::{Where, virtual_bus};
+use super::envelope::Surroundings;
+use super::virtual_arm::{built, setup, with_current_mode};
+use crate::bus::driver::Profile;
+use crate::bus::driver::lwa4p::LWA4P;
+use crate::bus::transport::{Bus, BusUrl, Master};
+use crate::explanation::torque_model::{ModelFile, TorqueModel};
+use crate::identification::mounting::Mounting;
+use crate::identification::{KnownModel, NumericArm};
+use crate::logs::regression::RigidArm;
+use crate::procedure::{Envelope, RecordError};
+use crate::virtual_arm::slave::Hand;
+use crate::virtual_arm::{Undeclared, VirtualArm};
+use clap::Args;
+use dyngen::Arm;
+use nalgebra::SVector;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::path::{Path, PathBuf};
+
+/// Random poses at which gains are judged.
+const POSES: usize = 300;
+
+/// Arm, model and bus.
+#[derive(Args, Debug)]
+pub(crate) struct ModelOnBus {
+    /// The torque model: model.json of `powerball explain` or identified.json of `powerball identify`, for the same arm
+    /// file.
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) model: PathBuf,
+    #[command(flatten)]
+    pub(crate) surroundings: Surroundings,
+    #[command(flatten)]
+    pub(crate) place: Where,
+    /// The virtual arm of --bus virtual with what no model is told of it: virtual_arm.json, as `powerball demo` writes it.
+    #[arg(long, value_name = "FILE")]
+    plant: Option<PathBuf>,
+    /// You accept the drives' current mode, which this project has never seen on an arm. Not asked on --bus virtual.
+    #[arg(long)]
+    accept_unverified: bool,
+}
+
+/// A model that fits its arm.
+#[derive(Debug)]
+pub(crate) struct ModelArm {
+    pub(crate) body: RigidArm,
+    pub(crate) model: TorqueModel,
+    pub(crate) numeric: NumericArm<6>,
+}
+
+impl ModelArm {
+    /// Reads a model of the arm of a file, with its effects or without.
+    pub(crate) fn read(arm: &Arm, file: &Path, effects: bool) -> Result<ModelArm, Failure> {
+        let wrong = |what: String| Failure::Unusable(what);
+        let read = ModelFile::read(file).map_err(|e| wrong(e.to_string()))?;
+        let (named, name) = (read.model.arm.clone(), file.display());
+        if !named.is_empty() && named != arm.name {
+            return Err(wrong(format!(
+                "{name}: is a model of the arm '{named}', and the arm file is of '{}': take the arm file that it was \
+                    identified with",
+                arm.name
+            )));
+        }
+        if arm.dof() != LWA4P.joints.len() {
+            let (has, needs) = (arm.dof(), LWA4P.joints.len());
+            return Err(wrong(format!("the arm file has {has} joints, the arm on the bus {needs}")));
+        }
+        if !arm.transmissions.is_empty() {
+            let what = "the arm file couples joints by a transmission, which control laws here do not know";
+            return Err(wrong(what.to_string()));
+        }
+        let arm = read.arm(arm, Mounting::Filed).map_err(wrong)?;
+        let body = RigidArm::new(&arm).map_err(|e| wrong(e.to_string()))?;
+        let model = read.checked(&body).map_err(|e| wrong(e.to_string()))?;
+        let model = if effects { model } else { model.base() };
+        let numeric = model.numeric_arm(&body).map_err(|e| wrong(e.to_string()))?;
+        let numeric = numeric.ok_or_else(|| wrong(format!("{name}: does not fit the arm file")))?;
+        Ok(ModelArm { body, model, numeric })
+    }
+
+    /// Poses within the joints' limits, always the same ones.
+    pub(crate) fn poses(&self) -> Vec<SVector<f64, 6>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let limits = LWA4P.joints.map(|joint| joint.position);
+        let pose = |_| SVector::from(limits.map(|[low, high]| rng.random_range(low..high)));
+        (0..POSES).map(pose).collect()
+    }
+}
+
+impl ModelOnBus {
+    /// The arm file and the model, and what motions must keep: with the model's masses where no values were given.
+    pub(crate) fn read(&mut self) -> Result<(Arm, ModelArm, Envelope<6>), Failure> {
+        if self.plant.is_some() && self.place.bus != BusUrl::Virtual {
+            return Err(Failure::Unusable(
+                "--plant is for --bus virtual; elsewhere the arm is what it is".into(),
+            ));
+        }
+        let arm = self.surroundings.arm()?;
+        let model = ModelArm::read(&arm, &self.model, true)?;
+        if model.model.additions.arm_changes.is_empty() {
+            self.surroundings.values_or(&self.model);
+        }
+        let envelope = self.surroundings.envelope(&arm, &Mounting::Filed)?;
+        Ok((arm, model, envelope))
+    }
+
+    /// Whether the current mode may be tried.
+    pub(crate) fn accepts(&self) -> bool {
+        self.accept_unverified || self.place.bus == BusUrl::Virtual
+    }
+
+    /// A driver of the arm; where the bus is virtual the arm stands at `start`, with a hand on it if there is one.
+    pub(crate) fn master(
+        &self,
+        profile: Profile<6>,
+        start: [f64; 6],
+        hand: Option<Hand>,
+    ) -> Result<Master<Box<dyn Bus>, 6>, Failure> {
+        let bus = match self.place.bus {
+            BusUrl::Virtual => virtual_bus(self.virtual_arm(start, hand)?)?,
+            _ => self.place.open()?,
+        };
+        self.place.driver_of(profile, bus)
+    }
+
+    fn virtual_arm(&self, start: [f64; 6], hand: Option<Hand>) -> Result<VirtualArm, Failure> {
+        let setup = match &self.plant {
+            Some(file) => Undeclared::read(file)
+                .map_err(Failure::Unusable)?
+                .setup(start, 1)
+                .map_err(|e| Failure::Refused(e.to_string()))?,
+            None => setup(start, 1, None)?,
+        };
+        let arm = built(with_current_mode(setup), false)?;
+        Ok(match hand {
+            Some(hand) => arm.with_hand(hand),
+            None => arm,
+        })
+    }
+}
+
+/// What went wrong with a trajectory's file, or with the arm.
+pub(crate) fn failed(e: RecordError, file: &Path) -> Failure {
+    match e {
+        RecordError::Motion(what) => Failure::Unusable(format!("{}: {what}", file.display())),
+        other => Failure::Refused(other.to_string()),
+    }
+}

@@ -1,0 +1,28 @@
+//! Control laws: model and state in, torque out. One file a law, each with its book, units, and what holds for its
+//! stability; none was run on hardware.
+//!
+//! Every law gives the torque of the rigid arm and its feedback. What the model adds to the rigid arm (friction, effects)
+//! is added by the caller, at the reference; [`Limiter`] comes last. Nothing here allocates or panics.
+
+mod cartesian;
+mod computed_torque;
+mod hand_guiding;
+mod impedance;
+mod limits;
+mod observer;
+mod stability;
+#[cfg(test)]
+mod test_arm;
+
+pub use cartesian::{CartesianImpedance, Goal};
+pub use computed_torque::{ComputedTorque, Integrator};
+pub use hand_guiding::{HandGuiding, Softening};
+pub use impedance::JointImpedance;
+pub use limits::Limiter;
+pub use observer::{MomentumObserver, tool_force};
+pub use stability::{LargestPole, largest_pole};
+
+/// A number of the scalar type.
+fn number<T: nalgebra::RealField>(x: f64) -> T {
+    nalgebra::convert(x)
+}

@@ -1,0 +1,193 @@
+//! `powerball follow` and `float` on the virtual arm as a user runs them.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use dyngen::{Model, SetKind};
+use powerball::controller::friction::TABLE_2;
+use powerball::virtual_arm::lwa4p;
+use serde_json::{Value, json};
+use std::f64::consts::TAU;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+const ARM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/lwa4p.toml");
+
+fn powerball(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_powerball")).args(arguments).output().unwrap()
+}
+
+fn complaint(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn printed(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {}", complaint(output)))
+}
+
+fn file(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("follow").join(name)
+}
+
+fn write(name: &str, text: &str) -> String {
+    std::fs::create_dir_all(file("")).unwrap();
+    std::fs::write(file(name), text).unwrap();
+    file(name).to_str().unwrap().to_string()
+}
+
+/// The virtual arm's true values, with a spring at joint 1 of the plant's strength.
+fn model() -> Value {
+    let model = Model::derive(lwa4p::arm().unwrap()).unwrap();
+    let set = model.set(SetKind::Minimal).unwrap();
+    let all: Vec<f64> = lwa4p::links().iter().flat_map(|b| b.parameters()).collect();
+    let values = model.set_values(set, &all);
+    let parameters: Vec<Value> = set
+        .names()
+        .iter()
+        .zip(values)
+        .map(|(name, value)| json!({"name": name, "value": value, "std": 0.0, "relative_std": 0.0}))
+        .collect();
+    let friction: Vec<Value> = TABLE_2
+        .iter()
+        .enumerate()
+        .map(|(j, g)| json!({"joint": j + 1, "gamma1": g[0], "gamma2": g[1], "gamma3": g[2], "gamma4": g[3], "gamma5": g[4]}))
+        .collect();
+    json!({
+        "arm": "powerball_lwa4p_hardware", "set": "minimal", "parameters": parameters, "friction": friction,
+        "terms": [
+            {"effect": "spring", "joint": 1, "law": "position", "coefficient": 5.0},
+            {"effect": "spring", "joint": 1, "law": "constant", "coefficient": 1.0},
+        ],
+    })
+}
+
+const PLANT: &str = r#"{"effect": {"spring": {"joint": 0, "stiffness": 5.0, "rest": -0.2}}, "age": 0.0}"#;
+
+/// From rest to rest in `seconds`.
+fn path(name: &str, seconds: f64) -> String {
+    let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
+    for k in 0..=(200.0 * seconds) as u32 {
+        let t = 0.005 * f64::from(k);
+        let q = 0.3 * (1.0 - (TAU * t / seconds).cos());
+        text += &format!("{t:.6},{q},{q},{},{q},{q},{q}\n", -q);
+    }
+    write(name, &text)
+}
+
+#[test]
+fn the_explained_model_follows_better_than_the_base_model() {
+    let (model, plant) = (write("model.json", &model().to_string()), write("plant.json", PLANT));
+    let (path, out) = (path("path.csv", 4.0), file("out"));
+    let run = powerball(&[
+        "follow",
+        "--trajectory",
+        &path,
+        "--arm",
+        ARM,
+        "--floor",
+        "none",
+        "--model",
+        &model,
+        "--plant",
+        &plant,
+        "--with",
+        "torque",
+        "--compare",
+        "base",
+        "--out",
+        out.to_str().unwrap(),
+        "--json",
+    ]);
+    let result = printed(&run);
+    let error = |name: &str| result["tracking_error"][name][0].as_f64().unwrap_or_else(|| panic!("{result}"));
+    assert!(error("explained") < 0.5 * error("base"), "{result}");
+    assert!(result["torque"]["explained"]["effects"][0].as_f64().unwrap() > 1.0, "{result}");
+    assert!(result["largest_pole"].as_f64().unwrap() < 0.95);
+    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("Tracking error") && page.contains("of the error with the base model"));
+}
+
+#[test]
+fn a_guided_arm_is_light_and_stays_where_it_is_left() {
+    let (model, plant) = (write("float.json", &model().to_string()), write("float_plant.json", PLANT));
+    let push = path("push.csv", 4.0);
+    let arguments = [
+        "float", "--arm", ARM, "--model", &model, "--plant", &plant, "--push", &push, "--for", "14", "--json",
+    ];
+    let result = printed(&powerball(&arguments));
+    let list = |value: &Value| -> Vec<f64> {
+        value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+    };
+    let (hand, friction) = (list(&result["hand"]["rms"]), list(&result["hand"]["friction_rms"]));
+    for j in 0..6 {
+        assert!(hand[j] < 0.4 * friction[j], "joint {}: {result}", j + 1);
+    }
+    assert!(list(&result["drift"]).iter().all(|drift| *drift < 2e-3), "{result}");
+    // Without what is taken off, the hand carries the friction.
+    let result = printed(&powerball(&[&arguments[..], &["--friction", "0"]].concat()));
+    assert!(result["hand"]["rms"][0].as_f64().unwrap() > 0.8 * friction[0], "{result}");
+}
+
+/// Each is refused before anything moves: nothing is written.
+#[test]
+fn what_cannot_work_is_refused_before_the_arm_moves() {
+    let good = write("good.json", &model().to_string());
+    let mut other = model();
+    other["arm"] = "another".into();
+    let other = write("other.json", &other.to_string());
+    let mut fewer = model();
+    fewer["friction"].as_array_mut().unwrap().pop();
+    let fewer = write("fewer.json", &fewer.to_string());
+    let mut lighter = model();
+    lighter["parameters"].as_array_mut().unwrap().iter_mut().for_each(|p| p["value"] = json!(-1.0));
+    let lighter = write("lighter.json", &lighter.to_string());
+    let two = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/arms/planar2r.toml");
+    let mut nameless = model();
+    nameless["arm"] = "".into();
+    let nameless = write("nameless.json", &nameless.to_string());
+    let (path, fast) = (path("refused.csv", 4.0), path("fast.csv", 0.5));
+    let empty = write("empty.csv", "t,q1\n0,0\n");
+    for (extra, code, why) in [
+        (&["--model", &other][..], 2, "is a model of the arm 'another'"),
+        (&["--model", &fewer], 2, "no friction for joint 6"),
+        (&["--model", "no.json"], 2, "no.json"),
+        (&["--model", &lighter, "--values", &good, "--with", "torque"], 2, "not positive definite"),
+        (&["--model", &good, "--with", "torque", "--bandwidth", "-3"], 2, "above 0"),
+        (&["--model", &good, "--with", "torque", "--damping", "-1"], 2, "above 0"),
+        (&["--model", &good, "--with", "torque", "--bandwidth", "150"], 2, "not stable at 200 Hz"),
+        (&["--model", &good, "--with", "impedance", "--bandwidth", "120"], 2, "not stable at 200 Hz"),
+        (&["--model", &good, "--trajectory", &fast], 2, "rad/s"),
+        (&["--model", &good, "--trajectory", &empty], 2, "q1 to q6"),
+        (&["--model", &good, "--compare", "base", "--compare", "base"], 2, "twice"),
+        (&["--model", &good, "--compare", "no.json"], 2, "no.json"),
+        (&["--model", &good, "--with", "magic"], 2, "feedforward"),
+        (&["--model", &good, "--plant", "x", "--bus", "udp:239.74.163.2:43191"], 2, "--plant"),
+    ] {
+        let out = file("refused");
+        let mut arguments = vec!["follow", "--floor", "none", "--out", out.to_str().unwrap()];
+        if !extra.contains(&"--trajectory") {
+            arguments.extend(["--trajectory", &path]);
+        }
+        arguments.extend(["--arm", ARM]);
+        let run = powerball(&[&arguments[..], extra].concat());
+        assert_eq!(run.status.code(), Some(code), "{extra:?}: {}", complaint(&run));
+        assert!(complaint(&run).contains(why), "{extra:?}: {}", complaint(&run));
+        assert!(!out.exists(), "{extra:?}");
+    }
+    for (extra, why) in [
+        (&["--model", &good, "--friction", "1.2"][..], "0.95"),
+        (&["--model", &good, "--for", "0"], "--for"),
+        (&["--model", &good, "--push", &empty], "q1 to q6"),
+        (&["--model", &good, "--push", &path, "--bus", "udp:239.74.163.2:43191"], "--push"),
+        (&["--model", &nameless, "--arm", two], "has 2 joints, the arm on the bus 6"),
+    ] {
+        let arm: &[&str] = if extra.contains(&"--arm") { &[] } else { &["--arm", ARM] };
+        let run = powerball(&[&["float"], arm, extra].concat());
+        assert_eq!(run.status.code(), Some(2), "{extra:?}: {}", complaint(&run));
+        assert!(complaint(&run).contains(why), "{extra:?}: {}", complaint(&run));
+    }
+    for command in ["follow", "float"] {
+        let help = powerball(&[command, "--help"]);
+        let help = String::from_utf8_lossy(&help.stdout).into_owned();
+        assert!(help.contains("Example") && help.contains("ever run on hardware"), "{command}");
+    }
+}
