@@ -143,7 +143,7 @@ impl WatchCommand {
     ) -> Result<(), Failure> {
         const NAME: &str = "standard input";
         let (mut rows, mut first, mut watch) = (None, Vec::new(), None::<Watch<'_>>);
-        let mut begin = |first: &mut Vec<LiveSample>| -> Option<Watch<'_>> {
+        let begin = |first: &mut Vec<LiveSample>| -> Option<Watch<'_>> {
             let t: Vec<f64> = first.iter().map(|s| s.t).collect();
             let step = median_step(&t).filter(|_| t.len() >= FIRST)?;
             let mut watch = Watch::new(body, model, options, NAME, 1.0 / step);

@@ -1,19 +1,20 @@
 //! Says when a torque model no longer holds: a sequential test of its innovations with a stated rate of false alarms.
 //!
 //! A joint's residual r (measured less predicted torque) has a colour: e(t) = r(t) − Σ a_k·r(t−k) is what nobody
-//! could tell from its past, and z = e/σ, cut at ±[`CUT`]. **The null hypothesis**: given all before it and the
-//! whole motion, the mean of z(t) lies within ±m(t), m = margin + range·|f(t)|. The margin is what the model errs
-//! even where nothing has changed; f is the joint's friction seen through the same filter, over σ, so that
-//! friction may wander by ± range of itself. Nothing else is assumed: no normal distribution, no variance.
+//! could tell from its past, and z = e/σ. **The null hypothesis**: given all before it and the whole motion, the mean
+//! of z(t), cut at −[`LOSS`] and [`GAIN`], is at most m(t), and that of −z(t), cut alike, is too;
+//! m = margin + range·|f(t)|. The margin is what the model errs even where nothing has changed; f is the joint's
+//! friction seen through the same filter, over σ, so that friction may wander by ± range of itself. Nothing else
+//! is assumed: no normal distribution, no variance, no independence of joints. (The means of normal innovations that
+//! are cut so are 0.0085, less than [`LEAST_MARGIN`].)
 //!
-//! **The test** bets against it. Bet b puts the share λ_b(t), known before z(t), on one sign, and its capital is
-//! multiplied by 1 + λ·z − |λ|·m. Under the null the mean of that factor is at most 1, whenever the bet began: it is
-//! an e-process. Each bet keeps the largest capital of all possible beginnings, C ← max(C, 1)·factor (e-CUSUM; that is
+//! **The test** bets against it. A bet puts the share λ(t) ≥ 0, known before z(t), on one sign, and its capital is
+//! multiplied by 1 + λ·(±z − m), z cut. Under the null the mean of that factor is at most 1, whenever the bet began: it
+//! is an e-process. Each bet keeps the largest capital of all possible beginnings, C ← max(C, 1)·factor (e-CUSUM; that is
 //! less than the sum over all beginnings, e-SR), and the alarm rises when the mean of C over all bets and
 //! joints exceeds A. Then the mean time to a false alarm is at least A samples, whatever the noise is like
 //! (J. Shin, A. Ramdas, A. Rinaldo, "E-detectors: a nonparametric framework for sequential change detection",
-//! 2022, theorem 2.4; I. Waudby-Smith, A. Ramdas, "Estimating means of bounded random variables by betting",
-//! 2023).
+//! 2022; I. Waudby-Smith, A. Ramdas, "Estimating means of bounded random variables by betting", 2023).
 //!
 //! What is bet on is what changes look like: a constant, a share of the friction, a share of the whole torque.
 //! The bet with the largest capital says the joint, and where it began is when the change did.
@@ -22,18 +23,22 @@ use nalgebra::RealField;
 
 /// Past values in a colour.
 pub const ORDER: usize = 6;
-/// Innovations count up to so many standard deviations.
-pub const CUT: f64 = 3.0;
+/// An innovation against a bet counts up to so many standard deviations …
+pub const LOSS: f64 = 2.0;
+/// … and one for it up to so many: a clear change shows within a few samples.
+pub const GAIN: f64 = 8.0;
+/// No margin is less: cutting more on one side moves a mean a little.
+pub const LEAST_MARGIN: f64 = 0.02;
 /// Signals whose shares are bet on: friction and whole torque.
 pub const COLUMNS: usize = 2;
 /// Bets on a constant: shares of the capital for each standard deviation.
-const CONSTANT: [f64; 3] = [0.03, 0.08, 0.2];
+const CONSTANT: [f64; 3] = [0.04, 0.12, 0.4];
 /// Bets on a column: changes of it by so much of itself.
 const SHARES: [f64; 3] = [0.05, 0.15, 0.5];
 /// Bets of a joint, each with two signs.
 pub const BETS: usize = 2 * (CONSTANT.len() + COLUMNS * SHARES.len());
 /// What a bet may lose at most of its capital.
-const MOST: f64 = 0.8;
+const MOST: f64 = 0.9;
 /// Capital beyond this is not counted: it fits into single precision, and the alarm is far below.
 const RICH: f64 = 1e25;
 
@@ -130,18 +135,18 @@ impl<T: RealField + Copy> JointTest<T> {
         }
         let Some((innovation, columns)) = self.whiten(now) else { return };
         let of = |x: f64| nalgebra::convert::<f64, T>(x);
-        let z = innovation.clamp(-of(CUT), of(CUT));
-        let margin = self.colour.margin + self.range * columns[0].abs();
-        let most = of(MOST) / (of(CUT) + margin);
+        let margin = self.colour.margin.max(of(LEAST_MARGIN)) + self.range * columns[0].abs();
+        let most = of(MOST) / (of(LOSS) + margin);
         let constant = CONSTANT.iter().map(|share| of(*share));
         let shares = columns.iter().flat_map(|c| SHARES.iter().map(move |share| *c * of(*share)));
         let stakes = constant.chain(shares).flat_map(|stake| [stake, -stake]);
         for (bet, stake) in self.bets.iter_mut().zip(stakes) {
-            let stake = stake.clamp(-most, most);
+            let for_it = if stake < T::zero() { -innovation } else { innovation };
+            let won = for_it.clamp(-of(LOSS), of(GAIN)) - margin;
             if bet.capital <= T::one() {
                 *bet = Bet { capital: T::one(), since: number };
             }
-            let factor = T::one() + stake * z - stake.abs() * margin;
+            let factor = T::one() + stake.abs().min(most) * won;
             bet.capital = (bet.capital * factor).clamp(T::zero(), of(RICH));
         }
     }

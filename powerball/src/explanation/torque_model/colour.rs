@@ -4,7 +4,7 @@
 //! rows are nearly independent. A joint has no rows while it rests: friction is not determined there.
 
 use super::TorqueModel;
-use crate::controller::change::{self, COLUMNS, JointTest, ORDER, Shown};
+use crate::controller::change::{self, JointTest, LEAST_MARGIN, ORDER, Shown};
 use crate::controller::friction::TanhFriction;
 use crate::identification::estimate::NormalEquations;
 use crate::logs::log::{Log, logs_of_motors};
@@ -155,7 +155,7 @@ fn joint_colour(rows: &[&[Option<Shown<f64>>]], level: f64, range: f64) -> Optio
     let mut colour = JointColour { coefficients, deviation, margin: 0.0 };
     // The least margin with which the tests stay calm.
     let calm = level.powf(CALM);
-    let (mut low, mut high) = (0.0, MOST_MARGIN);
+    let (mut low, mut high) = (LEAST_MARGIN, MOST_MARGIN);
     for _ in 0..STEPS {
         colour.margin = 0.5 * (low + high);
         if most_capital(&colour, rows, range) < calm { high = colour.margin } else { low = colour.margin }
@@ -180,6 +180,3 @@ fn most_capital(colour: &JointColour, rows: &[&[Option<Shown<f64>>]], range: f64
     }
     most
 }
-
-/// As many columns as a test bets on.
-const _: () = assert!(COLUMNS == 2);

@@ -1,7 +1,7 @@
 //! Whether a model still holds: samples in, events out, as a stream.
 //!
 //! The test is [`crate::controller::change`], whose false alarms have a stated rate; here it is fed with the rows of a
-//! stream, and what it finds is named ([`name`]). After an event the model has the change, so that one change is
+//! stream, and what it finds is named (`name`). After an event the model has the change, so that one change is
 //! one event.
 
 mod buffer;
@@ -14,7 +14,7 @@ use crate::controller::change::{JointTest, alarm};
 use crate::explanation::rule::Rule;
 use crate::explanation::torque_model::{BAND, Colour, JointColour, Rows, TorqueModel, rows_a_second};
 use crate::logs::log::{LiveSample, Log, logs_of_motors};
-use crate::logs::regression::{Data, DataOptions, Recording, RigidArm};
+use crate::logs::regression::{Data, DataOptions, Recording, RigidArm, Signals};
 use buffer::Buffer;
 use changes::Change;
 pub use event::{Event, Evidence};
@@ -96,6 +96,8 @@ pub struct Watch<'a> {
     learns: Vec<bool>,
     changes: Vec<Change>,
     pending: Option<Pending>,
+    /// When it is asked again what an alarm means, s.
+    ask: f64,
     notes: Vec<String>,
 }
 
@@ -156,6 +158,7 @@ impl<'a> Watch<'a> {
             learns,
             changes: Vec::new(),
             pending: None,
+            ask: f64::NEG_INFINITY,
             notes,
         };
         watch.restart();
@@ -191,8 +194,11 @@ impl<'a> Watch<'a> {
 
     /// All tests begin anew.
     fn restart(&mut self) {
-        let test = |colour: &JointColour| JointTest::new(colour.for_test(), self.options.friction_range);
-        self.tests = self.colours.iter().map(|colour| colour.as_ref().map(test)).collect();
+        let test = |(colour, learns): (&Option<JointColour>, &bool)| {
+            let colour = colour.as_ref().filter(|_| !learns)?;
+            Some(JointTest::new(colour.for_test(), self.options.friction_range))
+        };
+        self.tests = self.colours.iter().zip(&self.learns).map(test).collect();
     }
 
     fn interrupt(&mut self) {
@@ -301,9 +307,10 @@ impl<'a> Watch<'a> {
     fn decide(&mut self, ends: bool) -> Vec<Event> {
         let Some(pending) = self.pending else { return Vec::new() };
         let seconds = self.last - pending.time;
-        if !ends && seconds < 2.0 * HOP {
+        if !ends && self.last < self.ask {
             return Vec::new();
         }
+        self.ask = self.last + 2.0 * HOP;
         let found = self.name(&pending, seconds, ends);
         let Some(found) = found else { return Vec::new() };
         self.pending = None;
@@ -327,25 +334,23 @@ impl<'a> Watch<'a> {
         let colour = Colour { rate: self.rate, joints: self.colours.clone() };
         let model = changes::with(self.model, &self.changes);
         let stretch = Stretch::new(&data, &model, predicted(&self.changes), &colour, &self.options.rule);
-        let (square, usual) = stretch.excess(from);
-        let left = |explains: f64| ((square - explains - usual) / (square - usual)).clamp(0.0, 1.0);
+        let (excess, square) = stretch.excess(&stretch.residual, from);
+        let left = |residual: &Signals| stretch.excess(residual, from).0 / excess.max(1.0);
         // An earlier change that is over leaves the model as it was.
         let over = (0..self.changes.len()).map(|k| {
             let mut without = self.changes.clone();
             let change = without.remove(k);
-            (change, square - stretch.square_of(&predicted(&without), from))
+            let residual = predicted(&without);
+            (change, square - stretch.excess(&residual, from).1, left(&residual))
         });
         let over = over.max_by(|a, b| a.1.total_cmp(&b.1));
-        let names = stretch.names(from, self.last);
-        if std::env::var_os("WATCH_DEBUG").is_some() {
-            eprintln!("DEBUG last {:.2} since {:.2} alarm {:.2} square {square:.0} usual {usual:.0}", self.last, from, pending.time);
-            for n in &names { eprintln!("   {:?} until {:?} since {:.2} explains {:.0} score {:.0} joints {:?}", n.changes, n.until, n.since, n.explains, n.score, n.joints); }
-        }
+        let held = |change: &Change| if let Change::Payload { mass, .. } = change { *mass } else { 0.0 };
+        let names = stretch.names(from, self.last, self.changes.iter().map(held).sum());
         let best = names.first();
-        if let Some((change, explains)) = over {
+        if let Some((change, explains, left)) = over {
             let better = best.is_none_or(|best| explains > 0.9 * best.explains);
-            if better && left(explains) <= self.options.rule.max_unexplained && (up || seconds >= CLEAR) {
-                return Some(Found { over: Some(change), explains, left: left(explains), ..Found::default() });
+            if better && left <= self.options.rule.max_unexplained && (up || seconds >= CLEAR) {
+                return Some(Found { over: Some(change), explains, left, ..Found::default() });
             }
         }
         let Some(best) = best else { return nothing() };
@@ -355,14 +360,14 @@ impl<'a> Watch<'a> {
             .filter(|other| best.explains < rule.least_margin * other.explains || best.score - other.score < rule.least_score)
             .map(|other| other.name().to_string())
             .collect();
-        let known = left(best.explains) <= rule.max_unexplained;
+        let left = left(&stretch.without(best));
+        let known = left <= rule.max_unexplained;
         let is_over = best.until.is_some_and(|until| until < self.last - OVER);
         let is_clear = known && rivals.is_empty() && (is_over || (best.until.is_none() && seconds >= CLEAR));
         if !(is_clear || up) {
             return None;
         }
-        let (explains, left) = (best.explains, left(best.explains));
-        Some(Found { named: known.then(|| best.clone()), over: None, explains, left, rivals })
+        Some(Found { named: known.then(|| best.clone()), over: None, explains: best.explains, left, rivals })
     }
 
     /// Takes what was found into the model; the event, where it is a new one.
@@ -391,7 +396,6 @@ impl<'a> Watch<'a> {
         let Some(named) = found.named else {
             // What has no name is taken as good from now on.
             self.learns[pending.joint] = true;
-            self.colours[pending.joint] = None;
             self.learning.clear();
             return Some(event("unknown", Vec::new(), Map::new(), pending.since));
         };
@@ -401,6 +405,11 @@ impl<'a> Watch<'a> {
             return Some(new);
         }
         let refined = named.changes.iter().all(|change| self.refines(change));
+        // How much the model errs with a change of which the size is known roughly must be seen first.
+        if !matches!(named.changes[..], [Change::Force { .. }]) {
+            named.joints.iter().for_each(|j| self.learns[j.index()] = true);
+            self.learning.clear();
+        }
         for change in named.changes {
             self.changes.push(change);
         }

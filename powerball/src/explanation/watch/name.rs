@@ -24,6 +24,10 @@ const AROUND: f64 = 0.6;
 const ROUNDS: usize = 4;
 /// Further joints whose friction has changed as well explain so much of χ² each.
 const FURTHER: f64 = 30.0;
+/// Innovations of a block.
+const BLOCK: usize = 12;
+/// A heavier body pulls more than any push that is taken for one, kg.
+const HEAVIEST: f64 = 200.0;
 /// A joint shows a change where that explains so much of its χ².
 const SHOWS: f64 = 15.0;
 
@@ -93,25 +97,31 @@ impl<'a> Stretch<'a> {
         white
     }
 
-    /// χ² of the rows from a time on: as they are, and as many as there are of them.
-    pub(super) fn excess(&self, since: f64) -> (f64, f64) {
-        let mut sums = (0.0, 0.0);
-        for (white, times) in self.white.iter().zip(&self.times) {
-            for (z, _) in white.iter().zip(times).filter(|(z, t)| **t >= since && **z != 0.0) {
-                sums.0 += z * z;
-                sums.1 += 1.0;
+    /// What a residual on the stretch's rows errs more than usual from a time on, and its χ² there. A block of
+    /// [`BLOCK`] innovations counts by its sum: what changes is slow, and usual is what the margin allows.
+    pub(super) fn excess(&self, residual: &Signals, since: f64) -> (f64, f64) {
+        let (mut excess, mut square) = (0.0, 0.0);
+        for (j, residual) in residual.iter().enumerate() {
+            let Some(colour) = self.colour.joints.get(j).and_then(Option::as_ref) else { continue };
+            let usual = 1.0 + BLOCK as f64 * colour.margin.powi(2);
+            let white = self.whitened(j, residual);
+            for run in self.data.joints[j].runs() {
+                let first = run.start + self.times[j][run.clone()].partition_point(|t| *t < since);
+                for block in white[first.max(run.start + ORDER).min(run.end)..run.end].chunks(BLOCK) {
+                    let sum: f64 = block.iter().sum();
+                    excess += sum * sum / block.len() as f64 - usual;
+                    square += block.iter().map(|z| z * z).sum::<f64>();
+                }
             }
         }
-        sums
+        (excess.max(0.0), square)
     }
 
-    /// The same with another residual on the same rows.
-    pub(super) fn square_of(&self, residual: &Signals, since: f64) -> f64 {
-        let of = |(j, r): (usize, &Vec<f64>)| -> f64 {
-            let rows = self.whitened(j, r).into_iter().zip(&self.times[j]);
-            rows.filter(|(_, t)| **t >= since).map(|(z, _)| z * z).sum()
-        };
-        residual.iter().enumerate().map(of).sum()
+    /// The residual without what a name says.
+    pub(super) fn without(&self, named: &Named) -> Signals {
+        let mut left = self.residual.clone();
+        left.subtract(&named.columns, &named.coefficients);
+        left
     }
 
     /// χ² by joint that columns explain with these coefficients.
@@ -168,11 +178,12 @@ impl<'a> Stretch<'a> {
     }
 
     /// The names that could be, best first; at most one an effect. `now` is the last time of the stretch.
-    pub(super) fn names(&self, since: f64, now: f64) -> Vec<Named> {
+    /// `held` is the mass that the last link holds and that may be taken off, kg.
+    pub(super) fn names(&self, since: f64, now: f64, held: f64) -> Vec<Named> {
         let context = Context::for_columns(self.data, &self.fit, self.rule);
         let mut names: Vec<Named> = Vec::new();
         names.extend(self.forces(&context, since, now));
-        names.extend(self.payload(&context, since));
+        names.extend(self.payload(&context, since, held));
         names.extend(self.friction(&context, since));
         names.extend(self.offset(&context, since));
         names.extend(self.delay(&context, since));
@@ -249,7 +260,7 @@ impl<'a> Stretch<'a> {
     }
 
     /// A body that the last link holds.
-    fn payload(&self, context: &Context<'_>, since: f64) -> Option<Named> {
+    fn payload(&self, context: &Context<'_>, since: f64, held: f64) -> Option<Named> {
         let everywhere = Window { log: self.data.logs[0].clone(), from: f64::NEG_INFINITY, to: f64::INFINITY, offset: 0.0 };
         let joints = (0..self.data.dof()).map(JointNumber::from_index).collect();
         let settings = payload::Settings { com: None, stays: false, link: None };
@@ -269,6 +280,9 @@ impl<'a> Stretch<'a> {
             let c = &named.coefficients;
             // A body that was taken off is the lack of one.
             let sign = if c[0] < 0.0 { -1.0 } else { 1.0 };
+            if !(-1.2 * held..HEAVIEST).contains(&c[0]) {
+                return None;
+            }
             let possible: Vec<f64> = c.iter().map(|c| sign * c).collect();
             if !candidate.effect().admissible(&candidate, &possible) {
                 return None;
