@@ -143,7 +143,8 @@ fn virtual_arm(arguments: &Arguments) -> Result<(), String> {
         Ok(found.paths[0].sample(RATE))
     };
     let motions: Vec<Motion> = (0..8).map(motion).collect::<Result<_, _>>()?;
-    let recorded: Vec<Log> = (0..5).map(|k| plant.record(&motions[k], 0.0, k as u64).log(format!("{k}"))).collect();
+    let recorded: Vec<Log> =
+        (0..5).map(|k| plant.record(&motions[k], 0.0, k as u64).log(format!("{k}"))).collect();
     let (body, model) = explained(&arm, &recorded[..3], &recorded[3..])?;
     let options = WatchOptions::default();
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.seed);
@@ -166,7 +167,12 @@ fn virtual_arm(arguments: &Arguments) -> Result<(), String> {
                 count[2] += usize::from(event.what == kind);
                 *confused.entry((kind.to_string(), event.what.clone())).or_default() += 1;
                 if event.what != kind {
-                    println!("  {kind} on {joint} at {at:.2}: {} rivals {:?} left {:.2}", event.sentence(), event.evidence.rivals, event.evidence.left);
+                    println!(
+                        "  {kind} on {joint} at {at:.2}: {} rivals {:?} left {:.2}",
+                        event.sentence(),
+                        event.evidence.rivals,
+                        event.evidence.left
+                    );
                 }
             } else {
                 println!("  {kind} on {joint} at {at:.2}: not seen");
@@ -197,7 +203,8 @@ fn changed(plant: &Plant, motion: &Motion, kind: &str, size: f64, rng: &mut ChaC
         plant.record(motion, 0.0, seed).log("run")
     };
     let clean = log(None, None);
-    let joint = rng.random_range(0..n);
+    // The zero of an upright first joint shows in no torque.
+    let joint = rng.random_range(usize::from(kind == "encoder_offset")..n);
     let direction: [f64; 3] = std::array::from_fn(|_| StandardNormal.sample(rng));
     let length = direction.iter().map(|x: &f64| x * x).sum::<f64>().sqrt();
     let centre = std::array::from_fn(|k| if k == 2 { 0.1 } else { rng.random_range(-0.05..0.05) });
@@ -213,7 +220,9 @@ fn changed(plant: &Plant, motion: &Motion, kind: &str, size: f64, rng: &mut ChaC
         _ => log(Some(PlantEffect::TimeDelay { delay: by }), None),
     };
     let start = if kind == "contact_wrench" { 5.0 } else { 0.05 };
-    let from = (clean.t.len() as f64 * rng.random_range(0.3..0.6)) as usize;
+    // A zero is another one after a start, and does not jump on the way.
+    let place = rng.random_range(0.3..0.6);
+    let from = if kind == "encoder_offset" { 0 } else { (clean.t.len() as f64 * place) as usize };
     let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt();
     // The rms of the change over that of the torque, on the joint on which it is largest.
     let share = |log: &Log| {
@@ -269,7 +278,6 @@ fn offset_of_size(plant: &Plant, motion: &Motion, joint: usize, size: f64) -> f6
         (change / whole).sqrt()
     };
     let most = (0..n).map(of).fold(0.0, f64::max);
-    // The first joint's zero shows in nothing; an offset that everybody sees.
     (0.01 * size / most.max(1e-6)).min(0.3)
 }
 
@@ -278,7 +286,8 @@ fn offset_of_size(plant: &Plant, motion: &Motion, joint: usize, size: f64) -> f6
 fn false_alarms(arguments: &Arguments, body: &RigidArm, model: &TorqueModel, log: &Log) {
     let Some(colour) = &model.colour else { return };
     let options = WatchOptions::default();
-    let recording = Recording::new(log, 0, 0..log.t.len(), 1.0 / colour.rate, DataOptions::default().smoothing);
+    let recording =
+        Recording::new(log, 0, 0..log.t.len(), 1.0 / colour.rate, DataOptions::default().smoothing);
     let Some(recording) = recording else { return };
     let rows = Rows::new(model, &recording, &model.torque(body, &recording, &|_| false));
     let a_second = powerball::explanation::torque_model::rows_a_second(colour.rate);
@@ -287,7 +296,11 @@ fn false_alarms(arguments: &Arguments, body: &RigidArm, model: &TorqueModel, log
     for range in [0.0, options.friction_range] {
         let fresh = || -> Vec<(usize, JointTest<f64>)> {
             let joints = colour.joints.iter().enumerate();
-            joints.filter_map(|(j, c)| Some((j, JointTest::new(c.as_ref()?.for_test(), options.friction_range)))).collect()
+            joints
+                .filter_map(|(j, c)| {
+                    Some((j, JointTest::new(c.as_ref()?.for_test(), options.friction_range)))
+                })
+                .collect()
         };
         let mut tests = fresh();
         let mut past = vec![[0.0; ORDER]; colour.joints.len()];

@@ -20,10 +20,12 @@ use std::path::PathBuf;
 /// `--hours` of motion on average, as long as the model errs no more than on the logs it was explained on and
 /// friction stays within `--friction-range`. Rows at rest say nothing and are not watched.
 #[derive(Args, Debug)]
-#[command(after_help = "Examples:\n  powerball watch --arm arm.toml --model result/model.json --log today.csv --json\n  \
+#[command(
+    after_help = "Examples:\n  powerball watch --arm arm.toml --model result/model.json --log today.csv --json\n  \
     ros2_to_csv | powerball watch --arm arm.toml --model result/model.json -\n\n\
     With - rows are read from standard input as they come: CSV with a header line, or an object with the same\n\
-    keys on each line ({\"t\": 0.005, \"q1\": …, \"tau1\": …} or {\"t\": 0.005, \"q\": […], \"tau\": […]}).")]
+    keys on each line ({\"t\": 0.005, \"q1\": …, \"tau1\": …} or {\"t\": 0.005, \"q\": […], \"tau\": […]})."
+)]
 #[command(group(clap::ArgGroup::new("from").required(true).args(["log", "bus", "stream"])))]
 pub(crate) struct WatchCommand {
     /// The arm file (TOML).
@@ -58,11 +60,17 @@ pub(crate) struct WatchCommand {
 }
 
 fn positive(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0).ok_or_else(|| "give a number above 0".to_string())
+    text.parse()
+        .ok()
+        .filter(|x: &f64| x.is_finite() && *x > 0.0)
+        .ok_or_else(|| "give a number above 0".to_string())
 }
 
 fn share(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|x| (0.0..1.0).contains(x)).ok_or_else(|| "give a share from 0 to 1, 0.05 for 5 %".to_string())
+    text.parse()
+        .ok()
+        .filter(|x| (0.0..1.0).contains(x))
+        .ok_or_else(|| "give a share from 0 to 1, 0.05 for 5 %".to_string())
 }
 
 /// Samples of a stream before its rate is known.

@@ -10,14 +10,14 @@
 //!
 //! **The test** bets against it. A bet puts the share λ(t) ≥ 0, known before z(t), on one sign, and its capital is
 //! multiplied by 1 + λ·(±z − m), z cut. Under the null the mean of that factor is at most 1, whenever the bet began: it
-//! is an e-process. Each bet keeps the largest capital of all possible beginnings, C ← max(C, 1)·factor (e-CUSUM; that is
-//! less than the sum over all beginnings, e-SR), and the alarm rises when the mean of C over all bets and
-//! joints exceeds A. Then the mean time to a false alarm is at least A samples, whatever the noise is like
+//! is an e-process. A bet is begun anew at every sample, and all its beginnings together have C ← (C + 1)·factor (e-SR).
+//! Under the null the mean of C grows by at most 1 a sample, and so does that of C's mean over all bets and joints. The
+//! alarm rises when that exceeds A: then the mean time to a false alarm is at least A samples, whatever the noise is like
 //! (J. Shin, A. Ramdas, A. Rinaldo, "E-detectors: a nonparametric framework for sequential change detection",
 //! 2022; I. Waudby-Smith, A. Ramdas, "Estimating means of bounded random variables by betting", 2023).
 //!
-//! What is bet on is what changes look like: a constant, a share of the friction, a share of the whole torque.
-//! The bet with the largest capital says the joint, and where it began is when the change did.
+//! What is bet on is what changes look like: a constant, a share of the friction, of the whole torque, and of its rate.
+//! The bet with the largest capital says the joint, and its best beginning (e-CUSUM) is when the change began.
 
 use nalgebra::RealField;
 
@@ -29,8 +29,10 @@ pub const LOSS: f64 = 2.0;
 pub const GAIN: f64 = 8.0;
 /// No margin is less: cutting more on one side moves a mean a little.
 pub const LEAST_MARGIN: f64 = 0.02;
-/// Signals whose shares are bet on: friction and whole torque.
-pub const COLUMNS: usize = 2;
+/// Signals whose shares are bet on: friction, whole torque, and by how much that changes within [`LATE`].
+pub const COLUMNS: usize = 3;
+/// Torque that is late by this is the third signal, s.
+pub const LATE: f64 = 0.01;
 /// Bets on a constant: shares of the capital for each standard deviation.
 const CONSTANT: [f64; 3] = [0.04, 0.12, 0.4];
 /// Bets on a column: changes of it by so much of itself.
@@ -58,14 +60,17 @@ pub struct Colour<T> {
 pub struct Shown<T> {
     /// Measured less predicted torque, N·m.
     pub residual: T,
-    /// The model's friction and its whole torque, N·m.
+    /// The model's friction, its whole torque, and the latter's change within [`LATE`], N·m.
     pub columns: [T; COLUMNS],
 }
 
-/// One bet against the null: its capital since its best beginning.
+/// One bet against the null.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bet<T> {
+    /// Of all its beginnings together.
     capital: T,
+    /// Of the best one, and which that is.
+    largest: T,
     since: u64,
 }
 
@@ -97,7 +102,7 @@ impl<T: RealField + Copy> JointTest<T> {
     #[must_use]
     pub fn new(colour: Colour<T>, range: T) -> Self {
         let nothing = Shown { residual: T::zero(), columns: [T::zero(); COLUMNS] };
-        let bets = [Bet { capital: T::zero(), since: 0 }; BETS];
+        let bets = [Bet { capital: T::zero(), largest: T::zero(), since: 0 }; BETS];
         JointTest { colour, range, past: [nothing; ORDER], seen: 0, bets }
     }
 
@@ -108,7 +113,7 @@ impl<T: RealField + Copy> JointTest<T> {
 
     /// All bets begin anew.
     pub fn restart(&mut self) {
-        self.bets.iter_mut().for_each(|bet| bet.capital = T::zero());
+        self.bets.iter_mut().for_each(|bet| (bet.capital, bet.largest) = (T::zero(), T::zero()));
     }
 
     /// A residual through the joint's colour, over σ: the innovation and the same of the columns; `None` until
@@ -143,11 +148,12 @@ impl<T: RealField + Copy> JointTest<T> {
         for (bet, stake) in self.bets.iter_mut().zip(stakes) {
             let for_it = if stake < T::zero() { -innovation } else { innovation };
             let won = for_it.clamp(-of(LOSS), of(GAIN)) - margin;
-            if bet.capital <= T::one() {
-                *bet = Bet { capital: T::one(), since: number };
+            if bet.largest <= T::one() {
+                (bet.largest, bet.since) = (T::one(), number);
             }
             let factor = T::one() + stake.abs().min(most) * won;
-            bet.capital = (bet.capital * factor).clamp(T::zero(), of(RICH));
+            bet.capital = ((bet.capital + T::one()) * factor).clamp(T::zero(), of(RICH));
+            bet.largest = (bet.largest * factor).clamp(T::zero(), of(RICH));
         }
     }
 

@@ -4,13 +4,13 @@
 //! rows are nearly independent. A joint has no rows while it rests: friction is not determined there.
 
 use super::TorqueModel;
-use crate::controller::change::{self, JointTest, LEAST_MARGIN, ORDER, Shown};
+use crate::controller::change::{self, JointTest, LATE, LEAST_MARGIN, ORDER, Shown};
 use crate::controller::friction::TanhFriction;
 use crate::identification::estimate::NormalEquations;
 use crate::logs::log::{Log, logs_of_motors};
 use crate::logs::regression::{DataOptions, Recording, RigidArm};
 use crate::logs::signal::resample::median_step;
-use crate::logs::signal::{Band, motion};
+use crate::logs::signal::{Band, difference, motion};
 use serde::{Deserialize, Serialize};
 
 /// The band of the rows, Hz.
@@ -77,10 +77,13 @@ impl Rows {
             let measured = recording.smooth_torque(j);
             let left: Vec<f64> = measured.iter().zip(&torque).map(|(m, p)| m - p).collect();
             let friction: Vec<f64> = recording.velocity(j).map(|v| laws[j].torque(v)).collect();
-            let [left, friction, torque] = [left, friction, torque].map(|signal| band.pass(&signal));
+            let rate = difference::derivative(&torque, 1.0 / recording.rate);
+            let late: Vec<f64> = rate.iter().map(|rate| rate * LATE).collect();
+            let [left, friction, torque, late] =
+                [left, friction, torque, late].map(|signal| band.pass(&signal));
             let speed: Vec<f64> = recording.velocity(j).collect();
             let row = |(row, k): (usize, &usize)| {
-                let shown = Shown { residual: left[row], columns: [friction[row], torque[row]] };
+                let shown = Shown { residual: left[row], columns: [friction[row], torque[row], late[row]] };
                 (speed[*k].abs() > REST).then_some(shown)
             };
             kept.iter().enumerate().map(row).collect()
@@ -100,7 +103,13 @@ impl Colour {
     /// What a model leaves on logs: `body` is the arm with the model's changes. The mean time to a false alarm is
     /// `level` rows, and friction may wander by ± `range` of itself. `None` where there is nothing to learn from.
     #[must_use]
-    pub fn learn(model: &TorqueModel, body: &RigidArm, logs: &[Log], level: f64, range: f64) -> Option<Colour> {
+    pub fn learn(
+        model: &TorqueModel,
+        body: &RigidArm,
+        logs: &[Log],
+        level: f64,
+        range: f64,
+    ) -> Option<Colour> {
         let logs = &*logs_of_motors(body.arm(), logs);
         let mut steps: Vec<f64> = logs.iter().filter_map(|log| median_step(&log.t)).collect();
         steps.sort_by(f64::total_cmp);
@@ -136,7 +145,8 @@ fn joint_colour(rows: &[&[Option<Shown<f64>>]], level: f64, range: f64) -> Optio
     let (mut past, mut now) = (vec![Vec::new(); ORDER], Vec::new());
     for rows in rows {
         for window in rows.windows(ORDER + 1) {
-            let Some(values) = window.iter().map(|r| Some(r.as_ref()?.residual)).collect::<Option<Vec<f64>>>()
+            let Some(values) =
+                window.iter().map(|r| Some(r.as_ref()?.residual)).collect::<Option<Vec<f64>>>()
             else {
                 continue;
             };

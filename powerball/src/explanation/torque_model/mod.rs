@@ -20,8 +20,8 @@ use crate::explanation::effects::{PASSES, SOFT, Window, each_instant, move_link,
 use crate::identification::estimate::{JointFriction, ParameterEstimate, in_set_of};
 use crate::logs::parallel;
 use crate::logs::regression::{Data, Recording, RigidArm, Signals};
-use dyngen::arm::ParameterKind;
 pub use colour::{BAND, Colour, JointColour, Rows, rows_a_second};
+use dyngen::arm::ParameterKind;
 pub use file::FileError;
 pub use known::{ModelFile, Unchanged};
 use serde::{Deserialize, Serialize};

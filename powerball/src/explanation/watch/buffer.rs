@@ -78,7 +78,7 @@ impl Buffer {
         let strides = ((from.max(self.first()) - self.origin) / stride).ceil();
         let start = self.origin + strides * stride;
         let count = ((self.latest() - start) / self.step + 1e-6).floor();
-        if !(count >= 2.0) {
+        if count.is_nan() || count < 2.0 {
             return None;
         }
         let count = count as usize + 1;

@@ -27,7 +27,8 @@ impl Change {
             (Change::Friction { joint: a, .. }, Change::Friction { joint: b, .. })
             | (Change::Offset { joint: a, .. }, Change::Offset { joint: b, .. }) => a == b,
             (Change::Delay { joints: a, .. }, Change::Delay { joints: b, .. }) => a == b,
-            (Change::Payload { .. }, Change::Payload { .. }) | (Change::Force { .. }, Change::Force { .. }) => true,
+            (Change::Payload { .. }, Change::Payload { .. })
+            | (Change::Force { .. }, Change::Force { .. }) => true,
             _ => false,
         }
     }
@@ -87,7 +88,12 @@ pub(super) fn with(model: &TorqueModel, changes: &[Change]) -> TorqueModel {
 }
 
 /// The torque of a model with some changes along a recording, n a sample, N·m as logged.
-pub(super) fn torque(body: &RigidArm, model: &TorqueModel, changes: &[Change], recording: &Recording) -> Vec<f64> {
+pub(super) fn torque(
+    body: &RigidArm,
+    model: &TorqueModel,
+    changes: &[Change],
+    recording: &Recording,
+) -> Vec<f64> {
     let mut torque = with(model, changes).torque(body, recording, &|_| true);
     for change in changes {
         let Change::Force { force, link } = change else { continue };

@@ -13,7 +13,7 @@ use crate::controller::JointNumber;
 use crate::controller::change::{JointTest, alarm};
 use crate::explanation::rule::Rule;
 use crate::explanation::torque_model::{BAND, Colour, JointColour, Rows, TorqueModel, rows_a_second};
-use crate::logs::log::{LiveSample, Log, logs_of_motors};
+use crate::logs::log::{LiveSample, logs_of_motors};
 use crate::logs::regression::{Data, DataOptions, Recording, RigidArm, Signals};
 use buffer::Buffer;
 use changes::Change;
@@ -22,7 +22,9 @@ use name::{Named, Stretch};
 use serde_json::{Map, Value, json};
 
 /// Rows are made so often, s.
-const HOP: f64 = 0.2;
+const HOP: f64 = 0.1;
+/// It is asked so often what an alarm means, s.
+const ASK: f64 = 0.4;
 /// So many seconds before new rows are needed: filters and presliding have memories.
 const BEFORE: f64 = 2.5;
 /// A stretch for naming begins so many seconds before the change.
@@ -37,6 +39,9 @@ const CLEAR: f64 = 2.0;
 const LATEST: f64 = 5.0;
 /// A change of another size by less than this share of it is the same one, better known.
 const SAME: f64 = 0.35;
+
+/// What is learnt again, of a model with a change whose size is known roughly, has so many times the margin.
+const AGAIN: f64 = 1.5;
 
 /// How a model is watched.
 #[derive(Clone, Debug)]
@@ -210,18 +215,13 @@ impl<'a> Watch<'a> {
         1.0 / rows_a_second(self.rate)
     }
 
-    /// A stretch of the stream and the torque that the model with some changes predicts along it.
-    fn stretch(&self, from: f64) -> Option<(Log, Recording)> {
-        let log = self.buffer.log(from, &self.file)?;
-        let motors = logs_of_motors(self.body.arm(), std::slice::from_ref(&log)).first()?.clone();
-        let all = motors.pieces.first()?.clone();
-        let recording = Recording::new(&motors, 0, all, 1.0 / self.rate, DataOptions::default().smoothing)?;
-        Some((log, recording))
-    }
-
     /// The rows since the last time.
     fn rows(&self) -> Option<Rows> {
-        let (_, recording) = self.stretch(self.last - BEFORE)?;
+        let log = [self.buffer.log(self.last - BEFORE, &self.file)?];
+        let motors = logs_of_motors(self.body.arm(), &log);
+        let log = motors.first()?;
+        let all = log.pieces.first()?.clone();
+        let recording = Recording::new(log, 0, all, 1.0 / self.rate, DataOptions::default().smoothing)?;
         let predicted = changes::torque(self.body, self.model, &self.changes, &recording);
         let rows = Rows::new(self.model, &recording, &predicted);
         let new = rows.t.partition_point(|t| *t < self.last + 0.5 * self.row_step());
@@ -294,9 +294,12 @@ impl<'a> Watch<'a> {
         let found = Colour::of_rows(&self.learning, self.rate, level, range);
         for j in ready {
             self.learns[j] = false;
-            self.colours[j] = found.as_ref().and_then(|colour| colour.joints[j].clone());
-            let test = |colour: &JointColour| JointTest::new(colour.for_test(), range);
-            self.tests[j] = self.colours[j].as_ref().map(test);
+            let mut colour = found.as_ref().and_then(|colour| colour.joints[j].clone());
+            if let (Some(colour), Some(before)) = (&mut colour, &self.colours[j]) {
+                colour.margin = AGAIN * colour.margin.max(before.margin);
+            }
+            self.tests[j] = colour.as_ref().map(|colour| JointTest::new(colour.for_test(), range));
+            self.colours[j] = colour;
             if self.colours[j].is_none() {
                 self.notes.push(format!("joint {} is not watched: the model errs too much there", j + 1));
             }
@@ -310,7 +313,7 @@ impl<'a> Watch<'a> {
         if !ends && self.last < self.ask {
             return Vec::new();
         }
-        self.ask = self.last + 2.0 * HOP;
+        self.ask = self.last + ASK;
         let found = self.name(&pending, seconds, ends);
         let Some(found) = found else { return Vec::new() };
         self.pending = None;
@@ -324,12 +327,13 @@ impl<'a> Watch<'a> {
         let up = ends || seconds >= LATEST;
         let nothing = || up.then(Found::default);
         let from = pending.since.max(self.last - LONGEST);
-        let Some((log, recording)) = self.stretch(from - LEAD) else { return nothing() };
+        let Some(log) = self.buffer.log(from - LEAD, &self.file) else { return nothing() };
         let options = DataOptions { cutoff: BAND, ..DataOptions::default() };
         let logs = [log];
         let Ok(data) = Data::new(self.body, &logs, &options) else { return nothing() };
         let predicted = |changes: &[Change]| {
-            data.residual(&[changes::torque(self.body, self.model, changes, &recording)])
+            let torque = |recording| changes::torque(self.body, self.model, changes, recording);
+            data.residual(&data.recordings.iter().map(torque).collect::<Vec<_>>())
         };
         let colour = Colour { rate: self.rate, joints: self.colours.clone() };
         let model = changes::with(self.model, &self.changes);
@@ -357,7 +361,10 @@ impl<'a> Watch<'a> {
         let rule = &self.options.rule;
         let rivals: Vec<String> = names[1..]
             .iter()
-            .filter(|other| best.explains < rule.least_margin * other.explains || best.score - other.score < rule.least_score)
+            .filter(|other| {
+                best.explains < rule.least_margin * other.explains
+                    || best.score - other.score < rule.least_score
+            })
             .map(|other| other.name().to_string())
             .collect();
         let left = left(&stretch.without(best));
@@ -405,9 +412,9 @@ impl<'a> Watch<'a> {
             return Some(new);
         }
         let refined = named.changes.iter().all(|change| self.refines(change));
-        // How much the model errs with a change of which the size is known roughly must be seen first.
+        // How much the model errs with a change whose size is known roughly must be seen first.
         if !matches!(named.changes[..], [Change::Force { .. }]) {
-            named.joints.iter().for_each(|j| self.learns[j.index()] = true);
+            self.learns.fill(true);
             self.learning.clear();
         }
         for change in named.changes {
@@ -462,7 +469,13 @@ fn value(named: &Named) -> Map<String, Value> {
                 .collect();
             let all = |sign: f64| shares.iter().all(|by| by * sign > 0.0);
             put("change", by(&shares));
-            let reading = if all(-1.0) { "warmer" } else if all(1.0) { "colder or worn" } else { "mixed" };
+            let reading = if all(-1.0) {
+                "warmer"
+            } else if all(1.0) {
+                "colder or worn"
+            } else {
+                "mixed"
+            };
             put("friction", json!(reading));
         }
     }

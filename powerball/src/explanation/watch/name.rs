@@ -162,7 +162,13 @@ impl<'a> Stretch<'a> {
         columns.iter().map(|column| Column { parts: column.parts.iter().map(part).collect() }).collect()
     }
 
-    fn named(&self, changes: impl FnOnce(&[f64]) -> Vec<Change>, columns: Vec<Column>, searched: f64, since: f64) -> Named {
+    fn named(
+        &self,
+        changes: impl FnOnce(&[f64]) -> Vec<Change>,
+        columns: Vec<Column>,
+        searched: f64,
+        since: f64,
+    ) -> Named {
         let (coefficients, explains) = self.fitted(&columns);
         let penalty = self.rule.per_coefficient * columns.len() as f64 + 2.0 * searched.ln();
         Named {
@@ -202,13 +208,22 @@ impl<'a> Stretch<'a> {
         let steps = (AROUND / GRID).round() as i32;
         let at = |k: i32| since + f64::from(k) * GRID;
         let explains = |from: f64| self.fitted(&self.cut(columns, from, f64::INFINITY)).1;
-        (-steps..=steps).map(at).map(|from| (from, explains(from))).fold((since, 0.0), |a, b| if b.1 > a.1 { b } else { a }).0
+        (-steps..=steps)
+            .map(at)
+            .map(|from| (from, explains(from)))
+            .fold((since, 0.0), |a, b| if b.1 > a.1 { b } else { a })
+            .0
     }
 
     /// A force on the tool or on a link, that goes on or is over.
     fn forces(&self, context: &Context<'_>, since: f64, now: f64) -> Vec<Named> {
         let n = self.data.dof();
-        let everywhere = Window { log: self.data.logs[0].clone(), from: f64::NEG_INFINITY, to: f64::INFINITY, offset: 0.0 };
+        let everywhere = Window {
+            log: self.data.logs[0].clone(),
+            from: f64::NEG_INFINITY,
+            to: f64::INFINITY,
+            offset: 0.0,
+        };
         let candidate = |settings: contact_wrench::Settings, window: Window| Candidate {
             windows: vec![window],
             ..Candidate::on_all((0..n).map(JointNumber::from_index).collect(), settings, 1)
@@ -234,14 +249,21 @@ impl<'a> Stretch<'a> {
         for link in (0..n).rev() {
             let columns: Vec<Column> = match link + 1 == n {
                 true => context.columns(&candidate(constant, everywhere.clone())),
-                false => (0..3).filter_map(|axis| self.data.pull_columns(axis).get(link * PULLED).cloned()).collect(),
+                false => (0..3)
+                    .filter_map(|axis| self.data.pull_columns(axis).get(link * PULLED).cloned())
+                    .collect(),
             };
             if columns.len() < 3 {
                 continue;
             }
             let searched = if link + 1 == n { 1.0 } else { 20.0 * n as f64 };
             let since = self.beginning(&columns, since);
-            consider(self.named(change(link, 1.0), self.cut(&columns, since, f64::INFINITY), searched, since));
+            consider(self.named(
+                change(link, 1.0),
+                self.cut(&columns, since, f64::INFINITY),
+                searched,
+                since,
+            ));
             let ends = ((now - since) / GRID) as usize;
             for end in ((SHORTEST / GRID) as usize..ends).map(|k| since + k as f64 * GRID) {
                 let cut = self.cut(&columns, since, end);
@@ -261,7 +283,12 @@ impl<'a> Stretch<'a> {
 
     /// A body that the last link holds.
     fn payload(&self, context: &Context<'_>, since: f64, held: f64) -> Option<Named> {
-        let everywhere = Window { log: self.data.logs[0].clone(), from: f64::NEG_INFINITY, to: f64::INFINITY, offset: 0.0 };
+        let everywhere = Window {
+            log: self.data.logs[0].clone(),
+            from: f64::NEG_INFINITY,
+            to: f64::INFINITY,
+            offset: 0.0,
+        };
         let joints = (0..self.data.dof()).map(JointNumber::from_index).collect();
         let settings = payload::Settings { com: None, stays: false, link: None };
         let mut candidate = Candidate { windows: vec![everywhere], ..Candidate::on_all(joints, settings, 1) };
