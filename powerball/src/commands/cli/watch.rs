@@ -91,7 +91,9 @@ impl WatchCommand {
         // Logs before the derivation: what cannot be read is said at once.
         let logs = self.logs(&said, &map)?;
         let body = RigidArm::new(&arm).map_err(|e| Failure::Refused(e.to_string()))?;
-        let model = known.model(&body)?.unwrap_or_else(|| unreachable!("a model was named"));
+        let model = known.model(&body)?;
+        let model =
+            model.ok_or_else(|| Failure::Unusable(format!("{}: is no model", self.model.display())))?;
         self.same_arm(&model, &said)?;
         let options = WatchOptions {
             hours: self.hours,

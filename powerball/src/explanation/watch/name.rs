@@ -24,6 +24,8 @@ const AROUND: f64 = 0.6;
 const ROUNDS: usize = 4;
 /// Further joints whose friction has changed as well explain so much of χ² each.
 const FURTHER: f64 = 30.0;
+/// A force elsewhere than on the tool counts as so many alternatives for each link.
+const ELSEWHERE: f64 = 20.0;
 /// Innovations of a block.
 const BLOCK: usize = 12;
 /// A heavier body pulls more than any push that is taken for one, kg.
@@ -42,6 +44,22 @@ pub(super) struct Stretch<'a> {
     white: Signals,
     /// Times by joint and row, s.
     times: Vec<Vec<f64>>,
+}
+
+/// A force that is tried.
+#[derive(Clone, Copy, Debug)]
+struct Push {
+    link: usize,
+    from: f64,
+    end: Option<f64>,
+    /// Whether it rises and falls as that of a hand does.
+    rises: bool,
+}
+
+/// The times near a first guess at which a change may begin.
+fn around(since: f64) -> impl Iterator<Item = f64> {
+    let steps = (AROUND / GRID).round() as i32;
+    (-steps..=steps).map(move |k| since + f64::from(k) * GRID)
 }
 
 /// A name with its size.
@@ -205,93 +223,101 @@ impl<'a> Stretch<'a> {
 
     /// Where a change of such columns begins: what explains most near the first guess.
     fn beginning(&self, columns: &[Column], since: f64) -> f64 {
-        let steps = (AROUND / GRID).round() as i32;
-        let at = |k: i32| since + f64::from(k) * GRID;
         let explains = |from: f64| self.fitted(&self.cut(columns, from, f64::INFINITY)).1;
-        (-steps..=steps)
-            .map(at)
+        around(since)
             .map(|from| (from, explains(from)))
             .fold((since, 0.0), |a, b| if b.1 > a.1 { b } else { a })
             .0
     }
 
     /// A force on the tool or on a link, that goes on or is over.
-    fn forces(&self, context: &Context<'_>, since: f64, now: f64) -> Vec<Named> {
+    fn forces(&self, context: &Context<'_>, since: f64, now: f64) -> Option<Named> {
         let n = self.data.dof();
-        let everywhere = Window {
-            log: self.data.logs[0].clone(),
-            from: f64::NEG_INFINITY,
-            to: f64::INFINITY,
-            offset: 0.0,
-        };
-        let candidate = |settings: contact_wrench::Settings, window: Window| Candidate {
-            windows: vec![window],
-            ..Candidate::on_all((0..n).map(JointNumber::from_index).collect(), settings, 1)
-        };
-        let constant = contact_wrench::Settings::Constant;
-        let admissible = |c: &[f64]| {
-            let candidate = candidate(constant, everywhere.clone());
-            candidate.effect().admissible(&candidate, c)
-        };
-        let mut best: Option<Named> = None;
-        let mut consider = |named: Named| {
-            let better = best.as_ref().is_none_or(|best| named.score > best.score);
-            if better && admissible(&named.coefficients) {
-                best = Some(named);
-            }
-        };
-        let change = |link: usize, peak: f64| {
-            move |c: &[f64]| {
-                let force = [0, 1, 2].map(|k| c.get(k).copied().unwrap_or(0.0) * peak);
-                vec![Change::Force { force, link: JointNumber::from_index(link) }]
-            }
-        };
+        let mut best: Option<(Push, Named)> = None;
         for link in (0..n).rev() {
-            let columns: Vec<Column> = match link + 1 == n {
-                true => context.columns(&candidate(constant, everywhere.clone())),
-                false => (0..3)
-                    .filter_map(|axis| self.data.pull_columns(axis).get(link * PULLED).cloned())
-                    .collect(),
-            };
-            if columns.len() < 3 {
-                continue;
+            let Some(columns) = self.force_columns(context, link) else { continue };
+            let from = self.beginning(&columns, since);
+            let mut tried = vec![Push { link, from, end: None, rises: false }];
+            let ends = (SHORTEST / GRID) as usize..((now - from) / GRID).max(0.0) as usize;
+            for end in ends.map(|k| Some(from + k as f64 * GRID)) {
+                tried.push(Push { link, from, end, rises: false });
+                // Elsewhere than on the tool a force is told by its columns alone.
+                tried.extend((link + 1 == n).then_some(Push { link, from, end, rises: true }));
             }
-            let searched = if link + 1 == n { 1.0 } else { 20.0 * n as f64 };
-            let since = self.beginning(&columns, since);
-            consider(self.named(
-                change(link, 1.0),
-                self.cut(&columns, since, f64::INFINITY),
-                searched,
-                since,
-            ));
-            let ends = ((now - since) / GRID) as usize;
-            for end in ((SHORTEST / GRID) as usize..ends).map(|k| since + k as f64 * GRID) {
-                let cut = self.cut(&columns, since, end);
-                let named = self.named(change(link, 1.0), cut, searched * ends as f64, since);
-                consider(Named { until: Some(end), ..named });
-                if link + 1 < n {
-                    continue;
+            self.best_force(context, &columns, tried, &mut best);
+        }
+        // Of a push that is over the beginning is looked for again, its end being known.
+        if let Some(push) = best.as_ref().map(|(push, _)| *push).filter(|push| push.end.is_some()) {
+            let columns = self.force_columns(context, push.link)?;
+            let near = around(since).map(|from| Push { from, ..push });
+            let long_enough = |push: &Push| push.end.is_some_and(|end| end - push.from >= SHORTEST);
+            self.best_force(context, &columns, near.filter(long_enough).collect(), &mut best);
+        }
+        best.map(|(_, named)| named)
+    }
+
+    /// Columns of a constant force on a link.
+    fn force_columns(&self, context: &Context<'_>, link: usize) -> Option<Vec<Column>> {
+        let columns: Vec<Column> = match link + 1 == self.data.dof() {
+            true => context.columns(&self.wrench(contact_wrench::Settings::Constant, self.everywhere())),
+            false => {
+                (0..3).filter_map(|axis| self.data.pull_columns(axis).get(link * PULLED).cloned()).collect()
+            }
+        };
+        (columns.len() == 3).then_some(columns)
+    }
+
+    fn wrench(&self, settings: contact_wrench::Settings, window: Window) -> Candidate {
+        let joints = (0..self.data.dof()).map(JointNumber::from_index).collect();
+        Candidate { windows: vec![window], ..Candidate::on_all(joints, settings, 1) }
+    }
+
+    /// All the time of the stretch.
+    fn everywhere(&self) -> Window {
+        let log = self.data.logs.first().cloned().unwrap_or_default();
+        Window { log, from: f64::NEG_INFINITY, to: f64::INFINITY, offset: 0.0 }
+    }
+
+    /// Takes the best of some pushes where it is better than the best so far.
+    fn best_force(
+        &self,
+        context: &Context<'_>,
+        columns: &[Column],
+        tried: Vec<Push>,
+        best: &mut Option<(Push, Named)>,
+    ) {
+        let constant = self.wrench(contact_wrench::Settings::Constant, self.everywhere());
+        let count = tried.len() as f64;
+        for push in tried {
+            let Push { link, from, end, rises } = push;
+            let torques = match end.filter(|_| rises) {
+                None => self.cut(columns, from, end.unwrap_or(f64::INFINITY)),
+                Some(end) => {
+                    let window = Window { from: from - GRID, to: end + GRID, ..self.everywhere() };
+                    context.columns(&self.wrench(contact_wrench::Settings::Push, window))
                 }
-                let window = Window { from: since - GRID, to: end + GRID, ..everywhere.clone() };
-                let push = context.columns(&candidate(contact_wrench::Settings::Push, window));
-                let named = self.named(change(link, 1.0), push, searched * ends as f64, since);
-                consider(Named { until: Some(end), ..named });
+            };
+            let elsewhere =
+                if link + 1 == self.data.dof() { 1.0 } else { ELSEWHERE * self.data.dof() as f64 };
+            let searched = elsewhere * if end.is_some() { count } else { 1.0 };
+            let change = |c: &[f64]| {
+                let force = [0, 1, 2].map(|k| c.get(k).copied().unwrap_or(0.0));
+                vec![Change::Force { force, link: JointNumber::from_index(link) }]
+            };
+            let named = Named { until: end, ..self.named(change, torques, searched, from) };
+            let better = best.as_ref().is_none_or(|(_, best)| named.score > best.score);
+            if better && constant.effect().admissible(&constant, &named.coefficients) {
+                *best = Some((push, named));
             }
         }
-        best.into_iter().collect()
     }
 
     /// A body that the last link holds.
     fn payload(&self, context: &Context<'_>, since: f64, held: f64) -> Option<Named> {
-        let everywhere = Window {
-            log: self.data.logs[0].clone(),
-            from: f64::NEG_INFINITY,
-            to: f64::INFINITY,
-            offset: 0.0,
-        };
         let joints = (0..self.data.dof()).map(JointNumber::from_index).collect();
         let settings = payload::Settings { com: None, stays: false, link: None };
-        let mut candidate = Candidate { windows: vec![everywhere], ..Candidate::on_all(joints, settings, 1) };
+        let mut candidate =
+            Candidate { windows: vec![self.everywhere()], ..Candidate::on_all(joints, settings, 1) };
         let since = self.beginning(&context.columns(&candidate), since);
         let mut found = None;
         for _ in 0..ROUNDS {
