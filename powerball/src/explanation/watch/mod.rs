@@ -338,14 +338,17 @@ impl<'a> Watch<'a> {
         let colour = Colour { rate: self.rate, joints: self.colours.clone() };
         let model = changes::with(self.model, &self.changes);
         let stretch = Stretch::new(&data, &model, predicted(&self.changes), &colour, &self.options.rule);
-        let (excess, square) = stretch.excess(&stretch.residual, from);
-        let left = |residual: &Signals| stretch.excess(residual, from).0 / excess.max(1.0);
+        let left = |residual: &Signals, edges: &[f64]| {
+            let before = stretch.excess(&stretch.residual, from, edges).0;
+            stretch.excess(residual, from, edges).0 / before.max(1.0)
+        };
+        let square = |residual: &Signals| stretch.excess(residual, from, &[from]).1;
         // An earlier change that is over leaves the model as it was.
         let over = (0..self.changes.len()).map(|k| {
             let mut without = self.changes.clone();
             let change = without.remove(k);
             let residual = predicted(&without);
-            (change, square - stretch.excess(&residual, from).1, left(&residual))
+            (change, square(&stretch.residual) - square(&residual), left(&residual, &[from]))
         });
         let over = over.max_by(|a, b| a.1.total_cmp(&b.1));
         let held = |change: &Change| if let Change::Payload { mass, .. } = change { *mass } else { 0.0 };
@@ -367,7 +370,7 @@ impl<'a> Watch<'a> {
             })
             .map(|other| other.name().to_string())
             .collect();
-        let left = left(&stretch.without(best));
+        let left = left(&stretch.without(best), &best.edges());
         let known = left <= rule.max_unexplained;
         let is_over = best.until.is_some_and(|until| until < self.last - OVER);
         let is_clear = known && rivals.is_empty() && (is_over || (best.until.is_none() && seconds >= CLEAR));

@@ -24,6 +24,8 @@ const AROUND: f64 = 0.6;
 const ROUNDS: usize = 4;
 /// Further joints whose friction has changed as well explain so much of χ² each.
 const FURTHER: f64 = 30.0;
+/// When exactly a change sets in is known roughly: rows so long before and after it say nothing of its size, s.
+const BLURRED: [f64; 2] = [0.15, 0.3];
 /// A force elsewhere than on the tool counts as so many alternatives for each link.
 const ELSEWHERE: f64 = 20.0;
 /// Innovations of a block.
@@ -79,6 +81,11 @@ pub(super) struct Named {
 }
 
 impl Named {
+    /// When it begins and ends.
+    pub(super) fn edges(&self) -> Vec<f64> {
+        std::iter::once(self.since).chain(self.until).collect()
+    }
+
     pub(super) fn name(&self) -> &'static str {
         self.changes.first().map_or("unknown", Change::name)
     }
@@ -116,13 +123,14 @@ impl<'a> Stretch<'a> {
     }
 
     /// What a residual on the stretch's rows errs more than usual from a time on, and its χ² there. A block of
-    /// [`BLOCK`] innovations counts by its sum: what changes is slow, and usual is what the margin allows.
-    pub(super) fn excess(&self, residual: &Signals, since: f64) -> (f64, f64) {
+    /// [`BLOCK`] innovations counts by its sum: what changes is slow, and usual is what the margin allows. Rows near
+    /// `edges` do not count.
+    pub(super) fn excess(&self, residual: &Signals, since: f64, edges: &[f64]) -> (f64, f64) {
         let (mut excess, mut square) = (0.0, 0.0);
         for (j, residual) in residual.iter().enumerate() {
             let Some(colour) = self.colour.joints.get(j).and_then(Option::as_ref) else { continue };
             let usual = 1.0 + BLOCK as f64 * colour.margin.powi(2);
-            let white = self.whitened(j, residual);
+            let white = self.sharp(j, self.whitened(j, residual), edges);
             for run in self.data.joints[j].runs() {
                 let first = run.start + self.times[j][run.clone()].partition_point(|t| *t < since);
                 for block in white[first.max(run.start + ORDER).min(run.end)..run.end].chunks(BLOCK) {
@@ -143,26 +151,37 @@ impl<'a> Stretch<'a> {
     }
 
     /// χ² by joint that columns explain with these coefficients.
-    fn by_joint(&self, columns: &[Column], c: &[f64]) -> Vec<f64> {
+    fn by_joint(&self, columns: &[Column], c: &[f64], edges: &[f64]) -> Vec<f64> {
         let of = |j: usize| {
             let mut torque = vec![0.0; self.white[j].len()];
             for (column, c) in columns.iter().zip(c) {
                 let values = column.at(j).unwrap_or_default();
                 torque.iter_mut().zip(values).for_each(|(torque, v)| *torque += c * v);
             }
-            let torque = self.whitened(j, &torque);
+            let torque = self.sharp(j, self.whitened(j, &torque), edges);
             torque.iter().zip(&self.white[j]).map(|(t, z)| t * (2.0 * z - t)).sum()
         };
         (0..self.data.dof()).map(of).collect()
     }
 
-    /// Least squares: coefficients, and what they explain.
-    fn fitted(&self, columns: &[Column]) -> (Vec<f64>, f64) {
+    /// A whitened signal on a joint's rows without those near some times.
+    fn sharp(&self, j: usize, mut white: Vec<f64>, edges: &[f64]) -> Vec<f64> {
+        for (z, t) in white.iter_mut().zip(&self.times[j]) {
+            if edges.iter().any(|edge| (edge - BLURRED[0]..edge + BLURRED[1]).contains(t)) {
+                *z = 0.0;
+            }
+        }
+        white
+    }
+
+    /// Least squares over the rows that are not near `edges`: coefficients, and what they explain.
+    fn fitted(&self, columns: &[Column], edges: &[f64]) -> (Vec<f64>, f64) {
         let places: Vec<usize> = (0..columns.len()).collect();
         let mut equations = NormalEquations::zero(columns.len());
         for (j, white) in self.white.iter().enumerate() {
             let here: Vec<usize> = places.iter().copied().filter(|c| columns[*c].at(j).is_some()).collect();
-            let of = |c: &usize| self.whitened(j, columns[*c].at(j).unwrap_or_default());
+            let of =
+                |c: &usize| self.sharp(j, self.whitened(j, columns[*c].at(j).unwrap_or_default()), edges);
             equations.add_columns(&here, &here.iter().map(of).collect::<Vec<_>>(), white, 1.0);
         }
         let c = equations.solve();
@@ -185,15 +204,16 @@ impl<'a> Stretch<'a> {
         changes: impl FnOnce(&[f64]) -> Vec<Change>,
         columns: Vec<Column>,
         searched: f64,
-        since: f64,
+        (since, until): (f64, Option<f64>),
     ) -> Named {
-        let (coefficients, explains) = self.fitted(&columns);
+        let edges: Vec<f64> = std::iter::once(since).chain(until).collect();
+        let (coefficients, explains) = self.fitted(&columns, &edges);
         let penalty = self.rule.per_coefficient * columns.len() as f64 + 2.0 * searched.ln();
         Named {
             changes: changes(&coefficients),
             joints: Vec::new(),
             since,
-            until: None,
+            until,
             explains,
             score: explains - penalty,
             columns,
@@ -214,7 +234,7 @@ impl<'a> Stretch<'a> {
         names.retain(|named| named.score > 0.0);
         names.sort_by(|a, b| b.score.total_cmp(&a.score));
         for named in &mut names {
-            let by_joint = self.by_joint(&named.columns, &named.coefficients);
+            let by_joint = self.by_joint(&named.columns, &named.coefficients, &named.edges());
             let shows = |j: &usize| by_joint[*j] > SHOWS;
             named.joints = (0..self.data.dof()).filter(shows).map(JointNumber::from_index).collect();
         }
@@ -223,7 +243,7 @@ impl<'a> Stretch<'a> {
 
     /// Where a change of such columns begins: what explains most near the first guess.
     fn beginning(&self, columns: &[Column], since: f64) -> f64 {
-        let explains = |from: f64| self.fitted(&self.cut(columns, from, f64::INFINITY)).1;
+        let explains = |from: f64| self.fitted(&self.cut(columns, from, f64::INFINITY), &[]).1;
         around(since)
             .map(|from| (from, explains(from)))
             .fold((since, 0.0), |a, b| if b.1 > a.1 { b } else { a })
@@ -249,9 +269,12 @@ impl<'a> Stretch<'a> {
         // Of a push that is over the beginning is looked for again, its end being known.
         if let Some(push) = best.as_ref().map(|(push, _)| *push).filter(|push| push.end.is_some()) {
             let columns = self.force_columns(context, push.link)?;
-            let near = around(since).map(|from| Push { from, ..push });
-            let long_enough = |push: &Push| push.end.is_some_and(|end| end - push.from >= SHORTEST);
-            self.best_force(context, &columns, near.filter(long_enough).collect(), &mut best);
+            let end = push.end.unwrap_or(f64::INFINITY);
+            let explains = |from: f64| self.fitted(&self.cut(&columns, from, end), &[]).1;
+            let near = around(since).filter(|from| end - from >= SHORTEST).map(|from| (from, explains(from)));
+            let from = near.fold((push.from, 0.0), |a, b| if b.1 > a.1 { b } else { a }).0;
+            best = None;
+            self.best_force(context, &columns, vec![Push { from, ..push }], &mut best);
         }
         best.map(|(_, named)| named)
     }
@@ -304,7 +327,7 @@ impl<'a> Stretch<'a> {
                 let force = [0, 1, 2].map(|k| c.get(k).copied().unwrap_or(0.0));
                 vec![Change::Force { force, link: JointNumber::from_index(link) }]
             };
-            let named = Named { until: end, ..self.named(change, torques, searched, from) };
+            let named = self.named(change, torques, searched, (from, end));
             let better = best.as_ref().is_none_or(|(_, best)| named.score > best.score);
             if better && constant.effect().admissible(&constant, &named.coefficients) {
                 *best = Some((push, named));
@@ -329,7 +352,7 @@ impl<'a> Stretch<'a> {
             if columns.is_empty() {
                 return None;
             }
-            let named = self.named(change, columns, 1.0, since);
+            let named = self.named(change, columns, 1.0, (since, None));
             let c = &named.coefficients;
             // A body that was taken off is the lack of one.
             let sign = if c[0] < 0.0 { -1.0 } else { 1.0 };
@@ -368,7 +391,7 @@ impl<'a> Stretch<'a> {
                     let by = if viscous { c[0] / gamma } else { c[0] };
                     vec![Change::Friction { joint, viscous, by }]
                 };
-                let named = self.named(change, columns, 2.0, since);
+                let named = self.named(change, columns, 2.0, (since, None));
                 let possible = candidate.effect().possible(context, &candidate, &named.coefficients)
                     && (!viscous || gamma > 0.0);
                 possible.then_some((candidate, named))
@@ -435,7 +458,7 @@ impl<'a> Stretch<'a> {
         let searched = candidates.len().max(1) as f64;
         let ask = |candidate: &Candidate, since: f64| {
             let columns = self.cut(&context.columns(candidate), since, f64::INFINITY);
-            let named = self.named(|c| change(candidate, c), columns, searched, since);
+            let named = self.named(|c| change(candidate, c), columns, searched, (since, None));
             candidate.effect().admissible(candidate, &named.coefficients).then_some(named)
         };
         let mut best: Option<(Candidate, Named)> = None;
