@@ -16,6 +16,8 @@ use crate::logs::regression::{Column, Data, PULLED, Signals};
 
 /// Ends of a push are looked for on a grid of this, s.
 pub(super) const GRID: f64 = 0.1;
+/// Beginnings on a finer one, s: a row more or less tells a sudden change.
+const FINE: f64 = 0.02;
 /// A push lasts so long at least, s.
 const SHORTEST: f64 = 0.3;
 /// How far before and after the first guess a change may begin, s.
@@ -60,8 +62,8 @@ struct Push {
 
 /// The times near a first guess at which a change may begin.
 fn around(since: f64) -> impl Iterator<Item = f64> {
-    let steps = (AROUND / GRID).round() as i32;
-    (-steps..=steps).map(move |k| since + f64::from(k) * GRID)
+    let steps = (AROUND / FINE).round() as i32;
+    (-steps..=steps).map(move |k| since + f64::from(k) * FINE)
 }
 
 /// A name with its size.
