@@ -8,6 +8,7 @@ mod stories;
 mod study;
 mod subsets;
 mod textbook;
+mod watch;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -41,6 +42,8 @@ enum Command {
     Subsets(subsets::Arguments),
     /// What `explain` finds in the measured logs, case by case, as a page with figures
     Stories(stories::Arguments),
+    /// How soon `watch` sees a change, whether it names it right, and how often it is wrong
+    Watch(watch::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -55,6 +58,7 @@ fn main() -> ExitCode {
         Command::KnownTruth(arguments) => known_truth::run(&arguments),
         Command::Subsets(arguments) => subsets::run(&arguments),
         Command::Stories(arguments) => stories::run(&arguments),
+        Command::Watch(arguments) => watch::run(&arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

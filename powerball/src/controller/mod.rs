@@ -1,5 +1,6 @@
 //! What runs in the control loop of an arm: no `std`, no allocation, no panic.
 
+pub mod change;
 pub mod correction;
 pub mod dynamics;
 pub mod friction;

@@ -3,12 +3,14 @@
 use super::experiment::propose;
 use super::explain::{Explained, explain_body};
 use super::options::{ExplainError, ExplainOptions};
-use super::torque_model::TorqueModel;
+use super::torque_model::{Colour, TorqueModel};
+use super::watch::WatchOptions;
 use crate::identification::conventions::{Conventions, conventions};
 use crate::identification::motion::Motion;
 use crate::identification::transmission::{JointTransmission, transmission};
 use crate::logs::log::{Log, common_clock};
 use crate::logs::regression::RigidArm;
+use crate::logs::signal::resample::median_step;
 use dyngen::Arm;
 use std::path::Path;
 
@@ -104,11 +106,29 @@ impl Prepared {
         logs
     }
 
+    /// What the explained model leaves on the logs that are like the others; `None` where that cannot be learnt.
+    fn colour(&self, explained: &Explained) -> Option<Colour> {
+        let model = &explained.model;
+        let changes = &model.additions.arm_changes;
+        let changed = (!changes.is_empty()).then(|| RigidArm::new(&changes.of(self.body.arm()).ok()?).ok());
+        let changed = changed.map_or(Some(None), |body| body.map(Some))?;
+        let body = changed.as_ref().unwrap_or(&self.body);
+        let with_events: Vec<&String> = (explained.effects.iter().flat_map(|effect| &effect.logs))
+            .chain(explained.logs.iter().filter(|log| !log.like_the_others).map(|log| &log.log))
+            .collect();
+        let usual = self.logs.iter().chain(&self.validate).filter(|log| !with_events.contains(&&log.file));
+        let usual: Vec<Log> = usual.cloned().collect();
+        let options = WatchOptions::default();
+        let rate = 1.0 / median_step(&usual.first()?.t)?;
+        Colour::learn(model, body, &usual, options.level(rate), options.friction_range)
+    }
+
     /// An explanation with what the columns and the transmissions are, whose model holds what was known too.
     #[must_use]
     pub fn with_known(&self, mut explained: Explained) -> Explained {
         explained.conventions = Some(self.conventions.clone());
         explained.transmission.clone_from(&self.transmission);
+        explained.model.colour = self.colour(&explained);
         if let Some(known) = &self.known {
             explained.model.additions = known.additions.and(&explained.model.additions);
         }

@@ -6,6 +6,7 @@
 //! | [`mod@explain`] | the pipeline that finds effects; its `comparison` **decides that a name is given** |
 //! | [`experiment`] | where names stay open: the path on which they differ most, and what its log decides |
 //! | [`torque_model`] | a model with its effects: its file, its torque along logs, its controller's code |
+//! | [`watch`] | whether a model still holds, along a stream: since when not, on which joints and why |
 //!
 //! [`explain()`] is the API, and [`Rule`] holds every threshold.
 //!
@@ -33,6 +34,7 @@ pub mod explain;
 mod options;
 mod rule;
 pub mod torque_model;
+pub mod watch;
 
 pub use api::{Prepared, explain};
 pub use explain::{Explained, explain_body};

@@ -21,6 +21,7 @@ mod summarize;
 mod verify;
 mod virtual_arm;
 mod warm_up;
+mod watch;
 
 use crate::identification::IdentifyError;
 use clap::{Parser, Subcommand};
@@ -72,6 +73,8 @@ enum Command {
     Explain(explain::Explain),
     /// Write a model with its effects as one Rust file for a controller.
     Generate(generate::Generate),
+    /// Say when a model no longer holds, along logs or a stream: since when, on which joints and why.
+    Watch(watch::WatchCommand),
 }
 
 /// Why a command did not do what it was asked for.
@@ -116,6 +119,7 @@ pub fn main() -> ExitCode {
         Command::Compare(command) => command.run(),
         Command::Explain(command) => command.run(),
         Command::Generate(command) => command.run(),
+        Command::Watch(command) => command.run(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

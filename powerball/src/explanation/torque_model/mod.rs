@@ -5,6 +5,7 @@
 //! the logs, at true positions: an encoder's offset is taken off first.
 
 mod c_api;
+mod colour;
 mod file;
 mod known;
 mod planned;
@@ -20,6 +21,7 @@ use crate::explanation::effects::{PASSES, SOFT, Window, each_instant, move_link,
 use crate::identification::estimate::{JointFriction, ParameterEstimate, in_set_of};
 use crate::logs::parallel;
 use crate::logs::regression::{Data, Recording, RigidArm, Signals};
+pub use colour::{BAND, Colour, JointColour, Rows, rows_a_second};
 use dyngen::arm::ParameterKind;
 pub use file::FileError;
 pub use known::{ModelFile, Unchanged};
@@ -43,6 +45,9 @@ pub struct TorqueModel {
     /// What goes beyond these.
     #[serde(flatten)]
     pub additions: Additions,
+    /// What it leaves where it holds, for `powerball watch`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub colour: Option<Colour>,
 }
 
 /// What an explanation adds to a base model.

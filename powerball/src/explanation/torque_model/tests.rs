@@ -68,6 +68,7 @@ fn model(body: &RigidArm, laws: &[Law<f64>]) -> TorqueModel {
             .collect(),
         friction: friction.collect(),
         additions: Additions { terms: laws.iter().enumerate().map(term).collect(), ..Additions::default() },
+        colour: None,
     }
 }
 

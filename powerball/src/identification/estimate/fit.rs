@@ -103,6 +103,36 @@ impl Fit {
     }
 }
 
+/// A base model that is known, seen as a fit of some data: its parameters and γ1 … γ5 by joint as coefficients, and
+/// nothing free.
+#[cfg(feature = "explain")]
+#[must_use]
+pub fn known(data: &Data<'_>, inertial: &[f64], gammas: &[[f64; 5]]) -> Fit {
+    let shapes: Vec<[f64; 2]> = gammas.iter().map(|[_, g2, _, g4, _]| [*g2, *g4]).collect();
+    let design = Design::new(data, &friction_columns(data, &shapes), &[]);
+    let gram = Gram::new(data, &design, &Folds::new(data));
+    let mut theta = vec![0.0; design.size];
+    theta.iter_mut().zip(inertial).for_each(|(to, value)| *to = *value);
+    for (j, [g1, _, g3, _, g5]) in gammas.iter().enumerate() {
+        for (k, level) in [g1, g3, g5].into_iter().enumerate() {
+            theta[design.friction(j, k)] = *level;
+        }
+    }
+    let residual = residuals(data, &design, &theta);
+    Fit {
+        shapes,
+        weights: vec![1.0; data.dof()],
+        sigma: residual.rms(),
+        inflation: vec![1.0; data.dof()],
+        top_velocity: (0..data.dof()).map(|j| data.top_velocity(j)).collect(),
+        residual,
+        free: vec![false; design.size],
+        theta,
+        design,
+        gram,
+    }
+}
+
 /// Fits the base model with the given terms; `start` saves the search for shapes and weights.
 #[must_use]
 pub fn fit(data: &Data<'_>, folds: &Folds, terms: &[Term], start: Option<&Fit>) -> Fit {

@@ -24,6 +24,8 @@ pub use estimates::{
     BaseModel, Estimates, JointFriction, JointVerdict, ParameterEstimate, ResidualStats, TorqueCurve, curves,
     estimates, residual_stats, stats_of, verdicts,
 };
+#[cfg(feature = "explain")]
+pub use fit::known;
 pub use fit::{Fit, Term, fit, friction_columns};
 #[cfg(feature = "explain")]
 pub(crate) use fit::{MEAN_OVER, variance_inflation};

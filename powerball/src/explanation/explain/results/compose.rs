@@ -52,6 +52,7 @@ pub(crate) fn compose(
         parameters: plain(body, found.fit.inertial()),
         friction: friction(found),
         additions,
+        colour: None,
     };
     let changed = match model.additions.arm_changes == ArmChanges::default() {
         true => None,

@@ -119,6 +119,7 @@ fn a_log_that_took_no_part_judges_the_fit() {
         parameters: names.map(|(name, value)| ParameterEstimate::plain(name, *value)).collect(),
         friction: (0..6).map(|j| JointFriction::plain(j, solution.friction(j))).collect(),
         additions: Additions::default(),
+        colour: None,
     };
     let direct = residual_stats(&data, &model.residual(&body, &data, &[]));
     for j in 0..6 {
