@@ -10,18 +10,18 @@ use crate::report::{Figure, Files, Ink, Page, Panel, Table, Tone, number};
 pub fn files<const N: usize>(
     followed: &Followed,
     path: &Path<N>,
-    tracks: &[(&str, &Track<N>)],
+    tracks: &[(&str, Track<N>)],
 ) -> Result<Files, String> {
     let page = page(followed, path, tracks).to_html();
     Ok(Files::default().json("follow.json", followed)?.with("report.html", page))
 }
 
-/// The colours of the runs.
+/// The colours of the runs: without a model, base, explained.
 const INKS: [Ink; 3] = [Ink::Grey, Ink::Orange, Ink::Blue];
 
 /// The page.
 #[must_use]
-pub fn page<const N: usize>(followed: &Followed, path: &Path<N>, tracks: &[(&str, &Track<N>)]) -> Page {
+pub fn page<const N: usize>(followed: &Followed, path: &Path<N>, tracks: &[(&str, Track<N>)]) -> Page {
     let mut page = Page::new(format!("{} along a path", followed.arm));
     page.lead("Measured less wanted position by joint, and what the torque was for. Nothing of this was run on hardware by this project.");
     let mut facts = vec![("with", followed.with.clone()), ("cycles", followed.cycles.to_string())];
@@ -32,17 +32,7 @@ pub fn page<const N: usize>(followed: &Followed, path: &Path<N>, tracks: &[(&str
         facts.push(("feedback", format!("{} rad/s, largest pole {pole:.3}", number(bandwidth))));
     }
     page.facts(facts);
-    page.heading("Tracking error");
-    errors(&mut page, followed, tracks);
-    for joint in 0..N {
-        let panel =
-            tracks.iter().enumerate().fold(Panel::new("error [mrad]"), |panel, (k, (name, track))| {
-                let errors = track.errors(path, followed.delay);
-                let points = track.samples.iter().zip(errors).map(|(s, e)| (s.t, 1e3 * e[joint])).collect();
-                panel.line(*name, INKS[k % INKS.len()], points)
-            });
-        page.figure(&Figure::new(format!("Joint {}", joint + 1), "time [s]").panel(panel), "");
-    }
+    add_to_page(&mut page, followed, path, tracks);
     if let Some((name, track)) = tracks.last() {
         page.heading(&format!("Torque, {name}"));
         torques(&mut page, followed, name, track);
@@ -50,7 +40,28 @@ pub fn page<const N: usize>(followed: &Followed, path: &Path<N>, tracks: &[(&str
     page
 }
 
-fn errors<const N: usize>(page: &mut Page, followed: &Followed, tracks: &[(&str, &Track<N>)]) {
+/// Tracking errors as a table, and along the path.
+pub fn add_to_page<const N: usize>(
+    page: &mut Page,
+    followed: &Followed,
+    path: &Path<N>,
+    tracks: &[(&str, Track<N>)],
+) {
+    page.heading("Tracking error");
+    errors(page, followed, tracks);
+    let inks = &INKS[INKS.len().saturating_sub(tracks.len())..];
+    for joint in 0..N {
+        let panel =
+            tracks.iter().enumerate().fold(Panel::new("error [mrad]"), |panel, (k, (name, track))| {
+                let errors = track.errors(path, followed.delay);
+                let points = track.samples.iter().zip(errors).map(|(s, e)| (s.t, 1e3 * e[joint])).collect();
+                panel.line(*name, inks[k % inks.len()], points)
+            });
+        page.figure(&Figure::new(format!("Joint {}", joint + 1), "time [s]").panel(panel), "");
+    }
+}
+
+fn errors<const N: usize>(page: &mut Page, followed: &Followed, tracks: &[(&str, Track<N>)]) {
     let columns = tracks.iter().map(|(name, _)| format!("{name}: rms (largest) [mrad]"));
     let mut table = Table::new(std::iter::once("joint".to_string()).chain(columns));
     for joint in 0..N {
@@ -65,10 +76,7 @@ fn errors<const N: usize>(page: &mut Page, followed: &Followed, tracks: &[(&str,
         table.push(std::iter::once((joint + 1).to_string()).chain(cells));
     }
     page.table(&table);
-    let sum =
-        |name: &str| followed.tracking_error.get(name).map(|e| e.iter().map(|x| x * x).sum::<f64>().sqrt());
-    if let (Some(base), Some(explained)) = (sum("base"), sum("explained")) {
-        let share = explained / base;
+    if let Some(share) = followed.share_of_base() {
         let tone = if share <= 1.0 { Tone::Good } else { Tone::Bad };
         page.note(
             tone,

@@ -3,7 +3,7 @@
 use super::dynamics::{Body, Dynamics};
 use super::effect::{Places, PlantEffect};
 use super::plant::{Plant, Sensors};
-use super::slave::{Identity, Module, Setup};
+use super::slave::{CurrentMode, Identity, Module, Setup};
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::controller::friction::{TABLE_2, TanhFriction};
 use crate::identification::chain::Chain;
@@ -165,4 +165,13 @@ const VENDOR: u32 = 0x0000_0200;
 /// As [`arm`].
 pub fn setup(start: [f64; 6], seed: u64) -> Result<Setup, Diagnostics> {
     Ok(Setup { plant: plant()?, modules: modules()?, start: start.to_vec(), age: 0.0, seed })
+}
+
+/// The same with drives that have the current mode that the bus profile knows.
+#[must_use]
+pub fn with_current_mode(setup: Setup) -> Setup {
+    match LWA4P.current {
+        Some(mode) => setup.with_current_mode(CurrentMode { mode: mode.mode.code(), target: mode.setpoint }),
+        None => setup,
+    }
 }

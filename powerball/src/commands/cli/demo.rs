@@ -58,12 +58,15 @@ impl DemoCommand {
         })?;
         let seconds = started.elapsed().as_secs_f64();
         output::write(&self.out, "explained.json", output::json(&demo.explained)?.as_bytes())?;
-        output::write(&self.out, "model.json", output::json(&demo.explained.model)?.as_bytes())?;
+        if let Ok(driven) = &demo.driven {
+            output::write(&self.out, "follow.json", output::json(&driven.followed)?.as_bytes())?;
+        }
         output::write(&self.out, "report.html", demo::page(&demo).to_html().as_bytes())?;
         if self.json {
             let session = &demo.session;
             let result = json!({
                 "seed": self.seed, "verdict": demo.verdict, "explained": demo.explained,
+                "followed": demo.driven.as_ref().ok().map(|driven| &driven.followed),
                 "fit_logs": session.fit, "held_out_logs": session.held_out, "arm": session.arm_file,
                 "report": self.out.join("report.html"), "seconds": seconds,
             });
@@ -103,12 +106,41 @@ impl DemoCommand {
         out.push_str(&super::explain::open_in_words(explained));
         let _ = writeln!(
             out,
-            "\nnamed:         {}\nin the plant:  {}\n\n{}\n\n{} and the logs beside it, {seconds:.1} s",
+            "\nnamed:         {}\nin the plant:  {}\n\n{}\n\n{}\n{} and the logs beside it, {seconds:.1} s",
             verdict.named_in_words(),
             verdict.truth_in_words(),
             verdict.sentence(),
+            tracking_in_words(demo),
             self.out.join("report.html").display(),
         );
         out.trim_end().to_string()
     }
+}
+
+/// How far the arm was off its path with either model.
+fn tracking_in_words(demo: &Demo) -> String {
+    let followed = match &demo.driven {
+        Ok(driven) => &driven.followed,
+        Err(why) => return format!("The arm was not moved with the models: {why}\n"),
+    };
+    let mut out = String::from(
+        "Tracking error of the same arm along a new path, computed torque, rms in mrad\n\n\
+         joint   base model   explained model   change\n",
+    );
+    let of = |name: &str| followed.tracking_error.get(name).map(Vec::as_slice).unwrap_or_default();
+    for (joint, (base, explained)) in of("base").iter().zip(of("explained")).enumerate() {
+        let change = 100.0 * (explained / base - 1.0);
+        let _ = writeln!(
+            out,
+            "{:>5}   {:>10.3}   {:>15.3}   {change:>+4.0} %",
+            joint + 1,
+            1e3 * base,
+            1e3 * explained
+        );
+    }
+    if let Some(share) = followed.share_of_base() {
+        let _ =
+            writeln!(out, "\nAll joints together: {:.0} % of the error with the base model.", 100.0 * share);
+    }
+    out
 }

@@ -1,9 +1,10 @@
 //! `powerball float`: hand guiding.
 
-use super::model_arm::{ModelArm, ModelOnBus, failed};
+use super::model_on_bus::{ModelOnBus, failed};
 use super::{Failure, output};
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::BusUrl;
+use crate::commands::model_arm::ModelArm;
 use crate::controller::correction::{Instant, Memory, add_torques};
 use crate::controller::dynamics::{ArmModel, State};
 use crate::controller::friction::TanhFriction;

@@ -1,13 +1,14 @@
 //! `powerball follow`: a trajectory with a torque model.
 
-use super::model_arm::{ModelArm, ModelOnBus, failed};
+use super::model_on_bus::{ModelOnBus, failed};
 use super::{Failure, output};
 use crate::bus::driver::lwa4p::LWA4P;
+use crate::commands::model_arm::ModelArm;
 use crate::controller::dynamics::ArmModel;
 use crate::controller::laws::{ComputedTorque, JointImpedance};
 use crate::identification::motion::Motion;
 use crate::procedure::Envelope;
-use crate::procedure::follow::{Followed, Law, Parts, Path, Run, Track, common_delay};
+use crate::procedure::follow::{Followed, Law, Parts, Path, Run, Track};
 use crate::report::followed;
 use clap::{Args, ValueEnum};
 use nalgebra::SVector;
@@ -106,7 +107,7 @@ impl FollowCommand {
             tracks.push((name, track));
         }
         drop(master);
-        self.report(&arm.name, &path, &tracks, pole)
+        self.report(&arm.name, &law, &path, &tracks, pole)
     }
 
     fn law(&self, model: &ModelArm, start: SVector<f64, 6>) -> Result<Law<6>, Failure> {
@@ -161,11 +162,13 @@ impl FollowCommand {
     /// What is to be driven, in order.
     fn entries(&self, arm: &dyngen::Arm, model: ModelArm, path: &Path<6>) -> Result<Vec<Entry>, Failure> {
         let mut entries = Vec::new();
+        let read =
+            |file: &std::path::Path, effects| ModelArm::read(arm, file, effects).map_err(Failure::Unusable);
         for what in &self.compare {
             let (name, other) = match what.as_str() {
-                "feedback" => ("feedback", ModelArm::read(arm, &self.on.model, true)?),
-                "base" => ("base", ModelArm::read(arm, &self.on.model, false)?),
-                file => ("base", ModelArm::read(arm, file.as_ref(), true)?),
+                "feedback" => ("feedback", read(&self.on.model, true)?),
+                "base" => ("base", read(&self.on.model, false)?),
+                file => ("base", read(file.as_ref(), true)?),
             };
             if entries.iter().any(|entry: &Entry| entry.name == name) {
                 return Err(Failure::Unusable(format!("--compare: {name} is there twice")));
@@ -175,27 +178,10 @@ impl FollowCommand {
         // The least first; the explained model is shown in detail, last.
         entries.sort_by_key(|entry| entry.name != "feedback");
         entries.push(Entry { name: "explained", model, parts: None });
-        let limits = SVector::from(LWA4P.joints.map(|joint| joint.torque));
         for entry in entries.iter_mut().filter(|entry| entry.name != "feedback") {
-            let planned = entry.model.model.planned(&entry.model.body, path.motion(), self.running);
-            let vectors = |x: &[f64]| {
-                x.chunks_exact(6).map(SVector::from_column_slice).collect::<Vec<SVector<f64, 6>>>()
-            };
-            let parts = Parts {
-                rigid: vectors(&planned.rigid),
-                friction: vectors(&planned.friction),
-                effects: vectors(&planned.effects),
-            };
-            if let Some((sample, joint, torque)) = parts.beyond(&limits) {
-                return Err(Failure::Refused(format!(
-                    "by the {} model the trajectory takes {torque:.1} N·m of joint {} at {:.3} s, {:.1} N·m can be",
-                    entry.name,
-                    joint + 1,
-                    sample as f64 * path.motion().period,
-                    limits[joint]
-                )));
-            }
-            entry.parts = Some(parts);
+            let parts = entry.model.parts(path, self.running);
+            entry.parts =
+                Some(parts.map_err(|e| Failure::Refused(format!("by the {} model {e}", entry.name)))?);
         }
         Ok(entries)
     }
@@ -203,29 +189,14 @@ impl FollowCommand {
     fn report(
         &self,
         arm: &str,
+        law: &Law<6>,
         path: &Path<6>,
         tracks: &[(&str, Track<6>)],
         largest_pole: Option<f64>,
     ) -> Result<(), Failure> {
-        let tracks: Vec<(&str, &Track<6>)> = tracks.iter().map(|(name, track)| (*name, track)).collect();
-        let only: Vec<&Track<6>> = tracks.iter().map(|(_, track)| *track).collect();
-        let delay = if self.with == With::Feedforward { common_delay(&only, path) } else { 0.0 };
-        let mut result = Followed {
-            arm: arm.to_string(),
-            with: format!("{:?}", self.with).to_lowercase(),
-            delay,
-            bandwidth: self.bandwidth(),
-            largest_pole,
-            cycles: only.iter().map(|track| track.samples.len()).max().unwrap_or(0),
-            ..Followed::default()
-        };
-        for (name, track) in &tracks {
-            let error = track.error(path, delay);
-            result.tracking_error.insert((*name).to_string(), error.rms);
-            result.largest_error.insert((*name).to_string(), error.max);
-            result.torque.insert((*name).to_string(), track.torques());
-        }
-        let files = followed::files(&result, path, &tracks).map_err(Failure::Refused)?;
+        let result =
+            Followed { bandwidth: self.bandwidth(), largest_pole, ..Followed::of(arm, law, path, tracks) };
+        let files = followed::files(&result, path, tracks).map_err(Failure::Refused)?;
         files.write(&self.out).map_err(Failure::Unusable)?;
         if self.on.place.json {
             output::print(&files.first());

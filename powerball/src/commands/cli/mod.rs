@@ -13,7 +13,7 @@ mod generate;
 mod identify;
 mod inputs;
 mod log;
-mod model_arm;
+mod model_on_bus;
 mod output;
 mod profile;
 mod record;

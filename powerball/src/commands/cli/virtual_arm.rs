@@ -2,9 +2,8 @@
 
 use super::Failure;
 use super::output;
-use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::{self, BusUrl};
-use crate::virtual_arm::slave::{CurrentMode, Setup};
+use crate::virtual_arm::slave::Setup;
 use crate::virtual_arm::{PlantEffect, Undeclared, VirtualArm, lwa4p, slave};
 use clap::Args;
 use rand::SeedableRng;
@@ -101,17 +100,9 @@ impl VirtualArmCommand {
             None => setup(start, self.seed, self.effect.as_deref())?,
         };
         if self.current_mode {
-            setup = with_current_mode(setup);
+            setup = lwa4p::with_current_mode(setup);
         }
         built(setup, self.commutated)
-    }
-}
-
-/// The drives with the current mode that the bus profile knows.
-pub(crate) fn with_current_mode(setup: Setup) -> Setup {
-    match LWA4P.current {
-        Some(mode) => setup.with_current_mode(CurrentMode { mode: mode.mode.code(), target: mode.setpoint }),
-        None => setup,
     }
 }
 

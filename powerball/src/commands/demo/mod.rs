@@ -1,6 +1,7 @@
-//! The whole loop on the virtual arm: an effect that the model is not told of, found again from the logs
-//! alone.
+//! The whole loop on the virtual arm: an effect that the model lacks, found again from the logs alone, and the arm
+//! moved with what was found.
 
+mod driven;
 mod session;
 mod verdict;
 
@@ -11,11 +12,14 @@ use crate::explanation::experiment::{self, TRAJECTORY};
 use crate::explanation::explain::Explained;
 use crate::explanation::{ExplainError, ExplainOptions, Prepared, effects, explain_body};
 use crate::identification::motion::Motion;
+use crate::identification::{IdentifyError, IdentifyOptions, identify};
 use crate::logs::Progress;
 use crate::logs::log::{LogError, read_logs};
 use crate::procedure::{Envelope, record};
 use crate::virtual_arm::PlantEffect as Effect;
+pub use driven::Driven;
 use dyngen::Arm;
+use serde::Serialize;
 pub use session::{Session, SessionError};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -30,6 +34,8 @@ pub struct Demo {
     pub explained: Explained,
     /// Both compared.
     pub verdict: Verdict,
+    /// The arm moved with the base model and with the explained one, or why it was not.
+    pub driven: Result<Driven, String>,
 }
 
 /// Why the demo broke.
@@ -41,14 +47,19 @@ pub enum DemoError {
     Read(String),
     /// The logs hold too little.
     Explain(ExplainError),
+    /// The logs hold too little for a base model.
+    Identify(IdentifyError),
+    /// The arm was not moved with a model.
+    Drive(String),
 }
 
 impl fmt::Display for DemoError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             DemoError::Session(e) => e.fmt(f),
-            DemoError::Read(what) => f.write_str(what),
+            DemoError::Read(what) | DemoError::Drive(what) => f.write_str(what),
             DemoError::Explain(e) => e.fmt(f),
+            DemoError::Identify(e) => e.fmt(f),
         }
     }
 }
@@ -67,6 +78,12 @@ impl From<LogError> for DemoError {
     }
 }
 
+impl From<IdentifyError> for DemoError {
+    fn from(e: IdentifyError) -> Self {
+        DemoError::Identify(e)
+    }
+}
+
 impl From<ExplainError> for DemoError {
     fn from(e: ExplainError) -> Self {
         DemoError::Explain(e)
@@ -80,7 +97,8 @@ pub fn names<'a>() -> Vec<&'a str> {
 }
 
 /// Records a session with an effect drawn by `seed`, or with the one of the given name, into `folder`, and
-/// explains it from the files alone, as a user would. Where names stay open, the trajectory that tells them
+/// explains it from the files alone, as a user would. Then the same arm is moved with the base model and with the explained
+/// one. Where names stay open, the trajectory that tells them
 /// apart is written there as well, and `with_experiment` runs it on the same arm and lets it decide.
 ///
 /// # Errors
@@ -100,6 +118,9 @@ pub fn run(
     let files: Vec<_> = session.fit.iter().chain(&session.held_out).collect();
     let (mut logs, _) = read_logs(&files, &arm)?;
     let held_out = logs.split_off(session.fit.len());
+    progress.say("identifying the base model");
+    let identified = identify(&arm, &logs, [], &IdentifyOptions::default())?;
+    let base = save(folder, "identified.json", &identified)?;
     let options = ExplainOptions { progress, ..ExplainOptions::default() };
     let Prepared { body, logs, validate, .. } = Prepared::new(&arm, &logs, &held_out, &options)?;
     let mut explained = explain_body(&body, &logs, &validate, &options)?;
@@ -122,8 +143,19 @@ pub fn run(
             }
         }
     }
+    let model = save(folder, "model.json", &explained.model)?;
     let verdict = Verdict::new(&session.effect, &explained);
-    Ok(Demo { session, explained, verdict })
+    progress.say("moving the arm with both models");
+    let driven = driven::drive(&session, [&base, &model], seed).map_err(|e| e.to_string());
+    Ok(Demo { session, explained, verdict, driven })
+}
+
+/// Writes a result into the folder.
+fn save(folder: &Path, name: &str, what: &impl Serialize) -> Result<PathBuf, DemoError> {
+    let file = folder.join(name);
+    let text = serde_json::to_string_pretty(what).map_err(|e| DemoError::Read(format!("{name}: {e}")))?;
+    std::fs::write(&file, text).map_err(|e| SessionError::Write(file.clone(), e))?;
+    Ok(file)
 }
 
 /// Runs a motion on the arm of a session, after it, and logs it.

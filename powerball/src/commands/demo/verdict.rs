@@ -5,7 +5,7 @@
 use super::Demo;
 use crate::explanation::explain::Explained;
 use crate::report::explained::add_to_page;
-use crate::report::{Page, Tone};
+use crate::report::{Page, Tone, followed};
 use crate::virtual_arm::PlantEffect as Effect;
 use serde::Serialize;
 
@@ -128,5 +128,13 @@ pub fn page(demo: &Demo) -> Page {
         ("band of the errors".to_string(), format!("{} to {} Hz", explained.band[0], explained.band[1])),
     ]);
     add_to_page(&mut page, explained);
+    match &demo.driven {
+        Ok(driven) => {
+            page.heading("The arm moved with what was found");
+            page.lead("The same virtual arm along a path that no model has seen, with computed torque in current mode: once with the base model, once with the explained one.");
+            followed::add_to_page(&mut page, &driven.followed, &driven.path, &driven.tracks);
+        }
+        Err(why) => page.note(Tone::Plain, &format!("The arm was not moved with the models: {why}")),
+    }
     page
 }

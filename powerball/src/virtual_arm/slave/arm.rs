@@ -53,6 +53,8 @@ pub struct VirtualArm {
     /// Torques of the last ticks, newest last, for drives that log late.
     history: VecDeque<Vec<f64>>,
     offsets: Vec<f64>,
+    /// Torque by the measured current of the torque that it truly is, by joint.
+    gains: Vec<f64>,
     torque: Vec<f64>,
     hand: Option<Hand>,
     ticks: u64,
@@ -79,16 +81,18 @@ impl VirtualArm {
         let friction = simulation.plant().friction().iter().map(|f| TUNED * f.gamma1.max(f.gamma3));
         let tuned = simulation.inertias().into_iter().zip(friction);
         let nodes = modules.into_iter().zip(tuned).map(|(m, (i, f))| Node::new(m, [i, f])).collect();
-        let mut offsets = vec![0.0; n];
+        let (mut offsets, mut gains) = (vec![0.0; n], vec![1.0; n]);
         for effect in simulation.plant().effects() {
-            if let PlantEffect::EncoderOffset { joint, offset } = effect {
-                offsets[*joint] += offset;
+            match effect {
+                PlantEffect::EncoderOffset { joint, offset } => offsets[*joint] += offset,
+                PlantEffect::TorqueConstant { joint, gain } => gains[*joint] *= gain,
+                _ => {}
             }
         }
         let noise = Noise { rng: ChaCha8Rng::seed_from_u64(seed), slow: vec![0.0; n] };
         let torque = vec![0.0; n];
         let history = VecDeque::new();
-        Some(VirtualArm { simulation, nodes, noise, history, offsets, torque, hand: None, ticks: 0 })
+        Some(VirtualArm { simulation, nodes, noise, history, offsets, gains, torque, hand: None, ticks: 0 })
     }
 
     /// The nodes, one a joint.
@@ -134,7 +138,8 @@ impl VirtualArm {
         for joint in 0..self.nodes.len() {
             let velocity = self.simulation.velocity(joint);
             let position = self.simulation.position(joint) + self.offsets[joint];
-            self.torque[joint] = self.nodes[joint].tick(h, now, [position, velocity]);
+            // A drive controls the current that it measures; a wrong constant makes another torque of it.
+            self.torque[joint] = self.nodes[joint].tick(h, now, [position, velocity]) / self.gains[joint];
         }
         self.measure(h, &before);
         for (joint, node) in self.nodes.iter().enumerate() {
@@ -156,14 +161,11 @@ impl VirtualArm {
     /// after.
     fn measure(&mut self, h: f64, before: &[f64]) {
         let sensors = self.simulation.plant().sensors();
-        let (mut delay, mut gains) = (0.0, vec![1.0; self.nodes.len()]);
-        for effect in self.simulation.plant().effects() {
-            match effect {
-                PlantEffect::TimeDelay { delay: late } => delay += late,
-                PlantEffect::TorqueConstant { joint, gain } => gains[*joint] *= gain,
-                _ => {}
-            }
-        }
+        let late = |effect: &PlantEffect| match effect {
+            PlantEffect::TimeDelay { delay } => *delay,
+            _ => 0.0,
+        };
+        let delay: f64 = self.simulation.plant().effects().iter().map(late).sum();
         let back = (delay / h).round() as usize;
         self.history.push_back(before.iter().zip(&self.torque).map(|(a, b)| 0.5 * (a + b)).collect());
         while self.history.len() > back + 1 {
@@ -178,7 +180,7 @@ impl VirtualArm {
             node.measure(Sample {
                 position: self.simulation.position(joint) + self.offsets[joint],
                 velocity: self.simulation.velocity(joint),
-                torque: torque * gains[joint] + *slow + sensors.white[joint] * normal(),
+                torque: torque * self.gains[joint] + *slow + sensors.white[joint] * normal(),
             });
         }
     }

@@ -1,28 +1,19 @@
-//! What `follow` and `float` are told: an arm with a torque model, and the bus that it is on.
+//! What `follow` and `float` take: an arm with a torque model, and the bus that it is on.
 
 use super::Failure;
 use super::bus::{Where, virtual_bus};
 use super::envelope::Surroundings;
-use super::virtual_arm::{built, setup, with_current_mode};
+use super::virtual_arm::{built, setup};
 use crate::bus::driver::Profile;
-use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::{Bus, BusUrl, Master};
-use crate::explanation::torque_model::{ModelFile, TorqueModel};
+use crate::commands::model_arm::ModelArm;
 use crate::identification::mounting::Mounting;
-use crate::identification::{KnownModel, NumericArm};
-use crate::logs::regression::RigidArm;
 use crate::procedure::{Envelope, RecordError};
 use crate::virtual_arm::slave::Hand;
-use crate::virtual_arm::{Undeclared, VirtualArm};
+use crate::virtual_arm::{Undeclared, VirtualArm, lwa4p};
 use clap::Args;
 use dyngen::Arm;
-use nalgebra::SVector;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::path::{Path, PathBuf};
-
-/// Random poses at which gains are judged.
-const POSES: usize = 300;
 
 /// Arm, model and bus.
 #[derive(Args, Debug)]
@@ -43,53 +34,6 @@ pub(crate) struct ModelOnBus {
     accept_unverified: bool,
 }
 
-/// A model that fits its arm.
-#[derive(Debug)]
-pub(crate) struct ModelArm {
-    pub(crate) body: RigidArm,
-    pub(crate) model: TorqueModel,
-    pub(crate) numeric: NumericArm<6>,
-}
-
-impl ModelArm {
-    /// Reads a model of the arm of a file, with its effects or without.
-    pub(crate) fn read(arm: &Arm, file: &Path, effects: bool) -> Result<ModelArm, Failure> {
-        let wrong = |what: String| Failure::Unusable(what);
-        let read = ModelFile::read(file).map_err(|e| wrong(e.to_string()))?;
-        let (named, name) = (read.model.arm.clone(), file.display());
-        if !named.is_empty() && named != arm.name {
-            return Err(wrong(format!(
-                "{name}: is a model of the arm '{named}', and the arm file is of '{}': take the arm file that it was \
-                    identified with",
-                arm.name
-            )));
-        }
-        if arm.dof() != LWA4P.joints.len() {
-            let (has, needs) = (arm.dof(), LWA4P.joints.len());
-            return Err(wrong(format!("the arm file has {has} joints, the arm on the bus {needs}")));
-        }
-        if !arm.transmissions.is_empty() {
-            let what = "the arm file couples joints by a transmission, which control laws here do not know";
-            return Err(wrong(what.to_string()));
-        }
-        let arm = read.arm(arm, Mounting::Filed).map_err(wrong)?;
-        let body = RigidArm::new(&arm).map_err(|e| wrong(e.to_string()))?;
-        let model = read.checked(&body).map_err(|e| wrong(e.to_string()))?;
-        let model = if effects { model } else { model.base() };
-        let numeric = model.numeric_arm(&body).map_err(|e| wrong(e.to_string()))?;
-        let numeric = numeric.ok_or_else(|| wrong(format!("{name}: does not fit the arm file")))?;
-        Ok(ModelArm { body, model, numeric })
-    }
-
-    /// Poses within the joints' limits, always the same ones.
-    pub(crate) fn poses(&self) -> Vec<SVector<f64, 6>> {
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let limits = LWA4P.joints.map(|joint| joint.position);
-        let pose = |_| SVector::from(limits.map(|[low, high]| rng.random_range(low..high)));
-        (0..POSES).map(pose).collect()
-    }
-}
-
 impl ModelOnBus {
     /// The arm file and the model, and what motions must keep: with the model's masses where no values were given.
     pub(crate) fn read(&mut self) -> Result<(Arm, ModelArm, Envelope<6>), Failure> {
@@ -99,7 +43,7 @@ impl ModelOnBus {
             ));
         }
         let arm = self.surroundings.arm()?;
-        let model = ModelArm::read(&arm, &self.model, true)?;
+        let model = ModelArm::read(&arm, &self.model, true).map_err(Failure::Unusable)?;
         if model.model.additions.arm_changes.is_empty() {
             self.surroundings.values_or(&self.model);
         }
@@ -134,7 +78,7 @@ impl ModelOnBus {
                 .map_err(|e| Failure::Refused(e.to_string()))?,
             None => setup(start, 1, None)?,
         };
-        let arm = built(with_current_mode(setup), false)?;
+        let arm = built(lwa4p::with_current_mode(setup), false)?;
         Ok(match hand {
             Some(hand) => arm.with_hand(hand),
             None => arm,

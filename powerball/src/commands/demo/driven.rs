@@ -1,0 +1,113 @@
+//! The same plant moved along a new path with the base model and with the explained one.
+
+use super::{DemoError, Session, SessionError};
+use crate::bus::driver::Driver;
+use crate::bus::driver::lwa4p::LWA4P;
+use crate::bus::transport::{Master, Memory};
+use crate::commands::model_arm::ModelArm;
+use crate::controller::laws::ComputedTorque;
+use crate::identification::excite::{self, Settings};
+use crate::identification::motion::Motion;
+use crate::procedure::Envelope;
+use crate::procedure::follow::{Followed, Law, Parts, Path as DrivenPath, Run, Track};
+use crate::virtual_arm::{VirtualArm, lwa4p};
+use dyngen::{Arm, Diagnostics, Model, SetKind};
+use std::f64::consts::TAU;
+use std::path::Path;
+
+/// The path's period, s: none of the recorded ones.
+const PERIOD: f64 = 8.5;
+/// Condition numbers count for nothing here: the best of a few paths will do.
+const EVALUATIONS: usize = 50;
+/// Paths go up to the joints' limits, and an arm that is off its path passes them: this share of the velocities leaves room.
+const PACE: f64 = 0.8;
+/// A path may take more torque of a joint than it has, by one of the models; so many are tried.
+const PATHS: u64 = 8;
+
+/// An arm that was moved with two models.
+#[derive(Debug)]
+pub struct Driven {
+    /// Tracking errors and torques, `base` and `explained`.
+    pub followed: Followed,
+    /// The same as tracks, in the order in which they were driven.
+    pub tracks: Vec<(&'static str, Track<6>)>,
+    /// The path.
+    pub path: DrivenPath<6>,
+}
+
+/// Moves the arm of a session, in current mode with computed torque, along a path that no model has seen: with the model of
+/// `base`, a file of `powerball identify`, and with that of `explained`, a file of `powerball explain`.
+///
+/// # Errors
+/// Where a model does not fit the arm, no path is within the joints' torques, or the arm stopped.
+pub(super) fn drive(
+    session: &Session,
+    [base, explained]: [&Path; 2],
+    seed: u64,
+) -> Result<Driven, DemoError> {
+    let arm = Arm::read(&session.arm_file).map_err(|e| DemoError::Read(e.to_string()))?;
+    let [base, explained] = [base, explained].map(|file| ModelArm::read(&arm, file, true));
+    let (base, explained) = (base.map_err(DemoError::Drive)?, explained.map_err(DemoError::Drive)?);
+    let (path, parts) = path(&[&base, &explained], session, seed)?;
+    let law = Law::Torque(ComputedTorque::for_period(LWA4P.period_seconds()));
+    let mut tracks = Vec::new();
+    for (name, (model, parts)) in
+        ["base", "explained"].into_iter().zip([&base, &explained].into_iter().zip(&parts))
+    {
+        let setup = session.undeclared.setup(path.start().into(), seed).map_err(SessionError::Arm)?;
+        let plant = VirtualArm::new(lwa4p::with_current_mode(setup)).ok_or_else(|| {
+            SessionError::Arm(Diagnostics::whole_file("lwa4p.toml", "six joints are needed"))
+        })?;
+        let driver = Driver::new(LWA4P).map_err(SessionError::Driver)?;
+        let run = Run { path: &path, arm: &model.numeric, parts: Some(parts), law, accept_unverified: true };
+        let on_bus = Master::new(driver, Memory::new(plant, LWA4P.bitrate));
+        let (_, track, _) = run.follow(on_bus, Envelope::new(|_| None)).map_err(SessionError::Record)?;
+        tracks.push((name, track));
+    }
+    let followed = Followed::of(&arm.name, &law, &path, &tracks);
+    Ok(Driven { followed, tracks, path })
+}
+
+/// The first of the paths drawn that both models find within the joints' torques, and what they say of it.
+fn path(
+    models: &[&ModelArm; 2],
+    session: &Session,
+    seed: u64,
+) -> Result<(DrivenPath<6>, Vec<Parts<6>>), DemoError> {
+    let model = Model::derive(lwa4p::arm().map_err(SessionError::Arm)?).map_err(excite::Error::Model);
+    let model = model.map_err(SessionError::Excitation)?;
+    let mut why = String::new();
+    for k in 0..PATHS {
+        let settings = Settings {
+            harmonics: 5,
+            fundamental: TAU / PERIOD,
+            evaluations: EVALUATIONS,
+            // Away from the seeds of the paths that were recorded.
+            seed: (1 << 32) + seed.wrapping_mul(PATHS).wrapping_add(k),
+            ..Settings::default()
+        };
+        let found =
+            excite::optimise(&model, SetKind::Minimal, &settings).map_err(SessionError::Excitation)?;
+        let Some(motion) = found.paths.first().map(|path| path.sample(session.plant.sensors().rate)) else {
+            continue;
+        };
+        let path =
+            DrivenPath::clear(&motion, &Envelope::new(|_| None), &LWA4P).map_err(SessionError::Record)?;
+        let parts: Result<Vec<_>, _> =
+            models.iter().map(|model| model.parts(&path, session.undeclared.age)).collect();
+        match parts {
+            Ok(parts) => return Ok((path, parts)),
+            Err(what) => why = what,
+        }
+    }
+    Err(DemoError::Drive(format!("of {PATHS} paths none is within the joints' torques: {why}")))
+}
+
+/// The same samples in more time.
+fn slower(motion: &Motion) -> Motion {
+    let mut slow = Motion::new(6, motion.period / PACE);
+    for [q, dq, ddq] in motion.samples() {
+        slow.push((0..6).map(|j| [q[j], PACE * dq[j], PACE * PACE * ddq[j]]));
+    }
+    slow
+}
