@@ -6,11 +6,15 @@ use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::{Master, Memory};
 use crate::commands::model_arm::ModelArm;
 use crate::controller::laws::ComputedTorque;
+use crate::explanation::torque_model::{Additions, TorqueModel};
+use crate::identification::Identified;
+use crate::identification::estimate::{JointFriction, ParameterEstimate};
 use crate::identification::excite::{self, Settings};
 use crate::identification::motion::Motion;
 use crate::procedure::Envelope;
 use crate::procedure::follow::{Followed, Law, Parts, Path as DrivenPath, Run, Track};
 use crate::virtual_arm::{VirtualArm, lwa4p};
+use dyngen::arm::Parameter;
 use dyngen::{Arm, Diagnostics, Model, SetKind};
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -35,21 +39,55 @@ pub struct Driven {
     pub path: DrivenPath<6>,
 }
 
+/// The base model as a controller takes it: the parameters that a real arm can have. Where the logs have an effect that the
+/// model lacks, the best fit itself need not be an arm's.
+///
+/// # Errors
+/// Where the arm file cannot be derived.
+pub(super) fn base_model(arm: &Arm, identified: &Identified) -> Result<TorqueModel, DemoError> {
+    let model = Model::derive(arm.clone()).map_err(excite::Error::Model).map_err(SessionError::Excitation)?;
+    let set = model.set(SetKind::Minimal).map_err(excite::Error::Model).map_err(SessionError::Excitation)?;
+    let value =
+        |p: Parameter| identified.consistent.parameters.get(&p.to_string()).copied().unwrap_or_default();
+    let all: Vec<f64> = arm.all_parameters().into_iter().map(value).collect();
+    let values = model.set_values(set, &all);
+    let friction = identified.consistent.friction.iter().enumerate();
+    Ok(TorqueModel {
+        arm: arm.name.clone(),
+        set: SetKind::Minimal.to_string(),
+        parameters: set
+            .names()
+            .iter()
+            .zip(values)
+            .map(|(name, x)| ParameterEstimate::plain(name, x))
+            .collect(),
+        friction: friction.map(|(j, gammas)| JointFriction::plain(j, *gammas)).collect(),
+        additions: Additions::default(),
+        colour: None,
+    })
+}
+
 /// Moves the arm of a session, in current mode with computed torque, along a path that no model has seen: with the model of
-/// `base`, a file of `powerball identify`, and with that of `explained`, a file of `powerball explain`.
+/// `base` and with that of `explained`, both files of models. The path is written into `folder`.
 ///
 /// # Errors
 /// Where a model does not fit the arm, no path is within the joints' torques, or the arm stopped.
 pub(super) fn drive(
     session: &Session,
+    folder: &Path,
     [base, explained]: [&Path; 2],
     seed: u64,
 ) -> Result<Driven, DemoError> {
     let arm = Arm::read(&session.arm_file).map_err(|e| DemoError::Read(e.to_string()))?;
     let [base, explained] = [base, explained].map(|file| ModelArm::read(&arm, file, true));
     let (base, explained) = (base.map_err(DemoError::Drive)?, explained.map_err(DemoError::Drive)?);
-    let (path, parts) = path(&[&base, &explained], session, seed)?;
+    let (path, path_csv, parts) = path(&[&base, &explained], session, seed)?;
+    super::write(&folder.join("path.csv"), &path_csv)?;
     let law = Law::Torque(ComputedTorque::for_period(LWA4P.period_seconds()));
+    for (name, model) in [("base", &base), ("explained", &explained)] {
+        let stable = law.judge(&model.numeric, model.poses(), LWA4P.period_seconds());
+        stable.map_err(|why| DemoError::Drive(format!("by the {name} model {why}")))?;
+    }
     let mut tracks = Vec::new();
     for (name, (model, parts)) in
         ["base", "explained"].into_iter().zip([&base, &explained].into_iter().zip(&parts))
@@ -61,7 +99,9 @@ pub(super) fn drive(
         let driver = Driver::new(LWA4P).map_err(SessionError::Driver)?;
         let run = Run { path: &path, arm: &model.numeric, parts: Some(parts), law, accept_unverified: true };
         let on_bus = Master::new(driver, Memory::new(plant, LWA4P.bitrate));
-        let (_, track, _) = run.follow(on_bus, Envelope::new(|_| None)).map_err(SessionError::Record)?;
+        let (_, track, _) = run
+            .follow(on_bus, Envelope::new(|_| None))
+            .map_err(|e| DemoError::Drive(format!("with the {name} model {e}")))?;
         tracks.push((name, track));
     }
     let followed = Followed::of(&arm.name, &law, &path, &tracks);
@@ -73,7 +113,7 @@ fn path(
     models: &[&ModelArm; 2],
     session: &Session,
     seed: u64,
-) -> Result<(DrivenPath<6>, Vec<Parts<6>>), DemoError> {
+) -> Result<(DrivenPath<6>, String, Vec<Parts<6>>), DemoError> {
     let model = Model::derive(lwa4p::arm().map_err(SessionError::Arm)?).map_err(excite::Error::Model);
     let model = model.map_err(SessionError::Excitation)?;
     let mut why = String::new();
@@ -88,7 +128,8 @@ fn path(
         };
         let found =
             excite::optimise(&model, SetKind::Minimal, &settings).map_err(SessionError::Excitation)?;
-        let Some(motion) = found.paths.first().map(|path| path.sample(session.plant.sensors().rate)) else {
+        let rate = session.plant.sensors().rate;
+        let Some(motion) = found.paths.first().map(|path| slower(&path.sample(rate / PACE))) else {
             continue;
         };
         let path =
@@ -96,7 +137,7 @@ fn path(
         let parts: Result<Vec<_>, _> =
             models.iter().map(|model| model.parts(&path, session.undeclared.age)).collect();
         match parts {
-            Ok(parts) => return Ok((path, parts)),
+            Ok(parts) => return Ok((path, motion.to_csv(), parts)),
             Err(what) => why = what,
         }
     }

@@ -119,17 +119,14 @@ pub fn run(
     let (mut logs, _) = read_logs(&files, &arm)?;
     let held_out = logs.split_off(session.fit.len());
     progress.say("identifying the base model");
-    let identified = identify(&arm, &logs, [], &IdentifyOptions::default())?;
-    let base = save(folder, "identified.json", &identified)?;
+    let base = driven::base_model(&arm, &identify(&arm, &logs, [], &IdentifyOptions::default())?)?;
+    let base = save(folder, "base.json", &base)?;
     let options = ExplainOptions { progress, ..ExplainOptions::default() };
     let Prepared { body, logs, validate, .. } = Prepared::new(&arm, &logs, &held_out, &options)?;
     let mut explained = explain_body(&body, &logs, &validate, &options)?;
     if let Some(motion) = experiment::propose(&body, &mut explained, &options) {
-        let write = |motion: &Motion| {
-            let file = folder.join(TRAJECTORY);
-            std::fs::write(&file, motion.to_csv()).map_err(|e| SessionError::Write(file, e))
-        };
-        write(&motion)?;
+        let next_file = folder.join(TRAJECTORY);
+        write(&next_file, &motion.to_csv())?;
         if with_experiment {
             progress.say("recording the experiment");
             let log = carry_out(&session, &motion, &folder.join("experiment.csv"), seed)?;
@@ -139,14 +136,14 @@ pub fn run(
             };
             explained = experiment::learn(&body, (&logs, &validate), new, &explained, &options)?;
             if let Some(next) = experiment::propose(&body, &mut explained, &options) {
-                write(&next)?;
+                write(&next_file, &next.to_csv())?;
             }
         }
     }
     let model = save(folder, "model.json", &explained.model)?;
     let verdict = Verdict::new(&session.effect, &explained);
     progress.say("moving the arm with both models");
-    let driven = driven::drive(&session, [&base, &model], seed).map_err(|e| e.to_string());
+    let driven = driven::drive(&session, folder, [&base, &model], seed).map_err(|e| e.to_string());
     Ok(Demo { session, explained, verdict, driven })
 }
 
@@ -154,8 +151,12 @@ pub fn run(
 fn save(folder: &Path, name: &str, what: &impl Serialize) -> Result<PathBuf, DemoError> {
     let file = folder.join(name);
     let text = serde_json::to_string_pretty(what).map_err(|e| DemoError::Read(format!("{name}: {e}")))?;
-    std::fs::write(&file, text).map_err(|e| SessionError::Write(file.clone(), e))?;
+    write(&file, &text)?;
     Ok(file)
+}
+
+fn write(file: &Path, text: &str) -> Result<(), DemoError> {
+    Ok(std::fs::write(file, text).map_err(|e| SessionError::Write(file.to_path_buf(), e))?)
 }
 
 /// Runs a motion on the arm of a session, after it, and logs it.
