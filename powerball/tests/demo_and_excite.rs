@@ -51,7 +51,7 @@ fn the_readme_shows_what_the_demo_prints() {
     let (result, _) = demo();
     let readme = std::fs::read_to_string(arm("../README.md")).unwrap();
     let (_, shown) = readme.split_once("joint   base model").unwrap();
-    let (shown, _) = shown.split_once("```").unwrap();
+    let (shown, moved) = shown.split_once("Tracking error").unwrap();
     let explained = &result["explained"];
     let [before, after] = ["before", "after"].map(|when| numbers(&explained[when]["validate"]["rms"]));
     let floor = numbers(&explained["noise_floor"]);
@@ -66,6 +66,14 @@ fn the_readme_shows_what_the_demo_prints() {
             // Another machine's rounding may be another one.
             assert!((cells[cell].parse::<f64>().unwrap() - value).abs() < 2e-4, "{cells:?}: {value}");
         }
+    }
+    let errors = &result["followed"]["tracking_error"];
+    let (base, explained) = (numbers(&errors["base"]), numbers(&errors["explained"]));
+    let (moved, _) = moved.split_once("```").unwrap();
+    for joint in [1, 2] {
+        let row =
+            format!("{joint:>5}   {:>10.3}   {:>15.3}", 1e3 * base[joint - 1], 1e3 * explained[joint - 1]);
+        assert!(moved.contains(&row), "{row} is not in {moved}");
     }
     let truth = result["verdict"]["truth"].as_str().unwrap();
     let joint = &result["verdict"]["joints"][0];
@@ -84,11 +92,20 @@ fn the_demo_finds_what_it_hid_and_writes_what_it_promises() {
     assert!(rms("after")[joint] < 0.5 * rms("before")[joint]);
 
     let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
-    // One figure a joint, the bars, and what shows the effect.
-    assert_eq!(page.matches("<svg").count(), 8);
+    // The same arm off its path by less than half, with no joint worse than by 5 %.
+    let errors = &result["followed"]["tracking_error"];
+    let (base, explained) = (numbers(&errors["base"]), numbers(&errors["explained"]));
+    let norm = |e: &[f64]| e.iter().map(|x| x * x).sum::<f64>();
+    assert!(norm(&explained) < 0.25 * norm(&base) && norm(&base) > 0.0, "{errors}");
+    assert!(explained.iter().zip(&base).all(|(explained, base)| *explained < 1.05 * base), "{errors}");
+
+    // One figure a joint, the bars, what shows the effect, and one a joint of the arm that moves.
+    assert_eq!(page.matches("<svg").count(), 14);
     assert!(page.contains(&format!("{effect} on joint {}", joint + 1)));
     assert!(page.len() < 2_000_000 && page.contains("The name is right."));
-    for file in ["arm.toml", "explained.json", "fit_5.csv", "held_out_3.csv"] {
+    for file in
+        ["arm.toml", "base.json", "model.json", "path.csv", "explained.json", "fit_5.csv", "held_out_3.csv"]
+    {
         assert!(folder.join(file).is_file(), "{file}");
     }
 }

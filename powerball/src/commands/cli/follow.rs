@@ -3,7 +3,7 @@
 use super::model_on_bus::{ModelOnBus, failed};
 use super::{Failure, output};
 use crate::bus::driver::lwa4p::LWA4P;
-use crate::commands::model_arm::ModelArm;
+use crate::commands::model_arm::{self, ModelArm};
 use crate::controller::dynamics::ArmModel;
 use crate::controller::laws::{ComputedTorque, JointImpedance};
 use crate::identification::motion::Motion;
@@ -154,7 +154,7 @@ impl FollowCommand {
     /// The largest pole of the loop, where this program closes it.
     fn judge(&self, law: &Law<6>, model: &ModelArm, path: &Path<6>) -> Result<Option<f64>, Failure> {
         let along = path.motion().samples().step_by(20).map(|[q, ..]| SVector::from_column_slice(q));
-        let poses = model.poses().into_iter().chain(along);
+        let poses = model_arm::poses().into_iter().chain(along);
         let pole = law.judge(&model.numeric, poses, LWA4P.period_seconds()).map_err(Failure::Unusable)?;
         Ok((*law != Law::Feedforward).then_some(pole))
     }
@@ -163,7 +163,7 @@ impl FollowCommand {
     fn entries(&self, arm: &dyngen::Arm, model: ModelArm, path: &Path<6>) -> Result<Vec<Entry>, Failure> {
         let mut entries = Vec::new();
         let read =
-            |file: &std::path::Path, effects| ModelArm::read(arm, file, effects).map_err(Failure::Unusable);
+            |file: &std::path::Path, effects| model_arm::read(arm, file, effects).map_err(Failure::Unusable);
         for what in &self.compare {
             let (name, other) = match what.as_str() {
                 "feedback" => ("feedback", read(&self.on.model, true)?),
@@ -179,7 +179,7 @@ impl FollowCommand {
         entries.sort_by_key(|entry| entry.name != "feedback");
         entries.push(Entry { name: "explained", model, parts: None });
         for entry in entries.iter_mut().filter(|entry| entry.name != "feedback") {
-            let parts = entry.model.parts(path, self.running);
+            let parts = model_arm::parts(&entry.model, path, self.running);
             entry.parts =
                 Some(parts.map_err(|e| Failure::Refused(format!("by the {} model {e}", entry.name)))?);
         }

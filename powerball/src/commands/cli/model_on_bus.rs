@@ -6,7 +6,7 @@ use super::envelope::Surroundings;
 use super::virtual_arm::{built, setup};
 use crate::bus::driver::Profile;
 use crate::bus::transport::{Bus, BusUrl, Master};
-use crate::commands::model_arm::ModelArm;
+use crate::commands::model_arm::{self, ModelArm};
 use crate::identification::mounting::Mounting;
 use crate::procedure::{Envelope, RecordError};
 use crate::virtual_arm::slave::Hand;
@@ -43,7 +43,7 @@ impl ModelOnBus {
             ));
         }
         let arm = self.surroundings.arm()?;
-        let model = ModelArm::read(&arm, &self.model, true).map_err(Failure::Unusable)?;
+        let model = model_arm::read(&arm, &self.model, true).map_err(Failure::Unusable)?;
         if model.model.additions.arm_changes.is_empty() {
             self.surroundings.values_or(&self.model);
         }

@@ -4,7 +4,7 @@ use super::{DemoError, Session, SessionError};
 use crate::bus::driver::Driver;
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::{Master, Memory};
-use crate::commands::model_arm::ModelArm;
+use crate::commands::model_arm::{self, ModelArm};
 use crate::controller::laws::ComputedTorque;
 use crate::explanation::torque_model::{Additions, TorqueModel};
 use crate::identification::Identified;
@@ -79,13 +79,13 @@ pub(super) fn drive(
     seed: u64,
 ) -> Result<Driven, DemoError> {
     let arm = Arm::read(&session.arm_file).map_err(|e| DemoError::Read(e.to_string()))?;
-    let [base, explained] = [base, explained].map(|file| ModelArm::read(&arm, file, true));
+    let [base, explained] = [base, explained].map(|file| model_arm::read(&arm, file, true));
     let (base, explained) = (base.map_err(DemoError::Drive)?, explained.map_err(DemoError::Drive)?);
     let (path, path_csv, parts) = path(&[&base, &explained], session, seed)?;
     super::write(&folder.join("path.csv"), &path_csv)?;
     let law = Law::Torque(ComputedTorque::for_period(LWA4P.period_seconds()));
     for (name, model) in [("base", &base), ("explained", &explained)] {
-        let stable = law.judge(&model.numeric, model.poses(), LWA4P.period_seconds());
+        let stable = law.judge(&model.numeric, model_arm::poses(), LWA4P.period_seconds());
         stable.map_err(|why| DemoError::Drive(format!("by the {name} model {why}")))?;
     }
     let mut tracks = Vec::new();
@@ -135,7 +135,7 @@ fn path(
         let path =
             DrivenPath::clear(&motion, &Envelope::new(|_| None), &LWA4P).map_err(SessionError::Record)?;
         let parts: Result<Vec<_>, _> =
-            models.iter().map(|model| model.parts(&path, session.undeclared.age)).collect();
+            models.iter().map(|model| model_arm::parts(model, &path, session.undeclared.age)).collect();
         match parts {
             Ok(parts) => return Ok((path, motion.to_csv(), parts)),
             Err(what) => why = what,
