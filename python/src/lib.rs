@@ -10,6 +10,7 @@ mod identify;
 mod logs;
 mod motion;
 mod session;
+mod simulate;
 mod source;
 mod summary;
 mod work;
@@ -33,6 +34,8 @@ mod _core {
     use super::motion::{Excited, Trajectory, excite, write_whole};
     #[pymodule_export]
     use super::session::{virtual_effects, virtual_session};
+    #[pymodule_export]
+    use super::simulate::{simulate, simulate_function};
     #[pymodule_export]
     use super::source::{description, export_imported, generate, generate_model};
     #[pymodule_export]

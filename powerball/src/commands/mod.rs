@@ -2,6 +2,6 @@
 
 mod cli;
 pub mod demo;
-mod model_arm;
+pub mod model_arm;
 
 pub use cli::main;

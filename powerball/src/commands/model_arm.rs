@@ -1,25 +1,29 @@
 //! A torque model that drives the arm that it was fitted to.
 
 use crate::bus::driver::lwa4p::LWA4P;
-use crate::explanation::torque_model::{ModelFile, ModelOnArm};
-use crate::procedure::follow::{Parts, Path as DrivenPath};
+use crate::controller::friction::TanhFriction;
+use crate::controller::laws::ContactDetector;
+use crate::explanation::torque_model::{JointColour, ModelFile, ModelOnArm, rows_a_second};
+use crate::procedure::follow::{OBSERVER, Parts, Path as DrivenPath};
 use dyngen::Arm;
 use nalgebra::SVector;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 
+/// External torque is noise up to so many standard deviations.
+const DEVIATIONS: f64 = 6.0;
 /// Random poses at which gains are judged.
 const POSES: usize = 300;
 
 /// A model of the arm on the bus.
-pub(crate) type ModelArm = ModelOnArm<6>;
+pub type ModelArm = ModelOnArm<6>;
 
 /// Reads a model of the arm of a file, with its effects or without.
 ///
 /// # Errors
 /// As [`ModelOnArm::new`]; an arm of another number of joints.
-pub(crate) fn read(arm: &Arm, file: &Path, effects: bool) -> Result<ModelArm, String> {
+pub fn read(arm: &Arm, file: &Path, effects: bool) -> Result<ModelArm, String> {
     let (has, needs) = (arm.dof(), LWA4P.joints.len());
     if has != needs {
         return Err(format!("the arm file has {has} joints, the arm on the bus {needs}"));
@@ -31,7 +35,7 @@ pub(crate) fn read(arm: &Arm, file: &Path, effects: bool) -> Result<ModelArm, St
 ///
 /// # Errors
 /// Where the path takes more torque than a joint has, in words.
-pub(crate) fn parts(on: &ModelArm, path: &DrivenPath<6>, running: f64) -> Result<Parts<6>, String> {
+pub fn parts(on: &ModelArm, path: &DrivenPath<6>, running: f64) -> Result<Parts<6>, String> {
     let planned = on.model.planned(&on.body, path.motion(), running);
     let vectors = |x: &[f64]| x.chunks_exact(6).map(SVector::from_column_slice).collect::<Vec<_>>();
     let parts = Parts {
@@ -51,8 +55,29 @@ pub(crate) fn parts(on: &ModelArm, path: &DrivenPath<6>, running: f64) -> Result
     }
 }
 
+/// What says that something touches the arm, of what a model leaves where it holds.
+///
+/// # Errors
+/// A model whose file does not say that.
+pub fn contact_detector(on: &ModelArm) -> Result<ContactDetector<f64, 6>, String> {
+    let colour = on.model.colour.as_ref().ok_or(
+        "the model does not say what it leaves where it holds (`colour`): take model.json of `powerball explain`",
+    )?;
+    let rate = rows_a_second(colour.rate);
+    let of = |joint: &JointColour| {
+        let [deviation, mean] = joint.low_passed(OBSERVER, rate);
+        DEVIATIONS * deviation + mean
+    };
+    // A joint that is not known is never touched.
+    let noise =
+        SVector::from_fn(|j, _| colour.joints.get(j).and_then(Option::as_ref).map_or(f64::INFINITY, of));
+    let gammas = on.model.gammas();
+    let laws = std::array::from_fn(|j| TanhFriction::new(gammas.get(j).copied().unwrap_or_default()));
+    Ok(ContactDetector::new(laws, noise))
+}
+
 /// Poses within the joints' limits, always the same ones.
-pub(crate) fn poses() -> Vec<SVector<f64, 6>> {
+pub fn poses() -> Vec<SVector<f64, 6>> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let limits = LWA4P.joints.map(|joint| joint.position);
     let pose = |_| SVector::from(limits.map(|[low, high]| rng.random_range(low..high)));

@@ -15,6 +15,20 @@ pub(super) const LICENCE: &str = include_str!("uplot/LICENSE");
 pub(super) const SCRIPTS: [&str; 2] = [include_str!("uplot/uPlot.iife.min.js"), include_str!("figures.js")];
 pub(super) const STYLE: &str = include_str!("uplot/uPlot.min.css");
 
+/// The page of a motion that goes on: it takes server-sent events from `events` beside it; `stream.js` says which.
+#[must_use]
+pub fn stream_page() -> String {
+    format!(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" \
+            content=\"width=device-width\"><title>powerball</title><style>{}{STYLE}</style></head><body><main><h1 \
+            id=\"title\">powerball</h1><p class=\"lead\" id=\"state\">waiting</p><div id=\"events\"></div><div \
+            id=\"charts\"></div></main><!-- {LICENCE} --><script>{}</script><script>{}</script></body></html>\n",
+        super::STYLE,
+        SCRIPTS[0],
+        include_str!("stream.js")
+    )
+}
+
 /// Longer curves keep the lowest and highest value of so many stretches: an hour at 20 Hz.
 const STRETCHES: usize = 75_000;
 /// Values are stored in so many steps of their range; the code below all of them is no number.

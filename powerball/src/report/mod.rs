@@ -40,6 +40,7 @@ pub use crate::explanation::effects::words::number;
 pub use bars::BarPairs;
 pub use figure::{Figure, Ink, JOINTS, Mark, Panel, Series};
 pub use files::Files;
+pub use live::stream_page;
 pub use page::{Page, Table, Tone, sign};
 
 /// The style of pages and figures.

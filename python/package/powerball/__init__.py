@@ -27,6 +27,7 @@ from .identification import (
 )
 from .reading import Recording, inspect, read_log
 from .rule import Rule
+from .simulation import Simulated, simulate
 from .source import export, generate
 from .summary import Summary, summarize
 from .virtual import Session, Truth, virtual_effects, virtual_session
@@ -55,6 +56,7 @@ __all__ = [
     "Rule",
     "Session",
     "SetParameter",
+    "Simulated",
     "Spread",
     "Summary",
     "Trajectory",
@@ -69,6 +71,7 @@ __all__ = [
     "identify",
     "inspect",
     "read_log",
+    "simulate",
     "summarize",
     "verify",
     "virtual_effects",

@@ -190,6 +190,19 @@ def description(path: str) -> str: ...
 def export_imported(
     arm: Arm, values: _Text, friction: Optional[_Text], uncertain: bool
 ) -> Tuple[str, List[str]]: ...
+def simulate(
+    arm: Arm,
+    plant: _Text,
+    model: _Text,
+    controller: str,
+    bandwidth: float,
+    damping: float,
+    period: float,
+    path: Sequence[Any],
+) -> List[_Array]: ...
+def simulate_function(
+    arm: Arm, plant: _Text, controller: Any, period: float, path: Sequence[Any]
+) -> List[_Array]: ...
 def virtual_effects() -> List[str]: ...
 def virtual_session(
     folder: str, seed: int, effect: Optional[str], progress: _Tell

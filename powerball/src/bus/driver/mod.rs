@@ -61,6 +61,7 @@ mod guard;
 #[cfg(feature = "bus")]
 pub mod import;
 mod joint;
+mod listen;
 pub mod lwa4p;
 pub mod profile;
 mod receive;
@@ -78,6 +79,7 @@ pub use cause::{Cause, Details, Refusal, Rejection};
 use core::fmt;
 pub use guard::check_path;
 pub use joint::{BusEvent, Joint, JointCounters, QueueFull, Transmit};
+pub use listen::{Heard, Listener, OtherMapping};
 pub use profile::{JointProfile, Profile};
 pub use receive::Foreign;
 use stop::{ResetStage, StopStage};

@@ -1,6 +1,7 @@
 //! `powerball float`: hand guiding.
 
 use super::model_on_bus::{ModelOnBus, failed};
+use super::serve::{self, Serve};
 use super::{Failure, output};
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::BusUrl;
@@ -49,6 +50,8 @@ pub(crate) struct FloatCommand {
     /// Share of the friction that is taken off, 0 to 0.95.
     #[arg(long, value_name = "SHARE", default_value_t = 0.85)]
     friction: f64,
+    #[command(flatten)]
+    serve: Serve,
 }
 
 impl FloatCommand {
@@ -112,6 +115,8 @@ impl FloatCommand {
         let mut law = HandGuiding::new(laws, softening);
         let terms = model.model.holding_terms();
         let mut memory = vec![Memory::default(); terms.len()];
+        let live = self.serve.open()?;
+        live.start("an arm guided by hand", &[("position", "rad"), ("velocity", "rad/s"), ("torque", "N·m")]);
         let most = seconds.map(|s| (s / LWA4P.period_seconds()) as usize);
         let mut positions = Vec::new();
         arm.run(|measured| {
@@ -121,10 +126,27 @@ impl FloatCommand {
             positions.push(measured.state.q);
             let mut torque = law.torque(&model.numeric, &measured.state);
             hold(model, &terms, &mut memory, &measured.state, &mut torque);
+            let t = positions.len() as f64 * LWA4P.period_seconds();
+            if positions.len() % serve::EVERY == 0 {
+                let q = measured.state.q.as_slice();
+                live.sample(
+                    "",
+                    t,
+                    &[
+                        ("position", q),
+                        ("velocity", measured.state.dq.as_slice()),
+                        ("torque", torque.as_slice()),
+                    ],
+                );
+            }
+            if self.on.place.bus == BusUrl::Virtual {
+                live.wait_until(t);
+            }
             Some(torque)
         })
         .map_err(refused)?;
         arm.finish().map_err(refused)?;
+        live.end("brakes closed");
         Ok(positions)
     }
 }

@@ -1,14 +1,16 @@
 //! `powerball follow`: a trajectory with a torque model.
 
 use super::model_on_bus::{ModelOnBus, failed};
+use super::serve::{self, Live, Serve};
 use super::{Failure, output};
 use crate::bus::driver::lwa4p::LWA4P;
+use crate::bus::transport::BusUrl;
 use crate::commands::model_arm::{self, ModelArm};
-use crate::controller::dynamics::ArmModel;
-use crate::controller::laws::{ComputedTorque, JointImpedance};
+use crate::controller::dynamics::{ArmModel, Reference};
+use crate::controller::laws::{ComputedTorque, ContactDetector, JointImpedance};
 use crate::identification::motion::Motion;
 use crate::procedure::Envelope;
-use crate::procedure::follow::{Followed, Law, Parts, Path, Run, Track};
+use crate::procedure::follow::{Followed, Law, Parts, Path, Run, Sample, Track};
 use crate::report::followed;
 use clap::{Args, ValueEnum};
 use nalgebra::SVector;
@@ -60,9 +62,14 @@ pub(crate) struct FollowCommand {
     /// Damping ratio of the feedback in current mode.
     #[arg(long, value_name = "RATIO", default_value_t = 1.0, allow_negative_numbers = true)]
     damping: f64,
+    /// Stop the arm where its external torque is more than the model's error can be, in current mode: something touches it.
+    #[arg(long)]
+    stop_at_contact: bool,
     /// Time that the arm has been working, s: 3600 counts as warm. For models with a temperature effect.
     #[arg(long, value_name = "SECONDS", default_value_t = 3600.0)]
     running: f64,
+    #[command(flatten)]
+    serve: Serve,
     /// Folder for the results; made if missing.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -73,6 +80,27 @@ struct Entry {
     name: &'static str,
     model: ModelArm,
     parts: Option<Parts<6>>,
+    contact: Option<ContactDetector<f64, 6>>,
+}
+
+/// What the page of --serve shows of a run.
+const FIELDS: [(&str, &str); 6] = [
+    ("error", "mrad"),
+    ("external_torque", "N·m"),
+    ("rigid_arm", "N·m"),
+    ("friction", "N·m"),
+    ("effects", "N·m"),
+    ("feedback", "N·m"),
+];
+
+fn show(live: &Live, run: &str, sample: &Sample<6>, reference: &Reference<f64, 6>) {
+    let error = (sample.q - reference.q) * 1e3;
+    let external = sample.external.unwrap_or_else(SVector::zeros);
+    let [rigid, friction, effects] = &sample.forward;
+    let values = [&error, &external, rigid, friction, effects, &sample.feedback];
+    let mut fields = FIELDS.iter().zip(values).map(|((name, _), values)| (*name, values.as_slice()));
+    let fields: [(&str, &[f64]); 6] = std::array::from_fn(|_| fields.next().unwrap_or_default());
+    live.sample(run, sample.t, &fields);
 }
 
 impl FollowCommand {
@@ -83,6 +111,10 @@ impl FollowCommand {
             .map_err(|e| Failure::Unusable(format!("{name}: cannot be read: {e}")))?;
         let motion = Motion::from_csv(&text, LWA4P.joints.len())
             .map_err(|why| Failure::Unusable(format!("{name}: {why}")))?;
+        if self.stop_at_contact && self.with == With::Feedforward {
+            let what = "--stop-at-contact needs --with torque or impedance: in interpolated position mode the drives' own loops press on";
+            return Err(Failure::Unusable(what.to_string()));
+        }
         let (arm, model, mut envelope) = self.on.read()?;
         let profile = match self.with {
             With::Feedforward => LWA4P.with_torque_offset(),
@@ -93,21 +125,45 @@ impl FollowCommand {
         let pole = self.judge(&law, &model, &path)?;
         let entries = self.entries(&arm, model, &path)?;
         output::make_folder(&self.out)?;
+        let live = self.serve.open()?;
+        let (mut shown, mut seconds) = (0, 0.0);
 
         let mut master = self.on.master(profile, [0.0; 6], None)?;
         let terminal = output::Progress::new();
         let mut tracks: Vec<(&str, Track<6>)> = Vec::new();
-        for Entry { name, model, parts } in &entries {
+        for Entry { name, model, parts, contact } in &entries {
             terminal.say(&format!("following with {name}"));
+            live.start(&format!("{} along a path, {name}", arm.name), &FIELDS);
             let (path, arm) = (&path, &model.numeric);
-            let run = Run { path, arm, parts: parts.as_ref(), law, accept_unverified: self.on.accepts() };
-            let (back, track, kept): (_, _, Envelope<6>) =
-                run.follow(master, envelope).map_err(|e| Failure::Refused(e.to_string()))?;
+            let contact = *contact;
+            let run =
+                Run { path, arm, parts: parts.as_ref(), law, contact, accept_unverified: self.on.accepts() };
+            let (back, track, kept): (_, _, Envelope<6>) = run
+                .follow(master, envelope, |sample, reference| {
+                    shown += 1;
+                    seconds += path.motion().period;
+                    if shown % serve::EVERY == 0 {
+                        show(&live, name, sample, reference);
+                    }
+                    if self.on.place.bus == BusUrl::Virtual {
+                        live.wait_until(seconds);
+                    }
+                })
+                .map_err(|e| Failure::Refused(e.to_string()))?;
             (master, envelope) = (back, kept);
+            let touched = track.contact.is_some();
             tracks.push((name, track));
+            if touched {
+                break;
+            }
         }
         drop(master);
-        self.report(&arm.name, &law, &path, &tracks, pole)
+        let done = self.report(&arm.name, &law, &path, &tracks, pole);
+        live.end(&match &done {
+            Ok(()) => format!("done: {}", self.out.join("report.html").display()),
+            Err(Failure::Refused(what) | Failure::Unusable(what) | Failure::Doubtful(what)) => what.clone(),
+        });
+        done
     }
 
     fn law(&self, model: &ModelArm, start: SVector<f64, 6>) -> Result<Law<6>, Failure> {
@@ -173,12 +229,15 @@ impl FollowCommand {
             if entries.iter().any(|entry: &Entry| entry.name == name) {
                 return Err(Failure::Unusable(format!("--compare: {name} is there twice")));
             }
-            entries.push(Entry { name, model: other, parts: None });
+            entries.push(Entry { name, model: other, parts: None, contact: None });
         }
         // The least first; the explained model is shown in detail, last.
         entries.sort_by_key(|entry| entry.name != "feedback");
-        entries.push(Entry { name: "explained", model, parts: None });
+        entries.push(Entry { name: "explained", model, parts: None, contact: None });
         for entry in entries.iter_mut().filter(|entry| entry.name != "feedback") {
+            if self.stop_at_contact {
+                entry.contact = Some(model_arm::contact_detector(&entry.model).map_err(Failure::Unusable)?);
+            }
             let parts = model_arm::parts(&entry.model, path, self.running);
             entry.parts =
                 Some(parts.map_err(|e| Failure::Refused(format!("by the {} model {e}", entry.name)))?);
@@ -200,8 +259,19 @@ impl FollowCommand {
         files.write(&self.out).map_err(Failure::Unusable)?;
         if self.on.place.json {
             output::print(&files.first());
-            return Ok(());
+        } else {
+            Self::in_words(&result, tracks);
         }
+        match result.contact.iter().next() {
+            None => Ok(()),
+            Some((name, contact)) => Err(Failure::Refused(format!(
+                "stopped at {:.2} s with the {name} model: something touches the arm at link {} or beyond, {:.1} N·m at joint {}",
+                contact.t, contact.link, contact.torque, contact.joint
+            ))),
+        }
+    }
+
+    fn in_words(result: &Followed, tracks: &[(&str, Track<6>)]) {
         for joint in 0..6 {
             let of = |(name, _): &(&str, _)| {
                 format!("{name} {:.3}", 1e3 * result.tracking_error.get(*name).map_or(f64::NAN, |e| e[joint]))
@@ -209,6 +279,5 @@ impl FollowCommand {
             let errors: Vec<String> = tracks.iter().map(of).collect();
             output::print(&format!("joint {}: off by {} mrad rms", joint + 1, errors.join(", ")));
         }
-        Ok(())
     }
 }

@@ -97,10 +97,17 @@ pub(super) fn drive(
             SessionError::Arm(Diagnostics::whole_file("lwa4p.toml", "six joints are needed"))
         })?;
         let driver = Driver::new(LWA4P).map_err(SessionError::Driver)?;
-        let run = Run { path: &path, arm: &model.numeric, parts: Some(parts), law, accept_unverified: true };
+        let run = Run {
+            path: &path,
+            arm: &model.numeric,
+            parts: Some(parts),
+            law,
+            contact: None,
+            accept_unverified: true,
+        };
         let on_bus = Master::new(driver, Memory::new(plant, LWA4P.bitrate));
         let (_, track, _) = run
-            .follow(on_bus, Envelope::new(|_| None))
+            .follow(on_bus, Envelope::new(|_| None), |_, _| ())
             .map_err(|e| DemoError::Drive(format!("with the {name} model {e}")))?;
         tracks.push((name, track));
     }

@@ -122,9 +122,10 @@ pub fn run(
     let base = driven::base_model(&arm, &identify(&arm, &logs, [], &IdentifyOptions::default())?)?;
     let base = save(folder, "base.json", &base)?;
     let options = ExplainOptions { progress, ..ExplainOptions::default() };
-    let Prepared { body, logs, validate, .. } = Prepared::new(&arm, &logs, &held_out, &options)?;
-    let mut explained = explain_body(&body, &logs, &validate, &options)?;
-    if let Some(motion) = experiment::propose(&body, &mut explained, &options) {
+    let prepared = Prepared::new(&arm, &logs, &held_out, &options)?;
+    let Prepared { body, logs, validate, .. } = &prepared;
+    let mut explained = explain_body(body, logs, validate, &options)?;
+    if let Some(motion) = experiment::propose(body, &mut explained, &options) {
         let next_file = folder.join(TRAJECTORY);
         write(&next_file, &motion.to_csv())?;
         if with_experiment {
@@ -134,12 +135,13 @@ pub fn run(
             let Some(new) = new.pop() else {
                 return Err(DemoError::Read("experiment.csv is missing".into()));
             };
-            explained = experiment::learn(&body, (&logs, &validate), new, &explained, &options)?;
-            if let Some(next) = experiment::propose(&body, &mut explained, &options) {
+            explained = experiment::learn(body, (logs, validate), new, &explained, &options)?;
+            if let Some(next) = experiment::propose(body, &mut explained, &options) {
                 write(&next_file, &next.to_csv())?;
             }
         }
     }
+    let explained = prepared.with_known(explained);
     let model = save(folder, "model.json", &explained.model)?;
     let verdict = Verdict::new(&session.effect, &explained);
     progress.say("moving the arm with both models");

@@ -4,7 +4,7 @@
 
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::driver::{Driver, Refusal};
-use crate::bus::transport::{Master, Memory};
+use crate::bus::transport::{ArmError, Master, Memory};
 use crate::identification::excite::{self, Settings};
 use crate::identification::motion::Motion;
 use crate::procedure::{Columns, Envelope, LogTime, RecordError, Recorder, way};
@@ -39,6 +39,8 @@ const PAUSE: f64 = 3.0;
 const SHARE: f64 = 0.5;
 /// Paths tried for each log: enough for a condition number near the best, in a fraction of a second.
 const EVALUATIONS: usize = 300;
+/// Paths are drawn so often where the arm is stopped on them.
+const ATTEMPTS: u64 = 6;
 
 /// What was recorded.
 #[derive(Clone, Debug)]
@@ -120,6 +122,22 @@ impl Session {
     /// # Errors
     /// A name that no effect has, a file that cannot be written.
     pub fn record(folder: &Path, seed: u64, named: &[&str]) -> Result<Session, SessionError> {
+        let mut attempt = 0;
+        loop {
+            match Self::record_along(folder, seed, attempt, named) {
+                // What the model lacks may be too much for a joint on these paths; others need less.
+                Err(SessionError::Record(RecordError::Arm(ArmError::Stopped(..))))
+                    if attempt + 1 < ATTEMPTS =>
+                {
+                    attempt += 1;
+                }
+                done => return done,
+            }
+        }
+    }
+
+    /// The same along the paths of one attempt.
+    fn record_along(folder: &Path, seed: u64, attempt: u64, named: &[&str]) -> Result<Session, SessionError> {
         let arm_file = folder.join("arm.toml");
         save(&arm_file, lwa4p::ARM_FILE)?;
         let model = Model::derive(lwa4p::arm()?).map_err(excite::Error::Model)?;
@@ -130,7 +148,7 @@ impl Session {
                 harmonics: 5,
                 fundamental: TAU / period,
                 evaluations: EVALUATIONS,
-                seed: seed.wrapping_mul(PATHS.len() as u64).wrapping_add(k as u64),
+                seed: seed.wrapping_mul(PATHS.len() as u64).wrapping_add(k as u64 + (attempt << 48)),
                 ..Settings::default()
             };
             found.push(excite::optimise(&model, SetKind::Minimal, &settings)?);

@@ -6,6 +6,7 @@
 
 mod cartesian;
 mod computed_torque;
+mod contact;
 mod hand_guiding;
 mod impedance;
 mod limits;
@@ -16,6 +17,7 @@ mod test_arm;
 
 pub use cartesian::{CartesianImpedance, Goal};
 pub use computed_torque::{ComputedTorque, Integrator};
+pub use contact::{Contact, ContactDetector};
 pub use hand_guiding::{HandGuiding, Softening};
 pub use impedance::JointImpedance;
 pub use limits::Limiter;

@@ -24,6 +24,8 @@ const FEWEST: usize = 200;
 const CALM: f64 = 0.5;
 /// A joint whose model errs by more standard deviations than this cannot be watched.
 const MOST_MARGIN: f64 = 1.5;
+/// Rows in which a colour's impulse response is over.
+const IMPULSE: usize = 2000;
 /// Steps of the search for the margin.
 const STEPS: usize = 12;
 
@@ -48,6 +50,23 @@ pub struct JointColour {
 }
 
 impl JointColour {
+    /// Standard deviation of what the model leaves behind a low pass of `bandwidth` rad/s, and its mean at most, N·m; `rate` is
+    /// that of the rows, 1/s. Sums of the impulse response of both filters.
+    #[must_use]
+    pub fn low_passed(&self, bandwidth: f64, rate: f64) -> [f64; 2] {
+        let keep = (-bandwidth / rate).exp();
+        let (mut past, mut low, mut squares, mut sum) = ([0.0; ORDER], 0.0, 0.0, 0.0);
+        for k in 0..IMPULSE {
+            let input = if k == 0 { 1.0 } else { 0.0 };
+            let now = input + self.coefficients.iter().zip(&past).map(|(a, r)| a * r).sum::<f64>();
+            past.copy_within(..ORDER - 1, 1);
+            past[0] = now;
+            low = keep * low + (1.0 - keep) * now;
+            (squares, sum) = (squares + low * low, sum + low);
+        }
+        [self.deviation * f64::sqrt(squares), self.deviation * self.margin * f64::abs(sum)]
+    }
+
     /// As the test of a controller takes it.
     #[must_use]
     pub fn for_test(&self) -> change::Colour<f64> {

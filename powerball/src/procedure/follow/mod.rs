@@ -8,11 +8,13 @@ use super::torque_loop::TorqueLoop;
 use super::{Envelope, RecordError, Recorder};
 use crate::bus::transport::{Bus, Master};
 use crate::controller::dynamics::{ArmModel, Reference, State};
-use crate::controller::laws::{ComputedTorque, JointImpedance, MomentumObserver, largest_pole};
+use crate::controller::laws::{
+    ComputedTorque, ContactDetector, JointImpedance, MomentumObserver, largest_pole,
+};
 use nalgebra::{SMatrix, SVector};
 pub use path::{Parts, Path};
 use path::{REST, between};
-pub use track::{Followed, Sample, TorqueParts, Track, TrackingError, common_delay};
+pub use track::{Followed, Sample, TorqueParts, Touched, Track, TrackingError, common_delay};
 
 /// Share of the joints' velocities and accelerations on the way to where a path begins.
 const APPROACH: f64 = 0.25;
@@ -22,7 +24,7 @@ const AHEAD: f64 = 1.5;
 /// spline is two periods late, and a set-point waits for its SYNC. How late the LWA 4P's drives are is not known.
 const LATE: f64 = 1.5;
 /// Momentum observer, rad/s.
-const OBSERVER: f64 = 30.0;
+pub const OBSERVER: f64 = 30.0;
 
 /// How a path is followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,9 +109,14 @@ pub struct Run<'a, M, const N: usize> {
     pub parts: Option<&'a Parts<N>>,
     /// How it is followed.
     pub law: Law<N>,
+    /// Stops the arm where something touches it, in current mode.
+    pub contact: Option<ContactDetector<f64, N>>,
     /// The caller's word that a mode which was never seen on the arm itself may be tried.
     pub accept_unverified: bool,
 }
+
+/// Who gets every sample.
+type Each<'a, const N: usize> = dyn FnMut(&Sample<N>, &Reference<f64, N>) + 'a;
 
 /// Gravity and Coriolis forces left out: what feedback alone knows of an arm.
 struct InertiaAlone<'a, M>(&'a M);
@@ -130,7 +137,8 @@ impl<M: ArmModel<f64, N>, const N: usize> ArmModel<f64, N> for InertiaAlone<'_, 
 }
 
 impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
-    /// Goes to where the path begins, follows it, and stops the arm: brakes closed.
+    /// Goes to where the path begins, follows it, and stops the arm: brakes closed. `each` gets every sample of the path and
+    /// where the arm shall be then.
     ///
     /// # Errors
     /// Where driver, arm or bus refuse, or the arm is stopped.
@@ -138,6 +146,7 @@ impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
         &self,
         master: Master<B, N>,
         envelope: Envelope<N>,
+        mut each: impl FnMut(&Sample<N>, &Reference<f64, N>),
     ) -> Result<(Master<B, N>, Track<N>, Envelope<N>), RecordError> {
         let mut recorder = Recorder::bring_up(master, envelope)?;
         let start: [f64; N] = self.path.start().into();
@@ -145,17 +154,21 @@ impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
         recorder.release()?;
         recorder.go(&start, APPROACH, 1.0)?;
         if self.law == Law::Feedforward {
-            let track = self.with_offsets(&mut recorder)?;
+            let track = self.with_offsets(&mut recorder, &mut each)?;
             let (master, envelope) = recorder.finish_with_envelope()?;
             return Ok((master, track, envelope));
         }
         let (master, envelope) = recorder.finish_with_envelope()?;
         let mut arm = TorqueLoop::bring_up(master, self.accept_unverified)?;
-        let track = self.by_torque(&mut arm)?;
+        let track = self.by_torque(&mut arm, &mut each)?;
         Ok((arm.finish()?, track, envelope))
     }
 
-    fn with_offsets<B: Bus>(&self, recorder: &mut Recorder<B, N>) -> Result<Track<N>, RecordError> {
+    fn with_offsets<B: Bus>(
+        &self,
+        recorder: &mut Recorder<B, N>,
+        each: &mut Each<'_, N>,
+    ) -> Result<Track<N>, RecordError> {
         let motion = self.path.motion();
         let last = motion.len().saturating_sub(1);
         let forward = |k: usize| -> [SVector<f64, N>; 3] {
@@ -180,16 +193,22 @@ impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
             let forward = forward(k);
             let feedback = torque - forward.iter().sum::<SVector<f64, N>>();
             let t = (k - REST) as f64 * motion.period;
-            samples.push(Sample { t, q, forward, feedback, external: None });
+            let sample = Sample { t, q, forward, feedback, external: None };
+            each(&sample, &self.path.at(k as f64));
+            samples.push(sample);
             Ok(())
         })?;
-        Ok(Track { samples })
+        Ok(Track { samples, contact: None })
     }
 
-    fn by_torque<B: Bus>(&self, arm: &mut TorqueLoop<B, N>) -> Result<Track<N>, RecordError> {
+    fn by_torque<B: Bus>(
+        &self,
+        arm: &mut TorqueLoop<B, N>,
+        each: &mut Each<'_, N>,
+    ) -> Result<Track<N>, RecordError> {
         let (path, period) = (self.path, self.path.motion().period);
         let mut observer = MomentumObserver::new(OBSERVER);
-        let mut samples = Vec::new();
+        let (mut samples, mut detector, mut contact) = (Vec::new(), self.contact, None);
         arm.run(|measured| {
             let k = usize::try_from(measured.cycle).unwrap_or(usize::MAX);
             if k >= path.reference.len() {
@@ -214,14 +233,30 @@ impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
             };
             let losses = self.parts.map_or_else(SVector::zeros, |parts| parts.losses(k as f64 - 0.5));
             let external = observer.advance(self.arm, &measured.state, &(measured.acted - losses), period);
+            if let (Some(detector), Some(parts)) = (&mut detector, self.parts) {
+                let rigid = between(&parts.rigid, k as f64);
+                if let Some(found) = detector.update(&external, &measured.state.dq, &rigid) {
+                    let t = (k as f64 - REST as f64) * period;
+                    contact = Some(Touched {
+                        t,
+                        joint: found.joint + 1,
+                        torque: found.torque,
+                        link: found.link + 1,
+                    });
+                    // No torque more: the driver stops the arm.
+                    return None;
+                }
+            }
             if path.is_within(k) {
                 let feedback = torque - forward.iter().sum::<SVector<f64, N>>();
                 let t = (k - REST) as f64 * period;
-                samples.push(Sample { t, q: measured.state.q, forward, feedback, external: Some(external) });
+                let sample = Sample { t, q: measured.state.q, forward, feedback, external: Some(external) };
+                each(&sample, &now);
+                samples.push(sample);
             }
             Some(torque)
         })?;
-        Ok(Track { samples })
+        Ok(Track { samples, contact })
     }
 
     fn law_torque(

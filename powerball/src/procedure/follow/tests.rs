@@ -68,8 +68,15 @@ fn a_known_effect_halves_the_error_and_the_observer_sees_an_unknown_one() {
     let (arm, path) = (numeric(), path(1.0));
     let law = Law::Torque(ComputedTorque::for_period(0.005));
     let drive = |parts: Option<Parts<6>>| {
-        let run = Run { path: &path, arm: &arm, parts: parts.as_ref(), law, accept_unverified: true };
-        let (master, track, _) = run.follow(master(LWA4P), Envelope::new(|_| None)).unwrap();
+        let run = Run {
+            path: &path,
+            arm: &arm,
+            parts: parts.as_ref(),
+            law,
+            contact: None,
+            accept_unverified: true,
+        };
+        let (master, track, _) = run.follow(master(LWA4P), Envelope::new(|_| None), |_, _| ()).unwrap();
         rests(&master);
         assert_eq!(track.samples.len(), 601);
         track
@@ -94,9 +101,16 @@ fn torque_offsets_take_the_work_off_the_drives_own_feedback() {
     let (arm, path) = (numeric(), path(1.0));
     let drive = |parts: Option<Parts<6>>| {
         let law = Law::Feedforward;
-        let run = Run { path: &path, arm: &arm, parts: parts.as_ref(), law, accept_unverified: false };
+        let run = Run {
+            path: &path,
+            arm: &arm,
+            parts: parts.as_ref(),
+            law,
+            contact: None,
+            accept_unverified: false,
+        };
         let profile = LWA4P.with_torque_offset();
-        let (master, track, _) = run.follow(master(profile), Envelope::new(|_| None)).unwrap();
+        let (master, track, _) = run.follow(master(profile), Envelope::new(|_| None), |_, _| ()).unwrap();
         rests(&master);
         track
     };

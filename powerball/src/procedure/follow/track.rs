@@ -26,6 +26,21 @@ pub struct Sample<const N: usize> {
 pub struct Track<const N: usize> {
     /// Cycles of the path itself.
     pub samples: Vec<Sample<N>>,
+    /// What touched the arm, which was stopped then.
+    pub contact: Option<Touched>,
+}
+
+/// A contact at which the arm was stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Touched {
+    /// Since the path began, s.
+    pub t: f64,
+    /// The joint, from 1, on which it shows most, and its external torque, N·m.
+    pub joint: usize,
+    /// N·m.
+    pub torque: f64,
+    /// It is on this link, from 1, or beyond it.
+    pub link: usize,
 }
 
 /// By how much a track is off its path.
@@ -91,6 +106,9 @@ pub struct Followed {
     pub largest_pole: Option<f64>,
     /// Cycles of the path in each run.
     pub cycles: usize,
+    /// Runs that were stopped because something touched the arm.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub contact: BTreeMap<String, Touched>,
 }
 
 impl Followed {
@@ -116,6 +134,7 @@ impl Followed {
             followed.tracking_error.insert((*name).to_string(), error.rms);
             followed.largest_error.insert((*name).to_string(), error.max);
             followed.torque.insert((*name).to_string(), track.torques());
+            followed.contact.extend(track.contact.map(|contact| ((*name).to_string(), contact)));
         }
         followed
     }
