@@ -3,8 +3,10 @@
 #![no_std]
 
 pub mod bus;
+pub mod cycle;
 #[cfg(target_os = "none")]
 pub mod measure;
+pub mod watch;
 
 /// The LWA 4P without rotors, 19 parameters.
 #[allow(dead_code)]

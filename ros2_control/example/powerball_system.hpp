@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "hardware_interface/system_interface.hpp"
+#include "hardware_interface/types/hardware_interface_type_values.hpp"
 #include "powerball.h"
 
 namespace powerball

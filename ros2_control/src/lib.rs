@@ -1,9 +1,11 @@
 //! The driver behind a C ABI, for a hardware interface of ros2_control: `include/powerball.h` says what each function
-//! does, `docs/ros2_control.md` how it is used. [`Arm`] is the same in Rust.
+//! does, `docs/ros2_control.md` how it is used. [`Arm`] is the same in Rust. [`control`] has control laws for a controller
+//! of any arm.
 //!
 //! Everything here is unsafe in the one way that C is: a pointer is what its caller says it is.
 
 mod arm;
+pub mod control;
 
 pub use arm::{Arm, JOINTS, State};
 

@@ -3,7 +3,10 @@
 
 use core::fmt::Write;
 use core::hint::black_box;
+use powerball::controller::dynamics::{Reference, State};
 use powerball::controller::online::SquareRoot;
+use powerball_firmware::cycle::{self, Controller, Joints};
+use powerball_firmware::f32 as single;
 use powerball_firmware::{arm, bus};
 
 /// FNV-1a over the bits of numbers.
@@ -64,8 +67,34 @@ macro_rules! bits {
     }};
 }
 
+/// Cycles of a controller along a motion. From the middle on joint 2 needs 3 N·m more than its model says: in which
+/// cycle the test says so first stands beside the bits.
+fn bits_of_cycles(out: &mut impl Write) {
+    let values = single::prepared(&single::PARAMETERS.into());
+    let mut controller = Controller::default();
+    let (mut hash, mut first) = (Hash::NEW, None);
+    for k in 0..2000u16 {
+        let rates = Joints::from_fn(|j, _| 1.0 + 0.1 * j as f32);
+        let trig = single::trig(&(rates * (f32::from(k) * 0.005)));
+        let wave = |waves: &[f32]| Joints::from_fn(|j, _| 0.3 * waves[j]);
+        let (q, dq) = (wave(&trig.sin), wave(&trig.cos).component_mul(&rates));
+        let reference = Reference { q, dq, ddq: -q.component_mul(&rates).component_mul(&rates) };
+        let output = cycle::control(&mut controller, &State { q: q * 0.99, dq }, &reference, &values);
+        let mut measured = output.model;
+        measured[1] += if k < 1000 { 0.0 } else { 3.0 };
+        if cycle::watch(&mut controller.watch, &output, &measured) {
+            first = first.or(Some(k));
+        }
+        for x in output.torque.iter().chain(&output.external) {
+            hash.add(&x.to_bits().to_le_bytes());
+        }
+    }
+    let _ = writeln!(out, "bits f32 cycles {:016x}, alarm in {first:?}", hash.0);
+}
+
 fn bits(out: &mut impl Write) {
     bits!(out, f32);
+    bits_of_cycles(out);
     bits!(out, f64);
     let mut hash = Hash::NEW;
     if let Ok(mut driver) = bus::driver() {
@@ -140,6 +169,55 @@ macro_rules! costs {
     }};
 }
 
+/// A controller's cycle: without the test whether the model holds; all turns of a row of that test; the dearest cycle
+/// with its turn.
+#[cfg(target_os = "none")]
+fn costs_of_cycle(out: &mut impl Write, counter: &mut powerball_firmware::measure::Counter) {
+    use powerball_firmware::measure::stack;
+    use powerball_firmware::watch::TURNS;
+    let values = single::prepared(&single::PARAMETERS.into());
+    let [q, dq, ddq] = single::STATES[0].map(Joints::from);
+    let (state, reference) = (State { q: q * 0.99, dq: dq * 0.98 }, Reference { q, dq, ddq });
+    let mut controller = Controller::default();
+    let output = cycle::control(&mut controller, &state, &reference, &values);
+    let measured = output.model * 1.01;
+
+    let mut control = || {
+        black_box(cycle::control(
+            black_box(&mut controller),
+            black_box(&state),
+            black_box(&reference),
+            &values,
+        ));
+    };
+    let _ =
+        writeln!(out, "cost cycle control {} {}", stack(&mut control), counter.instructions(&mut control));
+    let mut row = || {
+        for _ in 0..TURNS {
+            black_box(cycle::watch(
+                black_box(&mut controller.watch),
+                black_box(&output),
+                black_box(&measured),
+            ));
+        }
+    };
+    let _ = writeln!(out, "cost cycle row {} {}", stack(&mut row), counter.instructions(&mut row));
+    let dearest = (0..TURNS).fold([0; 2], |[deep, many], turn| {
+        let mut step = || {
+            controller.watch.next = turn;
+            black_box(cycle::step(
+                black_box(&mut controller),
+                black_box(&state),
+                black_box(&reference),
+                black_box(&measured),
+                &values,
+            ));
+        };
+        [deep.max(stack(&mut step) as u32), many.max(counter.instructions(&mut step))]
+    });
+    let _ = writeln!(out, "cost cycle step {} {}", dearest[0], dearest[1]);
+}
+
 #[cfg(target_os = "none")]
 mod target {
     use super::*;
@@ -163,6 +241,7 @@ mod target {
             bits(&mut out);
             let mut counter = powerball_firmware::measure::Counter::new(peripherals.SYST);
             costs!(out, counter, f32);
+            costs_of_cycle(&mut out, &mut counter);
             costs!(out, counter, f64);
             let mut driver = bus::driver();
             if let Ok(driver) = &mut driver {

@@ -74,6 +74,18 @@ struct Bet<T> {
     since: u64,
 }
 
+impl<T: RealField + Copy> Bet<T> {
+    /// Sample `number` multiplies the capital by `factor`.
+    fn grow(&mut self, factor: T, number: u64) {
+        if self.largest <= T::one() {
+            (self.largest, self.since) = (T::one(), number);
+        }
+        let rich = nalgebra::convert(RICH);
+        self.capital = ((self.capital + T::one()) * factor).clamp(T::zero(), rich);
+        self.largest = (self.largest * factor).clamp(T::zero(), rich);
+    }
+}
+
 /// The test of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointTest<T> {
@@ -142,19 +154,22 @@ impl<T: RealField + Copy> JointTest<T> {
         let of = |x: f64| nalgebra::convert::<f64, T>(x);
         let margin = self.colour.margin.max(of(LEAST_MARGIN)) + self.range * columns[0].abs();
         let most = of(MOST) / (of(LOSS) + margin);
-        let constant = CONSTANT.iter().map(|share| of(*share));
-        let shares = columns.iter().flat_map(|c| SHARES.iter().map(move |share| *c * of(*share)));
-        let stakes = constant.chain(shares).flat_map(|stake| [stake, -stake]);
-        for (bet, stake) in self.bets.iter_mut().zip(stakes) {
-            let for_it = if stake < T::zero() { -innovation } else { innovation };
-            let won = for_it.clamp(-of(LOSS), of(GAIN)) - margin;
-            if bet.largest <= T::one() {
-                (bet.largest, bet.since) = (T::one(), number);
+        // What all bets share is computed once, and constants are converted while this is compiled: a microcontroller
+        // would convert each double anew.
+        let cut = |for_it: T| for_it.clamp(-of(LOSS), of(GAIN)) - margin;
+        let won = [cut(innovation), cut(-innovation)];
+        let (constant, shares) = (CONSTANT.map(of), SHARES.map(of));
+        let of_columns = columns.iter().flat_map(|c| shares.map(|share| *c * share));
+        let mut pairs = self.bets.chunks_exact_mut(2);
+        constant.into_iter().chain(of_columns).for_each(|stake| {
+            // The first of two bets goes with the stake's sign, the other against it.
+            let won = if stake < T::zero() { [won[1], won[0]] } else { won };
+            let share = stake.abs();
+            let share = if share < most { share } else { most };
+            for (bet, won) in pairs.next().into_iter().flatten().zip(won) {
+                bet.grow(T::one() + share * won, number);
             }
-            let factor = T::one() + stake.abs().min(most) * won;
-            bet.capital = ((bet.capital + T::one()) * factor).clamp(T::zero(), of(RICH));
-            bet.largest = (bet.largest * factor).clamp(T::zero(), of(RICH));
-        }
+        });
     }
 
     /// The sum of all capitals.

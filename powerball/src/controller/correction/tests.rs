@@ -105,6 +105,25 @@ fn single_precision_agrees() {
     }
 }
 
+/// The waves of single precision, which are summed here: against the doubles of the standard library.
+#[test]
+fn sine_and_cosine_in_single_precision_are_within_a_bit() {
+    let value = |law: Law<f32>, q: f32| {
+        let now =
+            Instant { q: &[q], dq: &[], ddq: &[], rigid: &[], friction: &[], temperature: &[], running: 0.0 };
+        f64::from(law.value(0, &now, &mut Memory::default()))
+    };
+    for k in -80_000..=80_000 {
+        let q = 0.009_999f32 * k as f32;
+        let x = f64::from(q);
+        let errors =
+            [value(Law::Sine { order: 1.0 }, q) - x.sin(), value(Law::Cosine { order: 1.0 }, q) - x.cos()];
+        assert!(errors.iter().all(|e| e.abs() < 1.2e-7), "{q}: {errors:?}");
+    }
+    assert_eq!([value(Law::Sine { order: 1.0 }, 0.0), value(Law::Cosine { order: 1.0 }, 0.0)], [0.0, 1.0]);
+    assert!(value(Law::Sine { order: 1.0 }, f32::INFINITY).is_nan());
+}
+
 /// What a slice does not hold is zero and no panic, whatever joint a term names.
 #[test]
 fn a_joint_that_is_not_there_does_nothing() {

@@ -2,41 +2,15 @@
 // installed. In a ROS 2 workspace the real header is found instead.
 #pragma once
 
+#include "hardware_interface/handle.hpp"
+#include "rclcpp/rclcpp.hpp"
+
 #include <string>
 #include <unordered_map>
-#include <utility>
 #include <vector>
-
-namespace rclcpp
-{
-class Time
-{
-};
-class Duration
-{
-};
-}  // namespace rclcpp
-
-namespace rclcpp_lifecycle
-{
-class State
-{
-};
-namespace node_interfaces
-{
-struct LifecycleNodeInterface
-{
-  enum class CallbackReturn { SUCCESS, FAILURE, ERROR };
-};
-}  // namespace node_interfaces
-}  // namespace rclcpp_lifecycle
 
 namespace hardware_interface
 {
-constexpr char HW_IF_POSITION[] = "position";
-constexpr char HW_IF_VELOCITY[] = "velocity";
-constexpr char HW_IF_EFFORT[] = "effort";
-
 enum class return_type { OK, ERROR };
 using CallbackReturn = rclcpp_lifecycle::node_interfaces::LifecycleNodeInterface::CallbackReturn;
 
@@ -51,24 +25,6 @@ struct HardwareInfo
   std::unordered_map<std::string, std::string> hardware_parameters;
   std::vector<ComponentInfo> joints;
 };
-
-class Handle
-{
-public:
-  Handle(std::string joint, std::string interface, double * value)
-  : joint_(std::move(joint)), interface_(std::move(interface)), value_(value)
-  {
-  }
-  std::string get_name() const { return joint_ + "/" + interface_; }
-  double get_value() const { return *value_; }
-  void set_value(double value) { *value_ = value; }
-
-private:
-  std::string joint_, interface_;
-  double * value_;
-};
-using StateInterface = Handle;
-using CommandInterface = Handle;
 
 class SystemInterface
 {
