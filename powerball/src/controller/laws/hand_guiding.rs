@@ -43,7 +43,8 @@ impl<T: RealField + Copy> Softening<T> {
 /// With κ·f below the true friction f_t in both directions the joint stays dissipative: q̇·(κ·w·f − f_t) ≤ 0. The hold is an
 /// elastic slider (Prandtl): a spring hold/give whose end slips at `hold`, which stores no more than hold·give/2 and takes
 /// energy whenever it slips. So the arm is passive towards the hand; what it needs is about (1 − κ)·f + hold. Sampled and
-/// late, κ·∂f/∂q̇ acts against the same slope of the true friction: steady for κ < 1, tested at 200 Hz.
+/// late, κ·∂f/∂q̇ acts against the same slope of the true friction: steady for κ < 1 as long as the slope times the cycle is less
+/// than the joint's inertia (tested at 200 Hz). A lighter joint with steep friction creeps: run it faster, or take a smaller share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandGuiding<T, const N: usize> {
     /// Eq. 16 by joint.
