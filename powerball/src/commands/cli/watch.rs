@@ -4,10 +4,9 @@ use super::Failure;
 use super::inputs::{Known, MapArgument};
 use super::output;
 use crate::explanation::torque_model::TorqueModel;
-use crate::explanation::watch::{Event, Watch, WatchOptions};
-use crate::logs::log::{ColumnMap, LiveRows, LiveSample, Log, read_logs_as};
+use crate::explanation::watch::{Event, FIRST, Watch, WatchOptions};
+use crate::logs::log::{ColumnMap, LiveRows, Log, read_logs_as};
 use crate::logs::regression::RigidArm;
-use crate::logs::signal::resample::median_step;
 use clap::Args;
 use dyngen::Arm;
 use std::io::BufRead;
@@ -73,9 +72,6 @@ fn share(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "give a share from 0 to 1, 0.05 for 5 %".to_string())
 }
 
-/// Samples of a stream before its rate is known.
-const FIRST: usize = 40;
-
 impl WatchCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         if let Some(bus) = &self.bus {
@@ -131,18 +127,13 @@ impl WatchCommand {
     }
 
     fn watch_log(&self, log: &Log, body: &RigidArm, model: &TorqueModel, options: &WatchOptions) {
-        let Some(step) = median_step(&log.t) else { return };
-        let mut watch = Watch::new(body, model, options, &log.file, 1.0 / step);
-        for piece in &log.pieces {
-            for k in piece.clone() {
-                let of = |x: &Vec<Vec<f64>>| x.iter().map(|x| x[k]).collect();
-                let sample = LiveSample { t: log.t[k], q: of(&log.q), torque: of(&log.torque) };
-                let events = watch.push(&sample);
-                self.say(&mut watch, &events);
-            }
-            let events = watch.finish();
+        let mut watch = Watch::new(body, model, options, &log.file);
+        for sample in log.samples() {
+            let events = watch.push(&sample);
             self.say(&mut watch, &events);
         }
+        let events = watch.finish();
+        self.say(&mut watch, &events);
     }
 
     fn watch_stream(
@@ -152,17 +143,7 @@ impl WatchCommand {
         (body, model, options): (&RigidArm, &TorqueModel, &WatchOptions),
     ) -> Result<(), Failure> {
         const NAME: &str = "standard input";
-        let (mut rows, mut first, mut watch) = (None, Vec::new(), None::<Watch<'_>>);
-        let begin = |first: &mut Vec<LiveSample>| -> Option<Watch<'_>> {
-            let t: Vec<f64> = first.iter().map(|s| s.t).collect();
-            let step = median_step(&t).filter(|_| t.len() >= FIRST)?;
-            let mut watch = Watch::new(body, model, options, NAME, 1.0 / step);
-            for sample in first.drain(..) {
-                let events = watch.push(&sample);
-                self.say(&mut watch, &events);
-            }
-            Some(watch)
-        };
+        let (mut rows, mut watch, mut usable) = (None, Watch::new(body, model, options, NAME), 0);
         let mut format = None;
         for (number, line) in std::io::stdin().lock().lines().enumerate() {
             let line = line.map_err(|e| Failure::Unusable(format!("{NAME}: line {}: {e}", number + 1)))?;
@@ -181,25 +162,18 @@ impl WatchCommand {
             let values = format.values(&line);
             let sample = rows.as_mut().and_then(|rows| rows.sample(|k| values.get(k).copied().flatten()));
             let Some(sample) = sample else { continue };
-            if let Some(watch) = &mut watch {
-                let events = watch.push(&sample);
-                self.say(watch, &events);
-            } else {
-                first.push(sample);
-                watch = begin(&mut first);
-            }
+            usable += 1;
+            let events = watch.push(&sample);
+            self.say(&mut watch, &events);
         }
-        match &mut watch {
-            Some(watch) => {
-                let events = watch.finish();
-                self.say(watch, &events);
-                Ok(())
-            }
-            None => Err(Failure::Unusable(format!(
-                "{NAME}: {} usable samples are too few: at least {FIRST} are needed",
-                first.len()
-            ))),
+        if !watch.has_begun() {
+            return Err(Failure::Unusable(format!(
+                "{NAME}: {usable} usable samples are too few: at least {FIRST} are needed"
+            )));
         }
+        let events = watch.finish();
+        self.say(&mut watch, &events);
+        Ok(())
     }
 
     /// Events on standard output, notes on standard error.

@@ -6,10 +6,12 @@
 
 mod c_api;
 mod colour;
+mod detector;
 mod file;
 mod known;
 mod planned;
 mod ros;
+mod rows;
 mod source;
 #[cfg(test)]
 mod tests;
@@ -21,11 +23,13 @@ use crate::explanation::effects::{PASSES, SOFT, Window, each_instant, move_link,
 use crate::identification::estimate::{JointFriction, ParameterEstimate, in_set_of};
 use crate::logs::parallel;
 use crate::logs::regression::{Data, Recording, RigidArm, Signals};
-pub use colour::{BAND, Colour, JointColour, Rows, rows_a_second};
+pub use colour::{Colour, JointColour};
+pub use detector::Detector;
 use dyngen::arm::ParameterKind;
 pub use file::FileError;
 pub use known::{ModelFile, Unchanged};
 pub use planned::PlannedTorque;
+pub use rows::{BAND, Rows, Shown, rows_a_second};
 use serde::{Deserialize, Serialize};
 pub use source::{ForC, Scalar, SourceError};
 
