@@ -2,12 +2,15 @@
 
 use super::Failure;
 use super::inputs::{Known, MapArgument};
+use super::listen::listen;
 use super::output;
+use super::serve::{self, Live, Serve};
+use crate::bus::driver::lwa4p::LWA4P;
+use crate::bus::transport::BusUrl;
 use crate::explanation::torque_model::TorqueModel;
-use crate::explanation::watch::{Event, Watch, WatchOptions};
-use crate::logs::log::{ColumnMap, LiveRows, LiveSample, Log, read_logs_as};
+use crate::explanation::watch::{Event, FIRST, Watch, WatchOptions};
+use crate::logs::log::{ColumnMap, LiveRows, Log, read_logs_as};
 use crate::logs::regression::RigidArm;
-use crate::logs::signal::resample::median_step;
 use clap::Args;
 use dyngen::Arm;
 use std::io::BufRead;
@@ -37,9 +40,15 @@ pub(crate) struct WatchCommand {
     /// Logs, each watched by itself (CSV, Parquet, MCAP, rosbag2, npz or mat).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     log: Vec<PathBuf>,
-    /// A bus on which others move the arm.
+    /// A bus on which another master moves the LWA 4P: socketcan:can0, slcan:/dev/ttyACM0 or udp:239.74.163.2:43113.
+    /// Nothing is sent.
     #[arg(long, value_name = "URL")]
-    bus: Option<String>,
+    bus: Option<BusUrl>,
+    /// Listen to the bus for so many seconds; else until Ctrl-C.
+    #[arg(long = "for", value_name = "SECONDS", requires = "bus")]
+    seconds: Option<f64>,
+    #[command(flatten)]
+    serve: Serve,
     /// Rows from standard input.
     #[arg(value_name = "-", value_parser = ["-"])]
     stream: Option<String>,
@@ -73,16 +82,10 @@ fn share(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "give a share from 0 to 1, 0.05 for 5 %".to_string())
 }
 
-/// Samples of a stream before its rate is known.
-const FIRST: usize = 40;
-
 impl WatchCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        if let Some(bus) = &self.bus {
-            return Err(Failure::Unusable(format!(
-                "--bus {bus}: listening to a bus that others drive is not there yet; pipe its samples into `powerball \
-                 watch … -`, or record them and give --log"
-            )));
+        if self.seconds.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
+            return Err(Failure::Unusable("--for needs a number of seconds above 0".to_string()));
         }
         let map = self.map.read()?;
         let said = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
@@ -101,12 +104,18 @@ impl WatchCommand {
             learn: self.learn,
             ..WatchOptions::default()
         };
+        let live = self.serve.open()?;
+        live.start(&format!("{} watched", said.name), &[("position", "rad"), ("torque", "N·m")]);
         for log in &logs {
-            self.watch_log(log, &body, &model, &options);
+            self.watch_log(log, &body, &model, &options, &live);
         }
         if self.stream.is_some() {
-            self.watch_stream(&said, &map, (&body, &model, &options))?;
+            self.watch_stream(&said, &map, (&body, &model, &options), &live)?;
         }
+        if let Some(bus) = &self.bus {
+            self.watch_bus(bus, (&body, &model, &options), &live)?;
+        }
+        live.end("no more samples");
         Ok(())
     }
 
@@ -130,19 +139,51 @@ impl WatchCommand {
         Ok(())
     }
 
-    fn watch_log(&self, log: &Log, body: &RigidArm, model: &TorqueModel, options: &WatchOptions) {
-        let Some(step) = median_step(&log.t) else { return };
-        let mut watch = Watch::new(body, model, options, &log.file, 1.0 / step);
-        for piece in &log.pieces {
-            for k in piece.clone() {
-                let of = |x: &Vec<Vec<f64>>| x.iter().map(|x| x[k]).collect();
-                let sample = LiveSample { t: log.t[k], q: of(&log.q), torque: of(&log.torque) };
-                let events = watch.push(&sample);
-                self.say(&mut watch, &events);
-            }
-            let events = watch.finish();
-            self.say(&mut watch, &events);
+    fn watch_log(
+        &self,
+        log: &Log,
+        body: &RigidArm,
+        model: &TorqueModel,
+        options: &WatchOptions,
+        live: &Live,
+    ) {
+        let mut watch = Watch::new(body, model, options, &log.file);
+        for (k, sample) in log.samples().enumerate() {
+            self.take(&mut watch, &sample, k, live);
         }
+        let events = watch.finish();
+        self.say(&mut watch, &events, live);
+    }
+
+    /// An arm that another master drives, until Ctrl-C or as long as --for says.
+    fn watch_bus(
+        &self,
+        bus: &BusUrl,
+        (body, model, options): (&RigidArm, &TorqueModel, &WatchOptions),
+        live: &Live,
+    ) -> Result<(), Failure> {
+        if body.dof() != LWA4P.joints.len() {
+            let (has, needs) = (body.dof(), LWA4P.joints.len());
+            return Err(Failure::Unusable(format!("the arm file has {has} joints, the arm on the bus {needs}")));
+        }
+        let name = bus.to_string();
+        let (mut watch, mut count) = (Watch::new(body, model, options, &name), 0);
+        listen(bus, self.seconds, |sample| {
+            self.take(&mut watch, sample, count, live);
+            count += 1;
+        })?;
+        let events = watch.finish();
+        self.say(&mut watch, &events, live);
+        Ok(())
+    }
+
+    /// Sample `k`.
+    fn take(&self, watch: &mut Watch<'_>, sample: &LiveSample, k: usize, live: &Live) {
+        if k.is_multiple_of(serve::EVERY) {
+            live.sample("", sample.t, &[("position", &sample.q), ("torque", &sample.torque)]);
+        }
+        let events = watch.push(sample);
+        self.say(watch, &events, live);
     }
 
     fn watch_stream(
@@ -150,19 +191,10 @@ impl WatchCommand {
         arm: &Arm,
         map: &ColumnMap,
         (body, model, options): (&RigidArm, &TorqueModel, &WatchOptions),
+        live: &Live,
     ) -> Result<(), Failure> {
         const NAME: &str = "standard input";
-        let (mut rows, mut first, mut watch) = (None, Vec::new(), None::<Watch<'_>>);
-        let begin = |first: &mut Vec<LiveSample>| -> Option<Watch<'_>> {
-            let t: Vec<f64> = first.iter().map(|s| s.t).collect();
-            let step = median_step(&t).filter(|_| t.len() >= FIRST)?;
-            let mut watch = Watch::new(body, model, options, NAME, 1.0 / step);
-            for sample in first.drain(..) {
-                let events = watch.push(&sample);
-                self.say(&mut watch, &events);
-            }
-            Some(watch)
-        };
+        let (mut rows, mut watch, mut usable) = (None, Watch::new(body, model, options, NAME), 0);
         let mut format = None;
         for (number, line) in std::io::stdin().lock().lines().enumerate() {
             let line = line.map_err(|e| Failure::Unusable(format!("{NAME}: line {}: {e}", number + 1)))?;
@@ -181,31 +213,24 @@ impl WatchCommand {
             let values = format.values(&line);
             let sample = rows.as_mut().and_then(|rows| rows.sample(|k| values.get(k).copied().flatten()));
             let Some(sample) = sample else { continue };
-            if let Some(watch) = &mut watch {
-                let events = watch.push(&sample);
-                self.say(watch, &events);
-            } else {
-                first.push(sample);
-                watch = begin(&mut first);
-            }
+            self.take(&mut watch, &sample, usable, live);
+            usable += 1;
         }
-        match &mut watch {
-            Some(watch) => {
-                let events = watch.finish();
-                self.say(watch, &events);
-                Ok(())
-            }
-            None => Err(Failure::Unusable(format!(
-                "{NAME}: {} usable samples are too few: at least {FIRST} are needed",
-                first.len()
-            ))),
+        if !watch.has_begun() {
+            return Err(Failure::Unusable(format!(
+                "{NAME}: {usable} usable samples are too few: at least {FIRST} are needed"
+            )));
         }
+        let events = watch.finish();
+        self.say(&mut watch, &events, live);
+        Ok(())
     }
 
     /// Events on standard output, notes on standard error.
-    fn say(&self, watch: &mut Watch<'_>, events: &[Event]) {
+    fn say(&self, watch: &mut Watch<'_>, events: &[Event], live: &Live) {
         watch.notes().iter().for_each(|note| eprintln!("note: {note}"));
         for event in events {
+            live.event(&event.sentence());
             match self.json {
                 true => output::print(&serde_json::to_string(event).unwrap_or_default()),
                 false => output::print(&event.sentence()),

@@ -1,22 +1,14 @@
 //! The colour of what a model leaves, and how much it errs: what a watch measures changes against.
-//!
-//! Rows are those of a band of [`BAND`]: wide enough that a change shows at once, and narrow enough that neighbouring
-//! rows are nearly independent. A joint has no rows while it rests: friction is not determined there.
 
-use super::TorqueModel;
-use crate::controller::change::{self, JointTest, LATE, LEAST_MARGIN, ORDER, Shown};
-use crate::controller::friction::TanhFriction;
+use super::rows::{Rows, Shown};
+use super::{Detector, TorqueModel};
+use crate::controller::change::{self, LEAST_MARGIN, ORDER};
 use crate::identification::estimate::NormalEquations;
 use crate::logs::log::{Log, logs_of_motors};
 use crate::logs::regression::{DataOptions, Recording, RigidArm};
 use crate::logs::signal::resample::median_step;
-use crate::logs::signal::{Band, difference, motion};
 use serde::{Deserialize, Serialize};
 
-/// The band of the rows, Hz.
-pub const BAND: f64 = 20.0;
-/// A slower joint rests, rad/s or m/s: what is left there is how it sticks.
-const REST: f64 = motion::REST_SPEED;
 /// A joint with fewer rows says nothing of its colour.
 const FEWEST: usize = 200;
 /// The margin is such that no test on the logs it was learnt from comes nearer to an alarm than the level to the power
@@ -26,8 +18,10 @@ const CALM: f64 = 0.5;
 const MOST_MARGIN: f64 = 1.5;
 /// Rows in which a colour's impulse response is over.
 const IMPULSE: usize = 2000;
-/// Steps of the search for the margin.
-const STEPS: usize = 12;
+/// Steps of the search for a margin.
+const STEPS: usize = 8;
+/// Joints together may need margins so many times as large as each by itself.
+const TOGETHER: f64 = 4.0;
 
 /// What a model leaves on logs on which it holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -67,55 +61,18 @@ impl JointColour {
         [self.deviation * f64::sqrt(squares), self.deviation * self.margin * f64::abs(sum)]
     }
 
+    /// The same with another margin.
+    fn with(&self, margin: f64) -> JointColour {
+        let mut own = self.clone();
+        own.margin = margin;
+        own
+    }
+
     /// As the test of a controller takes it.
     #[must_use]
     pub fn for_test(&self) -> change::Colour<f64> {
         change::Colour { coefficients: self.coefficients, deviation: self.deviation, margin: self.margin }
     }
-}
-
-/// The rows of a stretch of time on an even grid.
-#[derive(Clone, Debug, Default)]
-pub struct Rows {
-    /// Their times in the log's own t, s.
-    pub t: Vec<f64>,
-    /// By joint and row; none while the joint rests.
-    pub joints: Vec<Vec<Option<Shown<f64>>>>,
-}
-
-impl Rows {
-    /// Those of a recording for which a model predicts a torque, n a sample.
-    #[must_use]
-    pub fn new(model: &TorqueModel, recording: &Recording, predicted: &[f64]) -> Rows {
-        let n = recording.dof;
-        let band = Band::new(BAND, recording.rate);
-        let kept = band.kept(recording.len());
-        let laws: Vec<TanhFriction<f64>> = model.gammas().into_iter().map(TanhFriction::new).collect();
-        let of_joint = |j: usize| {
-            let torque: Vec<f64> = predicted.iter().skip(j).step_by(n).copied().collect();
-            let measured = recording.smooth_torque(j);
-            let left: Vec<f64> = measured.iter().zip(&torque).map(|(m, p)| m - p).collect();
-            let friction: Vec<f64> = recording.velocity(j).map(|v| laws[j].torque(v)).collect();
-            let rate = difference::derivative(&torque, 1.0 / recording.rate);
-            let late: Vec<f64> = rate.iter().map(|rate| rate * LATE).collect();
-            let [left, friction, torque, late] =
-                [left, friction, torque, late].map(|signal| band.pass(&signal));
-            let speed: Vec<f64> = recording.velocity(j).collect();
-            let row = |(row, k): (usize, &usize)| {
-                let shown = Shown { residual: left[row], columns: [friction[row], torque[row], late[row]] };
-                (speed[*k].abs() > REST).then_some(shown)
-            };
-            kept.iter().enumerate().map(row).collect()
-        };
-        let t = kept.iter().map(|k| recording.start + *k as f64 / recording.rate).collect();
-        Rows { t, joints: (0..n).map(of_joint).collect() }
-    }
-}
-
-/// Rows a second of logs of so many samples a second.
-#[must_use]
-pub fn rows_a_second(rate: f64) -> f64 {
-    rate / Band::new(BAND, rate).decimation as f64
 }
 
 impl Colour {
@@ -140,7 +97,7 @@ impl Colour {
                 // Shorter than what the band's filter needs at its ends: no rows.
                 for recording in recording.into_iter().filter(|r| r.len() as f64 > r.rate) {
                     let predicted = model.torque(body, &recording, &|_| false);
-                    rows.push(Rows::new(model, &recording, &predicted));
+                    rows.push(Rows::new(model, body, &recording, &predicted));
                 }
             }
         }
@@ -151,24 +108,50 @@ impl Colour {
     #[must_use]
     pub fn of_rows(rows: &[Rows], rate: f64, level: f64, range: f64) -> Option<Colour> {
         let dof = rows.first()?.joints.len();
-        let of_joint = |j: usize| {
-            let joint: Vec<&[Option<Shown<f64>>]> = rows.iter().map(|r| r.joints[j].as_slice()).collect();
-            joint_colour(&joint, level, range)
+        let mut joints: Vec<Option<JointColour>> = (0..dof).map(|j| joint_colour(rows, j)).collect();
+        let calm = level.powf(CALM);
+        let is_calm = |joints: &[Option<JointColour>]| most_capital(joints, rows, range) < calm;
+        for j in 0..dof {
+            let Some(own) = joints[j].clone() else { continue };
+            let alone = |margin: f64| {
+                let mut colours = vec![None; dof];
+                colours[j] = Some(own.with(margin));
+                is_calm(&colours)
+            };
+            let margin = least(LEAST_MARGIN, MOST_MARGIN, alone);
+            joints[j] = margin.map(|margin| own.with(margin));
+        }
+        let scaled = |by: f64| -> Vec<Option<JointColour>> {
+            let scale = |own: &JointColour| own.with(own.margin * by);
+            joints.iter().map(|own| own.as_ref().map(scale)).collect()
         };
-        let joints: Vec<Option<JointColour>> = (0..dof).map(of_joint).collect();
+        // Where each is calm but not what they say together; where no such margin helps each keeps its own.
+        let by = least(1.0, TOGETHER, |by| is_calm(&scaled(by))).unwrap_or(1.0);
+        let joints = scaled(by);
         joints.iter().any(Option::is_some).then_some(Colour { rate, joints })
     }
 }
 
-fn joint_colour(rows: &[&[Option<Shown<f64>>]], level: f64, range: f64) -> Option<JointColour> {
+/// The least number in a range with which something holds that holds with all larger ones; none where there is none.
+fn least(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
+    if holds(low) {
+        return Some(low);
+    }
+    let (mut low, mut high) = (low, Some(high).filter(|high| holds(*high))?);
+    for _ in 0..STEPS {
+        let middle = 0.5 * (low + high);
+        if holds(middle) { high = middle } else { low = middle }
+    }
+    Some(high)
+}
+
+/// A joint's colour with no margin; none where too few rows show it.
+fn joint_colour(rows: &[Rows], j: usize) -> Option<JointColour> {
     let (mut past, mut now) = (vec![Vec::new(); ORDER], Vec::new());
     for rows in rows {
-        for window in rows.windows(ORDER + 1) {
-            let Some(values) =
-                window.iter().map(|r| Some(r.as_ref()?.residual)).collect::<Option<Vec<f64>>>()
-            else {
-                continue;
-            };
+        for window in rows.joints[j].windows(ORDER + 1) {
+            let residual = |row: &Option<Shown>| Some(row.as_ref()?.residual);
+            let Some(values) = window.iter().map(residual).collect::<Option<Vec<f64>>>() else { continue };
             past.iter_mut().enumerate().for_each(|(k, past)| past.push(values[ORDER - 1 - k]));
             now.push(values[ORDER]);
         }
@@ -181,30 +164,18 @@ fn joint_colour(rows: &[&[Option<Shown<f64>>]], level: f64, range: f64) -> Optio
     let deviation = (equations.left(&found) / (now.len() - ORDER) as f64).sqrt();
     let mut coefficients = [0.0; ORDER];
     coefficients.iter_mut().zip(found).for_each(|(to, from)| *to = from);
-    let mut colour = JointColour { coefficients, deviation, margin: 0.0 };
-    // The least margin with which the tests stay calm.
-    let calm = level.powf(CALM);
-    let (mut low, mut high) = (LEAST_MARGIN, MOST_MARGIN);
-    for _ in 0..STEPS {
-        colour.margin = 0.5 * (low + high);
-        if most_capital(&colour, rows, range) < calm { high = colour.margin } else { low = colour.margin }
-    }
-    colour.margin = high;
-    (deviation > 0.0 && high < MOST_MARGIN).then_some(colour)
+    (deviation > 0.0).then_some(JointColour { coefficients, deviation, margin: 0.0 })
 }
 
-/// The mean capital of the bets when it is largest.
-fn most_capital(colour: &JointColour, rows: &[&[Option<Shown<f64>>]], range: f64) -> f64 {
-    let mut test = JointTest::new(colour.for_test(), range);
+/// The average capital of the bets when it is largest.
+fn most_capital(colours: &[Option<JointColour>], rows: &[Rows], range: f64) -> f64 {
+    let mut test = Detector::new(colours, range);
     let mut most = 0.0f64;
     for rows in rows {
         test.interrupt();
-        for (number, row) in rows.iter().enumerate() {
-            match row {
-                Some(shown) => test.update(*shown, number as u64),
-                None => test.interrupt(),
-            }
-            most = most.max(test.capital() / change::BETS as f64);
+        for number in 0..rows.t.len() {
+            test.update(rows.row(number), number as u64);
+            most = most.max(test.capital());
         }
     }
     most

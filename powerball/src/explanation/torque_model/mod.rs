@@ -6,11 +6,13 @@
 
 mod c_api;
 mod colour;
+mod detector;
 mod file;
 mod known;
 mod on_arm;
 mod planned;
 mod ros;
+mod rows;
 mod source;
 #[cfg(test)]
 mod tests;
@@ -22,12 +24,14 @@ use crate::explanation::effects::{PASSES, SOFT, Window, each_instant, move_link,
 use crate::identification::estimate::{JointFriction, ParameterEstimate, in_set_of};
 use crate::logs::parallel;
 use crate::logs::regression::{Data, Recording, RigidArm, Signals};
-pub use colour::{BAND, Colour, JointColour, Rows, rows_a_second};
+pub use colour::{Colour, JointColour};
+pub use detector::Detector;
 use dyngen::arm::ParameterKind;
 pub use file::FileError;
 pub use known::{ModelFile, Unchanged};
 pub use on_arm::ModelOnArm;
 pub use planned::PlannedTorque;
+pub use rows::{BAND, Rows, Shown, rows_a_second};
 use serde::{Deserialize, Serialize};
 pub use source::{ForC, Scalar, SourceError};
 

@@ -20,7 +20,7 @@ pub(super) const GRID: f64 = 0.1;
 const FINE: f64 = 0.02;
 /// A push lasts so long at least, s.
 const SHORTEST: f64 = 0.3;
-/// How far before and after the first guess a change may begin, s.
+/// How far before the first guess a change may begin, s.
 const AROUND: f64 = 0.6;
 /// Times that an inertia or a secant is taken anew from the last estimate.
 const ROUNDS: usize = 4;
@@ -28,6 +28,10 @@ const ROUNDS: usize = 4;
 const FURTHER: f64 = 30.0;
 /// When exactly a change sets in is known roughly: rows so long before and after it say nothing of its size, s.
 const BLURRED: [f64; 2] = [0.15, 0.3];
+/// χ² of such a row that noise does not reach.
+const ANYTHING: f64 = 16.0;
+/// They hold at most so many times what the others do: a step through the colour is largest where it is.
+const EDGES: f64 = 4.0;
 /// A force elsewhere than on the tool counts as so many alternatives for each link.
 const ELSEWHERE: f64 = 20.0;
 /// Innovations of a block.
@@ -60,10 +64,27 @@ struct Push {
     rises: bool,
 }
 
-/// The times near a first guess at which a change may begin.
-fn around(since: f64) -> impl Iterator<Item = f64> {
-    let steps = (AROUND / FINE).round() as i32;
-    (-steps..=steps).map(move |k| since + f64::from(k) * FINE)
+/// Whether a row is too near an edge to say anything.
+fn is_near(edge: f64, t: f64) -> bool {
+    (edge - BLURRED[0]..edge + BLURRED[1]).contains(&t)
+}
+
+/// When a change began, roughly: the alarm's guess, and when it rose, s.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Guess {
+    pub(super) since: f64,
+    pub(super) alarm: f64,
+}
+
+/// The time near a guess for which most is explained: on a coarse grid, then on a fine one.
+fn best_time(guess: Guess, explains: impl Fn(f64) -> f64) -> f64 {
+    let best = |from: f64, to: f64, step: f64| {
+        let times = (0..=((to - from) / step).round() as usize).map(|k| from + k as f64 * step);
+        let asked = times.map(|time| (time, explains(time)));
+        asked.fold((guess.since, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a }).0
+    };
+    let coarse = best(guess.since - AROUND, guess.alarm.max(guess.since), GRID);
+    best(coarse - GRID, coarse + GRID, FINE)
 }
 
 /// A name with its size.
@@ -169,7 +190,7 @@ impl<'a> Stretch<'a> {
     /// A whitened signal on a joint's rows without those near some times.
     fn sharp(&self, j: usize, mut white: Vec<f64>, edges: &[f64]) -> Vec<f64> {
         for (z, t) in white.iter_mut().zip(&self.times[j]) {
-            if edges.iter().any(|edge| (edge - BLURRED[0]..edge + BLURRED[1]).contains(t)) {
+            if edges.iter().any(|edge| is_near(*edge, *t)) {
                 *z = 0.0;
             }
         }
@@ -189,6 +210,18 @@ impl<'a> Stretch<'a> {
         let c = equations.solve();
         let explains: f64 = c.iter().zip(&equations.right).map(|(c, r)| c * r).sum();
         (c, explains)
+    }
+
+    /// χ² that rows near `edges` have beyond [`ANYTHING`] each: when exactly a change sets in is known roughly, so any of
+    /// these rows may be anything. Without this an edge beside the true one, which leaves the true one's rows to be
+    /// explained, would seem to explain more.
+    fn blurred(&self, edges: &[f64]) -> f64 {
+        let near = |t: &f64| edges.iter().any(|edge| is_near(*edge, *t));
+        let of = |(white, times): (&Vec<f64>, &Vec<f64>)| -> f64 {
+            let rows = white.iter().zip(times).filter(|(_, t)| near(t));
+            rows.map(|(z, _)| (z * z - ANYTHING).max(0.0)).sum()
+        };
+        self.white.iter().zip(&self.times).map(of).sum()
     }
 
     /// Columns that are there during some time only.
@@ -225,14 +258,14 @@ impl<'a> Stretch<'a> {
 
     /// The names that could be, best first; at most one an effect. `now` is the last time of the stretch.
     /// `held` is the mass that the last link holds and that may be taken off, kg.
-    pub(super) fn names(&self, since: f64, now: f64, held: f64) -> Vec<Named> {
+    pub(super) fn names(&self, guess: Guess, now: f64, held: f64) -> Vec<Named> {
         let context = Context::for_columns(self.data, &self.fit, self.rule);
         let mut names: Vec<Named> = Vec::new();
-        names.extend(self.forces(&context, since, now));
-        names.extend(self.payload(&context, since, held));
-        names.extend(self.friction(&context, since));
-        names.extend(self.offset(&context, since));
-        names.extend(self.delay(&context, since));
+        names.extend(self.forces(&context, guess, now));
+        names.extend(self.payload(&context, guess, held));
+        names.extend(self.friction(&context, guess));
+        names.extend(self.offset(&context, guess));
+        names.extend(self.delay(&context, guess));
         names.retain(|named| named.score > 0.0);
         names.sort_by(|a, b| b.score.total_cmp(&a.score));
         for named in &mut names {
@@ -244,21 +277,17 @@ impl<'a> Stretch<'a> {
     }
 
     /// Where a change of such columns begins: what explains most near the first guess.
-    fn beginning(&self, columns: &[Column], since: f64) -> f64 {
-        let explains = |from: f64| self.fitted(&self.cut(columns, from, f64::INFINITY), &[]).1;
-        around(since)
-            .map(|from| (from, explains(from)))
-            .fold((since, 0.0), |a, b| if b.1 > a.1 { b } else { a })
-            .0
+    fn beginning(&self, columns: &[Column], guess: Guess) -> f64 {
+        best_time(guess, |from| self.fitted(&self.cut(columns, from, f64::INFINITY), &[]).1)
     }
 
     /// A force on the tool or on a link, that goes on or is over.
-    fn forces(&self, context: &Context<'_>, since: f64, now: f64) -> Option<Named> {
+    fn forces(&self, context: &Context<'_>, guess: Guess, now: f64) -> Option<Named> {
         let n = self.data.dof();
         let mut best: Option<(Push, Named)> = None;
         for link in (0..n).rev() {
             let Some(columns) = self.force_columns(context, link) else { continue };
-            let from = self.beginning(&columns, since);
+            let from = self.beginning(&columns, guess);
             let mut tried = vec![Push { link, from, end: None, rises: false }];
             let ends = (SHORTEST / GRID) as usize..((now - from) / GRID).max(0.0) as usize;
             for end in ends.map(|k| Some(from + k as f64 * GRID)) {
@@ -272,9 +301,8 @@ impl<'a> Stretch<'a> {
         if let Some(push) = best.as_ref().map(|(push, _)| *push).filter(|push| push.end.is_some()) {
             let columns = self.force_columns(context, push.link)?;
             let end = push.end.unwrap_or(f64::INFINITY);
-            let explains = |from: f64| self.fitted(&self.cut(&columns, from, end), &[]).1;
-            let near = around(since).filter(|from| end - from >= SHORTEST).map(|from| (from, explains(from)));
-            let from = near.fold((push.from, 0.0), |a, b| if b.1 > a.1 { b } else { a }).0;
+            let latest = Guess { alarm: guess.alarm.min(end - SHORTEST), ..guess };
+            let from = best_time(latest, |from| self.fitted(&self.cut(&columns, from, end), &[]).1);
             best = None;
             self.best_force(context, &columns, vec![Push { from, ..push }], &mut best);
         }
@@ -313,6 +341,8 @@ impl<'a> Stretch<'a> {
     ) {
         let constant = self.wrench(contact_wrench::Settings::Constant, self.everywhere());
         let count = tried.len() as f64;
+        // Windows that leave out different rows are compared with what these could be.
+        let whole = |named: &Named| named.score + self.blurred(&named.edges()).min(EDGES * named.explains);
         for push in tried {
             let Push { link, from, end, rises } = push;
             let torques = match end.filter(|_| rises) {
@@ -330,7 +360,7 @@ impl<'a> Stretch<'a> {
                 vec![Change::Force { force, link: JointNumber::from_index(link) }]
             };
             let named = self.named(change, torques, searched, (from, end));
-            let better = best.as_ref().is_none_or(|(_, best)| named.score > best.score);
+            let better = best.as_ref().is_none_or(|(_, best)| whole(&named) > whole(best));
             if better && constant.effect().admissible(&constant, &named.coefficients) {
                 *best = Some((push, named));
             }
@@ -338,12 +368,12 @@ impl<'a> Stretch<'a> {
     }
 
     /// A body that the last link holds.
-    fn payload(&self, context: &Context<'_>, since: f64, held: f64) -> Option<Named> {
+    fn payload(&self, context: &Context<'_>, guess: Guess, held: f64) -> Option<Named> {
         let joints = (0..self.data.dof()).map(JointNumber::from_index).collect();
         let settings = payload::Settings { com: None, stays: false, link: None };
         let mut candidate =
             Candidate { windows: vec![self.everywhere()], ..Candidate::on_all(joints, settings, 1) };
-        let since = self.beginning(&context.columns(&candidate), since);
+        let since = self.beginning(&context.columns(&candidate), guess);
         let mut found = None;
         for _ in 0..ROUNDS {
             let columns = self.cut(&context.columns(&candidate), since, f64::INFINITY);
@@ -376,47 +406,49 @@ impl<'a> Stretch<'a> {
     }
 
     /// Friction that is another one, on one joint or several.
-    fn friction(&self, context: &Context<'_>, since: f64) -> Option<Named> {
-        let with = temperature::Warmth::RunningTime { time_constant: f64::INFINITY };
-        let candidates = context.moving_joints().flat_map(|j| {
-            let of = [temperature::Friction::Whole, temperature::Friction::Viscous];
-            of.map(|of| Candidate::on(j, temperature::Settings { of, with }, 1))
-        });
-        let asked: Vec<(Candidate, Named)> = candidates
-            .filter_map(|candidate| {
-                let columns = self.cut(&context.columns(&candidate), since, f64::INFINITY);
-                let joint = candidate.joints[0];
-                let viscous = temperature::Settings::of(&candidate)?.of == temperature::Friction::Viscous;
-                let gamma = self.fit.friction(joint.index())[4];
-                let change = |c: &[f64]| {
-                    // The viscous column is the velocity.
-                    let by = if viscous { c[0] / gamma } else { c[0] };
-                    vec![Change::Friction { joint, viscous, by }]
-                };
-                let named = self.named(change, columns, 2.0, (since, None));
-                let possible = candidate.effect().possible(context, &candidate, &named.coefficients)
-                    && (!viscous || gamma > 0.0);
-                possible.then_some((candidate, named))
-            })
-            .collect();
-        let best = |among: &dyn Fn(&Candidate) -> bool| {
-            asked.iter().filter(|(c, _)| among(c)).map(|(_, n)| n).max_by(|a, b| a.score.total_cmp(&b.score))
-        };
-        let mut all = best(&|_| true)?.clone();
-        all.since = self.beginning(&self.uncut(&all, context), since);
+    fn friction(&self, context: &Context<'_>, guess: Guess) -> Option<Named> {
+        let first = best_of(&self.frictions(context, guess.since), &|_| true)?;
+        let since = self.beginning(&self.uncut(&first, context), guess);
+        let asked = self.frictions(context, since);
+        let mut all = best_of(&asked, &|_| true)?;
         // Joints are independent: what others explain adds up.
         for joint in context.moving_joints() {
             let own = |change: &Change| matches!(change, Change::Friction { joint: j, .. } if *j == joint);
-            let Some(more) = best(&|c| c.joints[0] == joint) else { continue };
+            let Some(more) = best_of(&asked, &|c| c.joints[0] == joint) else { continue };
             if !all.changes.iter().any(own) && more.explains > FURTHER {
-                all.changes.extend(more.changes.iter().cloned());
-                all.columns.extend(more.columns.iter().cloned());
-                all.coefficients.extend(&more.coefficients);
+                all.changes.extend(more.changes);
+                all.columns.extend(more.columns);
+                all.coefficients.extend(more.coefficients);
                 all.explains += more.explains;
                 all.score += more.score;
             }
         }
         Some(all)
+    }
+
+    /// Friction of each joint that could be another one since a time, the whole of it or its viscous part.
+    fn frictions(&self, context: &Context<'_>, since: f64) -> Vec<(Candidate, Named)> {
+        let with = temperature::Warmth::RunningTime { time_constant: f64::INFINITY };
+        let candidates = context.moving_joints().flat_map(|j| {
+            let of = [temperature::Friction::Whole, temperature::Friction::Viscous];
+            of.map(|of| Candidate::on(j, temperature::Settings { of, with }, 1))
+        });
+        let ask = |candidate: Candidate| {
+            let columns = self.cut(&context.columns(&candidate), since, f64::INFINITY);
+            let joint = candidate.joints[0];
+            let viscous = temperature::Settings::of(&candidate)?.of == temperature::Friction::Viscous;
+            let gamma = self.fit.friction(joint.index())[4];
+            let change = |c: &[f64]| {
+                // The viscous column is the velocity.
+                let by = if viscous { c[0] / gamma } else { c[0] };
+                vec![Change::Friction { joint, viscous, by }]
+            };
+            let named = self.named(change, columns, 2.0, (since, None));
+            let possible = candidate.effect().possible(context, &candidate, &named.coefficients)
+                && (!viscous || gamma > 0.0);
+            possible.then_some((candidate, named))
+        };
+        candidates.filter_map(ask).collect()
     }
 
     /// The whole columns of a change of friction.
@@ -433,17 +465,17 @@ impl<'a> Stretch<'a> {
     }
 
     /// A joint whose zero has moved.
-    fn offset(&self, context: &Context<'_>, since: f64) -> Option<Named> {
+    fn offset(&self, context: &Context<'_>, guess: Guess) -> Option<Named> {
         let first = Candidate::on(JointNumber::from_index(0), encoder_offset::Settings { about: 0.01 }, 1);
-        self.one_of(context, first.effect().candidates(context), since, |candidate, c| {
+        self.one_of(context, &first.effect().candidates(context), guess, |candidate, c| {
             vec![Change::Offset { joint: candidate.joints[0], by: c[0] }]
         })
     }
 
     /// Torques that come later than they did.
-    fn delay(&self, context: &Context<'_>, since: f64) -> Option<Named> {
+    fn delay(&self, context: &Context<'_>, guess: Guess) -> Option<Named> {
         let first = Candidate::on(JointNumber::from_index(0), time_delay::Settings { delay: 0.01 }, 1);
-        self.one_of(context, first.effect().candidates(context), since, |candidate, c| {
+        self.one_of(context, &first.effect().candidates(context), guess, |candidate, c| {
             let delay = time_delay::Settings::of(candidate).map_or(0.0, |settings| settings.delay);
             vec![Change::Delay { joints: candidate.joints.clone(), by: delay * c[0] }]
         })
@@ -453,30 +485,34 @@ impl<'a> Stretch<'a> {
     fn one_of(
         &self,
         context: &Context<'_>,
-        candidates: Vec<Candidate>,
-        since: f64,
+        candidates: &[Candidate],
+        guess: Guess,
         change: impl Fn(&Candidate, &[f64]) -> Vec<Change>,
     ) -> Option<Named> {
         let searched = candidates.len().max(1) as f64;
         let ask = |candidate: &Candidate, since: f64| {
             let columns = self.cut(&context.columns(candidate), since, f64::INFINITY);
             let named = self.named(|c| change(candidate, c), columns, searched, (since, None));
-            candidate.effect().admissible(candidate, &named.coefficients).then_some(named)
+            candidate.effect().admissible(candidate, &named.coefficients).then(|| (candidate.clone(), named))
         };
-        let mut best: Option<(Candidate, Named)> = None;
-        for candidate in candidates {
-            let Some(named) = ask(&candidate, since) else { continue };
-            if best.as_ref().is_none_or(|(_, best)| named.score > best.score) {
-                best = Some((candidate, named));
-            }
-        }
-        let (mut candidate, mut named) = best?;
-        let since = self.beginning(&context.columns(&candidate), since);
+        let best = |since: f64| {
+            let asked: Vec<_> = candidates.iter().filter_map(|candidate| ask(candidate, since)).collect();
+            asked.into_iter().max_by(|a, b| a.1.score.total_cmp(&b.1.score))
+        };
+        let (first, _) = best(guess.since)?;
+        let since = self.beginning(&context.columns(&first), guess);
+        let (mut candidate, mut named) = best(since)?;
         for _ in 0..ROUNDS {
             let Some(next) = candidate.effect().refined(&candidate, &named.coefficients) else { break };
             let Some(better) = ask(&next, since) else { break };
-            (candidate, named) = (next, better);
+            (candidate, named) = better;
         }
         Some(named)
     }
+}
+
+/// The one of some names that explains most.
+fn best_of(asked: &[(Candidate, Named)], among: &dyn Fn(&Candidate) -> bool) -> Option<Named> {
+    let those = asked.iter().filter(|(candidate, _)| among(candidate)).map(|(_, named)| named);
+    those.max_by(|a, b| a.score.total_cmp(&b.score)).cloned()
 }

@@ -57,6 +57,13 @@ impl Log {
         [self.part(0..middle, "first half"), self.part(middle..self.t.len(), "second half")]
     }
 
+    /// The samples of its pieces one by one, as a stream has them.
+    pub fn samples(&self) -> impl Iterator<Item = LiveSample> + '_ {
+        let of = |x: &[Vec<f64>], k: usize| x.iter().map(|x| x[k]).collect();
+        let sample = move |k| LiveSample { t: self.t[k], q: of(&self.q, k), torque: of(&self.torque, k) };
+        self.pieces.iter().cloned().flatten().map(sample)
+    }
+
     fn part(&self, own: std::ops::Range<usize>, name: &str) -> Log {
         let cut = |all: &Vec<Vec<f64>>| all.iter().map(|x| x[own.clone()].to_vec()).collect();
         let clip = |piece: &std::ops::Range<usize>| {

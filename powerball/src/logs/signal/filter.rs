@@ -10,6 +10,8 @@ use crate::logs::batch::{self, Work};
 /// accelerations are noise of positions differentiated twice, and arms are hardly rigid; a motion and what
 /// friction does at its reversals are slower than the narrowest.
 pub const BANDS: [f64; 3] = [7.0, 3.5, 1.75];
+/// What is left out at each end of a stretch, s.
+const ENDS: f64 = 0.3;
 
 /// A low-pass band with its decimation, the same on both sides of a regression.
 ///
@@ -51,7 +53,8 @@ impl Stage {
         let at = |rate: f64| if cutoff < 0.4 * rate { Butterworth::low_pass(4, single, rate) } else { None };
         let filter = at(rate);
         let every = |share: f64| {
-            if filter.is_some() { ((rate / (share * cutoff)).floor() as usize).max(1) } else { 1 }
+            // A rate of 99.99…9 is one of 100: rows of all stretches are as many a second.
+            if filter.is_some() { ((rate / (share * cutoff) + 1e-6).floor() as usize).max(1) } else { 1 }
         };
         let (decimation, onward) = (every(2.5), every(5.0));
         Stage { whole: filter.as_ref().and_then(|_| at(whole)), filter, decimation, onward, first }
@@ -69,8 +72,14 @@ impl Band {
     /// filtered and the band ends at half the rate.
     #[must_use]
     pub fn new(cutoff: f64, rate: f64) -> Band {
+        Band::with_ends(cutoff, rate, ENDS)
+    }
+
+    /// The same where `ends` seconds are left out at each end.
+    #[must_use]
+    pub fn with_ends(cutoff: f64, rate: f64, ends: f64) -> Band {
         let wider = BANDS.iter().position(|band| *band == cutoff).unwrap_or(0);
-        let trim = (0.3 * rate).ceil() as usize;
+        let trim = (ends * rate).ceil() as usize;
         let none = Band { cutoff, decimation: 1, trim, stages: Vec::new() };
         BANDS[..wider].iter().chain([&cutoff]).fold(none, |band, cutoff| band.with(*cutoff, rate))
     }
