@@ -9,7 +9,7 @@ use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::BusUrl;
 use crate::explanation::torque_model::TorqueModel;
 use crate::explanation::watch::{Event, FIRST, Watch, WatchOptions};
-use crate::logs::log::{ColumnMap, LiveRows, Log, read_logs_as};
+use crate::logs::log::{ColumnMap, LiveRows, LiveSample, Log, read_logs_as};
 use crate::logs::regression::RigidArm;
 use clap::Args;
 use dyngen::Arm;
@@ -164,7 +164,9 @@ impl WatchCommand {
     ) -> Result<(), Failure> {
         if body.dof() != LWA4P.joints.len() {
             let (has, needs) = (body.dof(), LWA4P.joints.len());
-            return Err(Failure::Unusable(format!("the arm file has {has} joints, the arm on the bus {needs}")));
+            return Err(Failure::Unusable(format!(
+                "the arm file has {has} joints, the arm on the bus {needs}"
+            )));
         }
         let name = bus.to_string();
         let (mut watch, mut count) = (Watch::new(body, model, options, &name), 0);
