@@ -5,7 +5,7 @@
 use super::columns::{Asked, Columns};
 use super::map::ColumnMap;
 use super::{Finding, Log, LogError, check, topics};
-use crate::logs::tables::{Format, RowSink, columnar, read_contents, text};
+use crate::logs::tables::{Format, RowSink, columnar, read_topics, text};
 use dyngen::Arm;
 use std::path::Path;
 
@@ -62,7 +62,16 @@ pub fn read_log_as(
             parse(&std::fs::read(path).map_err(unreadable)?, asked, findings)
         }
         Format::Mcap | Format::Rosbag | Format::Npz | Format::Mat => {
-            let contents = read_contents(path)?;
+            // With other topics left aside; an error names them all.
+            if let Some(only) = map.topics() {
+                let contents = read_topics(path, Some(&only))?;
+                let mut own = contents.notes;
+                if let Ok(log) = topics::log(&contents.tables, asked, &mut own) {
+                    findings.extend(own);
+                    return Ok(log);
+                }
+            }
+            let contents = read_topics(path, None)?;
             findings.extend(contents.notes);
             topics::log(&contents.tables, asked, findings)
         }

@@ -74,6 +74,9 @@ impl Format {
     }
 }
 
+/// The topics that are read, where not all are.
+type Only<'a> = Option<&'a [String]>;
+
 fn shown(path: &Path) -> String {
     path.display().to_string()
 }
@@ -84,6 +87,11 @@ fn shown(path: &Path) -> String {
 /// # Errors
 /// Where the file cannot be read, is torn, or is of a format that this build does not have.
 pub fn read_contents(path: &Path) -> Result<Contents, LogError> {
+    read_topics(path, None)
+}
+
+/// The same with the topics of some names alone, where a file has topics; others are counted.
+pub(crate) fn read_topics(path: &Path, only: Only<'_>) -> Result<Contents, LogError> {
     let format = Format::of_file(path)?;
     let file = shown(path);
     let failed = |e: std::io::Error| LogError::of_file(&file, "file", format!("cannot be read: {e}"));
@@ -102,8 +110,8 @@ pub fn read_contents(path: &Path) -> Result<Contents, LogError> {
             columnar::read(&std::fs::read(path).map_err(failed)?, &file, &mut table)?;
             vec![table]
         }
-        Format::Mcap => mcap_tables(path, &file, &mut notes)?,
-        Format::Rosbag => rosbag_tables(path, &file, &mut notes)?,
+        Format::Mcap => mcap_tables(path, only, &file, &mut notes)?,
+        Format::Rosbag => rosbag_tables(path, only, &file, &mut notes)?,
         Format::Npz => npz_tables(path, &file, &mut notes)?,
         Format::Mat => mat_tables(path, &file, &mut notes)?,
     };
@@ -118,16 +126,27 @@ pub fn read_contents(path: &Path) -> Result<Contents, LogError> {
 }
 
 #[cfg(feature = "mcap")]
-fn mcap_tables(path: &Path, file: &str, notes: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
-    let read = File::open(path).and_then(super::mcap::read);
-    let (tables, torn) = read.map_err(|e| LogError::of_file(file, "MCAP", format!("cannot be read: {e}")))?;
-    notes.extend(torn.map(|torn| Finding::of_file(file, "MCAP", torn)));
+fn mcap_tables(
+    path: &Path,
+    only: Only<'_>,
+    file: &str,
+    notes: &mut Vec<Finding>,
+) -> Result<Vec<Table>, LogError> {
+    let read = File::open(path).and_then(|opened| super::mcap::read(opened, only));
+    let (tables, wrong) =
+        read.map_err(|e| LogError::of_file(file, "MCAP", format!("cannot be read: {e}")))?;
+    notes.extend(wrong.into_iter().map(|wrong| Finding::of_file(file, "MCAP", wrong)));
     Ok(tables)
 }
 
 #[cfg(feature = "rosbag")]
-fn rosbag_tables(path: &Path, file: &str, notes: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
-    let read = File::open(path).and_then(super::rosbag::read);
+fn rosbag_tables(
+    path: &Path,
+    only: Only<'_>,
+    file: &str,
+    notes: &mut Vec<Finding>,
+) -> Result<Vec<Table>, LogError> {
+    let read = File::open(path).and_then(|opened| super::rosbag::read(opened, only));
     // SQLite moves what was written last into the file when it is closed.
     let mut waiting = path.as_os_str().to_owned();
     waiting.push("-wal");
@@ -160,17 +179,17 @@ fn mat_tables(path: &Path, file: &str, notes: &mut Vec<Finding>) -> Result<Vec<T
 
 /// What is said where a build lacks a format.
 macro_rules! absent {
-    ($feature:literal, $function:ident) => {
+    ($feature:literal, $function:ident $(, $only:ty)?) => {
         #[cfg(not(feature = $feature))]
-        fn $function(_: &Path, file: &str, _: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
+        fn $function(_: &Path, $(_: $only,)? file: &str, _: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
             let message = concat!("this build does not read it: enable the feature `", $feature, "`");
             Err(LogError::of_file(file, $feature, message))
         }
     };
 }
 
-absent!("mcap", mcap_tables);
-absent!("rosbag", rosbag_tables);
+absent!("mcap", mcap_tables, Only<'_>);
+absent!("rosbag", rosbag_tables, Only<'_>);
 absent!("npz", npz_tables);
 absent!("mat", mat_tables);
 

@@ -21,6 +21,8 @@ enum Kind {
 #[derive(Debug, Default)]
 pub(super) struct Topics {
     topics: Vec<Topic>,
+    /// The names of the topics that are read, where not all are.
+    only: Option<Vec<String>>,
 }
 
 #[derive(Debug)]
@@ -32,13 +34,23 @@ struct Topic {
     table: Table,
 }
 
+/// What a file says of the type of messages: its name, the language of its definition, and the definition.
+pub(super) type Type<'a> = (&'a str, &'a str, &'a [u8]);
+
 impl Topics {
+    /// Topics of which those with some names are read, the others counted.
+    pub(super) fn of(only: Option<&[String]>) -> Topics {
+        Topics { topics: Vec::new(), only: only.map(<[String]>::to_vec) }
+    }
+
     /// Makes a topic known: `kind` is the type of its messages, `encoding` how their bytes are made.
-    pub(super) fn add(&mut self, id: i64, name: &str, kind: &str, encoding: &str) {
-        if self.topics.iter().any(|t| t.ids.contains(&id)) {
+    pub(super) fn add(&mut self, id: i64, name: &str, (kind, _, _): Type<'_>, encoding: &str) {
+        if self.knows(id) {
             return;
         }
+        let left_aside = self.only.as_ref().is_some_and(|only| !only.iter().any(|own| own == name));
         let read = match (kind.replace("/msg/", "/").as_str(), encoding) {
+            _ if left_aside => Kind::Other,
             ("sensor_msgs/JointState", "cdr" | "ros1") => Kind::JointState,
             ("control_msgs/DynamicJointState", "cdr" | "ros1") => Kind::DynamicJointState,
             (_, "json") => Kind::Json,
@@ -55,8 +67,12 @@ impl Topics {
         }
     }
 
+    /// Whether a topic was made known.
+    pub(super) fn knows(&self, id: i64) -> bool {
+        self.topics.iter().any(|t| t.ids.contains(&id))
+    }
+
     /// Whether the messages of a topic are read: the bytes of others need not be fetched.
-    #[cfg(feature = "rosbag")]
     pub(super) fn reads(&self, id: i64) -> bool {
         self.topics.iter().any(|t| t.ids.contains(&id) && t.kind != Kind::Other)
     }

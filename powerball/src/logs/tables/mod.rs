@@ -27,6 +27,7 @@ pub(crate) mod text;
 #[cfg(feature = "parquet")]
 mod zstd_pages;
 
+pub(crate) use contents::read_topics;
 pub use contents::{Contents, Finding, Format, LogError, read_contents};
 #[cfg(feature = "mcap")]
 pub(crate) use mcap_out::from_csv as mcap_from_csv;

@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io;
 
 /// The topics of a bag, each a table.
-pub(super) fn read(file: File) -> io::Result<Vec<Table>> {
+pub(super) fn read(file: File, only: Option<&[String]>) -> io::Result<Vec<Table>> {
     let database = Database::open(file)?;
     let tables = database.tables()?;
     let root = |name: &str| {
@@ -15,9 +15,9 @@ pub(super) fn read(file: File) -> io::Result<Vec<Table>> {
         found
             .ok_or_else(|| io::Error::other(format!("an SQLite file without the table {name} is no rosbag2")))
     };
-    let mut topics = Topics::default();
+    let mut topics = Topics::of(only);
     database.scan(root("topics")?, &mut |row| {
-        topics.add(row.int(0)?, &row.text(1)?, &row.text(2)?, &row.text(3)?);
+        topics.add(row.int(0)?, &row.text(1)?, (&row.text(2)?, "", &[]), &row.text(3)?);
         Ok(())
     })?;
     database.scan(root("messages")?, &mut |row| {
