@@ -104,7 +104,7 @@ fn chunks_of_other_topics_are_not_read() {
             let time = 1_000_000 * u64::from(10 * k) + j as u64;
             let header =
                 mcap::records::MessageHeader { channel_id, sequence: k, log_time: time, publish_time: time };
-            let text = format!("{{\"q\": [{k}, 1.0], \"tau\": [0.1, {k}]}}");
+            let text = format!("{{\"q\": [{k}e-2, 1.0], \"tau\": [0.1, {k}]}}");
             writer.write_to_known_channel(&header, text.as_bytes()).unwrap();
             writer.flush().unwrap();
         }
@@ -217,4 +217,294 @@ fn the_joints_of_an_arm_keep_their_names_in_mcap() {
     assert_eq!(table.names()[..2], ["position.shoulder", "position.elbow"]);
     let (back, _) = read(&file, JOINTS);
     assert_eq!((back.q, back.torque), (log.q, log.torque));
+}
+
+// rosbag2's SQLite.
+
+/// What a crash left beside a bag is brought in, or taken back, on a copy: the bag's folder stays as it was.
+#[test]
+fn a_bag_that_a_crash_left_is_read_and_its_folder_stays_as_it_is() {
+    let (csv, _) = read(&data("log.csv"), "");
+    for (name, ending, samples) in [("waiting.db3", "-wal", 120), ("half_written.db3", "-journal", 60)] {
+        let folder = folder(name);
+        for file in [name.to_string(), format!("{name}{ending}")] {
+            std::fs::copy(data(&file), folder.join(&file)).unwrap();
+        }
+        let before = listing(&folder);
+        let (log, findings) = read(&folder.join(name), JOINTS);
+        assert_eq!(listing(&folder), before, "{name}");
+        assert_eq!((log.t.len(), findings.len()), (samples, 0), "{name}: {findings:?}");
+        for (own, wanted) in log.q.iter().zip(&csv.q).chain(log.torque.iter().zip(&csv.torque)) {
+            assert_eq!(own[..], wanted[..samples], "{name}");
+        }
+    }
+    // A bag that was closed is read where nobody may write, and without a file beside it.
+    let folder = folder("closed");
+    let file = folder.join("bag #1?.db3");
+    std::fs::copy(data("bag.db3"), &file).unwrap();
+    let before = listing(&folder);
+    assert_eq!(read(&file, JOINTS).0.t.len(), 120);
+    assert_eq!(listing(&folder), before);
+}
+
+/// The files of a folder with what is in them.
+fn listing(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let name = |path: &PathBuf| path.file_name().unwrap().to_string_lossy().into_owned();
+    let mut files: Vec<_> = entries.map(|path| (name(&path), std::fs::read(&path).unwrap())).collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn an_sqlite_file_that_is_torn_or_no_bag_says_so() {
+    let folder = folder("torn_sqlite");
+    let whole = std::fs::read(data("bag.db3")).unwrap();
+    let file = folder.join("bag.db3");
+    let error = |bytes: &[u8]| {
+        std::fs::write(&file, bytes).unwrap();
+        read_contents(&file).unwrap_err().to_string()
+    };
+    assert!(error(&whole[..600]).contains("torn"), "{}", error(&whole[..600]));
+    // What stands before the damage is read.
+    std::fs::write(&file, &whole[..whole.len() / 2]).unwrap();
+    let contents = read_contents(&file).unwrap();
+    let (samples, told) = (contents.tables[0].line.len(), told(&contents));
+    assert!(samples > 30 && samples < 132 && told.contains("damaged after message"), "{samples}: {told}");
+    // Another program's database.
+    let mut other = whole.clone();
+    for at in 0..other.len() - 8 {
+        if &other[at..at + 8] == b"messages" {
+            other[at..at + 8].copy_from_slice(b"massages");
+        }
+    }
+    assert!(error(&other).contains("without the table messages is no rosbag2"), "{}", error(&other));
+}
+
+// Messages by the definition that stands in their file.
+
+/// Types that nobody knows beforehand: in CDR by mcap-ros2-support, in both forms of XCDR2 by Cyclone DDS.
+#[test]
+fn messages_of_any_type_are_read_by_the_definition_in_their_file() {
+    let (csv, _) = read(&data("log.csv"), "");
+    for (name, topic) in
+        [("defined.mcap", "/arm"), ("xcdr2.mcap", "/final"), ("xcdr2.mcap", "/grown"), ("iron.db3", "/grown")]
+    {
+        let (log, findings) = read(&data(name), &format!("{JOINTS}topic = \"{topic}\""));
+        assert_eq!((log.t.len(), &log.q, &log.torque), (csv.t.len(), &csv.q, &csv.torque), "{name} {topic}");
+        // Where there is no header, the time of receipt counts.
+        let late = if topic == "/grown" { 0.0021 } else { 1e-6 };
+        for (k, t) in log.t.iter().enumerate() {
+            assert!((t - log.t[0] - csv.t[k]).abs() < late, "{name} {topic}");
+        }
+        assert!(findings.iter().all(|f| !f.message.contains("could not be read")), "{findings:?}");
+    }
+    let arm = read_contents(&data("defined.mcap")).unwrap().tables.remove(0);
+    assert_eq!((arm.kind.as_str(), &arm.unreadable), ("arm_msgs/msg/ArmState", &None));
+    let at = |name: &str| {
+        arm.columns.iter().find(|c| c.name == name).unwrap_or_else(|| panic!("{name}")).values[77]
+    };
+    let named = ["mode", "extra.on", "extra.count", "extra.force1", "extra.force3", "extra.big", "extra.age"];
+    assert_eq!(named.map(at), [1.0, 0.0, -77.0, 1.5, 77.0, (2f64).powi(40) + 77.0, 1.5]);
+    assert_eq!((at("temperature.shoulder"), at("temperature.elbow")), (31.0, 30.0));
+    // Lists of messages are no signals.
+    assert!(arm.columns.iter().all(|c| !c.name.starts_with("cloud")), "{:?}", arm.names());
+}
+
+// Parquet.
+
+/// Every type that holds numbers, in row groups of 25 rows, by pyarrow.
+#[test]
+fn every_type_of_parquet_that_holds_numbers_is_numbers() {
+    let table = read_contents(&data("types.parquet")).unwrap().tables.remove(0);
+    let start = 1_700_000_000.0;
+    let wanted: [(&str, fn(f64) -> f64); 23] = [
+        ("t", |k| 0.005 * k),
+        ("t_us", |k| 0.005 * k),
+        ("t_ms", |k| 0.005 * k),
+        ("day", |_| -80_000.0),
+        ("clock", |_| 0.0),
+        ("half", |k| k / 8.0),
+        ("single", |k| k),
+        ("cents", |k| k / 100.0),
+        ("long_cents", |k| k / 100.0),
+        ("short_cents", |k| k / 100.0),
+        ("on", |k| f64::from(k % 2.0 == 0.0)),
+        ("byte", |k| k - 30.0),
+        ("word", |k| 2f64.powi(63) + k),
+        ("some", |k| k),
+        ("list1", |k| k),
+        ("list2", |k| k + 0.5),
+        ("large1", |k| k),
+        ("large2", |k| k + 0.5),
+        ("fixed1", |k| k),
+        ("fixed2", |k| k + 0.5),
+        ("struct.a", |k| k),
+        ("struct.b", |k| -k),
+        ("word_of", |_| f64::NAN),
+    ];
+    assert_eq!((table.line.len(), table.columns.len()), (60, wanted.len()));
+    for (name, value) in wanted {
+        let values = table.column(name).unwrap_or_else(|| panic!("{name} is not among {:?}", table.names()));
+        let missing = |k: usize| k == 7 && ["single", "some", "list1", "list2"].contains(&name);
+        for (k, own) in values.iter().enumerate() {
+            let of = if ["t", "t_us", "t_ms", "day"].contains(&name) { start } else { 0.0 };
+            let wanted = if missing(k) { f64::NAN } else { of + value(k as f64) };
+            // Seconds since 1970 have steps of 0.24 µs.
+            let within = if of > 0.0 { 3e-7 } else { 0.0 };
+            let same = (own.is_nan() && wanted.is_nan()) || (own - wanted).abs() <= within;
+            assert!(same, "{name} {k}: {own} for {wanted}");
+        }
+    }
+}
+
+// NumPy.
+
+#[test]
+fn arrays_of_every_type_and_a_single_one_are_read() {
+    let (csv, _) = read(&data("log.csv"), "");
+    // An archive as those beyond 4 GB are, with times as dates.
+    let (log, findings) = read(&data("types.npz"), JOINTS);
+    assert_eq!((&log.q, &log.torque), (&csv.q, &csv.torque), "{findings:?}");
+    assert!(log.t.iter().zip(&csv.t).all(|(a, b)| (a - log.t[0] - b).abs() < 5e-7));
+    let table = read_contents(&data("types.npz")).unwrap().tables.remove(0);
+    let at = |name: &str, k: usize| table.column(name).unwrap_or_else(|| panic!("{name}"))[k];
+    let named = ["half", "single", "on", "byte", "word"].map(|name| at(name, 3));
+    assert_eq!(named, [0.375, 0.375, 0.0, -57.0, 3.0 + 2f64.powi(40)]);
+    assert!(at("late", 5).is_nan() && (at("late", 6) - 1_700_000_000.06).abs() < 5e-7);
+    assert_eq!(at("since", 7), 0.07);
+    // Records: a column a field.
+    let (log, _) = read(&data("records.npy"), "");
+    assert_eq!((&log.t, &log.torque), (&csv.t, &csv.torque));
+    assert!(log.q.iter().flatten().zip(csv.q.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-7));
+    // One array has the name of its file.
+    let table = read_contents(&data("alone.npy")).unwrap().tables.remove(0);
+    assert_eq!(
+        (table.names(), table.column("alone2").unwrap()),
+        (vec!["alone1".into(), "alone2".into()], &csv.q[1][..])
+    );
+}
+
+#[test]
+fn an_archive_whose_checksum_is_wrong_is_refused() {
+    let mut bytes = std::fs::read(data("stored.npz")).unwrap();
+    let file = folder("checksum").join("stored.npz");
+    // In the middle of an array: nothing but the checksum can tell.
+    let at = bytes.len() / 2;
+    bytes[at] ^= 1;
+    std::fs::write(&file, bytes).unwrap();
+    let error = read_contents(&file).unwrap_err().to_string();
+    assert!(error.contains("npz: cannot be read: the archive is torn"), "{error}");
+}
+
+// Recordings in folders and compressed as a whole; ROS 1.
+
+#[test]
+fn folders_of_bags_are_read_as_they_are() {
+    let (csv, _) = read(&data("log.csv"), "");
+    let same = |path: &Path| {
+        let (log, findings) = read(path, &format!("{JOINTS}topic = \"/joint_states\""));
+        assert_eq!((&log.q, &log.torque), (&csv.q, &csv.torque), "{}: {findings:?}", path.display());
+        findings.iter().map(|f| format!("{f}\n")).collect::<String>()
+    };
+    // Compressed as a whole, message by message, and split; split_2 is before split_10.
+    for name in ["packed_file", "packed_messages", "split", "packed_file/packed_file.db3.zstd"] {
+        assert_eq!(same(&data(name)), "", "{name}");
+    }
+    // An interrupted recording has no metadata.yaml.
+    let folder = folder("interrupted");
+    for name in ["split_2.mcap.zstd", "split_10.mcap.zstd"] {
+        std::fs::copy(data("split").join(name), folder.join(name)).unwrap();
+    }
+    let told = same(&folder);
+    assert!(told.contains("has no metadata.yaml"), "{told}");
+    // One of its files is missing.
+    std::fs::copy(data("split/metadata.yaml"), folder.join("metadata.yaml")).unwrap();
+    std::fs::remove_file(folder.join("split_10.mcap.zstd")).unwrap();
+    let contents = read_contents(&folder).unwrap();
+    assert_eq!(contents.tables[0].line.len(), 60);
+    assert!(self::told(&contents).contains("split_10.mcap.zstd is not there"), "{}", self::told(&contents));
+    std::fs::remove_file(folder.join("split_2.mcap.zstd")).unwrap();
+    let error = read_contents(&folder).unwrap_err().to_string();
+    assert!(error.contains("the files of metadata.yaml are not there"), "{error}");
+    std::fs::remove_file(folder.join("metadata.yaml")).unwrap();
+    let error = read_contents(&folder).unwrap_err().to_string();
+    assert!(error.contains("is a folder without a recording"), "{error}");
+}
+
+#[test]
+fn bags_of_ros_1_are_read() {
+    let (csv, _) = read(&data("log.csv"), "");
+    for name in ["ros1_lz4.bag", "ros1_bz2.bag"] {
+        let (log, _) = read(&data(name), &format!("{JOINTS}topic = \"/JointState\""));
+        assert_eq!((&log.q, &log.torque), (&csv.q, &csv.torque), "{name}");
+        // By its definition, with positions in single precision.
+        let (log, _) = read(&data(name), &format!("{JOINTS}topic = \"/State\""));
+        assert_eq!(log.torque, csv.torque, "{name}");
+        assert!(
+            log.q.iter().flatten().zip(csv.q.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-7),
+            "{name}"
+        );
+        assert!(log.t.iter().zip(&csv.t).all(|(a, b)| (a - log.t[0] - b).abs() < 5e-7), "{name}");
+    }
+    // Not closed, not whole, damaged: said, and nothing stops the program.
+    let whole = std::fs::read(data("ros1_bz2.bag")).unwrap();
+    let file = folder("ros1").join("x.bag");
+    let read = |bytes: &[u8]| {
+        std::fs::write(&file, bytes).unwrap();
+        read_contents(&file)
+    };
+    let error = read(&whole[..whole.len() / 2]).unwrap_err().to_string();
+    assert!(error.contains("rosbag reindex"), "{error}");
+    let mut damaged = whole.clone();
+    damaged[whole.len() / 2] ^= 0x55;
+    let contents = read(&damaged).unwrap();
+    let samples = contents.tables[0].line.len();
+    assert!(
+        samples > 40 && samples < 120 && told(&contents).contains("chunks are damaged"),
+        "{}",
+        told(&contents)
+    );
+    for k in (0..whole.len()).step_by(53) {
+        let mut damaged = whole.clone();
+        damaged[k] ^= 0xff;
+        let _ = read(&damaged);
+        let _ = read(&whole[..k]);
+    }
+}
+
+// HDF5.
+
+#[test]
+fn hdf5_and_matlabs_version_7_3_are_read() {
+    let (csv, _) = read(&data("log.csv"), "");
+    for name in ["v73.mat", "log.h5"] {
+        let (log, findings) = read(&data(name), JOINTS);
+        assert_eq!((&log.t, &log.q, &log.torque), (&csv.t, &csv.q, &csv.torque), "{name}: {findings:?}");
+    }
+    // Demonstrations are tables; pictures are left out.
+    let contents = read_contents(&data("demonstrations.hdf5")).unwrap();
+    let names: Vec<&str> = contents.tables.iter().map(|t| t.name.as_str()).collect();
+    assert_eq!(names, ["/data/demo_0", "/data/demo_1", "/mask"]);
+    let demo = &contents.tables[1];
+    assert_eq!(
+        demo.names(),
+        ["actions1", "actions2", "actions3", "dones", "obs.robot0_joint_pos1", "obs.robot0_joint_pos2"]
+    );
+    assert_eq!(demo.column("obs.robot0_joint_pos2").unwrap()[9], csv.q[1][9] + 1.0);
+    assert_eq!(demo.column("dones").unwrap().iter().sum::<f64>(), 19.0);
+    assert!(told(&contents).contains("obs.picture"), "{}", told(&contents));
+    // Torn or damaged, it is refused or read, and nothing stops the program.
+    let file = folder("hdf5").join("x.h5");
+    for name in ["log.h5", "v73.mat"] {
+        let whole = std::fs::read(data(name)).unwrap();
+        for k in (0..whole.len()).step_by(41) {
+            let mut damaged = whole.clone();
+            damaged[k] ^= 0xff;
+            for bytes in [&damaged[..], &whole[..k]] {
+                std::fs::write(&file, bytes).unwrap();
+                let _ = read_contents(&file);
+            }
+        }
+    }
 }

@@ -5,7 +5,6 @@
 //! damaged chunk, by its checksum or by what it unpacks to, loses its own messages only.
 
 use super::messages::Topics;
-use super::table::Table;
 use ::mcap::records::{ChunkIndex, Record, op};
 use ::mcap::sans_io::{
     LinearReadEvent, LinearReader, LinearReaderOptions, SummaryReadEvent, SummaryReader, SummaryReaderOptions,
@@ -14,23 +13,24 @@ use ::mcap::{McapError, McapResult, Summary, parse_record};
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
 
 /// A chunk that claims to be larger than this, bytes, is damaged.
 const LARGEST_CHUNK: usize = 1 << 30;
 
-/// The topics of a file, each a table, and what is wrong with the file. `only`: the topics that are read, where not all are.
-pub(super) fn read(mut file: File, only: Option<&[String]>) -> io::Result<(Vec<Table>, Vec<String>)> {
-    let begin = || Records { topics: Topics::of(only), ..Records::default() };
-    if let Ok(Some(summary)) = summary(&mut file) {
-        let mut records = begin();
+/// Reads the topics of a file; what is wrong with it.
+pub(super) fn read(path: &Path, topics: &mut Topics) -> io::Result<Vec<String>> {
+    let mut file = File::open(path)?;
+    let mut records = Records::new(topics);
+    let all = match summary(&mut file) {
+        Ok(Some(summary)) => records.by_index(&mut file, &summary)?,
+        _ => None,
+    };
+    let torn = match all {
+        Some(true) => None,
         // A file may have messages outside of its chunks, which its index does not know.
-        if records.by_index(&mut file, &summary)? {
-            return Ok(records.done(None));
-        }
-    }
-    file.rewind()?;
-    let mut records = begin();
-    let torn = records.from_beginning(&mut file)?;
+        all => records.from_beginning(&mut file, all.is_none())?,
+    };
     Ok(records.done(torn))
 }
 
@@ -53,9 +53,8 @@ fn summary(file: &mut File) -> McapResult<Option<Summary>> {
     Ok(reader.finish())
 }
 
-#[derive(Default)]
-struct Records {
-    topics: Topics,
+struct Records<'t> {
+    topics: &'t mut Topics,
     /// Types of messages by their number: name, language and definition.
     schemas: HashMap<u16, (String, String, Vec<u8>)>,
     /// Messages that were taken or counted.
@@ -74,12 +73,23 @@ struct Lost {
     reason: String,
 }
 
-impl Records {
-    /// Reads by the index; false where it does not tell of all messages.
-    fn by_index(&mut self, file: &mut File, summary: &Summary) -> io::Result<bool> {
-        let Some(stats) = &summary.stats else { return Ok(false) };
+impl<'t> Records<'t> {
+    fn new(topics: &'t mut Topics) -> Records<'t> {
+        Records {
+            topics,
+            schemas: HashMap::new(),
+            messages: 0,
+            chunks: 0,
+            lost: Vec::new(),
+            behind_lost: false,
+        }
+    }
+
+    /// Reads by the index, where there is one; false where it does not tell of all messages.
+    fn by_index(&mut self, file: &mut File, summary: &Summary) -> io::Result<Option<bool>> {
+        let Some(stats) = &summary.stats else { return Ok(None) };
         if summary.chunk_indexes.len() != stats.chunk_count as usize {
-            return Ok(false);
+            return Ok(None);
         }
         let mut channels: Vec<_> = summary.channels.values().collect();
         channels.sort_by_key(|channel| channel.id);
@@ -96,7 +106,7 @@ impl Records {
         for index in &summary.chunk_indexes {
             self.indexed_chunk(file, index)?;
         }
-        Ok(self.messages >= stats.message_count || !self.lost.is_empty())
+        Ok(Some(self.messages >= stats.message_count || !self.lost.is_empty()))
     }
 
     fn indexed_chunk(&mut self, file: &mut File, index: &ChunkIndex) -> io::Result<()> {
@@ -138,9 +148,10 @@ impl Records {
         Ok(())
     }
 
-    /// Reads record by record; where the file ends too early, what that means.
-    fn from_beginning(&mut self, file: &mut File) -> io::Result<Option<String>> {
+    /// Reads record by record, with chunks or without; where the file ends too early, what that means.
+    fn from_beginning(&mut self, file: &mut File, chunks: bool) -> io::Result<Option<String>> {
         let length = usize::try_from(file.metadata()?.len()).unwrap_or(usize::MAX);
+        file.rewind()?;
         let options = LinearReaderOptions::default().with_emit_chunks(true);
         let mut reader = LinearReader::new_with_options(options.with_record_length_limit(length));
         while let Some(event) = reader.next_event() {
@@ -150,6 +161,7 @@ impl Records {
                     reader.notify_read(read);
                 }
                 Ok(LinearReadEvent::Record { opcode: op::DATA_END, .. }) => return Ok(None),
+                Ok(LinearReadEvent::Record { opcode: op::CHUNK, .. }) if !chunks => {}
                 Ok(LinearReadEvent::Record { opcode: op::CHUNK, data }) => {
                     self.chunks += 1;
                     let head = [&[op::CHUNK][..], &(data.len() as u64).to_le_bytes()].concat();
@@ -238,7 +250,7 @@ impl Records {
         }
     }
 
-    fn done(self, torn: Option<String>) -> (Vec<Table>, Vec<String>) {
+    fn done(self, torn: Option<String>) -> Vec<String> {
         let lost = self.lost.first().map(|first| {
             let messages: usize = self.lost.iter().map(|lost| lost.messages).sum();
             let how_many = if messages > 0 { format!("{messages} messages") } else { "its messages".into() };
@@ -250,7 +262,7 @@ impl Records {
                 first.reason,
             )
         });
-        (self.topics.tables(), lost.into_iter().chain(torn).collect())
+        lost.into_iter().chain(torn).collect()
     }
 }
 
