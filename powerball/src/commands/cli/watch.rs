@@ -34,7 +34,7 @@ pub(crate) struct WatchCommand {
     /// model.json of `powerball explain`, or identified.json, for the same arm file.
     #[arg(long, value_name = "FILE.json")]
     model: PathBuf,
-    /// Logs, each watched by itself (CSV, Parquet, MCAP, rosbag2, npz or mat).
+    /// Logs, each watched by itself (CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     log: Vec<PathBuf>,
     /// A bus on which others move the arm.

@@ -153,6 +153,7 @@ mod tests {
             parameters: body.names().iter().zip(values).map(entry).collect(),
             friction: friction.collect(),
             additions: Additions::default(),
+            colour: None,
         };
         let payload = |end: Option<f64>| Payload {
             mass: 2.0,

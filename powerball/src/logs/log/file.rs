@@ -114,7 +114,10 @@ impl Made {
             #[cfg(feature = "mcap")]
             Made::Mcap => crate::logs::tables::mcap_from_csv(lines, joints, io::BufWriter::new(out)),
             #[cfg(not(feature = "mcap"))]
-            Made::Mcap => Err(io::Error::other("this build does not write it: enable the feature `mcap`")),
+            Made::Mcap => {
+                let _ = joints;
+                Err(io::Error::other("this build does not write it: enable the feature `mcap`"))
+            }
         }
     }
 }

@@ -55,7 +55,9 @@ fn parse(bytes: &[u8], file: &str, arm: &Arm, findings: &mut Vec<Finding>) -> Re
     #[cfg(feature = "parquet")]
     if bytes.starts_with(b"PAR1") {
         let input = bytes::Bytes::copy_from_slice(bytes);
-        let read = |samples: &mut _, _: &mut _| columnar::read(input, file, samples).map(|()| false);
+        let read = |samples: &mut super::read::Samples<'_>, _: &mut Vec<Finding>| {
+            crate::logs::tables::columnar::read(input, file, samples).map(|()| false)
+        };
         return super::read::rows(asked, findings, read);
     }
     super::read::parse(bytes, asked, findings)

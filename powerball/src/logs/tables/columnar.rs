@@ -35,16 +35,17 @@ pub(crate) fn read(
     let length = input.len();
     // What Arrow noted of its own types beside those of Parquet says nothing more about numbers.
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-    let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(input, options)
+    let builder = guarded(|| ParquetRecordBatchReaderBuilder::try_new_with_options(input, options))
         .map_err(|e| unreadable(None, &e))?;
     within(builder.metadata(), length).map_err(|e| unreadable(None, &e))?;
     let fields: Vec<String> = builder.schema().fields().iter().map(|field| field.name().clone()).collect();
-    let reader = builder.with_batch_size(ROWS).build().map_err(|e| unreadable(None, &e))?;
+    let mut reader = guarded(|| builder.with_batch_size(ROWS).build()).map_err(|e| unreadable(None, &e))?;
     let mut count = 0;
     // How many numbers each column is, by the first rows, and the dataset that the file is part of.
     let mut known: Option<(Vec<usize>, Dataset)> = None;
-    for batch in reader {
-        let batch = batch.map_err(|e| unreadable(Some(count + 1), &e))?;
+    loop {
+        let next = guarded(|| reader.next().transpose()).map_err(|e| unreadable(Some(count + 1), &e))?;
+        let Some(batch) = next else { break };
         let columns = leaves(&batch);
         let (widths, dataset) = match &mut known {
             Some(known) => known,
@@ -72,6 +73,15 @@ pub(crate) fn read(
         rows.begin(&fields)?;
     }
     Ok(())
+}
+
+/// A step of the library's, which panics at some of what is damaged within a page.
+#[cfg(feature = "parquet")]
+fn guarded<T, E: std::fmt::Display>(step: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
+    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(step)) {
+        Ok(done) => done.map_err(|e| e.to_string()),
+        Err(_) => Err("a page is damaged".into()),
+    }
 }
 
 /// Whether all columns lie within the file: `parquet` panics where one lies before it.

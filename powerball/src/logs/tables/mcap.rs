@@ -29,7 +29,7 @@ pub(super) fn read(path: &Path, topics: &mut Topics) -> io::Result<Vec<String>> 
     let torn = match all {
         Some(true) => None,
         // A file may have messages outside of its chunks, which its index does not know.
-        all => records.from_beginning(&mut file, all.is_none())?,
+        all => records.record_by_record(&mut file, all.is_none())?,
     };
     Ok(records.done(torn))
 }
@@ -149,7 +149,7 @@ impl<'t> Records<'t> {
     }
 
     /// Reads record by record, with chunks or without; where the file ends too early, what that means.
-    fn from_beginning(&mut self, file: &mut File, chunks: bool) -> io::Result<Option<String>> {
+    fn record_by_record(&mut self, file: &mut File, chunks: bool) -> io::Result<Option<String>> {
         let length = usize::try_from(file.metadata()?.len()).unwrap_or(usize::MAX);
         file.rewind()?;
         let options = LinearReaderOptions::default().with_emit_chunks(true);

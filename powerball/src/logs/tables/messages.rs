@@ -90,6 +90,7 @@ impl Topics {
     }
 
     /// Whether the messages of a topic are read: the bytes of others need not be fetched.
+    #[cfg(feature = "mcap")]
     pub(super) fn reads(&self, id: i64) -> bool {
         self.topics.iter().any(|t| t.ids.contains(&id) && !matches!(t.reader, Reader::Other))
     }
