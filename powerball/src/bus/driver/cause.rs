@@ -313,7 +313,7 @@ impl fmt::Display for Details {
         let mut part = |f: &mut fmt::Formatter<'_>, text: fmt::Arguments<'_>| {
             write!(f, "{separator}{text}")?;
             separator = ", ";
-            Ok(())
+            Ok::<(), fmt::Error>(())
         };
         if let Some(register) = self.register {
             part(f, format_args!("error register 0x{register:02X}"))?;

@@ -20,7 +20,7 @@ pub(crate) struct Inputs {
     /// The arm file (TOML).
     #[arg(long, value_name = "ARM.toml")]
     pub arm: PathBuf,
-    /// Logs to fit (CSV, Parquet, MCAP, rosbag2, npz or mat: t, q1…, tau1… or i1…); several, in the order in which
+    /// Logs to fit (CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5: t, q1…, tau1… or i1…); several, in the order in which
     /// they were recorded.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     pub log: Vec<PathBuf>,
@@ -113,7 +113,7 @@ impl MountedLogs {
 /// As they stand on the command line.
 #[derive(Args, Debug)]
 struct Options {
-    /// Logs to fit (CSV, Parquet, MCAP, rosbag2, npz or mat: t, q1…, tau1… or i1…), or their summaries from
+    /// Logs to fit (CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5: t, q1…, tau1… or i1…), or their summaries from
     /// `powerball summarize`.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     log: Vec<PathBuf>,

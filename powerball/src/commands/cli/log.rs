@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// Show what is in log files and what they are taken to be: topics, columns, units, rates, gaps, doubts;
 /// with --out as a page with figures.
 ///
-/// CSV, Parquet, MCAP, rosbag2 (`.db3`), npz and mat. With an arm also the log that `identify` would read. Exit
+/// CSV, Parquet, MCAP, bags of ROS 1 and 2 (also their folders), npz, npy, mat and HDF5. With an arm also the log that `identify` would read. Exit
 /// code 1 where a file is no log of that arm.
 #[derive(Args, Debug)]
 #[command(
@@ -206,7 +206,7 @@ fn table_lines(table: &InspectedTable, lines: &mut Vec<String>) {
 /// Writes a log; with a model as MCAP that has measured, predicted and residual torque beside each other.
 pub(super) fn write(log: &Log, arm: &Arm, model: Option<&Path>, out: &Path) -> Result<(), Failure> {
     let failed = |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", out.display()));
-    let Some(model) = model else { return log.write(out).map_err(failed) };
+    let Some(model) = model else { return log.write_for(out, &joint_names(arm)).map_err(failed) };
     let model = ModelFile::read(model).map_err(|e| Failure::Unusable(e.to_string()))?;
     // Times along the log, and measured, predicted and residual torque there, by joint.
     let mut torque: Vec<Vec<[f64; 4]>> = vec![Vec::new(); arm.dof()];
@@ -219,12 +219,19 @@ pub(super) fn write(log: &Log, arm: &Arm, model: Option<&Path>, out: &Path) -> R
         }
     }
     let mut bytes = Vec::new();
-    mcap(log, &torque, &mut bytes).map_err(failed)?;
+    mcap(log, &joint_names(arm), &torque, &mut bytes).map_err(failed)?;
     super::output::write_file(out, &bytes)
 }
 
-fn mcap(log: &Log, torque: &[Vec<[f64; 4]>], out: &mut Vec<u8>) -> std::io::Result<()> {
-    let joints: Vec<String> = (1..=log.q.len()).map(|j| format!("joint{j}")).collect();
+/// The names of an arm's joints as an MCAP has them: those of the arm file, else `joint1` and so on.
+pub(super) fn joint_names(arm: &Arm) -> Vec<String> {
+    match arm.moving_joints().all(|joint| joint.name.is_some()) {
+        true => arm.joint_names(),
+        false => (1..=arm.dof()).map(|j| format!("joint{j}")).collect(),
+    }
+}
+
+fn mcap(log: &Log, joints: &[String], torque: &[Vec<[f64; 4]>], out: &mut Vec<u8>) -> std::io::Result<()> {
     let members = ["measured", "predicted", "residual"];
     let mut writer = McapWriter::new(out)?;
     let states = writer.joint_states("/joint_states")?;
@@ -238,7 +245,7 @@ fn mcap(log: &Log, torque: &[Vec<[f64; 4]>], out: &mut Vec<u8>) -> std::io::Resu
         writer.state(
             states,
             *t,
-            &joints,
+            joints,
             &JointState { position: &position, velocity: &[], effort: &effort },
         )?;
     }

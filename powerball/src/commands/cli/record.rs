@@ -3,6 +3,7 @@
 use super::Failure;
 use super::bus::{Where, master};
 use super::envelope::Surroundings;
+use super::log::joint_names;
 use super::output;
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::identification::motion::Motion;
@@ -62,11 +63,12 @@ impl RecordCommand {
                 self.out.display()
             )));
         }
-        let envelope = self.surroundings.envelope(&self.surroundings.arm()?, &self.mounting)?;
+        let arm = self.surroundings.arm()?;
+        let envelope = self.surroundings.envelope(&arm, &self.mounting)?;
         let master = master(&self.place)?;
         let unwritable =
             |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", self.out.display()));
-        let (log, recovered) = LogFile::create(&self.out).map_err(unwritable)?;
+        let (log, recovered) = LogFile::create_for(&self.out, &joint_names(&arm)).map_err(unwritable)?;
         if let Some(file) = &recovered {
             let file = file.display();
             eprintln!("powerball: an earlier recording was broken off: its lines are now in {file}");

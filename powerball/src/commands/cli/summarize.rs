@@ -28,7 +28,7 @@ pub(crate) struct Summarize {
     /// The arm file (TOML).
     #[arg(long, value_name = "ARM.toml")]
     arm: PathBuf,
-    /// Logs (CSV, Parquet, MCAP, rosbag2, npz or mat), or summaries to join.
+    /// Logs (CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5), or summaries to join.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     log: Vec<PathBuf>,
     #[command(flatten)]

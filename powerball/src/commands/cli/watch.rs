@@ -37,7 +37,7 @@ pub(crate) struct WatchCommand {
     /// model.json of `powerball explain`, or identified.json, for the same arm file.
     #[arg(long, value_name = "FILE.json")]
     model: PathBuf,
-    /// Logs, each watched by itself (CSV, Parquet, MCAP, rosbag2, npz or mat).
+    /// Logs, each watched by itself (CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     log: Vec<PathBuf>,
     /// A bus on which another master moves the LWA 4P: socketcan:can0, slcan:/dev/ttyACM0 or udp:239.74.163.2:43113.

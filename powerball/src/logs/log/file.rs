@@ -20,6 +20,7 @@ pub struct LogFile {
     lines: PathBuf,
     file: File,
     started: bool,
+    joints: Vec<String>,
 }
 
 impl LogFile {
@@ -30,6 +31,15 @@ impl LogFile {
     /// # Errors
     /// What the file system says, and a format that this build does not have.
     pub fn create(path: &Path) -> io::Result<(LogFile, Option<PathBuf>)> {
+        Self::create_for(path, &[])
+    }
+
+    /// The same with the names that an MCAP gives the joints, in chain order; `joint1` and so on where there are
+    /// none.
+    ///
+    /// # Errors
+    /// As [`LogFile::create`].
+    pub fn create_for(path: &Path, joints: &[String]) -> io::Result<(LogFile, Option<PathBuf>)> {
         let made = Made::of(path);
         let absent = match made {
             Some(Made::Parquet) if !cfg!(feature = "parquet") => Some("parquet"),
@@ -42,9 +52,10 @@ impl LogFile {
             )));
         }
         let lines = if made.is_some() { with_more(path, ".csv") } else { path.to_path_buf() };
-        let recovered = if made.is_some() { recover(path, &lines)? } else { None };
+        let recovered = if made.is_some() { recover(path, &lines, joints)? } else { None };
         let file = OpenOptions::new().create(true).append(true).open(&lines)?;
-        Ok((LogFile { path: path.to_path_buf(), lines, file, started: false }, recovered))
+        let (path, joints) = (path.to_path_buf(), joints.to_vec());
+        Ok((LogFile { path, lines, file, started: false, joints }, recovered))
     }
 
     /// Ends the log.
@@ -60,7 +71,7 @@ impl LogFile {
             return Err(io::Error::other("nothing was recorded"));
         }
         if self.lines != self.path {
-            convert(&self.lines, &self.path)?;
+            convert(&self.lines, &self.path, &self.joints)?;
             fs::remove_file(&self.lines)?;
         }
         Ok(())
@@ -97,13 +108,16 @@ impl Made {
             .map(|m| m.1)
     }
 
-    fn convert(self, lines: File, out: File) -> io::Result<usize> {
+    fn convert(self, lines: File, joints: &[String], out: File) -> io::Result<usize> {
         match self {
             Made::Parquet => crate::logs::tables::columnar::from_csv(lines, out),
             #[cfg(feature = "mcap")]
-            Made::Mcap => crate::logs::tables::mcap_from_csv(lines, io::BufWriter::new(out)),
+            Made::Mcap => crate::logs::tables::mcap_from_csv(lines, joints, io::BufWriter::new(out)),
             #[cfg(not(feature = "mcap"))]
-            Made::Mcap => Err(io::Error::other("this build does not write it: enable the feature `mcap`")),
+            Made::Mcap => {
+                let _ = joints;
+                Err(io::Error::other("this build does not write it: enable the feature `mcap`"))
+            }
         }
     }
 }
@@ -115,24 +129,24 @@ fn with_more(path: &Path, more: &str) -> PathBuf {
 }
 
 /// Lines that a dead program left become a file of the format under a name that is still free.
-fn recover(path: &Path, lines: &Path) -> io::Result<Option<PathBuf>> {
+fn recover(path: &Path, lines: &Path, joints: &[String]) -> io::Result<Option<PathBuf>> {
     if !lines.exists() {
         return Ok(None);
     }
     let ending = path.extension().unwrap_or_default().to_string_lossy().into_owned();
     let free = (1..).map(|k| path.with_extension(format!("interrupted-{k}.{ending}"))).find(|p| !p.exists());
     let Some(target) = free else { return Ok(None) };
-    let rows = convert(lines, &target)?;
+    let rows = convert(lines, &target, joints)?;
     fs::remove_file(lines)?;
     Ok((rows > 0).then_some(target))
 }
 
 /// Lines of CSV to a file of the target's format, whole or not at all; the number of rows. Without rows there
 /// is no file.
-fn convert(lines: &Path, target: &Path) -> io::Result<usize> {
+fn convert(lines: &Path, target: &Path, joints: &[String]) -> io::Result<usize> {
     let part = with_more(target, &format!(".{}.part", std::process::id()));
     let made = Made::of(target).unwrap_or(Made::Parquet);
-    let written = made.convert(File::open(lines)?, File::create(&part)?);
+    let written = made.convert(File::open(lines)?, joints, File::create(&part)?);
     match written {
         Ok(rows) if rows > 0 => fs::rename(&part, target).map(|()| rows),
         other => {
@@ -151,7 +165,15 @@ impl Log {
     /// # Errors
     /// What the file system says.
     pub fn write(&self, path: &Path) -> io::Result<()> {
-        let (mut file, _) = LogFile::create(path)?;
+        self.write_for(path, &[])
+    }
+
+    /// The same with the names that an MCAP gives the joints.
+    ///
+    /// # Errors
+    /// As [`Log::write`].
+    pub fn write_for(&self, path: &Path, joints: &[String]) -> io::Result<()> {
+        let (mut file, _) = LogFile::create_for(path, joints)?;
         let groups = self.groups();
         let mut line = String::from("t");
         for (stem, signals) in &groups {

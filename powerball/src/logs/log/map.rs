@@ -127,6 +127,13 @@ const CURRENTS: &[Unit] = &[(&["A"], 1.0), (&["mA"], 1e-3)];
 const TEMPERATURES: &[Unit] = &[(&["°C", "C", "degC"], 1.0)];
 
 impl ColumnMap {
+    /// The topics that the map names, where it names the one with all that is not said to be elsewhere.
+    pub(super) fn topics(&self) -> Option<Vec<String>> {
+        let main = self.topic.clone()?;
+        let others = [&self.t, &self.q, &self.dq, &self.tau, &self.i, &self.temp, &self.motor];
+        Some(std::iter::once(main).chain(others.iter().filter_map(|own| own.topic.clone())).collect())
+    }
+
     /// Reads a map from TOML; `name` stands in messages where the file does.
     ///
     /// # Errors

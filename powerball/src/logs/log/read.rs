@@ -5,8 +5,9 @@
 use super::columns::{Asked, Columns};
 use super::map::ColumnMap;
 use super::{Finding, Log, LogError, check, topics};
-use crate::logs::tables::{Format, RowSink, columnar, read_contents, text};
+use crate::logs::tables::{Format, RowSink, columnar, read_topics, text};
 use dyngen::Arm;
+use std::fs::File;
 use std::path::Path;
 
 /// Reads several logs of an arm; the findings are of all of them.
@@ -56,36 +57,53 @@ pub fn read_log_as(
 ) -> Result<Log, LogError> {
     let file = path.display().to_string();
     let asked = Asked { arm, map, file: &file, header: None };
+    let unreadable = |e| LogError::of_file(&file, "file", format!("cannot be read: {e}"));
     match Format::of_file(path)? {
-        Format::Csv | Format::Parquet => {
-            let unreadable = |e| LogError::of_file(&file, "file", format!("cannot be read: {e}"));
-            parse(&std::fs::read(path).map_err(unreadable)?, asked, findings)
+        Format::Csv => parse(&std::fs::read(path).map_err(unreadable)?, asked, findings),
+        Format::Parquet => {
+            let opened = File::open(path).map_err(unreadable)?;
+            rows(asked, findings, |samples, _| columnar::read(opened, &file, samples).map(|()| false))
         }
-        Format::Mcap | Format::Rosbag | Format::Npz | Format::Mat => {
-            let contents = read_contents(path)?;
+        _ => {
+            // With other topics left aside; an error names them all.
+            if let Some(only) = map.topics() {
+                let contents = read_topics(path, Some(&only))?;
+                let mut own = contents.notes;
+                if let Ok(log) = topics::log(&contents.tables, asked, &mut own) {
+                    findings.extend(own);
+                    return Ok(log);
+                }
+            }
+            let contents = read_topics(path, None)?;
             findings.extend(contents.notes);
             topics::log(&contents.tables, asked, findings)
         }
     }
 }
 
-/// Reads a log from the bytes of a file: Parquet by its mark, CSV else.
+/// Reads a log from lines.
 pub(super) fn parse(bytes: &[u8], asked: Asked<'_>, findings: &mut Vec<Finding>) -> Result<Log, LogError> {
+    rows(asked, findings, |samples, notes| text::read(bytes, asked.file, samples, notes))
+}
+
+/// Reads a log row by row; `read` says whether the last one is torn.
+pub(super) fn rows(
+    asked: Asked<'_>,
+    findings: &mut Vec<Finding>,
+    read: impl FnOnce(&mut Samples<'_>, &mut Vec<Finding>) -> Result<bool, LogError>,
+) -> Result<Log, LogError> {
     // Their header is their first line.
     let asked = Asked { header: Some(1), ..asked };
-    let mut lines = Vec::new();
+    let mut notes = Vec::new();
     let mut samples = Samples::new(asked, "line", findings);
-    let torn = match Format::of(bytes) {
-        Format::Parquet => columnar::read(bytes, asked.file, &mut samples).map(|()| false),
-        _ => text::read(bytes, asked.file, &mut samples, &mut lines),
-    }?;
+    let torn = read(&mut samples, &mut notes)?;
     let log = samples.finish(torn);
-    findings.extend(lines);
+    findings.extend(notes);
     log
 }
 
 impl Log {
-    /// Reads a log of an arm from a file, CSV, Parquet, MCAP, rosbag2 (`.db3`), npz or mat, with what is odd about
+    /// Reads a log of an arm from a file, CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5, with what is odd about
     /// it.
     ///
     /// # Errors

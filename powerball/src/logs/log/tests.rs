@@ -52,6 +52,14 @@ const HEADER: &str = "t,q1,q2,tau1,tau2";
 
 fn parse(bytes: &[u8], file: &str, arm: &Arm, findings: &mut Vec<Finding>) -> Result<Log, LogError> {
     let asked = Asked { arm, map: &ColumnMap::default(), file, header: None };
+    #[cfg(feature = "parquet")]
+    if bytes.starts_with(b"PAR1") {
+        let input = bytes::Bytes::copy_from_slice(bytes);
+        let read = |samples: &mut super::read::Samples<'_>, _: &mut Vec<Finding>| {
+            crate::logs::tables::columnar::read(input, file, samples).map(|()| false)
+        };
+        return super::read::rows(asked, findings, read);
+    }
     super::read::parse(bytes, asked, findings)
 }
 

@@ -19,6 +19,13 @@ pub(super) enum Values {
     Texts(Vec<String>),
 }
 
+/// All arrays of a file as its one table, and those that have no place in it.
+#[cfg(any(feature = "npz", feature = "mat"))]
+pub(super) fn one(arrays: &[Array], left_out: Vec<String>) -> (Vec<Table>, Vec<String>) {
+    let (table, note) = table(arrays, left_out);
+    (vec![table], note.into_iter().collect())
+}
+
 /// The arrays as one table, and those that have no place in it. `left_out`: those that could not be read.
 pub(super) fn table(arrays: &[Array], mut left_out: Vec<String>) -> (Table, Option<String>) {
     // As many samples as the time has, or as most arrays have.

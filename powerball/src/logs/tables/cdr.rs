@@ -1,7 +1,13 @@
-//! Messages of ROS as their bytes are: CDR (ROS 2) and the serialisation of ROS 1.
+//! Messages of ROS as their bytes are: CDR of both versions (ROS 2) and the serialisation of ROS 1.
+//!
+//! Crates that read CDR know its first version alone, with types that are known when they are compiled (`cdr`, `cdr-encoding`), or
+//! build a tree of each message (`re_ros_msg`, which asks for a newer Rust than this workspace).
+
+use super::schema::Bits;
+use std::borrow::Cow;
 
 /// A number of values or letters beyond this is no message of joints.
-const MOST_OF_A_TYPE: usize = 1 << 16;
+const MOST_OF_A_TYPE: usize = 1 << 28;
 
 /// The bytes of a message, read from the front.
 pub(super) struct Cdr<'a> {
@@ -10,38 +16,51 @@ pub(super) struct Cdr<'a> {
     little: bool,
     /// Numbers stand at multiples of their size up to this: 8 in CDR, 4 in XCDR2, 1 in ROS 1.
     alignment: usize,
+    /// Whether messages begin with their size: types of XCDR2 that may grow.
+    delimited: bool,
 }
 
 impl<'a> Cdr<'a> {
     /// A message of ROS 2: two bytes say how it is encoded, two more are options.
     pub(super) fn ros2(message: &'a [u8]) -> Result<Cdr<'a>, String> {
-        let (little, alignment) = match message.get(..2) {
-            Some([0, 0]) => (false, 8),
-            Some([0, 1]) => (true, 8),
-            Some([0, 6]) => (false, 4),
-            Some([0, 7]) => (true, 4),
-            _ => return Err("is not plain CDR".into()),
+        let (little, alignment, delimited) = match message.get(..2) {
+            Some([0, kind @ (0 | 1)]) => (kind % 2 == 1, 8, false),
+            Some([0, kind @ (6 | 7)]) => (kind % 2 == 1, 4, false),
+            Some([0, kind @ (8 | 9)]) => (kind % 2 == 1, 4, true),
+            Some([0, 2 | 3 | 10 | 11]) => {
+                return Err("is a list of parameters (a mutable type), which is not read".into());
+            }
+            Some(_) => return Err("is no CDR".into()),
+            None => return Err("is torn".into()),
         };
         let bytes = message.get(4..).ok_or("is torn")?;
-        Ok(Cdr { bytes, at: 0, little, alignment })
+        Ok(Cdr { bytes, at: 0, little, alignment, delimited })
     }
 
     /// A message of ROS 1.
     pub(super) fn ros1(message: &'a [u8]) -> Cdr<'a> {
-        Cdr { bytes: message, at: 0, little: true, alignment: 1 }
+        Cdr { bytes: message, at: 0, little: true, alignment: 1, delimited: false }
     }
 
     fn is_ros1(&self) -> bool {
         self.alignment == 1
     }
 
+    fn slice(&mut self, size: usize) -> Result<&'a [u8], String> {
+        let end = self.at.checked_add(size).ok_or("is torn")?;
+        let bytes = self.bytes.get(self.at..end).ok_or("is torn")?;
+        self.at = end;
+        Ok(bytes)
+    }
+
+    fn align(&mut self, size: usize) {
+        self.at = self.at.next_multiple_of(size.min(self.alignment));
+    }
+
     fn take<const N: usize>(&mut self) -> Result<[u8; N], String> {
-        let step = N.min(self.alignment);
-        let at = self.at.next_multiple_of(step);
-        let bytes = self.bytes.get(at..at + N).ok_or("is torn")?;
-        self.at = at + N;
+        self.align(N);
         let mut out = [0; N];
-        out.copy_from_slice(bytes);
+        out.copy_from_slice(self.slice(N)?);
         if !self.little {
             out.reverse();
         }
@@ -52,45 +71,113 @@ impl<'a> Cdr<'a> {
         self.take().map(u32::from_le_bytes)
     }
 
-    fn count(&mut self) -> Result<usize, String> {
+    /// How many values a list has.
+    pub(super) fn count(&mut self) -> Result<usize, String> {
         let count = self.u32()? as usize;
         if count > MOST_OF_A_TYPE { Err("is torn".into()) } else { Ok(count) }
     }
 
-    pub(super) fn string(&mut self) -> Result<String, String> {
+    /// A number of so many bytes.
+    pub(super) fn number(&mut self, size: usize, bits: Bits) -> Result<f64, String> {
+        self.align(size);
+        let mut own = [0; 8];
+        own[..size].copy_from_slice(self.slice(size)?);
+        if !self.little {
+            own[..size].reverse();
+        }
+        let unsigned = u64::from_le_bytes(own);
+        let unused = 64 - 8 * size as u32;
+        Ok(match (bits, size) {
+            (Bits::Float, 4) => f64::from(f32::from_bits(unsigned as u32)),
+            (Bits::Float, _) => f64::from_bits(unsigned),
+            (Bits::Signed, _) => (((unsigned << unused) as i64) >> unused) as f64,
+            (Bits::Unsigned, _) => unsigned as f64,
+        })
+    }
+
+    /// Passes over numbers of so many bytes.
+    pub(super) fn skip(&mut self, count: usize, size: usize) -> Result<(), String> {
+        if count > 0 {
+            self.align(size);
+            self.slice(count.saturating_mul(size))?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn string(&mut self) -> Result<Cow<'a, str>, String> {
         let length = self.count()?;
-        let bytes = self.bytes.get(self.at..self.at + length).ok_or("is torn")?;
-        self.at += length;
+        let bytes = self.slice(length)?;
         // CDR counts a zero at the end.
-        let text = bytes.strip_suffix(b"\0").unwrap_or(bytes);
-        Ok(String::from_utf8_lossy(text).into_owned())
+        Ok(String::from_utf8_lossy(bytes.strip_suffix(b"\0").unwrap_or(bytes)))
     }
 
-    pub(super) fn strings(&mut self) -> Result<Vec<String>, String> {
+    pub(super) fn strings(&mut self) -> Result<Vec<Cow<'a, str>>, String> {
+        self.begin_list()?;
         (0..self.count()?).map(|_| self.string()).collect()
-    }
-
-    pub(super) fn numbers(&mut self) -> Result<Vec<f64>, String> {
-        (0..self.count()?).map(|_| self.take().map(f64::from_le_bytes)).collect()
     }
 
     /// A list of what `each` reads.
     pub(super) fn list<T>(
         &mut self,
-        each: impl Fn(&mut Self) -> Result<T, String>,
+        mut each: impl FnMut(&mut Self) -> Result<T, String>,
     ) -> Result<Vec<T>, String> {
         (0..self.count()?).map(|_| each(self)).collect()
     }
 
+    /// Before a list of anything but numbers: XCDR2 says there how many bytes it has.
+    pub(super) fn begin_list(&mut self) -> Result<(), String> {
+        if self.alignment == 4 { self.u32().map(|_| ()) } else { Ok(()) }
+    }
+
+    /// Before a message; where it ends, if that is said.
+    pub(super) fn begin_message(&mut self) -> Result<Option<usize>, String> {
+        if !self.delimited {
+            return Ok(None);
+        }
+        let size = self.u32()? as usize;
+        Ok(Some(self.at.saturating_add(size)))
+    }
+
+    /// After it: what a newer type may have added is passed over.
+    pub(super) fn end_message(&mut self, end: Option<usize>) -> Result<(), String> {
+        match end {
+            Some(end) if end < self.at || end > self.bytes.len() => Err("is torn".into()),
+            Some(end) => {
+                self.at = end;
+                Ok(())
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// A message without a field, which ROS 2 gives one.
+    pub(super) fn pass_empty(&mut self) -> Result<(), String> {
+        if self.is_ros1() { Ok(()) } else { self.skip(1, 1) }
+    }
+
+    /// `builtin_interfaces/Time`, or ROS 1's time, s.
+    pub(super) fn time(&mut self) -> Result<f64, String> {
+        let end = self.begin_message()?;
+        let seconds = self.take()?;
+        let seconds = match self.is_ros1() {
+            true => f64::from(u32::from_le_bytes(seconds)),
+            false => f64::from(i32::from_le_bytes(seconds)),
+        };
+        let time = seconds + 1e-9 * f64::from(self.u32()?);
+        self.end_message(end)?;
+        Ok(time)
+    }
+
     /// `std_msgs/Header`: its time stamp, s.
     pub(super) fn header(&mut self) -> Result<f64, String> {
+        let end = self.begin_message()?;
         if self.is_ros1() {
             self.u32()?;
         }
-        let seconds = self.take().map(i32::from_le_bytes)?;
-        let nanoseconds = self.u32()?;
+        let time = self.time()?;
         self.string()?;
-        Ok(f64::from(seconds) + 1e-9 * f64::from(nanoseconds))
+        self.end_message(end)?;
+        Ok(time)
     }
 }
 

@@ -1,18 +1,29 @@
-//! The same columns in Parquet. A list of k numbers is k columns.
+//! The same columns in Parquet. A list of k numbers is k columns; the fields of a struct are columns too.
 
 #[cfg(feature = "parquet")]
-use super::lists::Flattened;
+use super::lerobot::Dataset;
+#[cfg(feature = "parquet")]
+use super::numbers::{leaves, numbers, width};
 use super::table::RowSink;
 use super::{Finding, LogError};
 #[cfg(feature = "parquet")]
-use std::path::Path;
-
-/// Hands the rows of a Parquet file over. They take the place of lines in findings.
+use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 #[cfg(feature = "parquet")]
-pub(crate) fn read(bytes: &[u8], file: &str, rows: &mut impl RowSink) -> Result<(), LogError> {
-    use super::zstd_pages::RowGroup;
-    use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
+use parquet::file::metadata::ParquetMetaData;
+#[cfg(feature = "parquet")]
+use parquet::file::reader::ChunkReader;
 
+/// So many rows are in memory at a time.
+#[cfg(feature = "parquet")]
+const ROWS: usize = 8192;
+
+/// Hands the rows of a Parquet file over, which stays on the disk. They take the place of lines in findings.
+#[cfg(feature = "parquet")]
+pub(crate) fn read(
+    input: impl ChunkReader + 'static,
+    file: &str,
+    rows: &mut impl RowSink,
+) -> Result<(), LogError> {
     let unreadable = |row: Option<usize>, e: &dyn std::fmt::Display| {
         LogError(vec![Finding {
             file: file.to_string(),
@@ -21,39 +32,77 @@ pub(crate) fn read(bytes: &[u8], file: &str, rows: &mut impl RowSink) -> Result<
             message: format!("cannot be read: {e}; write the log again, or as CSV"),
         }])
     };
-    let bytes = bytes::Bytes::copy_from_slice(bytes);
-    let reader = SerializedFileReader::new(bytes.clone()).map_err(|e| unreadable(None, &e))?;
-    let schema = reader.metadata().file_metadata().schema();
-    let names: Vec<String> = schema.get_fields().iter().map(|field| field.name().to_string()).collect();
-    let mut flattened: Option<Flattened> = None;
+    let length = input.len();
+    // What Arrow noted of its own types beside those of Parquet says nothing more about numbers.
+    let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+    let builder = guarded(|| ParquetRecordBatchReaderBuilder::try_new_with_options(input, options))
+        .map_err(|e| unreadable(None, &e))?;
+    within(builder.metadata(), length).map_err(|e| unreadable(None, &e))?;
+    let fields: Vec<String> = builder.schema().fields().iter().map(|field| field.name().clone()).collect();
+    let mut reader = guarded(|| builder.with_batch_size(ROWS).build()).map_err(|e| unreadable(None, &e))?;
     let mut count = 0;
-    for group in 0..reader.num_row_groups() {
-        let inner = reader.get_row_group(group).map_err(|e| unreadable(Some(count + 1), &e))?;
-        let group = RowGroup::new(inner, &bytes).map_err(|e| unreadable(Some(count + 1), &e))?;
-        for row in group.get_row_iter(None).map_err(|e| unreadable(Some(count + 1), &e))? {
+    // How many numbers each column is, by the first rows, and the dataset that the file is part of.
+    let mut known: Option<(Vec<usize>, Dataset)> = None;
+    loop {
+        let next = guarded(|| reader.next().transpose()).map_err(|e| unreadable(Some(count + 1), &e))?;
+        let Some(batch) = next else { break };
+        let columns = leaves(&batch);
+        let (widths, dataset) = match &mut known {
+            Some(known) => known,
+            None => {
+                let widths: Vec<usize> = columns.iter().map(|(_, array)| width(array).unwrap_or(1)).collect();
+                let named = columns.iter().zip(&widths);
+                let named = named.map(|((name, array), count)| (name.as_str(), width(array).map(|_| *count)));
+                let (names, dataset) = Dataset::of(std::path::Path::new(file), named);
+                rows.begin(&names)?;
+                known.insert((widths, dataset))
+            }
+        };
+        let mut values: Vec<Vec<f64>> = columns
+            .iter()
+            .zip(widths.iter())
+            .flat_map(|((_, array), width)| numbers(array, *width))
+            .collect();
+        dataset.follow(&mut values);
+        for k in 0..batch.num_rows() {
             count += 1;
-            let row = row.map_err(|e| unreadable(Some(count), &e))?;
-            let flattened = match &mut flattened {
-                Some(flattened) => flattened,
-                None => {
-                    let first = flattened.insert(Flattened::of(&names, &row, Path::new(file)));
-                    rows.begin(first.names())?;
-                    first
-                }
-            };
-            let values = flattened.values(&row);
-            rows.row(count, &|column| values.get(column).copied().flatten());
+            rows.row(count, &|column| values.get(column)?.get(k).copied().filter(|value| !value.is_nan()));
         }
     }
-    if flattened.is_none() {
-        rows.begin(&names)?;
+    if known.is_none() {
+        rows.begin(&fields)?;
     }
     Ok(())
 }
 
+/// A step of the library's, which panics at some of what is damaged within a page.
+#[cfg(feature = "parquet")]
+fn guarded<T, E: std::fmt::Display>(step: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
+    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(step)) {
+        Ok(done) => done.map_err(|e| e.to_string()),
+        Err(_) => Err("a page is damaged".into()),
+    }
+}
+
+/// Whether all columns lie within the file: `parquet` panics where one lies before it.
+#[cfg(feature = "parquet")]
+fn within(metadata: &ParquetMetaData, length: u64) -> Result<(), &'static str> {
+    let mut columns = metadata.row_groups().iter().flat_map(|group| group.columns());
+    let within = columns.all(|column| {
+        let start = column.dictionary_page_offset().unwrap_or_else(|| column.data_page_offset());
+        let (start, size) = (u64::try_from(start), u64::try_from(column.compressed_size()));
+        start
+            .ok()
+            .zip(size.ok())
+            .and_then(|(start, size)| start.checked_add(size))
+            .is_some_and(|end| end <= length)
+    });
+    if within { Ok(()) } else { Err("a column lies outside of the file, which is torn") }
+}
+
 /// Hands the rows of a Parquet file over.
 #[cfg(not(feature = "parquet"))]
-pub(crate) fn read(_: &[u8], file: &str, _: &mut impl RowSink) -> Result<(), LogError> {
+pub(crate) fn read(_: std::fs::File, file: &str, _: &mut impl RowSink) -> Result<(), LogError> {
     Err(LogError(vec![Finding {
         file: file.to_string(),
         line: None,

@@ -2,6 +2,8 @@
 //!
 //! Also here: what is odd about a log, and why one cannot be used.
 
+#[cfg(feature = "topics")]
+use super::bag;
 use super::table::Table;
 use super::{columnar, text};
 use serde::Serialize;
@@ -24,12 +26,21 @@ pub enum Format {
     /// A rosbag2 of the storage `sqlite3`.
     #[serde(rename = "rosbag2 (SQLite)")]
     Rosbag,
+    /// A bag of ROS 1.
+    #[serde(rename = "ROS 1 bag")]
+    Bag,
     /// An archive of NumPy arrays.
     #[serde(rename = "npz")]
     Npz,
+    /// One NumPy array.
+    #[serde(rename = "npy")]
+    Npy,
     /// A file of MATLAB's, of version 5 to 7.
     #[serde(rename = "mat")]
     Mat,
+    /// HDF5; MATLAB's version 7.3 is such.
+    #[serde(rename = "HDF5")]
+    Hdf5,
 }
 
 /// The tables of a file.
@@ -52,27 +63,54 @@ impl Format {
             () if begins(b"PAR1") => Format::Parquet,
             () if begins(b"\x89MCAP0\r\n") => Format::Mcap,
             () if begins(b"SQLite format 3\0") => Format::Rosbag,
+            () if begins(b"#ROSBAG V2.0\n") => Format::Bag,
             () if begins(b"PK\x03\x04") => Format::Npz,
+            () if begins(b"\x93NUMPY") => Format::Npy,
+            () if begins(b"\x89HDF\r\n\x1a\n") || begins(b"MATLAB 7.3") => Format::Hdf5,
             () if begins(b"MATLAB ") => Format::Mat,
             () => Format::Csv,
         }
     }
 
-    /// What the file at a path begins with.
+    /// What the file at a path begins with; of the folder of a recording, its first file, and of a compressed recording
+    /// what is in it.
     ///
     /// # Errors
     /// Where it cannot be read, is empty, or is none of these.
     pub fn of_file(path: &Path) -> Result<Format, LogError> {
+        let failed =
+            |e: std::io::Error| LogError::of_file(&shown(path), "file", format!("cannot be read: {e}"));
+        #[cfg(feature = "topics")]
+        if path.is_dir() {
+            return bag::Parts::of(path)?.format();
+        }
         let mut head = Vec::new();
         let read = File::open(path).and_then(|file| file.take(text::HEAD as u64).read_to_end(&mut head));
-        read.map_err(|e| LogError::of_file(&shown(path), "file", format!("cannot be read: {e}")))?;
+        read.map_err(failed)?;
+        #[cfg(feature = "topics")]
+        if head.starts_with(bag::ZSTD) {
+            let packed = Format::of(&bag::unpacked_head(path, text::HEAD as u64).map_err(failed)?);
+            // What else is compressed is refused below.
+            if packed.has_topics() {
+                return Ok(packed);
+            }
+        }
         let format = Format::of(&head);
         match text::no_text(&head).filter(|_| format == Format::Csv) {
             Some(what) => Err(LogError::of_file(&shown(path), "file", what)),
             None => Ok(format),
         }
     }
+
+    /// Whether it is a recording of topics.
+    #[must_use]
+    pub fn has_topics(self) -> bool {
+        matches!(self, Format::Mcap | Format::Rosbag | Format::Bag)
+    }
 }
+
+/// The topics that are read, where not all are.
+type Only<'a> = Option<&'a [String]>;
 
 fn shown(path: &Path) -> String {
     path.display().to_string()
@@ -84,6 +122,11 @@ fn shown(path: &Path) -> String {
 /// # Errors
 /// Where the file cannot be read, is torn, or is of a format that this build does not have.
 pub fn read_contents(path: &Path) -> Result<Contents, LogError> {
+    read_topics(path, None)
+}
+
+/// The same with the topics of some names alone, where a file has topics; others are counted.
+pub(crate) fn read_topics(path: &Path, only: Only<'_>) -> Result<Contents, LogError> {
     let format = Format::of_file(path)?;
     let file = shown(path);
     let failed = |e: std::io::Error| LogError::of_file(&file, "file", format!("cannot be read: {e}"));
@@ -99,13 +142,14 @@ pub fn read_contents(path: &Path) -> Result<Contents, LogError> {
         }
         Format::Parquet => {
             let mut table = Table::new("", "rows");
-            columnar::read(&std::fs::read(path).map_err(failed)?, &file, &mut table)?;
+            columnar::read(File::open(path).map_err(failed)?, &file, &mut table)?;
             vec![table]
         }
-        Format::Mcap => mcap_tables(path, &file, &mut notes)?,
-        Format::Rosbag => rosbag_tables(path, &file, &mut notes)?,
+        Format::Mcap | Format::Rosbag | Format::Bag => topic_tables(path, only, &file, &mut notes)?,
         Format::Npz => npz_tables(path, &file, &mut notes)?,
+        Format::Npy => npy_tables(path, &file, &mut notes)?,
         Format::Mat => mat_tables(path, &file, &mut notes)?,
+        Format::Hdf5 => hdf5_tables(path, &file, &mut notes)?,
     };
     for table in &tables {
         if let Some((count, reason)) = &table.unreadable {
@@ -117,62 +161,49 @@ pub fn read_contents(path: &Path) -> Result<Contents, LogError> {
     Ok(Contents { format, tables, notes })
 }
 
-#[cfg(feature = "mcap")]
-fn mcap_tables(path: &Path, file: &str, notes: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
-    let read = File::open(path).and_then(super::mcap::read);
-    let (tables, torn) = read.map_err(|e| LogError::of_file(file, "MCAP", format!("cannot be read: {e}")))?;
-    notes.extend(torn.map(|torn| Finding::of_file(file, "MCAP", torn)));
-    Ok(tables)
+#[cfg(feature = "topics")]
+fn topic_tables(
+    path: &Path,
+    only: Only<'_>,
+    _: &str,
+    notes: &mut Vec<Finding>,
+) -> Result<Vec<Table>, LogError> {
+    let mut topics = super::messages::Topics::of(only);
+    bag::Parts::of(path)?.read(&mut topics, notes)?;
+    Ok(topics.tables())
 }
 
-#[cfg(feature = "rosbag")]
-fn rosbag_tables(path: &Path, file: &str, notes: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
-    let read = File::open(path).and_then(super::rosbag::read);
-    // SQLite moves what was written last into the file when it is closed.
-    let mut waiting = path.as_os_str().to_owned();
-    waiting.push("-wal");
-    if std::fs::metadata(&waiting).is_ok_and(|m| m.len() > 0) {
-        let message = "its last messages are still in the file beside it that ends in -wal, and were not \
-            read: \
-            `sqlite3 FILE vacuum` brings them in";
-        notes.push(Finding::of_file(file, "rosbag2", message));
-    }
-    read.map_err(|e| LogError::of_file(file, "rosbag2", format!("cannot be read: {e}")))
+#[cfg(not(feature = "topics"))]
+fn topic_tables(_: &Path, _: Only<'_>, file: &str, _: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
+    let message = "this build does not read it: enable the feature `mcap`, `rosbag` or `bag1`";
+    Err(LogError::of_file(file, "topics", message))
 }
 
-#[cfg(feature = "npz")]
-fn npz_tables(path: &Path, file: &str, notes: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
-    let read = std::fs::read(path).and_then(|bytes| super::npz::read(&bytes));
-    let (table, left_out) =
-        read.map_err(|e| LogError::of_file(file, "npz", format!("cannot be read: {e}")))?;
-    notes.extend(left_out.map(|note| Finding::of_file(file, "arrays", note)));
-    Ok(vec![table])
-}
+/// Files of arrays: what each kind of them is called, the feature that reads it, and its reader.
+macro_rules! arrays {
+    ($name:literal, $feature:literal, $function:ident, $read:expr) => {
+        #[cfg(feature = $feature)]
+        fn $function(path: &Path, file: &str, notes: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
+            let read = $read(path);
+            let (tables, left_out) = read.map_err(|e: std::io::Error| {
+                LogError::of_file(file, $name, format!("cannot be read: {e}"))
+            })?;
+            notes.extend(left_out.into_iter().map(|note| Finding::of_file(file, "arrays", note)));
+            Ok(tables)
+        }
 
-#[cfg(feature = "mat")]
-fn mat_tables(path: &Path, file: &str, notes: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
-    let read = std::fs::read(path).and_then(|bytes| super::mat::read(&bytes));
-    let (table, left_out) =
-        read.map_err(|e| LogError::of_file(file, "mat", format!("cannot be read: {e}")))?;
-    notes.extend(left_out.map(|note| Finding::of_file(file, "arrays", note)));
-    Ok(vec![table])
-}
-
-/// What is said where a build lacks a format.
-macro_rules! absent {
-    ($feature:literal, $function:ident) => {
         #[cfg(not(feature = $feature))]
         fn $function(_: &Path, file: &str, _: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
             let message = concat!("this build does not read it: enable the feature `", $feature, "`");
-            Err(LogError::of_file(file, $feature, message))
+            Err(LogError::of_file(file, $name, message))
         }
     };
 }
 
-absent!("mcap", mcap_tables);
-absent!("rosbag", rosbag_tables);
-absent!("npz", npz_tables);
-absent!("mat", mat_tables);
+arrays!("npz", "npz", npz_tables, super::npz::read);
+arrays!("npy", "npz", npy_tables, super::npz::read_array);
+arrays!("mat", "mat", mat_tables, super::mat::read);
+arrays!("HDF5", "hdf5", hdf5_tables, super::hdf5::read);
 
 // What is odd about a log, and why one cannot be used.
 

@@ -1,9 +1,10 @@
 //! MATLAB's files of version 5 to 7 (`save`, `save -v7`, `scipy.io.savemat`), as "MAT-File Format" of MathWorks describes
-//! them: arrays of numbers, of letters, cells of letters, and the fields of a struct of one element.
+//! them (version 7.3 is HDF5): arrays of numbers, of letters, cells of letters, and the fields of a struct of one element.
 
-use super::arrays::{Array, Values, table};
+use super::arrays::{Array, Values, one};
 use super::table::Table;
 use std::io::{self, Read};
+use std::path::Path;
 
 /// What a compressed variable may unpack to, bytes.
 const LARGEST: u64 = 1 << 32;
@@ -19,10 +20,8 @@ const STRUCT: u32 = 2;
 const LETTERS: u32 = 4;
 
 /// The arrays of a file as one table, and those that have no place in it.
-pub(super) fn read(bytes: &[u8]) -> io::Result<(Table, Option<String>)> {
-    if bytes.starts_with(b"MATLAB 7.3") {
-        return Err(io::Error::other("it is of version 7.3: save it with '-v7'"));
-    }
+pub(super) fn read(path: &Path) -> io::Result<(Vec<Table>, Vec<String>)> {
+    let bytes = std::fs::read(path)?;
     let big = match bytes.get(126..128) {
         Some(b"IM") => false,
         Some(b"MI") => true,
@@ -42,7 +41,7 @@ pub(super) fn read(bytes: &[u8]) -> io::Result<(Table, Option<String>)> {
             found.variable(Elements { rest: content, big }, None, 0)?;
         }
     }
-    Ok(table(&found.arrays, found.left_out))
+    Ok(one(&found.arrays, found.left_out))
 }
 
 fn torn() -> io::Error {

@@ -1,170 +1,276 @@
-//! MCAP files, the default storage of rosbag2 (<https://mcap.dev/spec>): records one after the other, some of
-//! them in compressed chunks. The index at the end is not needed, so that a recording whose program died can
-//! be read.
+//! MCAP files, the default storage of rosbag2 (<https://mcap.dev/spec>).
 //!
-//! The crate `mcap` would bring fifteen others, among them C libraries for the compression.
+//! A file with an index is read chunk by chunk, and chunks without a topic that is read stay on the disk: their messages are
+//! counted by the index. A file without one, as a program that died leaves it, is read from its beginning. Either way a
+//! damaged chunk, by its checksum or by what it unpacks to, loses its own messages only.
 
 use super::messages::Topics;
-use super::table::Table;
+use ::mcap::records::{ChunkIndex, Record, op};
+use ::mcap::sans_io::{
+    LinearReadEvent, LinearReader, LinearReaderOptions, SummaryReadEvent, SummaryReader, SummaryReaderOptions,
+};
+use ::mcap::{McapError, McapResult, Summary, parse_record};
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
 
-/// What a file begins and ends with.
-pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// A chunk that claims to be larger than this, bytes, is torn.
-const LARGEST_CHUNK: u64 = 1 << 30;
+/// A chunk that claims to be larger than this, bytes, is damaged.
+const LARGEST_CHUNK: usize = 1 << 30;
 
-// Records by their number.
-pub(super) const FOOTER: u8 = 0x02;
-pub(super) const SCHEMA: u8 = 0x03;
-pub(super) const CHANNEL: u8 = 0x04;
-pub(super) const MESSAGE: u8 = 0x05;
-const CHUNK: u8 = 0x06;
-pub(super) const DATA_END: u8 = 0x0f;
+/// Reads the topics of a file; what is wrong with it.
+pub(super) fn read(path: &Path, topics: &mut Topics) -> io::Result<Vec<String>> {
+    let mut file = File::open(path)?;
+    let mut records = Records::new(topics);
+    let all = match summary(&mut file) {
+        Ok(Some(summary)) => records.by_index(&mut file, &summary)?,
+        _ => None,
+    };
+    let torn = match all {
+        Some(true) => None,
+        // A file may have messages outside of its chunks, which its index does not know.
+        all => records.record_by_record(&mut file, all.is_none())?,
+    };
+    Ok(records.done(torn))
+}
 
-/// The topics of a file, each a table, and where it is torn what that means.
-pub(super) fn read(file: File) -> io::Result<(Vec<Table>, Option<String>)> {
-    let mut left = file.metadata()?.len().saturating_sub(MAGIC.len() as u64);
-    let mut reader = BufReader::with_capacity(1 << 16, file);
-    reader.read_exact(&mut [0; 8])?;
-    let mut records = Records::default();
-    let mut body = Vec::new();
-    loop {
-        let mut head = [0; 9];
-        if left < 9 {
-            break;
-        }
-        reader.read_exact(&mut head)?;
-        let size = u64::from_le_bytes(head[1..].try_into().unwrap_or_default());
-        if matches!(head[0], DATA_END | FOOTER) {
-            return Ok((records.topics.tables(), None));
-        }
-        left -= 9;
-        if size > left {
-            break;
-        }
-        left -= size;
-        match head[0] {
-            SCHEMA | CHANNEL | MESSAGE | CHUNK => {
-                body.clear();
-                (&mut reader).take(size).read_to_end(&mut body)?;
-                records.record(head[0], &body)?;
+/// The summary at the end of a file; none where there is none.
+fn summary(file: &mut File) -> McapResult<Option<Summary>> {
+    let length = file.metadata()?.len();
+    let mut reader = SummaryReader::new_with_options(SummaryReaderOptions::default().with_file_size(length));
+    while let Some(event) = reader.next_event() {
+        match event? {
+            SummaryReadEvent::ReadRequest(n) => {
+                let read = file.read(reader.insert(n))?;
+                reader.notify_read(read);
             }
-            // Attachments may be large.
-            _ => {
-                io::copy(&mut (&mut reader).take(size), &mut io::sink())?;
+            SummaryReadEvent::SeekRequest(to) => {
+                let at = file.seek(to)?;
+                reader.notify_seeked(at);
             }
         }
     }
-    let torn =
-        "the file ends before its end is marked: the recording was interrupted; it was read up to there";
-    Ok((records.topics.tables(), Some(torn.into())))
+    Ok(reader.finish())
 }
 
-#[derive(Default)]
-struct Records {
-    topics: Topics,
-    /// Names of types by their number.
-    schemas: HashMap<u16, String>,
+struct Records<'t> {
+    topics: &'t mut Topics,
+    /// Types of messages by their number: name, language and definition.
+    schemas: HashMap<u16, (String, String, Vec<u8>)>,
+    /// Messages that were taken or counted.
+    messages: u64,
+    chunks: usize,
+    /// Chunks that could not be read.
+    lost: Vec<Lost>,
+    /// Whether index records that follow are those of a lost chunk.
+    behind_lost: bool,
 }
 
-impl Records {
-    fn record(&mut self, number: u8, body: &[u8]) -> io::Result<()> {
-        let mut fields = Fields(body);
-        match number {
-            SCHEMA => {
-                let id = fields.u16()?;
-                self.schemas.insert(id, fields.text()?);
-            }
-            CHANNEL => {
-                let (id, schema) = (fields.u16()?, fields.u16()?);
-                let (topic, encoding) = (fields.text()?, fields.text()?);
-                let kind = self.schemas.get(&schema).map_or("", String::as_str);
-                self.topics.add(i64::from(id), &topic, kind, &encoding);
-            }
-            MESSAGE => {
-                let (channel, _, received, _) = (fields.u16()?, fields.u32()?, fields.u64()?, fields.u64()?);
-                self.topics.take(i64::from(channel), received as i64, fields.0);
-            }
-            CHUNK => {
-                let (_, _, size, _) = (fields.u64()?, fields.u64()?, fields.u64()?, fields.u32()?);
-                let compression = fields.text()?;
-                let stored = fields.u64()?;
-                let stored = fields.take(usize::try_from(stored).map_err(|_| torn())?)?;
-                let records = decompress(&compression, stored, size)?;
-                let mut rest = Fields(&records);
-                while !rest.0.is_empty() {
-                    let number = rest.take(1)?[0];
-                    let size = usize::try_from(rest.u64()?).map_err(|_| torn())?;
-                    let body = rest.take(size)?;
-                    if number != CHUNK {
-                        self.record(number, body)?;
-                    }
+/// A chunk that could not be read: its number in the file, from 1, how many messages its index names, and why.
+struct Lost {
+    chunk: usize,
+    messages: usize,
+    reason: String,
+}
+
+impl<'t> Records<'t> {
+    fn new(topics: &'t mut Topics) -> Records<'t> {
+        Records {
+            topics,
+            schemas: HashMap::new(),
+            messages: 0,
+            chunks: 0,
+            lost: Vec::new(),
+            behind_lost: false,
+        }
+    }
+
+    /// Reads by the index, where there is one; false where it does not tell of all messages.
+    fn by_index(&mut self, file: &mut File, summary: &Summary) -> io::Result<Option<bool>> {
+        let Some(stats) = &summary.stats else { return Ok(None) };
+        if summary.chunk_indexes.len() != stats.chunk_count as usize {
+            return Ok(None);
+        }
+        let mut channels: Vec<_> = summary.channels.values().collect();
+        channels.sort_by_key(|channel| channel.id);
+        for channel in channels {
+            let schema = channel.schema.as_deref();
+            let kind = schema.map(|s| (s.name.as_str(), s.encoding.as_str(), s.data.as_ref()));
+            self.topics.add(
+                i64::from(channel.id),
+                &channel.topic,
+                kind.unwrap_or_default(),
+                &channel.message_encoding,
+            );
+        }
+        for index in &summary.chunk_indexes {
+            self.indexed_chunk(file, index)?;
+        }
+        Ok(Some(self.messages >= stats.message_count || !self.lost.is_empty()))
+    }
+
+    fn indexed_chunk(&mut self, file: &mut File, index: &ChunkIndex) -> io::Result<()> {
+        let needed = |id: &u16| self.topics.reads(i64::from(*id)) || !self.topics.knows(i64::from(*id));
+        let skipped = index.message_index_length > 0 && !index.message_index_offsets.keys().any(needed);
+        let (mut from, mut length) = (index.chunk_start_offset, index.message_index_length);
+        match skipped {
+            true => from = from.saturating_add(index.chunk_length),
+            false => length = length.saturating_add(index.chunk_length),
+        }
+        file.seek(SeekFrom::Start(from))?;
+        let mut bytes = Vec::new();
+        file.take(length).read_to_end(&mut bytes)?;
+        let mut rest = bytes.as_slice();
+        self.behind_lost = false;
+        self.chunks += 1;
+        if !skipped {
+            let size = usize::try_from(index.chunk_length).unwrap_or(usize::MAX);
+            match rest.split_at_checked(size) {
+                Some((chunk, index)) => {
+                    rest = index;
+                    self.chunk(chunk);
                 }
+                None => self.lose("the file ends before it".into()),
             }
-            _ => {}
+        }
+        while let Some((number, body, after)) = record(rest) {
+            rest = after;
+            match parse_record(number, body) {
+                Ok(Record::MessageIndex(entries)) if skipped => {
+                    let received = entries.records.iter().map(|entry| entry.log_time as i64);
+                    received.for_each(|t| self.topics.take(i64::from(entries.channel_id), t, &[]));
+                    self.messages += entries.records.len() as u64;
+                }
+                Ok(known) => self.record(known),
+                Err(_) => break,
+            }
         }
         Ok(())
     }
+
+    /// Reads record by record, with chunks or without; where the file ends too early, what that means.
+    fn record_by_record(&mut self, file: &mut File, chunks: bool) -> io::Result<Option<String>> {
+        let length = usize::try_from(file.metadata()?.len()).unwrap_or(usize::MAX);
+        file.rewind()?;
+        let options = LinearReaderOptions::default().with_emit_chunks(true);
+        let mut reader = LinearReader::new_with_options(options.with_record_length_limit(length));
+        while let Some(event) = reader.next_event() {
+            match event {
+                Ok(LinearReadEvent::ReadRequest(n)) => {
+                    let read = file.read(reader.insert(n))?;
+                    reader.notify_read(read);
+                }
+                Ok(LinearReadEvent::Record { opcode: op::DATA_END, .. }) => return Ok(None),
+                Ok(LinearReadEvent::Record { opcode: op::CHUNK, .. }) if !chunks => {}
+                Ok(LinearReadEvent::Record { opcode: op::CHUNK, data }) => {
+                    self.chunks += 1;
+                    let head = [&[op::CHUNK][..], &(data.len() as u64).to_le_bytes()].concat();
+                    self.chunk(&[&head, data].concat());
+                }
+                Ok(LinearReadEvent::Record { opcode, data }) => match parse_record(opcode, data) {
+                    Ok(known) => self.record(known),
+                    Err(e) => return self.torn(&e),
+                },
+                Err(e) => return self.torn(&e),
+            }
+        }
+        Ok(None)
+    }
+
+    /// What a file means that cannot be read further.
+    fn torn(&self, error: &McapError) -> io::Result<Option<String>> {
+        Ok(Some(match error {
+            McapError::UnexpectedEof | McapError::RecordTooLarge { .. } | McapError::ChunkTooLarge(_) => {
+                "the file ends before its end is marked: the recording was interrupted; it was read up to there"
+                    .into()
+            }
+            _ if self.messages == 0 => return Err(io::Error::other(error.to_string())),
+            other => format!("it is torn ({other}): it was read up to there"),
+        }))
+    }
+
+    /// The records of a chunk, all or none of them. `bytes` is the chunk as a record.
+    fn chunk(&mut self, bytes: &[u8]) {
+        self.behind_lost = false;
+        let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_skip_end_magic(true)
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(LARGEST_CHUNK);
+        let (mut reader, mut rest) = (LinearReader::new_with_options(options), bytes);
+        while let Some(event) = reader.next_event() {
+            let done = match event {
+                Ok(LinearReadEvent::ReadRequest(n)) => {
+                    let (some, after) = rest.split_at(n.min(rest.len()));
+                    reader.insert(some.len()).copy_from_slice(some);
+                    reader.notify_read(some.len());
+                    rest = after;
+                    Ok(())
+                }
+                Ok(LinearReadEvent::Record { opcode, data }) => {
+                    parse_record(opcode, data).map(|known| self.record(known))
+                }
+                Err(e) => Err(e),
+            };
+            if let Err(e) = done {
+                self.lose(e.to_string());
+                return;
+            }
+        }
+    }
+
+    fn lose(&mut self, reason: String) {
+        self.lost.push(Lost { chunk: self.chunks, messages: 0, reason });
+        self.behind_lost = true;
+    }
+
+    fn record(&mut self, record: Record<'_>) {
+        match record {
+            Record::Schema { header, data } => {
+                self.schemas.insert(header.id, (header.name, header.encoding, data.into_owned()));
+            }
+            Record::Channel(channel) => {
+                let schema = self.schemas.get(&channel.schema_id);
+                let kind =
+                    schema.map(|(name, language, text)| (name.as_str(), language.as_str(), text.as_slice()));
+                let id = i64::from(channel.id);
+                self.topics.add(id, &channel.topic, kind.unwrap_or_default(), &channel.message_encoding);
+            }
+            Record::Message { header, data } => {
+                self.messages += 1;
+                self.topics.take(i64::from(header.channel_id), header.log_time as i64, &data);
+            }
+            Record::MessageIndex(index) if self.behind_lost => {
+                if let Some(lost) = self.lost.last_mut() {
+                    lost.messages += index.records.len();
+                }
+            }
+            Record::MessageIndex(_) => {}
+            _ => self.behind_lost = false,
+        }
+    }
+
+    fn done(self, torn: Option<String>) -> Vec<String> {
+        let lost = self.lost.first().map(|first| {
+            let messages: usize = self.lost.iter().map(|lost| lost.messages).sum();
+            let how_many = if messages > 0 { format!("{messages} messages") } else { "its messages".into() };
+            format!(
+                "{} of {} chunks are damaged (the first: chunk {}, {}): {how_many} are lost, the others were read",
+                self.lost.len(),
+                self.chunks,
+                first.chunk,
+                first.reason,
+            )
+        });
+        lost.into_iter().chain(torn).collect()
+    }
 }
 
-fn decompress(compression: &str, stored: &[u8], size: u64) -> io::Result<Vec<u8>> {
-    if size > LARGEST_CHUNK {
-        return Err(torn());
-    }
-    let mut out = Vec::new();
-    // The chunk's word for its size is a bound, so that a torn file cannot ask for all memory.
-    match compression {
-        "" => return Ok(stored.to_vec()),
-        "zstd" => {
-            let decoder = ruzstd::decoding::StreamingDecoder::new(stored);
-            decoder.map_err(io::Error::other)?.take(size + 1).read_to_end(&mut out)?;
-        }
-        "lz4" => {
-            lz4_flex::frame::FrameDecoder::new(stored).take(size + 1).read_to_end(&mut out)?;
-        }
-        other => {
-            return Err(io::Error::other(format!(
-                "a chunk is compressed by {other}, which nobody knows here"
-            )));
-        }
-    }
-    if out.len() as u64 == size { Ok(out) } else { Err(torn()) }
-}
-
-fn torn() -> io::Error {
-    io::Error::new(io::ErrorKind::InvalidData, "a record of the MCAP file is torn")
-}
-
-/// The fields of a record, from the front.
-struct Fields<'a>(&'a [u8]);
-
-impl<'a> Fields<'a> {
-    fn take(&mut self, size: usize) -> io::Result<&'a [u8]> {
-        let (taken, rest) = self.0.split_at_checked(size).ok_or_else(torn)?;
-        self.0 = rest;
-        Ok(taken)
-    }
-
-    fn bytes<const N: usize>(&mut self) -> io::Result<[u8; N]> {
-        self.take(N)?.try_into().map_err(|_| torn())
-    }
-
-    fn u16(&mut self) -> io::Result<u16> {
-        self.bytes().map(u16::from_le_bytes)
-    }
-
-    fn u32(&mut self) -> io::Result<u32> {
-        self.bytes().map(u32::from_le_bytes)
-    }
-
-    fn u64(&mut self) -> io::Result<u64> {
-        self.bytes().map(u64::from_le_bytes)
-    }
-
-    fn text(&mut self) -> io::Result<String> {
-        let size = self.u32()? as usize;
-        Ok(String::from_utf8_lossy(self.take(size)?).into_owned())
-    }
+/// The first record of some bytes: its number, its body and what follows.
+fn record(bytes: &[u8]) -> Option<(u8, &[u8], &[u8])> {
+    let (head, rest) = bytes.split_first_chunk::<9>()?;
+    let (number, size) = head.split_first()?;
+    let size = u64::from_le_bytes(size.try_into().ok()?);
+    let (body, after) = rest.split_at_checked(usize::try_from(size).ok()?)?;
+    Some((*number, body, after))
 }

@@ -1,15 +1,14 @@
-//! Recordings as MCAP, which Foxglove and rerun open: joint states in ROS's message, all else as JSON.
-//!
-//! Records stand one after the other, without chunks and index, so that a file can be read up to where its
-//! writer died.
+//! Recordings as MCAP, which rosbag2 plays and Foxglove and rerun open: joint states in ROS's message, all else as JSON.
 
 use super::cdr::CdrWriter;
-use super::mcap::{CHANNEL, DATA_END, FOOTER, MAGIC, MESSAGE, SCHEMA};
+use ::mcap::records::MessageHeader;
+use ::mcap::write::NoSeek;
+use ::mcap::{Compression, McapError, WriteOptions, Writer};
 use serde_json::{Map, Value};
+use std::collections::BTreeMap;
+use std::fmt;
 use std::io::{self, Read, Write};
 
-/// The first record of a file.
-const HEADER: u8 = 0x01;
 /// `sensor_msgs/JointState` with what it is made of, as ROS 2 writes definitions into bags.
 const JOINT_STATE: &str = "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\n\
     float64[] effort\n\
@@ -22,12 +21,16 @@ const JOINT_STATE: &str = "std_msgs/Header header\nstring[] name\nfloat64[] posi
 #[derive(Clone, Copy, Debug)]
 pub struct Channel(u16);
 
-/// Writes a file, message by message.
-#[derive(Debug)]
+/// Writes a file, message by message, in chunks compressed with Zstandard, with checksums, an index and statistics.
 pub struct McapWriter<W: Write> {
-    out: W,
-    channels: u16,
+    inner: Writer<NoSeek<W>>,
     messages: u32,
+}
+
+impl<W: Write> fmt::Debug for McapWriter<W> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("McapWriter").field("messages", &self.messages).finish_non_exhaustive()
+    }
 }
 
 /// One message of `sensor_msgs/JointState`: each list empty or one value a name.
@@ -46,11 +49,16 @@ impl<W: Write> McapWriter<W> {
     ///
     /// # Errors
     /// What the file system says, here and below.
-    pub fn new(mut out: W) -> io::Result<Self> {
-        out.write_all(MAGIC)?;
-        let mut writer = McapWriter { out, channels: 0, messages: 0 };
-        writer.record(HEADER, &[text("ros2"), text("powerball")].concat())?;
-        Ok(writer)
+    pub fn new(out: W) -> io::Result<Self> {
+        let options = WriteOptions::new()
+            .profile("ros2")
+            .library("powerball")
+            .compression(Some(Compression::Zstd))
+            .compression_threads(0)
+            // A pipe will do: a chunk is complete before it is written.
+            .disable_seeking(true);
+        let inner = options.create(NoSeek::new(out)).map_err(failed)?;
+        Ok(McapWriter { inner, messages: 0 })
     }
 
     /// A topic of joint states.
@@ -80,12 +88,9 @@ impl<W: Write> McapWriter<W> {
         definition: &str,
         encoding: &str,
     ) -> io::Result<Channel> {
-        self.channels += 1;
-        let id = self.channels.to_le_bytes();
-        self.record(SCHEMA, &[id.to_vec(), text(kind), text(language), text(definition)].concat())?;
-        let nothing = 0u32.to_le_bytes().to_vec();
-        self.record(CHANNEL, &[id.to_vec(), id.to_vec(), text(topic), text(encoding), nothing].concat())?;
-        Ok(Channel(self.channels))
+        let schema = self.inner.add_schema(kind, language, definition.as_bytes()).map_err(failed)?;
+        let channel = self.inner.add_channel(schema, topic, encoding, &BTreeMap::new());
+        channel.map(Channel).map_err(failed)
     }
 
     /// A message of joint states at a time, s.
@@ -120,48 +125,48 @@ impl<W: Write> McapWriter<W> {
         self.message(channel, t, Value::Object(object).to_string().as_bytes())
     }
 
-    fn message(&mut self, Channel(id): Channel, t: f64, data: &[u8]) -> io::Result<()> {
-        let nanoseconds = ((1e9 * t).round().max(0.0) as u64).to_le_bytes();
-        self.messages += 1;
-        let head = [&id.to_le_bytes()[..], &self.messages.to_le_bytes(), &nanoseconds, &nanoseconds].concat();
-        self.record(MESSAGE, &[&head, data].concat())
+    fn message(&mut self, Channel(channel_id): Channel, t: f64, data: &[u8]) -> io::Result<()> {
+        let nanoseconds = (1e9 * t).round().max(0.0) as u64;
+        self.messages = self.messages.wrapping_add(1);
+        let (sequence, log_time, publish_time) = (self.messages, nanoseconds, nanoseconds);
+        let header = MessageHeader { channel_id, sequence, log_time, publish_time };
+        self.inner.write_to_known_channel(&header, data).map_err(failed)
     }
 
-    fn record(&mut self, number: u8, body: &[u8]) -> io::Result<()> {
-        self.out.write_all(&[number])?;
-        self.out.write_all(&(body.len() as u64).to_le_bytes())?;
-        self.out.write_all(body)
-    }
-
-    /// Ends the file.
+    /// Ends the file: its last chunk, its index and its statistics.
     ///
     /// # Errors
     /// As [`McapWriter::new`].
     pub fn finish(mut self) -> io::Result<W> {
-        // Without checksums, and without a summary.
-        self.record(DATA_END, &[0; 4])?;
-        self.record(FOOTER, &[0; 20])?;
-        self.out.write_all(MAGIC)?;
-        self.out.flush()?;
-        Ok(self.out)
+        self.inner.finish().map_err(failed)?;
+        let mut out = self.inner.into_inner().into_inner();
+        out.flush()?;
+        Ok(out)
     }
 }
 
-fn text(value: &str) -> Vec<u8> {
-    [&(value.len() as u32).to_le_bytes()[..], value.as_bytes()].concat()
+fn failed(error: McapError) -> io::Error {
+    match error {
+        McapError::Io(error) => error,
+        other => io::Error::other(other.to_string()),
+    }
 }
 
 /// CSV lines of numbers as MCAP: `q`, `dq` and `tau` of joints 1 to n are `/joint_states`, other columns
 /// `/log`; the number of lines. Lines that are torn or hold anything else are left out. A time that begins
-/// below 0 is moved there.
-pub(crate) fn from_csv(csv: impl Read, out: impl Write) -> io::Result<usize> {
+/// below 0 is moved there. The joints have the names given, `joint1` and so on where they are not as many.
+pub(crate) fn from_csv(csv: impl Read, joints: &[String], out: impl Write) -> io::Result<usize> {
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(csv);
     let names: Vec<String> = reader.headers()?.iter().map(str::to_string).collect();
     let at = |name: &str| names.iter().position(|own| own == name);
     let time = at("t").ok_or_else(|| io::Error::other("the lines have no column t"))?;
     let by_joint = |stem: &str| -> Vec<usize> { (1..).map_while(|j| at(&format!("{stem}{j}"))).collect() };
     let [q, dq, tau] = ["q", "dq", "tau"].map(by_joint);
-    let joints: Vec<String> = (1..=q.len().max(tau.len())).map(|j| format!("joint{j}")).collect();
+    let dof = q.len().max(tau.len());
+    let joints: Vec<String> = match joints.len() == dof {
+        true => joints.to_vec(),
+        false => (1..=dof).map(|j| format!("joint{j}")).collect(),
+    };
     let whole = |at: Vec<usize>| if at.len() == joints.len() { at } else { Vec::new() };
     let [q, dq, tau] = [q, dq, tau].map(whole);
     let used = |k: &usize| *k == time || [&q, &dq, &tau].iter().any(|group| group.contains(k));

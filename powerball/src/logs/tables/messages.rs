@@ -1,17 +1,17 @@
 //! Messages of a bag as rows of tables, one table a topic.
 
 use super::cdr::Cdr;
-use super::table::Table;
+use super::schema::{Bits, MOST, Schema};
+use super::table::{Row, Table};
 use serde_json::Value;
 
-/// Values of one array of a JSON message beyond this are no joints.
-const MOST: usize = 64;
-
 /// How the messages of a topic are read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+#[derive(Debug)]
+enum Reader {
     JointState,
     DynamicJointState,
+    /// By the definition that the file has.
+    Defined(Schema),
     Json,
     /// Counted, not read.
     Other,
@@ -21,65 +21,109 @@ enum Kind {
 #[derive(Debug, Default)]
 pub(super) struct Topics {
     topics: Vec<Topic>,
+    /// The names of the topics that are read, where not all are.
+    only: Option<Vec<String>>,
+    /// Whether each message is compressed, by Zstandard.
+    pub(super) compressed: bool,
 }
 
 #[derive(Debug)]
 struct Topic {
     /// Publishers of one topic may have numbers of their own.
     ids: Vec<i64>,
-    kind: Kind,
+    reader: Reader,
     ros1: bool,
     table: Table,
 }
 
+/// What a file says of the type of messages: its name, the language of its definition, and the definition.
+pub(super) type Type<'a> = (&'a str, &'a str, &'a [u8]);
+
+impl Reader {
+    fn of((kind, language, definition): Type<'_>, encoding: &str) -> Reader {
+        let by_definition = || {
+            let text =
+                std::str::from_utf8(definition).ok().filter(|_| matches!(language, "ros2msg" | "ros1msg"));
+            Schema::parse(kind, text?).filter(Schema::has_quantities)
+        };
+        match (kind.replace("/msg/", "/").as_str(), encoding) {
+            ("sensor_msgs/JointState", "cdr" | "ros1") => Reader::JointState,
+            ("control_msgs/DynamicJointState", "cdr" | "ros1") => Reader::DynamicJointState,
+            (_, "cdr" | "ros1") => by_definition().map_or(Reader::Other, Reader::Defined),
+            (_, "json") => Reader::Json,
+            _ => Reader::Other,
+        }
+    }
+}
+
 impl Topics {
-    /// Makes a topic known: `kind` is the type of its messages, `encoding` how their bytes are made.
-    pub(super) fn add(&mut self, id: i64, name: &str, kind: &str, encoding: &str) {
-        if self.topics.iter().any(|t| t.ids.contains(&id)) {
+    /// Topics of which those with some names are read, the others counted.
+    pub(super) fn of(only: Option<&[String]>) -> Topics {
+        Topics { only: only.map(<[String]>::to_vec), ..Topics::default() }
+    }
+
+    /// Makes a topic known: `encoding` is how the bytes of its messages are made.
+    pub(super) fn add(&mut self, id: i64, name: &str, of: Type<'_>, encoding: &str) {
+        if self.knows(id) {
             return;
         }
-        let read = match (kind.replace("/msg/", "/").as_str(), encoding) {
-            ("sensor_msgs/JointState", "cdr" | "ros1") => Kind::JointState,
-            ("control_msgs/DynamicJointState", "cdr" | "ros1") => Kind::DynamicJointState,
-            (_, "json") => Kind::Json,
-            _ => Kind::Other,
-        };
+        let (kind, ros1) = (of.0, encoding == "ros1");
         let shown = if kind.is_empty() { encoding } else { kind };
-        let ros1 = encoding == "ros1";
         let same = |t: &&mut Topic| t.table.name == name && t.table.kind == shown && t.ros1 == ros1;
-        match self.topics.iter_mut().find(same) {
-            Some(topic) => topic.ids.push(id),
-            None => {
-                self.topics.push(Topic { ids: vec![id], kind: read, ros1, table: Table::new(name, shown) })
-            }
+        if let Some(topic) = self.topics.iter_mut().find(same) {
+            topic.ids.push(id);
+            return;
         }
+        let left_aside = self.only.as_ref().is_some_and(|only| !only.iter().any(|own| own == name));
+        let reader = if left_aside { Reader::Other } else { Reader::of(of, encoding) };
+        self.topics.push(Topic { ids: vec![id], reader, ros1, table: Table::new(name, shown) });
+    }
+
+    /// Begins another file of the same recording: its numbers of topics are its own.
+    pub(super) fn next_file(&mut self) {
+        self.topics.iter_mut().for_each(|topic| topic.ids.clear());
+    }
+
+    /// Whether a topic was made known.
+    pub(super) fn knows(&self, id: i64) -> bool {
+        self.topics.iter().any(|t| t.ids.contains(&id))
     }
 
     /// Whether the messages of a topic are read: the bytes of others need not be fetched.
-    #[cfg(feature = "rosbag")]
+    #[cfg(feature = "mcap")]
     pub(super) fn reads(&self, id: i64) -> bool {
-        self.topics.iter().any(|t| t.ids.contains(&id) && t.kind != Kind::Other)
+        self.topics.iter().any(|t| t.ids.contains(&id) && !matches!(t.reader, Reader::Other))
+    }
+
+    /// The numbers of the topics that are read.
+    #[cfg(feature = "rosbag")]
+    pub(super) fn ids_read(&self) -> impl Iterator<Item = i64> {
+        let read = self.topics.iter().filter(|t| !matches!(t.reader, Reader::Other));
+        read.flat_map(|t| t.ids.iter().copied())
     }
 
     /// Takes a message in; `received` in nanoseconds.
     pub(super) fn take(&mut self, id: i64, received: i64, message: &[u8]) {
         let Some(topic) = self.topics.iter_mut().find(|t| t.ids.contains(&id)) else { return };
-        let cdr = || if topic.ros1 { Ok(Cdr::ros1(message)) } else { Cdr::ros2(message) };
-        let values = match topic.kind {
-            Kind::JointState => cdr().and_then(joint_state),
-            Kind::DynamicJointState => cdr().and_then(dynamic_joint_state),
-            Kind::Json => json(message),
-            Kind::Other => Ok((None, Vec::new())),
+        let mut row = topic.table.begin_row(1e-9 * received as f64);
+        let unpacked = match self.compressed && !matches!(topic.reader, Reader::Other) {
+            true => match zstd::decode_all(message) {
+                Ok(unpacked) => Some(unpacked),
+                Err(e) => return row.end(Err(format!("cannot be unpacked: {e}"))),
+            },
+            false => None,
         };
-        let received = 1e-9 * received as f64;
-        match values {
-            Ok((stamp, values)) => topic.table.push(received, stamp, &values),
-            Err(reason) => {
-                // It keeps its number.
-                topic.table.push(received, None, &[]);
-                topic.table.unreadable.get_or_insert((0, reason)).0 += 1;
-            }
-        }
+        let message = unpacked.as_deref().unwrap_or(message);
+        let ros1 = topic.ros1;
+        let cdr = || if ros1 { Ok(Cdr::ros1(message)) } else { Cdr::ros2(message) };
+        let done = match &topic.reader {
+            Reader::JointState => cdr().and_then(|message| joint_state(message, &mut row)),
+            Reader::DynamicJointState => cdr().and_then(|message| dynamic_joint_state(message, &mut row)),
+            Reader::Defined(schema) => cdr().and_then(|mut message| schema.read(&mut message, &mut row)),
+            Reader::Json => json(message, &mut row),
+            Reader::Other => Ok(None),
+        };
+        row.end(done);
     }
 
     /// One table a topic.
@@ -92,39 +136,50 @@ impl Topics {
     }
 }
 
-type Values = (Option<f64>, Vec<(String, f64)>);
+/// The time stamp of a message, s, where it has one; else why it cannot be read.
+type Stamp = Result<Option<f64>, String>;
 
 /// `sensor_msgs/JointState`: position, velocity and effort, each empty or one a name.
-fn joint_state(mut message: Cdr<'_>) -> Result<Values, String> {
+fn joint_state(mut message: Cdr<'_>, row: &mut Row<'_>) -> Stamp {
+    let end = message.begin_message()?;
     let stamp = Some(message.header()?);
     let names = message.strings()?;
-    let mut values = Vec::new();
     for quantity in ["position", "velocity", "effort"] {
-        let numbers = message.numbers()?;
-        if !numbers.is_empty() && numbers.len() != names.len() {
-            return Err(format!("has {} values of {quantity} for {} joints", numbers.len(), names.len()));
+        let count = message.count()?;
+        if count != 0 && count != names.len() {
+            return Err(format!("has {count} values of {quantity} for {} joints", names.len()));
         }
-        let named = |(name, value): (&String, f64)| (format!("{quantity}.{name}"), value);
-        values.extend(names.iter().zip(numbers).map(named));
+        for name in names.iter().take(count) {
+            row.put(&[quantity, ".", name], message.number(8, Bits::Float)?);
+        }
     }
-    Ok((stamp, values))
+    message.end_message(end)?;
+    Ok(stamp)
 }
 
 /// `control_msgs/DynamicJointState`: by joint, values with a name each.
-fn dynamic_joint_state(mut message: Cdr<'_>) -> Result<Values, String> {
+fn dynamic_joint_state(mut message: Cdr<'_>, row: &mut Row<'_>) -> Stamp {
+    let end = message.begin_message()?;
     let stamp = Some(message.header()?);
     let joints = message.strings()?;
-    let interfaces = message.list(|m| Ok((m.strings()?, m.numbers()?)))?;
-    let mut values = Vec::new();
+    message.begin_list()?;
+    let interfaces = message.list(|m| {
+        let end = m.begin_message()?;
+        let names = m.strings()?;
+        let numbers = m.list(|m| m.number(8, Bits::Float))?;
+        m.end_message(end)?;
+        Ok((names, numbers))
+    })?;
     for (joint, (names, numbers)) in joints.iter().zip(interfaces) {
-        values.extend(names.iter().zip(numbers).map(|(name, value)| (format!("{name}.{joint}"), value)));
+        names.iter().zip(numbers).for_each(|(name, value)| row.put(&[name, ".", joint], value));
     }
-    Ok((stamp, values))
+    message.end_message(end)?;
+    Ok(stamp)
 }
 
 /// A JSON object: its numbers, by their path. The elements of an array are counted from 1: `q` of three
 /// values is `q1`, `q2`, `q3`. A `name` array beside arrays of as many values names them, as in a JointState.
-fn json(message: &[u8]) -> Result<Values, String> {
+fn json(message: &[u8], row: &mut Row<'_>) -> Stamp {
     let message: Value = serde_json::from_slice(message).map_err(|e| format!("is no JSON: {e}"))?;
     let Value::Object(fields) = &message else { return Err("is no JSON object".into()) };
     let stamp = message.pointer("/header/stamp").or(message.get("timestamp"));
@@ -132,32 +187,31 @@ fn json(message: &[u8]) -> Result<Values, String> {
     let stamp = stamp.and_then(|s| Some(s.get("sec")?.as_f64()? + 1e-9 * nanoseconds(s)?));
     let names: Option<Vec<&str>> =
         message.get("name").and_then(Value::as_array).and_then(|n| n.iter().map(Value::as_str).collect());
-    let mut values = Vec::new();
     for (key, value) in fields.iter().filter(|(key, _)| *key != "header" && *key != "timestamp") {
         match (&names, value) {
             (Some(names), Value::Array(of)) if of.len() == names.len() => {
-                let named =
-                    names.iter().zip(of).filter_map(|(n, v)| Some((format!("{key}.{n}"), v.as_f64()?)));
-                values.extend(named);
+                let named = names.iter().zip(of).filter_map(|(n, v)| Some((n, v.as_f64()?)));
+                named.for_each(|(name, value)| row.put(&[key, ".", name], value));
             }
-            _ => flatten(key, value, &mut values),
+            _ => flatten(key, value, row),
         }
     }
     if stamp.is_none() {
-        values.extend(message.get("timestamp").and_then(Value::as_f64).map(|t| ("timestamp".into(), t)));
+        let time = message.get("timestamp").and_then(Value::as_f64);
+        time.into_iter().for_each(|t| row.put(&["timestamp"], t));
     }
-    Ok((stamp, values))
+    Ok(stamp)
 }
 
-fn flatten(path: &str, value: &Value, values: &mut Vec<(String, f64)>) {
+fn flatten(path: &str, value: &Value, row: &mut Row<'_>) {
     match value {
-        Value::Number(number) => values.extend(number.as_f64().map(|v| (path.to_string(), v))),
-        Value::Bool(value) => values.push((path.to_string(), f64::from(u8::from(*value)))),
+        Value::Number(number) => number.as_f64().into_iter().for_each(|v| row.put(&[path], v)),
+        Value::Bool(value) => row.put(&[path], f64::from(u8::from(*value))),
         Value::Array(list) if list.len() <= MOST => {
-            list.iter().enumerate().for_each(|(k, v)| flatten(&format!("{path}{}", k + 1), v, values));
+            list.iter().enumerate().for_each(|(k, v)| flatten(&format!("{path}{}", k + 1), v, row));
         }
         Value::Object(fields) => {
-            fields.iter().for_each(|(key, v)| flatten(&format!("{path}.{key}"), v, values));
+            fields.iter().for_each(|(key, v)| flatten(&format!("{path}.{key}"), v, row));
         }
         _ => {}
     }

@@ -1,32 +1,39 @@
 //! What is in a file: tables of named columns, whatever the format, before anybody says what they mean.
 
-#[cfg(any(feature = "npz", feature = "mat"))]
+#[cfg(any(feature = "npz", feature = "mat", feature = "hdf5"))]
 mod arrays;
-#[cfg(any(feature = "mcap", feature = "rosbag"))]
+#[cfg(feature = "topics")]
+mod bag;
+#[cfg(feature = "bag1")]
+mod bag1;
+#[cfg(feature = "topics")]
 mod cdr;
 pub(crate) mod columnar;
 mod contents;
+#[cfg(feature = "hdf5")]
+mod hdf5;
 #[cfg(feature = "parquet")]
-mod lists;
+mod lerobot;
 #[cfg(feature = "mat")]
 mod mat;
 #[cfg(feature = "mcap")]
 mod mcap;
 #[cfg(feature = "mcap")]
 mod mcap_out;
-#[cfg(any(feature = "mcap", feature = "rosbag"))]
+#[cfg(feature = "topics")]
 mod messages;
 #[cfg(feature = "npz")]
 mod npz;
+#[cfg(feature = "parquet")]
+mod numbers;
 #[cfg(feature = "rosbag")]
 mod rosbag;
-#[cfg(feature = "rosbag")]
-mod sqlite;
+#[cfg(feature = "topics")]
+mod schema;
 mod table;
 pub(crate) mod text;
-#[cfg(feature = "parquet")]
-mod zstd_pages;
 
+pub(crate) use contents::read_topics;
 pub use contents::{Contents, Finding, Format, LogError, read_contents};
 #[cfg(feature = "mcap")]
 pub(crate) use mcap_out::from_csv as mcap_from_csv;

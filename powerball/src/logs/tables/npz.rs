@@ -1,137 +1,225 @@
-//! Archives of NumPy arrays (`.npz`, `numpy.savez` and `savez_compressed`): a ZIP of `.npy` files.
+//! Arrays of NumPy: archives of them (`.npz`, `numpy.savez` and `savez_compressed`, a ZIP of `.npy` files) and a `.npy` alone.
 
-use super::arrays::{Array, Values, table};
+use super::arrays::{Array, Values, one};
 use super::table::Table;
-use std::io::{self, Read};
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+use std::path::Path;
 
 /// An array that claims to be larger than this, bytes, is torn.
-const LARGEST: u64 = 1 << 32;
+const LARGEST: u64 = 1 << 36;
 
 /// The arrays of an archive as one table, and those that have no place in it.
-pub(super) fn read(bytes: &[u8]) -> io::Result<(Table, Option<String>)> {
-    let mut arrays = Vec::new();
-    let mut left_out = Vec::new();
-    for (name, npy) in entries(bytes)? {
-        match array(name.trim_end_matches(".npy"), &npy) {
-            Ok(array) => arrays.push(array),
-            Err(reason) => left_out.push(format!("{name} ({reason})")),
+pub(super) fn read(path: &Path) -> io::Result<(Vec<Table>, Vec<String>)> {
+    let mut archive = zip::ZipArchive::new(BufReader::new(File::open(path)?)).map_err(torn)?;
+    let (mut arrays, mut left_out) = (Vec::new(), Vec::new());
+    for k in 0..archive.len() {
+        let mut entry = archive.by_index(k).map_err(torn)?;
+        let (name, size) = (entry.name().map_err(torn)?.into_owned(), entry.size());
+        if size > LARGEST {
+            return Err(torn("an array's size"));
         }
+        let mut npy = Vec::new();
+        // The checksum is compared where the entry ends.
+        entry.read_to_end(&mut npy).map_err(|e| torn(format!("{name}: {e}")))?;
+        if npy.len() as u64 != size {
+            return Err(torn(name));
+        }
+        add(name.trim_end_matches(".npy"), &npy, &mut arrays, &mut left_out);
     }
-    Ok(table(&arrays, left_out))
+    Ok(one(&arrays, left_out))
 }
 
-fn torn(what: &str) -> io::Error {
+/// A `.npy` file as a table: its fields, or columns named after the file.
+pub(super) fn read_array(path: &Path) -> io::Result<(Vec<Table>, Vec<String>)> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let (mut arrays, mut left_out) = (Vec::new(), Vec::new());
+    add(&stem, &std::fs::read(path)?, &mut arrays, &mut left_out);
+    match arrays.is_empty() {
+        true => Err(io::Error::other(left_out.join(", "))),
+        false => Ok(one(&arrays, left_out)),
+    }
+}
+
+fn torn(what: impl std::fmt::Display) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, format!("the archive is torn: {what}"))
 }
 
-fn le16(bytes: &[u8], at: usize) -> io::Result<usize> {
-    let two = bytes.get(at..at + 2).ok_or_else(|| torn("its directory"))?;
-    Ok(usize::from(u16::from_le_bytes([two[0], two[1]])))
-}
-
-fn le32(bytes: &[u8], at: usize) -> io::Result<usize> {
-    let four = bytes.get(at..at + 4).ok_or_else(|| torn("its directory"))?;
-    match u32::from_le_bytes([four[0], four[1], four[2], four[3]]) {
-        u32::MAX => Err(io::Error::other("archives beyond 4 GB are not read: split it")),
-        value => Ok(value as usize),
+fn add(name: &str, npy: &[u8], arrays: &mut Vec<Array>, left_out: &mut Vec<String>) {
+    match array(name, npy) {
+        Ok(parts) => {
+            for part in parts {
+                match part {
+                    Ok(array) => arrays.push(array),
+                    Err(reason) => left_out.push(reason),
+                }
+            }
+        }
+        Err(reason) => left_out.push(format!("{name} ({reason})")),
     }
 }
 
-/// The files of a ZIP with their names, by the directory at its end.
-fn entries(bytes: &[u8]) -> io::Result<Vec<(String, Vec<u8>)>> {
-    let from = bytes.len().saturating_sub(22 + 65_535);
-    let end = bytes[from..].windows(4).rposition(|w| w == b"PK\x05\x06").map(|at| from + at);
-    let end = end.ok_or_else(|| torn("it has no end"))?;
-    let (count, mut at) = (le16(bytes, end + 10)?, le32(bytes, end + 16)?);
-    let mut entries = Vec::new();
-    for _ in 0..count {
-        if bytes.get(at..at + 4) != Some(b"PK\x01\x02") {
-            return Err(torn("its directory"));
-        }
-        let (method, packed, size) = (le16(bytes, at + 10)?, le32(bytes, at + 20)?, le32(bytes, at + 24)?);
-        let (name, extra, comment) = (le16(bytes, at + 28)?, le16(bytes, at + 30)?, le16(bytes, at + 32)?);
-        let local = le32(bytes, at + 42)?;
-        let name_at = at + 46;
-        let text = bytes.get(name_at..name_at + name).ok_or_else(|| torn("a name"))?;
-        let start = local + 30 + le16(bytes, local + 26)? + le16(bytes, local + 28)?;
-        let stored = bytes.get(start..start + packed).ok_or_else(|| torn("an array"))?;
-        let content = match method {
-            0 => stored.to_vec(),
-            8 => {
-                let mut out = Vec::new();
-                flate2::read::DeflateDecoder::new(stored).take(size as u64 + 1).read_to_end(&mut out)?;
-                out
-            }
-            other => {
-                return Err(io::Error::other(format!("an array is compressed by method {other} of ZIP")));
-            }
-        };
-        if content.len() != size || size as u64 > LARGEST {
-            return Err(torn("an array"));
-        }
-        entries.push((String::from_utf8_lossy(text).into_owned(), content));
-        at = name_at + name + extra + comment;
-    }
-    Ok(entries)
+/// One field of an array's elements, or all there is of them.
+struct Part<'h> {
+    /// Empty where the elements have no fields.
+    name: &'h str,
+    descr: &'h str,
+    /// How many numbers an element has of it.
+    width: usize,
 }
 
-/// An array from the bytes of a `.npy` file.
-fn array(name: &str, bytes: &[u8]) -> Result<Array, String> {
+/// The arrays in the bytes of a `.npy` file: one, or one a field where its elements are records.
+fn array(name: &str, bytes: &[u8]) -> Result<Vec<Result<Array, String>>, String> {
     let rest = bytes.strip_prefix(b"\x93NUMPY").ok_or("is no .npy")?;
-    let (length, start) = match rest.first() {
-        Some(1) => (le16(rest, 2), 4),
-        Some(2 | 3) => (le32(rest, 2), 6),
+    let byte = |at: usize| rest.get(at).copied().map(usize::from).ok_or("is torn");
+    let (length, start) = match byte(0)? {
+        1 => (byte(2)? | byte(3)? << 8, 4),
+        2 | 3 => (byte(2)? | byte(3)? << 8 | byte(4)? << 16 | byte(5)? << 24, 6),
         _ => return Err("is a .npy of an unknown version".into()),
     };
-    let length = length.map_err(|e| e.to_string())?;
     let header = rest.get(start..start + length).ok_or("is torn")?;
-    let header = String::from_utf8_lossy(header).into_owned();
+    let header = std::str::from_utf8(header).map_err(|_| "has a head that is no text")?;
     let after = |key: &str| {
         let (_, rest) = header.split_once(&format!("'{key}'")).ok_or(format!("its head lacks {key}"))?;
         Ok::<&str, String>(rest.trim_start_matches([':', ' ']))
     };
-    let descr = after("descr")?;
-    let descr =
-        descr.strip_prefix('\'').and_then(|d| d.split('\'').next()).ok_or("is an array of records")?;
     let columns_first = after("fortran_order")?.starts_with("True");
     let shape = after("shape")?.strip_prefix('(').and_then(|s| s.split(')').next()).ok_or("has no shape")?;
     let shape: Vec<usize> = shape.split(',').filter_map(|n| n.trim().parse().ok()).collect();
-    let data = &rest[start + length..];
-    Ok(Array { name: name.into(), shape, columns_first, values: values(descr, data)? })
+    let parts = parts(after("descr")?)?;
+    let size = |part: &Part<'_>| Some(part.width * self::size(part.descr)?);
+    let stride = parts.iter().map(size).sum::<Option<usize>>().filter(|stride| *stride > 0);
+    let stride = stride
+        .ok_or_else(|| format!("its values are {}", parts.iter().map(|p| p.descr).collect::<String>()))?;
+    let count = shape.iter().try_fold(1usize, |all, n| all.checked_mul(*n)).ok_or("is torn")?;
+    let data = rest.get(start + length..).unwrap_or_default();
+    if count.checked_mul(stride).is_none_or(|size| size > data.len()) {
+        return Err("is torn".into());
+    }
+    let mut from = 0;
+    let read = parts.iter().map(|part| {
+        let own = part.width * self::size(part.descr).unwrap_or(0);
+        let bytes = from..from + own;
+        from += own;
+        let elements = data.chunks_exact(stride).take(count).map(|element| &element[bytes.clone()]);
+        let full = if part.name.is_empty() { name } else { part.name };
+        let values = values(part.descr, elements).map_err(|reason| format!("{full} ({reason})"))?;
+        let inner = (part.width > 1).then_some(part.width);
+        let shape = shape.iter().copied().chain(inner).collect();
+        Ok(Array { name: full.to_string(), shape, columns_first: columns_first && inner.is_none(), values })
+    });
+    Ok(read.collect())
 }
 
-fn values(descr: &str, data: &[u8]) -> Result<Values, String> {
-    let unknown = || format!("its values are {descr}");
-    let order = descr.chars().next().ok_or_else(unknown)?;
-    let (kind, size) = descr.get(1..).and_then(|d| Some((d.get(..1)?, d.get(1..)?))).ok_or_else(unknown)?;
-    let size: usize = size.parse().map_err(|_| unknown())?;
-    if kind == "U" {
-        let text = |letters: &[u8]| {
-            let letters = letters.chunks_exact(4).map(|c| u32::from_le_bytes([c[0], c[1], c[2], c[3]]));
-            letters.take_while(|c| *c != 0).filter_map(char::from_u32).collect()
-        };
-        return Ok(Values::Texts(data.chunks_exact((4 * size).max(4)).map(text).collect()));
+/// What an array's elements are made of: `'<f8'`, or `[('t', '<f8'), ('q', '<f8', (6,))]`.
+fn parts(descr: &str) -> Result<Vec<Part<'_>>, String> {
+    let quoted = |text: &'_ str| -> Option<(usize, usize)> {
+        let begin = text.find('\'')? + 1;
+        Some((begin, begin + text[begin..].find('\'')?))
+    };
+    if !descr.starts_with('[') {
+        let (begin, end) = quoted(descr).ok_or("has a head that is torn")?;
+        return Ok(vec![Part { name: "", descr: &descr[begin..end], width: 1 }]);
     }
-    let number = |bytes: &[u8]| -> Option<f64> {
+    let (mut parts, mut rest) = (Vec::new(), &descr[1..]);
+    while let Some(field) = rest.trim_start_matches([',', ' ']).strip_prefix('(') {
+        let (begin, end) = quoted(field).ok_or("has a head that is torn")?;
+        let (name, after) = (&field[begin..end], field[end + 1..].trim_start_matches([',', ' ']));
+        if !after.starts_with('\'') {
+            return Err("has records within records".into());
+        }
+        let (begin, end) = quoted(after).ok_or("has a head that is torn")?;
+        let (descr, after) = (&after[begin..end], &after[end + 1..]);
+        let (shape, after) = after.split_once(')').ok_or("has a head that is torn")?;
+        let numbers = shape.split(|c: char| !c.is_ascii_digit()).filter_map(|n| n.parse::<usize>().ok());
+        let width = numbers.product();
+        // A field with a shape has a bracket more.
+        rest = if shape.contains('(') {
+            after.split_once(')').ok_or("has a head that is torn")?.1
+        } else {
+            after
+        };
+        parts.push(Part { name, descr, width });
+    }
+    Ok(parts)
+}
+
+/// The kind of a value, `f`, and its bytes; its order of bytes and its unit, where it is a time.
+fn kind(descr: &str) -> Option<(char, usize, bool, Option<&str>)> {
+    let big = descr.starts_with('>');
+    let mut letters = descr.chars();
+    let kind = letters.nth(1)?;
+    let (size, unit) = match letters.as_str().split_once('[') {
+        Some((size, unit)) => (size, unit.strip_suffix(']')),
+        None => (letters.as_str(), None),
+    };
+    Some((kind, size.parse().ok()?, big, unit))
+}
+
+/// Bytes of a value.
+fn size(descr: &str) -> Option<usize> {
+    let (kind, size, ..) = kind(descr)?;
+    // Letters have four.
+    Some(if kind == 'U' { 4 * size } else { size }).filter(|size| *size < 1 << 20)
+}
+
+fn values<'d>(descr: &str, elements: impl Iterator<Item = &'d [u8]>) -> Result<Values, String> {
+    let unknown = || format!("its values are {descr}");
+    let (kind, size, big, unit) = kind(descr).ok_or_else(unknown)?;
+    if kind == 'U' {
+        let letter = |four: &[u8]| {
+            let four = four.try_into().unwrap_or_default();
+            if big { u32::from_be_bytes(four) } else { u32::from_le_bytes(four) }
+        };
+        let text = |letters: &[u8]| {
+            let letters = letters.chunks_exact(4).map(letter).take_while(|c| *c != 0);
+            letters.filter_map(char::from_u32).collect()
+        };
+        return Ok(Values::Texts(elements.map(text).collect()));
+    }
+    let number: fn(u64, u32) -> f64 = match (kind, size) {
+        ('f', 2) => |bits, _| f64::from(half::f16::from_bits(bits as u16)),
+        ('f', 4) => |bits, _| f64::from(f32::from_bits(bits as u32)),
+        ('f', 8) => |bits, _| f64::from_bits(bits),
+        ('i' | 'm' | 'M', 1..=8) => |bits, unused| (((bits << unused) as i64) >> unused) as f64,
+        ('u' | 'b', 1..=8) => |bits, _| bits as f64,
+        _ => return Err(unknown()),
+    };
+    let of_second = if matches!(kind, 'm' | 'M') { Some(time_unit(unit).ok_or_else(unknown)?) } else { None };
+    let unused = 64 - 8 * size as u32;
+    let value = |bytes: &[u8]| {
         let mut own = [0u8; 8];
         own[..size].copy_from_slice(bytes);
-        if order == '>' {
+        if big {
             own[..size].reverse();
         }
-        let unsigned = u64::from_le_bytes(own);
-        let unused = 64 - 8 * size as u32;
-        let signed = ((unsigned << unused) as i64) >> unused;
-        match (kind, size) {
-            ("f", 8) => Some(f64::from_bits(unsigned)),
-            ("f", 4) => Some(f64::from(f32::from_bits(unsigned as u32))),
-            ("i", _) => Some(signed as f64),
-            ("u" | "b", _) => Some(unsigned as f64),
-            _ => None,
+        let bits = u64::from_le_bytes(own);
+        match of_second {
+            // No time at all.
+            Some(_) if bits as i64 == i64::MIN => f64::NAN,
+            Some((parts, of)) => {
+                let parts_of = i64::wrapping_mul(bits as i64, parts);
+                parts_of.div_euclid(of) as f64 + parts_of.rem_euclid(of) as f64 / of as f64
+            }
+            None => number(bits, unused),
         }
     };
-    if !(1..=8).contains(&size) {
-        return Err(unknown());
-    }
-    let numbers: Option<Vec<f64>> = data.chunks_exact(size).map(number).collect();
-    numbers.map(Values::Numbers).ok_or_else(unknown)
+    Ok(Values::Numbers(elements.flat_map(|element| element.chunks_exact(size)).map(value).collect()))
+}
+
+/// A unit of time, `10ms`, as so many parts of which so many are a second.
+fn time_unit(unit: Option<&str>) -> Option<(i64, i64)> {
+    let unit = unit?;
+    let letters = unit.trim_start_matches(|c: char| c.is_ascii_digit());
+    let count = unit[..unit.len() - letters.len()].parse().unwrap_or(1);
+    Some(match letters {
+        "D" => (86_400 * count, 1),
+        "h" => (3_600 * count, 1),
+        "m" => (60 * count, 1),
+        "s" => (count, 1),
+        "ms" => (count, 1_000),
+        "us" => (count, 1_000_000),
+        "ns" => (count, 1_000_000_000),
+        _ => return None,
+    })
 }

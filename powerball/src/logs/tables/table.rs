@@ -57,32 +57,68 @@ impl Table {
         self.columns.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
     }
 
-    /// Adds a message; its values may come in any order and may be of some columns only.
-    #[cfg(any(feature = "mcap", feature = "rosbag"))]
-    pub(crate) fn push(&mut self, received: f64, stamp: Option<f64>, values: &[(String, f64)]) {
+    /// Begins a message that was received at a time, s.
+    #[cfg(feature = "topics")]
+    pub(super) fn begin_row(&mut self, received: f64) -> Row<'_> {
         let row = self.line.len();
         self.line.push(row + 1);
         self.received.push(received);
-        self.stamps.push(stamp.unwrap_or(f64::NAN));
-        for (k, (name, value)) in values.iter().enumerate() {
-            // Nearly every message has its values where the one before had them.
-            let here = self.columns.get(k).is_some_and(|c| c.name == *name);
-            let at = if here { Some(k) } else { self.columns.iter().position(|c| c.name == *name) };
-            let at = at.unwrap_or_else(|| {
-                self.columns.push(Column { name: name.clone(), values: Vec::new() });
-                self.columns.len() - 1
-            });
-            let column = &mut self.columns[at].values;
-            column.resize(row, f64::NAN);
-            column.push(*value);
-        }
+        self.stamps.push(f64::NAN);
+        let known = self.columns.len();
+        Row { table: self, row, known, next: 0, name: String::new() }
     }
 
     /// Every column as long as there are samples.
-    #[cfg(any(feature = "mcap", feature = "rosbag"))]
+    #[cfg(feature = "topics")]
     pub(crate) fn fill(&mut self) {
         let rows = self.line.len();
         self.columns.iter_mut().for_each(|c| c.values.resize(rows, f64::NAN));
+    }
+}
+
+/// A message of a topic while it is read; its values may come in any order and may be of some columns only.
+#[cfg(feature = "topics")]
+pub(super) struct Row<'t> {
+    table: &'t mut Table,
+    row: usize,
+    /// How many columns there were before it.
+    known: usize,
+    /// The column after the last one: nearly every message has its values where the one before had them.
+    next: usize,
+    /// The name of a value.
+    name: String,
+}
+
+#[cfg(feature = "topics")]
+impl Row<'_> {
+    /// A value whose name is these pieces.
+    pub(super) fn put(&mut self, pieces: &[&str], value: f64) {
+        let (columns, name) = (&mut self.table.columns, &mut self.name);
+        name.clear();
+        pieces.iter().for_each(|piece| name.push_str(piece));
+        let here = columns.get(self.next).is_some_and(|c| c.name == *name);
+        let at = if here { Some(self.next) } else { columns.iter().position(|c| c.name == *name) };
+        let at = at.unwrap_or_else(|| {
+            columns.push(Column { name: name.clone(), values: Vec::new() });
+            columns.len() - 1
+        });
+        let column = &mut columns[at].values;
+        column.resize(self.row, f64::NAN);
+        column.push(value);
+        self.next = at + 1;
+    }
+
+    /// Ends the message with its time stamp, s. One that could not be read keeps its number and has no value.
+    pub(super) fn end(self, done: Result<Option<f64>, String>) {
+        let table = self.table;
+        match done {
+            Ok(stamp) => table.stamps[self.row] = stamp.unwrap_or(f64::NAN),
+            Err(reason) => {
+                table.columns.truncate(self.known);
+                table.columns.iter_mut().for_each(|c| c.values.truncate(self.row));
+                table.unreadable.get_or_insert((0, reason)).0 += 1;
+            }
+        }
     }
 }
 

@@ -9,13 +9,12 @@ use std::cell::Cell;
 pub(super) const HEAD: usize = 4096;
 
 /// What files begin with that are no logs, and what they are.
-const OTHERS: [(&[u8], &str); 7] = [
+const OTHERS: [(&[u8], &str); 6] = [
     (b"\x89PNG", "a PNG picture"),
     (b"\xff\xd8\xff", "a JPEG picture"),
     (b"%PDF", "a PDF"),
     (b"\x1f\x8b", "compressed by gzip: unpack it first"),
     (b"\x28\xb5\x2f\xfd", "compressed by zstd: unpack it first"),
-    (b"\x89HDF", "HDF5; from MATLAB save with -v7"),
     (b"\x7fELF", "a program"),
 ];
 
@@ -32,7 +31,7 @@ pub(super) fn no_text(head: &[u8]) -> Option<String> {
     }
     let is_control = |byte: &u8| matches!(byte, 0..=8 | 14..=31 | 127);
     head.iter().any(is_control).then(|| {
-        "is no log: it holds bytes that are no text, and begins like no Parquet, MCAP, rosbag2, npz or mat".to_string()
+        "is no log: it holds bytes that are no text, and begins like no Parquet, MCAP, bag, npz, mat or HDF5".to_string()
     })
 }
 

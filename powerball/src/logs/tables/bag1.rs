@@ -1,0 +1,83 @@
+//! Bags of ROS 1 (`.bag`, version 2.0), their chunks stored or compressed by LZ4 or bzip2.
+
+use super::messages::Topics;
+use rosbag::{ChunkRecord, Error, IndexRecord, MessageRecord, RosBag};
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// What a bag begins with.
+pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
+/// Its first record fills so many bytes.
+const HEAD: u64 = 4096;
+
+/// Reads the topics of a bag; what is wrong with it.
+pub(super) fn read(path: &Path, topics: &mut Topics) -> io::Result<Vec<String>> {
+    has_index(path)?;
+    let bag = RosBag::new(path)?;
+    for record in bag.index_records() {
+        if let IndexRecord::Connection(of) = record.map_err(torn)? {
+            let definition = (of.tp, "ros1msg", of.message_definition.as_bytes());
+            topics.add(i64::from(of.id), of.storage_topic, definition, "ros1");
+        }
+    }
+    let (mut chunks, mut lost, mut first) = (0, 0, None);
+    for record in bag.chunk_records() {
+        let taken = match record {
+            Ok(ChunkRecord::Chunk(chunk)) => {
+                chunks += 1;
+                chunk.messages().try_for_each(|message| take(message?, topics))
+            }
+            Ok(ChunkRecord::IndexData(_)) => Ok(()),
+            // Where a record's length is wrong, nothing after it can be found.
+            Err(error @ (Error::OutOfBounds | Error::InvalidRecord | Error::InvalidHeader)) if lost > 0 => {
+                first.get_or_insert(error);
+                lost += 1;
+                break;
+            }
+            Err(error) => {
+                chunks += 1;
+                Err(error)
+            }
+        };
+        if let Err(error) = taken {
+            lost += 1;
+            first.get_or_insert(error);
+        }
+    }
+    let told = first.map(|error| {
+        format!("{lost} of {chunks} chunks are damaged (the first: {error}): their messages are lost, the others were read")
+    });
+    Ok(told.into_iter().collect())
+}
+
+fn take(record: MessageRecord<'_>, topics: &mut Topics) -> Result<(), Error> {
+    if let MessageRecord::MessageData(message) = record {
+        topics.take(i64::from(message.conn_id), message.time as i64, message.data);
+    }
+    Ok(())
+}
+
+/// The crate panics where the index is not within the file.
+fn has_index(path: &Path) -> io::Result<()> {
+    let mut file = File::open(path)?;
+    let length = file.metadata()?.len();
+    let mut head = Vec::new();
+    (&mut file).take(HEAD).read_to_end(&mut head)?;
+    let field = b"index_pos=";
+    let at = head.windows(field.len()).position(|w| w == field).map(|at| at + field.len());
+    let position = at.and_then(|at| head.get(at..at + 8)?.try_into().ok()).map(u64::from_le_bytes);
+    let start = MAGIC.len() as u64 + HEAD;
+    match position {
+        Some(0) => Err(io::Error::other("was not closed and has no index: `rosbag reindex FILE` makes one")),
+        Some(position) if (start..=length).contains(&position) => Ok(()),
+        Some(_) => {
+            Err(io::Error::other("ends before its index: it was not copied whole; `rosbag reindex FILE`"))
+        }
+        None => Err(io::Error::other("its head is torn")),
+    }
+}
+
+fn torn(error: Error) -> io::Error {
+    io::Error::other(format!("its index is torn ({error}): `rosbag reindex FILE`"))
+}
