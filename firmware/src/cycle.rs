@@ -119,7 +119,7 @@ pub fn control(
 /// A turn of the test whether the model still holds; whether its alarm rises.
 #[inline(never)]
 pub fn watch(watch: &mut Watch, output: &Output, measured: &Joints) -> bool {
-    watch.turn(&(measured - output.model), &output.friction, &output.model)
+    watch.turn(&(measured - output.model), &output.friction)
 }
 
 /// Both.

@@ -4,7 +4,7 @@
 //! pays for all of them.
 
 use crate::cycle::Joints;
-use powerball::controller::change::{Colour, JointTest, Shown, alarm};
+use powerball::controller::change::{Alarm, Bet, Colour, Joint, Standing, Term, Whitener, alarm};
 
 /// Cycles from row to row.
 pub const TURNS: usize = 4;
@@ -16,11 +16,23 @@ const LEVEL: f32 = 24.0 * 3600.0 * 50.0;
 const COLOUR: Colour<f32> =
     Colour { coefficients: [0.6, 0.2, -0.1, 0.05, 0.02, -0.01], deviation: 0.1, margin: 0.05 };
 
+/// By how much of itself friction may wander.
+const RANGE: f32 = 0.02;
+
+/// What one joint has: its innovations, a bet on a force and one on a change of its friction.
+#[derive(Clone, Copy)]
+struct Test {
+    joint: Joint<f32>,
+    constant: Whitener<f32>,
+    force: Bet<f32, 1>,
+    friction: Bet<f32, 1>,
+}
+
 /// The tests of six joints.
 pub struct Watch {
-    tests: [JointTest<f32>; 6],
-    /// The row that they take in turns.
-    row: [Shown<f32>; 6],
+    tests: [Test; 6],
+    /// Residual and friction of the row that they take in turns, N·m.
+    row: [[f32; 2]; 6],
     rows: u64,
     /// Whose turn it is, 0 to [`TURNS`] − 1.
     pub next: usize,
@@ -28,21 +40,35 @@ pub struct Watch {
 
 impl Default for Watch {
     fn default() -> Self {
-        let nothing = Shown { residual: 0.0, columns: [0.0; 3] };
-        Watch { tests: [JointTest::new(COLOUR, 0.1); 6], row: [nothing; 6], rows: 0, next: 0 }
+        let test = Test {
+            joint: Joint::new(COLOUR, RANGE),
+            constant: Whitener::default(),
+            force: Bet::default(),
+            friction: Bet::default(),
+        };
+        Watch { tests: [test; 6], row: [[0.0; 2]; 6], rows: 0, next: 0 }
+    }
+}
+
+impl Test {
+    fn update(&mut self, [residual, friction]: [f32; 2], row: u64) {
+        let constant = self.constant.update(&COLOUR, 1.0);
+        let (Some(constant), Some(innovation)) = (constant, self.joint.update(residual, friction)) else {
+            return;
+        };
+        self.force.update(&[Term { innovation, columns: [constant] }], row);
+        self.friction.update(&[Term { innovation, columns: [innovation.friction] }], row);
     }
 }
 
 impl Watch {
-    /// A row in the first of [`TURNS`] cycles; whether its alarm rises, in the last. Measured less predicted torque, the
-    /// model's friction and its whole torque, N·m.
-    pub fn turn(&mut self, residual: &Joints, friction: &Joints, model: &Joints) -> bool {
+    /// A row in the first of [`TURNS`] cycles; whether its alarm rises, in the last. Measured less predicted torque and the
+    /// model's friction, N·m.
+    pub fn turn(&mut self, residual: &Joints, friction: &Joints) -> bool {
         if self.next == 0 {
             self.rows += 1;
-            let now = residual.iter().zip(friction).zip(model);
-            for (row, ((residual, friction), model)) in self.row.iter_mut().zip(now) {
-                let [_, before, _] = row.columns;
-                *row = Shown { residual: *residual, columns: [*friction, *model, *model - before] };
+            for (row, (residual, friction)) in self.row.iter_mut().zip(residual.iter().zip(friction)) {
+                *row = [*residual, *friction];
             }
         }
         for (joint, (test, row)) in self.tests.iter_mut().zip(&self.row).enumerate() {
@@ -51,6 +77,12 @@ impl Watch {
             }
         }
         self.next = (self.next + 1) % TURNS;
-        self.next == 0 && alarm(self.tests.iter().enumerate(), LEVEL).is_some()
+        self.next == 0 && self.alarm().is_some()
+    }
+
+    fn alarm(&self) -> Option<Alarm<f32>> {
+        let standing =
+            |bet: &Bet<f32, 1>| Standing { weight: 1.0 / 12.0, capital: bet.capital(), since: bet.since() };
+        alarm(self.tests.iter().flat_map(|test| [standing(&test.force), standing(&test.friction)]), LEVEL)
     }
 }
