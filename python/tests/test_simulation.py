@@ -1,8 +1,9 @@
 """Controllers in simulation, against what closed forms and the arm's own functions say."""
 
 import numpy as np
-import powerball as pb
 import pytest
+
+import powerball as pb
 
 ARM = """
 name = "pendulum"
@@ -29,7 +30,13 @@ def model(arm: pb.Arm, spring: float = 0.0) -> dict:
     friction = {"joint": 1, "gamma1": 0.4, "gamma2": 50, "gamma3": 0.2, "gamma4": 20, "gamma5": 0.8}
     terms = [{"effect": "spring", "joint": 1, "law": "position", "coefficient": spring}] if spring else []
     parameters = [{"name": n, "value": float(v)} for n, v in zip(names, values)]
-    return {"arm": "pendulum", "set": "minimal", "parameters": parameters, "friction": [friction], "terms": terms}
+    return {
+        "arm": "pendulum",
+        "set": "minimal",
+        "parameters": parameters,
+        "friction": [friction],
+        "terms": terms,
+    }
 
 
 def path():

@@ -60,12 +60,13 @@ def simulate(
     bandwidth: Optional[float] = None,
     damping: float = 1.0,
 ) -> Simulated:
-    """Moves a simulated arm along a path, from rest where the path begins; one cycle a sample, torques held in between.
+    """Moves a simulated arm along a path, from rest where the path begins; torques are held for a sample.
 
-    ``controller`` knows ``model``: "gravity", "computed_torque" (default bandwidth 0.1/cycle rad/s), "impedance" (8 rad/s), both
-    with the model's friction and effects fed forward, or a function, which gets what it sees and returns n torques in N·m.
-    The arm moves as ``plant`` says, by default the model itself: give ``explain``'s model as the plant and ``identify``'s as the
-    model to see what an effect costs that a controller does not know. Arms have 1 to 7 joints.
+    ``controller`` knows ``model``: "gravity", "computed_torque" (default bandwidth 0.1/cycle rad/s) or
+    "impedance" (8 rad/s), the latter two with the model's friction and effects fed forward, or a function,
+    which gets what it sees and returns n torques in N·m. The arm moves as ``plant`` says, by default the
+    model itself: give ``explain``'s model as the plant and ``identify``'s as the model to see what an effect
+    costs that a controller does not know. Arms have 1 to 7 joints.
     """
     t, q, dq, ddq = _samples(path)
     period = _period(t)
@@ -77,7 +78,9 @@ def simulate(
         if bandwidth is None:
             bandwidth = 8.0 if controller == "impedance" else 0.1 / period
         known = model_text(model)
-        moved = _core.simulate(arm._core, truth, known, controller, float(bandwidth), float(damping), period, motion)
+        moved = _core.simulate(
+            arm._core, truth, known, controller, float(bandwidth), float(damping), period, motion
+        )
     return Simulated(t, moved[0], moved[1], moved[2], q)
 
 
@@ -88,7 +91,9 @@ def _samples(path: Path) -> Tuple[Array, Array, Array, Array]:
         raise ValueError("path must be a Trajectory, (t, q) or (t, q, dq, ddq) with t (N,) and q (N, n)")
     t = arrays[0]
     if len(t) < 2 or any(len(a) != len(t) or a.shape != arrays[1].shape for a in arrays[1:]):
-        raise ValueError(f"path: t has {len(t)} times; q, dq and ddq must be (N, n) with the same N, 2 at least")
+        raise ValueError(
+            f"path: t has {len(t)} times; q, dq and ddq must be (N, n) with the same N, 2 at least"
+        )
     if not all(np.all(np.isfinite(a)) for a in arrays):
         raise ValueError("path: NaN or infinity")
     if len(arrays) == 2:
