@@ -63,7 +63,7 @@ fn explained(arm: &Arm, fit: &[Log], validate: &[Log]) -> Result<(RigidArm, Torq
     let body = RigidArm::new(&changed).map_err(|e| e.to_string())?;
     for (j, colour) in found.model.colour.iter().flat_map(|colour| colour.joints.iter().enumerate()) {
         match colour {
-            Some(c) => println!("joint {}: σ {:.4} N·m, margins {:.2?}", j + 1, c.deviation, c.margins),
+            Some(c) => println!("joint {}: σ {:.4} N·m, margin {:.3}", j + 1, c.deviation, c.margin),
             None => println!("joint {}: not watched", j + 1),
         }
     }

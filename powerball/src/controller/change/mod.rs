@@ -7,8 +7,7 @@
 //!
 //! **The null hypothesis**: given all before it and the whole motion, the mean of the innovation, cut at −[`LOSS`] and
 //! [`GAIN`], is at most m(t), and so is that of its negative, cut alike; m = margin + [`SLIP`]·range·|f(t)|. The margin
-//! is what the model errs even where nothing has changed (a bet may have a wider one of its own, where the model errs along its
-//! columns), the rest by how much a friction that wanders over its range
+//! is what the model errs even where nothing has changed, the rest by how much a friction that wanders over its range
 //! within minutes is ahead of what was followed. Nothing else is assumed: no normal distribution, no variance, no
 //! independence of joints. (The means of normal innovations that are cut so are 0.0085, less than [`LEAST_MARGIN`].)
 //!

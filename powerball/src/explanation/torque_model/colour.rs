@@ -1,8 +1,7 @@
 //! The colour of what a model leaves, and how much it errs: what a watch measures changes against.
 
-use super::TorqueModel;
-use super::detector::{CONSTANT, Detector, KINDS};
 use super::rows::{Rows, Shown};
+use super::{Detector, TorqueModel};
 use crate::controller::change::{self, LEAST_MARGIN, ORDER};
 use crate::identification::estimate::NormalEquations;
 use crate::logs::log::{Log, logs_of_motors};
@@ -21,8 +20,6 @@ const MOST_MARGIN: f64 = 1.5;
 const IMPULSE: usize = 2000;
 /// Steps of the search for a margin.
 const STEPS: usize = 8;
-/// The margin of a bet that none makes calm: nothing is put on it.
-const NEVER: f64 = 1e3;
 /// Joints together may need margins so many times as large as each by itself.
 const TOGETHER: f64 = 4.0;
 
@@ -42,9 +39,8 @@ pub struct JointColour {
     pub coefficients: [f64; ORDER],
     /// Standard deviation of e, N·m.
     pub deviation: f64,
-    /// By how many of these the mean of e differs from zero without a change, for each of the [`KINDS`] of bets: what a model
-    /// errs looks like one change more than like another.
-    pub margins: [f64; KINDS],
+    /// By how many of these the mean of e differs from zero without a change.
+    pub margin: f64,
 }
 
 impl JointColour {
@@ -62,27 +58,20 @@ impl JointColour {
             low = keep * low + (1.0 - keep) * now;
             (squares, sum) = (squares + low * low, sum + low);
         }
-        [self.deviation * f64::sqrt(squares), self.deviation * self.margin() * f64::abs(sum)]
+        [self.deviation * f64::sqrt(squares), self.deviation * self.margin * f64::abs(sum)]
     }
 
-    /// The same with other margins.
-    #[must_use]
-    pub fn with(&self, margins: [f64; KINDS]) -> JointColour {
+    /// The same with another margin.
+    fn with(&self, margin: f64) -> JointColour {
         let mut own = self.clone();
-        own.margins = margins;
+        own.margin = margin;
         own
     }
 
-    /// That of a constant torque.
-    #[must_use]
-    pub fn margin(&self) -> f64 {
-        self.margins[CONSTANT]
-    }
-
-    /// As a joint's innovations take it; the [`Detector`] adds what the margin of a bet is more.
+    /// As the test of a controller takes it.
     #[must_use]
     pub fn for_test(&self) -> change::Colour<f64> {
-        change::Colour { coefficients: self.coefficients, deviation: self.deviation, margin: LEAST_MARGIN }
+        change::Colour { coefficients: self.coefficients, deviation: self.deviation, margin: self.margin }
     }
 }
 
@@ -121,43 +110,39 @@ impl Colour {
         let dof = rows.first()?.joints.len();
         let mut joints: Vec<Option<JointColour>> = (0..dof).map(|j| joint_colour(rows, j)).collect();
         let calm = level.powf(CALM);
-        let is_calm = |joints: &[Option<JointColour>]| most_capitals(joints, rows, range).map(|c| c < calm);
+        let is_calm = |joints: &[Option<JointColour>]| most_capital(joints, rows, range) < calm;
         for j in 0..dof {
             let Some(own) = joints[j].clone() else { continue };
-            let alone = |margins: [f64; KINDS]| {
+            let alone = |margin: f64| {
                 let mut colours = vec![None; dof];
-                colours[j] = Some(own.with(margins));
+                colours[j] = Some(own.with(margin));
                 is_calm(&colours)
             };
-            let margins = least([LEAST_MARGIN, MOST_MARGIN], alone);
-            // A bet that no margin makes calm is none; a joint on which a constant torque cannot be bet is not watched.
-            let margins = margins.map(|margin| margin.unwrap_or(NEVER));
-            joints[j] = Some(own.with(margins)).filter(|own| own.margin() < NEVER);
+            let margin = least(LEAST_MARGIN, MOST_MARGIN, alone);
+            joints[j] = margin.map(|margin| own.with(margin));
         }
-        let scaled = |by: [f64; KINDS]| -> Vec<Option<JointColour>> {
-            let scale = |own: &JointColour| own.with(std::array::from_fn(|k| own.margins[k] * by[k]));
+        let scaled = |by: f64| -> Vec<Option<JointColour>> {
+            let scale = |own: &JointColour| own.with(own.margin * by);
             joints.iter().map(|own| own.as_ref().map(scale)).collect()
         };
         // Where each is calm but not what they say together; where no such margin helps each keeps its own.
-        let by = least([1.0, TOGETHER], |by| is_calm(&scaled(by))).map(|by| by.unwrap_or(1.0));
+        let by = least(1.0, TOGETHER, |by| is_calm(&scaled(by))).unwrap_or(1.0);
         let joints = scaled(by);
         joints.iter().any(Option::is_some).then_some(Colour { rate, joints })
     }
 }
 
-/// The least numbers in a range, one a kind, with which something holds that holds with all larger ones; none where there is
-/// none. All kinds are searched at once: what one asks says nothing of another.
-fn least([low, high]: [f64; 2], holds: impl Fn([f64; KINDS]) -> [bool; KINDS]) -> [Option<f64>; KINDS] {
-    let (at_low, at_high) = (holds([low; KINDS]), holds([high; KINDS]));
-    let (mut lows, mut highs) = ([low; KINDS], [high; KINDS]);
-    for _ in 0..STEPS {
-        let middles = std::array::from_fn(|k| 0.5 * (lows[k] + highs[k]));
-        let calm = holds(middles);
-        for k in 0..KINDS {
-            if calm[k] { highs[k] = middles[k] } else { lows[k] = middles[k] }
-        }
+/// The least number in a range with which something holds that holds with all larger ones; none where there is none.
+fn least(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
+    if holds(low) {
+        return Some(low);
     }
-    std::array::from_fn(|k| if at_low[k] { Some(low) } else { at_high[k].then_some(highs[k]) })
+    let (mut low, mut high) = (low, Some(high).filter(|high| holds(*high))?);
+    for _ in 0..STEPS {
+        let middle = 0.5 * (low + high);
+        if holds(middle) { high = middle } else { low = middle }
+    }
+    Some(high)
 }
 
 /// A joint's colour with no margin; none where too few rows show it.
@@ -179,19 +164,18 @@ fn joint_colour(rows: &[Rows], j: usize) -> Option<JointColour> {
     let deviation = (equations.left(&found) / (now.len() - ORDER) as f64).sqrt();
     let mut coefficients = [0.0; ORDER];
     coefficients.iter_mut().zip(found).for_each(|(to, from)| *to = from);
-    (deviation > 0.0).then_some(JointColour { coefficients, deviation, margins: [0.0; KINDS] })
+    (deviation > 0.0).then_some(JointColour { coefficients, deviation, margin: 0.0 })
 }
 
-/// What each kind of bets gives to the average capital when it is largest.
-fn most_capitals(colours: &[Option<JointColour>], rows: &[Rows], range: f64) -> [f64; KINDS] {
+/// The average capital of the bets when it is largest.
+fn most_capital(colours: &[Option<JointColour>], rows: &[Rows], range: f64) -> f64 {
     let mut test = Detector::new(colours, range);
-    let mut most = [0.0f64; KINDS];
+    let mut most = 0.0f64;
     for rows in rows {
         test.interrupt();
         for number in 0..rows.t.len() {
             test.update(rows.row(number), number as u64);
-            let now = test.capitals();
-            most.iter_mut().zip(now).for_each(|(most, now)| *most = most.max(now));
+            most = most.max(test.capital());
         }
     }
     most

@@ -2,19 +2,10 @@
 
 use super::JointColour;
 use super::rows::{DELAY, FORCE, PAYLOAD, Shown};
-use crate::controller::change::{
-    Alarm, Bet, Innovation, Joint, LEAST_MARGIN, Standing, Term, Whitener, alarm,
-};
+use crate::controller::change::{Alarm, Bet, Innovation, Joint, Standing, Term, Whitener, alarm};
 
-/// Kinds of changes; each has the same share of all bets, and a margin of its own at each joint.
-pub const KINDS: usize = 6;
-/// A body in the hand, a force, a delay, a constant torque of a joint, its friction, its zero.
-const BODY: usize = 0;
-const PUSH: usize = 1;
-const LATE: usize = 2;
-pub(super) const CONSTANT: usize = 3;
-const FRICTION: usize = 4;
-const ZERO: usize = 5;
+/// Kinds of changes; each has the same share of all bets.
+const KINDS: f64 = 6.0;
 
 /// One joint's innovations and columns.
 #[derive(Clone, Debug)]
@@ -22,8 +13,6 @@ struct Seen {
     joint: Joint<f64>,
     columns: Vec<Whitener<f64>>,
     constant: Whitener<f64>,
-    /// By kind, beyond what its innovations allow.
-    margins: [f64; KINDS],
 }
 
 /// Bets on one joint's own changes.
@@ -55,7 +44,6 @@ impl Detector {
             joint: Joint::new(colour.for_test(), range),
             columns: vec![Whitener::default(); columns],
             constant: Whitener::default(),
-            margins: colour.margins.map(|margin| (margin - LEAST_MARGIN).max(0.0)),
         };
         Detector {
             seen: colours.iter().map(|colour| colour.as_ref().map(seen)).collect(),
@@ -80,22 +68,22 @@ impl Detector {
             .enumerate()
             .filter_map(|(j, (seen, shown))| Some((j, seen.as_mut()?.update(shown)?)))
             .collect();
-        self.payload.update(&terms(&says, BODY, |_, says| Some(columns(says, 0))), number);
-        self.force.update(&terms(&says, PUSH, |_, says| Some(columns(says, PAYLOAD))), number);
-        self.delay.update(&terms(&says, LATE, |_, says| Some(columns(says, PAYLOAD + FORCE))), number);
+        self.payload.update(&terms(&says, |_, says| Some(columns(says, 0))), number);
+        self.force.update(&terms(&says, |_, says| Some(columns(says, PAYLOAD))), number);
+        self.delay.update(&terms(&says, |_, says| Some(columns(says, PAYLOAD + FORCE))), number);
         for (j, own) in self.own.iter_mut().enumerate() {
             let zero = PAYLOAD + FORCE + DELAY + j;
-            own.zero.update(&terms(&says, ZERO, |_, says| Some(columns(says, zero))), number);
+            own.zero.update(&terms(&says, |_, says| Some(columns(says, zero))), number);
             let here = |k: usize, x: f64| (k == j).then_some([x]);
-            own.constant.update(&terms(&says, CONSTANT, |k, says| here(k, says.constant)), number);
-            own.friction.update(&terms(&says, FRICTION, |k, says| here(k, says.innovation.friction)), number);
+            own.constant.update(&terms(&says, |k, says| here(k, says.constant)), number);
+            own.friction.update(&terms(&says, |k, says| here(k, says.innovation.friction)), number);
         }
         !says.is_empty()
     }
 
     /// The bets: those on a body, a force and a delay, then three a joint.
     fn standings(&self) -> impl Iterator<Item = Standing<f64>> + '_ {
-        let all = 1.0 / KINDS as f64;
+        let all = 1.0 / KINDS;
         let each = all / self.own.len().max(1) as f64;
         let whole = [of(&self.payload, all), of(&self.force, all), of(&self.delay, all)];
         let own = self.own.iter();
@@ -104,17 +92,10 @@ impl Detector {
         )
     }
 
-    /// What each kind of bets gives to the average capital.
+    /// The average capital.
     #[must_use]
-    pub fn capitals(&self) -> [f64; KINDS] {
-        let mut capitals = [0.0; KINDS];
-        // The first three kinds have one bet each, the others one a joint, in turns.
-        for (place, standing) in self.standings().enumerate() {
-            let kind =
-                if place < CONSTANT { place } else { CONSTANT + (place - CONSTANT) % (KINDS - CONSTANT) };
-            capitals[kind] += standing.weight * standing.capital;
-        }
-        capitals
+    pub fn capital(&self) -> f64 {
+        self.standings().map(|s| s.weight * s.capital).sum()
     }
 
     /// The alarm, where the average capital is at least `level`.
@@ -136,7 +117,6 @@ impl Detector {
 #[derive(Debug)]
 struct Says {
     innovation: Innovation<f64>,
-    margins: [f64; KINDS],
     columns: Vec<f64>,
     constant: f64,
 }
@@ -159,7 +139,7 @@ impl Seen {
         let constant = self.constant.update(&colour, 1.0);
         let innovation = self.joint.update(shown.residual, shown.friction)?;
         let columns = columns.into_iter().collect::<Option<Vec<f64>>>()?;
-        Some(Says { innovation, margins: self.margins, columns, constant: constant? })
+        Some(Says { innovation, columns, constant: constant? })
     }
 }
 
@@ -168,16 +148,13 @@ fn columns<const P: usize>(says: &Says, from: usize) -> [f64; P] {
     std::array::from_fn(|k| says.columns.get(from + k).copied().unwrap_or(0.0))
 }
 
-/// What joints say to a bet of a kind on which they show.
+/// What joints say to a bet on which they show.
 fn terms<const P: usize>(
     says: &[(usize, Says)],
-    kind: usize,
     columns: impl Fn(usize, &Says) -> Option<[f64; P]>,
 ) -> Vec<Term<f64, P>> {
-    let term = |(j, says): &(usize, Says)| {
-        let allowed = says.innovation.allowed + says.margins[kind];
-        Some(Term { innovation: Innovation { allowed, ..says.innovation }, columns: columns(*j, says)? })
-    };
+    let term =
+        |(j, says): &(usize, Says)| Some(Term { innovation: says.innovation, columns: columns(*j, says)? });
     says.iter().filter_map(term).collect()
 }
 

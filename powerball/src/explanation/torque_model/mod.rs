@@ -25,7 +25,7 @@ use crate::identification::estimate::{JointFriction, ParameterEstimate, in_set_o
 use crate::logs::parallel;
 use crate::logs::regression::{Data, Recording, RigidArm, Signals};
 pub use colour::{Colour, JointColour};
-pub use detector::{Detector, KINDS};
+pub use detector::Detector;
 use dyngen::arm::ParameterKind;
 pub use file::FileError;
 pub use known::{ModelFile, Unchanged};

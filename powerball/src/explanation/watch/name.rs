@@ -152,7 +152,7 @@ impl<'a> Stretch<'a> {
         let (mut excess, mut square) = (0.0, 0.0);
         for (j, residual) in residual.iter().enumerate() {
             let Some(colour) = self.colour.joints.get(j).and_then(Option::as_ref) else { continue };
-            let usual = 1.0 + BLOCK as f64 * colour.margin().powi(2);
+            let usual = 1.0 + BLOCK as f64 * colour.margin.powi(2);
             let white = self.sharp(j, self.whitened(j, residual), edges);
             for run in self.data.joints[j].runs() {
                 let first = run.start + self.times[j][run.clone()].partition_point(|t| *t < since);

@@ -188,8 +188,7 @@ impl<'a> Stream<'a> {
             self.learns[j] = false;
             let mut colour = found.as_ref().and_then(|colour| colour.joints[j].clone());
             if let (Some(colour), Some(before)) = (&mut colour, &self.colours[j]) {
-                let wider = |k: usize| AGAIN * colour.margins[k].max(before.margins[k]);
-                colour.margins = std::array::from_fn(wider);
+                colour.margin = AGAIN * colour.margin.max(before.margin);
             }
             self.colours[j] = colour;
             if self.colours[j].is_none() {
