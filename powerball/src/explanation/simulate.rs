@@ -1,6 +1,6 @@
 //! An arm that moves as a torque model says, under a control law that knows the same model or another one.
 //!
-//! B(q)·q̈ + C·q̇ + g + friction + effects = τ, with a zero-order hold of τ over a cycle. Each of [`STEPS`] steps a cycle is
+//! B(q)·q̈ + C·q̇ + g + friction + effects = τ, with a zero-order hold of τ over a cycle. Each of ten steps a cycle is
 //! linearly implicit in Eq. 16: friction is s·q̇' against the new velocity q̇', with s = f(q̇')/q̇' found by iteration, so that
 //! a joint sticks without chatter. Effects are taken at the old velocity.
 

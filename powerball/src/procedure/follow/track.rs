@@ -102,7 +102,7 @@ pub struct Followed {
     pub torque: BTreeMap<String, TorqueParts>,
     /// Bandwidth of the feedback, rad/s, and the largest pole of its sampled loop, where this program closes it.
     pub bandwidth: Option<f64>,
-    /// See [`largest_pole`].
+    /// See [`crate::controller::laws::largest_pole`].
     pub largest_pole: Option<f64>,
     /// Cycles of the path in each run.
     pub cycles: usize,
