@@ -25,7 +25,7 @@ def arm() -> pb.Arm:
 
 def model(arm: pb.Arm, spring: float = 0.0) -> dict:
     """2 kg at 0.5 m: all its inertia is at the frame at the end."""
-    values = arm.set_values({"m1": 2.0})
+    values = arm.set_values({"m1": 2.0, "mx1": 0.0, "my1": 0.0, "Izz1": 0.0})
     names = arm.sets["minimal"].names
     friction = {"joint": 1, "gamma1": 0.4, "gamma2": 50, "gamma3": 0.2, "gamma4": 20, "gamma5": 0.8}
     terms = [{"effect": "spring", "joint": 1, "law": "position", "coefficient": spring}] if spring else []

@@ -30,6 +30,8 @@ __all__ = [
     "inspect",
     "read_log",
     "rule",
+    "simulate",
+    "simulate_function",
     "summarize",
     "verify",
     "virtual_effects",
