@@ -11,7 +11,6 @@ use powerball::bus::transport::{Master, Memory};
 use powerball::commands::{demo, model_arm};
 use powerball::controller::laws::{ComputedTorque, ContactDetector};
 use powerball::identification::excite::{self, Settings};
-use powerball::identification::motion::Motion;
 use powerball::logs::Progress;
 use powerball::procedure::Envelope;
 use powerball::procedure::follow::{Law, Path, Run, Track};
@@ -22,6 +21,9 @@ use std::path::PathBuf;
 
 /// A push that is not seen within this is missed, s.
 const PATIENCE: f64 = 0.5;
+
+/// Share of the velocities that the limits allow.
+const PACE: f64 = 0.8;
 
 /// One run: what came of it, and the plant's time at its end, s.
 struct Ran {
@@ -40,7 +42,7 @@ struct Study {
 
 /// What came of pushes.
 #[derive(Debug, Default)]
-struct Result {
+struct Outcome {
     false_alarms: usize,
     /// Seconds without contact.
     calm: f64,
@@ -52,9 +54,9 @@ struct Result {
     right: usize,
 }
 
-fn study(draws: usize, calm_paths: u64, seed: u64) -> Result {
+fn study(draws: usize, calm_paths: u64, seed: u64) -> Outcome {
     let study = Study::new(seed);
-    let (mut result, mut largest) = (Result::default(), SVector::<f64, 6>::zeros());
+    let (mut result, mut largest) = (Outcome::default(), SVector::<f64, 6>::zeros());
     for k in 0..calm_paths {
         let path = study.path(1000 + k);
         let ran = study.follow(&path, None, None);
@@ -159,15 +161,8 @@ impl Study {
                 ..Settings::default()
             };
             let found = excite::optimise(model, SetKind::Minimal, &settings).unwrap();
-            let Some(fast) =
-                found.paths.first().map(|p| p.sample(1.25 * self.demo.session.plant.sensors().rate))
-            else {
-                continue;
-            };
-            let mut motion = Motion::new(6, 1.25 * fast.period);
-            for [q, dq, ddq] in fast.samples() {
-                motion.push((0..6).map(|j| [q[j], 0.8 * dq[j], 0.64 * ddq[j]]));
-            }
+            let rate = self.demo.session.plant.sensors().rate;
+            let motion = found.paths[0].sample(rate / PACE).slower(PACE);
             let path = Path::clear(&motion, &Envelope::new(|_| None), &LWA4P).unwrap();
             if model_arm::parts(&self.model, &path, self.demo.session.undeclared.age).is_ok() {
                 return path;

@@ -51,6 +51,16 @@ impl Motion {
         }
     }
 
+    /// The same samples at `pace` of the velocities, 0 to 1: they take so much longer.
+    #[must_use]
+    pub fn slower(&self, pace: f64) -> Motion {
+        let mut slow = self.clone();
+        slow.period /= pace;
+        slow.dq.iter_mut().for_each(|dq| *dq *= pace);
+        slow.ddq.iter_mut().for_each(|ddq| *ddq *= pace * pace);
+        slow
+    }
+
     /// The samples: `[q, dq, ddq]`, each of n values.
     pub fn samples(&self) -> impl Iterator<Item = [&[f64]; 3]> {
         let n = self.dof.max(1);

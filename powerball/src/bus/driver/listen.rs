@@ -1,5 +1,4 @@
-//! A second pair of ears: joints' positions and torques from the process data of an arm that another master drives. Nothing
-//! is sent.
+//! Joints' positions and torques from the process data of an arm that another master drives. Nothing is sent.
 
 use super::profile::Profile;
 use crate::bus::canopen::cob::Cob;
@@ -125,7 +124,7 @@ mod tests {
         let mut listener = Listener::new(LWA4P);
         let cycle = |listener: &mut Listener<6>, nodes: std::ops::RangeInclusive<u8>| {
             for node in nodes {
-                // 90° and −1 ‰ … of the rated current.
+                // 90°, and the rated current backwards.
                 assert_eq!(listener.hear(&tpdo(node, -1000, 90_000)), Ok(None));
             }
             listener.hear(&sync()).unwrap()
@@ -140,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn another_mapping_is_told_by_its_length_and_other_frames_are_nothing() {
+    fn another_mapping_is_an_error_and_other_frames_are_nothing() {
         let mut listener = Listener::new(LWA4P);
         let short = Frame::from_raw(0x183, &[1, 2, 3, 4]).unwrap();
         let other = listener.hear(&short).unwrap_err();

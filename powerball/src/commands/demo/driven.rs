@@ -10,7 +10,6 @@ use crate::explanation::torque_model::{Additions, TorqueModel};
 use crate::identification::Identified;
 use crate::identification::estimate::{JointFriction, ParameterEstimate};
 use crate::identification::excite::{self, Settings};
-use crate::identification::motion::Motion;
 use crate::procedure::Envelope;
 use crate::procedure::follow::{Followed, Law, Parts, Path as DrivenPath, Run, Track};
 use crate::virtual_arm::{VirtualArm, lwa4p};
@@ -136,7 +135,7 @@ fn path(
         let found =
             excite::optimise(&model, SetKind::Minimal, &settings).map_err(SessionError::Excitation)?;
         let rate = session.plant.sensors().rate;
-        let Some(motion) = found.paths.first().map(|path| slower(&path.sample(rate / PACE))) else {
+        let Some(motion) = found.paths.first().map(|path| path.sample(rate / PACE).slower(PACE)) else {
             continue;
         };
         let path =
@@ -149,13 +148,4 @@ fn path(
         }
     }
     Err(DemoError::Drive(format!("of {PATHS} paths none is within the joints' torques: {why}")))
-}
-
-/// The same samples in more time.
-fn slower(motion: &Motion) -> Motion {
-    let mut slow = Motion::new(6, motion.period / PACE);
-    for [q, dq, ddq] in motion.samples() {
-        slow.push((0..6).map(|j| [q[j], PACE * dq[j], PACE * PACE * ddq[j]]));
-    }
-    slow
 }
