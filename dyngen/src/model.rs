@@ -10,7 +10,7 @@ use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::elimination::Unproven;
 use crate::exact::rational::{self, Rational};
 use crate::exact::symbols::AngleSymbols;
-use crate::lagrangian::elements::{angle_symbols, has_joint_symbols};
+use crate::lagrangian::elements::{angle_symbols, joint_symbols};
 use crate::optimize::{PASSES, Pass};
 use crate::parameters::span::Sum;
 use crate::parameters::{Combination, ParameterSet, SetKind};
@@ -244,7 +244,7 @@ impl Model {
                 };
                 // With symbols eliminations are slow, and two rules must do.
                 let orders =
-                    Order::all().step_by(if has_joint_symbols(&self.arm) { Order::RULES } else { 1 });
+                    Order::all().step_by(if joint_symbols(&self.arm) > 0 { Order::RULES } else { 1 });
                 orders.map(of).collect()
             })
         };

@@ -186,3 +186,20 @@ fn frames_that_cannot_be_are_refused_with_their_line() {
         assert!(message.contains(words) && message.contains("arm.toml:1"), "{frame}: {message}");
     }
 }
+
+/// A model of a robot has a frame for each sensor, at angles of its own: none of them is of the dynamics.
+#[test]
+fn frames_at_many_angles_leave_the_dynamics_as_they_are() {
+    let frame = |k: usize| {
+        let rpy = [1, 2, 3].map(|i| f64::from(i) * 0.01 + 0.1 * k as f64);
+        format!("[[frame]]\nname = \"sensor_{k}\"\nlink = 3\nxyz = [0, 0, 0.1]\nrpy = {rpy:?}\n")
+    };
+    let arm = ARM.replace("alpha = 0.7", "alpha = 0");
+    let with = model(&(arm.clone() + &(0..40).map(frame).collect::<String>()));
+    let without = model(&arm);
+    let torque =
+        |model: &Model| model.function(Function::InverseDynamics, SetKind::Minimal).unwrap().operations();
+    assert_eq!(torque(&with), torque(&without));
+    let at = with.at_frame("sensor_39").unwrap();
+    Evaluator::new(&at, Function::Jacobian, SetKind::Minimal).unwrap();
+}

@@ -17,7 +17,7 @@ use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{Dependence, Unproven};
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::Expr;
-use crate::lagrangian::elements::has_joint_symbols;
+use crate::lagrangian::elements::joint_symbols;
 use crate::optimize::PASSES;
 
 /// A rule that was tried, with what the regressor costs for it.
@@ -47,7 +47,7 @@ pub fn cheapest(
     let [first, others @ ..] = Preference::ALL;
     let start = eliminate(first)?;
     let all = AllColumns::build(&Subject { arm, angles: &Angles::new(arm), symbols, field, minimal: &start });
-    let search = !has_joint_symbols(arm);
+    let search = joint_symbols(arm) == 0;
     let (mut best, candidate) = all.improved(field, start, first, search);
     let mut candidates = vec![candidate];
     let others = if search { &others[..] } else { &[] };

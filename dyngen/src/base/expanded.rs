@@ -8,7 +8,7 @@ use crate::exact::elimination::SparseRow;
 use crate::exact::polynomial::{Monomial, Numerator, Polynomial, PolynomialRing, Square};
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
-use crate::lagrangian::elements::{ArmElements, Source};
+use crate::lagrangian::elements::{ArmElements, Source, joint_symbols};
 use crate::lagrangian::twice_lagrangian;
 use std::collections::BTreeMap;
 
@@ -118,7 +118,7 @@ impl LagrangianPolynomials {
         variables.extend((0..couplings.len()).map(Variable::Coupling));
         variables.extend([0, 1, 2].map(Variable::Gravity));
         squares.resize(variables.len(), Square::Free);
-        for index in 0..symbols.angles.len() {
+        for index in 0..joint_symbols(arm) {
             squares.push(Square::OneMinusSquare(squares.len() + 1));
             squares.push(Square::Free);
             variables.extend([Variable::Symbol(index, true), Variable::Symbol(index, false)]);
@@ -291,7 +291,7 @@ fn the_rows_span_those_of_the_expanded_lagrangian() {
     for text in &texts {
         let arm = Arm::parse(text, "arm.toml").unwrap();
         let symbols = angle_symbols(&arm);
-        let field = ConstantField::new(&symbols, &mut Draws::new(5));
+        let field = ConstantField::new(&symbols, joint_symbols(&arm), &mut Draws::new(5));
         let expanded = LagrangianPolynomials::derive(&arm, &symbols);
         let order: Vec<usize> = Preference::ALL[0].order(&arm).iter().map(|p| p.index()).collect();
         for sizes in [Sizes::Numbers, Sizes::Variables] {

@@ -11,7 +11,7 @@ use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{self, Dependence, SparseRow, Unproven};
 use crate::exact::prime::Draws;
 use crate::exact::symbols::AngleSymbols;
-use crate::lagrangian::elements::has_joint_symbols;
+use crate::lagrangian::elements::joint_symbols;
 use crate::parameters::{Combination, ParameterSet, SetKind, SetParameter, minimal_coordinates};
 
 pub use super::plain::combination_text;
@@ -65,7 +65,7 @@ impl Sets {
     /// # Errors
     /// [`Unproven`] where a number of the arm is a multiple of the proof's prime.
     pub fn derive(arm: &Arm, symbols: &AngleSymbols) -> Result<Sets, Unproven> {
-        let field = ConstantField::new(symbols, &mut Draws::new(SEED));
+        let field = ConstantField::new(symbols, joint_symbols(arm), &mut Draws::new(SEED));
         let columns = arm.links() * 11;
         let eliminate_of = |arm: &Arm, rows: &[SparseRow], preference: Preference| {
             let order: Vec<usize> = preference.order(arm).iter().map(|p| p.index()).collect();
@@ -93,7 +93,7 @@ impl Sets {
             let (rank, relations) = relations(&field, &minimal, &set.parameters)?;
             (set.rank, set.relations) = (rank, relations);
         }
-        let on_joints = match arm.convention == Convention::Standard && has_joint_symbols(arm) {
+        let on_joints = match arm.convention == Convention::Standard && joint_symbols(arm) > 0 {
             true => {
                 let chain = arm.on_joints();
                 let rows = coefficients::all_rows(&chain, symbols, &field, Sizes::Numbers)?;
@@ -109,7 +109,7 @@ impl Sets {
 
     /// The set `full` alone, and nothing known of how columns depend: enough for what takes no parameters.
     pub(crate) fn underived(arm: &Arm, symbols: &AngleSymbols) -> Sets {
-        let field = ConstantField::new(symbols, &mut Draws::new(SEED));
+        let field = ConstantField::new(symbols, joint_symbols(arm), &mut Draws::new(SEED));
         let minimal = Dependence { kept: Vec::new(), coordinates: vec![Vec::new(); arm.links() * 11] };
         let sets = vec![full_set(arm, &field)];
         Sets { field, sets, minimal, on_joints: None, rows: Vec::new(), candidates: Vec::new() }

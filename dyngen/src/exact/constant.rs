@@ -33,20 +33,25 @@ pub struct ConstantField {
     variables: Vec<(String, f64, bool)>,
     /// For each ring variable, the symbol whose sine (`true`) or cosine it is.
     origins: Vec<(usize, bool)>,
+    /// For each angle symbol, also those outside of the ring, its sine and cosine modulo the prime.
+    residues: Vec<(Fp, Fp)>,
     /// For each ring variable, its value modulo the prime.
     modular: Vec<Fp>,
 }
 
 impl ConstantField {
-    /// The field of an arm's angle symbols; `draws` gives general angles their values modulo the prime.
-    pub fn new(angles: &AngleSymbols, draws: &mut Draws) -> Self {
+    /// The field of the first `members` of an arm's angle symbols; `draws` gives general angles their values modulo
+    /// the prime. The others, those of frames that no torque depends on, have such a value only: an arm may have
+    /// dozens of them, and a ring has room for [`VARIABLES`](super::polynomial::VARIABLES).
+    pub fn new(angles: &AngleSymbols, members: usize, draws: &mut Draws) -> Self {
+        let residues: Vec<_> = (0..angles.angles.len()).map(|index| angles.modular(index, draws)).collect();
         let mut squares = Vec::new();
         let mut variables = Vec::new();
         let mut modular = Vec::new();
         let mut origins = Vec::new();
-        for (index, angle) in angles.angles.iter().enumerate() {
+        for (index, angle) in angles.angles[..members].iter().enumerate() {
             let (sin, cos) = angle.sin_cos();
-            let (sin_p, cos_p) = angles.modular(index, draws);
+            let (sin_p, cos_p) = residues[index];
             let root = |n: i64, d: i64| Square::Constant(rational::ratio(n, d));
             match angles.kind(index) {
                 SymbolKind::General => {
@@ -73,7 +78,7 @@ impl ConstantField {
         }
         let ring = PolynomialRing::new(squares);
         let mut at = 0;
-        let symbols = (0..angles.angles.len())
+        let symbols = (0..members)
             .map(|index| match angles.kind(index) {
                 SymbolKind::General => {
                     at += 2;
@@ -89,7 +94,7 @@ impl ConstantField {
                 }
             })
             .collect();
-        ConstantField { ring, symbols, variables, origins, modular }
+        ConstantField { ring, symbols, variables, origins, modular, residues }
     }
 
     /// The ring of numerators.
@@ -97,7 +102,7 @@ impl ConstantField {
         &self.ring
     }
 
-    /// Sine or cosine of a symbol.
+    /// Sine or cosine of a symbol of the field.
     pub fn symbol(&self, index: usize, sine: bool) -> &Numerator {
         let (sin, cos) = &self.symbols[index];
         if sine { sin } else { cos }
@@ -133,7 +138,8 @@ impl ConstantField {
 
     /// The sine or cosine of a symbol modulo the prime.
     pub fn modular_symbol(&self, index: usize, sine: bool) -> Fp {
-        self.modular_whole(self.symbol(index, sine)).unwrap_or(Fp::ZERO)
+        let (sin, cos) = self.residues[index];
+        if sine { sin } else { cos }
     }
 
     /// The nearest `f64`.
@@ -349,7 +355,7 @@ mod tests {
 
     fn field(angles: &[&str]) -> ConstantField {
         let symbols = AngleSymbols { angles: angles.iter().map(|a| Angle::parse(a).unwrap()).collect() };
-        ConstantField::new(&symbols, &mut Draws::new(7))
+        ConstantField::new(&symbols, symbols.angles.len(), &mut Draws::new(7))
     }
 
     #[test]

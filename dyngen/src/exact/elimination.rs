@@ -311,7 +311,7 @@ mod tests {
 
     #[test]
     fn preferred_columns_are_kept_and_the_rest_is_expressed_in_them() {
-        let field = ConstantField::new(&AngleSymbols::default(), &mut Draws::new(1));
+        let field = ConstantField::new(&AngleSymbols::default(), 0, &mut Draws::new(1));
         // column 2 = 2·column 0 − column 1; column 3 = 0
         let rows = matrix(&field, &[&[1, 0, 2, 0], &[0, 1, -1, 0], &[3, 5, 1, 0]]);
         let natural = dependence(&field, &rows, 4, &[0, 1, 2, 3]).unwrap();
@@ -328,7 +328,7 @@ mod tests {
 
     #[test]
     fn a_wrong_relation_is_noticed() {
-        let field = ConstantField::new(&AngleSymbols::default(), &mut Draws::new(1));
+        let field = ConstantField::new(&AngleSymbols::default(), 0, &mut Draws::new(1));
         let rows = matrix(&field, &[&[1, 2], &[2, 4]]);
         let mut found = dependence(&field, &rows, 2, &[0, 1]).unwrap();
         let all_hold = |d: &Dependence| rows.iter().all(|r| holds(&field, r, &relations(&field, d)));

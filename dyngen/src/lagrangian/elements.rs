@@ -5,17 +5,17 @@ use crate::exact::algebra::Algebra;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::{AngleSymbols, Trig};
 
-/// The arm's angles whose sine and cosine are no rationals: twists, the fixed angles of prismatic joints, and
-/// those of the tool and the base.
+/// The arm's angles whose sine and cosine are no rationals: twists and the fixed angles of prismatic joints
+/// ([`joint_symbols`] of them), then those of the tool, the base and the other frames.
 pub fn angle_symbols(arm: &Arm) -> AngleSymbols {
     let frames = arm.frames.iter().map(|frame| &frame.placement);
     let fixed = arm.tool.iter().chain(&arm.base).chain(frames).flat_map(|frame| &frame.rpy);
     AngleSymbols::collect(joint_angles(arm).chain(fixed))
 }
 
-/// Whether such angles are among the joints', so that they take part in the dynamics.
-pub fn has_joint_symbols(arm: &Arm) -> bool {
-    !AngleSymbols::collect(joint_angles(arm)).angles.is_empty()
+/// How many of them are the joints', so that they take part in the dynamics.
+pub fn joint_symbols(arm: &Arm) -> usize {
+    AngleSymbols::collect(joint_angles(arm)).angles.len()
 }
 
 fn joint_angles(arm: &Arm) -> impl Iterator<Item = &Angle> {

@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn sums_and_products_share_their_parts() {
-        let field = ConstantField::new(&AngleSymbols::default(), &mut Draws::new(1));
+        let field = ConstantField::new(&AngleSymbols::default(), 0, &mut Draws::new(1));
         let b = Builder::new();
         let [x, y, z, w] = [0, 1, 2, 3].map(|i| b.input(Input::Velocity(i)));
         let [p, r] = [0, 1].map(|i| b.input(Input::Parameter(i)));

@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn different_forms_of_one_function_become_one_node() {
-        let field = ConstantField::new(&AngleSymbols::default(), &mut Draws::new(1));
+        let field = ConstantField::new(&AngleSymbols::default(), 0, &mut Draws::new(1));
         let b = Builder::new();
         let sum = JointSum::joint(0);
         let (s, c) = (b.input(Input::Sin(sum)), b.input(Input::Cos(sum)));
