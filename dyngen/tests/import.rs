@@ -100,7 +100,7 @@ fn the_torque_of_rounded_numbers_is_said() {
     let note = meant.notes.iter().find(|n| n.contains("holds the arm still by at most")).unwrap();
     let said = note.split("still by at most ").nth(1).unwrap().split(' ').next().unwrap();
     let said: f64 = said.parse().unwrap();
-    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(4);
+    let mut random = chacha20::ChaCha8Rng::seed_from_u64(4);
     let q: Vec<f64> = (0..200 * meant.arm.dof()).map(|_| random.random_range(-3.0..3.0)).collect();
     let [a, b] = [&meant, &exact].map(|imported| {
         let model = Model::derive(imported.arm.clone()).unwrap();
@@ -159,7 +159,7 @@ fn what_is_no_serial_arm_is_refused_by_name() {
         refusal(&ODD.replacen(from, to, 1), None)
     };
     let cases = [
-        (refusal(FIXED, None), vec!["tree", "'left', 'right'", "--tip", "hand"]),
+        (refusal(FIXED, None), vec!["tree", "'left', 'right'", "choose the arm's tip", "hand"]),
         (refusal(FIXED, Some("paw")), vec!["no link 'paw'"]),
         (refusal(FIXED, Some("right_finger")), vec!["'right'", "mimics joint 'left'"]),
         (refusal(FIXED, Some("table")), vec!["no joint moves", "'world'", "'table'"]),

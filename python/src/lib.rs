@@ -40,4 +40,9 @@ mod _core {
     use super::source::{description, export_imported, generate, generate_model};
     #[pymodule_export]
     use super::summary::{Summary, summarize};
+
+    /// The package's version, for `powerball.__version__`.
+    #[pymodule_export]
+    #[allow(non_upper_case_globals)]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
 }

@@ -22,6 +22,12 @@ enum Message<T> {
     Done(T),
 }
 
+/// What is being done, for who listens to Python's logger "powerball".
+fn log(py: Python<'_>, what: &str) -> PyResult<()> {
+    let logger = py.import("logging")?.call_method1("getLogger", ("powerball",))?;
+    logger.call_method1("info", (what,)).map(drop)
+}
+
 /// Runs a computation on a thread of its own while this one calls `listener` with what is being done and looks
 /// for Ctrl-C. Where either raises, the exception is raised at once, and the computation ends when it next says
 /// what it does.
@@ -51,7 +57,7 @@ pub(crate) fn run<T: Send + 'static>(
     loop {
         let heard = match py.detach(next) {
             Ok(Message::Done(done)) => return Ok(done),
-            Ok(Message::Said(what)) => listener.map_or(Ok(()), |l| l.call1((what,)).map(|_| ())),
+            Ok(Message::Said(what)) => log(py, &what).and_then(|()| listener.map_or(Ok(()), |l| l.call1((what,)).map(drop))),
             Err(RecvTimeoutError::Timeout) => Ok(()),
             // It ended without a result.
             Err(RecvTimeoutError::Disconnected) => match thread.join() {

@@ -23,6 +23,7 @@ def test_an_arm_file():
     assert arm.values == {} and np.array_equal(arm.base, np.eye(4))
     np.testing.assert_allclose(arm.gravity_vector, [0, 0, -9.81])
     assert "6 joints" in repr(arm)
+    assert arm._repr_html_().count("<tr>") == 7 and "revolute" in arm._repr_html_()
     described = arm.describe()
     assert described == json.loads(command("dyngen", "describe", LWA4P, "--json").stdout)
     for kind, known in arm.sets.items():

@@ -54,6 +54,12 @@ def test_progress_with_tqdm_and_without(capsys):
     assert "searching" in capsys.readouterr().err
 
 
+def test_what_is_being_done_is_logged(caplog):
+    with caplog.at_level("INFO", logger="powerball"):
+        pb.excite(pb.Arm.from_toml(LWA4P), evaluations=100)
+    assert any("searching" in record.message for record in caplog.records)
+
+
 def test_batches_let_other_threads_work():
     arm = pb.Arm.from_urdf(PUMA)
     q = np.random.default_rng(0).uniform(-1, 1, (400_000, 6))

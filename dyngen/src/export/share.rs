@@ -109,7 +109,7 @@ fn same_arm(arm: &Arm, chain: &Chain) -> Result<(), String> {
     let named = |i: usize| arm.joints[i].name.as_deref().is_none_or(|name| name == names[i]);
     if names.len() != arm.links() || !(0..names.len()).all(named) {
         return Err(format!(
-            "its joints are {}, those of the arm {}: give --base, --tip and --lock as they were given to \
+            "its joints are {}, those of the arm {}: give base, tip and lock as they were given to \
              the import",
             names.join(", "),
             all_names(arm).join(", ")
@@ -121,7 +121,7 @@ fn same_arm(arm: &Arm, chain: &Chain) -> Result<(), String> {
         if distance > APART || angle > APART {
             return Err(format!(
                 "joint '{}': its axis lies {:.3} mm and {:.3} mrad from that of the arm file, which is \
-                 another arm or was imported with another --base",
+                 another arm or was imported with another base",
                 joint.name,
                 1e3 * distance,
                 1e3 * angle

@@ -148,8 +148,8 @@ impl<'r> Tree<'r> {
                     ends.extend(leaves.map(|l| self.robot.links[l].name.as_str()));
                     ends.dedup();
                     return Err(format!(
-                        "the robot is a tree: the joints {} all move on link '{}'; choose the end of the arm \
-                            with --tip, such as {}",
+                        "the robot is a tree: the joints {} all move on link '{}'; choose the arm's \
+                            tip, such as {}",
                         joints.join(", "),
                         self.robot.links[body].name,
                         ends.join(", ")

@@ -8,6 +8,7 @@ model = pb.identify(arm, ["a.csv", "b.mcap"], ["c.csv"])  # files, frames, dicts
 why = pb.explain(arm, ["a.csv", "b.mcap"], ["c.csv"])     # what the model lacks, by name
 """
 
+from ._core import __version__
 from ._errors import Error, InputError, RefusedError
 from ._logs import Log, Mounted
 from ._result import Spread
@@ -63,6 +64,7 @@ __all__ = [
     "Truth",
     "Verdict",
     "Verified",
+    "__version__",
     "compare",
     "excite",
     "explain",

@@ -9,6 +9,8 @@ _Array = NDArray[np.float64]
 _Limit = Optional[float]
 _Limits = Tuple[Optional[List[float]], _Limit, _Limit, _Limit, _Limit]
 
+__version__: str
+
 __all__ = [
     "Arm",
     "ComparedSide",
@@ -18,6 +20,7 @@ __all__ = [
     "Summary",
     "Trajectory",
     "Written",
+    "__version__",
     "compare",
     "description",
     "excite",

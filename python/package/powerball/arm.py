@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 from dataclasses import dataclass
@@ -306,10 +307,37 @@ class Arm(Functions):
     def __repr__(self) -> str:
         return f"<Arm {self.name}: {self.dof} joints, {len(self.parameters)} parameters>"
 
+    def _repr_html_(self) -> str:
+        """A table of the joints, for notebooks: name, kind and limits."""
+        limits = self.limits
+        head = ("joint", "kind", "position", "velocity", "torque")
+
+        def row(j: int) -> Tuple[str, ...]:
+            linear = self.joint_kinds[j] == "prismatic"
+            low, high = limits.position[j]
+            return (
+                self.joint_names[j],
+                self.joint_kinds[j],
+                f"{_shown(low)} to {_shown(high)} {'m' if linear else 'rad'}",
+                f"{_shown(limits.velocity[j])} {'m/s' if linear else 'rad/s'}",
+                f"{_shown(limits.torque[j])} {'N' if linear else 'N·m'}",
+            )
+
+        def line(cells: Tuple[str, ...], tag: str) -> str:
+            return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+
+        rows = "".join(line(row(j), "td") for j in range(self.dof))
+        title = f"{self.name}: {self.dof} joints, {len(self.parameters)} parameters"
+        return f"<table><caption>{html.escape(title)}</caption>{line(head, 'th')}{rows}</table>"
+
 
 def _made(function: str, arguments: Tuple[Any, ...], frame: Optional[str] = None) -> Arm:
     core = getattr(_core.Arm, function)(*arguments)
     return Arm(core if frame is None else core.at_frame(frame), (function, arguments), frame)
+
+
+def _shown(value: float) -> str:
+    return "–" if np.isnan(value) else f"{value:.4g}"
 
 
 _TAKES_VALUES = {name for name, arguments, _, _ in _core.functions() if "parameters" in arguments}
