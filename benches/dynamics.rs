@@ -7,12 +7,12 @@
 
 mod support;
 
+use chacha20::ChaCha8Rng;
 use dyngen::{Model, SetKind, Values};
 use nalgebra::{SMatrix, SVector};
 use powerball_workspace::arm as arm_file;
 use powerball_workspace::generated::lwa4p_rotorless_minimal as arm;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::cell::RefCell;
 use std::fmt::Write;
 use std::hint::black_box;

@@ -5,13 +5,13 @@
 
 mod support;
 
+use chacha20::ChaCha8Rng;
 use dyngen::{Evaluator, Function, Model, Samples, SetKind};
 use nalgebra::SVector;
 use powerball_workspace::arm;
 use powerball_workspace::generated::lwa4p_minimal as lwa4p;
 use powerball_workspace::generated::panda_minimal as panda;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::hint::black_box;
 
 const SAMPLES: usize = 4096;

@@ -8,10 +8,10 @@
 
 mod support;
 
+use chacha20::ChaCha8Rng;
 use dyngen::{Arm, Function, Model, SetKind};
 use nalgebra::SVector;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::fmt::Write;
 use std::hint::black_box;
 use std::path::Path;

@@ -9,13 +9,13 @@
 
 mod support;
 
+use chacha20::ChaCha8Rng;
 use dyngen::exact::rational::to_f64;
 use powerball::controller::friction::{TABLE_2, TanhFriction};
 use powerball::identification::estimate::{States, Stream};
 use powerball::logs::regression::RigidArm;
 use powerball_workspace::arm;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::fmt::Write as _;
 use std::hint::black_box;
 use std::io::Write;

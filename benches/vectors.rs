@@ -7,10 +7,10 @@
 
 mod support;
 
+use chacha20::ChaCha8Rng;
 use nalgebra::SVector;
 use powerball_workspace::generated::lwa4p_rotorless_minimal as arm;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::fmt::Write;
 use std::hint::black_box;
 

@@ -32,7 +32,7 @@ fn compiled_functions_are_the_evaluator_s() {
     let of = |k: usize| [2.0, 0.02, -0.03, 0.04, 0.5, 0.0, 0.0, 0.6, 0.0, 0.7, 0.0][k];
     let all: Vec<f64> = (0..11 * N).map(|i| of(i % 11)).collect();
     let values = model.set_values(set, &all);
-    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(61);
+    let mut random = chacha20::ChaCha8Rng::seed_from_u64(61);
     let states: [State; LANES] = std::array::from_fn(|_| State::draw(&mut random, N, 1.2));
     let parameters = SVector::<f64, { lwa4p::PARAMETERS }>::from_column_slice(&values);
     let of = |part: fn(&State) -> &Vec<f64>| lanes::<N>(part, &states);

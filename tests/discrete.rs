@@ -22,7 +22,7 @@ fn values() -> SVector<f64, { lwa4p::PARAMETERS }> {
 }
 
 fn draw(seed: u64) -> (State<f64>, Torque) {
-    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let mut random = chacha20::ChaCha8Rng::seed_from_u64(seed);
     let mut number = |_: usize, _: usize| random.random_range(-1.0..1.0);
     (State::from_fn(&mut number), Torque::from_fn(&mut number) * 5.0)
 }

@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use chacha20::ChaCha8Rng;
 use dyngen::arm::{Arm, ParameterKind};
 use dyngen::{Evaluator, Function, Model, Samples, SetKind};
 use powerball::identification::chain::Chain;
@@ -10,7 +11,6 @@ use powerball::virtual_arm::{Dynamics, bodies};
 use powerball_workspace::generated;
 use powerball_workspace::{arm, paper_arm_with_ratios};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::sync::OnceLock;
 use support::{State, evaluate, proven};
 

@@ -2,11 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use chacha20::ChaCha8Rng;
 use nalgebra::{SMatrix, SVector, SimdValue};
 use powerball::logs::batch::{self, Work};
 use powerball_workspace::generated::{panda_minimal, stanford_minimal};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use simba::simd::AutoF64x4;
 
 fn random<const N: usize>(rng: &mut ChaCha8Rng) -> SVector<f64, N> {

@@ -4,12 +4,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use chacha20::ChaCha8Rng;
 use dyngen::Arm;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 use powerball::identification::chain::Chain;
 use powerball::virtual_arm::{Body, Dynamics};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 /// Every kind of joint in both conventions, with and without rotors.
 const ARMS: [&str; 4] = [

@@ -1,10 +1,10 @@
 //! Generated code over the dual numbers of the crate num-dual.
 
+use chacha20::ChaCha8Rng;
 use nalgebra::SVector;
 use num_dual::Dual64;
 use powerball_workspace::generated::stanford_minimal;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 fn random<const N: usize>(rng: &mut ChaCha8Rng) -> SVector<f64, N> {
     SVector::from_fn(|_, _| rng.random_range(-1.5..1.5))

@@ -3,13 +3,13 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use chacha20::ChaCha8Rng;
 use dyngen::arm::Convention;
 use dyngen::exact::rational::to_f64;
 use dyngen::import::{self, Options};
 use dyngen::{Arm, Evaluator, Function, Model, SetKind};
 use nalgebra::{Matrix3, Matrix4, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use urdf_rs::{JointType, Robot};
 
 /// Two ways of adding the same numbers, with lengths written to 1e-12 m.

@@ -52,7 +52,7 @@ fn of_tool() -> Vec<Function> {
 /// What comes behind a frame's link does not move it: the functions are those of an arm that ends there.
 #[test]
 fn a_frame_moves_as_the_tool_of_an_arm_that_ends_at_its_link() {
-    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(71);
+    let mut random = chacha20::ChaCha8Rng::seed_from_u64(71);
     for text in [ARM.to_string(), modified(ARM)] {
         let whole = Model::kinematic(Arm::parse(&with_frames(&text), "arm.toml").unwrap());
         let state = State::draw(&mut random, whole.arm().dof(), 1.2);

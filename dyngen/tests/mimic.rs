@@ -3,11 +3,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use chacha20::ChaCha8Rng;
 use dyngen::dynamics::function::Size;
 use dyngen::exact::rational::to_f64;
 use dyngen::{Arm, Evaluator, Function, Model, SetKind};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use support::{State, evaluate, model, proven};
 
 mod support;

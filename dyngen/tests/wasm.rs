@@ -2,9 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use chacha20::ChaCha8Rng;
 use dyngen::{Arm, Config, Evaluator, Function, Model, SetKind};
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 use std::process::Command;
 use support::{State, evaluate};

@@ -77,7 +77,7 @@
 
 #[cfg(feature = "driver")]
 pub mod bus;
-#[cfg(feature = "cli")]
+#[cfg(feature = "demo")]
 pub mod commands;
 #[cfg(feature = "identify")]
 pub mod comparison;

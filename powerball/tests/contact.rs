@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use chacha20::ChaCha8Rng;
 use dyngen::{Arm, SetKind};
 use nalgebra::{SVector, Vector3};
 use powerball::bus::driver::Driver;
@@ -16,7 +17,6 @@ use powerball::procedure::Envelope;
 use powerball::procedure::follow::{Law, Path, Run, Track};
 use powerball::virtual_arm::{PlantEffect, VirtualArm, lwa4p};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::path::PathBuf;
 
 /// A push that is not seen within this is missed, s.

@@ -8,6 +8,7 @@
 
 mod generated;
 
+use chacha20::ChaCha8Rng;
 use dyngen::Arm;
 use powerball::controller::JointNumber;
 use powerball::controller::correction::Law;
@@ -21,7 +22,6 @@ use powerball::identification::{VerifyOptions, verify};
 use powerball::virtual_arm::{Dynamics, Plant, Sensors, SimulatedLog, lwa4p};
 use powerball::{ExplainOptions, Identified, IdentifyOptions, Log, explain, identify};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::Path;

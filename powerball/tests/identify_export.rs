@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use chacha20::ChaCha8Rng;
 use dyngen::import::{self, Options};
 use dyngen::{Arm, Model, SetKind, Values};
 use powerball::controller::friction::TanhFriction;
@@ -9,7 +10,6 @@ use powerball::identification::chain::Chain;
 use powerball::identification::excite::{Fourier, Harmonics};
 use powerball::virtual_arm::{Body, Dynamics, Plant, Sensors};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 use std::fs;
 use std::path::{Path, PathBuf};

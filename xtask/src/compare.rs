@@ -1,5 +1,6 @@
 //! How often `compare` calls equal arms different, and how often it sees what changed, on simulated pairs.
 
+use chacha20::ChaCha8Rng;
 use powerball::comparison::{Cause, CompareOptions, Side, compare};
 use powerball::controller::friction::{TABLE_2, TanhFriction};
 use powerball::identification::chain::Chain;
@@ -11,7 +12,6 @@ use powerball::logs::regression::{DataOptions, RigidArm};
 use powerball::logs::summary::Bands;
 use powerball::virtual_arm::{Body, Dynamics, Plant, lwa4p};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 /// How much is simulated.
 #[derive(clap::Args)]

@@ -1,5 +1,6 @@
 //! What the columns of logs are taken to be: as they are, and after one thing was made wrong with them.
 
+use chacha20::ChaCha8Rng;
 use dyngen::Arm;
 use dyngen::arm::Convention;
 use dyngen::exact::angle::Angle;
@@ -11,7 +12,6 @@ use powerball::logs::regression::RigidArm;
 use powerball::virtual_arm::lwa4p;
 use powerball::{IdentifyOptions, identify};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 

@@ -8,6 +8,7 @@ mod export;
 mod generate;
 mod import;
 mod inspect;
+mod shell;
 mod verify;
 
 use clap::{Parser, Subcommand, ValueEnum};
@@ -45,6 +46,10 @@ enum Command {
     Check(check::Args),
     /// Proves what is printed in a generated file equal to the Lagrangian of its arm.
     Verify(verify::Args),
+    /// Prints what completes this program's words in a shell.
+    Completions(shell::Completions),
+    /// Writes man pages of this program and its commands.
+    Man(shell::Man),
 }
 
 /// A parameter set on the command line.
@@ -100,6 +105,8 @@ pub(crate) fn main() -> ExitCode {
         Command::Eval(args) => eval::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Completions(args) => shell::completions(&args),
+        Command::Man(args) => shell::man(&args),
     };
     match result {
         Ok(code) => code,

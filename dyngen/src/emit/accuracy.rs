@@ -3,11 +3,11 @@
 #![allow(clippy::unwrap_used)]
 
 use super::trigonometry;
+use chacha20::ChaCha8Rng;
 use dashu_int::IBig;
 use nalgebra::SimdRealField;
 use num_traits::{Signed, ToPrimitive, Zero};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 fn sin_cos<T: SimdRealField + Copy, const N: usize>(angles: [T; N]) -> ([T; N], [T; N]) {
     trigonometry::sin_cos(&angles, |angles| *angles)

@@ -15,9 +15,9 @@ use crate::graph::{Expr, Input, JointSum, Node};
 use crate::model::Model;
 use crate::parameters::SetKind;
 use crate::values::Values;
+use chacha20::ChaCha8Rng;
 use nalgebra::{RealField, convert};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::time::Instant;
 use twice::Twice;
 

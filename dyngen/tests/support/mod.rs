@@ -5,9 +5,9 @@
 
 pub(crate) mod valued;
 
+use chacha20::ChaCha8Rng;
 use dyngen::{Arm, Evaluator, Model, Samples, SetKind};
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 
 pub(crate) fn model(text: &str) -> Model {
     Model::derive(Arm::parse(text, "arm.toml").unwrap_or_else(|e| panic!("{e}"))).unwrap()

@@ -53,7 +53,7 @@ impl Arm {
         let of = |k: usize| [2.0, 0.02, -0.03, 0.04, 0.5, 0.0, 0.0, 0.6, 0.0, 0.7, 1e-4][k];
         let all: Vec<f64> = (0..11 * model.arm().links()).map(|i| of(i % 11)).collect();
         let values = model.set_values(set, &all);
-        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut random = chacha20::ChaCha8Rng::seed_from_u64(seed);
         let state = State::draw(&mut random, model.arm().dof(), 1.0);
         Arm { model, kind, values, state }
     }

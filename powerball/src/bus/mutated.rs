@@ -9,8 +9,8 @@ use super::canopen::{Frame, Micros, NodeId, nmt};
 use super::driver::import::rust_source;
 use super::driver::lwa4p::LWA4P;
 use super::driver::{BusEvent, ControlMode, Driver, Phase, QueueFull, Transmit};
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 const TIMES: usize = 100_000;
 

@@ -5,10 +5,10 @@ use crate::controller::friction::TanhFriction;
 use crate::controller::laws::ContactDetector;
 use crate::explanation::torque_model::{JointColour, ModelFile, ModelOnArm, rows_a_second};
 use crate::procedure::follow::{OBSERVER, Parts, Path as DrivenPath};
+use chacha20::ChaCha8Rng;
 use dyngen::Arm;
 use nalgebra::SVector;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 
 /// External torque is noise up to so many standard deviations.

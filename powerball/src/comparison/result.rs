@@ -1,7 +1,6 @@
 //! What a comparison is told and what it gives.
 
 use serde::Serialize;
-use std::fmt;
 
 /// All settings of [`compare`](super::compare).
 #[derive(Clone, Debug)]
@@ -161,27 +160,18 @@ pub enum Cause {
 }
 
 /// Why two fits cannot be compared.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CompareError {
     /// A file cannot be read or is no fit.
+    #[error("{0}")]
     Unreadable(String),
     /// They are of different arms or parameter sets.
+    #[error("{0}")]
     Different(String),
     /// Nothing of them has standard errors.
+    #[error("{0}")]
     NoErrors(String),
     /// A setting out of its range.
+    #[error("{0}")]
     Setting(String),
 }
-
-impl fmt::Display for CompareError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            CompareError::Unreadable(why)
-            | CompareError::Different(why)
-            | CompareError::NoErrors(why)
-            | CompareError::Setting(why) => f.write_str(why),
-        }
-    }
-}
-
-impl std::error::Error for CompareError {}

@@ -10,8 +10,8 @@ use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::regression::{DataOptions, RigidArm};
 use crate::logs::summary::Bands;
 use crate::virtual_arm::{Body, Dynamics, Plant, lwa4p};
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::sync::LazyLock;
 
 /// A fit of three logs of 20 s.

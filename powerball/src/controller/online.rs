@@ -147,8 +147,8 @@ fn hypotenuse<T: RealField + Copy>(a: T, b: T) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use chacha20::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
 
     const P: usize = 6;
     type Rows = Vec<(SVector<f64, P>, f64)>;

@@ -5,7 +5,6 @@ use super::torque_model::{FileError, TorqueModel, Unchanged};
 use crate::controller::JointNumber;
 use crate::logs::Progress;
 use crate::logs::regression::{DataError, DataOptions};
-use std::fmt;
 
 /// What an explanation is told beside the arm and the logs. The default knows nothing and tells nobody.
 #[derive(Clone, Debug, Default)]
@@ -39,39 +38,21 @@ pub struct RuledOut {
 }
 
 /// Why logs cannot be explained.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, thiserror::Error)]
 pub enum ExplainError {
     /// The logs to fit hold too little.
-    Fit(DataError),
+    #[error("--log: {0}")]
+    Fit(#[source] DataError),
     /// The validation logs hold too little.
-    Validate(DataError),
+    #[error("--validate: {0}")]
+    Validate(#[source] DataError),
     /// The arm's dynamics cannot be derived, or those of the arm that was found.
-    Arm(dyngen::Error),
+    #[error("{0}")]
+    Arm(#[source] dyngen::Error),
     /// The known model, or what was found, changes the arm in a way that it cannot be changed.
-    Changes(Unchanged),
+    #[error("{0}")]
+    Changes(#[source] Unchanged),
     /// The known model is another arm's.
-    Known(FileError),
-}
-
-impl fmt::Display for ExplainError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            ExplainError::Fit(e) => write!(f, "--log: {e}"),
-            ExplainError::Validate(e) => write!(f, "--validate: {e}"),
-            ExplainError::Arm(e) => e.fmt(f),
-            ExplainError::Changes(e) => e.fmt(f),
-            ExplainError::Known(e) => e.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for ExplainError {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        match self {
-            ExplainError::Fit(e) | ExplainError::Validate(e) => Some(e),
-            ExplainError::Arm(e) => Some(e),
-            ExplainError::Changes(e) => Some(e),
-            ExplainError::Known(e) => Some(e),
-        }
-    }
+    #[error("{0}")]
+    Known(#[source] FileError),
 }

@@ -1,7 +1,6 @@
 //! Every threshold that decides what an explanation says, with its reason.
 
 use serde::{Deserialize, Serialize};
-use std::fmt;
 
 /// The thresholds of the rule that accepts, names or refuses effects.
 ///
@@ -222,16 +221,9 @@ impl Default for Rule {
 }
 
 /// Why thresholds are no rule.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the rule: {0}")]
 pub struct RuleError(String);
-
-impl fmt::Display for RuleError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the rule: {}", self.0)
-    }
-}
-
-impl std::error::Error for RuleError {}
 
 impl Rule {
     /// From JSON: an object with the fields that differ from the defaults.

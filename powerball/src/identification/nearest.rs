@@ -6,7 +6,6 @@ use dyngen::consistency;
 use dyngen::{Arm, Diagnostics, Error, Model, Values};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::fmt;
 
 /// Torques nearer than this count as the same, N·m.
 const SAME: f64 = 1e-3;
@@ -46,24 +45,15 @@ pub struct ValueChange {
 }
 
 /// Why no values were found.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum NearestError {
     /// The values are of no parameter set of the arm.
+    #[error("{0}")]
     Values(Diagnostics),
     /// The arm's model, or the search.
+    #[error("{0}")]
     Model(Error),
 }
-
-impl fmt::Display for NearestError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            NearestError::Values(e) => e.fmt(f),
-            NearestError::Model(e) => e.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for NearestError {}
 
 impl From<Error> for NearestError {
     fn from(e: Error) -> Self {

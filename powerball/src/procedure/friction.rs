@@ -10,7 +10,6 @@ use crate::identification::mounting::Mounting;
 use crate::logs::log::{LogError, read_log};
 use dyngen::Model;
 use serde_json::{Value, json};
-use std::fmt;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -39,37 +38,24 @@ pub struct JointFriction {
 }
 
 /// Why an experiment has no result.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum FrictionError {
     /// The arm file lacks something.
+    #[error("{0}")]
     Arm(String),
     /// The arm, or the file of its log.
+    #[error("{0}")]
     Record(RecordError),
     /// A log could not be opened for writing.
+    #[error("{}: cannot be written: {}", .0.display(), .1)]
     Write(PathBuf, std::io::Error),
     /// A log cannot be read.
+    #[error("{0}")]
     Log(LogError),
     /// A log holds too few plateaus.
+    #[error("{}: fewer than five velocities can be told from this log: delete it and record the joint again", .0.display())]
     TooLittle(PathBuf),
 }
-
-impl fmt::Display for FrictionError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            FrictionError::Arm(what) => f.write_str(what),
-            FrictionError::Record(e) => e.fmt(f),
-            FrictionError::Write(path, e) => write!(f, "{}: cannot be written: {e}", path.display()),
-            FrictionError::Log(e) => e.fmt(f),
-            FrictionError::TooLittle(path) => write!(
-                f,
-                "{}: fewer than five velocities can be told from this log: delete it and record the joint again",
-                path.display()
-            ),
-        }
-    }
-}
-
-impl std::error::Error for FrictionError {}
 
 impl From<RecordError> for FrictionError {
     fn from(e: RecordError) -> Self {

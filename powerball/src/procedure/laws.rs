@@ -258,7 +258,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     fn points(truth: impl Fn(f64) -> f64, noise: f64, seed: u64) -> Vec<Point> {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(seed);
         let slow = (0..11).map(|k| 0.01 + 0.19 * f64::from(k) / 10.0);
         let fast = (1..=7).map(|k| 0.2 + 0.35 * f64::from(k) / 7.0);
         slow.chain(fast)

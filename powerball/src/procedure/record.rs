@@ -350,32 +350,24 @@ pub fn record<B: Bus, const N: usize>(
 // Why an arm is not recorded.
 
 /// Why a recording ended early, or did not begin.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// The arm.
+    #[error("{0}")]
     Arm(ArmError),
     /// A set-point was rejected.
+    #[error("the motion cannot be followed: {0}")]
     Rejected(Rejection),
     /// The motion does not fit the arm or its rate.
+    #[error("{0}")]
     Motion(String),
     /// The arm must not go where it would have to: why.
+    #[error("{0}")]
     Barred(String),
     /// The log could not be written.
+    #[error("the log cannot be written: {0}")]
     Write(io::Error),
 }
-
-impl fmt::Display for RecordError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            RecordError::Arm(e) => e.fmt(f),
-            RecordError::Rejected(rejection) => write!(f, "the motion cannot be followed: {rejection}"),
-            RecordError::Motion(what) | RecordError::Barred(what) => f.write_str(what),
-            RecordError::Write(e) => write!(f, "the log cannot be written: {e}"),
-        }
-    }
-}
-
-impl std::error::Error for RecordError {}
 
 impl<E: Into<ArmError>> From<E> for RecordError {
     fn from(e: E) -> Self {

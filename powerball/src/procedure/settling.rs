@@ -164,7 +164,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     fn warming(count: usize, noise: f64, seed: u64) -> Vec<Cycle> {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(seed);
         (0..count)
             .map(|k| {
                 let time = 5.0 * (k as f64 + 0.5);

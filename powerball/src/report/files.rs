@@ -62,15 +62,21 @@ pub fn make_folder(folder: &Path) -> Result<(), String> {
 /// # Errors
 /// The file, and why it cannot be written.
 pub fn write_whole(target: &Path, bytes: &[u8]) -> Result<(), String> {
-    let name = target.file_name().unwrap_or_default().to_string_lossy();
-    let part = target.with_file_name(format!(".{name}.{}.part", std::process::id()));
-    let done = std::fs::File::create(&part).and_then(|mut file| {
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        std::fs::rename(&part, target)
+    let done = part(target).and_then(|mut part| {
+        part.write_all(bytes)?;
+        part.as_file().sync_all()?;
+        part.persist(target).map_err(|e| e.error)
     });
-    done.map_err(|e: io::Error| {
-        let _ = std::fs::remove_file(&part);
-        format!("{}: cannot be written: {e}", target.display())
-    })
+    done.map(drop).map_err(|e| format!("{}: cannot be written: {e}", target.display()))
+}
+
+/// A file next to the target, which becomes it or is gone.
+fn part(target: &Path) -> io::Result<tempfile::NamedTempFile> {
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let mut part = tempfile::Builder::new();
+    part.prefix(".").suffix(".part");
+    // As any new file: who may read it is the umask's to say.
+    #[cfg(unix)]
+    part.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    part.tempfile_in(folder.unwrap_or(Path::new(".")))
 }

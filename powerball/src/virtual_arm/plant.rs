@@ -9,9 +9,9 @@ use super::{VirtualArm, lwa4p};
 use crate::controller::friction::TanhFriction;
 use crate::identification::motion::Motion;
 use crate::logs::log::Log;
+use chacha20::ChaCha8Rng;
 use dyngen::Diagnostics;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
@@ -365,8 +365,8 @@ mod tests {
 #[cfg(test)]
 mod undeclared_tests {
     use super::*;
+    use chacha20::ChaCha8Rng;
     use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn every_effect_survives_its_file() {

@@ -504,7 +504,7 @@ mod tests {
         use rand::SeedableRng;
         let plain = lwa4p::plant().unwrap();
         for name in PlantEffect::NAMES {
-            let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+            let mut rng = chacha20::ChaCha8Rng::seed_from_u64(1);
             let effect = lwa4p::draw_effect(name, &plain, 20.0, 0.1..0.2, &mut rng).unwrap();
             let mut simulation = open(plain.clone().with(effect));
             let hold = simulation.plant().dynamics().gravity(&POSE);

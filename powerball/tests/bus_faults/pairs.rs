@@ -6,9 +6,9 @@
 use crate::faults::Fault;
 use crate::walks::Walk;
 use crate::world::CYCLE;
+use chacha20::ChaCha8Rng;
 use powerball::bus::driver::{ControlMode, Phase};
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
 /// Between two things that happen: less than a stop takes.
 const BETWEEN: u64 = 3 * CYCLE;

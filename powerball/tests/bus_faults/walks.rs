@@ -4,12 +4,12 @@
 
 use crate::faults::Fault;
 use crate::world::{CYCLE, VICTIM, World};
+use chacha20::ChaCha8Rng;
 use powerball::bus::canopen::{Cob, Micros, NodeId};
 use powerball::bus::cia402::{Command, Controlword};
 use powerball::bus::driver::lwa4p::LWA4P;
 use powerball::bus::driver::{Cause, ControlMode, Phase, TorqueGuard};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 const SEEDS: u64 = 16;
 const STEPS: usize = 40;
@@ -23,10 +23,19 @@ const WIRE: Micros = 2_500;
 static WALL: TorqueGuard<6> =
     TorqueGuard::new(&|q, _, _| [0.0, 0.0, if q[2] > 0.0 { 1e3 } else { 0.0 }, 0.0, 0.0, 0.0]);
 
+/// What the walk draws from; a copy draws the same.
+struct Draws(ChaCha8Rng);
+
+impl Clone for Draws {
+    fn clone(&self) -> Self {
+        Draws(ChaCha8Rng::deserialize_state(&self.0.serialize_state()))
+    }
+}
+
 #[derive(Clone)]
 pub(crate) struct Walk {
     pub(crate) world: World,
-    rng: ChaCha8Rng,
+    draws: Draws,
     control: ControlMode,
     /// What was done, for who reads a failure.
     pub(crate) done: Vec<String>,
@@ -61,7 +70,18 @@ impl Walk {
         let mut world = World::new(commutated, profile);
         world.pilot.enable = false;
         let (done, causes, enabled, running) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Walk { world, rng, control, done, causes, enabled, running, fault: None, guarded: false, wrong: None }
+        Walk {
+            world,
+            draws: Draws(rng),
+            control,
+            done,
+            causes,
+            enabled,
+            running,
+            fault: None,
+            guarded: false,
+            wrong: None,
+        }
     }
 
     /// Lets time pass, a turn at a time, and watches the driver's cause.
@@ -105,7 +125,7 @@ impl Walk {
 
     fn step(&mut self) {
         let now = self.world.now();
-        let act = self.rng.random_range(0..100u32);
+        let act = self.draws.0.random_range(0..100u32);
         match (act, self.world.driver.phase()) {
             (_, Phase::Idle) => {
                 if let Some(fault) = self.fault.take() {
@@ -122,7 +142,7 @@ impl Walk {
                 self.pass(800_000);
             }
             (0..60, Phase::Faulted) => {
-                if let Some(fault) = self.fault.take().filter(|_| self.rng.random_bool(0.8)) {
+                if let Some(fault) = self.fault.take().filter(|_| self.draws.0.random_bool(0.8)) {
                     fault.repair(&mut self.world);
                 }
                 self.done.push(format!("{now}: acknowledge"));
@@ -142,30 +162,30 @@ impl Walk {
                 }
             }
             (75..80, _) if self.fault.is_none() => {
-                self.world.pilot.bad = self.rng.random_range(1..6);
+                self.world.pilot.bad = self.draws.0.random_range(1..6);
                 self.world.pilot.bad_value =
-                    [f64::NAN, 9.0, -0.3, f64::INFINITY][self.rng.random_range(0..4)];
+                    [f64::NAN, 9.0, -0.3, f64::INFINITY][self.draws.0.random_range(0..4)];
                 self.done.push(format!("{now}: bad set-points {}", self.world.pilot.bad_value));
             }
             (80..83, _) => {
-                let time = self.rng.random_range(1_000..40_000);
+                let time = self.draws.0.random_range(1_000..40_000);
                 self.done.push(format!("{now}: the caller gives nothing for {time} µs"));
                 self.world.hold_pilot(time);
             }
             (83..86, _) => {
-                let time = self.rng.random_range(1_000..60_000);
+                let time = self.draws.0.random_range(1_000..60_000);
                 self.done.push(format!("{now}: nobody polls for {time} µs"));
                 self.world.run_without_driver(time);
             }
             _ if self.fault.is_none() => {
-                let (fault, name) = Fault::ALL[self.rng.random_range(0..Fault::ALL.len())];
+                let (fault, name) = Fault::ALL[self.draws.0.random_range(0..Fault::ALL.len())];
                 self.done.push(format!("{now}: {name}"));
                 fault.inject(&mut self.world);
                 self.fault = Some(fault);
             }
             _ => {}
         }
-        let time = self.rng.random_range(1_000..150_000);
+        let time = self.draws.0.random_range(1_000..150_000);
         self.pass(time);
     }
 

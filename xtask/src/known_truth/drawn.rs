@@ -1,11 +1,11 @@
 //! Effects that a draw puts into one of two measured logs, and pairs of logs in which nothing is.
 
 use super::Logs;
+use chacha20::ChaCha8Rng;
 use dyngen::arm::ParameterKind;
 use powerball::logs::log::Log;
 use powerball::logs::regression::{Recording, RigidArm};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 use std::path::Path;

@@ -2,11 +2,11 @@
 
 use super::alike::PAIRS;
 use super::law::Outside;
+use chacha20::ChaCha8Rng;
 use clap::ValueEnum;
 use powerball::virtual_arm::PlantEffect as Effect;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::ops::Range;
 
 /// The tables of a study.

@@ -1,9 +1,9 @@
 //! Torques that are no effect of the library, and other laws of friction: functions of the true motion.
 
+use chacha20::ChaCha8Rng;
 use powerball::identification::motion::Motion;
 use powerball::virtual_arm::Plant;
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{PI, TAU};
 
 /// What a joint feels along a motion, N·m for each sample and joint.

@@ -185,8 +185,8 @@ fn share(cases: &[Case]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use chacha20::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
 
     /// Cases drawn by a curve give its coefficients back, within their errors.
     #[test]

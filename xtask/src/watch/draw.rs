@@ -1,11 +1,11 @@
 //! Logs of the virtual arm in the middle of which something changes by a drawn amount.
 
+use chacha20::ChaCha8Rng;
 use powerball::controller::friction::TanhFriction;
 use powerball::identification::motion::Motion;
 use powerball::logs::log::Log;
 use powerball::virtual_arm::{Plant, PlantEffect};
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 /// Changes that are drawn.

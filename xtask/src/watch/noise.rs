@@ -1,13 +1,13 @@
 //! False alarms: noise of the model's colour along the rows of a log, again and again, with friction that wanders.
 
 use super::Arguments;
+use chacha20::ChaCha8Rng;
 use powerball::controller::change::ORDER;
 use powerball::explanation::torque_model::{Colour, Detector, Rows, Shown, TorqueModel, rows_a_second};
 use powerball::explanation::watch::WatchOptions;
 use powerball::logs::log::Log;
 use powerball::logs::regression::{DataOptions, Recording, RigidArm};
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 /// Prints how many there are.

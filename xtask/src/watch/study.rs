@@ -2,6 +2,7 @@
 
 use super::draw::{Changed, KINDS, changed};
 use super::{Arguments, events, explained, noise};
+use chacha20::ChaCha8Rng;
 use dyngen::{Model, SetKind};
 use powerball::controller::change::Whitener;
 use powerball::explanation::torque_model::{Rows, TorqueModel};
@@ -12,7 +13,6 @@ use powerball::logs::log::Log;
 use powerball::logs::regression::{DataOptions, Recording, RigidArm};
 use powerball::virtual_arm::lwa4p;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
 const RATE: f64 = 200.0;

@@ -3,15 +3,15 @@
 use super::{Bus, BusError, Event};
 use crate::bus::canopen::client::{Client, SdoError, Value};
 use crate::bus::canopen::{Cob, Frame, Micros, NodeId, Object};
-use std::fmt;
 
 /// For each answer of a node, µs.
 const TIMEOUT: Micros = 200_000;
 
 /// Why a transfer did not happen.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TransferError {
     /// The node refused, or did not answer.
+    #[error("node {node}, {object}: {error}")]
     Node {
         /// The node.
         node: NodeId,
@@ -21,19 +21,9 @@ pub enum TransferError {
         error: SdoError,
     },
     /// The bus itself.
+    #[error("{0}")]
     Bus(BusError),
 }
-
-impl fmt::Display for TransferError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            TransferError::Node { node, object, error } => write!(f, "node {node}, {object}: {error}"),
-            TransferError::Bus(e) => e.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for TransferError {}
 
 impl From<BusError> for TransferError {
     fn from(e: BusError) -> Self {

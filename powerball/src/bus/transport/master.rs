@@ -1,5 +1,6 @@
 //! A driver on a bus: the loop that neither of them has.
 
+use super::events::Observed;
 use super::{Bus, BusError, Event, Interrupt, blocking};
 use crate::bus::canopen::client::Value;
 use crate::bus::canopen::objects::CONSUMER_HEARTBEAT;
@@ -22,6 +23,7 @@ pub struct Master<B: Bus, const N: usize> {
     bus: B,
     cycle: u64,
     reported: bool,
+    observed: Observed<N>,
     interrupt: Interrupt,
 }
 
@@ -103,7 +105,8 @@ impl<B: Bus> Transmit for Out<'_, B> {
 impl<B: Bus, const N: usize> Master<B, N> {
     /// A driver and the bus of its arm.
     pub fn new(driver: Driver<N>, bus: B) -> Self {
-        Master { driver, bus, cycle: 0, reported: true, interrupt: Interrupt::default() }
+        let observed = Observed::of(&driver);
+        Master { driver, bus, cycle: 0, reported: true, observed, interrupt: Interrupt::default() }
     }
 
     /// The same, stopped by signals: the stop leaves within 10 ms of one.
@@ -159,6 +162,7 @@ impl<B: Bus, const N: usize> Master<B, N> {
             Some(wrong) => return Err(wrong),
             None => {}
         }
+        self.observed.compare(&self.driver);
         let cycle = self.driver.counters().cycles;
         if cycle != self.cycle {
             (self.cycle, self.reported) = (cycle, false);

@@ -4,6 +4,7 @@
 //! the bus, so that a bus in memory can run faster than real time.
 
 pub mod blocking;
+mod events;
 mod interrupt;
 mod master;
 mod memory;
@@ -49,27 +50,18 @@ pub enum Event {
 }
 
 /// Why a bus does not do what it was asked for.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BusError {
     /// Too many frames wait to be sent: this one was not taken.
+    #[error("the bus takes no more frames: its transmit queue is full")]
     Full,
     /// The controller is off the bus.
+    #[error("the controller is off the bus")]
     Off,
     /// What the system says, with what was tried.
+    #[error("{0}")]
     Io(String),
 }
-
-impl fmt::Display for BusError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            BusError::Full => f.write_str("the bus takes no more frames: its transmit queue is full"),
-            BusError::Off => f.write_str("the controller is off the bus"),
-            BusError::Io(what) => f.write_str(what),
-        }
-    }
-}
-
-impl std::error::Error for BusError {}
 
 #[cfg(unix)]
 impl BusError {

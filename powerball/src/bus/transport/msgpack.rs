@@ -2,104 +2,75 @@
 //! (a capture of its network) is read by these as well.
 
 use crate::bus::canopen::Frame;
+use serde::{Deserialize, Serialize};
+
+/// What python-can writes of a frame, in its order.
+#[derive(Serialize)]
+struct Sent<'a> {
+    timestamp: f64,
+    arbitration_id: u16,
+    is_extended_id: bool,
+    is_remote_frame: bool,
+    is_error_frame: bool,
+    channel: Option<()>,
+    dlc: u8,
+    #[serde(serialize_with = "as_bytes")]
+    data: &'a [u8],
+    is_fd: bool,
+    bitrate_switch: bool,
+    error_state_indicator: bool,
+}
+
+fn as_bytes<S: serde::Serializer>(data: &[u8], to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_bytes(data)
+}
+
+/// What is needed of it to make a frame.
+#[derive(Deserialize)]
+struct Heard<'a> {
+    arbitration_id: u16,
+    #[serde(borrow)]
+    data: &'a [u8],
+    #[serde(default)]
+    is_extended_id: bool,
+    #[serde(default)]
+    is_remote_frame: bool,
+    #[serde(default)]
+    is_error_frame: bool,
+    #[serde(default)]
+    is_fd: bool,
+}
 
 /// A frame as the map that python-can writes, `timestamp` in s.
 #[must_use]
 pub fn encode(frame: &Frame, timestamp: f64) -> Vec<u8> {
-    const FALSE: u8 = 0xC2;
-    let mut out = vec![0x80 | 11];
-    let key = |out: &mut Vec<u8>, name: &str| {
-        out.push(0xA0 | name.len() as u8);
-        out.extend(name.bytes());
+    let bytes = frame.bytes();
+    let sent = Sent {
+        timestamp,
+        arbitration_id: frame.raw_id(),
+        is_extended_id: false,
+        is_remote_frame: false,
+        is_error_frame: false,
+        channel: None,
+        dlc: bytes.len() as u8,
+        data: bytes,
+        is_fd: false,
+        bitrate_switch: false,
+        error_state_indicator: false,
     };
-    key(&mut out, "timestamp");
-    out.push(0xCB);
-    out.extend(timestamp.to_be_bytes());
-    key(&mut out, "arbitration_id");
-    out.push(0xCD);
-    out.extend(frame.raw_id().to_be_bytes());
-    for name in ["is_extended_id", "is_remote_frame", "is_error_frame"] {
-        key(&mut out, name);
-        out.push(FALSE);
-    }
-    key(&mut out, "channel");
-    out.push(0xC0);
-    key(&mut out, "dlc");
-    out.push(frame.bytes().len() as u8);
-    key(&mut out, "data");
-    out.extend([0xC4, frame.bytes().len() as u8]);
-    out.extend(frame.bytes());
-    for name in ["is_fd", "bitrate_switch", "error_state_indicator"] {
-        key(&mut out, name);
-        out.push(FALSE);
-    }
-    out
+    // A Vec takes every write, and the map has a known length.
+    rmp_serde::to_vec_named(&sent).unwrap_or_default()
 }
 
 /// The frame in a datagram; `None` for what is no classic data frame with an 11-bit identifier.
 #[must_use]
 pub fn decode(bytes: &[u8]) -> Option<Frame> {
-    let mut rest = bytes;
-    let count = match next(&mut rest)? {
-        Item::Map(count) => count,
-        _ => return None,
-    };
-    let (mut id, mut data) = (None, None);
-    for _ in 0..count {
-        let Item::Bytes(name) = next(&mut rest)? else { return None };
-        match (name, next(&mut rest)?) {
-            (b"arbitration_id", Item::Integer(value)) => id = u16::try_from(value).ok(),
-            (b"data", Item::Bytes(value)) => data = Some(value),
-            (b"is_extended_id" | b"is_remote_frame" | b"is_error_frame" | b"is_fd", Item::Bool(true)) => {
-                return None;
-            }
-            (_, Item::Map(_)) => return None,
-            _ => {}
-        }
+    let heard: Heard<'_> = rmp_serde::from_slice(bytes).ok()?;
+    let other = [heard.is_extended_id, heard.is_remote_frame, heard.is_error_frame, heard.is_fd];
+    if other.contains(&true) {
+        return None;
     }
-    Frame::from_raw(id?, data?)
-}
-
-/// What MessagePack writes, as far as a flat map needs it.
-enum Item<'a> {
-    Map(usize),
-    Bytes(&'a [u8]),
-    Integer(u64),
-    Bool(bool),
-    Other,
-}
-
-fn next<'a>(rest: &mut &'a [u8]) -> Option<Item<'a>> {
-    let take = |rest: &mut &'a [u8], count: usize| -> Option<&'a [u8]> {
-        let (head, tail) = rest.split_at_checked(count)?;
-        *rest = tail;
-        Some(head)
-    };
-    let number = |rest: &mut &'a [u8], count: usize| -> Option<u64> {
-        Some(take(rest, count)?.iter().fold(0, |sum, byte| sum << 8 | u64::from(*byte)))
-    };
-    let tag = *take(rest, 1)?.first()?;
-    Some(match tag {
-        0x00..=0x7F => Item::Integer(u64::from(tag)),
-        0x80..=0x8F => Item::Map(usize::from(tag & 0x0F)),
-        0xA0..=0xBF => Item::Bytes(take(rest, usize::from(tag & 0x1F))?),
-        0xC2 | 0xC3 => Item::Bool(tag == 0xC3),
-        // Bytes and strings, their length in one, two or four bytes.
-        0xC4..=0xC6 | 0xD9..=0xDB => {
-            let size = 1 << if tag < 0xD9 { tag - 0xC4 } else { tag - 0xD9 };
-            let len = number(rest, size)?;
-            Item::Bytes(take(rest, usize::try_from(len).ok()?)?)
-        }
-        0xCC..=0xCF => Item::Integer(number(rest, 1 << (tag - 0xCC))?),
-        0xDE => Item::Map(number(rest, 2)? as usize),
-        // Floats, negative numbers, nil: their length is all that matters.
-        0xCA | 0xD2 => take(rest, 4).map(|_| Item::Other)?,
-        0xCB | 0xD3 => take(rest, 8).map(|_| Item::Other)?,
-        0xD0 => take(rest, 1).map(|_| Item::Other)?,
-        0xD1 => take(rest, 2).map(|_| Item::Other)?,
-        0xC0 | 0xE0..=0xFF => Item::Other,
-        _ => return None,
-    })
+    Frame::from_raw(heard.arbitration_id, heard.data)
 }
 
 #[cfg(test)]

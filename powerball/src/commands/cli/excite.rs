@@ -151,7 +151,7 @@ impl Excite {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let arm = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
         for note in arm.notes() {
-            eprintln!("powerball: {}: {note}", self.arm.display());
+            tracing::warn!("{}: {note}", self.arm.display());
         }
         let files = self.files()?;
         let terminal = output::Progress::new();

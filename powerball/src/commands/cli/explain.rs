@@ -63,8 +63,6 @@ pub(crate) struct Explain {
     #[arg(long)]
     timings: bool,
     #[command(flatten)]
-    verbosity: Verbosity,
-    #[command(flatten)]
     accept: Accept,
     /// Where something stays without a name, fit a bounded curve of the one or two signals that it depends on
     /// most; kept where errors fall that it was not fitted to.
@@ -80,7 +78,7 @@ pub(crate) struct Explain {
 }
 
 impl Explain {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self, verbosity: Verbosity) -> Result<(), Failure> {
         let progress = Progress::timed(self.timings);
         let experiment = if self.experiment { Some(self.arm()?) } else { None };
         let arm = Arm::read(&self.inputs.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
@@ -117,7 +115,7 @@ impl Explain {
         }
         explained.warnings.splice(0..0, recorded.warnings);
         progress.say("writing");
-        self.write(&prepared.with_known(explained))
+        self.write(&prepared.with_known(explained), verbosity)
     }
 
     /// Writes the trajectory of the experiment that an explanation asks for.
@@ -127,11 +125,11 @@ impl Explain {
     }
 
     /// Writes and prints the result.
-    fn write(&self, explained: &Explained) -> Result<(), Failure> {
+    fn write(&self, explained: &Explained, verbosity: Verbosity) -> Result<(), Failure> {
         let files = report::explained::files(explained).map_err(Failure::Refused)?;
         files.write(&self.inputs.out).map_err(Failure::Unusable)?;
         let (arm, out) = (&self.inputs.arm, &self.inputs.out);
-        match (self.inputs.json, self.verbosity) {
+        match (self.inputs.json, verbosity) {
             (true, _) => output::print(&files.first()),
             (_, Verbosity { quiet: true, .. }) => {}
             (_, Verbosity { verbose: true, .. }) => output::print(&everything(explained, arm, out)),

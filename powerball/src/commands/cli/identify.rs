@@ -57,8 +57,6 @@ pub(crate) struct Identify {
     #[arg(long)]
     timings: bool,
     #[command(flatten)]
-    verbosity: Verbosity,
-    #[command(flatten)]
     accept: Accept,
     /// Folder for the results; made if missing.
     #[arg(long, value_name = "DIR")]
@@ -93,7 +91,7 @@ enum EstimatorName {
 }
 
 impl Identify {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self, verbosity: Verbosity) -> Result<(), Failure> {
         let arm = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
         let known = self.model.as_deref().map(ModelFile::read).transpose();
         let known = known.map_err(|e| Failure::Unusable(e.to_string()))?;
@@ -123,8 +121,8 @@ impl Identify {
         files.write(&self.out).map_err(Failure::Unusable)?;
         if self.json {
             output::print(&files.first());
-        } else if !self.verbosity.quiet {
-            output::print(&in_words(&identified, self.verbosity.verbose, &self.out));
+        } else if !verbosity.quiet {
+            output::print(&in_words(&identified, verbosity.verbose, &self.out));
         }
         if let Some(original) = original {
             original.write(&arm, &files.first(), &self.out.join("identified.json"))?;
@@ -246,7 +244,7 @@ impl Original {
         })?;
         for note in &exported.notes {
             // Standard output may be the result as JSON.
-            eprintln!("{}: note: {note}", self.source.file);
+            tracing::warn!("{}: {note}", self.source.file);
         }
         output::write_file(&self.copy, &self.source.bytes(&exported.text))
     }

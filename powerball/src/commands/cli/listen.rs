@@ -41,7 +41,7 @@ pub(super) fn listen(
         }
         if bus.now().saturating_sub(last) > SILENCE && !is_silent {
             is_silent = true;
-            eprintln!("note: no cycle of nodes 3 to 8 was heard for {} s on {url}", SILENCE / 1_000_000);
+            tracing::warn!("no cycle of nodes 3 to 8 was heard for {} s on {url}", SILENCE / 1_000_000);
         }
     }
     Ok(())

@@ -4,6 +4,7 @@ mod bus;
 mod compare;
 mod demo;
 mod envelope;
+mod events;
 mod excite;
 mod explain;
 mod float;
@@ -19,6 +20,7 @@ mod output;
 mod profile;
 mod record;
 mod serve;
+mod shell;
 mod summarize;
 mod verify;
 mod virtual_arm;
@@ -27,6 +29,7 @@ mod watch;
 
 use crate::identification::IdentifyError;
 use clap::{Parser, Subcommand};
+use events::Events;
 use std::process::ExitCode;
 
 /// Identify a robot arm's torque model from logs, and explain what it lacks.
@@ -35,6 +38,8 @@ use std::process::ExitCode;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    events: Events,
 }
 
 #[derive(Debug, Subcommand)]
@@ -77,6 +82,48 @@ enum Command {
     Generate(generate::Generate),
     /// Say when a model no longer holds, along logs or a stream: since when, on which joints and why.
     Watch(watch::WatchCommand),
+    /// Print what completes this program's words in a shell.
+    Completions(shell::Completions),
+    /// Write man pages of this program and its commands.
+    Man(shell::Man),
+}
+
+impl Command {
+    fn run(self, verbosity: output::Verbosity) -> Result<(), Failure> {
+        match self {
+            Command::Demo(command) => command.run(),
+            Command::Bus(command) => command.run(),
+            Command::VirtualArm(command) => command.run(),
+            Command::Record(command) => command.run(),
+            Command::Follow(command) => command.run(),
+            Command::Float(command) => command.run(),
+            Command::WarmUp(command) => command.run(),
+            Command::Friction(command) => command.run(),
+            Command::Profile(command) => command.run(),
+            Command::Log(command) => command.run(),
+            Command::Excite(command) => command.run(),
+            Command::Identify(command) => command.run(verbosity),
+            Command::Consistent(command) => command.run(),
+            Command::Summarize(command) => command.run(),
+            Command::Verify(command) => command.run(),
+            Command::Compare(command) => command.run(),
+            Command::Explain(command) => command.run(verbosity),
+            Command::Generate(command) => command.run(),
+            Command::Watch(command) => command.run(),
+            Command::Completions(command) => command.run(),
+            Command::Man(command) => command.run(),
+        }
+    }
+}
+
+/// The last event: how it ended. A person reads it on standard error anyhow.
+fn record_end(done: &Result<(), Failure>) {
+    match done {
+        Ok(()) => tracing::info!(target: events::SHOWN, exit = 0, "done"),
+        Err(Failure::Doubtful(reason)) => tracing::warn!(target: events::SHOWN, exit = 3, "{reason}"),
+        Err(Failure::Refused(reason)) => tracing::error!(target: events::SHOWN, exit = 1, "{reason}"),
+        Err(Failure::Unusable(reason)) => tracing::error!(target: events::SHOWN, exit = 2, "{reason}"),
+    }
 }
 
 /// Why a command did not do what it was asked for.
@@ -101,28 +148,16 @@ impl From<IdentifyError> for Failure {
 pub fn main() -> ExitCode {
     // clap itself exits with 2 on wrong use.
     let cli = Cli::parse();
-    crate::report::sign(output::signature(std::env::args(), std::time::SystemTime::now()));
-    let done = match cli.command {
-        Command::Demo(command) => command.run(),
-        Command::Bus(command) => command.run(),
-        Command::VirtualArm(command) => command.run(),
-        Command::Record(command) => command.run(),
-        Command::Follow(command) => command.run(),
-        Command::Float(command) => command.run(),
-        Command::WarmUp(command) => command.run(),
-        Command::Friction(command) => command.run(),
-        Command::Profile(command) => command.run(),
-        Command::Log(command) => command.run(),
-        Command::Excite(command) => command.run(),
-        Command::Identify(command) => command.run(),
-        Command::Consistent(command) => command.run(),
-        Command::Summarize(command) => command.run(),
-        Command::Verify(command) => command.run(),
-        Command::Compare(command) => command.run(),
-        Command::Explain(command) => command.run(),
-        Command::Generate(command) => command.run(),
-        Command::Watch(command) => command.run(),
-    };
+    crate::report::sign(output::signature());
+    let listening = cli.events.listen();
+    tracing::info!(target: events::SHOWN, version = env!("CARGO_PKG_VERSION"), "{}", output::command_line());
+    let done = listening.and_then(|guards| {
+        let done = cli.command.run(cli.events.verbosity());
+        record_end(&done);
+        // All lines are written before the program ends.
+        drop(guards);
+        done
+    });
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(Failure::Refused(reason)) => {

@@ -1,15 +1,17 @@
 //! Results on disk and on the terminal.
 
 use super::Failure;
+use super::events::SHOWN;
 use crate::controller::JointNumber;
 use crate::identification::conventions::Conventions;
 use crate::identification::estimate::ResidualStats;
 use crate::report::files;
 use clap::Args;
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::Mutex;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 /// What a command is doing, on standard error: as it happens where a person looks at it, and as a table of
 /// times at its end where `--timings` asks for one.
@@ -59,6 +61,7 @@ impl Progress {
         if self.shown {
             eprintln!("  {what} …");
         }
+        tracing::info!(target: SHOWN, "{what}");
         if let Some(mut phases) = self.phases.as_ref().and_then(|phases| phases.lock().ok()) {
             phases.push(Phase::from_now(what));
         }
@@ -96,33 +99,14 @@ fn times(phases: &[Phase]) -> String {
     text
 }
 
-/// A line on standard error, where a person looks at it, that is written over by the next one: how far a motion has
-/// come. A line feed ends it when nothing more is told.
+/// A line on standard error, where a person looks at it, that is written over by the next one and cut at the terminal's
+/// width: how far a motion has come. The last one stays.
 pub(crate) fn live<T: std::fmt::Display>() -> impl FnMut(&T) {
-    let mut line = Line { shown: std::io::stderr().is_terminal(), started: false };
-    move |what| line.show(what)
-}
-
-struct Line {
-    shown: bool,
-    started: bool,
-}
-
-impl Line {
-    fn show(&mut self, what: &impl std::fmt::Display) {
-        if self.shown {
-            self.started = true;
-            let _ = write!(std::io::stderr(), "\r\x1b[K  {what}");
-        }
-    }
-}
-
-impl Drop for Line {
-    fn drop(&mut self) {
-        if self.started {
-            let _ = writeln!(std::io::stderr());
-        }
-    }
+    let line = ProgressBar::no_length().with_style(
+        ProgressStyle::with_template("  {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner()),
+    );
+    let line = line.with_finish(ProgressFinish::AndLeave);
+    move |what| line.set_message(what.to_string())
 }
 
 /// Makes a folder for results, where it is missing.
@@ -145,14 +129,12 @@ pub(crate) fn json(value: &impl serde::Serialize) -> Result<String, Failure> {
     files::json(value).map_err(Failure::Refused)
 }
 
-/// How much a command prints.
-#[derive(Args, Clone, Copy, Debug)]
+/// How much a command prints: what `--verbose` and `--quiet` say.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Verbosity {
-    /// Print every note and all evidence.
-    #[arg(short, long, conflicts_with = "quiet")]
+    /// Every note and all evidence.
     pub verbose: bool,
-    /// Print nothing but errors.
-    #[arg(short, long, conflicts_with = "json")]
+    /// Nothing but errors.
     pub quiet: bool,
 }
 
@@ -200,34 +182,24 @@ pub(crate) fn print(text: &str) {
     let _ = writeln!(std::io::stdout(), "{text}");
 }
 
-/// The foot of a page: version, command and time (UTC).
-pub(crate) fn signature(arguments: impl Iterator<Item = String>, now: SystemTime) -> String {
-    let seconds = now.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
-    let (year, month, day) = date(seconds / 86_400);
-    let (hour, minute) = (seconds / 3600 % 24, seconds / 60 % 60);
-    let quoted = |word: &String| match word.contains(|c: char| c.is_whitespace() || c == '\'') {
-        true => format!("'{}'", word.replace('\'', "'\\''")),
-        false => word.clone(),
-    };
-    let command: Vec<String> = arguments.skip(1).map(|word| quoted(&word)).collect();
-    format!(
-        "{year}-{month:02}-{day:02} {hour:02}:{minute:02} UTC, powerball {}: powerball {}",
-        env!("CARGO_PKG_VERSION"),
-        command.join(" ")
-    )
+/// The foot of a page: time (UTC), version and command.
+pub(crate) fn signature() -> String {
+    let now = jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M UTC");
+    format!("{now}, powerball {}: {}", env!("CARGO_PKG_VERSION"), command_line())
 }
 
-/// Year, month and day of a day since 1970-01-01 (Gregorian calendar; H. Hinnant, "chrono-compatible low-level date
-/// algorithms", `civil_from_days`).
-fn date(days: u64) -> (u64, u64, u64) {
-    let z = days + 719_468;
-    let (era, of_era) = (z / 146_097, z % 146_097);
-    let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
-    let of_year = of_era - (365 * year + year / 4 - year / 100);
-    let month = (5 * of_year + 2) / 153;
-    let day = of_year - (153 * month + 2) / 5 + 1;
-    let month = if month < 10 { month + 3 } else { month - 9 };
-    (400 * era + year + u64::from(month <= 2), month, day)
+/// The command of this process, as it can be typed again.
+pub(crate) fn command_line() -> String {
+    typed(std::env::args())
+}
+
+fn typed(arguments: impl Iterator<Item = String>) -> String {
+    let quoted = |word: String| match word.contains(|c: char| c.is_whitespace() || c == '\'') {
+        true => format!("'{}'", word.replace('\'', "'\\''")),
+        false => word,
+    };
+    let words = std::iter::once("powerball".to_string()).chain(arguments.skip(1).map(quoted));
+    words.collect::<Vec<_>>().join(" ")
 }
 
 /// Errors by joint as a table; several spreads side by side.
@@ -281,22 +253,13 @@ mod tests {
         assert!(processor() > before);
     }
 
-    /// Times by `date -u -d @SECONDS`.
     #[test]
     fn a_page_says_when_and_how_it_was_made() {
-        let signed = |seconds| {
-            let words = ["/bin/powerball", "verify", "--out", "a b"].map(String::from);
-            signature(words.into_iter(), SystemTime::UNIX_EPOCH + Duration::from_secs(seconds))
-        };
-        let rest = format!("UTC, powerball {}: powerball verify --out 'a b'", env!("CARGO_PKG_VERSION"));
-        for (seconds, time) in [
-            (0, "1970-01-01 00:00"),
-            (951_782_399, "2000-02-28 23:59"),
-            (951_868_800, "2000-03-01 00:00"),
-            (1_709_208_000, "2024-02-29 12:00"),
-            (4_107_542_400, "2100-03-01 00:00"),
-        ] {
-            assert_eq!(signed(seconds), format!("{time} {rest}"));
-        }
+        let words = ["/bin/powerball", "verify", "--out", "a b"].map(String::from);
+        assert_eq!(typed(words.into_iter()), "powerball verify --out 'a b'");
+        let signature = signature();
+        let (head, _) = signature.split_once(" UTC, powerball ").unwrap();
+        let (day, time) = head.split_once(' ').unwrap();
+        assert_eq!((day.len(), time.len()), (10, 5), "{head}");
     }
 }

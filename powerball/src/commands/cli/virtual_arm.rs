@@ -5,9 +5,9 @@ use super::output;
 use crate::bus::transport::{self, BusUrl};
 use crate::virtual_arm::slave::Setup;
 use crate::virtual_arm::{PlantEffect, Undeclared, VirtualArm, lwa4p, slave};
+use chacha20::ChaCha8Rng;
 use clap::Args;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -72,7 +72,7 @@ impl VirtualArmCommand {
         let behind = slave::serve(&mut arm, &mut bus, stop).map_err(|e| Failure::Refused(e.to_string()))?;
         if behind > 0 {
             let seconds = behind as f64 * 1e-6;
-            eprintln!("powerball: this machine was too slow at times: the arm is {seconds:.3} s behind");
+            tracing::warn!("this machine was too slow at times: the arm is {seconds:.3} s behind");
         }
         if self.json {
             let result = json!({

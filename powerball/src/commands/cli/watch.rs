@@ -122,7 +122,7 @@ impl WatchCommand {
     fn logs(&self, arm: &Arm, map: &ColumnMap) -> Result<Vec<Log>, Failure> {
         let (logs, findings) =
             read_logs_as(&self.log, arm, map).map_err(|e| Failure::Unusable(e.to_string()))?;
-        findings.iter().for_each(|finding| eprintln!("note: {finding}"));
+        findings.iter().for_each(|finding| tracing::warn!("{finding}"));
         Ok(logs)
     }
 
@@ -230,7 +230,7 @@ impl WatchCommand {
 
     /// Events on standard output, notes on standard error.
     fn say(&self, watch: &mut Watch<'_>, events: &[Event], live: &Live) {
-        watch.notes().iter().for_each(|note| eprintln!("note: {note}"));
+        watch.notes().iter().for_each(|note| tracing::warn!("{note}"));
         for event in events {
             live.event(&event.sentence());
             match self.json {

@@ -21,7 +21,6 @@ pub use driven::Driven;
 use dyngen::Arm;
 use serde::Serialize;
 pub use session::{Session, SessionError};
-use std::fmt;
 use std::path::{Path, PathBuf};
 pub use verdict::{Judgement, Verdict, page};
 
@@ -39,32 +38,24 @@ pub struct Demo {
 }
 
 /// Why the demo broke.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum DemoError {
     /// No session could be recorded.
+    #[error("{0}")]
     Session(SessionError),
     /// The recorded files could not be read.
+    #[error("{0}")]
     Read(String),
     /// The logs hold too little.
+    #[error("{0}")]
     Explain(ExplainError),
     /// The logs hold too little for a base model.
+    #[error("{0}")]
     Identify(IdentifyError),
     /// The arm was not moved with a model.
+    #[error("{0}")]
     Drive(String),
 }
-
-impl fmt::Display for DemoError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            DemoError::Session(e) => e.fmt(f),
-            DemoError::Read(what) | DemoError::Drive(what) => f.write_str(what),
-            DemoError::Explain(e) => e.fmt(f),
-            DemoError::Identify(e) => e.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for DemoError {}
 
 impl From<SessionError> for DemoError {
     fn from(e: SessionError) -> Self {

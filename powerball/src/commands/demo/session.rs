@@ -10,10 +10,10 @@ use crate::identification::motion::Motion;
 use crate::procedure::{Columns, Envelope, LogTime, RecordError, Recorder, way};
 use crate::virtual_arm::slave::Setup;
 use crate::virtual_arm::{Plant, PlantEffect as Effect, Undeclared, VirtualArm, lwa4p};
+use chacha20::ChaCha8Rng;
 use dyngen::{Model, SetKind};
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -64,38 +64,27 @@ pub struct Session {
 }
 
 /// Why there is no session.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum SessionError {
     /// No path could be found.
+    #[error("{0}")]
     Excitation(excite::Error),
     /// The built-in arm file has errors.
+    #[error("{0}")]
     Arm(dyngen::Diagnostics),
     /// No effect has this name.
+    #[error("no effect is called {}; there are {}", .0, Effect::NAMES.join(", "))]
     UnknownEffect(String),
     /// A file could not be written.
+    #[error("{} cannot be written: {}", .0.display(), .1)]
     Write(PathBuf, io::Error),
     /// The driver refuses its own profile.
+    #[error("{0}")]
     Driver(Refusal),
     /// A recording failed.
+    #[error("{0}")]
     Record(RecordError),
 }
-
-impl std::fmt::Display for SessionError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            SessionError::Excitation(e) => e.fmt(f),
-            SessionError::Arm(e) => e.fmt(f),
-            SessionError::UnknownEffect(name) => {
-                write!(f, "no effect is called {name}; there are {}", Effect::NAMES.join(", "))
-            }
-            SessionError::Driver(e) => e.fmt(f),
-            SessionError::Record(e) => e.fmt(f),
-            SessionError::Write(path, e) => write!(f, "{} cannot be written: {e}", path.display()),
-        }
-    }
-}
-
-impl std::error::Error for SessionError {}
 
 impl From<excite::Error> for SessionError {
     fn from(e: excite::Error) -> Self {

@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn what_is_taken_off_never_exceeds_the_friction() {
         use rand::{RngExt, SeedableRng};
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(3);
         for _ in 0..50 {
             let mut law = law(rng.random_range(0.0..1.0), rng.random_range(0.0..1.0));
             let waves: [[f64; 3]; 3] = std::array::from_fn(|_| {

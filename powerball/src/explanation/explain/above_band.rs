@@ -18,8 +18,8 @@ use crate::identification::estimate::residual_stats;
 use crate::logs::parallel;
 use crate::logs::regression::{Data, Recording};
 use crate::logs::signal::Band;
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{LN_2, TAU};
 
 /// Ripples of a joint, at most.

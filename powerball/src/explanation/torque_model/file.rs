@@ -4,20 +4,12 @@ use super::{NamedTerm, TorqueModel};
 use crate::controller::correction::{Law, Term};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::fmt;
 use std::path::Path;
 
 /// Why a file is no model of an arm.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
 pub struct FileError(String);
-
-impl fmt::Display for FileError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for FileError {}
 
 /// A term in the file: joints from 1.
 #[derive(Clone, Debug, Serialize, Deserialize)]

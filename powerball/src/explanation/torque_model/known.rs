@@ -16,7 +16,6 @@ use dyngen::Arm;
 use dyngen::arm::{Parameter, ParameterKind};
 use dyngen::exact::rational;
 use serde_json::Value;
-use std::fmt;
 use std::path::{Path, PathBuf};
 
 impl TorqueModel {
@@ -256,26 +255,15 @@ impl KnownModel for ModelFile {
 // The arm of the file as a model has it.
 
 /// Why an arm cannot be changed as a model says.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unchanged {
     /// A name that is none of the arm's parameters.
+    #[error("arm_changes.not_zero: '{0}' is no parameter of this arm")]
     NoParameter(String),
     /// Gravity that is no number.
+    #[error("arm_changes.gravity must be three finite numbers")]
     Gravity,
 }
-
-impl fmt::Display for Unchanged {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Unchanged::NoParameter(name) => {
-                write!(f, "arm_changes.not_zero: '{name}' is no parameter of this arm")
-            }
-            Unchanged::Gravity => f.write_str("arm_changes.gravity must be three finite numbers"),
-        }
-    }
-}
-
-impl std::error::Error for Unchanged {}
 
 impl ArmChanges {
     /// The arm as it is.

@@ -40,27 +40,18 @@ pub struct ForC {
 }
 
 /// Why there is no code.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, thiserror::Error)]
 pub enum SourceError {
     /// The model's changes are another arm's.
+    #[error("{0}")]
     Changes(Unchanged),
     /// What cannot be proven is not emitted.
+    #[error("{0}")]
     Generator(dyngen::Error),
     /// No name in C can begin so.
+    #[error("{0}")]
     Prefix(String),
 }
-
-impl fmt::Display for SourceError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            SourceError::Changes(e) => e.fmt(f),
-            SourceError::Generator(e) => e.fmt(f),
-            SourceError::Prefix(e) => e.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for SourceError {}
 
 impl TorqueModel {
     /// What a controller cannot make up for, in words.

@@ -5,12 +5,12 @@ use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::log::Log;
 use crate::logs::regression::RigidArm;
 use crate::virtual_arm::lwa4p;
+use chacha20::ChaCha8Rng;
 use dyngen::Arm;
 use dyngen::arm::Convention;
 use dyngen::exact::angle::Angle;
 use dyngen::exact::rational::integer;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::sync::LazyLock;
 
 /// The virtual arm and six logs of it; the last two are of another path than those that are fitted.

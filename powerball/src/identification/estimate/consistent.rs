@@ -17,10 +17,12 @@
 //! Also here: a fit whose parameters a real arm can have, and what that costs; how far apart values of a parameter set
 //! are, in torque.
 
+use super::bounded::bounded;
 use super::estimates::{ResidualStats, stats_of};
 use super::reduced::Solution;
-use super::solve::{NormalEquations, Solver, bounded, dot};
+use super::solve::{NormalEquations, Solver, dot};
 use crate::logs::regression::RigidArm;
+use chacha20::ChaCha8Rng;
 use dyngen::arm::{Arm, Convention, Parameter, ParameterKind};
 use dyngen::consistency::pseudo_inertia;
 use dyngen::{Error, Evaluator, Function, Model, SetKind};
@@ -28,7 +30,6 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use nalgebra::Matrix4;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -502,7 +503,7 @@ mod tests {
         assert!(consistency::check(&model, SetKind::Full, &full).unwrap().possible);
         assert!(consistency::check(&model, SetKind::Published, &found.set).unwrap().possible);
         // Mixtures with other real arms are real arms too: the distance must not fall along any of them.
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(4);
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(4);
         let distance = |all: &[f64]| {
             let sums = model.set_values(set, all);
             let miss: Vec<f64> = sums.iter().zip(&values).map(|(a, b)| a - b).collect();

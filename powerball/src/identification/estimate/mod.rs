@@ -1,6 +1,7 @@
 //! Weighted least squares in the minimal set, friction shapes included, with honest standard errors.
 
 mod band;
+mod bounded;
 mod consistent;
 mod design;
 pub mod distribution;
@@ -16,6 +17,7 @@ mod uncertainty;
 mod variable_projection;
 
 pub use band::{InBand, bands_of, reduce_in_bands, solve_in_band};
+pub use bounded::bounded;
 pub use consistent::{Consistent, ConsistentFit, ConsistentReport, TorqueMetric, consistent_fit, nearest};
 pub use design::{Added, Design, Folds, Gram, runs};
 #[cfg(feature = "explain")]
@@ -33,7 +35,7 @@ pub use mountings::Together;
 pub use reduced::{FrictionKind, Solution, solve_reduced};
 pub(crate) use robust::over_blocks;
 pub use robust::{Robust, solve_instrumental, solve_robust};
-pub use solve::{NormalEquations, Solver, bounded};
+pub use solve::{NormalEquations, Solver};
 pub use spectrum::noise_floor;
 pub(crate) use spectrum::noise_in_band;
 pub use stream::{States, Stream, StreamFit};

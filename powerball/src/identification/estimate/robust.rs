@@ -398,7 +398,7 @@ mod ratio_tests {
 
     #[test]
     fn intervals_hold_the_true_ratio_as_often_as_they_say() {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(5);
         let held = (0..2000)
             .filter(|_| {
                 let blocks: Vec<(f64, f64)> = (0..25)

@@ -1,5 +1,4 @@
-//! Normal equations, summed over joints and parts of logs, and their solution: they may be short of rank or bounded from
-//! below.
+//! Normal equations, summed over joints and parts of logs, and their solution: they may be short of rank.
 
 use faer::Mat;
 
@@ -117,51 +116,6 @@ impl Solver {
     }
 }
 
-/// Least squares from normal equations with some coefficients ≥ 0, by an active set.
-///
-/// Returns the solution and the factor over the columns that are free.
-#[must_use]
-pub fn bounded(
-    gram: &Mat<f64>,
-    right: &[f64],
-    wanted: impl Fn(usize) -> bool,
-    non_negative: &[usize],
-) -> (Vec<f64>, Solver) {
-    let mut at_bound: Vec<usize> = Vec::new();
-    let mut best = None;
-    // Each round moves one coefficient; a cycle would be endless only through rounding.
-    for _ in 0..4 * non_negative.len() + 2 {
-        let solver = Solver::new(gram, |c| wanted(c) && !at_bound.contains(&c));
-        let x = solver.solve(right);
-        let size = |c: usize| x[c] * gram[(c, c)].sqrt();
-        let worst =
-            non_negative.iter().copied().filter(|c| x[*c] < 0.0).min_by(|a, b| size(*a).total_cmp(&size(*b)));
-        if let Some(c) = worst {
-            at_bound.push(c);
-            best = Some((x, solver));
-            continue;
-        }
-        // A coefficient at its bound that would now rise is let free again.
-        let rising = at_bound.iter().copied().find(|&c| {
-            let gradient = right[c] - (0..x.len()).map(|k| gram[(c, k)] * x[k]).sum::<f64>();
-            gradient > 1e-9 * (gram[(c, c)].sqrt() * right[c].abs().max(1.0)) && {
-                let trial =
-                    Solver::new(gram, |k| wanted(k) && (k == c || !at_bound.contains(&k))).solve(right);
-                trial[c] > 0.0 && non_negative.iter().all(|k| trial[*k] >= 0.0)
-            }
-        });
-        match rising {
-            Some(c) => at_bound.retain(|k| *k != c),
-            None => return (x, solver),
-        }
-    }
-    let (mut x, solver) = best.unwrap_or_else(|| (vec![0.0; gram.ncols()], Solver::new(gram, |_| false)));
-    for c in non_negative {
-        x[*c] = x[*c].max(0.0);
-    }
-    (x, solver)
-}
-
 // Normal equations of a linear model, summed over joints and parts of logs: what every fit is solved from.
 
 /// Σ w·A'A, Σ w·A'y and Σ w·y'y of some rows.
@@ -242,16 +196,6 @@ impl NormalEquations {
         self.solver(|_| true).solve(&self.right)
     }
 
-    /// The same over the columns for which `wanted` holds, with some coefficients ≥ 0 (see [`bounded`]).
-    #[must_use]
-    pub fn solve_bounded(
-        &self,
-        wanted: impl Fn(usize) -> bool,
-        non_negative: &[usize],
-    ) -> (Vec<f64>, Solver) {
-        bounded(&self.gram, &self.right, wanted, non_negative)
-    }
-
     /// Σ w·(y − A·θ)², as far as rounding lets it be told from zero.
     #[must_use]
     pub fn left(&self, theta: &[f64]) -> f64 {
@@ -268,7 +212,7 @@ mod tests {
 
     #[test]
     fn dependent_columns_are_left_out_and_the_rest_solved() {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(5);
         let a = Mat::<f64>::from_fn(40, 5, |_, _| rng.random_range(-1.0..1.0));
         let mut b = a.clone();
         for i in 0..40 {
@@ -284,28 +228,5 @@ mod tests {
             approx::assert_abs_diff_eq!(*x, t, epsilon = 1e-10);
         }
         assert!(solver.inverse_diagonal()[3].is_infinite());
-    }
-
-    #[test]
-    fn bounds_hold_and_are_optimal() {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(6);
-        for _ in 0..50 {
-            let a = Mat::<f64>::from_fn(30, 6, |_, _| rng.random_range(-1.0..1.0));
-            let y: Vec<f64> = (0..30).map(|_| rng.random_range(-1.0..1.0)).collect();
-            let gram = a.transpose() * &a;
-            let right: Vec<f64> = (0..6).map(|c| (0..30).map(|i| a[(i, c)] * y[i]).sum()).collect();
-            let bounds = [1, 2, 4, 5];
-            let (x, _) = bounded(&gram, &right, |_| true, &bounds);
-            for c in 0..6 {
-                let gradient = right[c] - (0..6).map(|k| gram[(c, k)] * x[k]).sum::<f64>();
-                if bounds.contains(&c) {
-                    assert!(x[c] >= 0.0);
-                    assert!(gradient < 1e-8, "a bounded coefficient wants to rise");
-                    assert!(x[c] == 0.0 || gradient.abs() < 1e-8);
-                } else {
-                    assert!(gradient.abs() < 1e-8);
-                }
-            }
-        }
     }
 }

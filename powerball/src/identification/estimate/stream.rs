@@ -82,7 +82,7 @@ impl<'a> Stream<'a> {
             None => states,
             Some([q, dq, ddq, tau]) => States { q, dq, ddq, tau },
         };
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let cores = parallel::threads();
         let shares: Vec<(usize, usize)> =
             (0..cores).map(|c| (count * c / cores, count * (c + 1) / cores)).collect();
         let parts = parallel::map(&shares, |(from, to)| {
@@ -185,7 +185,7 @@ mod tests {
         let arm = Arm::parse(include_str!("../../../arm.toml"), "arm.toml").unwrap();
         let body = RigidArm::new(&arm).unwrap();
         let n = arm.dof();
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(8);
         let mut draw = |count: usize| (0..count).map(|_| rng.random_range(-1.5..1.5)).collect::<Vec<f64>>();
         let (q, dq, ddq) = (draw(1000 * n), draw(1000 * n), draw(1000 * n));
         let values = draw(body.names().len());

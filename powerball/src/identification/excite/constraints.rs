@@ -9,7 +9,6 @@ use super::shape::{Floor, Nearness, Shape};
 use crate::identification::motion::Motion;
 use dyngen::Arm;
 use nalgebra::Vector3;
-use std::fmt;
 
 /// Instants a second at which the search looks at a path: between two of them a wrist at 40 m/s² comes at
 /// most two millimetres nearer than at either.
@@ -192,7 +191,8 @@ pub struct JointLimits {
 pub struct Limits(pub Vec<JointLimits>);
 
 /// The arm file misses limits: one text for each joint.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("an exciting trajectory needs limits that the arm file does not give: {}", .0.join("; "))]
 pub struct MissingLimits(pub Vec<String>);
 
 impl Limits {
@@ -227,18 +227,6 @@ impl Limits {
         if missing.is_empty() { Ok(Limits(limits)) } else { Err(MissingLimits(missing)) }
     }
 }
-
-impl fmt::Display for MissingLimits {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "an exciting trajectory needs limits that the arm file does not give: {}",
-            self.0.join("; ")
-        )
-    }
-}
-
-impl std::error::Error for MissingLimits {}
 
 // What stands around an arm: the floor, and the arm's own links as capsules.
 
@@ -354,7 +342,7 @@ mod capsule_tests {
     /// Against the distance of many points on both, which is never below the truth and little above it.
     #[test]
     fn distances_are_those_of_the_nearest_of_many_points() {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(4);
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(4);
         const POINTS: usize = 200;
         for case in 0..300 {
             let mut point = || Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0));

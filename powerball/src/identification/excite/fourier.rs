@@ -154,8 +154,8 @@ impl Fourier {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use chacha20::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
 
     fn random(seed: u64) -> (Fourier, Vec<JointLimits>) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -4,13 +4,13 @@ use super::Error;
 use super::fourier::Fourier;
 use crate::identification::motion::Motion;
 use crate::identification::mounting::together;
+use chacha20::ChaCha8Rng;
 use dyngen::arm::{Arm, Parameter, ParameterKind};
 use dyngen::base::preference::Preference;
 use dyngen::exact::rational::to_f64;
 use dyngen::{Evaluator, Function, Model, SetKind};
 use faer::Mat;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 /// The figures of a path. Both refer to the regressor with its rows divided by the joints' largest torques
 /// and its columns by their usual size, so that they have no units.
@@ -313,7 +313,7 @@ mod tests {
         let models = mountings.map(|m| Model::derive(m.of(&arm).unwrap()).unwrap());
         let objective = Objective::new(&[&models[0], &models[1]], SetKind::Minimal, 8).unwrap();
         let alone = Objective::new(&[&models[0]], SetKind::Minimal, 8).unwrap();
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(2);
         let motions = [(); 2].map(|()| {
             let mut motion = Motion::new(6, 0.01);
             (0..60).for_each(|_| motion.push((0..6).map(|_| [(); 3].map(|()| rng.random_range(-1.5..1.5)))));

@@ -7,10 +7,10 @@ use super::fourier::{Fourier, Harmonics};
 use super::objective::{Criterion, Figures, Objective};
 use super::shape::poses;
 use crate::logs::parallel;
+use chacha20::ChaCha8Rng;
 use dyngen::{Model, SetKind};
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 /// Poses that are tried for the middle of a random path.

@@ -8,12 +8,12 @@
 
 use super::constraints::{JointLimits, Segment};
 use crate::identification::chain::Chain;
+use chacha20::ChaCha8Rng;
 use dyngen::Arm;
 use dyngen::arm::{Convention, Joint, JointKind};
 use dyngen::exact::rational::to_f64;
 use nalgebra::{Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::fmt;
 
 /// Two parts count as joined within this many radii of the joints between them: their capsules overlap there

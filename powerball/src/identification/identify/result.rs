@@ -14,7 +14,6 @@ use crate::logs::regression::DataError;
 use crate::logs::summary::BANDS;
 use dyngen::Arm;
 use serde::Serialize;
-use std::fmt;
 
 /// A model with its errors; as JSON it is `identified.json`.
 #[derive(Clone, Debug, Serialize)]
@@ -120,33 +119,45 @@ pub(super) fn band_reason(bands: &[usize], motion: Option<f64>) -> String {
 // Why logs come to no model.
 
 /// Why an identification, a verification or a summary was not made.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyError {
     /// A file is among the logs to fit and among those to judge by.
+    #[error("{0} is given to --log and --validate: a log cannot judge its own fit")]
     JudgesItself(String),
     /// Logs that cannot be used as they are: unreadable, damaged, of another arm, given twice, told of a
     /// wrong mounting. Every reason.
+    #[error("{}", .0.join("\n"))]
     Unusable(Vec<String>),
     /// Logs that can be read, of which nothing can be used. Every reason.
+    #[error("{}", .0.join("\n"))]
     NothingUsable(Vec<String>),
     /// Gravity that is no number: which.
+    #[error("{0}")]
     Mounting(String),
     /// Logs of several mountings of the base, where one is asked for: by what.
+    #[error("{0} logs of one mounting of the base")]
     SeveralMountings(&'static str),
     /// The known model is none of this arm, or says nothing of this mounting: why.
+    #[error("{0}")]
     Known(String),
     /// A setting that is out of its range: which.
+    #[error("{0}")]
     Setting(String),
     /// The arm's dynamics cannot be derived.
-    Arm(dyngen::Error),
+    #[error("{0}")]
+    Arm(#[from] dyngen::Error),
     /// Of the logs to judge by nothing can be used.
-    Data(DataError),
+    #[error("{0}")]
+    Data(#[from] DataError),
     /// The logs of several mountings come to no common parameters: why.
+    #[error("{0}")]
     Together(String),
     /// The instruments do not determine what the columns do, or there are none: why.
+    #[error("{0}")]
     Instruments(String),
     /// No joint is in any band.
+    #[error("no joint has a band")]
     NoBand,
 }
 
@@ -169,49 +180,5 @@ impl IdentifyError {
             | IdentifyError::Instruments(_)
             | IdentifyError::NoBand => false,
         }
-    }
-}
-
-impl fmt::Display for IdentifyError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            IdentifyError::JudgesItself(file) => {
-                write!(f, "{file} is given to --log and --validate: a log cannot judge its own fit")
-            }
-            IdentifyError::Unusable(reasons) | IdentifyError::NothingUsable(reasons) => {
-                f.write_str(&reasons.join("\n"))
-            }
-            IdentifyError::Mounting(why)
-            | IdentifyError::Known(why)
-            | IdentifyError::Setting(why)
-            | IdentifyError::Together(why)
-            | IdentifyError::Instruments(why) => f.write_str(why),
-            IdentifyError::SeveralMountings(what) => write!(f, "{what} logs of one mounting of the base"),
-            IdentifyError::Arm(e) => e.fmt(f),
-            IdentifyError::Data(e) => e.fmt(f),
-            IdentifyError::NoBand => f.write_str("no joint has a band"),
-        }
-    }
-}
-
-impl std::error::Error for IdentifyError {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        match self {
-            IdentifyError::Arm(e) => Some(e),
-            IdentifyError::Data(e) => Some(e),
-            _ => None,
-        }
-    }
-}
-
-impl From<dyngen::Error> for IdentifyError {
-    fn from(e: dyngen::Error) -> Self {
-        IdentifyError::Arm(e)
-    }
-}
-
-impl From<DataError> for IdentifyError {
-    fn from(e: DataError) -> Self {
-        IdentifyError::Data(e)
     }
 }

@@ -328,7 +328,7 @@ fn garbage_is_no_panic() {
     use rand::{RngExt, SeedableRng};
     let sound = text(HEADER, |_, f| Some(f.join(","))).into_bytes();
     for seed in 0..200 {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(seed);
         let mut bytes = sound.clone();
         for _ in 0..rng.random_range(1..40) {
             let at = rng.random_range(0..bytes.len());

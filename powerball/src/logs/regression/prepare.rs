@@ -7,7 +7,6 @@ use crate::logs::parallel;
 use crate::logs::signal::resample::median_step;
 use crate::logs::signal::{BANDS, Band, motion};
 use dyngen::arm::{Parameter, ParameterKind};
-use std::fmt;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// How logs are prepared.
@@ -31,32 +30,17 @@ impl Default for DataOptions {
 }
 
 /// Why logs cannot be analysed.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DataError {
     /// No log has a stretch long enough.
+    #[error("the logs hold no stretch of at least a second without gaps: record longer")]
     TooShort,
     /// No joint says anything: why, joint by joint.
+    #[error("no joint moves enough in these logs, with torques that change: friction and inertia cannot \
+                    be seen; record an \
+                 exciting motion\n  {}", .0.join("\n  "))]
     NoMotion(Vec<String>),
 }
-
-impl fmt::Display for DataError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            DataError::TooShort => {
-                write!(f, "the logs hold no stretch of at least a second without gaps: record longer")
-            }
-            DataError::NoMotion(why) => write!(
-                f,
-                "no joint moves enough in these logs, with torques that change: friction and inertia cannot \
-                    be seen; record an \
-                 exciting motion\n  {}",
-                why.join("\n  ")
-            ),
-        }
-    }
-}
-
-impl std::error::Error for DataError {}
 
 /// Everything that regressions over some logs share.
 ///

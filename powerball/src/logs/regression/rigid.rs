@@ -334,7 +334,7 @@ mod tests {
         let arm = Arm::parse(&text, "arm.toml").unwrap();
         let body = RigidArm::new(&arm).unwrap();
         let n = arm.dof();
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(3);
         let mut draw = |count: usize| (0..count).map(|_| rng.random_range(-1.5..1.5)).collect::<Vec<f64>>();
         let (q, v, a) = (draw(3 * n), draw(3 * n), draw(3 * n));
         let values = draw(body.names().len());

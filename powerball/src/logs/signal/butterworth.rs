@@ -161,8 +161,8 @@ impl Biquad {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use chacha20::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
 
     /// Order, cutoff, rate, a1 and a2 by section, product of the sections' b0.
     type Design = (usize, f64, f64, &'static [[f64; 2]], f64);

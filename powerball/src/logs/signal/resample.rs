@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn a_smooth_signal_survives_jitter() {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(1);
         let t: Vec<f64> = (0..400).map(|k| 0.01 * k as f64 + rng.random_range(-0.003..0.003)).collect();
         let f = |t: f64| (3.0 * t).sin();
         let x: Vec<f64> = t.iter().map(|t| f(*t)).collect();

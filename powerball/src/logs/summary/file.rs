@@ -4,7 +4,6 @@
 
 use super::{Columns, Identity, NODES, OCTAVES, Octaves, Powers, RFactor, Steepness, Summary, fnv};
 use serde::{Deserialize, Serialize};
-use std::fmt;
 
 /// First word of every summary.
 const FORMAT: &str = "powerball summary";
@@ -15,23 +14,15 @@ const VERSION: u32 = 6;
 const MOST_JOINTS: usize = 64;
 
 /// Why a summary is of no use here.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SummaryError {
     /// It is no summary, or a damaged one: why.
+    #[error("{0}")]
     Unreadable(String),
     /// It is of something else: what differs.
+    #[error("{0}")]
     Differs(String),
 }
-
-impl fmt::Display for SummaryError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            SummaryError::Unreadable(why) | SummaryError::Differs(why) => write!(f, "{why}"),
-        }
-    }
-}
-
-impl std::error::Error for SummaryError {}
 
 /// The first line.
 #[derive(Serialize, Deserialize)]
@@ -358,8 +349,8 @@ impl Reader<'_> {
 #[cfg(test)]
 mod packed_tests {
     use super::*;
+    use chacha20::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
 
     /// Factors of random rows, the second column zero throughout.
     fn factors(seed: u64) -> Octaves {

@@ -127,8 +127,8 @@ impl Octaves {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use chacha20::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
 
     /// Octave by octave the rows of white noise, and together the products of the rows themselves.
     #[test]

@@ -225,8 +225,8 @@ fn dots<const N: usize>(v: &[f64], others: [&[f64]; N]) -> [f64; N] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use chacha20::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
 
     fn rows(count: usize, width: usize, seed: u64) -> Vec<Vec<f64>> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

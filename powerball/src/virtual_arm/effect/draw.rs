@@ -277,8 +277,8 @@ impl PlantEffect {
 mod tests {
     use super::*;
     use crate::virtual_arm::lwa4p;
+    use chacha20::ChaCha8Rng;
     use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn every_name_is_drawn_as_itself_and_the_same_seed_draws_the_same() {

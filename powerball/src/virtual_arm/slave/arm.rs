@@ -9,8 +9,8 @@ use super::{Fault, Sample};
 use crate::bus::canopen::{Frame, Micros, NodeId, Object};
 use crate::bus::transport::{Bus, BusError, Event, Peer};
 use crate::virtual_arm::{Plant, PlantEffect, Simulation};
+use chacha20::ChaCha8Rng;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::collections::VecDeque;
 
@@ -61,10 +61,17 @@ pub struct VirtualArm {
 }
 
 /// Noise of the current sensors.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct Noise {
     rng: ChaCha8Rng,
     slow: Vec<f64>,
+}
+
+impl Clone for Noise {
+    /// The same noise from here on, which the generator leaves to who asks for it.
+    fn clone(&self) -> Self {
+        Noise { rng: ChaCha8Rng::deserialize_state(&self.rng.serialize_state()), slow: self.slow.clone() }
+    }
 }
 
 impl VirtualArm {

@@ -14,29 +14,20 @@ pub use dcf::{Access, Dcf, DcfError, Number, Variable};
 use crate::bus::canopen::objects::{CONSUMER_HEARTBEAT, PRODUCER_HEARTBEAT, SYNC_COB_ID};
 use crate::bus::canopen::pdo::{Entry, Mapping};
 use crate::bus::cia402::{objects, schunk};
-use std::fmt;
 
 /// Why a profile cannot be made.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ImportError {
     /// The DCF, or an overlay.
+    #[error("{0}")]
     Dcf(DcfError),
     /// The TOML, in the words of its parser (with line and column).
+    #[error("{0}")]
     Toml(String),
     /// They do not fit together.
+    #[error("{0}")]
     Mismatch(String),
 }
-
-impl fmt::Display for ImportError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            ImportError::Dcf(error) => error.fmt(f),
-            ImportError::Toml(message) | ImportError::Mismatch(message) => f.write_str(message),
-        }
-    }
-}
-
-impl std::error::Error for ImportError {}
 
 impl From<DcfError> for ImportError {
     fn from(error: DcfError) -> ImportError {

@@ -81,8 +81,8 @@ impl Where {
     pub(crate) fn open(&self) -> Result<Box<dyn Bus>, Failure> {
         if self.bus != BusUrl::Virtual {
             if let BusUrl::Udp(_, Some(interface)) = &self.bus {
-                eprintln!(
-                    "powerball: whoever reaches the network of {interface} can read this bus and move the arm; \
+                tracing::warn!(
+                    "whoever reaches the network of {interface} can read this bus and move the arm; \
                         docs/bus.md says how to fence it"
                 );
             }
@@ -115,7 +115,7 @@ impl Where {
         if self.bus != BusUrl::Virtual
             && let Err(why) = transport::realtime::claim()
         {
-            eprintln!("powerball: {why}; SYNCs may be late");
+            tracing::warn!("{why}; SYNCs may be late");
         }
         let signals = |e| Failure::Unusable(format!("cannot listen to signals: {e}"));
         let interrupt = Interrupt::install().map_err(signals)?;

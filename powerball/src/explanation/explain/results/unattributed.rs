@@ -204,7 +204,7 @@ pub(crate) fn signals(context: &Context<'_>, joint: usize) -> Vec<(String, Vec<f
 pub(crate) fn depends_on(context: &Context<'_>, joint: usize) -> Vec<(String, f64)> {
     let rows = &context.data.joints[joint];
     let residual = &context.residual[joint];
-    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(joint as u64);
+    let mut rng = chacha20::ChaCha8Rng::seed_from_u64(joint as u64);
     let mut found = Vec::new();
     for (name, signal) in signals(context, joint) {
         let bins = quantile_bins(&signal, BINS);

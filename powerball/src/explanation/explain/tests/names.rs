@@ -8,9 +8,9 @@ use crate::explanation::explain::special::repeats;
 use crate::explanation::explain::{Explained, explain_body};
 use crate::logs::regression::{Data, DataOptions, RigidArm};
 use crate::logs::signal::Band;
+use chacha20::ChaCha8Rng;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
-use rand_chacha::ChaCha8Rng;
 use std::ops::Range;
 
 /// What other tests name, from the same logs.

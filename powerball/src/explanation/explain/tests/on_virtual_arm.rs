@@ -7,8 +7,8 @@ use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::log::common_clock;
 use crate::logs::regression::RigidArm;
 use crate::virtual_arm::{PlantEffect as Effect, lwa4p};
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 
 fn explained(effect: Option<Effect>) -> Explained {

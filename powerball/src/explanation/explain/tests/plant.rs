@@ -2,11 +2,11 @@
 
 use crate::logs::log::Log;
 use crate::logs::regression::newton_euler::regressor;
+use chacha20::ChaCha8Rng;
 use dyngen::Arm;
 use dyngen::arm::ParameterKind;
 use dyngen::exact::rational::to_f64;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::PI;
 

@@ -9,8 +9,8 @@ use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::log::{Log, common_clock};
 use crate::logs::regression::{Data, DataOptions, RigidArm};
 use crate::virtual_arm::lwa4p;
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 
 /// How long a run lasts, s, and the time in which the arm warms.

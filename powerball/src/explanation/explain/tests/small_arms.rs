@@ -10,11 +10,11 @@ use crate::identification::excite::{Fourier, Harmonics};
 use crate::logs::log::{Log, common_clock};
 use crate::logs::regression::RigidArm;
 use crate::virtual_arm::{Body, Dynamics, Plant, PlantEffect as Effect, Sensors};
+use chacha20::ChaCha8Rng;
 use dyngen::Arm;
 use dyngen::arm::{JointKind, ParameterKind};
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 

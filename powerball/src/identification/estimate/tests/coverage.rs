@@ -6,8 +6,8 @@ use crate::identification::estimate::{
 };
 use crate::logs::regression::DataOptions;
 use crate::logs::summary::{BANDS, Bands};
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 /// Stronger than the white part in the band.
 const COLOUR: f64 = 2.0;

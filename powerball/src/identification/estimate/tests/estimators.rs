@@ -7,8 +7,8 @@ use crate::identification::estimate::{
 use crate::logs::log::Log;
 use crate::logs::regression::{DataOptions, RigidArm};
 use crate::logs::summary::Summary;
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 fn weighted(body: &RigidArm, logs: &[Log]) -> Solution {

@@ -5,8 +5,8 @@ use crate::controller::friction::TanhFriction;
 use crate::identification::estimate::{Folds, fit};
 use crate::logs::regression::{Data, DataOptions};
 use crate::virtual_arm::{Sensors, lwa4p};
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 /// In slow motion the bend of Eq. 16 is all but straight, and a second step looks as good from afar: without
 /// noise one in four joints then kept half a percent of its friction.

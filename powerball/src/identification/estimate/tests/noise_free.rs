@@ -5,9 +5,9 @@ use crate::logs::log::Arrays;
 use crate::logs::log::Log;
 use crate::logs::regression::{Data, DataOptions, RigidArm};
 use approx::assert_relative_eq;
+use chacha20::ChaCha8Rng;
 use dyngen::Arm;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 use std::slice;
 

@@ -7,9 +7,9 @@ use crate::identification::mounting::Mounting;
 use crate::logs::log::Log;
 use crate::logs::regression::RigidArm;
 use crate::virtual_arm::{Body, Dynamics, Plant, Sensors, lwa4p};
+use chacha20::ChaCha8Rng;
 use dyngen::SetKind;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 /// The arm's functions, and the true values of its minimal set.
 pub(super) fn truth() -> (RigidArm, Vec<f64>) {
