@@ -29,7 +29,7 @@
 //! |---|---|---|---|
 //! | a drive's heartbeat lost | three of its periods | stop, [`Cause::HeartbeatLost`], restart needed | at once |
 //! | process data missing | not there when the next SYNC is due | data held, counted; after 3 cycles stop, [`Cause::DataMissing`] | 3 cycles |
-//! | master lost | the drives: 0x1016 and 0x200E, written and verified | the drives stop; without both no enabling ([`Cause::NoWatch`]) | 0x1016, 0x200E |
+//! | master lost | the drives: 0x1016, and SCHUNK's 0x200E, written and verified | the drives stop; without both no enabling ([`Cause::NoWatch`]) | 0x1016, 0x200E |
 //! | SYNC late, left out | the driver's own raster | counted; 5 late or 3 left out: stop, [`Cause::Late`]; a missed slot is left out | the limit |
 //! | emergency, code ≠ 0 | 0x80 + id | latched with its code, stop; the drive's error details are read after it; repeats are counted only | at once |
 //! | boot-up while running | 0x700 + id, 0x00 | stop, [`Cause::Rebooted`], restart needed | at once |
