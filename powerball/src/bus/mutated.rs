@@ -91,7 +91,8 @@ fn a_driver_that_hears_nonsense_moves_nothing() {
                 1 => drop(driver.enable().is_ok()),
                 2 => drop(driver.acknowledge().is_ok()),
                 3 => driver.event(BusEvent::ErrorPassive, now, &mut wire),
-                4..=20 => driver.poll(now, &mut wire),
+                4 => driver.event(BusEvent::Overrun, now, &mut wire),
+                5..=20 => driver.poll(now, &mut wire),
                 _ => {
                     // Identifiers of the arm's nodes more often than others.
                     let node = rng.random_range(3..9u16);

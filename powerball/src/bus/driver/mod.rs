@@ -35,7 +35,7 @@
 //! | boot-up while running | 0x700 + id, 0x00 | stop, [`Cause::Rebooted`], restart needed | at once |
 //! | unexpected state or mode | each statusword and mode display | stop, [`Cause::DriveFault`], [`Cause::StateLost`], [`Cause::UnknownState`], [`Cause::WrongMode`] | at once |
 //! | left NMT operational | heartbeat | stop, [`Cause::NotOperational`], restart needed | at once |
-//! | error passive | transport | counted | |
+//! | error passive, received frames lost | transport | counted | |
 //! | another master: SYNC, NMT, set-points for our nodes, our own heartbeat | listening before the start, and always | before: refused, nothing was sent; later: stop, [`Cause::OtherMaster`], restart needed | at once |
 //! | two nodes with one id | process data twice in a cycle, 5 cycles in a row | stop, [`Cause::TwoNodes`], restart needed | 5 cycles |
 //! | bus-off | transport | queue discarded, silence (also of the heartbeat, so that the drives stop themselves), [`Cause::BusOff`], restart needed | at once |
@@ -186,6 +186,8 @@ pub struct Counters {
     pub queue_full: u64,
     /// Times that the controller became error passive.
     pub error_passive: u64,
+    /// Times that received frames were lost in the controller or the adapter.
+    pub overruns: u64,
     /// Received frames that are nobody's.
     pub unexpected: u64,
 }

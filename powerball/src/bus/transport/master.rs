@@ -147,6 +147,8 @@ impl<B: Bus, const N: usize> Master<B, N> {
             Some((at, Event::Frame(frame))) => driver.receive(&frame, at, &mut out),
             Some((at, Event::ErrorPassive)) => driver.event(BusEvent::ErrorPassive, at, &mut out),
             Some((at, Event::BusOff)) => driver.event(BusEvent::BusOff, at, &mut out),
+            Some((at, Event::Overrun)) => driver.event(BusEvent::Overrun, at, &mut out),
+            Some((at, Event::NotSent)) => driver.event(BusEvent::TransmitQueueFull, at, &mut out),
             Some((_, Event::Restarted)) | None => {}
         }
         let now = out.bus.now();
