@@ -5,7 +5,8 @@
 //! adapter sends by itself Linux's drivers/net/can/slcan.
 
 mod line;
-#[cfg(all(test, target_os = "linux"))]
+#[cfg(test)]
+#[cfg(target_os = "linux")]
 mod tests;
 
 #[cfg(unix)]
