@@ -155,6 +155,8 @@ fn decode(line: &[u8]) -> Option<Frame> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn frames_are_those_of_the_protocol() {
@@ -209,6 +211,26 @@ mod tests {
         let text = [&[b'x'; 64][..], b"t1230\rt1230\r"].concat();
         let told: Vec<Line> = text.iter().filter_map(|byte| lines.push(*byte)).collect();
         assert_eq!(told, [Line::Other, Line::Frame(Frame::from_raw(0x123, &[]).unwrap())]);
+    }
+
+    /// Noise out of letters that lines have: what is taken for a frame is written as that frame.
+    #[test]
+    fn random_lines_are_read_or_left() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let (mut lines, mut frames) = (Lines::default(), 0);
+        for _ in 0..500_000 {
+            let letters = b"t0123Fs\rz\x07";
+            let byte = match rng.random_range(0..50) {
+                0 => rng.random(),
+                _ => letters[rng.random_range(0..letters.len())],
+            };
+            if let Some(Line::Frame(frame)) = lines.push(byte) {
+                frames += 1;
+                let told: Vec<Line> = encode(&frame).iter().filter_map(|byte| lines.push(*byte)).collect();
+                assert_eq!(told, [Line::Frame(frame)]);
+            }
+        }
+        assert!(frames > 50, "{frames}");
     }
 
     #[test]

@@ -89,3 +89,30 @@ fn nothing_is_read_that_python_canopen_does_not_read_but_parts_of_arrays() {
     // 24 valves and their number; three sensors and theirs.
     assert_eq!((parts(0x3006), parts(0x3004)), (25, 4));
 }
+
+/// The samples with bytes changed, lost and doubled: read, or refused with a line of the file.
+#[test]
+fn mutated_samples_are_read_or_refused() {
+    use rand::{RngExt, SeedableRng};
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+    let mut refused = 0;
+    for name in ["sample", "node", "compact", "canfestival"] {
+        let sample = std::fs::read(folder().join(format!("{name}.eds"))).unwrap();
+        for _ in 0..1000 {
+            let mut text = sample.clone();
+            for _ in 0..rng.random_range(1..8) {
+                let (at, from) = (rng.random_range(0..text.len()), rng.random_range(0..sample.len()));
+                match rng.random_range(0..3) {
+                    0 => text[at] = rng.random(),
+                    1 => drop(text.remove(at)),
+                    _ => text.insert(at, sample[from]),
+                }
+            }
+            if let Err(error) = Dcf::parse(&text) {
+                refused += 1;
+                assert!((1..=text.len()).contains(&error.line) && !error.message.is_empty(), "{error}");
+            }
+        }
+    }
+    assert!((100..3900).contains(&refused), "{refused}");
+}
