@@ -34,6 +34,10 @@ pub(super) enum State {
 pub(super) struct Flags(pub(super) u8);
 
 impl Flags {
+    pub(super) fn with(self, other: Flags) -> Flags {
+        Flags(self.0 | other.0)
+    }
+
     /// Received frames were lost: receive FIFO full, or data overrun.
     pub(super) fn overrun(self) -> bool {
         self.0 & 0x09 != 0
@@ -64,6 +68,8 @@ pub(super) enum Line {
     /// A command or a frame was refused.
     Refused,
     Flags(Flags),
+    /// The answer to `V`.
+    Version,
     /// `sp128000`: passive, with both error counters.
     State(State),
     /// `e1o`, `e1O`: received frames lost, frames not sent.
@@ -71,7 +77,7 @@ pub(super) enum Line {
         received: bool,
         sent: bool,
     },
-    /// Extended and remote frames, versions, noise.
+    /// Extended and remote frames, noise.
     Other,
 }
 
@@ -109,6 +115,7 @@ impl Lines {
 fn read(line: &[u8]) -> Line {
     match line {
         b"" | b"z" | b"Z" => Line::Done,
+        [b'V', _, ..] => Line::Version,
         [b't', ..] => decode(line).map_or(Line::Other, Line::Frame),
         [b'F', digits @ ..] if digits.len() == 2 => {
             hex(digits).map_or(Line::Other, |flags| Line::Flags(Flags(flags as u8)))
@@ -188,7 +195,8 @@ mod tests {
             (b"F28\r", Line::Flags(Flags(0x28))),
             (b"F2x\r", Line::Other),
             (b"F\r", Line::Other),
-            (b"V1013\r", Line::Other),
+            (b"V1013\r", Line::Version),
+            (b"V\r", Line::Other),
             (b"sb256256\r", Line::State(State::Off)),
             (b"sp128000\r", Line::State(State::Passive)),
             (b"sa057033\r", Line::State(State::Active)),

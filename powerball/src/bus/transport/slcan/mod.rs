@@ -23,10 +23,8 @@ use std::time::Duration;
 
 /// Bytes that may wait for the device: about thirty frames.
 const ROOM: usize = 1024;
-/// An adapter answers a command within this, µs.
-const ANSWER: Micros = 200_000;
-/// What an adapter still had to say of an earlier session comes within this, µs.
-const QUIET: Micros = 50_000;
+/// An adapter answers a command within this, µs: some are behind a radio link, or on a busy machine.
+const ANSWER: Micros = 500_000;
 /// Time from one question for the status flags to the next, µs.
 const ASKING: Micros = 250_000;
 /// An adapter that leaves a question without an answer for so long is gone, µs.
@@ -47,6 +45,8 @@ pub struct Slcan {
     state: State,
     /// The adapter refused something, and has not yet said why.
     refused: bool,
+    /// The flags before, which reading has cleared.
+    before: Flags,
     /// When to ask for the flags again; `None` where the adapter has none.
     ask_at: Option<Micros>,
     /// When the question was asked that has no answer yet.
@@ -82,6 +82,7 @@ impl Slcan {
             clock: Clock::start(),
             state: State::Active,
             refused: false,
+            before: Flags(0),
             ask_at: None,
             asked: None,
             forgiven: false,
@@ -92,15 +93,13 @@ impl Slcan {
 
     /// Ends what the adapter did before, then sets its speed and opens its channel.
     fn begin(&mut self, digit: usize, bitrate: u32) -> Result<(), BusError> {
-        // Ends half a command of an earlier program. A channel that is closed refuses to be closed.
-        self.out.extend(b"\r\rC\r");
-        let end = self.now() + ANSWER;
-        while self.now() < end && self.hear(self.now() + QUIET)?.is_some() {}
-        self.inbox.clear();
         let speed = format!("S{digit}");
+        if !self.end_session()? {
+            return self.unheard(&[&speed, "O"]);
+        }
         match self.command(&speed)? {
-            // Who answers nothing now will not do so later.
-            None => return self.command_unheard("O"),
+            // Who answers no command now will not do so later.
+            None => return self.unheard(&["O"]),
             Some(Line::Refused) => {
                 return Err(self.wrong(format_args!("the adapter refuses {bitrate} bit/s ({speed})")));
             }
@@ -116,6 +115,21 @@ impl Slcan {
         Ok(())
     }
 
+    /// Ends what an earlier program began; false where the adapter answers nothing.
+    fn end_session(&mut self) -> Result<bool, BusError> {
+        // The first two end half a command. A channel that is closed may refuse to be closed. The version comes last: what
+        // is heard before it answers none of the commands that follow.
+        self.out.extend(b"\r\rC\rV\r");
+        let (end, mut answers) = (self.now() + ANSWER, false);
+        while let Some(line) = self.hear(end)? {
+            answers |= matches!(line, Line::Done | Line::Refused | Line::Version);
+            if line == Line::Version {
+                break;
+            }
+        }
+        Ok(answers)
+    }
+
     /// Gives a command and waits for its answer; `None` where none comes. What else comes is taken as always.
     fn command(&mut self, command: &str) -> Result<Option<Line>, BusError> {
         self.out.extend(command.bytes().chain([b'\r']));
@@ -129,8 +143,9 @@ impl Slcan {
         Ok(None)
     }
 
-    fn command_unheard(&mut self, command: &str) -> Result<(), BusError> {
-        self.out.extend(command.bytes().chain([b'\r']));
+    /// Gives commands to an adapter that does not answer.
+    fn unheard(&mut self, commands: &[&str]) -> Result<(), BusError> {
+        self.out.extend(commands.iter().flat_map(|command| command.bytes().chain([b'\r'])));
         self.drain()
     }
 
@@ -221,7 +236,7 @@ impl Slcan {
             }
             // Nobody says why: the frame was not sent.
             Line::Refused => self.tell(Event::NotSent),
-            Line::Done | Line::Other => {}
+            Line::Done | Line::Version | Line::Other => {}
         }
     }
 
@@ -229,7 +244,9 @@ impl Slcan {
         self.asked = None;
         let refused = std::mem::take(&mut self.refused);
         self.lost(flags.overrun(), flags.not_sent());
-        if flags.off(refused) {
+        // A question just before the refusal may have taken the reason with it.
+        let before = std::mem::replace(&mut self.before, flags);
+        if flags.with(before).off(refused) {
             self.enter(State::Off);
         } else if refused && !flags.not_sent() && self.state != State::Off {
             self.tell(Event::NotSent);

@@ -37,6 +37,7 @@ impl Adapter {
                 format!("F{flags:02X}\r").into_bytes()
             }
             ("F", None) => vec![0x07],
+            ("V", _) => b"V1013\r".to_vec(),
             (command, _) if command.starts_with('t') => b"z\r".to_vec(),
             _ => b"\r".to_vec(),
         }
@@ -131,7 +132,7 @@ fn the_channel_is_set_opened_used_and_closed() {
     for (bitrate, speed) in [(10_000, "S0"), (125_000, "S4"), (1_000_000, "S8")] {
         let mut port = Port::new(Adapter::default());
         let mut bus = Slcan::open(&port.path, bitrate).unwrap();
-        assert_eq!(port.heard_until("F"), ["C", speed, "O", "F"]);
+        assert_eq!(port.heard_until("F"), ["C", "V", speed, "O", "F"]);
         bus.send(&frame(0x123)).unwrap();
         assert_eq!(port.heard_until("t12320102").last().unwrap(), "t12320102");
         port.says(b"t12320102\rT0000012320102\rt45600A1B\r");
@@ -157,6 +158,8 @@ fn what_the_adapter_refuses_is_named() {
     );
     // A channel that is closed already refuses to be closed.
     Port::new(Adapter { refuses: vec!["C"], ..Adapter::default() }).open();
+    // And one may have no version.
+    Port::new(Adapter { refuses: vec!["V"], ..Adapter::default() }).open();
 }
 
 #[test]
@@ -185,6 +188,12 @@ fn a_frame_that_is_refused_for_errors_on_the_bus_means_bus_off() {
     port.adapter.lock().unwrap().flags = Some(0x80);
     assert_eq!(first(&mut bus, 1), [Event::BusOff]);
     assert_eq!(bus.send(&frame(1)), Err(BusError::Off));
+    // The reason is not lost where a question has just cleared it.
+    let mut port = Port::new(Adapter { refuses: vec!["t"], ..Adapter::default() });
+    let mut later = port.open();
+    port.says(b"F80\r");
+    later.send(&frame(1)).unwrap();
+    assert_eq!(first(&mut later, 1), [Event::BusOff]);
     // Flags that are clear again are no sign that it is back.
     assert_eq!(events(&mut bus, 600), []);
     assert_eq!(bus.send(&frame(1)), Err(BusError::Off));
@@ -221,7 +230,7 @@ fn what_answers_nothing_is_a_bus_all_the_same() {
     let mut port = Port::new(Adapter { silent: true, ..Adapter::default() });
     let mut bus = port.open();
     bus.send(&frame(0x123)).unwrap();
-    assert_eq!(port.heard_until("t12320102"), ["C", "S6", "O", "t12320102"]);
+    assert_eq!(port.heard_until("t12320102"), ["C", "V", "S6", "O", "t12320102"]);
     port.says(b"t12320102\r");
     assert_eq!(first(&mut bus, 1), [Event::Frame(frame(0x123))]);
     assert_eq!(events(&mut bus, 600), []);
