@@ -48,6 +48,7 @@ fn exit_codes_tell_refusals_from_wrong_use() {
         (&["bus", "sdo", "read", "3", "statusword"], 2, "INDEX"),
         (&["bus", "scan", "--bus", "can0"], 2, "socketcan:can0"),
         (&["bus", "scan", "--bus", "slcan:/no/such/tty"], 2, "/no/such/tty"),
+        (&["bus", "scan", "--bus", "slcan:/no/such/tty?bitrate=300000"], 2, "125000, 250000"),
         (&["bus", "move", "--joint", "7", "--to", "0"], 2, "1..=6"),
         (&["bus", "move", "--joint", "2", "--to", "2.5"], 2, "-1.920 to 1.920"),
         (&["virtual-arm", "--bus", "virtual"], 2, "udp:239.74.163.2:43113"),

@@ -38,6 +38,14 @@ fn what_is_wrong_is_told_with_its_line() {
     let told = String::from_utf8(profile(&dcf, &arm, &out).stderr).unwrap();
     assert!(told.contains("0x1016:1"), "{told}");
 
+    // Of several files the one that is wrong is named.
+    let overlay = scratch("overlay.dcf");
+    std::fs::write(&overlay, "[1003Value]\n1=0\n").unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_powerball"));
+    command.arg("profile").arg("--dcf").arg(&dcf).arg("--overlay").arg(&overlay).arg("--arm").arg(&arm);
+    let told = String::from_utf8(command.arg("-o").arg(&out).output().unwrap().stderr).unwrap();
+    assert!(told.contains("overlay.dcf: line 2: [1003Value] lists 1"), "{told}");
+
     let output = profile(Path::new("not/there.dcf"), &arm, &out);
     assert_eq!(output.status.code(), Some(2));
     assert!(!out.exists());

@@ -57,7 +57,9 @@ pub(crate) fn run<T: Send + 'static>(
     loop {
         let heard = match py.detach(next) {
             Ok(Message::Done(done)) => return Ok(done),
-            Ok(Message::Said(what)) => log(py, &what).and_then(|()| listener.map_or(Ok(()), |l| l.call1((what,)).map(drop))),
+            Ok(Message::Said(what)) => {
+                log(py, &what).and_then(|()| listener.map_or(Ok(()), |l| l.call1((what,)).map(drop)))
+            }
             Err(RecvTimeoutError::Timeout) => Ok(()),
             // It ended without a result.
             Err(RecvTimeoutError::Disconnected) => match thread.join() {

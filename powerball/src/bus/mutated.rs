@@ -91,7 +91,8 @@ fn a_driver_that_hears_nonsense_moves_nothing() {
                 1 => drop(driver.enable().is_ok()),
                 2 => drop(driver.acknowledge().is_ok()),
                 3 => driver.event(BusEvent::ErrorPassive, now, &mut wire),
-                4..=20 => driver.poll(now, &mut wire),
+                4 => driver.event(BusEvent::Overrun, now, &mut wire),
+                5..=20 => driver.poll(now, &mut wire),
                 _ => {
                     // Identifiers of the arm's nodes more often than others.
                     let node = rng.random_range(3..9u16);
@@ -110,7 +111,10 @@ fn a_driver_that_hears_nonsense_moves_nothing() {
 #[test]
 fn mutated_files_of_drives_are_read_or_refused() {
     const DCF: &str = "[DeviceInfo]\nBaudRate_500=1\n[1016sub1]\nDataType=7\nAccessType=rw\n[6040]\nDataType=6\n\
-        AccessType=rww\nPDOMapping=1\n[1400sub1]\nDataType=7\nAccessType=rw\nDefaultValue=$NODEID+0x200\n";
+        AccessType=rww\nPDOMapping=1\n[1400sub1]\nDataType=7\nAccessType=rw\nDefaultValue=$NODEID+0x200\n[1003]\n\
+        ObjectType=8\nDataType=0x1B\nCompactSubObj=3\n[1003Name]\nNrOfEntries=1\n1=Newest ; of all\n[1003Value]\n\
+        2=0x8130\n[A0sub1]\nDataType=5\nDefaultValue=0x10\n[2000]\nDataType=0xA0\nDefaultValue=0xFFFFFF\n\
+        [DeviceComissioning]\nNodeID=5\nBaudrate=500\n";
     const ARM: &str = include_str!("../../lwa4p_bus.toml");
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     for _ in 0..2_000 {

@@ -69,6 +69,23 @@ fn a_drive_that_does_not_watch_the_master_is_not_enabled() {
     }
 }
 
+/// A profile without `sync_timeout_factor` asks for no object of SCHUNK's, and still has the drives watch the master.
+#[test]
+fn drives_of_another_maker_run_without_schunks_objects() {
+    let profile = Profile { sync_timeout_factor: None, ..LWA4P };
+    for object in [schunk::SYNC_TIMEOUT_FACTOR, schunk::EXTENDED_STATUS] {
+        let mut world = started(ControlMode::Velocity, profile, true, Wire::Refuse(object));
+        let runs = world.run_until(20_000_000, |w| w.driver.phase() == Phase::Running);
+        assert!(runs, "{object}: {:?}", world.driver.cause());
+        let mut world = started(ControlMode::Velocity, LWA4P, true, Wire::Refuse(object));
+        assert!(world.run_until(20_000_000, |w| w.driver.phase() == Phase::Faulted), "{object}");
+        assert!(matches!(world.driver.cause(), Some(Cause::NoWatch(..) | Cause::Sdo(..))));
+    }
+    let heartbeat = Object::new(0x1016, 1);
+    let cause = refused(started(ControlMode::Velocity, profile, true, Wire::Refuse(heartbeat)));
+    assert!(matches!(cause, Cause::NoWatch(VICTIM, o, _) if o == heartbeat), "{cause}");
+}
+
 #[test]
 fn a_mapping_that_reads_back_otherwise_is_refused() {
     let entry = Object::new(0x1A00, 2);
@@ -538,7 +555,7 @@ fn profiles_that_contradict_themselves_are_refused() {
     };
     assert!(refused(|p| p.joints[1].node = p.joints[0].node));
     assert!(refused(|p| p.master = p.joints[0].node));
-    assert!(refused(|p| p.sync_timeout_factor = 0));
+    assert!(refused(|p| p.sync_timeout_factor = Some(0)));
     assert!(refused(|p| p.master_watch_ms = 0));
     assert!(refused(|p| p.master_heartbeat = 80_000));
     assert!(refused(|p| p.sync_period = 3333));

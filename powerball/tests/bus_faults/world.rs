@@ -326,7 +326,7 @@ impl World {
                 Event::Frame(frame) => self.driver.receive(&frame, at, &mut door),
                 Event::BusOff => self.driver.event(BusEvent::BusOff, at, &mut door),
                 Event::ErrorPassive => self.driver.event(BusEvent::ErrorPassive, at, &mut door),
-                Event::Restarted => {}
+                Event::Restarted | Event::Overrun | Event::NotSent => {}
             }
         }
     }

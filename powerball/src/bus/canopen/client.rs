@@ -28,11 +28,11 @@ impl Value {
         value.push(data).then_some(value)
     }
 
-    /// The low `size` bytes (1, 2 or 4) of `number`, two's complement.
+    /// The low `size` bytes (at most 8) of `number`, two's complement.
     pub fn number(number: i64, size: usize) -> Value {
         let mut value = Value::EMPTY;
-        value.bytes.iter_mut().zip(number.to_le_bytes()).take(size.min(4)).for_each(|(to, from)| *to = from);
-        value.len = size.min(4);
+        value.bytes.iter_mut().zip(number.to_le_bytes()).take(size.min(8)).for_each(|(to, from)| *to = from);
+        value.len = size.min(8);
         value
     }
 

@@ -386,6 +386,8 @@ impl<const N: usize> Driver<N> {
             Cause::Transition(self.node(j), now_in, wanted, Hindrance::of(status, on_the_way))
         };
         match (step_of(state), step_of(now_in)) {
+            // Only SCHUNK's drives say when their commutation search is done.
+            (_, Some(4)) if self.profile.sync_timeout_factor.is_none() => self.progress(j, Progress::Done),
             (_, Some(4)) => self.progress(j, Progress::Commutating { reads: 0, next: self.now }),
             (Some(before), Some(after)) if after > before => {
                 let deadline = self.now + self.profile.reactions.transition_timeout;

@@ -2,7 +2,7 @@
 
 use crate::bus::canopen::Object;
 
-/// Data types of CiA 301 that the table needs.
+/// Data types of CiA 301.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DataType {
     /// u8.
@@ -11,18 +11,44 @@ pub enum DataType {
     Unsigned16,
     /// u32.
     Unsigned32,
+    /// Unsigned, three bytes.
+    Unsigned24,
+    /// Unsigned, five bytes.
+    Unsigned40,
+    /// Unsigned, six bytes; also times.
+    Unsigned48,
+    /// Unsigned, seven bytes.
+    Unsigned56,
+    /// u64.
+    Unsigned64,
     /// i8.
     Integer8,
     /// i16.
     Integer16,
     /// i32.
     Integer32,
+    /// Signed, three bytes.
+    Integer24,
+    /// Signed, five bytes.
+    Integer40,
+    /// Signed, six bytes.
+    Integer48,
+    /// Signed, seven bytes.
+    Integer56,
+    /// i64.
+    Integer64,
     /// f32.
     Real32,
+    /// f64.
+    Real64,
     /// Text.
     VisibleString,
     /// Bytes.
     OctetString,
+    /// Text of two bytes a letter.
+    UnicodeString,
+    /// Bytes in a form of the maker's own, such as a program.
+    Domain,
 }
 
 impl DataType {
@@ -31,14 +57,31 @@ impl DataType {
         match self {
             DataType::Unsigned8 | DataType::Integer8 => Some(1),
             DataType::Unsigned16 | DataType::Integer16 => Some(2),
+            DataType::Unsigned24 | DataType::Integer24 => Some(3),
             DataType::Unsigned32 | DataType::Integer32 | DataType::Real32 => Some(4),
-            DataType::VisibleString | DataType::OctetString => None,
+            DataType::Unsigned40 | DataType::Integer40 => Some(5),
+            DataType::Unsigned48 | DataType::Integer48 => Some(6),
+            DataType::Unsigned56 | DataType::Integer56 => Some(7),
+            DataType::Unsigned64 | DataType::Integer64 | DataType::Real64 => Some(8),
+            DataType::VisibleString | DataType::OctetString | DataType::UnicodeString | DataType::Domain => {
+                None
+            }
         }
     }
 
     /// Whether the number has a sign.
     pub const fn is_signed(self) -> bool {
-        matches!(self, DataType::Integer8 | DataType::Integer16 | DataType::Integer32)
+        matches!(
+            self,
+            DataType::Integer8
+                | DataType::Integer16
+                | DataType::Integer24
+                | DataType::Integer32
+                | DataType::Integer40
+                | DataType::Integer48
+                | DataType::Integer56
+                | DataType::Integer64
+        )
     }
 }
 
@@ -55,7 +98,8 @@ pub struct Entry {
     pub writable: bool,
     /// Whether it can be in a PDO.
     pub mappable: bool,
-    /// Value after power-up, less the node's number where `plus_node` says so.
+    /// Value after power-up of a whole number, less the node's number where `plus_node` says so. An
+    /// [`DataType::Unsigned64`] above `i64::MAX` is here with the same bits.
     pub default: Option<i64>,
     /// Whether the node's number is added to the default.
     pub plus_node: bool,

@@ -276,4 +276,6 @@ pub enum BusEvent {
     BusOff,
     /// A frame that was queued could not be sent.
     TransmitQueueFull,
+    /// Received frames were lost before they came here: a warning. What is missed of them is judged by itself.
+    Overrun,
 }

@@ -20,7 +20,7 @@ pub const LWA4P: Profile<6> = Profile {
     master: NodeId::clamped(1),
     master_heartbeat: 25000,
     master_watch_ms: 100,
-    sync_timeout_factor: 6,
+    sync_timeout_factor: Some(6),
     node_heartbeat_ms: 100,
     profile_position: ModeProfile {
         mode: Mode::from_code(1),

@@ -29,13 +29,13 @@
 //! |---|---|---|---|
 //! | a drive's heartbeat lost | three of its periods | stop, [`Cause::HeartbeatLost`], restart needed | at once |
 //! | process data missing | not there when the next SYNC is due | data held, counted; after 3 cycles stop, [`Cause::DataMissing`] | 3 cycles |
-//! | master lost | the drives: 0x1016 and 0x200E, written and verified | the drives stop; without both no enabling ([`Cause::NoWatch`]) | 0x1016, 0x200E |
+//! | master lost | the drives: 0x1016, and SCHUNK's 0x200E, written and verified | the drives stop; without both no enabling ([`Cause::NoWatch`]) | 0x1016, 0x200E |
 //! | SYNC late, left out | the driver's own raster | counted; 5 late or 3 left out: stop, [`Cause::Late`]; a missed slot is left out | the limit |
 //! | emergency, code ≠ 0 | 0x80 + id | latched with its code, stop; the drive's error details are read after it; repeats are counted only | at once |
 //! | boot-up while running | 0x700 + id, 0x00 | stop, [`Cause::Rebooted`], restart needed | at once |
 //! | unexpected state or mode | each statusword and mode display | stop, [`Cause::DriveFault`], [`Cause::StateLost`], [`Cause::UnknownState`], [`Cause::WrongMode`] | at once |
 //! | left NMT operational | heartbeat | stop, [`Cause::NotOperational`], restart needed | at once |
-//! | error passive | transport | counted | |
+//! | error passive, received frames lost | transport | counted | |
 //! | another master: SYNC, NMT, set-points for our nodes, our own heartbeat | listening before the start, and always | before: refused, nothing was sent; later: stop, [`Cause::OtherMaster`], restart needed | at once |
 //! | two nodes with one id | process data twice in a cycle, 5 cycles in a row | stop, [`Cause::TwoNodes`], restart needed | 5 cycles |
 //! | bus-off | transport | queue discarded, silence (also of the heartbeat, so that the drives stop themselves), [`Cause::BusOff`], restart needed | at once |
@@ -186,6 +186,8 @@ pub struct Counters {
     pub queue_full: u64,
     /// Times that the controller became error passive.
     pub error_passive: u64,
+    /// Times that received frames were lost in the controller or the adapter.
+    pub overruns: u64,
     /// Received frames that are nobody's.
     pub unexpected: u64,
 }

@@ -198,8 +198,9 @@ pub struct Profile<const N: usize> {
     pub master_heartbeat: Micros,
     /// A drive that misses the master's heartbeat for so long reacts; 0x1016, ms.
     pub master_watch_ms: u16,
-    /// Cycles without a fresh interpolation point before a drive stops quickly; 0x200E, not 0.
-    pub sync_timeout_factor: u8,
+    /// Cycles without a fresh interpolation point before a drive stops quickly; 0x200E, not 0. `None` for drives of
+    /// another maker: 0x200E and the commutation search of 0x2050 are SCHUNK's, and neither is asked for then.
+    pub sync_timeout_factor: Option<u8>,
     /// Period of the drives' heartbeats, 0x1017, ms.
     pub node_heartbeat_ms: u16,
     /// Profile position.
@@ -294,7 +295,7 @@ impl<const N: usize> Profile<N> {
                     expected",
             );
         }
-        if self.sync_timeout_factor == 0 || self.master_watch_ms == 0 || self.node_heartbeat_ms == 0 {
+        if self.sync_timeout_factor == Some(0) || self.master_watch_ms == 0 || self.node_heartbeat_ms == 0 {
             return wrong("the drives must watch the master and be watched: no such time may be 0");
         }
         if self.master_heartbeat == 0 || self.master_heartbeat > Micros::from(self.master_watch_ms) * 500 {

@@ -121,12 +121,15 @@ pub(super) fn configuration<const N: usize>(
     let (tpdos, rpdo) = (profile.tpdos, mode.rpdo);
     let watch = i64::from(profile.master.raw()) << 16 | i64::from(profile.master_watch_ms);
     let (period, exponent) = profile.interpolation_period().unwrap_or((0, -3));
+    let sync_timeout = profile
+        .sync_timeout_factor
+        .map(|cycles| Write::new(schunk::SYNC_TIMEOUT_FACTOR, i64::from(cycles), 1));
     let general = [
-        Write::new(CONSUMER_HEARTBEAT, watch, 4),
-        Write::new(schunk::SYNC_TIMEOUT_FACTOR, i64::from(profile.sync_timeout_factor), 1),
-        Write::new(PRODUCER_HEARTBEAT, i64::from(profile.node_heartbeat_ms), 2),
-        Write::new(objects::INTERPOLATION_PERIOD, i64::from(period), 1),
-        Write::new(objects::INTERPOLATION_PERIOD_EXPONENT, i64::from(exponent), 1),
+        Some(Write::new(CONSUMER_HEARTBEAT, watch, 4)),
+        sync_timeout,
+        Some(Write::new(PRODUCER_HEARTBEAT, i64::from(profile.node_heartbeat_ms), 2)),
+        Some(Write::new(objects::INTERPOLATION_PERIOD, i64::from(period), 1)),
+        Some(Write::new(objects::INTERPOLATION_PERIOD_EXPONENT, i64::from(exponent), 1)),
     ];
     let mode_code = i64::from(mode.mode.code());
     joint.into_iter().flat_map(move |joint| {
@@ -156,7 +159,7 @@ pub(super) fn configuration<const N: usize>(
         let linear = control == ControlMode::InterpolatedPosition;
         receive
             .chain(transmit)
-            .chain(general)
+            .chain(general.into_iter().flatten())
             .chain(limits)
             .chain(following.into_iter().filter(move |_| control.is_position()))
             .chain(profile_position.into_iter().filter(move |_| moves))

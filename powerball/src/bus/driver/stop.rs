@@ -63,6 +63,7 @@ impl<const N: usize> Driver<N> {
         self.now = now;
         match event {
             BusEvent::ErrorPassive => self.counters.error_passive += 1,
+            BusEvent::Overrun => self.counters.overruns += 1,
             BusEvent::TransmitQueueFull => {
                 self.counters.queue_full += 1;
                 if self.phase.is_live() {

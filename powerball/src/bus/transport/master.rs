@@ -150,6 +150,8 @@ impl<B: Bus, const N: usize> Master<B, N> {
             Some((at, Event::Frame(frame))) => driver.receive(&frame, at, &mut out),
             Some((at, Event::ErrorPassive)) => driver.event(BusEvent::ErrorPassive, at, &mut out),
             Some((at, Event::BusOff)) => driver.event(BusEvent::BusOff, at, &mut out),
+            Some((at, Event::Overrun)) => driver.event(BusEvent::Overrun, at, &mut out),
+            Some((at, Event::NotSent)) => driver.event(BusEvent::TransmitQueueFull, at, &mut out),
             Some((_, Event::Restarted)) | None => {}
         }
         let now = out.bus.now();
@@ -283,8 +285,8 @@ impl<B: Bus, const N: usize> Drop for Master<B, N> {
 mod tests {
     use super::*;
     use crate::bus::cia402::State;
-    use crate::bus::driver::ControlMode;
     use crate::bus::driver::lwa4p::LWA4P;
+    use crate::bus::driver::{Cause, ControlMode};
     use crate::bus::transport::Memory;
     use crate::virtual_arm::{VirtualArm, lwa4p};
 
@@ -295,7 +297,7 @@ mod tests {
     }
 
     /// A master whose joints all move.
-    fn moving(bus: &mut Memory<VirtualArm>) -> Master<&mut Memory<VirtualArm>, 6> {
+    fn moving<B: Bus>(bus: B) -> Master<B, 6> {
         let mut master = Master::new(Driver::new(LWA4P).unwrap(), bus);
         master.driver_mut().start(ControlMode::Velocity, false).unwrap();
         master.wait_for(Phase::Ready, 20_000_000).unwrap();
@@ -325,6 +327,42 @@ mod tests {
             let history = crate::bus::canopen::Object::new(0x1003, 0);
             assert_eq!(node.dictionary().get(history), 0, "joint {}", j + 1);
         }
+    }
+
+    /// A bus whose controller says something besides.
+    #[derive(Debug)]
+    struct Telling<B>(B, Option<Event>);
+
+    impl<B: Bus> Bus for Telling<B> {
+        fn now(&self) -> Micros {
+            self.0.now()
+        }
+
+        fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+            self.0.send(frame)
+        }
+
+        fn receive(&mut self, until: Micros) -> Result<Option<(Micros, Event)>, BusError> {
+            match self.1.take() {
+                Some(event) => Ok(Some((self.now(), event))),
+                None => self.0.receive(until),
+            }
+        }
+
+        fn flush(&mut self) {
+            self.0.flush();
+        }
+    }
+
+    #[test]
+    fn lost_frames_are_counted_and_one_that_was_not_sent_stops_the_arm() {
+        let mut master = moving(Telling(bus(), None));
+        master.bus_mut().1 = Some(Event::Overrun);
+        fly(&mut master, 10);
+        assert_eq!((master.driver().phase(), master.driver().counters().overruns), (Phase::Running, 1));
+        master.bus_mut().1 = Some(Event::NotSent);
+        fly(&mut master, 10);
+        assert_eq!(master.driver().cause(), Some(&Cause::TransmitQueueFull));
     }
 
     #[test]

@@ -12,7 +12,6 @@ mod memory;
 pub mod msgpack;
 #[cfg(target_os = "linux")]
 pub mod realtime;
-#[cfg(unix)]
 mod slcan;
 #[cfg(all(target_os = "linux", feature = "socketcan"))]
 mod socketcan;
@@ -23,7 +22,6 @@ mod url;
 pub use interrupt::Interrupt;
 pub use master::{ArmError, Master, Moment};
 pub use memory::{Memory, Peer};
-#[cfg(unix)]
 pub use slcan::Slcan;
 #[cfg(all(target_os = "linux", feature = "socketcan"))]
 pub use socketcan::SocketCan;
@@ -33,7 +31,6 @@ pub use url::{BusUrl, Interface, UrlError};
 
 use crate::bus::canopen::{Frame, Micros};
 use std::fmt;
-#[cfg(unix)]
 use std::time::{Duration, Instant};
 
 /// What comes from a bus.
@@ -47,6 +44,10 @@ pub enum Event {
     BusOff,
     /// The controller is on the bus again.
     Restarted,
+    /// The controller or the adapter had no room for frames that it received: some are lost.
+    Overrun,
+    /// A frame that was taken could not be sent.
+    NotSent,
 }
 
 /// Why a bus does not do what it was asked for.
@@ -63,7 +64,6 @@ pub enum BusError {
     Io(String),
 }
 
-#[cfg(unix)]
 impl BusError {
     /// What was tried, and what the system said.
     fn io(what: impl fmt::Display, error: impl fmt::Display) -> BusError {
@@ -141,8 +141,7 @@ pub fn open(url: &BusUrl) -> Result<Box<dyn Bus>, BusError> {
         )),
         #[cfg(all(target_os = "linux", feature = "socketcan"))]
         BusUrl::SocketCan(interface) => Ok(Box::new(SocketCan::open(interface)?)),
-        #[cfg(unix)]
-        BusUrl::Slcan(device) => Ok(Box::new(Slcan::open(device)?)),
+        BusUrl::Slcan(device, bitrate) => Ok(Box::new(Slcan::open(device, *bitrate)?)),
         #[cfg(unix)]
         BusUrl::Udp(group, interface) => Ok(Box::new(UdpMulticast::open_on(*group, interface.as_ref())?)),
         #[allow(unreachable_patterns)]
@@ -151,11 +150,9 @@ pub fn open(url: &BusUrl) -> Result<Box<dyn Bus>, BusError> {
 }
 
 /// The clock of a bus in real time.
-#[cfg(unix)]
 #[derive(Clone, Copy, Debug)]
 struct Clock(Instant);
 
-#[cfg(unix)]
 impl Clock {
     fn start() -> Clock {
         Clock(Instant::now())

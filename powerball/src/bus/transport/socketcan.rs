@@ -14,6 +14,9 @@ const BUS_OFF: u32 = 0x040;
 const RESTARTED: u32 = 0x100;
 /// In the second byte of an error frame of the controller: receiver or transmitter is error-passive.
 const PASSIVE: u8 = 0x30;
+/// There too: received frames were lost, or frames to be sent.
+const RECEIVED_LOST: u8 = 0x01;
+const SENT_LOST: u8 = 0x02;
 /// The kernel's queue is full.
 const ENOBUFS: i32 = 105;
 /// The interface is down, which it is after bus-off without a restart.
@@ -64,12 +67,17 @@ impl SocketCan {
 
 /// What an error frame with these class bits and data says that a driver must know.
 fn event(class: u32, data: &[u8]) -> Option<Event> {
+    let controller = |bits| class & CONTROLLER != 0 && data.get(1).is_some_and(|status| status & bits != 0);
     if class & BUS_OFF != 0 {
         Some(Event::BusOff)
     } else if class & RESTARTED != 0 {
         Some(Event::Restarted)
-    } else if class & CONTROLLER != 0 && data.get(1).is_some_and(|status| status & PASSIVE != 0) {
+    } else if controller(SENT_LOST) {
+        Some(Event::NotSent)
+    } else if controller(PASSIVE) {
         Some(Event::ErrorPassive)
+    } else if controller(RECEIVED_LOST) {
+        Some(Event::Overrun)
     } else {
         None
     }
@@ -133,6 +141,8 @@ mod tests {
         assert_eq!(event(BUS_OFF, &[0; 8]), Some(Event::BusOff));
         assert_eq!(event(RESTARTED, &[0; 8]), Some(Event::Restarted));
         assert_eq!(event(CONTROLLER, &[0, 0x20, 0, 0, 0, 0, 0, 0]), Some(Event::ErrorPassive));
+        assert_eq!(event(CONTROLLER, &[0, 0x01, 0, 0, 0, 0, 0, 0]), Some(Event::Overrun));
+        assert_eq!(event(CONTROLLER, &[0, 0x22, 0, 0, 0, 0, 0, 0]), Some(Event::NotSent));
         assert_eq!(event(CONTROLLER, &[0, 0x08, 0, 0, 0, 0, 0, 0]), None);
         assert_eq!(event(0x002, &[0; 8]), None);
     }

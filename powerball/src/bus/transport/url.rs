@@ -1,5 +1,6 @@
 //! Buses by name, as users give them.
 
+use super::slcan;
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
@@ -12,8 +13,8 @@ pub enum BusUrl {
     Virtual,
     /// A CAN interface of Linux.
     SocketCan(String),
-    /// A serial adapter that speaks slcan, at 500 kbit/s.
-    Slcan(PathBuf),
+    /// A serial adapter that speaks slcan, and the bit rate of its bus in bit/s.
+    Slcan(PathBuf, u32),
     /// A multicast group and port of python-can's `udp_multicast`: of this machine alone, or on the network of an
     /// interface.
     Udp(SocketAddr, Option<Interface>),
@@ -37,6 +38,8 @@ impl fmt::Display for Interface {
     }
 }
 
+/// bit/s of a serial adapter that is told no other: what the LWA 4P's drives have.
+const BITRATE: u32 = 500_000;
 /// Longest name of an interface: IFNAMSIZ less its zero.
 const NAME: usize = 15;
 
@@ -44,7 +47,7 @@ const NAME: usize = 15;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UrlError {
     text: String,
-    why: &'static str,
+    why: String,
 }
 
 impl fmt::Display for UrlError {
@@ -52,8 +55,8 @@ impl fmt::Display for UrlError {
         write!(
             f,
             "\"{}\" names no bus: {}. Buses are: virtual, socketcan:can0, slcan:/dev/ttyACM0, \
-                udp:239.74.163.2:43113, \
-                udp:239.74.163.2:43113@eth0",
+                \
+                slcan:/dev/ttyACM0?bitrate=250000, udp:239.74.163.2:43113, udp:239.74.163.2:43113@eth0",
             self.text, self.why
         )
     }
@@ -65,7 +68,7 @@ impl FromStr for BusUrl {
     type Err = UrlError;
 
     fn from_str(text: &str) -> Result<BusUrl, UrlError> {
-        let wrong = |why| UrlError { text: text.to_string(), why };
+        let wrong = |why: &str| UrlError { text: text.to_string(), why: why.to_string() };
         let (kind, rest) = text.split_once(':').unwrap_or((text, ""));
         match (kind, rest) {
             ("virtual", "") => Ok(BusUrl::Virtual),
@@ -76,7 +79,10 @@ impl FromStr for BusUrl {
             }
             ("socketcan", name) => Ok(BusUrl::SocketCan(name.to_string())),
             ("slcan", "") => Err(wrong("the serial device is missing")),
-            ("slcan", path) => Ok(BusUrl::Slcan(PathBuf::from(path))),
+            ("slcan", rest) => {
+                let (path, bitrate) = port_of(rest).map_err(|why| wrong(&why))?;
+                Ok(BusUrl::Slcan(path, bitrate))
+            }
             ("udp", rest) => match group_of(rest) {
                 Some((group, interface)) if group.ip().is_multicast() => Ok(BusUrl::Udp(group, interface)),
                 Some(_) => Err(wrong("the address is no multicast group (224.0.0.0 to 239.255.255.255)")),
@@ -87,6 +93,18 @@ impl FromStr for BusUrl {
             _ => Err(wrong("its first word is unknown")),
         }
     }
+}
+
+/// `/dev/ttyACM0` or `COM3` at [`BITRATE`], or with `?bitrate=250000` behind it at another.
+fn port_of(text: &str) -> Result<(PathBuf, u32), String> {
+    let Some((path, option)) = text.rsplit_once('?') else { return Ok((PathBuf::from(text), BITRATE)) };
+    if path.is_empty() {
+        return Err("the serial device is missing".to_string());
+    }
+    let told = option.strip_prefix("bitrate=").and_then(|bitrate| bitrate.parse().ok());
+    let bitrate = told.ok_or("behind ? slcan takes bitrate= and a number in bit/s")?;
+    slcan::speed(bitrate)?;
+    Ok((PathBuf::from(path), bitrate))
 }
 
 /// `239.74.163.2:43113`, or with `@` the name of the interface behind it, or its own address where the group is of IPv4.
@@ -115,7 +133,8 @@ impl fmt::Display for BusUrl {
         match self {
             BusUrl::Virtual => f.write_str("virtual"),
             BusUrl::SocketCan(interface) => write!(f, "socketcan:{interface}"),
-            BusUrl::Slcan(device) => write!(f, "slcan:{}", device.display()),
+            BusUrl::Slcan(device, BITRATE) => write!(f, "slcan:{}", device.display()),
+            BusUrl::Slcan(device, bitrate) => write!(f, "slcan:{}?bitrate={bitrate}", device.display()),
             BusUrl::Udp(group, None) => write!(f, "udp:{group}"),
             BusUrl::Udp(group, Some(interface)) => write!(f, "udp:{group}@{interface}"),
         }
@@ -132,6 +151,7 @@ mod tests {
             "virtual",
             "socketcan:can0",
             "slcan:/dev/ttyACM0",
+            "slcan:COM3?bitrate=1000000",
             "udp:239.74.163.2:43113",
             "udp:239.74.163.2:43113@192.168.1.5",
             "udp:239.74.163.2:43113@eth0",
@@ -150,6 +170,10 @@ mod tests {
             "virtual:1",
             "socketcan:",
             "slcan:",
+            "slcan:?bitrate=500000",
+            "slcan:/dev/ttyACM0?bitrate=300000",
+            "slcan:/dev/ttyACM0?bitrate=",
+            "slcan:/dev/ttyACM0?speed=500000",
             "udp:239.74.163.2",
             "udp:192.168.0.1:43113",
             "udp:239.74.163.2:43113@",
@@ -162,5 +186,11 @@ mod tests {
             let error = text.parse::<BusUrl>().unwrap_err().to_string();
             assert!(error.contains("slcan:/dev/ttyACM0") && error.contains(text), "{error}");
         }
+        let error = "slcan:COM3?bitrate=300000".parse::<BusUrl>().unwrap_err().to_string();
+        let known = "10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000, 1000000";
+        assert!(
+            error.contains(known) && !"slcan:COM3".parse::<BusUrl>().unwrap().to_string().contains('?'),
+            "{error}"
+        );
     }
 }

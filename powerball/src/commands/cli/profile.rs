@@ -49,6 +49,9 @@ impl ProfileCommand {
         let made = import::rust_source(&dcf, &overlays, &toml, &self.constant, &source).map_err(|error| {
             let file = match error {
                 import::ImportError::Dcf(_) => name(&self.dcf),
+                import::ImportError::Overlay(k, _) => {
+                    self.overlay.get(k).map_or_else(String::new, |p| name(p))
+                }
                 _ => name(&self.arm),
             };
             Failure::Unusable(format!("{file}: {error}"))

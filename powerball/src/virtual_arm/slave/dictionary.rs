@@ -12,7 +12,7 @@ pub enum Value {
     /// A whole number.
     Number(i64),
     /// A real number.
-    Real(f32),
+    Real(f64),
     /// A string.
     Text(String),
 }
@@ -158,7 +158,7 @@ impl Dictionary {
     /// Sets a real number without asking for rights.
     pub fn set_real(&mut self, object: Object, number: f32) {
         if let Some(entry) = self.entry_mut(object) {
-            entry.value = Value::Real(number);
+            entry.value = Value::Real(f64::from(number));
         }
     }
 
@@ -180,6 +180,7 @@ impl Dictionary {
         }
         Ok(match &entry.value {
             Value::Number(number) => number.to_le_bytes()[..entry.kind.size().unwrap_or(0)].to_vec(),
+            Value::Real(number) if entry.kind == DataType::Real32 => (*number as f32).to_le_bytes().to_vec(),
             Value::Real(number) => number.to_le_bytes().to_vec(),
             Value::Text(text) => text.as_bytes().to_vec(),
         })
@@ -202,11 +203,13 @@ impl Dictionary {
             len if len < size => return Err(AbortCode::TOO_SHORT),
             _ => {}
         }
-        let raw = bytes.iter().rev().fold(0u32, |sum, byte| sum << 8 | u32::from(*byte));
+        let raw = bytes.iter().rev().fold(0u64, |sum, byte| sum << 8 | u64::from(*byte));
+        let unused = 64 - 8 * size as u32;
         let number = match entry.kind {
-            DataType::Real32 => return Ok(Value::Real(f32::from_bits(raw))),
-            kind if kind.is_signed() => i64::from(crate::bus::canopen::pdo::sign_extend(raw, 8 * size as u8)),
-            _ => i64::from(raw),
+            DataType::Real32 => return Ok(Value::Real(f64::from(f32::from_bits(raw as u32)))),
+            DataType::Real64 => return Ok(Value::Real(f64::from_bits(raw))),
+            kind if kind.is_signed() => ((raw << unused) as i64) >> unused,
+            _ => raw as i64,
         };
         let in_range = (entry.range[0]..=entry.range[1]).contains(&number);
         if in_range { Ok(Value::Number(number)) } else { Err(AbortCode::VALUE) }
@@ -228,17 +231,18 @@ impl Dictionary {
 /// All that a type can hold.
 fn range(kind: DataType) -> [i64; 2] {
     match kind.size() {
+        // 64 bits without a sign are kept as those of an i64.
+        Some(8) | None => [i64::MIN, i64::MAX],
         Some(size) if kind.is_signed() => [-(1i64 << (8 * size - 1)), (1i64 << (8 * size - 1)) - 1],
         Some(size) => [0, (1i64 << (8 * size)) - 1],
-        None => [i64::MIN, i64::MAX],
     }
 }
 
 /// A value of a type.
 fn zero(kind: DataType, number: i64) -> Value {
     match kind {
-        DataType::Real32 => Value::Real(number as f32),
-        DataType::VisibleString | DataType::OctetString => Value::Text(String::new()),
+        DataType::Real32 | DataType::Real64 => Value::Real(number as f64),
+        _ if kind.size().is_none() => Value::Text(String::new()),
         _ => Value::Number(number),
     }
 }

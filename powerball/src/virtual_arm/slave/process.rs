@@ -115,7 +115,7 @@ impl Pdo {
     pub(super) fn frame(&self, dictionary: &Dictionary) -> Option<Frame> {
         let (bytes, len) = self.mapping.pack(|object| match dictionary.entry(object).map(|e| &e.value) {
             Ok(super::dictionary::Value::Number(number)) => *number,
-            Ok(super::dictionary::Value::Real(number)) => i64::from(number.to_bits()),
+            Ok(super::dictionary::Value::Real(number)) => i64::from((*number as f32).to_bits()),
             _ => 0,
         });
         Frame::from_raw(self.id, &bytes[..len])

@@ -37,8 +37,8 @@ pub struct Watch {
     pub master_heartbeat_ms: u64,
     /// 0x1016.
     pub master_watch_ms: u16,
-    /// 0x200E.
-    pub sync_timeout_factor: u8,
+    /// 0x200E; left out for drives of another maker than SCHUNK.
+    pub sync_timeout_factor: Option<u8>,
     /// 0x1017.
     pub node_heartbeat_ms: u16,
 }

@@ -9,7 +9,7 @@ mod dcf;
 mod write;
 
 pub use arm::{Arm, JointTable, Mapped, ModeTable, VelocityScaleTable, Watch};
-pub use dcf::{Access, Dcf, DcfError, Number, Variable};
+pub use dcf::{Access, Dcf, DcfError, Number, Value, Variable};
 
 use crate::bus::canopen::objects::{CONSUMER_HEARTBEAT, PRODUCER_HEARTBEAT, SYNC_COB_ID};
 use crate::bus::canopen::pdo::{Entry, Mapping};
@@ -18,9 +18,12 @@ use crate::bus::cia402::{objects, schunk};
 /// Why a profile cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ImportError {
-    /// The DCF, or an overlay.
+    /// The DCF.
     #[error("{0}")]
     Dcf(DcfError),
+    /// An overlay, counted from 0.
+    #[error("{1}")]
+    Overlay(usize, DcfError),
     /// The TOML, in the words of its parser (with line and column).
     #[error("{0}")]
     Toml(String),
@@ -48,8 +51,9 @@ pub fn rust_source(
     source: &str,
 ) -> Result<String, ImportError> {
     let mut drive = Dcf::parse(dcf)?;
-    for overlay in overlays {
-        drive.overlay(&Dcf::parse(overlay)?)?;
+    for (k, overlay) in overlays.iter().enumerate() {
+        let read = Dcf::parse(overlay).and_then(|overlay| drive.overlay(&overlay));
+        read.map_err(|error| ImportError::Overlay(k, error))?;
     }
     let arm: Arm = toml::from_str(toml).map_err(|error| ImportError::Toml(error.to_string()))?;
     check(&drive, &arm)?;
@@ -62,17 +66,26 @@ fn mismatch<T>(message: String) -> Result<T, ImportError> {
 
 /// Whether the drive can do what the arm's file wants of it.
 fn check(drive: &Dcf, arm: &Arm) -> Result<(), ImportError> {
-    let rate = format!("baudrate_{}", arm.bitrate / 1000);
-    match drive.info.get(&rate).map(String::as_str) {
-        Some("1") => {}
-        _ => return mismatch(format!("the DCF does not offer {} bit/s ({rate} is not 1)", arm.bitrate)),
+    if !drive.offers(arm.bitrate) {
+        let rate = arm.bitrate / 1000;
+        return mismatch(format!("the DCF does not offer {} bit/s (BaudRate_{rate} is not 1)", arm.bitrate));
+    }
+    if let Some(other) = drive.bitrate.filter(|rate| *rate != arm.bitrate) {
+        return mismatch(format!(
+            "bitrate = {}: the DCF configures its drive for {other} bit/s ([DeviceCommissioning])",
+            arm.bitrate
+        ));
     }
     if arm.rate == 0 || !1_000_000u32.is_multiple_of(arm.rate) {
         return mismatch(format!("rate = {}: a divisor of 1000000 Hz is expected", arm.rate));
     }
-    let written =
-        [CONSUMER_HEARTBEAT, PRODUCER_HEARTBEAT, SYNC_COB_ID, schunk::SYNC_TIMEOUT_FACTOR, objects::MODE];
-    for object in written {
+    let is_schunk = drive.info.get("vendorname").is_some_and(|name| name.to_uppercase().contains("SCHUNK"));
+    if is_schunk && arm.watch.sync_timeout_factor.is_none() {
+        return mismatch("a drive of SCHUNK needs sync_timeout_factor in [watch]".into());
+    }
+    let written = [CONSUMER_HEARTBEAT, PRODUCER_HEARTBEAT, SYNC_COB_ID, objects::MODE];
+    let of_schunk = arm.watch.sync_timeout_factor.map(|_| schunk::SYNC_TIMEOUT_FACTOR);
+    for object in written.into_iter().chain(of_schunk) {
         match drive.variables.get(&object) {
             Some(variable) if matches!(variable.access, Access::ReadWrite | Access::WriteOnly) => {}
             _ => {

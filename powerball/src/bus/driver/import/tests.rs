@@ -56,6 +56,12 @@ const DRIVE: &str = "[DeviceInfo]\nBaudRate_500=1\n[1005]\nDataType=7\nAccessTyp
     AccessType=rw\n[6040]\nDataType=6\nAccessType=rww\nPDOMapping=1\n\
     [6041]\nDataType=6\nAccessType=ro\nPDOMapping=0\n";
 
+/// What the modes of the arm's file map beside it, and types that SCHUNK's drive has not.
+const TARGETS: &str = "[607A]\nDataType=4\nPDOMapping=1\n[6042]\nDataType=3\nPDOMapping=1\n[60C1sub1]\nDataType=4\n\
+    PDOMapping=1\n[6077]\nDataType=3\nPDOMapping=1\n[6064]\nDataType=4\nPDOMapping=1\n[606C]\nDataType=4\n\
+    PDOMapping=1\n[6061]\nDataType=2\nPDOMapping=1\n[6041]\nDataType=6\nPDOMapping=1\n[2100]\nDataType=0x1B\n\
+    DefaultValue=0xFFFFFFFFFFFFFFFF\n[2101]\nDataType=0x11\nDefaultValue=1.5\n[1021]\nObjectType=2\n";
+
 fn refused(toml: &str) -> String {
     rust_source(DRIVE.as_bytes(), &[], toml, "ARM", "a test").unwrap_err().to_string()
 }
@@ -69,4 +75,21 @@ fn contradictions_are_told() {
     // Line and column come from the TOML parser.
     assert!(refused(&TOML.replace("master = 1", "master = \"one\"")).contains("line"));
     assert!(refused(TOML).contains("0x607A:0"), "an object that the drive lacks");
+    let made = |drive: &str, toml: &str| rust_source(drive.as_bytes(), &[], toml, "ARM", "a test");
+    let elsewhere = format!("{DRIVE}[DeviceCommissioning]\nBaudrate=125\n");
+    assert!(made(&elsewhere, TOML).unwrap_err().to_string().contains("125000 bit/s"));
+    let overlay = rust_source(DRIVE.as_bytes(), &[vec![], b"[1000\n".to_vec()], TOML, "ARM", "a test");
+    assert!(matches!(overlay, Err(ImportError::Overlay(1, DcfError { line: 1, .. }))), "{overlay:?}");
+}
+
+/// 0x200E is SCHUNK's: of a drive of another maker neither the DCF nor the driver is asked for it.
+#[test]
+fn drives_of_other_makers_need_no_object_of_schunks() {
+    let without = TOML.replace("sync_timeout_factor", "# sync_timeout_factor");
+    let other = DRIVE.replace("[200E]", "[2FFF]") + TARGETS;
+    let made = |drive: &str, toml: &str| rust_source(drive.as_bytes(), &[], toml, "ARM", "a test");
+    assert!(made(&other, &without).unwrap().contains("    sync_timeout_factor: None,\n"));
+    assert!(made(&other, TOML).unwrap_err().to_string().contains("0x200E:0"));
+    let schunk = other.replace("[DeviceInfo]", "[DeviceInfo]\nVendorName=SCHUNK GmbH");
+    assert!(made(&schunk, &without).unwrap_err().to_string().contains("sync_timeout_factor"));
 }

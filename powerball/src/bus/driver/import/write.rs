@@ -1,6 +1,6 @@
 //! The constant tables as Rust.
 
-use super::{Access, Arm, Dcf, ImportError, JointTable, Mapped, ModeTable, mapping, mismatch};
+use super::{Access, Arm, Dcf, ImportError, JointTable, Mapped, ModeTable, Value, mapping, mismatch};
 use crate::bus::canopen::Object;
 use crate::bus::canopen::pdo::Mapping;
 use std::fmt::Write;
@@ -42,7 +42,7 @@ fn profile(out: &mut String, drive: &Dcf, arm: &Arm, constant: &str) -> Result<(
     line(format!("    master: NodeId::clamped({}),", arm.master));
     line(format!("    master_heartbeat: {},", arm.watch.master_heartbeat_ms * 1000));
     line(format!("    master_watch_ms: {},", arm.watch.master_watch_ms));
-    line(format!("    sync_timeout_factor: {},", arm.watch.sync_timeout_factor));
+    line(format!("    sync_timeout_factor: {:?},", arm.watch.sync_timeout_factor));
     line(format!("    node_heartbeat_ms: {},", arm.watch.node_heartbeat_ms));
     for (name, bits) in [
         ("profile_position", "profile::PROFILE_POSITION_BITS"),
@@ -173,12 +173,25 @@ fn dictionary(out: &mut String, drive: &Dcf) -> Result<(), ImportError> {
             0x0002 => "Integer8",
             0x0003 => "Integer16",
             0x0004 => "Integer32",
+            0x0010 => "Integer24",
+            0x0012 => "Integer40",
+            0x0013 => "Integer48",
+            0x0014 => "Integer56",
+            0x0015 => "Integer64",
             0x0001 | 0x0005 => "Unsigned8",
             0x0006 => "Unsigned16",
             0x0007 => "Unsigned32",
+            0x0016 => "Unsigned24",
+            0x0018 => "Unsigned40",
+            0x000C | 0x000D | 0x0019 => "Unsigned48",
+            0x001A => "Unsigned56",
+            0x001B => "Unsigned64",
             0x0008 => "Real32",
+            0x0011 => "Real64",
             0x0009 => "VisibleString",
             0x000A => "OctetString",
+            0x000B => "UnicodeString",
+            0x000F => "Domain",
             other => return mismatch(format!("{at}: data type 0x{other:04X} is not known here")),
         };
         let access = match variable.access {
@@ -187,9 +200,12 @@ fn dictionary(out: &mut String, drive: &Dcf) -> Result<(), ImportError> {
             _ => "ReadOnly",
         };
         let mapped = if variable.mappable { ".mapped()" } else { "" };
-        let default = match variable.default {
-            Some(number) if number.depends_on_node() => format!(".default_plus_node({})", number.of(0)),
-            Some(number) => format!(".default({})", number.of(0)),
+        // Of 64 bits, which an i64 holds.
+        let default = match variable.default.as_ref().and_then(Value::number) {
+            Some(number) if number.depends_on_node() => {
+                format!(".default_plus_node({})", number.of(0) as i64)
+            }
+            Some(number) => format!(".default({})", number.of(0) as i64),
             None => String::new(),
         };
         let row = format!(

@@ -67,8 +67,8 @@ impl BusCommand {
 /// What every command on a bus is told.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Where {
-    /// The bus: virtual, socketcan:can0, slcan:/dev/ttyACM0, udp:239.74.163.2:43113 (this machine alone) or
-    /// udp:239.74.163.2:43113@eth0 (the network of that interface).
+    /// The bus: virtual, socketcan:can0, slcan:/dev/ttyACM0 (500 kbit/s; others with ?bitrate=250000 behind it),
+    /// udp:239.74.163.2:43113 (this machine alone) or udp:239.74.163.2:43113@eth0 (the network of that interface).
     #[arg(long, value_name = "URL", default_value = "virtual")]
     pub(crate) bus: BusUrl,
     /// Print the result as one JSON object on standard output.

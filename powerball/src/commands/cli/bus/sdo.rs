@@ -153,11 +153,16 @@ fn encode(text: &str, kind: DataType) -> Result<Value, String> {
         let real: f32 = text.parse().map_err(|_| "a number is needed".to_string())?;
         return Ok(Value::number(i64::from(real.to_bits()), 4));
     }
+    if kind == DataType::Real64 {
+        let real: f64 = text.parse().map_err(|_| "a number is needed".to_string())?;
+        return Ok(Value::number(real.to_bits() as i64, 8));
+    }
     let value = number(text).ok_or("a whole number is needed, decimal or 0x…")?;
     let bits = 8 * size as u32;
+    let wide = i128::from(value);
     // A signed object may be given as the bits that it shows in hexadecimal.
-    let range = if kind.is_signed() { -(1i64 << (bits - 1))..1i64 << bits } else { 0..1i64 << bits };
-    if range.contains(&value) {
+    let range = if kind.is_signed() { -(1i128 << (bits - 1))..1i128 << bits } else { 0..1i128 << bits };
+    if range.contains(&wide) {
         Ok(Value::number(value, size))
     } else {
         Err(format!("it does not fit into {bits} bits"))
