@@ -361,6 +361,58 @@ fn every_type_of_parquet_that_holds_numbers_is_numbers() {
     }
 }
 
+// LeRobot.
+
+/// A dataset's folder, or its description, of both layouts: episodes are pieces, joints go by name, and what LeRobot does
+/// not say is asked for.
+#[test]
+fn datasets_of_lerobot_are_read_as_they_are() {
+    let (csv, _) = read(&data("log.csv"), "");
+    let degrees = format!("{JOINTS}q.unit = \"deg\"");
+    for name in ["lerobot_v21", "lerobot_v21/meta/info.json", "lerobot_v30"] {
+        let (log, findings) = read(&data(name), &degrees);
+        assert_eq!(log.pieces, [0..40, 40..90, 90..120], "{name}");
+        assert_eq!(log.torque, csv.torque, "{name}");
+        let off = |(a, b): (&f64, &f64)| (a - b).abs();
+        let worst = log.q.iter().flatten().zip(csv.q.iter().flatten()).map(off).fold(0.0, f64::max);
+        assert!(worst < 1e-7, "{name}: {worst}");
+        for piece in &log.pieces {
+            let own = |k: usize| log.t[k] - log.t[piece.start] - 0.01 * (k - piece.start) as f64;
+            assert!(piece.clone().all(|k| own(k).abs() < 1e-6), "{name}");
+        }
+        let told = findings.iter().map(|f| format!("{f}\n")).collect::<String>();
+        assert!(told.contains("3 episodes") && told.contains("even frames at 100 Hz"), "{told}");
+    }
+    let asked = |path: &Path, map: &str| {
+        let map = ColumnMap::parse(map, "map").unwrap();
+        Log::read_as(path, &arm(), &map).unwrap_err().to_string()
+    };
+    let error = asked(&data("lerobot_v30"), JOINTS);
+    assert!(error.contains("in which unit observation.state is"), "{error}");
+    // Without torques.
+    let error = asked(&data("lerobot_v30"), &format!("{degrees}\ntau.column = \"observation.load\""));
+    assert!(
+        error.contains("missing: observation.load") && error.contains("`action` is a set-point"),
+        "{error}"
+    );
+
+    // Not all of it is there.
+    let folder = folder("lerobot");
+    std::fs::create_dir_all(folder.join("meta")).unwrap();
+    std::fs::copy(data("lerobot_v30/meta/info.json"), folder.join("meta/info.json")).unwrap();
+    std::fs::create_dir_all(folder.join("data/chunk-000")).unwrap();
+    assert!(asked(&folder, &degrees).contains("has no Parquet file"), "{}", asked(&folder, &degrees));
+    let file = folder.join("data/chunk-000/file-000.parquet");
+    std::fs::write(&file, "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n").unwrap();
+    assert!(asked(&folder, &degrees).contains("git lfs pull"), "{}", asked(&folder, &degrees));
+    std::fs::copy(data("lerobot_v30/data/chunk-000/file-000.parquet"), &file).unwrap();
+    let told = self::told(&read_contents(&folder).unwrap());
+    assert!(told.contains("counts 3 episodes, and 2 are there"), "{told}");
+    // A file of another dataset among them.
+    std::fs::copy(data("types.parquet"), folder.join("data/chunk-000/file-001.parquet")).unwrap();
+    assert!(asked(&folder, &degrees).contains("other columns"), "{}", asked(&folder, &degrees));
+}
+
 // NumPy.
 
 #[test]

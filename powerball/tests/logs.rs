@@ -73,15 +73,15 @@ fn every_format_comes_to_the_same_log_whatever_the_order_of_its_joints() {
 #[test]
 fn a_dataset_of_lists_is_a_log_of_episodes() {
     let (csv, _) = read("log.csv", "").unwrap();
-    let columns =
-        "t.column = \"timestamp\"\nq.column = \"observation.state\"\ntau.column = \"observation.effort\"\n";
+    let columns = "t.column = \"timestamp\"\nq = { column = \"observation.state\", unit = \"rad\" }\n\
+        tau.column = \"observation.effort\"\n";
     let file = "dataset/data/chunk-000/file-000.parquet";
     let (log, _) = read(file, &format!("{JOINTS}{columns}")).unwrap();
     assert_eq!((log.t.len(), log.pieces.len()), (120, 2));
     assert_eq!((&log.q, &log.torque), (&csv.q, &csv.torque));
-    // The second episode begins a second after the first one has ended; its time is in single precision.
+    // The second episode begins ten seconds after the first one has ended; its time is in single precision.
     let step = |k: usize| log.t[k + 1] - log.t[k];
-    assert!((step(59) - 1.0).abs() < 1e-6 && (step(60) - 0.01).abs() < 1e-6);
+    assert!((step(59) - 10.0).abs() < 1e-6 && (step(60) - 0.01).abs() < 1e-6);
     // Without its description they are numbered, and the numbers are not the arm's order: it is the file's.
     let copy = std::env::temp_dir().join(format!("powerball_lists_{}.parquet", std::process::id()));
     std::fs::copy(data(file), &copy).unwrap();

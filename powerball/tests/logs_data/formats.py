@@ -5,6 +5,8 @@
 
 import datetime
 import decimal
+import json
+import math
 import os
 import pathlib
 import shutil
@@ -418,6 +420,65 @@ def hdf5():
         out["names"] = CHAIN
 
 
+def lerobot(folder, version, names, files):
+    """A dataset as LeRobot leaves it: its description, and episodes of some samples each in files."""
+    shutil.rmtree(folder, ignore_errors=True)
+    os.makedirs(f"{folder}/meta")
+    features = {
+        "observation.state": {"dtype": "float32", "shape": [3], "names": names},
+        "action": {"dtype": "float32", "shape": [3], "names": names},
+        "observation.effort": {"dtype": "float64", "shape": [3], "names": names},
+        "timestamp": {"dtype": "float32", "shape": [1], "names": None},
+    }
+    episodes = sum((episodes for _, episodes in files), [])
+    path = "episode_{episode_index:06d}" if version == "v2.1" else "file-{file_index:03d}"
+    info = {
+        "codebase_version": version,
+        "robot_type": "two_joints",
+        "total_episodes": len(episodes),
+        "total_frames": sum(map(len, episodes)),
+        "fps": 100,
+        "data_path": "data/chunk-{chunk_index:03d}/" + path + ".parquet",
+        "features": features,
+    }
+    with open(f"{folder}/meta/info.json", "w") as out:
+        json.dump(info, out, indent=1)
+    kinds = [
+        ("observation.state", pyarrow.list_(pyarrow.float32(), 3)),
+        ("action", pyarrow.list_(pyarrow.float32())),
+        ("observation.effort", pyarrow.list_(pyarrow.float64())),
+        ("timestamp", pyarrow.float32()),
+        ("frame_index", pyarrow.int64()),
+        ("episode_index", pyarrow.int64()),
+        ("index", pyarrow.int64()),
+        ("task_index", pyarrow.int64()),
+    ]
+    first = index = 0
+    for name, episodes in files:
+        rows = []
+        for episode, samples in enumerate(episodes, first):
+            for frame, k in enumerate(samples):
+                q, _, tau = sample(k)
+                # A gripper, then the joints from the tip.
+                state = [50.0, math.degrees(q[1]), math.degrees(q[0])]
+                rows.append([state, state, [0.0, tau[1], tau[0]], frame * STEP, frame, episode, index, 0])
+                index += 1
+        first += len(episodes)
+        os.makedirs(os.path.dirname(f"{folder}/{name}"), exist_ok=True)
+        columns = [pyarrow.array([row[i] for row in rows], kind) for i, (_, kind) in enumerate(kinds)]
+        table = pyarrow.table(dict(zip((name for name, _ in kinds), columns)))
+        pyarrow.parquet.write_table(table, f"{folder}/{name}", compression="snappy")
+
+
+def datasets_of_lerobot():
+    names = [f"{joint}.pos" for joint in ["gripper", *CHAIN[::-1]]]
+    each = [range(40), range(40, 90), range(90, SAMPLES)]
+    files = [(f"data/chunk-{k // 2:03d}/episode_{k:06d}.parquet", [samples]) for k, samples in enumerate(each)]
+    lerobot("lerobot_v21", "v2.1", {"motors": names}, files)
+    files = [("data/chunk-000/file-000.parquet", each[:2]), ("data/chunk-000/file-001.parquet", each[2:])]
+    lerobot("lerobot_v30", "v3.0", names, files)
+
+
 crashed()
 defined()
 bag_with_definitions()
@@ -429,3 +490,4 @@ split_folder()
 for compression in rosbags.rosbag1.Writer.CompressionFormat:
     ros1(f"ros1_{compression.name.lower()}.bag", compression)
 hdf5()
+datasets_of_lerobot()

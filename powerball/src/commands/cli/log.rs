@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// Show what is in log files and what they are taken to be: topics, columns, units, rates, gaps, doubts;
 /// with --out as a page with figures.
 ///
-/// CSV, Parquet, MCAP, bags of ROS 1 and 2 (also their folders), npz, npy, mat and HDF5. With an arm also the log that `identify` would read. Exit
+/// CSV, Parquet, LeRobot datasets, MCAP, bags of ROS 1 and 2 (also their folders), npz, npy, mat and HDF5. With an arm also the log that `identify` would read. Exit
 /// code 1 where a file is no log of that arm.
 #[derive(Args, Debug)]
 #[command(

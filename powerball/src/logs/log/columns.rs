@@ -16,13 +16,14 @@ pub(super) struct Asked<'a> {
     pub header: Option<usize>,
 }
 
-/// The quantities with the names that columns have for them: those of this project's own logs, then those of
-/// ROS.
+/// What LeRobot calls an arm's positions.
+const LEROBOT: &str = "observation.state";
+/// The quantities with the names that columns have for them: those of this project's own logs, of ROS and of LeRobot.
 const NAMES: [(&str, &[&str]); 6] = [
-    ("q", &["q", "position"]),
-    ("dq", &["dq", "velocity"]),
-    ("tau", &["tau", "effort"]),
-    ("i", &["i", "current"]),
+    ("q", &["q", "position", LEROBOT]),
+    ("dq", &["dq", "velocity", "observation.velocity"]),
+    ("tau", &["tau", "effort", "observation.effort"]),
+    ("i", &["i", "current", "observation.current"]),
     ("temp", &["temp", "temperature"]),
     ("motor", &["motor"]),
 ];
@@ -37,6 +38,13 @@ const RTDE: [(&str, &str); 5] = [
 ];
 /// Names of the time; the first is that of this project's own logs. Lines with a header have that one alone.
 pub(super) const TIMES: [&str; 3] = ["t", "time", "timestamp"];
+
+/// What LeRobot does not say of positions.
+const UNIT_OF_LEROBOT: &str = "LeRobot does not say in which unit observation.state is: rad, degrees from the middle of a \
+    servo's range, or a share of that range from -100 to 100. Say it with --map 'q.unit = \"deg\"' (or \"rad\"); a share of \
+    the range is no angle before it is multiplied by the range ('q.scale = […]')";
+const TORQUE_OF_LEROBOT: &str = ". LeRobot records torques or currents only where the robot was made to give them: name \
+    their column with --map 'tau.column = \"…\"' or 'i.column = \"…\"'; `action` is a set-point";
 
 /// The columns of one quantity by joint, and what each is to be multiplied with.
 pub(super) struct Group {
@@ -86,6 +94,11 @@ fn rtde(key: &str, joint: usize) -> Option<String> {
 /// Whether columns are those of a recording by RTDE.
 fn by_rtde(names: &[String]) -> bool {
     rtde("q", 0).is_some_and(|first| names.contains(&first))
+}
+
+/// Whether a column is one of LeRobot's positions.
+fn by_lerobot(name: &str) -> bool {
+    name.starts_with(LEROBOT)
 }
 
 /// What a column is taken to be by its name, and the joint that the name says.
@@ -206,8 +219,12 @@ impl Columns {
             );
             errors.push(finding(&more, message));
         }
-        if let Err(missing) = &q {
-            errors.push(finding("q", missing_positions(names, missing, asked)));
+        match &q {
+            Ok(q) if asked.map.q.unit.is_none() && q.at.iter().any(|k| by_lerobot(&names[*k])) => {
+                errors.push(finding("q", UNIT_OF_LEROBOT.into()));
+            }
+            Ok(_) => {}
+            Err(missing) => errors.push(finding("q", missing_positions(names, missing, asked))),
         }
         let (mut effort, mut torque) = (Effort::Torque, None);
         match (group(names, "tau", asked), group(names, "i", asked)) {
@@ -223,11 +240,12 @@ impl Columns {
             (Err(_), Err(_)) if q.is_err() && !logged_joints(names, asked.map).is_empty() => {}
             (Err(tau), Err(current)) => {
                 let missing = if tau.len() <= current.len() { tau } else { current };
+                let hint = if names.iter().any(|name| by_lerobot(name)) { TORQUE_OF_LEROBOT } else { "" };
                 errors.push(finding(
                     "tau",
                     format!(
                         "a log needs tau1 … tau{n} [N·m] or i1 … i{n} [A] for each of \
-                the {n} joints; missing: {}",
+                the {n} joints; missing: {}{hint}",
                         missing.join(", ")
                     ),
                 ));
@@ -311,7 +329,8 @@ fn one_too_many(names: &[String], asked: Asked<'_>) -> Option<String> {
 
 fn time(names: &[String], asked: Asked<'_>) -> Option<Group> {
     let at = |name: &str| names.iter().position(|own| own == name);
-    let known = if asked.header.is_some() && !by_rtde(names) { &TIMES[..1] } else { &TIMES[..] };
+    let others = by_rtde(names) || names.iter().any(|name| by_lerobot(name));
+    let known = if asked.header.is_some() && !others { &TIMES[..1] } else { &TIMES[..] };
     let found = match asked.map.t.column.as_ref().and_then(|by| by.of(0)) {
         Some(name) => at(name),
         None => known.iter().find_map(|name| at(name)),

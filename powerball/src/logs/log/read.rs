@@ -5,7 +5,7 @@
 use super::columns::{Asked, Columns};
 use super::map::ColumnMap;
 use super::{Finding, Log, LogError, check, topics};
-use crate::logs::tables::{Format, RowSink, columnar, read_topics, text};
+use crate::logs::tables::{Format, RowSink, columnar, read_dataset, read_topics, text};
 use dyngen::Arm;
 use std::fs::File;
 use std::path::Path;
@@ -63,6 +63,9 @@ pub fn read_log_as(
         Format::Parquet => {
             let opened = File::open(path).map_err(unreadable)?;
             rows(asked, findings, |samples, _| columnar::read(opened, &file, samples).map(|()| false))
+        }
+        Format::LeRobot => {
+            rows(asked, findings, |samples, notes| read_dataset(path, &file, samples, notes).map(|()| false))
         }
         _ => {
             // With other topics left aside; an error names them all.

@@ -4,6 +4,8 @@
 
 #[cfg(feature = "topics")]
 use super::bag;
+#[cfg(feature = "parquet")]
+use super::lerobot;
 use super::table::Table;
 use super::{columnar, text};
 use serde::Serialize;
@@ -20,6 +22,9 @@ pub enum Format {
     Csv,
     /// Columns in Parquet.
     Parquet,
+    /// The folder of a LeRobot dataset.
+    #[serde(rename = "LeRobot")]
+    LeRobot,
     /// A rosbag2 of the storage `mcap`, or any other MCAP.
     #[serde(rename = "MCAP")]
     Mcap,
@@ -73,13 +78,17 @@ impl Format {
     }
 
     /// What the file at a path begins with; of the folder of a recording, its first file, and of a compressed recording
-    /// what is in it.
+    /// what is in it. A folder with a `meta/info.json` is a dataset of LeRobot's, and so is that file.
     ///
     /// # Errors
     /// Where it cannot be read, is empty, or is none of these.
     pub fn of_file(path: &Path) -> Result<Format, LogError> {
         let failed =
             |e: std::io::Error| LogError::of_file(&shown(path), "file", format!("cannot be read: {e}"));
+        #[cfg(feature = "parquet")]
+        if lerobot::folder(path).is_some() {
+            return Ok(Format::LeRobot);
+        }
         #[cfg(feature = "topics")]
         if path.is_dir() {
             return bag::Parts::of(path)?.format();
@@ -145,6 +154,11 @@ pub(crate) fn read_topics(path: &Path, only: Only<'_>) -> Result<Contents, LogEr
             columnar::read(File::open(path).map_err(failed)?, &file, &mut table)?;
             vec![table]
         }
+        Format::LeRobot => {
+            let mut table = Table::new("", "rows");
+            read_dataset(path, &file, &mut table, &mut notes)?;
+            vec![table]
+        }
         Format::Mcap | Format::Rosbag | Format::Bag => topic_tables(path, only, &file, &mut notes)?,
         Format::Npz => npz_tables(path, &file, &mut notes)?,
         Format::Npy => npy_tables(path, &file, &mut notes)?,
@@ -159,6 +173,20 @@ pub(crate) fn read_topics(path: &Path, only: Only<'_>) -> Result<Contents, LogEr
         }
     }
     Ok(Contents { format, tables, notes })
+}
+
+#[cfg(feature = "parquet")]
+pub(crate) use super::lerobot::read as read_dataset;
+
+/// Without Parquet no folder is called one.
+#[cfg(not(feature = "parquet"))]
+pub(crate) fn read_dataset(
+    _: &Path,
+    file: &str,
+    _: &mut impl super::RowSink,
+    _: &mut Vec<Finding>,
+) -> Result<(), LogError> {
+    Err(LogError::of_file(file, "LeRobot", "this build does not read it: enable the feature `parquet`"))
 }
 
 #[cfg(feature = "topics")]

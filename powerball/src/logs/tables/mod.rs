@@ -33,7 +33,7 @@ mod schema;
 mod table;
 pub(crate) mod text;
 
-pub(crate) use contents::read_topics;
+pub(crate) use contents::{read_dataset, read_topics};
 pub use contents::{Contents, Finding, Format, LogError, read_contents};
 #[cfg(feature = "mcap")]
 pub(crate) use mcap_out::from_csv as mcap_from_csv;
