@@ -311,6 +311,51 @@ fn messages_of_any_type_are_read_by_the_definition_in_their_file() {
     assert!(arm.columns.iter().all(|c| !c.name.starts_with("cloud")), "{:?}", arm.names());
 }
 
+/// Messages of Protocol Buffers by mcap-protobuf-support, and objects of JSON: lists with their names, and joints each with
+/// its name.
+#[test]
+fn messages_of_protobuf_and_json_are_read_whatever_names_their_joints() {
+    let (csv, _) = read(&data("log.csv"), "");
+    for (name, topic) in [
+        ("protobuf.mcap", "/state"),
+        ("protobuf.mcap", "/joints"),
+        ("json_forms.mcap", "/joints"),
+        ("json_forms.mcap", "/named"),
+    ] {
+        let (log, findings) = read(&data(name), &format!("{JOINTS}topic = \"{topic}\""));
+        assert_eq!((&log.q, &log.torque), (&csv.q, &csv.torque), "{name} {topic}");
+        // By the messages' own time.
+        let late = |k: usize| (log.t[k] - 1_700_000_000.0 - csv.t[k]).abs();
+        assert!((0..120).all(|k| late(k) < 5e-7), "{name} {topic}");
+        assert!(findings.iter().all(|f| !f.message.contains("could not be read")), "{findings:?}");
+    }
+    let tables = read_contents(&data("protobuf.mcap")).unwrap().tables;
+    let (state, joints) = (&tables[0], &tables[1]);
+    assert_eq!((state.kind.as_str(), joints.kind.as_str()), ("arm.State", "arm.Joints"));
+    let at = |name: &str| state.column(name).unwrap_or_else(|| panic!("{name}: {:?}", state.names()))[77];
+    // Numbers that are zero are not in the message, and zero all the same.
+    let named = ["mode", "on", "count", "force1", "force3", "tip.x", "tip.y", "sent"].map(at);
+    assert_eq!(named, [1.0, 0.0, -77.0, 1.5, 77.0, 77.0, 0.5, 3.5]);
+    assert_eq!(state.column("mode").unwrap()[76], 0.0);
+    assert!(state.columns.iter().all(|c| !c.name.starts_with("cloud")), "{:?}", state.names());
+    // What may be absent, and is, is no number.
+    assert_eq!(joints.names(), ["position.shoulder", "effort.shoulder", "position.elbow", "effort.elbow"]);
+}
+
+// CSV.
+
+/// Whole seconds have no fraction as Python prints them.
+#[test]
+fn dates_are_times_in_csv() {
+    let (csv, _) = read(&data("log.csv"), "");
+    for map in ["", "t.column = \"iso\"", "t.column = \"numpy\""] {
+        let (log, _) = read(&data("dates.csv"), map);
+        assert_eq!((log.t[0], &log.q, &log.torque), (1_700_000_000.0, &csv.q, &csv.torque), "{map}");
+        // Seconds since 1970 have steps of 0.24 µs.
+        assert!(log.t.iter().zip(&csv.t).all(|(a, b)| (a - log.t[0] - b).abs() < 3e-7), "{map}");
+    }
+}
+
 // Parquet.
 
 /// A column's name, and its value in row k.
@@ -552,6 +597,7 @@ fn whatever_a_byte_is_there_is_an_answer() {
     for name in [
         "defined.mcap",
         "xcdr2.mcap",
+        "protobuf.mcap",
         "iron.db3",
         "ros1_lz4.bag",
         "ros1_bz2.bag",

@@ -203,31 +203,18 @@ pub(crate) fn print(text: &str) {
 /// The foot of a page: version, command and time (UTC).
 pub(crate) fn signature(arguments: impl Iterator<Item = String>, now: SystemTime) -> String {
     let seconds = now.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
-    let (year, month, day) = date(seconds / 86_400);
-    let (hour, minute) = (seconds / 3600 % 24, seconds / 60 % 60);
+    let time = jiff::Timestamp::from_second(i64::try_from(seconds).unwrap_or(0)).unwrap_or_default();
     let quoted = |word: &String| match word.contains(|c: char| c.is_whitespace() || c == '\'') {
         true => format!("'{}'", word.replace('\'', "'\\''")),
         false => word.clone(),
     };
     let command: Vec<String> = arguments.skip(1).map(|word| quoted(&word)).collect();
     format!(
-        "{year}-{month:02}-{day:02} {hour:02}:{minute:02} UTC, powerball {}: powerball {}",
+        "{} UTC, powerball {}: powerball {}",
+        time.strftime("%Y-%m-%d %H:%M"),
         env!("CARGO_PKG_VERSION"),
         command.join(" ")
     )
-}
-
-/// Year, month and day of a day since 1970-01-01 (Gregorian calendar; H. Hinnant, "chrono-compatible low-level date
-/// algorithms", `civil_from_days`).
-fn date(days: u64) -> (u64, u64, u64) {
-    let z = days + 719_468;
-    let (era, of_era) = (z / 146_097, z % 146_097);
-    let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
-    let of_year = of_era - (365 * year + year / 4 - year / 100);
-    let month = (5 * of_year + 2) / 153;
-    let day = of_year - (153 * month + 2) / 5 + 1;
-    let month = if month < 10 { month + 3 } else { month - 9 };
-    (400 * era + year + u64::from(month <= 2), month, day)
 }
 
 /// Errors by joint as a table; several spreads side by side.

@@ -10,6 +10,8 @@ mod bag1;
 mod cdr;
 pub(crate) mod columnar;
 mod contents;
+#[cfg(feature = "dates")]
+mod dates;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 #[cfg(feature = "parquet")]
@@ -26,6 +28,8 @@ mod messages;
 mod npz;
 #[cfg(feature = "parquet")]
 mod numbers;
+#[cfg(feature = "mcap")]
+mod protobuf;
 #[cfg(feature = "rosbag")]
 mod rosbag;
 #[cfg(feature = "topics")]
@@ -33,8 +37,8 @@ mod schema;
 mod table;
 pub(crate) mod text;
 
-pub(crate) use contents::{read_dataset, read_topics};
 pub use contents::{Contents, Finding, Format, LogError, read_contents};
+pub(crate) use contents::{read_dataset, read_topics};
 #[cfg(feature = "mcap")]
 pub(crate) use mcap_out::from_csv as mcap_from_csv;
 #[cfg(feature = "mcap")]

@@ -1,5 +1,5 @@
 //! Logs as CSV with a header line, between whose names stand commas, semicolons, tabs or blanks. Where no commas stand
-//! there, numbers may have decimal commas.
+//! there, numbers may have decimal commas. Times may be dates.
 
 use super::table::RowSink;
 use super::{Finding, LogError};
@@ -9,13 +9,14 @@ use std::cell::Cell;
 pub(super) const HEAD: usize = 4096;
 
 /// What files begin with that are no logs, and what they are.
-const OTHERS: [(&[u8], &str); 6] = [
+const OTHERS: [(&[u8], &str); 7] = [
     (b"\x89PNG", "a PNG picture"),
     (b"\xff\xd8\xff", "a JPEG picture"),
     (b"%PDF", "a PDF"),
     (b"\x1f\x8b", "compressed by gzip: unpack it first"),
     (b"\x28\xb5\x2f\xfd", "compressed by zstd: unpack it first"),
     (b"\x7fELF", "a program"),
+    (b"version https://git-lfs", "what Git leaves in place of a large file: fetch it by git lfs pull"),
 ];
 
 /// Why a file that begins so is no text: in words, after its name.
@@ -33,6 +34,17 @@ pub(super) fn no_text(head: &[u8]) -> Option<String> {
     head.iter().any(is_control).then(|| {
         "is no log: it holds bytes that are no text, and begins like no Parquet, MCAP, bag, npz, mat or HDF5".to_string()
     })
+}
+
+/// A number, or the time of a date in s.
+pub(crate) fn number(text: &str) -> Option<f64> {
+    let date = || {
+        #[cfg(feature = "dates")]
+        return super::dates::seconds(text);
+        #[cfg(not(feature = "dates"))]
+        None
+    };
+    text.parse().ok().or_else(date)
 }
 
 /// Hands the lines of a CSV file over; whether the last one is torn. Unreadable lines are named in
@@ -90,7 +102,7 @@ pub(crate) fn read(
             // A torn line's last number may be cut off too.
             let field = record.get(k).filter(|_| !last_torn)?;
             let text = std::str::from_utf8(field).ok()?;
-            text.parse().ok().or_else(|| {
+            number(text).or_else(|| {
                 let value = text.replacen(',', ".", 1).parse().ok()?;
                 decimal_commas.set(true);
                 Some(value)
