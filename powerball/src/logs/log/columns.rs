@@ -1,7 +1,7 @@
 //! A log's quantities found by the names of its columns.
 
 use super::map::{ByJoint, ColumnMap};
-use super::read::Effort;
+use super::read::{Effort, Raw};
 use super::{Finding, LogError};
 use dyngen::Arm;
 use std::collections::HashMap;
@@ -58,6 +58,19 @@ impl Group {
         number: &'a impl Fn(usize) -> Option<f64>,
     ) -> impl Iterator<Item = Option<f64>> + 'a {
         self.at.iter().zip(&self.factor).map(move |(k, factor)| Some(number(*k)? * factor))
+    }
+}
+
+impl Group {
+    /// Its columns, moved out of those of a table; the last use of one takes it.
+    fn take(&self, values: &mut [Vec<f64>], uses: &mut [usize]) -> Vec<Vec<f64>> {
+        let one = |(at, factor): (&usize, &f64)| {
+            uses[*at] -= 1;
+            let mut own = if uses[*at] == 0 { std::mem::take(&mut values[*at]) } else { values[*at].clone() };
+            own.iter_mut().for_each(|v| *v = if v.is_finite() { *v * factor } else { f64::NAN });
+            own
+        };
+        self.at.iter().zip(&self.factor).map(one).collect()
     }
 }
 
@@ -299,6 +312,29 @@ impl Columns {
             values.extend(group.values(number).map(|value| value.unwrap_or(f64::NAN)));
         }
         Some(values)
+    }
+
+    /// How often each column of a table is used; those that are not are dropped.
+    pub(super) fn uses(&self, values: &mut [Vec<f64>]) -> Vec<usize> {
+        let mut uses = vec![0; values.len()];
+        self.groups().flat_map(|group| &group.at).for_each(|at| uses[*at] += 1);
+        values.iter_mut().zip(&uses).filter(|(_, uses)| **uses == 0).for_each(|(own, _)| *own = Vec::new());
+        uses
+    }
+
+    /// Moves the columns of a table into samples.
+    pub(super) fn take(&self, values: &mut [Vec<f64>], uses: &mut [usize], raw: &mut Raw) {
+        raw.t = self.t.take(values, uses).pop().unwrap_or_default();
+        raw.q = self.q.take(values, uses);
+        raw.effort = self.torque.take(values, uses);
+        let mut optional = |group: &Option<Group>| group.as_ref().map(|group| group.take(values, uses));
+        (raw.temperature, raw.motor) = (optional(&self.temperature), optional(&self.motor));
+        raw.dq = optional(&self.dq).unwrap_or_else(|| vec![Vec::new(); raw.q.len()]);
+    }
+
+    /// Whether a sample has a number for all that it needs.
+    pub(super) fn are_whole(&self, number: &impl Fn(usize) -> Option<f64>) -> bool {
+        [&self.t, &self.q, &self.torque].into_iter().flat_map(|group| &group.at).all(|k| number(*k).is_some())
     }
 
     /// Whether a sample holds anything of this arm.

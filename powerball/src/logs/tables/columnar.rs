@@ -121,10 +121,30 @@ impl<'s, S: RowSink> Rows<'s, S> {
     }
 }
 
-/// A step of the library's, which panics at some of what is damaged within a page.
+/// A step of the library's, which panics at some of what is damaged within a page: that is an error like any other, and prints
+/// nothing.
 #[cfg(feature = "parquet")]
 fn guarded<T, E: std::fmt::Display>(step: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
-    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(step)) {
+    use std::cell::Cell;
+    use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
+    use std::sync::Once;
+    thread_local! {
+        static GUARDED: Cell<bool> = const { Cell::new(false) };
+    }
+    static HOOK: Once = Once::new();
+    // Panics anywhere else go the way that they went before.
+    HOOK.call_once(|| {
+        let before = take_hook();
+        set_hook(Box::new(move |panic| {
+            if !GUARDED.get() {
+                before(panic)
+            }
+        }));
+    });
+    GUARDED.set(true);
+    let done = catch_unwind(AssertUnwindSafe(step));
+    GUARDED.set(false);
+    match done {
         Ok(done) => done.map_err(|e| e.to_string()),
         Err(_) => Err("a page is damaged".into()),
     }

@@ -104,6 +104,12 @@ impl Topics {
         self.topics.iter().any(|t| t.ids.contains(&id) && !matches!(t.reader, Reader::Other))
     }
 
+    /// Whether messages of other topics need not be counted.
+    #[cfg(feature = "mcap")]
+    pub(super) fn counts_no_others(&self) -> bool {
+        self.only.is_some()
+    }
+
     /// The numbers of the topics that are read.
     #[cfg(feature = "rosbag")]
     pub(super) fn ids_read(&self) -> impl Iterator<Item = i64> {

@@ -14,6 +14,8 @@ mod contents;
 mod dates;
 #[cfg(feature = "hdf5")]
 mod hdf5;
+#[cfg(feature = "mcap")]
+pub(crate) mod layouts;
 #[cfg(feature = "parquet")]
 mod lerobot;
 #[cfg(feature = "mat")]
@@ -28,8 +30,11 @@ mod messages;
 mod npz;
 #[cfg(feature = "parquet")]
 mod numbers;
+mod place;
 #[cfg(feature = "mcap")]
 mod protobuf;
+#[cfg(feature = "remote")]
+mod remote;
 #[cfg(feature = "rosbag")]
 mod rosbag;
 #[cfg(feature = "topics")]
@@ -43,5 +48,6 @@ pub(crate) use contents::{read_dataset, read_topics};
 pub(crate) use mcap_out::from_csv as mcap_from_csv;
 #[cfg(feature = "mcap")]
 pub use mcap_out::{Channel, JointState, McapWriter};
+pub(crate) use place::Place;
 pub(crate) use table::RowSink;
 pub use table::{Column, Table};

@@ -4,9 +4,13 @@
 use super::table::RowSink;
 use super::{Finding, LogError};
 use std::cell::Cell;
+use std::io::Read;
 
 /// So many bytes show whether a file is text.
 pub(super) const HEAD: usize = 4096;
+
+/// The names of the columns stand within so many bytes.
+const LONGEST_HEADER: u64 = 1 << 20;
 
 /// What files begin with that are no logs, and what they are.
 const OTHERS: [(&[u8], &str); 7] = [
@@ -47,18 +51,23 @@ pub(crate) fn number(text: &str) -> Option<f64> {
     text.parse().ok().or_else(date)
 }
 
-/// Hands the lines of a CSV file over; whether the last one is torn. Unreadable lines are named in
+/// Hands the lines of a CSV file over, which stays on the disk; whether the last one is torn. Unreadable lines are named in
 /// `findings`.
 pub(crate) fn read(
-    bytes: &[u8],
+    mut input: impl Read,
     file: &str,
     rows: &mut impl RowSink,
     findings: &mut Vec<Finding>,
 ) -> Result<bool, LogError> {
-    if let Some(what) = no_text(&bytes[..bytes.len().min(HEAD)]) {
+    let mut head = Vec::new();
+    (&mut input)
+        .take(LONGEST_HEADER)
+        .read_to_end(&mut head)
+        .map_err(|e| LogError::of_file(file, "file", format!("cannot be read: {e}")))?;
+    if let Some(what) = no_text(&head[..head.len().min(HEAD)]) {
         return Err(LogError::of_file(file, "file", what));
     }
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let bytes = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&head);
     let delimiter = delimiter(bytes);
     let error = |line: Option<usize>, quantity: &str, message: String| Finding {
         file: file.to_string(),
@@ -66,8 +75,11 @@ pub(crate) fn read(
         quantity: quantity.to_string(),
         message,
     };
-    let mut reader =
-        csv::ReaderBuilder::new().delimiter(delimiter).flexible(true).trim(csv::Trim::All).from_reader(bytes);
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(delimiter)
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .from_reader(bytes.chain(input));
     let header = reader
         .byte_headers()
         .map_err(|e| LogError(vec![error(Some(1), "header", format!("cannot be read: {e}"))]))?
