@@ -5,7 +5,9 @@
 use super::columns::{Asked, Columns};
 use super::map::ColumnMap;
 use super::{Finding, Log, LogError, check, topics};
-use crate::logs::tables::{Format, Place, RowSink, Table, columnar, read_dataset, read_topics, text};
+use crate::logs::tables::{
+    Format, Place, RowSink, Table, columnar, make_room, read_dataset, read_topics, text,
+};
 use dyngen::Arm;
 use std::fs::File;
 use std::io::Read;
@@ -173,6 +175,15 @@ impl Raw {
         }
     }
 
+    /// Makes room for so many more samples.
+    fn expect(&mut self, samples: usize) {
+        make_room(&mut self.line, samples);
+        let motor = self.motor.iter_mut().flatten().chain(&mut self.dq);
+        let optional = self.temperature.iter_mut().flatten().chain(motor);
+        let by_joint = self.q.iter_mut().chain(&mut self.effort).chain(optional);
+        by_joint.chain([&mut self.t]).for_each(|values| make_room(values, samples));
+    }
+
     pub(super) fn push(&mut self, line: usize, values: &[f64]) {
         let mut values = values.iter().copied();
         self.line.push(line);
@@ -306,6 +317,12 @@ impl RowSink for Samples<'_> {
         self.found = Some((columns, raw));
         self.names = names.to_vec();
         Ok(())
+    }
+
+    fn expect(&mut self, rows: usize) {
+        if let Some((_, raw)) = &mut self.found {
+            raw.expect(rows);
+        }
     }
 
     fn row(&mut self, line: usize, number: &dyn Fn(usize) -> Option<f64>) {

@@ -15,6 +15,9 @@ use parquet::file::metadata::ParquetMetaData;
 #[cfg(feature = "parquet")]
 use parquet::file::reader::ChunkReader;
 
+/// A file that claims more rows does not have them.
+#[cfg(feature = "parquet")]
+const ROWS_A_BYTE: u64 = 64;
 /// So many rows are in memory at a time.
 #[cfg(feature = "parquet")]
 const ROWS: usize = 8192;
@@ -38,6 +41,8 @@ pub(super) struct Rows<'s, S> {
     count: usize,
     /// By the first rows.
     known: Option<Known>,
+    /// Of the file that is read.
+    expected: usize,
     /// The columns of a file without rows.
     fields: Vec<String>,
 }
@@ -52,7 +57,7 @@ struct Known {
 #[cfg(feature = "parquet")]
 impl<'s, S: RowSink> Rows<'s, S> {
     pub(super) fn new(sink: &'s mut S) -> Self {
-        Rows { sink, count: 0, known: None, fields: Vec::new() }
+        Rows { sink, count: 0, known: None, expected: 0, fields: Vec::new() }
     }
 
     /// Hands the rows of a file over.
@@ -72,6 +77,8 @@ impl<'s, S: RowSink> Rows<'s, S> {
             .map_err(|e| unreadable(None, &e))?;
         within(builder.metadata(), length).map_err(|e| unreadable(None, &e))?;
         self.fields = builder.schema().fields().iter().map(|field| field.name().clone()).collect();
+        let rows = u64::try_from(builder.metadata().file_metadata().num_rows()).unwrap_or(0);
+        self.expected = usize::try_from(rows.min(length.saturating_mul(ROWS_A_BYTE))).unwrap_or(0);
         let mut reader =
             guarded(|| builder.with_batch_size(ROWS).build()).map_err(|e| unreadable(None, &e))?;
         let before = self.count;
@@ -92,6 +99,7 @@ impl<'s, S: RowSink> Rows<'s, S> {
                 let named = columns.iter().zip(&widths).map(|((name, _), width)| (name.as_str(), *width));
                 let (names, dataset) = Dataset::of(std::path::Path::new(file), named);
                 self.sink.begin(&names)?;
+                self.sink.expect(self.expected);
                 let columns =
                     columns.iter().zip(&widths).map(|((name, _), w)| (name.clone(), w.unwrap_or(1)));
                 self.known.insert(Known { columns: columns.collect(), dataset })

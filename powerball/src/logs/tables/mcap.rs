@@ -18,6 +18,8 @@ use std::path::Path;
 /// A chunk that claims to be larger than this, bytes, is damaged.
 const LARGEST_CHUNK: usize = 1 << 30;
 
+/// Bytes of a message that Zstandard compressed very well.
+const SHORTEST: u64 = 2;
 /// So many bytes are read ahead where records follow each other.
 const AHEAD: u64 = 256 << 10;
 
@@ -176,6 +178,11 @@ impl<'t> Records<'t> {
                 kind.unwrap_or_default(),
                 &channel.message_encoding,
             );
+        }
+        // No message is shorter.
+        let most = file.length()? / SHORTEST;
+        for (id, count) in &stats.channel_message_counts {
+            self.topics.expect(i64::from(*id), usize::try_from((*count).min(most)).unwrap_or(0));
         }
         for index in &summary.chunk_indexes {
             self.indexed_chunk(file, index)?;

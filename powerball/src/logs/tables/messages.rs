@@ -39,6 +39,8 @@ struct Topic {
     reader: Reader,
     ros1: bool,
     table: Table,
+    /// How many messages there are, about; 0 where nobody says it.
+    expected: usize,
 }
 
 /// What a file says of the type of messages: its name, the language of its definition, and the definition.
@@ -85,7 +87,7 @@ impl Topics {
         }
         let left_aside = self.only.as_ref().is_some_and(|only| !only.iter().any(|own| own == name));
         let reader = if left_aside { Reader::Other } else { Reader::of(of, encoding) };
-        self.topics.push(Topic { ids: vec![id], reader, ros1, table: Table::new(name, shown) });
+        self.topics.push(Topic { ids: vec![id], reader, ros1, table: Table::new(name, shown), expected: 0 });
     }
 
     /// Begins another file of the same recording: its numbers of topics are its own.
@@ -104,6 +106,14 @@ impl Topics {
         self.topics.iter().any(|t| t.ids.contains(&id) && !matches!(t.reader, Reader::Other))
     }
 
+    /// Says about how many messages of a topic follow.
+    #[cfg(feature = "mcap")]
+    pub(super) fn expect(&mut self, id: i64, messages: usize) {
+        if let Some(topic) = self.topics.iter_mut().find(|t| t.ids.contains(&id)) {
+            topic.expected += messages;
+        }
+    }
+
     /// Whether messages of other topics need not be counted.
     #[cfg(feature = "mcap")]
     pub(super) fn counts_no_others(&self) -> bool {
@@ -120,7 +130,7 @@ impl Topics {
     /// Takes a message in; `received` in nanoseconds.
     pub(super) fn take(&mut self, id: i64, received: i64, message: &[u8]) {
         let Some(topic) = self.topics.iter_mut().find(|t| t.ids.contains(&id)) else { return };
-        let mut row = topic.table.begin_row(1e-9 * received as f64);
+        let mut row = topic.table.begin_row(1e-9 * received as f64, topic.expected);
         let unpacked = match self.compressed && !matches!(topic.reader, Reader::Other) {
             true => match zstd::decode_all(message) {
                 Ok(unpacked) => Some(unpacked),

@@ -49,5 +49,5 @@ pub(crate) use mcap_out::from_csv as mcap_from_csv;
 #[cfg(feature = "mcap")]
 pub use mcap_out::{Channel, JointState, McapWriter};
 pub(crate) use place::Place;
-pub(crate) use table::RowSink;
 pub use table::{Column, Table};
+pub(crate) use table::{RowSink, make_room};
