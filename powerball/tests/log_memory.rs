@@ -13,7 +13,7 @@ const JOINTS: usize = 7;
 /// Of the arrays' size, at the peak.
 const MOST: f64 = 1.5;
 /// What libraries hold whatever a log's size, MB: buffers, a row group, windows of decompression.
-const FIXED_MB: f64 = 24.0;
+const FIXED_MB: f64 = 8.0;
 
 fn arm() -> dyngen::Arm {
     let joint = |k| {
