@@ -198,7 +198,7 @@ fn topic_tables(
 ) -> Result<Vec<Table>, LogError> {
     let mut topics = super::messages::Topics::of(only);
     #[cfg(feature = "remote")]
-    if let super::remote::Afar::Read(object) = &mut place.afar {
+    if let super::remote::Remote::Read(object) = &mut place.remote {
         let wrong = super::mcap::read_from(object, &mut topics)
             .map_err(|e| LogError::of_file(file, "MCAP", format!("cannot be read: {e}")))?;
         notes.extend(wrong.into_iter().map(|wrong| Finding::of_file(file, "MCAP", wrong)));

@@ -12,7 +12,7 @@ pub(crate) struct Place {
     pub(crate) path: PathBuf,
     pub(crate) format: Format,
     #[cfg(feature = "remote")]
-    pub(super) afar: super::remote::Afar,
+    pub(super) remote: super::remote::Remote,
 }
 
 impl Place {
@@ -27,7 +27,7 @@ impl Place {
                 path: path.to_path_buf(),
                 format: Format::of_file(path)?,
                 #[cfg(feature = "remote")]
-                afar: super::remote::Afar::No,
+                remote: super::remote::Remote::No,
             }),
         }
     }
@@ -39,8 +39,8 @@ impl Place {
 
     #[cfg(feature = "remote")]
     fn at(address: &str) -> Result<Place, LogError> {
-        let (path, format, afar) = super::remote::reached(address)?;
-        Ok(Place { path, format, afar })
+        let (path, format, remote) = super::remote::reached(address)?;
+        Ok(Place { path, format, remote })
     }
 
     #[cfg(not(feature = "remote"))]

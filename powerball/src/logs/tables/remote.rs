@@ -24,7 +24,7 @@ const RETRIES: usize = 2;
 const PIECE: u64 = 16 << 20;
 
 /// A log that is not here.
-pub(super) enum Afar {
+pub(super) enum Remote {
     /// It is here.
     No,
     /// It was copied into a folder, which goes with this.
@@ -42,7 +42,7 @@ pub(super) struct Object {
 }
 
 /// Reaches an address: the path of its copy, its format, and what it is.
-pub(super) fn reached(address: &str) -> std::result::Result<(PathBuf, Format, Afar), LogError> {
+pub(super) fn reached(address: &str) -> std::result::Result<(PathBuf, Format, Remote), LogError> {
     let failed = |e: String| LogError::of_file(address, "address", e);
     let runtime = Builder::new_current_thread().enable_all().build().map_err(|e| failed(e.to_string()))?;
     let (store, location) = store(address).map_err(|e| failed(shown(&e, address)))?;
@@ -59,7 +59,7 @@ pub(super) fn reached(address: &str) -> std::result::Result<(PathBuf, Format, Af
     };
     let mut object = Object { store, location, runtime, size };
     if head.is_some_and(|head| Format::of(&head) == Format::Mcap) {
-        return Ok((address.into(), Format::Mcap, Afar::Read(object)));
+        return Ok((address.into(), Format::Mcap, Remote::Read(object)));
     }
     let folder = tempfile::tempdir().map_err(|e| failed(e.to_string()))?;
     // An array is called by its file's name.
@@ -69,7 +69,7 @@ pub(super) fn reached(address: &str) -> std::result::Result<(PathBuf, Format, Af
         reasons.iter_mut().for_each(|reason| reason.file = address.to_string());
         LogError(reasons)
     })?;
-    Ok((path, format, Afar::Copied { _folder: folder }))
+    Ok((path, format, Remote::Copied { _folder: folder }))
 }
 
 fn store(address: &str) -> Result<(Box<dyn ObjectStore>, Location)> {
