@@ -311,6 +311,51 @@ fn messages_of_any_type_are_read_by_the_definition_in_their_file() {
     assert!(arm.columns.iter().all(|c| !c.name.starts_with("cloud")), "{:?}", arm.names());
 }
 
+/// Messages of Protocol Buffers by mcap-protobuf-support, and objects of JSON: lists with their names, and joints each with
+/// its name.
+#[test]
+fn messages_of_protobuf_and_json_are_read_whatever_names_their_joints() {
+    let (csv, _) = read(&data("log.csv"), "");
+    for (name, topic) in [
+        ("protobuf.mcap", "/state"),
+        ("protobuf.mcap", "/joints"),
+        ("json_forms.mcap", "/joints"),
+        ("json_forms.mcap", "/named"),
+    ] {
+        let (log, findings) = read(&data(name), &format!("{JOINTS}topic = \"{topic}\""));
+        assert_eq!((&log.q, &log.torque), (&csv.q, &csv.torque), "{name} {topic}");
+        // By the messages' own time.
+        let late = |k: usize| (log.t[k] - 1_700_000_000.0 - csv.t[k]).abs();
+        assert!((0..120).all(|k| late(k) < 5e-7), "{name} {topic}");
+        assert!(findings.iter().all(|f| !f.message.contains("could not be read")), "{findings:?}");
+    }
+    let tables = read_contents(&data("protobuf.mcap")).unwrap().tables;
+    let (state, joints) = (&tables[0], &tables[1]);
+    assert_eq!((state.kind.as_str(), joints.kind.as_str()), ("arm.State", "arm.Joints"));
+    let at = |name: &str| state.column(name).unwrap_or_else(|| panic!("{name}: {:?}", state.names()))[77];
+    // Numbers that are zero are not in the message, and zero all the same.
+    let named = ["mode", "on", "count", "force1", "force3", "tip.x", "tip.y", "sent"].map(at);
+    assert_eq!(named, [1.0, 0.0, -77.0, 1.5, 77.0, 77.0, 0.5, 3.5]);
+    assert_eq!(state.column("mode").unwrap()[76], 0.0);
+    assert!(state.columns.iter().all(|c| !c.name.starts_with("cloud")), "{:?}", state.names());
+    // What may be absent, and is, is no number.
+    assert_eq!(joints.names(), ["position.shoulder", "effort.shoulder", "position.elbow", "effort.elbow"]);
+}
+
+// CSV.
+
+/// Whole seconds have no fraction as Python prints them.
+#[test]
+fn dates_are_times_in_csv() {
+    let (csv, _) = read(&data("log.csv"), "");
+    for map in ["", "t.column = \"iso\"", "t.column = \"numpy\""] {
+        let (log, _) = read(&data("dates.csv"), map);
+        assert_eq!((log.t[0], &log.q, &log.torque), (1_700_000_000.0, &csv.q, &csv.torque), "{map}");
+        // Seconds since 1970 have steps of 0.24 µs.
+        assert!(log.t.iter().zip(&csv.t).all(|(a, b)| (a - log.t[0] - b).abs() < 3e-7), "{map}");
+    }
+}
+
 // Parquet.
 
 /// A column's name, and its value in row k.
@@ -359,6 +404,58 @@ fn every_type_of_parquet_that_holds_numbers_is_numbers() {
             assert!(same, "{name} {k}: {own} for {wanted}");
         }
     }
+}
+
+// LeRobot.
+
+/// A dataset's folder, or its description, of both layouts: episodes are pieces, joints go by name, and what LeRobot does
+/// not say is asked for.
+#[test]
+fn datasets_of_lerobot_are_read_as_they_are() {
+    let (csv, _) = read(&data("log.csv"), "");
+    let degrees = format!("{JOINTS}q.unit = \"deg\"");
+    for name in ["lerobot_v21", "lerobot_v21/meta/info.json", "lerobot_v30"] {
+        let (log, findings) = read(&data(name), &degrees);
+        assert_eq!(log.pieces, [0..40, 40..90, 90..120], "{name}");
+        assert_eq!(log.torque, csv.torque, "{name}");
+        let off = |(a, b): (&f64, &f64)| (a - b).abs();
+        let worst = log.q.iter().flatten().zip(csv.q.iter().flatten()).map(off).fold(0.0, f64::max);
+        assert!(worst < 1e-7, "{name}: {worst}");
+        for piece in &log.pieces {
+            let own = |k: usize| log.t[k] - log.t[piece.start] - 0.01 * (k - piece.start) as f64;
+            assert!(piece.clone().all(|k| own(k).abs() < 1e-6), "{name}");
+        }
+        let told = findings.iter().map(|f| format!("{f}\n")).collect::<String>();
+        assert!(told.contains("3 episodes") && told.contains("even frames at 100 Hz"), "{told}");
+    }
+    let asked = |path: &Path, map: &str| {
+        let map = ColumnMap::parse(map, "map").unwrap();
+        Log::read_as(path, &arm(), &map).unwrap_err().to_string()
+    };
+    let error = asked(&data("lerobot_v30"), JOINTS);
+    assert!(error.contains("in which unit observation.state is"), "{error}");
+    // Without torques.
+    let error = asked(&data("lerobot_v30"), &format!("{degrees}\ntau.column = \"observation.load\""));
+    assert!(
+        error.contains("missing: observation.load") && error.contains("`action` is a set-point"),
+        "{error}"
+    );
+
+    // Not all of it is there.
+    let folder = folder("lerobot");
+    std::fs::create_dir_all(folder.join("meta")).unwrap();
+    std::fs::copy(data("lerobot_v30/meta/info.json"), folder.join("meta/info.json")).unwrap();
+    std::fs::create_dir_all(folder.join("data/chunk-000")).unwrap();
+    assert!(asked(&folder, &degrees).contains("has no Parquet file"), "{}", asked(&folder, &degrees));
+    let file = folder.join("data/chunk-000/file-000.parquet");
+    std::fs::write(&file, "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n").unwrap();
+    assert!(asked(&folder, &degrees).contains("git lfs pull"), "{}", asked(&folder, &degrees));
+    std::fs::copy(data("lerobot_v30/data/chunk-000/file-000.parquet"), &file).unwrap();
+    let told = self::told(&read_contents(&folder).unwrap());
+    assert!(told.contains("counts 3 episodes, and 2 are there"), "{told}");
+    // A file of another dataset among them.
+    std::fs::copy(data("types.parquet"), folder.join("data/chunk-000/file-001.parquet")).unwrap();
+    assert!(asked(&folder, &degrees).contains("other columns"), "{}", asked(&folder, &degrees));
 }
 
 // NumPy.
@@ -500,6 +597,7 @@ fn whatever_a_byte_is_there_is_an_answer() {
     for name in [
         "defined.mcap",
         "xcdr2.mcap",
+        "protobuf.mcap",
         "iron.db3",
         "ros1_lz4.bag",
         "ros1_bz2.bag",

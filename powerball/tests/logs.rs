@@ -73,15 +73,15 @@ fn every_format_comes_to_the_same_log_whatever_the_order_of_its_joints() {
 #[test]
 fn a_dataset_of_lists_is_a_log_of_episodes() {
     let (csv, _) = read("log.csv", "").unwrap();
-    let columns =
-        "t.column = \"timestamp\"\nq.column = \"observation.state\"\ntau.column = \"observation.effort\"\n";
+    let columns = "t.column = \"timestamp\"\nq = { column = \"observation.state\", unit = \"rad\" }\n\
+        tau.column = \"observation.effort\"\n";
     let file = "dataset/data/chunk-000/file-000.parquet";
     let (log, _) = read(file, &format!("{JOINTS}{columns}")).unwrap();
     assert_eq!((log.t.len(), log.pieces.len()), (120, 2));
     assert_eq!((&log.q, &log.torque), (&csv.q, &csv.torque));
-    // The second episode begins a second after the first one has ended; its time is in single precision.
+    // The second episode begins ten seconds after the first one has ended; its time is in single precision.
     let step = |k: usize| log.t[k + 1] - log.t[k];
-    assert!((step(59) - 1.0).abs() < 1e-6 && (step(60) - 0.01).abs() < 1e-6);
+    assert!((step(59) - 10.0).abs() < 1e-6 && (step(60) - 0.01).abs() < 1e-6);
     // Without its description they are numbered, and the numbers are not the arm's order: it is the file's.
     let copy = std::env::temp_dir().join(format!("powerball_lists_{}.parquet", std::process::id()));
     std::fs::copy(data(file), &copy).unwrap();
@@ -272,8 +272,50 @@ fn a_bag_in_the_order_of_the_alphabet_is_identified_in_the_order_of_the_chain() 
     let tables = read_contents(Path::new(&torque)).unwrap().tables;
     let of = |name: &str| tables[1].column(name).unwrap();
     assert_eq!((tables[0].name.as_str(), tables[1].name.as_str()), ("/joint_states", "/torque/joint1"));
+    layouts_name_what_is_there(Path::new(&torque), &["measured", "predicted", "residual"]);
     for ((measured, predicted), left) in of("measured").iter().zip(of("predicted")).zip(of("residual")) {
         assert!((measured - predicted - left).abs() < 1e-9);
+    }
+}
+
+/// Every line that the layouts beside an MCAP draw is a column of a topic of it, and the last parts of their names are these.
+fn layouts_name_what_is_there(mcap: &Path, members: &[&str]) {
+    let tables = read_contents(mcap).unwrap().tables;
+    let has = |topic: &str, column: &str| {
+        tables.iter().any(|t| t.name == topic && t.columns.iter().any(|c| c.name.starts_with(column)))
+    };
+    let layout = std::fs::read_to_string(mcap.with_extension("foxglove.json")).unwrap();
+    let layout: Value = serde_json::from_str(&layout).unwrap();
+    let plots = layout["configById"].as_object().unwrap();
+    let paths: Vec<&str> = plots
+        .values()
+        .flat_map(|plot| plot["paths"].as_array().unwrap().iter().map(|path| path["value"].as_str().unwrap()))
+        .collect();
+    let place = |path: &str| path.split(['[', ']']).nth(1).map(|k| k.parse::<usize>().unwrap());
+    let states = tables.iter().find(|t| t.name == "/joint_states").unwrap().names();
+    for path in &paths {
+        let (topic, rest) = path.split_once('.').unwrap();
+        let field = rest.split(['[', '.']).next().unwrap();
+        assert!(has(topic, field), "{path}");
+        let own = states.iter().filter(|name| name.starts_with(field)).count();
+        assert!(place(path).is_none_or(|k| k < own), "{path}");
+    }
+    // Every panel is shown, and only once.
+    let shown = layout["layout"].to_string();
+    assert!(plots.keys().all(|id| shown.matches(&format!("\"{id}\"")).count() == 1), "{shown}");
+    let text = std::fs::read_to_string(mcap.with_extension("plotjuggler.xml")).unwrap();
+    let curves: Vec<&str> =
+        text.split("<curve name=\"").skip(1).map(|c| c.split('"').next().unwrap()).collect();
+    for curve in &curves {
+        let (above, last) = curve.rsplit_once('/').unwrap();
+        let joint = above.strip_prefix("/joint_states/");
+        let there =
+            joint.map_or_else(|| has(above, last), |joint| has("/joint_states", &format!("{last}.{joint}")));
+        assert!(there, "{curve}");
+    }
+    for member in members {
+        let of = |name: &&str| name.contains(member);
+        assert!(paths.iter().any(of) && curves.iter().any(of), "{member}: {paths:?} {curves:?}");
     }
 }
 
@@ -290,6 +332,7 @@ fn logs_go_out_in_every_format_and_come_back() {
         // Temperatures are no joint states.
         assert_eq!(back.temperature.is_some(), name != "log.mcap");
     }
+    layouts_name_what_is_there(&folder.join("log.mcap"), &["position", "effort"]);
 }
 
 #[test]

@@ -8,6 +8,7 @@ use crate::logs::Progress;
 use crate::logs::log::{ColumnMap, Log, notes_of};
 use crate::logs::regression::DataOptions;
 use crate::logs::summary::{Bands, Summary};
+use crate::logs::tables::Place;
 use dyngen::Arm;
 use std::borrow::Cow;
 use std::io::Read;
@@ -86,6 +87,10 @@ impl<'a> Source<'a> {
 /// # Errors
 /// Why the file cannot be read, in words.
 pub(super) fn read_summary(file: &Path) -> Result<Option<Bands>, String> {
+    // What is at an address is a log.
+    if Place::address(file).is_some() {
+        return Ok(None);
+    }
     let read = |mut f: std::fs::File| {
         let mut head = vec![0; 64];
         let count = f.read(&mut head)?;

@@ -1,10 +1,12 @@
 """Makes the logs of tests/log_formats.rs: the samples of samples.py, as others left or stored them.
 
-    pip install numpy pyarrow mcap mcap-ros2-support cyclonedds rosbags zstandard h5py hdf5storage && python formats.py
+    pip install numpy pyarrow mcap mcap-ros2-support mcap-protobuf-support cyclonedds rosbags zstandard h5py hdf5storage && python formats.py
 """
 
 import datetime
 import decimal
+import json
+import math
 import os
 import pathlib
 import shutil
@@ -23,8 +25,10 @@ import rosbags.rosbag2
 import zstandard
 from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.types import float64, int32, sequence, uint32
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
+from mcap_protobuf.writer import Writer as ProtobufWriter
 from mcap_ros2.writer import Writer as RosWriter
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -227,6 +231,100 @@ def defined():
         writer.finish()
 
 
+def protobuf_types():
+    """An arm's state as lists with their names, and joints each with its name, as foxglove.JointStates has them."""
+    kinds = {"double": 1, "float": 2, "int64": 3, "int32": 5, "bool": 8, "string": 9, "message": 11, "uint32": 13, "enum": 14}
+    file = descriptor_pb2.FileDescriptorProto(
+        name="arm.proto", package="arm", syntax="proto3", dependency=["google/protobuf/timestamp.proto"]
+    )
+    mode = file.enum_type.add(name="Mode")
+    for number, name in enumerate(["IDLE", "RUN"]):
+        mode.value.add(name=name, number=number)
+
+    def message(name, fields):
+        own = file.message_type.add(name=name)
+        for number, (field, kind, of, repeated) in enumerate(fields, 1):
+            own.field.add(name=field, number=number, type=kinds[kind], type_name=of, label=3 if repeated else 1)
+
+    def optional(name, fields):
+        for field in next(m for m in file.message_type if m.name == name).field:
+            if field.name in fields:
+                own = next(m for m in file.message_type if m.name == name)
+                own.oneof_decl.add(name=f"_{field.name}")
+                field.oneof_index, field.proto3_optional = len(own.oneof_decl) - 1, True
+
+    time = ".google.protobuf.Timestamp"
+    message("Point", [("x", "double", None, False), ("y", "float", None, False)])
+    message("Header", [("stamp", "message", time, False), ("frame_id", "string", None, False)])
+    message(
+        "State",
+        [
+            ("header", "message", ".arm.Header", False),
+            ("joint_names", "string", None, True),
+            ("position", "double", None, True),
+            ("effort", "double", None, True),
+            ("mode", "enum", ".arm.Mode", False),
+            ("count", "int64", None, False),
+            ("force", "float", None, True),
+            ("tip", "message", ".arm.Point", False),
+            ("cloud", "message", ".arm.Point", True),
+            ("sent", "message", time, False),
+            ("on", "bool", None, False),
+        ],
+    )
+    message(
+        "Joint",
+        [("name", "string", None, False), *((q, "double", None, False) for q in ("position", "velocity", "effort"))],
+    )
+    optional("Joint", ["velocity", "effort"])
+    message("Joints", [("timestamp", "message", time, False), ("joints", "message", ".arm.Joint", True)])
+    pool = descriptor_pool.DescriptorPool()
+    pool.AddSerializedFile(timestamp_pb2.DESCRIPTOR.serialized_pb)
+    pool.Add(file)
+    return [message_factory.GetMessageClass(pool.FindMessageTypeByName(f"arm.{name}")) for name in ("State", "Joints")]
+
+
+def protobuf():
+    State, Joints = protobuf_types()
+    with open("protobuf.mcap", "wb") as out:
+        writer = ProtobufWriter(out, chunk_size=8192)
+        for k in range(SAMPLES):
+            names, q, _, tau = turned(k)
+            at = {"seconds": START + k // 100, "nanos": k % 100 * 10_000_000}
+            state = State(
+                header={"stamp": at, "frame_id": "base"}, joint_names=names, position=q, effort=tau, mode=k % 2, count=-k,
+                force=[1.5, -2.0, k], tip={"x": k, "y": 0.5}, cloud=[{"x": 1.0}] * (k % 3),
+                sent={"seconds": 3, "nanos": 500_000_000}, on=k % 2 == 0,
+            )  # fmt: skip
+            # A velocity that was not measured is absent, not zero.
+            joints = [{"name": n, "position": p, "effort": e} for n, p, e in zip(names, q, tau)]
+            for topic, own in [("/state", state), ("/joints", Joints(timestamp=at, joints=joints))]:
+                writer.write_message(topic, own, log_time=received(k), publish_time=received(k))
+        writer.finish()
+
+
+def json_forms():
+    """Objects as foxglove.JointStates in JSON, and with names under another name and a date."""
+    with open("json_forms.mcap", "wb") as out:
+        writer = McapWriter(out, compression=CompressionType.ZSTD)
+        writer.start()
+        schema = writer.register_schema("foxglove.JointStates", "jsonschema", b"{}")
+        channels = [writer.register_channel(topic, "json", schema) for topic in ("/joints", "/named")]
+        zone = datetime.timezone.utc
+        for k in range(SAMPLES):
+            names, q, _, tau = turned(k)
+            at = datetime.datetime.fromtimestamp(START, zone) + datetime.timedelta(milliseconds=10 * k)
+            joints = [{"name": n, "position": p, "effort": e} for n, p, e in zip(names, q, tau)]
+            forms = [
+                {"timestamp": {"sec": START + k // 100, "nsec": k % 100 * 10_000_000}, "joints": joints},
+                {"timestamp": at.isoformat(), "joint_names": names, "position": q, "effort": tau},
+            ]
+            for channel, form in zip(channels, forms):
+                data = json.dumps(form).encode()
+                writer.add_message(channel, log_time=received(k), publish_time=received(k), data=data)
+        writer.finish()
+
+
 def bag_with_definitions():
     db = bag("iron.db3", "DELETE")
     db.execute(
@@ -418,6 +516,78 @@ def hdf5():
         out["names"] = CHAIN
 
 
+def dates():
+    """Times as dates: with a zone, as Python prints them, and as NumPy does; a clock in Berlin's summer time."""
+    zone = datetime.timezone(datetime.timedelta(hours=2))
+    start = datetime.datetime.fromtimestamp(START, datetime.timezone.utc)
+    with open("dates.csv", "w") as out:
+        out.write("iso,t,numpy,q1,q2,tau1,tau2\n")
+        for k in range(SAMPLES):
+            at = start + datetime.timedelta(milliseconds=10 * k)
+            q, _, tau = sample(k)
+            times = [at.astimezone(zone).isoformat(), str(at.replace(tzinfo=None)), numpy.datetime64(at.replace(tzinfo=None), "ns")]
+            out.write(",".join([*map(str, times), *map(repr, [*q, *tau])]) + "\n")
+
+
+def lerobot(folder, version, names, files):
+    """A dataset as LeRobot leaves it: its description, and episodes of some samples each in files."""
+    shutil.rmtree(folder, ignore_errors=True)
+    os.makedirs(f"{folder}/meta")
+    features = {
+        "observation.state": {"dtype": "float32", "shape": [3], "names": names},
+        "action": {"dtype": "float32", "shape": [3], "names": names},
+        "observation.effort": {"dtype": "float64", "shape": [3], "names": names},
+        "timestamp": {"dtype": "float32", "shape": [1], "names": None},
+    }
+    episodes = sum((episodes for _, episodes in files), [])
+    path = "episode_{episode_index:06d}" if version == "v2.1" else "file-{file_index:03d}"
+    info = {
+        "codebase_version": version,
+        "robot_type": "two_joints",
+        "total_episodes": len(episodes),
+        "total_frames": sum(map(len, episodes)),
+        "fps": 100,
+        "data_path": "data/chunk-{chunk_index:03d}/" + path + ".parquet",
+        "features": features,
+    }
+    with open(f"{folder}/meta/info.json", "w") as out:
+        json.dump(info, out, indent=1)
+    kinds = [
+        ("observation.state", pyarrow.list_(pyarrow.float32(), 3)),
+        ("action", pyarrow.list_(pyarrow.float32())),
+        ("observation.effort", pyarrow.list_(pyarrow.float64())),
+        ("timestamp", pyarrow.float32()),
+        ("frame_index", pyarrow.int64()),
+        ("episode_index", pyarrow.int64()),
+        ("index", pyarrow.int64()),
+        ("task_index", pyarrow.int64()),
+    ]
+    first = index = 0
+    for name, episodes in files:
+        rows = []
+        for episode, samples in enumerate(episodes, first):
+            for frame, k in enumerate(samples):
+                q, _, tau = sample(k)
+                # A gripper, then the joints from the tip.
+                state = [50.0, math.degrees(q[1]), math.degrees(q[0])]
+                rows.append([state, state, [0.0, tau[1], tau[0]], frame * STEP, frame, episode, index, 0])
+                index += 1
+        first += len(episodes)
+        os.makedirs(os.path.dirname(f"{folder}/{name}"), exist_ok=True)
+        columns = [pyarrow.array([row[i] for row in rows], kind) for i, (_, kind) in enumerate(kinds)]
+        table = pyarrow.table(dict(zip((name for name, _ in kinds), columns)))
+        pyarrow.parquet.write_table(table, f"{folder}/{name}", compression="snappy")
+
+
+def datasets_of_lerobot():
+    names = [f"{joint}.pos" for joint in ["gripper", *CHAIN[::-1]]]
+    each = [range(40), range(40, 90), range(90, SAMPLES)]
+    files = [(f"data/chunk-{k // 2:03d}/episode_{k:06d}.parquet", [samples]) for k, samples in enumerate(each)]
+    lerobot("lerobot_v21", "v2.1", {"motors": names}, files)
+    files = [("data/chunk-000/file-000.parquet", each[:2]), ("data/chunk-000/file-001.parquet", each[2:])]
+    lerobot("lerobot_v30", "v3.0", names, files)
+
+
 crashed()
 defined()
 bag_with_definitions()
@@ -429,3 +599,7 @@ split_folder()
 for compression in rosbags.rosbag1.Writer.CompressionFormat:
     ros1(f"ros1_{compression.name.lower()}.bag", compression)
 hdf5()
+datasets_of_lerobot()
+dates()
+protobuf()
+json_forms()

@@ -5,7 +5,7 @@ use super::{Failure, output};
 use crate::explanation::torque_model::ModelFile;
 use crate::identification::{Source, VerifyOptions, verify};
 use crate::logs::log::{Inspected, InspectedTable, Log, inspect};
-use crate::logs::tables::{JointState, McapWriter};
+use crate::logs::tables::{JointState, McapWriter, layouts};
 use crate::report::inspected;
 use clap::{Args, ValueEnum};
 use dyngen::Arm;
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// Show what is in log files and what they are taken to be: topics, columns, units, rates, gaps, doubts;
 /// with --out as a page with figures.
 ///
-/// CSV, Parquet, MCAP, bags of ROS 1 and 2 (also their folders), npz, npy, mat and HDF5. With an arm also the log that `identify` would read. Exit
+/// CSV, Parquet, LeRobot datasets, MCAP, bags of ROS 1 and 2 (also their folders), npz, npy, mat and HDF5. With an arm also the log that `identify` would read. Exit
 /// code 1 where a file is no log of that arm.
 #[derive(Args, Debug)]
 #[command(
@@ -220,7 +220,9 @@ pub(super) fn write(log: &Log, arm: &Arm, model: Option<&Path>, out: &Path) -> R
     }
     let mut bytes = Vec::new();
     mcap(log, &joint_names(arm), &torque, &mut bytes).map_err(failed)?;
-    super::output::write_file(out, &bytes)
+    super::output::write_file(out, &bytes)?;
+    let held = layouts::Held { joints: &joint_names(arm), velocities: false, torques: true };
+    layouts::write(out, held).map_err(failed)
 }
 
 /// The names of an arm's joints as an MCAP has them: those of the arm file, else `joint1` and so on.

@@ -11,6 +11,7 @@ use crate::explanation::torque_model::TorqueModel;
 use crate::explanation::watch::{Event, FIRST, Watch, WatchOptions};
 use crate::logs::log::{ColumnMap, LiveRows, LiveSample, Log, read_logs_as};
 use crate::logs::regression::RigidArm;
+use crate::logs::tables::text;
 use clap::Args;
 use dyngen::Arm;
 use std::io::BufRead;
@@ -275,7 +276,7 @@ impl Format {
     /// The numbers of a line in the order of the names.
     fn values(&self, line: &str) -> Vec<Option<f64>> {
         match self {
-            Format::Lines(mark) => line.split(*mark).map(|field| field.trim().parse().ok()).collect(),
+            Format::Lines(mark) => line.split(*mark).map(|field| text::number(field.trim())).collect(),
             Format::Objects(names) => {
                 let all = numbers(line).unwrap_or_default();
                 let of = |name: &String| all.iter().find(|(own, _)| own == name).map(|(_, value)| *value);

@@ -137,6 +137,7 @@ impl Log {
         let asked = Asked { arm, map, file: name, header: Some(1) };
         let mut samples = Samples::new(asked, "sample", &mut findings);
         samples.begin(&names)?;
+        samples.expect(times);
         for k in 0..times {
             samples.row(k + 1, &|column| columns.get(column)?.1.get(k).copied());
         }

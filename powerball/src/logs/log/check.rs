@@ -11,6 +11,8 @@ use std::ops::Range;
 /// A step between samples longer than this, s, or than [`GAP_STEPS`] median steps, is a gap.
 const GAP: f64 = 0.1;
 const GAP_STEPS: f64 = 5.0;
+/// So many of a log's gaps and jumps are named one by one.
+const SPLITS_SHOWN: usize = 5;
 /// Time stamps that do not rise: up to this share are left out, more make the log unusable.
 const MOST_STALE: f64 = 0.05;
 /// The fewest samples with which anything can be done.
@@ -131,9 +133,10 @@ fn check_signals(
     if errors.is_empty() { Ok(()) } else { Err(LogError(errors)) }
 }
 
-/// The pieces of a log between gaps of time and jumps of position.
+/// The pieces of a log between gaps of time and jumps of position. Of many splits the first ones are shown.
 fn pieces(raw: &Raw, step: f64, file: &str, arm: &Arm, findings: &mut Vec<Finding>) -> Vec<Range<usize>> {
     let (mut pieces, mut start) = (Vec::new(), 0);
+    let mut splits = Vec::new();
     for k in 1..raw.t.len() {
         let gap = raw.t[k] - raw.t[k - 1];
         let jump = (0..arm.dof()).find(|&j| {
@@ -143,7 +146,7 @@ fn pieces(raw: &Raw, step: f64, file: &str, arm: &Arm, findings: &mut Vec<Findin
         if gap > GAP.max(GAP_STEPS * step) {
             let message =
                 format!("at {:.3} s: a gap of {gap:.3} s: the log is used as two pieces", raw.t[k - 1]);
-            findings.push(finding(file, Some(raw.line[k]), "t", message));
+            splits.push(finding(file, Some(raw.line[k]), "t", message));
         } else if let Some(j) = jump {
             let by = raw.q[j][k] - raw.q[j][k - 1];
             let message = format!(
@@ -151,7 +154,7 @@ fn pieces(raw: &Raw, step: f64, file: &str, arm: &Arm, findings: &mut Vec<Findin
                  split there",
                 raw.t[k]
             );
-            findings.push(finding(file, Some(raw.line[k]), format!("q{}", j + 1), message));
+            splits.push(finding(file, Some(raw.line[k]), format!("q{}", j + 1), message));
         } else {
             continue;
         }
@@ -159,6 +162,13 @@ fn pieces(raw: &Raw, step: f64, file: &str, arm: &Arm, findings: &mut Vec<Findin
         start = k;
     }
     pieces.push(start..raw.t.len());
+    let more = splits.len().saturating_sub(SPLITS_SHOWN);
+    splits.truncate(SPLITS_SHOWN);
+    if more > 0 {
+        let message = format!("{more} more gaps or jumps: the log is used as {} pieces", pieces.len());
+        splits.push(finding(file, None, "t", message));
+    }
+    findings.extend(splits);
     pieces
 }
 

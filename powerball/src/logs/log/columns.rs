@@ -1,7 +1,7 @@
 //! A log's quantities found by the names of its columns.
 
 use super::map::{ByJoint, ColumnMap};
-use super::read::Effort;
+use super::read::{Effort, Raw};
 use super::{Finding, LogError};
 use dyngen::Arm;
 use std::collections::HashMap;
@@ -16,13 +16,14 @@ pub(super) struct Asked<'a> {
     pub header: Option<usize>,
 }
 
-/// The quantities with the names that columns have for them: those of this project's own logs, then those of
-/// ROS.
+/// What LeRobot calls an arm's positions.
+const LEROBOT: &str = "observation.state";
+/// The quantities with the names that columns have for them: those of this project's own logs, of ROS and of LeRobot.
 const NAMES: [(&str, &[&str]); 6] = [
-    ("q", &["q", "position"]),
-    ("dq", &["dq", "velocity"]),
-    ("tau", &["tau", "effort"]),
-    ("i", &["i", "current"]),
+    ("q", &["q", "position", LEROBOT]),
+    ("dq", &["dq", "velocity", "observation.velocity"]),
+    ("tau", &["tau", "effort", "observation.effort"]),
+    ("i", &["i", "current", "observation.current"]),
     ("temp", &["temp", "temperature"]),
     ("motor", &["motor"]),
 ];
@@ -38,6 +39,13 @@ const RTDE: [(&str, &str); 5] = [
 /// Names of the time; the first is that of this project's own logs. Lines with a header have that one alone.
 pub(super) const TIMES: [&str; 3] = ["t", "time", "timestamp"];
 
+/// What LeRobot does not say of positions.
+const UNIT_OF_LEROBOT: &str = "LeRobot does not say in which unit observation.state is: rad, degrees from the middle of a \
+    servo's range, or a share of that range from -100 to 100. Say it with --map 'q.unit = \"deg\"' (or \"rad\"); a share of \
+    the range is no angle before it is multiplied by the range ('q.scale = […]')";
+const TORQUE_OF_LEROBOT: &str = ". LeRobot records torques or currents only where the robot was made to give them: name \
+    their column with --map 'tau.column = \"…\"' or 'i.column = \"…\"'; `action` is a set-point";
+
 /// The columns of one quantity by joint, and what each is to be multiplied with.
 pub(super) struct Group {
     pub at: Vec<usize>,
@@ -50,6 +58,19 @@ impl Group {
         number: &'a impl Fn(usize) -> Option<f64>,
     ) -> impl Iterator<Item = Option<f64>> + 'a {
         self.at.iter().zip(&self.factor).map(move |(k, factor)| Some(number(*k)? * factor))
+    }
+}
+
+impl Group {
+    /// Its columns, moved out of those of a table; the last use of one takes it.
+    fn take(&self, values: &mut [Vec<f64>], uses: &mut [usize]) -> Vec<Vec<f64>> {
+        let one = |(at, factor): (&usize, &f64)| {
+            uses[*at] -= 1;
+            let mut own = if uses[*at] == 0 { std::mem::take(&mut values[*at]) } else { values[*at].clone() };
+            own.iter_mut().for_each(|v| *v = if v.is_finite() { *v * factor } else { f64::NAN });
+            own
+        };
+        self.at.iter().zip(&self.factor).map(one).collect()
     }
 }
 
@@ -86,6 +107,11 @@ fn rtde(key: &str, joint: usize) -> Option<String> {
 /// Whether columns are those of a recording by RTDE.
 fn by_rtde(names: &[String]) -> bool {
     rtde("q", 0).is_some_and(|first| names.contains(&first))
+}
+
+/// Whether a column is one of LeRobot's positions.
+fn by_lerobot(name: &str) -> bool {
+    name.starts_with(LEROBOT)
 }
 
 /// What a column is taken to be by its name, and the joint that the name says.
@@ -206,8 +232,12 @@ impl Columns {
             );
             errors.push(finding(&more, message));
         }
-        if let Err(missing) = &q {
-            errors.push(finding("q", missing_positions(names, missing, asked)));
+        match &q {
+            Ok(q) if asked.map.q.unit.is_none() && q.at.iter().any(|k| by_lerobot(&names[*k])) => {
+                errors.push(finding("q", UNIT_OF_LEROBOT.into()));
+            }
+            Ok(_) => {}
+            Err(missing) => errors.push(finding("q", missing_positions(names, missing, asked))),
         }
         let (mut effort, mut torque) = (Effort::Torque, None);
         match (group(names, "tau", asked), group(names, "i", asked)) {
@@ -223,11 +253,12 @@ impl Columns {
             (Err(_), Err(_)) if q.is_err() && !logged_joints(names, asked.map).is_empty() => {}
             (Err(tau), Err(current)) => {
                 let missing = if tau.len() <= current.len() { tau } else { current };
+                let hint = if names.iter().any(|name| by_lerobot(name)) { TORQUE_OF_LEROBOT } else { "" };
                 errors.push(finding(
                     "tau",
                     format!(
                         "a log needs tau1 … tau{n} [N·m] or i1 … i{n} [A] for each of \
-                the {n} joints; missing: {}",
+                the {n} joints; missing: {}{hint}",
                         missing.join(", ")
                     ),
                 ));
@@ -283,6 +314,29 @@ impl Columns {
         Some(values)
     }
 
+    /// How often each column of a table is used; those that are not are dropped.
+    pub(super) fn uses(&self, values: &mut [Vec<f64>]) -> Vec<usize> {
+        let mut uses = vec![0; values.len()];
+        self.groups().flat_map(|group| &group.at).for_each(|at| uses[*at] += 1);
+        values.iter_mut().zip(&uses).filter(|(_, uses)| **uses == 0).for_each(|(own, _)| *own = Vec::new());
+        uses
+    }
+
+    /// Moves the columns of a table into samples.
+    pub(super) fn take(&self, values: &mut [Vec<f64>], uses: &mut [usize], raw: &mut Raw) {
+        raw.t = self.t.take(values, uses).pop().unwrap_or_default();
+        raw.q = self.q.take(values, uses);
+        raw.effort = self.torque.take(values, uses);
+        let mut optional = |group: &Option<Group>| group.as_ref().map(|group| group.take(values, uses));
+        (raw.temperature, raw.motor) = (optional(&self.temperature), optional(&self.motor));
+        raw.dq = optional(&self.dq).unwrap_or_else(|| vec![Vec::new(); raw.q.len()]);
+    }
+
+    /// Whether a sample has a number for all that it needs.
+    pub(super) fn are_whole(&self, number: &impl Fn(usize) -> Option<f64>) -> bool {
+        [&self.t, &self.q, &self.torque].into_iter().flat_map(|group| &group.at).all(|k| number(*k).is_some())
+    }
+
     /// Whether a sample holds anything of this arm.
     pub(super) fn touches(&self, number: &impl Fn(usize) -> Option<f64>) -> bool {
         [&self.q, &self.torque].into_iter().flat_map(|group| &group.at).any(|k| number(*k).is_some())
@@ -311,7 +365,8 @@ fn one_too_many(names: &[String], asked: Asked<'_>) -> Option<String> {
 
 fn time(names: &[String], asked: Asked<'_>) -> Option<Group> {
     let at = |name: &str| names.iter().position(|own| own == name);
-    let known = if asked.header.is_some() && !by_rtde(names) { &TIMES[..1] } else { &TIMES[..] };
+    let others = by_rtde(names) || names.iter().any(|name| by_lerobot(name));
+    let known = if asked.header.is_some() && !others { &TIMES[..1] } else { &TIMES[..] };
     let found = match asked.map.t.column.as_ref().and_then(|by| by.of(0)) {
         Some(name) => at(name),
         None => known.iter().find_map(|name| at(name)),

@@ -108,14 +108,23 @@ impl Made {
             .map(|m| m.1)
     }
 
-    fn convert(self, lines: File, joints: &[String], out: File) -> io::Result<usize> {
+    /// The number of rows; an MCAP gets its layouts beside it.
+    fn convert(self, lines: File, joints: &[String], out: File, target: &Path) -> io::Result<usize> {
         match self {
             Made::Parquet => crate::logs::tables::columnar::from_csv(lines, out),
             #[cfg(feature = "mcap")]
-            Made::Mcap => crate::logs::tables::mcap_from_csv(lines, joints, io::BufWriter::new(out)),
+            Made::Mcap => {
+                use crate::logs::tables::{layouts, mcap_from_csv};
+                let written = mcap_from_csv(lines, joints, io::BufWriter::new(out))?;
+                if written.rows > 0 {
+                    let (joints, velocities) = (written.joints.as_slice(), written.velocities);
+                    layouts::write(target, layouts::Held { joints, velocities, torques: false })?;
+                }
+                Ok(written.rows)
+            }
             #[cfg(not(feature = "mcap"))]
             Made::Mcap => {
-                let _ = joints;
+                let _ = (joints, target);
                 Err(io::Error::other("this build does not write it: enable the feature `mcap`"))
             }
         }
@@ -146,7 +155,7 @@ fn recover(path: &Path, lines: &Path, joints: &[String]) -> io::Result<Option<Pa
 fn convert(lines: &Path, target: &Path, joints: &[String]) -> io::Result<usize> {
     let part = with_more(target, &format!(".{}.part", std::process::id()));
     let made = Made::of(target).unwrap_or(Made::Parquet);
-    let written = made.convert(File::open(lines)?, joints, File::create(&part)?);
+    let written = made.convert(File::open(lines)?, joints, File::create(&part)?, target);
     match written {
         Ok(rows) if rows > 0 => fs::rename(&part, target).map(|()| rows),
         other => {

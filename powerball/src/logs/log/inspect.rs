@@ -135,11 +135,12 @@ pub struct TakenAs {
 /// Where the file cannot be read at all.
 pub fn inspect(path: &Path, map: &ColumnMap, arm: Option<&Arm>) -> Result<Inspected, LogError> {
     let Contents { format, tables, notes } = read_contents(path)?;
+    let alignment = aligned(&tables, map);
     let mut inspected = Inspected {
         file: path.display().to_string(),
         format,
-        tables: tables.iter().map(|t| table(t, map)).collect(),
-        alignment: aligned(&tables, map),
+        tables: tables.into_iter().map(|t| table(t, map)).collect(),
+        alignment,
         taken_as: None,
         refused: Vec::new(),
         warnings: Vec::new(),
@@ -149,7 +150,6 @@ pub fn inspect(path: &Path, map: &ColumnMap, arm: Option<&Arm>) -> Result<Inspec
         inspected.warnings = shown(&notes);
         return Ok(inspected);
     };
-    drop(tables);
     let mut findings = Vec::new();
     match read_log_as(path, arm, map, &mut findings) {
         Ok(log) => {
@@ -200,8 +200,8 @@ fn time<'a>(table: &'a Table, map: &ColumnMap) -> Option<(Vec<f64>, String, Opti
     Some((time.to_vec(), name.to_string(), doubt))
 }
 
-fn table(table: &Table, map: &ColumnMap) -> InspectedTable {
-    let (t, clock, clock_doubt) = match time(table, map) {
+fn table(table: Table, map: &ColumnMap) -> InspectedTable {
+    let (t, clock, clock_doubt) = match time(&table, map) {
         Some((t, clock, doubt)) => (t, Some(clock), doubt),
         None => (Vec::new(), None, None),
     };
@@ -211,15 +211,15 @@ fn table(table: &Table, map: &ColumnMap) -> InspectedTable {
     delays.sort_by(f64::total_cmp);
     let steps = || t.windows(2).map(|w| w[1] - w[0]);
     let mut joints: Vec<String> = Vec::new();
-    let columns: Vec<InspectedColumn> = table.columns.iter().map(|c| column(c, map, step)).collect();
+    let columns: Vec<InspectedColumn> = table.columns.into_iter().map(|c| column(c, map, step)).collect();
     for joint in columns.iter().filter_map(|c| c.joint.clone()) {
         if !joints.contains(&joint) {
             joints.push(joint);
         }
     }
     InspectedTable {
-        name: table.name.clone(),
-        kind: table.kind.clone(),
+        name: table.name,
+        kind: table.kind,
         samples: table.line.len(),
         clock,
         clock_doubt,
@@ -236,7 +236,7 @@ fn table(table: &Table, map: &ColumnMap) -> InspectedTable {
     }
 }
 
-fn column(column: &Column, map: &ColumnMap, step: Option<f64>) -> InspectedColumn {
+fn column(column: Column, map: &ColumnMap, step: Option<f64>) -> InspectedColumn {
     let means = meaning(&column.name, map);
     let range = range(&column.values);
     let quantity = means.as_ref().map(|(key, _)| *key);
@@ -244,14 +244,14 @@ fn column(column: &Column, map: &ColumnMap, step: Option<f64>) -> InspectedColum
     let joint = means.as_ref().is_some_and(|(_, joint)| joint.is_some());
     let guess = |key| guessed(key, range?, &column.values, step);
     InspectedColumn {
-        name: column.name.clone(),
+        name: column.name,
         quantity,
         joint: means.and_then(|(_, joint)| joint),
         unit: said.or_else(|| quantity.and_then(guess).map(str::to_string)),
         min: range.map(|[min, _]| min),
         max: range.map(|[_, max]| max),
         missing: column.values.iter().filter(|v| !v.is_finite()).count(),
-        values: if joint { column.values.clone() } else { Vec::new() },
+        values: if joint { column.values } else { Vec::new() },
     }
 }
 

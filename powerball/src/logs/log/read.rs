@@ -5,9 +5,12 @@
 use super::columns::{Asked, Columns};
 use super::map::ColumnMap;
 use super::{Finding, Log, LogError, check, topics};
-use crate::logs::tables::{Format, RowSink, columnar, read_topics, text};
+use crate::logs::tables::{
+    Format, Place, RowSink, Table, columnar, make_room, read_dataset, read_topics, text,
+};
 use dyngen::Arm;
 use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 /// Reads several logs of an arm; the findings are of all of them.
@@ -58,32 +61,41 @@ pub fn read_log_as(
     let file = path.display().to_string();
     let asked = Asked { arm, map, file: &file, header: None };
     let unreadable = |e| LogError::of_file(&file, "file", format!("cannot be read: {e}"));
-    match Format::of_file(path)? {
-        Format::Csv => parse(&std::fs::read(path).map_err(unreadable)?, asked, findings),
+    let mut place = Place::of(path)?;
+    let path = place.path.clone();
+    match place.format {
+        Format::Csv => parse(File::open(&path).map_err(unreadable)?, asked, findings),
         Format::Parquet => {
-            let opened = File::open(path).map_err(unreadable)?;
+            let opened = File::open(&path).map_err(unreadable)?;
             rows(asked, findings, |samples, _| columnar::read(opened, &file, samples).map(|()| false))
+        }
+        Format::LeRobot => {
+            rows(asked, findings, |samples, notes| read_dataset(&path, &file, samples, notes).map(|()| false))
         }
         _ => {
             // With other topics left aside; an error names them all.
             if let Some(only) = map.topics() {
-                let contents = read_topics(path, Some(&only))?;
+                let contents = read_topics(&mut place, &file, Some(&only))?;
                 let mut own = contents.notes;
-                if let Ok(log) = topics::log(&contents.tables, asked, &mut own) {
+                if let Ok(log) = topics::log(contents.tables, asked, &mut own) {
                     findings.extend(own);
                     return Ok(log);
                 }
             }
-            let contents = read_topics(path, None)?;
+            let contents = read_topics(&mut place, &file, None)?;
             findings.extend(contents.notes);
-            topics::log(&contents.tables, asked, findings)
+            topics::log(contents.tables, asked, findings)
         }
     }
 }
 
 /// Reads a log from lines.
-pub(super) fn parse(bytes: &[u8], asked: Asked<'_>, findings: &mut Vec<Finding>) -> Result<Log, LogError> {
-    rows(asked, findings, |samples, notes| text::read(bytes, asked.file, samples, notes))
+pub(super) fn parse(
+    input: impl Read,
+    asked: Asked<'_>,
+    findings: &mut Vec<Finding>,
+) -> Result<Log, LogError> {
+    rows(asked, findings, |samples, notes| text::read(input, asked.file, samples, notes))
 }
 
 /// Reads a log row by row; `read` says whether the last one is torn.
@@ -161,6 +173,15 @@ impl Raw {
             dq: empty(),
             motor: motor.then(empty),
         }
+    }
+
+    /// Makes room for so many more samples.
+    fn expect(&mut self, samples: usize) {
+        make_room(&mut self.line, samples);
+        let motor = self.motor.iter_mut().flatten().chain(&mut self.dq);
+        let optional = self.temperature.iter_mut().flatten().chain(motor);
+        let by_joint = self.q.iter_mut().chain(&mut self.effort).chain(optional);
+        by_joint.chain([&mut self.t]).for_each(|values| make_room(values, samples));
     }
 
     pub(super) fn push(&mut self, line: usize, values: &[f64]) {
@@ -255,6 +276,40 @@ impl<'a> Samples<'a> {
     }
 }
 
+impl Samples<'_> {
+    /// Takes a whole table, whose columns become the log's without a copy; `time` is the time of its samples where no column is.
+    pub(super) fn table(&mut self, table: Table, time: Option<Vec<f64>>) -> Result<(), LogError> {
+        // A message may have a `t` of its own beside the time that counts.
+        let own = |name: String| if time.is_some() && name == "t" { "t of the message".into() } else { name };
+        let names = table.columns.iter().map(|column| own(column.name.clone()));
+        self.begin(&time.iter().map(|_| "t".to_string()).chain(names).collect::<Vec<_>>())?;
+        let Some((columns, raw)) = &mut self.found else { return Ok(()) };
+        let mut values: Vec<Vec<f64>> =
+            time.into_iter().chain(table.columns.into_iter().map(|c| c.values)).collect();
+        let mut uses = columns.uses(&mut values);
+        let keep: Vec<bool> = (0..table.line.len())
+            .map(|k| {
+                let field = |at: usize| values.get(at)?.get(k).copied().filter(|v| v.is_finite());
+                if self.called == "message" && !columns.touches(&field) {
+                    return false;
+                }
+                self.total += 1;
+                let whole = columns.are_whole(&field);
+                if !whole {
+                    self.bad += 1;
+                    let names = &self.names;
+                    self.first_bad.get_or_insert_with(|| (table.line[k], columns.culprit(&field, names)));
+                }
+                whole
+            })
+            .collect();
+        raw.line = table.line;
+        columns.take(&mut values, &mut uses, raw);
+        raw.retain(&keep);
+        Ok(())
+    }
+}
+
 impl RowSink for Samples<'_> {
     fn begin(&mut self, names: &[String]) -> Result<(), LogError> {
         let columns = Columns::find(names, self.asked, self.findings)?;
@@ -262,6 +317,12 @@ impl RowSink for Samples<'_> {
         self.found = Some((columns, raw));
         self.names = names.to_vec();
         Ok(())
+    }
+
+    fn expect(&mut self, rows: usize) {
+        if let Some((_, raw)) = &mut self.found {
+            raw.expect(rows);
+        }
     }
 
     fn row(&mut self, line: usize, number: &dyn Fn(usize) -> Option<f64>) {

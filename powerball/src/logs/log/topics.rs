@@ -6,7 +6,7 @@ use super::map::{Clock, ColumnMap};
 use super::read::Samples;
 use super::{Finding, Log, LogError};
 use crate::logs::signal::resample::{cubic_at, median_step};
-use crate::logs::tables::{RowSink, Table};
+use crate::logs::tables::Table;
 
 /// Header stamps count where at least this share of them is there and rises.
 const MOST_STAMPS: f64 = 0.95;
@@ -87,39 +87,35 @@ fn implausible(stamps: &[f64], received: &[f64]) -> Option<String> {
     None
 }
 
-/// The log in the tables of a file.
-pub(super) fn log(tables: &[Table], asked: Asked<'_>, findings: &mut Vec<Finding>) -> Result<Log, LogError> {
-    let (positions, torques) = choose(tables, asked)?;
-    let (names, table, map) = match std::ptr::eq(positions, torques) {
-        true => (positions.names(), positions.clone(), asked.map.clone()),
-        false => {
-            let joined = join(positions, torques, tables, asked, findings)?;
-            (joined.names(), joined, asked.map.without_columns())
+/// The log in the tables of a file, whose columns become the log's.
+pub(super) fn log(
+    mut tables: Vec<Table>,
+    asked: Asked<'_>,
+    findings: &mut Vec<Finding>,
+) -> Result<Log, LogError> {
+    let (positions, torques) = choose(&tables, asked)?;
+    let (mut table, map) = match std::ptr::eq(positions, torques) {
+        true => {
+            let at = tables.iter().position(|table| std::ptr::eq(table, positions)).unwrap_or(0);
+            (tables.swap_remove(at), asked.map.clone())
         }
+        false => (join(positions, torques, &tables, asked, findings)?, asked.map.without_columns()),
     };
+    drop(tables);
     let timed = columns_have_time(&table, asked.map);
     let (time, called) = match timed {
         true => (None, "sample"),
         false => {
-            let (time, _, doubt) = clock(&table, asked.map.clock);
+            let (_, name, doubt) = clock(&table, asked.map.clock);
             let text = doubt.map(|doubt| format!("{doubt}: the times of receipt count"));
             findings.extend(text.map(|text| Finding::of_file(asked.file, "t", text)));
-            (Some(time), "message")
+            let own = if name == "header" { &mut table.stamps } else { &mut table.received };
+            (Some(std::mem::take(own)), "message")
         }
     };
+    (table.stamps, table.received) = (Vec::new(), Vec::new());
     let mut samples = Samples::new(Asked { map: &map, ..asked }, called, findings);
-    // A message may have a `t` of its own beside the time that counts.
-    let other = |name: String| if time.is_some() && name == "t" { "t of the message".into() } else { name };
-    let names: Vec<String> =
-        time.map(|_| "t".to_string()).into_iter().chain(names.into_iter().map(other)).collect();
-    samples.begin(&names)?;
-    let shift = usize::from(time.is_some());
-    for (k, line) in table.line.iter().enumerate() {
-        samples.row(*line, &|column| match (time, column.checked_sub(shift)) {
-            (Some(time), None) => time.get(k).copied(),
-            (_, column) => table.columns.get(column?)?.values.get(k).copied(),
-        });
-    }
+    samples.table(table, time)?;
     samples.finish(false)
 }
 

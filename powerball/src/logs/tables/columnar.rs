@@ -7,12 +7,17 @@ use super::numbers::{leaves, numbers, width};
 use super::table::RowSink;
 use super::{Finding, LogError};
 #[cfg(feature = "parquet")]
+use arrow_array::RecordBatch;
+#[cfg(feature = "parquet")]
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 #[cfg(feature = "parquet")]
 use parquet::file::metadata::ParquetMetaData;
 #[cfg(feature = "parquet")]
 use parquet::file::reader::ChunkReader;
 
+/// A file that claims more rows does not have them.
+#[cfg(feature = "parquet")]
+const ROWS_A_BYTE: u64 = 64;
 /// So many rows are in memory at a time.
 #[cfg(feature = "parquet")]
 const ROWS: usize = 8192;
@@ -24,61 +29,130 @@ pub(crate) fn read(
     file: &str,
     rows: &mut impl RowSink,
 ) -> Result<(), LogError> {
-    let unreadable = |row: Option<usize>, e: &dyn std::fmt::Display| {
-        LogError(vec![Finding {
-            file: file.to_string(),
-            line: row,
-            quantity: "Parquet".into(),
-            message: format!("cannot be read: {e}; write the log again, or as CSV"),
-        }])
-    };
-    let length = input.len();
-    // What Arrow noted of its own types beside those of Parquet says nothing more about numbers.
-    let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-    let builder = guarded(|| ParquetRecordBatchReaderBuilder::try_new_with_options(input, options))
-        .map_err(|e| unreadable(None, &e))?;
-    within(builder.metadata(), length).map_err(|e| unreadable(None, &e))?;
-    let fields: Vec<String> = builder.schema().fields().iter().map(|field| field.name().clone()).collect();
-    let mut reader = guarded(|| builder.with_batch_size(ROWS).build()).map_err(|e| unreadable(None, &e))?;
-    let mut count = 0;
-    // How many numbers each column is, by the first rows, and the dataset that the file is part of.
-    let mut known: Option<(Vec<usize>, Dataset)> = None;
-    loop {
-        let next = guarded(|| reader.next().transpose()).map_err(|e| unreadable(Some(count + 1), &e))?;
-        let Some(batch) = next else { break };
-        let columns = leaves(&batch);
-        let (widths, dataset) = match &mut known {
-            Some(known) => known,
-            None => {
-                let widths: Vec<usize> = columns.iter().map(|(_, array)| width(array).unwrap_or(1)).collect();
-                let named = columns.iter().zip(&widths);
-                let named = named.map(|((name, array), count)| (name.as_str(), width(array).map(|_| *count)));
-                let (names, dataset) = Dataset::of(std::path::Path::new(file), named);
-                rows.begin(&names)?;
-                known.insert((widths, dataset))
-            }
-        };
-        let mut values: Vec<Vec<f64>> = columns
-            .iter()
-            .zip(widths.iter())
-            .flat_map(|((_, array), width)| numbers(array, *width))
-            .collect();
-        dataset.follow(&mut values);
-        for k in 0..batch.num_rows() {
-            count += 1;
-            rows.row(count, &|column| values.get(column)?.get(k).copied().filter(|value| !value.is_nan()));
-        }
-    }
-    if known.is_none() {
-        rows.begin(&fields)?;
-    }
-    Ok(())
+    let mut reader = Rows::new(rows);
+    reader.read(input, file)?;
+    reader.finish().map(|_| ())
 }
 
-/// A step of the library's, which panics at some of what is damaged within a page.
+/// The rows of one file or of several with the same columns, one after the other.
+#[cfg(feature = "parquet")]
+pub(super) struct Rows<'s, S> {
+    sink: &'s mut S,
+    count: usize,
+    /// By the first rows.
+    known: Option<Known>,
+    /// Of the file that is read.
+    expected: usize,
+    /// The columns of a file without rows.
+    fields: Vec<String>,
+}
+
+/// The columns: how many numbers each one is, and the dataset that they are part of.
+#[cfg(feature = "parquet")]
+struct Known {
+    columns: Vec<(String, usize)>,
+    dataset: Dataset,
+}
+
+#[cfg(feature = "parquet")]
+impl<'s, S: RowSink> Rows<'s, S> {
+    pub(super) fn new(sink: &'s mut S) -> Self {
+        Rows { sink, count: 0, known: None, expected: 0, fields: Vec::new() }
+    }
+
+    /// Hands the rows of a file over.
+    pub(super) fn read(&mut self, input: impl ChunkReader + 'static, file: &str) -> Result<(), LogError> {
+        let unreadable = |row: Option<usize>, e: &dyn std::fmt::Display| {
+            LogError(vec![Finding {
+                file: file.to_string(),
+                line: row,
+                quantity: "Parquet".into(),
+                message: format!("cannot be read: {e}; write the log again, or as CSV"),
+            }])
+        };
+        let length = input.len();
+        // What Arrow noted of its own types beside those of Parquet says nothing more about numbers.
+        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        let builder = guarded(|| ParquetRecordBatchReaderBuilder::try_new_with_options(input, options))
+            .map_err(|e| unreadable(None, &e))?;
+        within(builder.metadata(), length).map_err(|e| unreadable(None, &e))?;
+        self.fields = builder.schema().fields().iter().map(|field| field.name().clone()).collect();
+        let rows = u64::try_from(builder.metadata().file_metadata().num_rows()).unwrap_or(0);
+        self.expected = usize::try_from(rows.min(length.saturating_mul(ROWS_A_BYTE))).unwrap_or(0);
+        let mut reader =
+            guarded(|| builder.with_batch_size(ROWS).build()).map_err(|e| unreadable(None, &e))?;
+        let before = self.count;
+        loop {
+            let row = Some(self.count - before + 1);
+            let next = guarded(|| reader.next().transpose()).map_err(|e| unreadable(row, &e))?;
+            let Some(batch) = next else { return Ok(()) };
+            self.batch(&batch, file)?;
+        }
+    }
+
+    fn batch(&mut self, batch: &RecordBatch, file: &str) -> Result<(), LogError> {
+        let columns = leaves(batch);
+        let known = match &mut self.known {
+            Some(known) => known,
+            None => {
+                let widths: Vec<Option<usize>> = columns.iter().map(|(_, array)| width(array)).collect();
+                let named = columns.iter().zip(&widths).map(|((name, _), width)| (name.as_str(), *width));
+                let (names, dataset) = Dataset::of(std::path::Path::new(file), named);
+                self.sink.begin(&names)?;
+                self.sink.expect(self.expected);
+                let columns =
+                    columns.iter().zip(&widths).map(|((name, _), w)| (name.clone(), w.unwrap_or(1)));
+                self.known.insert(Known { columns: columns.collect(), dataset })
+            }
+        };
+        if !columns.iter().map(|(name, _)| name).eq(known.columns.iter().map(|(name, _)| name)) {
+            return Err(LogError::of_file(file, "Parquet", "has other columns than the files before it"));
+        }
+        let widths = known.columns.iter().map(|(_, width)| *width);
+        let mut values: Vec<Vec<f64>> =
+            columns.iter().zip(widths).flat_map(|((_, array), width)| numbers(array, width)).collect();
+        known.dataset.follow(&mut values);
+        for k in 0..batch.num_rows() {
+            self.count += 1;
+            let value = |column: usize| values.get(column)?.get(k).copied().filter(|value| !value.is_nan());
+            self.sink.row(self.count, &value);
+        }
+        Ok(())
+    }
+
+    /// Ends them; the number of episodes.
+    pub(super) fn finish(self) -> Result<usize, LogError> {
+        match self.known {
+            Some(known) => Ok(known.dataset.episodes),
+            None => self.sink.begin(&self.fields).map(|()| 0),
+        }
+    }
+}
+
+/// A step of the library's, which panics at some of what is damaged within a page: that is an error like any other, and prints
+/// nothing.
 #[cfg(feature = "parquet")]
 fn guarded<T, E: std::fmt::Display>(step: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
-    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(step)) {
+    use std::cell::Cell;
+    use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
+    use std::sync::Once;
+    thread_local! {
+        static GUARDED: Cell<bool> = const { Cell::new(false) };
+    }
+    static HOOK: Once = Once::new();
+    // Panics anywhere else go the way that they went before.
+    HOOK.call_once(|| {
+        let before = take_hook();
+        set_hook(Box::new(move |panic| {
+            if !GUARDED.get() {
+                before(panic)
+            }
+        }));
+    });
+    GUARDED.set(true);
+    let done = catch_unwind(AssertUnwindSafe(step));
+    GUARDED.set(false);
+    match done {
         Ok(done) => done.map_err(|e| e.to_string()),
         Err(_) => Err("a page is damaged".into()),
     }

@@ -4,6 +4,9 @@
 
 #[cfg(feature = "topics")]
 use super::bag;
+#[cfg(feature = "parquet")]
+use super::lerobot;
+use super::place::Place;
 use super::table::Table;
 use super::{columnar, text};
 use serde::Serialize;
@@ -20,6 +23,9 @@ pub enum Format {
     Csv,
     /// Columns in Parquet.
     Parquet,
+    /// The folder of a LeRobot dataset.
+    #[serde(rename = "LeRobot")]
+    LeRobot,
     /// A rosbag2 of the storage `mcap`, or any other MCAP.
     #[serde(rename = "MCAP")]
     Mcap,
@@ -73,13 +79,17 @@ impl Format {
     }
 
     /// What the file at a path begins with; of the folder of a recording, its first file, and of a compressed recording
-    /// what is in it.
+    /// what is in it. A folder with a `meta/info.json` is a dataset of LeRobot's, and so is that file.
     ///
     /// # Errors
     /// Where it cannot be read, is empty, or is none of these.
     pub fn of_file(path: &Path) -> Result<Format, LogError> {
         let failed =
             |e: std::io::Error| LogError::of_file(&shown(path), "file", format!("cannot be read: {e}"));
+        #[cfg(feature = "parquet")]
+        if lerobot::folder(path).is_some() {
+            return Ok(Format::LeRobot);
+        }
         #[cfg(feature = "topics")]
         if path.is_dir() {
             return bag::Parts::of(path)?.format();
@@ -122,59 +132,90 @@ fn shown(path: &Path) -> String {
 /// # Errors
 /// Where the file cannot be read, is torn, or is of a format that this build does not have.
 pub fn read_contents(path: &Path) -> Result<Contents, LogError> {
-    read_topics(path, None)
+    read_topics(&mut Place::of(path)?, &shown(path), None)
 }
 
 /// The same with the topics of some names alone, where a file has topics; others are counted.
-pub(crate) fn read_topics(path: &Path, only: Only<'_>) -> Result<Contents, LogError> {
-    let format = Format::of_file(path)?;
-    let file = shown(path);
-    let failed = |e: std::io::Error| LogError::of_file(&file, "file", format!("cannot be read: {e}"));
+/// `file` stands in messages.
+pub(crate) fn read_topics(place: &mut Place, file: &str, only: Only<'_>) -> Result<Contents, LogError> {
+    let (format, path) = (place.format, place.path.clone());
+    let failed = |e: std::io::Error| LogError::of_file(file, "file", format!("cannot be read: {e}"));
     let mut notes = Vec::new();
     let tables = match format {
         Format::Csv => {
             let mut table = Table::new("", "lines");
-            let bytes = std::fs::read(path).map_err(failed)?;
-            if text::read(&bytes, &file, &mut table, &mut notes)? {
-                notes.push(Finding::of_file(&file, "last line", "is torn"));
+            if text::read(File::open(&path).map_err(failed)?, file, &mut table, &mut notes)? {
+                notes.push(Finding::of_file(file, "last line", "is torn"));
             }
             vec![table]
         }
         Format::Parquet => {
             let mut table = Table::new("", "rows");
-            columnar::read(File::open(path).map_err(failed)?, &file, &mut table)?;
+            columnar::read(File::open(&path).map_err(failed)?, file, &mut table)?;
             vec![table]
         }
-        Format::Mcap | Format::Rosbag | Format::Bag => topic_tables(path, only, &file, &mut notes)?,
-        Format::Npz => npz_tables(path, &file, &mut notes)?,
-        Format::Npy => npy_tables(path, &file, &mut notes)?,
-        Format::Mat => mat_tables(path, &file, &mut notes)?,
-        Format::Hdf5 => hdf5_tables(path, &file, &mut notes)?,
+        Format::LeRobot => {
+            let mut table = Table::new("", "rows");
+            read_dataset(&path, file, &mut table, &mut notes)?;
+            vec![table]
+        }
+        Format::Mcap | Format::Rosbag | Format::Bag => topic_tables(place, only, file, &mut notes)?,
+        Format::Npz => npz_tables(&path, file, &mut notes)?,
+        Format::Npy => npy_tables(&path, file, &mut notes)?,
+        Format::Mat => mat_tables(&path, file, &mut notes)?,
+        Format::Hdf5 => hdf5_tables(&path, file, &mut notes)?,
     };
     for table in &tables {
         if let Some((count, reason)) = &table.unreadable {
             let message =
                 format!("{count} messages could not be read (the first: {reason}) and were left out");
-            notes.push(Finding::of_file(&file, &table.name, message));
+            notes.push(Finding::of_file(file, &table.name, message));
         }
     }
     Ok(Contents { format, tables, notes })
 }
 
+#[cfg(feature = "parquet")]
+pub(crate) use super::lerobot::read as read_dataset;
+
+/// Without Parquet no folder is called one.
+#[cfg(not(feature = "parquet"))]
+pub(crate) fn read_dataset(
+    _: &Path,
+    file: &str,
+    _: &mut impl super::RowSink,
+    _: &mut Vec<Finding>,
+) -> Result<(), LogError> {
+    Err(LogError::of_file(file, "LeRobot", "this build does not read it: enable the feature `parquet`"))
+}
+
 #[cfg(feature = "topics")]
 fn topic_tables(
-    path: &Path,
+    place: &mut Place,
     only: Only<'_>,
-    _: &str,
+    file: &str,
     notes: &mut Vec<Finding>,
 ) -> Result<Vec<Table>, LogError> {
     let mut topics = super::messages::Topics::of(only);
-    bag::Parts::of(path)?.read(&mut topics, notes)?;
+    #[cfg(feature = "remote")]
+    if let super::remote::Remote::Read(object) = &mut place.remote {
+        let wrong = super::mcap::read_from(object, &mut topics)
+            .map_err(|e| LogError::of_file(file, "MCAP", format!("cannot be read: {e}")))?;
+        notes.extend(wrong.into_iter().map(|wrong| Finding::of_file(file, "MCAP", wrong)));
+        return Ok(topics.tables());
+    }
+    let _ = file;
+    bag::Parts::of(&place.path)?.read(&mut topics, notes)?;
     Ok(topics.tables())
 }
 
 #[cfg(not(feature = "topics"))]
-fn topic_tables(_: &Path, _: Only<'_>, file: &str, _: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
+fn topic_tables(
+    _: &mut Place,
+    _: Only<'_>,
+    file: &str,
+    _: &mut Vec<Finding>,
+) -> Result<Vec<Table>, LogError> {
     let message = "this build does not read it: enable the feature `mcap`, `rosbag` or `bag1`";
     Err(LogError::of_file(file, "topics", message))
 }

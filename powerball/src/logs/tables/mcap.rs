@@ -1,7 +1,7 @@
 //! MCAP files, the default storage of rosbag2 (<https://mcap.dev/spec>).
 //!
-//! A file with an index is read chunk by chunk, and chunks without a topic that is read stay on the disk: their messages are
-//! counted by the index. A file without one, as a program that died leaves it, is read from its beginning. Either way a
+//! A file with an index is read chunk by chunk, and chunks without a topic that is read stay where they are: their messages are
+//! counted by the index, or not at all where some topics alone are asked for. A file without one, as a program that died leaves it, is read from its beginning. Either way a
 //! damaged chunk, by its checksum or by what it unpacks to, loses its own messages only.
 
 use super::messages::Topics;
@@ -18,26 +18,91 @@ use std::path::Path;
 /// A chunk that claims to be larger than this, bytes, is damaged.
 const LARGEST_CHUNK: usize = 1 << 30;
 
+/// Bytes of a message that Zstandard compressed very well.
+const SHORTEST: u64 = 2;
+/// So many bytes are read ahead where records follow each other.
+const AHEAD: u64 = 256 << 10;
+
+/// Where the bytes of a file come from.
+pub(super) trait Source {
+    /// How many there are.
+    fn length(&mut self) -> io::Result<u64>;
+
+    /// Those from a place on; fewer where the file ends.
+    fn range(&mut self, from: u64, length: u64) -> io::Result<Vec<u8>>;
+}
+
+impl Source for File {
+    fn length(&mut self) -> io::Result<u64> {
+        self.metadata().map(|metadata| metadata.len())
+    }
+
+    fn range(&mut self, from: u64, length: u64) -> io::Result<Vec<u8>> {
+        self.seek(SeekFrom::Start(from))?;
+        let mut bytes = Vec::new();
+        self.take(length).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    }
+}
+
+/// A place in a file from which it is read on.
+struct Cursor<'s, S> {
+    source: &'s mut S,
+    at: u64,
+    /// What was read ahead, and where it begins.
+    window: (u64, Vec<u8>),
+}
+
+impl<'s, S: Source> Cursor<'s, S> {
+    fn new(source: &'s mut S) -> Self {
+        Cursor { source, at: 0, window: (0, Vec::new()) }
+    }
+
+    /// Reads what fits, or less; nothing at the end.
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let held = |(begin, bytes): &(u64, Vec<u8>), at: u64| {
+            usize::try_from(at.checked_sub(*begin)?).ok().filter(|from| *from < bytes.len())
+        };
+        let from = match held(&self.window, self.at) {
+            Some(from) => from,
+            None => {
+                self.window = (self.at, self.source.range(self.at, AHEAD.max(into.len() as u64))?);
+                0
+            }
+        };
+        let rest = &self.window.1[from..];
+        let count = rest.len().min(into.len());
+        into[..count].copy_from_slice(&rest[..count]);
+        self.at += count as u64;
+        Ok(count)
+    }
+}
+
 /// Reads the topics of a file; what is wrong with it.
 pub(super) fn read(path: &Path, topics: &mut Topics) -> io::Result<Vec<String>> {
-    let mut file = File::open(path)?;
+    read_from(&mut File::open(path)?, topics)
+}
+
+/// The same, wherever its bytes come from.
+pub(super) fn read_from(source: &mut impl Source, topics: &mut Topics) -> io::Result<Vec<String>> {
     let mut records = Records::new(topics);
-    let all = match summary(&mut file) {
-        Ok(Some(summary)) => records.by_index(&mut file, &summary)?,
+    let all = match summary(source) {
+        Ok(Some(summary)) => records.by_index(source, &summary)?,
         _ => None,
     };
     let torn = match all {
         Some(true) => None,
         // A file may have messages outside of its chunks, which its index does not know.
-        all => records.record_by_record(&mut file, all.is_none())?,
+        all => records.record_by_record(source, all.is_none())?,
     };
     Ok(records.done(torn))
 }
 
 /// The summary at the end of a file; none where there is none.
-fn summary(file: &mut File) -> McapResult<Option<Summary>> {
-    let length = file.metadata()?.len();
+fn summary(source: &mut impl Source) -> McapResult<Option<Summary>> {
+    let length = source.length()?;
     let mut reader = SummaryReader::new_with_options(SummaryReaderOptions::default().with_file_size(length));
+    let mut file = Cursor::new(source);
     while let Some(event) = reader.next_event() {
         match event? {
             SummaryReadEvent::ReadRequest(n) => {
@@ -45,8 +110,13 @@ fn summary(file: &mut File) -> McapResult<Option<Summary>> {
                 reader.notify_read(read);
             }
             SummaryReadEvent::SeekRequest(to) => {
-                let at = file.seek(to)?;
-                reader.notify_seeked(at);
+                let to = match to {
+                    SeekFrom::Start(at) => Some(at),
+                    SeekFrom::End(by) => length.checked_add_signed(by),
+                    SeekFrom::Current(by) => file.at.checked_add_signed(by),
+                };
+                file.at = to.ok_or_else(|| io::Error::other("it is shorter than an MCAP"))?;
+                reader.notify_seeked(file.at);
             }
         }
     }
@@ -59,6 +129,10 @@ struct Records<'t> {
     schemas: HashMap<u16, (String, String, Vec<u8>)>,
     /// Messages that were taken or counted.
     messages: u64,
+    /// Those of topics that are read.
+    taken: u64,
+    /// Whether a chunk was left where it is, with its index.
+    passed_over: bool,
     chunks: usize,
     /// Chunks that could not be read.
     lost: Vec<Lost>,
@@ -79,6 +153,8 @@ impl<'t> Records<'t> {
             topics,
             schemas: HashMap::new(),
             messages: 0,
+            taken: 0,
+            passed_over: false,
             chunks: 0,
             lost: Vec::new(),
             behind_lost: false,
@@ -86,7 +162,7 @@ impl<'t> Records<'t> {
     }
 
     /// Reads by the index, where there is one; false where it does not tell of all messages.
-    fn by_index(&mut self, file: &mut File, summary: &Summary) -> io::Result<Option<bool>> {
+    fn by_index(&mut self, file: &mut impl Source, summary: &Summary) -> io::Result<Option<bool>> {
         let Some(stats) = &summary.stats else { return Ok(None) };
         if summary.chunk_indexes.len() != stats.chunk_count as usize {
             return Ok(None);
@@ -103,23 +179,41 @@ impl<'t> Records<'t> {
                 &channel.message_encoding,
             );
         }
+        // No message is shorter.
+        let most = file.length()? / SHORTEST;
+        for (id, count) in &stats.channel_message_counts {
+            self.topics.expect(i64::from(*id), usize::try_from((*count).min(most)).unwrap_or(0));
+        }
         for index in &summary.chunk_indexes {
             self.indexed_chunk(file, index)?;
         }
-        Ok(Some(self.messages >= stats.message_count || !self.lost.is_empty()))
+        let expected = match self.passed_over {
+            false => stats.message_count,
+            true => stats
+                .channel_message_counts
+                .iter()
+                .filter(|(id, _)| self.topics.reads(i64::from(**id)))
+                .map(|(_, n)| n)
+                .sum(),
+        };
+        let taken = if self.passed_over { self.taken } else { self.messages };
+        Ok(Some(taken >= expected || !self.lost.is_empty()))
     }
 
-    fn indexed_chunk(&mut self, file: &mut File, index: &ChunkIndex) -> io::Result<()> {
+    fn indexed_chunk(&mut self, file: &mut impl Source, index: &ChunkIndex) -> io::Result<()> {
         let needed = |id: &u16| self.topics.reads(i64::from(*id)) || !self.topics.knows(i64::from(*id));
         let skipped = index.message_index_length > 0 && !index.message_index_offsets.keys().any(needed);
+        if skipped && self.topics.counts_no_others() {
+            self.chunks += 1;
+            self.passed_over = true;
+            return Ok(());
+        }
         let (mut from, mut length) = (index.chunk_start_offset, index.message_index_length);
         match skipped {
             true => from = from.saturating_add(index.chunk_length),
             false => length = length.saturating_add(index.chunk_length),
         }
-        file.seek(SeekFrom::Start(from))?;
-        let mut bytes = Vec::new();
-        file.take(length).read_to_end(&mut bytes)?;
+        let bytes = file.range(from, length)?;
         let mut rest = bytes.as_slice();
         self.behind_lost = false;
         self.chunks += 1;
@@ -149,9 +243,9 @@ impl<'t> Records<'t> {
     }
 
     /// Reads record by record, with chunks or without; where the file ends too early, what that means.
-    fn record_by_record(&mut self, file: &mut File, chunks: bool) -> io::Result<Option<String>> {
-        let length = usize::try_from(file.metadata()?.len()).unwrap_or(usize::MAX);
-        file.rewind()?;
+    fn record_by_record(&mut self, source: &mut impl Source, chunks: bool) -> io::Result<Option<String>> {
+        let length = usize::try_from(source.length()?).unwrap_or(usize::MAX);
+        let mut file = Cursor::new(source);
         let options = LinearReaderOptions::default().with_emit_chunks(true);
         let mut reader = LinearReader::new_with_options(options.with_record_length_limit(length));
         while let Some(event) = reader.next_event() {
@@ -238,6 +332,7 @@ impl<'t> Records<'t> {
             }
             Record::Message { header, data } => {
                 self.messages += 1;
+                self.taken += u64::from(self.topics.reads(i64::from(header.channel_id)));
                 self.topics.take(i64::from(header.channel_id), header.log_time as i64, &data);
             }
             Record::MessageIndex(index) if self.behind_lost => {

@@ -152,10 +152,18 @@ fn failed(error: McapError) -> io::Error {
     }
 }
 
+/// What lines of CSV became.
+pub(crate) struct Written {
+    pub(crate) rows: usize,
+    /// Their names in the file.
+    pub(crate) joints: Vec<String>,
+    pub(crate) velocities: bool,
+}
+
 /// CSV lines of numbers as MCAP: `q`, `dq` and `tau` of joints 1 to n are `/joint_states`, other columns
-/// `/log`; the number of lines. Lines that are torn or hold anything else are left out. A time that begins
+/// `/log`. Lines that are torn or hold anything else are left out. A time that begins
 /// below 0 is moved there. The joints have the names given, `joint1` and so on where they are not as many.
-pub(crate) fn from_csv(csv: impl Read, joints: &[String], out: impl Write) -> io::Result<usize> {
+pub(crate) fn from_csv(csv: impl Read, joints: &[String], out: impl Write) -> io::Result<Written> {
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(csv);
     let names: Vec<String> = reader.headers()?.iter().map(str::to_string).collect();
     let at = |name: &str| names.iter().position(|own| own == name);
@@ -192,5 +200,5 @@ pub(crate) fn from_csv(csv: impl Read, joints: &[String], out: impl Write) -> io
         rows += 1;
     }
     writer.finish()?;
-    Ok(rows)
+    Ok(Written { rows, velocities: !dq.is_empty(), joints })
 }

@@ -1,8 +1,11 @@
 //! Messages of a bag as rows of tables, one table a topic.
 
 use super::cdr::Cdr;
-use super::schema::{Bits, MOST, Schema};
+#[cfg(feature = "mcap")]
+use super::protobuf;
+use super::schema::{Bits, MOST, NAMES, Schema};
 use super::table::{Row, Table};
+use super::text;
 use serde_json::Value;
 
 /// How the messages of a topic are read.
@@ -12,6 +15,8 @@ enum Reader {
     DynamicJointState,
     /// By the definition that the file has.
     Defined(Schema),
+    #[cfg(feature = "mcap")]
+    Protobuf(protobuf::Schema),
     Json,
     /// Counted, not read.
     Other,
@@ -34,6 +39,8 @@ struct Topic {
     reader: Reader,
     ros1: bool,
     table: Table,
+    /// How many messages there are, about; 0 where nobody says it.
+    expected: usize,
 }
 
 /// What a file says of the type of messages: its name, the language of its definition, and the definition.
@@ -50,6 +57,10 @@ impl Reader {
             ("sensor_msgs/JointState", "cdr" | "ros1") => Reader::JointState,
             ("control_msgs/DynamicJointState", "cdr" | "ros1") => Reader::DynamicJointState,
             (_, "cdr" | "ros1") => by_definition().map_or(Reader::Other, Reader::Defined),
+            #[cfg(feature = "mcap")]
+            (_, "protobuf") => {
+                protobuf::Schema::parse(kind, definition).map_or(Reader::Other, Reader::Protobuf)
+            }
             (_, "json") => Reader::Json,
             _ => Reader::Other,
         }
@@ -76,7 +87,7 @@ impl Topics {
         }
         let left_aside = self.only.as_ref().is_some_and(|only| !only.iter().any(|own| own == name));
         let reader = if left_aside { Reader::Other } else { Reader::of(of, encoding) };
-        self.topics.push(Topic { ids: vec![id], reader, ros1, table: Table::new(name, shown) });
+        self.topics.push(Topic { ids: vec![id], reader, ros1, table: Table::new(name, shown), expected: 0 });
     }
 
     /// Begins another file of the same recording: its numbers of topics are its own.
@@ -95,6 +106,20 @@ impl Topics {
         self.topics.iter().any(|t| t.ids.contains(&id) && !matches!(t.reader, Reader::Other))
     }
 
+    /// Says about how many messages of a topic follow.
+    #[cfg(feature = "mcap")]
+    pub(super) fn expect(&mut self, id: i64, messages: usize) {
+        if let Some(topic) = self.topics.iter_mut().find(|t| t.ids.contains(&id)) {
+            topic.expected += messages;
+        }
+    }
+
+    /// Whether messages of other topics need not be counted.
+    #[cfg(feature = "mcap")]
+    pub(super) fn counts_no_others(&self) -> bool {
+        self.only.is_some()
+    }
+
     /// The numbers of the topics that are read.
     #[cfg(feature = "rosbag")]
     pub(super) fn ids_read(&self) -> impl Iterator<Item = i64> {
@@ -105,7 +130,7 @@ impl Topics {
     /// Takes a message in; `received` in nanoseconds.
     pub(super) fn take(&mut self, id: i64, received: i64, message: &[u8]) {
         let Some(topic) = self.topics.iter_mut().find(|t| t.ids.contains(&id)) else { return };
-        let mut row = topic.table.begin_row(1e-9 * received as f64);
+        let mut row = topic.table.begin_row(1e-9 * received as f64, topic.expected);
         let unpacked = match self.compressed && !matches!(topic.reader, Reader::Other) {
             true => match zstd::decode_all(message) {
                 Ok(unpacked) => Some(unpacked),
@@ -120,6 +145,8 @@ impl Topics {
             Reader::JointState => cdr().and_then(|message| joint_state(message, &mut row)),
             Reader::DynamicJointState => cdr().and_then(|message| dynamic_joint_state(message, &mut row)),
             Reader::Defined(schema) => cdr().and_then(|mut message| schema.read(&mut message, &mut row)),
+            #[cfg(feature = "mcap")]
+            Reader::Protobuf(schema) => schema.read(message, &mut row),
             Reader::Json => json(message, &mut row),
             Reader::Other => Ok(None),
         };
@@ -178,15 +205,17 @@ fn dynamic_joint_state(mut message: Cdr<'_>, row: &mut Row<'_>) -> Stamp {
 }
 
 /// A JSON object: its numbers, by their path. The elements of an array are counted from 1: `q` of three
-/// values is `q1`, `q2`, `q3`. A `name` array beside arrays of as many values names them, as in a JointState.
+/// values is `q1`, `q2`, `q3`. A `name` array beside arrays of as many values names them, as in a JointState, and objects of
+/// an array that each have a name are named by these, as in `foxglove.JointStates`.
 fn json(message: &[u8], row: &mut Row<'_>) -> Stamp {
     let message: Value = serde_json::from_slice(message).map_err(|e| format!("is no JSON: {e}"))?;
     let Value::Object(fields) = &message else { return Err("is no JSON object".into()) };
     let stamp = message.pointer("/header/stamp").or(message.get("timestamp"));
     let nanoseconds = |s: &Value| s.get("nanosec").or(s.get("nsec")).and_then(Value::as_f64);
-    let stamp = stamp.and_then(|s| Some(s.get("sec")?.as_f64()? + 1e-9 * nanoseconds(s)?));
-    let names: Option<Vec<&str>> =
-        message.get("name").and_then(Value::as_array).and_then(|n| n.iter().map(Value::as_str).collect());
+    let parts = |s: &Value| Some(s.get("sec")?.as_f64()? + 1e-9 * nanoseconds(s)?);
+    let stamp = stamp.and_then(|s| s.as_str().map_or_else(|| parts(s), text::number));
+    let names = NAMES.iter().find_map(|name| message.get(name)).and_then(Value::as_array);
+    let names: Option<Vec<&str>> = names.and_then(|n| n.iter().map(Value::as_str).collect());
     for (key, value) in fields.iter().filter(|(key, _)| *key != "header" && *key != "timestamp") {
         match (&names, value) {
             (Some(names), Value::Array(of)) if of.len() == names.len() => {
@@ -203,11 +232,23 @@ fn json(message: &[u8], row: &mut Row<'_>) -> Stamp {
     Ok(stamp)
 }
 
+/// The name that an object has.
+fn name_of(object: &Value) -> Option<&str> {
+    NAMES.iter().find_map(|name| object.get(name)?.as_str())
+}
+
 fn flatten(path: &str, value: &Value, row: &mut Row<'_>) {
     match value {
         Value::Number(number) => number.as_f64().into_iter().for_each(|v| row.put(&[path], v)),
         Value::Bool(value) => row.put(&[path], f64::from(u8::from(*value))),
-        Value::Array(list) if list.len() <= MOST => {
+        Value::Array(list) if list.len() > MOST => {}
+        Value::Array(list) if list.iter().all(|own| name_of(own).is_some()) => {
+            let above = path.rsplit_once('.').map_or(String::new(), |(above, _)| format!("{above}."));
+            for (own, name) in list.iter().filter_map(|own| Some((own.as_object()?, name_of(own)?))) {
+                own.iter().for_each(|(key, v)| flatten(&format!("{above}{key}.{name}"), v, row));
+            }
+        }
+        Value::Array(list) => {
             list.iter().enumerate().for_each(|(k, v)| flatten(&format!("{path}{}", k + 1), v, row));
         }
         Value::Object(fields) => {

@@ -10,8 +10,12 @@ mod bag1;
 mod cdr;
 pub(crate) mod columnar;
 mod contents;
+#[cfg(feature = "dates")]
+mod dates;
 #[cfg(feature = "hdf5")]
 mod hdf5;
+#[cfg(feature = "mcap")]
+pub(crate) mod layouts;
 #[cfg(feature = "parquet")]
 mod lerobot;
 #[cfg(feature = "mat")]
@@ -26,6 +30,11 @@ mod messages;
 mod npz;
 #[cfg(feature = "parquet")]
 mod numbers;
+mod place;
+#[cfg(feature = "mcap")]
+mod protobuf;
+#[cfg(feature = "remote")]
+mod remote;
 #[cfg(feature = "rosbag")]
 mod rosbag;
 #[cfg(feature = "topics")]
@@ -33,11 +42,12 @@ mod schema;
 mod table;
 pub(crate) mod text;
 
-pub(crate) use contents::read_topics;
 pub use contents::{Contents, Finding, Format, LogError, read_contents};
+pub(crate) use contents::{read_dataset, read_topics};
 #[cfg(feature = "mcap")]
 pub(crate) use mcap_out::from_csv as mcap_from_csv;
 #[cfg(feature = "mcap")]
 pub use mcap_out::{Channel, JointState, McapWriter};
-pub(crate) use table::RowSink;
+pub(crate) use place::Place;
 pub use table::{Column, Table};
+pub(crate) use table::{RowSink, make_room};

@@ -15,7 +15,7 @@ const DEEPEST: usize = 16;
 /// Parts of one message beyond this are none of joints.
 const MOST_PARTS: usize = 1 << 20;
 /// Lists of texts that name the values of arrays.
-const NAMES: [&str; 4] = ["name", "names", "joint_name", "joint_names"];
+pub(super) const NAMES: [&str; 4] = ["name", "names", "joint_name", "joint_names"];
 
 /// A type of messages with all that it is made of; the first is the type itself.
 #[derive(Debug)]

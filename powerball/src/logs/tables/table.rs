@@ -8,8 +8,17 @@ pub(crate) trait RowSink {
     /// Why rows of these columns are of no use.
     fn begin(&mut self, names: &[String]) -> Result<(), super::LogError>;
 
+    /// About so many rows follow: room is made for them at once, where there is so much.
+    fn expect(&mut self, rows: usize);
+
     /// A row: its line in the file, from 1, and the number in a column, where there is one.
     fn row(&mut self, line: usize, number: &dyn Fn(usize) -> Option<f64>);
+}
+
+/// Makes room for so many more values at once, so that no second copy is ever needed; a file that claims more than there is
+/// gets none.
+pub(crate) fn make_room<T>(values: &mut Vec<T>, more: usize) {
+    let _ = values.try_reserve_exact(more);
 }
 
 /// One stream of samples in a file: all lines of a CSV, the messages of one topic, the arrays of an archive.
@@ -57,15 +66,20 @@ impl Table {
         self.columns.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
     }
 
-    /// Begins a message that was received at a time, s.
+    /// Begins a message that was received at a time, s; of about `expected` in all.
     #[cfg(feature = "topics")]
-    pub(super) fn begin_row(&mut self, received: f64) -> Row<'_> {
+    pub(super) fn begin_row(&mut self, received: f64, expected: usize) -> Row<'_> {
+        if self.line.is_empty() {
+            make_room(&mut self.line, expected);
+            make_room(&mut self.received, expected);
+            make_room(&mut self.stamps, expected);
+        }
         let row = self.line.len();
         self.line.push(row + 1);
         self.received.push(received);
         self.stamps.push(f64::NAN);
         let known = self.columns.len();
-        Row { table: self, row, known, next: 0, name: String::new() }
+        Row { table: self, row, known, next: 0, name: String::new(), expected }
     }
 
     /// Every column as long as there are samples.
@@ -87,6 +101,8 @@ pub(super) struct Row<'t> {
     next: usize,
     /// The name of a value.
     name: String,
+    /// How many messages are expected.
+    expected: usize,
 }
 
 #[cfg(feature = "topics")]
@@ -99,7 +115,9 @@ impl Row<'_> {
         let here = columns.get(self.next).is_some_and(|c| c.name == *name);
         let at = if here { Some(self.next) } else { columns.iter().position(|c| c.name == *name) };
         let at = at.unwrap_or_else(|| {
-            columns.push(Column { name: name.clone(), values: Vec::new() });
+            let mut values = Vec::new();
+            make_room(&mut values, self.expected);
+            columns.push(Column { name: name.clone(), values });
             columns.len() - 1
         });
         let column = &mut columns[at].values;
@@ -127,6 +145,11 @@ impl RowSink for Table {
         let column = |name: &String| Column { name: name.clone(), values: Vec::new() };
         self.columns = names.iter().map(column).collect();
         Ok(())
+    }
+
+    fn expect(&mut self, rows: usize) {
+        make_room(&mut self.line, rows);
+        self.columns.iter_mut().for_each(|column| make_room(&mut column.values, rows));
     }
 
     fn row(&mut self, line: usize, number: &dyn Fn(usize) -> Option<f64>) {

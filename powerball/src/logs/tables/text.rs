@@ -1,21 +1,26 @@
 //! Logs as CSV with a header line, between whose names stand commas, semicolons, tabs or blanks. Where no commas stand
-//! there, numbers may have decimal commas.
+//! there, numbers may have decimal commas. Times may be dates.
 
 use super::table::RowSink;
 use super::{Finding, LogError};
 use std::cell::Cell;
+use std::io::Read;
 
 /// So many bytes show whether a file is text.
 pub(super) const HEAD: usize = 4096;
 
+/// The names of the columns stand within so many bytes.
+const LONGEST_HEADER: u64 = 1 << 20;
+
 /// What files begin with that are no logs, and what they are.
-const OTHERS: [(&[u8], &str); 6] = [
+const OTHERS: [(&[u8], &str); 7] = [
     (b"\x89PNG", "a PNG picture"),
     (b"\xff\xd8\xff", "a JPEG picture"),
     (b"%PDF", "a PDF"),
     (b"\x1f\x8b", "compressed by gzip: unpack it first"),
     (b"\x28\xb5\x2f\xfd", "compressed by zstd: unpack it first"),
     (b"\x7fELF", "a program"),
+    (b"version https://git-lfs", "what Git leaves in place of a large file: fetch it by git lfs pull"),
 ];
 
 /// Why a file that begins so is no text: in words, after its name.
@@ -35,18 +40,34 @@ pub(super) fn no_text(head: &[u8]) -> Option<String> {
     })
 }
 
-/// Hands the lines of a CSV file over; whether the last one is torn. Unreadable lines are named in
+/// A number, or the time of a date in s.
+pub(crate) fn number(text: &str) -> Option<f64> {
+    let date = || {
+        #[cfg(feature = "dates")]
+        return super::dates::seconds(text);
+        #[cfg(not(feature = "dates"))]
+        None
+    };
+    text.parse().ok().or_else(date)
+}
+
+/// Hands the lines of a CSV file over, which stays on the disk; whether the last one is torn. Unreadable lines are named in
 /// `findings`.
 pub(crate) fn read(
-    bytes: &[u8],
+    mut input: impl Read,
     file: &str,
     rows: &mut impl RowSink,
     findings: &mut Vec<Finding>,
 ) -> Result<bool, LogError> {
-    if let Some(what) = no_text(&bytes[..bytes.len().min(HEAD)]) {
+    let mut head = Vec::new();
+    (&mut input)
+        .take(LONGEST_HEADER)
+        .read_to_end(&mut head)
+        .map_err(|e| LogError::of_file(file, "file", format!("cannot be read: {e}")))?;
+    if let Some(what) = no_text(&head[..head.len().min(HEAD)]) {
         return Err(LogError::of_file(file, "file", what));
     }
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let bytes = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&head);
     let delimiter = delimiter(bytes);
     let error = |line: Option<usize>, quantity: &str, message: String| Finding {
         file: file.to_string(),
@@ -54,8 +75,11 @@ pub(crate) fn read(
         quantity: quantity.to_string(),
         message,
     };
-    let mut reader =
-        csv::ReaderBuilder::new().delimiter(delimiter).flexible(true).trim(csv::Trim::All).from_reader(bytes);
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(delimiter)
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .from_reader(bytes.chain(input));
     let header = reader
         .byte_headers()
         .map_err(|e| LogError(vec![error(Some(1), "header", format!("cannot be read: {e}"))]))?
@@ -90,7 +114,7 @@ pub(crate) fn read(
             // A torn line's last number may be cut off too.
             let field = record.get(k).filter(|_| !last_torn)?;
             let text = std::str::from_utf8(field).ok()?;
-            text.parse().ok().or_else(|| {
+            number(text).or_else(|| {
                 let value = text.replacen(',', ".", 1).parse().ok()?;
                 decimal_commas.set(true);
                 Some(value)

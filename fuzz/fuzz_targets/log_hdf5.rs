@@ -1,0 +1,8 @@
+//! Any bytes as HDF5: tables or a reason, never a panic.
+#![no_main]
+
+mod log;
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| log::read(b"\x89HDF\r\n\x1a\n", data));

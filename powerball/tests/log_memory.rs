@@ -1,0 +1,98 @@
+//! How much memory reading a log takes, against what its arrays take. Prints the figures of docs/logs.md with `--nocapture`.
+
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use powerball::Log;
+use std::path::Path;
+use std::process::Command;
+use std::time::Instant;
+
+const SAMPLES: usize = 300_000;
+const JOINTS: usize = 7;
+/// Of the arrays' size, at the peak.
+const MOST: f64 = 1.5;
+/// What libraries hold whatever a log's size, MB: buffers, a row group, windows of decompression.
+const FIXED_MB: f64 = 8.0;
+
+fn arm() -> dyngen::Arm {
+    let joint = |k| {
+        let turn = if k % 2 == 0 { "pi/2" } else { "-pi/2" };
+        format!(
+            "[[joint]]\nkind = \"revolute\"\nname = \"arm_joint_{}\"\na = 0.3\nalpha = \"{turn}\"\nd = 0.1\ntheta = 0\n",
+            k + 1
+        )
+    };
+    let joints: String = (0..JOINTS).map(joint).collect();
+    let head = "name = \"seven\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\n";
+    dyngen::Arm::parse(&format!("{head}{joints}"), "seven.toml").unwrap()
+}
+
+fn log() -> Log {
+    let t: Vec<f64> = (0..SAMPLES).map(|k| 0.001 * k as f64).collect();
+    let wave = |j: usize, size: f64| {
+        t.iter().map(|t| size * (t * (1.0 + 0.1 * j as f64)).sin()).collect::<Vec<f64>>()
+    };
+    Log {
+        file: "made".into(),
+        q: (0..JOINTS).map(|j| wave(j, 1.0)).collect(),
+        torque: (0..JOINTS).map(|j| wave(j, 5.0)).collect(),
+        temperature: None,
+        motor: None,
+        pieces: std::iter::once(0..SAMPLES).collect(),
+        clock: 0.0,
+        t,
+    }
+}
+
+/// MB that the program holds now, and that it held at most.
+fn held() -> [f64; 2] {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let of = |name: &str| {
+        let line = status.lines().find_map(|line| line.strip_prefix(name)).unwrap();
+        line.trim().trim_end_matches(" kB").parse::<f64>().unwrap() / 1024.0
+    };
+    [of("VmRSS:"), of("VmHWM:")]
+}
+
+/// Run by the test below, in a program of its own for each file; `LOG` and `ARM_OF_LOG` are files.
+#[test]
+#[ignore = "a part of the test below"]
+fn one() {
+    let Ok(file) = std::env::var("LOG") else { return };
+    let arm = match std::env::var("ARM_OF_LOG") {
+        Ok(arm) => dyngen::Arm::read(Path::new(&arm)).unwrap(),
+        Err(_) => arm(),
+    };
+    let (before, begun) = (held()[0], Instant::now());
+    let (log, _) = Log::read(&file, &arm).unwrap();
+    let seconds = begun.elapsed().as_secs_f64();
+    let arrays = 8.0 * log.t.len() as f64 * (1 + log.q.len() + log.torque.len()) as f64 / f64::from(1 << 20);
+    println!("\nfigures {} {arrays:.1} {:.1} {seconds:.2}", log.t.len(), held()[1] - before);
+}
+
+#[test]
+fn a_log_is_read_in_little_more_memory_than_its_arrays_take() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("log_memory");
+    std::fs::create_dir_all(&folder).unwrap();
+    let made = log();
+    let names: Vec<String> = (1..=JOINTS).map(|j| format!("arm_joint_{j}")).collect();
+    for name in ["log.csv", "log.parquet", "log.mcap"] {
+        let file = folder.join(name);
+        made.write_for(&file, &names).unwrap();
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        command
+            .args(["--exact", "one", "--ignored", "--nocapture"])
+            .env("LOG", &file)
+            .env_remove("ARM_OF_LOG");
+        let done = command.output().unwrap();
+        let text = String::from_utf8_lossy(&done.stdout).into_owned();
+        let figures =
+            text.lines().find_map(|line| line.strip_prefix("figures ")).unwrap_or_else(|| panic!("{text}"));
+        let figures: Vec<f64> = figures.split(' ').map(|x| x.parse().unwrap()).collect();
+        let [samples, arrays, peak, seconds] = figures[..] else { panic!("{text}") };
+        println!("{name}: {samples} samples, arrays of {arrays:.1} MB, {peak:.1} MB at most, {seconds:.2} s");
+        assert_eq!(samples as usize, SAMPLES);
+        assert!(peak <= MOST * arrays + FIXED_MB, "{name}: {peak} MB for arrays of {arrays} MB");
+    }
+}
