@@ -123,7 +123,7 @@ fn foxglove(columns: &[Vec<Plot<'_>>; 2]) -> Value {
 }
 
 fn plotjuggler(columns: &[Vec<Plot<'_>>; 2]) -> String {
-    // It computes rates where it is told to by hand only.
+    // It computes rates only where a person asks for it.
     let drawn = |plot: &&Plot<'_>| plot.lines.iter().any(|line| !matches!(line.of, Of::Rate(_)));
     let columns = columns.each_ref().map(|plots| plots.iter().filter(drawn).collect::<Vec<_>>());
     let mut text = String::from("<?xml version='1.0' encoding='UTF-8'?>\n<root>\n");

@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn answers_are_told_apart() {
+    fn answers_are_distinguished() {
         for (text, expected) in [
             (&b"\r"[..], Line::Done),
             (b"z\r", Line::Done),
@@ -208,8 +208,8 @@ mod tests {
             (b"e9o\r", Line::Other),
         ] {
             let mut lines = Lines::default();
-            let told: Vec<Line> = text.iter().filter_map(|byte| lines.push(*byte)).collect();
-            assert_eq!(told, [expected], "{}", String::from_utf8_lossy(text));
+            let found: Vec<Line> = text.iter().filter_map(|byte| lines.push(*byte)).collect();
+            assert_eq!(found, [expected], "{}", String::from_utf8_lossy(text));
         }
     }
 
@@ -217,8 +217,8 @@ mod tests {
     fn what_follows_noise_is_noise_until_the_line_ends() {
         let mut lines = Lines::default();
         let text = [&[b'x'; 64][..], b"t1230\rt1230\r"].concat();
-        let told: Vec<Line> = text.iter().filter_map(|byte| lines.push(*byte)).collect();
-        assert_eq!(told, [Line::Other, Line::Frame(Frame::from_raw(0x123, &[]).unwrap())]);
+        let found: Vec<Line> = text.iter().filter_map(|byte| lines.push(*byte)).collect();
+        assert_eq!(found, [Line::Other, Line::Frame(Frame::from_raw(0x123, &[]).unwrap())]);
     }
 
     /// Noise out of letters that lines have: what is taken for a frame is written as that frame.
@@ -234,8 +234,8 @@ mod tests {
             };
             if let Some(Line::Frame(frame)) = lines.push(byte) {
                 frames += 1;
-                let told: Vec<Line> = encode(&frame).iter().filter_map(|byte| lines.push(*byte)).collect();
-                assert_eq!(told, [Line::Frame(frame)]);
+                let found: Vec<Line> = encode(&frame).iter().filter_map(|byte| lines.push(*byte)).collect();
+                assert_eq!(found, [Line::Frame(frame)]);
             }
         }
         assert!(frames > 50, "{frames}");

@@ -163,7 +163,7 @@ fn what_the_adapter_refuses_is_named() {
 }
 
 #[test]
-fn flags_are_told_as_events() {
+fn flags_become_events() {
     let port = Port::new(Adapter { flags: Some(0x20), ..Adapter::default() });
     let mut bus = port.open();
     assert_eq!(first(&mut bus, 1), [Event::ErrorPassive]);

@@ -194,7 +194,7 @@ impl Dcf {
     /// Whether the drive offers a bit rate, bit/s.
     pub(super) fn offers(&self, bitrate: u32) -> bool {
         let key = format!("baudrate_{}", bitrate / 1000);
-        let told = self.info.get(&key).and_then(|text| Number::parse(text));
-        told.is_some_and(|number| number.of(0) != 0)
+        let flag = self.info.get(&key).and_then(|text| Number::parse(text));
+        flag.is_some_and(|number| number.of(0) != 0)
     }
 }

@@ -60,10 +60,10 @@ fn every_object_is_read_as_python_canopen_reads_it() {
                 continue;
             }
             // CiA 306 puts the sub-index behind the name where a part of a compact array has none of its own.
-            let told = theirs["name"].as_str().unwrap();
-            let own =
-                ours.name == told || object == Object::new(0x3006, 1) && ours.name == format!("{told}1");
-            assert!(own, "{name}, {object}: {}, {told}", ours.name);
+            let name_there = theirs["name"].as_str().unwrap();
+            let own = ours.name == name_there
+                || object == Object::new(0x3006, 1) && ours.name == format!("{name_there}1");
+            assert!(own, "{name}, {object}: {}, {name_there}", ours.name);
             assert!(access(ours.access).contains(&theirs["access"].as_str().unwrap()), "{name}, {object}");
             assert_eq!(plain(ours.default.as_ref(), node), theirs["default"], "{name}, {object}: default");
             assert_eq!(plain(ours.value.as_ref(), node), theirs["value"], "{name}, {object}: value");

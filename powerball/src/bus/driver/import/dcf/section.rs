@@ -193,16 +193,16 @@ impl Section {
     }
 
     fn data_type(&self, types: &Types) -> Result<u16, DcfError> {
-        let Some(told) = self.number_within("datatype", 0, i128::from(u16::MAX))? else {
+        let Some(code) = self.number_within("datatype", 0, i128::from(u16::MAX))? else {
             if self.object_type()? == DOMAIN {
                 return Ok(DOMAIN_TYPE);
             }
             let message = format!("[{}] has no DataType", self.name);
             return Err(DcfError { line: self.line, message });
         };
-        let told = told as u16;
+        let code = code as u16;
         // What a type of the maker's own holds is not known here: bytes.
-        Ok(if told > LAST_TYPE { types.get(&told).copied().unwrap_or(DOMAIN_TYPE) } else { told })
+        Ok(if code > LAST_TYPE { types.get(&code).copied().unwrap_or(DOMAIN_TYPE) } else { code })
     }
 
     fn access(&self) -> Result<Access, DcfError> {

@@ -58,8 +58,8 @@ const COMPACT: &str = "[1003name]\nNrOfEntries=1\n2=Older ; not the newest\n[100
 fn parts_of_a_compact_array_share_its_section() {
     let dcf = Dcf::parse(COMPACT.as_bytes()).unwrap();
     let part = |sub| &dcf.variables[&Object::new(0x1003, sub)];
-    let told: Vec<_> = (0..=3).map(|sub| (part(sub).name.as_str(), part(sub).data_type)).collect();
-    assert_eq!(told, [("NrOfObjects", 5), ("Errors1", 7), ("Older", 7), ("Own", 7)]);
+    let parts: Vec<_> = (0..=3).map(|sub| (part(sub).name.as_str(), part(sub).data_type)).collect();
+    assert_eq!(parts, [("NrOfObjects", 5), ("Errors1", 7), ("Older", 7), ("Own", 7)]);
     // The value goes over the default, which is that of all parts but the one with a section of its own.
     let values: Vec<_> = (0..=3).map(|sub| dcf.value(Object::new(0x1003, sub), 4).unwrap()).collect();
     assert_eq!(values, [3, 0x8130, 7, 5]);
