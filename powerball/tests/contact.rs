@@ -91,7 +91,7 @@ fn study(draws: usize, calm_paths: u64, seed: u64) -> Outcome {
                 println!("before the push at {begins:.2} s: {contact:?}");
                 result.early += 1;
             }
-            Track { contact: Some(contact), samples } if contact.t < begins + PATIENCE => {
+            Track { contact: Some(contact), samples, .. } if contact.t < begins + PATIENCE => {
                 result.delays.push(contact.t - begins);
                 result.right +=
                     usize::from(study.is_right(&samples.last().unwrap().q, force, contact.joint - 1));
@@ -186,12 +186,16 @@ impl Study {
             path,
             arm: &self.model.numeric,
             parts: Some(&parts),
+            best: &parts,
+            // The pushes are what is studied: the driver lets them be.
+            give: 1.0,
+            guard: None,
             law,
             contact,
             accept_unverified: true,
         };
         let master = Master::new(driver, Memory::new(arm, LWA4P.bitrate));
-        let (master, track, _) = run.follow(master, Envelope::new(|_| None), |_, _| ()).unwrap();
+        let (master, track, _) = run.follow(master, Envelope::new(|_| None), None, |_, _| ()).unwrap();
         Ran { track, ended: master.bus().peer().simulation().time() }
     }
 

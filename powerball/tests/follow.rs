@@ -102,8 +102,45 @@ fn the_explained_model_follows_better_than_the_base_model() {
     assert!(error("explained") < 0.5 * error("base"), "{result}");
     assert!(result["torque"]["explained"]["effects"][0].as_f64().unwrap() > 1.0, "{result}");
     assert!(result["largest_pole"].as_f64().unwrap() < 0.95);
+    // Both runs in one log, which is one.
+    let log = std::fs::read_to_string(out.join("log.csv")).unwrap();
+    assert!(log.lines().count() > 2 * 800 && whole(&log), "{} lines", log.lines().count());
+    let read = powerball(&["log", out.join("log.csv").to_str().unwrap()]);
+    assert_eq!(read.status.code(), Some(0), "{}", complaint(&read));
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("Tracking error") && page.contains("of the error with the base model"));
+}
+
+/// Whether every line of a log has as many cells as its first one, and ends.
+fn whole(log: &str) -> bool {
+    let cells = |line: &str| line.split(',').count();
+    let all = log.lines().next().map_or(0, cells);
+    log.ends_with('\n') && all == 40 && log.lines().all(|line| cells(line) == all)
+}
+
+/// Somebody leans on the wrist: the driver stops the arm, the cause names the joint, and the log is there.
+#[test]
+fn a_run_that_is_stopped_keeps_its_log() {
+    let mut model = model();
+    model["terms"] = json!([]);
+    let model = write("pushed.json", &model.to_string());
+    let push = r#"{"effect": {"contact_wrench": {"force": [0.0, 60.0, -60.0], "start": 0.0, "length": 1.0, "every": 2.0}}, "age": 0.0}"#;
+    let (plant, path) = (write("push_plant.json", push), path("pushed.csv", 4.0));
+    for with in ["torque", "impedance"] {
+        let out = file(&format!("pushed_{with}"));
+        let arguments = [
+            "follow", "--trajectory", &path, "--arm", ARM, "--floor", "none", "--model", &model, "--plant", &plant, "--with",
+            with, "--out", out.to_str().unwrap(),
+        ];
+        let run = powerball(&arguments);
+        let complaint = complaint(&run);
+        assert_eq!(run.status.code(), Some(1), "{complaint}");
+        assert!(complaint.contains("the arm was stopped: node") && complaint.contains("joint "), "{complaint}");
+        let log = std::fs::read_to_string(out.join("log.csv")).unwrap();
+        assert!(log.lines().count() > 1 && whole(&log), "{log}");
+    }
+    let refused = powerball(&["follow", "--trajectory", &path, "--model", &model, "--give", "0.6", "--out", "x"]);
+    assert_eq!(refused.status.code(), Some(2), "{}", complaint(&refused));
 }
 
 #[test]

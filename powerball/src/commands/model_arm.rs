@@ -1,9 +1,12 @@
 //! A torque model that drives the arm that it was fitted to.
 
+use crate::bus::driver::TorqueGuard;
 use crate::bus::driver::lwa4p::LWA4P;
+use crate::controller::correction::{Instant, Memory, Term, add_torques};
+use crate::controller::dynamics::{ArmModel, State};
 use crate::controller::friction::TanhFriction;
 use crate::controller::laws::ContactDetector;
-use crate::explanation::torque_model::{JointColour, ModelFile, ModelOnArm, rows_a_second};
+use crate::explanation::torque_model::{JointColour, LogChanges, ModelFile, ModelOnArm, rows_a_second};
 use crate::procedure::follow::{OBSERVER, Parts, Path as DrivenPath};
 use chacha20::ChaCha8Rng;
 use dyngen::Arm;
@@ -74,6 +77,48 @@ pub fn contact_detector(on: &ModelArm) -> Result<ContactDetector<f64, 6>, String
     let gammas = on.model.gammas();
     let laws = std::array::from_fn(|j| TanhFriction::new(gammas.get(j).copied().unwrap_or_default()));
     Ok(ContactDetector::new(laws, noise))
+}
+
+/// The model for the driver's guard of current mode: rigid arm, friction, and effects that hold a position. It stays in
+/// memory until the program ends.
+pub fn torque_guard(on: &ModelArm) -> TorqueGuard<6> {
+    let (arm, terms, changes) =
+        (on.numeric.clone(), on.model.holding_terms(), on.model.additions.log_changes.clone());
+    let gammas = on.model.gammas();
+    let laws: [TanhFriction<f64>; 6] =
+        std::array::from_fn(|j| TanhFriction::new(gammas.get(j).copied().unwrap_or_default()));
+    let torque = move |q: &[f64; 6], dq: &[f64; 6], ddq: &[f64; 6]| -> [f64; 6] {
+        let state = State { q: (*q).into(), dq: (*dq).into() };
+        let friction = SVector::from_fn(|j, _| laws[j].torque(dq[j]));
+        let mut torque = arm.mass_matrix(&state.q) * SVector::from(*ddq)
+            + arm.coriolis_times_velocity(&state.q, &state.dq)
+            + arm.gravity(&state.q)
+            + friction;
+        hold(&changes, &terms, &mut vec![Memory::default(); terms.len()], &state, &mut torque);
+        torque.into()
+    };
+    TorqueGuard::new(Box::leak(Box::new(torque)))
+}
+
+/// Adds what a model's [terms of position](crate::explanation::torque_model::TorqueModel::holding_terms) hold against.
+pub fn hold(
+    changes: &LogChanges,
+    terms: &[Term<f64>],
+    memory: &mut [Memory<f64>],
+    state: &State<f64, 6>,
+    torque: &mut SVector<f64, 6>,
+) {
+    let place = SVector::<f64, 6>::from_fn(|j, _| state.q[j] - changes.offset(j));
+    let now = Instant {
+        q: place.as_slice(),
+        dq: state.dq.as_slice(),
+        ddq: &[],
+        rigid: &[],
+        friction: &[],
+        temperature: &[],
+        running: 0.0,
+    };
+    add_torques(terms, memory, &now, torque.as_mut_slice());
 }
 
 /// Poses within the joints' limits, always the same ones.

@@ -4,9 +4,11 @@
 
 use crate::bus::canopen::Micros;
 use crate::bus::driver::{Counters, Driver};
+use crate::logs::log::LogFile;
 use std::fmt;
 use std::fmt::Write as _;
 use std::io::{self, Write};
+use std::path::Path;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
@@ -86,6 +88,70 @@ impl Columns {
             counts.iter().for_each(|count| cell(format_args!("{count}")));
         }
         line.push('\n');
+    }
+}
+
+/// The log of an arm that moves by whatever law, with [all columns](Columns::Everything): a whole line a cycle, written by a
+/// thread of its own. Dropped it is closed too: what was recorded counts, whatever ended it.
+#[derive(Debug)]
+pub struct MotionLog {
+    time: LogTime,
+    /// Where counts begin, once the header is written.
+    begin: Option<Counters>,
+    line: String,
+    out: Option<Behind<LogFile>>,
+}
+
+impl MotionLog {
+    /// A log as [`LogFile::create`] makes it. What was there before stays until the first line.
+    ///
+    /// # Errors
+    /// Where the file cannot be made.
+    pub fn create(path: &Path) -> io::Result<MotionLog> {
+        let (file, _) = LogFile::create(path)?;
+        Ok(MotionLog {
+            time: LogTime::default(),
+            begin: None,
+            line: String::new(),
+            out: Some(Behind::new(file)),
+        })
+    }
+
+    /// The line of the present cycle, in which `reference` (rad) was where the joints should be.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn take<const N: usize>(&mut self, driver: &Driver<N>, reference: &[f64]) -> io::Result<()> {
+        let Some(out) = &mut self.out else { return Ok(()) };
+        if self.begin.is_none() {
+            out.write_all(Columns::Everything.header(N).as_bytes())?;
+        }
+        let begin = self.begin.get_or_insert(*driver.counters());
+        let t = self.time.at(driver.synced_at());
+        Columns::Everything.line(&mut self.line, t, driver, reference, begin);
+        out.write_all(self.line.as_bytes())
+    }
+
+    /// Waits until all lines are written.
+    ///
+    /// # Errors
+    /// Where they cannot be.
+    pub fn close(mut self) -> io::Result<()> {
+        let recorded = self.begin.is_some();
+        let ended = self.end();
+        if recorded { ended } else { Ok(()) }
+    }
+
+    fn end(&mut self) -> io::Result<()> {
+        let Some(out) = self.out.take() else { return Ok(()) };
+        let (file, written) = out.close();
+        written.and_then(|()| file.map_or(Ok(()), LogFile::close))
+    }
+}
+
+impl Drop for MotionLog {
+    fn drop(&mut self) {
+        let _ = self.end();
     }
 }
 

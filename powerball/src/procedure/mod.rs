@@ -14,6 +14,6 @@ pub mod torque_loop;
 pub mod warm_up;
 
 pub use envelope::{Cleared, Envelope};
-pub use log_line::{Behind, Columns, LogTime, RecordProgress};
+pub use log_line::{Behind, Columns, LogTime, MotionLog, RecordProgress};
 pub use record::{Record, RecordError, Recorder, record, way};
 pub use settling::approach;

@@ -38,10 +38,15 @@ pub(crate) enum Fault {
     TwoNodes,
     OtherSync,
     OtherSetpoints,
+    VelocityHuge,
+    Frozen,
+    Drift,
+    TorqueFull,
 }
 
 impl Fault {
-    pub(crate) const ALL: [(Fault, &'static str); 28] = [
+    /// Those that every mode answers in the same way, but for how soon.
+    pub(crate) const ALL: [(Fault, &'static str); 29] = [
         (Fault::DropOne, "one frame dropped"),
         (Fault::DropFive, "5 cycles of frames dropped"),
         (Fault::DelayOne, "one frame 2 ms late"),
@@ -70,7 +75,17 @@ impl Fault {
         (Fault::TwoNodes, "two nodes with one id"),
         (Fault::OtherSync, "SYNC of another master"),
         (Fault::OtherSetpoints, "set-points of another master"),
+        (Fault::VelocityHuge, "velocity reads 2³¹"),
     ];
+
+    /// What can happen in a mode: in current mode also what its guard is for.
+    pub(crate) fn of(control: ControlMode) -> impl Iterator<Item = Fault> + Clone {
+        let own: &[Fault] = match control {
+            ControlMode::Current => &[Fault::Frozen, Fault::Drift, Fault::TorqueFull],
+            _ => &[],
+        };
+        Fault::ALL.into_iter().map(|(fault, _)| fault).chain(own.iter().copied())
+    }
 
     pub(crate) fn inject(self, world: &mut World) {
         let now = world.now();
@@ -115,6 +130,10 @@ impl Fault {
                 world.bus.peer_mut().foreign = Frame::from_raw(Cob::Rpdo(1, VICTIM).id(), &[0; 6])
             }
             Fault::PositionJump => wire(world, Wire::Shift { by: 5000, frames: 12 }),
+            Fault::VelocityHuge => wire(world, Wire::Velocity(i32::MIN)),
+            Fault::Frozen => wire(world, Wire::Freeze(None)),
+            Fault::Drift => wire(world, Wire::Drift(None)),
+            Fault::TorqueFull => wire(world, Wire::Torque(i16::MAX)),
         }
     }
 
@@ -157,12 +176,15 @@ impl Fault {
                 Fault::OtherSync => matches!(cause, Cause::OtherMaster(Foreign::Sync)),
                 Fault::OtherSetpoints => matches!(cause, Cause::OtherMaster(Foreign::Setpoints(VICTIM))),
                 Fault::PositionJump => matches!(cause, Cause::PositionJump(..)),
+                Fault::VelocityHuge => matches!(cause, Cause::Overspeed(..) | Cause::ImplausibleVelocity(..)),
+                Fault::Drift => matches!(cause, Cause::PositionAgainstVelocity(..)),
+                Fault::TorqueFull => matches!(cause, Cause::CurrentError(..)),
                 _ => false,
             }
     }
 
     /// What must follow where the arm is in `phase`.
-    pub(crate) fn expected(self, phase: Stage) -> Expected {
+    pub(crate) fn expected(self, phase: Stage, control: ControlMode) -> Expected {
         use Expected::{GoesOn, Refused, SlavesStop, Stays, Stops};
         use Stage::{
             Boot, Commutating, Configure, Enabling, Faulted, Identify, Resetting, Running, Starting,
@@ -183,6 +205,11 @@ impl Fault {
                 }
             }
             // SDO and boot are repeated, first data is waited for.
+            // In current mode the caller carries the state of a joint on over five cycles.
+            Fault::DropFive | Fault::ShortFive if phase == Running && control == ControlMode::Current => GoesOn,
+            Fault::Reboot | Fault::Silent if phase == Running && control == ControlMode::Current => {
+                Stops { cycles: 7 }
+            }
             Fault::DropFive | Fault::ShortFive if early || phase == Starting => GoesOn,
             Fault::DropFive | Fault::ShortFive => stop(4),
             Fault::Reboot if phase == Boot => GoesOn,
@@ -209,6 +236,10 @@ impl Fault {
             Fault::NanAgain | Fault::JumpAgain if !matches!(phase, Stopping | Faulted | Resetting) => Refused,
             Fault::LostMaster => SlavesStop,
             // What the victim shows counts once it has torque, or its brake is open.
+            Fault::VelocityHuge => match phase {
+                Stopping | Resetting => GoesOn,
+                _ => stop(5),
+            },
             Fault::NoVoltage | Fault::NotRemote | Fault::InternalLimit => match phase {
                 Running | Commutating => Stops { cycles: 5 },
                 Enabling => Stops { cycles: 40 },
@@ -221,6 +252,8 @@ impl Fault {
                 Stopping | Resetting => GoesOn,
                 _ => stop(3),
             },
+            // Asked of in histories alone.
+            Fault::Frozen | Fault::Drift | Fault::TorqueFull => stop(0),
             Fault::QueueFull | Fault::LateOnce | Fault::LateLong => match phase {
                 Faulted => Stays,
                 _ => GoesOn,

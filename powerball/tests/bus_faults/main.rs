@@ -33,7 +33,7 @@ fn cell(fault: Fault, stage: Stage, control: ControlMode) -> Result<String, Stri
     stage.reach(&mut world, control);
     let before = world.driver.cause().copied();
     let injected = world.now();
-    let expected = fault.expected(stage);
+    let expected = fault.expected(stage, control);
     fault.inject(&mut world);
     let fail = |what: String| Err(what);
     match expected {
@@ -95,6 +95,7 @@ fn cell(fault: Fault, stage: Stage, control: ControlMode) -> Result<String, Stri
                     | Fault::NoVoltage
                     | Fault::NotRemote
                     | Fault::InternalLimit
+                    | Fault::VelocityHuge
             );
             let came = world
                 .run_until(12_000_000, |w| w.driver.phase() == Phase::Faulted && w.driver.cause().is_some());

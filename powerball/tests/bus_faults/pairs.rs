@@ -22,9 +22,9 @@ enum Act {
 }
 
 impl Act {
-    fn all() -> impl Iterator<Item = Act> + Clone {
+    fn all(control: ControlMode) -> impl Iterator<Item = Act> + Clone {
         let acts = [Act::Enable, Act::Acknowledge, Act::Stop];
-        Fault::ALL.into_iter().map(|(fault, _)| Act::Happens(fault)).chain(acts)
+        Fault::of(control).map(Act::Happens).chain(acts)
     }
 
     fn done(self, walk: &mut Walk) {
@@ -77,11 +77,11 @@ fn arm(control: ControlMode, phase: Phase) -> Walk {
 fn pairs(control: ControlMode, phase: Phase, asked: impl Fn(usize, usize) -> bool) -> f64 {
     let begin = arm(control, phase);
     let (mut latched, mut all) = (0, 0);
-    for (i, first) in Act::all().enumerate() {
+    for (i, first) in Act::all(control).enumerate() {
         let mut after = begin.clone();
         first.done(&mut after);
         after.pass(BETWEEN);
-        for (_, second) in Act::all().enumerate().filter(|(j, _)| asked(i, *j)) {
+        for (_, second) in Act::all(control).enumerate().filter(|(j, _)| asked(i, *j)) {
             all += 1;
             let mut walk = after.clone();
             second.done(&mut walk);

@@ -178,8 +178,9 @@ impl Walk {
                 self.world.run_without_driver(time);
             }
             _ if self.fault.is_none() => {
-                let (fault, name) = Fault::ALL[self.draws.0.random_range(0..Fault::ALL.len())];
-                self.done.push(format!("{now}: {name}"));
+                let faults: Vec<Fault> = Fault::of(self.control).collect();
+                let fault = faults[self.draws.0.random_range(0..faults.len())];
+                self.done.push(format!("{now}: {fault:?}"));
                 fault.inject(&mut self.world);
                 self.fault = Some(fault);
             }

@@ -54,6 +54,11 @@ pub(crate) enum Wire {
     Twice,
     /// The position stays as it is in the first frame.
     Freeze(Option<i32>),
+    /// The position drifts away by 0.2 rad/s from the first frame on.
+    Drift(Option<Micros>),
+    /// The velocity, first in its second transmit PDO, and the torque, second in its first, read this.
+    Velocity(i32),
+    Torque(i16),
     /// Its server refuses this object.
     Refuse(Object),
     /// Its server reads this value for this object, whatever was written.
@@ -137,13 +142,28 @@ impl Faulty {
                 self.out.extend(Frame::from_raw(frame.raw_id(), &bytes));
             }
             Wire::Twice if frame.raw_id() == Cob::Tpdo(1, VICTIM).id() => self.out.extend([frame, frame]),
-            wire @ (Wire::Status { .. } | Wire::Shift { .. } | Wire::Freeze(_))
+            Wire::Velocity(velocity) if frame.raw_id() == Cob::Tpdo(2, VICTIM).id() => {
+                let mut bytes = frame.bytes().to_vec();
+                bytes[..4].copy_from_slice(&velocity.to_le_bytes());
+                self.out.extend(Frame::from_raw(frame.raw_id(), &bytes));
+            }
+            wire @ (Wire::Status { .. }
+            | Wire::Shift { .. }
+            | Wire::Freeze(_)
+            | Wire::Drift(_)
+            | Wire::Torque(_))
                 if frame.raw_id() == Cob::Tpdo(1, VICTIM).id() && frame.bytes().len() == 8 =>
             {
                 let b = frame.bytes();
                 let mut status = u16::from_le_bytes([b[0], b[1]]);
+                let mut torque = i16::from_le_bytes([b[2], b[3]]);
                 let mut position = i32::from_le_bytes([b[4], b[5], b[6], b[7]]);
                 match wire {
+                    Wire::Drift(from) => {
+                        let time = (self.now - *from.get_or_insert(self.now)) as f64 * 1e-6;
+                        position += (0.2f64.to_degrees() * 1e3 * time) as i32;
+                    }
+                    Wire::Torque(read) => torque = *read,
                     Wire::Status { set, clear } => status = status & !*clear | *set,
                     Wire::Shift { by, frames } if *frames > 0 => {
                         *frames -= 1;
@@ -154,6 +174,7 @@ impl Faulty {
                 }
                 let mut bytes = b.to_vec();
                 bytes[..2].copy_from_slice(&status.to_le_bytes());
+                bytes[2..4].copy_from_slice(&torque.to_le_bytes());
                 bytes[4..].copy_from_slice(&position.to_le_bytes());
                 self.out.extend(Frame::from_raw(frame.raw_id(), &bytes));
             }

@@ -122,8 +122,18 @@ pub enum Cause {
     /// twice: the dimension factor 0x604C means something else than the profile says, or the joint is
     /// blocked.
     WrongVelocityScale(NodeId, f64),
-    /// A joint moves faster than it may.
-    Overspeed(JointNumber),
+    /// A joint moves faster than it may: its velocity and the greatest one, rad/s.
+    Overspeed(JointNumber, f64, f64),
+    /// Current mode: velocities of a joint that no joint can have, one after the other; the last one, rad/s.
+    ImplausibleVelocity(NodeId, JointNumber, f64),
+    /// Current mode: a joint's position is off its integrated velocity by so much, rad: one of the two is wrong.
+    PositionAgainstVelocity(NodeId, JointNumber, f64),
+    /// Current mode: a joint's current is not the one that was asked for: measured and asked for, A.
+    CurrentError(NodeId, JointNumber, f64, f64),
+    /// Current mode: so much of a joint's torque does not act as the model says, and what may be, N·m.
+    TorqueError(NodeId, JointNumber, f64, f64),
+    /// Current mode: a joint is so far from where it should be, and how far it may be, rad.
+    OffPath(NodeId, JointNumber, f64, f64),
     /// The CAN controller is off the bus.
     BusOff,
     /// The transport's queue is full.
@@ -170,6 +180,11 @@ impl Cause {
             | Cause::PositionLimit(node, ..)
             | Cause::TorqueLimit(node, ..)
             | Cause::WrongVelocityScale(node, _)
+            | Cause::ImplausibleVelocity(node, ..)
+            | Cause::PositionAgainstVelocity(node, ..)
+            | Cause::CurrentError(node, ..)
+            | Cause::TorqueError(node, ..)
+            | Cause::OffPath(node, ..)
             | Cause::NoBoot(node)
             | Cause::WrongIdentity(node, ..)
             | Cause::ModeNotOffered(node, ..)
@@ -264,7 +279,36 @@ impl fmt::Display for Cause {
                         free the joint"
                 )
             }
-            Cause::Overspeed(joint) => write!(f, "joint {joint} moves faster than it may"),
+            Cause::Overspeed(joint, velocity, limit) => {
+                write!(f, "joint {joint} moves at {velocity:.3} rad/s, {limit:.3} may be")
+            }
+            Cause::ImplausibleVelocity(_, joint, velocity) => {
+                write!(f, "joint {joint} reports {velocity:.3} rad/s, which no joint can have: check the encoder")
+            }
+            Cause::PositionAgainstVelocity(_, joint, slip) => {
+                write!(
+                    f,
+                    "joint {joint}: position and integrated velocity differ by {slip:.4} rad: one of them is wrong, check \
+                        the encoder and the scales"
+                )
+            }
+            Cause::CurrentError(_, joint, measured, asked) => {
+                write!(f, "joint {joint}: {measured:.2} A are measured where {asked:.2} A were asked for")
+            }
+            Cause::TorqueError(_, joint, left, limit) => {
+                write!(
+                    f,
+                    "joint {joint}: {left:.1} N·m of its torque do not act as the model says, {limit:.1} may be: is it \
+                        blocked, pushed, its encoder stuck, its drive without power?"
+                )
+            }
+            Cause::OffPath(_, joint, far, limit) => {
+                write!(
+                    f,
+                    "joint {joint} is {far:.4} rad from where it should be, {limit:.4} may be: is it blocked or pushed, its \
+                        encoder stuck, the model another arm's?"
+                )
+            }
             Cause::BusOff => f.write_str("CAN controller off the bus"),
             Cause::TransmitQueueFull => f.write_str("transmit queue full"),
             Cause::NoBoot(_) => f.write_str("no boot-up message: is it powered, and the bit rate right?"),

@@ -139,12 +139,18 @@ impl<const N: usize> Driver<N> {
     /// Judges the cycle that ends with this SYNC.
     fn judge_cycle(&mut self, tick: Tick, tx: &mut impl Transmit) {
         self.judge_lateness(tick, tx);
+        self.judge_missing(tx);
         if self.phase == Phase::Running {
             self.judge_setpoints(tx);
             self.judge_travel(tx);
         }
+        self.judge_duplicates(tx);
+        self.watch_motion(tx);
+    }
+
+    fn judge_missing(&mut self, tx: &mut impl Transmit) {
         let judged = self.phase != Phase::Starting;
-        let (all, limit) = (self.all_tpdos(), self.profile.reactions.missing_cycles);
+        let (all, limit) = (self.all_tpdos(), self.missing_limit());
         for j in 0..N {
             let Some(joint) = self.joints.get_mut(j) else { continue };
             if joint.arrived == all {
@@ -159,8 +165,17 @@ impl<const N: usize> Driver<N> {
                 self.trip(Cause::DataMissing(self.node(j)), tx);
             }
         }
-        self.judge_duplicates(tx);
-        self.watch_motion(tx);
+    }
+
+    /// Consecutive cycles without a joint's data that stop the arm. In current mode the caller carries the state on.
+    fn missing_limit(&self) -> u8 {
+        let reactions = &self.profile.reactions;
+        match self.control {
+            ControlMode::Current if self.phase == Phase::Running => {
+                reactions.torque_mode.missing_cycles.max(reactions.missing_cycles)
+            }
+            _ => reactions.missing_cycles,
+        }
     }
 
     fn judge_duplicates(&mut self, tx: &mut impl Transmit) {
@@ -213,7 +228,10 @@ impl<const N: usize> Driver<N> {
             self.counters.starved += 1;
             self.starved_run = self.starved_run.saturating_add(1);
             if self.starved_run >= reactions.starved_cycles {
-                self.trip(Cause::Starved, tx);
+                // Who waits for data that does not come has no set-points: the silent node is why.
+                let silent = self.joints.iter().position(|joint| joint.missing_run >= reactions.starved_cycles);
+                let cause = silent.map_or(Cause::Starved, |j| Cause::DataMissing(self.node(j)));
+                self.trip(cause, tx);
             }
         }
     }

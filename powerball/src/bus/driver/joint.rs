@@ -5,6 +5,7 @@
 use super::profile::{JointProfile, ModeProfile};
 use super::script::Progress;
 use super::torque::{ControlMode, Demand};
+use super::torque_mode::Guarded;
 use super::units::{JointUnits, Saturated, to_i16};
 use super::watch::Watched;
 use crate::bus::canopen::client::Client;
@@ -25,6 +26,8 @@ pub struct JointCounters {
     pub malformed: u64,
     /// Emergencies, beyond the first of each kind not told one by one.
     pub emergencies: u64,
+    /// Velocities that no joint can have, in current mode: the one before was used in their place.
+    pub implausible: u64,
 }
 
 /// What is known of one joint.
@@ -78,6 +81,10 @@ pub struct Joint {
     /// Torque offset that goes with the set-points, N·m.
     pub(super) offset: f64,
     pub(super) watched: Watched,
+    pub(super) guarded: Guarded,
+    /// Cycles, by the driver's count, whose position and velocity came last.
+    pub(super) position_cycle: u64,
+    pub(super) velocity_cycle: u64,
     /// Greatest current that the drive gives (0x6073), A, where it tells.
     pub(super) current_limit: Option<f64>,
     /// Settings that the drive declined and need not have, by bit.
@@ -125,6 +132,9 @@ impl Joint {
             demand: Demand::at_rest(0.0),
             offset: 0.0,
             watched: Watched::default(),
+            guarded: Guarded::default(),
+            position_cycle: 0,
+            velocity_cycle: 0,
             current_limit: None,
             declined: 0,
             announced: None,

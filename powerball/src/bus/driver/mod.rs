@@ -45,6 +45,7 @@
 //! | no new set-point | in the slot | the last one held; 3 cycles in a row: stop, [`Cause::Starved`] (not in profile position) | 3 cycles |
 //! | velocities mean something else | way asked for and way gone, while the scale is not verified on hardware | stop, [`Cause::WrongVelocityScale`] | 0.1 rad |
 //! | joint not where or not as fast as told, stuck, jumping, beyond its limits, at its current limit | each cycle | stop, [`Cause::FollowingError`], [`Cause::VelocityError`], [`Cause::Stuck`], [`Cause::PositionJump`], [`Cause::PositionLimit`], [`Cause::TorqueLimit`] | [`profile::Reactions`] |
+//! | current mode: a joint that does not move as its torque says, measurements that no joint can have | each cycle | stop, [`Cause::ImplausibleVelocity`], [`Cause::PositionAgainstVelocity`], [`Cause::CurrentError`], [`Cause::TorqueError`], [`Cause::OffPath`] | [`profile::TorqueMode`] |
 //! | voltage, remote, internal limit, interpolation, following error in the statusword | each statusword of a joint with torque | stop, [`Cause::Hindered`] | at once, 3 cycles |
 //! | the program is asked to end | the caller, by a signal | stop, [`Cause::Interrupted`] | at once |
 //! | joint too fast | measured velocity | 3 cycles in a row: stop, [`Cause::Overspeed`] | 3 cycles |
@@ -68,6 +69,7 @@ mod receive;
 mod script;
 mod stop;
 mod torque;
+mod torque_mode;
 pub mod units;
 mod watch;
 
@@ -84,6 +86,7 @@ pub use profile::{JointProfile, Profile};
 pub use receive::Foreign;
 use stop::{ResetStage, StopStage};
 pub use torque::{ControlMode, TorqueGuard};
+pub use torque_mode::Tracking;
 
 /// What the driver is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -441,6 +444,11 @@ impl<const N: usize> Driver<N> {
     pub fn cycle_complete(&self) -> bool {
         let all = self.all_tpdos();
         self.sync.is_running() && self.joints.iter().all(|joint| joint.arrived == all)
+    }
+
+    /// When the set-points of this cycle leave, where they have not left yet.
+    pub fn setpoints_due(&self) -> Option<Micros> {
+        self.slot_open.then(|| self.slot())
     }
 
     /// When [`Driver::poll`] has something to do at the latest.

@@ -139,6 +139,59 @@ pub struct Reactions {
     pub one_at_a_time: bool,
     /// Below this velocity, rad/s, a joint counts as at rest.
     pub rest_velocity: f64,
+    /// Limits of the guard of current mode.
+    pub torque_mode: TorqueMode,
+}
+
+/// Limits of the guard of current mode, where the caller closes the loop and no drive holds a position: a measurement
+/// that is wrong becomes a motion at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueMode {
+    /// Cycles in a row beyond a limit that stop the arm, where nothing else is said.
+    pub cycles: u8,
+    /// Cycles in a row without a joint's data that stop the arm: the caller carries its state on until then.
+    pub missing_cycles: u8,
+    /// A joint measured faster than this times its greatest velocity stops the arm.
+    pub overspeed_factor: f64,
+    /// A velocity that grows in one cycle by more than this part of the greatest one is no measurement: it is not used.
+    pub velocity_step: f64,
+    /// Way by which position and integrated velocity may drift apart, rad, next to a cycle at the greatest velocity …
+    pub slip_margin: f64,
+    /// … forgotten with this time constant, s.
+    pub slip_time: f64,
+    /// The measured current may be off the one that was asked for by this part of the greatest current.
+    pub current_error: f64,
+    /// The torque that acted may be off what the model needs for the measured motion by this part of the joint's torque, …
+    pub torque_error: f64,
+    /// … or, where that is less, by what this part of its greatest acceleration takes of its own inertia, …
+    pub acceleration_error: f64,
+    /// … this part of the torque of weight and Coriolis forces, …
+    pub rigid_error: f64,
+    /// … this part of the torque of the acceleration: a gear with play moves its motor alone, …
+    pub inertial_error: f64,
+    /// … this part of the friction in motion …
+    pub friction_error: f64,
+    /// … and so many times the dry friction where the joint rests.
+    pub sticking: f64,
+}
+
+impl TorqueMode {
+    /// What docs/control.md argues for.
+    pub const DEFAULT: TorqueMode = TorqueMode {
+        cycles: 3,
+        missing_cycles: 6,
+        overspeed_factor: 1.2,
+        velocity_step: 0.4,
+        slip_margin: 0.01,
+        slip_time: 1.0,
+        current_error: 0.03,
+        torque_error: 0.1,
+        acceleration_error: 0.5,
+        rigid_error: 0.25,
+        inertial_error: 0.7,
+        friction_error: 0.5,
+        sticking: 1.3,
+    };
 }
 
 impl Reactions {
@@ -180,6 +233,7 @@ impl Reactions {
         commutation_settle: 1_000_000,
         one_at_a_time: true,
         rest_velocity: 0.01,
+        torque_mode: TorqueMode::DEFAULT,
     };
 }
 

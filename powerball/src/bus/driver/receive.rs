@@ -3,7 +3,7 @@
 //! Also here: frames that only a master sends, and that this one did not.
 
 use super::script::Progress;
-use super::{Cause, Driver, Phase, Transmit};
+use super::{Cause, ControlMode, Driver, Phase, Transmit};
 use crate::bus::canopen::client::SdoError;
 use crate::bus::canopen::emcy::Emcy;
 use crate::bus::canopen::{Cob, Frame, Micros, NodeId, nmt};
@@ -62,14 +62,26 @@ impl<const N: usize> Driver<N> {
             self.counters.unexpected += 1;
             return;
         };
-        let now = self.now;
+        let (now, cycle, all) = (self.now, self.counters.cycles, self.all_tpdos());
         let Some(joint) = self.joints.get_mut(j) else { return };
+        let (velocity, since) = (joint.velocity, cycle.saturating_sub(joint.velocity_cycle));
         if !joint.update(number, &mapping, frame) {
             return;
         }
         joint.answered_at = now;
+        let whole = joint.arrived == all;
+        if mapping.contains(objects::VELOCITY) {
+            joint.velocity_cycle = cycle;
+            self.gate_velocity(j, velocity, since, tx);
+        }
         if mapping.contains(objects::POSITION) {
+            if let Some(joint) = self.joints.get_mut(j) {
+                joint.position_cycle = cycle;
+            }
             self.watch_position(j, tx);
+        }
+        if whole {
+            self.guard_sample(j, tx);
         }
         if mapping.contains(objects::STATUSWORD) {
             self.judge_state(j, tx);
@@ -125,17 +137,23 @@ impl<const N: usize> Driver<N> {
 
     fn judge_velocity(&mut self, j: usize, tx: &mut impl Transmit) {
         let reactions = self.profile.reactions;
+        let (factor, cycles) = match self.control {
+            ControlMode::Current => (reactions.torque_mode.overspeed_factor, reactions.torque_mode.cycles),
+            _ => (reactions.overspeed_factor, reactions.missing_cycles),
+        };
         let (Some(profile), Some(joint)) = (self.profile.joints.get(j), self.joints.get_mut(j)) else {
             return;
         };
-        if joint.velocity.abs() <= profile.velocity * reactions.overspeed_factor {
+        let most = profile.velocity * factor;
+        if joint.velocity.abs() <= most {
             joint.overspeed_run = 0;
             return;
         }
         joint.overspeed_run = joint.overspeed_run.saturating_add(1);
-        if joint.overspeed_run >= reactions.missing_cycles {
+        if joint.overspeed_run >= cycles {
             joint.overspeed_run = 0;
-            self.trip(Cause::Overspeed(JointNumber::from_index(j)), tx);
+            let velocity = joint.velocity;
+            self.trip(Cause::Overspeed(JointNumber::from_index(j), velocity, most), tx);
         }
     }
 

@@ -17,17 +17,31 @@ type InverseDynamics<const N: usize> =
 /// A function of the arm's generated code, or a closure over one with identified parameters; the driver calls it
 /// once a cycle, so it must be quick, and on a controller it must not allocate.
 #[derive(Clone, Copy)]
-pub struct TorqueGuard<const N: usize>(&'static InverseDynamics<N>);
+pub struct TorqueGuard<const N: usize> {
+    model: &'static InverseDynamics<N>,
+    margin: f64,
+}
 
 impl<const N: usize> TorqueGuard<N> {
     /// Of an arm's inverse dynamics (rad, rad/s, rad/s² → N·m).
     pub const fn new(inverse_dynamics: &'static InverseDynamics<N>) -> Self {
-        TorqueGuard(inverse_dynamics)
+        TorqueGuard { model: inverse_dynamics, margin: 0.0 }
+    }
+
+    /// The same where somebody pushes the arm in current mode, with up to this part of each joint's torque.
+    #[must_use]
+    pub const fn with_push(self, part: f64) -> Self {
+        TorqueGuard { margin: part, ..self }
+    }
+
+    /// That part.
+    pub(super) const fn margin(&self) -> f64 {
+        self.margin
     }
 
     /// N·m by joint.
     pub fn torque(&self, q: &[f64; N], dq: &[f64; N], ddq: &[f64; N]) -> [f64; N] {
-        (self.0)(q, dq, ddq)
+        (self.model)(q, dq, ddq)
     }
 
     /// Whether the joints have the torque that `setpoints` ask of them after those that have left.

@@ -76,6 +76,11 @@ impl JointUnits {
         to_i16(torque / self.rated_torque * 1000.0)
     }
 
+    /// N·m at the joint of an ampere with the joint's sign.
+    pub fn torque_constant(&self) -> f64 {
+        self.rated_torque.abs() / self.rated_current
+    }
+
     fn sign(&self) -> f64 {
         if self.rated_torque < 0.0 { -1.0 } else { 1.0 }
     }

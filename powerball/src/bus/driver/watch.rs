@@ -34,7 +34,7 @@ pub(super) struct Watched {
 }
 
 /// Counts `wrong` cycles in a row; whether they are as many as `limit`.
-fn run(count: &mut u8, wrong: bool, limit: u8) -> bool {
+pub(super) fn run(count: &mut u8, wrong: bool, limit: u8) -> bool {
     *count = if wrong { count.saturating_add(1) } else { 0 };
     *count >= limit
 }
@@ -48,6 +48,7 @@ impl<const N: usize> Driver<N> {
             let (released_at, still) = (joint.position, (joint.position, now));
             joint.watched = Watched { seen, warned, released_at, still, ..Watched::default() };
         }
+        self.release_guard();
     }
 
     /// Each position: an encoder that jumps is no measurement.
@@ -109,6 +110,9 @@ impl<const N: usize> Driver<N> {
 
     /// Once a cycle, while the joints may have torque.
     pub(super) fn watch_motion(&mut self, tx: &mut impl Transmit) {
+        if let Some(cause) = self.torque_left().and_then(|left| self.torque_error(&left)) {
+            self.trip(cause, tx);
+        }
         for j in 0..N {
             if !self.phase.is_live() {
                 return;
@@ -129,6 +133,9 @@ impl<const N: usize> Driver<N> {
     }
 
     fn not_following(&mut self, j: usize) -> Option<Cause> {
+        if self.control == ControlMode::Current {
+            return self.not_obeying(j);
+        }
         let (reactions, now, node) = (self.profile.reactions, self.now, self.node(j));
         let (profile, joint) = (self.profile.joints.get(j)?, self.joints.get_mut(j)?);
         let watched = &mut joint.watched;

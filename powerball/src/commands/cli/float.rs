@@ -5,9 +5,9 @@ use super::serve::{self, Serve};
 use super::{Failure, output};
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::transport::BusUrl;
-use crate::commands::model_arm::ModelArm;
-use crate::controller::correction::{Instant, Memory, add_torques};
-use crate::controller::dynamics::{ArmModel, State};
+use crate::commands::model_arm::{self, ModelArm};
+use crate::controller::correction::Memory;
+use crate::controller::dynamics::ArmModel;
 use crate::controller::friction::TanhFriction;
 use crate::controller::laws::{HandGuiding, Softening};
 use crate::identification::motion::Motion;
@@ -21,6 +21,8 @@ use std::path::{Path, PathBuf};
 
 /// The hand of --push: N·m/rad and N·m·s/rad.
 const HAND: [f64; 2] = [300.0, 20.0];
+/// A hand may push with so much of each joint's torque before the driver's guard takes it for a drive that does not obey.
+pub(super) const PUSH: f64 = 0.4;
 /// Drift counts from so long after the hand let go, s.
 const SETTLE: f64 = 1.0;
 /// Without a hand and without --for the virtual arm floats for so long, s.
@@ -50,6 +52,9 @@ pub(crate) struct FloatCommand {
     /// Share of the friction that is taken off, 0 to 0.95.
     #[arg(long, value_name = "SHARE", default_value_t = 0.85)]
     friction: f64,
+    /// Folder for log.csv, with the columns of `powerball record`, a whole line a cycle; made if missing.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     #[command(flatten)]
     serve: Serve,
 }
@@ -109,23 +114,26 @@ impl FloatCommand {
         // In interpolated position mode the motors find their commutation while their drives hold the arm.
         let master = Recorder::enable(master, envelope).and_then(Recorder::finish).map_err(refused)?;
         let mut arm = TorqueLoop::bring_up(master, self.on.accepts()).map_err(refused)?;
+        arm.guard(model_arm::torque_guard(model).with_push(PUSH));
         let laws: [TanhFriction<f64>; 6] =
             std::array::from_fn(|j| TanhFriction::new(model.model.gammas()[j]));
         let softening = laws.each_ref().map(|law| Softening { share: self.friction, ..Softening::of(law) });
         let mut law = HandGuiding::new(laws, softening);
         let terms = model.model.holding_terms();
         let mut memory = vec![Memory::default(); terms.len()];
+        let changes = &model.model.additions.log_changes;
         let live = self.serve.open()?;
         live.start("an arm guided by hand", &[("position", "rad"), ("velocity", "rad/s"), ("torque", "N·m")]);
         let most = seconds.map(|s| (s / LWA4P.period_seconds()) as usize);
         let mut positions = Vec::new();
-        arm.run(|measured| {
+        let mut log = self.out.as_deref().map(output::motion_log).transpose()?;
+        arm.run(log.as_mut(), |measured| {
             if most.is_some_and(|most| positions.len() >= most) {
                 return None;
             }
             positions.push(measured.state.q);
             let mut torque = law.torque(&model.numeric, &measured.state);
-            hold(model, &terms, &mut memory, &measured.state, &mut torque);
+            model_arm::hold(changes, &terms, &mut memory, &measured.state, &mut torque);
             let t = positions.len() as f64 * LWA4P.period_seconds();
             if positions.len() % serve::EVERY == 0 {
                 let q = measured.state.q.as_slice();
@@ -145,32 +153,15 @@ impl FloatCommand {
             Some(torque)
         })
         .map_err(refused)?;
+        if arm.carried_on() > 0 {
+            let cycles = arm.carried_on();
+            tracing::warn!("data of a joint was missing in {cycles} cycles: its state was carried on with its last velocity");
+        }
         arm.finish().map_err(refused)?;
+        log.map_or(Ok(()), output::close)?;
         live.end("brakes closed");
         Ok(positions)
     }
-}
-
-/// Adds what the model's terms of position hold against.
-fn hold(
-    model: &ModelArm,
-    terms: &[crate::controller::correction::Term<f64>],
-    memory: &mut [Memory<f64>],
-    state: &State<f64, 6>,
-    torque: &mut SVector<f64, 6>,
-) {
-    let changes = &model.model.additions.log_changes;
-    let place = SVector::<f64, 6>::from_fn(|j, _| state.q[j] - changes.offset(j));
-    let now = Instant {
-        q: place.as_slice(),
-        dq: state.dq.as_slice(),
-        ddq: &[],
-        rigid: &[],
-        friction: &[],
-        temperature: &[],
-        running: 0.0,
-    };
-    add_torques(terms, memory, &now, torque.as_mut_slice());
 }
 
 fn read_push(file: &Path) -> Result<Motion, Failure> {

@@ -1,5 +1,6 @@
 //! `powerball follow`: a trajectory with a torque model.
 
+use super::float::PUSH;
 use super::model_on_bus::{ModelOnBus, failed};
 use super::serve::{self, Live, Serve};
 use super::{Failure, output};
@@ -33,7 +34,8 @@ enum With {
 /// Follow a trajectory with a torque model and say how far off the arm was, by joint; with --compare also with a base model
 /// or with no model, one after the other.
 ///
-/// Nothing of this was run on hardware by this project: try --bus virtual first. Writes follow.json and report.html.
+/// Nothing of this was run on hardware by this project: try --bus virtual first. Writes follow.json, report.html, and log.csv
+/// with the columns of `powerball record`, a whole line a cycle, also where the arm is stopped: `identify` and `explain` read it.
 /// Before anything moves, the model is held against the arm file, the gains against the cycle (largest pole of the sampled
 /// loop over 300 poses), and the trajectory is looked at as `powerball record` does. Set-points, torque offsets and
 /// currents pass the driver's guards; Ctrl-C stops the arm. THE ARM MOVES.
@@ -65,6 +67,10 @@ pub(crate) struct FollowCommand {
     /// Stop the arm where its external torque is more than the model's error can be, in current mode: something touches it.
     #[arg(long)]
     stop_at_contact: bool,
+    /// How far a push may take a joint off its path in current mode before the arm is stopped, rad, 0 to 0.5, next to what gains
+    /// and model explain. For --with impedance, where somebody is to push the arm.
+    #[arg(long, value_name = "RAD", default_value_t = 0.0, allow_negative_numbers = true)]
+    give: f64,
     /// Time that the arm has been working, s: 3600 counts as warm. For models with a temperature effect.
     #[arg(long, value_name = "SECONDS", default_value_t = 3600.0)]
     running: f64,
@@ -115,6 +121,9 @@ impl FollowCommand {
             let what = "--stop-at-contact needs --with torque or impedance: in interpolated position mode the drives' own loops press on";
             return Err(Failure::Unusable(what.to_string()));
         }
+        if !(0.0..=0.5).contains(&self.give) {
+            return Err(Failure::Unusable(format!("--give {}: 0 to 0.5 rad can be", self.give)));
+        }
         let (arm, model, mut envelope) = self.on.read()?;
         let profile = match self.with {
             With::Feedforward => LWA4P.with_torque_offset(),
@@ -123,23 +132,37 @@ impl FollowCommand {
         let path = Path::clear(&motion, &envelope, &profile).map_err(|e| failed(e, &file))?;
         let law = self.law(&model, path.start())?;
         let pole = self.judge(&law, &model, &path)?;
+        let guard = model_arm::torque_guard(&model);
+        let guard = if self.give > 0.0 { guard.with_push(PUSH) } else { guard };
         let entries = self.entries(&arm, model, &path)?;
         output::make_folder(&self.out)?;
+        // The explained model, which is the last, says what all runs are held against.
+        let best = entries.last().and_then(|entry| entry.parts.clone()).unwrap_or_default();
         let live = self.serve.open()?;
         let (mut shown, mut seconds) = (0, 0.0);
 
+        let mut log = output::motion_log(&self.out)?;
         let mut master = self.on.master(profile, [0.0; 6], None)?;
         let terminal = output::Progress::new();
         let mut tracks: Vec<(&str, Track<6>)> = Vec::new();
         for Entry { name, model, parts, contact } in &entries {
             terminal.say(&format!("following with {name}"));
             live.start(&format!("{} along a path, {name}", arm.name), &FIELDS);
-            let (path, arm) = (&path, &model.numeric);
+            let (path, arm, best) = (&path, &model.numeric, &best);
             let contact = *contact;
-            let run =
-                Run { path, arm, parts: parts.as_ref(), law, contact, accept_unverified: self.on.accepts() };
+            let run = Run {
+                path,
+                arm,
+                parts: parts.as_ref(),
+                best,
+                give: self.give,
+                guard: Some(guard),
+                law,
+                contact,
+                accept_unverified: self.on.accepts(),
+            };
             let (back, track, kept): (_, _, Envelope<6>) = run
-                .follow(master, envelope, |sample, reference| {
+                .follow(master, envelope, Some(&mut log), |sample, reference| {
                     shown += 1;
                     seconds += path.motion().period;
                     if shown % serve::EVERY == 0 {
@@ -158,6 +181,7 @@ impl FollowCommand {
             }
         }
         drop(master);
+        output::close(log)?;
         let done = self.report(&arm.name, &law, &path, &tracks, pole);
         live.end(&match &done {
             Ok(()) => format!("done: {}", self.out.join("report.html").display()),
@@ -278,6 +302,11 @@ impl FollowCommand {
             };
             let errors: Vec<String> = tracks.iter().map(of).collect();
             output::print(&format!("joint {}: off by {} mrad rms", joint + 1, errors.join(", ")));
+        }
+        for (name, cycles) in &result.carried_on {
+            output::print(&format!(
+                "{name}: data of a joint was missing in {cycles} cycles; its state was carried on with its last velocity"
+            ));
         }
     }
 }

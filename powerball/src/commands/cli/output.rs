@@ -5,6 +5,7 @@ use super::events::SHOWN;
 use crate::controller::JointNumber;
 use crate::identification::conventions::Conventions;
 use crate::identification::estimate::ResidualStats;
+use crate::procedure::MotionLog;
 use crate::report::files;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
@@ -107,6 +108,19 @@ pub(crate) fn live<T: std::fmt::Display>() -> impl FnMut(&T) {
     );
     let line = line.with_finish(ProgressFinish::AndLeave);
     move |what| line.set_message(what.to_string())
+}
+
+/// Begins the log of a motion in a folder for results.
+pub(crate) fn motion_log(folder: &Path) -> Result<MotionLog, Failure> {
+    make_folder(folder)?;
+    let file = folder.join("log.csv");
+    MotionLog::create(&file)
+        .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", file.display())))
+}
+
+/// Ends it.
+pub(crate) fn close(log: MotionLog) -> Result<(), Failure> {
+    log.close().map_err(|e| Failure::Refused(format!("the log cannot be written: {e}")))
 }
 
 /// Makes a folder for results, where it is missing.

@@ -80,16 +80,17 @@ pub(super) fn drive(
     let arm = Arm::read(&session.arm_file).map_err(|e| DemoError::Read(e.to_string()))?;
     let [base, explained] = [base, explained].map(|file| model_arm::read(&arm, file, true));
     let (base, explained) = (base.map_err(DemoError::Drive)?, explained.map_err(DemoError::Drive)?);
-    let (path, path_csv, parts) = path(&[&base, &explained], session, seed)?;
+    let (path, path_csv, parts_of_both) = path(&[&base, &explained], session, seed)?;
     super::write(&folder.join("path.csv"), &path_csv)?;
     let law = Law::Torque(ComputedTorque::for_period(LWA4P.period_seconds()));
     for (name, model) in [("base", &base), ("explained", &explained)] {
         let stable = law.judge(&model.numeric, model_arm::poses(), LWA4P.period_seconds());
         stable.map_err(|why| DemoError::Drive(format!("by the {name} model {why}")))?;
     }
+    let guard = model_arm::torque_guard(&explained);
     let mut tracks = Vec::new();
     for (name, (model, parts)) in
-        ["base", "explained"].into_iter().zip([&base, &explained].into_iter().zip(&parts))
+        ["base", "explained"].into_iter().zip([&base, &explained].into_iter().zip(&parts_of_both))
     {
         let setup = session.undeclared.setup(path.start().into(), seed).map_err(SessionError::Arm)?;
         let plant = VirtualArm::new(lwa4p::with_current_mode(setup)).ok_or_else(|| {
@@ -100,13 +101,16 @@ pub(super) fn drive(
             path: &path,
             arm: &model.numeric,
             parts: Some(parts),
+            best: &parts_of_both[1],
+            give: 0.0,
+            guard: Some(guard),
             law,
             contact: None,
             accept_unverified: true,
         };
         let on_bus = Master::new(driver, Memory::new(plant, LWA4P.bitrate));
         let (_, track, _) = run
-            .follow(on_bus, Envelope::new(|_| None), |_, _| ())
+            .follow(on_bus, Envelope::new(|_| None), None, |_, _| ())
             .map_err(|e| DemoError::Drive(format!("with the {name} model {e}")))?;
         tracks.push((name, track));
     }

@@ -2,10 +2,12 @@
 //! current mode.
 
 mod path;
+mod tolerance;
 mod track;
 
-use super::torque_loop::TorqueLoop;
-use super::{Envelope, RecordError, Recorder};
+use super::torque_loop::{Asked, TorqueLoop};
+use super::{Envelope, MotionLog, RecordError, Recorder};
+use crate::bus::driver::{TorqueGuard, Tracking};
 use crate::bus::transport::{Bus, Master};
 use crate::controller::dynamics::{ArmModel, Reference, State};
 use crate::controller::laws::{
@@ -14,6 +16,7 @@ use crate::controller::laws::{
 use nalgebra::{SMatrix, SVector};
 pub use path::{Parts, Path};
 use path::{REST, between};
+use tolerance::Tolerance;
 pub use track::{Followed, Sample, TorqueParts, Touched, Track, TrackingError, common_delay};
 
 /// Share of the joints' velocities and accelerations on the way to where a path begins.
@@ -107,6 +110,12 @@ pub struct Run<'a, M, const N: usize> {
     pub arm: &'a M,
     /// What the model says of the path; `None` for feedback alone.
     pub parts: Option<&'a Parts<N>>,
+    /// What the best model that is known says of it: how far the arm may be off the path in current mode.
+    pub best: &'a Parts<N>,
+    /// So far, rad, a push may take a joint off the path next to that.
+    pub give: f64,
+    /// The best model, for the driver's guard in current mode; without one the guard looks at all but torques.
+    pub guard: Option<TorqueGuard<N>>,
     /// How it is followed.
     pub law: Law<N>,
     /// Stops the arm where something touches it, in current mode.
@@ -138,7 +147,7 @@ impl<M: ArmModel<f64, N>, const N: usize> ArmModel<f64, N> for InertiaAlone<'_, 
 
 impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
     /// Goes to where the path begins, follows it, and stops the arm: brakes closed. `each` gets every sample of the path and
-    /// where the arm shall be then.
+    /// where the arm shall be then, `log` a line for every cycle from the beginning of the path on.
     ///
     /// # Errors
     /// Where driver, arm or bus refuse, or the arm is stopped.
@@ -146,6 +155,7 @@ impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
         &self,
         master: Master<B, N>,
         envelope: Envelope<N>,
+        log: Option<&mut MotionLog>,
         mut each: impl FnMut(&Sample<N>, &Reference<f64, N>),
     ) -> Result<(Master<B, N>, Track<N>, Envelope<N>), RecordError> {
         let mut recorder = Recorder::bring_up(master, envelope)?;
@@ -154,19 +164,23 @@ impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
         recorder.release()?;
         recorder.go(&start, APPROACH, 1.0)?;
         if self.law == Law::Feedforward {
-            let track = self.with_offsets(&mut recorder, &mut each)?;
+            let track = self.with_offsets(&mut recorder, log, &mut each)?;
             let (master, envelope) = recorder.finish_with_envelope()?;
             return Ok((master, track, envelope));
         }
         let (master, envelope) = recorder.finish_with_envelope()?;
         let mut arm = TorqueLoop::bring_up(master, self.accept_unverified)?;
-        let track = self.by_torque(&mut arm, &mut each)?;
+        if let Some(guard) = self.guard {
+            arm.guard(guard);
+        }
+        let track = self.by_torque(&mut arm, log, &mut each)?;
         Ok((arm.finish()?, track, envelope))
     }
 
     fn with_offsets<B: Bus>(
         &self,
         recorder: &mut Recorder<B, N>,
+        mut log: Option<&mut MotionLog>,
         each: &mut Each<'_, N>,
     ) -> Result<Track<N>, RecordError> {
         let motion = self.path.motion();
@@ -184,7 +198,13 @@ impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
         };
         let mut samples = Vec::new();
         recorder.follow(motion, &torques, |k, master| {
-            let Some(master) = master.filter(|_| self.path.is_within(k)) else { return Ok(()) };
+            let Some(master) = master else { return Ok(()) };
+            if let Some(log) = log.as_deref_mut() {
+                log.take(master.driver(), self.path.at(k as f64).q.as_slice()).map_err(RecordError::Write)?;
+            }
+            if !self.path.is_within(k) {
+                return Ok(());
+            }
             let joints = master.driver().joints();
             let [q, torque] = [
                 SVector::from(joints.each_ref().map(|joint| joint.position)),
@@ -198,18 +218,20 @@ impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
             samples.push(sample);
             Ok(())
         })?;
-        Ok(Track { samples, contact: None })
+        Ok(Track { samples, contact: None, carried_on: 0 })
     }
 
     fn by_torque<B: Bus>(
         &self,
         arm: &mut TorqueLoop<B, N>,
+        log: Option<&mut MotionLog>,
         each: &mut Each<'_, N>,
     ) -> Result<Track<N>, RecordError> {
         let (path, period) = (self.path, self.path.motion().period);
+        let tolerance = Tolerance::new(self.parts, self.best, arm.greatest_torque(), self.give);
         let mut observer = MomentumObserver::new(OBSERVER);
         let (mut samples, mut detector, mut contact) = (Vec::new(), self.contact, None);
-        arm.run(|measured| {
+        arm.run(log, |measured| {
             let k = usize::try_from(measured.cycle).unwrap_or(usize::MAX);
             if k >= path.reference.len() {
                 return None;
@@ -233,7 +255,8 @@ impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
             };
             let losses = self.parts.map_or_else(SVector::zeros, |parts| parts.losses(k as f64 - 0.5));
             let external = observer.advance(self.arm, &measured.state, &(measured.acted - losses), period);
-            if let (Some(detector), Some(parts)) = (&mut detector, self.parts) {
+            // What was carried on is no measurement.
+            if let (Some(detector), Some(parts), false) = (&mut detector, self.parts, measured.is_carried_on) {
                 let rigid = between(&parts.rigid, k as f64);
                 if let Some(found) = detector.update(&external, &measured.state.dq, &rigid) {
                     let t = (k as f64 - REST as f64) * period;
@@ -254,9 +277,14 @@ impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
                 each(&sample, &now);
                 samples.push(sample);
             }
-            Some(torque)
+            let stiffness = self.law.stiffness_and_damping(&self.arm.mass_matrix(&measured.state.q));
+            let tracking = stiffness.map(|[stiffness, _]| Tracking {
+                position: now.q.into(),
+                tolerance: tolerance.at(k, &stiffness),
+            });
+            Some(Asked { torque, tracking })
         })?;
-        Ok(Track { samples, contact })
+        Ok(Track { samples, contact, carried_on: arm.carried_on() })
     }
 
     fn law_torque(

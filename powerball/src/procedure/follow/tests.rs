@@ -67,16 +67,20 @@ fn rests(master: &Arm) {
 fn a_known_effect_halves_the_error_and_the_observer_sees_an_unknown_one() {
     let (arm, path) = (numeric(), path(1.0));
     let law = Law::Torque(ComputedTorque::for_period(0.005));
+    let best = parts(&path, &arm, true);
     let drive = |parts: Option<Parts<6>>| {
         let run = Run {
             path: &path,
             arm: &arm,
             parts: parts.as_ref(),
+            best: &best,
+            give: 0.0,
+            guard: None,
             law,
             contact: None,
             accept_unverified: true,
         };
-        let (master, track, _) = run.follow(master(LWA4P), Envelope::new(|_| None), |_, _| ()).unwrap();
+        let (master, track, _) = run.follow(master(LWA4P), Envelope::new(|_| None), None, |_, _| ()).unwrap();
         rests(&master);
         assert_eq!(track.samples.len(), 601);
         track
@@ -99,18 +103,22 @@ fn a_known_effect_halves_the_error_and_the_observer_sees_an_unknown_one() {
 #[test]
 fn torque_offsets_take_the_work_off_the_drives_own_feedback() {
     let (arm, path) = (numeric(), path(1.0));
+    let best = parts(&path, &arm, true);
     let drive = |parts: Option<Parts<6>>| {
         let law = Law::Feedforward;
         let run = Run {
             path: &path,
             arm: &arm,
             parts: parts.as_ref(),
+            best: &best,
+            give: 0.0,
+            guard: None,
             law,
             contact: None,
             accept_unverified: false,
         };
         let profile = LWA4P.with_torque_offset();
-        let (master, track, _) = run.follow(master(profile), Envelope::new(|_| None), |_, _| ()).unwrap();
+        let (master, track, _) = run.follow(master(profile), Envelope::new(|_| None), None, |_, _| ()).unwrap();
         rests(&master);
         track
     };
@@ -150,7 +158,7 @@ fn an_interrupt_stops_the_law_and_the_arm() {
     let interrupt = Interrupt::default();
     let mut cycles = 0;
     let mut held = TorqueLoop::bring_up(master(LWA4P).with_interrupt(interrupt.clone()), true).unwrap();
-    let ended = held.run(|m| {
+    let ended = held.run(None, |m| {
         cycles += 1;
         if cycles == 100 {
             interrupt.ask();

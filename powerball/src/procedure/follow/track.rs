@@ -28,6 +28,8 @@ pub struct Track<const N: usize> {
     pub samples: Vec<Sample<N>>,
     /// What touched the arm, which was stopped then.
     pub contact: Option<Touched>,
+    /// Cycles in which data of a joint was missing and its state was carried on, in current mode.
+    pub carried_on: u64,
 }
 
 /// A contact at which the arm was stopped.
@@ -109,6 +111,9 @@ pub struct Followed {
     /// Runs that were stopped because something touched the arm.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub contact: BTreeMap<String, Touched>,
+    /// Cycles of each run in which data of a joint was missing and its state was carried on; runs without any are left out.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub carried_on: BTreeMap<String, u64>,
 }
 
 impl Followed {
@@ -134,6 +139,9 @@ impl Followed {
             followed.tracking_error.insert((*name).to_string(), error.rms);
             followed.largest_error.insert((*name).to_string(), error.max);
             followed.torque.insert((*name).to_string(), track.torques());
+            if track.carried_on > 0 {
+                followed.carried_on.insert((*name).to_string(), track.carried_on);
+            }
             followed.contact.extend(track.contact.map(|contact| ((*name).to_string(), contact)));
         }
         followed

@@ -1,0 +1,62 @@
+//! How far a joint may be from its path in current mode before the arm is stopped: by the gains of the law and by what the
+//! feedback has to make up for.
+
+use super::path::{Parts, between};
+use nalgebra::{SMatrix, SVector};
+
+/// Of the torques by the best model that is known, so much may be wrong: rigid arm and effects, here and now; and of each
+/// joint's torque.
+const RIGID: f64 = 0.05;
+const EFFECTS: f64 = 0.25;
+const OF_LIMIT: f64 = 0.01;
+/// Of the greatest friction on the path: a joint that came to rest stays where that holds it.
+const FRICTION: f64 = 0.25;
+/// The error of a joint follows the torque that is missing with the loop's time constant: so many cycles count, before and
+/// after.
+const CYCLES: usize = 60;
+/// A loop that is pushed goes beyond where it settles, and joints push each other.
+const DYNAMIC: f64 = 1.5;
+/// Whatever the model: a reference that is half a cycle off, encoders, a sampled loop; rad.
+const LEAST: f64 = 0.01;
+
+/// The greatest torque, by sample and joint, that the feedback may have to make up for, N·m.
+#[derive(Clone, Debug)]
+pub(super) struct Tolerance<const N: usize> {
+    missing: Vec<SVector<f64, N>>,
+    give: f64,
+}
+
+impl<const N: usize> Tolerance<N> {
+    /// Of a path for which `fed` is fed forward, or nothing, and that needs `best` by the best model that is known. `limits`
+    /// are the joints' torques, N·m; `give` is how far a push may take a joint off the path, rad.
+    pub(super) fn new(fed: Option<&Parts<N>>, best: &Parts<N>, limits: &SVector<f64, N>, give: f64) -> Self {
+        let greatest = |series: &mut dyn Iterator<Item = SVector<f64, N>>| {
+            series.fold(SVector::zeros(), |most: SVector<f64, N>, x| most.sup(&x))
+        };
+        let now: Vec<SVector<f64, N>> = (0..best.rigid.len())
+            .map(|k| {
+                let at = k as f64;
+                let fed = fed.map_or_else(SVector::zeros, |fed| fed.total(at));
+                let part = |series: &[SVector<f64, N>], share: f64| between(series, at).abs() * share;
+                (best.total(at) - fed).abs() + part(&best.rigid, RIGID) + part(&best.effects, EFFECTS)
+            })
+            .collect();
+        let friction = greatest(&mut best.friction.iter().map(|f| f.abs())) * FRICTION + limits * OF_LIMIT;
+        let missing = |k: usize| {
+            let near = now.iter().take(k + CYCLES).skip(k.saturating_sub(CYCLES));
+            greatest(&mut near.copied()) * DYNAMIC + friction
+        };
+        Tolerance { missing: (0..now.len()).map(missing).collect(), give }
+    }
+
+    /// By joint, rad, at a sample and with this stiffness (N·m/rad) of the loop. Infinite where the stiffness cannot be
+    /// inverted: the driver's other limits hold.
+    pub(super) fn at(&self, sample: usize, stiffness: &SMatrix<f64, N, N>) -> [f64; N] {
+        let last = self.missing.len().saturating_sub(1);
+        let (Some(missing), Some(yielding)) = (self.missing.get(sample.min(last)), stiffness.try_inverse()) else {
+            return [f64::INFINITY; N];
+        };
+        let error = yielding.abs() * missing;
+        error.map(|error| LEAST + self.give + error).into()
+    }
+}
