@@ -253,6 +253,26 @@ fn current(frame: &Frame) -> bool {
     matches!(Cob::of(frame), Some(Cob::Rpdo(1, _))) && matches!(frame.bytes(), [0x0F, 0, _, _])
 }
 
+/// A run that has been in torque mode for a second. A machine with other work may leave it without time for its cycle: then
+/// the driver stops the arm, and it is tried again.
+fn in_torque_mode(folder: &Path, url: &str, heard: &Receiver<(Instant, Frame)>) -> Ended {
+    let mut why = String::new();
+    for _ in 0..5 {
+        let mut run = Ended(follow(folder, "out", &["--bus", url, "--accept-unverified"]).spawn().unwrap());
+        let mut commands = 0;
+        while run.0.try_wait().unwrap().is_none() {
+            let Ok((_, frame)) = heard.recv_timeout(Duration::from_millis(100)) else { continue };
+            assert!(!leaves_operational(&frame) && quick_stop(&frame).is_none(), "it spoke too early");
+            commands += usize::from(current(&frame));
+            if commands >= 1200 {
+                return run;
+            }
+        }
+        run.0.stderr.take().unwrap().read_to_string(&mut why).unwrap();
+    }
+    panic!("no run came to its torque mode: {why}")
+}
+
 #[test]
 fn a_process_that_is_killed_in_motion_leaves_a_stop_on_the_bus() {
     let folder = folder("killed_in_motion", 60.0);
@@ -265,21 +285,7 @@ fn a_process_that_is_killed_in_motion_leaves_a_stop_on_the_bus() {
         );
         let heard = listen(&url);
         std::thread::sleep(Duration::from_millis(500));
-        let mut run = Ended(follow(&folder, "out", &["--bus", &url, "--accept-unverified"]).spawn().unwrap());
-        let started = Instant::now();
-        // A second of torque mode.
-        let mut commands = 0;
-        while commands < 1200 {
-            let (_, frame) = heard.recv_timeout(Duration::from_secs(5)).unwrap_or_else(|e| {
-                let _ = run.0.kill();
-                let mut why = String::new();
-                run.0.stderr.take().unwrap().read_to_string(&mut why).unwrap();
-                panic!("{e}: {why}")
-            });
-            assert!(!leaves_operational(&frame) && quick_stop(&frame).is_none(), "it spoke too early");
-            commands += usize::from(current(&frame));
-            assert!(started.elapsed() < Duration::from_secs(90));
-        }
+        let mut run = in_torque_mode(&folder, &url, &heard);
         // What ends both does not end the watchdog first.
         let watchdogs = running_with(&url);
         assert_eq!(watchdogs.len(), 1);
