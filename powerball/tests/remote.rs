@@ -5,73 +5,88 @@
 use powerball::logs::log::{ColumnMap, LogError};
 use powerball::{Log, logs::tables::read_contents};
 use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use tiny_http::{Header, Response, Server};
 
 /// Files under their paths, and what was asked for and sent.
 struct Served {
-    server: Arc<Server>,
-    sent: Arc<AtomicU64>,
-    requests: Arc<AtomicU64>,
+    at: SocketAddr,
+    counts: Arc<Counts>,
+}
+
+#[derive(Default)]
+struct Counts {
+    sent: AtomicU64,
+    requests: AtomicU64,
 }
 
 impl Served {
     /// Serves files; those below /plain/ without ranges, as the simplest servers do.
     fn new(files: BTreeMap<String, Vec<u8>>) -> Served {
-        let server = Arc::new(Server::http("127.0.0.1:0").unwrap());
-        let served = Served { server, sent: Arc::default(), requests: Arc::default() };
-        let (server, sent, requests) =
-            (Arc::clone(&served.server), Arc::clone(&served.sent), Arc::clone(&served.requests));
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let served = Served { at: listener.local_addr().unwrap(), counts: Arc::default() };
+        let counts = Arc::clone(&served.counts);
+        // Until the test's process ends.
         std::thread::spawn(move || {
-            for request in server.incoming_requests() {
-                requests.fetch_add(1, Ordering::SeqCst);
-                let path = request.url().split('?').next().unwrap_or_default().to_string();
-                let Some(bytes) = files.get(&path) else {
-                    let _ = request.respond(Response::from_string("nothing here").with_status_code(404));
-                    continue;
-                };
-                let range = request.headers().iter().find(|h| h.field.equiv("Range"));
-                let range = range
-                    .filter(|_| !path.starts_with("/plain/"))
-                    .map(|h| bounds(h.value.as_str(), bytes.len()));
-                let (body, status) = match range.clone() {
-                    Some(range) => (bytes[range].to_vec(), 206),
-                    None => (bytes.clone(), 200),
-                };
-                sent.fetch_add(body.len() as u64, Ordering::SeqCst);
-                let mut response =
-                    Response::from_data(body).with_status_code(status).with_chunked_threshold(usize::MAX);
-                let mut add = |name: &str, value: &str| {
-                    response.add_header(Header::from_bytes(name, value).unwrap());
-                };
-                add("Last-Modified", "Wed, 01 May 2024 12:00:00 GMT");
-                add("ETag", "\"a\"");
-                if let Some(range) = range {
-                    add("Content-Range", &format!("bytes {}-{}/{}", range.start, range.end - 1, bytes.len()));
-                }
-                let _ = request.respond(response);
+            let files = Arc::new(files);
+            for stream in listener.incoming() {
+                let (files, counts) = (Arc::clone(&files), Arc::clone(&counts));
+                std::thread::spawn(move || answer(stream.unwrap(), &files, &counts));
             }
         });
         served
     }
 
     fn url(&self, path: &str) -> String {
-        format!("http://{}{path}", self.server.server_addr())
+        format!("http://{}{path}", self.at)
     }
 
     /// Bytes and requests since it was asked last.
     fn taken(&self) -> (u64, u64) {
-        (self.sent.swap(0, Ordering::SeqCst), self.requests.swap(0, Ordering::SeqCst))
+        (self.counts.sent.swap(0, Ordering::SeqCst), self.counts.requests.swap(0, Ordering::SeqCst))
     }
 }
 
-impl Drop for Served {
-    fn drop(&mut self) {
-        self.server.unblock();
+/// One request on each connection.
+fn answer(mut stream: TcpStream, files: &BTreeMap<String, Vec<u8>>, counts: &Counts) -> std::io::Result<()> {
+    let lines = BufReader::new(stream.try_clone()?).lines().map_while(Result::ok);
+    let asked: Vec<String> = lines.take_while(|line| !line.is_empty()).collect();
+    let mut words = asked.first().map(String::as_str).unwrap_or_default().split(' ');
+    let (method, url) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
+    if method.is_empty() {
+        return Ok(());
     }
+    counts.requests.fetch_add(1, Ordering::SeqCst);
+    let path = url.split('?').next().unwrap_or_default();
+    let Some(bytes) = files.get(path) else {
+        return stream.write_all(b"HTTP/1.1 404 Not Found\r\nConnection: close\r\nContent-Length: 0\r\n\r\n");
+    };
+    let range = asked
+        .iter()
+        .filter_map(|line| line.split_once(": "))
+        .find(|(name, _)| name.eq_ignore_ascii_case("range"))
+        .filter(|_| !path.starts_with("/plain/"))
+        .map(|(_, value)| bounds(value, bytes.len()));
+    let (status, extra) = match &range {
+        Some(range) => {
+            let place = format!("{}-{}/{}", range.start, range.end - 1, bytes.len());
+            ("206 Partial Content", format!("Content-Range: bytes {place}\r\n"))
+        }
+        None => ("200 OK", String::new()),
+    };
+    let body = &bytes[range.unwrap_or(0..bytes.len())];
+    counts.sent.fetch_add(body.len() as u64, Ordering::SeqCst);
+    write!(
+        stream,
+        "HTTP/1.1 {status}\r\nConnection: close\r\nContent-Length: {}\r\n\
+            Last-Modified: Wed, 01 May 2024 12:00:00 GMT\r\nETag: \"a\"\r\n{extra}\r\n",
+        body.len()
+    )?;
+    if method == "HEAD" { Ok(()) } else { stream.write_all(body) }
 }
 
 /// `bytes=0-99` of a file of some length.

@@ -15,7 +15,8 @@ pub(super) const LICENCE: &str = include_str!("uplot/LICENSE");
 pub(super) const SCRIPTS: [&str; 2] = [include_str!("uplot/uPlot.iife.min.js"), include_str!("figures.js")];
 pub(super) const STYLE: &str = include_str!("uplot/uPlot.min.css");
 
-/// The page of a motion that goes on: it takes server-sent events from `events` beside it; `stream.js` says which.
+/// The page of a motion that goes on: it takes server-sent events from `events` next to it, with its own query; `stream.js` says
+/// which.
 #[must_use]
 pub fn stream_page() -> String {
     format!(

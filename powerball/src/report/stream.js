@@ -80,7 +80,7 @@
     line.textContent = text;
     events.prepend(line);
   };
-  const source = new EventSource("events");
+  const source = new EventSource("events" + location.search);
   source.onmessage = (event) => {
     const message = JSON.parse(event.data);
     if (message.kind === "start") start(message);

@@ -220,6 +220,8 @@ pub struct Driver<const N: usize> {
     cause: Option<Cause>,
     /// The nodes' configuration can no longer be trusted.
     restart: bool,
+    /// The program was asked to end, and the arm was stopped for it.
+    interrupted: bool,
     details: Details,
     silent: bool,
     joints: [Joint; N],
@@ -267,6 +269,7 @@ impl<const N: usize> Driver<N> {
             now: 0,
             cause: None,
             restart: false,
+            interrupted: false,
             details: Details::default(),
             silent: false,
             joints: profile.joints.map(|joint| Joint::new(&joint, lost, reactions.sdo_timeout)),
@@ -360,6 +363,7 @@ impl<const N: usize> Driver<N> {
             return Err(Refusal::Phase(self.phase.text()));
         }
         self.cause = None;
+        self.interrupted = false;
         self.diagnosis = None;
         self.joints.iter_mut().for_each(|joint| joint.client.cancel());
         if self.restart || !self.sync.is_running() {

@@ -50,11 +50,28 @@ impl<const N: usize> Driver<N> {
     }
 
     /// Stops the arm because the program was asked to end: as [`Driver::stop`], and latched, so that nothing moves
-    /// again. Once is enough.
+    /// again. Where a joint may have torque quick stop leaves at once in every phase, also where the arm is being stopped
+    /// already: its brakes stay closed then. Once is enough.
     pub fn interrupt(&mut self, now: Micros, tx: &mut impl Transmit) {
         self.now = now;
-        if self.cause != Some(Cause::Interrupted) {
-            self.trip(Cause::Interrupted, tx);
+        if self.interrupted || self.phase == Phase::Idle {
+            return;
+        }
+        self.interrupted = true;
+        let stopping = self.phase == Phase::Stopping;
+        self.trip(Cause::Interrupted, tx);
+        let torque = |joint: &super::Joint| joint.state().is_some_and(State::has_torque);
+        if self.silent || !self.joints.iter().any(torque) {
+            return;
+        }
+        if stopping {
+            if let StopStage::Off { .. } = self.stop {
+                self.stop = StopStage::Brake { since: now };
+            }
+            self.joints.iter_mut().for_each(|joint| joint.unsent = true);
+            self.retry_stop(tx);
+        } else if self.phase == Phase::Faulted && self.sync.is_running() {
+            self.begin_stop(tx);
         }
     }
 

@@ -1,5 +1,7 @@
 //! A driver on a bus: the loop that neither of them has.
 
+#[cfg(unix)]
+use super::Watchdog;
 use super::events::Observed;
 use super::{Bus, BusError, Event, Interrupt, blocking};
 use crate::bus::canopen::client::Value;
@@ -15,8 +17,9 @@ const STOP: Micros = 5_000_000;
 ///
 /// However a program leaves it, by an error, a panic or a signal ([`Master::with_interrupt`]), the arm is stopped: a
 /// master that is dropped while joints may have torque sends quick stop, closes the brakes, takes the torque away and
-/// tells the drives that they need not watch it any more. A program that is killed (SIGKILL) or a machine that
-/// loses its power sends nothing: then the drives' own watching stops them.
+/// tells the drives that they need not watch it any more. Where a program dies without leaving it (SIGKILL, an abort), a
+/// second process can send the stop (`Master::with_watchdog`); a machine that loses its power sends nothing, and then the
+/// drives' own watching stops them.
 #[derive(Debug)]
 pub struct Master<B: Bus, const N: usize> {
     driver: Driver<N>,
@@ -25,6 +28,8 @@ pub struct Master<B: Bus, const N: usize> {
     reported: bool,
     observed: Observed<N>,
     interrupt: Interrupt,
+    #[cfg(unix)]
+    watchdog: Option<Watchdog>,
 }
 
 /// What has happened in a [`step`](Master::step).
@@ -106,7 +111,24 @@ impl<B: Bus, const N: usize> Master<B, N> {
     /// A driver and the bus of its arm.
     pub fn new(driver: Driver<N>, bus: B) -> Self {
         let observed = Observed::of(&driver);
-        Master { driver, bus, cycle: 0, reported: true, observed, interrupt: Interrupt::default() }
+        Master {
+            driver,
+            bus,
+            cycle: 0,
+            reported: true,
+            observed,
+            interrupt: Interrupt::default(),
+            #[cfg(unix)]
+            watchdog: None,
+        }
+    }
+
+    /// The same with a second process that stops the arm where this one dies. It is dismissed once the arm rests.
+    #[cfg(unix)]
+    #[must_use]
+    pub fn with_watchdog(mut self, watchdog: Watchdog) -> Self {
+        self.watchdog = Some(watchdog);
+        self
     }
 
     /// The same, stopped by signals: the stop leaves within 10 ms of one.
@@ -275,6 +297,10 @@ impl<B: Bus, const N: usize> Drop for Master<B, N> {
         // What cannot be done here is done by the drives, which watch.
         if self.is_at_rest() || self.bring_to_rest().is_ok() {
             self.disarm_watch();
+            #[cfg(unix)]
+            if let Some(watchdog) = self.watchdog.take() {
+                watchdog.dismiss();
+            }
         }
         self.interrupt.guard(false);
     }

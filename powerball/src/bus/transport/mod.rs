@@ -18,6 +18,8 @@ mod socketcan;
 #[cfg(unix)]
 mod udp;
 mod url;
+#[cfg(unix)]
+mod watchdog;
 
 pub use interrupt::Interrupt;
 pub use master::{ArmError, Master, Moment};
@@ -28,6 +30,8 @@ pub use socketcan::SocketCan;
 #[cfg(unix)]
 pub use udp::UdpMulticast;
 pub use url::{BusUrl, Interface, UrlError};
+#[cfg(unix)]
+pub use watchdog::Watchdog;
 
 use crate::bus::canopen::{Frame, Micros};
 use std::fmt;

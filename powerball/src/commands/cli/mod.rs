@@ -14,6 +14,7 @@ mod generate;
 mod identify;
 mod inputs;
 mod listen;
+mod live_server;
 mod log;
 mod model_on_bus;
 mod output;

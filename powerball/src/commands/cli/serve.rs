@@ -1,45 +1,36 @@
 //! `--serve`: a page that shows a motion while it goes on.
 //!
-//! One thread answers requests, one more feeds each page that is open. Who comes late gets what was before. Nothing here is
-//! waited for by the cycle: what is sent is put into queues.
+//! Who comes late gets what was before. Nothing here is waited for by the cycle: what is sent goes into a queue that has an
+//! end, and is lost where the server has no time for it.
 
-use super::Failure;
-use crate::report::stream_page;
+use super::{Failure, live_server};
 use clap::Args;
 use serde_json::{Value, json};
-use std::io::Write;
-use std::net::SocketAddr;
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::fmt::Write as _;
+use std::net::{SocketAddr, TcpListener};
 use std::time::{Duration, Instant};
-use tiny_http::{Header, Request, Response, Server};
+use tokio::sync::mpsc::{Sender, channel};
 
 /// Cycles between two samples of the page: 20 a second at 200 Hz.
 pub(super) const EVERY: usize = 10;
-/// Messages that late pages still get; the oldest samples go first.
-const MOST: usize = 50_000;
+/// Messages that wait for the server: those of 50 s.
+const QUEUE: usize = 1000;
 /// For pages to take the last messages before the program ends.
 const GOODBYE: Duration = Duration::from_millis(500);
 
 /// Where the page is.
 #[derive(Args, Clone, Debug)]
 pub(super) struct Serve {
-    /// Show the motion on a page while it goes on, at this address of this machine; --bus virtual then takes real time.
+    /// Show the motion on a page while it goes on, at this address of this machine; --bus virtual then takes real time. The
+    /// page's whole address, with the token that it asks for, is printed.
     #[arg(long, value_name = "127.0.0.1:PORT")]
     serve: Option<SocketAddr>,
-}
-
-/// Messages so far, and who gets the next ones.
-#[derive(Debug, Default)]
-struct Shared {
-    history: Vec<String>,
-    pages: Vec<Sender<String>>,
 }
 
 /// A page that is fed, or none.
 #[derive(Clone, Debug)]
 pub(super) struct Live {
-    shared: Option<Arc<Mutex<Shared>>>,
+    server: Option<Sender<String>>,
     began: Instant,
 }
 
@@ -50,85 +41,51 @@ impl Serve {
     /// An address that is not this machine's own loopback, or that is in use.
     pub(super) fn open(&self) -> Result<Live, Failure> {
         let began = Instant::now();
-        let Some(address) = self.serve else { return Ok(Live { shared: None, began }) };
+        let Some(address) = self.serve else { return Ok(Live { server: None, began }) };
         if !address.ip().is_loopback() {
             return Err(Failure::Unusable(format!(
                 "--serve {address}: pages are for this machine alone, 127.0.0.1 or [::1]; from another one take a tunnel (ssh -L)"
             )));
         }
-        let server =
-            Server::http(address).map_err(|e| Failure::Unusable(format!("--serve {address}: {e}")))?;
-        let at = server.server_addr().to_ip().unwrap_or(address);
-        eprintln!("powerball: http://{at}/");
-        let shared = Arc::new(Mutex::new(Shared::default()));
-        let of_server = Arc::clone(&shared);
+        let failed = |e: &dyn std::fmt::Display| Failure::Unusable(format!("--serve {address}: {e}"));
+        let listener = TcpListener::bind(address).map_err(|e| failed(&e))?;
+        let at = listener.local_addr().map_err(|e| failed(&e))?;
+        let token = token().map_err(|e| failed(&e))?;
+        eprintln!("powerball: http://{at}/?token={token}");
+        let (server, messages) = channel(QUEUE);
         std::thread::spawn(move || {
-            for request in server.incoming_requests() {
-                answer(request, &of_server);
+            // It must not have the priority of the cycle, which the thread that opened it may have.
+            #[cfg(target_os = "linux")]
+            crate::bus::transport::realtime::resign();
+            if let Err(e) = live_server::serve(listener, &token, messages) {
+                tracing::warn!("--serve {at}: {e}; there is no page");
             }
         });
-        Ok(Live { shared: Some(shared), began })
+        Ok(Live { server: Some(server), began })
     }
 }
 
-fn locked(shared: &Mutex<Shared>) -> MutexGuard<'_, Shared> {
-    shared.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-fn answer(request: Request, shared: &Mutex<Shared>) {
-    // A page that has gone is nobody's loss.
-    let _ = match request.url() {
-        "/" => {
-            let header = Header::from_bytes("Content-Type", "text/html; charset=utf-8");
-            let page = Response::from_string(stream_page());
-            request.respond(header.into_iter().fold(page, Response::with_header))
-        }
-        "/events" => {
-            let (send, messages) = channel();
-            let before = {
-                let mut shared = locked(shared);
-                shared.pages.push(send);
-                shared.history.clone()
-            };
-            std::thread::spawn(move || feed(request, &before, &messages));
-            Ok(())
-        }
-        _ => request.respond(Response::from_string("nothing is here; / is the page\n").with_status_code(404)),
-    };
-}
-
-/// Server-sent events (HTML, §9.2) until the page or the program goes.
-fn feed(request: Request, before: &[String], messages: &Receiver<String>) -> std::io::Result<()> {
-    let mut page = request.into_writer();
-    page.write_all(
-        b"HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\nConnection: close\r\n\r\n",
-    )?;
-    for message in before {
-        write!(page, "data: {message}\n\n")?;
-    }
-    page.flush()?;
-    while let Ok(message) = messages.recv() {
-        write!(page, "data: {message}\n\n")?;
-        page.flush()?;
-    }
-    Ok(())
+/// 128 random bits: only who was given the page's address has it.
+fn token() -> Result<String, getrandom::Error> {
+    let mut bytes = [0; 16];
+    getrandom::fill(&mut bytes)?;
+    Ok(bytes.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    }))
 }
 
 impl Live {
     /// Whether somebody may look.
     pub(super) fn is_open(&self) -> bool {
-        self.shared.is_some()
+        self.server.is_some()
     }
 
     fn send(&self, message: &Value) {
-        let Some(shared) = &self.shared else { return };
-        let (mut shared, text) = (locked(shared), message.to_string());
-        if shared.history.len() >= MOST {
-            // What began it all stays.
-            shared.history.drain(1..MOST / 10);
+        if let Some(server) = &self.server {
+            // A sample that the server has no time for is lost.
+            let _ = server.try_send(message.to_string());
         }
-        shared.history.push(text.clone());
-        shared.pages.retain(|page| page.send(text.clone()).is_ok());
     }
 
     /// What there is to see: fields with their units, each with a value by joint in every sample.

@@ -303,4 +303,7 @@ impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
 
 #[cfg(test)]
 #[cfg(feature = "virtual-arm")]
+mod interrupted;
+#[cfg(test)]
+#[cfg(feature = "virtual-arm")]
 mod tests;

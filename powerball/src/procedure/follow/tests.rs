@@ -6,7 +6,7 @@ use crate::bus::transport::{ArmError, Interrupt, Memory};
 use crate::controller::friction::{TABLE_2, TanhFriction};
 use crate::identification::NumericArm;
 use crate::identification::motion::Motion;
-use crate::virtual_arm::slave::CurrentMode;
+use crate::virtual_arm::slave::{CurrentMode, Setup};
 use crate::virtual_arm::{PlantEffect, VirtualArm, lwa4p};
 use dyngen::{Model, SetKind};
 
@@ -14,32 +14,40 @@ const SPRING: f64 = 6.0;
 
 type Arm = Master<Memory<VirtualArm>, 6>;
 
-fn master(profile: Profile<6>) -> Arm {
+pub(super) fn setup() -> Setup {
     let mode = CurrentMode { mode: 4, target: LWA4P.current.unwrap().setpoint };
     let mut setup = lwa4p::setup([0.0; 6], 1).unwrap().with_current_mode(mode);
     setup.modules.iter_mut().for_each(|module| module.commutated = true);
     setup.plant = setup.plant.with(PlantEffect::Spring { joint: 0, stiffness: SPRING, rest: -0.2 });
-    Master::new(Driver::new(profile).unwrap(), Memory::new(VirtualArm::new(setup).unwrap(), 500_000))
+    setup
 }
 
-fn numeric() -> NumericArm<6> {
+pub(super) fn master_on<B: Bus>(profile: Profile<6>, bus: B) -> Master<B, 6> {
+    Master::new(Driver::new(profile).unwrap(), bus)
+}
+
+fn master(profile: Profile<6>) -> Arm {
+    master_on(profile, Memory::new(VirtualArm::new(setup()).unwrap(), 500_000))
+}
+
+pub(super) fn numeric() -> NumericArm<6> {
     let model = Model::derive(lwa4p::arm().unwrap()).unwrap();
     let all: Vec<f64> = lwa4p::links().iter().flat_map(|b| b.parameters()).collect();
     let values = model.set_values(model.set(SetKind::Minimal).unwrap(), &all);
     NumericArm::new(&model, &values, [0.0; 6]).unwrap().unwrap()
 }
 
-fn path(amplitude: f64) -> Path<6> {
+pub(super) fn path(amplitude: f64, cycles: u32) -> Path<6> {
     let mut motion = Motion::new(6, 0.005);
-    for k in 0..=600 {
-        let w = std::f64::consts::TAU * f64::from(k) / 600.0;
+    for k in 0..=cycles {
+        let w = std::f64::consts::TAU * f64::from(k) / f64::from(cycles);
         motion.push((0..6).map(|j| [amplitude * (0.2 + 0.05 * f64::from(j)) * (1.0 - w.cos()), 0.0, 0.0]));
     }
     Path::clear(&motion, &Envelope::new(|_| None), &LWA4P).unwrap()
 }
 
 /// True parts of the path; `spring` tells whether the effect is known.
-fn parts(path: &Path<6>, arm: &NumericArm<6>, spring: bool) -> Parts<6> {
+pub(super) fn parts(path: &Path<6>, arm: &NumericArm<6>, spring: bool) -> Parts<6> {
     let laws = TABLE_2.map(TanhFriction::new);
     let of = |f: &dyn Fn(&Reference<f64, 6>) -> SVector<f64, 6>| path.reference.iter().map(f).collect();
     let effect = |r: &Reference<f64, 6>| {
@@ -65,7 +73,7 @@ fn rests(master: &Arm) {
 
 #[test]
 fn a_known_effect_halves_the_error_and_the_observer_sees_an_unknown_one() {
-    let (arm, path) = (numeric(), path(1.0));
+    let (arm, path) = (numeric(), path(1.0, 600));
     let law = Law::Torque(ComputedTorque::for_period(0.005));
     let best = parts(&path, &arm, true);
     let drive = |parts: Option<Parts<6>>| {
@@ -102,7 +110,7 @@ fn a_known_effect_halves_the_error_and_the_observer_sees_an_unknown_one() {
 
 #[test]
 fn torque_offsets_take_the_work_off_the_drives_own_feedback() {
-    let (arm, path) = (numeric(), path(1.0));
+    let (arm, path) = (numeric(), path(1.0, 600));
     let best = parts(&path, &arm, true);
     let drive = |parts: Option<Parts<6>>| {
         let law = Law::Feedforward;
@@ -154,7 +162,7 @@ fn what_is_not_accepted_not_known_or_not_stable_is_refused_with_closed_brakes() 
 
 #[test]
 fn an_interrupt_stops_the_law_and_the_arm() {
-    let (arm, path) = (numeric(), path(1.0));
+    let (arm, path) = (numeric(), path(1.0, 600));
     let interrupt = Interrupt::default();
     let mut cycles = 0;
     let mut held = TorqueLoop::bring_up(master(LWA4P).with_interrupt(interrupt.clone()), true).unwrap();

@@ -7,11 +7,15 @@ use crate::bus::canopen::{NodeId, nmt};
 use crate::bus::cia402::{Command, Controlword, Statusword};
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::driver::{ControlMode, Phase};
+#[cfg(unix)]
+use crate::bus::transport;
 use crate::bus::transport::{ArmError, Bus, BusUrl, Master, Moment};
 use crate::identification::mounting::Mounting;
 use crate::procedure::{RecordError, Recorder};
 use clap::Args;
 use serde_json::json;
+#[cfg(unix)]
+use std::io::Write as _;
 use std::time::Duration;
 
 /// For bringing the arm up and for enabling it, µs: joints commutate one after the other.
@@ -40,6 +44,10 @@ pub(crate) struct Enable {
 pub(crate) struct Stop {
     #[command(flatten)]
     place: Where,
+    /// Stop them when the process at the other end of standard input has died, not before.
+    #[cfg(unix)]
+    #[arg(long, hide = true)]
+    watchdog: bool,
 }
 
 /// Move one joint slowly to a position, and let go again.
@@ -122,11 +130,24 @@ fn list(values: &[f64]) -> String {
 }
 
 impl Stop {
+    /// The bus, when it is time to stop the arm. Nothing may be in the way then, not even a word on standard error.
+    fn bus(&self) -> Result<Box<dyn Bus>, Failure> {
+        #[cfg(unix)]
+        if self.watchdog {
+            let open = || transport::open(&self.place.bus).map_err(refused);
+            // That it can be opened is seen now. Then it is opened anew, with nothing old to read.
+            drop(open()?);
+            transport::Watchdog::wait().map_err(refused)?;
+            return open();
+        }
+        self.place.open()
+    }
+
     pub(crate) fn run(self) -> Result<(), Failure> {
         use crate::bus::canopen::client::Value;
         use crate::bus::cia402::objects::{CONTROLWORD, STATUSWORD};
         use crate::bus::transport::blocking;
-        let mut bus = self.place.open()?;
+        let mut bus = self.bus()?;
         let nodes: Vec<NodeId> = LWA4P.joints.iter().map(|joint| joint.node).collect();
         // In one frame for all of them: leaving "operational" ends the set-points of whoever gives them. Then the
         // stop, to all drives before any answer is awaited.
@@ -139,6 +160,11 @@ impl Stop {
         for (word, pause) in words {
             blocking::write_all(&mut *bus, &nodes, CONTROLWORD, Value::number(i64::from(word.0), 2));
             super::wait(&mut *bus, pause)?;
+        }
+        #[cfg(unix)]
+        if self.watchdog {
+            let told = "powerball: the process that moved the arm has died; all drives were told to stop";
+            let _ = writeln!(std::io::stderr(), "{told}");
         }
         let answers = blocking::read_all(&mut *bus, &nodes, STATUSWORD);
         let (mut states, mut stopped, mut failed) = (Vec::new(), Vec::new(), Vec::new());

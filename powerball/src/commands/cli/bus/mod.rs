@@ -119,7 +119,32 @@ impl Where {
         }
         let signals = |e| Failure::Unusable(format!("cannot listen to signals: {e}"));
         let interrupt = Interrupt::install().map_err(signals)?;
-        Ok(Master::new(Driver::new(profile).map_err(refused)?, bus).with_interrupt(interrupt))
+        let master = Master::new(Driver::new(profile).map_err(refused)?, bus).with_interrupt(interrupt);
+        #[cfg(unix)]
+        if let Some(watchdog) = self.watchdog() {
+            return Ok(master.with_watchdog(watchdog));
+        }
+        Ok(master)
+    }
+
+    /// This program once more, with the same priority, to stop the arm where this process dies. A serial adapter cannot be
+    /// opened twice.
+    #[cfg(unix)]
+    fn watchdog(&self) -> Option<transport::Watchdog> {
+        if matches!(self.bus, BusUrl::Virtual | BusUrl::Slcan(..)) {
+            return None;
+        }
+        let started = std::env::current_exe().and_then(|program| {
+            let mut command = std::process::Command::new(program);
+            command.args(["bus", "stop", "--watchdog", "--bus", &self.bus.to_string()]);
+            transport::Watchdog::start(command)
+        });
+        let failed = |e| {
+            tracing::warn!(
+                "no watchdog: {e}; where this program is killed, the drives' own monitoring alone stops the arm"
+            );
+        };
+        started.map_err(failed).ok()
     }
 }
 
