@@ -119,7 +119,37 @@ fn another_node_than_expected_is_refused() {
     let mut profile = LWA4P;
     profile.joints[2].identity.vendor = Some(0xBAD);
     let cause = refused(started(ControlMode::Velocity, profile, true, Wire::Good));
-    assert_eq!(cause, Cause::WrongIdentity(VICTIM, Object::new(0x1018, 1), 0xBAD, 0x200));
+    assert_eq!(cause, Cause::WrongIdentity(VICTIM, Object::new(0x1018, 1), 0xBAD, 0x15E));
+
+    // A device of another maker, one that is no drive, and one that does not say what it is.
+    let (vendor, device_type) = (Object::new(0x1018, 1), Object::new(0x1000, 0));
+    let told = |wire| refused(started(ControlMode::InterpolatedPosition, LWA4P, true, wire)).to_string();
+    let expected = "node 5: vendor 0xDEADBEEF (0x1018:1) where 0x0000015E is expected";
+    assert_eq!(told(Wire::Misread(vendor, 0xDEAD_BEEF)), expected);
+    let expected = "node 5: device type 0x00030191 (0x1000:0), which is CiA 401 where CiA 402 is expected";
+    assert_eq!(told(Wire::Misread(device_type, 0x0003_0191)), expected);
+    assert!(told(Wire::Refuse(device_type)).contains("0x1000:0"));
+}
+
+/// What the caller accepts is noted by name, and the arm runs.
+#[test]
+fn another_node_than_expected_runs_where_it_is_accepted() {
+    let (vendor, device_type) = (Object::new(0x1018, 1), Object::new(0x1000, 0));
+    for wire in
+        [Wire::Misread(vendor, 0xDEAD_BEEF), Wire::Misread(device_type, 0x191), Wire::Refuse(device_type)]
+    {
+        let mut world = World::new(true, LWA4P);
+        world.run(100_000);
+        world.bus.peer_mut().wire = wire;
+        world.driver.accept_other_nodes();
+        world.driver.start(ControlMode::InterpolatedPosition, false).unwrap();
+        assert!(world.run_until(20_000_000, |w| w.driver.phase() == Phase::Running), "{wire:?}");
+        let notes: Vec<Cause> = world.driver.notes().map(|note| note.cause).collect();
+        assert!(
+            matches!(notes[..], [Cause::WrongIdentity(VICTIM, ..) | Cause::Sdo(VICTIM, ..)]),
+            "{notes:?}"
+        );
+    }
 }
 
 #[test]
@@ -133,7 +163,7 @@ fn a_bus_that_cannot_carry_it_is_refused_and_a_tight_one_told() {
         Mapping::new(&[entry(0x6064, 32), entry(0x606C, 32)]).unwrap(),
         Mapping::EMPTY,
     ];
-    profile.interpolated_position.rpdo =
+    profile.interpolated_position.as_mut().unwrap().rpdo =
         Mapping::new(&[entry(0x6040, 16), entry(0x6042, 16), Entry::new(Object::new(0x60C1, 1), 32)])
             .unwrap();
     profile.tpdos[3] = Mapping::new(&[entry(0x607A, 32), entry(0x6081, 32)]).unwrap();
@@ -149,7 +179,7 @@ fn a_bus_that_cannot_carry_it_is_refused_and_a_tight_one_told() {
     let mut profile = LWA4P;
     let lean = Driver::new(profile).unwrap().start(ControlMode::InterpolatedPosition, false);
     assert_eq!(lean, Ok(Verdict::Fits));
-    profile.interpolated_position.rpdo =
+    profile.interpolated_position.as_mut().unwrap().rpdo =
         Mapping::new(&[entry(0x6040, 16), Entry::new(Object::new(0x60C1, 1), 32), entry(0x60B2, 16)])
             .unwrap();
     let tight = Driver::new(profile).unwrap().start(ControlMode::InterpolatedPosition, false);
@@ -237,7 +267,8 @@ fn torque_offsets_need_their_place_in_the_pdo() {
     let mut world = running(ControlMode::InterpolatedPosition);
     let here = world.driver.setpoints();
     assert_eq!(world.driver.set_with_torque(&here, &[0.0; 6]), Err(Rejection::NoTorqueOffset));
-    let budget = Budget::of(&LWA4P.with_torque_offset(), &LWA4P.with_torque_offset().interpolated_position);
+    let profile = LWA4P.with_torque_offset();
+    let budget = Budget::of(&profile, &profile.interpolated_position.unwrap());
     assert!((budget.worst_load() - 0.935).abs() < 5e-3, "{budget}");
     assert_eq!(budget.verdict(), Verdict::Tight);
 }

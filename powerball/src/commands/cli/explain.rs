@@ -3,7 +3,7 @@
 //! Also here: what `explain` prints.
 
 use super::Failure;
-use super::bus::{Where, virtual_bus};
+use super::bus::{Consent, Where, virtual_bus};
 use super::inputs::{Inputs, recorded};
 use super::output::{self, Accept, Progress, Verbosity, notes};
 use crate::bus::driver::lwa4p::LWA4P;
@@ -75,6 +75,8 @@ pub(crate) struct Explain {
     /// without, the file virtual_arm.json beside the arm file.
     #[arg(long, value_name = "FILE", requires = "experiment")]
     plant: Option<PathBuf>,
+    #[command(flatten)]
+    consent: Consent,
 }
 
 impl Explain {
@@ -205,7 +207,7 @@ impl Explain {
             _ => Envelope::of(arm, &Mounting::Filed, None, None)
                 .map_err(|e| Failure::Unusable(format!("--experiment: {e}")))?,
         };
-        let master = self.place().driver(bus)?;
+        let master = self.place().driver(bus, self.consent)?;
         let mut log = std::fs::File::create(file)
             .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", file.display())))?;
         record(master, motion, envelope, output::live(), &mut log).map(|_| ()).map_err(|e| match e {

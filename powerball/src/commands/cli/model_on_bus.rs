@@ -1,7 +1,7 @@
 //! What `follow` and `float` take: an arm with a torque model, and the bus that it is on.
 
 use super::Failure;
-use super::bus::{Where, virtual_bus};
+use super::bus::{Consent, Where, virtual_bus};
 use super::envelope::Surroundings;
 use super::virtual_arm::{built, setup};
 use crate::bus::driver::Profile;
@@ -29,9 +29,8 @@ pub(crate) struct ModelOnBus {
     /// The virtual arm of --bus virtual with what no model is told of it: virtual_arm.json, as `powerball demo` writes it.
     #[arg(long, value_name = "FILE")]
     plant: Option<PathBuf>,
-    /// You accept the drives' current mode, which this project has never seen on an arm. Not asked on --bus virtual.
-    #[arg(long)]
-    accept_unverified: bool,
+    #[command(flatten)]
+    consent: Consent,
 }
 
 impl ModelOnBus {
@@ -53,7 +52,7 @@ impl ModelOnBus {
 
     /// Whether the current mode may be tried.
     pub(crate) fn accepts(&self) -> bool {
-        self.accept_unverified || self.place.bus == BusUrl::Virtual
+        self.consent.accept_unverified || self.place.bus == BusUrl::Virtual
     }
 
     /// A driver of the arm; where the bus is virtual the arm stands at `start`, with a hand on it if there is one.
@@ -67,7 +66,7 @@ impl ModelOnBus {
             BusUrl::Virtual => virtual_bus(self.virtual_arm(start, hand)?)?,
             _ => self.place.open()?,
         };
-        self.place.driver_of(profile, bus)
+        self.place.driver_of(profile, bus, self.consent)
     }
 
     fn virtual_arm(&self, start: [f64; 6], hand: Option<Hand>) -> Result<VirtualArm, Failure> {
