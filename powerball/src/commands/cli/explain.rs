@@ -160,9 +160,7 @@ impl Explain {
             }
             return Ok((self.place().open()?, None));
         }
-        let beside = self.inputs.arm.with_file_name(Undeclared::FILE);
-        let file = self.plant.clone().or_else(|| beside.is_file().then_some(beside));
-        let Some(file) = file else {
+        let Some(file) = self.plant.clone().or_else(|| Undeclared::next_to(&self.inputs.arm)) else {
             let note = "the experiment was recorded on the built-in virtual arm, which has no undeclared \
                 effect: it says \
                         nothing of another arm; name that one's bus by --bus, or the virtual arm's file by \

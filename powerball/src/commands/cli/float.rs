@@ -86,7 +86,7 @@ impl FloatCommand {
         let position = positions.last().map(|q| q.as_slice().to_vec()).unwrap_or_default();
         let result = json!({
             "seconds": positions.len() as f64 * period, "position": position, "drift": drift,
-            "drift_time": rest.len() as f64 * period, "hand": hand,
+            "drift_time": rest.len() as f64 * period, "hand": hand, "plant": self.on.plant(),
         });
         match self.on.place.json {
             true => output::print(&result.to_string()),

@@ -26,7 +26,8 @@ pub(crate) struct ModelOnBus {
     pub(crate) surroundings: Surroundings,
     #[command(flatten)]
     pub(crate) place: Where,
-    /// The virtual arm of --bus virtual with what no model is told of it: virtual_arm.json, as `powerball demo` writes it.
+    /// The virtual arm of --bus virtual with what no model is told of it: virtual_arm.json, as `powerball demo` writes it;
+    /// without, the file of that name next to the arm file, else the built-in arm.
     #[arg(long, value_name = "FILE")]
     plant: Option<PathBuf>,
     #[command(flatten)]
@@ -69,8 +70,27 @@ impl ModelOnBus {
         self.place.driver_of(profile, bus, self.consent)
     }
 
+    /// The plant of --bus virtual: the file that is told, else the one next to the arm file, as for `explain --experiment`.
+    fn plant_file(&self) -> Option<PathBuf> {
+        self.plant.clone().or_else(|| self.surroundings.arm.as_deref().and_then(Undeclared::next_to))
+    }
+
+    /// What the plant of --bus virtual is called; nothing on other buses.
+    pub(crate) fn plant(&self) -> Option<String> {
+        let file = || self.plant_file().map_or("built-in".to_string(), |file| file.display().to_string());
+        (self.place.bus == BusUrl::Virtual).then(file)
+    }
+
     fn virtual_arm(&self, start: [f64; 6], hand: Option<Hand>) -> Result<VirtualArm, Failure> {
-        let setup = match &self.plant {
+        let file = self.plant_file();
+        match &file {
+            Some(file) => eprintln!("powerball: the virtual arm is that of {}", file.display()),
+            None => eprintln!(
+                "powerball: the virtual arm is the built-in one, which has no undeclared effect: it says nothing of a model \
+                    of another arm; --plant names that one's file"
+            ),
+        }
+        let setup = match &file {
             Some(file) => Undeclared::read(file)
                 .map_err(Failure::Unusable)?
                 .setup(start, 1)
