@@ -102,8 +102,28 @@ fn the_explained_model_follows_better_than_the_base_model() {
     assert!(error("explained") < 0.5 * error("base"), "{result}");
     assert!(result["torque"]["explained"]["effects"][0].as_f64().unwrap() > 1.0, "{result}");
     assert!(result["largest_pole"].as_f64().unwrap() < 0.95);
+    assert_eq!(result["plant"].as_str(), Some(plant.as_str()));
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("Tracking error") && page.contains("of the error with the base model"));
+}
+
+/// As of `explain --experiment`: the plant next to the arm file moves, and it is said which one does.
+#[test]
+fn the_plant_next_to_the_arm_file_moves() {
+    let text = std::fs::read_to_string(ARM).unwrap();
+    let model = write("plant_model.json", &model().to_string());
+    for folder in ["lone", "session"] {
+        std::fs::create_dir_all(file(folder)).unwrap();
+    }
+    let (lone, arm) = (write("lone/arm.toml", &text), write("session/arm.toml", &text));
+    let plant = write("session/virtual_arm.json", PLANT);
+    for (arm, expected) in [(lone, "built-in"), (arm, plant.as_str())] {
+        let run = powerball(&[
+            "float", "--arm", &arm, "--model", &model, "--floor", "none", "--for", "0.1", "--json",
+        ]);
+        assert_eq!(printed(&run)["plant"], expected);
+        assert!(complaint(&run).contains(expected), "{}", complaint(&run));
+    }
 }
 
 #[test]

@@ -44,7 +44,7 @@ fn turn(drive: &Dcf, node: u8) -> Option<Turn> {
             counts: resolution.counts * gear.counts,
             source: format!("{} and {}", resolution.source, gear.source),
         },
-        None => Turn { source: format!("{}, without a gear (no 0x6091)", resolution.source), ..resolution },
+        None => Turn { source: format!("{} without a gear 0x6091", resolution.source), ..resolution },
     })
 }
 
