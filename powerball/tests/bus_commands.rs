@@ -24,6 +24,7 @@ fn the_virtual_arm_is_found_read_and_written() {
     let nodes: Vec<u64> =
         found["nodes"].as_array().unwrap().iter().map(|n| n["node"].as_u64().unwrap()).collect();
     assert_eq!(nodes, [3, 4, 5, 6, 7, 8]);
+    assert_eq!(found["used_twice"].as_array().map(Vec::len), Some(0), "{found}");
     let read = json(&powerball(&["bus", "sdo", "read", "3", "0x1018:4", "--json"]));
     assert_eq!(read["value"], 1003);
     let written = json(&powerball(&["bus", "sdo", "write", "3", "0x200E", "0x1E", "--json"]));

@@ -107,6 +107,7 @@ fn the_explained_model_follows_better_than_the_base_model() {
     assert!(log.lines().count() > 2 * 800 && whole(&log), "{} lines", log.lines().count());
     let read = powerball(&["log", out.join("log.csv").to_str().unwrap()]);
     assert_eq!(read.status.code(), Some(0), "{}", complaint(&read));
+    assert_eq!(result["plant"].as_str(), Some(plant.as_str()));
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("Tracking error") && page.contains("of the error with the base model"));
 }
@@ -129,18 +130,54 @@ fn a_run_that_is_stopped_keeps_its_log() {
     for with in ["torque", "impedance"] {
         let out = file(&format!("pushed_{with}"));
         let arguments = [
-            "follow", "--trajectory", &path, "--arm", ARM, "--floor", "none", "--model", &model, "--plant", &plant, "--with",
-            with, "--out", out.to_str().unwrap(),
+            "follow",
+            "--trajectory",
+            &path,
+            "--arm",
+            ARM,
+            "--floor",
+            "none",
+            "--model",
+            &model,
+            "--plant",
+            &plant,
+            "--with",
+            with,
+            "--out",
+            out.to_str().unwrap(),
         ];
         let run = powerball(&arguments);
         let complaint = complaint(&run);
         assert_eq!(run.status.code(), Some(1), "{complaint}");
-        assert!(complaint.contains("the arm was stopped: node") && complaint.contains("joint "), "{complaint}");
+        assert!(
+            complaint.contains("the arm was stopped: node") && complaint.contains("joint "),
+            "{complaint}"
+        );
         let log = std::fs::read_to_string(out.join("log.csv")).unwrap();
         assert!(log.lines().count() > 1 && whole(&log), "{log}");
     }
-    let refused = powerball(&["follow", "--trajectory", &path, "--model", &model, "--give", "0.6", "--out", "x"]);
+    let refused =
+        powerball(&["follow", "--trajectory", &path, "--model", &model, "--give", "0.6", "--out", "x"]);
     assert_eq!(refused.status.code(), Some(2), "{}", complaint(&refused));
+}
+
+/// As of `explain --experiment`: the plant next to the arm file moves, and it is said which one does.
+#[test]
+fn the_plant_next_to_the_arm_file_moves() {
+    let text = std::fs::read_to_string(ARM).unwrap();
+    let model = write("plant_model.json", &model().to_string());
+    for folder in ["lone", "session"] {
+        std::fs::create_dir_all(file(folder)).unwrap();
+    }
+    let (lone, arm) = (write("lone/arm.toml", &text), write("session/arm.toml", &text));
+    let plant = write("session/virtual_arm.json", PLANT);
+    for (arm, expected) in [(lone, "built-in"), (arm, plant.as_str())] {
+        let run = powerball(&[
+            "float", "--arm", &arm, "--model", &model, "--floor", "none", "--for", "0.1", "--json",
+        ]);
+        assert_eq!(printed(&run)["plant"], expected);
+        assert!(complaint(&run).contains(expected), "{}", complaint(&run));
+    }
 }
 
 #[test]

@@ -24,6 +24,46 @@ fn profile(dcf: &Path, arm: &Path, out: &Path) -> Output {
     command.arg(source.trim_end_matches('.')).output().unwrap()
 }
 
+/// As little of a drive as a profile needs, of no maker.
+const DRIVE: &str = "[DeviceInfo]\nBaudRate_500=1\n[1005]\nDataType=7\nAccessType=rw\n[1016sub1]\nDataType=7\n\
+    AccessType=rw\n[1017]\nDataType=6\nAccessType=rw\n[6060]\nDataType=2\nAccessType=rw\n[6061]\nDataType=2\n\
+    PDOMapping=1\n[6040]\nDataType=6\nPDOMapping=1\n[6041]\nDataType=6\nPDOMapping=1\n[6064]\nDataType=4\n\
+    PDOMapping=1\n[606C]\nDataType=4\nPDOMapping=1\n[6077]\nDataType=3\nPDOMapping=1\n[60C1sub1]\nDataType=4\n\
+    PDOMapping=1\n[6502]\nDataType=7\nDefaultValue=0x40\n";
+
+/// A drive of another maker counts as its file says, and never as SCHUNK's does.
+#[test]
+fn the_scale_is_taken_from_the_drives_file() {
+    let (dcf, toml, out) = (scratch("other.eds"), scratch("other.toml"), scratch("other.rs"));
+    let arm = std::fs::read_to_string(here("lwa4p_bus.toml")).unwrap();
+    let other = arm.replace("sync_timeout_factor", "# ").replace("counts_per_degree", "# ");
+    std::fs::write(&toml, &other).unwrap();
+    std::fs::write(&dcf, DRIVE).unwrap();
+    let output = profile(&dcf, &toml, &out);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        output.status.code() == Some(2) && told.contains("other.toml: node 3: counts_per_degree"),
+        "{told}"
+    );
+
+    let encoder = "[608Fsub1]\nDataType=7\nDefaultValue=2000\n[608Fsub2]\nDataType=7\nDefaultValue=1\n";
+    std::fs::write(&dcf, format!("{DRIVE}{encoder}")).unwrap();
+    let output = profile(&dcf, &toml, &out);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && told.contains("2000 counts a turn"), "{told}");
+    assert!(told.contains("[mode.velocity] is left out"), "{told}");
+    let made = std::fs::read_to_string(&out).unwrap();
+    assert!(made.contains("counts_per_radian: 0.005555555555555556 * MILLIDEGREES_PER_RADIAN"), "{made}");
+
+    std::fs::write(&toml, arm.replace("sync_timeout_factor", "# ")).unwrap();
+    let output = profile(&dcf, &toml, &out);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        output.status.success() && told.contains("360000 counts a turn, the drive's file says 2000"),
+        "{told}"
+    );
+}
+
 #[test]
 fn what_is_wrong_is_told_with_its_line() {
     let out = scratch("never.rs");
@@ -36,7 +76,22 @@ fn what_is_wrong_is_told_with_its_line() {
 
     std::fs::write(&dcf, "[DeviceInfo]\nBaudRate_500=1\n").unwrap();
     let told = String::from_utf8(profile(&dcf, &arm, &out).stderr).unwrap();
-    assert!(told.contains("0x1016:1"), "{told}");
+    assert!(told.contains("broken.dcf: no writable 0x1016:1"), "{told}");
+    // What is wrong in the arm's file is not the drive's.
+    let toml = scratch("wrong.toml");
+    let committed = std::fs::read_to_string(&arm).unwrap().replace("sync_timeout_factor", "# ");
+    std::fs::write(&toml, committed.replace("node = 4", "node = 3")).unwrap();
+    std::fs::write(&dcf, DRIVE).unwrap();
+    let told = String::from_utf8(profile(&dcf, &toml, &out).stderr).unwrap();
+    assert!(told.contains("wrong.toml: two joints"), "{told}");
+    // Where they contradict each other, both are named.
+    std::fs::write(&toml, committed.replace("500_000", "800_000")).unwrap();
+    let told = String::from_utf8(profile(&dcf, &toml, &out).stderr).unwrap();
+    assert!(told.contains("broken.dcf and wrong.toml: the DCF does not offer 800000"), "{told}");
+    let wide: Vec<u8> = "\u{feff}name".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    std::fs::write(&toml, wide).unwrap();
+    let told = String::from_utf8(profile(&dcf, &toml, &out).stderr).unwrap();
+    assert!(told.contains("wrong.toml: is UTF-16"), "{told}");
 
     // Of several files the one that is wrong is named.
     let overlay = scratch("overlay.dcf");

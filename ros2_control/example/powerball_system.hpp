@@ -21,7 +21,7 @@ public:
 
   ~PowerballSystem() override { powerball_close(arm_); }
 
-  // The hardware parameter `bus` names the bus; `mounting` and `values` are those of powerball_guard_model. Six joints are expected, from the base on.
+  // The hardware parameter `bus` names the bus; `mounting` and `values` are those of powerball_guard_model, `accept_unverified` (true) is powerball_accept_unverified. Six joints are expected, from the base on.
   CallbackReturn on_init(const hardware_interface::HardwareInfo & info) override
   {
     if (SystemInterface::on_init(info) != CallbackReturn::SUCCESS) {
@@ -46,6 +46,10 @@ public:
       // How the base stands and what the arm weighs: no set-point leaves that takes more torque than a joint has.
       if (!told(powerball_guard_model(arm_, parameter("mounting"), parameter("values")))) {
         return CallbackReturn::FAILURE;
+      }
+      const char * accept = parameter("accept_unverified");
+      if (accept != nullptr && std::string(accept) == "true") {
+        powerball_accept_unverified(arm_);
       }
     }
     return told(powerball_configure(arm_)) ? CallbackReturn::SUCCESS : CallbackReturn::FAILURE;

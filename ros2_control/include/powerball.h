@@ -49,6 +49,10 @@ int powerball_guard_torque(powerball_arm *arm, powerball_inverse_dynamics torque
  * values file; null takes the masses of the CAD model and the published friction. It allocates in powerball_write. */
 int powerball_guard_model(powerball_arm *arm, const char *mounting, const char *values);
 
+/* Before powerball_configure: drives whose device type (0x1000) or identity (0x1018) is another than the profile of the arm says
+ * are used all the same. Without it powerball_configure refuses them. */
+int powerball_accept_unverified(powerball_arm *arm);
+
 /* Boots, identifies, configures and verifies all drives: some seconds. Nothing moves. */
 int powerball_configure(powerball_arm *arm);
 

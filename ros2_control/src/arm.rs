@@ -81,6 +81,11 @@ impl Arm {
         Ok(())
     }
 
+    /// From the next [`Arm::configure`] on, drives whose device type or identity is another than the profile says are used.
+    pub fn accept_other_drives(&mut self) {
+        self.master.driver_mut().accept_other_nodes();
+    }
+
     /// Boots, identifies, configures and verifies all drives; nothing moves. SYNC runs from here on: [`Arm::read`] must be
     /// called each cycle.
     ///

@@ -143,6 +143,21 @@ pub unsafe extern "C" fn powerball_guard_torque(
     }
 }
 
+/// See [`Arm::accept_other_drives`].
+///
+/// # Safety
+/// `handle` is null or an open arm's that nobody else uses now.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn powerball_accept_unverified(handle: *mut Handle) -> c_int {
+    // SAFETY: the caller's promise.
+    unsafe {
+        with(handle, |arm| {
+            arm.accept_other_drives();
+            Ok(OK)
+        })
+    }
+}
+
 /// See [`Arm::guard_model`].
 ///
 /// # Safety
@@ -279,6 +294,7 @@ mod tests {
         unsafe {
             assert!(powerball_open(std::ptr::null(), std::ptr::null_mut(), 0).is_null());
             assert_eq!(powerball_configure(null), ERROR);
+            assert_eq!(powerball_accept_unverified(null), ERROR);
             assert_eq!(powerball_guard_torque(null, None, std::ptr::null_mut()), ERROR);
             assert_eq!(powerball_guard_model(null, std::ptr::null(), std::ptr::null()), ERROR);
             assert_eq!(

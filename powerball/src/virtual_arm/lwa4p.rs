@@ -156,8 +156,8 @@ pub fn modules() -> Result<Vec<Module>, Diagnostics> {
         .collect())
 }
 
-/// A number for the vendor object: SCHUNK's own is in none of its public files.
-const VENDOR: u32 = 0x0000_0200;
+/// The vendor that `powerball/lwa4p_bus.toml` names, which says where it is from.
+const VENDOR: u32 = 0x0000_015E;
 
 /// The virtual LWA 4P for a bus: [`plant`] with its six drives at `start`, rad.
 ///

@@ -15,7 +15,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What the drives measure, and how well.
 #[derive(Clone, Debug)]
@@ -236,6 +236,11 @@ pub struct Undeclared {
 impl Undeclared {
     /// The file's name in the folder of a session.
     pub const FILE: &'static str = "virtual_arm.json";
+
+    /// The file of the session that an arm file is of, where there is one: in the same folder.
+    pub fn next_to(arm: &Path) -> Option<PathBuf> {
+        Some(arm.with_file_name(Self::FILE)).filter(|file| file.is_file())
+    }
 
     /// Reads it.
     ///

@@ -206,7 +206,9 @@ impl Fault {
             }
             // SDO and boot are repeated, first data is waited for.
             // In current mode the caller carries the state of a joint on over five cycles.
-            Fault::DropFive | Fault::ShortFive if phase == Running && control == ControlMode::Current => GoesOn,
+            Fault::DropFive | Fault::ShortFive if phase == Running && control == ControlMode::Current => {
+                GoesOn
+            }
             Fault::Reboot | Fault::Silent if phase == Running && control == ControlMode::Current => {
                 Stops { cycles: 7 }
             }

@@ -8,6 +8,7 @@
 mod faults;
 mod motion;
 mod pairs;
+mod refusals;
 mod rules;
 mod walks;
 mod world;

@@ -257,7 +257,7 @@ def python_is_slave(powerball, place):
         for index, value in values:
             node.sdo[index].raw = value
         node.sdo[0x1008].raw = "a name of more than four letters"
-        for sub, value in enumerate([4, 0x200, 2, 3, 0xCAFE]):
+        for sub, value in enumerate([4, 0x15E, 2, 3, 0xCAFE]):
             node.sdo[0x1018][sub].raw = value
         answer_the_master(powerball, place, node)
     finally:

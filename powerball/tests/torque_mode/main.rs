@@ -52,7 +52,8 @@ fn model(name: &str, friction: f64) -> ModelArm {
                 "gamma5": friction * g[4]})
         })
         .collect();
-    let text = json!({"arm": arm.name, "set": "minimal", "parameters": parameters, "friction": laws}).to_string();
+    let text =
+        json!({"arm": arm.name, "set": "minimal", "parameters": parameters, "friction": laws}).to_string();
     let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("torque_mode_{name}.json"));
     std::fs::write(&file, text).unwrap();
     model_arm::read(&arm, &file, true).unwrap()
@@ -159,7 +160,11 @@ impl Stop {
 
     fn words(self) -> String {
         let off = format!("{:.0} mrad", 1e3 * self.off);
-        if self.after.is_finite() { format!("{:.0} ms, {off}", 1e3 * self.after) } else { format!("no stop, {off}") }
+        if self.after.is_finite() {
+            format!("{:.0} ms, {off}", 1e3 * self.after)
+        } else {
+            format!("no stop, {off}")
+        }
     }
 }
 
@@ -297,7 +302,11 @@ fn the_page_holds(table: &str) {
     if std::env::var_os("POWERBALL_BLESS").is_some() {
         std::fs::write(&page, format!("{head}{BEGIN}{table}{END}{tail}")).unwrap();
     } else {
-        assert!(shown == table, "{} shows another table; run this test with POWERBALL_BLESS=1", page.display());
+        assert!(
+            shown == table,
+            "{} shows another table; run this test with POWERBALL_BLESS=1",
+            page.display()
+        );
     }
 }
 
@@ -345,6 +354,7 @@ fn false_stops(name: &str, seeds: u64) -> Vec<String> {
 #[test]
 #[ignore = "at length"]
 fn no_effect_stops_the_arm_at_length() {
-    let stops: Vec<String> = ["torque", "impedance"].into_iter().flat_map(|name| false_stops(name, 2)).collect();
+    let stops: Vec<String> =
+        ["torque", "impedance"].into_iter().flat_map(|name| false_stops(name, 2)).collect();
     assert!(stops.is_empty(), "{} stops:\n{}", stops.len(), stops.join("\n"));
 }

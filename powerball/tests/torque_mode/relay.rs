@@ -160,7 +160,10 @@ impl Relay {
         let place = usize::from(number) - 1;
         self.frames += u32::from(self.is_on());
         // A fixed sequence of no pattern that the two frames of a cycle share (Knuth's multiplicative hash).
-        if self.fault == Fault::Lossy && self.is_on() && self.frames.wrapping_mul(2_654_435_769) < u32::MAX / 10 {
+        if self.fault == Fault::Lossy
+            && self.is_on()
+            && self.frames.wrapping_mul(2_654_435_769) < u32::MAX / 10
+        {
             return None;
         }
         let b = frame.bytes().to_vec();
@@ -249,7 +252,9 @@ impl Peer for Relay {
         loop {
             let frame = self.arm.transmit()?;
             let passed = match Cob::of(&frame) {
-                Some(Cob::Tpdo(number @ (1 | 2), node)) if node == self.node() => self.to_master(number, &frame),
+                Some(Cob::Tpdo(number @ (1 | 2), node)) if node == self.node() => {
+                    self.to_master(number, &frame)
+                }
                 _ => Some(frame),
             };
             if passed.is_some() {

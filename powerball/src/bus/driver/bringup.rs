@@ -5,7 +5,7 @@ use super::cause::Hindrance;
 use super::script::{Progress, Write, configuration, questions};
 use super::{Cause, Driver, Phase, Transmit};
 use crate::bus::canopen::client::{SdoError, Value};
-use crate::bus::canopen::objects::{PRODUCT_CODE, REVISION, SERIAL_NUMBER, VENDOR_ID};
+use crate::bus::canopen::objects::{DEVICE_TYPE, PRODUCT_CODE, REVISION, SERIAL_NUMBER, VENDOR_ID};
 use crate::bus::canopen::sdo::AbortCode;
 use crate::bus::canopen::{Frame, Micros, Object, nmt};
 use crate::bus::cia402::{State, objects, schunk};
@@ -15,6 +15,9 @@ use crate::bus::cia402::{State, objects, schunk};
 pub(super) struct BringUp {
     resets: u8,
 }
+
+/// The device profile of drives, CiA 402: the low 16 bits of 0x1000.
+const DRIVES: u32 = 402;
 
 /// A node that does not boot is reset once more: supplies come late.
 const RESETS: u8 = 2;
@@ -191,24 +194,38 @@ impl<const N: usize> Driver<N> {
         let (Some(profile), Some(joint)) = (self.profile.joints.get(j), self.joints.get_mut(j)) else {
             return Ok(());
         };
-        let identity = [VENDOR_ID, PRODUCT_CODE, REVISION, SERIAL_NUMBER];
-        if let Some(k) = identity.iter().position(|asked| *asked == object) {
-            let id = profile.identity;
-            let expected = [id.vendor, id.product, id.revision, id.serial].get(k).copied().flatten();
-            // A drive need not have every part; what the profile knows, it must have.
-            let found = match (number, expected) {
-                (Ok(found), _) => Some(found),
-                (Err(SdoError::Aborted(_)), None) => None,
-                (Err(error), _) => return Err(failed(error)),
+        let id = profile.identity;
+        let [vendor, product, revision, serial] = &mut joint.identity;
+        let identity = match object {
+            DEVICE_TYPE => Some((&mut joint.device_type, Some(DRIVES))),
+            VENDOR_ID => Some((vendor, id.vendor)),
+            PRODUCT_CODE => Some((product, id.product)),
+            REVISION => Some((revision, id.revision)),
+            SERIAL_NUMBER => Some((serial, id.serial)),
+            _ => None,
+        };
+        if let Some((place, expected)) = identity {
+            *place = number.ok();
+            // The high bits of the device type say what kind of drive it is.
+            let same = |found: u32, expected| match object {
+                DEVICE_TYPE => found & 0xFFFF == expected,
+                _ => found == expected,
             };
-            if let Some(place) = joint.identity.get_mut(k) {
-                *place = found;
-            }
-            return match (expected, found) {
-                (Some(expected), Some(found)) if expected != found => {
-                    Err(Cause::WrongIdentity(node, object, expected, found))
+            // A drive need not have every part; what the profile knows, it must have.
+            let deviation = match (number, expected) {
+                (Ok(found), Some(expected)) if !same(found, expected) => {
+                    Cause::WrongIdentity(node, object, expected, found)
                 }
-                _ => Ok(()),
+                (Ok(_), _) | (Err(SdoError::Aborted(_)), None) => return Ok(()),
+                (Err(error), _) => failed(error),
+            };
+            let bearable = matches!(deviation, Cause::WrongIdentity(..))
+                || matches!(deviation, Cause::Sdo(_, _, SdoError::Aborted(_)));
+            return if self.other_nodes && bearable {
+                self.note(deviation);
+                Ok(())
+            } else {
+                Err(deviation)
             };
         }
         // A drive need not tell it; the profile's limit counts then.

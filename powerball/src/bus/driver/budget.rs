@@ -201,11 +201,11 @@ mod tests {
     #[test]
     fn the_arms_own_budget() {
         use crate::bus::driver::lwa4p::LWA4P;
-        let budget = Budget::of(&LWA4P, &LWA4P.interpolated_position);
+        let budget = Budget::of(&LWA4P, &LWA4P.interpolated_position.unwrap());
         assert!((budget.worst_load() - 0.887).abs() < 5e-4, "{budget}");
         assert_eq!((budget.setpoint_slot(), budget.compute_time()), (3520, 530));
         assert_eq!((budget.heartbeats.worst, budget.verdict()), (6500, Verdict::Fits));
-        assert!((Budget::of(&LWA4P, &LWA4P.velocity).worst_load() - 0.839).abs() < 5e-4);
+        assert!((Budget::of(&LWA4P, &LWA4P.velocity.unwrap()).worst_load() - 0.839).abs() < 5e-4);
     }
 
     /// Seven heartbeats at 10 Hz need 0.9 % of 500 kbit/s.

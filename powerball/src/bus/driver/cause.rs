@@ -6,6 +6,7 @@ use super::receive::Foreign;
 use super::torque::ControlMode;
 use crate::bus::canopen::client::SdoError;
 use crate::bus::canopen::emcy::{Emcy, vendor_text};
+use crate::bus::canopen::objects::{DEVICE_TYPE, PRODUCT_CODE, REVISION, VENDOR_ID};
 use crate::bus::canopen::pdo::MappingError;
 use crate::bus::canopen::{NodeId, Object};
 use crate::bus::cia402::{Mode, State, Statusword};
@@ -283,7 +284,10 @@ impl fmt::Display for Cause {
                 write!(f, "joint {joint} moves at {velocity:.3} rad/s, {limit:.3} may be")
             }
             Cause::ImplausibleVelocity(_, joint, velocity) => {
-                write!(f, "joint {joint} reports {velocity:.3} rad/s, which no joint can have: check the encoder")
+                write!(
+                    f,
+                    "joint {joint} reports {velocity:.3} rad/s, which no joint can have: check the encoder"
+                )
             }
             Cause::PositionAgainstVelocity(_, joint, slip) => {
                 write!(
@@ -313,7 +317,18 @@ impl fmt::Display for Cause {
             Cause::TransmitQueueFull => f.write_str("transmit queue full"),
             Cause::NoBoot(_) => f.write_str("no boot-up message: is it powered, and the bit rate right?"),
             Cause::WrongIdentity(_, object, expected, found) => {
-                write!(f, "{object} reads 0x{found:08X} where 0x{expected:08X} is expected")
+                let what = match *object {
+                    DEVICE_TYPE => {
+                        let profile = found & 0xFFFF;
+                        write!(f, "device type 0x{found:08X} ({object}), which is ")?;
+                        return write!(f, "CiA {profile} where CiA {expected} is expected");
+                    }
+                    VENDOR_ID => "vendor",
+                    PRODUCT_CODE => "product",
+                    REVISION => "revision",
+                    _ => "serial number",
+                };
+                write!(f, "{what} 0x{found:08X} ({object}) where 0x{expected:08X} is expected")
             }
             Cause::ModeNotOffered(_, mode, offered) => {
                 write!(f, "{mode} is not among the drive's modes (0x6502 reads 0x{offered:X})")

@@ -229,7 +229,8 @@ impl<const N: usize> Driver<N> {
             self.starved_run = self.starved_run.saturating_add(1);
             if self.starved_run >= reactions.starved_cycles {
                 // Who waits for data that does not come has no set-points: the silent node is why.
-                let silent = self.joints.iter().position(|joint| joint.missing_run >= reactions.starved_cycles);
+                let silent =
+                    self.joints.iter().position(|joint| joint.missing_run >= reactions.starved_cycles);
                 let cause = silent.map_or(Cause::Starved, |j| Cause::DataMissing(self.node(j)));
                 self.trip(cause, tx);
             }

@@ -49,6 +49,8 @@ pub struct Joint {
     pub nmt: Option<nmt::State>,
     /// The last emergency, until the drive says that it is gone.
     pub emergency: Option<Emcy>,
+    /// 0x1000: the device type; its low 16 bits are the number of the device profile.
+    pub device_type: Option<u32>,
     /// 0x1018: vendor, product, revision, serial number, as far as the drive tells them.
     pub identity: [Option<u32>; 4],
     /// When its last process data came, on the clock that the driver is told, µs.
@@ -110,6 +112,7 @@ impl Joint {
             mode: None,
             nmt: None,
             emergency: None,
+            device_type: None,
             identity: [None; 4],
             answered_at: 0,
             counters: JointCounters::default(),

@@ -22,7 +22,7 @@ pub const LWA4P: Profile<6> = Profile {
     master_watch_ms: 100,
     sync_timeout_factor: Some(6),
     node_heartbeat_ms: 100,
-    profile_position: ModeProfile {
+    profile_position: Some(ModeProfile {
         mode: Mode::from_code(1),
         setpoint: Object::new(0x607A, 0),
         rpdo: Mapping::of(&[
@@ -31,8 +31,8 @@ pub const LWA4P: Profile<6> = Profile {
         ]),
         running_bits: profile::PROFILE_POSITION_BITS,
         verified_on_hardware: false,
-    },
-    velocity: ModeProfile {
+    }),
+    velocity: Some(ModeProfile {
         mode: Mode::from_code(2),
         setpoint: Object::new(0x6042, 0),
         rpdo: Mapping::of(&[
@@ -41,8 +41,8 @@ pub const LWA4P: Profile<6> = Profile {
         ]),
         running_bits: profile::VELOCITY_BITS,
         verified_on_hardware: false,
-    },
-    interpolated_position: ModeProfile {
+    }),
+    interpolated_position: Some(ModeProfile {
         mode: Mode::from_code(7),
         setpoint: Object::new(0x60C1, 1),
         rpdo: Mapping::of(&[
@@ -51,7 +51,7 @@ pub const LWA4P: Profile<6> = Profile {
         ]),
         running_bits: profile::INTERPOLATED_POSITION_BITS,
         verified_on_hardware: false,
-    },
+    }),
     current: Some(ModeProfile {
         mode: Mode::from_code(4),
         setpoint: Object::new(0x6071, 0),
@@ -84,7 +84,7 @@ pub const LWA4P: Profile<6> = Profile {
     joints: [
         JointProfile {
             node: NodeId::clamped(3),
-            identity: Identity { vendor: None, product: None, revision: None, serial: None },
+            identity: Identity { vendor: Some(0x0000015E), product: None, revision: None, serial: None },
             units: JointUnits {
                 counts_per_radian: MILLIDEGREES_PER_RADIAN,
                 rated_current: 0.0,
@@ -101,7 +101,7 @@ pub const LWA4P: Profile<6> = Profile {
         },
         JointProfile {
             node: NodeId::clamped(4),
-            identity: Identity { vendor: None, product: None, revision: None, serial: None },
+            identity: Identity { vendor: Some(0x0000015E), product: None, revision: None, serial: None },
             units: JointUnits {
                 counts_per_radian: MILLIDEGREES_PER_RADIAN,
                 rated_current: 0.0,
@@ -118,7 +118,7 @@ pub const LWA4P: Profile<6> = Profile {
         },
         JointProfile {
             node: NodeId::clamped(5),
-            identity: Identity { vendor: None, product: None, revision: None, serial: None },
+            identity: Identity { vendor: Some(0x0000015E), product: None, revision: None, serial: None },
             units: JointUnits {
                 counts_per_radian: MILLIDEGREES_PER_RADIAN,
                 rated_current: 0.0,
@@ -135,7 +135,7 @@ pub const LWA4P: Profile<6> = Profile {
         },
         JointProfile {
             node: NodeId::clamped(6),
-            identity: Identity { vendor: None, product: None, revision: None, serial: None },
+            identity: Identity { vendor: Some(0x0000015E), product: None, revision: None, serial: None },
             units: JointUnits {
                 counts_per_radian: MILLIDEGREES_PER_RADIAN,
                 rated_current: 0.0,
@@ -152,7 +152,7 @@ pub const LWA4P: Profile<6> = Profile {
         },
         JointProfile {
             node: NodeId::clamped(7),
-            identity: Identity { vendor: None, product: None, revision: None, serial: None },
+            identity: Identity { vendor: Some(0x0000015E), product: None, revision: None, serial: None },
             units: JointUnits {
                 counts_per_radian: MILLIDEGREES_PER_RADIAN,
                 rated_current: 0.0,
@@ -169,7 +169,7 @@ pub const LWA4P: Profile<6> = Profile {
         },
         JointProfile {
             node: NodeId::clamped(8),
-            identity: Identity { vendor: None, product: None, revision: None, serial: None },
+            identity: Identity { vendor: Some(0x0000015E), product: None, revision: None, serial: None },
             units: JointUnits {
                 counts_per_radian: MILLIDEGREES_PER_RADIAN,
                 rated_current: 0.0,

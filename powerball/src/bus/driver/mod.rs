@@ -230,6 +230,8 @@ pub struct Driver<const N: usize> {
     synced_at: Micros,
     heartbeat: HeartbeatProducer,
     bring_up: BringUp,
+    /// Nodes that are others than the profile says are accepted.
+    other_nodes: bool,
     stop: StopStage,
     reset: ResetStage,
     diagnosis: Option<(usize, usize)>,
@@ -263,7 +265,7 @@ impl<const N: usize> Driver<N> {
         let lost = Micros::from(profile.node_heartbeat_ms) * 3000;
         Ok(Driver {
             control: ControlMode::InterpolatedPosition,
-            budget: Budget::of(&profile, &profile.interpolated_position),
+            budget: Budget::of(&profile, &profile::ModeProfile::NONE),
             phase: Phase::Idle,
             since: 0,
             now: 0,
@@ -278,6 +280,7 @@ impl<const N: usize> Driver<N> {
             synced_at: 0,
             heartbeat: HeartbeatProducer::new(profile.master_heartbeat),
             bring_up: BringUp::default(),
+            other_nodes: false,
             stop: StopStage::Quick,
             reset: ResetStage::Low,
             diagnosis: None,
@@ -301,6 +304,12 @@ impl<const N: usize> Driver<N> {
     /// From now on no set-point leaves for which the model of `guard` asks more torque of a joint than its profile allows.
     pub fn guard_torque(&mut self, guard: TorqueGuard<N>) {
         self.torque_guard = Some(guard);
+    }
+
+    /// From the next [`Driver::start`] on, nodes whose device type (0x1000) or identity (0x1018) is another than the
+    /// profile says are used all the same, each deviation with a [`Note`]. Without the caller's word they are refused.
+    pub fn accept_other_nodes(&mut self) {
+        self.other_nodes = true;
     }
 
     /// Boots, identifies, configures and verifies all nodes for `control`; the driver is [`Phase::Ready`]
@@ -543,7 +552,7 @@ impl<const N: usize> Driver<N> {
     }
 
     fn mode_profile(&self) -> &profile::ModeProfile {
-        self.profile.mode(self.control).unwrap_or(&self.profile.interpolated_position)
+        self.profile.mode(self.control).unwrap_or(&profile::ModeProfile::NONE)
     }
 
     fn note(&mut self, cause: Cause) {

@@ -24,7 +24,18 @@ pub struct ModeProfile {
     pub verified_on_hardware: bool,
 }
 
-/// What 0x1018 must say, where it is known. What is `None` is read and told, not compared.
+impl ModeProfile {
+    /// What stands for the mode until one was chosen: nothing is received and nothing is sent.
+    pub(super) const NONE: ModeProfile = ModeProfile {
+        mode: Mode::None,
+        setpoint: Object::new(0, 0),
+        rpdo: Mapping::EMPTY,
+        running_bits: 0,
+        verified_on_hardware: false,
+    };
+}
+
+/// What 0x1018 must say, where it is known. What is `None` is read and reported, not compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Identity {
     /// Sub 1.
@@ -257,13 +268,13 @@ pub struct Profile<const N: usize> {
     pub sync_timeout_factor: Option<u8>,
     /// Period of the drives' heartbeats, 0x1017, ms.
     pub node_heartbeat_ms: u16,
-    /// Profile position.
-    pub profile_position: ModeProfile,
+    /// Profile position. Each of the modes is `None` where the drive has it not or nothing is known of it.
+    pub profile_position: Option<ModeProfile>,
     /// Velocity.
-    pub velocity: ModeProfile,
+    pub velocity: Option<ModeProfile>,
     /// Interpolated position.
-    pub interpolated_position: ModeProfile,
-    /// Current, where anything is known of it.
+    pub interpolated_position: Option<ModeProfile>,
+    /// Current.
     pub current: Option<ModeProfile>,
     /// What 0x604C must read for velocities to be scaled as [`VelocityScale`] says.
     pub velocity_scale: VelocityScale,
@@ -280,9 +291,9 @@ impl<const N: usize> Profile<N> {
     /// What is known of `mode`.
     pub const fn mode(&self, mode: ControlMode) -> Option<&ModeProfile> {
         match mode {
-            ControlMode::ProfilePosition => Some(&self.profile_position),
-            ControlMode::Velocity => Some(&self.velocity),
-            ControlMode::InterpolatedPosition => Some(&self.interpolated_position),
+            ControlMode::ProfilePosition => self.profile_position.as_ref(),
+            ControlMode::Velocity => self.velocity.as_ref(),
+            ControlMode::InterpolatedPosition => self.interpolated_position.as_ref(),
             ControlMode::Current => self.current.as_ref(),
         }
     }
@@ -291,11 +302,13 @@ impl<const N: usize> Profile<N> {
     /// [`Driver::set_with_torque`](super::Driver::set_with_torque): two bytes more a joint and cycle.
     #[must_use]
     pub const fn with_torque_offset(mut self) -> Self {
-        self.interpolated_position.rpdo = Mapping::of(&[
-            Entry::new(objects::CONTROLWORD, 16),
-            Entry::new(objects::TORQUE_OFFSET, 16),
-            Entry::new(self.interpolated_position.setpoint, 32),
-        ]);
+        if let Some(mode) = &mut self.interpolated_position {
+            mode.rpdo = Mapping::of(&[
+                Entry::new(objects::CONTROLWORD, 16),
+                Entry::new(objects::TORQUE_OFFSET, 16),
+                Entry::new(mode.setpoint, 32),
+            ]);
+        }
         self
     }
 
@@ -363,6 +376,9 @@ impl<const N: usize> Profile<N> {
             .all(sent)
         {
             return wrong("the transmit PDOs must hold statusword, position, velocity and mode display");
+        }
+        if ControlMode::ALL.into_iter().all(|mode| self.mode(mode).is_none()) {
+            return wrong("it has no mode");
         }
         for mode in ControlMode::ALL.into_iter().filter_map(|mode| self.mode(mode)) {
             if !(mode.rpdo.contains(objects::CONTROLWORD) && mode.rpdo.contains(mode.setpoint)) {

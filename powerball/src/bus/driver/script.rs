@@ -6,8 +6,8 @@ use super::profile::{ModeProfile, Profile};
 use super::torque::ControlMode;
 use crate::bus::canopen::client::Value;
 use crate::bus::canopen::objects::{
-    CONSUMER_HEARTBEAT, PRODUCER_HEARTBEAT, PRODUCT_CODE, REVISION, SERIAL_NUMBER, VENDOR_ID, rpdo_mapping,
-    rpdo_parameter, tpdo_mapping, tpdo_parameter,
+    CONSUMER_HEARTBEAT, DEVICE_TYPE, PRODUCER_HEARTBEAT, PRODUCT_CODE, REVISION, SERIAL_NUMBER, VENDOR_ID,
+    rpdo_mapping, rpdo_parameter, tpdo_mapping, tpdo_parameter,
 };
 use crate::bus::canopen::pdo::{EVERY_SYNC, INVALID, Mapping};
 use crate::bus::canopen::{Cob, Micros, NodeId, Object};
@@ -168,12 +168,12 @@ pub(super) fn configuration<const N: usize>(
     })
 }
 
-/// What is read from each drive before anything is written, in order: identity, what it offers, its scales.
+/// What is read from each drive before anything is written, in order: device type, identity, what it offers, its scales.
 pub(super) fn questions(mode: &ModeProfile, control: ControlMode) -> impl Iterator<Item = Object> {
-    let always =
-        [VENDOR_ID, PRODUCT_CODE, REVISION, SERIAL_NUMBER, objects::SUPPORTED_MODES, objects::RATED_CURRENT];
+    let identity = [DEVICE_TYPE, VENDOR_ID, PRODUCT_CODE, REVISION, SERIAL_NUMBER];
+    let always = identity.into_iter().chain([objects::SUPPORTED_MODES, objects::RATED_CURRENT]);
     // The greatest current is per mille of the rated one, and so asked for after it.
-    let always = always.into_iter().chain([objects::MAX_CURRENT]);
+    let always = always.chain([objects::MAX_CURRENT]);
     let velocity = [objects::VL_FACTOR_NUMERATOR, objects::VL_FACTOR_DENOMINATOR];
     let scaled = control == ControlMode::Velocity;
     // The target itself: a drive that has it not says so now, and not in the middle of its mapping.

@@ -162,7 +162,9 @@ impl<const N: usize> Driver<N> {
             return;
         }
         let limits = self.profile.reactions.torque_mode;
-        let (Some(profile), Some(joint)) = (self.profile.joints.get(j), self.joints.get_mut(j)) else { return };
+        let (Some(profile), Some(joint)) = (self.profile.joints.get(j), self.joints.get_mut(j)) else {
+            return;
+        };
         let velocity = joint.velocity;
         // A brake may stop a joint within a cycle. Nothing speeds it up like that.
         let step = limits.velocity_step * profile.velocity * cycles.clamp(1, 10) as f64;
@@ -182,7 +184,9 @@ impl<const N: usize> Driver<N> {
         }
         let (limits, at, period) =
             (self.profile.reactions.torque_mode, self.synced_at, self.profile.period_seconds());
-        let (Some(profile), Some(joint)) = (self.profile.joints.get(j), self.joints.get_mut(j)) else { return };
+        let (Some(profile), Some(joint)) = (self.profile.joints.get(j), self.joints.get_mut(j)) else {
+            return;
+        };
         let sample = Sample { at, position: joint.position, velocity: joint.velocity };
         let slip = joint.guarded.take(sample, period, profile, [limits.slip_margin, limits.slip_time]);
         if let Some(slip) = slip {
@@ -230,7 +234,9 @@ impl<const N: usize> Driver<N> {
             joint.guarded.inertia = Some(inertia);
         }
         Some(core::array::from_fn(|j| {
-            let (Some(joint), Some(of)) = (self.joints.get(j), profile.joints.get(j)) else { return Left::default() };
+            let (Some(joint), Some(of)) = (self.joints.get(j), profile.joints.get(j)) else {
+                return Left::default();
+            };
             // From the oldest sample's SYNC to the newest one's.
             let current = joint.guarded.acted[2..].iter().sum::<f64>() / WINDOW as f64;
             let acted = current * joint.units.torque_constant();
@@ -280,8 +286,12 @@ impl<const N: usize> Driver<N> {
         }
         let error = joint.demand.error(joint.current);
         let wrong = beyond(error, limits.current_error * profile.current);
-        run(&mut joint.guarded.current, wrong, limits.cycles)
-            .then_some(Cause::CurrentError(node, number, joint.current, joint.current - error))
+        run(&mut joint.guarded.current, wrong, limits.cycles).then_some(Cause::CurrentError(
+            node,
+            number,
+            joint.current,
+            joint.current - error,
+        ))
     }
 }
 

@@ -4,7 +4,7 @@
 //! for the state of each drive. Without a listener, and in a cycle without a change, this costs some comparisons.
 
 use crate::bus::cia402::State;
-use crate::bus::driver::{Driver, Note, Phase};
+use crate::bus::driver::{Cause, Driver, Note, Phase};
 use crate::controller::JointNumber;
 
 /// What the events so far have said.
@@ -53,7 +53,14 @@ impl<const N: usize> Observed<N> {
         if last.as_ref().is_some_and(|note| !known(note)) {
             let new = driver.notes().position(known).map_or(0, |at| at + 1);
             for note in driver.notes().skip(new) {
-                tracing::warn!(bus_time = note.at as f64 * 1e-6, "noted: {}", note.cause);
+                let bus_time = note.at as f64 * 1e-6;
+                match &note.cause {
+                    // Such a thing stops the start, or the caller accepted it.
+                    what @ (Cause::WrongIdentity(..) | Cause::Sdo(..)) if driver.cause() != Some(what) => {
+                        tracing::warn!(bus_time, "{what}: accepted");
+                    }
+                    cause => tracing::warn!(bus_time, "noted: {cause}"),
+                }
             }
             self.note = last;
         }

@@ -233,9 +233,13 @@ impl<B: Bus, const N: usize> Master<B, N> {
                 let cause = *cause;
                 let others = self.driver.notes().filter(|note| note.cause != cause);
                 let reported = self.driver.details().to_string();
+                let way_out = matches!(cause, Cause::WrongIdentity(..)).then(|| {
+                    "accept that explicitly (--accept-unverified), or correct the profile".to_string()
+                });
                 let reported: Vec<String> = (!reported.is_empty())
                     .then_some(reported)
                     .into_iter()
+                    .chain(way_out)
                     .chain(others.map(|note| format!("also {}", note.cause)))
                     .collect();
                 Err(ArmError::Stopped(cause, reported.join("; ")))

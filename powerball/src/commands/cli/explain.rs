@@ -3,7 +3,7 @@
 //! Also here: what `explain` prints.
 
 use super::Failure;
-use super::bus::{Where, virtual_bus};
+use super::bus::{Consent, Where, virtual_bus};
 use super::inputs::{Inputs, recorded};
 use super::output::{self, Accept, Progress, Verbosity, notes};
 use crate::bus::driver::lwa4p::LWA4P;
@@ -75,6 +75,8 @@ pub(crate) struct Explain {
     /// without, the file virtual_arm.json beside the arm file.
     #[arg(long, value_name = "FILE", requires = "experiment")]
     plant: Option<PathBuf>,
+    #[command(flatten)]
+    consent: Consent,
 }
 
 impl Explain {
@@ -158,9 +160,7 @@ impl Explain {
             }
             return Ok((self.place().open()?, None));
         }
-        let beside = self.inputs.arm.with_file_name(Undeclared::FILE);
-        let file = self.plant.clone().or_else(|| beside.is_file().then_some(beside));
-        let Some(file) = file else {
+        let Some(file) = self.plant.clone().or_else(|| Undeclared::next_to(&self.inputs.arm)) else {
             let note = "the experiment was recorded on the built-in virtual arm, which has no undeclared \
                 effect: it says \
                         nothing of another arm; name that one's bus by --bus, or the virtual arm's file by \
@@ -205,7 +205,7 @@ impl Explain {
             _ => Envelope::of(arm, &Mounting::Filed, None, None)
                 .map_err(|e| Failure::Unusable(format!("--experiment: {e}")))?,
         };
-        let master = self.place().driver(bus)?;
+        let master = self.place().driver(bus, self.consent)?;
         let mut log = std::fs::File::create(file)
             .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", file.display())))?;
         record(master, motion, envelope, output::live(), &mut log).map(|_| ()).map_err(|e| match e {

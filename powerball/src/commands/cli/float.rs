@@ -91,7 +91,7 @@ impl FloatCommand {
         let position = positions.last().map(|q| q.as_slice().to_vec()).unwrap_or_default();
         let result = json!({
             "seconds": positions.len() as f64 * period, "position": position, "drift": drift,
-            "drift_time": rest.len() as f64 * period, "hand": hand,
+            "drift_time": rest.len() as f64 * period, "hand": hand, "plant": self.on.plant(),
         });
         match self.on.place.json {
             true => output::print(&result.to_string()),
@@ -155,7 +155,9 @@ impl FloatCommand {
         .map_err(refused)?;
         if arm.carried_on() > 0 {
             let cycles = arm.carried_on();
-            tracing::warn!("data of a joint was missing in {cycles} cycles: its state was carried on with its last velocity");
+            tracing::warn!(
+                "data of a joint was missing in {cycles} cycles: its state was carried on with its last velocity"
+            );
         }
         arm.finish().map_err(refused)?;
         log.map_or(Ok(()), output::close)?;

@@ -277,8 +277,8 @@ impl FollowCommand {
         tracks: &[(&str, Track<6>)],
         largest_pole: Option<f64>,
     ) -> Result<(), Failure> {
-        let result =
-            Followed { bandwidth: self.bandwidth(), largest_pole, ..Followed::of(arm, law, path, tracks) };
+        let (bandwidth, plant) = (self.bandwidth(), self.on.plant());
+        let result = Followed { bandwidth, largest_pole, plant, ..Followed::of(arm, law, path, tracks) };
         let files = followed::files(&result, path, tracks).map_err(Failure::Refused)?;
         files.write(&self.out).map_err(Failure::Unusable)?;
         if self.on.place.json {

@@ -1,7 +1,7 @@
 //! `powerball friction`: the friction experiment on an arm, and the laws that fit.
 
 use super::Failure;
-use super::bus::{Where, virtual_bus};
+use super::bus::{Consent, Where, virtual_bus};
 use super::envelope::Surroundings;
 use super::output::{self, Progress};
 use crate::bus::driver::lwa4p::LWA4P;
@@ -43,6 +43,8 @@ pub(crate) struct Friction {
     surroundings: Surroundings,
     #[command(flatten)]
     place: Where,
+    #[command(flatten)]
+    consent: Consent,
 }
 
 impl Friction {
@@ -167,7 +169,7 @@ impl Friction {
                 _ => self.place.open()?,
             };
             let refused = |e: RecordError| Failure::Refused(e.to_string());
-            let mut recorder = Recorder::enable(self.place.driver(bus)?, envelope)
+            let mut recorder = Recorder::enable(self.place.driver(bus, self.consent)?, envelope)
                 .map_err(refused)?
                 .with_progress(output::live());
             let joints = open.iter().map(|experiment| experiment.plan.joint);

@@ -1,7 +1,7 @@
 //! What `follow` and `float` take: an arm with a torque model, and the bus that it is on.
 
 use super::Failure;
-use super::bus::{Where, virtual_bus};
+use super::bus::{Consent, Where, virtual_bus};
 use super::envelope::Surroundings;
 use super::virtual_arm::{built, setup};
 use crate::bus::driver::Profile;
@@ -26,12 +26,12 @@ pub(crate) struct ModelOnBus {
     pub(crate) surroundings: Surroundings,
     #[command(flatten)]
     pub(crate) place: Where,
-    /// The virtual arm of --bus virtual with what no model is told of it: virtual_arm.json, as `powerball demo` writes it.
+    /// The virtual arm of --bus virtual with what no model is told of it: virtual_arm.json, as `powerball demo` writes it;
+    /// without, the file of that name next to the arm file, else the built-in arm.
     #[arg(long, value_name = "FILE")]
     plant: Option<PathBuf>,
-    /// You accept the drives' current mode, which this project has never seen on an arm. Not asked on --bus virtual.
-    #[arg(long)]
-    accept_unverified: bool,
+    #[command(flatten)]
+    consent: Consent,
 }
 
 impl ModelOnBus {
@@ -53,7 +53,7 @@ impl ModelOnBus {
 
     /// Whether the current mode may be tried.
     pub(crate) fn accepts(&self) -> bool {
-        self.accept_unverified || self.place.bus == BusUrl::Virtual
+        self.consent.accept_unverified || self.place.bus == BusUrl::Virtual
     }
 
     /// A driver of the arm; where the bus is virtual the arm stands at `start`, with a hand on it if there is one.
@@ -67,11 +67,30 @@ impl ModelOnBus {
             BusUrl::Virtual => virtual_bus(self.virtual_arm(start, hand)?)?,
             _ => self.place.open()?,
         };
-        self.place.driver_of(profile, bus)
+        self.place.driver_of(profile, bus, self.consent)
+    }
+
+    /// The plant of --bus virtual: the file that is told, else the one next to the arm file, as for `explain --experiment`.
+    fn plant_file(&self) -> Option<PathBuf> {
+        self.plant.clone().or_else(|| self.surroundings.arm.as_deref().and_then(Undeclared::next_to))
+    }
+
+    /// What the plant of --bus virtual is called; nothing on other buses.
+    pub(crate) fn plant(&self) -> Option<String> {
+        let file = || self.plant_file().map_or("built-in".to_string(), |file| file.display().to_string());
+        (self.place.bus == BusUrl::Virtual).then(file)
     }
 
     fn virtual_arm(&self, start: [f64; 6], hand: Option<Hand>) -> Result<VirtualArm, Failure> {
-        let setup = match &self.plant {
+        let file = self.plant_file();
+        match &file {
+            Some(file) => eprintln!("powerball: the virtual arm is that of {}", file.display()),
+            None => eprintln!(
+                "powerball: the virtual arm is the built-in one, which has no undeclared effect: it says nothing of a model \
+                    of another arm; --plant names that one's file"
+            ),
+        }
+        let setup = match &file {
             Some(file) => Undeclared::read(file)
                 .map_err(Failure::Unusable)?
                 .setup(start, 1)

@@ -1,7 +1,7 @@
 //! `powerball record`: a trajectory in interpolated position mode, and its log.
 
 use super::Failure;
-use super::bus::{Where, master};
+use super::bus::{Consent, Where, master};
 use super::envelope::Surroundings;
 use super::log::joint_names;
 use super::output;
@@ -48,6 +48,8 @@ pub(crate) struct RecordCommand {
     surroundings: Surroundings,
     #[command(flatten)]
     place: Where,
+    #[command(flatten)]
+    consent: Consent,
 }
 
 impl RecordCommand {
@@ -65,7 +67,7 @@ impl RecordCommand {
         }
         let arm = self.surroundings.arm()?;
         let envelope = self.surroundings.envelope(&arm, &self.mounting)?;
-        let master = master(&self.place)?;
+        let master = master(&self.place, self.consent)?;
         let unwritable =
             |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", self.out.display()));
         let (log, recovered) = LogFile::create_for(&self.out, &joint_names(&arm)).map_err(unwritable)?;

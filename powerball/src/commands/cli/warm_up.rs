@@ -1,7 +1,7 @@
 //! `powerball warm-up`: swings the arm until its friction has settled.
 
 use super::Failure;
-use super::bus::{Where, virtual_bus};
+use super::bus::{Consent, Where, virtual_bus};
 use super::envelope::Surroundings;
 use super::output::{self, Progress};
 use crate::bus::driver::lwa4p::LWA4P;
@@ -47,6 +47,8 @@ pub(crate) struct WarmUp {
     surroundings: Surroundings,
     #[command(flatten)]
     place: Where,
+    #[command(flatten)]
+    consent: Consent,
 }
 
 impl WarmUp {
@@ -98,7 +100,8 @@ impl WarmUp {
             }
             _ => self.place.open()?,
         };
-        let mut recorder = Recorder::enable(self.place.driver(bus)?, envelope).map_err(refused)?;
+        let mut recorder =
+            Recorder::enable(self.place.driver(bus, self.consent)?, envelope).map_err(refused)?;
         let mut log = Behind::new(log);
         let done = warm_up(&mut recorder, &settings, seen, start, &mut log, |seconds, change| {
             let change = change

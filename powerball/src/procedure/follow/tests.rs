@@ -126,7 +126,8 @@ fn torque_offsets_take_the_work_off_the_drives_own_feedback() {
             accept_unverified: false,
         };
         let profile = LWA4P.with_torque_offset();
-        let (master, track, _) = run.follow(master(profile), Envelope::new(|_| None), None, |_, _| ()).unwrap();
+        let (master, track, _) =
+            run.follow(master(profile), Envelope::new(|_| None), None, |_, _| ()).unwrap();
         rests(&master);
         track
     };

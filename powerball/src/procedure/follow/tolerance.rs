@@ -53,7 +53,8 @@ impl<const N: usize> Tolerance<N> {
     /// inverted: the driver's other limits hold.
     pub(super) fn at(&self, sample: usize, stiffness: &SMatrix<f64, N, N>) -> [f64; N] {
         let last = self.missing.len().saturating_sub(1);
-        let (Some(missing), Some(yielding)) = (self.missing.get(sample.min(last)), stiffness.try_inverse()) else {
+        let (Some(missing), Some(yielding)) = (self.missing.get(sample.min(last)), stiffness.try_inverse())
+        else {
             return [f64::INFINITY; N];
         };
         let error = yielding.abs() * missing;

@@ -108,6 +108,9 @@ pub struct Followed {
     pub largest_pole: Option<f64>,
     /// Cycles of the path in each run.
     pub cycles: usize,
+    /// The virtual arm that moved: its file, or `built-in`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plant: Option<String>,
     /// Runs that were stopped because something touched the arm.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub contact: BTreeMap<String, Touched>,

@@ -20,11 +20,11 @@ pub struct Arm {
     pub watch: Watch,
     /// Transmit PDOs by number: what the drives send each SYNC.
     pub transmit: BTreeMap<String, Vec<Mapped>>,
-    /// Modes by name: `profile_position`, `velocity`, `interpolated_position`, and `current` where anything
-    /// is known of it.
+    /// Modes by name: `profile_position`, `velocity`, `interpolated_position`, `current`; those that the drive has not
+    /// are left out.
     pub mode: BTreeMap<String, ModeTable>,
-    /// Scale of mode VL.
-    pub velocity_scale: VelocityScaleTable,
+    /// Scale of mode VL, where it is among the modes.
+    pub velocity_scale: Option<VelocityScaleTable>,
     /// The joints from the base on.
     pub joint: Vec<JointTable>,
 }
@@ -102,10 +102,10 @@ pub struct JointTable {
     /// Greatest velocity error, rad/s.
     #[serde(default = "velocity_error")]
     pub velocity_error: f64,
-    /// Counts in a degree; negative where the drive counts against the joint.
-    #[serde(default = "thousand")]
-    pub counts_per_degree: f64,
-    /// 0x1018:1, where it is known.
+    /// Counts in a degree; negative where the drive counts against the joint. Where it is left out it is taken from
+    /// 0x608F, 0x6091 and 0x6092 of the drive's file.
+    pub counts_per_degree: Option<f64>,
+    /// 0x1018:1; where it is left out, VendorNumber of the drive's file.
     pub vendor: Option<u32>,
     /// 0x1018:2, where it is known.
     pub product: Option<u32>,
@@ -125,10 +125,6 @@ fn following_error() -> f64 {
 
 fn velocity_error() -> f64 {
     0.3
-}
-
-fn thousand() -> f64 {
-    1000.0
 }
 
 /// `"6041"`, `"60C1:1"`, or with bits `"6071/16"` where the DCF does not know the object.

@@ -6,6 +6,7 @@
 
 mod arm;
 mod dcf;
+mod scale;
 mod write;
 
 pub use arm::{Arm, JointTable, Mapped, ModeTable, VelocityScaleTable, Watch};
@@ -24,10 +25,13 @@ pub enum ImportError {
     /// An overlay, counted from 0.
     #[error("{1}")]
     Overlay(usize, DcfError),
-    /// The TOML, in the words of its parser (with line and column).
+    /// The TOML: in the words of its parser (with line and column), or what it says cannot be.
     #[error("{0}")]
     Toml(String),
-    /// They do not fit together.
+    /// What the drive's file lacks.
+    #[error("{0}")]
+    Drive(String),
+    /// The two files do not fit together.
     #[error("{0}")]
     Mismatch(String),
 }
@@ -36,6 +40,11 @@ impl From<DcfError> for ImportError {
     fn from(error: DcfError) -> ImportError {
         ImportError::Dcf(error)
     }
+}
+
+/// Says something of a file that is no error.
+fn say(note: &str) {
+    tracing::warn!("{note}");
 }
 
 /// Rust source with the constants `DICTIONARY` and `constant` (a `Profile`) for the arm of `toml` with the
@@ -77,7 +86,7 @@ fn check(drive: &Dcf, arm: &Arm) -> Result<(), ImportError> {
         ));
     }
     if arm.rate == 0 || !1_000_000u32.is_multiple_of(arm.rate) {
-        return mismatch(format!("rate = {}: a divisor of 1000000 Hz is expected", arm.rate));
+        return Err(ImportError::Toml(format!("rate = {}: a divisor of 1000000 Hz is expected", arm.rate)));
     }
     let is_schunk = drive.info.get("vendorname").is_some_and(|name| name.to_uppercase().contains("SCHUNK"));
     if is_schunk && arm.watch.sync_timeout_factor.is_none() {
@@ -89,19 +98,24 @@ fn check(drive: &Dcf, arm: &Arm) -> Result<(), ImportError> {
         match drive.variables.get(&object) {
             Some(variable) if matches!(variable.access, Access::ReadWrite | Access::WriteOnly) => {}
             _ => {
-                return mismatch(format!(
-                    "the DCF has no writable {object}, without which the driver may not run"
-                ));
+                let lacks = format!("no writable {object}, without which the driver may not run");
+                return match object {
+                    schunk::SYNC_TIMEOUT_FACTOR => {
+                        mismatch(format!("sync_timeout_factor is SCHUNK's, and the DCF has {lacks}"))
+                    }
+                    _ => Err(ImportError::Drive(lacks)),
+                };
             }
         }
     }
     let mut nodes: Vec<u8> = arm.joint.iter().map(|joint| joint.node).chain([arm.master]).collect();
     nodes.sort_unstable();
     if nodes.windows(2).any(|pair| pair[0] == pair[1]) {
-        return mismatch("two joints, or a joint and the master, have the same node id".into());
+        let twice = "two joints, or a joint and the master, have the same node id";
+        return Err(ImportError::Toml(twice.into()));
     }
     if nodes.iter().any(|node| !(1..=127).contains(node)) {
-        return mismatch("node ids are 1 … 127".into());
+        return Err(ImportError::Toml("node ids are 1 … 127".into()));
     }
     Ok(())
 }
@@ -134,7 +148,7 @@ fn mapping(drive: &Dcf, mapped: &[Mapped], what: &str) -> Result<Mapping, Import
         };
         entries.push(Entry::new(item.object, bits));
     }
-    Mapping::new(&entries).map_err(|error| ImportError::Mismatch(format!("{what}: {error}")))
+    Mapping::new(&entries).map_err(|error| ImportError::Toml(format!("{what}: {error}")))
 }
 
 #[cfg(test)]

@@ -82,6 +82,57 @@ fn contradictions_are_told() {
     assert!(matches!(overlay, Err(ImportError::Overlay(1, DcfError { line: 1, .. }))), "{overlay:?}");
 }
 
+/// What the drive lacks is not asked for: a mode that 0x6502 does not offer, and its scale.
+#[test]
+fn modes_that_the_drive_lacks_are_left_out() {
+    let other = DRIVE.replace("[200E]", "[2FFF]") + &TARGETS.replace("[6042]", "[2042]");
+    let toml = TOML.replace("sync_timeout_factor", "# sync_timeout_factor");
+    let made = |drive: &str, toml: &str| rust_source(drive.as_bytes(), &[], toml, "ARM", "a test");
+    assert!(made(&other, &toml).unwrap_err().to_string().contains("0x6042:0"));
+    let modes = |offered: &str| format!("{other}[6502]\nDataType=7\nDefaultValue={offered}\n");
+    let without = made(&modes("0x41"), &toml).unwrap();
+    assert!(without.contains("    velocity: None,\n"), "{without}");
+    assert!(without.contains("    profile_position: Some(ModeProfile {\n"));
+    // Offered and not there is a contradiction.
+    assert!(made(&modes("0x43"), &toml).unwrap_err().to_string().contains("0x6042:0"));
+
+    // The TOML need not speak of it either, nor of its scale.
+    let (before, after) = toml.split_once("[mode.velocity]").unwrap();
+    let (_, rest) = after.split_once("[mode.interpolated_position]").unwrap();
+    let (rest, joints) = rest.split_once("[velocity_scale]").unwrap();
+    let (_, joints) = joints.split_once("[[joint]]").unwrap();
+    let lean = format!("{before}[mode.interpolated_position]{rest}[[joint]]{joints}");
+    let without = made(&modes("0x41"), &lean).unwrap();
+    assert!(without.contains("    velocity: None,\n") && without.contains("denominator: 1,\n"), "{without}");
+    let unknown = made(&other, &lean.replace("interpolated", "spline")).unwrap_err().to_string();
+    assert!(unknown.contains("[mode.spline_position] is no mode"), "{unknown}");
+    let (before, _) = toml.split_once("[mode.profile_position]").unwrap();
+    let none = format!("{before}[mode]\n[[joint]]{joints}");
+    assert!(made(&other, &none).unwrap_err().to_string().contains("no mode"));
+    let unscaled = format!("{before}[mode.velocity]{}[[joint]]{joints}", velocity_mode(&toml));
+    assert!(
+        made(&modes("0x43").replace("[2042]", "[6042]"), &unscaled)
+            .unwrap_err()
+            .to_string()
+            .contains("[velocity_scale]")
+    );
+}
+
+/// The TOML's lines of the velocity mode.
+fn velocity_mode(toml: &str) -> &str {
+    let (_, after) = toml.split_once("[mode.velocity]").unwrap();
+    after.split_once("[mode.interpolated_position]").unwrap().0
+}
+
+/// The maker's number in the drive's file is expected of the drives; the TOML's goes over it.
+#[test]
+fn the_vendor_of_the_drives_file_is_expected() {
+    let other = DRIVE.replace("[DeviceInfo]", "[DeviceInfo]\nVendorNumber=0x9A") + TARGETS;
+    let made = |toml: &str| rust_source(other.as_bytes(), &[], toml, "ARM", "a test").unwrap();
+    assert!(made(&TOML.replace("vendor = 0x15E\n", "")).contains("vendor: Some(0x0000009A)"));
+    assert!(made(TOML).contains("vendor: Some(0x0000015E)"));
+}
+
 /// 0x200E is SCHUNK's: of a drive of another maker neither the DCF nor the driver is asked for it.
 #[test]
 fn drives_of_other_makers_need_no_object_of_schunks() {

@@ -1,8 +1,9 @@
 //! The constant tables as Rust.
 
-use super::{Access, Arm, Dcf, ImportError, JointTable, Mapped, ModeTable, Value, mapping, mismatch};
+use super::{Access, Arm, Dcf, ImportError, JointTable, Mapped, ModeTable, Value, mapping, say, scale};
 use crate::bus::canopen::Object;
 use crate::bus::canopen::pdo::Mapping;
+use crate::bus::cia402::{Mode, objects};
 use std::fmt::Write;
 
 /// Rows that would be longer go on in a second line.
@@ -29,6 +30,14 @@ pub(super) fn source(drive: &Dcf, arm: &Arm, constant: &str, source: &str) -> Re
     Ok(out)
 }
 
+/// The modes of the driver, and how they are run.
+const MODES: [(&str, &str); 4] = [
+    ("profile_position", "profile::PROFILE_POSITION_BITS"),
+    ("velocity", "profile::VELOCITY_BITS"),
+    ("interpolated_position", "profile::INTERPOLATED_POSITION_BITS"),
+    ("current", "0"),
+];
+
 fn profile(out: &mut String, drive: &Dcf, arm: &Arm, constant: &str) -> Result<(), ImportError> {
     let mut line = |text: String| {
         out.push_str(&text);
@@ -44,31 +53,46 @@ fn profile(out: &mut String, drive: &Dcf, arm: &Arm, constant: &str) -> Result<(
     line(format!("    master_watch_ms: {},", arm.watch.master_watch_ms));
     line(format!("    sync_timeout_factor: {:?},", arm.watch.sync_timeout_factor));
     line(format!("    node_heartbeat_ms: {},", arm.watch.node_heartbeat_ms));
-    for (name, bits) in [
-        ("profile_position", "profile::PROFILE_POSITION_BITS"),
-        ("velocity", "profile::VELOCITY_BITS"),
-        ("interpolated_position", "profile::INTERPOLATED_POSITION_BITS"),
-    ] {
-        let Some(table) = arm.mode.get(name) else { return mismatch(format!("[mode.{name}] is missing")) };
-        line(format!("    {name}: {},", mode(drive, table, name, bits)?));
-    }
-    match arm.mode.get("current") {
-        Some(table) => line(format!("    current: Some({}),", mode(drive, table, "current", "0")?)),
-        None => line("    current: None,".into()),
-    }
-    let known = ["profile_position", "velocity", "interpolated_position", "current"];
+    let known = MODES.map(|(name, _)| name);
     if let Some(unknown) = arm.mode.keys().find(|name| !known.contains(&name.as_str())) {
-        return mismatch(format!("[mode.{unknown}] is no mode of the driver; {} are", known.join(", ")));
+        return wrong(format!("[mode.{unknown}] is no mode of the driver; {} are", known.join(", ")));
     }
-    let scale = &arm.velocity_scale;
+    let mut modes = Vec::new();
+    for (name, bits) in MODES {
+        let Some(table) = arm.mode.get(name) else { continue };
+        match (mode(drive, table, name, bits), offered(drive, arm, table)) {
+            (Ok(source), _) => modes.push((name, source)),
+            (Err(why), Some(modes)) => {
+                say(&format!(
+                    "[mode.{name}] is left out: the drive has it not (0x6502 = 0x{modes:X}); {why}"
+                ));
+            }
+            (Err(why), None) => return Err(why),
+        }
+    }
+    let has = |name: &str| modes.iter().any(|(mode, _)| *mode == name);
+    if modes.is_empty() {
+        return wrong(format!("there is no mode that the drive has; the driver knows {}", known.join(", ")));
+    }
+    for name in known {
+        let source = modes.iter().find(|(mode, _)| *mode == name);
+        let source = source.map_or("None".to_string(), |(_, source)| format!("Some({source})"));
+        line(format!("    {name}: {source},"));
+    }
+    let (numerator, denominator, millidegrees, verified) = match &arm.velocity_scale {
+        Some(scale) => {
+            (scale.numerator, scale.denominator, scale.millidegrees_per_second, scale.verified_on_hardware)
+        }
+        None if has("velocity") => return wrong("[mode.velocity] needs [velocity_scale]".into()),
+        None => (1, 1, 1.0, false),
+    };
     line(format!(
-        "    velocity_scale: VelocityScale {{\n        numerator: {},\n        denominator: {},\n        \
-         millidegrees: {:?},\n        verified_on_hardware: {},\n    }},",
-        scale.numerator, scale.denominator, scale.millidegrees_per_second, scale.verified_on_hardware
+        "    velocity_scale: VelocityScale {{\n        numerator: {numerator},\n        denominator: {denominator},\n        \
+         millidegrees: {millidegrees:?},\n        verified_on_hardware: {verified},\n    }},"
     ));
     line("    tpdos: [".into());
     if let Some(unknown) = arm.transmit.keys().find(|key| !["1", "2", "3", "4"].contains(&key.as_str())) {
-        return mismatch(format!("[transmit] {unknown}: PDOs are numbered 1 … 4"));
+        return wrong(format!("[transmit] {unknown}: PDOs are numbered 1 … 4"));
     }
     for number in 1..=4 {
         let mapped = arm.transmit.get(&number.to_string()).map_or(&[][..], Vec::as_slice);
@@ -77,8 +101,15 @@ fn profile(out: &mut String, drive: &Dcf, arm: &Arm, constant: &str) -> Result<(
     }
     line("    ],".into());
     line("    joints: [".into());
+    let mut said: Vec<String> = Vec::new();
     for joint in &arm.joint {
-        line(format!("        {},", joint_source(joint)));
+        let (counts, note) = scale::counts_per_degree(drive, joint)?;
+        // Drives of one kind have one scale: it is said once.
+        if let Some(note) = note.filter(|note| !said.contains(note)) {
+            say(&note);
+            said.push(note);
+        }
+        line(format!("        {},", joint_source(drive, joint, counts)));
     }
     line("    ],".into());
     line("    reactions: Reactions::DEFAULT,".into());
@@ -113,7 +144,7 @@ fn mode(drive: &Dcf, table: &ModeTable, name: &str, bits: &str) -> Result<String
     let (rpdo, mapping) = mapped_source(drive, &table.receive, &format!("[mode.{name}]"), 8)?;
     for needed in [crate::bus::cia402::objects::CONTROLWORD, table.setpoint.object] {
         if !mapping.contains(needed) {
-            return mismatch(format!("[mode.{name}]: receive lacks {needed}"));
+            return wrong(format!("[mode.{name}]: receive lacks {needed}"));
         }
     }
     Ok(format!(
@@ -125,18 +156,31 @@ fn mode(drive: &Dcf, table: &ModeTable, name: &str, bits: &str) -> Result<String
     ))
 }
 
-fn joint_source(joint: &JointTable) -> String {
-    let counts = match joint.counts_per_degree {
+/// The drive's modes where the mode of `table` is not among them.
+fn offered(drive: &Dcf, arm: &Arm, table: &ModeTable) -> Option<u32> {
+    let node = arm.joint.first().map_or(1, |joint| joint.node);
+    let modes = drive.value(objects::SUPPORTED_MODES, node).and_then(|modes| u32::try_from(modes).ok())?;
+    (Mode::from_code(table.mode).is_in(modes) == Some(false)).then_some(modes)
+}
+
+fn wrong<T>(message: String) -> Result<T, ImportError> {
+    Err(ImportError::Toml(message))
+}
+
+fn joint_source(drive: &Dcf, joint: &JointTable, counts_per_degree: f64) -> String {
+    let counts = match counts_per_degree {
         1000.0 => "MILLIDEGREES_PER_RADIAN".to_string(),
         other => format!("{:?} * MILLIDEGREES_PER_RADIAN", other / 1000.0),
     };
-    let JointTable { vendor, product, revision, serial, .. } = joint;
+    let JointTable { product, revision, serial, .. } = joint;
+    let vendor = joint.vendor.or_else(|| drive.vendor());
+    let vendor = vendor.map_or("None".to_string(), |vendor| format!("Some(0x{vendor:08X})"));
     let fields = [
         ("node", format!("NodeId::clamped({})", joint.node)),
         (
             "identity",
             format!(
-                "Identity {{ vendor: {vendor:?}, product: {product:?}, revision: {revision:?}, \
+                "Identity {{ vendor: {vendor}, product: {product:?}, revision: {revision:?}, \
                  serial: {serial:?} }}"
             ),
         ),
@@ -192,7 +236,9 @@ fn dictionary(out: &mut String, drive: &Dcf) -> Result<(), ImportError> {
             0x000A => "OctetString",
             0x000B => "UnicodeString",
             0x000F => "Domain",
-            other => return mismatch(format!("{at}: data type 0x{other:04X} is not known here")),
+            other => {
+                return Err(ImportError::Drive(format!("{at}: data type 0x{other:04X} is not known here")));
+            }
         };
         let access = match variable.access {
             Access::WriteOnly => "WriteOnly",

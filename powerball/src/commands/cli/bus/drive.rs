@@ -2,7 +2,7 @@
 
 use super::super::envelope::Surroundings;
 use super::super::output;
-use super::{Failure, Where, master, refused};
+use super::{Consent, Failure, Where, master, refused};
 use crate::bus::canopen::{NodeId, nmt};
 use crate::bus::cia402::{Command, Controlword, Statusword};
 use crate::bus::driver::lwa4p::LWA4P;
@@ -31,6 +31,8 @@ const PATIENCE: u64 = 60_000_000;
 pub(crate) struct Enable {
     #[command(flatten)]
     place: Where,
+    #[command(flatten)]
+    consent: Consent,
     /// Holds the arm for so many seconds.
     #[arg(long, default_value_t = 2.0, value_name = "SECONDS")]
     hold: f64,
@@ -59,6 +61,8 @@ pub(crate) struct Stop {
 pub(crate) struct Move {
     #[command(flatten)]
     place: Where,
+    #[command(flatten)]
+    consent: Consent,
     /// The joint, from 1 at the base.
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=6))]
     joint: u8,
@@ -88,7 +92,7 @@ impl Enable {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let hold = Duration::try_from_secs_f64(self.hold)
             .map_err(|_| Failure::Unusable("--hold needs a number of seconds".to_string()))?;
-        let mut master = master(&self.place)?;
+        let mut master = master(&self.place, self.consent)?;
         let arm = |e: ArmError| refused(e);
         master.driver_mut().start(ControlMode::InterpolatedPosition, false).map_err(refused)?;
         master.wait_for(Phase::Ready, PATIENCE).map_err(arm)?;
@@ -222,8 +226,9 @@ impl Move {
         }
         let arm = |e: RecordError| refused(e);
         let envelope = self.surroundings.envelope(&self.surroundings.arm()?, &self.mounting)?;
-        let mut recorder =
-            Recorder::bring_up(master(&self.place)?, envelope).map_err(arm)?.with_progress(output::live());
+        let mut recorder = Recorder::bring_up(master(&self.place, self.consent)?, envelope)
+            .map_err(arm)?
+            .with_progress(output::live());
         let from = recorder.master().driver().positions();
         let mut to = from;
         to[index] = self.to.unwrap_or(from[index] + self.by.unwrap_or(0.0));

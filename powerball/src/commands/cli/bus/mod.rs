@@ -76,6 +76,15 @@ pub(crate) struct Where {
     pub(crate) json: bool,
 }
 
+/// What a command that configures drives may be told to accept.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct Consent {
+    /// You accept what was not verified: drives whose device type (0x1000) or identity (0x1018) is another than the
+    /// profile says, each with a warning; and the current mode, which this project has never seen on an arm.
+    #[arg(long)]
+    pub(crate) accept_unverified: bool,
+}
+
 impl Where {
     /// Opens the bus; the built-in arm's drives have booted.
     pub(crate) fn open(&self) -> Result<Box<dyn Bus>, Failure> {
@@ -95,8 +104,12 @@ impl Where {
     ///
     /// UDP multicast is a bench: nobody promises a program its time slices there, and no arm is hurt by a
     /// late SYNC. The driver then bears what it would not on a real bus; it counts all the same.
-    pub(crate) fn driver(&self, bus: Box<dyn Bus>) -> Result<Master<Box<dyn Bus>, 6>, Failure> {
-        self.driver_of(LWA4P, bus)
+    pub(crate) fn driver(
+        &self,
+        bus: Box<dyn Bus>,
+        consent: Consent,
+    ) -> Result<Master<Box<dyn Bus>, 6>, Failure> {
+        self.driver_of(LWA4P, bus, consent)
     }
 
     /// The same with another profile.
@@ -104,6 +117,7 @@ impl Where {
         &self,
         mut profile: Profile<6>,
         bus: Box<dyn Bus>,
+        consent: Consent,
     ) -> Result<Master<Box<dyn Bus>, 6>, Failure> {
         if matches!(self.bus, BusUrl::Udp(..)) {
             let reactions = &mut profile.reactions;
@@ -119,7 +133,11 @@ impl Where {
         }
         let signals = |e| Failure::Unusable(format!("cannot listen to signals: {e}"));
         let interrupt = Interrupt::install().map_err(signals)?;
-        let master = Master::new(Driver::new(profile).map_err(refused)?, bus).with_interrupt(interrupt);
+        let mut driver = Driver::new(profile).map_err(refused)?;
+        if consent.accept_unverified {
+            driver.accept_other_nodes();
+        }
+        let master = Master::new(driver, bus).with_interrupt(interrupt);
         #[cfg(unix)]
         if let Some(watchdog) = self.watchdog() {
             return Ok(master.with_watchdog(watchdog));
@@ -156,8 +174,8 @@ pub(crate) fn virtual_bus(arm: VirtualArm) -> Result<Box<dyn Bus>, Failure> {
 }
 
 /// A driver of the arm on the bus.
-pub(crate) fn master(place: &Where) -> Result<Master<Box<dyn Bus>, 6>, Failure> {
-    place.driver(place.open()?)
+pub(crate) fn master(place: &Where, consent: Consent) -> Result<Master<Box<dyn Bus>, 6>, Failure> {
+    place.driver(place.open()?, consent)
 }
 
 /// Lets time pass on the bus.
@@ -178,6 +196,13 @@ impl From<TransferError> for Failure {
     fn from(e: TransferError) -> Self {
         refused(e)
     }
+}
+
+/// A text that a device sent, as it may be shown: what could steer a terminal is left out.
+fn printable(bytes: &[u8]) -> String {
+    // Marks of the direction of writing can make a name look like another.
+    let steers = |c: char| matches!(c, '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}' | '\u{2060}'..='\u{206F}' | '\u{FEFF}');
+    String::from_utf8_lossy(bytes).chars().filter(|c| !c.is_control() && !steers(*c)).collect()
 }
 
 /// A node's number on the command line.

@@ -1,7 +1,7 @@
 //! `powerball bus sdo`.
 
 use super::super::output;
-use super::{Failure, Where, node, number};
+use super::{Failure, Where, node, number, printable};
 use crate::bus::canopen::client::Value;
 use crate::bus::canopen::{NodeId, Object};
 use crate::bus::driver::dictionary::{DataType, find};
@@ -175,10 +175,10 @@ fn show(address: &Address, value: &Value, place: &Where) {
     let entry = find(DICTIONARY, address.object);
     let meaning = match (kind, value.signed(), value.unsigned()) {
         (Some(DataType::Real32), _, Some(bits)) => json!(f32::from_bits(bits)),
-        (Some(DataType::VisibleString | DataType::OctetString), ..) => json!(String::from_utf8_lossy(bytes)),
+        (Some(DataType::VisibleString | DataType::OctetString), ..) => json!(printable(bytes)),
         (Some(kind), Some(signed), _) if kind.is_signed() => json!(signed),
         (_, _, Some(unsigned)) => json!(unsigned),
-        _ => json!(String::from_utf8_lossy(bytes)),
+        _ => json!(printable(bytes)),
     };
     let hex: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
     if place.json {

@@ -1,7 +1,7 @@
 //! `powerball bus timing`.
 
 use super::super::output;
-use super::{Failure, Where, master, refused};
+use super::{Consent, Failure, Where, master, refused};
 use crate::bus::cia402::objects::STATUSWORD;
 use crate::bus::driver::lwa4p::LWA4P;
 use crate::bus::driver::{ControlMode, Phase};
@@ -27,6 +27,8 @@ const TRIPS: usize = 500;
 pub(crate) struct Timing {
     #[command(flatten)]
     place: Where,
+    #[command(flatten)]
+    consent: Consent,
     /// Measures for so many seconds.
     #[arg(long = "for", default_value_t = 10.0, value_name = "SECONDS")]
     seconds: f64,
@@ -79,7 +81,7 @@ impl Timing {
         if !(self.seconds.is_finite() && self.seconds > 0.0) {
             return Err(Failure::Unusable("--for must be above 0".to_string()));
         }
-        let mut master = master(&self.place)?;
+        let mut master = master(&self.place, self.consent)?;
         let (mut cycles, mut data, mut trips) = (Times::default(), Times::default(), Times::default());
         for k in 0..TRIPS {
             let node = LWA4P.joints[k % LWA4P.joints.len()].node;

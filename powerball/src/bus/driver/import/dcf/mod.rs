@@ -1,5 +1,5 @@
 //! Electronic data sheets (EDS) and device configuration files (DCF) of CiA 306, as makers really write them:
-//! latin-1 or UTF-8, any case, `$NODEID + 0x80` anywhere in a number, names that repeat, comments behind values,
+//! latin-1, UTF-8 or UTF-16 with its mark, any case, `$NODEID + 0x80` anywhere in a number, names that repeat, comments behind values,
 //! arrays whose parts share one section (`CompactSubObj`), types that the file defines itself.
 //!
 //! Not read: `[DummyUsage]` (types that fill a PDO are no objects) and `CompactPDO` (PDOs without sections).
@@ -88,14 +88,20 @@ pub struct Dcf {
 }
 
 impl Dcf {
-    /// The dictionary in a file's bytes. Bytes that are no UTF-8 are read as latin-1.
+    /// The dictionary in a file's bytes. Bytes that are neither UTF-8 nor begin with the mark of UTF-16 are latin-1.
     ///
     /// # Errors
     /// The first line that cannot be read, with what was expected.
     pub fn parse(bytes: &[u8]) -> Result<Dcf, DcfError> {
-        let text = match std::str::from_utf8(bytes) {
-            Ok(text) => text.trim_start_matches('\u{feff}').to_string(),
-            Err(_) => bytes.iter().map(|&byte| char::from(byte)).collect(),
+        let wide = |unit: fn([u8; 2]) -> u16, bytes: &[u8]| {
+            let units: Vec<u16> = bytes.chunks_exact(2).map(|pair| unit([pair[0], pair[1]])).collect();
+            String::from_utf16_lossy(&units)
+        };
+        let text = match (bytes, std::str::from_utf8(bytes)) {
+            ([0xFF, 0xFE, rest @ ..], _) => wide(u16::from_le_bytes, rest),
+            ([0xFE, 0xFF, rest @ ..], _) => wide(u16::from_be_bytes, rest),
+            (_, Ok(text)) => text.trim_start_matches('\u{feff}').to_string(),
+            (_, Err(_)) => bytes.iter().map(|&byte| char::from(byte)).collect(),
         };
         let sections = section::split(&text)?;
         let types: Types = sections.iter().filter_map(Section::defined_type).collect();
@@ -189,6 +195,12 @@ impl Dcf {
         let variable = self.variables.get(&object)?;
         let value = variable.value.as_ref().or(variable.default.as_ref())?;
         value.number().map(|number| number.of(node))
+    }
+
+    /// The maker's number, where the file tells it.
+    pub(super) fn vendor(&self) -> Option<u32> {
+        let number = self.info.get("vendornumber").and_then(|text| Number::parse(text))?;
+        u32::try_from(number.of(0)).ok().filter(|vendor| *vendor > 0)
     }
 
     /// Whether the drive offers a bit rate, bit/s.

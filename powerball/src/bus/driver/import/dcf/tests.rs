@@ -133,3 +133,17 @@ fn errors_of_lists_and_counts_name_their_line_and_key() {
         assert!(error(text).starts_with(expected), "{}", error(text));
     }
 }
+
+/// Windows' editors save so; both orders of the bytes.
+#[test]
+fn utf_16_is_read() {
+    let text = "[1008]\nParameterName=Geräte\nDataType=9\n";
+    let read = Dcf::parse(text.as_bytes()).unwrap();
+    let wide = |mark: [u8; 2], bytes: fn(u16) -> [u8; 2]| {
+        let units = text.encode_utf16().flat_map(bytes);
+        Dcf::parse(&mark.into_iter().chain(units).collect::<Vec<u8>>()).unwrap()
+    };
+    assert_eq!(read.variables.values().next().unwrap().name, "Geräte");
+    assert_eq!(wide([0xFF, 0xFE], u16::to_le_bytes), read);
+    assert_eq!(wide([0xFE, 0xFF], u16::to_be_bytes), read);
+}
