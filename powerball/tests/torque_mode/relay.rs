@@ -128,7 +128,7 @@ impl Relay {
     }
 
     /// A receive PDO of the victim on its way to it.
-    fn to_drive(&mut self, frame: &Frame) -> Option<Frame> {
+    fn pass_setpoint(&mut self, frame: &Frame) -> Option<Frame> {
         let b = frame.bytes();
         let word = Controlword(u16::from_le_bytes([b[0], b[1]]));
         if word.decode(Controlword::default()) == Command::QuickStop && self.is_on() {
@@ -156,7 +156,7 @@ impl Relay {
     }
 
     /// Process data of the victim on its way to the master.
-    fn to_master(&mut self, number: u8, frame: &Frame) -> Option<Frame> {
+    fn pass_data(&mut self, number: u8, frame: &Frame) -> Option<Frame> {
         let place = usize::from(number) - 1;
         self.frames += u32::from(self.is_on());
         // A fixed sequence of no pattern that the two frames of a cycle share (Knuth's multiplicative hash).
@@ -221,7 +221,7 @@ impl Peer for Relay {
     fn receive(&mut self, frame: &Frame, now: Micros) {
         self.now = now;
         let passed = match Cob::of(frame) {
-            Some(Cob::Rpdo(1, node)) if node == self.node() => self.to_drive(frame),
+            Some(Cob::Rpdo(1, node)) if node == self.node() => self.pass_setpoint(frame),
             _ => Some(*frame),
         };
         if let Some(frame) = passed {
@@ -253,7 +253,7 @@ impl Peer for Relay {
             let frame = self.arm.transmit()?;
             let passed = match Cob::of(&frame) {
                 Some(Cob::Tpdo(number @ (1 | 2), node)) if node == self.node() => {
-                    self.to_master(number, &frame)
+                    self.pass_data(number, &frame)
                 }
                 _ => Some(frame),
             };

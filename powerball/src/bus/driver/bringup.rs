@@ -219,9 +219,9 @@ impl<const N: usize> Driver<N> {
                 (Ok(_), _) | (Err(SdoError::Aborted(_)), None) => return Ok(()),
                 (Err(error), _) => failed(error),
             };
-            let bearable = matches!(deviation, Cause::WrongIdentity(..))
+            let acceptable = matches!(deviation, Cause::WrongIdentity(..))
                 || matches!(deviation, Cause::Sdo(_, _, SdoError::Aborted(_)));
-            return if self.other_nodes && bearable {
+            return if self.other_nodes && acceptable {
                 self.note(deviation);
                 Ok(())
             } else {

@@ -36,10 +36,6 @@ const WINDOW: usize = 4;
 /// Below this part of the greatest velocity a joint may stick: all of its dry friction can hold it.
 const SLOW: f64 = 0.05;
 
-/// Where somebody may push the arm, a joint of which nearly all torque does not act, for so many cycles, has a drive without
-/// power: nobody pulls an arm down with all of its weight.
-const POWERLESS: (f64, u8) = (0.3, 8);
-
 /// What the guard remembers of one joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Guarded {
@@ -59,17 +55,14 @@ pub(super) struct Guarded {
     implausible: u8,
     current: u8,
     torque: u8,
-    powerless: u8,
     tracking: u8,
 }
 
-/// How the torque of a joint fits its motion, N·m: what acted less what the model needs, how much that may be, and whether
-/// the joint moves as if nothing acted.
+/// How the torque of a joint fits its motion, N·m: what acted less what the model needs, and how much that may be.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Left {
     left: f64,
     tolerance: f64,
-    powerless: bool,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -245,14 +238,13 @@ impl<const N: usize> Driver<N> {
             } else {
                 limits.friction_error * friction[j].abs()
             };
-            let rigid = limits.rigid_error * (steady[j] - friction[j]).abs()
-                + limits.inertial_error * (need[j] - steady[j]).abs();
+            let weight = (steady[j] - friction[j]).abs();
+            let rigid = limits.rigid_error * weight + limits.inertial_error * (need[j] - steady[j]).abs();
             // A light joint with a strong drive is far away before a tenth of its torque is missing.
             let own = joint.guarded.inertia.map_or(f64::INFINITY, |inertia| inertia * of.acceleration);
             let least = (limits.torque_error * of.torque).min(limits.acceleration_error * own);
-            let (tolerance, push) = (least + rigid + loose, guard.margin() * of.torque);
-            let powerless = acted.abs() > tolerance && need[j] * acted < POWERLESS.0 * acted * acted;
-            Left { left: acted - need[j], tolerance: tolerance + push, powerless }
+            let push = guard.margin() * of.torque;
+            Left { left: acted - need[j], tolerance: least + push + rigid + loose }
         }))
     }
 
@@ -264,13 +256,12 @@ impl<const N: usize> Driver<N> {
         for (j, (joint, of)) in self.joints.iter_mut().zip(left).enumerate() {
             let share = of.left.abs() / of.tolerance;
             let long = run(&mut joint.guarded.torque, beyond(share, 1.0), limit);
-            let powerless = run(&mut joint.guarded.powerless, of.powerless, POWERLESS.1);
-            if (long || powerless) && worst.is_none_or(|(most, _)| beyond(share, most)) {
+            if long && worst.is_none_or(|(most, _)| beyond(share, most)) {
                 worst = Some((share, j));
             }
         }
         let (_, j) = worst?;
-        let Left { left, tolerance, .. } = *left.get(j)?;
+        let Left { left, tolerance } = *left.get(j)?;
         Some(Cause::TorqueError(self.node(j), JointNumber::from_index(j), left, tolerance))
     }
 

@@ -58,19 +58,19 @@ pub(super) fn counts_per_degree(
 ) -> Result<(f64, Option<String>), ImportError> {
     let node = joint.node;
     match (joint.counts_per_degree, turn(drive, node)) {
-        (Some(told), _) if !(told.is_finite() && told != 0.0) => {
-            Err(ImportError::Toml(format!("node {node}: counts_per_degree = {told} is no scale")))
+        (Some(given), _) if !(given.is_finite() && given != 0.0) => {
+            Err(ImportError::Toml(format!("node {node}: counts_per_degree = {given} is no scale")))
         }
-        (Some(told), Some(turn)) if (told.abs() * 360.0 - turn.counts).abs() > ROUNDING * turn.counts => {
+        (Some(given), Some(turn)) if (given.abs() * 360.0 - turn.counts).abs() > ROUNDING * turn.counts => {
             let note = format!(
-                "counts_per_degree = {told} is {} counts a turn, the drive's file says {} ({}): the TOML counts",
-                told.abs() * 360.0,
+                "counts_per_degree = {given} is {} counts a turn, the drive's file says {} ({}): the TOML counts",
+                given.abs() * 360.0,
                 turn.counts,
                 turn.source
             );
-            Ok((told, Some(note)))
+            Ok((given, Some(note)))
         }
-        (Some(told), _) => Ok((told, None)),
+        (Some(given), _) => Ok((given, None)),
         (None, Some(turn)) if turn.counts >= FEWEST => {
             let degree = turn.counts / 360.0;
             let note = format!(
@@ -81,7 +81,7 @@ pub(super) fn counts_per_degree(
             Ok((degree, Some(note)))
         }
         (None, Some(turn)) => Err(ImportError::Mismatch(format!(
-            "node {node}: {} counts a turn ({}) are no scale of a joint; tell counts_per_degree in [[joint]]",
+            "node {node}: {} counts a turn ({}) are no scale of a joint; give counts_per_degree in [[joint]]",
             turn.counts, turn.source
         ))),
         (None, None) => Err(ImportError::Toml(format!(
@@ -98,10 +98,10 @@ mod tests {
     const JOINT: &str = "node = 3\nposition = [-1.0, 1.0]\nvelocity = 1.0\nacceleration = 1.0\nrated_torque = 1.0\n\
         current = 1.0\n";
 
-    fn scaled(objects: &[(&str, &str)], told: &str) -> Result<(f64, Option<String>), ImportError> {
+    fn scaled(objects: &[(&str, &str)], given: &str) -> Result<(f64, Option<String>), ImportError> {
         let section = |(name, value): &(&str, &str)| format!("[{name}]\nDataType=7\nDefaultValue={value}\n");
         let dcf: String = objects.iter().map(section).collect();
-        let joint = toml::from_str(&format!("{JOINT}{told}")).unwrap();
+        let joint = toml::from_str(&format!("{JOINT}{given}")).unwrap();
         counts_per_degree(&Dcf::parse(dcf.as_bytes()).unwrap(), &joint)
     }
 
@@ -115,7 +115,7 @@ mod tests {
             let (counts, note) = scaled(objects, "").unwrap();
             assert_eq!(counts * 360.0, turn);
             assert!(note.unwrap().contains(&format!("{turn} counts a turn")), "{objects:?}");
-            // The same told is nothing to speak of, with a sign too; another is said, and counts.
+            // The same given is nothing to speak of, with a sign too; another is said, and counts.
             assert_eq!(scaled(objects, &format!("counts_per_degree = {}", -turn / 360.0)).unwrap().1, None);
             let (counts, note) = scaled(objects, "counts_per_degree = 1234.0").unwrap();
             assert!(counts == 1234.0 && note.unwrap().contains(&format!("says {turn}")), "{objects:?}");
@@ -126,8 +126,8 @@ mod tests {
     fn without_a_scale_there_is_no_profile() {
         assert_eq!(scaled(&[], "counts_per_degree = -1000.0").unwrap(), (-1000.0, None));
         let unset = [("608Fsub1", "1"), ("608Fsub2", "1")];
-        for (objects, told) in [(&[][..], ""), (&unset, ""), (&[], "counts_per_degree = 0.0")] {
-            let refused = scaled(objects, told).unwrap_err().to_string();
+        for (objects, given) in [(&[][..], ""), (&unset, ""), (&[], "counts_per_degree = 0.0")] {
+            let refused = scaled(objects, given).unwrap_err().to_string();
             assert!(refused.contains("node 3") && refused.contains("counts_per_degree"), "{refused}");
         }
         assert!(scaled(&[("608Fsub1", "0")], "").unwrap_err().to_string().contains("0x608F"));
