@@ -213,7 +213,8 @@ impl Fault {
                 Stops { cycles: 7 }
             }
             Fault::DropFive | Fault::ShortFive if early || phase == Starting => GoesOn,
-            Fault::DropFive | Fault::ShortFive => stop(4),
+            // An answer of the commutation search may be on the wire when the stop leaves.
+            Fault::DropFive | Fault::ShortFive => stop(if phase == Commutating { 5 } else { 4 }),
             Fault::Reboot if phase == Boot => GoesOn,
             // The node is silent while it boots: missed within three cycles, and told as what it is when it
             // has booted.

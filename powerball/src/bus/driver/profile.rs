@@ -198,8 +198,8 @@ impl TorqueMode {
         current_error: 0.03,
         torque_error: 0.1,
         acceleration_error: 0.5,
-        rigid_error: 0.25,
-        inertial_error: 0.7,
+        rigid_error: 0.3,
+        inertial_error: 0.8,
         friction_error: 0.5,
         sticking: 1.3,
     };

@@ -10,14 +10,14 @@ const RIGID: f64 = 0.05;
 const EFFECTS: f64 = 0.25;
 const OF_LIMIT: f64 = 0.01;
 /// Of the greatest friction on the path: a joint that came to rest stays where that holds it.
-const FRICTION: f64 = 0.25;
+const FRICTION: f64 = 0.3;
 /// The error of a joint follows the torque that is missing with the loop's time constant: so many cycles count, before and
 /// after.
 const CYCLES: usize = 60;
 /// A loop that is pushed goes beyond where it settles, and joints push each other.
-const DYNAMIC: f64 = 1.5;
+const DYNAMIC: f64 = 2.0;
 /// Whatever the model: a reference that is half a cycle off, encoders, a sampled loop; rad.
-const LEAST: f64 = 0.01;
+const LEAST: f64 = 0.015;
 
 /// The greatest torque, by sample and joint, that the feedback may have to make up for, N·m.
 #[derive(Clone, Debug)]
