@@ -158,7 +158,7 @@ pub struct Reactions {
 /// that is wrong becomes a motion at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorqueMode {
-    /// Cycles in a row beyond a limit that stop the arm, where nothing else is said.
+    /// Cycles in a row beyond a limit that stop the arm, where no other number is given.
     pub cycles: u8,
     /// Cycles in a row without a joint's data that stop the arm: the caller carries its state on until then.
     pub missing_cycles: u8,
@@ -182,7 +182,7 @@ pub struct TorqueMode {
     pub inertial_error: f64,
     /// … this part of the friction in motion …
     pub friction_error: f64,
-    /// … and so many times the dry friction where the joint rests.
+    /// … and this multiple of the dry friction where the joint rests.
     pub sticking: f64,
 }
 

@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 
 /// The hand of --push: N·m/rad and N·m·s/rad.
 const HAND: [f64; 2] = [300.0, 20.0];
-/// A hand may push with so much of each joint's torque before the driver's guard takes it for a drive that does not obey.
+/// A hand may push with this part of each joint's torque before the driver's guard takes it for a drive that does not obey.
 pub(super) const PUSH: f64 = 0.4;
 /// Drift counts from so long after the hand let go, s.
 const SETTLE: f64 = 1.0;

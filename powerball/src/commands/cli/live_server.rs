@@ -28,7 +28,7 @@ use tokio::sync::mpsc::Receiver;
 use tokio::task::{LocalSet, spawn_local};
 use tokio::time::{Sleep, sleep, timeout};
 
-/// Request line and headers together, bytes: the least that hyper can be told.
+/// Request line and headers together, bytes: the least that hyper takes.
 const REQUEST: usize = 8192;
 /// Connections at one time, pages that are fed among them; further ones are closed at once.
 const CONNECTIONS: usize = 16;

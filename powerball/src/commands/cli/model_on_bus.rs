@@ -70,7 +70,7 @@ impl ModelOnBus {
         self.place.driver_of(profile, bus, self.consent)
     }
 
-    /// The plant of --bus virtual: the file that is told, else the one next to the arm file, as for `explain --experiment`.
+    /// The plant of --bus virtual: the file that is given, else the one next to the arm file, as for `explain --experiment`.
     fn plant_file(&self) -> Option<PathBuf> {
         self.plant.clone().or_else(|| self.surroundings.arm.as_deref().and_then(Undeclared::next_to))
     }

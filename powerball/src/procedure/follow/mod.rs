@@ -112,7 +112,7 @@ pub struct Run<'a, M, const N: usize> {
     pub parts: Option<&'a Parts<N>>,
     /// What the best model that is known says of it: how far the arm may be off the path in current mode.
     pub best: &'a Parts<N>,
-    /// So far, rad, a push may take a joint off the path next to that.
+    /// How far, rad, a push may take a joint off the path next to that.
     pub give: f64,
     /// The best model, for the driver's guard in current mode; without one the guard looks at all but torques.
     pub guard: Option<TorqueGuard<N>>,

@@ -11,7 +11,7 @@ const EFFECTS: f64 = 0.25;
 const OF_LIMIT: f64 = 0.01;
 /// Of the greatest friction on the path: a joint that came to rest stays where that holds it.
 const FRICTION: f64 = 0.3;
-/// The error of a joint follows the torque that is missing with the loop's time constant: so many cycles count, before and
+/// The error of a joint follows the torque that is missing with the loop's time constant: this number of cycles counts, before and
 /// after.
 const CYCLES: usize = 60;
 /// A loop that is pushed goes beyond where it settles, and joints push each other.

@@ -76,7 +76,7 @@ pub(crate) struct Where {
     pub(crate) json: bool,
 }
 
-/// What a command that configures drives may be told to accept.
+/// What a command that configures drives may accept.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Consent {
     /// You accept what was not verified: drives whose device type (0x1000) or identity (0x1018) is another than the
