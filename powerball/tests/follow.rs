@@ -2,13 +2,13 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use dyngen::{Model, SetKind};
-use powerball::controller::friction::TABLE_2;
-use powerball::virtual_arm::lwa4p;
+mod true_model;
+
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 use std::process::{Command, Output};
+use true_model::true_model;
 
 const ARM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/lwa4p.toml");
 
@@ -36,28 +36,11 @@ fn write(name: &str, text: &str) -> String {
 
 /// The virtual arm's true values, with a spring at joint 1 of the plant's strength.
 fn model() -> Value {
-    let model = Model::derive(lwa4p::arm().unwrap()).unwrap();
-    let set = model.set(SetKind::Minimal).unwrap();
-    let all: Vec<f64> = lwa4p::links().iter().flat_map(|b| b.parameters()).collect();
-    let values = model.set_values(set, &all);
-    let parameters: Vec<Value> = set
-        .names()
-        .iter()
-        .zip(values)
-        .map(|(name, value)| json!({"name": name, "value": value, "std": 0.0, "relative_std": 0.0}))
-        .collect();
-    let friction: Vec<Value> = TABLE_2
-        .iter()
-        .enumerate()
-        .map(|(j, g)| json!({"joint": j + 1, "gamma1": g[0], "gamma2": g[1], "gamma3": g[2], "gamma4": g[3], "gamma5": g[4]}))
-        .collect();
-    json!({
-        "arm": "powerball_lwa4p_hardware", "set": "minimal", "parameters": parameters, "friction": friction,
-        "terms": [
-            {"effect": "spring", "joint": 1, "law": "position", "coefficient": 5.0},
-            {"effect": "spring", "joint": 1, "law": "constant", "coefficient": 1.0},
-        ],
-    })
+    let terms = json!([
+        {"effect": "spring", "joint": 1, "law": "position", "coefficient": 5.0},
+        {"effect": "spring", "joint": 1, "law": "constant", "coefficient": 1.0},
+    ]);
+    true_model(1.0, terms)
 }
 
 const PLANT: &str = r#"{"effect": {"spring": {"joint": 0, "stiffness": 5.0, "rest": -0.2}}, "age": 0.0}"#;

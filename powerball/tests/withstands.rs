@@ -4,12 +4,11 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use dyngen::{Model, SetKind};
+mod true_model;
+
 use powerball::bus::canopen::{Cob, Frame};
 use powerball::bus::driver::lwa4p::LWA4P;
 use powerball::bus::transport::{self, Event};
-use powerball::controller::friction::TABLE_2;
-use powerball::virtual_arm::lwa4p;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -18,6 +17,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
+use true_model::true_model;
 
 const ARM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/lwa4p.toml");
 
@@ -27,25 +27,12 @@ fn powerball(arguments: &[&str]) -> Command {
     command
 }
 
-/// A fresh folder with the virtual arm's true model, and a path of so many seconds from rest to rest.
+/// A fresh folder with the virtual arm's true model, and a path of `seconds` from rest to rest.
 fn folder(name: &str, seconds: f64) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).unwrap();
-    let model = Model::derive(lwa4p::arm().unwrap()).unwrap();
-    let set = model.set(SetKind::Minimal).unwrap();
-    let all: Vec<f64> = lwa4p::links().iter().flat_map(|b| b.parameters()).collect();
-    let values = model.set_values(set, &all);
-    let parameter = |(name, value)| json!({"name": name, "value": value, "std": 0.0, "relative_std": 0.0});
-    let parameters: Vec<Value> = set.names().iter().zip(values).map(parameter).collect();
-    let friction: Vec<Value> = TABLE_2
-        .iter()
-        .enumerate()
-        .map(|(j, g)| json!({"joint": j + 1, "gamma1": g[0], "gamma2": g[1], "gamma3": g[2], "gamma4": g[3], "gamma5": g[4]}))
-        .collect();
-    let model = json!({
-        "arm": "powerball_lwa4p_hardware", "set": "minimal", "parameters": parameters, "friction": friction, "terms": [],
-    });
+    let model = true_model(1.0, json!([]));
     std::fs::write(folder.join("model.json"), model.to_string()).unwrap();
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
     for k in 0..=(200.0 * seconds) as u32 {

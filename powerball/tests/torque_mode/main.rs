@@ -5,9 +5,10 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test's helpers may stop the test")]
 
 mod relay;
+#[path = "../true_model/mod.rs"]
+mod true_model;
 
 use chacha20::ChaCha8Rng;
-use dyngen::{Model, SetKind};
 use powerball::bus::canopen::Micros;
 use powerball::bus::driver::lwa4p::LWA4P;
 use powerball::bus::driver::{Cause, Driver};
@@ -23,39 +24,20 @@ use powerball::procedure::{Envelope, RecordError, Recorder};
 use powerball::virtual_arm::{PlantEffect, VirtualArm, lwa4p};
 use rand::SeedableRng;
 use relay::{Fault, Relay};
-use serde_json::{Value, json};
+use serde_json::json;
 use std::cell::Cell;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 use std::rc::Rc;
+use true_model::true_model;
 
 const PERIOD: f64 = 0.005;
 
 /// The virtual arm's true values; its friction by a factor.
 fn model(name: &str, friction: f64) -> ModelArm {
     let arm = lwa4p::arm().unwrap();
-    let model = Model::derive(arm.clone()).unwrap();
-    let set = model.set(SetKind::Minimal).unwrap();
-    let all: Vec<f64> = lwa4p::links().iter().flat_map(|b| b.parameters()).collect();
-    let values = model.set_values(set, &all);
-    let parameters: Vec<Value> = set
-        .names()
-        .iter()
-        .zip(values)
-        .map(|(name, value)| json!({"name": name, "value": value, "std": 0.0, "relative_std": 0.0}))
-        .collect();
-    let laws: Vec<Value> = TABLE_2
-        .iter()
-        .enumerate()
-        .map(|(j, g)| {
-            json!({"joint": j + 1, "gamma1": friction * g[0], "gamma2": g[1], "gamma3": friction * g[2], "gamma4": g[3],
-                "gamma5": friction * g[4]})
-        })
-        .collect();
-    let text =
-        json!({"arm": arm.name, "set": "minimal", "parameters": parameters, "friction": laws}).to_string();
     let file = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("torque_mode_{name}.json"));
-    std::fs::write(&file, text).unwrap();
+    std::fs::write(&file, true_model(friction, json!([])).to_string()).unwrap();
     model_arm::read(&arm, &file, true).unwrap()
 }
 
