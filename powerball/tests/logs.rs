@@ -388,18 +388,6 @@ fn the_command_says_what_is_in_a_file() {
     assert_eq!(powerball(&["log", "nowhere.mcap"]).status.code(), Some(2));
 }
 
-/// With the feature: tests/remote.rs.
-#[cfg(not(feature = "remote"))]
-#[test]
-fn an_address_is_refused_by_a_command_that_reads_none() {
-    for address in ["s3://logs/day/log.csv", "http://127.0.0.1:9/log.mcap"] {
-        let run = powerball(&["log", address]);
-        let complaint = String::from_utf8_lossy(&run.stderr).into_owned();
-        assert_eq!(run.status.code(), Some(2), "{complaint}");
-        assert!(complaint.contains(address) && complaint.contains("the feature `remote`"), "{complaint}");
-    }
-}
-
 /// With and without an arm: what is in a file as a page with figures, and as JSON beside it.
 #[test]
 fn a_look_into_a_log_is_a_page_with_figures() {

@@ -8,6 +8,7 @@
 //! Also here: logs as files.
 
 use super::Log;
+use crate::logs::tables::NOT_WRITTEN;
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
@@ -41,15 +42,13 @@ impl LogFile {
     /// As [`LogFile::create`].
     pub fn create_for(path: &Path, joints: &[String]) -> io::Result<(LogFile, Option<PathBuf>)> {
         let made = Made::of(path);
-        let absent = match made {
-            Some(Made::Parquet) if !cfg!(feature = "parquet") => Some("parquet"),
-            Some(Made::Mcap) if !cfg!(feature = "mcap") => Some("mcap"),
-            _ => None,
+        let built = match made {
+            Some(Made::Parquet) => cfg!(feature = "parquet"),
+            Some(Made::Mcap) => cfg!(feature = "mcap"),
+            None => true,
         };
-        if let Some(feature) = absent {
-            return Err(io::Error::other(format!(
-                "this build does not write it: enable the feature `{feature}`"
-            )));
+        if !built {
+            return Err(io::Error::other(NOT_WRITTEN));
         }
         let lines = if made.is_some() { with_more(path, ".csv") } else { path.to_path_buf() };
         let recovered = if made.is_some() { recover(path, &lines, joints)? } else { None };
@@ -125,7 +124,7 @@ impl Made {
             #[cfg(not(feature = "mcap"))]
             Made::Mcap => {
                 let _ = (joints, target);
-                Err(io::Error::other("this build does not write it: enable the feature `mcap`"))
+                Err(io::Error::other(NOT_WRITTEN))
             }
         }
     }

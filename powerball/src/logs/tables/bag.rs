@@ -166,7 +166,7 @@ macro_rules! reader {
 
         #[cfg(not(feature = $feature))]
         fn $function(_: &Path, _: &mut Topics) -> io::Result<Vec<String>> {
-            Err(io::Error::other(concat!("this build does not read it: enable the feature `", $feature, "`")))
+            Err(io::Error::other(super::NOT_READ))
         }
     };
 }

@@ -181,7 +181,7 @@ pub(crate) fn read(_: std::fs::File, file: &str, _: &mut impl RowSink) -> Result
         file: file.to_string(),
         line: None,
         quantity: "Parquet".into(),
-        message: "this build reads CSV alone: enable the feature `parquet`".into(),
+        message: super::NOT_READ.into(),
     }]))
 }
 
@@ -250,5 +250,5 @@ pub(crate) fn from_csv(csv: impl std::io::Read, out: impl std::io::Write + Send)
 /// CSV lines as Parquet columns.
 #[cfg(not(feature = "parquet"))]
 pub(crate) fn from_csv(_: impl std::io::Read, _: impl std::io::Write + Send) -> std::io::Result<usize> {
-    Err(std::io::Error::other("this build writes CSV alone: enable the feature `parquet`"))
+    Err(std::io::Error::other(super::NOT_WRITTEN))
 }

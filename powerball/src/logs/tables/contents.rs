@@ -2,10 +2,9 @@
 //!
 //! Also here: what is odd about a log, and why one cannot be used.
 
+use super::NOT_READ;
 #[cfg(feature = "topics")]
 use super::bag;
-#[cfg(feature = "parquet")]
-use super::lerobot;
 use super::place::Place;
 use super::table::Table;
 use super::{columnar, text};
@@ -13,7 +12,7 @@ use serde::Serialize;
 use std::fmt;
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The formats that are told apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -86,8 +85,7 @@ impl Format {
     pub fn of_file(path: &Path) -> Result<Format, LogError> {
         let failed =
             |e: std::io::Error| LogError::of_file(&shown(path), "file", format!("cannot be read: {e}"));
-        #[cfg(feature = "parquet")]
-        if lerobot::folder(path).is_some() {
+        if dataset(path).is_some() {
             return Ok(Format::LeRobot);
         }
         #[cfg(feature = "topics")]
@@ -117,6 +115,15 @@ impl Format {
     pub fn has_topics(self) -> bool {
         matches!(self, Format::Mcap | Format::Rosbag | Format::Bag)
     }
+}
+
+/// What describes a dataset of LeRobot's, within its folder.
+pub(super) const INFO: &str = "meta/info.json";
+
+/// The folder of such a dataset, where a path is one or its `meta/info.json`.
+pub(super) fn dataset(path: &Path) -> Option<PathBuf> {
+    let folder = if path.ends_with(INFO) { path.ancestors().nth(2)? } else { path };
+    folder.join(INFO).is_file().then(|| folder.to_path_buf())
 }
 
 /// The topics that are read, where not all are.
@@ -178,7 +185,6 @@ pub(crate) fn read_topics(place: &mut Place, file: &str, only: Only<'_>) -> Resu
 #[cfg(feature = "parquet")]
 pub(crate) use super::lerobot::read as read_dataset;
 
-/// Without Parquet no folder is called one.
 #[cfg(not(feature = "parquet"))]
 pub(crate) fn read_dataset(
     _: &Path,
@@ -186,7 +192,7 @@ pub(crate) fn read_dataset(
     _: &mut impl super::RowSink,
     _: &mut Vec<Finding>,
 ) -> Result<(), LogError> {
-    Err(LogError::of_file(file, "LeRobot", "this build does not read it: enable the feature `parquet`"))
+    Err(LogError::of_file(file, "LeRobot", NOT_READ))
 }
 
 #[cfg(feature = "topics")]
@@ -216,8 +222,7 @@ fn topic_tables(
     file: &str,
     _: &mut Vec<Finding>,
 ) -> Result<Vec<Table>, LogError> {
-    let message = "this build does not read it: enable the feature `mcap`, `rosbag` or `bag1`";
-    Err(LogError::of_file(file, "topics", message))
+    Err(LogError::of_file(file, "topics", NOT_READ))
 }
 
 /// Files of arrays: what each kind of them is called, the feature that reads it, and its reader.
@@ -235,8 +240,7 @@ macro_rules! arrays {
 
         #[cfg(not(feature = $feature))]
         fn $function(_: &Path, file: &str, _: &mut Vec<Finding>) -> Result<Vec<Table>, LogError> {
-            let message = concat!("this build does not read it: enable the feature `", $feature, "`");
-            Err(LogError::of_file(file, $name, message))
+            Err(LogError::of_file(file, $name, NOT_READ))
         }
     };
 }

@@ -9,24 +9,16 @@
 //! each other, some seconds apart, so that they are pieces of one log.
 
 use super::columnar;
-use super::contents::{Finding, Format, LogError};
+use super::contents::{Finding, Format, INFO, LogError, dataset};
 use super::table::RowSink;
 use serde_json::Value;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// What describes a dataset, within its folder.
-const INFO: &str = "meta/info.json";
 /// From the end of an episode to the next one, s: a gap at any rate of samples that a log may have.
 const BETWEEN: f64 = 10.0;
 /// Folders above a file in which a dataset's description is looked for: data/chunk-000/ is two below it.
 const ABOVE: usize = 4;
-
-/// The folder of a dataset, where a path is one or its `meta/info.json`.
-pub(super) fn folder(path: &Path) -> Option<PathBuf> {
-    let folder = if path.ends_with(INFO) { path.ancestors().nth(2)? } else { path };
-    folder.join(INFO).is_file().then(|| folder.to_path_buf())
-}
 
 /// Hands the rows of all its episodes over, numbered through its files.
 pub(crate) fn read(
@@ -36,7 +28,7 @@ pub(crate) fn read(
     notes: &mut Vec<Finding>,
 ) -> Result<(), LogError> {
     let error = |what: String| LogError::of_file(file, "LeRobot", what);
-    let folder = folder(path).ok_or_else(|| error(format!("has no {INFO}")))?;
+    let folder = dataset(path).ok_or_else(|| error(format!("has no {INFO}")))?;
     let text = std::fs::read(folder.join(INFO)).map_err(|e| error(format!("{INFO} cannot be read: {e}")))?;
     let info: Value = serde_json::from_slice(&text).map_err(|e| error(format!("{INFO} is no JSON: {e}")))?;
     let files = numbered(&folder.join("data")).map_err(|e| error(format!("data/ cannot be read: {e}")))?;

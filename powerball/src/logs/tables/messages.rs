@@ -1,7 +1,7 @@
 //! Messages of a bag as rows of tables, one table a topic.
 
 use super::cdr::Cdr;
-#[cfg(feature = "mcap")]
+#[cfg(feature = "protobuf")]
 use super::protobuf;
 use super::schema::{Bits, MOST, NAMES, Schema};
 use super::table::{Row, Table};
@@ -15,8 +15,11 @@ enum Reader {
     DynamicJointState,
     /// By the definition that the file has.
     Defined(Schema),
-    #[cfg(feature = "mcap")]
+    #[cfg(feature = "protobuf")]
     Protobuf(protobuf::Schema),
+    /// Protobuf in a build without it.
+    #[cfg(not(feature = "protobuf"))]
+    NotBuilt,
     Json,
     /// Counted, not read.
     Other,
@@ -57,10 +60,12 @@ impl Reader {
             ("sensor_msgs/JointState", "cdr" | "ros1") => Reader::JointState,
             ("control_msgs/DynamicJointState", "cdr" | "ros1") => Reader::DynamicJointState,
             (_, "cdr" | "ros1") => by_definition().map_or(Reader::Other, Reader::Defined),
-            #[cfg(feature = "mcap")]
+            #[cfg(feature = "protobuf")]
             (_, "protobuf") => {
                 protobuf::Schema::parse(kind, definition).map_or(Reader::Other, Reader::Protobuf)
             }
+            #[cfg(not(feature = "protobuf"))]
+            (_, "protobuf") => Reader::NotBuilt,
             (_, "json") => Reader::Json,
             _ => Reader::Other,
         }
@@ -145,8 +150,10 @@ impl Topics {
             Reader::JointState => cdr().and_then(|message| joint_state(message, &mut row)),
             Reader::DynamicJointState => cdr().and_then(|message| dynamic_joint_state(message, &mut row)),
             Reader::Defined(schema) => cdr().and_then(|mut message| schema.read(&mut message, &mut row)),
-            #[cfg(feature = "mcap")]
+            #[cfg(feature = "protobuf")]
             Reader::Protobuf(schema) => schema.read(message, &mut row),
+            #[cfg(not(feature = "protobuf"))]
+            Reader::NotBuilt => Err(super::NOT_READ.into()),
             Reader::Json => json(message, &mut row),
             Reader::Other => Ok(None),
         };

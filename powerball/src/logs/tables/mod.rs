@@ -31,7 +31,7 @@ mod npz;
 #[cfg(feature = "parquet")]
 mod numbers;
 mod place;
-#[cfg(feature = "mcap")]
+#[cfg(feature = "protobuf")]
 mod protobuf;
 #[cfg(feature = "remote")]
 mod remote;
@@ -41,6 +41,13 @@ mod rosbag;
 mod schema;
 mod table;
 pub(crate) mod text;
+
+/// Said of a format that this build leaves out; the command has few, which keeps it quick to build.
+pub(crate) const NOT_READ: &str =
+    "this build does not read it: build with `--features formats`, which reads every format";
+/// The same of a file that is to be written.
+pub(crate) const NOT_WRITTEN: &str =
+    "this build does not write it: build with `--features formats`, or name a .csv";
 
 pub use contents::{Contents, Finding, Format, LogError, read_contents};
 pub(crate) use contents::{read_dataset, read_topics};

@@ -45,7 +45,7 @@ impl Place {
 
     #[cfg(not(feature = "remote"))]
     fn at(address: &str) -> Result<Place, LogError> {
-        let message = "this build reads no addresses: fetch the file, or enable the feature `remote`";
+        let message = format!("fetch the file, or: {}", super::NOT_READ);
         Err(LogError::of_file(address, "address", message))
     }
 }
