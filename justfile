@@ -4,9 +4,9 @@
 default:
     @just --list
 
-# The tests of one room: a feature of powerball, or `none` for the controller's part. `just test bus sdo`: those named so.
+# The tests of one room, a folder of powerball/. `just test bus sdo`: those named so.
 test ROOM *TESTS:
-    .ci/room {{ROOM}} {{TESTS}}
+    cargo test -p powerball-{{ROOM}} --all-features --locked -- {{TESTS}}
 
 # What can be asked in minutes: formatting, spelling, licences, lints, each room alone.
 fast:

@@ -7,15 +7,24 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The crates whose order the page gives.
-const CRATES: [&str; 2] = ["dyngen", "powerball"];
+/// The crates whose order the page gives; cargo holds the order among them.
+const CRATES: [&str; 8] = [
+    "dyngen",
+    "powerball/controller",
+    "powerball/bus",
+    "powerball/logs",
+    "powerball/identification",
+    "powerball/explanation",
+    "powerball/virtual-arm",
+    "powerball/commands",
+];
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Places of a crate's sources in the order of the page: `logs/log` for the row of `powerball/src/logs/log/`, `model` for
-/// that of `dyngen/src/model.rs`. One row may name several; they stand in the order in which it names them.
+/// Places of a crate's sources in the order of the page: `log` for the row of `powerball/logs/src/log/`, `model` for
+/// that of `dyngen/src/model.rs`; empty for the row of a whole crate. One row may name several; they stand in the order in which it names them.
 fn order(page: &str, name: &str) -> Vec<String> {
     let rows = page.lines().filter(|line| line.starts_with('|'));
     let cells = rows.filter_map(|line| line.split('|').nth(1));
@@ -104,7 +113,7 @@ fn tree(text: &str, prefix: &mut Vec<String>, found: &mut Vec<Vec<String>>) -> u
 
 /// The place in the list that a module belongs to: the longest that it lies in.
 fn place(order: &[String], module: &[String]) -> Option<usize> {
-    (1..=module.len()).rev().find_map(|n| order.iter().position(|place| *place == module[..n].join("/")))
+    (0..=module.len()).rev().find_map(|n| order.iter().position(|place| *place == module[..n].join("/")))
 }
 
 #[test]
@@ -114,7 +123,7 @@ fn code_uses_what_stands_above_it_on_the_page() {
     for name in CRATES {
         let source = root().join(name).join("src");
         let order = order(&page, name);
-        assert!(order.len() > 5, "ARCHITECTURE.md lists {order:?} of {name}");
+        assert!(!order.is_empty(), "ARCHITECTURE.md lists nothing of {name}");
         for place in &order {
             let there = source.join(place).is_dir() || source.join(format!("{place}.rs")).is_file();
             assert!(there, "ARCHITECTURE.md names {name}/src/{place}, which is not there");
@@ -206,7 +215,7 @@ fn folders_do_not_use_each_other_in_a_circle() {
 /// The table of `explain/mod.rs` says who decides what in which order, and that nothing uses what stands below it.
 #[test]
 fn an_explanation_runs_in_the_order_of_its_table() {
-    let folder = root().join("powerball/src/explanation/explain");
+    let folder = root().join("powerball/explanation/src/explain");
     let page = fs::read_to_string(folder.join("mod.rs")).unwrap();
     let rows = page.lines().filter_map(|line| line.strip_prefix("//! |")?.split('|').next());
     let order: Vec<String> =

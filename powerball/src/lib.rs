@@ -1,8 +1,8 @@
 //! The runtime of a robot arm: friction and torque corrections on a controller, a CANopen driver, and the way
 //! from logs to a model that explains them.
 //!
-//! The crate is a house of a few rooms. A room uses the rooms above it in this list and never one below it;
-//! each has a feature of its own, so that nobody builds what he does not use.
+//! The crate is a house of a few rooms, each a package of its own (`powerball-controller` and so on). A room uses the rooms
+//! above it in this list and never one below it; each has a feature here, so that nobody builds what he does not use.
 //!
 //! | room | feature | `std` | who lives there |
 //! |---|---|---|---|
@@ -73,27 +73,25 @@
 //! }
 //! # assert!(torque.iter().all(|t| t.is_finite()));
 //! ```
-#![cfg_attr(not(any(feature = "std", test)), no_std)]
+#![no_std]
 
 #[cfg(feature = "driver")]
-pub mod bus;
+pub use powerball_bus as bus;
 #[cfg(feature = "demo")]
-pub mod commands;
-#[cfg(feature = "identify")]
-pub mod comparison;
-pub mod controller;
-#[cfg(feature = "explain")]
-pub mod explanation;
-#[cfg(feature = "identify")]
-pub mod identification;
-#[cfg(feature = "identify")]
-pub mod logs;
+pub use powerball_commands::commands;
 #[cfg(feature = "procedure")]
-pub mod procedure;
+pub use powerball_commands::procedure;
 #[cfg(feature = "report")]
-pub mod report;
+pub use powerball_commands::report;
+pub use powerball_controller as controller;
+#[cfg(feature = "explain")]
+pub use powerball_explanation as explanation;
+#[cfg(feature = "identify")]
+pub use powerball_identification::{self as identification, comparison};
+#[cfg(feature = "identify")]
+pub use powerball_logs as logs;
 #[cfg(feature = "virtual-arm")]
-pub mod virtual_arm;
+pub use powerball_virtual_arm as virtual_arm;
 
 #[cfg(feature = "identify")]
 pub use comparison::{CompareOptions, Comparison, Side, compare};

@@ -60,8 +60,15 @@ fn a_recording_in_a_format_that_is_left_out_does_not_begin() {
     let motion = folder.join("motion.csv");
     std::fs::write(&motion, "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n0.005,0,0,0,0,0,0\n").unwrap();
     let out = folder.join("log.parquet");
-    let run =
-        powerball(&["record", "--trajectory", motion.to_str().unwrap(), "--bus", "virtual", "--out", out.to_str().unwrap()]);
+    let run = powerball(&[
+        "record",
+        "--trajectory",
+        motion.to_str().unwrap(),
+        "--bus",
+        "virtual",
+        "--out",
+        out.to_str().unwrap(),
+    ]);
     let complaint = String::from_utf8_lossy(&run.stderr).into_owned();
     assert_eq!(run.status.code(), Some(2), "{complaint}");
     assert!(complaint.contains("`--features formats`"), "{complaint}");

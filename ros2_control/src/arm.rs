@@ -5,7 +5,7 @@ use powerball::bus::driver::{ControlMode, Driver, Phase, TorqueGuard};
 use powerball::bus::transport::{self, Bus, BusUrl, Master, Memory, Moment};
 use powerball::identification::excite::Masses;
 use powerball::identification::mounting::Mounting;
-use powerball::procedure::Envelope;
+use powerball::procedure::{Envelope, built_in_masses};
 use powerball::virtual_arm::{VirtualArm, lwa4p};
 use std::path::Path;
 
@@ -73,7 +73,7 @@ impl Arm {
         let arm = lwa4p::arm().map_err(|e| e.to_string())?;
         let masses = match values {
             Some(path) => Masses::read(path, &arm).map_err(|e| e.to_string())?,
-            None => lwa4p::masses(),
+            None => built_in_masses(),
         };
         let envelope =
             Envelope::<JOINTS>::of(&arm, &mounting, None, Some(&masses)).map_err(|e| e.to_string())?;

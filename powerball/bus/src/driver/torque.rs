@@ -1,0 +1,328 @@
+//! The torque that set-points ask of the joints, from a model of the arm: what no limit of one joint can see.
+//!
+//! Also here: what one joint was told last; how the joints are commanded.
+
+use super::cause::Rejection;
+use super::joint::Joint;
+use super::profile::Profile;
+use core::fmt;
+use powerball_controller::JointNumber;
+
+/// Inverse dynamics: what the joints need, N·m, for positions (rad), velocities (rad/s) and accelerations (rad/s²).
+type InverseDynamics<const N: usize> =
+    dyn Fn(&[f64; N], &[f64; N], &[f64; N]) -> [f64; N] + Send + Sync + 'static;
+
+/// A model of the arm's torque for the guard of set-points: its inverse dynamics, gravity and friction included.
+///
+/// A function of the arm's generated code, or a closure over one with identified parameters; the driver calls it
+/// once a cycle, so it must be quick, and on a controller it must not allocate.
+#[derive(Clone, Copy)]
+pub struct TorqueGuard<const N: usize> {
+    model: &'static InverseDynamics<N>,
+    margin: f64,
+}
+
+impl<const N: usize> TorqueGuard<N> {
+    /// Of an arm's inverse dynamics (rad, rad/s, rad/s² → N·m).
+    pub const fn new(inverse_dynamics: &'static InverseDynamics<N>) -> Self {
+        TorqueGuard { model: inverse_dynamics, margin: 0.0 }
+    }
+
+    /// The same where somebody pushes the arm in current mode, with up to this part of each joint's torque.
+    #[must_use]
+    pub const fn with_push(self, part: f64) -> Self {
+        TorqueGuard { margin: part, ..self }
+    }
+
+    /// That part.
+    pub(super) const fn margin(&self) -> f64 {
+        self.margin
+    }
+
+    /// N·m by joint.
+    pub fn torque(&self, q: &[f64; N], dq: &[f64; N], ddq: &[f64; N]) -> [f64; N] {
+        (self.model)(q, dq, ddq)
+    }
+
+    /// Whether the joints have the torque that `setpoints` ask of them after those that have left.
+    ///
+    /// Interpolated positions are looked at with the velocity and the acceleration of their differences, velocities
+    /// with theirs where the joints are, targets of profile position at rest there: the drive plans the way. A current
+    /// is a torque itself, and bounded as one.
+    pub(super) fn check(
+        &self,
+        profile: &Profile<N>,
+        mode: ControlMode,
+        joints: &[Joint; N],
+        setpoints: &[f64; N],
+    ) -> Result<(), Rejection> {
+        let period = profile.period_seconds();
+        let (mut q, mut dq, mut ddq) = (*setpoints, [0.0; N], [0.0; N]);
+        let places = q.iter_mut().zip(&mut dq).zip(&mut ddq);
+        for (((q, dq), ddq), joint) in places.zip(joints) {
+            match mode {
+                ControlMode::Current => return Ok(()),
+                ControlMode::ProfilePosition => {}
+                ControlMode::InterpolatedPosition => {
+                    *dq = (*q - joint.demand.last()) / period;
+                    *ddq = (*dq - joint.demand.velocity(period)) / period;
+                }
+                ControlMode::Velocity => {
+                    let velocity = core::mem::replace(q, joint.position);
+                    (*dq, *ddq) = (velocity, (velocity - joint.demand.last()) / period);
+                }
+            }
+        }
+        let torques = self.torque(&q, &dq, &ddq);
+        for (j, (torque, limits)) in torques.iter().zip(&profile.joints).enumerate() {
+            // A model that gives no number says nothing in favour of the set-point.
+            if torque.abs().partial_cmp(&limits.torque).is_none_or(core::cmp::Ordering::is_gt) {
+                return Err(Rejection::Torque(JointNumber::from_index(j), *torque, limits.torque));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<const N: usize> fmt::Debug for TorqueGuard<N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("TorqueGuard")
+    }
+}
+
+// What one joint was told last: the set-points that have left, newest first.
+
+/// So many set-points are kept. A drive follows its interpolation points some cycles late: the joint is where one
+/// of the last of them was.
+pub(super) const KEPT: usize = 8;
+
+/// The set-points of one joint that have left, in rad, rad/s or A.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Demand {
+    points: [f64; KEPT],
+}
+
+impl Demand {
+    /// Nothing but `value` for as long as is kept.
+    pub(super) const fn at_rest(value: f64) -> Demand {
+        Demand { points: [value; KEPT] }
+    }
+
+    /// The next set-point leaves.
+    pub(super) fn push(&mut self, value: f64) {
+        self.points.rotate_right(1);
+        if let Some(newest) = self.points.first_mut() {
+            *newest = value;
+        }
+    }
+
+    /// The last one.
+    pub(super) const fn last(&self) -> f64 {
+        self.points[0]
+    }
+
+    /// Velocity of the last step, per s of `period`.
+    pub(super) fn velocity(&self, period: f64) -> f64 {
+        (self.points[0] - self.points[1]) / period
+    }
+
+    /// Where positions go on to, for a cycle in which nothing new came: with the velocity and the acceleration that
+    /// they had, within the limits of both. Not back: what slows down comes to rest, and what rests stays. What
+    /// could not come to rest any more before the end of its range (`position`, rad) brakes.
+    pub(super) fn next(&self, period: f64, position: [f64; 2], velocity: f64, acceleration: f64) -> f64 {
+        let v = self.velocity(period);
+        let before = (self.points[1] - self.points[2]) / period;
+        let most = acceleration * period;
+        // Not `clamp`, which panics where a bound is no number.
+        let change = (v - before).max(-most).min(most);
+        let mut next = (v + change).max(-velocity).min(velocity);
+        let (last, [low, high]) = (self.points[0], position);
+        let rest = rest(last + next * period, next, acceleration);
+        if next > 0.0 && rest > high || next < 0.0 && rest < low {
+            next = v - v.max(-most).min(most);
+        }
+        let next = last + if next * v > 0.0 { next * period } else { 0.0 };
+        // Nothing outside its range goes further out.
+        next.max(low.min(last)).min(high.max(last))
+    }
+
+    /// How far `actual` is from where a drive with any delay up to [`KEPT`] cycles would be: from the range of the
+    /// last set-points. 0 within it, negative below it.
+    pub(super) fn error(&self, actual: f64) -> f64 {
+        let low = self.points.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = self.points.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        actual - actual.max(low).min(high)
+    }
+}
+
+/// Where a joint at `position` (rad) with `velocity` (rad/s) comes to rest that brakes with `acceleration` (rad/s²).
+pub(super) fn rest(position: f64, velocity: f64, acceleration: f64) -> f64 {
+    position + velocity * velocity.abs() / (2.0 * acceleration)
+}
+
+// How the joints are commanded.
+
+/// How the joints are commanded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ControlMode {
+    /// Profile position: the drive plans the way to a target (rad).
+    ProfilePosition,
+    /// Velocity (rad/s).
+    Velocity,
+    /// Interpolated position: one point (rad) each SYNC.
+    InterpolatedPosition,
+    /// Current (A).
+    Current,
+}
+
+impl ControlMode {
+    /// All of them.
+    pub const ALL: [ControlMode; 4] = [
+        ControlMode::ProfilePosition,
+        ControlMode::Velocity,
+        ControlMode::InterpolatedPosition,
+        ControlMode::Current,
+    ];
+
+    /// Whether set-points are positions.
+    pub const fn is_position(self) -> bool {
+        matches!(self, ControlMode::ProfilePosition | ControlMode::InterpolatedPosition)
+    }
+}
+
+impl fmt::Display for ControlMode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            ControlMode::ProfilePosition => "profile position",
+            ControlMode::Velocity => "velocity",
+            ControlMode::InterpolatedPosition => "interpolated position",
+            ControlMode::Current => "current",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lwa4p::LWA4P;
+    use super::*;
+    use crate::driver::torque::Demand;
+
+    /// A pendulum on joint 1 and nothing else: 10 N·m sin q, 2 N·m·s/rad, 4 kg·m².
+    static PENDULUM: TorqueGuard<6> = TorqueGuard::new(&|q, dq, ddq| {
+        [10.0 * q[0].sin() + 2.0 * dq[0] + 4.0 * ddq[0], 0.0, 0.0, 0.0, 0.0, 0.0]
+    });
+
+    fn arm(last: f64, before: f64, position: f64) -> [Joint; 6] {
+        let mut joints = LWA4P.joints.map(|joint| Joint::new(&joint, 1, 1));
+        joints[0].demand = Demand::at_rest(before);
+        joints[0].demand.push(last);
+        joints[0].position = position;
+        joints
+    }
+
+    fn judge(mode: ControlMode, joints: &[Joint; 6], value: f64, limit: f64) -> Option<f64> {
+        let mut profile = LWA4P;
+        profile.joints[0].torque = limit;
+        let mut setpoints = [0.0; 6];
+        setpoints[0] = value;
+        match PENDULUM.check(&profile, mode, joints, &setpoints) {
+            Ok(()) => None,
+            Err(Rejection::Torque(j, torque, reported)) => {
+                assert_eq!((j.index(), reported), (0, limit));
+                Some(torque)
+            }
+            Err(other) => panic!("{other}"),
+        }
+    }
+
+    /// Torques by hand: differences of positions, of velocities, and none.
+    #[test]
+    fn the_torque_is_that_of_the_motion_that_the_set_points_describe() {
+        let near = |reported: Option<f64>, expected: f64| {
+            let reported = reported.unwrap_or_else(|| panic!("{expected} N·m were let through"));
+            assert!((reported - expected).abs() < 1e-6, "{reported} {expected}");
+        };
+        let (q, v, a) = (0.3f64, 0.2, 3.0);
+        let (last, before) = (q - v * 0.005, q - 2.0 * v * 0.005 + a * 0.005 * 0.005);
+        let expected = 10.0 * q.sin() + 2.0 * v + 4.0 * a;
+        let joints = arm(last, before, 0.0);
+        near(judge(ControlMode::InterpolatedPosition, &joints, q, expected - 1e-3), expected);
+        assert_eq!(judge(ControlMode::InterpolatedPosition, &joints, q, expected + 1e-3), None);
+        let joints = arm(v - a * 0.005, 0.0, q);
+        near(judge(ControlMode::Velocity, &joints, v, expected - 1e-3), expected);
+        assert_eq!(judge(ControlMode::Velocity, &joints, v, expected + 1e-3), None);
+        let joints = arm(0.0, 0.0, 0.0);
+        near(judge(ControlMode::ProfilePosition, &joints, q, 1.0), 10.0 * q.sin());
+        assert_eq!(judge(ControlMode::Current, &joints, 5.0, 1e-9), None);
+    }
+
+    #[test]
+    fn a_model_without_an_answer_lets_nothing_through() {
+        let model: TorqueGuard<6> = TorqueGuard::new(&|_, _, _| [f64::NAN; 6]);
+        let judged = model.check(&LWA4P, ControlMode::InterpolatedPosition, &arm(0.0, 0.0, 0.0), &[0.0; 6]);
+        assert!(matches!(judged, Err(Rejection::Torque(..))));
+    }
+}
+
+#[cfg(test)]
+mod demand_tests {
+    use super::*;
+
+    const WIDE: [f64; 2] = [-10.0, 10.0];
+
+    /// Without any new set-point a joint that is on its way to the end of its range comes to rest before it, and never
+    /// brakes harder than it may.
+    #[test]
+    fn what_goes_on_comes_to_rest_within_its_range() {
+        let (period, acceleration) = (0.005, 4.0);
+        for velocity in [0.02, 0.3, 1.2] {
+            for side in [1.0, -1.0] {
+                let mut demand = Demand::at_rest(0.0);
+                let way = rest(0.0, velocity, acceleration) + 0.01;
+                (0..KEPT).rev().for_each(|k| demand.push(side * (1.0 - way - velocity * period * k as f64)));
+                let mut v = side * velocity;
+                for _ in 0..400 {
+                    demand.push(demand.next(period, [-1.0, 1.0], 1.2, acceleration));
+                    let now = demand.velocity(period);
+                    assert!((now - v).abs() <= acceleration * period * (1.0 + 1e-6), "{v} {now}");
+                    v = now;
+                }
+                assert!(
+                    v.abs() < 1e-9 && (0.95..=1.0).contains(&(side * demand.last())),
+                    "{v} {}",
+                    demand.last()
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_missed_goes_on_as_it_went() {
+        let period = 0.005;
+        let mut demand = Demand::at_rest(0.0);
+        let path = |k: i32| 0.5 * 2.0 * (period * f64::from(k)).powi(2);
+        (1..=20).for_each(|k| demand.push(path(k)));
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
+        near(demand.next(period, WIDE, 1.0, 4.0), path(21));
+        // Within both limits, and not back.
+        near(demand.next(period, WIDE, 0.1, 4.0), path(20) + 0.1 * period);
+        near(demand.next(period, WIDE, 1.0, 0.0), path(20) + demand.velocity(period) * period);
+        let mut slowing = Demand::at_rest(0.0);
+        [0.0001, 0.00011].into_iter().for_each(|q| slowing.push(q));
+        near(slowing.next(period, WIDE, 1.0, 100.0), 0.00011);
+        near(Demand::at_rest(0.3).next(period, WIDE, 1.0, 4.0), 0.3);
+    }
+
+    #[test]
+    fn a_late_follower_has_no_error_and_a_stuck_one_has_all_of_it() {
+        let mut demand = Demand::at_rest(0.0);
+        for k in 1..=20 {
+            demand.push(0.01 * f64::from(k));
+        }
+        assert_eq!(demand.last(), 0.2);
+        // Three cycles late, and ahead or behind by more than what is kept.
+        assert_eq!(demand.error(0.17), 0.0);
+        assert!((demand.error(0.25) - 0.05).abs() < 1e-12);
+        assert!((demand.error(0.0) + 0.13).abs() < 1e-12);
+    }
+}

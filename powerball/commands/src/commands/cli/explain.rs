@@ -1,0 +1,475 @@
+//! `powerball explain`: the residual loop, from logs to explained.json and report.html.
+//!
+//! Also here: what `explain` prints.
+
+use super::Failure;
+use super::bus::{Consent, Where, virtual_bus};
+use super::inputs::{Inputs, recorded};
+use super::output::{self, Accept, Progress, Verbosity, notes};
+use crate::procedure::{Envelope, RecordError, record};
+use crate::report;
+use crate::report::explained::{change, nothing_named};
+use crate::report::number;
+use clap::Args;
+use dyngen::Arm;
+use powerball_bus::driver::lwa4p::LWA4P;
+use powerball_bus::transport::{Bus, BusUrl};
+use powerball_controller::JointNumber;
+use powerball_explanation::experiment::{self, TRAJECTORY};
+use powerball_explanation::explain::{
+    Correction, Explained, FalsePositives, NamedEffect, Rival, State, Unattributed, Verdict,
+};
+use powerball_explanation::torque_model::TorqueModel;
+use powerball_explanation::{ExplainError, ExplainOptions, Prepared};
+use powerball_identification::mounting::Mounting;
+use powerball_logs as logs;
+use powerball_logs::log::{Log, read_logs};
+use powerball_logs::motion::Motion;
+use powerball_virtual_arm::Undeclared;
+use std::path::{Path, PathBuf};
+
+/// Said where an experiment has nothing to tell apart.
+const NOTHING_OPEN: &str = "--experiment: nothing was recorded: these logs leave no names open that a path \
+    within the arm file's limits could tell apart";
+
+/// Find, name and add what the model lacks on logs; every addition is judged on another path.
+///
+/// Writes explained.json, report.html, and model.json: the model with what was named, for `powerball
+/// generate`, `verify` and the next `identify` or `explain`. Where two names fit equally well, also
+/// next_experiment.csv: the trajectory on which they differ most. With --experiment THE ARM MOVES along it.
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Example:\n  powerball explain --arm arm.toml --log a.csv b.csv c.csv --validate d.csv \
+        --out result\n\n\
+    On the virtual arm, from logs to a decision between two names that fit alike:\n  \
+    powerball demo --effect asymmetry --seed 3 --out demo\n  \
+    powerball explain --arm demo/arm.toml --log demo/fit_*.csv --validate demo/held_out_*.csv --out again \
+    --experiment"
+)]
+pub(crate) struct Explain {
+    #[command(flatten)]
+    inputs: Inputs,
+    /// Logs of another path, on which additions must hold.
+    #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
+    validate: Vec<PathBuf>,
+    /// What is known already: model.json of an earlier `powerball explain` for the same arm file. It is taken
+    /// out of the logs as it stands; what is found comes to it.
+    #[arg(long, value_name = "FILE.json")]
+    model: Option<PathBuf>,
+    /// Where two names fit equally well, record the experiment that tells them apart, and explain again with
+    /// its log.
+    #[arg(long)]
+    experiment: bool,
+    /// Print how long each phase took, on standard error.
+    #[arg(long)]
+    timings: bool,
+    #[command(flatten)]
+    accept: Accept,
+    /// Where something stays without a name, fit a bounded curve of the one or two signals that it depends on
+    /// most; kept where errors fall that it was not fitted to.
+    #[arg(long)]
+    correct_unattributed: bool,
+    /// The bus that the arm of the experiment is on.
+    #[arg(long, value_name = "URL", default_value = "virtual", requires = "experiment")]
+    bus: BusUrl,
+    /// What is undeclared in the virtual arm, where it is on --bus virtual: as `powerball demo` writes it;
+    /// without, the file virtual_arm.json beside the arm file.
+    #[arg(long, value_name = "FILE", requires = "experiment")]
+    plant: Option<PathBuf>,
+    #[command(flatten)]
+    consent: Consent,
+}
+
+impl Explain {
+    pub(crate) fn run(self, verbosity: Verbosity) -> Result<(), Failure> {
+        let progress = Progress::timed(self.timings);
+        let experiment = if self.experiment { Some(self.arm()?) } else { None };
+        let arm = Arm::read(&self.inputs.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let known = self.model.as_deref().map(TorqueModel::read).transpose();
+        let known = known.map_err(|e| Failure::Unusable(e.to_string()))?;
+        let mut recorded = recorded(&self.inputs, &self.validate, &arm, &progress)?;
+        let say = |what: &str| progress.say(what);
+        let options = ExplainOptions {
+            known,
+            correct_unattributed: self.correct_unattributed,
+            progress: logs::Progress::to(&say),
+            ..ExplainOptions::default()
+        };
+        let refused = |e| self.failure(&e);
+        let prepared = Prepared::new(&arm, &recorded.fit, &recorded.validate, &options).map_err(refused)?;
+        let (mut explained, motion) = prepared.explained(&options).map_err(refused)?;
+        self.write_trajectory(motion.as_ref())?;
+        match (experiment, motion) {
+            (Some((bus, note)), Some(motion)) => {
+                progress.say("recording the experiment");
+                let (new, notes) = self.recorded(&motion, bus, &arm)?;
+                recorded.warnings.extend(notes.into_iter().chain(note));
+                let old = (prepared.logs.as_slice(), prepared.validate.as_slice());
+                for new in prepared.without_known(new) {
+                    explained =
+                        experiment::learn(&prepared.body, old, new, &explained, &options).map_err(refused)?;
+                }
+                // What is still open may ask for another experiment.
+                let next = experiment::propose(&prepared.body, &mut explained, &options);
+                self.write_trajectory(next.as_ref())?;
+            }
+            (Some(_), None) => recorded.warnings.push(NOTHING_OPEN.to_string()),
+            (None, _) => {}
+        }
+        explained.warnings.splice(0..0, recorded.warnings);
+        progress.say("writing");
+        self.write(&prepared.with_known(explained), verbosity)
+    }
+
+    /// Writes the trajectory of the experiment that an explanation asks for.
+    fn write_trajectory(&self, motion: Option<&Motion>) -> Result<(), Failure> {
+        let Some(motion) = motion else { return Ok(()) };
+        output::write(&self.inputs.out, TRAJECTORY, motion.to_csv().as_bytes())
+    }
+
+    /// Writes and prints the result.
+    fn write(&self, explained: &Explained, verbosity: Verbosity) -> Result<(), Failure> {
+        let files = report::explained::files(explained).map_err(Failure::Refused)?;
+        files.write(&self.inputs.out).map_err(Failure::Unusable)?;
+        let (arm, out) = (&self.inputs.arm, &self.inputs.out);
+        match (self.inputs.json, verbosity) {
+            (true, _) => output::print(&files.first()),
+            (_, Verbosity { quiet: true, .. }) => {}
+            (_, Verbosity { verbose: true, .. }) => output::print(&everything(explained, arm, out)),
+            _ => output::print(&summary(explained, arm, out)),
+        }
+        self.accept.judge(explained.conventions.as_ref(), &explained.useless_joints())
+    }
+
+    /// Why there is no explanation: a known model that cannot be used is a wrong input.
+    fn failure(&self, e: &ExplainError) -> Failure {
+        match (e, &self.model) {
+            (ExplainError::Changes(_) | ExplainError::Known(_), Some(file)) => {
+                Failure::Unusable(format!("{}: {e}", file.display()))
+            }
+            _ => Failure::Refused(e.to_string()),
+        }
+    }
+}
+
+impl Explain {
+    /// The bus of the experiment, opened before any work is done, and what there is to say of it.
+    fn arm(&self) -> Result<(Box<dyn Bus>, Option<String>), Failure> {
+        if self.bus != BusUrl::Virtual {
+            if self.plant.is_some() {
+                return Err(Failure::Unusable("--plant is for --bus virtual".to_string()));
+            }
+            return Ok((self.place().open()?, None));
+        }
+        let Some(file) = self.plant.clone().or_else(|| Undeclared::next_to(&self.inputs.arm)) else {
+            let note = "the experiment was recorded on the built-in virtual arm, which has no undeclared \
+                effect: it says \
+                        nothing of another arm; name that one's bus by --bus, or the virtual arm's file by \
+                        --plant";
+            return Ok((self.place().open()?, Some(note.to_string())));
+        };
+        let arm = Undeclared::read(&file).map_err(Failure::Unusable)?.arm([0.0; 6], 1, false);
+        let note = format!("the experiment was recorded on the virtual arm of {}", file.display());
+        Ok((virtual_bus(arm.map_err(|e| Failure::Refused(e.to_string()))?)?, Some(note)))
+    }
+
+    fn place(&self) -> Where {
+        Where { bus: self.bus.clone(), json: self.inputs.json }
+    }
+
+    /// Records the experiment and reads its log, with what is to be said of that.
+    fn recorded(
+        &self,
+        motion: &Motion,
+        bus: Box<dyn Bus>,
+        arm: &Arm,
+    ) -> Result<(Vec<Log>, Vec<String>), Failure> {
+        let file = self.inputs.out.join("experiment.csv");
+        self.record(motion, bus, arm, &file)?;
+        let (new, findings) = read_logs(&[&file], arm).map_err(|e| Failure::Refused(e.to_string()))?;
+        Ok((new, findings.iter().map(ToString::to_string).collect()))
+    }
+
+    fn record(&self, motion: &Motion, bus: Box<dyn Bus>, arm: &Arm, file: &Path) -> Result<(), Failure> {
+        if motion.dof() != LWA4P.joints.len() {
+            return Err(Failure::Unusable(format!(
+                "--experiment: the driver's arm has {} joints, the arm file has {}; {TRAJECTORY} is written, \
+                    record it with the \
+                 arm's own driver",
+                LWA4P.joints.len(),
+                motion.dof()
+            )));
+        }
+        // Nothing stands around a simulated arm.
+        let envelope = match self.bus {
+            BusUrl::Virtual => Envelope::new(|_| None),
+            _ => Envelope::of(arm, &Mounting::Filed, None, None)
+                .map_err(|e| Failure::Unusable(format!("--experiment: {e}")))?,
+        };
+        let master = self.place().driver(bus, self.consent)?;
+        let mut log = std::fs::File::create(file)
+            .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", file.display())))?;
+        record(master, motion, envelope, output::live(), &mut log).map(|_| ()).map_err(|e| match e {
+            RecordError::Write(_) => Failure::Unusable(e.to_string()),
+            other => Failure::Refused(format!("the experiment was not recorded: {other}")),
+        })
+    }
+}
+
+// What `explain` prints: the answer first, in few lines; everything with `--verbose`.
+
+/// Lines of the answer; names that find no room are counted.
+const LINES: usize = 25;
+/// Laws without a name that have a line.
+const LAWS: usize = 2;
+/// Other names that a line lists.
+const RIVALS: usize = 3;
+/// Logs unlike the others that have a line.
+const LOGS: usize = 2;
+
+/// The answer in at most [`LINES`] lines for an arm of seven joints. `arm` and `out` are the arm file and the folder of the
+/// results, for the next command.
+pub(super) fn summary(explained: &Explained, arm: &Path, out: &Path) -> String {
+    let mut head: Vec<String> = wrong_columns(explained).into_iter().collect();
+    head.push(table(explained));
+    let mut tail: Vec<String> = Vec::new();
+    let laws = explained.laws.iter().take(LAWS);
+    tail.extend(laws.map(|law| format!("no name on joint {}: {}", list(&law.joints), law.sentence())));
+    tail.extend(explained.unattributed.as_ref().map(without_name));
+    tail.extend(odd_logs(explained));
+    if let Some(joints) = &explained.transmission {
+        let count = joints.len();
+        tail.push(format!(
+            "what is between the motors' torques and the links', {count} joints: --verbose or the page"
+        ));
+    }
+    tail.extend(decided(explained));
+    tail.extend(notes(explained.warnings.len()));
+    tail.push(format!("report: {}", out.join("report.html").display()));
+    tail.push(format!("next: {}", next(explained, arm, out)));
+    let used: usize = head.iter().chain(&tail).map(|line| line.lines().count()).sum();
+    // One line counts those that have no room.
+    head.extend(names(explained, LINES.saturating_sub(used + 1)));
+    head.extend(tail);
+    head.join("\n")
+}
+
+/// The same with all evidence, rivals and notes.
+pub(super) fn everything(explained: &Explained, arm: &Path, out: &Path) -> String {
+    let mut text = explained.conventions.as_ref().map_or_else(String::new, |c| format!("{}\n", c.verdict()));
+    let odd = explained.logs.iter().filter(|log| !log.like_the_others);
+    odd.for_each(|log| text.push_str(&format!("{}\n", log.sentence())));
+    for warning in &explained.warnings {
+        text.push_str(&format!("note: {warning}\n"));
+    }
+    text.push_str(&table(explained));
+    text.push('\n');
+    text.push_str(&explained.verdict.iter().filter(|v| !v.advice.is_empty()).map(advice).collect::<String>());
+    if explained.effects.is_empty() {
+        text.push_str(&format!("{}\n", nothing_named(explained)));
+    }
+    for effect in &explained.effects {
+        text.push_str(&evidence(effect, &explained.sliding));
+    }
+    for law in &explained.laws {
+        text.push_str(&format!("no name on joint {}: {}\n", list(&law.joints), law.sentence()));
+    }
+    if let Some(rest) = &explained.unattributed {
+        text.push_str(&format!("{}\n{}", without_name(rest), curves(rest)));
+    }
+    text.push_str(
+        &explained.transmission.iter().flatten().map(|joint| joint.sentence() + "\n").collect::<String>(),
+    );
+    text.push_str(&open_in_words(explained));
+    let FalsePositives { accepted, surrogates, without, .. } = &explained.false_positives;
+    text.push_str(&format!("{accepted} of {surrogates} effects that cannot be there were accepted"));
+    if *without > 0 {
+        text.push_str(&format!(" ({without} more draws were of constants that no shift in time changes)"));
+    }
+    text.push_str(&format!("\nreport: {}\n", out.join("report.html").display()));
+    text.push_str(&format!("next: {}", next(explained, arm, out)));
+    text
+}
+
+/// What the logs leave open and what an experiment decided, in words; empty where there is nothing of the kind.
+pub(super) fn open_in_words(explained: &Explained) -> String {
+    let mut text = decided(explained).map_or_else(String::new, |line| line + "\n");
+    if let Some(next) = &explained.next_experiment {
+        text.push_str(&format!("Next experiment: {}\n", next.advice));
+    }
+    text
+}
+
+/// What comes before everything: columns or an arm file that are not what they are said to be.
+fn wrong_columns(explained: &Explained) -> Option<String> {
+    explained.conventions.as_ref().filter(|c| c.is_remarkable()).map(|c| c.verdict())
+}
+
+/// A line a joint: its error before and after on the logs to judge on, the change, what is left, the verdict.
+fn table(explained: &Explained) -> String {
+    let mut text = String::from("joint        before         after  change, 95 % interval     left  verdict");
+    let (before, after) = (&explained.before.validate, &explained.after.validate);
+    for verdict in &explained.verdict {
+        let j = verdict.joint.index();
+        let unit = if explained.sliding.get(j).copied().unwrap_or(false) { "N" } else { "N·m" };
+        let cell = |rms: f64| format!("{} {unit}", number(rms));
+        let changed = explained.held_out_change.iter().find(|c| c.joint == verdict.joint);
+        text.push_str(&format!(
+            "\n{:>5}  {:>12}  {:>12}  {:>21}  {:>7}  {}",
+            verdict.joint.number(),
+            cell(before.rms[j]),
+            cell(after.rms[j]),
+            changed.map_or_else(String::new, change),
+            if verdict.left.is_nan() { "–".to_string() } else { format!("{:.1} %", 100.0 * verdict.left) },
+            verdict.state
+        ));
+    }
+    text
+}
+
+/// One line a name, of so many at most: its joints, size, probability and what it was not.
+fn names(explained: &Explained, most: usize) -> Vec<String> {
+    if explained.effects.is_empty() {
+        return vec![nothing_named(explained).to_string()];
+    }
+    let line = |effect: &NamedEffect| {
+        format!(
+            "{} on {}: {}; right in {:.0} of 100{}{}",
+            effect.effect,
+            on(&effect.joints, explained.verdict.len()),
+            effect.size(&explained.sliding),
+            100.0 * effect.probability,
+            in_logs(effect),
+            not(effect)
+        )
+    };
+    let mut lines: Vec<String> = explained.effects.iter().take(most).map(line).collect();
+    let more: Vec<&str> = explained.effects.iter().skip(most).map(|effect| effect.effect.as_str()).collect();
+    if !more.is_empty() {
+        lines.push(format!("and {} more: {}", more.len(), more.join(", ")));
+    }
+    lines
+}
+
+fn in_logs(effect: &NamedEffect) -> String {
+    match effect.logs.as_slice() {
+        [] => String::new(),
+        [one] => format!(
+            "; in {}",
+            Path::new(one).file_name().map_or(one.as_str(), |name| name.to_str().unwrap_or(one))
+        ),
+        several => format!("; in {} of the logs", several.len()),
+    }
+}
+
+fn not(effect: &NamedEffect) -> String {
+    let (alike, others): (Vec<_>, Vec<_>) = effect.rivals.iter().partition(|rival| rival.alike);
+    let names = |of: &[&Rival], between: &str| {
+        of.iter().take(RIVALS).map(|rival| rival.effect.clone()).collect::<Vec<_>>().join(between)
+    };
+    let mut text = String::new();
+    if !alike.is_empty() {
+        text.push_str(&format!("; or {}, which fits as well", names(&alike, " or ")));
+    }
+    if !others.is_empty() {
+        text.push_str(&format!("; not {}", names(&others, ", ")));
+    }
+    text
+}
+
+fn without_name(rest: &Unattributed) -> String {
+    let signals: Vec<&str> = rest.depends_on.iter().take(3).map(String::as_str).collect();
+    format!(
+        "without a name: what is left of joint {}; it depends on {}",
+        list(&rest.joints),
+        signals.join(", ")
+    )
+}
+
+fn odd_logs(explained: &Explained) -> Vec<String> {
+    let odd: Vec<String> =
+        explained.logs.iter().filter(|log| !log.like_the_others).map(|log| log.sentence()).collect();
+    let mut lines: Vec<String> = odd.iter().take(LOGS).cloned().collect();
+    if odd.len() > LOGS {
+        lines.push(format!("{} more logs are unlike the others", odd.len() - LOGS));
+    }
+    lines
+}
+
+fn decided(explained: &Explained) -> Option<String> {
+    let experiment = explained.experiment.as_ref()?;
+    let why = &experiment.why;
+    Some(match experiment.decided {
+        Some(name) => format!("The experiment decides for {name}: {why}"),
+        None => format!("The experiment does not decide: {why}"),
+    })
+}
+
+/// What to do next.
+fn next(explained: &Explained, arm: &Path, out: &Path) -> String {
+    if let Some(experiment) = &explained.next_experiment {
+        return experiment.advice.clone();
+    }
+    let open = explained.verdict.iter().filter(|v| v.state != State::Explained && !v.advice.is_empty());
+    match open.max_by(|a, b| a.left.total_cmp(&b.left)) {
+        Some(worst) => format!("joint {}: {}", worst.joint, worst.advice),
+        None => format!(
+            "powerball generate --arm {} --model {} --output model.rs",
+            arm.display(),
+            out.join("model.json").display()
+        ),
+    }
+}
+
+fn advice(verdict: &Verdict) -> String {
+    format!("joint {}: {}\n", verdict.joint, verdict.advice)
+}
+
+fn evidence(effect: &NamedEffect, sliding: &[bool]) -> String {
+    let mut text = format!(
+        "{} on joint {}: {}\n  p = {:.1e}, evidence {:.2} times that of the next name, {:.0} % of the excess over noise left, \
+         right in {:.0} of 100\n",
+        effect.effect,
+        list(&effect.joints),
+        effect.size(sliding),
+        effect.p_value,
+        effect.margin,
+        100.0 * effect.leftover,
+        100.0 * effect.probability
+    );
+    for rival in &effect.rivals {
+        text.push_str(&format!("  not {}: {}\n", rival.effect, rival.why_not));
+    }
+    text
+}
+
+fn curves(rest: &Unattributed) -> String {
+    let Some(kept) = &rest.correction else { return String::new() };
+    if kept.is_empty() {
+        return "  no curve of these signals lowers held-out errors: none is kept\n".to_string();
+    }
+    let one = |c: &Correction| {
+        let signals: Vec<&str> = c.curves.iter().map(|curve| curve.signal.as_str()).collect();
+        format!(
+            "  a curve of {} within ±{:.2} N·m lowers the held-out error of joint {} from {:.4} to {:.4} N·m\n",
+            signals.join(" and "),
+            c.limit,
+            c.joint,
+            c.rms_before,
+            c.rms_after
+        )
+    };
+    kept.iter().map(one).collect()
+}
+
+fn on(joints: &[JointNumber], dof: usize) -> String {
+    match joints {
+        [one] => format!("joint {one}"),
+        all if all.len() == dof => "all joints".to_string(),
+        several => format!("joints {}", list(several)),
+    }
+}
+
+fn list(joints: &[JointNumber]) -> String {
+    joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}

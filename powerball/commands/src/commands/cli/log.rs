@@ -1,0 +1,261 @@
+//! `powerball log`: what is in a file and what it is taken to be.
+
+use super::inputs::MapArgument;
+use super::{Failure, output};
+use crate::report::inspected;
+use clap::{Args, ValueEnum};
+use dyngen::Arm;
+use powerball_explanation::torque_model::ModelFile;
+use powerball_identification::{Source, VerifyOptions, verify};
+use powerball_logs::log::{Inspected, InspectedTable, Log, inspect};
+use powerball_logs::tables::{JointState, McapWriter, layouts};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Show what is in log files and what they are taken to be: topics, columns, units, rates, gaps, doubts;
+/// with --out as a page with figures.
+///
+/// CSV, Parquet, LeRobot datasets, MCAP, bags of ROS 1 and 2 (also their folders), npz, npy, mat and HDF5. With an arm also the log that `identify` would read. Exit
+/// code 1 where a file is no log of that arm.
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Examples:\n  powerball log recording.mcap --out looked\n  powerball log bag_0.db3 --arm arm.toml --map \
+        'joints = [\"shoulder_pan_joint\", \"shoulder_lift_joint\"]'\n  powerball log run.csv --arm arm.toml --model \
+        result/identified.json --to mcap -o run.mcap"
+)]
+pub(crate) struct LogCommand {
+    /// The files.
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    map: MapArgument,
+    /// The arm file (TOML) whose logs they are.
+    #[arg(long, value_name = "ARM.toml")]
+    arm: Option<PathBuf>,
+    /// Write the log that was found as another file, in SI units and under plain names; needs --arm.
+    #[arg(long, value_enum, value_name = "FORMAT", requires_all = ["arm", "out"])]
+    to: Option<Target>,
+    /// A folder for report.html, the same with figures, and log.json; with --to the file to write.
+    #[arg(short, long, value_name = "OUT")]
+    out: Option<PathBuf>,
+    /// A model, identified.json or model.json: an MCAP then has measured, predicted and residual torque of
+    /// each joint beside each other, in the band of the fit.
+    #[arg(long, value_name = "FILE.json", requires = "to")]
+    model: Option<PathBuf>,
+    /// Print what was found as one JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Formats that are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Target {
+    Mcap,
+    Parquet,
+    Csv,
+}
+
+/// What was found.
+#[derive(Serialize)]
+struct Written {
+    files: Vec<Inspected>,
+}
+
+impl LogCommand {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let unusable = |e: &dyn std::fmt::Display| Failure::Unusable(e.to_string());
+        let arm = self.arm.as_deref().map(Arm::read).transpose().map_err(|e| unusable(&e))?;
+        let map = self.map.read()?;
+        let inspected =
+            self.files.iter().map(|file| inspect(file, &map, arm.as_ref()).map_err(|e| unusable(&e)));
+        let files = inspected.collect::<Result<Vec<_>, _>>()?;
+        match (&self.out, self.to) {
+            (Some(folder), None) => {
+                inspected::files(&files).and_then(|page| page.write(folder)).map_err(Failure::Unusable)?;
+            }
+            _ => self.write(&files, arm.as_ref())?,
+        }
+        let refused: Vec<String> = files.iter().flat_map(|file| file.refused.clone()).collect();
+        if self.json {
+            output::print(&output::json(&Written { files })?);
+        } else {
+            files.iter().for_each(|file| output::print(&text(file)));
+        }
+        if refused.is_empty() { Ok(()) } else { Err(Failure::Refused(refused.join("\n"))) }
+    }
+
+    /// The log as another file, where that is asked for.
+    fn write(&self, files: &[Inspected], arm: Option<&Arm>) -> Result<(), Failure> {
+        let (Some(to), Some(out), Some(arm)) = (self.to, &self.out, arm) else { return Ok(()) };
+        let unusable = |what: &str| Err(Failure::Unusable(format!("{}: {what}", out.display())));
+        let [file] = files else { return unusable("holds one log: give one file") };
+        let ending = out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        match to {
+            Target::Mcap if ending != "mcap" => {
+                return unusable("--to mcap writes a file that ends in .mcap");
+            }
+            Target::Parquet if ending != "parquet" => {
+                return unusable("--to parquet writes one that ends in .parquet");
+            }
+            Target::Csv if ["mcap", "parquet"].contains(&ending.as_str()) => {
+                return unusable("--to csv writes a file that ends in .csv");
+            }
+            Target::Parquet | Target::Csv if self.model.is_some() => {
+                return unusable("with --model an MCAP is written: --to mcap");
+            }
+            _ => {}
+        }
+        match &file.log {
+            Some(log) => write(log, arm, self.model.as_deref(), out),
+            // Why it is none is told below.
+            None => Ok(()),
+        }
+    }
+}
+
+fn text(file: &Inspected) -> String {
+    let format = serde_json::to_value(file.format).ok().and_then(|f| f.as_str().map(str::to_string));
+    let mut lines = vec![format!("{}: {}", file.file, format.unwrap_or_default())];
+    for table in &file.tables {
+        table_lines(table, &mut lines);
+    }
+    for pair in &file.alignment {
+        let a = pair.alignment;
+        lines.push(format!(
+            "  {} and {} overlap for {:.2} s; their samples are {:.1} ms apart (median), {:.1} ms at most",
+            pair.a,
+            pair.b,
+            a.overlap,
+            1e3 * a.median,
+            1e3 * a.largest
+        ));
+    }
+    if let Some(log) = &file.taken_as {
+        let with = if log.motor { ", with torques on the motors' side" } else { "" };
+        lines.push(format!(
+            "  a log of {}: {} samples in {:.2} s, {} without a gap{with}",
+            log.arm,
+            log.samples,
+            log.duration,
+            if log.pieces == 1 { "one piece".to_string() } else { format!("{} pieces", log.pieces) }
+        ));
+        for (j, (q, tau)) in log.positions.iter().zip(&log.torques).enumerate() {
+            lines.push(format!(
+                "    joint {}: q {:.3} to {:.3}, torque {:.3} to {:.3}",
+                j + 1,
+                q[0],
+                q[1],
+                tau[0],
+                tau[1]
+            ));
+        }
+    }
+    lines.extend(file.warnings.iter().map(|doubt| format!("  note: {doubt}")));
+    lines.join("\n")
+}
+
+fn table_lines(table: &InspectedTable, lines: &mut Vec<String>) {
+    let name = if table.name.is_empty() { String::new() } else { format!("{} ", table.name) };
+    let mut line = format!("  {name}({}): {} samples", table.kind, table.samples);
+    if let (Some(duration), Some(rate)) = (table.duration, table.rate) {
+        line.push_str(&format!(", {duration:.2} s, {rate:.1} Hz"));
+    }
+    if let Some(clock) = &table.clock {
+        line.push_str(&format!(", time: {clock}"));
+    }
+    lines.push(line);
+    if let Some(doubt) = &table.clock_doubt {
+        lines.push(format!("    time of receipt counts: {doubt}"));
+    }
+    if let Some(delay) = table.delay {
+        lines.push(format!("    received {:.1} ms after their time stamps (median)", 1e3 * delay));
+    }
+    if table.gaps > 0 {
+        let longest = table.longest_step.unwrap_or(0.0);
+        lines.push(format!("    {} gaps, the longest {longest:.3} s", table.gaps));
+    }
+    if table.not_rising > 0 {
+        lines.push(format!("    {} time stamps do not rise", table.not_rising));
+    }
+    if !table.joints.is_empty() {
+        lines.push(format!("    joints: {}", table.joints.join(", ")));
+    }
+    let mut aside = Vec::new();
+    for column in &table.columns {
+        let Some(quantity) = column.quantity else {
+            aside.push(column.name.as_str());
+            continue;
+        };
+        let unit = column.unit.as_ref().map_or(String::new(), |unit| format!(" [{unit}?]"));
+        let of = column.joint.as_ref().map_or(String::new(), |joint| format!(" of {joint}"));
+        let range = column.min.zip(column.max);
+        let range = range.map_or("no numbers".into(), |(min, max)| format!("{min:.4} to {max:.4}"));
+        let holes = match column.missing {
+            0 => String::new(),
+            count => format!(", {count} samples without a number"),
+        };
+        lines.push(format!("    {}: {quantity}{of}{unit}, {range}{holes}", column.name));
+    }
+    if !aside.is_empty() {
+        lines.push(format!("    left aside: {}", aside.join(", ")));
+    }
+}
+
+// `powerball log --to`: a log as another file, with what a model predicts beside it.
+
+/// Writes a log; with a model as MCAP that has measured, predicted and residual torque beside each other.
+pub(super) fn write(log: &Log, arm: &Arm, model: Option<&Path>, out: &Path) -> Result<(), Failure> {
+    let failed = |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", out.display()));
+    let Some(model) = model else { return log.write_for(out, &joint_names(arm)).map_err(failed) };
+    let model = ModelFile::read(model).map_err(|e| Failure::Unusable(e.to_string()))?;
+    // Times along the log, and measured, predicted and residual torque there, by joint.
+    let mut torque: Vec<Vec<[f64; 4]>> = vec![Vec::new(); arm.dof()];
+    for piece in log.whole_pieces() {
+        let start = piece.t.first().copied().unwrap_or(0.0);
+        let verified = verify(arm, &model, [Source::from(piece)], &VerifyOptions::default())?;
+        for (rows, curve) in torque.iter_mut().zip(&verified.curves) {
+            let at = curve.t.iter().zip(&curve.measured).zip(&curve.before);
+            rows.extend(at.map(|((t, measured), left)| [start + t, *measured, measured - left, *left]));
+        }
+    }
+    let mut bytes = Vec::new();
+    mcap(log, &joint_names(arm), &torque, &mut bytes).map_err(failed)?;
+    super::output::write_file(out, &bytes)?;
+    let held = layouts::Held { joints: &joint_names(arm), velocities: false, torques: true };
+    layouts::write(out, held).map_err(failed)
+}
+
+/// The names of an arm's joints as an MCAP has them: those of the arm file, else `joint1` and so on.
+pub(super) fn joint_names(arm: &Arm) -> Vec<String> {
+    match arm.moving_joints().all(|joint| joint.name.is_some()) {
+        true => arm.joint_names(),
+        false => (1..=arm.dof()).map(|j| format!("joint{j}")).collect(),
+    }
+}
+
+fn mcap(log: &Log, joints: &[String], torque: &[Vec<[f64; 4]>], out: &mut Vec<u8>) -> std::io::Result<()> {
+    let members = ["measured", "predicted", "residual"];
+    let mut writer = McapWriter::new(out)?;
+    let states = writer.joint_states("/joint_states")?;
+    let channels: Vec<_> = joints
+        .iter()
+        .map(|joint| writer.numbers(&format!("/torque/{joint}"), "Torque", &members))
+        .collect::<Result<_, _>>()?;
+    for (k, t) in log.t.iter().enumerate() {
+        let of = |signals: &[Vec<f64>]| signals.iter().map(|x| x[k]).collect::<Vec<f64>>();
+        let (position, effort) = (of(&log.q), of(&log.torque));
+        writer.state(
+            states,
+            *t,
+            joints,
+            &JointState { position: &position, velocity: &[], effort: &effort },
+        )?;
+    }
+    for (channel, rows) in channels.into_iter().zip(torque) {
+        for [t, measured, predicted, residual] in rows {
+            let values = members.into_iter().zip([*measured, *predicted, *residual]);
+            writer.object(channel, *t, values)?;
+        }
+    }
+    writer.finish().map(|_| ())
+}

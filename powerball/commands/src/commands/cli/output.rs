@@ -1,0 +1,279 @@
+//! Results on disk and on the terminal.
+
+use super::Failure;
+use super::events::SHOWN;
+use crate::procedure::MotionLog;
+use crate::report::files;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
+use powerball_controller::JointNumber;
+use powerball_identification::conventions::Conventions;
+use powerball_identification::estimate::ResidualStats;
+use std::io::{IsTerminal, Write};
+use std::path::Path;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// What a command is doing, on standard error: as it happens where a person looks at it, and as a table of
+/// times at its end where `--timings` asks for one.
+pub(crate) struct Progress {
+    shown: bool,
+    phases: Option<Mutex<Vec<Phase>>>,
+}
+
+/// What was being done from when on.
+struct Phase {
+    what: String,
+    clock: Instant,
+    processor: Duration,
+}
+
+impl Phase {
+    fn from_now(what: &str) -> Phase {
+        Phase { what: what.to_string(), clock: Instant::now(), processor: processor() }
+    }
+}
+
+/// Processor time that this program has taken, all its threads together.
+#[cfg(unix)]
+fn processor() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec.try_into().unwrap_or(0))
+}
+
+/// Processor time is not known here.
+#[cfg(not(unix))]
+fn processor() -> Duration {
+    Duration::ZERO
+}
+
+impl Progress {
+    pub(crate) fn new() -> Progress {
+        Progress { shown: std::io::stderr().is_terminal(), phases: None }
+    }
+
+    /// The same, with times by phase on standard error when it ends.
+    pub(crate) fn timed(timings: bool) -> Progress {
+        let phases = timings.then(|| Mutex::new(vec![Phase::from_now("reading the arm file")]));
+        Progress { phases, ..Progress::new() }
+    }
+
+    pub(crate) fn say(&self, what: &str) {
+        if self.shown {
+            eprintln!("  {what} …");
+        }
+        tracing::info!(target: SHOWN, "{what}");
+        if let Some(mut phases) = self.phases.as_ref().and_then(|phases| phases.lock().ok()) {
+            phases.push(Phase::from_now(what));
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        let Some(mut phases) = self.phases.as_ref().and_then(|phases| phases.lock().ok()) else { return };
+        phases.push(Phase::from_now(""));
+        eprint!("{}", times(&phases));
+    }
+}
+
+/// A table of phases: what lies between the start of each and of the next one.
+fn times(phases: &[Phase]) -> String {
+    let line = |clock: Duration, processor: Duration, what: &str| {
+        format!("{:9.3} {:11.3}  {what}\n", clock.as_secs_f64(), processor.as_secs_f64())
+    };
+    let mut text = String::from("  clock s processor s  what\n");
+    for (phase, next) in phases.iter().zip(phases.iter().skip(1)) {
+        text.push_str(&line(
+            next.clock - phase.clock,
+            next.processor.saturating_sub(phase.processor),
+            &phase.what,
+        ));
+    }
+    if let (Some(first), Some(last)) = (phases.first(), phases.last()) {
+        text.push_str(&line(
+            last.clock - first.clock,
+            last.processor.saturating_sub(first.processor),
+            "in all",
+        ));
+    }
+    text
+}
+
+/// A line on standard error, where a person looks at it, that is written over by the next one and cut at the terminal's
+/// width: how far a motion has come. The last one stays.
+pub(crate) fn live<T: std::fmt::Display>() -> impl FnMut(&T) {
+    let line = ProgressBar::no_length().with_style(
+        ProgressStyle::with_template("  {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner()),
+    );
+    let line = line.with_finish(ProgressFinish::AndLeave);
+    move |what| line.set_message(what.to_string())
+}
+
+/// Begins the log of a motion in a folder for results.
+pub(crate) fn motion_log(folder: &Path) -> Result<MotionLog, Failure> {
+    make_folder(folder)?;
+    let file = folder.join("log.csv");
+    MotionLog::create(&file)
+        .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", file.display())))
+}
+
+/// Ends it.
+pub(crate) fn close(log: MotionLog) -> Result<(), Failure> {
+    log.close().map_err(|e| Failure::Refused(format!("the log cannot be written: {e}")))
+}
+
+/// Makes a folder for results, where it is missing.
+pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
+    files::make_folder(folder).map_err(Failure::Unusable)
+}
+
+/// Writes a file of a folder whole or not at all: a reader never sees half of it.
+pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+    write_file(&folder.join(name), bytes)
+}
+
+/// The same for a path.
+pub(crate) fn write_file(target: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    files::write_whole(target, bytes).map_err(Failure::Unusable)
+}
+
+/// Serialises a result.
+pub(crate) fn json(value: &impl serde::Serialize) -> Result<String, Failure> {
+    files::json(value).map_err(Failure::Refused)
+}
+
+/// How much a command prints: what `--verbose` and `--quiet` say.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Verbosity {
+    /// Every note and all evidence.
+    pub verbose: bool,
+    /// Nothing but errors.
+    pub quiet: bool,
+}
+
+/// The line that stands for notes that are not printed; none where there are none.
+pub(crate) fn notes(count: usize) -> Option<String> {
+    match count {
+        0 => None,
+        1 => Some("1 note: --verbose or the page".to_string()),
+        _ => Some(format!("{count} notes: --verbose or the page")),
+    }
+}
+
+/// Whether a result that should not be built on is taken nevertheless.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct Accept {
+    /// End with 0 instead of 3 where columns or arm file are not what they are said to be, or a joint is predicted no
+    /// better than by its mean.
+    #[arg(long)]
+    accept: bool,
+}
+
+impl Accept {
+    /// The failure that such a result is. `useless` are the joints that are predicted no better than by their mean.
+    pub(crate) fn judge(self, columns: Option<&Conventions>, useless: &[JointNumber]) -> Result<(), Failure> {
+        let mut why: Vec<String> = Vec::new();
+        if columns.is_some_and(Conventions::differ) {
+            why.push("the columns or the arm file are not what they are said to be".to_string());
+        }
+        if !useless.is_empty() {
+            let list: Vec<String> = useless.iter().map(ToString::to_string).collect();
+            why.push(format!(
+                "the torque of joint {} is predicted no better than by its mean",
+                list.join(", ")
+            ));
+        }
+        match self.accept || why.is_empty() {
+            true => Ok(()),
+            false => Err(Failure::Doubtful(format!("{}; --accept takes it as it is", why.join(", and ")))),
+        }
+    }
+}
+
+/// Prints to standard output; a closed pipe is no error.
+pub(crate) fn print(text: &str) {
+    let _ = writeln!(std::io::stdout(), "{text}");
+}
+
+/// The foot of a page: time (UTC), version and command.
+pub(crate) fn signature() -> String {
+    let now = jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M UTC");
+    format!("{now}, powerball {}: {}", env!("CARGO_PKG_VERSION"), command_line())
+}
+
+/// The command of this process, as it can be typed again.
+pub(crate) fn command_line() -> String {
+    typed(std::env::args())
+}
+
+fn typed(arguments: impl Iterator<Item = String>) -> String {
+    let quoted = |word: String| match word.contains(|c: char| c.is_whitespace() || c == '\'') {
+        true => format!("'{}'", word.replace('\'', "'\\''")),
+        false => word,
+    };
+    let words = std::iter::once("powerball".to_string()).chain(arguments.skip(1).map(quoted));
+    words.collect::<Vec<_>>().join(" ")
+}
+
+/// Errors by joint as a table; several spreads side by side.
+pub(crate) fn table(columns: &[(&str, &ResidualStats)]) -> String {
+    let mut text = String::from("joint");
+    for (name, _) in columns {
+        text.push_str(&format!("  {name:>26}"));
+    }
+    let joints = columns.iter().map(|(_, s)| s.rms.len()).max().unwrap_or(0);
+    for j in 0..joints {
+        text.push_str(&format!("\n{:>5}", JointNumber::from_index(j).number()));
+        for (_, stats) in columns {
+            let cell = format!("{:.4} N·m  {:5.1} %", stats.rms[j], 100.0 * stats.relative[j]);
+            text.push_str(&format!("  {cell:>26}"));
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_those_between_one_phase_and_the_next() {
+        let start = Instant::now();
+        let at = |what: &str, seconds, processor| Phase {
+            what: what.to_string(),
+            clock: start + Duration::from_millis(seconds),
+            processor: Duration::from_millis(processor),
+        };
+        let text = times(&[at("reading", 0, 100), at("fitting", 250, 300), at("", 1250, 2200)]);
+        let lines: Vec<&str> = text.lines().skip(1).collect();
+        assert_eq!(
+            lines,
+            [
+                "    0.250       0.200  reading",
+                "    1.000       1.900  fitting",
+                "    1.250       2.100  in all"
+            ]
+        );
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn work_takes_processor_time() {
+        let (before, began) = (processor(), Instant::now());
+        while began.elapsed() < Duration::from_millis(30) {
+            std::hint::spin_loop();
+        }
+        assert!(processor() > before);
+    }
+
+    #[test]
+    fn a_page_says_when_and_how_it_was_made() {
+        let words = ["/bin/powerball", "verify", "--out", "a b"].map(String::from);
+        assert_eq!(typed(words.into_iter()), "powerball verify --out 'a b'");
+        let signature = signature();
+        let (head, _) = signature.split_once(" UTC, powerball ").unwrap();
+        let (day, time) = head.split_once(' ').unwrap();
+        assert_eq!((day.len(), time.len()), (10, 5), "{head}");
+    }
+}

@@ -1,0 +1,137 @@
+//! The API: from an arm and logs to an explanation.
+
+use super::experiment::propose;
+use super::explain::{Explained, explain_body};
+use super::options::{ExplainError, ExplainOptions};
+use super::torque_model::{Colour, TorqueModel};
+use super::watch::WatchOptions;
+use dyngen::Arm;
+use powerball_identification::conventions::{Conventions, conventions};
+use powerball_identification::transmission::{JointTransmission, transmission};
+use powerball_logs::log::{Log, common_clock};
+use powerball_logs::motion::Motion;
+use powerball_logs::regression::RigidArm;
+use powerball_logs::signal::resample::median_step;
+use std::path::Path;
+
+/// Explains what the base model of an arm lacks on `logs`; every addition is judged on `validate`, the logs
+/// of another path.
+///
+/// The clocks of all logs are joined, in the order `logs`, then `validate`; the arm's dynamics are derived
+/// and proven; and what is known already is taken out of the logs and comes back into the model. Serialized,
+/// the result is explained.json, and its model is model.json.
+///
+/// # Errors
+/// [`ExplainError`] where logs hold too little, where the arm's dynamics cannot be derived, and where the
+/// known model is another arm's.
+pub fn explain(
+    arm: &Arm,
+    logs: &[Log],
+    validate: &[Log],
+    options: &ExplainOptions<'_>,
+) -> Result<Explained, ExplainError> {
+    let prepared = Prepared::new(arm, logs, validate, options)?;
+    let explained = explain_body(&prepared.body, &prepared.logs, &prepared.validate, options)?;
+    Ok(prepared.with_known(explained))
+}
+
+/// An arm that is derived, and logs from which what is known is taken out: for those who also propose
+/// experiments.
+#[derive(Debug)]
+pub struct Prepared {
+    /// The arm as it is known to be.
+    pub body: RigidArm,
+    /// Logs to fit, on the common clock.
+    pub logs: Vec<Log>,
+    /// The validation set, on the common clock.
+    pub validate: Vec<Log>,
+    /// What the columns of all of them are.
+    pub conventions: Conventions,
+    /// What is between the motors' torques and the links', by joint, where logs hold both.
+    pub transmission: Option<Vec<JointTransmission>>,
+    known: Option<TorqueModel>,
+}
+
+impl Prepared {
+    /// Joins the clocks, derives the dynamics and takes out what is known.
+    ///
+    /// # Errors
+    /// [`ExplainError`] as [`explain`].
+    pub fn new(
+        arm: &Arm,
+        logs: &[Log],
+        validate: &[Log],
+        options: &ExplainOptions<'_>,
+    ) -> Result<Prepared, ExplainError> {
+        let mut all: Vec<Log> = logs.iter().chain(validate).cloned().collect();
+        common_clock(&mut all);
+        options.progress.say("deriving and proving the arm's dynamics");
+        let changed = options.known.as_ref().map(|known| known.additions.arm_changes.of(arm)).transpose();
+        let body = RigidArm::new(changed.map_err(ExplainError::Changes)?.as_ref().unwrap_or(arm))
+            .map_err(ExplainError::Arm)?;
+        let checked = |known: TorqueModel| {
+            known.in_set_of(&body).checked(body.names(), body.dof(), Path::new("the known model"))
+        };
+        let known = options.known.clone().map(checked).transpose().map_err(ExplainError::Known)?;
+        let validate = all.split_off(logs.len());
+        options.progress.say("asking what the columns are");
+        let conventions = conventions(&body, &all, &validate);
+        let transmission = transmission(body.arm(), &all, &validate);
+        let (logs, held_out) = (Vec::new(), Vec::new());
+        let mut prepared = Prepared { body, logs, validate: held_out, conventions, transmission, known };
+        (prepared.logs, prepared.validate) = (prepared.without_known(all), prepared.without_known(validate));
+        Ok(prepared)
+    }
+
+    /// The explanation of the logs, and the trajectory that tells apart what they leave open, where there is
+    /// one.
+    ///
+    /// # Errors
+    /// [`ExplainError`] as [`explain`].
+    pub fn explained(
+        &self,
+        options: &ExplainOptions<'_>,
+    ) -> Result<(Explained, Option<Motion>), ExplainError> {
+        let mut explained = explain_body(&self.body, &self.logs, &self.validate, options)?;
+        let motion = propose(&self.body, &mut explained, options);
+        Ok((explained, motion))
+    }
+
+    /// Other logs of the same arm, without what is known.
+    #[must_use]
+    pub fn without_known(&self, mut logs: Vec<Log>) -> Vec<Log> {
+        if let Some(known) = &self.known {
+            known.take_out(&self.body, &mut logs);
+        }
+        logs
+    }
+
+    /// What the explained model leaves on the logs that are like the others; `None` where that cannot be learnt.
+    fn colour(&self, explained: &Explained) -> Option<Colour> {
+        let model = &explained.model;
+        let changes = &model.additions.arm_changes;
+        let changed = (!changes.is_empty()).then(|| RigidArm::new(&changes.of(self.body.arm()).ok()?).ok());
+        let changed = changed.map_or(Some(None), |body| body.map(Some))?;
+        let body = changed.as_ref().unwrap_or(&self.body);
+        let with_events: Vec<&String> = (explained.effects.iter().flat_map(|effect| &effect.logs))
+            .chain(explained.logs.iter().filter(|log| !log.like_the_others).map(|log| &log.log))
+            .collect();
+        let usual = self.logs.iter().chain(&self.validate).filter(|log| !with_events.contains(&&log.file));
+        let usual: Vec<Log> = usual.cloned().collect();
+        let options = WatchOptions::default();
+        let rate = 1.0 / median_step(&usual.first()?.t)?;
+        Colour::learn(model, body, &usual, options.level(rate), options.friction_range)
+    }
+
+    /// An explanation with what the columns and the transmissions are, whose model holds what was known too.
+    #[must_use]
+    pub fn with_known(&self, mut explained: Explained) -> Explained {
+        explained.conventions = Some(self.conventions.clone());
+        explained.transmission.clone_from(&self.transmission);
+        explained.model.colour = self.colour(&explained);
+        if let Some(known) = &self.known {
+            explained.model.additions = known.additions.and(&explained.model.additions);
+        }
+        explained
+    }
+}

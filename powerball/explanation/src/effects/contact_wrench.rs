@@ -1,0 +1,298 @@
+//! An outside force on the last link during some time: a touch, a push, a thing leaned on.
+
+use super::payload::all_joints;
+use super::windows::{Sums, best_run, by_log, cut, explained, rests, step_start, window};
+use super::words::{Words, list, number};
+use super::{Axis, Candidate, Class, Context, Effect, Found, Part, Window};
+use powerball_logs::regression::Column;
+use serde::Serialize;
+use std::f64::consts::PI;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A force in the base frame at the last frame's origin, during a window of one log: constant, or rising and falling
+/// as that of a hand does.
+pub(super) struct ContactWrench;
+
+/// How its force goes through its windows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Settings {
+    /// It is the same from the window's beginning to its end.
+    Constant,
+    /// Half a wave: largest in the middle of the window.
+    Push,
+}
+
+/// What it is, one entry a window.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// When it ended, in the log's own t, s.
+    pub end_time: Vec<f64>,
+    /// The force in the base frame, N; of a push that rises and falls the largest.
+    pub force: Vec<Vec<f64>>,
+    /// When it began, in the log's own t, s.
+    pub start_time: Vec<f64>,
+}
+
+/// Of so many pushes each is shown; of more the range.
+const EACH: usize = 3;
+
+impl Figures {
+    /// In words.
+    #[must_use]
+    pub(super) fn in_words(&self, _: &Words<'_>) -> String {
+        let size = |force: &Vec<f64>| force.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let sizes: Vec<f64> = self.force.iter().map(size).collect();
+        let times = self.start_time.iter().zip(&self.end_time);
+        if sizes.len() <= EACH {
+            let one = |(size, (from, to)): (&f64, (&f64, &f64))| {
+                format!("{} N from {from:.1} to {to:.1} s", number(*size))
+            };
+            return list(sizes.iter().zip(times).map(one));
+        }
+        let [least, most] =
+            [f64::min, f64::max].map(|of| sizes.iter().copied().reduce(of).unwrap_or(f64::NAN));
+        let seconds: f64 = times.map(|(from, to)| to - from).sum();
+        format!("{} pushes of {} to {} N, {seconds:.1} s together", sizes.len(), number(least), number(most))
+    }
+}
+
+/// Windows begin and end on a grid of this, s.
+const GRID: f64 = 0.5;
+/// Longest window in grid steps that is tried from every step on, and anywhere.
+const SHORT: usize = 16;
+/// Ends of longer windows are looked for this many grid steps apart first.
+const COARSE: usize = 4;
+/// Longer windows keep away from their log's ends by a share of 1 / `CLEAR` of it: what is there until the
+/// end is a payload.
+const CLEAR: usize = 10;
+/// Share of a window's gain that one half of its time must explain to be a push by itself: a force that is constant
+/// explains half of it in half of its time.
+const ALONE: f64 = 0.65;
+/// Larger forces are a rank-poor fit, N.
+const MOST: f64 = 2000.0;
+/// How many times as long as the constant force that fits best a push is taken to be …
+const LONGER: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
+/// … and by which share of that its middle is later.
+const LATE: [f64; 3] = [-0.25, 0.0, 0.25];
+/// What is longer leans on the arm, and does not push it, s.
+pub(crate) const LONGEST_PUSH: f64 = 4.0;
+/// Grid of the same push in other logs, s: its force is known there, so that a row more or less can be told.
+const FINE: f64 = 0.1;
+
+impl Effect for ContactWrench {
+    fn name(&self) -> &'static str {
+        "contact_wrench"
+    }
+
+    fn class(&self) -> Class {
+        Class::Event
+    }
+
+    fn may_be_in_validation_only(&self) -> bool {
+        true
+    }
+
+    fn shown_by(&self, _: &Candidate) -> Axis {
+        Axis::Time
+    }
+
+    /// One force at a time.
+    fn excludes(&self, a: &Candidate, b: &Candidate) -> bool {
+        a.windows.iter().any(|w| b.windows.iter().any(|other| w.overlaps(other)))
+    }
+
+    fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
+        search(context).unwrap_or_default()
+    }
+
+    fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
+        let constant = cut(context, context.data.force_columns(), &candidate.windows);
+        match Settings::of(candidate) {
+            Some(Settings::Push) => rising_and_falling(context, constant, &candidate.windows),
+            _ => constant,
+        }
+    }
+
+    fn part(&self, _: &Context<'_>, _: &Candidate, _: &[f64]) -> Part {
+        Part::Event
+    }
+
+    fn admissible(&self, _: &Candidate, c: &[f64]) -> bool {
+        c.iter().all(|f| f.abs() < MOST)
+    }
+
+    /// When the other logs have the same force: nothing of it is fitted to them but its times. It must
+    /// explain more than the best of all windows of a log explains by chance.
+    fn seen_in(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
+        let (data, rule) = (context.data, context.rule);
+        let mut seen = candidate.clone();
+        seen.windows.retain(|w| !data.logs.contains(&w.log));
+        let lasted = seen.windows.iter().map(|w| w.to - w.from).fold(f64::INFINITY, f64::min);
+        let steps = data.blocks_of(FINE);
+        // Of a push the mean of its half wave: it explains over its time what its own form would explain there.
+        let mean = if Settings::of(candidate) == Some(&Settings::Push) { 2.0 / PI } else { 1.0 };
+        let force: Vec<f64> = c.iter().map(|c| mean * c).collect();
+        let explains = explained(context, data.force_columns(), &force, &steps);
+        for log in by_log(&steps) {
+            let chance = 4.0 * (log.len().max(1) as f64).ln();
+            let mut open = vec![log.clone()];
+            while let Some(stretch) = open.pop() {
+                let found = best_run(&explains[stretch.clone()]);
+                let found = stretch.start + found.start..stretch.start + found.end;
+                let (less, own) =
+                    explains[found.clone()].iter().fold((0.0, 0.0), |sum, e| (sum.0 + e.0, sum.1 + e.1));
+                let as_long = found.len() as f64 * FINE > rule.same_time * lasted;
+                if less > rule.another_log + chance && less > rule.same_force * own && as_long {
+                    seen.windows.push(window(context, &steps, &log, &found)?);
+                    open.extend([stretch.start..found.start, found.end..stretch.end]);
+                }
+            }
+        }
+        Some(seen)
+    }
+
+    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+        let windows = || found.iter().flat_map(|f| &f.candidate.windows);
+        let force = |f: &Found<'_>| vec![f.coefficients.to_vec(); f.candidate.windows.len()];
+        Figures {
+            end_time: windows().map(|w| w.to).collect(),
+            force: found.iter().flat_map(force).collect(),
+            start_time: windows().map(|w| w.from).collect(),
+        }
+        .into()
+    }
+}
+
+/// A constant force in the window that explains most, and pushes about its middle. Short windows are all tried, longer
+/// ones on a coarse grid, whose ends are then moved. None begins where the arm sets off from rest: what it errs there by is
+/// how it sets off. A push that goes on is found from then on.
+fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
+    let (data, fit) = (context.data, context.fit);
+    let columns = data.force_columns();
+    if columns.len() < 3 {
+        return None;
+    }
+    let solver = fit.solver();
+    let steps = data.blocks_of(GRID);
+    let rests = rests(context, &steps, GRID);
+    let sets_off: Vec<bool> = (steps.iter())
+        .map(|step| {
+            step_start(context, step).is_none_or(|start| sets_off(&rests, &data.logs[step.log], start))
+        })
+        .collect();
+    let mut before = vec![Sums::zero(&solver, 3)];
+    for step in &steps {
+        let mut sum = before[before.len() - 1].clone();
+        sum.add(&Sums::of_block(context, &solver, columns, step));
+        before.push(sum);
+    }
+    let mut searched = 0.0;
+    let mut best: Option<(f64, Range<usize>)> = None;
+    let mut consider = |window: Range<usize>, best: &mut Option<(f64, Range<usize>)>| {
+        if sets_off[window.start] {
+            return;
+        }
+        let mut sums = before[window.end].clone();
+        sums.subtract(&before[window.start]);
+        searched += 1.0;
+        let (gain, force) = sums.gain();
+        if gain > best.as_ref().map_or(0.0, |(g, _)| *g) && force.iter().all(|f| f.abs() < MOST) {
+            *best = Some((gain, window));
+        }
+    };
+    let logs = by_log(&steps);
+    for log in &logs {
+        for first in log.clone() {
+            for end in first + 1..=(first + SHORT).min(log.end) {
+                consider(first..end, &mut best);
+            }
+        }
+        let inner = inner(log);
+        for first in inner.clone().step_by(COARSE) {
+            for end in (first + SHORT + 1..=inner.end).step_by(COARSE) {
+                consider(first..end, &mut best);
+            }
+        }
+    }
+    let (_, coarse) = best.clone()?;
+    let log = logs.iter().find(|log| log.contains(&coarse.start))?;
+    if coarse.len() > SHORT {
+        let inner = inner(log);
+        let near =
+            |at: usize| at.saturating_sub(COARSE - 1).max(inner.start)..(at + COARSE).min(inner.end + 1);
+        for first in near(coarse.start) {
+            for end in near(coarse.end) {
+                consider(first..end, &mut best);
+            }
+        }
+    }
+    let (mut gain, mut found) = best?;
+    // Two pushes with a pause are two: one that explains most of a window in half of its time is taken by itself,
+    // and the other one is found after it.
+    while found.len() > 1 {
+        let longest = found.len().div_ceil(2);
+        let mut part = None;
+        for first in found.clone() {
+            for end in first + 1..=(first + longest).min(found.end) {
+                consider(first..end, &mut part);
+            }
+        }
+        match part.filter(|(own, _)| *own > ALONE * gain) {
+            Some((own, window)) => (gain, found) = (own, window),
+            None => break,
+        }
+    }
+    let windows = vec![window(context, &steps, log, &found)?];
+    let constant =
+        Candidate { joints: all_joints(data), settings: Settings::Constant.into(), windows, searched };
+    let pushes = pushes(context, &constant, &rests);
+    let searched = searched + pushes.len() as f64;
+    Some(std::iter::once(constant).chain(pushes).map(|c| Candidate { searched, ..c }).collect())
+}
+
+/// Whether an arm rests or sets off at a time of a log.
+fn sets_off(rests: &[Window], log: &str, time: f64) -> bool {
+    rests.iter().any(|rest| rest.log == log && (rest.from..rest.to + GRID).contains(&time))
+}
+
+/// Pushes about the middle of a constant force, which covers but the height of one.
+fn pushes(context: &Context<'_>, constant: &Candidate, rests: &[Window]) -> Vec<Candidate> {
+    let Some(window) = constant.windows.first() else { return Vec::new() };
+    let (middle, length) = (0.5 * (window.from + window.to), window.to - window.from);
+    let recordings = || context.data.recordings.iter().filter(|r| context.data.logs[r.log] == window.log);
+    let starts = recordings().map(|r| r.start).fold(f64::INFINITY, f64::min);
+    let ends = recordings().map(|r| r.start + r.len() as f64 / r.rate).fold(f64::NEG_INFINITY, f64::max);
+    let push = |(longer, late): (f64, f64)| {
+        let (middle, half) = (middle + late * length, 0.5 * longer * length);
+        let window = Window { from: middle - half, to: middle + half, ..window.clone() };
+        let inside = window.from > starts && window.to < ends && half < 0.5 * LONGEST_PUSH;
+        (inside && !sets_off(rests, &window.log, window.from)).then(|| Candidate {
+            windows: vec![window],
+            settings: Settings::Push.into(),
+            ..constant.clone()
+        })
+    };
+    LONGER.iter().flat_map(|longer| LATE.map(|late| (*longer, late))).filter_map(push).collect()
+}
+
+/// Columns of a force that is the largest in the middle of its window and nothing at its ends.
+fn rising_and_falling(context: &Context<'_>, constant: Vec<Column>, windows: &[Window]) -> Vec<Column> {
+    let height = |(log, t): &(usize, f64)| {
+        let own = windows.iter().find(|w| w.log == context.data.logs[*log] && *t >= w.from && *t <= w.to);
+        own.map_or(0.0, |w| (PI * (t - w.from) / (w.to - w.from)).sin())
+    };
+    let heights: Vec<Vec<f64>> =
+        (0..context.data.dof()).map(|j| context.row_times(j).iter().map(height).collect()).collect();
+    let part = |(j, values): (usize, Arc<Vec<f64>>)| {
+        (j, values.iter().zip(&heights[j]).map(|(v, h)| v * h).collect::<Vec<f64>>().into())
+    };
+    let of = |column: Column| Column { parts: column.parts.into_iter().map(part).collect() };
+    constant.into_iter().map(of).collect()
+}
+
+/// Where a log's longer windows lie.
+fn inner(log: &Range<usize>) -> Range<usize> {
+    let clear = log.len().div_ceil(CLEAR);
+    log.start + clear..log.end.saturating_sub(clear).max(log.start + clear)
+}

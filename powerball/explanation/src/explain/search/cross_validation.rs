@@ -1,0 +1,143 @@
+//! What speaks for a candidate that takes much of an error away, on logs that hold few seconds.
+//!
+//! A small effect needs many blocks and folds to be told from chance; one that lowers an error by a tenth and
+//! more is told by few seconds. It is judged both ways round: fitted to the logs and judged on the validation
+//! set, fitted to the validation set and judged on the logs; each time the squared error must fall by a share
+//! that chance does not give, and both must say the same. Significance is that of blocks as long as the
+//! residual's own memory.
+
+use super::super::model::Model;
+use super::super::study::Study;
+use super::evidence::{Validation, left, log_change, validation_gain, wald};
+use super::screen::{Screen, Trial};
+use crate::effects::Candidate;
+use powerball_identification::estimate::{Design, Fit, Folds, fit, friction_columns};
+use powerball_logs::regression::{Data, Signals};
+use powerball_logs::vector::dot;
+
+/// The model fitted to the validation set.
+#[derive(Debug)]
+pub(crate) struct CrossValidation {
+    fit: Fit,
+    /// Its columns on the logs that the model was fitted to.
+    design: Design,
+    /// What it leaves there.
+    residual: Signals,
+}
+
+/// What both ways say.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CrossValidated {
+    /// The share by which the squared error of the candidate's joints falls on the logs that took no part in
+    /// the fit, the lesser of both ways.
+    pub(crate) gain: f64,
+    /// The probability of such coefficients by chance, both ways together.
+    pub(crate) p_value: f64,
+    /// The correlation of what either way adds.
+    pub(crate) correlation: f64,
+    /// By how much the logarithm of the squared error changes on the logs, mean over joints.
+    pub(crate) log_change: f64,
+}
+
+impl CrossValidation {
+    /// Fits the model to the validation set, all of it or without one accepted effect.
+    pub(crate) fn new(study: &Study<'_>, model: &Model, without: Option<usize>) -> CrossValidation {
+        let on_validation = study.on_validation(&model.fit, &[]);
+        let terms = model.terms(&on_validation, without);
+        let fit = fit(&study.validation, &Folds::new(&study.validation), &terms, Some(&model.fit));
+        let on_fitted: Vec<_> =
+            model.terms(&model.context(study), without).into_iter().map(|t| t.column).collect();
+        let residual = fit.residual_on(&study.data, &on_fitted);
+        let design = Design::new(&study.data, &friction_columns(&study.data, &fit.shapes), &on_fitted);
+        CrossValidation { fit, design, residual }
+    }
+
+    /// What it leaves on the logs that the model was fitted to, by joint and row, N·m.
+    pub(crate) fn residual(&self) -> &Signals {
+        &self.residual
+    }
+
+    /// Asks about a candidate that was tried on the logs; `forward` is what the validation set gained by it.
+    pub(crate) fn ask(
+        &self,
+        study: &Study<'_>,
+        screen: &Screen<'_>,
+        (candidate, trial, forward): (&Candidate, &Trial, f64),
+    ) -> Option<CrossValidated> {
+        let on_validation = study.on_validation(&self.fit, &self.fit.residual);
+        let back = Screen::new(&on_validation);
+        let cross_validation = back.try_columns(on_validation.columns(candidate), candidate.searched)?;
+        let columns = screen.context.columns(candidate);
+        let judged =
+            Validation { data: &study.data, design: self.design.clone(), residual: self.residual.clone() };
+        let gain = validation_gain(&back, &cross_validation, &candidate.joints, &judged, &columns);
+        let [p, q] = [(screen, trial), (&back, &cross_validation)]
+            .map(|(screen, trial)| by_blocks(screen, trial, candidate));
+        let product = (p * q).max(f64::MIN_POSITIVE);
+        Some(CrossValidated {
+            gain: forward.min(gain),
+            // Fisher: −2 ln(p·q) is χ² with four degrees of freedom.
+            p_value: (product * (1.0 - product.ln())).min(1.0),
+            correlation: correlation(screen, trial, &cross_validation.theta),
+            log_change: log_change(&back, &cross_validation, &judged, &columns),
+        })
+    }
+}
+
+/// The Wald test over blocks as long as what the trial leaves remembers.
+fn by_blocks(screen: &Screen<'_>, trial: &Trial, candidate: &Candidate) -> f64 {
+    let data = screen.context.data;
+    let rule = screen.context.rule;
+    let residual = left(screen, trial, &screen.residualised(trial));
+    let memory = candidate.joints.iter().map(|j| memory(data, j.index(), &residual[j.index()]));
+    let length = (rule.block_memories * memory.fold(0.0, f64::max)).max(rule.shortest_block);
+    let length = length.min(rule.longest_block);
+    wald(screen, trial, &data.blocks_of(length))
+}
+
+/// The autocorrelation time of a joint's residual, s: twice the sum of its autocorrelation up to where that
+/// first vanishes.
+fn memory(data: &Data<'_>, joint: usize, residual: &[f64]) -> f64 {
+    let per_second = data.rate() / data.joints[joint].band.decimation as f64;
+    let at = |lag: usize| -> f64 {
+        let of = |rows: &std::ops::Range<usize>| {
+            let r = &residual[rows.clone()];
+            dot(&r[..r.len().saturating_sub(lag)], &r[lag.min(r.len())..])
+        };
+        data.joints[joint].rows.iter().map(of).sum()
+    };
+    let power = at(0);
+    if power <= 0.0 {
+        return 0.0;
+    }
+    let later = (1..residual.len().min((4.0 * per_second) as usize)).map(at);
+    (1.0 + 2.0 * later.take_while(|c| *c > 0.0).sum::<f64>() / power) / per_second
+}
+
+/// The correlation of what two sets of coefficients add on the logs.
+fn correlation(screen: &Screen<'_>, trial: &Trial, other: &[f64]) -> f64 {
+    let (mut cross, mut own, mut theirs) = (0.0, 0.0, 0.0);
+    for (j, columns) in screen.residualised(trial).iter().enumerate() {
+        let added = |theta: &[f64]| {
+            let mut sum = vec![0.0; screen.context.residual[j].len()];
+            for (column, theta) in columns.iter().zip(theta) {
+                sum.iter_mut().zip(column).for_each(|(s, c)| *s += theta * c);
+            }
+            sum
+        };
+        let (a, b, w) = (added(&trial.theta), added(other), screen.context.fit.weights[j]);
+        cross += w * dot(&a, &b);
+        own += w * dot(&a, &a);
+        theirs += w * dot(&b, &b);
+    }
+    if own > 0.0 && theirs > 0.0 { cross / (own * theirs).sqrt() } else { 0.0 }
+}
+
+impl CrossValidated {
+    /// Whether it is enough; `tests` counts what was tried.
+    pub(crate) fn is_enough(&self, rule: &crate::rule::Rule, tests: f64) -> bool {
+        self.gain >= rule.large_gain
+            && self.p_value * tests <= rule.family_wise
+            && self.correlation >= rule.least_correlation
+    }
+}

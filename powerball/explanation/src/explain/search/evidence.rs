@@ -1,0 +1,370 @@
+//! What speaks for a candidate: blocks that agree, folds that gain, a validation set that gains.
+//!
+//! Also here: whether the evidence for a candidate is enough.
+
+use super::screen::{Screen, Trial, fold_gains};
+use crate::effects::Candidate;
+use crate::rule::Rule;
+use faer::Mat;
+use powerball_controller::JointNumber;
+use powerball_identification::estimate::distribution::f_tail;
+use powerball_identification::estimate::{
+    Design, Folds, MEAN_OVER, NormalEquations, Solver, variance_inflation,
+};
+use powerball_logs::regression::{Block, Column, Data, Signals};
+use powerball_logs::vector::dot;
+
+/// The evidence for one candidate.
+#[derive(Clone, Debug)]
+pub(crate) struct Evidence {
+    /// Penalised gain.
+    pub(crate) score: f64,
+    /// Cluster-robust Wald test over blocks, base refitted: the probability of such coefficients by chance.
+    pub(crate) p_value: f64,
+    /// Share by which the held-out squared error of the candidate's joints falls, by fold.
+    pub(crate) fold_gains: Vec<f64>,
+    /// The same on the validation set: the median over its logs.
+    pub(crate) validation_gain: f64,
+    /// Of an event: how much of what its time has more than other times of squared error stays; 1 and more where that
+    /// time has no more than others.
+    pub(crate) event_left: Option<f64>,
+}
+
+impl Evidence {
+    /// The median of the held-out gains over folds.
+    pub(crate) fn median_gain(&self) -> f64 {
+        let mut gains = self.fold_gains.clone();
+        gains.sort_by(f64::total_cmp);
+        gains.get(gains.len() / 2).copied().unwrap_or(0.0)
+    }
+}
+
+/// Where a candidate acts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Extent {
+    /// In all logs.
+    Everywhere,
+    /// In some logs, for most of their time.
+    SomeLogs,
+    /// For a while of so many seconds: too short for blocks and folds.
+    Short(f64),
+}
+
+impl Extent {
+    /// That of a candidate.
+    pub(crate) fn of(candidate: &Candidate) -> Extent {
+        match candidate.windows.iter().map(|w| w.to - w.from).reduce(f64::max) {
+            None => Extent::Everywhere,
+            Some(seconds) if seconds.is_finite() => Extent::Short(seconds),
+            Some(_) => Extent::SomeLogs,
+        }
+    }
+}
+
+/// The validation set, prepared for one base model.
+#[derive(Debug)]
+pub(crate) struct Validation<'p> {
+    /// Its data.
+    pub(crate) data: &'p Data<'p>,
+    /// The base's columns on it.
+    pub(crate) design: Design,
+    /// What the base leaves on it.
+    pub(crate) residual: Signals,
+}
+
+/// Gathers the evidence for a trial. `validation` holds the validation set and the candidate's columns there.
+#[must_use]
+pub(crate) fn evidence(
+    screen: &Screen<'_>,
+    trial: &Trial,
+    joints: &[JointNumber],
+    folds: &Folds,
+    extent: Extent,
+    validation: Option<(&Validation<'_>, &[Column])>,
+) -> Evidence {
+    let (p_value, fold_gains, event_left) = match extent {
+        Extent::Short(seconds) => {
+            let columns = screen.residualised(trial);
+            let after = left(screen, trial, &columns);
+            let by_chance = by_chance(screen, trial, &after, seconds);
+            (by_chance, event_gains(screen, trial, &columns), Some(event_left(screen, trial, &after)))
+        }
+        _ => {
+            let local = extent != Extent::Everywhere;
+            let p_value = wald(screen, trial, &screen.context.data.blocks);
+            (p_value, fold_gains(screen, trial, joints, folds, local), None)
+        }
+    };
+    Evidence {
+        event_left,
+        score: trial.score,
+        p_value,
+        fold_gains,
+        validation_gain: validation
+            .map_or(0.0, |(set, columns)| validation_gain(screen, trial, joints, set, columns)),
+    }
+}
+
+/// The Wald test of the coefficients with blocks as clusters: within a block residuals may depend on each
+/// other.
+pub(crate) fn wald(screen: &Screen<'_>, trial: &Trial, blocks: &[Block]) -> f64 {
+    let fit = screen.context.fit;
+    let k = trial.columns.len();
+    let columns = screen.residualised(trial);
+    let mut square = Mat::<f64>::zeros(k, k);
+    let mut meat = Mat::<f64>::zeros(k, k);
+    let after = left(screen, trial, &columns);
+    let mut clusters = 0.0;
+    for block in blocks {
+        let mut score = vec![0.0; k];
+        let mut touched = false;
+        for (j, rows) in block.rows.iter().enumerate() {
+            let w = fit.weights[j];
+            if rows.is_empty() || w == 0.0 {
+                continue;
+            }
+            for a in 0..k {
+                let own = &columns[j][a][rows.clone()];
+                score[a] += w * dot(own, &after[j][rows.clone()]);
+                for b in 0..=a {
+                    square[(a, b)] += w * dot(own, &columns[j][b][rows.clone()]);
+                }
+            }
+            touched = true;
+        }
+        if touched {
+            clusters += 1.0;
+        }
+        for a in 0..k {
+            for b in 0..k {
+                meat[(a, b)] += score[a] * score[b];
+            }
+        }
+    }
+    for a in 0..k {
+        for b in 0..a {
+            square[(b, a)] = square[(a, b)];
+        }
+    }
+    // Wald: θ' S M⁻¹ S θ with S the residualised gram and M the sum over clusters.
+    let s: Vec<f64> = (0..k).map(|a| (0..k).map(|b| square[(a, b)] * trial.theta[b]).sum()).collect();
+    let used = trial.theta.iter().filter(|t| **t != 0.0).count() as f64;
+    let solver = Solver::new(&meat, |a| trial.theta[a] != 0.0);
+    let wald = dot(&s, &solver.solve(&s));
+    let freedom = clusters - used;
+    if freedom < 3.0 || used == 0.0 {
+        return 1.0;
+    }
+    f_tail(wald / used * freedom / clusters, used, freedom)
+}
+
+/// What a trial leaves, given its columns with the base's shares taken out.
+pub(super) fn left(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) -> Signals {
+    let of = |(columns, residual): (&Vec<Vec<f64>>, &Vec<f64>)| {
+        let mut e = residual.clone();
+        for (column, theta) in columns.iter().zip(&trial.theta) {
+            e.iter_mut().zip(column).for_each(|(e, c)| *e -= theta * c);
+        }
+        e
+    };
+    columns.iter().zip(screen.context.residual).map(of).collect()
+}
+
+/// The probability of the gain by chance, for an event of some seconds, too short for blocks. Gains are over
+/// the variance inflation of means over 1 s; slow noise looks like an event that lasts as long as it stays,
+/// so it is that of means over the event's own duration that counts.
+fn by_chance(screen: &Screen<'_>, trial: &Trial, after: &[Vec<f64>], seconds: f64) -> f64 {
+    let data = screen.context.data;
+    let slower: Vec<f64> = (after.iter().enumerate())
+        .filter(|(j, e)| !e.is_empty() && trial.columns.iter().any(|c| c.at(*j).is_some()))
+        .map(|(j, e)| {
+            let inflation = |over: f64| variance_inflation(data, j, e, over);
+            (inflation(seconds.max(MEAN_OVER)) / inflation(MEAN_OVER)).max(1.0)
+        })
+        .collect();
+    let slower = slower.iter().sum::<f64>() / slower.len().max(1) as f64;
+    let used = trial.theta.iter().filter(|t| **t != 0.0).count() as f64;
+    // The inflation itself is known from about a hundred means.
+    f_tail(trial.gain / slower.max(1.0) / used.max(1.0), used, 100.0)
+}
+
+/// Parts into which an event's own rows are dealt.
+const EVENT_PARTS: usize = 5;
+
+/// Held-out gains of a short event: it happens once, so that each part of its rows is predicted from the
+/// others. Rows are dealt to the parts in turn: a part in one piece would ask whether the noise of a fifth of
+/// the event is smaller than the event, while what tells an event from slow noise is what its log holds
+/// elsewhere ([`by_chance`]).
+fn event_gains(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) -> Vec<f64> {
+    let fit = screen.context.fit;
+    let k = trial.columns.len();
+    let places: Vec<usize> = (0..k).collect();
+    let mut parts = vec![NormalEquations::zero(k); EVENT_PARTS];
+    for j in 0..fit.design.dof() {
+        let residual = &screen.context.residual[j];
+        let rows: Vec<usize> = (0..residual.len())
+            .filter(|i| trial.columns.iter().any(|c| c.at(j).is_some_and(|v| v[*i] != 0.0)))
+            .collect();
+        for (n, part) in parts.iter_mut().enumerate() {
+            let own = |x: &Vec<f64>| -> Vec<f64> {
+                rows.iter().skip(n).step_by(EVENT_PARTS).map(|row| x[*row]).collect()
+            };
+            let columns: Vec<Vec<f64>> = columns[j].iter().map(own).collect();
+            part.add_columns(&places, &columns, &own(residual), fit.weights[j]);
+        }
+    }
+    let gain = |held: usize| {
+        let mut others = NormalEquations::zero(k);
+        parts.iter().enumerate().filter(|(n, _)| *n != held).for_each(|(_, p)| others.add(&places, p, 1.0));
+        let part = &parts[held];
+        (part.square > 0.0).then(|| 1.0 - part.left(&others.solve()) / part.square)
+    };
+    (0..EVENT_PARTS).filter_map(gain).collect()
+}
+
+/// See [`Evidence::event_left`]. Other times are told by the median over blocks, so that other events do not count.
+fn event_left(screen: &Screen<'_>, trial: &Trial, after: &[Vec<f64>]) -> f64 {
+    let (data, fit) = (screen.context.data, screen.context.fit);
+    let (mut excess, mut stays) = (0.0, 0.0);
+    for (j, residual) in screen.context.residual.iter().enumerate() {
+        let inside = |i: &usize| trial.columns.iter().any(|c| c.at(j).is_some_and(|v| v[*i] != 0.0));
+        let rows: Vec<usize> = (0..residual.len()).filter(inside).collect();
+        let mut elsewhere: Vec<f64> = (data.blocks.iter())
+            .filter(|block| !block.rows[j].is_empty())
+            .map(|block| mean_square(&residual[block.rows[j].clone()]))
+            .collect();
+        elsewhere.sort_by(f64::total_cmp);
+        let usual = elsewhere.get(elsewhere.len() / 2).copied().unwrap_or(0.0);
+        for i in rows {
+            excess += fit.weights[j] * (residual[i] * residual[i] - usual);
+            stays += fit.weights[j] * (after[j][i] * after[j][i] - usual);
+        }
+    }
+    if excess > 0.0 { stays.max(0.0) / excess } else { f64::INFINITY }
+}
+
+fn mean_square(x: &[f64]) -> f64 {
+    dot(x, x) / x.len().max(1) as f64
+}
+
+/// What a trial adds to the prediction on the validation set, by joint and row, N·m.
+fn added(
+    screen: &Screen<'_>,
+    trial: &Trial,
+    validation: &Validation<'_>,
+    columns: &[Column],
+) -> Vec<Vec<f64>> {
+    let fit = screen.context.fit;
+    let mut shift = vec![0.0; fit.design.size];
+    for (base, theta) in trial.base.iter().zip(&trial.theta) {
+        shift.iter_mut().zip(base).for_each(|(s, b)| *s -= theta * b);
+    }
+    let of = |j: usize| {
+        let mut moved = validation.design.predict(j, &shift);
+        for (column, theta) in columns.iter().zip(&trial.theta) {
+            if let Some(values) = column.at(j) {
+                moved.iter_mut().zip(values).for_each(|(m, v)| *m += theta * v);
+            }
+        }
+        moved
+    };
+    (0..fit.design.dof()).map(of).collect()
+}
+
+/// The mean over joints of the logarithm of the squared error on the validation set, with a trial less
+/// without it: negative where the trial predicts better. No joint's unit or size rules it.
+pub(crate) fn log_change(
+    screen: &Screen<'_>,
+    trial: &Trial,
+    validation: &Validation<'_>,
+    columns: &[Column],
+) -> f64 {
+    let moved = added(screen, trial, validation, columns);
+    let (mut sum, mut joints) = (0.0, 0.0);
+    for (residual, moved) in validation.residual.iter().zip(&moved) {
+        let before = dot(residual, residual);
+        let after = before - 2.0 * dot(residual, moved) + dot(moved, moved);
+        if before > 0.0 && after > 0.0 {
+            sum += (after / before).ln();
+            joints += 1.0;
+        }
+    }
+    if joints > 0.0 { sum / joints } else { 0.0 }
+}
+
+/// The share of the squared error of `joints` that a trial takes away on the validation set: the median over
+/// its logs.
+pub(crate) fn validation_gain(
+    screen: &Screen<'_>,
+    trial: &Trial,
+    joints: &[JointNumber],
+    validation: &Validation<'_>,
+    columns: &[Column],
+) -> f64 {
+    let fit = screen.context.fit;
+    let mut change = vec![0.0; validation.data.logs.len()];
+    let mut scale = vec![0.0; validation.data.logs.len()];
+    for (j, moved) in added(screen, trial, validation, columns).iter().enumerate() {
+        for (recording, rows) in validation.data.recordings.iter().zip(&validation.data.joints[j].rows) {
+            let (r, m) = (&validation.residual[j][rows.clone()], &moved[rows.clone()]);
+            change[recording.log] += fit.weights[j] * (2.0 * dot(r, m) - dot(m, m));
+            if joints.contains(&JointNumber::from_index(j)) {
+                scale[recording.log] += fit.weights[j] * dot(r, r);
+            }
+        }
+    }
+    let gains: Vec<f64> = change.iter().zip(&scale).filter(|(_, s)| **s > 0.0).map(|(c, s)| c / s).collect();
+    // The median keeps one odd log (something held, something touched) from deciding.
+    let mut sorted = gains.clone();
+    sorted.sort_by(f64::total_cmp);
+    match sorted.len() {
+        0 => 0.0,
+        n if n % 2 == 1 => sorted[n / 2],
+        n => 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]),
+    }
+}
+
+// Whether the evidence for a candidate is enough: the rule that accepts or refuses.
+
+/// Why a candidate is refused, `None` where it passes. `tests` counts what was tried over joints and
+/// candidates.
+pub(crate) fn refusal(rule: &Rule, evidence: &Evidence, tests: f64, local: bool) -> Option<String> {
+    if evidence.score < rule.least_score {
+        return Some(format!("explains too little (score {:.1} of {})", evidence.score, rule.least_score));
+    }
+    let p = (evidence.p_value * tests).min(1.0);
+    if p > rule.family_wise {
+        return Some(format!(
+            "not significant between independent blocks (p = {p:.2} over all that was tried)"
+        ));
+    }
+    let folds = &evidence.fold_gains;
+    let good = folds.iter().filter(|g| **g > 0.0).count();
+    let mean = folds.iter().sum::<f64>() / folds.len().max(1) as f64;
+    if (good as f64) < rule.folds_that_must_gain * folds.len() as f64 {
+        return Some(format!("the held-out error falls in {good} of {} folds only", folds.len()));
+    }
+    if mean < rule.least_gain {
+        return Some(format!("the held-out squared error falls by {:.1} % only", 100.0 * mean));
+    }
+    if let Some(worst) = folds.iter().copied().reduce(f64::min).filter(|w| *w < rule.worst_fold) {
+        return Some(format!("one held-out fold is {:.0} % worse", -100.0 * worst));
+    }
+    // A push is where errors are larger than elsewhere, and explains that.
+    if let Some(left) = evidence.event_left.filter(|left| *left > rule.event_left) {
+        return Some(match left.is_finite() {
+            true => {
+                format!("leaves {:.0} % of what its time has more than others of squared error", 100.0 * left)
+            }
+            false => "its time has no larger error than others".to_string(),
+        });
+    }
+    // What happens in some logs only need not happen in the validation set.
+    if evidence.validation_gain <= 0.0 && !local {
+        return Some(format!(
+            "does not lower the error on the other path ({:+.1} %)",
+            -100.0 * evidence.validation_gain
+        ));
+    }
+    None
+}

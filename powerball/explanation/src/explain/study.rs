@@ -1,0 +1,60 @@
+//! What does not change while effects are looked for.
+
+use crate::effects::{Context, Made};
+use crate::options::ExplainOptions;
+use crate::rule::Rule;
+use powerball_identification::estimate::{Fit, Folds};
+use powerball_logs::regression::Data;
+
+/// The logs as rows, how they are held out, and what the search was told.
+pub(super) struct Study<'a> {
+    /// The logs to fit.
+    pub(super) data: Data<'a>,
+    /// Their columns that were made already.
+    pub(super) made: Made,
+    /// The validation set: logs of another path, on which additions must hold.
+    pub(super) validation: Data<'a>,
+    /// Its columns that were made already.
+    pub(super) made_on_validation: Made,
+    /// How the logs to fit are held out.
+    pub(super) folds: Folds,
+    /// Whether the validation set repeats the path of the fitted logs.
+    pub(super) one_path: bool,
+    /// What it was told beside the logs.
+    pub(super) options: &'a ExplainOptions<'a>,
+}
+
+impl<'a> Study<'a> {
+    /// The same logs with one multibody model for all joints.
+    pub(super) fn joint_fit(&self) -> Study<'a> {
+        let [made, made_on_validation] = [Made::default(), Made::default()];
+        let (data, validation) = (self.data.joint_fit(), self.validation.joint_fit());
+        let Study { ref folds, one_path, options, .. } = *self;
+        Study { data, made, validation, made_on_validation, folds: folds.clone(), one_path, options }
+    }
+
+    /// The thresholds.
+    pub(super) fn rule(&self) -> &Rule {
+        &self.options.rule
+    }
+
+    /// How long the fitted logs are, s.
+    pub(super) fn fitted_time(&self) -> f64 {
+        self.data.recordings.iter().map(|r| r.len() as f64 / r.rate).sum()
+    }
+
+    /// A model seen on the logs to fit, with what is left of them.
+    pub(super) fn on_fitted<'c>(&'c self, fit: &'c Fit, residual: &'c [Vec<f64>]) -> Context<'c> {
+        Context::new(&self.data, fit, residual, self.rule()).with(&self.made)
+    }
+
+    /// The same on the validation set.
+    pub(super) fn on_validation<'c>(&'c self, fit: &'c Fit, residual: &'c [Vec<f64>]) -> Context<'c> {
+        Context::new(&self.validation, fit, residual, self.rule()).with(&self.made_on_validation)
+    }
+
+    /// Says what is being done.
+    pub(super) fn say(&self, what: &str) {
+        self.options.progress.say(what);
+    }
+}

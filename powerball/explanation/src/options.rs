@@ -1,0 +1,58 @@
+//! What an explanation is told beside the logs, and why there may be none.
+
+use super::rule::Rule;
+use super::torque_model::{FileError, TorqueModel, Unchanged};
+use powerball_controller::JointNumber;
+use powerball_logs::Progress;
+use powerball_logs::regression::{DataError, DataOptions};
+
+/// What an explanation is told beside the arm and the logs. The default knows nothing and tells nobody.
+#[derive(Clone, Debug, Default)]
+pub struct ExplainOptions<'a> {
+    /// The thresholds of the rule.
+    pub rule: Rule,
+    /// How logs are prepared.
+    pub data: DataOptions,
+    /// What is known already: the model of an earlier explanation for the same arm file. It is taken out of
+    /// the logs as it stands; what is found comes to it.
+    pub known: Option<TorqueModel>,
+    /// Names that an experiment has ruled out.
+    pub ruled_out: Vec<RuledOut>,
+    /// Whether what stays without a name is corrected by bounded curves where that helps.
+    pub correct_unattributed: bool,
+    /// Who wants to know what is being done.
+    pub progress: Progress<'a>,
+}
+
+/// A name that an experiment has ruled out on some joints.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RuledOut {
+    /// The name.
+    pub effect: String,
+    /// The joints.
+    pub joints: Vec<JointNumber>,
+    /// The name that the experiment speaks for instead.
+    pub in_favour_of: String,
+    /// What showed it.
+    pub why_not: String,
+}
+
+/// Why logs cannot be explained.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum ExplainError {
+    /// The logs to fit hold too little.
+    #[error("--log: {0}")]
+    Fit(#[source] DataError),
+    /// The validation logs hold too little.
+    #[error("--validate: {0}")]
+    Validate(#[source] DataError),
+    /// The arm's dynamics cannot be derived, or those of the arm that was found.
+    #[error("{0}")]
+    Arm(#[source] dyngen::Error),
+    /// The known model, or what was found, changes the arm in a way that it cannot be changed.
+    #[error("{0}")]
+    Changes(#[source] Unchanged),
+    /// The known model is another arm's.
+    #[error("{0}")]
+    Known(#[source] FileError),
+}

@@ -1,0 +1,110 @@
+//! Whether a model still holds: samples in, events out, as a stream.
+//!
+//! The test is [`powerball_controller::change`], whose false alarms have a stated rate; `stream` feeds it with the rows of a
+//! stream, `meaning` says what an alarm means, with a name (`name`). After an event the model has the change, so
+//! that one change is one event.
+
+mod buffer;
+mod changes;
+mod event;
+mod meaning;
+mod name;
+mod stream;
+
+use crate::rule::Rule;
+use crate::torque_model::{TorqueModel, rows_a_second};
+pub use event::{Event, Evidence};
+use powerball_logs::log::LiveSample;
+use powerball_logs::regression::RigidArm;
+use powerball_logs::signal::resample::median_step;
+use stream::Stream;
+
+/// Samples that say how many there are a second. A file is watched as a stream is: the same rows give the same events.
+pub const FIRST: usize = 40;
+
+/// How a model is watched.
+#[derive(Clone, Debug)]
+pub struct WatchOptions {
+    /// The mean time to a false alarm, h of motion.
+    pub hours: f64,
+    /// By how much of itself each joint's friction may wander.
+    pub friction_range: f64,
+    /// Where the model does not say its colour: so many seconds of motion are taken as good.
+    pub learn: f64,
+    /// The thresholds for names.
+    pub rule: Rule,
+}
+
+impl Default for WatchOptions {
+    fn default() -> Self {
+        WatchOptions { hours: 24.0, friction_range: 0.02, learn: 20.0, rule: Rule::default() }
+    }
+}
+
+impl WatchOptions {
+    /// The level of the alarm for rows of logs with so many samples a second.
+    #[must_use]
+    pub fn level(&self, rate: f64) -> f64 {
+        self.hours * 3600.0 * rows_a_second(rate)
+    }
+}
+
+/// What a stream is watched with.
+#[derive(Clone, Copy, Debug)]
+struct Setting<'a> {
+    body: &'a RigidArm,
+    model: &'a TorqueModel,
+    options: &'a WatchOptions,
+    /// What the stream is called.
+    file: &'a str,
+}
+
+/// One stream that is watched.
+#[derive(Debug)]
+pub struct Watch<'a> {
+    setting: Setting<'a>,
+    /// Before the rate is known.
+    first: Vec<LiveSample>,
+    stream: Option<Stream<'a>>,
+}
+
+impl<'a> Watch<'a> {
+    /// A stream of samples called `file`. `model` is one of the arm `body`, checked.
+    #[must_use]
+    pub fn new(
+        body: &'a RigidArm,
+        model: &'a TorqueModel,
+        options: &'a WatchOptions,
+        file: &'a str,
+    ) -> Watch<'a> {
+        Watch { setting: Setting { body, model, options, file }, first: Vec::new(), stream: None }
+    }
+
+    /// What is to be said of the stream beside events; each once.
+    pub fn notes(&mut self) -> Vec<String> {
+        self.stream.as_mut().map(Stream::notes).unwrap_or_default()
+    }
+
+    /// Takes a sample; times rise.
+    pub fn push(&mut self, sample: &LiveSample) -> Vec<Event> {
+        if let Some(stream) = &mut self.stream {
+            return stream.push(sample);
+        }
+        self.first.push(sample.clone());
+        let t: Vec<f64> = self.first.iter().map(|s| s.t).collect();
+        let Some(step) = median_step(&t).filter(|_| t.len() >= FIRST) else { return Vec::new() };
+        let stream = self.stream.insert(Stream::new(self.setting, 1.0 / step));
+        self.first.drain(..).flat_map(|sample| stream.push(&sample)).collect()
+    }
+
+    /// The stream ends.
+    pub fn finish(&mut self) -> Vec<Event> {
+        self.stream.as_mut().map(Stream::finish).unwrap_or_default()
+    }
+
+    /// Whether there were enough samples to begin.
+    #[must_use]
+    pub fn has_begun(&self) -> bool {
+        self.stream.is_some()
+    }
+}

@@ -1,0 +1,174 @@
+//! What would explain that two fits differ, and all of it in a sentence.
+
+use super::differences::{Differences, Inertia};
+use super::result::Cause;
+use crate::estimate::Solver;
+use crate::estimate::distribution::f_tail;
+use dyngen::arm::sum::parse_sum;
+use dyngen::arm::{Parameter, ParameterKind};
+use dyngen::exact::rational::to_f64;
+use faer::Mat;
+
+/// A payload that leaves less than this share of the inertial difference unexplained is one, however small
+/// the errors.
+const PAYLOAD_LEAVES: f64 = 0.05;
+
+/// What explains the differences, the inertial ones first; empty where there is none.
+pub(super) fn causes(joints: usize, found: &Differences) -> Vec<Cause> {
+    let mut causes = Vec::new();
+    let inertial: Vec<String> =
+        found.parameters.iter().filter(|p| p.differs).map(|p| p.name.clone()).collect();
+    if !inertial.is_empty() {
+        causes.push(payload(joints, found).unwrap_or(Cause::Inertia { parameters: inertial.clone() }));
+    }
+    for f in found.friction.iter().filter(|f| f.differs) {
+        causes.push(Cause::Friction { joint: f.joint, change: f.change });
+    }
+    for c in found.constants.iter().filter(|c| c.differs) {
+        causes.push(Cause::SensorZero { joint: c.joint, change: c.interval });
+    }
+    let changed = found.friction.iter().filter(|f| f.differs).count();
+    if inertial.is_empty() && changed >= 3 && 2 * changed > found.friction.len() {
+        causes.push(Cause::AnotherUnit);
+    }
+    causes
+}
+
+/// The link of which ten inertial parameters explain all that differs, where there is one: the last where it does so
+/// nearly as well as the best.
+fn payload(joints: usize, found: &Differences) -> Option<Cause> {
+    let loads: Vec<Load> = (0..joints).rev().filter_map(|link| Load::of(link, found)).collect();
+    let least = loads.iter().map(|load| load.left).reduce(f64::min)?;
+    let load = loads.iter().find(|load| load.left <= AS_WELL * least)?;
+    load.is_enough(found).then(|| load.cause())
+}
+
+/// What a body on a link explains of the inertial difference.
+struct Load {
+    link: usize,
+    /// By parameter of a body: its value and its variance, where the logs tell it.
+    values: Vec<Option<[f64; 2]>>,
+    /// χ² of the difference, and what of it is left.
+    all: f64,
+    left: f64,
+    /// Degrees of freedom of that.
+    free: f64,
+}
+
+/// A link does as well as another one where it leaves so many times as much.
+const AS_WELL: f64 = 1.1;
+/// The parameters of a body: of a link but for its rotor.
+fn of_a_body() -> impl Iterator<Item = ParameterKind> {
+    ParameterKind::ALL.iter().copied().filter(|kind| *kind != ParameterKind::Im)
+}
+
+impl Load {
+    /// By generalised least squares over the minimal set, whose parameters say in their names what they are sums of.
+    fn of(link: usize, found: &Differences) -> Option<Load> {
+        let sums: Vec<Vec<(Parameter, f64)>> = found
+            .parameters
+            .iter()
+            .map(|p| Some(parse_sum(&p.name).ok()?.into_iter().map(|(p, c)| (p, to_f64(&c))).collect()))
+            .collect::<Option<_>>()?;
+        let column = |kind: ParameterKind| -> Vec<f64> {
+            let own = |(p, factor): &(Parameter, f64)| {
+                if p.link == link && p.kind == kind { *factor } else { 0.0 }
+            };
+            sums.iter().map(|sum| sum.iter().map(own).sum()).collect()
+        };
+        let columns: Vec<Vec<f64>> = of_a_body().map(column).collect();
+        let inner = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+        let Inertia { difference, weights, .. } = &found.inertia;
+        let weighted: Vec<Vec<f64>> = columns.iter().map(|column| weights.solve(column)).collect();
+        let gram = Mat::from_fn(columns.len(), columns.len(), |i, k| inner(&columns[i], &weighted[k]));
+        let right: Vec<f64> = weighted.iter().map(|column| inner(column, difference)).collect();
+        let solver = Solver::new(&gram, |_| true);
+        let load = solver.solve(&right);
+        let all = inner(difference, &weights.solve(difference));
+        let left = all - inner(&load, &right);
+        let free = weights.kept().len().checked_sub(solver.kept().len()).filter(|free| *free > 0)? as f64;
+        let variances = solver.inverse_diagonal();
+        let value = |k: usize| solver.kept().contains(&k).then(|| [load[k], variances[k]]);
+        Some(Load { link, values: (0..columns.len()).map(value).collect(), all, left, free })
+    }
+
+    fn is_enough(&self, found: &Differences) -> bool {
+        self.left <= PAYLOAD_LEAVES * self.all
+            || f_tail(self.left / self.free, self.free, found.inertia.freedom) >= found.level
+    }
+
+    fn cause(&self) -> Cause {
+        let value = |kind: ParameterKind| self.values[of_a_body().position(|k| k == kind)?];
+        let mass = value(ParameterKind::M).map(|[mass, variance]| [mass, variance.sqrt()]);
+        let moments = [ParameterKind::Mx, ParameterKind::My, ParameterKind::Mz];
+        let square: f64 = moments.into_iter().filter_map(value).map(|[moment, _]| moment * moment).sum();
+        Cause::Payload { link: self.link + 1, mass, first_moment: square.sqrt() }
+    }
+}
+
+/// A difference in words.
+pub(super) fn sentence(found: &Differences, causes: &[Cause]) -> String {
+    if causes.is_empty() {
+        let widest = found.friction.iter().map(|f| f.change[0].abs().max(f.change[1].abs()));
+        let widest = widest.filter(|w| w.is_finite()).fold(0.0, f64::max);
+        return format!(
+            "Same arm, as far as these fits can tell: none of {} numbers differs (level {} %); a change of \
+                friction by \
+                more than {:.1} % would have been seen on every joint.",
+            found.comparisons,
+            100.0 * found.level,
+            100.0 * widest
+        );
+    }
+    let words: Vec<String> = causes.iter().map(in_words).collect();
+    let mut text = words.join("; ");
+    if let Some(first) = text.get(..1).map(str::to_uppercase) {
+        text.replace_range(..1, &first);
+    }
+    format!("{text}.")
+}
+
+fn in_words(cause: &Cause) -> String {
+    match cause {
+        Cause::Payload { link, mass, first_moment } => {
+            let moment = format!("first moments that the logs tell differ by {first_moment:.3} kg·m");
+            match mass {
+                Some([mass, std]) => {
+                    let which = if *mass >= 0.0 { "heavier" } else { "lighter" };
+                    let mass = mass.abs();
+                    format!(
+                        "another payload: link {link} is {mass:.3} kg {which} (standard error {std:.3} kg); \
+                            its {moment}"
+                    )
+                }
+                None => format!("another payload: on link {link} {moment}; these logs do not tell its mass"),
+            }
+        }
+        Cause::Inertia { parameters } => format!(
+            "the inertial parameters {} differ, and not as a body on one link would make them",
+            parameters.join("; ")
+        ),
+        Cause::Friction { joint, change: [low, high] } => {
+            let percent = |x: f64| 100.0 * x;
+            match (percent(*low), percent(*high)) {
+                (low, high) if low > 0.0 => format!(
+                    "friction changed on joint {joint} by {low:.1} to \
+                    {high:.1} %"
+                ),
+                (low, high) => format!("friction changed on joint {joint} by {high:.1} to {low:.1} %"),
+            }
+        }
+        Cause::SensorZero { joint, change: [low, high] } => {
+            format!(
+                "another sensor zero on joint {joint}: a constant torque of {low:.3} to {high:.3} N·m \
+                came in"
+            )
+        }
+        Cause::AnotherUnit => {
+            "friction differs on most joints and inertia on none: another unit of the same kind, or the same \
+                one at another \
+                temperature"
+                .into()
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! Two fits side by side: which parameters and friction curves truly differ, what that means in torque, and a
+//! sentence.
+//!
+//! Two fits never come to the same numbers. What differs is told by the covariance of both: intervals that
+//! hold all at once at one stated level (Bonferroni's, over every parameter and every point of the friction
+//! curves that is compared), and by a few questions that share the level: inertia, each joint's friction, each
+//! constant torque. So equal arms are called different in that share of comparisons and not in that share of
+//! numbers. Friction is compared as a curve: its five coefficients make up for each other, the torque at a
+//! velocity does not.
+
+mod cause;
+mod differences;
+mod result;
+mod side;
+
+pub use result::{
+    Cause, CompareError, CompareOptions, Comparison, ConstantDifference, FrictionDifference,
+    ParameterDifference, TorqueDifference,
+};
+pub use side::Side;
+
+use differences::Differences;
+
+/// Compares two fits of one arm file; differences are `b` less `a`.
+///
+/// # Errors
+/// [`CompareError`]: fits of other arms or parameter sets, or without standard errors.
+pub fn compare(a: &Side, b: &Side, options: &CompareOptions) -> Result<Comparison, CompareError> {
+    let differences = Differences::new(a, b, options)?;
+    let causes = cause::causes(a.friction.len(), &differences);
+    let sentence = cause::sentence(&differences, &causes);
+    let Differences { level, comparisons, parameters, friction, constants, torque, warnings, .. } =
+        differences;
+    let differ = parameters.iter().any(|p| p.differs)
+        || friction.iter().any(|f| f.differs)
+        || constants.iter().any(|c| c.differs);
+    Ok(Comparison {
+        a: a.name.clone(),
+        b: b.name.clone(),
+        arm: a.arm.clone(),
+        differ,
+        level,
+        comparisons,
+        parameters,
+        friction,
+        constants,
+        torque_difference: torque,
+        causes,
+        sentence,
+        warnings,
+    })
+}
+
+#[cfg(test)]
+mod tests;

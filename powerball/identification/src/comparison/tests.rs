@@ -1,0 +1,141 @@
+//! Simulated pairs: the virtual arm with its own dynamics, sensors and noise, recorded twice.
+
+use super::{Cause, CompareOptions, Comparison, Side, compare};
+use crate::estimate::{
+    FrictionKind, Uncertainty, estimates, reduce_in_bands, solve_in_band, standard_errors,
+};
+use crate::excite::{Fourier, Harmonics};
+use chacha20::ChaCha8Rng;
+use powerball_controller::friction::TanhFriction;
+use powerball_logs::chain::Chain;
+use powerball_logs::regression::{DataOptions, RigidArm};
+use powerball_logs::summary::Bands;
+use powerball_virtual_arm::{Body, Dynamics, Plant, lwa4p};
+use rand::{RngExt, SeedableRng};
+use std::sync::LazyLock;
+
+/// A fit of three logs of 20 s.
+fn fitted(body: &RigidArm, links: Vec<Body>, friction: Vec<TanhFriction<f64>>, seed: u64) -> Side {
+    let chain = Chain::new(&lwa4p::arm().unwrap());
+    let sensors = lwa4p::plant().unwrap().sensors().clone();
+    let plant = Plant::new(Dynamics::new(chain, links).unwrap(), friction, sensors);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let options = DataOptions::default();
+    let mut bands = Bands::new(body, &options);
+    for log in 0..3 {
+        let mut draw = || (0..5).map(|_| 0.25 * rng.random_range(-1.0..1.0)).collect();
+        let joints = (0..6).map(|_| Harmonics { middle: 0.0, a: draw(), b: draw() }).collect();
+        let path = Fourier { fundamental: std::f64::consts::TAU / 10.0, periods: 2, ramp: 1.0, joints };
+        let recording = plant.record(&path.sample(plant.sensors().rate), 0.0, 1000 * seed + log);
+        bands.merge(&reduce_in_bands(body, &recording.log("virtual"), &options).unwrap().0).unwrap();
+    }
+    let solution = solve_in_band(&bands, FrictionKind::Symmetric).solution;
+    let errors = standard_errors(&solution);
+    let found = estimates(body.names(), &solution, &errors);
+    let uncertainty = Some(Uncertainty::of(body.names(), &solution, &errors));
+    let (parameters, friction) = (found.parameters, found.friction);
+    Side { name: format!("seed {seed}"), arm: "virtual".into(), parameters, friction, uncertainty }
+}
+
+/// The usual arm, which every other one is compared with.
+fn usual() -> &'static Side {
+    static USUAL: LazyLock<Side> = LazyLock::new(|| {
+        let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
+        fitted(&body, lwa4p::links(), table(), 1)
+    });
+    &USUAL
+}
+
+fn table() -> Vec<TanhFriction<f64>> {
+    lwa4p::plant().unwrap().friction().to_vec()
+}
+
+/// Viscous friction of the third joint `factor` times as large.
+fn viscous(factor: f64) -> Vec<TanhFriction<f64>> {
+    let mut friction = table();
+    let [g1, g2, g3, g4, g5] = powerball_controller::friction::TABLE_2[2];
+    friction[2] = TanhFriction::new([g1, g2, g3, g4, factor * g5]);
+    friction
+}
+
+fn compared(a: &Side, b: &Side) -> Comparison {
+    compare(a, b, &CompareOptions::default()).unwrap()
+}
+
+#[test]
+fn equal_arms_are_equal_and_five_per_cent_of_viscous_friction_is_seen() {
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
+    let a = usual();
+    for seed in 2..4 {
+        let same = compared(a, &fitted(&body, lwa4p::links(), table(), seed));
+        assert!(!same.differ && same.sentence.starts_with("Same arm"), "{}", same.sentence);
+        // What differs in torque is what the errors of both make.
+        for t in &same.torque_difference {
+            assert!(t.rms < 3.0 * t.expected && t.relative < 0.02, "{t:?}");
+        }
+        let changed = fitted(&body, lwa4p::links(), viscous(1.05), 10 + seed);
+        let other = compared(a, &changed);
+        assert!(other.differ);
+        let [Cause::Friction { joint: 3, change: [low, high] }] = other.causes[..] else {
+            panic!("{}", other.sentence)
+        };
+        // Viscous friction is a part of it all.
+        assert!(low > 0.0 && high < 0.1, "{low} {high}");
+        assert!(other.sentence.starts_with("Friction changed on joint 3 by"), "{}", other.sentence);
+        // The other way round it is the other way round.
+        let back = compared(&changed, a);
+        assert!(back.differ && back.friction[2].change[1] < 0.0);
+        assert_eq!(back.parameters[0].difference, -other.parameters[0].difference);
+    }
+}
+
+#[test]
+fn a_payload_is_told_with_its_mass() {
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
+    let a = usual();
+    let mut links = lwa4p::links();
+    let last = links.last_mut().unwrap();
+    let load = Body::even_box(1.0, [0.02, 0.0, 0.1], [0.05; 3], 0.0);
+    (last.mass, last.moment, last.inertia) =
+        (last.mass + load.mass, last.moment + load.moment, last.inertia + load.inertia);
+    let loaded = compared(a, &fitted(&body, links, table(), 5));
+    let Some(Cause::Payload { link: 6, mass: Some([mass, std]), .. }) = loaded.causes.first() else {
+        panic!("{}", loaded.sentence)
+    };
+    assert!((mass - 1.0).abs() < 4.0 * std && *std < 0.2, "{mass} ± {std}");
+    assert!(!loaded.friction.iter().any(|f| f.differs), "{}", loaded.sentence);
+}
+
+/// An arm whose friction differs by a tenth between the halves of its own log is not said to differ by a twentieth from
+/// another one; halves that are alike change nothing to speak of.
+#[test]
+fn what_varies_within_a_log_is_no_difference_of_arms() {
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
+    let (a, other) = (usual(), fitted(&body, lwa4p::links(), viscous(1.05), 12));
+    let [same, warm] =
+        [(2, 1.0), (3, 1.1)].map(|(seed, factor)| fitted(&body, lwa4p::links(), viscous(factor), seed));
+    assert!(compared(&a.clone().repeated([a, &same]), &other).differ);
+    let varies = compared(&a.clone().repeated([a, &warm]), &other);
+    assert!(!varies.differ, "{}", varies.sentence);
+}
+
+#[test]
+fn what_cannot_be_compared_is_told() {
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
+    let a = usual();
+    let mut other = a.clone();
+    other.parameters.pop();
+    let refused = compare(a, &other, &CompareOptions::default()).unwrap_err().to_string();
+    assert!(refused.contains("one arm file"), "{refused}");
+    let level = compare(a, a, &CompareOptions { level: 1.5 }).unwrap_err().to_string();
+    assert!(level.contains("--level"), "{level}");
+    // Without the covariance less is known, never more.
+    let bare = Side { uncertainty: None, ..a.clone() };
+    let b = fitted(&body, lwa4p::links(), viscous(1.05), 12);
+    let alone = compared(&bare, &b);
+    assert!(alone.warnings[0].contains("covariance.json"));
+    for (with, without) in compared(a, &b).friction.iter().zip(&alone.friction) {
+        let width = |[low, high]: [f64; 2]| high - low;
+        assert!(width(without.interval[0]) >= 0.9 * width(with.interval[0]));
+    }
+}

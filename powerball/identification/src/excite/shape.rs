@@ -1,0 +1,384 @@
+//! The arm as capsules along its Denavit–Hartenberg geometry, and how near they come to each other and to the
+//! floor.
+//!
+//! The origins of the frames, and the corners between the parts of length d and a of each row, are a polyline
+//! from the base to the last frame (and the tool). Every part of it that has a length is a capsule. That is
+//! all an arm file tells of a shape: joints that bulge, and cables, are what the radius and the clearance are
+//! for.
+
+use super::constraints::{JointLimits, Segment};
+use chacha20::ChaCha8Rng;
+use dyngen::Arm;
+use dyngen::arm::{Convention, Joint, JointKind};
+use dyngen::exact::rational::to_f64;
+use nalgebra::{Rotation3, Vector3};
+use powerball_logs::chain::Chain;
+use rand::{RngExt, SeedableRng};
+use std::fmt;
+
+/// Two parts count as joined within this many radii of the joints between them: their capsules overlap there
+/// whatever the arm does.
+const JOINED: f64 = 6.0;
+/// Poses that tell what always touches and what never moves.
+const POSES: usize = 256;
+
+/// What is nearest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Contact {
+    /// Two links, from 1; 0 is the base.
+    Links(usize, usize),
+    /// A link and the floor.
+    Floor(usize),
+}
+
+impl fmt::Display for Contact {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = |link: &usize| if *link == 0 { "the base".to_string() } else { format!("link {link}") };
+        match self {
+            Contact::Links(a, b) => write!(f, "{} and {}", name(a), name(b)),
+            Contact::Floor(link) => write!(f, "{} and the floor", name(link)),
+        }
+    }
+}
+
+/// How near an arm comes to something: the surfaces' distance, m, below zero inside it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nearness {
+    /// m
+    pub distance: f64,
+    /// What.
+    pub contact: Contact,
+}
+
+/// A part of the polyline.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    /// The vertex that it begins at; it ends at the next one.
+    vertex: usize,
+    link: usize,
+}
+
+/// The capsules of an arm.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    chain: Chain,
+    modified: bool,
+    across: Vec<Vector3<f64>>,
+    tool: Option<Vector3<f64>>,
+    radius: f64,
+    parts: Vec<Part>,
+    pairs: Vec<(usize, usize)>,
+    always: Vec<(usize, usize)>,
+}
+
+/// A floor: what is below this height above the base frame's origin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Floor {
+    /// Upwards in the base frame.
+    pub up: Vector3<f64>,
+    /// m
+    pub height: f64,
+    /// The vertices that move up or down; what stands still is where it was built.
+    moving: Vec<bool>,
+}
+
+/// What a joint's row goes across its axes, a and b, m.
+fn normal(joint: &Joint) -> Vector3<f64> {
+    Vector3::new(to_f64(&joint.a), to_f64(&joint.b), 0.0)
+}
+
+impl Shape {
+    /// The capsules of an arm, of one radius (m). Parts that touch in every pose within the limits are not
+    /// looked at again: see [`Shape::always_touching`].
+    #[must_use]
+    pub fn new(arm: &Arm, limits: &[JointLimits], radius: f64) -> Shape {
+        let modified = arm.convention == Convention::Modified;
+        let mut parts = Vec::new();
+        for (i, joint) in arm.joints.iter().enumerate() {
+            let (along_a, along_d) = (normal(joint).norm() != 0.0, to_f64(&joint.d) != 0.0);
+            let along_d = along_d || joint.kind == JointKind::Prismatic;
+            // Modified rows go along a first, and that part is rigid with the link before.
+            let (first, second) = if modified { (along_a, along_d) } else { (along_d, along_a) };
+            if first {
+                parts.push(Part { vertex: 2 * i, link: if modified { i } else { i + 1 } });
+            }
+            if second {
+                parts.push(Part { vertex: 2 * i + 1, link: i + 1 });
+            }
+        }
+        let tool = arm.tool.as_ref().map(|tool| Vector3::from(tool.xyz.each_ref().map(to_f64)));
+        if tool.is_some_and(|tool| tool.norm() > 0.0) {
+            parts.push(Part { vertex: 2 * arm.dof(), link: arm.dof() });
+        }
+        // x of frame i is that after Rx(alpha) too (standard), x of frame i − 1 that before it (modified).
+        let across = |joint: &Joint| match modified {
+            true => normal(joint),
+            false => Rotation3::from_axis_angle(&Vector3::x_axis(), -joint.alpha.radians()) * normal(joint),
+        };
+        let across = arm.joints.iter().map(across).collect();
+        let all = (0..parts.len()).flat_map(|k| (k + 1..parts.len()).map(move |l| (k, l))).collect();
+        let mut shape = Shape {
+            chain: Chain::new(arm),
+            modified,
+            across,
+            tool,
+            radius,
+            parts,
+            pairs: all,
+            always: Vec::new(),
+        };
+        let mut touching = vec![true; shape.pairs.len()];
+        for q in poses(limits) {
+            let vertices = shape.vertices(&q);
+            for (pair, touching) in shape.pairs.iter().zip(&mut touching) {
+                *touching &= shape.between(*pair, &vertices).is_some_and(|distance| distance <= 0.0);
+            }
+        }
+        let (always, pairs) =
+            shape.pairs.iter().zip(touching).partition::<Vec<_>, _>(|(_, touching)| *touching);
+        let links = |(k, l): (usize, usize)| (shape.parts[k].link, shape.parts[l].link);
+        shape.always = always.into_iter().map(|(pair, _)| links(*pair)).collect();
+        shape.pairs = pairs.into_iter().map(|(pair, _)| *pair).collect();
+        shape
+    }
+
+    /// Links that touch in every pose, from 1: their capsules are thicker than the arm, and nothing is said
+    /// of them.
+    #[must_use]
+    pub fn always_touching(&self) -> &[(usize, usize)] {
+        &self.always
+    }
+
+    /// A floor at a height (m) along `up` from the base frame's origin.
+    #[must_use]
+    pub fn floor(&self, up: Vector3<f64>, height: f64, limits: &[JointLimits]) -> Floor {
+        let mut range: Vec<[f64; 2]> = Vec::new();
+        for q in poses(limits) {
+            let heights: Vec<f64> = self.vertices(&q).iter().map(|v| v.dot(&up)).collect();
+            range.resize(heights.len(), [f64::INFINITY, f64::NEG_INFINITY]);
+            for ([low, high], h) in range.iter_mut().zip(heights) {
+                (*low, *high) = (low.min(h), high.max(h));
+            }
+        }
+        Floor { up, height, moving: range.iter().map(|[low, high]| high - low > 1e-6).collect() }
+    }
+
+    /// Share of the poses within the limits in which the floor is nearer than the clearance (m), and nearer
+    /// than anything else.
+    #[must_use]
+    pub fn blocked(&self, floor: &Floor, clearance: f64, limits: &[JointLimits]) -> f64 {
+        let at_floor = |q: &Vec<f64>| {
+            self.nearest(q, Some(floor))
+                .is_some_and(|near| near.distance < clearance && matches!(near.contact, Contact::Floor(_)))
+        };
+        poses(limits).filter(at_floor).count() as f64 / POSES as f64
+    }
+
+    /// The polyline in a pose: base origin, then for each joint its corner and its frame's origin, and the
+    /// tool, m.
+    #[must_use]
+    pub fn vertices(&self, q: &[f64]) -> Vec<Vector3<f64>> {
+        let poses = self.chain.poses(q);
+        let mut vertices = Vec::with_capacity(2 * poses.len() + 2);
+        vertices.push(Vector3::zeros());
+        let mut before = (nalgebra::Matrix3::identity(), Vector3::zeros());
+        for ((rotation, origin), across) in poses.iter().zip(&self.across) {
+            vertices.push(match self.modified {
+                true => before.1 + before.0 * across,
+                false => origin - rotation * across,
+            });
+            vertices.push(*origin);
+            before = (*rotation, *origin);
+        }
+        vertices.extend(self.tool.map(|tool| before.1 + before.0 * tool));
+        vertices
+    }
+
+    /// The capsules' axes in a pose with their links, from 1; 0 is the base.
+    pub fn segments(&self, q: &[f64]) -> impl Iterator<Item = (usize, Segment)> + '_ {
+        let vertices = self.vertices(q);
+        self.parts.iter().map(move |part| (part.link, segment(part, &vertices)))
+    }
+
+    /// The capsules' radius, m.
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// What is nearest in a pose; `None` where nothing can touch.
+    #[must_use]
+    pub fn nearest(&self, q: &[f64], floor: Option<&Floor>) -> Option<Nearness> {
+        let vertices = self.vertices(q);
+        let links = self.pairs.iter().filter_map(|pair| {
+            let contact = Contact::Links(self.parts[pair.0].link, self.parts[pair.1].link);
+            self.between(*pair, &vertices).map(|distance| Nearness { distance, contact })
+        });
+        let floor = floor.into_iter().flat_map(|floor| {
+            self.parts.iter().flat_map(|part| [(part, part.vertex), (part, part.vertex + 1)]).filter_map(
+                |(part, vertex)| {
+                    let distance = vertices[vertex].dot(&floor.up) - floor.height - self.radius;
+                    floor.moving[vertex].then_some(Nearness { distance, contact: Contact::Floor(part.link) })
+                },
+            )
+        });
+        links.chain(floor).min_by(|a, b| a.distance.total_cmp(&b.distance))
+    }
+
+    /// Distance of two parts' surfaces but for what is joined; `None` where nothing else is left of one.
+    fn between(&self, (k, l): (usize, usize), vertices: &[Vector3<f64>]) -> Option<f64> {
+        let [first, second] = [k, l].map(|part| segment(&self.parts[part], vertices));
+        let gap: f64 = self.parts[k + 1..l].iter().map(|part| segment(part, vertices).length()).sum();
+        let cut = 0.5 * (JOINED * self.radius - gap).max(0.0);
+        Some(first.cut(0.0, cut)?.distance(&second.cut(cut, 0.0)?) - 2.0 * self.radius)
+    }
+}
+
+fn segment(part: &Part, vertices: &[Vector3<f64>]) -> Segment {
+    Segment { from: vertices[part.vertex], to: vertices[part.vertex + 1] }
+}
+
+/// The same random poses within the limits every time.
+pub(super) fn poses(limits: &[JointLimits]) -> impl Iterator<Item = Vec<f64>> + '_ {
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    (0..POSES).map(move |_| {
+        limits
+            .iter()
+            .map(|l| l.position[0] + rng.random_range(0.0..=1.0) * (l.position[1] - l.position[0]))
+            .collect()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::constraints::Limits;
+    use super::*;
+    use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+
+    /// Points along the arm every few millimetres, with the place of each along the chain, by transforms of
+    /// its own.
+    fn points(arm: &Arm, q: &[f64]) -> Vec<(f64, Vector3<f64>)> {
+        let turn = |axis, angle| {
+            Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&axis, angle))
+        };
+        let (x, z) = (Vector3::x_axis(), Vector3::z_axis());
+        let (mut frame, mut place, mut out) = (Isometry3::identity(), 0.0, Vec::new());
+        let mut slide = |frame: &mut Isometry3<f64>, by: Vector3<f64>| {
+            let steps = (by.norm() / 0.004).ceil() as usize;
+            for k in 0..=steps.max(1) {
+                let share = k as f64 / steps.max(1) as f64;
+                if by.norm() > 0.0 {
+                    out.push((
+                        place + share * by.norm(),
+                        (*frame * Translation3::from(by * share)).translation.vector,
+                    ));
+                }
+            }
+            place += by.norm();
+            *frame *= Translation3::from(by);
+        };
+        for (joint, q) in arm.joints.iter().zip(q) {
+            let (mut theta, mut d) = (joint.theta.radians(), to_f64(&joint.d));
+            *(if joint.kind == JointKind::Prismatic { &mut d } else { &mut theta }) += q;
+            let (along_a, along_d) = (Vector3::x() * to_f64(&joint.a), Vector3::z() * d);
+            if arm.convention == Convention::Modified {
+                frame *= turn(x, joint.alpha.radians());
+                slide(&mut frame, along_a);
+                frame *= turn(z, theta);
+                slide(&mut frame, along_d);
+            } else {
+                frame *= turn(z, theta);
+                slide(&mut frame, along_d);
+                slide(&mut frame, along_a);
+                frame *= turn(x, joint.alpha.radians());
+            }
+        }
+        out
+    }
+
+    const SCARA: &str = r#"
+name = "scara"
+convention = "standard"
+gravity = [0, 0, -9.81]
+[[joint]]
+kind = "revolute"
+a = 0.4
+alpha = 0
+d = 0.5
+theta = 0
+position = [-2.5, 2.5]
+velocity = 2
+acceleration = 5
+[[joint]]
+kind = "revolute"
+a = 0.3
+alpha = "pi"
+d = 0
+theta = 0
+position = [-2.8, 2.8]
+velocity = 2
+acceleration = 5
+[[joint]]
+kind = "prismatic"
+a = 0
+alpha = 0
+d = 0.1
+theta = 0
+position = [0, 0.35]
+velocity = 0.5
+acceleration = 3
+"#;
+
+    /// Against points in their thousands: the floor, and links away from the joints between them, in both
+    /// conventions and with a joint that slides.
+    #[test]
+    fn the_nearest_is_that_of_many_points() {
+        let file = |text: &str| Arm::parse(text, "arm.toml").unwrap();
+        let lwa4p = include_str!("../../../lwa4p.toml");
+        let modified = lwa4p.replace("\"standard\"", "\"modified\"").replace("d = 0.0\n", "d = 0.11\n");
+        let radius = 0.03;
+        for arm in [file(lwa4p), file(&modified), file(SCARA)] {
+            let limits = Limits::of(&arm, 0.0).unwrap().0;
+            let shape = Shape::new(&arm, &limits, radius);
+            assert!(shape.always_touching().is_empty());
+            let up = Vector3::new(0.1, -0.2, 1.0).normalize();
+            let floor = shape.floor(up, -0.3, &limits);
+            for q in poses(&limits).take(60) {
+                let all = points(&arm, &q);
+                let lowest = all.iter().map(|(_, p)| p.dot(&up)).fold(f64::INFINITY, f64::min);
+                // Further apart along the arm than what counts as joined; cut evenly from both.
+                let links = shape.nearest(&q, None).map_or(f64::INFINITY, |near| near.distance);
+                for (k, (s, a)) in all.iter().enumerate() {
+                    for (t, b) in &all[k..] {
+                        let joint_between = (t - s) > JOINED * radius + 0.6;
+                        if joint_between {
+                            assert!((a - b).norm() - 2.0 * radius >= links - 1e-9, "{q:?}");
+                        }
+                    }
+                }
+                let with_floor = shape.nearest(&q, Some(&floor)).map_or(f64::INFINITY, |near| near.distance);
+                let to_floor = lowest + 0.3 - radius;
+                // What stands still is not asked about.
+                assert!(with_floor <= links + 1e-12);
+                if floor.moving.iter().skip(1).all(|m| *m) && lowest < 0.0 {
+                    approx::assert_abs_diff_eq!(with_floor, links.min(to_floor), epsilon = 1e-9);
+                }
+            }
+        }
+    }
+
+    /// The forearm of an elbow arm against its upper arm: free when stretched, touching when folded, by the
+    /// triangle's own formula.
+    #[test]
+    fn an_elbow_folds_as_far_as_its_triangle_says() {
+        let arm = Arm::parse(include_str!("../../../lwa4p.toml"), "lwa4p.toml").unwrap();
+        let limits = Limits::of(&arm, 0.0).unwrap().0;
+        let shape = Shape::new(&arm, &limits, 0.05);
+        for fold in [-2.6, -1.9, -1.0, 1.0, 2.0, 2.6] {
+            let near = shape.nearest(&[0.3, 0.1, fold, 0.0, 0.0, 0.0], None).unwrap();
+            // Both are cut three radii from the elbow; the shorter one ends 0.305 m from it.
+            let ends = 2.0 * 0.15 * (0.5 * (std::f64::consts::PI - f64::abs(fold))).sin();
+            approx::assert_abs_diff_eq!(near.distance, ends - 0.1, epsilon = 1e-9);
+        }
+    }
+}

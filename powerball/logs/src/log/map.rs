@@ -1,0 +1,390 @@
+//! Which columns of a file are which quantities, in which unit and with which sign.
+//!
+//! Also here: one running time through several logs.
+
+use super::Log;
+use crate::signal::resample::linear_at;
+use serde::Deserialize;
+use std::path::Path;
+
+/// How the columns of a log are to be read where their names do not say it, as a TOML file has it:
+///
+/// ```toml
+/// joints = ["shoulder_pan_joint", "shoulder_lift_joint"]   # the log's names of the joints, in chain order
+/// topic = "/joint_states"          # of several
+/// clock = "receipt"                # when messages were received, not what their headers say ("header")
+/// q.unit = "deg"
+/// tau = { column = "effort", sign = [1, -1], scale = 0.001 }
+/// motor = { column = ["m_a", "m_b"], topic = "/drives" }
+/// ```
+///
+/// What it does not name is found as everywhere: `q1` or `q.shoulder_pan_joint`.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ColumnMap {
+    /// The names that the log has for the arm's joints, in the order of the arm file; empty where they are
+    /// those of the arm file.
+    pub joints: Vec<String>,
+    /// The topic with all that is not said to be elsewhere.
+    pub topic: Option<String>,
+    /// Which time counts.
+    pub clock: Clock,
+    /// Time.
+    pub t: Mapped,
+    /// Positions.
+    pub q: Mapped,
+    /// Velocities.
+    pub dq: Mapped,
+    /// Torques.
+    pub tau: Mapped,
+    /// Motor currents.
+    pub i: Mapped,
+    /// Temperatures.
+    pub temp: Mapped,
+    /// Torques on the motors' side.
+    pub motor: Mapped,
+}
+
+/// Which time of a message counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Clock {
+    /// What the header says where that is plausible, else when it was received.
+    #[default]
+    Auto,
+    /// What the header says.
+    Header,
+    /// When it was received.
+    Receipt,
+}
+
+/// How one quantity is stored.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Mapped {
+    /// One name: the columns are `name1` … or `name.joint` …. A list: the column of each joint in chain
+    /// order.
+    pub column: Option<ByJoint<String>>,
+    /// The topic that has it.
+    pub topic: Option<String>,
+    /// Its unit; nothing is the one of docs/logs.md.
+    pub unit: Option<ByJoint<String>>,
+    /// 1 or −1.
+    pub sign: Option<ByJoint<f64>>,
+    /// What the column is to be multiplied with, beside unit and sign.
+    pub scale: Option<ByJoint<f64>>,
+    /// What is to be added to the column's time stamps, s: of torques and currents that are late it is
+    /// negative.
+    pub shift: Option<ByJoint<f64>>,
+}
+
+/// A value for all joints, or one for each in the order of the arm file.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(untagged)]
+pub enum ByJoint<T> {
+    /// The same for all.
+    All(T),
+    /// One a joint.
+    Each(Vec<T>),
+}
+
+impl<T> ByJoint<T> {
+    /// The value of a joint, from 0.
+    pub fn of(&self, joint: usize) -> Option<&T> {
+        match self {
+            ByJoint::All(value) => Some(value),
+            ByJoint::Each(values) => values.get(joint),
+        }
+    }
+
+    fn fits(&self, joints: usize) -> bool {
+        matches!(self, ByJoint::All(_)) || matches!(self, ByJoint::Each(values) if values.len() == joints)
+    }
+}
+
+/// A unit's names and how much of the log's own unit it is.
+type Unit = (&'static [&'static str], f64);
+
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+const TURN: f64 = 2.0 * std::f64::consts::PI;
+const TIMES: &[Unit] = &[(&["s"], 1.0), (&["ms"], 1e-3), (&["us", "µs"], 1e-6), (&["ns"], 1e-9)];
+const POSITIONS: &[Unit] =
+    &[(&["rad", "m"], 1.0), (&["deg", "°"], DEGREE), (&["turn", "rev"], TURN), (&["mrad", "mm"], 1e-3)];
+const VELOCITIES: &[Unit] = &[
+    (&["rad/s", "m/s"], 1.0),
+    (&["deg/s", "°/s"], DEGREE),
+    (&["turn/s", "rev/s"], TURN),
+    (&["rpm", "turn/min"], TURN / 60.0),
+    (&["mrad/s", "mm/s"], 1e-3),
+];
+const TORQUES: &[Unit] = &[
+    (&["N·m", "Nm", "N*m", "N"], 1.0),
+    (&["mN·m", "mNm"], 1e-3),
+    (&["N·cm", "Ncm"], 1e-2),
+    (&["kN·m", "kN"], 1e3),
+];
+const CURRENTS: &[Unit] = &[(&["A"], 1.0), (&["mA"], 1e-3)];
+const TEMPERATURES: &[Unit] = &[(&["°C", "C", "degC"], 1.0)];
+
+impl ColumnMap {
+    /// The topics that the map names, where it names the one with all that is not said to be elsewhere.
+    pub(super) fn topics(&self) -> Option<Vec<String>> {
+        let main = self.topic.clone()?;
+        let others = [&self.t, &self.q, &self.dq, &self.tau, &self.i, &self.temp, &self.motor];
+        Some(std::iter::once(main).chain(others.iter().filter_map(|own| own.topic.clone())).collect())
+    }
+
+    /// Reads a map from TOML; `name` stands in messages where the file does.
+    ///
+    /// # Errors
+    /// What is wrong with it and where.
+    pub fn parse(text: &str, name: &str) -> Result<ColumnMap, String> {
+        let map: ColumnMap =
+            toml::from_str(text).map_err(|e| format!("{name}: {}", e.to_string().trim_end()))?;
+        for (key, mapped) in map.quantities() {
+            mapped.check(key).map_err(|reason| format!("{name}: {reason}"))?;
+        }
+        Ok(map)
+    }
+
+    /// The map of all that was said: files, and lines of one such as `tau.sign = -1`.
+    ///
+    /// # Errors
+    /// As [`ColumnMap::parse`], and a file that cannot be read.
+    pub fn said(said: &[String]) -> Result<ColumnMap, String> {
+        // Lines first: in a file they might fall into a table that it opened.
+        let (lines, files): (Vec<&String>, Vec<&String>) = said.iter().partition(|said| said.contains('='));
+        let mut text = lines.iter().map(|line| format!("{line}\n")).collect::<String>();
+        for file in &files {
+            let read = std::fs::read_to_string(file).map_err(|e| format!("{file}: cannot be read: {e}"))?;
+            text.push_str(&read);
+        }
+        let name = match (lines.as_slice(), files.as_slice()) {
+            ([], [file]) => file.as_str(),
+            _ => "--map",
+        };
+        ColumnMap::parse(&text, name)
+    }
+
+    /// Reads a map from a file.
+    ///
+    /// # Errors
+    /// Where it cannot be read, and as [`ColumnMap::parse`].
+    pub fn read(path: &Path) -> Result<ColumnMap, String> {
+        let name = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|e| format!("{name}: cannot be read: {e}"))?;
+        ColumnMap::parse(&text, &name)
+    }
+
+    /// The quantities under their names.
+    pub(super) fn quantities(&self) -> [(&'static str, &Mapped); 7] {
+        [
+            ("t", &self.t),
+            ("q", &self.q),
+            ("dq", &self.dq),
+            ("tau", &self.tau),
+            ("i", &self.i),
+            ("temp", &self.temp),
+            ("motor", &self.motor),
+        ]
+    }
+
+    pub(super) fn of(&self, key: &str) -> &Mapped {
+        self.quantities().into_iter().find(|(own, _)| *own == key).map_or(&self.t, |(_, mapped)| mapped)
+    }
+
+    /// The same for columns that already have their plain names: units and signs alone.
+    pub(super) fn without_columns(&self) -> ColumnMap {
+        let mut map = self.clone();
+        for mapped in
+            [&mut map.t, &mut map.q, &mut map.dq, &mut map.tau, &mut map.i, &mut map.temp, &mut map.motor]
+        {
+            (mapped.column, mapped.topic) = (None, None);
+        }
+        map
+    }
+}
+
+fn units(key: &str) -> &'static [Unit] {
+    match key {
+        "t" => TIMES,
+        "q" => POSITIONS,
+        "dq" => VELOCITIES,
+        "tau" => TORQUES,
+        "i" => CURRENTS,
+        "temp" => TEMPERATURES,
+        // On the motors' side units are anybody's.
+        _ => &[],
+    }
+}
+
+impl Mapped {
+    fn check(&self, key: &str) -> Result<(), String> {
+        let list = |unit: &ByJoint<String>| match unit {
+            ByJoint::All(unit) => vec![unit.clone()],
+            ByJoint::Each(units) => units.clone(),
+        };
+        for unit in self.unit.iter().flat_map(list) {
+            if factor(key, &unit).is_none() {
+                let known: Vec<&str> =
+                    units(key).iter().flat_map(|(names, _)| names.iter().copied()).collect();
+                return Err(match known.is_empty() {
+                    true => format!("{key}.unit: its unit is not needed: leave it out"),
+                    false => format!("{key}.unit: `{unit}` is unknown; known are {}", known.join(", ")),
+                });
+            }
+        }
+        let signs = self.sign.iter().flat_map(|sign| match sign {
+            ByJoint::All(sign) => vec![*sign],
+            ByJoint::Each(signs) => signs.clone(),
+        });
+        for sign in signs {
+            if sign.abs() != 1.0 {
+                return Err(format!("{key}.sign: {sign} is neither 1 nor -1; other factors are its `scale`"));
+            }
+        }
+        if self.shift.is_some() && !["tau", "i"].contains(&key) {
+            return Err(format!(
+                "{key}.shift: only `tau` and `i` can be shifted in time, against the positions"
+            ));
+        }
+        Ok(())
+    }
+
+    /// The shift of a joint's column, s.
+    pub(super) fn shift_of(&self, joint: usize) -> f64 {
+        self.shift.as_ref().and_then(|by| by.of(joint)).copied().unwrap_or(0.0)
+    }
+
+    /// What the column of a joint is to be multiplied with.
+    pub(super) fn factor(&self, key: &str, joint: usize) -> f64 {
+        let unit = self.unit.as_ref().and_then(|unit| factor(key, unit.of(joint)?)).unwrap_or(1.0);
+        let of = |by: &Option<ByJoint<f64>>| by.as_ref().and_then(|by| by.of(joint)).copied().unwrap_or(1.0);
+        unit * of(&self.sign) * of(&self.scale)
+    }
+
+    /// The name of a list that is not of as many joints as the arm has.
+    pub(super) fn misfit(&self, joints: usize) -> Option<&'static str> {
+        let fits = |by: Option<bool>| by.unwrap_or(true);
+        [
+            ("column", fits(self.column.as_ref().map(|by| by.fits(joints)))),
+            ("unit", fits(self.unit.as_ref().map(|by| by.fits(joints)))),
+            ("sign", fits(self.sign.as_ref().map(|by| by.fits(joints)))),
+            ("scale", fits(self.scale.as_ref().map(|by| by.fits(joints)))),
+            ("shift", fits(self.shift.as_ref().map(|by| by.fits(joints)))),
+        ]
+        .into_iter()
+        .find(|(_, fits)| !fits)
+        .map(|(name, _)| name)
+    }
+}
+
+fn factor(key: &str, unit: &str) -> Option<f64> {
+    units(key).iter().find(|(names, _)| names.contains(&unit)).map(|(_, factor)| *factor)
+}
+
+// One running time through several logs: what warms up knows no files.
+//
+// Also here: torques whose time stamps are known to be off.
+
+/// Sets [`Log::clock`] so that `t + clock` runs through all logs.
+///
+/// Where the spans of `t` do not overlap, `t` is a common clock already. Otherwise the logs were recorded in
+/// the given order, one right after the other.
+pub fn common_clock(logs: &mut [Log]) {
+    let span = |log: &Log| (log.t.first().copied().unwrap_or(0.0), log.t.last().copied().unwrap_or(0.0));
+    let mut spans: Vec<(f64, f64)> = logs.iter().map(span).collect();
+    spans.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let start = spans.first().map_or(0.0, |s| s.0);
+    if spans.windows(2).all(|pair| pair[0].1 <= pair[1].0) {
+        for log in logs {
+            log.clock = -start;
+        }
+        return;
+    }
+    let mut end = 0.0;
+    for log in logs {
+        let (first, last) = span(log);
+        log.clock = end - first;
+        end += last - first;
+    }
+}
+
+// Torques whose time stamps are known to be off.
+
+impl Log {
+    /// The log with torques whose stamps are moved as a map says. What lies within the longest shift of an
+    /// end of a piece is left out there: its torque is not known any more.
+    #[must_use]
+    pub(super) fn shifted(mut self, map: &Mapped) -> Log {
+        let shifts: Vec<f64> = (0..self.torque.len()).map(|j| map.shift_of(j)).collect();
+        let longest = shifts.iter().fold(0.0f64, |most, s| most.max(s.abs()));
+        if longest == 0.0 {
+            return self;
+        }
+        for (torque, shift) in self.torque.iter_mut().zip(&shifts) {
+            let logged = torque.clone();
+            for piece in &self.pieces {
+                let (t, x) = (&self.t[piece.clone()], &logged[piece.clone()]);
+                for (k, to) in piece.clone().zip(t) {
+                    torque[k] = linear_at(t, x, to - shift);
+                }
+            }
+        }
+        for piece in &mut self.pieces {
+            let t = &self.t[piece.clone()];
+            let (from, to) = (t[0] + longest, t[t.len() - 1] - longest);
+            let start = piece.start;
+            *piece = start + t.partition_point(|t| *t < from)..start + t.partition_point(|t| *t <= to);
+        }
+        self.pieces.retain(|piece| piece.len() >= 2);
+        self
+    }
+}
+
+#[cfg(test)]
+mod shift_tests {
+    use super::super::map::ColumnMap;
+    use super::*;
+
+    #[test]
+    fn a_shift_moves_torques_and_nothing_else() {
+        let t: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
+        let wave = |late: f64| -> Vec<f64> { t.iter().map(|t| (2.0 * (t - late)).sin()).collect() };
+        let log = Log {
+            file: "log.csv".into(),
+            q: vec![wave(0.0); 2],
+            torque: vec![wave(0.08), wave(0.0)],
+            temperature: None,
+            motor: None,
+            pieces: vec![0..400, 400..1000],
+            clock: 0.0,
+            t: t.clone(),
+        };
+        let map = ColumnMap::parse("tau.shift = [-0.08, 0]", "--map").unwrap();
+        let shifted = log.clone().shifted(&map.tau);
+        assert_eq!((shifted.pieces.clone(), &shifted.q), (vec![8..392, 408..992], &log.q));
+        for k in shifted.pieces.into_iter().flatten() {
+            approx::assert_abs_diff_eq!(shifted.torque[0][k], log.torque[1][k], epsilon = 1e-4);
+            approx::assert_abs_diff_eq!(shifted.torque[1][k], log.torque[1][k], epsilon = 1e-12);
+        }
+        assert!(ColumnMap::parse("q.shift = 0.1", "--map").unwrap_err().contains("only `tau` and `i`"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_signs_and_scales_multiply_and_mistakes_are_named() {
+        let map = ColumnMap::parse("q.unit = \"deg\"\ntau = { sign = [1, -1], scale = 2 }", "x").unwrap();
+        assert_eq!(map.q.factor("q", 1) * 180.0, std::f64::consts::PI);
+        assert_eq!((map.tau.factor("tau", 0), map.tau.factor("tau", 1)), (2.0, -2.0));
+        assert_eq!((map.tau.misfit(2), map.tau.misfit(3)), (None, Some("sign")));
+        let wrong = |text: &str| ColumnMap::parse(text, "m.toml").unwrap_err();
+        assert!(wrong("q.unit = \"inch\"").contains("m.toml: q.unit: `inch` is unknown; known are rad"));
+        assert!(wrong("tau.sign = 3").contains("neither 1 nor -1"));
+        assert!(wrong("\n\ntorque.sign = 1").contains("line 3"), "{}", wrong("\n\ntorque.sign = 1"));
+    }
+}

@@ -1,0 +1,87 @@
+//! Logs of joint positions and torques: read, checked, and every doubt about them said.
+//!
+//! Files ([`Log::read`]: CSV, Parquet, LeRobot, MCAP, bags of ROS, npz, mat, HDF5), arrays ([`Log::from_arrays`]) and samples
+//! ([`Log::from_samples`]) come to columns by name, and these pass the same checks. A [`ColumnMap`] says what
+//! names do not.
+
+mod arrays;
+mod check;
+mod columns;
+mod file;
+mod inspect;
+mod live;
+mod map;
+mod motors;
+mod read;
+mod signal_checks;
+mod topics;
+
+pub use crate::tables::{Finding, LogError};
+pub use arrays::{Arrays, Sample};
+pub use file::LogFile;
+pub use inspect::{Aligned, Inspected, InspectedColumn, InspectedTable, TakenAs, inspect};
+pub use live::{LiveRows, LiveSample};
+pub use map::{ByJoint, Clock, ColumnMap, Mapped, common_clock};
+pub use motors::{Motors, logs_of_motors, notes_of};
+pub use read::{read_log, read_log_as, read_logs, read_logs_as};
+use signal_checks::{Severity, Warnings};
+pub use topics::{Alignment, alignment};
+
+/// One recording as it was logged, after its faults were taken out.
+#[derive(Clone, Debug)]
+pub struct Log {
+    /// The file, as the caller named it.
+    pub file: String,
+    /// Rising time stamps, s.
+    pub t: Vec<f64>,
+    /// Joint positions by joint, rad or m, without wraps.
+    pub q: Vec<Vec<f64>>,
+    /// Joint torques by joint, N·m or N, positive in the direction of q.
+    pub torque: Vec<Vec<f64>>,
+    /// Joint temperatures by joint, °C, where they were logged.
+    pub temperature: Option<Vec<Vec<f64>>>,
+    /// Torques on the motors' side of the gears by joint (n × N, as `torque`), where they were logged. Unit,
+    /// sign and ratio are whatever the drives say; not a number where a sample has none.
+    pub motor: Option<Vec<Vec<f64>>>,
+    /// Index ranges without a gap.
+    pub pieces: Vec<std::ops::Range<usize>>,
+    /// Seconds to add to `t` for a clock that runs through all logs (see [`common_clock`]).
+    pub clock: f64,
+}
+
+impl Log {
+    /// Its first and its second half by samples, as logs of their own.
+    #[must_use]
+    pub fn halves(&self) -> [Log; 2] {
+        let middle = self.t.len() / 2;
+        [self.part(0..middle, "first half"), self.part(middle..self.t.len(), "second half")]
+    }
+
+    /// The samples of its pieces one by one, as a stream has them.
+    pub fn samples(&self) -> impl Iterator<Item = LiveSample> + '_ {
+        let of = |x: &[Vec<f64>], k: usize| x.iter().map(|x| x[k]).collect();
+        let sample = move |k| LiveSample { t: self.t[k], q: of(&self.q, k), torque: of(&self.torque, k) };
+        self.pieces.iter().cloned().flatten().map(sample)
+    }
+
+    fn part(&self, own: std::ops::Range<usize>, name: &str) -> Log {
+        let cut = |all: &Vec<Vec<f64>>| all.iter().map(|x| x[own.clone()].to_vec()).collect();
+        let clip = |piece: &std::ops::Range<usize>| {
+            let (from, to) = (piece.start.max(own.start), piece.end.min(own.end));
+            (from < to).then(|| from - own.start..to - own.start)
+        };
+        Log {
+            file: format!("{} ({name})", self.file),
+            t: self.t[own.clone()].to_vec(),
+            q: cut(&self.q),
+            torque: cut(&self.torque),
+            temperature: self.temperature.as_ref().map(cut),
+            motor: self.motor.as_ref().map(cut),
+            pieces: self.pieces.iter().filter_map(clip).collect(),
+            clock: self.clock,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
