@@ -29,8 +29,7 @@ fn main() {
     let discrete = Config::new("tests/arms/lwa4p_rotorless.toml").functions(of_steps);
     discrete.build("lwa4p_rotorless_discrete.rs").unwrap_or_else(|e| e.exit());
     for set in [SetKind::Full, SetKind::Minimal, SetKind::Symbolic, SetKind::Published] {
-        let config =
-            Config::new("powerball/arm.toml").parameters(set).batch(set == SetKind::Minimal);
+        let config = Config::new("powerball/arm.toml").parameters(set).batch(set == SetKind::Minimal);
         config.build(&format!("lwa4p_{set}.rs")).unwrap_or_else(|e| e.exit());
     }
 }

@@ -57,22 +57,8 @@
 //!
 //! # A model in a control step
 //!
-//! Of the LWA 4P here; `powerball generate` writes the same for any arm, with every effect that was named.
-//!
-#![cfg_attr(feature = "lwa4p", doc = "```")]
-#![cfg_attr(not(feature = "lwa4p"), doc = "```ignore")]
-//! use powerball::controller::friction::{TABLE_2, TanhFriction};
-//! use powerball::controller::model::minimal::{PARAMETERS, inverse_dynamics};
-//! # let parameters = nalgebra::SVector::<f64, PARAMETERS>::from_element(0.1);
-//! # let [q, dq, ddq] = [0.3, 0.1, 0.0].map(nalgebra::SVector::<f64, 6>::from_element);
-//! let friction = TABLE_2.map(TanhFriction::new);
-//! // In the loop: no allocation, no panic.
-//! let mut torque = inverse_dynamics(&q, &dq, &ddq, &parameters);
-//! for (j, friction) in friction.iter().enumerate() {
-//!     torque[j] += friction.torque(dq[j]);
-//! }
-//! # assert!(torque.iter().all(|t| t.is_finite()));
-//! ```
+//! [`controller`] has an example with the LWA 4P's model; `powerball generate` writes the same for any arm, with every effect
+//! that was named.
 #![no_std]
 
 #[cfg(feature = "driver")]

@@ -11,8 +11,8 @@
 //! [`explain()`] is the API, and [`Rule`] holds every threshold.
 //!
 //! ```no_run
-//! use powerball::logs::log::read_logs;
-//! use powerball::{ExplainOptions, explain};
+//! use powerball_explanation::{ExplainOptions, explain};
+//! use powerball_logs::log::read_logs;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let arm = dyngen::Arm::read("arm.toml".as_ref())?;

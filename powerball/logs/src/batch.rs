@@ -5,10 +5,30 @@
 //! x86-64 they use vectors of two; inside a [`Work`] they use what the processor has (AVX2, AVX-512, NEON).
 //! The results stay the same, to the bit.
 //!
-#![cfg_attr(feature = "lwa4p", doc = "```")]
-#![cfg_attr(not(feature = "lwa4p"), doc = "```ignore")]
-//! use powerball::logs::batch::{self, Work};
-//! use powerball::controller::model::minimal::{self as arm, JOINTS, PARAMETERS};
+//! ```
+//! use powerball_logs::batch::{self, Work};
+//! # /// A pendulum as a generated file has it.
+//! # mod arm {
+//! #     use nalgebra::SVector;
+//! #     pub const JOINTS: usize = 1;
+//! #     pub const PARAMETERS: usize = 2;
+//! #     type Vector = SVector<f64, JOINTS>;
+//! #     pub fn inverse_dynamics(q: &Vector, _: &Vector, ddq: &Vector, p: &SVector<f64, PARAMETERS>) -> Vector {
+//! #         Vector::from([p[0] * ddq[0] + p[1] * q[0].cos()])
+//! #     }
+//! #     pub mod batch {
+//! #         type Block = [[f64; 8]; super::JOINTS];
+//! #         #[inline(always)]
+//! #         pub fn inverse_dynamics(
+//! #             q: &Block, _: &Block, ddq: &Block, p: &nalgebra::SVector<f64, 2>, out: &mut Block,
+//! #         ) {
+//! #             for k in 0..8 {
+//! #                 out[0][k] = p[0] * ddq[0][k] + p[1] * q[0][k].cos();
+//! #             }
+//! #         }
+//! #     }
+//! # }
+//! use arm::{JOINTS, PARAMETERS};
 //! use nalgebra::SVector;
 //!
 //! /// Eight samples of each joint.
@@ -37,7 +57,7 @@
 //! batch::run(Torques { motion: &motion, parameters: &parameters, out: &mut out });
 //!
 //! let [q, dq, ddq] = [0.1; 3].map(SVector::repeat);
-//! assert_eq!(out[99][2][7], arm::inverse_dynamics(&q, &dq, &ddq, &parameters)[2]);
+//! assert_eq!(out[99][0][7], arm::inverse_dynamics(&q, &dq, &ddq, &parameters)[0]);
 //! ```
 
 /// Work on batches.

@@ -2,7 +2,7 @@
 //! for print.
 //!
 //! ```
-//! use powerball::report::{Figure, Ink, Page, Panel, Series, Table};
+//! use powerball_commands::report::{Figure, Ink, Page, Panel, Series, Table};
 //!
 //! let mut page = Page::new("Identification of an arm");
 //! page.heading("Torque");

@@ -36,7 +36,8 @@ pub use result::{Identified, IdentifyError};
 /// that was mounted otherwise.
 ///
 /// ```
-/// use powerball::{Arrays, IdentifyOptions, Log, identify};
+/// use powerball_identification::{IdentifyOptions, identify};
+/// use powerball_logs::log::{Arrays, Log};
 /// # let arm = "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n[[joint]]\n\
 /// #     kind = \"revolute\"\na = 0.5\nalpha = 0\nd = 0\ntheta = 0\n";
 /// let arm = dyngen::Arm::parse(arm, "pendulum.toml")?;
