@@ -62,21 +62,30 @@
 #![no_std]
 
 #[cfg(feature = "driver")]
+#[doc(inline)]
 pub use powerball_bus as bus;
 #[cfg(feature = "demo")]
+#[doc(inline)]
 pub use powerball_commands::commands;
 #[cfg(feature = "procedure")]
+#[doc(inline)]
 pub use powerball_commands::procedure;
 #[cfg(feature = "report")]
+#[doc(inline)]
 pub use powerball_commands::report;
+#[doc(inline)]
 pub use powerball_controller as controller;
 #[cfg(feature = "explain")]
+#[doc(inline)]
 pub use powerball_explanation as explanation;
 #[cfg(feature = "identify")]
+#[doc(inline)]
 pub use powerball_identification::{self as identification, comparison};
 #[cfg(feature = "identify")]
+#[doc(inline)]
 pub use powerball_logs as logs;
 #[cfg(feature = "virtual-arm")]
+#[doc(inline)]
 pub use powerball_virtual_arm as virtual_arm;
 
 #[cfg(feature = "identify")]

@@ -169,7 +169,8 @@ pub(super) fn push_in_bands(
 }
 
 /// A log in parts that share what a band leaves out at their ends: each piece of it in equal ones of about
-/// [`PART`].
+/// two minutes.
+#[must_use]
 pub fn parts(log: &Log) -> Vec<Log> {
     let whole = |log: &Log| log.t.last().unwrap_or(&0.0) - log.t.first().unwrap_or(&0.0);
     if whole(log) < 1.5 * PART {
