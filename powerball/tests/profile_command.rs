@@ -19,7 +19,7 @@ fn profile(dcf: &Path, arm: &Path, out: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_powerball"));
     command.arg("profile").arg("--dcf").arg(dcf).arg("--arm").arg(arm).arg("-o").arg(out);
     command.args(["--constant", "LWA4P", "--source"]);
-    let committed = std::fs::read_to_string(here("src/bus/driver/lwa4p.rs")).unwrap();
+    let committed = std::fs::read_to_string(here("bus/src/driver/lwa4p.rs")).unwrap();
     let source = committed.lines().find_map(|line| line.strip_prefix("//! Made from ")).unwrap();
     command.arg(source.trim_end_matches('.')).output().unwrap()
 }
@@ -117,6 +117,6 @@ fn the_arms_table_is_made() {
     let out = scratch("lwa4p.rs");
     let output = profile(&dcf, &here("lwa4p_bus.toml"), &out);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let committed = std::fs::read_to_string(here("src/bus/driver/lwa4p.rs")).unwrap();
+    let committed = std::fs::read_to_string(here("bus/src/driver/lwa4p.rs")).unwrap();
     assert!(std::fs::read_to_string(&out).unwrap() == committed);
 }
