@@ -21,7 +21,7 @@ bless:
     DYNGEN_BLESS=1 cargo test -p dyngen --test golden
     DYNGEN_BLESS=1 cargo test --release -p dyngen --test operations
     DYNGEN_BLESS=1 cargo test -p dyngen-macros --test ui
-    POWERBALL_BLESS=1 cargo test --release -p powerball --lib the_committed_table
+    POWERBALL_BLESS=1 cargo test --release -p powerball-bus --features std --lib the_committed_table
     POWERBALL_BLESS=1 cargo test --release -p powerball --test bus_faults
     POWERBALL_BLESS=1 cargo test --release -p powerball-workspace --test firmware --test docs
 

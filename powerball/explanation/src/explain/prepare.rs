@@ -138,7 +138,7 @@ const LEAST: usize = 50;
 // The model that the search begins with.
 
 /// The base model, with what every arm may have where this one shows it plainly (see
-/// [`Effect::baseline`](crate::effects::Effect::baseline)): every effect is then judged beside that.
+/// [`Effect::baseline`](crate::effects::Effect::baseline)): every effect is then judged together with that.
 pub(super) fn initial_model<'a>(base: Fit, study: &Study<'a>) -> Model {
     let plain = Model::new(base);
     // Per-joint fits have an offset already.

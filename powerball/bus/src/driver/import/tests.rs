@@ -9,8 +9,8 @@ const SOURCE: &str =
 
 /// The DCF is not ours to copy; its place can be told by the environment.
 fn dcf() -> Option<Vec<u8>> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/hardware/Schunk_0_63_lwa4p.dcf");
-    let path = std::env::var_os("POWERBALL_DCF").map_or(beside, PathBuf::from);
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/hardware/Schunk_0_63_lwa4p.dcf");
+    let path = std::env::var_os("POWERBALL_DCF").map_or(file, PathBuf::from);
     let read = std::fs::read(&path).ok();
     if read.is_none() {
         eprintln!("skipped: {} is not there; set POWERBALL_DCF to the drive's DCF", path.display());
@@ -56,7 +56,7 @@ const DRIVE: &str = "[DeviceInfo]\nBaudRate_500=1\n[1005]\nDataType=7\nAccessTyp
     AccessType=rw\n[6040]\nDataType=6\nAccessType=rww\nPDOMapping=1\n\
     [6041]\nDataType=6\nAccessType=ro\nPDOMapping=0\n";
 
-/// What the modes of the arm's file map beside it, and types that SCHUNK's drive has not.
+/// What the modes of the arm's file map file it, and types that SCHUNK's drive has not.
 const TARGETS: &str = "[607A]\nDataType=4\nPDOMapping=1\n[6042]\nDataType=3\nPDOMapping=1\n[60C1sub1]\nDataType=4\n\
     PDOMapping=1\n[6077]\nDataType=3\nPDOMapping=1\n[6064]\nDataType=4\nPDOMapping=1\n[606C]\nDataType=4\n\
     PDOMapping=1\n[6061]\nDataType=2\nPDOMapping=1\n[6041]\nDataType=6\nPDOMapping=1\n[2100]\nDataType=0x1B\n\

@@ -51,7 +51,7 @@ fn share(counts: &[(String, [usize; 2], f64)], experiments: u64, which: usize) -
     covered as f64 / (counts.len() as u64 * experiments) as f64
 }
 
-/// A study: `cargo test --release -p powerball --lib coverage -- --ignored --nocapture`.
+/// A study: `cargo test --release -p powerball-identification --lib coverage -- --ignored --nocapture`.
 #[test]
 #[ignore = "a study of minutes; the short one below guards what it found"]
 fn intervals_cover_the_truth_in_a_hundred_experiments() {
