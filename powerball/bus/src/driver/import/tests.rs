@@ -56,7 +56,7 @@ const DRIVE: &str = "[DeviceInfo]\nBaudRate_500=1\n[1005]\nDataType=7\nAccessTyp
     AccessType=rw\n[6040]\nDataType=6\nAccessType=rww\nPDOMapping=1\n\
     [6041]\nDataType=6\nAccessType=ro\nPDOMapping=0\n";
 
-/// What the modes of the arm's file map file it, and types that SCHUNK's drive has not.
+/// What the modes of the arm's file map next to it, and types that SCHUNK's drive has not.
 const TARGETS: &str = "[607A]\nDataType=4\nPDOMapping=1\n[6042]\nDataType=3\nPDOMapping=1\n[60C1sub1]\nDataType=4\n\
     PDOMapping=1\n[6077]\nDataType=3\nPDOMapping=1\n[6064]\nDataType=4\nPDOMapping=1\n[606C]\nDataType=4\n\
     PDOMapping=1\n[6061]\nDataType=2\nPDOMapping=1\n[6041]\nDataType=6\nPDOMapping=1\n[2100]\nDataType=0x1B\n\
