@@ -1,5 +1,4 @@
-//! The generated code of four small arms: the committed bytes, and that they compile under the strictest
-//! lints.
+//! The generated code of small arms: the committed bytes of three, and that all compile under the strictest lints.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -8,6 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const ARMS: [&str; 4] = ["pendulum", "planar2r", "scara", "twist"];
+/// Those whose code can be read.
+const REVIEWED: [&str; 3] = ["pendulum", "planar2r", "scara"];
 /// Enough to review; every function is compiled.
 const FUNCTIONS: [Function; 7] = {
     use Function::*;
@@ -28,9 +29,13 @@ fn generated(arm: &str, functions: &[Function]) -> String {
 fn generated_code_is_what_was_reviewed() {
     let bless = std::env::var_os("DYNGEN_BLESS").is_some();
     let mut stale = Vec::new();
-    for arm in ARMS {
+    for arm in REVIEWED {
         let path = tests().join(format!("golden/{arm}.rs"));
-        let source = generated(arm, &FUNCTIONS);
+        let mut source = generated(arm, &FUNCTIONS);
+        // What every file ends with is in the first one.
+        if arm != REVIEWED[0] {
+            source.truncate(source.find("mod trigonometry {").unwrap());
+        }
         let golden = std::fs::read_to_string(&path).unwrap_or_default();
         if bless {
             std::fs::write(&path, source).unwrap();
