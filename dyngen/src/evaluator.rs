@@ -146,22 +146,25 @@ impl Evaluator {
                     *x = from[at(lane) * length + i];
                 }
             };
-            let gather_angle = |sum: JointSum, to: &mut Lane| {
-                for (lane, x) in to.iter_mut().enumerate() {
-                    *x = self.angles.value(sum, |i| samples.q[at(lane) * n + i]);
-                }
+            // An angle's sine and cosine are asked for one after the other.
+            let mut last: Option<(JointSum, [Lane; 2])> = None;
+            let mut sin_cos = |sum: JointSum| {
+                let known = last.filter(|(of, _)| *of == sum);
+                let (_, both) = *last.insert(known.unwrap_or_else(|| {
+                    let mut both = [[0.0; LANES]; 2];
+                    for lane in 0..LANES {
+                        let angle = self.angles.value(sum, |i| samples.q[at(lane) * n + i]);
+                        (both[0][lane], both[1][lane]) = angle.sin_cos();
+                    }
+                    (sum, both)
+                }));
+                both
             };
             self.tape.run(
                 &mut workspace,
                 |input, lane| match input {
-                    Input::Sin(sum) => {
-                        gather_angle(sum, lane);
-                        lane.iter_mut().for_each(|x| *x = x.sin());
-                    }
-                    Input::Cos(sum) => {
-                        gather_angle(sum, lane);
-                        lane.iter_mut().for_each(|x| *x = x.cos());
-                    }
+                    Input::Sin(sum) => *lane = sin_cos(sum)[0],
+                    Input::Cos(sum) => *lane = sin_cos(sum)[1],
                     Input::Position(i) => gather(Argument::Positions, i, lane),
                     Input::Velocity(i) => gather(Argument::Velocities, i, lane),
                     Input::Acceleration(i) => gather(Argument::Accelerations, i, lane),

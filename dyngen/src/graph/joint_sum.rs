@@ -28,10 +28,11 @@ impl JointSum {
 
     /// The joints with their signs, `true` where the sign is minus.
     pub fn joints(self) -> impl Iterator<Item = (usize, bool)> {
-        (0..16).filter_map(move |i| match ((self.plus >> i) & 1, (self.minus >> i) & 1) {
-            (1, _) => Some((i, false)),
-            (_, 1) => Some((i, true)),
-            _ => None,
+        let mut left = self.plus | self.minus;
+        std::iter::from_fn(move || {
+            let i = (left != 0).then(|| left.trailing_zeros() as usize)?;
+            left &= left - 1;
+            Some((i, (self.minus >> i) & 1 == 1))
         })
     }
 

@@ -103,7 +103,7 @@ fn duels(open: &Open) -> Vec<Duel<'_>> {
     pairs
         .map(|(truth, rival)| {
             let (other, fit) = (&all[truth].fit, &all[rival].fit);
-            let gram = fit.gram.sum(&fit.weights, |_| true).gram;
+            let gram = fit.gram.all(&fit.weights).gram;
             let difference = fit.residual.without(&other.residual);
             let mut signals: Vec<Signals> = vec![difference];
             let rows: Vec<usize> = fit.residual.iter().map(Vec::len).collect();
@@ -182,7 +182,7 @@ fn judge(
                 truth.iter().zip(rival).map(|(t, r)| t - r).collect()
             })
             .collect();
-        let gram = &duel.gram + &Gram::new(&data, design, &folds).sum(&fit.weights, |_| true).gram;
+        let gram = &duel.gram + &Gram::new(&data, design, &folds).all(&fit.weights).gram;
         let stays = |signal: &[Vec<f64>], old: &Signal| {
             let (right, square) = products(design, &fit.weights, signal);
             let right: Vec<f64> = right.iter().zip(&old.right).map(|(a, b)| a + b).collect();

@@ -209,7 +209,7 @@ impl<'s> Together<'s> {
         let on_validation = Design::new(validation, &friction_columns(validation, &fit.shapes), &columns);
         let mut normal = fit.normal_equations();
         let folds = Folds::new(validation);
-        let more = Gram::new(validation, &on_validation, &folds).sum(&fit.weights, |_| true);
+        let more = Gram::new(validation, &on_validation, &folds).all(&fit.weights);
         normal.add(&(0..fit.design.size).collect::<Vec<_>>(), &more, 1.0);
         let solver = normal.solver(|c| fit.free[c]);
         let solved = solver.solve(&normal.right);

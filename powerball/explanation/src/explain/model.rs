@@ -6,6 +6,7 @@ use crate::rule::Rule;
 use powerball_identification::estimate::{Fit, Folds, NormalEquations, Solver, Term, fit};
 use powerball_logs::regression::{Column, Data, Signals};
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// An accepted effect on its joints.
 #[derive(Clone, Debug)]
@@ -39,6 +40,8 @@ pub(super) struct Model {
     pub(super) given_up: Vec<Candidate>,
     /// The base model with all of it, fitted.
     pub(super) fit: Fit,
+    /// Which of what was accepted makes the error on the logs to judge on larger, once that is asked of this fit.
+    pub(super) harmful: OnceLock<Option<usize>>,
 }
 
 impl Accepted {
@@ -98,7 +101,7 @@ pub(super) struct Own {
 impl Model {
     /// The base model alone.
     pub(super) fn new(base: Fit) -> Model {
-        Model { accepted: Vec::new(), given_up: Vec::new(), fit: base }
+        Model { accepted: Vec::new(), given_up: Vec::new(), fit: base, harmful: OnceLock::new() }
     }
 
     /// The base model with what every arm may have (see [`Effect::baseline`]). Its friction is looked for anew.
@@ -120,7 +123,8 @@ impl Model {
         };
         let candidates = effects::all().iter().flat_map(|effect| effect.baseline(&context));
         let accepted: Vec<Accepted> = candidates.map(accepted).collect();
-        Model { accepted, given_up: Vec::new(), fit: fit(&study.data, &study.folds, &terms, None) }
+        let fit = fit(&study.data, &study.folds, &terms, None);
+        Model { accepted, ..Model::new(fit) }
     }
 
     /// The model without one of what was accepted, fitted.
@@ -128,7 +132,7 @@ impl Model {
         let mut accepted = self.accepted.clone();
         accepted.remove(k);
         let fit = fitted_again(study, &mut accepted, &self.fit);
-        Model { accepted, given_up: Vec::new(), fit }
+        Model { accepted, ..Model::new(fit) }
     }
 
     /// Takes in what was measured above the band of the fit.
@@ -136,6 +140,7 @@ impl Model {
         let columns = study.on_fitted(&self.fit, &[]).columns(&accepted.candidate);
         take_above_band_out(&accepted, &columns, &mut self.fit.residual);
         self.accepted.push(accepted);
+        self.harmful = OnceLock::new();
     }
 
     /// The terms of what was accepted on some data, of all or of all but one.
@@ -228,6 +233,7 @@ impl Model {
     /// Fits everything again, and asks the validation logs whether they have what is in some logs only.
     pub(super) fn refit(&mut self, study: &Study<'_>) {
         self.fit = fitted_again(study, &mut self.accepted, &self.fit);
+        self.harmful = OnceLock::new();
         for k in 0..self.accepted.len() {
             if let Some(seen) = self.seen_in_validation(study, k) {
                 self.accepted[k].candidate = seen;

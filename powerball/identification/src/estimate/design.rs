@@ -41,7 +41,7 @@ struct Local {
 impl Design {
     /// Lays out the columns; `friction[j]` are joint j's `FRICTION` columns.
     #[must_use]
-    pub fn new(data: &Data<'_>, friction: &[Arc<[Vec<f64>; FRICTION]>], extra: &[Column]) -> Design {
+    pub fn new(data: &Data<'_>, friction: &[[Arc<Vec<f64>>; FRICTION]], extra: &[Column]) -> Design {
         let (n, p) = (data.dof(), data.inertial_columns());
         let layout = Layout::of(data, extra.len());
         let own = |j: usize| if data.per_joint { p * j } else { 0 };
@@ -150,6 +150,8 @@ fn pack(columns: &[&[f64]], rows: &Range<usize>) -> Vec<f64> {
 pub struct Gram {
     /// `[joint][cell]`, over the joint's own columns.
     parts: Vec<Vec<NormalEquations>>,
+    /// By joint over all cells.
+    whole: Vec<NormalEquations>,
     globals: Vec<Vec<usize>>,
     size: usize,
     /// By column the precision with which it is known before anything is measured.
@@ -179,8 +181,30 @@ impl Gram {
             cells
         });
         let globals: Vec<Vec<usize>> = design.joints.iter().map(|l| l.global.clone()).collect();
-        let prior = prior(&parts, &globals, design);
-        Gram { parts, globals, size: design.size, prior }
+        let joint = |(cells, global): (&Vec<NormalEquations>, &Vec<usize>)| {
+            let (mut sum, own) = (NormalEquations::zero(global.len()), (0..global.len()).collect::<Vec<_>>());
+            cells.iter().for_each(|cell| sum.add(&own, cell, 1.0));
+            sum
+        };
+        let whole: Vec<NormalEquations> = parts.iter().zip(&globals).map(joint).collect();
+        let prior = prior(&whole, &globals, design.size);
+        Gram { parts, whole, globals, size: design.size, prior }
+    }
+
+    /// The normal equations of all rows, with what is known beforehand (see [`fitted`](Self::fitted)).
+    #[must_use]
+    pub fn normal_equations(&self, weights: &[f64]) -> NormalEquations {
+        self.with_prior(self.all(weights))
+    }
+
+    /// Those of all rows alone.
+    #[must_use]
+    pub fn all(&self, weights: &[f64]) -> NormalEquations {
+        let mut sum = NormalEquations::zero(self.size);
+        for ((own, global), w) in self.whole.iter().zip(&self.globals).zip(weights) {
+            sum.add(global, own, *w);
+        }
+        sum
     }
 
     /// As [`sum`](Self::sum), with what is known beforehand of an arm: none of its parameters alone makes more
@@ -188,7 +212,10 @@ impl Gram {
     /// they hardly determine stays where a real arm may be, and the model does not run away on other paths.
     #[must_use]
     pub fn fitted(&self, weights: &[f64], wanted: impl Fn(usize) -> bool) -> NormalEquations {
-        let mut sum = self.sum(weights, wanted);
+        self.with_prior(self.sum(weights, wanted))
+    }
+
+    fn with_prior(&self, mut sum: NormalEquations) -> NormalEquations {
         for (c, precision) in self.prior.iter().enumerate() {
             sum.gram[(c, c)] += precision;
         }
@@ -199,7 +226,9 @@ impl Gram {
     #[must_use]
     pub fn sum(&self, weights: &[f64], wanted: impl Fn(usize) -> bool) -> NormalEquations {
         let mut sum = NormalEquations::zero(self.size);
-        for ((cells, global), w) in self.parts.iter().zip(&self.globals).zip(weights) {
+        for ((cells, global), w) in
+            self.parts.iter().zip(&self.globals).zip(weights).filter(|(_, w)| **w != 0.0)
+        {
             for (_, own) in cells.iter().enumerate().filter(|(cell, _)| wanted(*cell)) {
                 sum.add(global, own, *w);
             }
@@ -210,14 +239,12 @@ impl Gram {
 
 /// By column 1/s², where s is the value at which it alone would make as much torque on some joint as was
 /// measured there.
-fn prior(parts: &[Vec<NormalEquations>], globals: &[Vec<usize>], design: &Design) -> Vec<f64> {
-    let mut prior = vec![0.0f64; design.size];
-    for (cells, global) in parts.iter().zip(globals) {
-        let measured: f64 = cells.iter().map(|own| own.square).sum();
+fn prior(whole: &[NormalEquations], globals: &[Vec<usize>], size: usize) -> Vec<f64> {
+    let mut prior = vec![0.0f64; size];
+    for (own, global) in whole.iter().zip(globals) {
         for (local, g) in global.iter().enumerate() {
-            let alone: f64 = cells.iter().map(|own| own.gram[(local, local)]).sum();
-            if measured > 0.0 {
-                prior[*g] = prior[*g].max(alone / measured);
+            if own.square > 0.0 {
+                prior[*g] = prior[*g].max(own.gram[(local, local)] / own.square);
             }
         }
     }

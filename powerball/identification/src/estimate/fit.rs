@@ -85,7 +85,7 @@ impl Fit {
     /// The normal equations of all rows, with what is known beforehand of an arm (see [`Gram::fitted`]).
     #[must_use]
     pub fn normal_equations(&self) -> NormalEquations {
-        self.gram.fitted(&self.weights, |_| true)
+        self.gram.normal_equations(&self.weights)
     }
 
     /// Them factored over the free columns.
@@ -190,7 +190,7 @@ impl SeparableRows for InMemory<'_> {
     }
 
     fn products(&self, (_, gram): &(Design, Gram), weights: &[f64]) -> NormalEquations {
-        gram.fitted(weights, |_| true)
+        gram.normal_equations(weights)
     }
 
     fn trials(&self, (design, _): &(Design, Gram), joint: usize, steep: &[f64]) -> Trials {
@@ -237,11 +237,9 @@ impl SeparableRows for InMemory<'_> {
 
 /// The friction columns of all joints for given shapes.
 #[must_use]
-pub fn friction_columns(data: &Data<'_>, shapes: &[[f64; 2]]) -> Vec<Arc<[Vec<f64>; FRICTION]>> {
+pub fn friction_columns(data: &Data<'_>, shapes: &[[f64; 2]]) -> Vec<[Arc<Vec<f64>>; FRICTION]> {
     let joints: Vec<usize> = (0..shapes.len()).collect();
-    let of =
-        |j: usize| data.friction_columns(j, shapes[j], || variable_projection::columns(data, j, shapes[j]));
-    parallel::map(&joints, |&j| of(j))
+    parallel::map(&joints, |&j| variable_projection::columns(data, j, shapes[j]))
 }
 
 fn residuals(data: &Data<'_>, design: &Design, theta: &[f64]) -> Signals {

@@ -315,7 +315,7 @@ fn columns(data: &Data<'_>, start: &Solution, joint: usize) -> (Vec<usize>, Vec<
     let [g2, g4, viscous, ..] = variable_projection::columns(data, joint, start.shapes[joint]);
     for (k, column) in [g2, g4, viscous].into_iter().enumerate() {
         global.push(layout.friction(joint, k));
-        columns.push(column);
+        columns.push(column.to_vec());
     }
     if layout.extra > 0 {
         global.push(layout.extra(joint));

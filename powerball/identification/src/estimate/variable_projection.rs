@@ -12,6 +12,7 @@ use faer::Mat;
 pub(super) use powerball_logs::regression::FRICTION;
 use powerball_logs::regression::{Data, Recording};
 use powerball_logs::summary::{NODES, Steepness};
+use std::sync::Arc;
 
 /// What a fit starts from where a similar one has been made.
 pub(super) struct Start<'a> {
@@ -192,7 +193,7 @@ const GRID: usize = 64;
 
 /// Friction columns of a joint in the band: tanh(γ2 q̇), tanh(γ4 q̇), q̇, and ∂/∂ ln γ of the first two.
 #[must_use]
-pub(super) fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f64>; FRICTION] {
+pub(super) fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Arc<Vec<f64>>; FRICTION] {
     let column =
         |signal: &dyn Fn(usize, &Recording) -> Vec<f64>| data.joints[joint].column(&data.recordings, signal);
     let level = |g: f64| {
@@ -203,8 +204,9 @@ pub(super) fn columns(data: &Data<'_>, joint: usize, shape: [f64; 2]) -> [Vec<f6
         };
         [column(&|k, _| levels[k].clone()), column(&slope)]
     };
-    let ([first, first_tangent], [second, second_tangent]) = (level(shape[0]), level(shape[1]));
-    [first, second, column(&|_, r| r.velocity(joint).collect()), first_tangent, second_tangent]
+    let [first, second] = shape.map(|g| data.level_columns(joint, g, || level(g)));
+    let ([first, first_tangent], [second, second_tangent]) = (first, second);
+    [first, second, data.viscous_column(joint), first_tangent, second_tangent]
 }
 
 /// ∂ tanh(γ·q̇) / ∂ ln γ.

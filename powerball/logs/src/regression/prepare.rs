@@ -74,17 +74,18 @@ pub struct Data<'a> {
     force: OnceLock<Vec<Column>>,
     declared_zero: OnceLock<Vec<Column>>,
     pull: [OnceLock<Vec<Column>>; 3],
-    friction: KeptFriction,
+    levels: KeptLevels,
+    viscous: Vec<OnceLock<Arc<Vec<f64>>>>,
 }
 
-/// Friction columns of the last few steepnesses: joint, γ2 and γ4, and what was made of them.
-type KeptFriction = Mutex<Vec<(usize, [f64; 2], Arc<[Vec<f64>; FRICTION]>)>>;
+/// Levels of friction by joint and steepness, those used last at the end: tanh(γ·q̇) and its tangent.
+type KeptLevels = Mutex<Vec<(usize, f64, [Arc<Vec<f64>>; 2])>>;
 
 /// Friction columns of a joint: two saturating levels, the viscous one, and the two tangents of the shapes.
 pub const FRICTION: usize = 5;
 
 /// Steepnesses of a joint whose columns are kept: a fit goes to and fro between a few.
-const KEPT_FRICTION: usize = 4;
+const KEPT_LEVELS: usize = 8;
 
 /// Mass and first moments: the parameters of a link that gravity pulls at.
 pub const PULLED: usize = 4;
@@ -183,7 +184,8 @@ impl<'a> Data<'a> {
                 force: OnceLock::new(),
                 declared_zero: OnceLock::new(),
                 pull: Default::default(),
-                friction: KeptFriction::default(),
+                levels: KeptLevels::default(),
+                viscous: vec![OnceLock::new(); n],
             })
         };
         Ok(bands.into_iter().zip(joints).map(of_band).collect())
@@ -252,7 +254,8 @@ impl<'a> Data<'a> {
             force: OnceLock::new(),
             declared_zero: OnceLock::new(),
             pull: Default::default(),
-            friction: KeptFriction::default(),
+            levels: KeptLevels::default(),
+            viscous: vec![OnceLock::new(); self.dof()],
         }
     }
 
@@ -296,7 +299,8 @@ impl<'a> Data<'a> {
             }
         }
         self.blocks = blocks_of(&self.recordings, &self.joints, &self.band, block);
-        (self.pull, self.friction) = Default::default();
+        (self.pull, self.levels) = Default::default();
+        self.viscous = vec![OnceLock::new(); self.dof()];
         self
     }
 
@@ -368,26 +372,32 @@ impl<'a> Data<'a> {
         })
     }
 
-    /// Columns of a joint's friction with steepnesses γ2 and γ4; `make` makes them where they were not made lately.
-    pub fn friction_columns(
+    /// A level of a joint's friction, tanh(γ·q̇), and its tangent; `make` makes them where they were not made lately.
+    pub fn level_columns(
         &self,
         joint: usize,
-        shape: [f64; 2],
-        make: impl FnOnce() -> [Vec<f64>; FRICTION],
-    ) -> Arc<[Vec<f64>; FRICTION]> {
-        let same = |kept: &&(usize, [f64; 2], Arc<_>)| kept.0 == joint && kept.1 == shape;
-        let lock = || self.friction.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, _, known)) = lock().iter().find(same) {
-            return Arc::clone(known);
-        }
-        let made = Arc::new(make());
+        steepness: f64,
+        make: impl FnOnce() -> [Vec<f64>; 2],
+    ) -> [Arc<Vec<f64>>; 2] {
+        let lock = || self.levels.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = |kept: &mut Vec<(usize, f64, _)>| {
+            let place = kept.iter().position(|(j, g, _)| (*j, *g) == (joint, steepness))?;
+            Some(kept.remove(place).2)
+        };
+        let found = known(&mut lock());
+        let columns = found.unwrap_or_else(|| make().map(Arc::new));
         let mut kept = lock();
-        let own = |kept: &(usize, [f64; 2], Arc<_>)| kept.0 == joint;
-        if kept.iter().filter(|kept| own(kept)).count() >= KEPT_FRICTION {
-            kept.iter().position(own).map(|oldest| kept.remove(oldest));
+        if kept.iter().filter(|(j, ..)| *j == joint).count() >= KEPT_LEVELS {
+            kept.iter().position(|(j, ..)| *j == joint).map(|oldest| kept.remove(oldest));
         }
-        kept.push((joint, shape, Arc::clone(&made)));
-        made
+        kept.push((joint, steepness, columns.clone()));
+        columns
+    }
+
+    /// A joint's velocity as a column: its viscous friction.
+    pub fn viscous_column(&self, joint: usize) -> Arc<Vec<f64>> {
+        let make = || self.joints[joint].column(&self.recordings, |_, r| r.velocity(joint).collect());
+        Arc::clone(self.viscous[joint].get_or_init(|| make().into()))
     }
 
     /// The parameters that the arm file declares zero.

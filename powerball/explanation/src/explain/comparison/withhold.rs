@@ -87,6 +87,10 @@ fn impossible(study: &Study<'_>, model: &Model) -> Option<usize> {
 /// The accepted effect without which the logs to judge on are predicted clearly better, on its joints or on all: what one
 /// joint gains others may lose, since they share their parameters.
 fn harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
+    *model.harmful.get_or_init(|| find_harmful(study, model))
+}
+
+fn find_harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
     let error = |left: &Signals, joints: &[JointNumber]| -> f64 {
         let squares = left.squares();
         joints.iter().map(|j| squares[j.index()]).filter(|s| *s > 0.0).map(f64::ln).sum::<f64>()

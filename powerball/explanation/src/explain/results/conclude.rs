@@ -249,7 +249,7 @@ pub(crate) fn warnings(findings: &Findings<'_>) -> Vec<String> {
         }
     }
     // What is known beforehand of an arm is no measurement.
-    let measured = fit.gram.sum(&fit.weights, |_| true).solver(|c| fit.free[c]);
+    let measured = fit.gram.all(&fit.weights).solver(|c| fit.free[c]);
     let is_seen =
         |c: usize| measured.kept().iter().any(|k| *k < fit.design.inertial && k % fit.design.set == c);
     let names = study.data.body.names().iter().enumerate();
