@@ -52,7 +52,7 @@ impl Explained {
 
 /// Explains what the base model of an arm lacks on logs.
 #[pyfunction]
-#[pyo3(signature = (arm, log, validate, map, model, correct_unattributed, rule, progress))]
+#[pyo3(signature = (arm, log, validate, map, model, rule, progress))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn explain(
     py: Python<'_>,
@@ -61,7 +61,6 @@ pub(crate) fn explain(
     validate: Vec<Given<'_>>,
     map: Vec<String>,
     model: Option<ModelText>,
-    correct_unattributed: bool,
     rule: &str,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Explained> {
@@ -73,8 +72,7 @@ pub(crate) fn explain(
     let done = work::run(py, progress.as_ref(), move |progress| -> Result<_, Why> {
         progress.say("reading logs");
         let recorded = Recorded::read(&arm, &logs.sources, &validate.sources).map_err(Why::Logs)?;
-        let options =
-            ExplainOptions { rule, known, correct_unattributed, progress, ..ExplainOptions::default() };
+        let options = ExplainOptions { rule, known, progress, ..ExplainOptions::default() };
         let prepared =
             Prepared::new(&arm, &recorded.fit, &recorded.validate, &options).map_err(Why::Explain)?;
         let (mut explained, motion) = prepared.explained(&options).map_err(Why::Explain)?;

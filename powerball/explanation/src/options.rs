@@ -18,8 +18,6 @@ pub struct ExplainOptions<'a> {
     pub known: Option<TorqueModel>,
     /// Names that an experiment has ruled out.
     pub ruled_out: Vec<RuledOut>,
-    /// Whether what stays without a name is corrected by bounded curves where that helps.
-    pub correct_unattributed: bool,
     /// Who wants to know what is being done.
     pub progress: Progress<'a>,
 }

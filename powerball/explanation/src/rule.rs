@@ -135,8 +135,6 @@ pub struct Rule {
     pub coloured: f64,
     /// Least share of a residual's variance that a signal must explain to be named as one that it depends on.
     pub least_share: f64,
-    /// The correction of what has no name stays within so many rms of what is left.
-    pub correction_bound: f64,
 
     /// A joint is explained where no more than this share of its torque's rms is left on the validation set.
     pub explained_share: f64,
@@ -207,7 +205,6 @@ impl Default for Rule {
             above_floor: 1.2,
             coloured: 2.0,
             least_share: 0.02,
-            correction_bound: 2.0,
             explained_share: 0.1,
             little_share: 0.05,
             nothing_share: 0.9,

@@ -168,7 +168,6 @@ def explain(
     validate: Sequence[Any],
     map: List[str],
     model: Optional[_Text],
-    correct_unattributed: bool,
     rule: str,
     progress: _Tell,
 ) -> Explained: ...

@@ -255,16 +255,14 @@ def explain(
     *,
     map: Optional[Map] = None,
     model: Optional[Model] = None,
-    correct_unattributed: bool = False,
     rule: Optional[Rule] = None,
     progress: Progress = False,
 ) -> Explained:
     """Finds, names and adds what the model lacks on logs; every addition is judged on logs of another path.
 
     Logs as for :func:`identify`, in the order in which they were recorded. ``model`` is what is known
-    already: it is taken out of the logs as it stands, and what is found comes to it. ``correct_unattributed``
-    fits a bounded curve to what stays without a name, kept where errors fall that it was not fitted to.
-    ``rule`` has every threshold by which this is decided.
+    already: it is taken out of the logs as it stands, and what is found comes to it. ``rule`` has every
+    threshold by which this is decided.
 
     Raises: ``InputError`` where logs or the rule cannot be used, ``RefusedError`` where they hold too little.
     """
@@ -275,7 +273,6 @@ def explain(
             given(validate, "validate"),
             said(map),
             optional_model(model),
-            correct_unattributed,
             rule_text(rule or Rule()),
             tell,
         )

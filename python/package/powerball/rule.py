@@ -134,8 +134,6 @@ class Rule:
     #: Least share of a residual's variance that a signal must explain to be named as one that it depends
     #: on.
     least_share: float = 0.02
-    #: The correction of what has no name stays within so many rms of what is left.
-    correction_bound: float = 2.0
     #: A joint is explained where no more than this share of its torque's rms is left on the validation set.
     explained_share: float = 0.1
     #: What is left of a joint below this share of its torque is little, whatever it depends on: a law that

@@ -330,7 +330,6 @@ fn rest(page: &mut Page, explained: &Explained) {
         }
         None => page.paragraph("Nothing that these logs could show."),
     }
-    corrections(page, explained);
     if let Some(experiment) = &explained.experiment {
         let why = &experiment.why;
         match experiment.decided {
@@ -378,37 +377,6 @@ fn notes(page: &mut Page, explained: &Explained) {
         }]);
     }
     page.folded(&format!("{} notes on the logs and the arm file", explained.warnings.len()), &table);
-}
-
-fn corrections(page: &mut Page, explained: &Explained) {
-    let Some(kept) = explained.unattributed.as_ref().and_then(|u| u.correction.as_ref()) else { return };
-    if kept.is_empty() {
-        page.paragraph("No curve of these signals lowers held-out errors: none is kept.");
-        return;
-    }
-    let mut table = Table::new([
-        "corrected joint",
-        "by a curve of",
-        "within [N·m]",
-        "held-out error [N·m]",
-        "corrected [N·m]",
-    ]);
-    for c in kept {
-        let signals: Vec<&str> = c.curves.iter().map(|curve| curve.signal.as_str()).collect();
-        let limit = format!("±{}", number(c.limit));
-        table.push([
-            c.joint.to_string(),
-            signals.join(", "),
-            limit,
-            number(c.rms_before),
-            number(c.rms_after),
-        ]);
-    }
-    page.table(&table);
-    page.paragraph(
-        "A correction is a number for the controller and no finding: it names nothing, and is no \
-        part of the errors above.",
-    );
 }
 
 fn list(joints: &[JointNumber]) -> String {

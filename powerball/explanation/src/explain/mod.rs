@@ -41,9 +41,8 @@ use powerball_logs::log::Log;
 use powerball_logs::regression::RigidArm;
 use prepare::{Inertia, Prepared, ValidationOnly, initial_model, prepare};
 pub use results::{
-    Change, Correction, Curve, Difference, Evidence, Experiment, Explained, FEATURES, LawCoefficient,
-    LogResult, NextExperiment, Shown, State, TorqueCurve, Trajectory, Unattributed, UnnamedLaw, Verdict,
-    contradictions, curves,
+    Change, Difference, Evidence, Experiment, Explained, FEATURES, LawCoefficient, LogResult, NextExperiment,
+    Shown, State, TorqueCurve, Trajectory, Unattributed, UnnamedLaw, Verdict, contradictions, curves,
 };
 use search::CandidateKind;
 use special::pushes_at_rest;

@@ -17,7 +17,7 @@ use powerball_bus::transport::{Bus, BusUrl};
 use powerball_controller::JointNumber;
 use powerball_explanation::experiment::{self, TRAJECTORY};
 use powerball_explanation::explain::{
-    Correction, Explained, FalsePositives, NamedEffect, Rival, State, Unattributed, Verdict,
+    Explained, FalsePositives, NamedEffect, Rival, State, Unattributed, Verdict,
 };
 use powerball_explanation::torque_model::TorqueModel;
 use powerball_explanation::{ExplainError, ExplainOptions, Prepared};
@@ -65,10 +65,6 @@ pub(crate) struct Explain {
     timings: bool,
     #[command(flatten)]
     accept: Accept,
-    /// Where something stays without a name, fit a bounded curve of the one or two signals that it depends on
-    /// most; kept where errors fall that it was not fitted to.
-    #[arg(long)]
-    correct_unattributed: bool,
     /// The bus that the arm of the experiment is on.
     #[arg(long, value_name = "URL", default_value = "virtual", requires = "experiment")]
     bus: BusUrl,
@@ -89,12 +85,8 @@ impl Explain {
         let known = known.map_err(|e| Failure::Unusable(e.to_string()))?;
         let mut recorded = recorded(&self.inputs, &self.validate, &arm, &progress)?;
         let say = |what: &str| progress.say(what);
-        let options = ExplainOptions {
-            known,
-            correct_unattributed: self.correct_unattributed,
-            progress: logs::Progress::to(&say),
-            ..ExplainOptions::default()
-        };
+        let options =
+            ExplainOptions { known, progress: logs::Progress::to(&say), ..ExplainOptions::default() };
         let refused = |e| self.failure(&e);
         let prepared = Prepared::new(&arm, &recorded.fit, &recorded.validate, &options).map_err(refused)?;
         let (mut explained, motion) = prepared.explained(&options).map_err(refused)?;
@@ -275,7 +267,7 @@ pub(super) fn everything(explained: &Explained, arm: &Path, out: &Path) -> Strin
         text.push_str(&format!("no name on joint {}: {}\n", list(&law.joints), law.sentence()));
     }
     if let Some(rest) = &explained.unattributed {
-        text.push_str(&format!("{}\n{}", without_name(rest), curves(rest)));
+        text.push_str(&format!("{}\n", without_name(rest)));
     }
     text.push_str(
         &explained.transmission.iter().flatten().map(|joint| joint.sentence() + "\n").collect::<String>(),
@@ -441,25 +433,6 @@ fn evidence(effect: &NamedEffect, sliding: &[bool]) -> String {
         text.push_str(&format!("  not {}: {}\n", rival.effect, rival.why_not));
     }
     text
-}
-
-fn curves(rest: &Unattributed) -> String {
-    let Some(kept) = &rest.correction else { return String::new() };
-    if kept.is_empty() {
-        return "  no curve of these signals lowers held-out errors: none is kept\n".to_string();
-    }
-    let one = |c: &Correction| {
-        let signals: Vec<&str> = c.curves.iter().map(|curve| curve.signal.as_str()).collect();
-        format!(
-            "  a curve of {} within ±{:.2} N·m lowers the held-out error of joint {} from {:.4} to {:.4} N·m\n",
-            signals.join(" and "),
-            c.limit,
-            c.joint,
-            c.rms_before,
-            c.rms_after
-        )
-    };
-    kept.iter().map(one).collect()
 }
 
 fn on(joints: &[JointNumber], dof: usize) -> String {

@@ -8,10 +8,10 @@ use super::super::model::{Accepted, Model, Own};
 use super::super::named::{FitErrors, NamedEffect, Rival};
 use super::super::study::Study;
 use super::compose::{Composed, compose, compose_per_joint};
-use super::correction::laws;
 use super::explained::{Change, Explained, NextExperiment, curves, shown};
 use super::logs::logs;
 use super::unattributed::{effective_samples, unattributed};
+use super::unnamed::laws;
 use super::verdict::{Evidence, verdict};
 use crate::effects::{Effect, Figures, Found, Settings, contact_wrench};
 use crate::options::{ExplainError, RuledOut};
@@ -43,7 +43,7 @@ pub(crate) fn conclude(findings: Findings<'_>) -> Result<Explained, ExplainError
     add_pushes_at_rest(&mut named, &findings, &after);
     not_named_elsewhere(&mut named);
     let (unattributed, unexplained, dependencies) =
-        unattributed(study, model, history, &held_out, &floor, &after, &named);
+        unattributed(study, model, history, &floor, &after, &named);
     let left = unattributed.as_ref().map_or(&[][..], |rest| &rest.joints);
     for effect in &mut named {
         effect.probability = Evidence::of(effect).probability();

@@ -6,7 +6,6 @@ use super::super::comparison::History;
 use super::super::model::Model;
 use super::super::named::{FitErrors, NamedEffect, Rival};
 use super::super::study::Study;
-use super::correction::{Correction, correct};
 use super::verdict::explained;
 use crate::effects::Context;
 use powerball_controller::JointNumber;
@@ -26,10 +25,6 @@ pub struct Unattributed {
     pub rms: Vec<f64>,
     /// Effects that fit a part of it, but not well enough to be named there.
     pub considered: Vec<Rival>,
-    /// Curves that take a part of it off, where they were asked for: those of the joints whose held-out
-    /// errors fall by them.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub correction: Option<Vec<Correction>>,
 }
 
 /// The joints that are not explained and whose residual depends on something, and what is to be said of the others on
@@ -38,7 +33,6 @@ pub(crate) fn unattributed(
     study: &Study<'_>,
     model: &Model,
     history: &History,
-    held_out: &[Vec<f64>],
     floor: &[f64],
     after: &FitErrors,
     named: &[NamedEffect],
@@ -49,13 +43,6 @@ pub(crate) fn unattributed(
         |j: &usize| rms[*j] > rule.above_floor * floor[*j] && model.fit.inflation[*j] > rule.coloured;
     let candidates: Vec<usize> = context.moving_joints().map(JointNumber::index).filter(is_left).collect();
     let found = parallel::map(&candidates, |j| depends_on(&context, *j));
-    let on_validation = study.on_validation(&model.fit, held_out);
-    let correction = study.options.correct_unattributed.then(|| {
-        let of = |(j, list): (&usize, &Vec<(String, f64)>)| {
-            correct(&context, &on_validation, &study.folds, *j, list)
-        };
-        candidates.iter().zip(&found).filter_map(of).collect()
-    });
     let dependencies = Dependencies::new(candidates.iter().copied().zip(found.iter().cloned()));
     let mut signals: Vec<(String, f64)> = Vec::new();
     let explained = explained(study, &after.validate, floor, &dependencies);
@@ -83,7 +70,6 @@ pub(crate) fn unattributed(
         rms: joints.iter().map(|j| rms[j.index()]).collect(),
         depends_on: signals.into_iter().map(|(name, _)| name).collect(),
         considered: considered(history, &joints, named),
-        correction,
         joints,
     });
     let mut unexplained = Vec::new();

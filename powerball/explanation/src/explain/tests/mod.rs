@@ -1,4 +1,3 @@
-mod correction;
 mod laws;
 #[path = "../../../../../tests/support/measured.rs"]
 mod logs_of_arms;
