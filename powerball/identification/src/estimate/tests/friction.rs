@@ -59,8 +59,7 @@ fn kept_columns_are_those_made_anew() {
     let columns = |shape: [f64; 2]| friction_columns(&kept, &[shape; 6]).swap_remove(2);
     let [first, second, viscous, first_tangent, second_tangent] = columns([7.0, 90.0]);
     let [a, b, c, d, e] = columns([90.0, 7.0]);
-    for (one, other) in
-        [(&first, b), (&second, a), (&viscous, c), (&first_tangent, e), (&second_tangent, d)]
+    for (one, other) in [(&first, b), (&second, a), (&viscous, c), (&first_tangent, e), (&second_tangent, d)]
     {
         assert!(Arc::ptr_eq(one, &other));
     }
