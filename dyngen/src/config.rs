@@ -1,6 +1,7 @@
 //! Generation from a build script.
 
 use crate::arm::Arm;
+use crate::consistency;
 use crate::diagnostic::Diagnostics;
 use crate::dynamics::Function;
 use crate::emit::{self, CFiles, FrictionTerm, Options};
@@ -142,6 +143,17 @@ impl Config {
     /// As [`Config::source`].
     pub fn texts(&self, file: &Path) -> Result<Vec<(PathBuf, String)>, GenerateError> {
         let files = self.files(file)?;
+        let (model, options) = self.model()?;
+        let texts = match files.get(1).and_then(|header| header.file_name()) {
+            None => emit::source(&model, &options).map(|source| vec![source]),
+            Some(header) => emit::c_files(&model, &options, &header.to_string_lossy())
+                .map(|CFiles { header, source }| vec![source, header]),
+        };
+        Ok(files.into_iter().zip(texts.map_err(GenerateError::Model)?).collect())
+    }
+
+    /// The model, and the options with the values.
+    fn model(&self) -> Result<(Model, Options), GenerateError> {
         let arm = Arm::read(&self.arm).map_err(GenerateError::Arm)?;
         let mut options = self.options.clone();
         let model = match self.values {
@@ -154,12 +166,26 @@ impl Config {
             let values = Values::read(file).and_then(|v| v.of_set(&model, set));
             options.values = Some(values.map_err(GenerateError::Arm)?);
         }
-        let texts = match files.get(1).and_then(|header| header.file_name()) {
-            None => emit::source(&model, &options).map(|source| vec![source]),
-            Some(header) => emit::c_files(&model, &options, &header.to_string_lossy())
-                .map(|CFiles { header, source }| vec![source, header]),
+        Ok((model, options))
+    }
+
+    /// Why no real arm can have the values that are baked in, in words; empty where there are none, or one can.
+    ///
+    /// # Errors
+    /// As [`Config::source`].
+    pub fn warnings(&self) -> Result<Vec<String>, GenerateError> {
+        let Some(file) = &self.values else { return Ok(Vec::new()) };
+        let (model, options) = self.model()?;
+        let values = options.values.unwrap_or_default();
+        let found = consistency::check(&model, options.parameters, &values).map_err(GenerateError::Model)?;
+        let warning = |reason: &String| {
+            format!(
+                "{}: no real arm can have these values: {reason}; the nearest that one can have: consistent.json of \
+                 `powerball identify`, or `powerball consistent`",
+                file.display()
+            )
         };
-        Ok(files.into_iter().zip(texts.map_err(GenerateError::Model)?).collect())
+        Ok(found.reasons.iter().map(warning).collect())
     }
 
     /// `file`, and in C its header.
@@ -206,6 +232,7 @@ impl Config {
         for file in std::iter::once(&self.arm).chain(&self.values) {
             println!("cargo::rerun-if-changed={}", file.display());
         }
+        self.warnings()?.iter().for_each(|warning| println!("cargo::warning={warning}"));
         let missing = || std::io::Error::other("OUT_DIR is not set: call this from a build script");
         let folder =
             std::env::var_os("OUT_DIR").ok_or_else(|| GenerateError::Write(name.into(), missing()))?;

@@ -28,6 +28,8 @@ pub struct Possibility {
     pub pose: Vec<f64>,
     /// The smallest eigenvalue of B(q) there, kg·m² (where all joints are revolute).
     pub min_eigenvalue: f64,
+    /// The share of poses drawn at random at which B(q) is not positive definite.
+    pub indefinite: f64,
 }
 
 /// Judges the values of a set's parameters, in the set's order.
@@ -41,6 +43,7 @@ pub fn check(model: &Model, kind: SetKind, values: &[f64]) -> Result<Possibility
     let mut reasons = impossible_links(arm, set, values);
     let search = Search { mass: &mass, values, n: arm.dof() };
     let ((smallest, largest), pose, indefinite) = search.worst(arm);
+    let share = indefinite as f64 / POSES as f64;
     if smallest < -ROUNDING * largest.abs() {
         reasons.push(format!(
             "B(q) is not positive definite: its smallest eigenvalue is {smallest:.6} at the pose shown, and \
@@ -51,7 +54,13 @@ pub fn check(model: &Model, kind: SetKind, values: &[f64]) -> Result<Possibility
         reasons
             .push(format!("B(q) is singular at the pose shown: its smallest eigenvalue is {smallest:.3e}"));
     }
-    Ok(Possibility { possible: reasons.is_empty(), reasons, pose, min_eigenvalue: smallest })
+    Ok(Possibility {
+        possible: reasons.is_empty(),
+        reasons,
+        pose,
+        min_eigenvalue: smallest,
+        indefinite: share,
+    })
 }
 
 struct Search<'a> {

@@ -40,6 +40,7 @@ fn log() -> Log {
         temperature: None,
         motor: None,
         pieces: std::iter::once(0..SAMPLES).collect(),
+        doubts: Vec::new(),
         clock: 0.0,
         t,
     }

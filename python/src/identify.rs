@@ -117,7 +117,7 @@ pub(crate) fn verify(
     let (arm, map, model) = (arm.arm.clone(), column_map(&map)?, model_file(&model)?);
     let logs = taken(&arm, &log, &map)?;
     let verified = work::run(py, progress.as_ref(), move |progress| {
-        let joint_bands = model.joint_bands.clone();
+        let joint_bands = model.model.joint_bands.clone();
         let options = VerifyOptions { tolerance, joint_bands, progress, ..VerifyOptions::default() };
         let verified = powerball::identification::verify(&arm, &model, logs.sources, &options);
         verified.map(|mut verified| {

@@ -313,6 +313,31 @@ impl Arm {
         })
     }
 
+    /// The lengths of the links together, m.
+    pub fn length(&self) -> f64 {
+        let value = rational::to_f64;
+        self.joints.iter().map(|j| value(&j.a).hypot(value(&j.b)).hypot(value(&j.d))).sum()
+    }
+
+    /// What no arm is: most likely a number in another unit. What is computed with it should not be used.
+    pub fn doubts(&self) -> Vec<String> {
+        let value = rational::to_f64;
+        let mut doubts = Vec::new();
+        let length = self.length();
+        if length > LONGEST_ARM {
+            doubts.push(format!(
+                "the links are {length:.0} m long together: give a, b and d in metres (mm look like this)"
+            ));
+        }
+        let gravity = self.gravity.iter().map(|g| value(g).powi(2)).sum::<f64>().sqrt();
+        if gravity > STRONGEST_GRAVITY {
+            doubts.push(format!(
+                "gravity is {gravity:.0} m/s²: give it in m/s² (mm/s² look like this; on Earth it is 9.81)"
+            ));
+        }
+        doubts
+    }
+
     /// Things about the file that are no errors but that its author may not have meant.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
@@ -336,6 +361,11 @@ impl Arm {
         notes
     }
 }
+
+/// No arm is longer, m.
+const LONGEST_ARM: f64 = 50.0;
+/// On no planet is gravity stronger, m/s²: 25 on Jupiter.
+const STRONGEST_GRAVITY: f64 = 100.0;
 
 /// Whether a joint's limits look as if they were degrees: whole numbers beyond what a joint turns.
 fn degrees(position: &[f64; 2]) -> bool {

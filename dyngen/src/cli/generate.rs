@@ -1,7 +1,7 @@
 //! `dyngen generate`.
 
 use super::{Failure, Progress, Set, same_file};
-use dyngen::{Arm, Config, FrictionTerm, Function, GenerateError, Language};
+use dyngen::{Config, FrictionTerm, Function, GenerateError, Language};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -82,7 +82,8 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         }
     }
     // What is wrong with the arm file is told below.
-    let progress = Arm::read(&args.arm).ok().map(|arm| Progress::new(&arm));
+    let progress = super::arm(&args.arm).ok().map(|arm| Progress::new(&arm));
+    config.warnings().map_err(failure)?.iter().for_each(|warning| eprintln!("warning: {warning}"));
     progress.iter().for_each(|p| p.say("deriving, proving and writing"));
     if !args.check {
         config.write(&args.output).map_err(failure)?;

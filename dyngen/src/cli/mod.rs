@@ -18,6 +18,7 @@ use std::fmt::Display;
 use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// From a DH table to the dynamics of a robot arm: exact base parameters and allocation-free Rust, proven
 /// equal to the Lagrangian.
@@ -26,6 +27,9 @@ use std::process::ExitCode;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// End with 0 instead of 3 where the arm file is of no arm, such as links in millimetres.
+    #[arg(long, global = true)]
+    accept: bool,
 }
 
 #[derive(Subcommand)]
@@ -96,7 +100,8 @@ impl Failure {
 
 /// Runs the command line.
 pub(crate) fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    let Cli { command, accept } = Cli::parse();
+    let result = match command {
         Command::Describe(args) => describe::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Import(args) => import::run(&args),
@@ -109,6 +114,10 @@ pub(crate) fn main() -> ExitCode {
         Command::Man(args) => shell::man(&args),
     };
     match result {
+        // What was written is of no arm, as has been said.
+        Ok(code) if code == ExitCode::SUCCESS && DOUBTFUL.load(Ordering::Relaxed) && !accept => {
+            ExitCode::from(3)
+        }
         Ok(code) => code,
         Err(failure) => {
             eprintln!("{}", failure.message);
@@ -117,9 +126,16 @@ pub(crate) fn main() -> ExitCode {
     }
 }
 
+/// Whether an arm that was read can be none: then no result of it should be used.
+static DOUBTFUL: AtomicBool = AtomicBool::new(false);
+
 /// Reads an arm; what its author may not have meant goes to standard error.
 fn arm(path: &Path) -> Result<Arm, Failure> {
     let arm = Arm::read(path).map_err(Failure::input)?;
+    for doubt in arm.doubts() {
+        DOUBTFUL.store(true, Ordering::Relaxed);
+        eprintln!("{}: do not use this result: {doubt}; --accept takes it as it is", path.display());
+    }
     for note in arm.notes() {
         eprintln!("{}: note: {note}", path.display());
     }

@@ -125,8 +125,8 @@ impl Prepared {
 
     /// An explanation with what the columns and the transmissions are, whose model holds what was known too.
     #[must_use]
-    pub fn with_known(&self, mut explained: Explained) -> Explained {
-        explained.conventions = Some(self.conventions.clone());
+    pub fn with_known(&self, explained: Explained) -> Explained {
+        let mut explained = explained.with_columns(self.conventions.clone());
         explained.transmission.clone_from(&self.transmission);
         explained.model.colour = self.colour(&explained);
         if let Some(known) = &self.known {

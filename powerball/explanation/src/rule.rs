@@ -136,10 +136,10 @@ pub struct Rule {
     /// Least share of a residual's variance that a signal must explain to be named as one that it depends on.
     pub least_share: f64,
 
-    /// A joint is explained where no more than this share of its torque's rms is left on the validation set.
-    pub explained_share: f64,
-    /// What is left of a joint below this share of its torque is little, whatever it depends on: a law that is missing
-    /// often leaves less than [`explained_share`](Self::explained_share).
+    /// A joint is predicted where no more than this share of its torque's rms is left on the validation set.
+    pub predicted_share: f64,
+    /// What is left of a joint below this share of its torque needs no name, whatever it depends on: a law that is missing
+    /// often leaves less than [`predicted_share`](Self::predicted_share).
     pub little_share: f64,
     /// Where more than this share is left a model predicts next to nothing.
     pub nothing_share: f64,
@@ -205,7 +205,7 @@ impl Default for Rule {
             above_floor: 1.2,
             coloured: 2.0,
             least_share: 0.02,
-            explained_share: 0.1,
+            predicted_share: 0.1,
             little_share: 0.05,
             nothing_share: 0.9,
             least_time: 30.0,

@@ -13,6 +13,7 @@ mod nearest;
 mod numeric_arm;
 mod source;
 pub mod transmission;
+pub mod usable;
 mod verify;
 
 pub use powerball_logs::{chain, motion};

@@ -182,6 +182,7 @@ impl SimulatedLog {
             temperature: None,
             motor: None,
             pieces: std::iter::once(0..self.t.len()).collect(),
+            doubts: Vec::new(),
             clock: 0.0,
             t: self.t.clone(),
         }

@@ -48,11 +48,11 @@ class Effect:
 
 @dataclass(frozen=True)
 class Verdict:
-    """How far a joint's torque is explained."""
+    """How well a joint's torque is predicted on the validation logs."""
 
     #: From 1.
     joint: int
-    #: "explained", "named in part" or "not explained".
+    #: "at the noise floor", "predicted", "improved" or "not predicted".
     state: str
     #: Share of the torque's rms on the validation logs that is left; NaN where the joint does not move.
     left: float

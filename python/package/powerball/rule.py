@@ -134,10 +134,10 @@ class Rule:
     #: Least share of a residual's variance that a signal must explain to be named as one that it depends
     #: on.
     least_share: float = 0.02
-    #: A joint is explained where no more than this share of its torque's rms is left on the validation set.
-    explained_share: float = 0.1
-    #: What is left of a joint below this share of its torque is little, whatever it depends on: a law that
-    #: is missing often leaves less than ``explained_share``.
+    #: A joint is predicted where no more than this share of its torque's rms is left on the validation set.
+    predicted_share: float = 0.1
+    #: What is left of a joint below this share of its torque needs no name, whatever it depends on: a law
+    #: that is missing often leaves less than ``predicted_share``.
     little_share: float = 0.05
     #: Where more than this share is left a model predicts next to nothing.
     nothing_share: float = 0.9

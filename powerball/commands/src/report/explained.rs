@@ -1,9 +1,9 @@
 //! An explanation as sections of a page.
 
 use crate::report::sections;
-use crate::report::{BarPairs, Figure, Files, Ink, Page, Panel, Series, Table, Tone, number};
+use crate::report::{BarPairs, Figure, Files, Ink, Page, Panel, Series, Table, Tone, band_of, number};
 use powerball_controller::JointNumber;
-use powerball_explanation::explain::{Change, Explained, NamedEffect, Shown, State, TorqueCurve};
+use powerball_explanation::explain::{Change, Explained, NamedEffect, Shown, TorqueCurve};
 
 /// explained.json, model.json and report.html.
 ///
@@ -57,7 +57,7 @@ const WORDS: [(&str, &str); 12] = [
     ("torque left", "The error after, as a share of the rms of the joint's torque."),
     (
         "verdict",
-        "Explained: little of the torque is left. Named in part: something was named, and more is left than noise. Not explained: much is left, and nothing was named.",
+        "At the noise floor: what is left is hardly more than the noise of the measurement. Predicted: at most a tenth of the torque's rms is left. Improved: more is left, and the error fell. Not predicted: more is left, and no error fell.",
     ),
     (
         "right in",
@@ -119,6 +119,7 @@ fn answer(page: &mut Page, explained: &Explained) {
         "change, 95 % interval",
         "torque left",
         "verdict",
+        "band [Hz]",
     ]);
     for v in &explained.verdict {
         let j = v.joint.index();
@@ -131,6 +132,7 @@ fn answer(page: &mut Page, explained: &Explained) {
             changed.map_or_else(String::new, change),
             if v.left.is_nan() { "–".to_string() } else { percent(v.left) },
             v.state.to_string(),
+            band_of(after.band[j]),
         ]);
     }
     page.table(&table);
@@ -173,13 +175,13 @@ pub fn change(change: &Change) -> String {
 #[must_use]
 pub fn nothing_named(explained: &Explained) -> &'static str {
     if !explained.laws.is_empty() {
-        "No effect was named: what the model lacks has no name here, and is told as a formula."
-    } else if explained.verdict.iter().all(|v| v.state == State::Explained) {
+        "No effect was named: what the model lacks has no name here, and is given as a formula."
+    } else if explained.verdict.iter().all(|v| v.state.is_good()) {
         "No effect was named: little is left of the torques, and these logs do not show that the model lacks \
          anything."
     } else {
         "No effect was named, but much is left on some joints (see the verdict): the model lacks something \
-         there that these logs do not tell."
+         there that these logs do not show."
     }
 }
 
@@ -194,12 +196,18 @@ fn errors(page: &mut Page, explained: &Explained) {
 /// Held-out errors by joint, before and after.
 #[must_use]
 pub fn error_bars(explained: &Explained) -> BarPairs {
-    let [low, high] = explained.band;
-    let title = format!("Torque error on logs that were not fitted, {low} to {high} Hz");
-    let errors = explained.before.validate.rms.iter().zip(&explained.after.validate.rms);
+    let (before, after) = (&explained.before.validate, &explained.after.validate);
+    let widest = after.band.iter().fold(0.0, |a: f64, b| a.max(*b));
+    let title = format!("Torque error on logs that were not fitted, {} Hz", band_of(widest));
+    let errors = before.rms.iter().zip(&after.rms);
     let bars = BarPairs::new(title, "rms [N·m]", ["base model", "with what was named"]);
     errors.zip(&explained.noise_floor).enumerate().fold(bars, |bars, (joint, ((before, after), floor))| {
-        bars.pair_with_floor(format!("joint {}", joint + 1), *before, *after, *floor)
+        let band = explained.after.validate.band[joint];
+        let name = match band < widest {
+            true => format!("joint {}, {} Hz", joint + 1, band_of(band)),
+            false => format!("joint {}", joint + 1),
+        };
+        bars.pair_with_floor(name, *before, *after, *floor)
     })
 }
 

@@ -1,7 +1,7 @@
 //! The files of an identification; its page is the one that a lab prints.
 
 use crate::report::sections;
-use crate::report::{Figure, Files, Ink, JOINTS, Page, Panel, Series, Table, Tone, number};
+use crate::report::{Figure, Files, Ink, JOINTS, Page, Panel, Series, Table, Tone, band_of, number};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 use dyngen::exact::rational::to_f64;
@@ -63,6 +63,7 @@ pub fn page(result: &Identified) -> Page {
         "held out [N·m]",
         "of the torque",
         "noise alone [N·m]",
+        "band [Hz]",
     ]);
     for j in 0..result.fit.rms.len() {
         let percent = |x: f64| format!("{:.1} %", 100.0 * x);
@@ -74,6 +75,7 @@ pub fn page(result: &Identified) -> Page {
             held.map_or(String::new(), |s| number(s.rms[j])),
             held.map_or(String::new(), |s| percent(s.relative[j])),
             shown.noise_floor.get(j).map_or(String::new(), |f| number(*f)),
+            band_of(result.fit.band[j]),
         ]);
     }
     page.table(&table);
@@ -121,7 +123,9 @@ fn mountings(page: &mut Page, result: &Identified, shown: &Along) {
     }
     let mut table = Table::new(["base of the fitted logs", "logs", "error by joint [N·m]"]);
     for mounted in &result.mountings {
-        let errors: Vec<String> = mounted.fit.rms.iter().map(|e| number(*e)).collect();
+        let each = mounted.fit.rms.iter().zip(&mounted.fit.band);
+        let errors: Vec<String> =
+            each.map(|(error, band)| format!("{} ({} Hz)", number(*error), band_of(*band))).collect();
         table.push([mounted.mounting.clone(), mounted.logs.len().to_string(), errors.join(", ")]);
     }
     page.table(&table);

@@ -46,6 +46,12 @@ pub use powerball_explanation::effects::words::number;
 /// The style of pages and figures.
 const STYLE: &str = include_str!("page.css");
 
+/// The band of an error that ends there, Hz, in words.
+#[must_use]
+pub fn band_of(end: f64) -> String {
+    format!("0 to {end}")
+}
+
 /// Text as it may stand in HTML, in an element or in a quoted attribute.
 pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());

@@ -1,7 +1,7 @@
 //! The files of a verification.
 
 use super::identified::torque_figure;
-use crate::report::{Files, Page, Table, Tone, number};
+use crate::report::{Files, Page, Table, Tone, band_of, number};
 use powerball_identification::Verified;
 
 /// verified.json and report.html.
@@ -27,15 +27,22 @@ pub fn page(verified: &Verified) -> Page {
         }
         false => page.note(Tone::Bad, &format!("Not every joint is within {percent} % of its torque.")),
     };
-    let mut table =
-        Table::new(["joint", "error [N·m]", "interval [N·m]", "of the torque", "noise alone [N·m]"]);
-    for j in &verified.joints {
+    let mut table = Table::new([
+        "joint",
+        "error [N·m]",
+        "interval [N·m]",
+        "of the torque",
+        "noise alone [N·m]",
+        "band [Hz]",
+    ]);
+    for (j, band) in verified.joints.iter().zip(&verified.joint_bands) {
         table.push([
             j.joint.to_string(),
             number(j.rms),
             format!("{} to {}", number(j.interval[0]), number(j.interval[1])),
             format!("{:.1} %", 100.0 * j.relative),
             number(j.noise_floor),
+            band_of(*band),
         ]);
     }
     page.table(&table);

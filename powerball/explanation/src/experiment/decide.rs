@@ -191,6 +191,7 @@ mod new_log_tests {
             temperature: None,
             motor: None,
             pieces: vec![0..400, 420..1000],
+            doubts: Vec::new(),
             clock,
         };
         let old = [log("a", 0.0), log("b", 20.0)];

@@ -239,6 +239,7 @@ fn log_of(motion: &Motion) -> Log {
         temperature: None,
         motor: None,
         pieces: std::iter::once(0..motion.len()).collect(),
+        doubts: Vec::new(),
         clock: 0.0,
     }
 }

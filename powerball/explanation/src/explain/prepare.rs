@@ -9,7 +9,7 @@ use super::special::{Baseline, Clock, ValidationOnlyEffect, choose_clock, repeat
 use super::study::Study;
 use crate::effects::Made;
 use crate::options::{ExplainError, ExplainOptions};
-use powerball_identification::estimate::{Fit, Folds, bands_of, fit, residual_stats};
+use powerball_identification::estimate::{Fit, Folds, bands_of_logs, fit, residual_stats};
 use powerball_logs::log::Log;
 use powerball_logs::regression::{Data, RigidArm, Signals};
 use powerball_logs::summary::BANDS;
@@ -89,11 +89,7 @@ pub(super) fn prepare<'a>(
     Ok(Prepared { study, base, initial_fit: InitialFit { errors, residual, validation_only: found, clock } })
 }
 
-/// The logs as rows, each joint in the band in which they speak of it.
-///
-/// A joint of whose torque much is left, and whose model lies below what it leaves in the upper octaves, would
-/// be judged there on the noise of positions that were differentiated twice: whatever attenuates the model
-/// helps. It is taken in the band below those octaves.
+/// The logs as rows, each joint in the band in which they speak of it ([`bands_of_logs`]).
 fn in_own_bands<'a>(
     body: &'a RigidArm,
     (logs, validate): (&[Log], &[Log]),
@@ -106,8 +102,7 @@ fn in_own_bands<'a>(
     }
     let fit = fit(&data, &Folds::new(&data), &[], None);
     let left = residual_stats(&data, &fit.residual).relative;
-    let much = |(j, band): (usize, usize)| if left[j] > options.rule.explained_share { band } else { 0 };
-    let mut which: Vec<usize> = bands_of(&data, &fit).into_iter().enumerate().map(much).collect();
+    let mut which = bands_of_logs(body, logs, &options.data, &left);
     if which.iter().all(|band| *band == 0) {
         return Ok((data, validation));
     }

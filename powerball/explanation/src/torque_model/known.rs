@@ -15,7 +15,6 @@ use powerball_identification::mounting::Mounting;
 use powerball_logs::log::Log;
 use powerball_logs::regression::{Data, DataOptions, Recording, RigidArm, Signals};
 use powerball_logs::signal::resample::median_step;
-use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 impl TorqueModel {
@@ -192,8 +191,6 @@ pub struct ModelFile {
     pub model: TorqueModel,
     /// Its file.
     pub file: PathBuf,
-    /// The end of each joint's band, Hz, where it is an identified.json.
-    pub joint_bands: Vec<f64>,
 }
 
 impl ModelFile {
@@ -211,10 +208,7 @@ impl ModelFile {
     /// As [`TorqueModel::parse`].
     pub fn parse(text: &str, file: &Path) -> Result<ModelFile, FileError> {
         let model = TorqueModel::parse(text, file)?;
-        let said: Option<Value> = serde_json::from_str(text).ok();
-        let bands = said.as_ref().and_then(|json| json.get("joint_bands")?.as_array());
-        let bands = bands.map(|bands| bands.iter().map(|band| band.as_f64().unwrap_or(0.0)).collect());
-        Ok(ModelFile { model, file: file.to_path_buf(), joint_bands: bands.unwrap_or_default() })
+        Ok(ModelFile { model, file: file.to_path_buf() })
     }
 
     /// The model with its parameters and joints in the order of a body's.

@@ -48,6 +48,9 @@ pub struct TorqueModel {
     pub parameters: Vec<ParameterEstimate>,
     /// Eq. 16 by joint.
     pub friction: Vec<JointFriction>,
+    /// The end of each joint's band, Hz, in which it was fitted and judged; none where that is not known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joint_bands: Vec<f64>,
     /// What goes beyond these.
     #[serde(flatten)]
     pub additions: Additions,

@@ -151,6 +151,7 @@ mod tests {
             set: "minimal".to_string(),
             parameters: body.names().iter().zip(values).map(entry).collect(),
             friction: friction.collect(),
+            joint_bands: Vec::new(),
             additions: Additions::default(),
             colour: None,
         };

@@ -67,6 +67,7 @@ fn model(body: &RigidArm, laws: &[Law<f64>]) -> TorqueModel {
             .map(|(k, name)| ParameterEstimate::plain(name, value(k)))
             .collect(),
         friction: friction.collect(),
+        joint_bands: Vec::new(),
         additions: Additions { terms: laws.iter().enumerate().map(term).collect(), ..Additions::default() },
         colour: None,
     }

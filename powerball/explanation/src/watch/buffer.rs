@@ -94,6 +94,7 @@ impl Buffer {
             temperature: None,
             motor: None,
             pieces: std::iter::once(0..count).collect(),
+            doubts: Vec::new(),
             clock: 0.0,
         })
     }

@@ -1,5 +1,6 @@
 //! What a watch says: one event for each change.
 
+use crate::effects::words::number;
 use powerball_controller::JointNumber;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -58,7 +59,7 @@ impl Event {
             self.since
         );
         for (name, value) in &self.value {
-            let _ = write!(text, ", {name} {}", shown(value));
+            let _ = write!(text, ", {} {}", name.replace('_', " "), shown(name, value));
         }
         if !self.evidence.rivals.is_empty() {
             let _ = write!(text, "; or {}", self.evidence.rivals.join(" or "));
@@ -67,11 +68,44 @@ impl Event {
     }
 }
 
-fn shown(value: &Value) -> String {
-    match value {
-        Value::Number(number) => number.as_f64().map_or_else(String::new, |x| format!("{x:.4}")),
-        Value::Array(list) => format!("({})", list.iter().map(shown).collect::<Vec<_>>().join(", ")),
+/// A size with its unit.
+fn shown(name: &str, value: &Value) -> String {
+    let (factor, unit) = match name {
+        "mass" => (1.0, " kg"),
+        "com" => (1.0, " m"),
+        "force" => (1.0, " N"),
+        "delay" | "end_time" => (1.0, " s"),
+        "offset" => (1.0, " N·m"),
+        "change" => (100.0, " %"),
+        _ => (1.0, ""),
+    };
+    let one = |value: &Value| match value {
+        Value::Number(whole) if whole.is_u64() => whole.to_string(),
+        Value::Number(x) => x.as_f64().map_or_else(String::new, |x| number(factor * x)),
         Value::String(text) => text.clone(),
         other => other.to_string(),
+    };
+    match value {
+        Value::Array(list) => format!("({}){unit}", list.iter().map(one).collect::<Vec<_>>().join(", ")),
+        single => format!("{}{unit}", one(single)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn sizes_have_units_and_links_are_whole() {
+        for (name, value, text) in [
+            ("mass", json!(0.503), "0.503 kg"),
+            ("force", json!([1.0, -2.5, 0.0]), "(1.00, −2.50, 0) N"),
+            ("link", json!(6), "6"),
+            ("change", json!([-0.2, 0.1]), "(−20.0, 10.0) %"),
+            ("friction", json!("warmer"), "warmer"),
+        ] {
+            assert_eq!(shown(name, &value), text);
+        }
     }
 }

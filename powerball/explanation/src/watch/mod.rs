@@ -14,6 +14,7 @@ mod stream;
 use crate::rule::Rule;
 use crate::torque_model::{TorqueModel, rows_a_second};
 pub use event::{Event, Evidence};
+use powerball_controller::JointNumber;
 use powerball_logs::log::LiveSample;
 use powerball_logs::regression::RigidArm;
 use powerball_logs::signal::resample::median_step;
@@ -100,6 +101,13 @@ impl<'a> Watch<'a> {
     /// The stream ends.
     pub fn finish(&mut self) -> Vec<Event> {
         self.stream.as_mut().map(Stream::finish).unwrap_or_default()
+    }
+
+    /// The joints of which it is known what the model leaves where it holds: the others are not watched.
+    #[must_use]
+    pub fn watched(&self) -> Vec<JointNumber> {
+        let colours = self.stream.iter().flat_map(|stream| stream.colours.iter().enumerate());
+        colours.filter(|(_, colour)| colour.is_some()).map(|(j, _)| JointNumber::from_index(j)).collect()
     }
 
     /// Whether there were enough samples to begin.

@@ -192,7 +192,11 @@ impl<'a> Stream<'a> {
             }
             self.colours[j] = colour;
             if self.colours[j].is_none() {
-                self.notes.push(format!("joint {} is not watched: the model errs too much there", j + 1));
+                self.notes.push(format!(
+                    "joint {} is not watched: what the model leaves there wanders as slowly as the changes that are \
+                     looked for",
+                    j + 1
+                ));
             }
         }
         self.restart();
@@ -221,7 +225,8 @@ fn beginning(setting: Setting<'_>, known: Option<&Colour>, rate: f64) -> Vec<Str
             let blind = colour.joints.iter().enumerate().filter(|(_, joint)| joint.is_none());
             let blind: Vec<String> = blind.map(|(j, _)| (j + 1).to_string()).collect();
             let note = format!(
-                "joint {} is not watched: the logs of the model did not show how much it errs there, or it errs too much",
+                "joint {} is not watched: it moved too little in the logs of the model, or what the model leaves there wanders \
+                 as slowly as the changes that are looked for (its verdict says only how much that is)",
                 blind.join(", ")
             );
             (!blind.is_empty()).then_some(note).into_iter().collect()

@@ -1,6 +1,6 @@
 //! What was found, in words.
 
-use super::arm_file::{Better, Change, LONGEST_ARM};
+use super::arm_file::{Better, Change};
 use super::properties::{Common, Scale, Size, Unit};
 use super::result::{Answer, GravityIs, Kind, Side};
 use super::search::{Found, Step};
@@ -157,15 +157,9 @@ pub(super) fn of_arm_file(better: &Better) -> Answer {
 
 /// What is to be said of the arm file where no change of it fits better.
 fn arm_file(facts: &Facts<'_>) -> Answer {
-    let Facts { length, good, .. } = *facts;
-    if length > LONGEST_ARM {
-        return plain(
-            "arm file",
-            Some(false),
-            format!(
-                "The links of the arm file are {length:.0} m long together: give a and d in metres (mm look like this)."
-            ),
-        );
+    let Facts { doubts, good, .. } = *facts;
+    if !doubts.is_empty() {
+        return plain("arm file", Some(false), format!("In the arm file {}.", doubts.join("; ")));
     }
     if facts.coupled {
         let why = "Whether the arm file is this arm's is not asked where a transmission couples joints.";
@@ -185,7 +179,7 @@ fn arm_file(facts: &Facts<'_>) -> Answer {
     )
 }
 
-fn plain(question: &'static str, as_said: Option<bool>, sentence: String) -> Answer {
+pub(super) fn plain(question: &'static str, as_said: Option<bool>, sentence: String) -> Answer {
     Answer { question, as_said, as_it_is: Vec::new(), as_it_would_be: Vec::new(), sentence }
 }
 
@@ -202,8 +196,8 @@ pub(super) struct Facts<'a> {
     pub(super) delay_would_show: bool,
     /// Whether the fit is good enough to judge by.
     pub(super) good: bool,
-    /// The lengths of the links together, m.
-    pub(super) length: f64,
+    /// What in the arm file no arm is.
+    pub(super) doubts: &'a [String],
     /// Whether a transmission couples joints.
     pub(super) coupled: bool,
 }
@@ -302,13 +296,10 @@ fn size(facts: &Facts<'_>) -> Answer {
         (None, None) => "these logs show neither weight nor inertia".to_string(),
     };
     match (facts.unit, facts.scale) {
-        _ if facts.length > LONGEST_ARM => plain(
+        _ if !facts.doubts.is_empty() => plain(
             "torque unit",
             None,
-            format!(
-                "The unit of the torques is not told by an arm file whose links are {:.0} m long.",
-                facts.length
-            ),
+            "Which unit the torques have cannot be seen with such an arm file.".to_string(),
         ),
         (Unit::Milli, _) => plain(
             "torque unit",

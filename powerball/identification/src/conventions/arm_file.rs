@@ -30,8 +30,6 @@ const CLEAR: f64 = 0.8;
 const ALIKE: f64 = 1.1;
 /// Gravity nearer to the filed direction than this is a tilt of the base: its cosine.
 const TILT: f64 = 0.9;
-/// Links of no arm are so long together, m.
-pub(super) const LONGEST_ARM: f64 = 50.0;
 
 /// One thing that may be wrong with an arm file.
 #[derive(Clone, Debug)]

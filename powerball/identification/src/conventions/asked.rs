@@ -176,6 +176,7 @@ fn of_stretch(log: &Log, piece: Range<usize>, wanted: f64) -> Option<Log> {
         torque: log.torque.iter().map(|x| small(linear(t, &x[piece.clone()], start, step, count))).collect(),
         temperature: None,
         pieces: std::iter::once(0..samples).collect(),
+        doubts: log.doubts.clone(),
         clock: log.clock,
     })
 }

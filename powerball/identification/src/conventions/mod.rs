@@ -22,11 +22,11 @@ mod properties;
 mod result;
 mod search;
 
-use answers::{Facts, answers};
+use answers::{Facts, answers, plain};
 use asked::Asked;
 use powerball_controller::JointNumber;
-use powerball_logs::log::Log;
-use powerball_logs::regression::RigidArm;
+use powerball_logs::log::{Doubt, Log};
+use powerball_logs::regression::{RigidArm, inactive_joints};
 use properties::{Common, Size, Unit};
 pub use result::{Answer, Conventions, GravityIs, Kind, PerJoint, PositionColumns, Side, TorqueColumns};
 use search::{Found, gravity_is, search};
@@ -37,6 +37,24 @@ use search::{Found, gravity_is, search};
 /// Nothing is changed by it, and nothing fails: where the logs hold too little, that is told.
 #[must_use]
 pub fn conventions(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventions {
+    let mut result = asked_of_arm(body, logs, validate);
+    // What signals say against themselves needs no arm.
+    let mut doubts: Vec<&Doubt> = Vec::new();
+    for doubt in logs.iter().chain(validate).flat_map(|log| &log.doubts) {
+        if !doubts.contains(&doubt) {
+            doubts.push(doubt);
+        }
+    }
+    for doubt in doubts {
+        result.answers.insert(0, plain("signals", Some(false), doubt.sentence.clone()));
+        result.evidence = [doubt.sentence.as_str(), &result.evidence].join(" ");
+        let lines = doubt.map.iter().cloned().chain(result.suggested_map.take());
+        result.suggested_map = Some(lines.collect::<Vec<_>>().join("\n")).filter(|map| !map.is_empty());
+    }
+    result
+}
+
+fn asked_of_arm(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventions {
     let asked = Asked::new(body, logs, validate);
     let found = match search(&asked) {
         Ok(found) => found,
@@ -44,7 +62,10 @@ pub fn conventions(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventio
     };
     let all: Vec<&Log> = logs.iter().chain(validate).collect();
     let kind = properties::kind(&all);
-    let Some(better) = arm_file::better(&asked, &found) else { return result(&asked, &found, kind) };
+    // The pose of a joint that does not move is any angle of the arm file.
+    let moves = inactive_joints(body.arm(), logs).iter().all(Option::is_none);
+    let better = if moves { arm_file::better(&asked, &found) } else { None };
+    let Some(better) = better else { return result(&asked, &found, kind) };
     // What the columns are is asked of the arm that they fit.
     let answer = answers::of_arm_file(&better);
     let of_other = RigidArm::new(&better.change.arm).ok().and_then(|body| {
@@ -84,9 +105,9 @@ fn result(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventio
         (false, _) => gravity_is(asked, found),
     };
     let scale = size.scale(gravity);
-    let length = properties::reach(asked.body.arm());
+    let doubts = asked.body.filed().doubts();
     // Nothing is too light or too heavy for an arm of another size.
-    let unit = if length > arm_file::LONGEST_ARM { Unit::Unknown } else { properties::unit(found, scale) };
+    let unit = if doubts.is_empty() { properties::unit(found, scale) } else { Unit::Unknown };
     let share = properties::least_share(&found.rows, &read.torques, &found.judged, &found.energies);
     let share = share.filter(|_| good && sign != Common::Unknown);
     let facts = Facts {
@@ -101,7 +122,7 @@ fn result(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventio
         delay_would_show: good
             && properties::would_show(&found.rows, &read.torques, found.ridge, &found.judged),
         good,
-        length,
+        doubts: &doubts,
         coupled: asked.body.motors().is_some(),
     };
     let answers = answers(found, &facts);
@@ -111,7 +132,7 @@ fn result(asked: &Asked<'_>, found: &Found<'_>, kind: Option<Kind>) -> Conventio
         positions: position_columns(found, good),
         evidence: sentences.join(" "),
         suggested_map: result::suggested_map(read, sign, &unit),
-        arm_file: (length > arm_file::LONGEST_ARM).then(|| "a and d in metres".to_string()),
+        arm_file: (!doubts.is_empty()).then(|| doubts.join("; ")),
         left: search::shares(&found.judged),
         answers,
     }

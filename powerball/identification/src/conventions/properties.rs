@@ -68,7 +68,7 @@ impl Size {
     pub(super) fn of(found: &Found<'_>) -> Size {
         let (rows, arm) = (&found.rows, found.rows.data.body.arm());
         let fit = &found.judged.fits[0];
-        let reach = reach(arm);
+        let reach = arm.length();
         let g = rows.data.body.gravity().iter().map(|x| x * x).sum::<f64>().sqrt();
         let (_, largest) = weight(rows, &fit.theta);
         let over = |x: f64| (x.is_finite() && x > 0.0).then_some(x);
@@ -106,11 +106,6 @@ impl Size {
             _ => Scale::Plausible,
         }
     }
-}
-
-/// The lengths of the links together, m.
-pub(super) fn reach(arm: &Arm) -> f64 {
-    arm.joints.iter().map(|j| to_f64(&j.a).hypot(to_f64(&j.b)).hypot(to_f64(&j.d))).sum()
 }
 
 /// The largest share of its limit that a joint's torque reaches in all but one of a hundred rows.

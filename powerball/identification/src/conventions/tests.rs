@@ -210,7 +210,13 @@ fn lengths_in_millimetres_are_told() {
             joint.d = &joint.d * integer(1000);
         }
     });
-    assert_eq!(result.arm_file.as_deref(), Some("a and d in metres"), "{}", result.evidence);
+    assert!(result.arm_file.unwrap().contains("give a, b and d in metres"), "{}", result.evidence);
+}
+
+#[test]
+fn gravity_in_another_unit_is_told() {
+    let result = told_of_arm(|arm| arm.gravity = arm.gravity.each_ref().map(|g| g * integer(1000)));
+    assert!(result.arm_file.unwrap().contains("give it in m/s²"), "{}", result.evidence);
 }
 
 #[test]

@@ -3,12 +3,14 @@
 //! Logs are reduced in bands an octave apart ([`Bands`]). In the spectrum of a joint's torque the model's
 //! part sinks under what it leaves at some frequency; from there on rows show noise, or what no rigid arm
 //! does. Each log says by itself where that is, with a fit of its own; the powers are added over logs, so
-//! that summaries say it too. A joint whose model is below what it leaves in an octave is fitted, and judged,
-//! in the band below that octave. Rows of a joint are filtered by themselves, so the other joints keep
-//! theirs.
+//! that summaries say it too. A joint of whose torque much is left, and whose model is below what it leaves in an
+//! octave, is fitted, and judged, in the band below that octave: in a wider one it would be judged on the noise of
+//! positions that were differentiated twice, and whatever attenuates the model would help. Rows of a joint are
+//! filtered by themselves, so the other joints keep theirs. Identification and explanation take the same bands.
 
 use super::design::Design;
-use super::fit::{Fit, friction_columns};
+use super::estimates::stats_of;
+use super::fit::friction_columns;
 use super::reduced::{FrictionKind, Solution, solve_reduced};
 use powerball_logs::log::Log;
 use powerball_logs::regression::{Data, DataError, DataOptions, RigidArm};
@@ -30,20 +32,47 @@ pub fn solve_in_band(reduced: &Bands, law: FrictionKind) -> InBand {
     // A log that is too short for a band must not fall out of the fit.
     let whole = |narrower: &&Summary| narrower.logs.len() == reduced.widest().logs.len();
     let narrower = reduced.all()[1..].iter().take_while(whole).count();
-    let bands: Vec<usize> =
-        reduced.spectrum().iter().map(|octaves| quiet_octaves(&octaves[..narrower])).collect();
-    InBand { solution: solve_reduced(&reduced.of_joints(&bands), law), bands }
+    let widest = solve_reduced(reduced.widest(), law);
+    let left = stats_of(&widest, &widest.theta).relative;
+    let mut bands = joint_bands(&left, reduced.spectrum());
+    bands.iter_mut().for_each(|band| *band = (*band).min(narrower));
+    match bands.iter().all(|band| *band == 0) {
+        true => InBand { solution: widest, bands },
+        false => InBand { solution: solve_reduced(&reduced.of_joints(&bands), law), bands },
+    }
 }
 
-/// How many octaves below the widest band hold less of a model than of what it leaves.
-fn quiet_octaves(octaves: &[[f64; 2]]) -> usize {
-    octaves.iter().take_while(|[model, left]| model < left).count()
+/// A joint of whose torque a fit of the widest band leaves more than this share may have a narrower one.
+const MUCH: f64 = 0.1;
+
+/// Which of [`BANDS`] each joint has: `left` is the share of its torque that a fit of the widest leaves.
+fn joint_bands(left: &[f64], spectrum: &[Powers]) -> Vec<usize> {
+    // How many octaves below the widest band hold less of a model than of what it leaves.
+    let quiet = |octaves: &Powers| octaves.iter().take_while(|[model, left]| model < left).count();
+    left.iter().zip(spectrum).map(|(left, octaves)| if *left > MUCH { quiet(octaves) } else { 0 }).collect()
 }
 
-/// Which of [`BANDS`] a fit of the widest asks for, by joint.
+/// Which of [`BANDS`] each joint has where single samples are at hand: as [`solve_in_band`] has it. `left` is the share of
+/// each joint's torque that a fit of the widest band leaves.
 #[must_use]
-pub fn bands_of(data: &Data<'_>, fit: &Fit) -> Vec<usize> {
-    spectrum(data, &fit.shapes, &fit.theta).iter().map(|octaves| quiet_octaves(octaves)).collect()
+pub fn bands_of_logs(body: &RigidArm, logs: &[Log], options: &DataOptions, left: &[f64]) -> Vec<usize> {
+    if left.iter().all(|left| *left <= MUCH) {
+        return vec![0; left.len()];
+    }
+    let options = DataOptions { cutoff: BANDS[0], ..options.clone() };
+    let own = |log: &Log| {
+        let mut reduced = Summary::new(body, &options);
+        reduced.push(body, log, &options).ok()?;
+        let own = solve_reduced(&reduced, FrictionKind::Symmetric);
+        reduced.spectrum = spectrum_of(body, log, &options, &own);
+        Some(reduced)
+    };
+    let mut all = Summary::new(body, &options);
+    for own in logs.iter().filter_map(own) {
+        // All are of one arm.
+        let _ = all.merge(&own);
+    }
+    joint_bands(left, &all.spectrum)
 }
 
 /// Reduces one log in all bands, and takes the spectrum of its first part. Also gives what was left out of
@@ -60,12 +89,15 @@ pub fn reduce_in_bands(
     let notes = bands.push(body, log, options)?;
     let own = solve_reduced(bands.widest(), FrictionKind::Symmetric);
     let widest = DataOptions { cutoff: BANDS[0], ..options.clone() };
-    // Some minutes say where a spectrum sinks.
-    let first = parts(log).into_iter().find_map(|part| Data::new(body, &[part], &widest).ok());
-    if let Some(data) = first {
-        bands.set_spectrum(&spectrum(&data, &own.shapes, &own.theta));
-    }
+    bands.set_spectrum(&spectrum_of(body, log, &widest, &own));
     Ok((bands, notes))
+}
+
+/// The spectrum of a log of which `own` is the fit; `widest` are options with the widest band.
+fn spectrum_of(body: &RigidArm, log: &Log, widest: &DataOptions, own: &Solution) -> Vec<Powers> {
+    // Some minutes say where a spectrum sinks.
+    let first = parts(log).into_iter().find_map(|part| Data::new(body, &[part], widest).ok());
+    first.map_or_else(|| vec![Powers::default(); body.dof()], |data| spectrum(&data, &own.shapes, &own.theta))
 }
 
 /// By joint and octave between neighbouring bands: the power of the model's torque, and of what it leaves.

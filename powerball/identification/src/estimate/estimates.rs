@@ -110,6 +110,8 @@ pub struct ResidualStats {
     /// the JSON.
     #[serde(skip)]
     pub of_deviation: Vec<f64>,
+    /// The end of the band in which the errors are, Hz, by joint: they are those from 0 to there.
+    pub band: Vec<f64>,
     /// Samples in the band, of all joints' rows the most.
     pub samples: usize,
 }
@@ -146,6 +148,7 @@ impl ResidualStats {
             rms: sums.iter().map(|[left, _, rows]| ratio(*left, *rows)).collect(),
             relative: sums.iter().map(|[left, torque, _]| ratio(*left, *torque)).collect(),
             of_deviation,
+            band: parts[0].0.band.clone(),
             samples: sums.iter().map(|[_, _, rows]| *rows as usize).max().unwrap_or(0),
         })
     }
@@ -187,6 +190,7 @@ pub fn residual_stats(data: &Data<'_>, residual: &[Vec<f64>]) -> ResidualStats {
         rms: errors,
         relative,
         of_deviation,
+        band: data.joints.iter().map(|joint| joint.band.cutoff).collect(),
         samples: data.joints.iter().map(|j| j.len()).max().unwrap_or(0),
     }
 }
@@ -250,6 +254,7 @@ pub fn stats_of(solution: &Solution, theta: &[f64]) -> ResidualStats {
             .map(|(left, torque, _)| if *torque > 0.0 { (left / torque).sqrt() } else { 0.0 })
             .collect(),
         of_deviation: Vec::new(),
+        band: solution.bands.clone(),
         samples: joints.iter().map(|(_, _, rows)| *rows as usize).max().unwrap_or(0),
     }
 }

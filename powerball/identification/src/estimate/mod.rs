@@ -16,7 +16,7 @@ mod stream;
 mod uncertainty;
 mod variable_projection;
 
-pub use band::{InBand, bands_of, reduce_in_bands, solve_in_band};
+pub use band::{InBand, bands_of_logs, reduce_in_bands, solve_in_band};
 pub use bounded::bounded;
 pub use consistent::{Consistent, ConsistentFit, ConsistentReport, TorqueMetric, consistent_fit, nearest};
 pub use design::{Added, Design, Folds, Gram, runs};

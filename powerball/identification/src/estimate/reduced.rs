@@ -31,6 +31,8 @@ pub struct Solution {
     pub weights: Vec<f64>,
     /// The columns whose coefficients are free, tangents among them.
     pub free: Vec<bool>,
+    /// The end of each joint's band, Hz.
+    pub bands: Vec<f64>,
     /// The rows of each joint and octave at these shapes.
     pub(super) parts: Vec<Vec<Part>>,
     /// Of what the logs were.
@@ -90,6 +92,7 @@ impl Solution {
             theta: self.theta.clone(),
             weights: self.weights.clone(),
             free: self.free.clone(),
+            bands: summary.joint_bands.clone(),
             parts: parts_at(&Reduced::new(summary, law), &self.shapes),
         })
     }
@@ -114,6 +117,7 @@ pub fn solve_reduced(summary: &Summary, law: FrictionKind) -> Solution {
         theta: done.theta,
         weights: done.weights,
         free: done.free,
+        bands: summary.joint_bands.clone(),
     }
 }
 

@@ -265,6 +265,7 @@ pub fn solve_instrumental(
         shapes: start.shapes.clone(),
         theta,
         weights: start.weights.clone(),
+        bands: start.bands.clone(),
         free: (0..layout.size()).map(|c| place[c].is_some()).collect(),
         parts: levels.into_iter().map(|j| j.into_iter().map(|l| l.part).collect()).collect(),
     };

@@ -7,13 +7,14 @@ use super::IdentifyOptions;
 use super::fit::{Along, Fitted, fit};
 use super::gather::{Gathered, Mounted};
 use super::result::{Identified, IdentifyError};
-use crate::conventions::conventions;
+use crate::conventions::{Conventions, conventions};
 use crate::estimate::{BaseModel, FrictionKind, ResidualStats, estimates, residual_stats, stats_of};
 use crate::mounting::Mounting;
+use crate::usable::Findings;
 use powerball_controller::JointNumber;
 use powerball_logs::Progress;
 use powerball_logs::log::Log;
-use powerball_logs::regression::{Data, DataOptions, RigidArm};
+use powerball_logs::regression::{Data, DataOptions, FEWEST_ROWS, RigidArm};
 use powerball_logs::summary::BANDS;
 use serde::Serialize;
 
@@ -47,7 +48,7 @@ fn of_mounting(
         let (all, rows) = judged.get_or_insert_with(|| (own.clone(), vec![0; body.dof()]));
         for j in members {
             (all.rms[j], all.relative[j]) = (own.rms[j], own.relative[j]);
-            all.of_deviation[j] = own.of_deviation[j];
+            (all.of_deviation[j], all.band[j]) = (own.of_deviation[j], own.band[j]);
             rows[j] = data.joints[j].len();
         }
     }
@@ -211,6 +212,26 @@ fn judged(
     let bands: Vec<f64> = fitted.bands.iter().map(|band| BANDS[*band]).collect();
     let held_out = validate(gathered, &model, &bands, options)?;
     Ok(held_out.unwrap_or_else(|| stats_of(solution, &solution.theta)))
+}
+
+/// Why an identification should not be used.
+pub(super) fn unusable(
+    gathered: &Gathered,
+    columns: Option<&Conventions>,
+    identified: &Identified,
+) -> Vec<String> {
+    let judged = identified.validate.as_ref().unwrap_or(&identified.fit);
+    let joints = &gathered.bands().widest().joints;
+    let rests = |j: &usize| (joints[*j].rows() as usize) < FEWEST_ROWS;
+    let values = identified.parameters.iter().map(|p| p.value).chain(judged.rms.iter().copied());
+    let findings = Findings {
+        columns,
+        resting: (0..joints.len()).filter(rests).map(JointNumber::from_index).collect(),
+        useless: judged.useless_joints(),
+        not_finite: values.into_iter().any(|x| !x.is_finite()),
+        indefinite: identified.indefinite,
+    };
+    findings.reasons()
 }
 
 // Logs prepared in the band of each joint.

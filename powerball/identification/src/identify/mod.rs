@@ -74,7 +74,8 @@ pub fn identify<'a, S: Into<Source<'a>>>(
     let mountings = judge::fits(&gathered, &fitted, options, &mut warnings)?;
     let identified = conclude(&gathered, &fitted, mountings, options, warnings)?;
     let advice = judge::advice(&gathered, &identified, options)?;
-    Ok(Identified { conventions, transmission, advice, ..identified })
+    let unusable = judge::unusable(&gathered, conventions.as_ref(), &identified);
+    Ok(Identified { conventions, transmission, advice, unusable, ..identified })
 }
 
 /// The sufficient statistics of the logs to fit, and the logs to judge by; without what is known already.
@@ -149,7 +150,8 @@ fn conclude(
     let along = judge::along(gathered, &model, &joint_bands, options)?;
     warnings.extend(result::undetermined(&found.parameters));
     let values: Vec<f64> = found.parameters.iter().map(|p| p.value).collect();
-    let reasons = body.impossible(&values)?;
+    let possibility = body.possibility(&values)?;
+    let reasons = &possibility.reasons;
     warnings.extend(reasons.iter().map(|r| format!("no real arm can have these values: {r}")));
     options.progress.say("looking for the nearest real arm");
     Ok(Identified {
@@ -157,6 +159,8 @@ fn conclude(
         conventions: None,
         transmission: None,
         advice: None,
+        unusable: Vec::new(),
+        indefinite: possibility.indefinite,
         set: SetKind::Minimal.to_string(),
         parameters: found.parameters,
         friction: found.friction,

@@ -18,6 +18,8 @@ use serde::Serialize;
 /// A model with its errors; as JSON it is `identified.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Identified {
+    /// Why this result should not be used; empty where it can be.
+    pub unusable: Vec<String>,
     /// The arm's name.
     pub arm: String,
     /// What the columns of the logs are; `None` where only summaries were given, which hold no samples.
@@ -37,6 +39,9 @@ pub struct Identified {
     pub validate: Option<ResidualStats>,
     /// Whether a real arm can have these values.
     pub physically_consistent: bool,
+    /// The share of poses at which the mass matrix of these values is not positive definite; not part of the JSON.
+    #[serde(skip)]
+    pub indefinite: f64,
     /// The nearest values that a real arm can have, with what that costs.
     pub consistent: ConsistentReport,
     /// How the base stood for the fitted logs, where it was not as the arm file says or not always the same.

@@ -1,7 +1,7 @@
 //! What can be wrong with numbers that are there: time, wraps, units, dead and saturated signals.
 
 use super::read::{Effort, Raw};
-use super::{Finding, Log, LogError, Motors, Severity, Warnings, signal_checks};
+use super::{Doubt, Finding, Log, LogError, Motors, Severity, Warnings, outliers, signal_checks};
 use crate::signal::resample::median_step;
 use dyngen::Arm;
 use dyngen::arm::JointKind;
@@ -28,10 +28,12 @@ pub(super) fn into_log(
     arm: &Arm,
     findings: &mut Vec<Finding>,
 ) -> Result<Log, LogError> {
+    let restarts = join_restarts(&mut raw, file, findings);
     drop_stale(&mut raw, file, findings)?;
     let step = sound_step(&raw, file, findings)?;
-    check_signals(&mut raw, effort, step, file, arm, findings)?;
-    let pieces = pieces(&raw, step, file, arm, findings);
+    outliers::leave_out(&mut raw, effort, (arm, file), findings);
+    let doubts = check_signals(&mut raw, effort, step, file, arm, findings)?;
+    let pieces = pieces(&raw, step, &restarts, (arm, file), findings);
     let torque = match effort {
         Effort::Torque => raw.effort,
         Effort::Current(constants) => {
@@ -48,12 +50,45 @@ pub(super) fn into_log(
         temperature,
         motor: raw.motor,
         pieces,
+        doubts,
         clock: 0.0,
     })
 }
 
 fn finding(file: &str, line: Option<usize>, quantity: impl Into<String>, message: String) -> Finding {
     Finding { file: file.to_string(), line, quantity: quantity.into(), message }
+}
+
+/// So many samples after a clock's restart rise, and lie before it.
+const AFTER_RESTART: usize = 5;
+/// Between the parts of a log whose clock restarts there is a gap of so many seconds.
+const RESTART: f64 = 1.0;
+
+/// Lets time run on where a clock restarts: what follows is a piece of its own, as after a gap. Gives the times of these
+/// pieces' first samples.
+fn join_restarts(raw: &mut Raw, file: &str, findings: &mut Vec<Finding>) -> Vec<f64> {
+    let (mut restarts, mut first, mut added) = (Vec::new(), None, 0.0);
+    let mut before = f64::NEG_INFINITY;
+    for k in 0..raw.t.len() {
+        let after = &raw.t[k..(k + AFTER_RESTART).min(raw.t.len())];
+        let rises = after.len() == AFTER_RESTART && after.windows(2).all(|w| w[0] < w[1]);
+        if rises && after.iter().all(|t| t + added < before - GAP) {
+            first.get_or_insert((raw.line[k], before, raw.t[k]));
+            restarts.push(before + RESTART);
+            added = before + RESTART - raw.t[k];
+        }
+        raw.t[k] += added;
+        before = before.max(raw.t[k]);
+    }
+    let Some((line, before, t)) = first else { return restarts };
+    let times = if restarts.len() == 1 { "once".to_string() } else { format!("{} times", restarts.len()) };
+    let message = format!(
+        "the clock restarts {times} (first here: {t} s after {before} s): the log is used as {} pieces, and the times \
+         of each go on after those of the one before",
+        restarts.len() + 1
+    );
+    findings.push(finding(file, Some(line), "t", message));
+    restarts
 }
 
 /// Leaves out samples whose time stands still or runs back.
@@ -72,7 +107,7 @@ fn drop_stale(raw: &mut Raw, file: &str, findings: &mut Vec<Finding>) -> Result<
     let Some((line, t, latest)) = first_stale else { return Ok(()) };
     let found = format!("{stale} of {} time stamps do not rise (first: {t} after {latest})", raw.t.len());
     if stale as f64 > MOST_STALE * raw.t.len() as f64 {
-        let message = format!("{found}: split the file where its clock restarts");
+        let message = format!("{found}: give the times at which samples were taken");
         return Err(LogError(vec![finding(file, Some(line), "t", message)]));
     }
     findings.push(finding(file, Some(line), "t", format!("{found}; those samples were left out")));
@@ -88,9 +123,13 @@ fn sound_step(raw: &Raw, file: &str, findings: &mut Vec<Finding>) -> Result<f64,
     }
     let step = median_step(&raw.t).unwrap_or(1.0);
     if step >= 0.5 {
+        let unit = match step {
+            step if step < 500.0 => "ms",
+            step if step < 5e5 => "us",
+            _ => "ns",
+        };
         let message = format!(
-            "the median step is {step} s: t must be in seconds (milliseconds or microseconds look like this: --map \
-             't.unit = \"ms\"' or 'us')"
+            "the median step is {step} s: t must be in seconds (this looks like {unit}: --map 't.unit = \"{unit}\"')"
         );
         return Err(LogError(vec![finding(file, Some(raw.line[1]), "t", message)]));
     }
@@ -114,7 +153,7 @@ fn check_signals(
     file: &str,
     arm: &Arm,
     findings: &mut Vec<Finding>,
-) -> Result<(), LogError> {
+) -> Result<Vec<Doubt>, LogError> {
     let mut errors = Vec::new();
     for j in 0..arm.dof() {
         unwrap(&mut raw.q[j], &raw.line, &raw.t, j, arm, file, findings);
@@ -127,23 +166,28 @@ fn check_signals(
         signal_checks::steps(effort, &format!("{name}{}", j + 1), false, &mut warnings);
         signal_checks::steps(q, &format!("q{}", j + 1), true, &mut warnings);
     }
-    signal_checks::velocities(raw, step, &mut warnings);
+    let doubts = signal_checks::velocities(raw, step, &mut warnings);
     signal_checks::torque_signs(raw, step, name, &mut warnings);
     rate(&raw.t, &mut warnings);
-    if errors.is_empty() { Ok(()) } else { Err(LogError(errors)) }
+    if errors.is_empty() { Ok(doubts) } else { Err(LogError(errors)) }
 }
 
 /// The pieces of a log between gaps of time and jumps of position. Of many splits the first ones are shown.
-fn pieces(raw: &Raw, step: f64, file: &str, arm: &Arm, findings: &mut Vec<Finding>) -> Vec<Range<usize>> {
+fn pieces(
+    raw: &Raw,
+    step: f64,
+    restarts: &[f64],
+    (arm, file): (&Arm, &str),
+    findings: &mut Vec<Finding>,
+) -> Vec<Range<usize>> {
     let (mut pieces, mut start) = (Vec::new(), 0);
     let mut splits = Vec::new();
     for k in 1..raw.t.len() {
         let gap = raw.t[k] - raw.t[k - 1];
-        let jump = (0..arm.dof()).find(|&j| {
-            let limit = 5.0 * arm.joints[j].velocity.unwrap_or(10.0);
-            (raw.q[j][k] - raw.q[j][k - 1]).abs() > (limit * gap).max(0.02)
-        });
-        if gap > GAP.max(GAP_STEPS * step) {
+        let jump = (0..arm.dof()).find(|&j| (raw.q[j][k] - raw.q[j][k - 1]).abs() > farthest(arm, j, gap));
+        if restarts.iter().any(|t| raw.t[k - 1] < *t && *t <= raw.t[k]) {
+            // That has been said.
+        } else if gap > GAP.max(GAP_STEPS * step) {
             let message =
                 format!("at {:.3} s: a gap of {gap:.3} s: the log is used as two pieces", raw.t[k - 1]);
             splits.push(finding(file, Some(raw.line[k]), "t", message));
@@ -170,6 +214,11 @@ fn pieces(raw: &Raw, step: f64, file: &str, arm: &Arm, findings: &mut Vec<Findin
     }
     findings.extend(splits);
     pieces
+}
+
+/// How far a joint can move in some time, rad or m: five times its speed limit, and always a few steps of an encoder.
+pub(super) fn farthest(arm: &Arm, j: usize, seconds: f64) -> f64 {
+    (5.0 * arm.joints[j].velocity.unwrap_or(10.0) * seconds).max(0.02)
 }
 
 /// The joints' torques of those that the motors' currents make: where a transmission couples joints a motor's

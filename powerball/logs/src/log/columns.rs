@@ -1,5 +1,6 @@
 //! A log's quantities found by the names of its columns.
 
+use super::headers::{self, Headers};
 use super::map::{ByJoint, ColumnMap};
 use super::read::{Effort, Raw};
 use super::{Finding, LogError};
@@ -211,6 +212,11 @@ impl Columns {
             quantity: quantity.to_string(),
             message,
         };
+        let headers = if asked.header.is_some() { headers::of(names, asked) } else { Headers::Plain };
+        if let Headers::Clear(map, text) = &headers {
+            findings.push(finding("columns", format!("read as {text}")));
+            return Columns::find(names, Asked { map, ..asked }, findings);
+        }
         let mut errors = misfits(asked).into_iter().map(|(key, m)| finding(&key, m)).collect::<Vec<_>>();
         let mut seen: HashMap<&str, usize> = HashMap::new();
         for (index, name) in names.iter().enumerate() {
@@ -226,11 +232,7 @@ impl Columns {
         }
         let q = group(names, "q", asked);
         if let Some(more) = one_too_many(names, asked) {
-            let message = format!(
-                "the header has {more}, the arm has {n} joints: another arm's log; where it holds more than this arm, say \
-                 which columns are its: --map 'q.column = [\"q1\", …]'"
-            );
-            errors.push(finding(&more, message));
+            errors.push(finding(&more, one_too_many_message(&more, n)));
         }
         match &q {
             Ok(q) if asked.map.q.unit.is_none() && q.at.iter().any(|k| by_lerobot(&names[*k])) => {
@@ -263,6 +265,12 @@ impl Columns {
                     ),
                 ));
             }
+        }
+        if let (Headers::Unclear(text), false) = (headers, errors.is_empty()) {
+            errors.push(finding(
+                "columns",
+                format!("by their names they may be {text}: take of these what is right"),
+            ));
         }
         let (Some(t), Ok(q), Some(torque), []) = (t, q, torque, errors.as_slice()) else {
             return Err(LogError(errors));
@@ -353,14 +361,34 @@ impl Columns {
     }
 }
 
-/// The position column of a joint after the arm's last one, where columns are numbered and no map says which are meant.
+fn one_too_many_message(more: &str, n: usize) -> String {
+    let Some(stem) = more.strip_suffix('0') else {
+        return format!(
+            "the header has {more}, the arm has {n} joints: another arm's log; where it holds more than this arm, say \
+             which columns are its: --map 'q.column = [\"q1\", …]'"
+        );
+    };
+    let first: Vec<String> = (0..n).map(|j| format!("\"{stem}{j}\"")).collect();
+    format!(
+        "the header has {stem}0 to {stem}{n}, which are {} columns, the arm has {n} joints: another arm's log, or say which \
+         columns are its: --map 'q.column = [{}]' where joints count from 0, --map 'q.column = \"{stem}\"' where they \
+         count from 1 (and tau.column, dq.column likewise)",
+        n + 1,
+        first.join(", ")
+    )
+}
+
+/// The position column beside those of the arm's joints, where columns are numbered and no map says which are meant: of a
+/// joint after the last one, or of a joint 0.
 fn one_too_many(names: &[String], asked: Asked<'_>) -> Option<String> {
     let is_said = asked.map.q.column.is_some() || !asked.map.joints.is_empty();
     let next = |stem: &str| format!("{stem}{}", asked.arm.dof() + 1);
     let last = |stem: &str| format!("{stem}{}", asked.arm.dof());
     let has = |name: &String| names.contains(name);
     let numbered = stems("q").into_iter().find(|stem| has(&last(stem)) && has(&next(stem)));
-    numbered.filter(|_| !is_said).map(next)
+    let zero = |stem: &&str| has(&format!("{stem}0")) && has(&format!("{stem}1")) && has(&last(stem));
+    let from_zero = || stems("q").into_iter().find(zero).map(|stem| format!("{stem}0"));
+    numbered.map(next).or_else(from_zero).filter(|_| !is_said)
 }
 
 fn time(names: &[String], asked: Asked<'_>) -> Option<Group> {

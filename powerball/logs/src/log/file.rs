@@ -225,6 +225,7 @@ impl Log {
             temperature: self.temperature.as_ref().map(|x| cut(x, range)),
             motor: self.motor.as_ref().map(|x| cut(x, range)),
             pieces: std::iter::once(0..range.len()).collect(),
+            doubts: self.doubts.clone(),
             clock: self.clock,
         };
         self.pieces.iter().map(piece).collect()

@@ -20,12 +20,35 @@ pub struct LiveSample {
     pub torque: Vec<f64>,
 }
 
+/// What a row is.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Taken {
+    /// A sample; where the clock `restarted` its time goes on from the last one's.
+    Sample {
+        /// It.
+        sample: LiveSample,
+        /// Whether time fell back before it.
+        restarted: bool,
+    },
+    /// Its time does not rise.
+    Stale,
+    /// A needed column has no finite number.
+    Nothing,
+}
+
+/// Time that falls back by more than this is a clock that restarts, s.
+const RESTARTS: f64 = 0.5;
+/// Between the last sample before and the first one after a restart so much time is taken to have passed, s.
+const BETWEEN: f64 = 1.0;
+
 /// How the rows of a stream become samples.
 pub struct LiveRows {
     columns: Columns,
     motors: Option<Motors>,
     turns: Vec<bool>,
     last: Option<LiveSample>,
+    /// Added to times since the clock restarted, s.
+    added: f64,
 }
 
 impl LiveRows {
@@ -41,18 +64,24 @@ impl LiveRows {
             motors: Motors::of(arm),
             turns: arm.joints.iter().map(|joint| joint.kind == JointKind::Revolute).collect(),
             last: None,
+            added: 0.0,
         })
     }
 
-    /// The sample of a row; `None` where a needed column has no finite number, or time does not rise.
-    pub fn sample(&mut self, number: impl Fn(usize) -> Option<f64>) -> Option<LiveSample> {
+    /// The sample of a row.
+    pub fn sample(&mut self, number: impl Fn(usize) -> Option<f64>) -> Taken {
         let finite = |k: usize| number(k).filter(|v: &f64| v.is_finite());
-        let values = self.columns.sample(&finite)?;
+        let Some(values) = self.columns.sample(&finite) else { return Taken::Nothing };
         let n = self.turns.len();
-        let (t, mut q) = (*values.first()?, values.get(1..=n)?.to_vec());
-        let mut torque = values.get(n + 1..=2 * n)?.to_vec();
-        if self.last.as_ref().is_some_and(|last| t <= last.t) {
-            return None;
+        let [t, q, torque] = [&values[..1], &values[1..=n], &values[n + 1..=2 * n]];
+        let (mut t, mut q, mut torque) = (t[0] + self.added, q.to_vec(), torque.to_vec());
+        let mut restarted = false;
+        if let Some(last) = self.last.as_ref().filter(|last| t <= last.t) {
+            if last.t - t < RESTARTS {
+                return Taken::Stale;
+            }
+            self.added += last.t + BETWEEN - t;
+            (t, restarted) = (last.t + BETWEEN, true);
         }
         if let Effort::Current(constants) = &self.columns.effort {
             torque.iter_mut().zip(constants).for_each(|(x, c)| *x *= c);
@@ -71,7 +100,7 @@ impl LiveRows {
         }
         let sample = LiveSample { t, q, torque };
         self.last = Some(sample.clone());
-        Some(sample)
+        Taken::Sample { sample, restarted }
     }
 }
 

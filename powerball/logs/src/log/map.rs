@@ -193,6 +193,18 @@ impl ColumnMap {
         self.quantities().into_iter().find(|(own, _)| *own == key).map_or(&self.t, |(_, mapped)| mapped)
     }
 
+    pub(super) fn of_mut(&mut self, key: &str) -> &mut Mapped {
+        match key {
+            "q" => &mut self.q,
+            "dq" => &mut self.dq,
+            "tau" => &mut self.tau,
+            "i" => &mut self.i,
+            "temp" => &mut self.temp,
+            "motor" => &mut self.motor,
+            _ => &mut self.t,
+        }
+    }
+
     /// The same for columns that already have their plain names: units and signs alone.
     pub(super) fn without_columns(&self) -> ColumnMap {
         let mut map = self.clone();
@@ -358,6 +370,7 @@ mod shift_tests {
             temperature: None,
             motor: None,
             pieces: vec![0..400, 400..1000],
+            doubts: Vec::new(),
             clock: 0.0,
             t: t.clone(),
         };

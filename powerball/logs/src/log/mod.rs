@@ -8,10 +8,12 @@ mod arrays;
 mod check;
 mod columns;
 mod file;
+mod headers;
 mod inspect;
 mod live;
 mod map;
 mod motors;
+mod outliers;
 mod read;
 mod signal_checks;
 mod topics;
@@ -20,7 +22,7 @@ pub use crate::tables::{Finding, LogError};
 pub use arrays::{Arrays, Sample};
 pub use file::LogFile;
 pub use inspect::{Aligned, Inspected, InspectedColumn, InspectedTable, TakenAs, inspect};
-pub use live::{LiveRows, LiveSample};
+pub use live::{LiveRows, LiveSample, Taken};
 pub use map::{ByJoint, Clock, ColumnMap, Mapped, common_clock};
 pub use motors::{Motors, logs_of_motors, notes_of};
 pub use read::{read_log, read_log_as, read_logs, read_logs_as};
@@ -45,8 +47,19 @@ pub struct Log {
     pub motor: Option<Vec<Vec<f64>>>,
     /// Index ranges without a gap.
     pub pieces: Vec<std::ops::Range<usize>>,
+    /// What in its signals makes every result useless as it stands.
+    pub doubts: Vec<Doubt>,
     /// Seconds to add to `t` for a clock that runs through all logs (see [`common_clock`]).
     pub clock: f64,
+}
+
+/// Why results of a log should not be used.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Doubt {
+    /// The reason, a sentence.
+    pub sentence: String,
+    /// The line of a column map that sets it right, where one does.
+    pub map: Option<String>,
 }
 
 impl Log {
@@ -78,6 +91,7 @@ impl Log {
             temperature: self.temperature.as_ref().map(cut),
             motor: self.motor.as_ref().map(cut),
             pieces: self.pieces.iter().filter_map(clip).collect(),
+            doubts: self.doubts.clone(),
             clock: self.clock,
         }
     }

@@ -1,8 +1,8 @@
 //! What one log's signals say against themselves, before an arm is asked: logged velocities against positions, levels,
 //! and the signs of torques. What an arm says against the columns is asked by `identification::conventions`.
 
-use super::Finding;
 use super::read::Raw;
+use super::{Doubt, Finding};
 
 // Logged velocities against logged positions: units, signs, columns that were exchanged, and clocks that disagree.
 //
@@ -18,8 +18,19 @@ const STILL: f64 = 0.02;
 /// Columns belong together from this correlation on, and not below the other.
 const SAME: f64 = 0.995;
 const OTHER: f64 = 0.9;
-/// Clocks that differ by more than this share are told.
+/// Clocks that differ by more than this share are named.
 const CLOCKS: f64 = 5e-3;
+/// With a time base that is off by more than this share no inertia and no friction is right.
+const WRONG_TIME: f64 = 0.1;
+/// Units of a velocity in rad/s, by their names in a column map.
+const UNITS: [(&str, f64); 4] = [
+    ("deg/s", 1.0 / 57.29578),
+    ("turn/s", std::f64::consts::TAU),
+    ("rpm", std::f64::consts::TAU / 60.0),
+    ("mrad/s", 1e-3),
+];
+/// A ratio is that of a unit where it differs from it by no more than this share.
+const LIKE_UNIT: f64 = 0.03;
 
 /// How far joint `j` moved in each stretch, and the integral of `dq`'s column `k`.
 struct Stretches {
@@ -27,13 +38,16 @@ struct Stretches {
     integral: Vec<Vec<f64>>,
 }
 
-/// Looks at the velocities of a log.
-pub(super) fn velocities(raw: &Raw, step: f64, warnings: &mut Warnings<'_>) {
+/// Looks at the velocities of a log; gives what makes the log useless as it stands.
+pub(super) fn velocities(raw: &Raw, step: f64, warnings: &mut Warnings<'_>) -> Vec<Doubt> {
     let n = raw.q.len();
     if raw.dq.iter().any(|dq| dq.len() != raw.t.len()) {
-        return;
+        return Vec::new();
     }
     let joints: Vec<Stretches> = (0..n).map(|j| stretches(raw, step, j)).collect();
+    if let Some(doubt) = wrong_time(&joints) {
+        return vec![doubt];
+    }
     let mut ratios = Vec::new();
     for (j, joint) in joints.iter().enumerate() {
         let largest = joint.moved.iter().fold(0.0f64, |m, x| m.max(x.abs()));
@@ -67,8 +81,10 @@ pub(super) fn velocities(raw: &Raw, step: f64, warnings: &mut Warnings<'_>) {
             );
         } else if !(0.67..1.5).contains(&ratio) {
             // The ratio is q's slope over dq.
-            let (hint, severity) = if (ratio * 57.2958 - 1.0).abs() < 0.25 {
-                ("dq looks like degrees a second (--map 'dq.unit = \"deg/s\"')", Severity::Warning)
+            let of_dq = UNITS.iter().find(|(_, unit)| (ratio / unit - 1.0).abs() < LIKE_UNIT);
+            let unit = of_dq.map(|(unit, _)| format!("dq looks like {unit} (--map 'dq.unit = \"{unit}\"')"));
+            let (hint, severity) = if let Some(hint) = &unit {
+                (hint.as_str(), Severity::Warning)
             } else if (ratio / 57.2958 - 1.0).abs() < 0.25 {
                 ("q looks like degrees (--map 'q.unit = \"deg\"')", Severity::Unusable)
             } else if ratio < 0.0 {
@@ -87,6 +103,39 @@ pub(super) fn velocities(raw: &Raw, step: f64, warnings: &mut Warnings<'_>) {
         }
     }
     clocks(raw, &joints, &ratios, warnings);
+    Vec::new()
+}
+
+/// Whether all joints' velocities differ from the slopes of their positions by one factor that is none of a unit.
+fn wrong_time(joints: &[Stretches]) -> Option<Doubt> {
+    let moves = |joint: &Stretches| joint.moved.iter().any(|x| x.abs() >= STILL);
+    let found = joints.iter().enumerate().filter(|(_, joint)| moves(joint));
+    let mut ratios: Vec<f64> = found
+        .map(|(j, joint)| slope(&joint.moved, &joint.integral[j]))
+        .map(|(ratio, like)| if like > SAME { ratio } else { f64::NAN })
+        .collect();
+    ratios.sort_by(f64::total_cmp);
+    let (least, most) = (*ratios.first()?, *ratios.last()?);
+    // One joint alone may have a unit of its own.
+    let common = ratios[ratios.len() / 2];
+    let alike = ratios.len() >= 2 && most - least < 0.02 * common;
+    let of_unit = UNITS
+        .iter()
+        .any(|(_, unit)| [common / unit, common * unit].iter().any(|ratio| (ratio - 1.0).abs() < LIKE_UNIT));
+    if !alike || of_unit || (common - 1.0).abs() < WRONG_TIME {
+        return None;
+    }
+    // More digits are not known, and all logs are to say the same.
+    let factor: f64 = format!("{common:.2e}").parse().unwrap_or(common);
+    let pace = if common > 1.0 { factor } else { 1.0 / factor };
+    let map = format!("t.scale = {factor}");
+    let sentence = format!(
+        "Time runs {pace:.2} times too {}: on all joints that move dq is {:.2} times the slope of q (--map '{map}'; where t is \
+         right dq has another unit, and 'dq.scale = {factor}' says so).",
+        if common > 1.0 { "fast" } else { "slowly" },
+        1.0 / factor,
+    );
+    Some(Doubt { sentence, map: Some(map) })
 }
 
 /// Drives integrate their velocities on their own clocks: where all joints disagree with `t` alike, it is `t`

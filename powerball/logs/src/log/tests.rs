@@ -151,7 +151,7 @@ fn what_cannot_be_used_is_refused_with_its_reason() {
     let plain = |header: &str| text(header, |_, f| Some(f.join(",")));
     let cases = [
         (plain("t,q1,q3,tau1,tau2"), "missing: q2"),
-        (plain("time,q1,q2,tau1,tau2"), "no column t"),
+        (plain("seconds_at,q1,q2,tau1,tau2"), "no column t"),
         (plain("t,q1,q2,i1,i2"), "torque_constant (N·m/A at the joint) for joint 2"),
         (plain("t,q1,q2,tau1,tau1"), "twice"),
         (
@@ -159,7 +159,7 @@ fn what_cannot_be_used_is_refused_with_its_reason() {
                 f[0] = format!("{}", 10 * k);
                 Some(f.join(","))
             }),
-            "milliseconds",
+            "this looks like ms",
         ),
         (
             text(HEADER, |k, mut f| {
@@ -186,12 +186,10 @@ fn what_cannot_be_used_is_refused_with_its_reason() {
         ),
         (
             text(HEADER, |k, mut f| {
-                if k > 100 {
-                    f[0] = format!("{}", 0.01 * (k - 101) as f64)
-                }
+                f[0] = format!("{}", -0.01 * k as f64);
                 Some(f.join(","))
             }),
-            "clock restarts",
+            "do not rise",
         ),
         (HEADER.to_string(), "too few"),
         (String::new(), "x.csv: file: is empty"),
@@ -276,7 +274,7 @@ fn each_doubt_finds_its_fault_and_no_other() {
             &["dq1: is not the slope of q1, but dq2 is", "dq2: is not the slope of q2"],
         ),
         (&swings(|_, r| r[3] = -r[3]), &["dq1: is -1.000 times the slope of q1: their signs differ"]),
-        (&swings(|_, r| r[4] *= 57.2958), &["dq2: is 57.2", "degrees a second"]),
+        (&swings(|_, r| r[4] *= 57.2958), &["dq2: is 57.2", "deg/s"]),
         (&swings(|k, r| r[4] = (0.001 * (k * k) as f64).sin()), &["dq2: does not follow q2"]),
         (&swings(|_, r| r[0] *= 1.02), &["t: passes 2.0 % too fast for the joints' velocities"]),
         (
@@ -358,6 +356,7 @@ fn a_clock_that_runs_on_is_common_and_others_follow_each_other() {
         temperature: None,
         motor: None,
         pieces: vec![],
+        doubts: Vec::new(),
         clock: 0.0,
     };
     let mut running = [log(10.0, 20.0), log(40.0, 50.0), log(20.5, 30.0)];
@@ -514,4 +513,113 @@ fn arrays_that_are_no_log_name_quantity_and_sample() {
     assert!(of(&degrees, &torque).contains("angles must be in radians"), "{}", of(&degrees, &torque));
     let holes = vec![torque[0].iter().map(|_| f64::NAN).collect(), torque[1].clone()];
     assert!(of(&q, &holes).starts_with("run:1: tau1: 200 of 200 samples"), "{}", of(&q, &holes));
+}
+
+/// The columns of a sound log under other names, in their order.
+fn named(header: &str) -> (Result<Log, LogError>, Vec<Finding>) {
+    read(&text(header, |_, f| Some(f.join(","))))
+}
+
+#[test]
+fn columns_of_other_names_are_read_where_each_quantity_has_one() {
+    let (plain, _) = named(HEADER);
+    for (header, map) in [
+        ("t,q0,q1,tau0,tau1", "q.column = [\"q0\", \"q1\"]"),
+        ("time,joint_1_pos,joint_2_pos,joint_1_effort,joint_2_effort", "t.column = \"time\""),
+        ("timestamp,actualPosition[0],actualPosition[1],motorTorque[0],motorTorque[1]", "motorTorque[1]"),
+        ("t,q1,q2,torque_1,torque_2", "tau.column = [\"torque_1\", \"torque_2\"]"),
+    ] {
+        let (log, findings) = named(header);
+        let (log, plain) = (log.unwrap(), plain.as_ref().unwrap());
+        assert_eq!((&log.t, &log.q, &log.torque), (&plain.t, &plain.q, &plain.torque), "{header}");
+        let said = findings.iter().find(|f| f.message.starts_with("read as --map")).unwrap();
+        assert!(said.message.contains(map), "{header}: {said}");
+    }
+    // A unit in the name is taken with it.
+    let (log, _) = named("time_ms,q1,q2,tau1,tau2");
+    assert_eq!(log.unwrap().t[10], 1e-3 * plain.unwrap().t[10]);
+}
+
+#[test]
+fn columns_that_may_be_read_in_two_ways_are_asked_for() {
+    for (header, reason) in [
+        // Seven columns for an arm of two joints less one.
+        ("t,q0,q1,q2,tau1", "which are 3 columns, the arm has 2 joints"),
+        ("time,stamp,q1,q2,tau1", "--map 't.column = \"time\"' --map 't.column = \"stamp\"'"),
+        ("t,arm_1_pos,arm_2_pos,motor_1_pos,motor_2_pos", "missing: q1, q2"),
+        ("t,arm_1_pos,arm_2_pos,motor_1_pos,motor_2_pos", "[\"arm_1_pos\", \"arm_2_pos\"]"),
+        ("t,arm_1_pos,arm_2_pos,motor_1_pos,motor_2_pos", "[\"motor_1_pos\", \"motor_2_pos\"]"),
+        // What was asked for is no measurement.
+        ("t,target_q_1,target_q_2,tau1,tau2", "missing: q1, q2"),
+    ] {
+        let said = named(header).0.unwrap_err().to_string();
+        assert!(said.contains(reason), "{header}: '{reason}' not in '{said}'");
+    }
+}
+
+#[test]
+fn a_clock_that_restarts_makes_pieces_whose_times_go_on() {
+    let restarting = |k: usize, mut f: Vec<String>| {
+        f[0] = format!("{}", 0.01 * (k % 70) as f64);
+        Some(f.join(","))
+    };
+    let (log, findings) = read(&text(HEADER, restarting));
+    let log = log.unwrap();
+    assert_eq!((log.t.len(), log.pieces.as_slice()), (200, &[0..70, 70..140, 140..200][..]));
+    assert!(log.t.windows(2).all(|w| w[0] < w[1]));
+    let said: Vec<String> = findings.iter().map(ToString::to_string).collect();
+    assert_eq!(said.iter().filter(|s| s.contains("the clock restarts 2 times")).count(), 1, "{said:?}");
+    assert!(!said.iter().any(|s| s.contains("a gap")), "{said:?}");
+}
+
+#[test]
+fn a_number_that_cannot_be_is_named_and_left_out() {
+    for (column, value, quantity) in
+        [(3, "1e9", "tau1"), (4, "-1e300", "tau2"), (1, "57.0", "q1"), (2, "-400", "q2")]
+    {
+        let spoilt = |k: usize, mut f: Vec<String>| {
+            if k == 120 {
+                f[column] = value.to_string();
+            }
+            Some(f.join(","))
+        };
+        let (log, findings) = read(&text(HEADER, spoilt));
+        let log = log.unwrap();
+        assert_eq!((log.t.len(), log.pieces.len()), (199, 1), "{quantity}");
+        let said = findings.iter().find(|f| f.quantity == quantity).unwrap();
+        // The header is line 1.
+        assert_eq!(said.line, Some(122));
+        assert!(said.message.contains("cannot be") && said.message.ends_with("left out"), "{said}");
+    }
+    // A wrap of the angle and back is no fault, and neither is a knock.
+    let sound = |k: usize, mut f: Vec<String>| {
+        if k == 120 {
+            f[2] = format!("{}", f[2].parse::<f64>().unwrap() + std::f64::consts::TAU);
+            f[3] = "30".to_string();
+        }
+        Some(f.join(","))
+    };
+    assert_eq!(read(&text(HEADER, sound)).0.unwrap().t.len(), 200);
+}
+
+#[test]
+fn one_factor_between_all_velocities_and_slopes_is_a_wrong_time() {
+    let header = format!("{HEADER},dq1,dq2");
+    let with = |factors: [f64; 2]| {
+        let line = move |k: usize, f: Vec<String>| {
+            let t = 0.01 * k as f64;
+            // q1 = sin 2t and q2 = cos 3t.
+            let slopes = [2.0 * (2.0 * t).cos(), -3.0 * (3.0 * t).sin()];
+            Some(format!("{},{},{}", f.join(","), factors[0] * slopes[0], factors[1] * slopes[1]))
+        };
+        read(&text(&header, line)).0.unwrap().doubts
+    };
+    let doubts = with([0.5, 0.5]);
+    assert_eq!(doubts.len(), 1);
+    assert_eq!(doubts[0].map.as_deref(), Some("t.scale = 2"));
+    assert!(doubts[0].sentence.starts_with("Time runs 2.00 times too fast"), "{}", doubts[0].sentence);
+    // As they should be; of one joint alone; degrees a second, rpm.
+    for factors in [[1.0, 1.0], [0.5, 1.0], [57.2958, 57.2958], [9.549, 9.549]] {
+        assert_eq!(with(factors), [], "{factors:?}");
+    }
 }

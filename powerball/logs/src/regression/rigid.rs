@@ -5,6 +5,7 @@
 use crate::log::Motors;
 use dyngen::arm::ParameterKind;
 use dyngen::base::span::combinations;
+use dyngen::consistency::Possibility;
 use dyngen::exact::rational::{self, Rational};
 use dyngen::{Arm, Error, Evaluator, Function, Model, SetKind};
 use faer::{Mat, Side};
@@ -190,12 +191,12 @@ impl RigidArm {
         }
     }
 
-    /// Why no real arm can have these values of the minimal set; empty where nothing speaks against them.
+    /// Whether a real arm can have these values of the minimal set.
     ///
     /// # Errors
     /// As [`Model::function`].
-    pub fn impossible(&self, values: &[f64]) -> Result<Vec<String>, Error> {
-        Ok(dyngen::consistency::check(&self.model, SetKind::Minimal, values)?.reasons)
+    pub fn possibility(&self, values: &[f64]) -> Result<Possibility, Error> {
+        dyngen::consistency::check(&self.model, SetKind::Minimal, values)
     }
 
     /// Values of all eleven parameters a link that move like the minimal set's `values`.

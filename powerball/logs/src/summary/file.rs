@@ -188,7 +188,8 @@ impl Summary {
             steepness: head.steepness.iter().map(|[low, high]| Steepness::between(*low, *high)).collect(),
         };
         let (logs, samples, inactive, spectrum) = (head.logs, head.samples, head.inactive, head.spectrum);
-        Ok((Summary { identity, logs, samples, inactive, joints, spectrum }, after))
+        let joint_bands = vec![identity.cutoff; joints.len()];
+        Ok((Summary { identity, logs, samples, inactive, joints, joint_bands, spectrum }, after))
     }
 }
 

@@ -50,6 +50,8 @@ pub struct Summary {
     pub inactive: Vec<Option<String>>,
     /// The rows of each joint.
     pub joints: Vec<Octaves>,
+    /// The end of each joint's band, Hz.
+    pub joint_bands: Vec<f64>,
     /// Of the widest of several bands: see [`Bands::spectrum`].
     pub spectrum: Vec<Powers>,
 }
@@ -86,6 +88,7 @@ impl Summary {
     fn without_logs(identity: Identity) -> Summary {
         let (columns, dof) = (Columns { inertial: identity.parameters.len() }, identity.steepness.len());
         Summary {
+            joint_bands: vec![identity.cutoff; dof],
             identity,
             logs: Vec::new(),
             samples: 0,

@@ -201,6 +201,7 @@ fn part(log: &Log, range: std::ops::Range<usize>) -> Log {
         temperature: log.temperature.as_ref().map(cut),
         motor: log.motor.as_ref().map(cut),
         pieces: std::iter::once(0..range.len()).collect(),
+        doubts: log.doubts.clone(),
         clock: log.clock,
     }
 }
@@ -363,7 +364,11 @@ impl Bands {
     #[must_use]
     pub fn of_joints(&self, bands: &[usize]) -> Summary {
         let joint = |(j, band): (usize, &usize)| self.bands[*band].joints[j].clone();
-        Summary { joints: bands.iter().enumerate().map(joint).collect(), ..self.bands[0].clone() }
+        Summary {
+            joints: bands.iter().enumerate().map(joint).collect(),
+            joint_bands: bands.iter().map(|band| self.bands[*band].identity.cutoff).collect(),
+            ..self.bands[0].clone()
+        }
     }
 
     /// By joint and octave between neighbouring bands, from fast to slow: the power of a model's torque

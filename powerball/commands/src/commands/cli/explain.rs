@@ -16,9 +16,7 @@ use powerball_bus::driver::lwa4p::LWA4P;
 use powerball_bus::transport::{Bus, BusUrl};
 use powerball_controller::JointNumber;
 use powerball_explanation::experiment::{self, TRAJECTORY};
-use powerball_explanation::explain::{
-    Explained, FalsePositives, NamedEffect, Rival, State, Unattributed, Verdict,
-};
+use powerball_explanation::explain::{Explained, FalsePositives, NamedEffect, Rival, Unattributed, Verdict};
 use powerball_explanation::torque_model::TorqueModel;
 use powerball_explanation::{ExplainError, ExplainOptions, Prepared};
 use powerball_identification::mounting::Mounting;
@@ -130,7 +128,7 @@ impl Explain {
             (_, Verbosity { verbose: true, .. }) => output::print(&everything(explained, arm, out)),
             _ => output::print(&summary(explained, arm, out)),
         }
-        self.accept.judge(explained.conventions.as_ref(), &explained.useless_joints())
+        self.accept.judge(&explained.unusable)
     }
 
     /// Why there is no explanation: a known model that cannot be used is a wrong input.
@@ -222,7 +220,7 @@ const LOGS: usize = 2;
 /// The answer in at most [`LINES`] lines for an arm of seven joints. `arm` and `out` are the arm file and the folder of the
 /// results, for the next command.
 pub(super) fn summary(explained: &Explained, arm: &Path, out: &Path) -> String {
-    let mut head: Vec<String> = wrong_columns(explained).into_iter().collect();
+    let mut head = output::first_lines(&explained.unusable, explained.conventions.as_ref(), false);
     head.push(table(explained));
     let mut tail: Vec<String> = Vec::new();
     let laws = explained.laws.iter().take(LAWS);
@@ -248,7 +246,8 @@ pub(super) fn summary(explained: &Explained, arm: &Path, out: &Path) -> String {
 
 /// The same with all evidence, rivals and notes.
 pub(super) fn everything(explained: &Explained, arm: &Path, out: &Path) -> String {
-    let mut text = explained.conventions.as_ref().map_or_else(String::new, |c| format!("{}\n", c.verdict()));
+    let first = output::first_lines(&explained.unusable, explained.conventions.as_ref(), true);
+    let mut text = first.iter().map(|line| format!("{line}\n")).collect::<String>();
     let odd = explained.logs.iter().filter(|log| !log.like_the_others);
     odd.for_each(|log| text.push_str(&format!("{}\n", log.sentence())));
     for warning in &explained.warnings {
@@ -292,14 +291,10 @@ pub(super) fn open_in_words(explained: &Explained) -> String {
     text
 }
 
-/// What comes before everything: columns or an arm file that are not what they are said to be.
-fn wrong_columns(explained: &Explained) -> Option<String> {
-    explained.conventions.as_ref().filter(|c| c.is_remarkable()).map(|c| c.verdict())
-}
-
 /// A line a joint: its error before and after on the logs to judge on, the change, what is left, the verdict.
 fn table(explained: &Explained) -> String {
-    let mut text = String::from("joint        before         after  change, 95 % interval     left  verdict");
+    let mut text =
+        String::from("joint  band, Hz        before         after  change, 95 % interval     left  verdict");
     let (before, after) = (&explained.before.validate, &explained.after.validate);
     for verdict in &explained.verdict {
         let j = verdict.joint.index();
@@ -307,8 +302,9 @@ fn table(explained: &Explained) -> String {
         let cell = |rms: f64| format!("{} {unit}", number(rms));
         let changed = explained.held_out_change.iter().find(|c| c.joint == verdict.joint);
         text.push_str(&format!(
-            "\n{:>5}  {:>12}  {:>12}  {:>21}  {:>7}  {}",
+            "\n{:>5}  {:>8}  {:>12}  {:>12}  {:>21}  {:>7}  {}",
             verdict.joint.number(),
+            report::band_of(after.band[j]),
             cell(before.rms[j]),
             cell(after.rms[j]),
             changed.map_or_else(String::new, change),
@@ -402,7 +398,7 @@ fn next(explained: &Explained, arm: &Path, out: &Path) -> String {
     if let Some(experiment) = &explained.next_experiment {
         return experiment.advice.clone();
     }
-    let open = explained.verdict.iter().filter(|v| v.state != State::Explained && !v.advice.is_empty());
+    let open = explained.verdict.iter().filter(|v| !v.state.is_good() && !v.advice.is_empty());
     match open.max_by(|a, b| a.left.total_cmp(&b.left)) {
         Some(worst) => format!("joint {}: {}", worst.joint, worst.advice),
         None => format!(

@@ -185,7 +185,7 @@ impl FollowCommand {
         let done = self.report(&arm.name, &law, &path, &tracks, pole);
         live.end(&match &done {
             Ok(()) => format!("done: {}", self.out.join("report.html").display()),
-            Err(Failure::Refused(what) | Failure::Unusable(what) | Failure::Doubtful(what)) => what.clone(),
+            Err(failure) => failure.reason().to_string(),
         });
         done
     }

@@ -127,16 +127,14 @@ impl Identify {
         if let Some(original) = original {
             original.write(&arm, &files.first(), &self.out.join("identified.json"))?;
         }
-        let judged = identified.validate.as_ref().unwrap_or(&identified.fit);
-        self.accept.judge(identified.conventions.as_ref(), &judged.useless_joints())
+        self.accept.judge(&identified.unusable)
     }
 }
 
 /// What was found, for a person: what is wrong first, then the errors.
 fn in_words(identified: &Identified, verbose: bool, out: &Path) -> String {
-    let columns = identified.conventions.as_ref();
-    let wrong = columns.filter(|c| verbose || c.is_remarkable()).map(|c| c.verdict());
-    let mut lines: Vec<String> = wrong.into_iter().chain(identified.advice.clone()).collect();
+    let mut lines = output::first_lines(&identified.unusable, identified.conventions.as_ref(), verbose);
+    lines.extend(identified.advice.clone());
     if verbose {
         lines.extend(identified.warnings.iter().map(|warning| format!("note: {warning}")));
     }

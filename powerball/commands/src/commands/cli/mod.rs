@@ -121,9 +121,13 @@ impl Command {
 fn record_end(done: &Result<(), Failure>) {
     match done {
         Ok(()) => tracing::info!(target: events::SHOWN, exit = 0, "done"),
-        Err(Failure::Doubtful(reason)) => tracing::warn!(target: events::SHOWN, exit = 3, "{reason}"),
-        Err(Failure::Refused(reason)) => tracing::error!(target: events::SHOWN, exit = 1, "{reason}"),
-        Err(Failure::Unusable(reason)) => tracing::error!(target: events::SHOWN, exit = 2, "{reason}"),
+        Err(failure @ Failure::Negative) => {
+            tracing::info!(target: events::SHOWN, exit = failure.code(), "done")
+        }
+        Err(failure @ Failure::Doubtful(reason)) => {
+            tracing::warn!(target: events::SHOWN, exit = failure.code(), "{reason}");
+        }
+        Err(failure) => tracing::error!(target: events::SHOWN, exit = failure.code(), "{}", failure.reason()),
     }
 }
 
@@ -136,6 +140,27 @@ pub(crate) enum Failure {
     Unusable(String),
     /// The result is written and should not be built on: exit code 3.
     Doubtful(String),
+    /// What was asked is not so, and that was printed: exit code 1.
+    Negative,
+}
+
+impl Failure {
+    /// The exit code.
+    fn code(&self) -> u8 {
+        match self {
+            Failure::Refused(_) | Failure::Negative => 1,
+            Failure::Unusable(_) => 2,
+            Failure::Doubtful(_) => 3,
+        }
+    }
+
+    /// Why; empty where that was printed.
+    pub(crate) fn reason(&self) -> &str {
+        match self {
+            Failure::Refused(reason) | Failure::Unusable(reason) | Failure::Doubtful(reason) => reason,
+            Failure::Negative => "",
+        }
+    }
 }
 
 impl From<IdentifyError> for Failure {
@@ -161,17 +186,11 @@ pub fn main() -> ExitCode {
     });
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(Failure::Refused(reason)) => {
-            eprintln!("powerball: {reason}");
-            ExitCode::from(1)
-        }
-        Err(Failure::Unusable(reason)) => {
-            eprintln!("powerball: {reason}");
-            ExitCode::from(2)
-        }
-        Err(Failure::Doubtful(reason)) => {
-            eprintln!("powerball: {reason}");
-            ExitCode::from(3)
+        Err(failure) => {
+            if !failure.reason().is_empty() {
+                eprintln!("powerball: {}", failure.reason());
+            }
+            ExitCode::from(failure.code())
         }
     }
 }

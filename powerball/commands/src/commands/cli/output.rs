@@ -3,7 +3,7 @@
 use super::Failure;
 use super::events::SHOWN;
 use crate::procedure::MotionLog;
-use crate::report::files;
+use crate::report::{band_of, files};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use powerball_controller::JointNumber;
@@ -161,34 +161,34 @@ pub(crate) fn notes(count: usize) -> Option<String> {
     }
 }
 
-/// Whether a result that should not be built on is taken nevertheless.
+/// Whether a result that should not be used is taken nevertheless.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Accept {
-    /// End with 0 instead of 3 where columns or arm file are not what they are said to be, or a joint is predicted no
-    /// better than by its mean.
+    /// End with 0 instead of 3 where the result should not be used: columns or arm file are not what they are said to
+    /// be, a joint does not move or is predicted no better than by its mean (docs/exit_codes.md).
     #[arg(long)]
     accept: bool,
 }
 
 impl Accept {
-    /// The failure that such a result is. `useless` are the joints that are predicted no better than by their mean.
-    pub(crate) fn judge(self, columns: Option<&Conventions>, useless: &[JointNumber]) -> Result<(), Failure> {
-        let mut why: Vec<String> = Vec::new();
-        if columns.is_some_and(Conventions::differ) {
-            why.push("the columns or the arm file are not what they are said to be".to_string());
-        }
-        if !useless.is_empty() {
-            let list: Vec<String> = useless.iter().map(ToString::to_string).collect();
-            why.push(format!(
-                "the torque of joint {} is predicted no better than by its mean",
-                list.join(", ")
-            ));
-        }
-        match self.accept || why.is_empty() {
+    /// The failure that a result is which should not be used, and why.
+    pub(crate) fn judge(self, unusable: &[String]) -> Result<(), Failure> {
+        match self.accept || unusable.is_empty() {
             true => Ok(()),
-            false => Err(Failure::Doubtful(format!("{}; --accept takes it as it is", why.join(", and ")))),
+            false => Err(Failure::Doubtful(format!("{}; --accept takes it as it is", unusable.join("; ")))),
         }
     }
+}
+
+/// The first lines of a result: why it should not be used, and what there is to be said of the columns (`all` of it, or
+/// where they are not taken as they stand). That columns are wrong is the first reason, and its line says how.
+pub(crate) fn first_lines(unusable: &[String], columns: Option<&Conventions>, all: bool) -> Vec<String> {
+    let differ = columns.is_some_and(Conventions::differ);
+    let verdict = columns.filter(|c| all || c.is_remarkable()).map(Conventions::verdict);
+    let others = unusable.get(usize::from(differ)..).unwrap_or_default();
+    let others = (!others.is_empty()).then(|| format!("Do not use this result: {}.", others.join("; ")));
+    let lines = if differ { [verdict, others] } else { [others, verdict] };
+    lines.into_iter().flatten().collect()
 }
 
 /// Prints to standard output; a closed pipe is no error.
@@ -216,15 +216,16 @@ fn typed(arguments: impl Iterator<Item = String>) -> String {
     words.collect::<Vec<_>>().join(" ")
 }
 
-/// Errors by joint as a table; several spreads side by side.
+/// Errors by joint as a table with the band that they are in; several spreads side by side.
 pub(crate) fn table(columns: &[(&str, &ResidualStats)]) -> String {
-    let mut text = String::from("joint");
+    let mut text = String::from("joint  band, Hz");
     for (name, _) in columns {
         text.push_str(&format!("  {name:>26}"));
     }
     let joints = columns.iter().map(|(_, s)| s.rms.len()).max().unwrap_or(0);
     for j in 0..joints {
-        text.push_str(&format!("\n{:>5}", JointNumber::from_index(j).number()));
+        let band = columns.iter().find_map(|(_, s)| s.band.get(j)).map_or(String::new(), |b| band_of(*b));
+        text.push_str(&format!("\n{:>5}  {band:>8}", JointNumber::from_index(j).number()));
         for (_, stats) in columns {
             let cell = format!("{:.4} N·m  {:5.1} %", stats.rms[j], 100.0 * stats.relative[j]);
             text.push_str(&format!("  {cell:>26}"));

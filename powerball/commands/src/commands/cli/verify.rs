@@ -45,7 +45,7 @@ impl Verify {
         let say = |what: &str| terminal.say(what);
         let options = VerifyOptions {
             tolerance: self.tolerance,
-            joint_bands: model.joint_bands.clone(),
+            joint_bands: model.model.joint_bands.clone(),
             progress: Progress::to(&say),
             ..VerifyOptions::default()
         };
@@ -58,15 +58,16 @@ impl Verify {
         if self.inputs.json {
             output::print(&files.first());
         } else {
-            for j in &verified.joints {
+            for (j, band) in verified.joints.iter().zip(&verified.joint_bands) {
                 output::print(&format!(
-                    "joint {}: {:.4} N·m ({:.4} to {:.4}), {:.1} % of the torque, noise alone {:.4} N·m",
+                    "joint {}: {:.4} N·m ({:.4} to {:.4}), {:.1} % of the torque, noise alone {:.4} N·m, {band} Hz",
                     j.joint,
                     j.rms,
                     j.interval[0],
                     j.interval[1],
                     100.0 * j.relative,
-                    j.noise_floor
+                    j.noise_floor,
+                    band = report::band_of(*band)
                 ));
             }
         }

@@ -9,18 +9,20 @@ use clap::Args;
 use dyngen::Arm;
 use powerball_bus::driver::lwa4p::LWA4P;
 use powerball_bus::transport::BusUrl;
+use powerball_controller::JointNumber;
 use powerball_explanation::torque_model::TorqueModel;
 use powerball_explanation::watch::{Event, FIRST, Watch, WatchOptions};
-use powerball_logs::log::{ColumnMap, LiveRows, LiveSample, Log, read_logs_as};
+use powerball_logs::log::{ColumnMap, LiveRows, LiveSample, Log, Taken, read_logs_as};
 use powerball_logs::regression::RigidArm;
 use powerball_logs::tables;
-use std::io::BufRead;
+use std::io::{BufRead, Read};
 use std::path::PathBuf;
 
 /// Say when the torque model no longer holds: since when, on which joints and why (a push, a payload, friction,
 /// a sensor's zero, a delay, or unknown).
 ///
-/// A line for each change; none where the model holds. It is a sequential test: at most one false alarm in
+/// A line for each change, and a last one: `holds` or `changed`. The exit code is 0 where the model holds, 1 where
+/// something changed, 3 where that cannot be said. It is a sequential test: at most one false alarm in
 /// `--hours` of motion on average, as long as the model errs no more than on the logs it was explained on and
 /// friction stays within `--friction-range`. Rows at rest say nothing and are not watched.
 #[derive(Args, Debug)]
@@ -55,9 +57,12 @@ pub(crate) struct WatchCommand {
     stream: Option<String>,
     #[command(flatten)]
     map: MapArgument,
-    /// One JSON object a line.
+    /// One JSON object a line for each change; the last line goes to standard error.
     #[arg(long)]
     json: bool,
+    /// End with 0 where something changed: for pipes that stop at the first command that fails.
+    #[arg(long)]
+    exit_zero: bool,
     /// Mean time between two false alarms, h of motion.
     #[arg(long, default_value_t = 24.0, value_parser = positive)]
     hours: f64,
@@ -107,17 +112,54 @@ impl WatchCommand {
         };
         let live = self.serve.open()?;
         live.start(&format!("{} watched", said.name), &[("position", "rad"), ("torque", "N·m")]);
+        let mut seen = Seen::default();
         for log in &logs {
-            self.watch_log(log, &body, &model, &options, &live);
+            seen.add(self.watch_log(log, &body, &model, &options, &live));
         }
         if self.stream.is_some() {
-            self.watch_stream(&said, &map, (&body, &model, &options), &live)?;
+            seen.add(self.watch_stream(&said, &map, (&body, &model, &options), &live)?);
         }
         if let Some(bus) = &self.bus {
-            self.watch_bus(bus, (&body, &model, &options), &live)?;
+            seen.add(self.watch_bus(bus, (&body, &model, &options), &live)?);
         }
         live.end("no more samples");
-        Ok(())
+        self.conclude(&seen)
+    }
+
+    /// The last line, and the exit code.
+    fn conclude(&self, seen: &Seen) -> Result<(), Failure> {
+        let stale = match seen.stale {
+            0 => String::new(),
+            count => format!(
+                "{count} of {} samples have a time that does not rise and were left out: give the times at which samples \
+                 were taken",
+                count + seen.samples
+            ),
+        };
+        if seen.stale as f64 > MOST_STALE * (seen.stale + seen.samples) as f64 {
+            return Err(Failure::Doubtful(stale));
+        }
+        if !stale.is_empty() {
+            tracing::warn!("{stale}");
+        }
+        let joints = seen.joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+        if seen.joints.is_empty() && seen.events == 0 {
+            return Err(Failure::Doubtful(format!(
+                "no joint was watched in {:.0} s: it is not known how much the model leaves where it holds",
+                seen.seconds
+            )));
+        }
+        let of = format!("{:.0} s, joint {joints}", seen.seconds);
+        let line = match seen.events {
+            0 => format!("holds: {of}"),
+            1 => format!("changed: 1 event in {of}"),
+            several => format!("changed: {several} events in {of}"),
+        };
+        match self.json {
+            true => eprintln!("{line}"),
+            false => output::print(&line),
+        }
+        if seen.events == 0 || self.exit_zero { Ok(()) } else { Err(Failure::Negative) }
     }
 
     fn logs(&self, arm: &Arm, map: &ColumnMap) -> Result<Vec<Log>, Failure> {
@@ -147,13 +189,19 @@ impl WatchCommand {
         model: &TorqueModel,
         options: &WatchOptions,
         live: &Live,
-    ) {
-        let mut watch = Watch::new(body, model, options, &log.file);
-        for (k, sample) in log.samples().enumerate() {
-            self.take(&mut watch, &sample, k, live);
+    ) -> Seen {
+        let (mut watch, mut seen) = (Watch::new(body, model, options, &log.file), Seen::default());
+        for sample in log.samples() {
+            self.take(&mut watch, &sample, &mut seen, live);
         }
+        self.finish(&mut watch, &mut seen, live);
+        seen
+    }
+
+    fn finish(&self, watch: &mut Watch<'_>, seen: &mut Seen, live: &Live) {
         let events = watch.finish();
-        self.say(&mut watch, &events, live);
+        self.say(watch, &events, seen, live);
+        seen.joints = watch.watched();
     }
 
     /// An arm that another master drives, until Ctrl-C or as long as --for says.
@@ -162,7 +210,7 @@ impl WatchCommand {
         bus: &BusUrl,
         (body, model, options): (&RigidArm, &TorqueModel, &WatchOptions),
         live: &Live,
-    ) -> Result<(), Failure> {
+    ) -> Result<Seen, Failure> {
         if body.dof() != LWA4P.joints.len() {
             let (has, needs) = (body.dof(), LWA4P.joints.len());
             return Err(Failure::Unusable(format!(
@@ -170,23 +218,20 @@ impl WatchCommand {
             )));
         }
         let name = bus.to_string();
-        let (mut watch, mut count) = (Watch::new(body, model, options, &name), 0);
-        listen(bus, self.seconds, |sample| {
-            self.take(&mut watch, sample, count, live);
-            count += 1;
-        })?;
-        let events = watch.finish();
-        self.say(&mut watch, &events, live);
-        Ok(())
+        let (mut watch, mut seen) = (Watch::new(body, model, options, &name), Seen::default());
+        listen(bus, self.seconds, |sample| self.take(&mut watch, sample, &mut seen, live))?;
+        self.finish(&mut watch, &mut seen, live);
+        Ok(seen)
     }
 
-    /// Sample `k`.
-    fn take(&self, watch: &mut Watch<'_>, sample: &LiveSample, k: usize, live: &Live) {
-        if k.is_multiple_of(serve::EVERY) {
+    /// The next sample.
+    fn take(&self, watch: &mut Watch<'_>, sample: &LiveSample, seen: &mut Seen, live: &Live) {
+        if seen.samples.is_multiple_of(serve::EVERY) {
             live.sample("", sample.t, &[("position", &sample.q), ("torque", &sample.torque)]);
         }
+        seen.sample(sample.t);
         let events = watch.push(sample);
-        self.say(watch, &events, live);
+        self.say(watch, &events, seen, live);
     }
 
     fn watch_stream(
@@ -195,11 +240,11 @@ impl WatchCommand {
         map: &ColumnMap,
         (body, model, options): (&RigidArm, &TorqueModel, &WatchOptions),
         live: &Live,
-    ) -> Result<(), Failure> {
+    ) -> Result<Seen, Failure> {
         const NAME: &str = "standard input";
-        let (mut rows, mut watch, mut usable) = (None, Watch::new(body, model, options, NAME), 0);
-        let mut format = None;
-        for (number, line) in std::io::stdin().lock().lines().enumerate() {
+        let (mut watch, mut seen) = (Watch::new(body, model, options, NAME), Seen::default());
+        let (mut rows, mut format) = (None, None);
+        for (number, line) in lines(std::io::stdin().lock()).enumerate() {
             let line = line.map_err(|e| Failure::Unusable(format!("{NAME}: line {}: {e}", number + 1)))?;
             if line.trim().is_empty() {
                 continue;
@@ -214,23 +259,34 @@ impl WatchCommand {
                 }
             }
             let values = format.values(&line);
-            let sample = rows.as_mut().and_then(|rows| rows.sample(|k| values.get(k).copied().flatten()));
-            let Some(sample) = sample else { continue };
-            self.take(&mut watch, &sample, usable, live);
-            usable += 1;
+            let taken = rows.as_mut().map(|rows| rows.sample(|k| values.get(k).copied().flatten()));
+            match taken {
+                Some(Taken::Sample { sample, restarted }) => {
+                    if restarted {
+                        tracing::warn!(
+                            "{NAME}: line {}: the clock restarts: times go on from here",
+                            number + 1
+                        );
+                    }
+                    self.take(&mut watch, &sample, &mut seen, live);
+                }
+                Some(Taken::Stale) => seen.stale += 1,
+                Some(Taken::Nothing) | None => {}
+            }
         }
+        let usable = seen.samples;
         if !watch.has_begun() {
             return Err(Failure::Unusable(format!(
                 "{NAME}: {usable} usable samples are too few: at least {FIRST} are needed"
             )));
         }
-        let events = watch.finish();
-        self.say(&mut watch, &events, live);
-        Ok(())
+        self.finish(&mut watch, &mut seen, live);
+        Ok(seen)
     }
 
     /// Events on standard output, notes on standard error.
-    fn say(&self, watch: &mut Watch<'_>, events: &[Event], live: &Live) {
+    fn say(&self, watch: &mut Watch<'_>, events: &[Event], seen: &mut Seen, live: &Live) {
+        seen.events += events.len();
         watch.notes().iter().for_each(|note| tracing::warn!("{note}"));
         for event in events {
             live.event(&event.sentence());
@@ -241,6 +297,63 @@ impl WatchCommand {
         }
     }
 }
+
+/// A longer line is no row, bytes.
+const LONGEST_LINE: u64 = 1 << 20;
+
+/// The lines of a stream; none is held that is longer than a row can be.
+fn lines(mut input: impl BufRead) -> impl Iterator<Item = std::io::Result<String>> {
+    std::iter::from_fn(move || {
+        let mut line = Vec::new();
+        match input.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line) {
+            Ok(0) => None,
+            Ok(read) if read as u64 == LONGEST_LINE && line.last() != Some(&b'\n') => {
+                Some(Err(std::io::Error::other("is longer than 1 MB: rows of a log are expected")))
+            }
+            Ok(_) => Some(String::from_utf8(line).map_err(std::io::Error::other)),
+            Err(e) => Some(Err(e)),
+        }
+    })
+}
+
+/// With a larger share of samples whose time does not rise nothing is said of a stream.
+const MOST_STALE: f64 = 0.05;
+
+/// What was watched.
+#[derive(Default)]
+struct Seen {
+    samples: usize,
+    /// Samples whose time does not rise.
+    stale: usize,
+    /// The time that samples are apart, without gaps, s.
+    seconds: f64,
+    last: Option<f64>,
+    events: usize,
+    joints: Vec<JointNumber>,
+}
+
+impl Seen {
+    fn sample(&mut self, t: f64) {
+        self.samples += 1;
+        // A gap was not watched.
+        self.seconds += self.last.map_or(0.0, |last| t - last).min(GAP);
+        self.last = Some(t);
+    }
+
+    /// What was seen in another log as well.
+    fn add(&mut self, other: Seen) {
+        self.samples += other.samples;
+        self.stale += other.stale;
+        self.seconds += other.seconds;
+        self.events += other.events;
+        self.joints.extend(other.joints);
+        self.joints.sort_unstable();
+        self.joints.dedup();
+    }
+}
+
+/// Samples further apart have a gap between them, s.
+const GAP: f64 = 0.5;
 
 /// How the rows of a stream are written.
 enum Format {

@@ -61,6 +61,7 @@ pub(super) fn base_model(arm: &Arm, identified: &Identified) -> Result<TorqueMod
             .map(|(name, x)| ParameterEstimate::plain(name, x))
             .collect(),
         friction: friction.map(|(j, gammas)| JointFriction::plain(j, *gammas)).collect(),
+        joint_bands: Vec::new(),
         additions: Additions::default(),
         colour: None,
     })

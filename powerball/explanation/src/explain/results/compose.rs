@@ -51,6 +51,7 @@ pub(crate) fn compose(
         set: SetKind::Minimal.to_string(),
         parameters: plain(body, found.fit.inertial()),
         friction: friction(found),
+        joint_bands: study.data.joints.iter().map(|joint| joint.band.cutoff).collect(),
         additions,
         colour: None,
     };

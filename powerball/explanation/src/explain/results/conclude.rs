@@ -19,7 +19,7 @@ use dyngen::arm::JointKind;
 use powerball_controller::JointNumber;
 use powerball_identification::estimate::distribution::f_tail;
 use powerball_identification::estimate::{noise_floor, over_blocks, residual_stats};
-use powerball_logs::regression::Data;
+use powerball_logs::regression::{Data, FEWEST_ROWS};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -49,14 +49,18 @@ pub(crate) fn conclude(findings: Findings<'_>) -> Result<Explained, ExplainError
         effect.probability = Evidence::of(effect).probability();
     }
     let open = open(study, model, history, left);
+    let held_out_change = changes(&study.validation, &before.residual, &held_out);
+    let resting = (0..study.data.dof()).filter(|j| study.data.joints[*j].len() < FEWEST_ROWS);
     Ok(Explained {
-        verdict: verdict(study, &named, &after.validate, &floor, &dependencies),
+        unusable: Vec::new(),
+        resting: resting.map(JointNumber::from_index).collect(),
+        verdict: verdict(study, &held_out_change, &after.validate, &floor, &dependencies),
         logs: logs(&findings),
         arm: study.data.body.arm().name.clone(),
         sliding: study.data.body.arm().joints.iter().map(|j| j.kind == JointKind::Prismatic).collect(),
         conventions: None,
         transmission: None,
-        held_out_change: changes(&study.validation, &before.residual, &held_out),
+        held_out_change,
         before: before.errors.clone(),
         noise_floor: floor,
         effects: named,

@@ -9,20 +9,23 @@ use super::super::study::Study;
 use super::logs::LogResult;
 use super::unattributed::{Unattributed, quantile_bins};
 use super::unnamed::UnnamedLaw;
-use super::verdict::{State, Verdict};
+use super::verdict::Verdict;
 use crate::effects::{Axis, Context};
 use crate::torque_model::TorqueModel;
 use powerball_controller::JointNumber;
 use powerball_identification::conventions::Conventions;
 pub use powerball_identification::estimate::{TorqueCurve, curves};
 use powerball_identification::transmission::JointTransmission;
+use powerball_identification::usable::Findings;
 use serde::Serialize;
 use std::sync::Arc;
 
 /// The result of the residual loop.
 #[derive(Clone, Debug, Serialize)]
 pub struct Explained {
-    /// How far each joint's torque is explained: the first thing to read.
+    /// Why this result should not be used; empty where it can be.
+    pub unusable: Vec<String>,
+    /// How well each joint's torque is predicted: the first thing to read.
     pub verdict: Vec<Verdict>,
     /// Whether each log is like the others, and what differs where it is not: those that were fitted first.
     pub logs: Vec<LogResult>,
@@ -31,6 +34,9 @@ pub struct Explained {
     /// Whether each joint slides: its torques are forces, N; not part of the JSON.
     #[serde(skip)]
     pub sliding: Vec<bool>,
+    /// The joints that do not move in the logs to fit; not part of the JSON.
+    #[serde(skip)]
+    pub resting: Vec<JointNumber>,
     /// What the columns of the logs are, where they were asked.
     pub conventions: Option<Conventions>,
     /// What is between the motors' torques and the links', by joint, where logs hold both. Its effects are on
@@ -84,14 +90,20 @@ pub struct Explained {
 }
 
 impl Explained {
-    /// The joints that the model with what was named predicts no better than their mean does, on the logs to judge on;
-    /// those of which no more than noise is left aside.
+    /// The same with what the columns are, and with why it should not be used.
     #[must_use]
-    pub fn useless_joints(&self) -> Vec<JointNumber> {
-        let is_open = |joint: &JointNumber| {
-            self.verdict.iter().any(|v| v.joint == *joint && v.state != State::Explained)
-        };
-        self.after.validate.useless_joints().into_iter().filter(is_open).collect()
+    pub fn with_columns(mut self, columns: Conventions) -> Explained {
+        // Of which no more than noise is left is no useless joint.
+        let is_open =
+            |joint: &JointNumber| self.verdict.iter().any(|v| v.joint == *joint && !v.state.is_good());
+        let useless = self.after.validate.useless_joints().into_iter().filter(is_open).collect();
+        let rms = &self.after.validate.rms;
+        let not_finite = rms.iter().any(|x| !x.is_finite());
+        let resting = self.resting.clone();
+        let findings = Findings { columns: Some(&columns), resting, useless, not_finite, indefinite: 0.0 };
+        self.unusable = findings.reasons();
+        self.conventions = Some(columns);
+        self
     }
 }
 

@@ -6,7 +6,7 @@ use super::super::comparison::History;
 use super::super::model::Model;
 use super::super::named::{FitErrors, NamedEffect, Rival};
 use super::super::study::Study;
-use super::verdict::explained;
+use super::verdict::needs_no_name;
 use crate::effects::Context;
 use powerball_controller::JointNumber;
 use powerball_logs::parallel;
@@ -27,7 +27,7 @@ pub struct Unattributed {
     pub considered: Vec<Rival>,
 }
 
-/// The joints that are not explained and whose residual depends on something, and what is to be said of the others on
+/// The joints of which more than little is left that depends on something, and what is to be said of the others on
 /// which more than noise is left.
 pub(crate) fn unattributed(
     study: &Study<'_>,
@@ -45,14 +45,13 @@ pub(crate) fn unattributed(
     let found = parallel::map(&candidates, |j| depends_on(&context, *j));
     let dependencies = Dependencies::new(candidates.iter().copied().zip(found.iter().cloned()));
     let mut signals: Vec<(String, f64)> = Vec::new();
-    let explained = explained(study, &after.validate, floor, &dependencies);
     let (mut joints, mut nothing, mut little) = (Vec::<JointNumber>::new(), Vec::new(), Vec::new());
     for (j, list) in candidates.iter().zip(found) {
         let Some((strongest, _)) = list.first() else {
             nothing.push(format!("{} ({:.1} times the noise floor)", j + 1, rms[*j] / floor[*j]));
             continue;
         };
-        if explained[*j] {
+        if needs_no_name(study, &after.validate, floor, *j) {
             let left = 100.0 * after.validate.relative[*j];
             little.push(format!("{strongest} on joint {} ({left:.1} % of its torque)", j + 1));
             continue;

@@ -1,49 +1,61 @@
-//! The first line of every answer: how much of each joint's torque is explained, and what to do about the rest.
+//! The first line of every answer: how well each joint's torque is predicted, and what to do about the rest.
 //!
 //! Also here: whether an explanation contradicts itself.
 
 use super::super::named::NamedEffect;
 use super::super::study::Study;
-use super::explained::Explained;
+use super::explained::{Change, Explained};
 use super::unattributed::Dependencies;
 use powerball_controller::JointNumber;
 use powerball_identification::estimate::ResidualStats;
 use serde::Serialize;
 use std::fmt;
 
-/// How far a joint's torque is explained on the validation set.
+/// How well a joint's torque is predicted on the validation set.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Verdict {
     /// The joint.
     pub joint: JointNumber,
-    /// How far.
+    /// How well.
     pub state: State,
     /// rms of what is left over rms of the measured torque; not a number where the joint does not move.
     pub left: f64,
-    /// What the rest depends on, the likely kinds, and what to record or check; empty where nothing is left.
+    /// What the rest depends on, the likely kinds, and what to record or check; empty where little is left.
     pub advice: String,
 }
 
-/// How far a torque is explained.
+/// How well a torque is predicted by the model with what was named. The first of these that is so holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum State {
-    /// What is left is little, or noise.
-    #[serde(rename = "explained")]
-    Explained,
-    /// Effects were named, and much is left beside them.
-    #[serde(rename = "named in part")]
-    InPart,
-    /// Much is left, and nothing was named.
-    #[serde(rename = "not explained")]
-    Not,
+    /// What is left is hardly more than measurement noise ([`above_floor`](crate::rule::Rule::above_floor)).
+    #[serde(rename = "at the noise floor")]
+    AtNoiseFloor,
+    /// Little of the torque is left ([`predicted_share`](crate::rule::Rule::predicted_share)).
+    #[serde(rename = "predicted")]
+    Predicted,
+    /// More is left, and what was named lowered the error: the 95 % interval of the change lies below zero.
+    #[serde(rename = "improved")]
+    Improved,
+    /// More is left, and no error fell.
+    #[serde(rename = "not predicted")]
+    NotPredicted,
+}
+
+impl State {
+    /// Whether no more than little or noise is left.
+    #[must_use]
+    pub fn is_good(self) -> bool {
+        matches!(self, State::AtNoiseFloor | State::Predicted)
+    }
 }
 
 impl fmt::Display for State {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            State::Explained => "explained",
-            State::InPart => "named in part",
-            State::Not => "not explained",
+        f.pad(match self {
+            State::AtNoiseFloor => "at the noise floor",
+            State::Predicted => "predicted",
+            State::Improved => "improved",
+            State::NotPredicted => "not predicted",
         })
     }
 }
@@ -51,54 +63,48 @@ impl fmt::Display for State {
 /// The verdict on every joint.
 pub(crate) fn verdict(
     study: &Study<'_>,
-    named: &[NamedEffect],
+    changes: &[Change],
     after: &ResidualStats,
     floor: &[f64],
     dependencies: &Dependencies,
 ) -> Vec<Verdict> {
-    let explained = explained(study, after, floor, dependencies);
     let of = |j: usize| {
         let joint = JointNumber::from_index(j);
-        let (left, rms) = (after.relative[j], after.rms[j]);
         if study.validation.joints[j].is_empty() {
             let advice = "it does not move in the logs to judge on, or its torque says nothing there: record a \
                 motion that moves it";
-            return Verdict { joint, state: State::Not, left: f64::NAN, advice: advice.to_string() };
+            let state = State::NotPredicted;
+            return Verdict { joint, state, left: f64::NAN, advice: advice.to_string() };
         }
-        let state = if explained[j] {
-            State::Explained
-        } else if named.iter().any(|e| e.joints.contains(&joint)) {
-            State::InPart
+        let (left, rms) = (after.relative[j], after.rms[j]);
+        let improved = || changes.iter().any(|change| change.joint == joint && change.interval[1] < 0.0);
+        let state = if is_at_noise_floor(study, rms, floor[j]) {
+            State::AtNoiseFloor
+        } else if left <= study.rule().predicted_share {
+            State::Predicted
+        } else if improved() {
+            State::Improved
         } else {
-            State::Not
+            State::NotPredicted
         };
-        let advice = match state {
-            State::Explained => String::new(),
-            _ => advice(study, j, left, rms / floor[j], dependencies),
+        let advice = match state.is_good() {
+            true => String::new(),
+            false => advice(study, j, left, rms / floor[j], dependencies),
         };
         Verdict { joint, state, left, advice }
     };
     (0..study.validation.dof()).map(of).collect()
 }
 
-/// Of which joints little is left, or hardly more than measurement noise; of one that does not move in the logs to judge
-/// on nothing is known.
-pub(super) fn explained(
-    study: &Study<'_>,
-    after: &ResidualStats,
-    floor: &[f64],
-    dependencies: &Dependencies,
-) -> Vec<bool> {
-    let rule = study.rule();
-    let of = |j: usize| {
-        let little = match dependencies.of(j) {
-            [] => rule.explained_share,
-            _ => rule.little_share,
-        };
-        let is_little = after.relative[j] <= little || after.rms[j] <= rule.above_floor * floor[j];
-        is_little && !study.validation.joints[j].is_empty()
-    };
-    (0..study.validation.dof()).map(of).collect()
+fn is_at_noise_floor(study: &Study<'_>, rms: f64, floor: f64) -> bool {
+    rms <= study.rule().above_floor * floor
+}
+
+/// Whether of a joint so little is left that it needs no name, whatever that depends on; of one that does not move in the
+/// logs to judge on nothing is known.
+pub(super) fn needs_no_name(study: &Study<'_>, after: &ResidualStats, floor: &[f64], j: usize) -> bool {
+    let little = after.relative[j] <= study.rule().little_share;
+    !study.validation.joints[j].is_empty() && (little || is_at_noise_floor(study, after.rms[j], floor[j]))
 }
 
 /// What to think of and to do where much is left.
@@ -160,8 +166,8 @@ fn kind(signals: &[(String, f64)], j: usize) -> String {
 ///
 /// * Probabilities lie between 0 and 1.
 /// * No name is given and refused on one joint.
-/// * A joint that is explained is not among those where something is left without a name; one that is named in part
-///   has a name, one that is not explained has none.
+/// * A joint at the noise floor is not among those where something is left without a name; the error of one that is
+///   improved falls, that of one that is not predicted does not.
 /// * An experiment is of names that are open: of at most one that was given on these joints.
 /// * No interval of a change lies on the wrong side of it.
 #[must_use]
@@ -181,18 +187,18 @@ pub fn contradictions(explained: &Explained) -> Vec<String> {
     all.extend(laws.map(|law| format!("the probability of {} is {}", law.formula, law.probability)));
     let rest = explained.unattributed.as_ref();
     for verdict in &explained.verdict {
-        let joint = verdict.joint;
+        let (joint, state) = (verdict.joint, verdict.state);
         let left = rest.is_some_and(|rest| rest.joints.contains(&joint));
-        let named = explained.effects.iter().any(|effect| effect.joints.contains(&joint));
-        let wrong = match verdict.state {
-            State::Explained => left,
-            State::InPart => !named,
-            State::Not => named && !verdict.left.is_nan(),
+        let falls = explained.held_out_change.iter().any(|c| c.joint == joint && c.interval[1] < 0.0);
+        let wrong = match state {
+            State::AtNoiseFloor => left,
+            State::Predicted => false,
+            State::Improved => !falls,
+            State::NotPredicted => falls,
         };
         if wrong {
             all.push(format!(
-                "joint {joint} is {}, and named: {named}, left without a name: {left}",
-                verdict.state
+                "joint {joint} is {state}; its error falls: {falls}; left without a name: {left}"
             ));
         }
     }

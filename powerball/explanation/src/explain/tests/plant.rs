@@ -370,6 +370,7 @@ pub(super) fn record(
         out.push(Log {
             file: format!("log{log}.csv"),
             pieces: std::iter::once(0..t.len()).collect(),
+            doubts: Vec::new(),
             t,
             q: q_log,
             torque: tau_log,

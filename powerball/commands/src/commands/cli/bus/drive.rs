@@ -233,9 +233,7 @@ impl Move {
         let mut to = from;
         to[index] = self.to.unwrap_or(from[index] + self.by.unwrap_or(0.0));
         if !allowed(to[index]) {
-            return Err(Failure::Refused(match wrong(to[index]) {
-                Failure::Unusable(why) | Failure::Refused(why) | Failure::Doubtful(why) => why,
-            }));
+            return Err(Failure::Refused(wrong(to[index]).reason().to_string()));
         }
         recorder.way_to(&to, self.velocity, 1.0).map_err(arm)?;
         recorder.release().map_err(arm)?;

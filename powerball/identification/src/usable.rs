@@ -1,0 +1,65 @@
+//! What makes a result one that should not be used: what a command prints first, and ends with 3 for.
+//!
+//! What only makes a result less exact is a warning. docs/exit_codes.md lists all conditions with their sentences.
+
+use super::conventions::Conventions;
+use powerball_controller::JointNumber;
+
+/// What is asked of a result.
+#[derive(Clone, Debug, Default)]
+pub struct Findings<'a> {
+    /// What the columns are.
+    pub columns: Option<&'a Conventions>,
+    /// Joints that hardly move in the logs to fit.
+    pub resting: Vec<JointNumber>,
+    /// Joints that are predicted no better than by the mean of their torque.
+    pub useless: Vec<JointNumber>,
+    /// Whether a number of the result is none.
+    pub not_finite: bool,
+    /// The share of poses at which B(q) is not positive definite.
+    pub indefinite: f64,
+}
+
+/// At more poses than this share no controller can divide by B(q).
+const INDEFINITE: f64 = 0.5;
+
+impl Findings<'_> {
+    /// The reasons not to use the result, each a sentence without its full stop; empty where there is none.
+    #[must_use]
+    pub fn reasons(&self) -> Vec<String> {
+        let mut reasons: Vec<String> = Vec::new();
+        if self.columns.is_some_and(Conventions::differ) {
+            reasons.push("the columns or the arm file are not what they are said to be".to_string());
+        }
+        if self.not_finite {
+            reasons.push(
+                "the fit has no finite solution: see the logs' largest numbers (powerball log)".to_string(),
+            );
+        }
+        if !self.resting.is_empty() {
+            reasons.push(format!(
+                "joint {} does not move in the logs to fit: nothing is known of its friction, and the parameters that its \
+                 torque would show are taken for 0 in the other joints; record paths on which it swings (powerball excite)",
+                list(&self.resting)
+            ));
+        }
+        if !self.useless.is_empty() {
+            reasons.push(format!(
+                "the torque of joint {} is predicted no better than by its mean",
+                list(&self.useless)
+            ));
+        }
+        if self.indefinite > INDEFINITE {
+            reasons.push(format!(
+                "the mass matrix B(q) of these values is not positive definite at {:.0} % of the poses: no real arm has \
+                 them, and forward dynamics with them is useless; consistent.json has the nearest values that one can have",
+                100.0 * self.indefinite
+            ));
+        }
+        reasons
+    }
+}
+
+fn list(joints: &[JointNumber]) -> String {
+    joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}
