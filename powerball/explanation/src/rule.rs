@@ -266,8 +266,23 @@ impl Rule {
     }
 
     /// What is a probability, a correlation or a share of a whole.
-    fn shares(&self) -> [(&'static str, f64); 8] {
+    fn shares(&self) -> [(&'static str, f64); 23] {
         [
+            ("least_gain", self.least_gain),
+            ("large_gain", self.large_gain),
+            ("only_corrects_class", self.only_corrects_class),
+            ("only_corrects_any", self.only_corrects_any),
+            ("as_good", self.as_good),
+            ("same_part", self.same_part),
+            ("max_unexplained", self.max_unexplained),
+            ("event_left", self.event_left),
+            ("least_missing", self.least_missing),
+            ("max_validation_loss", self.max_validation_loss),
+            ("same_force", self.same_force),
+            ("same_time", self.same_time),
+            ("least_share", self.least_share),
+            ("predicted_share", self.predicted_share),
+            ("many_accepted", self.many_accepted),
             ("family_wise", self.family_wise),
             ("folds_that_must_gain", self.folds_that_must_gain),
             ("least_correlation", self.least_correlation),
@@ -299,6 +314,7 @@ mod tests {
             (r#"{"least_scores": 1}"#, "unknown field `least_scores`"),
             (r#"{"least_score": -1}"#, "least_score is -1: give 0 or more"),
             (r#"{"family_wise": 2}"#, "family_wise is 2: it is a share"),
+            (r#"{"max_unexplained": 5}"#, "max_unexplained is 5: it is a share"),
             (r#"{"most_steps": 1.5}"#, "most_steps: invalid type"),
             (r#"{"least_score": NaN}"#, "expected value"),
             (r#"{"shortest_block": 9}"#, "shortest_block (9 s) is longer than longest_block (2 s)"),

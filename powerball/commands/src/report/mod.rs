@@ -46,6 +46,9 @@ pub use powerball_explanation::effects::words::number;
 /// The style of pages and figures.
 const STYLE: &str = include_str!("page.css");
 
+/// What in the head of a page says that it was made here.
+pub const MADE_BY: &str = "<meta name=\"generator\" content=\"powerball\">";
+
 /// The band of an error that ends there, Hz, in words.
 #[must_use]
 pub fn band_of(end: f64) -> String {

@@ -2,7 +2,7 @@
 //!
 //! Also here: tables.
 
-use super::{BarPairs, Figure, escape, live};
+use super::{BarPairs, Figure, MADE_BY, escape, live};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -141,7 +141,7 @@ impl Page {
         format!(
             "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
              <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
-             <meta name=\"color-scheme\" content=\"light dark\"><title>{title}</title>\n\
+             {MADE_BY}<meta name=\"color-scheme\" content=\"light dark\"><title>{title}</title>\n\
              <style>\n{style}</style></head>\n<body><main>\n<h1>{title}</h1>\n{}{foot}</main>\n{scripts}</body></html>\n",
             self.body
         )

@@ -4,13 +4,14 @@ use super::payload::all_joints;
 use super::windows::{Sums, best_run, by_log, cut, explained, rests, step_start, window};
 use super::words::{Words, list, number};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part, Window};
-use powerball_logs::regression::Column;
+use powerball_controller::JointNumber;
+use powerball_logs::regression::{Column, RigidArm};
 use serde::Serialize;
 use std::f64::consts::PI;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A force in the base frame at the last frame's origin, during a window of one log: constant, or rising and falling
+/// A force in the base frame at the tool, during a window of one log: constant, or rising and falling
 /// as that of a hand does.
 pub(super) struct ContactWrench;
 
@@ -30,8 +31,26 @@ pub struct Figures {
     pub end_time: Vec<f64>,
     /// The force in the base frame, N; of a push that rises and falls the largest.
     pub force: Vec<Vec<f64>>,
+    /// Where it is taken to act: on the tool. At another point of the link it has another size.
+    pub point: Vec<Point>,
     /// When it began, in the log's own t, s.
     pub start_time: Vec<f64>,
+}
+
+/// A point of a link.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Point {
+    /// The link.
+    pub link: JointNumber,
+    /// The point in the link's frame of the arm file, m.
+    pub xyz: [f64; 3],
+}
+
+impl Point {
+    /// The tool of the arm file; where it has none the origin of the last frame.
+    pub(crate) fn tool(body: &RigidArm) -> Point {
+        Point { link: JointNumber::from_index(body.dof() - 1), xyz: body.force_point() }
+    }
 }
 
 /// Of so many pushes each is shown; of more the range.
@@ -152,12 +171,13 @@ impl Effect for ContactWrench {
         Some(seen)
     }
 
-    fn figures(&self, _: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
+    fn figures(&self, context: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
         let windows = || found.iter().flat_map(|f| &f.candidate.windows);
         let force = |f: &Found<'_>| vec![f.coefficients.to_vec(); f.candidate.windows.len()];
         Figures {
             end_time: windows().map(|w| w.to).collect(),
             force: found.iter().flat_map(force).collect(),
+            point: windows().map(|_| Point::tool(context.data.body)).collect(),
             start_time: windows().map(|w| w.from).collect(),
         }
         .into()

@@ -62,9 +62,10 @@ fn asked_of_arm(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventions 
     };
     let all: Vec<&Log> = logs.iter().chain(validate).collect();
     let kind = properties::kind(&all);
-    // The pose of a joint that does not move is any angle of the arm file.
+    // The pose of a joint that does not move is any angle of the arm file, and what no arm is has been said.
     let moves = inactive_joints(body.arm(), logs).iter().all(Option::is_none);
-    let better = if moves { arm_file::better(&asked, &found) } else { None };
+    let better =
+        if moves && body.filed().doubts().is_empty() { arm_file::better(&asked, &found) } else { None };
     let Some(better) = better else { return result(&asked, &found, kind) };
     // What the columns are is asked of the arm that they fit.
     let answer = answers::of_arm_file(&better);

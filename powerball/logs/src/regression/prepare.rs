@@ -337,15 +337,13 @@ impl<'a> Data<'a> {
         })
     }
 
-    /// Torques for unit forces on the origin of the last frame along the base axes; empty where they cannot
-    /// be had.
+    /// Torques for unit forces on the tool ([`RigidArm::force_point`]) along the base axes; empty where they cannot be had.
     pub fn force_columns(&self) -> &[Column] {
         self.force.get_or_init(|| {
-            // The static torque of a unit mass under unit gravity is that of a unit force.
-            let mass = [self.body.last_link(ParameterKind::M)];
-            (0..3)
-                .flat_map(|axis| self.columns_over_all(1, |r| self.body.gravity_columns(axis, &mass, &r.q)))
-                .collect()
+            let all = self.recordings.iter().map(|r| self.body.force_columns(&r.q));
+            let Some(all) = all.collect::<Option<Vec<[Vec<f64>; 3]>>>() else { return Vec::new() };
+            let along = |axis: usize| -> Vec<Vec<f64>> { all.iter().map(|of| of[axis].clone()).collect() };
+            (0..3).map(|axis| self.column_over_all(&along(axis))).collect()
         })
     }
 

@@ -238,6 +238,28 @@ impl RigidArm {
         Some(self.on_motors(pick(&wides[axis], chosen, &q, &v, &a, self.dof())?, chosen.len()))
     }
 
+    /// Where a force on the last link is taken to act, in its frame, m: the tool of the arm file, else the origin.
+    #[must_use]
+    pub fn force_point(&self) -> [f64; 3] {
+        let on_last = self.arm().tool_carrier() + 1 == self.arm().links();
+        let tool = self.arm().tool.as_ref().filter(|_| on_last);
+        tool.map_or([0.0; 3], |tool| tool.xyz.each_ref().map(rational::to_f64))
+    }
+
+    /// Torques for unit forces there along the base axes: by axis and sample, n. `None` where they cannot be had.
+    #[must_use]
+    pub fn force_columns(&self, q: &[f64]) -> Option<[Vec<f64>; 3]> {
+        // The static torque of a unit mass under unit gravity is that of a unit force; its first moments say where.
+        let first = self.last_link(ParameterKind::M);
+        let point = self.force_point();
+        let of = |axis: usize| {
+            let columns = self.gravity_columns(axis, &[first, first + 1, first + 2, first + 3], q)?;
+            let at = |c: &[f64]| c[0] + (0..3).map(|k| point[k] * c[k + 1]).sum::<f64>();
+            Some(columns.chunks_exact(4).map(at).collect())
+        };
+        Some([of(0)?, of(1)?, of(2)?])
+    }
+
     /// Directions in the space of all parameters, eleven a link in the order of [`Arm::all_parameters`], that
     /// no motion under the arm's own gravity shows and that a gravity from another side does: how far from an
     /// upright first axis its link's weight is, say.
@@ -326,8 +348,40 @@ fn split(matrix: &Mat<f64>, norm: f64) -> Option<(Mat<f64>, Mat<f64>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chain::Chain;
     use crate::regression::newton_euler;
     use rand::{RngExt, SeedableRng};
+
+    /// A force on the tool is felt as the slopes of its work by the joints' positions: by the poses of the chain alone.
+    #[test]
+    fn a_force_on_the_tool_is_the_slope_of_its_work() {
+        let text = include_str!("../../../../tests/arms/ur5e.toml");
+        let tool = nalgebra::Vector3::new(0.05, -0.12, 0.23);
+        for placed in [false, true] {
+            let with =
+                format!("{text}\n[tool]\nxyz = [{}, {}, {}]\nrpy = [0, 0.3, 0]\n", tool.x, tool.y, tool.z);
+            let arm = Arm::parse(if placed { &with } else { text }, "ur5e.toml").unwrap();
+            let (body, chain) = (RigidArm::new(&arm).unwrap(), Chain::new(&arm));
+            let at = if placed { tool } else { nalgebra::Vector3::zeros() };
+            let mut rng = chacha20::ChaCha8Rng::seed_from_u64(8);
+            let q: Vec<f64> = (0..arm.dof()).map(|_| rng.random_range(-1.5..1.5)).collect();
+            let point = |q: &[f64]| {
+                let (rotation, origin) = chain.poses(q).pop().unwrap();
+                origin + rotation * at
+            };
+            let columns = body.force_columns(&q).unwrap();
+            for (j, axis) in (0..arm.dof()).flat_map(|j| (0..3).map(move |axis| (j, axis))) {
+                let moved = |by: f64| {
+                    let mut q = q.clone();
+                    q[j] += by;
+                    point(&q)[axis]
+                };
+                // The motors hold against what is outside.
+                let slope = -(moved(1e-5) - moved(-1e-5)) / 2e-5;
+                approx::assert_abs_diff_eq!(columns[axis][j], slope, epsilon = 1e-8);
+            }
+        }
+    }
 
     #[test]
     fn columns_agree_with_newton_euler() {

@@ -60,7 +60,7 @@ fn keep_moving(recordings: &[Recording], bands: &[Band], limit: &[f64], n: usize
             for (of_band, band) in all.iter_mut().zip(bands) {
                 // A joint that never moves has the limit 0 and is never below it.
                 let kept = if limit[j] < 1e-5 { Vec::new() } else { band.kept(r.len()) };
-                let guard = (r.rate / band.cutoff).round() as usize;
+                let guard = (0.5 * r.rate / band.cutoff).round() as usize;
                 let clear = away_from(&moving, guard);
                 of_band[j].push((0..kept.len()).filter(|k| clear[kept[*k]]).collect());
             }

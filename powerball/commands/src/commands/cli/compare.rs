@@ -58,10 +58,11 @@ impl Compare {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let arm =
             self.arm.as_deref().map(Arm::read).transpose().map_err(|e| Failure::Unusable(e.to_string()))?;
+        output::make_folder(&self.out)?;
         let [a, b] = [self.side(&self.a, arm.as_ref())?, self.side(&self.b, arm.as_ref())?];
         let compared = compare(&a, &b, &CompareOptions { level: self.level })?;
         let files = report::compared::files(&compared).map_err(Failure::Refused)?;
-        files.write(&self.out).map_err(Failure::Unusable)?;
+        output::write_all(&files, &self.out)?;
         if self.json {
             output::print(&files.first());
             return Ok(());

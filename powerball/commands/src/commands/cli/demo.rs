@@ -40,8 +40,7 @@ pub(crate) struct DemoCommand {
 impl DemoCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let progress = Progress::new();
-        std::fs::create_dir_all(&self.out)
-            .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", self.out.display())))?;
+        output::make_folder(&self.out)?;
         let started = std::time::Instant::now();
         let demo = demo::run(
             &self.out,

@@ -120,7 +120,7 @@ impl Explain {
     /// Writes and prints the result.
     fn write(&self, explained: &Explained, verbosity: Verbosity) -> Result<(), Failure> {
         let files = report::explained::files(explained).map_err(Failure::Refused)?;
-        files.write(&self.inputs.out).map_err(Failure::Unusable)?;
+        output::write_all(&files, &self.inputs.out)?;
         let (arm, out) = (&self.inputs.arm, &self.inputs.out);
         match (self.inputs.json, verbosity) {
             (true, _) => output::print(&files.first()),

@@ -280,7 +280,7 @@ impl FollowCommand {
         let (bandwidth, plant) = (self.bandwidth(), self.on.plant());
         let result = Followed { bandwidth, largest_pole, plant, ..Followed::of(arm, law, path, tracks) };
         let files = followed::files(&result, path, tracks).map_err(Failure::Refused)?;
-        files.write(&self.out).map_err(Failure::Unusable)?;
+        output::write_all(&files, &self.out)?;
         if self.on.place.json {
             output::print(&files.first());
         } else {

@@ -118,7 +118,7 @@ impl Identify {
         terminal.say("writing");
         let known = known.as_ref().map(|known| &known.model.additions);
         let files = report::identified::files(&identified, known).map_err(Failure::Refused)?;
-        files.write(&self.out).map_err(Failure::Unusable)?;
+        output::write_all(&files, &self.out)?;
         if self.json {
             output::print(&files.first());
         } else if !verbosity.quiet {

@@ -1,7 +1,7 @@
 //! `powerball log`: what is in a file and what it is taken to be.
 
 use super::inputs::MapArgument;
-use super::{Failure, output};
+use super::{Failure, output, replace};
 use crate::report::inspected;
 use clap::{Args, ValueEnum};
 use dyngen::Arm;
@@ -71,7 +71,7 @@ impl LogCommand {
         let files = inspected.collect::<Result<Vec<_>, _>>()?;
         match (&self.out, self.to) {
             (Some(folder), None) => {
-                inspected::files(&files).and_then(|page| page.write(folder)).map_err(Failure::Unusable)?;
+                output::write_all(&inspected::files(&files).map_err(Failure::Unusable)?, folder)?;
             }
             _ => self.write(&files, arm.as_ref())?,
         }
@@ -205,6 +205,7 @@ fn table_lines(table: &InspectedTable, lines: &mut Vec<String>) {
 
 /// Writes a log; with a model as MCAP that has measured, predicted and residual torque beside each other.
 pub(super) fn write(log: &Log, arm: &Arm, model: Option<&Path>, out: &Path) -> Result<(), Failure> {
+    replace::check_log(out, &[Path::new(&log.file)])?;
     let failed = |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", out.display()));
     let Some(model) = model else { return log.write_for(out, &joint_names(arm)).map_err(failed) };
     let model = ModelFile::read(model).map_err(|e| Failure::Unusable(e.to_string()))?;

@@ -20,6 +20,7 @@ mod model_on_bus;
 mod output;
 mod profile;
 mod record;
+mod replace;
 mod serve;
 mod shell;
 mod summarize;
@@ -41,6 +42,9 @@ struct Cli {
     command: Command,
     #[command(flatten)]
     events: Events,
+    /// Write over files that this command may not have made, and over logs.
+    #[arg(long, global = true)]
+    force: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -175,6 +179,9 @@ pub fn main() -> ExitCode {
     // clap itself exits with 2 on wrong use.
     let cli = Cli::parse();
     crate::report::sign(output::signature());
+    if cli.force {
+        replace::replace_all();
+    }
     let listening = cli.events.listen();
     tracing::info!(target: events::SHOWN, version = env!("CARGO_PKG_VERSION"), "{}", output::command_line());
     let done = listening.and_then(|guards| {

@@ -1,9 +1,9 @@
 //! Results on disk and on the terminal.
 
-use super::Failure;
 use super::events::SHOWN;
+use super::{Failure, replace};
 use crate::procedure::MotionLog;
-use crate::report::{band_of, files};
+use crate::report::{Files, band_of, files};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use powerball_controller::JointNumber;
@@ -123,8 +123,9 @@ pub(crate) fn close(log: MotionLog) -> Result<(), Failure> {
     log.close().map_err(|e| Failure::Refused(format!("the log cannot be written: {e}")))
 }
 
-/// Makes a folder for results, where it is missing.
+/// Makes a folder for results, where it is missing; refused where files of their names in it are none of them.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
+    replace::check_folder(folder)?;
     files::make_folder(folder).map_err(Failure::Unusable)
 }
 
@@ -135,7 +136,14 @@ pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failu
 
 /// The same for a path.
 pub(crate) fn write_file(target: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    replace::check(target, Some(bytes))?;
     files::write_whole(target, bytes).map_err(Failure::Unusable)
+}
+
+/// Writes the files of a result into a folder.
+pub(crate) fn write_all(result: &Files, folder: &Path) -> Result<(), Failure> {
+    make_folder(folder)?;
+    result.write(folder).map_err(Failure::Unusable)
 }
 
 /// Serialises a result.

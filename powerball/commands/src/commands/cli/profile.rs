@@ -1,6 +1,6 @@
 //! `powerball profile`: an arm's constant tables from its drives' DCF and one TOML.
 
-use super::Failure;
+use super::{Failure, output};
 use clap::Args;
 use powerball_bus::driver::import;
 use std::path::{Path, PathBuf};
@@ -58,8 +58,7 @@ impl ProfileCommand {
             };
             Failure::Unusable(format!("{file}: {error}"))
         })?;
-        std::fs::write(&self.out, made)
-            .map_err(|error| Failure::Unusable(format!("{}: {error}", self.out.display())))
+        output::write_file(&self.out, made.as_bytes())
     }
 }
 

@@ -1,10 +1,9 @@
 //! `powerball record`: a trajectory in interpolated position mode, and its log.
 
-use super::Failure;
 use super::bus::{Consent, Where, master};
 use super::envelope::Surroundings;
 use super::log::joint_names;
-use super::output;
+use super::{Failure, output, replace};
 use crate::procedure::{Behind, RecordError, record};
 use clap::Args;
 use powerball_bus::driver::lwa4p::LWA4P;
@@ -38,9 +37,6 @@ pub(crate) struct RecordCommand {
     /// Where the log is written: Parquet or MCAP where the name ends in .parquet or .mcap, CSV else.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Write over a log that is there already.
-    #[arg(long)]
-    force: bool,
     /// How the base stands: filed, ROLL,PITCH in degrees, or gravity in the base frame as X,Y,Z in m/s².
     #[arg(long, default_value = "filed", allow_hyphen_values = true)]
     mounting: Mounting,
@@ -59,12 +55,7 @@ impl RecordCommand {
             .map_err(|e| Failure::Unusable(format!("{name}: cannot be read: {e}")))?;
         let motion = Motion::from_csv(&text, LWA4P.joints.len())
             .map_err(|why| Failure::Unusable(format!("{name}: {why}")))?;
-        if self.out.is_file() && !self.force {
-            return Err(Failure::Unusable(format!(
-                "{}: is there already; --force writes over it",
-                self.out.display()
-            )));
-        }
+        replace::check_log(&self.out, &[&self.trajectory])?;
         let arm = self.surroundings.arm()?;
         let envelope = self.surroundings.envelope(&arm, &self.mounting)?;
         let master = master(&self.place, self.consent)?;

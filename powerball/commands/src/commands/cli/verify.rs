@@ -54,7 +54,7 @@ impl Verify {
         let logs = self.inputs.log.iter().map(source);
         let verified = verify(&arm, &model, logs, &options)?;
         let files = report::verified::files(&verified).map_err(Failure::Refused)?;
-        files.write(&self.inputs.out).map_err(Failure::Unusable)?;
+        output::write_all(&files, &self.inputs.out)?;
         if self.inputs.json {
             output::print(&files.first());
         } else {

@@ -168,6 +168,7 @@ fn add_pushes_at_rest(named: &mut Vec<NamedEffect>, findings: &Findings<'_>, aft
     let own = contact_wrench::Figures {
         end_time: pushes.iter().map(|p| p.to).collect(),
         force: pushes.iter().map(|p| p.force.to_vec()).collect(),
+        point: vec![contact_wrench::Point::tool(findings.study.data.body); pushes.len()],
         start_time: pushes.iter().map(|p| p.from).collect(),
     };
     let mut logs: Vec<String> = pushes.iter().map(|p| p.log.clone()).collect();
@@ -179,6 +180,7 @@ fn add_pushes_at_rest(named: &mut Vec<NamedEffect>, findings: &Findings<'_>, aft
     if let Some((figures, known)) = known {
         figures.end_time.extend(own.end_time);
         figures.force.extend(own.force);
+        figures.point.extend(own.point);
         figures.start_time.extend(own.start_time);
         known.extend(logs.into_iter().filter(|log| !known.contains(log)).collect::<Vec<_>>());
         return;

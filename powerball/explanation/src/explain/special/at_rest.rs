@@ -6,7 +6,6 @@
 
 use super::super::model::Model;
 use super::super::study::Study;
-use dyngen::arm::ParameterKind;
 use faer::Mat;
 use powerball_controller::JointNumber;
 use powerball_identification::estimate::Solver;
@@ -23,7 +22,7 @@ pub(crate) struct RestPush {
     /// When, in the log's own t, s.
     pub(crate) from: f64,
     pub(crate) to: f64,
-    /// The largest force on the last frame's origin in the base frame, N.
+    /// The largest force on the tool in the base frame, N.
     pub(crate) force: [f64; 3],
     /// The joints of which torque left by more than friction hides.
     pub(crate) joints: Vec<JointNumber>,
@@ -154,9 +153,7 @@ impl<'r> Stretch<'r> {
         let top = run.clone().max_by(|a, b| size(*a).total_cmp(&size(*b)))?;
         let deviation: Vec<f64> = (0..dof).map(|j| self.torque[j][top]).collect();
         let q = &self.recording.q[(self.samples.start + top) * dof..][..dof];
-        let mass = [data.body.last_link(ParameterKind::M)];
-        let lever: Vec<Vec<f64>> =
-            (0..3).map(|axis| data.body.gravity_columns(axis, &mass, q)).collect::<Option<_>>()?;
+        let lever = data.body.force_columns(q)?;
         // Each joint counts as surely as its friction lets it.
         let weight: Vec<f64> = limit.iter().zip(noise).map(|(l, n)| 1.0 / (l * l + n * n)).collect();
         let sum = |x: &[f64], y: &[f64]| (0..dof).map(|j| weight[j] * x[j] * y[j]).sum::<f64>();
