@@ -331,7 +331,7 @@ fn inspect_shows_what_each_pass_leaves() {
 fn friction_terms_that_do_not_fit_are_refused() {
     let target = file("friction.rs", "untouched");
     let generate = |terms: &str| {
-        dyngen(&["generate", &arm(), "-o", &target, "--functions", "gravity", "--friction", terms])
+        dyngen(&["generate", &arm(), "-o", &target, "--functions", "gravity", "--friction", terms, "--force"])
     };
     for (terms, code, reason) in [
         ("sticky", 2, "there are viscous, coulomb and tanh:SHAPE"),
@@ -344,6 +344,11 @@ fn friction_terms_that_do_not_fit_are_refused() {
         assert!(text(&out.stderr).contains(reason), "{terms}: {}", text(&out.stderr));
         assert_eq!(std::fs::read_to_string(&target).unwrap(), "untouched");
     }
+    // What dyngen has not generated is not written over.
+    let out = dyngen(&["generate", &arm(), "-o", &target, "--functions", "gravity"]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(text(&out.stderr).contains("--force"), "{}", text(&out.stderr));
+    assert_eq!(std::fs::read_to_string(&target).unwrap(), "untouched");
     assert!(generate("viscous,coulomb,tanh:216").status.success());
     let source = std::fs::read_to_string(&target).unwrap();
     assert!(source.contains("pub fn friction_columns<") && source.contains("FRICTION_TERMS: usize = 3"));

@@ -179,7 +179,7 @@ fn the_command_ends_with_its_codes_whatever_it_reads() {
         &["describe", &arm, "--json"],
         &["eval", &arm, "--function", "inverse_dynamics", "--states", &states, "--values", &values],
         &["check", &arm, "--values", &values],
-        &["generate", &arm, "-o", &out, "--functions", "gravity"],
+        &["generate", &arm, "-o", &out, "--functions", "gravity", "--force"],
         &["import", &urdf, "--tip", "hand", "-o", &out, "--force"],
     ];
     let mut rng = ChaCha8Rng::seed_from_u64(5);
@@ -199,7 +199,12 @@ fn the_command_ends_with_its_codes_whatever_it_reads() {
             let run = Command::new(env!("CARGO_BIN_EXE_dyngen")).args(command).output().unwrap();
             let said = String::from_utf8_lossy(&run.stderr);
             let code = run.status.code();
-            assert!(matches!(code, Some(0..=2)), "{command:?}: {code:?}: {said}\n{texts:#?}");
+            // A damaged number may make an arm that is none: 3.
+            let codes = if i > 0 { 0..=3 } else { 0..=2 };
+            assert!(
+                code.is_some_and(|code| codes.contains(&code)),
+                "{command:?}: {code:?}: {said}\n{texts:#?}"
+            );
             assert!(!said.contains("panicked"), "{command:?}: {said}\n{texts:#?}");
             // The first round is not damaged; check may find its values impossible, and says so on standard
             // output.

@@ -351,7 +351,7 @@ fn rest(page: &mut Page, explained: &Explained) {
     let chance = &explained.false_positives;
     let without = match chance.without {
         0 => String::new(),
-        n => format!(" ({n} more draws were of constants, which no shift in time changes)"),
+        n => format!(" ({n} more were constant torques, which no shift changes)"),
     };
     page.paragraph(&format!(
         "How often the rule is wrong on these data: {} of {} effects that cannot be there were accepted{without}. \

@@ -50,8 +50,7 @@ pub(super) fn kept_samples(
     (kept, left_out)
 }
 
-/// By band, joint and recording: which of the band's kept samples are rows. Those that the band's filter mixes with a stop
-/// are none: a joint that stands holds any torque up to its Coulomb friction, which biases what is fitted next to it.
+/// By band, joint and recording: which of the band's kept samples are rows.
 fn keep_moving(recordings: &[Recording], bands: &[Band], limit: &[f64], n: usize) -> Kept {
     let mut all = vec![vec![Vec::with_capacity(recordings.len()); n]; bands.len()];
     for j in 0..n {
@@ -60,26 +59,11 @@ fn keep_moving(recordings: &[Recording], bands: &[Band], limit: &[f64], n: usize
             for (of_band, band) in all.iter_mut().zip(bands) {
                 // A joint that never moves has the limit 0 and is never below it.
                 let kept = if limit[j] < 1e-5 { Vec::new() } else { band.kept(r.len()) };
-                let guard = (0.5 * r.rate / band.cutoff).round() as usize;
-                let clear = away_from(&moving, guard);
-                of_band[j].push((0..kept.len()).filter(|k| clear[kept[*k]]).collect());
+                of_band[j].push((0..kept.len()).filter(|k| moving[kept[*k]]).collect());
             }
         }
     }
     all
-}
-
-/// Which samples have no `false` within `guard` samples.
-fn away_from(moving: &[bool], guard: usize) -> Vec<bool> {
-    let mut clear = moving.to_vec();
-    for (k, pair) in moving.windows(2).enumerate() {
-        match pair {
-            [false, true] => clear[k..(k + 1 + guard).min(moving.len())].fill(false),
-            [true, false] => clear[(k + 1).saturating_sub(guard)..=k].fill(false),
-            _ => {}
-        }
-    }
-    clear
 }
 
 /// Leaves out a joint's samples in some spans of its logs, and those that the band's filter mixes with them.

@@ -273,9 +273,11 @@ pub(super) fn everything(explained: &Explained, arm: &Path, out: &Path) -> Strin
     );
     text.push_str(&open_in_words(explained));
     let FalsePositives { accepted, surrogates, without, .. } = &explained.false_positives;
-    text.push_str(&format!("{accepted} of {surrogates} effects that cannot be there were accepted"));
+    text.push_str(&format!(
+        "{accepted} of {surrogates} effects that cannot be there were accepted (shifted in time)"
+    ));
     if *without > 0 {
-        text.push_str(&format!(" ({without} more draws were of constants that no shift in time changes)"));
+        text.push_str(&format!("; {without} more were constant torques, which no shift changes"));
     }
     text.push_str(&format!("\nreport: {}\n", out.join("report.html").display()));
     text.push_str(&format!("next: {}", next(explained, arm, out)));

@@ -77,9 +77,8 @@ fn is_alike(target: &Path, old: &[u8], new: Option<&[u8]>) -> bool {
         _ => None,
     };
     if name.ends_with(".html") {
-        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-        let (head, foot) = (&old[..old.len().min(ENDS)], &old[old.len().saturating_sub(ENDS)..]);
-        return text(head).contains(crate::report::MADE_BY) || text(foot).contains(" UTC, powerball ");
+        let page = String::from_utf8_lossy(old);
+        return page.contains(crate::report::MADE_BY) || page.contains(" UTC, powerball ");
     }
     if let Some(own) = object(old) {
         let flat = |object: &serde_json::Map<String, Value>| object.values().all(Value::is_number);
@@ -97,9 +96,6 @@ fn is_alike(target: &Path, old: &[u8], new: Option<&[u8]>) -> bool {
     let first = |bytes: &[u8]| bytes.split(|b| *b == b'\n').next().map(<[u8]>::to_vec);
     new.is_some_and(|new| first(old) == first(new))
 }
-
-/// Bytes of a page in which its head lies, and its foot.
-const ENDS: usize = 2000;
 
 #[cfg(test)]
 mod tests {
