@@ -443,3 +443,43 @@ fn nothing_is_lost_and_no_nan_is_printed() {
     assert_eq!((eval.status.code(), eval.stdout.len()), (Some(1), 0), "{message}");
     assert!(message.contains("states.csv:2") && message.contains("singular"), "{message}");
 }
+
+/// A rod of negative inertia is generated, with a warning that says why and what to take; units that no arm has end with 3.
+#[test]
+fn what_no_arm_can_have_is_said() {
+    let rod = |a: &str, gravity: &str| {
+        format!(
+            "name = \"rod\"\nconvention = \"standard\"\ngravity = [0, {gravity}, 0]\n[[joint]]\nkind = \"revolute\"\n\
+             a = {a}\nalpha = 0\nd = 0\ntheta = 0\n"
+        )
+    };
+    let arm = file("rod.toml", &rod("0.5", "-9.81"));
+    let values = |izz: f64| {
+        let zero =
+            ["mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz"].map(|name| format!("\"{name}1\": 0, "));
+        file("rod.json", &format!("{{{}\"m1\": 1, \"Izz1\": {izz}}}", zero.concat()))
+    };
+    let generate = |arm: &str, values: &str, more: &[&str]| {
+        let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rod.rs").display().to_string();
+        dyngen(
+            &[&["generate", arm, "-o", &out, "--functions", "gravity", "--force", "--values", values], more]
+                .concat(),
+        )
+    };
+    // 1 kg at 0.5 m has 0.25 kg·m² about the axis.
+    let bad = generate(&arm, &values(-0.9), &[]);
+    assert_eq!(bad.status.code(), Some(0));
+    let said = text(&bad.stderr);
+    assert!(said.starts_with("warning: ") && said.contains("B(q) is not positive definite"), "{said}");
+    assert!(said.contains("consistent.json"), "{said}");
+    for (a, gravity, reason) in
+        [("500", "-9.81", "give a, b and d in metres"), ("0.5", "-9810", "give it in m/s²")]
+    {
+        let arm = file("rod_in_mm.toml", &rod(a, gravity));
+        let done = generate(&arm, &values(0.1), &[]);
+        assert_eq!(done.status.code(), Some(3), "{}", text(&done.stderr));
+        assert!(text(&done.stderr).lines().next().unwrap().contains(reason), "{}", text(&done.stderr));
+        assert_eq!(generate(&arm, &values(0.1), &["--accept"]).status.code(), Some(0));
+        assert_eq!(dyngen(&["describe", &arm]).status.code(), Some(3));
+    }
+}

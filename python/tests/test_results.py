@@ -61,6 +61,7 @@ def test_what_an_identification_tells(identified, arm, rng):
     assert arm.check(identified.consistent).possible
     assert "joint" in identified._repr_html_() and "Identified" in repr(identified)
     assert identified.conventions is not None
+    assert identified.unusable == [] and set(identified.fit.band) == {7.0}
 
 
 def test_frames_dicts_and_arrays_are_the_same_log(session, arm):

@@ -63,3 +63,37 @@ impl Findings<'_> {
 fn list(joints: &[JointNumber]) -> String {
     joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_reason_is_one_sentence_and_none_is_none() {
+        assert!(Findings::default().reasons().is_empty());
+        assert!(Findings { indefinite: 0.4, ..Findings::default() }.reasons().is_empty());
+        let joint = |j: usize| vec![JointNumber::from_index(j)];
+        let cases = [
+            (
+                Findings { resting: joint(3), ..Findings::default() },
+                "joint 4 does not move in the logs to fit",
+            ),
+            (
+                Findings { useless: joint(1), ..Findings::default() },
+                "joint 2 is predicted no better than by its mean",
+            ),
+            (Findings { not_finite: true, ..Findings::default() }, "no finite solution"),
+            (
+                Findings { indefinite: 1.0, ..Findings::default() },
+                "not positive definite at 100 % of the poses",
+            ),
+        ];
+        for (findings, part) in cases {
+            let reasons = findings.reasons();
+            assert!(
+                matches!(reasons.as_slice(), [one] if one.contains(part) && !one.ends_with('.')),
+                "{reasons:?}"
+            );
+        }
+    }
+}

@@ -21,6 +21,8 @@ class Spread:
     rms: Array
     #: rms of the error over rms of the measured torque, (n,).
     relative: Array
+    #: The end of the band in which the errors are, from 0, (n,), Hz.
+    band: Array
     #: Samples they are of.
     samples: int
 
@@ -29,7 +31,9 @@ def spread(told: Optional[Dict[str, Any]]) -> Optional[Spread]:
     """A spread of its JSON."""
     if told is None:
         return None
-    return Spread(numbers(told["rms"]), numbers(told["relative"]), int(told["samples"]))
+    return Spread(
+        numbers(told["rms"]), numbers(told["relative"]), numbers(told["band"]), int(told["samples"])
+    )
 
 
 def numbers(values: Sequence[Optional[float]]) -> Array:
@@ -67,6 +71,11 @@ class OfLogs(Result):
         """What the columns of the logs are: signs, units, gravity, delay; and the map that corrects them."""
         told: Optional[Dict[str, Any]] = self._told.get("conventions")
         return told
+
+    @property
+    def unusable(self) -> List[str]:
+        """Why this result should not be used (exit 3 of the command); empty where it can be."""
+        return list(self._told.get("unusable", []))
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:

@@ -228,7 +228,8 @@ class Explained(OfLogs):
         lead = paragraph(named and "What the model lacks" or "No effect was named.", strong=True)
         formulas = "".join(paragraph(f"Without a name: {law.formula}") for law in self.laws)
         return (
-            lead
+            "".join(paragraph(f"Do not use this result: {reason}.", strong=True) for reason in self.unusable)
+            + lead
             + named
             + formulas
             + table(["joint", "verdict", "base model", "with effects", "advice"], rows)

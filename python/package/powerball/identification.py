@@ -116,7 +116,8 @@ class Identified(OfLogs):
         head = ["joint", "fit", "validation"] if self.validate else ["joint", "fit"]
         possible = "" if self.physically_consistent else " No real arm can have these values."
         return (
-            paragraph(f"{self._told['arm']}: {len(self.parameters)} parameters.{possible}", strong=True)
+            "".join(paragraph(f"Do not use this result: {reason}.", strong=True) for reason in self.unusable)
+            + paragraph(f"{self._told['arm']}: {len(self.parameters)} parameters.{possible}", strong=True)
             + table(head, error_rows([self.fit, self.validate]))
             + "".join(paragraph(warning) for warning in self.warnings)
         )
