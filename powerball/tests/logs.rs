@@ -266,8 +266,9 @@ fn a_bag_in_the_order_of_the_alphabet_is_identified_in_the_order_of_the_chain() 
 
     // What a model predicts goes out beside what was measured.
     let (model, torque) = (shown(&folder.join("a/identified.json")), shown(&folder.join("torque.mcap")));
-    let done =
-        powerball(&["log", &csv, "--arm", &arm_file, "--model", &model, "--to", "mcap", "-o", &torque]);
+    let done = powerball(&[
+        "log", &csv, "--arm", &arm_file, "--model", &model, "--to", "mcap", "--force", "-o", &torque,
+    ]);
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let tables = read_contents(Path::new(&torque)).unwrap().tables;
     let of = |name: &str| tables[1].column(name).unwrap();

@@ -215,10 +215,8 @@ fn words(name: &str) -> Vec<String> {
         if !c.is_alphabetic() || (c.is_uppercase() && small) {
             words.push(String::new());
         }
-        if c.is_alphabetic() {
-            if let Some(last) = words.last_mut() {
-                last.extend(c.to_lowercase());
-            }
+        if let Some(last) = words.last_mut().filter(|_| c.is_alphabetic()) {
+            last.extend(c.to_lowercase());
         }
         small = c.is_lowercase();
     }

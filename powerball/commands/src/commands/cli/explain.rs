@@ -296,7 +296,7 @@ pub(super) fn open_in_words(explained: &Explained) -> String {
 /// A line a joint: its error before and after on the logs to judge on, the change, what is left, the verdict.
 fn table(explained: &Explained) -> String {
     let mut text =
-        String::from("joint  band, Hz        before         after  change, 95 % interval     left  verdict");
+        String::from("joint        before         after  change, 95 % interval     left  band, Hz  verdict");
     let (before, after) = (&explained.before.validate, &explained.after.validate);
     for verdict in &explained.verdict {
         let j = verdict.joint.index();
@@ -304,13 +304,13 @@ fn table(explained: &Explained) -> String {
         let cell = |rms: f64| format!("{} {unit}", number(rms));
         let changed = explained.held_out_change.iter().find(|c| c.joint == verdict.joint);
         text.push_str(&format!(
-            "\n{:>5}  {:>8}  {:>12}  {:>12}  {:>21}  {:>7}  {}",
+            "\n{:>5}  {:>12}  {:>12}  {:>21}  {:>7}  {:>8}  {}",
             verdict.joint.number(),
-            report::band_of(after.band[j]),
             cell(before.rms[j]),
             cell(after.rms[j]),
             changed.map_or_else(String::new, change),
             if verdict.left.is_nan() { "–".to_string() } else { format!("{:.1} %", 100.0 * verdict.left) },
+            report::band_of(after.band[j]),
             verdict.state
         ));
     }

@@ -226,18 +226,20 @@ fn typed(arguments: impl Iterator<Item = String>) -> String {
 
 /// Errors by joint as a table with the band that they are in; several spreads side by side.
 pub(crate) fn table(columns: &[(&str, &ResidualStats)]) -> String {
-    let mut text = String::from("joint  band, Hz");
+    let mut text = String::from("joint");
     for (name, _) in columns {
         text.push_str(&format!("  {name:>26}"));
     }
+    text.push_str("  band, Hz");
     let joints = columns.iter().map(|(_, s)| s.rms.len()).max().unwrap_or(0);
     for j in 0..joints {
-        let band = columns.iter().find_map(|(_, s)| s.band.get(j)).map_or(String::new(), |b| band_of(*b));
-        text.push_str(&format!("\n{:>5}  {band:>8}", JointNumber::from_index(j).number()));
+        text.push_str(&format!("\n{:>5}", JointNumber::from_index(j).number()));
         for (_, stats) in columns {
             let cell = format!("{:.4} N·m  {:5.1} %", stats.rms[j], 100.0 * stats.relative[j]);
             text.push_str(&format!("  {cell:>26}"));
         }
+        let band = columns.iter().find_map(|(_, s)| s.band.get(j)).map_or(String::new(), |b| band_of(*b));
+        text.push_str(&format!("  {band:>8}"));
     }
     text
 }
