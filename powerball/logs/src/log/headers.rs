@@ -8,7 +8,7 @@ use super::columns::{Asked, group};
 use super::map::{ByJoint, ColumnMap};
 use std::collections::BTreeMap;
 
-/// Words that name a quantity. Words of the first column that has one decide.
+/// Words that name a quantity; a name with those of two quantities names none.
 const WORDS: [(&str, &[&str]); 5] = [
     ("dq", &["dq", "qd", "qdot", "vel", "velocity", "velocities", "speed"]),
     ("tau", &["tau", "torque", "torques", "trq", "effort", "efforts"]),
