@@ -178,14 +178,7 @@ impl Config {
         let (model, options) = self.model()?;
         let values = options.values.unwrap_or_default();
         let found = consistency::check(&model, options.parameters, &values).map_err(GenerateError::Model)?;
-        let warning = |reason: &String| {
-            format!(
-                "{}: no real arm can have these values: {reason}; the nearest that one can have: consistent.json of \
-                 `powerball identify`, or `powerball consistent`",
-                file.display()
-            )
-        };
-        Ok(found.reasons.iter().map(warning).collect())
+        Ok(found.warnings(file))
     }
 
     /// `file`, and in C its header.

@@ -11,6 +11,7 @@ use crate::exact::prime::Draws;
 use crate::model::{Error, Model};
 use crate::parameters::{ParameterSet, SetKind, SetParameter};
 use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3};
+use std::path::Path;
 
 /// Poses that are drawn before the worst of them are refined.
 const POSES: usize = 512;
@@ -30,6 +31,21 @@ pub struct Possibility {
     pub min_eigenvalue: f64,
     /// The share of poses drawn at random at which B(q) is not positive definite.
     pub indefinite: f64,
+}
+
+impl Possibility {
+    /// What speaks against the values of a file, each with what to take in their place.
+    #[must_use]
+    pub fn warnings(&self, file: &Path) -> Vec<String> {
+        let warning = |reason: &String| {
+            format!(
+                "{}: no real arm can have these values: {reason}; the nearest that one can have: consistent.json of \
+                 `powerball identify`, or `powerball consistent`",
+                file.display()
+            )
+        };
+        self.reasons.iter().map(warning).collect()
+    }
 }
 
 /// Judges the values of a set's parameters, in the set's order.

@@ -85,7 +85,8 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         }
     }
     let foreign = |file: &&PathBuf| {
-        std::fs::read(file).is_ok_and(|old| !old.is_empty() && !is_generated(&old))
+        file.is_file()
+            && std::fs::read(file).is_ok_and(|old| !old.is_empty() && !is_generated(&old))
             && !args.force
             && !args.check
     };

@@ -214,7 +214,7 @@ fn lengths_in_millimetres_are_told() {
 }
 
 #[test]
-fn gravity_in_another_unit_is_told() {
+fn gravity_in_another_unit_is_reported() {
     let result = told_of_arm(|arm| arm.gravity = arm.gravity.each_ref().map(|g| g * integer(1000)));
     assert!(result.arm_file.unwrap().contains("give it in m/s²"), "{}", result.evidence);
 }

@@ -1,5 +1,6 @@
 //! What can be wrong with numbers that are there: time, wraps, units, dead and saturated signals.
 
+use super::map::{SLOWEST, time_unit};
 use super::read::{Effort, Raw};
 use super::{Doubt, Finding, Log, LogError, Motors, Severity, Warnings, outliers, signal_checks};
 use crate::signal::resample::median_step;
@@ -59,10 +60,10 @@ fn finding(file: &str, line: Option<usize>, quantity: impl Into<String>, message
     Finding { file: file.to_string(), line, quantity: quantity.into(), message }
 }
 
-/// So many samples after a clock's restart rise, and lie before it.
+/// Samples after a clock's restart that rise and lie before it.
 const AFTER_RESTART: usize = 5;
-/// Between the parts of a log whose clock restarts there is a gap of so many seconds.
-const RESTART: f64 = 1.0;
+/// The gap between the parts of a log whose clock restarts, s.
+pub(super) const RESTART: f64 = 1.0;
 
 /// Lets time run on where a clock restarts: what follows is a piece of its own, as after a gap. Gives the times of these
 /// pieces' first samples.
@@ -122,12 +123,8 @@ fn sound_step(raw: &Raw, file: &str, findings: &mut Vec<Finding>) -> Result<f64,
         return Err(LogError(vec![finding(file, None, "samples", message)]));
     }
     let step = median_step(&raw.t).unwrap_or(1.0);
-    if step >= 0.5 {
-        let unit = match step {
-            step if step < 500.0 => "ms",
-            step if step < 5e5 => "us",
-            _ => "ns",
-        };
+    if step >= SLOWEST {
+        let unit = time_unit(step);
         let message = format!(
             "the median step is {step} s: t must be in seconds (this looks like {unit}: --map 't.unit = \"{unit}\"')"
         );

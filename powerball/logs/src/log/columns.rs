@@ -378,7 +378,7 @@ fn one_too_many_message(more: &str, n: usize) -> String {
     )
 }
 
-/// The position column beside those of the arm's joints, where columns are numbered and no map says which are meant: of a
+/// The position column next to those of the arm's joints, where columns are numbered and no map says which are meant: of a
 /// joint after the last one, or of a joint 0.
 fn one_too_many(names: &[String], asked: Asked<'_>) -> Option<String> {
     let is_said = asked.map.q.column.is_some() || !asked.map.joints.is_empty();

@@ -1,7 +1,7 @@
 //! Columns of other names: `time`, `joint_1_pos`, `actual_q_0`. What they are by the words in their names, as a column map.
 //!
 //! A quantity is a family of columns whose names differ by one number, which counts all joints from 1 or from 0, or by
-//! the joints' names. Where every quantity has one family the log is read so, and that is said; else all that is
+//! the joints' names. Where every quantity has one family the log is read so, with a note; else all that is
 //! possible is proposed.
 
 use super::columns::{Asked, group};
@@ -161,7 +161,7 @@ fn families(names: &[String], asked: Asked<'_>) -> Vec<Family> {
                 found.entry((&name[..from], &name[to..])).or_default().insert(number, name);
             }
         }
-        for (j, joint) in asked.arm.joints.iter().enumerate() {
+        for (j, joint) in asked.arm.moving_joints().enumerate() {
             let own = joint.name.as_deref().filter(|own| !own.is_empty());
             if let Some(at) = own.and_then(|own| Some((name.find(own)?, own.len()))) {
                 found.entry((&name[..at.0], &name[at.0 + at.1..])).or_default().insert(j + 1, name);

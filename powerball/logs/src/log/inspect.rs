@@ -1,7 +1,7 @@
 //! What is in a file and what it is taken to be, before anybody uses it.
 
 use super::columns::meaning;
-use super::map::{Clock, ColumnMap};
+use super::map::{Clock, ColumnMap, time_unit};
 use super::topics::{Alignment, alignment, clock};
 use super::{Finding, Log, LogError, read_log_as};
 use crate::signal::resample::median_step;
@@ -259,12 +259,7 @@ fn column(column: Column, map: &ColumnMap, step: Option<f64>) -> InspectedColumn
 fn guessed(key: &str, [min, max]: [f64; 2], values: &[f64], step: Option<f64>) -> Option<&'static str> {
     let far = max.abs().max(min.abs()) > FAR;
     Some(match key {
-        "t" => match median_step(values).or(step)? {
-            step if step < 0.5 => "s",
-            step if step < 500.0 => "ms",
-            step if step < 5e5 => "us",
-            _ => "ns",
-        },
+        "t" => time_unit(median_step(values).or(step)?),
         "q" if far => "deg",
         "q" => "rad",
         "dq" if far => "deg/s",

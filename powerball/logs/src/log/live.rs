@@ -1,6 +1,7 @@
 //! Rows one by one, while they are recorded: found by their column names as those of files, and nothing is known of
 //! what comes after.
 
+use super::check::RESTART;
 use super::columns::{Asked, Columns};
 use super::map::ColumnMap;
 use super::read::Effort;
@@ -38,8 +39,6 @@ pub enum Taken {
 
 /// Time that falls back by more than this is a clock that restarts, s.
 const RESTARTS: f64 = 0.5;
-/// Between the last sample before and the first one after a restart so much time is taken to have passed, s.
-const BETWEEN: f64 = 1.0;
 
 /// How the rows of a stream become samples.
 pub struct LiveRows {
@@ -80,8 +79,8 @@ impl LiveRows {
             if last.t - t < RESTARTS {
                 return Taken::Stale;
             }
-            self.added += last.t + BETWEEN - t;
-            (t, restarted) = (last.t + BETWEEN, true);
+            self.added += last.t + RESTART - t;
+            (t, restarted) = (last.t + RESTART, true);
         }
         if let Effort::Current(constants) = &self.columns.effort {
             torque.iter_mut().zip(constants).for_each(|(x, c)| *x *= c);

@@ -217,6 +217,24 @@ impl ColumnMap {
     }
 }
 
+/// Units of velocities other than the log's own, with how much of that they are.
+pub(super) fn velocity_units() -> impl Iterator<Item = (&'static str, f64)> {
+    VELOCITIES.iter().filter(|(_, factor)| *factor != 1.0).map(|(names, factor)| (names[0], *factor))
+}
+
+/// The unit of time in which samples are so far apart.
+pub(super) fn time_unit(step: f64) -> &'static str {
+    match step {
+        step if step < SLOWEST => "s",
+        step if step < 1e3 * SLOWEST => "ms",
+        step if step < 1e6 * SLOWEST => "us",
+        _ => "ns",
+    }
+}
+
+/// No log has samples further apart, s.
+pub(super) const SLOWEST: f64 = 0.5;
+
 fn units(key: &str) -> &'static [Unit] {
     match key {
         "t" => TIMES,

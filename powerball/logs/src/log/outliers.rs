@@ -9,11 +9,11 @@ use dyngen::Arm;
 use dyngen::arm::JointKind;
 use std::f64::consts::TAU;
 
-/// So many times as far from the median as 99 of 100 samples are: no motion and no knock reaches that.
+/// Times as far from the median as 99 of 100 samples are: no motion and no knock reaches that.
 const FAR: f64 = 20.0;
-/// … and so many times a joint's torque limit, where the arm file has one.
+/// … and times a joint's torque limit, where the arm file has one.
 const ABOVE_LIMIT: f64 = 5.0;
-/// A position that comes back after at most so many samples did not move there.
+/// A position that comes back within this many samples did not move there.
 const LONGEST_JUMP: usize = 3;
 /// More samples than this share, and than [`FEW`], are no rare fault.
 const MOST: f64 = 1e-3;

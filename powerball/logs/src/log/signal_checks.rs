@@ -1,6 +1,7 @@
 //! What one log's signals say against themselves, before an arm is asked: logged velocities against positions, levels,
 //! and the signs of torques. What an arm says against the columns is asked by `identification::conventions`.
 
+use super::map::velocity_units;
 use super::read::Raw;
 use super::{Doubt, Finding};
 
@@ -22,13 +23,6 @@ const OTHER: f64 = 0.9;
 const CLOCKS: f64 = 5e-3;
 /// With a time base that is off by more than this share no inertia and no friction is right.
 const WRONG_TIME: f64 = 0.1;
-/// Units of a velocity in rad/s, by their names in a column map.
-const UNITS: [(&str, f64); 4] = [
-    ("deg/s", 1.0 / 57.29578),
-    ("turn/s", std::f64::consts::TAU),
-    ("rpm", std::f64::consts::TAU / 60.0),
-    ("mrad/s", 1e-3),
-];
 /// A ratio is that of a unit where it differs from it by no more than this share.
 const LIKE_UNIT: f64 = 0.03;
 
@@ -81,7 +75,7 @@ pub(super) fn velocities(raw: &Raw, step: f64, warnings: &mut Warnings<'_>) -> V
             );
         } else if !(0.67..1.5).contains(&ratio) {
             // The ratio is q's slope over dq.
-            let of_dq = UNITS.iter().find(|(_, unit)| (ratio / unit - 1.0).abs() < LIKE_UNIT);
+            let of_dq = velocity_units().find(|(_, unit)| (ratio / unit - 1.0).abs() < LIKE_UNIT);
             let unit = of_dq.map(|(unit, _)| format!("dq looks like {unit} (--map 'dq.unit = \"{unit}\"')"));
             let (hint, severity) = if let Some(hint) = &unit {
                 (hint.as_str(), Severity::Warning)
@@ -119,8 +113,7 @@ fn wrong_time(joints: &[Stretches]) -> Option<Doubt> {
     // One joint alone may have a unit of its own.
     let common = ratios[ratios.len() / 2];
     let alike = ratios.len() >= 2 && most - least < 0.02 * common;
-    let of_unit = UNITS
-        .iter()
+    let of_unit = velocity_units()
         .any(|(_, unit)| [common / unit, common * unit].iter().any(|ratio| (ratio - 1.0).abs() < LIKE_UNIT));
     if !alike || of_unit || (common - 1.0).abs() < WRONG_TIME {
         return None;

@@ -68,13 +68,7 @@ impl Generate {
         let Some(model) = known.model(&body)? else { return Ok(()) };
         let values: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
         let possibility = body.possibility(&values).map_err(|e| Failure::Refused(e.to_string()))?;
-        for reason in &possibility.reasons {
-            eprintln!(
-                "warning: {}: no real arm can have these values: {reason}; the nearest that one can have: consistent.json \
-                 of `powerball identify`, or `powerball consistent`",
-                self.model.display()
-            );
-        }
+        possibility.warnings(&self.model).iter().for_each(|warning| eprintln!("warning: {warning}"));
         let file = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
         let scalar = match self.scalar {
             ScalarName::F32 => Scalar::F32,

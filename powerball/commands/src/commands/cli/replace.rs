@@ -38,7 +38,8 @@ pub(super) fn check_folder(folder: &Path) -> Result<(), Failure> {
 
 /// Refuses to replace a file that is not of the kind of `new`; without it by its name alone.
 pub(super) fn check(target: &Path, new: Option<&[u8]>) -> Result<(), Failure> {
-    if FORCE.load(Ordering::Relaxed) {
+    // A pipe or a terminal holds nothing that could be lost.
+    if FORCE.load(Ordering::Relaxed) || !target.is_file() {
         return Ok(());
     }
     // What cannot be read says so when it is written.
@@ -57,7 +58,7 @@ pub(super) fn check_log(target: &Path, inputs: &[&Path]) -> Result<(), Failure> 
         let reason = format!("{}: is what is read: choose another file", target.display());
         return Err(Failure::Unusable(reason));
     }
-    match target.exists() && !FORCE.load(Ordering::Relaxed) {
+    match target.is_file() && !FORCE.load(Ordering::Relaxed) {
         true => Err(refused(target)),
         false => Ok(()),
     }

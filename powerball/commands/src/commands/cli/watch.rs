@@ -316,7 +316,7 @@ fn lines(mut input: impl BufRead) -> impl Iterator<Item = std::io::Result<String
     })
 }
 
-/// With a larger share of samples whose time does not rise nothing is said of a stream.
+/// With a larger share of samples whose time does not rise a stream is not judged.
 const MOST_STALE: f64 = 0.05;
 
 /// What was watched.
