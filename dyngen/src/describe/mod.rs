@@ -1,19 +1,23 @@
 //! What is known of an arm, as `dyngen describe --json` prints it.
 
-mod rounding;
+mod bounds;
 mod weak;
 
-pub use rounding::{ParameterRange, Rounding, why_unbounded};
+pub use bounds::{ParameterRange, Rounding, why_unbounded};
 pub use weak::Weak;
 
 use crate::arm::{Arm, Joint, Transmission};
 use crate::base::sets::{Class, combination_text};
 use crate::base::symmetry::{self, Removed, Symmetry};
+use crate::dynamics::Function;
 use crate::exact::rational;
 use crate::graph::{Operations, Preparation};
 use crate::model::{Error, Model};
 use crate::parameters::{ParameterSet, SetKind};
+use crate::rounding;
 use serde_json::{Map, Value, json};
+use std::num::NonZero;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What is known of an arm beside its sets: what its functions cost and what its symmetries removed.
 #[derive(Clone, Debug)]
@@ -51,14 +55,21 @@ impl Description {
         let mut preparation = Preparation::default();
         let mut operations = Vec::new();
         let mut rounding = Rounding::of(model.arm(), values);
-        for function in model.functions(SetKind::Minimal) {
-            say(&format!("proving {function}"));
+        let functions: Vec<Function> = model.functions(SetKind::Minimal).collect();
+        let bounded = rounding.is_some();
+        let of = |function: Function| {
             let built = model.function(function, SetKind::Minimal)?;
-            if let Some(rounding) = &mut rounding {
-                say(&format!("rounding in {function}"));
-                rounding.add(model, &built, values);
+            let bounds = bounded.then(|| rounding::bounds(model, &built, values));
+            Ok::<_, Error>((built, bounds))
+        };
+        say(&format!("proving {} functions", functions.len()));
+        for found in on_every_core(&functions, of) {
+            let (built, bounds) = found?;
+            if let (Some(rounding), Some(bounds)) = (&mut rounding, bounds) {
+                rounding.functions.push((built.function, bounds));
             }
-            operations.push((function.name(), built.without_preparation(&mut preparation).operations()));
+            operations
+                .push((built.function.name(), built.without_preparation(&mut preparation).operations()));
         }
         operations.push(("prepare", preparation.operations()));
         say("parameters that hardly show");
@@ -109,6 +120,29 @@ impl Description {
         }
         object
     }
+}
+
+/// What a computation gives for each item, in their order, on as many threads as there are cores.
+fn on_every_core<T: Copy + Sync, R: Send>(items: &[T], of: impl Fn(T) -> R + Sync) -> Vec<R> {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mine = std::iter::from_fn(|| {
+            let k = next.fetch_add(1, Ordering::Relaxed);
+            Some((k, of(*items.get(k)?)))
+        });
+        mine.collect::<Vec<_>>()
+    };
+    let cores = std::thread::available_parallelism().map_or(1, NonZero::get).min(items.len());
+    let mut all: Vec<(usize, R)> = std::thread::scope(|scope| {
+        let others: Vec<_> = (1..cores).map(|_| scope.spawn(work)).collect();
+        let mut all = work();
+        for other in others {
+            all.extend(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        }
+        all
+    });
+    all.sort_by_key(|(k, _)| *k);
+    all.into_iter().map(|(_, found)| found).collect()
 }
 
 /// The sets of a model by name, each with its parameters and the sums that they stand for.

@@ -4,8 +4,8 @@ use super::{Expr, Graph, Input, Node};
 use crate::exact::algebra::Algebra;
 use crate::exact::rational::{self, Rational};
 use num_traits::{One, Signed, Zero};
+use rustc_hash::FxHashMap;
 use std::cell::RefCell;
-use std::collections::HashMap;
 
 /// Builds a [`Graph`]; as an [`Algebra`] it turns any formula into expressions.
 #[derive(Debug)]
@@ -25,8 +25,8 @@ impl Builder {
         let mut graph = Graph {
             nodes: Vec::new(),
             constants: Vec::new(),
-            index: HashMap::new(),
-            constant_index: HashMap::new(),
+            index: FxHashMap::default(),
+            constant_index: FxHashMap::default(),
         };
         for value in [Rational::zero(), Rational::one()] {
             graph.intern_constant(value);

@@ -15,7 +15,7 @@ pub use joint_sum::JointSum;
 pub use preparation::Preparation;
 
 use crate::exact::rational::Rational;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 use std::fmt;
 
 /// A node with a sign.
@@ -137,8 +137,8 @@ pub enum Node {
 pub struct Graph {
     nodes: Vec<Node>,
     constants: Vec<Rational>,
-    index: HashMap<Node, u32>,
-    constant_index: HashMap<Rational, u32>,
+    index: FxHashMap<Node, u32>,
+    constant_index: FxHashMap<Rational, u32>,
 }
 
 /// Operations of a function, trigonometry apart. Changes of sign are free.

@@ -9,7 +9,8 @@ use crate::exact::constant::ConstantField;
 use crate::exact::prime::{Draws, Fp};
 use crate::graph::evaluate::{Field, sine_and_cosine};
 use crate::graph::{Builder, Expr, Graph, Input, Node};
-use std::collections::{BTreeMap, HashMap};
+use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
 
 const POINTS: usize = 2;
 type Fingerprint = [Fp; POINTS];
@@ -20,7 +21,7 @@ pub(super) fn merge(graph: &Graph, outputs: &[Expr], field: &ConstantField) -> (
     let mut inputs = Inputs::new();
     let mut new: Vec<Expr> = vec![Expr::ZERO; graph.nodes().len()];
     let mut prints: Vec<Option<Fingerprint>> = vec![None; graph.nodes().len()];
-    let mut known: HashMap<Fingerprint, Expr> = HashMap::new();
+    let mut known: FxHashMap<Fingerprint, Expr> = FxHashMap::default();
     for node in graph.needed(outputs) {
         let of = |e: Expr| prints[e.node()].map(|p| if e.is_negative() { p.map(|x| -x) } else { p });
         let print = fingerprint(graph, node, field, &mut inputs, of);

@@ -56,7 +56,7 @@ pub fn bounds(model: &Model, built: &FunctionGraph, parameters: Option<&[f64]>) 
         (0..built.outputs.len()).map(|output| Program::new(model, built, output)).collect();
     let programs = programs.ok_or("its parameters are prepared")?;
     let operations: usize = programs.iter().map(Program::len).sum();
-    let evaluations = (EFFORT / operations.max(1)).min(MOST);
+    let evaluations = (EFFORT[usize::from(parameters.is_some())] / operations.max(1)).min(MOST);
     for program in &programs {
         let ranges: Option<Vec<_>> = program.variables.iter().map(|v| limits.range(*v)).collect();
         let splits: Vec<bool> = program.variables.iter().map(|v| v.0 != Argument::Parameters).collect();
@@ -68,8 +68,10 @@ pub fn bounds(model: &Model, built: &FunctionGraph, parameters: Option<&[f64]>) 
     Ok(bounds)
 }
 
-/// Operations over intervals for one function: less than a tenth of a second.
-const EFFORT: usize = 2_000_000;
+/// Operations over intervals for one function: some 5 ms without values, some 50 ms where values are given, since then
+/// close bounds are what is asked for. The tenth part makes bounds 1.1 times as large in the median of 7444 outputs of 20
+/// arms, 1.4 times in one of ten.
+const EFFORT: [usize; 2] = [200_000, 2_000_000];
 
 /// Bounds of parts of the states that an output is worth at most.
 const MOST: usize = 4000;

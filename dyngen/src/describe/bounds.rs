@@ -1,9 +1,8 @@
 //! By how much emitted code may be off, of every function.
 
 use crate::arm::{Arm, Joint};
-use crate::dynamics::{Function, FunctionGraph};
-use crate::model::Model;
-use crate::rounding::{self, Bounds};
+use crate::dynamics::Function;
+use crate::rounding::Bounds;
 use serde_json::{Map, Value, json};
 
 /// For which parameters bounds hold.
@@ -42,11 +41,6 @@ impl Rounding {
         let limited = |joint: &Joint| joint.mimic.is_none() && joint.position.is_some();
         let parameters = if values.is_some() { ParameterRange::Values } else { ParameterRange::Unit };
         arm.joints.iter().any(limited).then(|| Rounding { parameters, functions: Vec::new() })
-    }
-
-    /// Adds those of a function.
-    pub(super) fn add(&mut self, model: &Model, built: &FunctionGraph, values: Option<&[f64]>) {
-        self.functions.push((built.function, rounding::bounds(model, built, values)));
     }
 
     /// By function, `f32` and `f64` by output; null with the reason where there is no bound.
