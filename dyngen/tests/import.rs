@@ -42,6 +42,55 @@ fn limits_and_names_are_kept_and_what_is_left_out_is_said() {
     assert_eq!(m1, 3.0 + 1.5);
 }
 
+/// A point of a link reads as in the description, in either convention: here each centre of mass, whose numbers stand there.
+#[test]
+fn centres_of_mass_are_the_descriptions_own_in_the_frame_of_the_link() {
+    let centre = |text: &str| {
+        let numbers = text.split_once("<origin xyz=\"").unwrap().1.split('"').next().unwrap();
+        numbers.split(' ').map(|x| x.parse().unwrap()).collect::<Vec<f64>>()
+    };
+    for text in [SLIDER, PUMA] {
+        let given: Vec<Vec<f64>> = text.split("<inertial>").skip(1).map(centre).collect();
+        for convention in [Convention::Standard, Convention::Modified] {
+            let found = import::urdf(text, "robot.urdf", &options(None, convention)).unwrap();
+            let value = |link: usize, kind: &str| {
+                let parameter = Parameter::parse(&format!("{kind}{}", link + 1)).unwrap();
+                found.values.iter().find(|(p, _)| *p == parameter).unwrap().1
+            };
+            // A base that stands still has a mass, and no joint.
+            let given = &given[given.len() - found.arm.joints.len()..];
+            for (link, (joint, given)) in found.arm.joints.iter().zip(given).enumerate() {
+                let centre = ["mx", "my", "mz"].map(|kind| value(link, kind) / value(link, "m"));
+                let seen = joint.link_frame.as_ref().map_or(centre, |frame| frame.see(centre));
+                let off = seen.iter().zip(given).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(off < 1e-12, "{convention:?} link {}: {seen:?} {given:?}", link + 1);
+            }
+        }
+    }
+}
+
+/// An arm file has no letters that turn its text around, whatever the names of the description have.
+#[test]
+fn letters_that_turn_text_around_are_left_out_of_names_and_said() {
+    let text = SLIDER
+        .replace("lift &quot;scara", "lift\u{202e} &quot;scara")
+        .replace("\"spin\"", "\"sp&#x2066;in\"");
+    assert_eq!(
+        text.matches('\u{202e}').count() + text.matches("&#x2066;").count(),
+        2,
+        "the test itself is wrong"
+    );
+    let found = imported(&text, None).unwrap();
+    assert_eq!(
+        (found.arm.name.as_str(), found.arm.joints[4].name.as_deref()),
+        ("lift \"scara\"", Some("spin"))
+    );
+    for words in ["robot 'lift \"scara\"' holds U+202E", "joint 'spin' holds U+2066"] {
+        assert!(found.notes.iter().any(|note| note.contains(words)), "{:?}", found.notes);
+    }
+    assert!(!found.text.contains(['\u{202e}', '\u{2066}']));
+}
+
 #[test]
 fn right_angles_and_lengths_come_out_exact() {
     let text = imported(LWA4P, None).unwrap().text;

@@ -11,6 +11,7 @@ use crate::diagnostic::Diagnostics;
 pub use crate::exact::angle::Angle;
 use crate::exact::rational::{self, Rational};
 pub use mimic::{Drive, Mimic};
+use nalgebra::{Rotation3, Vector3};
 use num_traits::{One, Zero};
 pub use parameter::{Parameter, ParameterKind};
 #[cfg(feature = "urdf")]
@@ -74,6 +75,9 @@ pub struct Joint {
     pub torque_constant: Option<f64>,
     /// The joint that it follows, where it does not move on its own.
     pub mimic: Option<Mimic>,
+    /// The frame in which a robot description has the link, in the frame of the table, where it is another: points of
+    /// the link are reported in it.
+    pub link_frame: Option<Placement>,
 }
 
 /// What the file does not say is left out, as for [`Arm`].
@@ -100,6 +104,9 @@ impl fmt::Debug for Joint {
         if let Some(mimic) = &self.mimic {
             text.field("mimic", mimic);
         }
+        if let Some(frame) = &self.link_frame {
+            text.field("link_frame", frame);
+        }
         text.finish()
     }
 }
@@ -120,6 +127,16 @@ pub struct Placement {
     pub xyz: [Rational; 3],
     /// Roll, pitch and yaw: R = Rz(yaw)·Ry(pitch)·Rx(roll).
     pub rpy: [Angle; 3],
+}
+
+impl Placement {
+    /// A point of the frame that it stands in, as it sees it, m.
+    pub fn see(&self, point: [f64; 3]) -> [f64; 3] {
+        let [roll, pitch, yaw] = self.rpy.each_ref().map(|angle| angle.radians());
+        let origin = Vector3::from(self.xyz.each_ref().map(rational::to_f64));
+        let rotation = Rotation3::from_euler_angles(roll, pitch, yaw);
+        rotation.inverse_transform_vector(&(Vector3::from(point) - origin)).into()
+    }
 }
 
 /// A frame that is fixed on a link: where kinematics can be asked for, as at the tool.
@@ -194,7 +211,7 @@ impl Arm {
     /// Every error of the file at once, each with its place.
     pub fn read(path: &Path) -> Result<Arm, Diagnostics> {
         let name = path.display().to_string();
-        let text = std::fs::read_to_string(path)
+        let text = crate::file::text(path)
             .map_err(|e| Diagnostics::whole_file(&name, format!("the arm file cannot be read: {e}")))?;
         Self::parse(&text, &name)
     }
@@ -297,6 +314,7 @@ impl Arm {
         for (joint, row) in arm.joints.iter_mut().zip(std::iter::once(flat()).chain(rows)) {
             (joint.a, joint.b, joint.alpha) = row;
             joint.zero = Vec::new();
+            joint.link_frame = None;
         }
         arm
     }

@@ -5,7 +5,7 @@ use super::{
     Angle, Arm, Convention, Frame, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind,
     Placement, mimic, sum, transmission,
 };
-use crate::diagnostic::{Collector, Diagnostics};
+use crate::diagnostic::{Collector, Diagnostics, is_unseen, unseen};
 use crate::exact::rational::{self, Rational};
 use num_traits::{Signed, Zero};
 use toml::de::DeTable;
@@ -14,7 +14,7 @@ const ARM_KEYS: [&str; 9] =
     ["name", "convention", "gravity", "joint", "base", "tool", "frame", "grouping", "transmission"];
 const FRAME_KEYS: [&str; 4] = ["name", "link", "xyz", "rpy"];
 const PLACEMENT_KEYS: [&str; 2] = ["xyz", "rpy"];
-const JOINT_KEYS: [&str; 15] = [
+const JOINT_KEYS: [&str; 16] = [
     "name",
     "kind",
     "a",
@@ -30,6 +30,7 @@ const JOINT_KEYS: [&str; 15] = [
     "torque",
     "torque_constant",
     "mimic",
+    "link_frame",
 ];
 const GROUPING_KEYS: [&str; 2] = ["name", "sum"];
 /// A larger file is no arm.
@@ -40,6 +41,10 @@ pub(super) fn parse(text: &str, file: &str) -> Result<Arm, Diagnostics> {
         return Err(Diagnostics::whole_file(file, "larger than 1 MiB: this is no arm file"));
     }
     let mut reader = Reader { errors: Collector::new(file, text) };
+    if let Some((at, c)) = text.char_indices().find(|(_, c)| is_unseen(*c)) {
+        reader.errors.error(at..at, format!("the text holds {}", unseen(c)));
+        return reader.errors.finish(None);
+    }
     let (document, errors) = DeTable::parse_recoverable(text);
     let broken = !errors.is_empty();
     let other = broken.then(|| other_kind(text)).flatten();
@@ -95,6 +100,13 @@ impl Reader<'_> {
                 0..0,
                 "the arm has no [[joint]]: give one table for each joint, from the base outwards",
             );
+        } else if document
+            .get("joint")
+            .and_then(|v| v.get_ref().as_array())
+            .is_some_and(|list| list.is_empty())
+        {
+            let span = document.get("joint").map_or(0..0, toml::Spanned::span);
+            self.errors.error(span, "an arm needs at least one joint: `[[joint]]`");
         } else if joint_tables.len() > MAX_JOINTS {
             let span = joint_tables[MAX_JOINTS].span.clone();
             self.errors
@@ -173,6 +185,8 @@ impl Reader<'_> {
         let torque = limit("torque", "N·m or N");
         let torque_constant = limit("torque_constant", "N·m/A or N/A");
         let mimic = self.optional(t, "mimic", |r, v| mimic::read(r, v, &place, dof));
+        let link_frame =
+            self.optional(t, "link_frame", |r, v| r.placement(v, &format!("{place}: link_frame"), "the link's frame"));
         Some(Joint {
             name: name?,
             kind: kind?,
@@ -189,6 +203,7 @@ impl Reader<'_> {
             torque: torque?,
             torque_constant: torque_constant?,
             mimic: mimic?,
+            link_frame: link_frame?,
         })
     }
 

@@ -1,6 +1,6 @@
 //! The values of an arm file's tables, each read or an error with its place.
 
-use crate::diagnostic::Collector;
+use crate::diagnostic::{Collector, is_unseen, unseen};
 use crate::exact::angle::Angle;
 use crate::exact::rational::{self, Rational};
 use std::ops::Range;
@@ -74,7 +74,14 @@ impl Reader<'_> {
 
     pub(super) fn text(&mut self, v: &Value<'_>, quantity: &str) -> Option<String> {
         match v.get_ref().as_str() {
-            Some(text) if !text.trim().is_empty() => Some(text.to_string()),
+            Some(text) if !text.trim().is_empty() => {
+                // Written as an escape; as itself it is refused before.
+                let Some(c) = text.chars().find(|c| c.is_control() || is_unseen(*c)) else {
+                    return Some(text.to_string());
+                };
+                self.errors.error(v.span(), format!("{quantity} holds {}", unseen(c)));
+                None
+            }
             _ => {
                 self.errors.error(
                     v.span(),
@@ -109,7 +116,11 @@ impl Reader<'_> {
     pub(super) fn tables<'d, 'i>(&mut self, t: &Table<'d, 'i>, key: &str) -> Vec<Table<'d, 'i>> {
         let Some(value) = t.table.get(key) else { return Vec::new() };
         let Some(list) = value.get_ref().as_array() else {
-            self.errors.error(value.span(), format!("{key} must be a list of tables: write [[{key}]]"));
+            let message = match value.get_ref().is_table() {
+                true => format!("write [[{key}]] with two brackets: each {key} is one entry of a list"),
+                false => format!("{key} must be a list of tables: write [[{key}]]"),
+            };
+            self.errors.error(value.span(), message);
             return Vec::new();
         };
         let mut tables = Vec::new();

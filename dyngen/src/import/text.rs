@@ -6,6 +6,7 @@ use super::frames::{Frames, Row};
 use super::pose::{Pose, twelfths};
 use crate::arm::{Convention, JointKind, Parameter, ParameterKind, is_name};
 use crate::consistency::parameters_of_body;
+use crate::diagnostic::is_unseen;
 use crate::exact::angle::Angle;
 use crate::exact::rational;
 use nalgebra::{Matrix3, Vector3};
@@ -18,10 +19,11 @@ const RATIO: f64 = 100.0;
 pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Options) -> String {
     let mut text = String::new();
     heading(&mut text, chain, frames, file, options.convention);
-    for (joint, row) in chain.joints.iter().zip(&frames.rows) {
+    for ((joint, row), link) in chain.joints.iter().zip(&frames.rows).zip(&frames.links) {
         table_of_joint(&mut text, joint, row, options.angle_tolerance);
         drive(&mut text, joint);
         limits(&mut text, joint);
+        link_frame(&mut text, joint, link, options);
     }
     let (base, tool) =
         (format!("frame 0 in link '{}'", chain.root), format!("link '{}' in the last frame", chain.tip));
@@ -139,6 +141,16 @@ fn limits(text: &mut String, joint: &ChainJoint) {
     }
 }
 
+/// The frame that the description gives the link behind a joint, where it is another than that of the table.
+fn link_frame(text: &mut String, joint: &ChainJoint, link: &Pose, options: &Options) {
+    let Some(pose) = joint.poses.first() else { return };
+    let (xyz, rpy) = numbers(&link.see(pose), options);
+    if [&xyz, &rpy].iter().any(|numbers| *numbers != "0, 0, 0") {
+        // A String takes every write.
+        let _ = writeln!(text, "link_frame = {{ xyz = [{xyz}], rpy = [{rpy}] }}");
+    }
+}
+
 /// The table of a fixed frame, where it is another than the one it stands in.
 fn placement(text: &mut String, what: &str, table: &str, pose: &Pose, options: &Options) {
     let (xyz, rpy) = numbers(pose, options);
@@ -230,7 +242,22 @@ fn quoted(name: &str) -> String {
     plain(name).replace('\\', "\\\\").replace('"', "\\\"")
 }
 
-/// Names as they may stand in a comment or a text.
-fn plain(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+/// Names as they may stand in a comment or a text: no letter ends the line or turns the text around.
+pub(crate) fn plain(text: &str) -> String {
+    text.chars().filter(|c| !is_unseen(*c)).map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+/// A note of each name in the arm file that is not the description's own, as letters of it are left out.
+pub(super) fn unseen_names(chain: &Chain) -> Vec<String> {
+    let joints = chain.joints.iter().map(|joint| ("joint", &joint.name));
+    let named = std::iter::once(("robot", &chain.name)).chain(joints);
+    let note = |(what, name): (&str, &String)| {
+        let c = name.chars().find(|c| is_unseen(*c))?;
+        let code = u32::from(c);
+        Some(format!(
+            "the name of {what} '{}' holds U+{code:04X}, which turns or breaks text: left out",
+            plain(name)
+        ))
+    };
+    named.filter_map(note).collect()
 }

@@ -249,7 +249,7 @@ impl Undeclared {
     /// What is wrong with the file.
     pub fn read(path: &Path) -> Result<Undeclared, String> {
         let text =
-            std::fs::read_to_string(path).map_err(|e| format!("{}: cannot be read: {e}", path.display()))?;
+            dyngen::file::text(path).map_err(|e| format!("{}: cannot be read: {e}", path.display()))?;
         serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))
     }
 

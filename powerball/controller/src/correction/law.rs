@@ -67,6 +67,20 @@ pub enum Law<T> {
         /// k, cycles a joint turn.
         order: T,
     },
+    /// tanh(γ·q̇)·cos(k·q): Coulomb friction that differs from place to place.
+    DirectionCosine {
+        /// k, cycles a joint turn.
+        order: T,
+        /// γ, s/rad.
+        steepness: T,
+    },
+    /// tanh(γ·q̇)·sin(k·q).
+    DirectionSine {
+        /// k, cycles a joint turn.
+        order: T,
+        /// γ, s/rad.
+        steepness: T,
+    },
     /// f(q̇)·e^(−t/T): Eq. 16 friction that warmth takes away.
     CoolFriction {
         /// T, s.
@@ -352,6 +366,8 @@ impl<T: RealField + Copy> Law<T> {
             Law::Position => q,
             Law::Cosine { order } => cosine(order * q),
             Law::Sine { order } => sine(order * q),
+            Law::DirectionCosine { order, steepness } => (steepness * dq).tanh() * cosine(order * q),
+            Law::DirectionSine { order, steepness } => (steepness * dq).tanh() * sine(order * q),
             Law::CoolFriction { time_constant } => {
                 of(now.friction, joint) * (-now.running / time_constant).exp()
             }

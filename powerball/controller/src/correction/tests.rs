@@ -67,6 +67,10 @@ fn single_precision_agrees() {
         ),
         (Law::Power { steepness: 80.0, power: 0.5 }, Law::Power { steepness: 80.0f32, power: 0.5 }),
         (Law::Cosine { order: 7.0 }, Law::Cosine { order: 7.0f32 }),
+        (
+            Law::DirectionSine { order: 2.0, steepness: 50.0 },
+            Law::DirectionSine { order: 2.0f32, steepness: 50.0 },
+        ),
         (Law::Presliding { distance: 0.01 }, Law::Presliding { distance: 0.01f32 }),
     ];
     for (double, single) in terms {

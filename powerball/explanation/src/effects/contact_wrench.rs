@@ -42,14 +42,16 @@ pub struct Figures {
 pub struct Point {
     /// The link.
     pub link: JointNumber,
-    /// The point in the link's frame of the arm file, m.
+    /// The point in the link's own frame, m: that of its robot description where the arm file has it, else that of the
+    /// table.
     pub xyz: [f64; 3],
 }
 
 impl Point {
     /// The tool of the arm file; where it has none the origin of the last frame.
     pub(crate) fn tool(body: &RigidArm) -> Point {
-        Point { link: JointNumber::from_index(body.dof() - 1), xyz: body.force_point() }
+        let last = body.dof() - 1;
+        Point { link: JointNumber::from_index(last), xyz: body.in_link_frame(last, body.force_point()) }
     }
 }
 

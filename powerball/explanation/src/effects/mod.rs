@@ -21,6 +21,7 @@ pub mod contact_wrench;
 mod context;
 mod effect;
 pub mod encoder_offset;
+pub mod friction_by_position;
 pub mod hysteresis;
 pub mod joint_coupling;
 pub mod joint_elasticity;
@@ -117,6 +118,7 @@ library! {
     velocity_nonlinearity::VelocityNonlinearity,
     asymmetry::Asymmetry,
     hysteresis::Hysteresis,
+    friction_by_position::FrictionByPosition,
     payload::Payload,
     spring::Spring,
     position_ripple::PositionRipple,

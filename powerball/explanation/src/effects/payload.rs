@@ -37,6 +37,10 @@ pub struct Figures {
     /// Its centre in the frame of its link, m; nothing where only its first moment shows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub com: Option<[f64; 3]>,
+    /// The same in the link's own frame, m: that of its robot description where the arm file has it, else that of the
+    /// table.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub com_in_link: Option<[f64; 3]>,
     /// Until when, one for each log that has it, in the log's own t, s: null where it stays to the end; nothing
     /// where it does in all.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -217,8 +221,11 @@ impl Effect for Payload {
             None => Some((c[0], centre(c))),
             Some(body) => body.shows_mass.then(|| (body.mass, body.centre.into())),
         };
+        let arm = context.data.body;
+        let on = link.unwrap_or(arm.dof() - 1);
         Figures {
             com: point.map(|(_, com)| com),
+            com_in_link: point.map(|(_, com)| arm.in_link_frame(on, com)),
             first_moment: body.map(|body| body.moment.into()),
             link: link.map(JointNumber::from_index),
             end_time: Window::ends(windows),

@@ -64,6 +64,14 @@ enum LawEntry {
     Sine {
         order: f64,
     },
+    DirectionCosine {
+        order: f64,
+        steepness: f64,
+    },
+    DirectionSine {
+        order: f64,
+        steepness: f64,
+    },
     CoolFriction {
         time_constant: f64,
     },
@@ -181,7 +189,7 @@ mod pair_from_one {
 
 /// The text of a model's file.
 pub(super) fn read_text(path: &Path) -> Result<String, FileError> {
-    std::fs::read_to_string(path).map_err(|e| FileError(format!("{}: cannot be read: {e}", path.display())))
+    dyngen::file::text(path).map_err(|e| FileError(format!("{}: cannot be read: {e}", path.display())))
 }
 
 impl TorqueModel {

@@ -137,6 +137,12 @@ fn at_true_position(term: &Term<f64>, joint: usize, offset: f64) -> Vec<Term<f64
         ],
         Law::Cosine { order } => turned(order * by(term.joint), term.law, Law::Sine { order }, -1.0),
         Law::Sine { order } => turned(order * by(term.joint), term.law, Law::Cosine { order }, 1.0),
+        Law::DirectionCosine { order, steepness } => {
+            turned(order * by(term.joint), term.law, Law::DirectionSine { order, steepness }, -1.0)
+        }
+        Law::DirectionSine { order, steepness } => {
+            turned(order * by(term.joint), term.law, Law::DirectionCosine { order, steepness }, 1.0)
+        }
         Law::CosineOfTwo { joints, orders } => {
             turned(phase(joints, orders), term.law, Law::SineOfTwo { joints, orders }, -1.0)
         }

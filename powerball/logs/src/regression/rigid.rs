@@ -246,6 +246,14 @@ impl RigidArm {
         tool.map_or([0.0; 3], |tool| tool.xyz.each_ref().map(rational::to_f64))
     }
 
+    /// A point of a link's frame in the frame that the robot description gives the link, where the arm file has that
+    /// (`link_frame`), m.
+    #[must_use]
+    pub fn in_link_frame(&self, link: usize, point: [f64; 3]) -> [f64; 3] {
+        let frame = self.arm().joints.get(link).and_then(|joint| joint.link_frame.as_ref());
+        frame.map_or(point, |frame| frame.see(point))
+    }
+
     /// Torques for unit forces there along the base axes: by axis and sample, n. `None` where they cannot be had.
     #[must_use]
     pub fn force_columns(&self, q: &[f64]) -> Option<[Vec<f64>; 3]> {

@@ -95,6 +95,11 @@ impl Lot<'_> {
                 level: self.coulomb(self.any) * rng.random_range(0.3..0.6),
                 way: self.unit(self.any) * rng.random_range(0.010..0.030),
             },
+            "friction_by_position" => PlantEffect::FrictionByPosition {
+                joint: self.any,
+                share: rng.random_range(0.2..0.4),
+                place: rng.random_range(-PI..PI),
+            },
             "temperature" => PlantEffect::Temperature {
                 change: -rng.random_range(0.15..0.30),
                 time_constant: self.session * rng.random_range(0.3..0.6),
@@ -184,7 +189,7 @@ impl Lot<'_> {
 
 impl PlantEffect {
     /// The names that [`draw`](Self::draw) knows.
-    pub const NAMES: [&'static str; 18] = [
+    pub const NAMES: [&'static str; 19] = [
         "load_friction",
         "stribeck",
         "velocity_nonlinearity",
@@ -203,6 +208,7 @@ impl PlantEffect {
         "joint_coupling",
         "joint_elasticity",
         "backlash",
+        "friction_by_position",
     ];
 
     /// Draws an effect of that name: its joint and its figures. `session` is the time in s within which the logs
@@ -234,6 +240,7 @@ impl PlantEffect {
             | "asymmetry"
             | "hysteresis"
             | "temperature"
+            | "friction_by_position"
             | "joint_coupling" => lot.friction_effect(name, rng),
             "spring" | "position_ripple" | "encoder_offset" | "base_tilt" | "broken_symmetry" | "payload" => {
                 lot.body_effect(name, rng)
@@ -251,6 +258,7 @@ impl PlantEffect {
             | PlantEffect::Stribeck { level: x, .. }
             | PlantEffect::VelocityNonlinearity { torque: x, .. }
             | PlantEffect::Hysteresis { level: x, .. }
+            | PlantEffect::FrictionByPosition { share: x, .. }
             | PlantEffect::Payload { mass: x, .. }
             | PlantEffect::Spring { stiffness: x, .. }
             | PlantEffect::PositionRipple { amplitude: x, .. }

@@ -90,6 +90,15 @@ pub enum PlantEffect {
         /// The way after which the last slider slips, rad.
         way: f64,
     },
+    /// Coulomb friction that is higher on one side of the joint's turn: a seal that is pressed on there.
+    FrictionByPosition {
+        /// The joint.
+        joint: usize,
+        /// By which share of itself it is higher and lower at most.
+        share: f64,
+        /// Where it is highest, rad.
+        place: f64,
+    },
     /// Somebody bolts something to the flange.
     Payload {
         /// Mass, kg.
@@ -226,6 +235,7 @@ impl PlantEffect {
             PlantEffect::VelocityNonlinearity { .. } => "velocity_nonlinearity",
             PlantEffect::Asymmetry { .. } => "asymmetry",
             PlantEffect::Hysteresis { .. } => "hysteresis",
+            PlantEffect::FrictionByPosition { .. } => "friction_by_position",
             PlantEffect::Payload { .. } => "payload",
             PlantEffect::Spring { .. } => "spring",
             PlantEffect::PositionRipple { .. } => "position_ripple",
@@ -254,6 +264,7 @@ impl PlantEffect {
             | PlantEffect::VelocityNonlinearity { joint, .. }
             | PlantEffect::Asymmetry { joint, .. }
             | PlantEffect::Hysteresis { joint, .. }
+            | PlantEffect::FrictionByPosition { joint, .. }
             | PlantEffect::Spring { joint, .. }
             | PlantEffect::PositionRipple { joint, .. }
             | PlantEffect::TorqueConstant { joint, .. }
@@ -287,6 +298,9 @@ impl PlantEffect {
             }
             PlantEffect::Hysteresis { level, way, .. } => {
                 format!("{level:.2} N·m of friction that builds up over {:.1} mrad", 1e3 * way)
+            }
+            PlantEffect::FrictionByPosition { share, place, .. } => {
+                format!("Coulomb friction ±{:.0} % by position, highest at {place:+.2} rad", 100.0 * share)
             }
             PlantEffect::Payload { mass, centre, start } => format!(
                 "{mass:.2} kg at ({:.3}, {:.3}, {:.3}) m of the last frame from t = {start:.1} s on",
@@ -368,7 +382,8 @@ impl PlantEffect {
             PlantEffect::LoadFriction { joint, .. }
             | PlantEffect::Stribeck { joint, .. }
             | PlantEffect::VelocityNonlinearity { joint, .. }
-            | PlantEffect::Asymmetry { joint, .. } => Some(*joint),
+            | PlantEffect::Asymmetry { joint, .. }
+            | PlantEffect::FrictionByPosition { joint, .. } => Some(*joint),
             _ => None,
         }
     }
@@ -449,6 +464,14 @@ impl PlantEffect {
                 let gamma = now.friction[*joint];
                 let forwards = 0.5 * (1.0 + direction(now.dq[*joint], RUB_SPEED));
                 tau[*joint] += constant + share * (gamma.gamma1 + gamma.gamma3) * forwards;
+            }
+            PlantEffect::FrictionByPosition { joint, share, place } => {
+                let gamma = now.friction[*joint];
+                let around = (now.q[*joint] - place).cos();
+                // Flatter than a cosine where it is highest.
+                let shape = 1.25 * around / (1.0 + 0.25 * around * around);
+                let level = share * (gamma.gamma1 + gamma.gamma3);
+                tau[*joint] += level * shape * direction(now.dq[*joint], RUB_SPEED);
             }
             PlantEffect::Hysteresis { joint, level, way } => {
                 tau[*joint] += level * wind(&mut state.sliders, now.q[*joint], *way);

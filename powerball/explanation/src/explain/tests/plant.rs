@@ -21,6 +21,7 @@ pub(super) enum Truth {
     VelocityNonlinearity,
     Asymmetry,
     Hysteresis,
+    FrictionByPosition,
     Payload,
     PayloadLater,
     Spring,
@@ -41,7 +42,7 @@ pub(super) enum Truth {
 }
 
 impl Truth {
-    pub(super) const ALL: [Truth; 20] = {
+    pub(super) const ALL: [Truth; 21] = {
         use Truth::*;
         [
             LoadFriction,
@@ -49,6 +50,7 @@ impl Truth {
             VelocityNonlinearity,
             Asymmetry,
             Hysteresis,
+            FrictionByPosition,
             Payload,
             PayloadLater,
             Spring,
@@ -75,6 +77,7 @@ impl Truth {
             Truth::VelocityNonlinearity => "velocity_nonlinearity",
             Truth::Asymmetry => "asymmetry",
             Truth::Hysteresis => "hysteresis",
+            Truth::FrictionByPosition => "friction_by_position",
             Truth::Payload | Truth::PayloadLater => "payload",
             Truth::Spring => "spring",
             Truth::Ripple | Truth::MotorRipple => "position_ripple",
@@ -316,6 +319,10 @@ pub(super) fn record(
                     z = f64::clamp(z + (x - previous) / 0.004, -1.0, 1.0);
                     previous = x;
                     2.5 * scale * (z - (200.0 * velocity).tanh())
+                }
+                // A stretch where the seal is pressed on.
+                Truth::FrictionByPosition => {
+                    scale * (200.0 * velocity).tanh() * (1.0 + (1.3 * (x - 0.4).sin()).tanh())
                 }
                 Truth::Spring => scale * ((x - 0.2) + 0.2 * (x - 0.2).powi(3)),
                 Truth::Ripple => 0.4 * scale * ((7.0 * x + 0.5).cos() + 0.2 * (14.0 * x).cos()),
