@@ -228,7 +228,7 @@ fn read(path: &LitStr, watched: &mut TokenStream) -> Result<String> {
             const _: &[u8] = include_bytes!(#full);
         ));
     }
-    std::fs::read_to_string(&full)
+    dyngen::file::text(&full)
         .map_err(|e| Error::new(path.span(), format!("{}: the file cannot be read: {e}", path.value())))
 }
 

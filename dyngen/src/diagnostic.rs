@@ -51,6 +51,18 @@ impl fmt::Display for Diagnostics {
 
 impl std::error::Error for Diagnostics {}
 
+/// Whether a letter turns the text around it or ends its line where nobody sees it: a name with one reads otherwise than it is
+/// written ("Trojan Source"), and compilers refuse it.
+pub(crate) fn is_unseen(c: char) -> bool {
+    matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// What is said of such a letter, or of a control character, that stands in something.
+pub(crate) fn unseen(c: char) -> String {
+    let what = if is_unseen(c) { "which turns or breaks the text around it" } else { "a control character" };
+    format!("U+{:04X}, {what}: remove it", u32::from(c))
+}
+
 /// Collects the diagnostics of one text while it is read.
 #[derive(Debug)]
 pub(crate) struct Collector<'t> {

@@ -15,6 +15,7 @@ mod evaluator;
 pub mod exact;
 #[cfg(feature = "urdf")]
 pub mod export;
+pub mod file;
 pub mod graph;
 #[cfg(feature = "urdf")]
 pub mod import;

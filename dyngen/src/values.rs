@@ -29,7 +29,7 @@ impl Values {
     /// all of these at once.
     pub fn read(path: &Path) -> Result<Values, Diagnostics> {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path)
+        let text = crate::file::text(path)
             .map_err(|e| Diagnostics::whole_file(&file, format!("the values cannot be read: {e}")))?;
         Self::parse(&text, &file)
     }

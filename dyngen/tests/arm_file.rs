@@ -78,6 +78,33 @@ fn each_error_names_its_place_and_quantity() {
     assert_error("d = 0.1", "d = ", "20:5", &["not valid TOML"]);
 }
 
+const HEAD: &str = "name = \"x\"\nconvention = \"standard\"\ngravity = [0, 0, 0]\n";
+
+#[test]
+fn an_arm_without_a_joint_is_one_error() {
+    assert_eq!(
+        errors(&format!("{HEAD}joint = []\n")),
+        ["arm.toml:4:9: an arm needs at least one joint: `[[joint]]`"]
+    );
+    let one = "kind = \"revolute\"\na = 0\nalpha = 0\nd = 0\ntheta = 0\n";
+    assert!(errors(&format!("{HEAD}[[joint]]\n{one}")).is_empty());
+    assert_eq!(
+        errors(&format!("{HEAD}\n[joint]\n{one}")),
+        ["arm.toml:5:1: write [[joint]] with two brackets: each joint is one entry of a list"]
+    );
+}
+
+/// Letters that turn the text around them would make the generated code read otherwise than it is.
+#[test]
+fn names_that_cannot_be_seen_are_refused() {
+    assert_error("\"two\"", "\"t\u{202e}wo\"", "1:10", &["U+202E", "remove it"]);
+    assert_error("\"two\"", "\"t\\u202ewo\"", "1:8", &["name holds U+202E", "remove it"]);
+    assert_error("\"two\"", "\"t\\nwo\"", "1:8", &["name holds U+000A, a control character"]);
+    assert_error("[[joint]]", "# \u{2066}\n[[joint]]", "5:3", &["U+2066"]);
+    assert_error("kind", "name = \"a\\u2029\"\nkind", "6:8", &["joint 1: name holds U+2029"]);
+    assert_error("\"R1\"", "\"R\\u200f\"", "24:8", &["grouping 1: name holds U+200F"]);
+}
+
 #[test]
 fn all_errors_of_a_file_come_at_once_in_order() {
     let text = GOOD
@@ -98,6 +125,7 @@ fn no_text_makes_it_panic() {
         "[[joint]]",
         "joint = 3",
         "joint = [1, 2]",
+        "joint = []",
         "[joint]\na = 1",
         "name = 1\nname = 2",
         "\0",

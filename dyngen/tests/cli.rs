@@ -444,6 +444,28 @@ fn nothing_is_lost_and_no_nan_is_printed() {
     assert!(message.contains("states.csv:2") && message.contains("singular"), "{message}");
 }
 
+/// What need not end is no input: it is refused before it is opened, which of a pipe without a writer never returns.
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices_are_refused() {
+    let pipe = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pipe");
+    let _ = std::fs::remove_file(&pipe);
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let pipe = pipe.display().to_string();
+    let out = file("never.toml", "");
+    for input in [pipe.as_str(), "/dev/zero"] {
+        let values = ["describe", &arm(), "--values", input];
+        let states = ["eval", &arm(), "--function", "forward_kinematics", "--states", input];
+        for command in [&["describe", input][..], &values, &states, &["import", input, "-o", &out, "--force"]]
+        {
+            let done = dyngen(command);
+            let said = text(&done.stderr);
+            assert_eq!(done.status.code(), Some(2), "{command:?}: {said}");
+            assert!(said.contains(input) && said.contains("it is a pipe or a device"), "{command:?}: {said}");
+        }
+    }
+}
+
 /// A rod of negative inertia is generated, with a warning that says why and what to take; units that no arm has end with 3.
 #[test]
 fn what_no_arm_can_have_is_said() {

@@ -106,6 +106,31 @@ fn what_cannot_be_included_is_told_with_file_and_line() {
     assert_eq!(unnamed, "m.xml: line 3: <include> names no file");
 }
 
+/// A device never ends: it is no part of a model. A file from elsewhere is one, and said.
+#[cfg(unix)]
+#[test]
+fn what_is_included_from_elsewhere_is_a_file_and_said() {
+    let device = error("device", &[("m.xml", "<mujoco>\n<include file=\"/dev/zero\"/>\n</mujoco>")]);
+    assert!(device.starts_with("m.xml: line 2: <include file=\"/dev/zero\"> cannot be read: "), "{device}");
+    assert!(device.contains("a pipe or a device"), "{device}");
+    let itself = Source::read(Path::new("/dev/zero")).unwrap_err().to_string();
+    assert!(itself.contains("a pipe or a device"), "{itself}");
+
+    let path = in_parts(&folder("elsewhere/model"));
+    let parts = path.with_file_name("parts");
+    assert!(imported(&path).notes.iter().all(|note| !note.contains("outside")));
+    fs::rename(parts.join("hand.xml"), path.parent().unwrap().join("../hand.xml")).unwrap();
+    fs::copy(parts.join("inertia.xml"), path.with_file_name("inertia.xml")).unwrap();
+    let model = fs::read_to_string(&path).unwrap().replace("parts/hand.xml", "../hand.xml");
+    fs::write(&path, model).unwrap();
+    let notes = imported(&path).notes;
+    let said = notes.iter().find(|note| note.contains("outside of the model's folder")).unwrap();
+    assert!(
+        said.starts_with("<include file=\"../hand.xml\">") && said.ends_with("elsewhere/hand.xml"),
+        "{said}"
+    );
+}
+
 /// Lines are those of the file in which somebody has to look.
 #[test]
 fn lines_are_those_of_the_part() {

@@ -185,8 +185,9 @@ impl Reader<'_> {
         let torque = limit("torque", "N·m or N");
         let torque_constant = limit("torque_constant", "N·m/A or N/A");
         let mimic = self.optional(t, "mimic", |r, v| mimic::read(r, v, &place, dof));
-        let link_frame =
-            self.optional(t, "link_frame", |r, v| r.placement(v, &format!("{place}: link_frame"), "the link's frame"));
+        let link_frame = self.optional(t, "link_frame", |r, v| {
+            r.placement(v, &format!("{place}: link_frame"), "the link's frame")
+        });
         Some(Joint {
             name: name?,
             kind: kind?,

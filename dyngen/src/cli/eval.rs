@@ -137,8 +137,8 @@ impl States {
     fn read(path: &Path) -> Result<States, Failure> {
         let file = path.display().to_string();
         let unreadable = |e: csv::Error| Failure::input(format!("{file}: the states cannot be read: {e}"));
-        let mut reader =
-            csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(unreadable)?;
+        let opened = dyngen::file::open(path).map_err(|e| unreadable(e.into()))?;
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(opened);
         let header: Vec<String> = reader.headers().map_err(unreadable)?.iter().map(str::to_string).collect();
         let mut rows = Vec::new();
         for record in reader.records() {

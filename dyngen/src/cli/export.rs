@@ -57,7 +57,7 @@ enum Format {
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     refuse_to_replace(&args.output, &args.original, args.force)?;
     let read = |path: &Path| {
-        let text = std::fs::read_to_string(path);
+        let text = dyngen::file::text(path);
         text.map_err(|e| Failure::input(format!("{}: cannot be read: {e}", path.display())))
     };
     let name = |path: &Path| path.display().to_string();

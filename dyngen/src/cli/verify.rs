@@ -25,8 +25,8 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let file = args.file.display();
-    let text = std::fs::read_to_string(&args.file)
-        .map_err(|e| Failure::input(format!("{file}: cannot be read: {e}")))?;
+    let text =
+        dyngen::file::text(&args.file).map_err(|e| Failure::input(format!("{file}: cannot be read: {e}")))?;
     let failure = |e: Error| match e {
         Error::Unreadable(e) => Failure::input(format!("{file}:{e}")),
         e => Failure::refused(format!("{file}, {}: {e}", args.arm.display())),

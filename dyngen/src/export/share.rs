@@ -6,6 +6,7 @@ use crate::arm::{Arm, Joint};
 use crate::import::Options;
 use crate::import::chain::{Chain, ChainJoint};
 use crate::import::pose::Pose;
+use crate::import::text::plain;
 use crate::import::urdf::Robot;
 use nalgebra::Matrix3;
 
@@ -27,7 +28,11 @@ pub(super) fn options(robot: &Robot, arm: &Arm, options: &Options) -> Options {
     let mut options = Options { exact: true, ..options.clone() };
     if options.tip.is_none() {
         let last = arm.joints.last().and_then(|joint| joint.name.as_ref());
-        options.tip = robot.joints.iter().find(|j| Some(&j.name) == last).map(|joint| joint.child.clone());
+        options.tip = robot
+            .joints
+            .iter()
+            .find(|j| Some(plain(&j.name)) == last.cloned())
+            .map(|joint| joint.child.clone());
     }
     options
 }
@@ -106,7 +111,7 @@ fn all_names(arm: &Arm) -> Vec<String> {
 /// The joints' names and axes must be the arm's.
 fn same_arm(arm: &Arm, chain: &Chain) -> Result<(), String> {
     let names: Vec<&str> = chain.joints.iter().map(|joint| joint.name.as_str()).collect();
-    let named = |i: usize| arm.joints[i].name.as_deref().is_none_or(|name| name == names[i]);
+    let named = |i: usize| arm.joints[i].name.as_deref().is_none_or(|name| name == plain(names[i]));
     if names.len() != arm.links() || !(0..names.len()).all(named) {
         return Err(format!(
             "its joints are {}, those of the arm {}: give base, tip and lock as they were given to \

@@ -21,7 +21,7 @@ pub(crate) mod pose;
 mod rounding;
 mod shapes;
 mod source;
-mod text;
+pub(crate) mod text;
 mod tree;
 pub(crate) mod urdf;
 
@@ -185,6 +185,9 @@ fn imported(robot: urdf::Robot, source: &Source, options: &Options) -> Result<Im
         chain.notes.extend(said);
     }
     chain.notes = placed(chain.notes);
+    chain.notes.splice(0..0, source.outside().iter().cloned());
+    chain.notes.extend(text::unseen_names(&chain));
+    chain.notes.iter_mut().for_each(|note| *note = text::plain(note));
     let frames = frames::place(&chain, options).map_err(|reason| refused(vec![reason]))?;
     let text = text::arm_file(&chain, &frames, file, options);
     let arm = Arm::parse(&text, file)

@@ -20,6 +20,8 @@ pub struct Source {
     letters: Letters,
     /// The files that are included, by their names.
     included: Vec<String>,
+    /// What is said of those that lie outside of the model's folder.
+    outside: Vec<String>,
     /// For each line of the text the file that it is from, 0 the description itself, and its line there.
     lines: Vec<(usize, u32)>,
 }
@@ -85,7 +87,7 @@ impl Source {
     pub fn read(path: &Path) -> Result<Source, ImportError> {
         let file = path.display().to_string();
         let told = |e: String| ImportError::Unreadable(format!("{file}: {e}"));
-        let bytes = std::fs::read(path).map_err(|e| told(format!("cannot be read: {e}")))?;
+        let bytes = crate::file::read(path).map_err(|e| told(format!("cannot be read: {e}")))?;
         let letters = Letters::of(&bytes);
         let text = letters.text(&bytes).map_err(told)?;
         // What is wrong with a text that is no XML is told by who reads it.
@@ -101,11 +103,12 @@ impl Source {
             names: vec![file.clone()],
             seen: path.canonicalize().into_iter().collect(),
             folder: folder.clone(),
+            outside: Vec::new(),
         };
         whole.append(&text, 0..text.len(), &document, 0, &folder).map_err(ImportError::Unreadable)?;
-        let Whole { text, lines, mut names, .. } = whole;
+        let Whole { text, lines, mut names, outside, .. } = whole;
         let included = names.split_off(1);
-        Ok(Source { text, file, letters, included, lines })
+        Ok(Source { text, file, letters, included, outside, lines })
     }
 
     /// Whether it is a MuJoCo model, and no URDF.
@@ -116,7 +119,14 @@ impl Source {
     /// A text that includes nothing; `file` names it in errors.
     pub fn of_text(text: &str, file: &str) -> Source {
         let letters = Letters::Utf8;
-        Source { text: text.to_string(), file: file.to_string(), letters, included: vec![], lines: vec![] }
+        Source {
+            text: text.to_string(),
+            file: file.to_string(),
+            letters,
+            included: vec![],
+            outside: vec![],
+            lines: vec![],
+        }
     }
 
     /// The bytes of a text that takes this one's place.
@@ -127,6 +137,11 @@ impl Source {
     /// The files that are in the text.
     pub fn included(&self) -> &[String] {
         &self.included
+    }
+
+    /// What is said of included files that lie outside of the model's folder.
+    pub(super) fn outside(&self) -> &[String] {
+        &self.outside
     }
 
     /// A message about the text, with its lines as those of the files that they are from.
@@ -158,6 +173,8 @@ struct Whole {
     seen: BTreeSet<PathBuf>,
     /// Of the model.
     folder: PathBuf,
+    /// What is said of included files that lie elsewhere.
+    outside: Vec<String>,
 }
 
 impl Whole {
@@ -197,8 +214,14 @@ impl Whole {
         let unreadable = |e: std::io::Error| {
             format!("{this} cannot be read: {e}: its place is relative to the model's folder")
         };
-        let bytes = std::fs::read(&path).map_err(unreadable)?;
-        if !self.seen.insert(path.canonicalize().map_err(unreadable)?) {
+        let bytes = crate::file::read(&path).map_err(unreadable)?;
+        let place = path.canonicalize().map_err(unreadable)?;
+        let inside = self.folder.join(".").canonicalize().is_ok_and(|own| place.starts_with(own));
+        if !inside {
+            let what = format!("{this} lies outside of the model's folder: {}", place.display());
+            self.outside.push(what);
+        }
+        if !self.seen.insert(place) {
             return Err(format!("{this} is included already, once is all that MuJoCo allows"));
         }
         let text = Letters::of(&bytes).text(&bytes).map_err(|e| format!("{this}: {e}"))?;

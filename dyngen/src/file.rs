@@ -1,0 +1,46 @@
+//! Files that are read. Neither a pipe nor a device is one: reading it may never begin or never end.
+
+use std::fs::File;
+use std::io;
+use std::path::Path;
+
+/// Refuses what is neither a file nor a folder, before it is opened.
+///
+/// # Errors
+/// What it is and what to do, and what the system says where there is nothing.
+pub fn regular(path: &Path) -> io::Result<()> {
+    let kind = std::fs::metadata(path)?.file_type();
+    match kind.is_file() || kind.is_dir() {
+        true => Ok(()),
+        false => Err(io::Error::other(
+            "it is a pipe or a device, which need not end: write what it gives into a file and name that",
+        )),
+    }
+}
+
+/// Opens a file.
+///
+/// # Errors
+/// As [`regular`].
+pub fn open(path: &Path) -> io::Result<File> {
+    regular(path)?;
+    File::open(path)
+}
+
+/// The bytes of a file.
+///
+/// # Errors
+/// As [`regular`].
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    regular(path)?;
+    std::fs::read(path)
+}
+
+/// The text of a file.
+///
+/// # Errors
+/// As [`regular`], and where it is not UTF-8.
+pub fn text(path: &Path) -> io::Result<String> {
+    regular(path)?;
+    std::fs::read_to_string(path)
+}
