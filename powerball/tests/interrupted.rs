@@ -175,4 +175,23 @@ fn a_log_that_cannot_grow_stops_the_arm() {
     let told = String::from_utf8_lossy(&ended.stderr).into_owned();
     assert_eq!(ended.status.code(), Some(1), "{told}");
     assert!(told.contains("cannot be written"), "{told}");
+    let log = std::fs::read_to_string(folder.join("log.csv")).unwrap();
+    assert!(log.lines().count() > 100 && log.ends_with('\n'), "{} bytes", log.len());
+
+    // A command that moves no arm says so too, and leaves nothing behind that it has half written.
+    let script = format!(
+        "ulimit -f 1; exec {} log {} --arm {} --to mcap --out {}",
+        env!("CARGO_BIN_EXE_powerball"),
+        folder.join("log.csv").display(),
+        hardware(),
+        folder.join("log.mcap").display()
+    );
+    let ended = Command::new("bash").args(["-c", &script]).output().unwrap();
+    let told = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(2), "{told}");
+    assert!(told.contains("log.mcap: cannot be written"), "{told}");
+    let names =
+        std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let names: Vec<String> = names.filter(|name| name.contains("part") || name.contains("mcap")).collect();
+    assert!(names.is_empty(), "{names:?}");
 }

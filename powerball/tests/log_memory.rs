@@ -72,6 +72,86 @@ fn one() {
     println!("\nfigures {} {arrays:.1} {:.1} {seconds:.2}", log.t.len(), held()[1] - before);
 }
 
+/// `powerball log` within so many kB of address space: its exit code and what it said.
+fn looked_at(file: &Path, more: &[&str], kilobytes: usize) -> (Option<i32>, String) {
+    let command = format!("ulimit -v {kilobytes}; exec \"$@\"");
+    let mut shell = Command::new("bash");
+    shell.args(["-c", &command, "bash", env!("CARGO_BIN_EXE_powerball"), "log"]).arg(file).args(more);
+    let begun = Instant::now();
+    let done = shell.output().unwrap();
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(begun.elapsed().as_secs_f64() < 5.0, "{}: {:?}", file.display(), begun.elapsed());
+    (done.status.code(), said)
+}
+
+/// Files that say of themselves that they are large: refused by what they say, and not by what is left when it is too late.
+#[test]
+fn what_needs_more_memory_than_is_allowed_is_refused_before_it_is_read() {
+    const ADDRESSES: usize = 600_000;
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("log_refused");
+    std::fs::create_dir_all(&folder).unwrap();
+    let made = log();
+    let names: Vec<String> = (1..=JOINTS).map(|j| format!("arm_joint_{j}")).collect();
+    for name in ["log.csv", "log.parquet", "log.mcap"] {
+        let file = folder.join(name);
+        made.write_for(&file, &names).unwrap();
+        let (code, said) = looked_at(&file, &["--memory", "10MB"], ADDRESSES);
+        assert_eq!(code, Some(2), "{name}: {said}");
+        for words in [name, "of memory, and a log may take 10.0 MB", "--memory"] {
+            assert!(said.contains(words), "{name}: {said}");
+        }
+    }
+    // 8 TB of zeros, none of them on the disk, and rows of nothing.
+    let array = |name: &str, shape: &str, bytes: u64| {
+        let head = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let size = u16::try_from(head.len()).unwrap().to_le_bytes();
+        let file = folder.join(name);
+        std::fs::write(&file, [b"\x93NUMPY\x01\x00", &size[..], head.as_bytes()].concat()).unwrap();
+        std::fs::OpenOptions::new()
+            .write(true)
+            .open(&file)
+            .unwrap()
+            .set_len(10 + head.len() as u64 + bytes)
+            .unwrap();
+        file
+    };
+    for file in [
+        array("zeros.npy", "(1000000000000,)", 8_000_000_000_000),
+        array("nothing.npy", "(1000000000000, 0)", 0),
+    ] {
+        let (code, said) = looked_at(&file, &[], ADDRESSES);
+        assert_eq!(code, Some(2), "{}: {said}", file.display());
+        assert!(said.contains(".0 TB of memory"), "{said}");
+        std::fs::remove_file(&file).unwrap();
+    }
+    let wide = folder.join("wide.csv");
+    let names: Vec<String> = (1..=100_000).map(|k| format!("q{k}")).collect();
+    std::fs::write(&wide, format!("{}\n{}\n", names.join(","), vec!["0"; names.len()].join(","))).unwrap();
+    let (code, said) = looked_at(&wide, &[], ADDRESSES);
+    assert!(code == Some(2) && said.contains("wide.csv:1: header: 100000 columns: "), "{code:?} {said}");
+}
+
+/// What need not end is refused before it is opened.
+#[test]
+fn pipes_and_devices_are_no_logs_and_no_maps() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("log_pipes");
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    let (pipe, csv) = (folder.join("pipe"), folder.join("log.csv"));
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    std::fs::write(&csv, "t,q1\n0,0\n").unwrap();
+    for input in [&pipe, Path::new("/dev/zero")] {
+        let map = input.display().to_string();
+        for (file, more) in [(input, &[][..]), (&csv, &["--map", &map][..])] {
+            let (code, said) = looked_at(file, more, 600_000);
+            assert!(
+                code == Some(2) && said.contains(&map) && said.contains("a pipe or a device"),
+                "{code:?} {said}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_log_is_read_in_little_more_memory_than_its_arrays_take() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("log_memory");

@@ -101,7 +101,7 @@ pub(super) fn read_summary(file: &Path) -> Result<Option<Bands>, String> {
         }
         Ok(None)
     };
-    let bytes = std::fs::File::open(file).and_then(read).map_err(|e| format!("cannot be read: {e}"))?;
+    let bytes = dyngen::file::open(file).and_then(read).map_err(|e| format!("cannot be read: {e}"))?;
     bytes.map(|bytes| Bands::from_bytes(&bytes).map_err(|e| e.to_string())).transpose()
 }
 

@@ -34,8 +34,7 @@ impl Interrupt {
             flag::register_conditional_default(signal, Arc::clone(&interrupt.idle))?;
             flag::register(signal, Arc::clone(&interrupt.asked))?;
         }
-        #[cfg(target_os = "linux")]
-        flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
+        file_limit_is_an_error()?;
         Ok(interrupt)
     }
 
@@ -54,6 +53,17 @@ impl Interrupt {
     pub(super) fn guard(&self, moved: bool) {
         self.idle.store(!moved && !self.is_asked(), Ordering::SeqCst);
     }
+}
+
+/// Makes a file-size limit (`ulimit -f`) an error of the write that meets it, and no end of this process, which could then
+/// neither say so nor take away what it has half written.
+///
+/// # Errors
+/// Where the system does not let signals be listened to.
+pub fn file_limit_is_an_error() -> io::Result<()> {
+    #[cfg(target_os = "linux")]
+    signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
+    Ok(())
 }
 
 /// A file would become larger than it may; the number on Linux (signal(7)), the same on all of its common machines.

@@ -21,7 +21,7 @@ mod url;
 #[cfg(unix)]
 mod watchdog;
 
-pub use interrupt::Interrupt;
+pub use interrupt::{Interrupt, file_limit_is_an_error};
 pub use master::{ArmError, Master, Moment};
 pub use memory::{Memory, Peer};
 pub use slcan::Slcan;

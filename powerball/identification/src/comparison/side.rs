@@ -59,7 +59,7 @@ impl Side {
             |file: &Path, what: String| CompareError::Unreadable(format!("{}: {what}", file.display()));
         let file = if path.is_dir() { path.join("identified.json") } else { path.to_path_buf() };
         let text =
-            std::fs::read_to_string(&file).map_err(|e| wrong(&file, format!("cannot be read: {e}")))?;
+            dyngen::file::text(&file).map_err(|e| wrong(&file, format!("cannot be read: {e}")))?;
         let model: File = serde_json::from_str(&text)
             .map_err(|e| wrong(&file, format!("is no result of `powerball identify`: {e}")))?;
         let beside = file.with_file_name("covariance.json");

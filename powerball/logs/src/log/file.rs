@@ -21,6 +21,9 @@ pub struct LogFile {
     lines: PathBuf,
     file: File,
     started: bool,
+    /// Bytes that were written, and those of whole lines.
+    length: u64,
+    whole: u64,
     joints: Vec<String>,
 }
 
@@ -54,7 +57,7 @@ impl LogFile {
         let recovered = if made.is_some() { recover(path, &lines, joints)? } else { None };
         let file = OpenOptions::new().create(true).append(true).open(&lines)?;
         let (path, joints) = (path.to_path_buf(), joints.to_vec());
-        Ok((LogFile { path, lines, file, started: false, joints }, recovered))
+        Ok((LogFile { path, lines, file, started: false, length: 0, whole: 0, joints }, recovered))
     }
 
     /// Ends the log.
@@ -83,7 +86,16 @@ impl Write for LogFile {
             self.file.set_len(0)?;
             self.started = true;
         }
-        self.file.write(bytes)
+        // Whole lines or nothing: what does not fit is taken away, up to the last line that did.
+        if let Err(e) = self.file.write_all(bytes) {
+            let _ = self.file.set_len(self.whole);
+            return Err(e);
+        }
+        self.length += bytes.len() as u64;
+        if let Some(end) = bytes.iter().rposition(|byte| *byte == b'\n') {
+            self.whole = self.length - (bytes.len() - 1 - end) as u64;
+        }
+        Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -181,7 +193,17 @@ impl Log {
     /// # Errors
     /// As [`Log::write`].
     pub fn write_for(&self, path: &Path, joints: &[String]) -> io::Result<()> {
-        let (mut file, _) = LogFile::create_for(path, joints)?;
+        let (file, _) = LogFile::create_for(path, joints)?;
+        let lines = file.lines.clone();
+        let written = self.write_into(file);
+        // The samples are still here: half of them in a file are of no use.
+        if written.is_err() {
+            let _ = fs::remove_file(lines);
+        }
+        written
+    }
+
+    fn write_into(&self, mut file: LogFile) -> io::Result<()> {
         let groups = self.groups();
         let mut line = String::from("t");
         for (stem, signals) in &groups {

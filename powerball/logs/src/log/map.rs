@@ -156,7 +156,8 @@ impl ColumnMap {
         let (lines, files): (Vec<&String>, Vec<&String>) = said.iter().partition(|said| said.contains('='));
         let mut text = lines.iter().map(|line| format!("{line}\n")).collect::<String>();
         for file in &files {
-            let read = std::fs::read_to_string(file).map_err(|e| format!("{file}: cannot be read: {e}"))?;
+            let read =
+                dyngen::file::text(Path::new(file)).map_err(|e| format!("{file}: cannot be read: {e}"))?;
             text.push_str(&read);
         }
         let name = match (lines.as_slice(), files.as_slice()) {
@@ -172,7 +173,7 @@ impl ColumnMap {
     /// Where it cannot be read, and as [`ColumnMap::parse`].
     pub fn read(path: &Path) -> Result<ColumnMap, String> {
         let name = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|e| format!("{name}: cannot be read: {e}"))?;
+        let text = dyngen::file::text(path).map_err(|e| format!("{name}: cannot be read: {e}"))?;
         ColumnMap::parse(&text, &name)
     }
 

@@ -182,6 +182,12 @@ impl Raw {
         by_joint.chain([&mut self.t]).for_each(|values| make_room(values, samples));
     }
 
+    /// How many signals there are.
+    fn signals(&self) -> usize {
+        let optional = self.temperature.iter().chain(&self.motor).map(Vec::len).sum::<usize>();
+        1 + self.q.len() + self.effort.len() + self.dq.len() + optional
+    }
+
     pub(super) fn push(&mut self, line: usize, values: &[f64]) {
         let mut values = values.iter().copied();
         self.line.push(line);
@@ -321,6 +327,10 @@ impl RowSink for Samples<'_> {
         if let Some((_, raw)) = &mut self.found {
             raw.expect(rows);
         }
+    }
+
+    fn kept(&self) -> usize {
+        self.found.as_ref().map_or(0, |(_, raw)| raw.signals() + 1)
     }
 
     fn row(&mut self, line: usize, number: &dyn Fn(usize) -> Option<f64>) {

@@ -3,6 +3,7 @@
 //! An array of N numbers is a column of its name, one of N × k numbers is k columns `name1` … `namek`. An
 //! array of k texts (`joints`, `names`) names the columns of N × k arrays: `q.shoulder`.
 
+use super::memory::{Memory, few_columns};
 use super::table::{Column, Table};
 
 /// One array as it is stored.
@@ -21,13 +22,25 @@ pub(super) enum Values {
 
 /// All arrays of a file as its one table, and those that have no place in it.
 #[cfg(any(feature = "npz", feature = "mat"))]
-pub(super) fn one(arrays: &[Array], left_out: Vec<String>) -> (Vec<Table>, Vec<String>) {
-    let (table, note) = table(arrays, left_out);
-    (vec![table], note.into_iter().collect())
+pub(super) fn one(
+    arrays: Vec<Array>,
+    left_out: Vec<String>,
+    mut memory: Memory,
+) -> std::io::Result<(Vec<Table>, Vec<String>)> {
+    let (table, note) = table(arrays, left_out, &mut memory).map_err(std::io::Error::other)?;
+    memory.done()?;
+    Ok((vec![table], note.into_iter().collect()))
 }
 
 /// The arrays as one table, and those that have no place in it. `left_out`: those that could not be read.
-pub(super) fn table(arrays: &[Array], mut left_out: Vec<String>) -> (Table, Option<String>) {
+///
+/// # Errors
+/// Why there is no room for it.
+pub(super) fn table(
+    arrays: Vec<Array>,
+    mut left_out: Vec<String>,
+    memory: &mut Memory,
+) -> Result<(Table, Option<String>), String> {
     // As many samples as the time has, or as most arrays have.
     let longest = |a: &Array| a.shape.iter().copied().max().unwrap_or(0);
     let time = arrays.iter().find(|a| ["t", "time", "times", "timestamp"].contains(&a.name.as_str()));
@@ -38,9 +51,11 @@ pub(super) fn table(arrays: &[Array], mut left_out: Vec<String>) -> (Table, Opti
     };
     let names: Vec<Vec<String>> = arrays.iter().filter_map(texts).collect();
     let mut table = Table::new("", "arrays");
+    // An array of no columns can have as many rows as it likes.
+    memory.claim_numbers(samples)?;
     table.line = (1..=samples).collect();
     for array in arrays {
-        let Values::Numbers(values) = &array.values else { continue };
+        let Values::Numbers(mut values) = array.values else { continue };
         let (width, down) = match array.shape[..] {
             [n] if n == samples => (1, !array.columns_first),
             [n, k] if n == samples => (k, !array.columns_first),
@@ -52,6 +67,7 @@ pub(super) fn table(arrays: &[Array], mut left_out: Vec<String>) -> (Table, Opti
                 continue;
             }
         };
+        few_columns(table.columns.len() + width)?;
         let joints = names.iter().find(|names| names.len() == width && width > 1);
         for k in 0..width {
             let name = match (joints, array.shape.len()) {
@@ -60,10 +76,16 @@ pub(super) fn table(arrays: &[Array], mut left_out: Vec<String>) -> (Table, Opti
                 (None, _) => format!("{}{}", array.name, k + 1),
             };
             let at = |n: usize| if down { n * width + k } else { k * samples + n };
-            let values = (0..samples).map(|n| values.get(at(n)).copied().unwrap_or(f64::NAN)).collect();
+            let values = match width {
+                1 => {
+                    values.resize(samples, f64::NAN);
+                    std::mem::take(&mut values)
+                }
+                _ => (0..samples).map(|n| values.get(at(n)).copied().unwrap_or(f64::NAN)).collect(),
+            };
             table.columns.push(Column { name, values });
         }
     }
     let note = (!left_out.is_empty()).then(|| format!("kept out: {}", left_out.join(", ")));
-    (table, note)
+    Ok((table, note))
 }

@@ -3,7 +3,7 @@
 use super::messages::Topics;
 use rosbag::{ChunkRecord, Error, IndexRecord, MessageRecord, RosBag};
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 /// What a bag begins with.
@@ -14,6 +14,7 @@ const HEAD: u64 = 4096;
 /// Reads the topics of a bag; what is wrong with it.
 pub(super) fn read(path: &Path, topics: &mut Topics) -> io::Result<Vec<String>> {
     has_index(path)?;
+    topics.holds(largest_chunk(path)?).map_err(io::Error::other)?;
     let bag = RosBag::new(path)?;
     for record in bag.index_records() {
         if let IndexRecord::Connection(of) = record.map_err(torn)? {
@@ -76,6 +77,40 @@ fn has_index(path: &Path) -> io::Result<()> {
         }
         None => Err(io::Error::other("its head is torn")),
     }
+}
+
+/// What the largest of a bag's chunks says that it unpacks to, bytes; room is made for it. A bag that is torn ends before its end.
+fn largest_chunk(path: &Path) -> io::Result<u64> {
+    let mut file = BufReader::new(File::open(path)?);
+    file.seek_relative(MAGIC.len() as i64)?;
+    let mut largest = 0;
+    loop {
+        let Ok(length) = u32_of(&mut file) else { return Ok(largest) };
+        let mut head = Vec::new();
+        (&mut file).take(u64::from(length)).read_to_end(&mut head)?;
+        // The fields of a head: their length, then name=value.
+        let (mut rest, mut chunk, mut size) = (head.as_slice(), false, 0);
+        while let Some((length, after)) = rest.split_first_chunk::<4>() {
+            let Some((field, after)) = after.split_at_checked(u32::from_le_bytes(*length) as usize) else {
+                break;
+            };
+            rest = after;
+            chunk |= field == b"op=\x05";
+            let number = field.strip_prefix(b"size=").and_then(|number| number.try_into().ok());
+            size = number.map_or(size, u32::from_le_bytes);
+        }
+        if chunk {
+            largest = largest.max(u64::from(size));
+        }
+        let Ok(length) = u32_of(&mut file) else { return Ok(largest) };
+        file.seek_relative(i64::from(length))?;
+    }
+}
+
+fn u32_of(file: &mut impl Read) -> io::Result<u32> {
+    let mut bytes = [0; 4];
+    file.read_exact(&mut bytes)?;
+    Ok(u32::from_le_bytes(bytes))
 }
 
 fn torn(error: Error) -> io::Error {

@@ -3,6 +3,8 @@
 #[cfg(feature = "parquet")]
 use super::lerobot::Dataset;
 #[cfg(feature = "parquet")]
+use super::memory::{Memory, few_columns};
+#[cfg(feature = "parquet")]
 use super::numbers::{leaves, numbers, width};
 use super::table::RowSink;
 use super::{Finding, LogError};
@@ -11,9 +13,11 @@ use arrow_array::RecordBatch;
 #[cfg(feature = "parquet")]
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 #[cfg(feature = "parquet")]
-use parquet::file::metadata::ParquetMetaData;
+use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
 #[cfg(feature = "parquet")]
 use parquet::file::reader::ChunkReader;
+#[cfg(feature = "parquet")]
+use parquet::schema::types::ColumnDescPtr;
 
 /// A file that claims more rows does not have them.
 #[cfg(feature = "parquet")]
@@ -21,6 +25,9 @@ const ROWS_A_BYTE: u64 = 64;
 /// So many rows are in memory at a time.
 #[cfg(feature = "parquet")]
 const ROWS: usize = 8192;
+/// The same where rows hold texts or pictures.
+#[cfg(feature = "parquet")]
+const ROWS_OF_TEXTS: usize = 256;
 
 /// Hands the rows of a Parquet file over, which stays on the disk. They take the place of lines in findings.
 #[cfg(feature = "parquet")]
@@ -43,6 +50,9 @@ pub(super) struct Rows<'s, S> {
     known: Option<Known>,
     /// Of the file that is read.
     expected: usize,
+    /// Rows that it says are still to come.
+    claimed: usize,
+    memory: Memory,
     /// The columns of a file without rows.
     fields: Vec<String>,
 }
@@ -57,7 +67,8 @@ struct Known {
 #[cfg(feature = "parquet")]
 impl<'s, S: RowSink> Rows<'s, S> {
     pub(super) fn new(sink: &'s mut S) -> Self {
-        Rows { sink, count: 0, known: None, expected: 0, fields: Vec::new() }
+        let memory = Memory::of_a_log();
+        Rows { sink, count: 0, known: None, expected: 0, claimed: 0, memory, fields: Vec::new() }
     }
 
     /// Hands the rows of a file over.
@@ -77,10 +88,16 @@ impl<'s, S: RowSink> Rows<'s, S> {
             .map_err(|e| unreadable(None, &e))?;
         within(builder.metadata(), length).map_err(|e| unreadable(None, &e))?;
         self.fields = builder.schema().fields().iter().map(|field| field.name().clone()).collect();
+        let refused = |reason: String| LogError::of_file(file, "Parquet", reason);
+        few_columns(builder.parquet_schema().num_columns()).map_err(refused)?;
+        self.memory.holds(lists(builder.metadata())).map_err(refused)?;
         let rows = u64::try_from(builder.metadata().file_metadata().num_rows()).unwrap_or(0);
+        self.claimed = usize::try_from(rows).unwrap_or(usize::MAX);
         self.expected = usize::try_from(rows.min(length.saturating_mul(ROWS_A_BYTE))).unwrap_or(0);
+        let texts = builder.parquet_schema().columns().iter().any(|column| has_texts(column));
+        let batch = if texts { ROWS_OF_TEXTS } else { ROWS };
         let mut reader =
-            guarded(|| builder.with_batch_size(ROWS).build()).map_err(|e| unreadable(None, &e))?;
+            guarded(|| builder.with_batch_size(batch).build()).map_err(|e| unreadable(None, &e))?;
         let before = self.count;
         loop {
             let row = Some(self.count - before + 1);
@@ -97,6 +114,8 @@ impl<'s, S: RowSink> Rows<'s, S> {
             None => {
                 let widths: Vec<Option<usize>> = columns.iter().map(|(_, array)| width(array)).collect();
                 let named = columns.iter().zip(&widths).map(|((name, _), width)| (name.as_str(), *width));
+                let count = columns.len() + widths.iter().flatten().sum::<usize>();
+                few_columns(count).map_err(|reason| LogError::of_file(file, "Parquet", reason))?;
                 let (names, dataset) = Dataset::of(std::path::Path::new(file), named);
                 self.sink.begin(&names)?;
                 self.sink.expect(self.expected);
@@ -105,6 +124,10 @@ impl<'s, S: RowSink> Rows<'s, S> {
                 self.known.insert(Known { columns: columns.collect(), dataset })
             }
         };
+        let rows = self.count.saturating_add(self.claimed.max(batch.num_rows()));
+        let held = self.memory.holds_rows(rows, self.sink.kept());
+        held.map_err(|reason| LogError::of_file(file, "Parquet", reason))?;
+        self.claimed = self.claimed.saturating_sub(batch.num_rows());
         if !columns.iter().map(|(name, _)| name).eq(known.columns.iter().map(|(name, _)| name)) {
             return Err(LogError::of_file(file, "Parquet", "has other columns than the files before it"));
         }
@@ -172,6 +195,23 @@ fn within(metadata: &ParquetMetaData, length: u64) -> Result<(), &'static str> {
             .is_some_and(|end| end <= length)
     });
     if within { Ok(()) } else { Err("a column lies outside of the file, which is torn") }
+}
+
+/// Whether a column holds texts or other bytes, each of them of any length.
+#[cfg(feature = "parquet")]
+fn has_texts(column: &ColumnDescPtr) -> bool {
+    column.physical_type() == parquet::basic::Type::BYTE_ARRAY
+}
+
+/// Bytes of the numbers in lists that one row group may bring at once: a single row can have them all.
+#[cfg(feature = "parquet")]
+fn lists(metadata: &ParquetMetaData) -> u64 {
+    let of = |column: &ColumnChunkMetaData| match column.column_descr().max_rep_level() {
+        0 => 0,
+        _ => u64::try_from(column.num_values()).unwrap_or(0).saturating_mul(8),
+    };
+    let groups = metadata.row_groups().iter();
+    groups.map(|group| group.columns().iter().map(of).fold(0, u64::saturating_add)).max().unwrap_or(0)
 }
 
 /// Hands the rows of a Parquet file over.

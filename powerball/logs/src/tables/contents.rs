@@ -84,6 +84,7 @@ impl Format {
     pub fn of_file(path: &Path) -> Result<Format, LogError> {
         let failed =
             |e: std::io::Error| LogError::of_file(&shown(path), "file", format!("cannot be read: {e}"));
+        dyngen::file::regular(path).map_err(failed)?;
         if dataset(path).is_some() {
             return Ok(Format::LeRobot);
         }
@@ -202,16 +203,16 @@ fn topic_tables(
     notes: &mut Vec<Finding>,
 ) -> Result<Vec<Table>, LogError> {
     let mut topics = super::messages::Topics::of(only);
+    let refused = |e: std::io::Error| LogError::of_file(file, "topics", format!("cannot be read: {e}"));
     #[cfg(feature = "remote")]
     if let super::remote::Remote::Read(object) = &mut place.remote {
         let wrong = super::mcap::read_from(object, &mut topics)
             .map_err(|e| LogError::of_file(file, "MCAP", format!("cannot be read: {e}")))?;
         notes.extend(wrong.into_iter().map(|wrong| Finding::of_file(file, "MCAP", wrong)));
-        return Ok(topics.tables());
+        return topics.tables().map_err(refused);
     }
-    let _ = file;
     bag::Parts::of(&place.path)?.read(&mut topics, notes)?;
-    Ok(topics.tables())
+    topics.tables().map_err(refused)
 }
 
 #[cfg(not(feature = "topics"))]

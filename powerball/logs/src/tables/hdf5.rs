@@ -4,6 +4,7 @@
 //! none above them, as a file of recorded demonstrations has, each is a table with the group's path as its name.
 
 use super::arrays::{Array, Values, table};
+use super::memory::Memory;
 use super::table::Table;
 use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group, Object};
 use std::collections::HashMap;
@@ -12,14 +13,14 @@ use std::path::Path;
 
 /// Groups within groups.
 const DEEPEST: usize = 16;
-/// An array of more values is no signal.
-const LARGEST: u64 = 1 << 32;
 
 /// The tables of a file, and what has no place in them.
 pub(super) fn read(path: &Path) -> io::Result<(Vec<Table>, Vec<String>)> {
     let file = File::open_streaming(path).map_err(failed)?;
-    let mut found = Vec::new();
-    tables(&file.root(), "", 0, &mut found).map_err(failed)?;
+    let (mut found, mut memory) = (Vec::new(), Memory::of_a_log());
+    let read = tables(&file.root(), "", 0, &mut found, &mut memory);
+    memory.done()?;
+    read.map_err(failed)?;
     if found.is_empty() {
         return Err(io::Error::other("it holds no arrays"));
     }
@@ -44,6 +45,7 @@ fn tables(
     path: &str,
     depth: usize,
     found: &mut Vec<(Table, Option<String>)>,
+    memory: &mut Memory,
 ) -> Result<(), Error> {
     let sets = group.datasets()?;
     let groups = group.groups()?;
@@ -52,13 +54,14 @@ fn tables(
     if sets.is_empty() {
         for name in inner.filter(|_| depth < DEEPEST) {
             let path = format!("{path}/{name}");
-            tables(&group.group(name)?, &path, depth + 1, found)?;
+            tables(&group.group(name)?, &path, depth + 1, found, memory)?;
         }
         return Ok(());
     }
     let (mut arrays, mut left_out) = (Vec::new(), Vec::new());
-    collect(group, "", depth, &mut arrays, &mut left_out)?;
-    let (mut table, note) = table(&arrays, left_out);
+    collect(group, "", depth, &mut arrays, &mut left_out, memory)?;
+    let (mut table, note) =
+        table(arrays, left_out, memory).map_err(|reason| Error::from(io::Error::other(reason)))?;
     table.name = path.to_string();
     found.push((table, note));
     Ok(())
@@ -71,10 +74,11 @@ fn collect(
     depth: usize,
     arrays: &mut Vec<Array>,
     left_out: &mut Vec<String>,
+    memory: &mut Memory,
 ) -> Result<(), Error> {
     for name in group.datasets()? {
         let full = format!("{prefix}{name}");
-        match group.dataset(&name).map_err(|e| e.to_string()).and_then(|set| array(&full, &set)) {
+        match group.dataset(&name).map_err(|e| e.to_string()).and_then(|set| array(&full, &set, memory)) {
             Ok(array) => arrays.push(array),
             Err(reason) => left_out.push(format!("{full} ({reason})")),
         }
@@ -84,20 +88,23 @@ fn collect(
         // The fields of a struct of MATLAB's have their own names, as in its older versions.
         let prefix =
             if class(inner.attrs()).is_some() { prefix.to_string() } else { format!("{prefix}{name}.") };
-        collect(&inner, &prefix, depth + 1, arrays, left_out)?;
+        collect(&inner, &prefix, depth + 1, arrays, left_out, memory)?;
     }
     Ok(())
 }
 
-fn array(name: &str, set: &Dataset) -> Result<Array, String> {
+fn array(name: &str, set: &Dataset, memory: &mut Memory) -> Result<Array, String> {
     let said = |e: Error| e.to_string();
     let class = class(set.attrs());
     let shape: Vec<u64> = set.shape().map_err(said)?;
     let count = shape.iter().try_fold(1u64, |all, n| all.checked_mul(*n)).unwrap_or(u64::MAX);
     let long: Vec<usize> = shape.iter().filter(|n| **n != 1).map(|n| *n as usize).collect();
-    if count > LARGEST || long.len() > 2 {
+    if long.len() > 2 {
         return Err(format!("its shape is {shape:?}"));
     }
+    // As they are stored, and as numbers.
+    let stored = set.element_size().map_or(8, |size| size as u64);
+    memory.claim(count.saturating_mul(stored.saturating_add(8)))?;
     let mut shape = if long.is_empty() { vec![1] } else { long };
     // MATLAB writes its arrays column by column, and so their dimensions the other way round.
     let columns_first = class.is_some();

@@ -2,12 +2,11 @@
 //! them (version 7.3 is HDF5): arrays of numbers, of letters, cells of letters, and the fields of a struct of one element.
 
 use super::arrays::{Array, Values, one};
+use super::memory::Memory;
 use super::table::Table;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// What a compressed variable may unpack to, bytes.
-const LARGEST: u64 = 1 << 32;
 /// Structs within structs.
 const DEEPEST: usize = 8;
 
@@ -21,18 +20,23 @@ const LETTERS: u32 = 4;
 
 /// The arrays of a file as one table, and those that have no place in it.
 pub(super) fn read(path: &Path) -> io::Result<(Vec<Table>, Vec<String>)> {
+    let mut memory = Memory::of_a_log();
+    memory.claim(std::fs::metadata(path)?.len()).map_err(io::Error::other)?;
     let bytes = std::fs::read(path)?;
     let big = match bytes.get(126..128) {
         Some(b"IM") => false,
         Some(b"MI") => true,
         _ => return Err(torn()),
     };
-    let mut found = Found::default();
+    let mut found = Found { arrays: Vec::new(), left_out: Vec::new(), memory };
     let mut elements = Elements { rest: &bytes[128..], big };
     while let Some((kind, content)) = elements.next()? {
         if kind == COMPRESSED {
             let mut unpacked = Vec::new();
-            flate2::read::ZlibDecoder::new(content).take(LARGEST).read_to_end(&mut unpacked)?;
+            // One byte more than there is room for is refused.
+            let most = found.memory.left().saturating_add(1);
+            flate2::read::ZlibDecoder::new(content).take(most).read_to_end(&mut unpacked)?;
+            found.memory.claim(unpacked.len() as u64).map_err(io::Error::other)?;
             let mut inner = Elements { rest: &unpacked, big };
             if let Some((MATRIX, content)) = inner.next()? {
                 found.variable(Elements { rest: content, big }, None, 0)?;
@@ -41,7 +45,7 @@ pub(super) fn read(path: &Path) -> io::Result<(Vec<Table>, Vec<String>)> {
             found.variable(Elements { rest: content, big }, None, 0)?;
         }
     }
-    Ok(one(&found.arrays, found.left_out))
+    one(found.arrays, found.left_out, found.memory)
 }
 
 fn torn() -> io::Error {
@@ -124,10 +128,10 @@ impl<'a> Elements<'a> {
     }
 }
 
-#[derive(Default)]
 struct Found {
     arrays: Vec<Array>,
     left_out: Vec<String>,
+    memory: Memory,
 }
 
 impl Found {
@@ -142,6 +146,8 @@ impl Found {
         let stored = own.text()?;
         let name = field.map_or(stored, str::to_string);
         let count = shape.iter().try_fold(1usize, |all, n| all.checked_mul(*n)).ok_or_else(torn)?;
+        // Letters are read as numbers too, and of any kind there are no more than bytes.
+        self.memory.claim_numbers(count.min(own.rest.len())).map_err(io::Error::other)?;
         // A vector is a row or a column there.
         let long: Vec<usize> = shape.iter().copied().filter(|n| *n != 1).collect();
         let shape = if long.is_empty() { vec![1] } else { long };

@@ -18,6 +18,11 @@ use std::path::Path;
 /// A chunk that claims to be larger than this, bytes, is damaged.
 const LARGEST_CHUNK: usize = 1 << 30;
 
+/// A chunk is unpacked in steps of so many bytes.
+const STEP: u64 = 64 << 20;
+/// No byte that LZ4 compressed is more than so many.
+const LZ4_MOST: u64 = 256;
+
 /// Bytes of a message that Zstandard compressed very well.
 const SHORTEST: u64 = 2;
 /// So many bytes are read ahead where records follow each other.
@@ -222,7 +227,7 @@ impl<'t> Records<'t> {
             match rest.split_at_checked(size) {
                 Some((chunk, index)) => {
                     rest = index;
-                    self.chunk(chunk);
+                    self.chunk(chunk)?;
                 }
                 None => self.lose("the file ends before it".into()),
             }
@@ -259,7 +264,7 @@ impl<'t> Records<'t> {
                 Ok(LinearReadEvent::Record { opcode: op::CHUNK, data }) => {
                     self.chunks += 1;
                     let head = [&[op::CHUNK][..], &(data.len() as u64).to_le_bytes()].concat();
-                    self.chunk(&[&head, data].concat());
+                    self.chunk(&[&head, data].concat())?;
                 }
                 Ok(LinearReadEvent::Record { opcode, data }) => match parse_record(opcode, data) {
                     Ok(known) => self.record(known),
@@ -284,8 +289,16 @@ impl<'t> Records<'t> {
     }
 
     /// The records of a chunk, all or none of them. `bytes` is the chunk as a record.
-    fn chunk(&mut self, bytes: &[u8]) {
+    fn chunk(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.behind_lost = false;
+        let unpacked = match self.unpacked(bytes)? {
+            Ok(unpacked) => unpacked,
+            Err(reason) => {
+                self.lose(reason);
+                return Ok(());
+            }
+        };
+        let bytes = unpacked.as_deref().unwrap_or(bytes);
         let options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
@@ -308,7 +321,41 @@ impl<'t> Records<'t> {
             };
             if let Err(e) = done {
                 self.lose(e.to_string());
-                return;
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// A chunk that Zstandard compressed, as one that is not: it takes what it holds and not what it says to hold. None for any
+    /// other that says no more than it can hold; why it is damaged where it does. A chunk that there is no room for ends the file.
+    fn unpacked(&self, bytes: &[u8]) -> io::Result<Result<Option<Vec<u8>>, String>> {
+        let Some(chunk) = Chunk::of(bytes) else { return Ok(Ok(None)) };
+        if chunk.size > LARGEST_CHUNK as u64 {
+            return Ok(Err(format!("it says that it unpacks to {} bytes", chunk.size)));
+        }
+        let packed = chunk.records.len() as u64;
+        match chunk.compression {
+            b"zstd" => {
+                let mut records = Vec::new();
+                let mut decoder = zstd::Decoder::new(chunk.records)?.take(chunk.size.saturating_add(1));
+                // In steps, so that one that is too large is refused on its way.
+                while (&mut decoder).take(STEP).read_to_end(&mut records).is_ok_and(|read| read > 0) {
+                    self.topics.holds(2 * records.len() as u64).map_err(io::Error::other)?;
+                }
+                match records.len() as u64 == chunk.size {
+                    true => Ok(Ok(Some(chunk.stored(&records)))),
+                    false => {
+                        Ok(Err(format!("it unpacks to other than the {} bytes that it says", chunk.size)))
+                    }
+                }
+            }
+            b"lz4" if chunk.size > packed.saturating_mul(LZ4_MOST) => {
+                Ok(Err(format!("it says that {packed} bytes unpack to {}", chunk.size)))
+            }
+            _ => {
+                self.topics.holds(chunk.size).map_err(io::Error::other)?;
+                Ok(Ok(None))
             }
         }
     }
@@ -358,6 +405,39 @@ impl<'t> Records<'t> {
             )
         });
         lost.into_iter().chain(torn).collect()
+    }
+}
+
+/// The parts of a chunk as a record.
+struct Chunk<'b> {
+    /// The times of its first and last message.
+    times: &'b [u8],
+    /// What it says that its records unpack to, bytes.
+    size: u64,
+    checksum: &'b [u8],
+    compression: &'b [u8],
+    records: &'b [u8],
+}
+
+impl<'b> Chunk<'b> {
+    fn of(bytes: &'b [u8]) -> Option<Chunk<'b>> {
+        let (_, body, _) = record(bytes)?;
+        let (times, rest) = body.split_at_checked(16)?;
+        let (size, rest) = rest.split_first_chunk::<8>()?;
+        let (checksum, rest) = rest.split_at_checked(4)?;
+        let (length, rest) = rest.split_first_chunk::<4>()?;
+        let (compression, rest) = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;
+        let (length, rest) = rest.split_first_chunk::<8>()?;
+        let records = rest.get(..usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
+        Some(Chunk { times, size: u64::from_le_bytes(*size), checksum, compression, records })
+    }
+
+    /// As a record, its records as they are.
+    fn stored(&self, records: &[u8]) -> Vec<u8> {
+        let length = (records.len() as u64).to_le_bytes();
+        let body = (self.times.len() + 8 + self.checksum.len() + 4 + 8 + records.len()) as u64;
+        let head = [&[op::CHUNK][..], &body.to_le_bytes(), self.times, &length, self.checksum];
+        [&head.concat()[..], &0u32.to_le_bytes(), &length, records].concat()
     }
 }
 

@@ -1,6 +1,7 @@
 //! Messages of a bag as rows of tables, one table a topic.
 
 use super::cdr::Cdr;
+use super::memory::Memory;
 #[cfg(feature = "protobuf")]
 use super::protobuf;
 use super::schema::{Bits, MOST, NAMES, Schema};
@@ -26,13 +27,14 @@ enum Reader {
 }
 
 /// The topics of a bag with their messages.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Topics {
     topics: Vec<Topic>,
     /// The names of the topics that are read, where not all are.
     only: Option<Vec<String>>,
     /// Whether each message is compressed, by Zstandard.
     pub(super) compressed: bool,
+    memory: Memory,
 }
 
 #[derive(Debug)]
@@ -75,7 +77,8 @@ impl Reader {
 impl Topics {
     /// Topics of which those with some names are read, the others counted.
     pub(super) fn of(only: Option<&[String]>) -> Topics {
-        Topics { only: only.map(<[String]>::to_vec), ..Topics::default() }
+        let only = only.map(<[String]>::to_vec);
+        Topics { topics: Vec::new(), only, compressed: false, memory: Memory::of_a_log() }
     }
 
     /// Makes a topic known: `encoding` is how the bytes of its messages are made.
@@ -135,6 +138,10 @@ impl Topics {
     /// Takes a message in; `received` in nanoseconds.
     pub(super) fn take(&mut self, id: i64, received: i64, message: &[u8]) {
         let Some(topic) = self.topics.iter_mut().find(|t| t.ids.contains(&id)) else { return };
+        let before = topic.table.numbers();
+        if self.memory.is_spent() {
+            return;
+        }
         let mut row = topic.table.begin_row(1e-9 * received as f64, topic.expected);
         let unpacked = match self.compressed && !matches!(topic.reader, Reader::Other) {
             true => match zstd::decode_all(message) {
@@ -158,15 +165,30 @@ impl Topics {
             Reader::Other => Ok(None),
         };
         row.end(done);
+        // What is not there is told when the tables are asked for.
+        let _ = self.memory.claim_numbers(topic.table.numbers().saturating_sub(before));
+    }
+
+    /// Room for the bytes of a chunk beside the tables.
+    ///
+    /// # Errors
+    /// Why there is none.
+    #[cfg(any(feature = "mcap", feature = "bag1"))]
+    pub(super) fn holds(&self, bytes: u64) -> Result<(), String> {
+        self.memory.holds(bytes)
     }
 
     /// One table a topic.
-    pub(super) fn tables(self) -> Vec<Table> {
+    ///
+    /// # Errors
+    /// Where there was no room for one of them.
+    pub(super) fn tables(self) -> std::io::Result<Vec<Table>> {
+        self.memory.done()?;
         let filled = |Topic { mut table, .. }| {
             table.fill();
             table
         };
-        self.topics.into_iter().map(filled).collect()
+        Ok(self.topics.into_iter().map(filled).collect())
     }
 }
 

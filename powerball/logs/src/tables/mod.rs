@@ -24,6 +24,7 @@ mod mat;
 mod mcap;
 #[cfg(feature = "mcap")]
 mod mcap_out;
+mod memory;
 #[cfg(feature = "topics")]
 mod messages;
 #[cfg(feature = "npz")]
@@ -57,6 +58,7 @@ pub(crate) use contents::{read_dataset, read_topics};
 pub(crate) use mcap_out::from_csv as mcap_from_csv;
 #[cfg(feature = "mcap")]
 pub use mcap_out::{Channel, JointState, McapWriter};
+pub use memory::allow_memory;
 pub(crate) use place::Place;
 pub use place::is_address;
 pub use table::{Column, Table};

@@ -1,43 +1,41 @@
 //! Arrays of NumPy: archives of them (`.npz`, `numpy.savez` and `savez_compressed`, a ZIP of `.npy` files) and a `.npy` alone.
 
 use super::arrays::{Array, Values, one};
+use super::memory::Memory;
 use super::table::Table;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 
-/// An array that claims to be larger than this, bytes, is torn.
-const LARGEST: u64 = 1 << 36;
-
 /// The arrays of an archive as one table, and those that have no place in it.
 pub(super) fn read(path: &Path) -> io::Result<(Vec<Table>, Vec<String>)> {
     let mut archive = zip::ZipArchive::new(BufReader::new(File::open(path)?)).map_err(torn)?;
-    let (mut arrays, mut left_out) = (Vec::new(), Vec::new());
+    let (mut arrays, mut left_out, mut memory) = (Vec::new(), Vec::new(), Memory::of_a_log());
     for k in 0..archive.len() {
         let mut entry = archive.by_index(k).map_err(torn)?;
         let (name, size) = (entry.name().map_err(torn)?.into_owned(), entry.size());
-        if size > LARGEST {
-            return Err(torn("an array's size"));
-        }
+        // As it is stored, and as numbers.
+        memory.claim(size.saturating_mul(2)).map_err(io::Error::other)?;
         let mut npy = Vec::new();
         // The checksum is compared where the entry ends.
-        entry.read_to_end(&mut npy).map_err(|e| torn(format!("{name}: {e}")))?;
+        entry.by_ref().take(size + 1).read_to_end(&mut npy).map_err(|e| torn(format!("{name}: {e}")))?;
         if npy.len() as u64 != size {
             return Err(torn(name));
         }
-        add(name.trim_end_matches(".npy"), &npy, &mut arrays, &mut left_out);
+        add(name.trim_end_matches(".npy"), &npy, &mut arrays, &mut left_out, &mut memory);
     }
-    Ok(one(&arrays, left_out))
+    one(arrays, left_out, memory)
 }
 
 /// A `.npy` file as a table: its fields, or columns named after the file.
 pub(super) fn read_array(path: &Path) -> io::Result<(Vec<Table>, Vec<String>)> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let (mut arrays, mut left_out) = (Vec::new(), Vec::new());
-    add(&stem, &std::fs::read(path)?, &mut arrays, &mut left_out);
+    let (mut arrays, mut left_out, mut memory) = (Vec::new(), Vec::new(), Memory::of_a_log());
+    memory.claim(std::fs::metadata(path)?.len().saturating_mul(2)).map_err(io::Error::other)?;
+    add(&stem, &std::fs::read(path)?, &mut arrays, &mut left_out, &mut memory);
     match arrays.is_empty() {
         true => Err(io::Error::other(left_out.join(", "))),
-        false => Ok(one(&arrays, left_out)),
+        false => one(arrays, left_out, memory),
     }
 }
 
@@ -45,8 +43,8 @@ fn torn(what: impl std::fmt::Display) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, format!("the archive is torn: {what}"))
 }
 
-fn add(name: &str, npy: &[u8], arrays: &mut Vec<Array>, left_out: &mut Vec<String>) {
-    match array(name, npy) {
+fn add(name: &str, npy: &[u8], arrays: &mut Vec<Array>, left_out: &mut Vec<String>, memory: &mut Memory) {
+    match array(name, npy, memory) {
         Ok(parts) => {
             for part in parts {
                 match part {
@@ -69,7 +67,7 @@ struct Part<'h> {
 }
 
 /// The arrays in the bytes of a `.npy` file: one, or one a field where its elements are records.
-fn array(name: &str, bytes: &[u8]) -> Result<Vec<Result<Array, String>>, String> {
+fn array(name: &str, bytes: &[u8], memory: &mut Memory) -> Result<Vec<Result<Array, String>>, String> {
     let rest = bytes.strip_prefix(b"\x93NUMPY").ok_or("is no .npy")?;
     let byte = |at: usize| rest.get(at).copied().map(usize::from).ok_or("is torn");
     let (length, start) = match byte(0)? {
@@ -96,6 +94,9 @@ fn array(name: &str, bytes: &[u8]) -> Result<Vec<Result<Array, String>>, String>
     if count.checked_mul(stride).is_none_or(|size| size > data.len()) {
         return Err("is torn".into());
     }
+    // Numbers that are stored in fewer bytes than they take here.
+    let numbers = count.saturating_mul(parts.iter().map(|part| part.width).sum());
+    memory.claim_numbers(numbers.saturating_sub(data.len() / 8))?;
     let mut from = 0;
     let read = parts.iter().map(|part| {
         let own = part.width * self::size(part.descr).unwrap_or(0);

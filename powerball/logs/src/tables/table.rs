@@ -1,5 +1,8 @@
 //! Named columns of numbers.
 
+#[cfg(feature = "topics")]
+use super::memory::few_columns;
+
 /// Who takes the rows of a file one after the other.
 pub(crate) trait RowSink {
     /// The names of the columns, once and first.
@@ -10,6 +13,9 @@ pub(crate) trait RowSink {
 
     /// About so many rows follow: room is made for them at once, where there is so much.
     fn expect(&mut self, rows: usize);
+
+    /// How many numbers are kept of a row, its line among them.
+    fn kept(&self) -> usize;
 
     /// A row: its line in the file, from 1, and the number in a column, where there is one.
     fn row(&mut self, line: usize, number: &dyn Fn(usize) -> Option<f64>);
@@ -66,6 +72,12 @@ impl Table {
         self.columns.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
     }
 
+    /// About how many numbers it holds.
+    #[cfg(feature = "topics")]
+    pub(super) fn numbers(&self) -> usize {
+        self.line.len() * (3 + self.columns.len())
+    }
+
     /// Begins a message that was received at a time, s; of about `expected` in all.
     #[cfg(feature = "topics")]
     pub(super) fn begin_row(&mut self, received: f64, expected: usize) -> Row<'_> {
@@ -79,7 +91,7 @@ impl Table {
         self.received.push(received);
         self.stamps.push(f64::NAN);
         let known = self.columns.len();
-        Row { table: self, row, known, next: 0, name: String::new(), expected }
+        Row { table: self, row, known, next: 0, name: String::new(), expected, refused: None }
     }
 
     /// Every column as long as there are samples.
@@ -103,17 +115,28 @@ pub(super) struct Row<'t> {
     name: String,
     /// How many messages are expected.
     expected: usize,
+    /// Why there is no place for one of its values.
+    refused: Option<String>,
 }
 
 #[cfg(feature = "topics")]
 impl Row<'_> {
     /// A value whose name is these pieces.
     pub(super) fn put(&mut self, pieces: &[&str], value: f64) {
+        if self.refused.is_some() {
+            return;
+        }
         let (columns, name) = (&mut self.table.columns, &mut self.name);
         name.clear();
         pieces.iter().for_each(|piece| name.push_str(piece));
         let here = columns.get(self.next).is_some_and(|c| c.name == *name);
         let at = if here { Some(self.next) } else { columns.iter().position(|c| c.name == *name) };
+        if at.is_none() {
+            self.refused = few_columns(columns.len() + 1).err();
+            if self.refused.is_some() {
+                return;
+            }
+        }
         let at = at.unwrap_or_else(|| {
             let mut values = Vec::new();
             make_room(&mut values, self.expected);
@@ -129,7 +152,7 @@ impl Row<'_> {
     /// Ends the message with its time stamp, s. One that could not be read keeps its number and has no value.
     pub(super) fn end(self, done: Result<Option<f64>, String>) {
         let table = self.table;
-        match done {
+        match self.refused.map_or(done, Err) {
             Ok(stamp) => table.stamps[self.row] = stamp.unwrap_or(f64::NAN),
             Err(reason) => {
                 table.columns.truncate(self.known);
@@ -150,6 +173,10 @@ impl RowSink for Table {
     fn expect(&mut self, rows: usize) {
         make_room(&mut self.line, rows);
         self.columns.iter_mut().for_each(|column| make_room(&mut column.values, rows));
+    }
+
+    fn kept(&self) -> usize {
+        1 + self.columns.len()
     }
 
     fn row(&mut self, line: usize, number: &dyn Fn(usize) -> Option<f64>) {

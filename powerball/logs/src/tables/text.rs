@@ -1,6 +1,7 @@
 //! Logs as CSV with a header line, between whose names stand commas, semicolons, tabs or blanks. Where no commas stand
 //! there, numbers may have decimal commas. Times may be dates.
 
+use super::memory::{Memory, few_columns};
 use super::table::RowSink;
 use super::{Finding, LogError};
 use std::cell::Cell;
@@ -85,7 +86,9 @@ pub(crate) fn read(
         .map_err(|e| LogError(vec![error(Some(1), "header", format!("cannot be read: {e}"))]))?
         .clone();
     let names: Vec<String> = header.iter().map(|h| String::from_utf8_lossy(h).into_owned()).collect();
+    few_columns(names.len()).map_err(|reason| LogError(vec![error(Some(1), "header", reason)]))?;
     rows.begin(&names)?;
+    let (memory, kept, mut count) = (Memory::of_a_log(), rows.kept(), 0);
     let mut record = csv::ByteRecord::new();
     let mut last_torn = false;
     let decimal_commas = Cell::new(false);
@@ -101,6 +104,10 @@ pub(crate) fn read(
         }
         let line = record.position().map_or(line, |p| p.line() as usize);
         last_torn = record.len() != names.len();
+        count += 1;
+        memory
+            .holds_rows(count, kept)
+            .map_err(|reason| LogError(vec![error(Some(line), "memory", reason)]))?;
         if delimiter == b',' && names.len() > 1 && record.len() == 2 * names.len() {
             let message = format!(
                 "has {} fields where the header names {} columns: decimal commas between commas; separate the fields by \

@@ -204,7 +204,7 @@ impl Excite {
     fn masses(&self) -> Result<MassSource, Failure> {
         let Some(path) = &self.values else { return Ok(MassSource::Guess) };
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path)
+        let text = dyngen::file::text(path)
             .map_err(|e| Failure::Unusable(format!("{file}: cannot be read: {e}")))?;
         Ok(MassSource::Values { text, file })
     }

@@ -168,8 +168,8 @@ impl FloatCommand {
 
 fn read_push(file: &Path) -> Result<Motion, Failure> {
     let name = file.display();
-    let text = std::fs::read_to_string(file)
-        .map_err(|e| Failure::Unusable(format!("{name}: cannot be read: {e}")))?;
+    let text =
+        dyngen::file::text(file).map_err(|e| Failure::Unusable(format!("{name}: cannot be read: {e}")))?;
     let path = Motion::from_csv(&text, 6).map_err(|why| Failure::Unusable(format!("{name}: {why}")))?;
     if path.len() < 2 || path.period <= 0.0 {
         return Err(failed(

@@ -113,7 +113,7 @@ impl FollowCommand {
     pub(crate) fn run(mut self) -> Result<(), Failure> {
         let file = self.trajectory.clone();
         let name = file.display();
-        let text = std::fs::read_to_string(&file)
+        let text = dyngen::file::text(&file)
             .map_err(|e| Failure::Unusable(format!("{name}: cannot be read: {e}")))?;
         let motion = Motion::from_csv(&text, LWA4P.joints.len())
             .map_err(|why| Failure::Unusable(format!("{name}: {why}")))?;

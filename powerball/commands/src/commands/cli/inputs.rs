@@ -11,6 +11,7 @@ use powerball_identification::mounting::Mounting;
 use powerball_identification::{KnownModel, Recorded, Source};
 use powerball_logs::log::{ColumnMap, notes_of};
 use powerball_logs::regression::RigidArm;
+use powerball_logs::tables::allow_memory;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -34,18 +35,44 @@ pub(crate) struct Inputs {
     pub json: bool,
 }
 
-/// How the columns of logs are read.
+/// How logs are read: what their columns are, and how much memory one may take.
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct MapArgument {
     /// Which column is what, where names do not say it: a TOML file, or a line of it such as
     /// 'joints = ["a", "b"]', 'topic = "/joint_states"' or 'tau.sign = -1'. May be repeated.
     #[arg(long, value_name = "MAP.toml")]
     map: Vec<String>,
+    /// What one log may take in memory, such as 2GB or 500MB: a larger one is refused before it is read. Half of what is free
+    /// where it is left out.
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    memory: Option<u64>,
+}
+
+/// Bytes as a person says them: 500MB, 2GB, 1.5GiB.
+fn size(text: &str) -> Result<u64, String> {
+    let digits = text.len() - text.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.').len();
+    let (number, unit) = text.split_at(digits);
+    let unit = match unit.trim().to_ascii_lowercase().as_str() {
+        "kb" => 1e3,
+        "mb" => 1e6,
+        "gb" => 1e9,
+        "tb" => 1e12,
+        "kib" => 1024.0,
+        "mib" => 1_048_576.0,
+        "gib" => 1_073_741_824.0,
+        _ => 0.0,
+    };
+    let bytes = number.parse().unwrap_or(0.0) * unit;
+    match bytes >= 1.0 {
+        true => Ok(bytes as u64),
+        false => Err("must be a number and kB, MB, GB, TB, KiB, MiB or GiB, such as 2GB".to_string()),
+    }
 }
 
 impl MapArgument {
-    /// The map of all that was said.
+    /// The map of all that was said; logs are read within the memory that was said from then on.
     pub(crate) fn read(&self) -> Result<ColumnMap, Failure> {
+        self.memory.into_iter().for_each(allow_memory);
         ColumnMap::said(&self.map).map_err(Failure::Unusable)
     }
 }
@@ -160,6 +187,16 @@ impl FromArgMatches for MountedLogs {
 mod mounted_tests {
     use super::*;
     use clap::Parser;
+
+    #[test]
+    fn a_size_has_a_unit() {
+        for (text, bytes) in [("2GB", 2_000_000_000), ("500 mb", 500_000_000), ("1.5GiB", 1_610_612_736)] {
+            assert_eq!(size(text), Ok(bytes), "{text}");
+        }
+        for text in ["", "2", "GB", "0GB", "-1GB", "2 parsecs"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+    }
 
     #[derive(Parser)]
     struct Line {

@@ -179,6 +179,8 @@ pub fn main() -> ExitCode {
     // clap itself exits with 2 on wrong use.
     let cli = Cli::parse();
     crate::report::sign(output::signature());
+    // Where signals cannot be listened to, a limit ends the program as it does any other.
+    let _ = powerball_bus::transport::file_limit_is_an_error();
     if cli.force {
         replace::replace_all();
     }

@@ -71,5 +71,5 @@ fn no_text(bytes: &[u8]) -> &'static str {
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    std::fs::read(path).map_err(|error| Failure::Unusable(format!("{}: {error}", path.display())))
+    dyngen::file::read(path).map_err(|error| Failure::Unusable(format!("{}: {error}", path.display())))
 }

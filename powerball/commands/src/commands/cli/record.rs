@@ -51,7 +51,7 @@ pub(crate) struct RecordCommand {
 impl RecordCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let name = self.trajectory.display();
-        let text = std::fs::read_to_string(&self.trajectory)
+        let text = dyngen::file::text(&self.trajectory)
             .map_err(|e| Failure::Unusable(format!("{name}: cannot be read: {e}")))?;
         let motion = Motion::from_csv(&text, LWA4P.joints.len())
             .map_err(|why| Failure::Unusable(format!("{name}: {why}")))?;
