@@ -192,7 +192,7 @@ fn equalities_are_followed_or_told() {
     assert!((offset - (0.2 + 1.5 * std::f64::consts::PI)).abs() < 1e-12, "{offset}");
     for (equality, words) in [
         ("<joint joint1=\"turn\" joint2=\"pan\" polycoef=\"0 1 2 0 0\"/>", "by a curve"),
-        ("<joint joint1=\"turn\" polycoef=\"0.3\"/>", "lock turn=0.3"),
+        ("<joint joint1=\"turn\" polycoef=\"0.3\"/>", "--lock turn=0.3"),
         ("<weld body1=\"hand\" body2=\"world\"/>", "<weld> is left out"),
     ] {
         let imported = imported(&with(equality)).unwrap();

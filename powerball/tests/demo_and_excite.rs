@@ -229,6 +229,41 @@ fn an_exciting_path_keeps_the_limits_from_rest_to_rest() {
     }
 }
 
+/// A URDF gives torque limits and no accelerations: these follow from the masses that the import has written.
+#[test]
+fn an_imported_arm_is_excited_as_it_is() {
+    let folder = scratch("imported");
+    std::fs::create_dir_all(&folder).unwrap();
+    let text = include_str!("../../dyngen/tests/urdf/lwa4p.urdf");
+    let imported = dyngen::import::urdf(text, "lwa4p.urdf", &dyngen::import::Options::default()).unwrap();
+    let file = folder.join("robot.toml");
+    std::fs::write(&file, &imported.text).unwrap();
+    std::fs::write(file.with_extension("values.json"), imported.values_json()).unwrap();
+    let path = folder.join("path.csv");
+    let run = |to: &std::path::Path| {
+        powerball(&[
+            "excite",
+            "--arm",
+            to.to_str().unwrap(),
+            "--out",
+            path.to_str().unwrap(),
+            "--evaluations",
+            "40",
+        ])
+    };
+    let done = run(&file);
+    assert!(done.status.success(), "{}", complaint(&done));
+    assert!(
+        complaint(&done).contains("robot.values.json: the masses are taken from it"),
+        "{}",
+        complaint(&done)
+    );
+    std::fs::remove_file(file.with_extension("values.json")).unwrap();
+    let without = run(&file);
+    assert_eq!(without.status.code(), Some(1));
+    assert!(complaint(&without).contains("`acceleration`"), "{}", complaint(&without));
+}
+
 #[test]
 fn excite_says_what_is_missing() {
     let file = scratch("none.csv");

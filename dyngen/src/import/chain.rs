@@ -225,7 +225,7 @@ impl Walk<'_> {
         if !usable(*ratio) || !usable(*offset) || *ratio == 0.0 {
             self.refused.push(format!(
                 "line {}: joint '{name}' mimics joint '{leader}' with the multiplier {ratio} and the offset \
-                 {offset}: lock {name}=0 holds it",
+                 {offset}: --lock {name}=0 holds it",
                 joint.line
             ));
         } else if *leader == *name {
@@ -237,7 +237,7 @@ impl Walk<'_> {
             ));
         } else {
             self.refused.push(format!(
-                "joint '{name}' mimics joint '{leader}', which is not on the chain: lock {leader}=0 holds both"
+                "joint '{name}' mimics joint '{leader}', which is not on the chain: --lock {leader}=0 holds both"
             ));
         }
     }
@@ -276,7 +276,7 @@ impl Walk<'_> {
                     rigid.push((self.tree.child(*j), pose));
                 } else if !self.path.contains(j) {
                     self.notes.push(format!(
-                        "left out: joint '{}' on link '{}', with all that it carries: {} kg (lock {}=0 \
+                        "left out: joint '{}' on link '{}', with all that it carries: {} kg (--lock {}=0 \
                          keeps it at a position)",
                         joint.name,
                         self.tree.robot.links[at].name,

@@ -182,7 +182,7 @@ impl<'d, 'i> Reader<'d, 'i> {
             Ok(Some(Equality::LeftOut(why))) => self.robot.notes.push(left_out(why)),
             Ok(Some(Equality::Stands { joint, offset })) => {
                 let held = offset + reference(&joint);
-                let what = left_out(&format!("it holds joint '{joint}', as lock {joint}={held} does"));
+                let what = left_out(&format!("it holds joint '{joint}', as --lock {joint}={held} does"));
                 self.robot.notes.push(what);
             }
             Ok(Some(Equality::Follows { joint, leader, offset, ratio })) => {

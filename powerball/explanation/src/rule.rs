@@ -177,7 +177,7 @@ impl Default for Rule {
             surrogate_level: 0.99,
             event_surrogate_level: 0.75,
             step_surrogates: 2000,
-            searched_surrogates: 60,
+            searched_surrogates: 200,
             final_surrogates: 2000,
             peak_surrogates: 200,
             surrogate_correlation: 0.4,

@@ -167,6 +167,8 @@ pub struct Summarized {
     pub mounting: Mounting,
     /// The factors: [`Bands::to_bytes`] writes them.
     pub bands: Bands,
+    /// Why its logs should not be used, each a sentence without its full stop.
+    pub unusable: Vec<String>,
     /// What is to be said of the logs and the arm file.
     pub warnings: Vec<String>,
 }
@@ -188,7 +190,8 @@ pub fn summarize<'a, S: Into<Source<'a>>>(
     let mut mounted = gathered.mounted.into_iter();
     match (mounted.next(), mounted.next()) {
         (Some(only), None) => {
-            Ok(Summarized { mounting: only.mounting, bands: only.bands, warnings: gathered.warnings })
+            let (mounting, bands) = (only.mounting, only.bands);
+            Ok(Summarized { mounting, bands, unusable: only.doubts, warnings: gathered.warnings })
         }
         _ => Err(IdentifyError::Unusable(vec![format!(
             "these are of several mountings of the base ({}): a summary has one; give them to identify as \

@@ -3,13 +3,17 @@
 //! What only makes a result less exact is a warning. docs/exit_codes.md lists all conditions with their sentences.
 
 use super::conventions::Conventions;
+use dyngen::Arm;
 use powerball_controller::JointNumber;
+use powerball_logs::log::Log;
 
 /// What is asked of a result.
 #[derive(Clone, Debug, Default)]
 pub struct Findings<'a> {
     /// What the columns are.
     pub columns: Option<&'a Conventions>,
+    /// What the logs and the arm file say themselves, where their columns were not asked.
+    pub doubts: Vec<String>,
     /// Joints that hardly move in the logs to fit.
     pub resting: Vec<JointNumber>,
     /// Joints that are predicted no better than by the mean of their torque.
@@ -31,6 +35,7 @@ impl Findings<'_> {
         if self.columns.is_some_and(Conventions::differ) {
             reasons.push("the columns or the arm file are not what they are said to be".to_string());
         }
+        reasons.extend(self.doubts.iter().cloned());
         if self.not_finite {
             reasons.push(
                 "the fit has no finite solution: see the logs' largest numbers (powerball log)".to_string(),
@@ -60,6 +65,18 @@ impl Findings<'_> {
     }
 }
 
+/// What logs and an arm say themselves against being used, each once: a sentence without its full stop.
+pub(crate) fn doubts<'l>(arm: &Arm, logs: impl IntoIterator<Item = &'l Log>) -> Vec<String> {
+    let mut all = arm.doubts();
+    for doubt in logs.into_iter().flat_map(|log| &log.doubts) {
+        let sentence = doubt.sentence.trim_end_matches('.').to_string();
+        if !all.contains(&sentence) {
+            all.push(sentence);
+        }
+    }
+    all
+}
+
 fn list(joints: &[JointNumber]) -> String {
     joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
@@ -81,6 +98,10 @@ mod tests {
             (
                 Findings { useless: joint(1), ..Findings::default() },
                 "joint 2 is predicted no better than by its mean",
+            ),
+            (
+                Findings { doubts: vec!["time runs 2 times too fast".into()], ..Findings::default() },
+                "time runs",
             ),
             (Findings { not_finite: true, ..Findings::default() }, "no finite solution"),
             (

@@ -4,6 +4,7 @@ use super::estimate::{JointVerdict, TorqueCurve, curves, verdicts};
 use super::identify::{IdentifyError, InMemory, by_band, one_mounting};
 use super::known::KnownModel;
 use super::source::Source;
+use super::usable::{Findings, doubts};
 use dyngen::Arm;
 use powerball_logs::Progress;
 use powerball_logs::regression::{Data, DataOptions};
@@ -52,6 +53,9 @@ pub struct Verified {
     pub band: [f64; 2],
     /// The end of each joint's band, Hz, in which its error is taken: the one in which it was identified.
     pub joint_bands: Vec<f64>,
+    /// Why it should not be used, each a sentence without its full stop; empty where it may be.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unusable: Vec<String>,
     /// What is to be said of the logs and the arm file.
     pub warnings: Vec<String>,
     /// Measured torque and error, by joint.
@@ -82,17 +86,24 @@ pub fn verify<'a, S: Into<Source<'a>>>(
     let mut joints = verdicts(&data, &residual, tolerance);
     let said = |j: usize| options.joint_bands.get(j).copied().filter(|band| BANDS.contains(band));
     let joint_bands: Vec<f64> = (0..joints.len()).map(|j| said(j).unwrap_or(BANDS[0])).collect();
-    for (members, data) in by_band(&read.body, &read.fit, &joint_bands, &options.data)? {
+    for band in by_band(&read.body, &read.fit, &joint_bands, &options.data) {
+        let (members, data) = band?;
         let own = verdicts(&data, &read.known.residual(&read.body, &data), tolerance);
         members.into_iter().for_each(|j| joints[j] = own[j].clone());
     }
     Ok(Verified {
         arm: read.body.arm().name.clone(),
         within_tolerance: joints.iter().all(|j| j.within != Some(false)),
-        joints,
         tolerance,
         band: [0.0, data.band.cutoff],
         joint_bands,
+        unusable: Findings {
+            doubts: doubts(&read.body.filed(), &read.fit),
+            not_finite: joints.iter().any(|j| !j.rms.is_finite()),
+            ..Findings::default()
+        }
+        .reasons(),
+        joints,
         curves: curves(&data, &residual, &residual),
         warnings: read.warnings.into_iter().chain(data.notes.iter().cloned()).collect(),
     })

@@ -56,7 +56,7 @@ class Rule:
     #: Surrogates that a step asks.
     step_surrogates: int = 2000
     #: Those for which an effect's search for logs and times is done again.
-    searched_surrogates: int = 60
+    searched_surrogates: int = 200
     #: Surrogates that state the false-positive rate.
     final_surrogates: int = 2000
     #: Those that judge ripple above the band.

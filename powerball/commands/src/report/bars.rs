@@ -2,13 +2,16 @@
 
 use super::axis::Axis;
 use super::escape;
-use super::figure::{WIDTH, draw_grid, file, svg, text_width, title};
+use super::figure::{WIDTH, draw_grid, file, svg, title};
 use super::number;
 use std::fmt::Write as _;
 
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = 12.0;
-const TOP: f64 = 62.0;
+const TOP: f64 = 96.0;
+/// The first line of the legend, and from one to the next.
+const LEGEND: f64 = 40.0;
+const LEGEND_LINE: f64 = 22.0;
 const HEIGHT: f64 = 190.0;
 
 /// Two bars for each item, and optionally a line that neither can get below.
@@ -112,24 +115,27 @@ impl BarPairs {
         svg(&self.title, bottom + 26.0, &out)
     }
 
+    /// One line for each: on a narrow screen text is larger than it is here.
     fn legend(&self, out: &mut String) {
-        let mut x = LEFT;
+        let mut y = LEGEND;
         for (name, class) in self.names.iter().zip(["c3", "c4"]) {
             let _ = write!(
                 out,
-                "<rect class=\"b {class}\" x=\"{x:.1}\" y=\"29\" width=\"14\" height=\"10\"/>\
-                 <text x=\"{:.1}\" y=\"38\">{}</text>",
-                x + 20.0,
+                "<rect class=\"b {class}\" x=\"{LEFT:.1}\" y=\"{:.1}\" width=\"14\" height=\"10\"/>\
+                 <text x=\"{:.1}\" y=\"{y:.1}\">{}</text>",
+                y - 9.0,
+                LEFT + 26.0,
                 escape(name)
             );
-            x += 28.0 + text_width(name);
+            y += LEGEND_LINE;
         }
         if self.pairs.iter().any(|p| p.floor.is_some()) {
             let _ = write!(
                 out,
-                "<path class=\"k dash c5\" d=\"M{x:.1} 34h20\"/><text x=\"{:.1}\" y=\"38\">noise \
+                "<path class=\"k dash c5\" d=\"M{LEFT:.1} {:.1}h20\"/><text x=\"{:.1}\" y=\"{y:.1}\">noise \
                     floor</text>",
-                x + 26.0
+                y - 4.0,
+                LEFT + 26.0
             );
         }
     }

@@ -24,15 +24,19 @@ pub fn page(compared: &Comparison) -> Page {
         compared.comparisons,
         100.0 * compared.level
     ));
+    for why in &compared.unusable {
+        page.note(Tone::Bad, &format!("Do not use this result: {why}."));
+    }
     page.note(if compared.differ { Tone::Bad } else { Tone::Good }, &compared.sentence);
     compared.warnings.iter().for_each(|warning| {
         page.note(Tone::Plain, warning);
     });
     page.heading("Torque");
     page.paragraph(
-        "What the difference means along the logs of A, and what the errors of both fits alone would make.",
+        "How far the torques of the two models differ along the logs of A, and how far the errors of the fits alone explain it.",
     );
-    let mut table = Table::new(["joint", "difference, rms [N·m]", "of the torque", "errors alone [N·m]"]);
+    let mut table =
+        Table::new(["joint", "difference, rms [N·m]", "of the torque", "explained by the errors [N·m]"]);
     for t in &compared.torque_difference {
         let share = format!("{:.2} %", 100.0 * t.relative);
         table.push([t.joint.to_string(), number(t.rms), share, number(t.expected)]);

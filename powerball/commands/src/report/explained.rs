@@ -161,7 +161,8 @@ fn answer(page: &mut Page, explained: &Explained) {
 pub fn change(change: &Change) -> String {
     let percent = |share: f64| format!("{:+.0}", 100.0 * share).replace('-', "\u{2212}");
     let [low, high] = change.interval;
-    if low == 0.0 && high == 0.0 {
+    // What the table's digits do not show.
+    if low.abs().max(high.abs()) < 0.005 {
         return "none".to_string();
     }
     let clear = match low <= 0.0 && high >= 0.0 {
@@ -351,7 +352,7 @@ fn rest(page: &mut Page, explained: &Explained) {
     let chance = &explained.false_positives;
     let without = match chance.without {
         0 => String::new(),
-        n => format!(" ({n} more were constant torques, which no shift changes)"),
+        n => format!(" (constant torques are left out: {n}, as they are the same at every time)"),
     };
     page.paragraph(&format!(
         "How often the rule is wrong on these data: {} of {} effects that cannot be there were accepted{without}. \

@@ -236,7 +236,7 @@ pub(super) fn title(text: &str) -> String {
 }
 
 /// About how wide a legend text is; there is no font to measure it with.
-pub(super) fn text_width(text: &str) -> f64 {
+fn text_width(text: &str) -> f64 {
     6.6 * text.chars().count() as f64 + 12.0
 }
 

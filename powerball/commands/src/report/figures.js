@@ -72,6 +72,8 @@
       stroke: () => ink("soft"),
       grid: { stroke: () => ink("line"), width: 1 },
       ticks: { stroke: () => ink("line"), width: 1 },
+      // uPlot's own labels end after three decimals.
+      values: (_, splits) => splits.map(digits),
     });
     const sync = uPlot.sync("figure" + charts.count++);
     const all = [];

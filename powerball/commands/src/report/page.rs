@@ -193,22 +193,26 @@ impl Table {
         self.rows.is_empty()
     }
 
-    /// The table as HTML.
+    /// The table as HTML, without columns of which no row says anything.
     pub(super) fn to_html(&self) -> String {
         let mut out = String::from("<div class=\"table\"><table><thead><tr>");
+        let says = |c: &usize| {
+            self.rows.is_empty() || self.rows.iter().any(|r| r.get(*c).is_some_and(|t| !t.is_empty()))
+        };
+        let columns: Vec<usize> = (0..self.header.len()).filter(says).collect();
         let numeric: Vec<bool> = (0..self.header.len())
             .map(|c| {
                 !self.rows.is_empty() && self.rows.iter().all(|r| r.get(c).is_none_or(|t| is_numeric(t)))
             })
             .collect();
         let class = |column: usize| if numeric.get(column) == Some(&true) { " class=\"n\"" } else { "" };
-        for (c, title) in self.header.iter().enumerate() {
-            let _ = write!(out, "<th scope=\"col\"{}>{}</th>", class(c), escape(title));
+        for c in columns.iter().copied() {
+            let _ = write!(out, "<th scope=\"col\"{}>{}</th>", class(c), escape(&self.header[c]));
         }
         out.push_str("</tr></thead><tbody>\n");
         for row in &self.rows {
             out.push_str("<tr>");
-            for c in 0..self.header.len() {
+            for c in columns.iter().copied() {
                 let text = row.get(c).map_or("", String::as_str);
                 let _ = write!(out, "<td{}>{}</td>", class(c), escape(text));
             }
@@ -235,5 +239,7 @@ mod table_tests {
         let html = Table::new(["name", "value"]).row(["a", "−1.5"]).row(["b", "12 %"]).row(["c"]).to_html();
         assert_eq!(html.matches("<td class=\"n\">").count(), 3);
         assert_eq!(html.matches("<td>").count(), 3);
+        let html = Table::new(["name", "logs"]).row(["a", ""]).row(["b", ""]).to_html();
+        assert!(!html.contains("logs") && html.matches("<td").count() == 2, "{html}");
     }
 }

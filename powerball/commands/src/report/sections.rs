@@ -19,7 +19,7 @@ pub fn add_conventions(page: &mut Page, conventions: &Conventions) {
         let said = match answer.as_said {
             Some(true) => "yes",
             Some(false) => "no",
-            None => "not told by these logs",
+            None => "these logs do not show it",
         };
         table.push([
             answer.question.to_string(),
@@ -37,7 +37,7 @@ fn errors(list: &[Option<f64>]) -> String {
     list.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// Adds what is told of the transmissions.
+/// Adds what is known of the transmissions.
 pub fn add_transmissions(page: &mut Page, joints: &[JointTransmission]) {
     page.heading("Between the motors' torques and the links'");
     let mut table = Table::new([
@@ -56,7 +56,7 @@ pub fn add_transmissions(page: &mut Page, joints: &[JointTransmission]) {
             JointTransmission::Unknown(unknown) => {
                 let nothing = std::iter::repeat_n(String::new(), 6);
                 let first = std::iter::once(unknown.joint.to_string());
-                table.push(first.chain(nothing).chain([format!("not told: {}", unknown.why_not)]));
+                table.push(first.chain(nothing).chain([format!("not known: {}", unknown.why_not)]));
             }
         }
     }

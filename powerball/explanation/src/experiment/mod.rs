@@ -55,9 +55,9 @@ fn advice(open: &Open, design: &DesignedExperiment, visible: f64) -> String {
         format!("to tell {both} apart, {how}")
     } else {
         format!(
-            "{both} predict nearly the same torques as fitted, on every path within the limits (χ² {:.1} \
-             on the best one found): where the new log does not speak for one of them, the one with fewer \
-             numbers is meant; {how}",
+            "{both} predict nearly the same torques on every path within the limits (on the best path found the wrong one \
+             is expected to fit worse by χ² = {:.1}, and {visible:.0} would be clear): where the new log decides for none of \
+             them, the one with fewer numbers is taken; {how}",
             design.evidence
         )
     }

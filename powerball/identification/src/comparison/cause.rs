@@ -149,14 +149,11 @@ fn in_words(cause: &Cause) -> String {
             parameters.join("; ")
         ),
         Cause::Friction { joint, change: [low, high] } => {
-            let percent = |x: f64| 100.0 * x;
-            match (percent(*low), percent(*high)) {
-                (low, high) if low > 0.0 => format!(
-                    "friction changed on joint {joint} by {low:.1} to \
-                    {high:.1} %"
-                ),
-                (low, high) => format!("friction changed on joint {joint} by {high:.1} to {low:.1} %"),
-            }
+            let which = if low + high > 0.0 { "higher" } else { "lower" };
+            // An interval that ends near zero is one of a change of either size, and of no sign.
+            let ends = [low.abs().min(high.abs()), low.abs().max(high.abs())].map(|end| 100.0 * end);
+            let least = if low * high > 0.0 { ends[0] } else { 0.0 };
+            format!("friction of joint {joint} is {which} by {least:.0} to {:.0} %", ends[1])
         }
         Cause::SensorZero { joint, change: [low, high] } => {
             format!(

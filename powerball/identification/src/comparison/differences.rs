@@ -124,14 +124,23 @@ impl Differences {
                 differs: p_value < share,
             }
         });
+        let torque = torque(a, b, &place);
+        // A curve that is another one, where all torques together are the same, is what another parameter of the fit made
+        // up for.
+        let shows = |f: &FrictionDifference| {
+            torque.iter().find(|t| t.joint == f.joint).is_none_or(|t| t.rms > t.expected)
+        };
+        let friction = friction.iter().map(|curves| curves.difference(p, share));
+        let friction =
+            friction.map(|f| FrictionDifference { differs: f.differs && shows(&f), ..f }).collect();
         Ok(Differences {
             level,
             comparisons,
             parameters: parameters.collect(),
             inertia,
-            friction: friction.iter().map(|curves| curves.difference(p, share)).collect(),
+            friction,
             constants: constants.collect(),
-            torque: torque(a, b, &place),
+            torque,
             warnings,
         })
     }

@@ -47,6 +47,10 @@ pub fn compare(a: &Side, b: &Side, options: &CompareOptions) -> Result<Compariso
         torque_difference: torque,
         causes,
         sentence,
+        unusable: [a, b]
+            .iter()
+            .flat_map(|side| side.unusable.iter().map(|why| format!("{}: {why}", side.name)))
+            .collect(),
         warnings,
     })
 }

@@ -43,6 +43,9 @@ pub struct Comparison {
     pub causes: Vec<Cause>,
     /// All of it in words.
     pub sentence: String,
+    /// Why it should not be used, each a sentence without its full stop; empty where it may be.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unusable: Vec<String>,
     /// What is to be said of the fits.
     pub warnings: Vec<String>,
 }
@@ -120,6 +123,25 @@ pub struct TorqueDifference {
     pub expected: f64,
     /// rms of the difference over the rms of the measured torque.
     pub relative: f64,
+}
+
+impl TorqueDifference {
+    /// In words.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let TorqueDifference { joint, rms, expected, relative } = self;
+        let torque = rms / relative;
+        if *expected > torque {
+            return format!(
+                "joint {joint}: its torque along the logs of A is not determined by the two fits"
+            );
+        }
+        format!(
+            "joint {joint}: the torques of the two models differ by {rms:.3} N·m rms along the logs of A, {:.1} % of the \
+             torque; errors of the fits alone give about {expected:.3} N·m",
+            100.0 * relative
+        )
+    }
 }
 
 /// One reason for a difference.

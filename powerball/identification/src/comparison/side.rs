@@ -22,6 +22,8 @@ pub struct Side {
     pub friction: Vec<JointFriction>,
     /// How well all of it is known together; without it the standard errors count one by one.
     pub uncertainty: Option<Uncertainty>,
+    /// Why it should not be used, each a sentence without its full stop; empty where it may be.
+    pub unusable: Vec<String>,
 }
 
 /// What is read of `identified.json` or `model.json`.
@@ -30,6 +32,8 @@ struct File {
     arm: String,
     parameters: Vec<ParameterEstimate>,
     friction: Vec<JointFriction>,
+    #[serde(default)]
+    unusable: Vec<String>,
 }
 
 /// Degrees of freedom where nothing is said of them.
@@ -45,6 +49,7 @@ impl Side {
             parameters: identified.parameters.clone(),
             friction: identified.friction.clone(),
             uncertainty: Some(identified.uncertainty.clone()),
+            unusable: identified.unusable.clone(),
         }
     }
 
@@ -58,8 +63,7 @@ impl Side {
         let wrong =
             |file: &Path, what: String| CompareError::Unreadable(format!("{}: {what}", file.display()));
         let file = if path.is_dir() { path.join("identified.json") } else { path.to_path_buf() };
-        let text =
-            dyngen::file::text(&file).map_err(|e| wrong(&file, format!("cannot be read: {e}")))?;
+        let text = dyngen::file::text(&file).map_err(|e| wrong(&file, format!("cannot be read: {e}")))?;
         let model: File = serde_json::from_str(&text)
             .map_err(|e| wrong(&file, format!("is no result of `powerball identify`: {e}")))?;
         let beside = file.with_file_name("covariance.json");
@@ -76,8 +80,8 @@ impl Side {
             }
             _ => None,
         };
-        let File { arm, parameters, friction } = model;
-        Ok(Side { name, arm, parameters, friction, uncertainty })
+        let File { arm, parameters, friction, unusable } = model;
+        Ok(Side { name, arm, parameters, friction, uncertainty, unusable })
     }
 
     /// The covariance of two parameters of the minimal set.

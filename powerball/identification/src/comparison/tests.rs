@@ -34,7 +34,14 @@ fn fitted(body: &RigidArm, links: Vec<Body>, friction: Vec<TanhFriction<f64>>, s
     let found = estimates(body.names(), &solution, &errors);
     let uncertainty = Some(Uncertainty::of(body.names(), &solution, &errors));
     let (parameters, friction) = (found.parameters, found.friction);
-    Side { name: format!("seed {seed}"), arm: "virtual".into(), parameters, friction, uncertainty }
+    Side {
+        name: format!("seed {seed}"),
+        arm: "virtual".into(),
+        parameters,
+        friction,
+        uncertainty,
+        unusable: Vec::new(),
+    }
 }
 
 /// The usual arm, which every other one is compared with.

@@ -274,7 +274,7 @@ fn common_sign(found: &Found<'_>, facts: &Facts<'_>) -> Answer {
             "torque sign",
             None,
             format!(
-                "The common sign of the torques is not told by these logs: {figures}, which is not sure or \
+                "The common sign of the torques is not shown by these logs: {figures}, which is not sure or \
                     not of one sign."
             ),
         ),
@@ -318,7 +318,7 @@ fn size(facts: &Facts<'_>) -> Answer {
         (_, Scale::Unknown) => plain(
             "torque unit",
             None,
-            format!("The unit of the torques is not told by these logs: {figure}."),
+            format!("The unit of the torques is not shown by these logs: {figure}."),
         ),
         _ => {
             plain("torque unit", Some(true), format!("Torques in N·m give an arm of usual weight: {figure}."))
@@ -343,7 +343,7 @@ fn gravity(facts: &Facts<'_>) -> Answer {
         Some(GravityIs::TakenOut) => {
             plain("gravity", Some(true), "Torques hold nothing of gravity, as the arm file says.".into())
         }
-        None => plain("gravity", None, "Whether torques hold gravity is not told by these logs.".into()),
+        None => plain("gravity", None, "Whether torques hold gravity is not shown by these logs.".into()),
     }
 }
 
@@ -362,7 +362,7 @@ fn side(facts: &Facts<'_>) -> Answer {
             Some(true),
             format!("Torques are on the motor side, with the friction of motor and gear in them{share}."),
         ),
-        None => plain("side", None, format!("The side of the gears is not told by these logs{share}.")),
+        None => plain("side", None, format!("The side of the gears is not shown by these logs{share}.")),
     }
 }
 
@@ -385,7 +385,7 @@ fn kind(facts: &Facts<'_>) -> Answer {
         None => plain(
             "kind",
             None,
-            "Whether torques were measured or commanded is not told by these \
+            "Whether torques were measured or commanded is not shown by these \
             logs."
                 .into(),
         ),

@@ -83,7 +83,7 @@ fn asked_of_arm(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventions 
 }
 
 fn not_told(why: &str) -> Conventions {
-    let sentence = format!("What the columns are is not told by these logs: {why}.");
+    let sentence = format!("What the columns are is not shown by these logs: {why}.");
     let answer = Answer {
         question: "columns",
         as_said: None,

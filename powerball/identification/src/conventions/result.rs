@@ -195,7 +195,7 @@ impl Conventions {
         }
         match open.is_empty() {
             true => format!("{result}."),
-            false => format!("{result}. Not told by these logs: {}.", open.join(", ")),
+            false => format!("{result}. Not shown by these logs: {}.", open.join(", ")),
         }
     }
 }

@@ -42,8 +42,8 @@ impl Masses {
     /// As there, and where it cannot be read.
     pub fn read(path: &Path, arm: &Arm) -> Result<Masses, Error> {
         let file = path.display().to_string();
-        let text = dyngen::file::text(path)
-            .map_err(|e| Error::Setting(format!("{file}: cannot be read: {e}")))?;
+        let text =
+            dyngen::file::text(path).map_err(|e| Error::Setting(format!("{file}: cannot be read: {e}")))?;
         Masses::parse(&text, &file, &Model::derive(arm.clone())?)
     }
 

@@ -141,18 +141,25 @@ impl Along {
         }
         let data = Data::new(body, logs, options)?;
         let residual = model.residual(body, &data);
-        let mut floor = noise_floor(&data);
-        for (members, data) in by_band(body, logs, joint_bands, options)? {
+        let (joints, curves) = (
+            (0..data.dof()).map(|j| JointAlong::new(&data, model, j, &residual[j])).collect(),
+            curves(&data, &residual, &residual),
+        );
+        let (mut floor, motion) = (noise_floor(&data), motion(&data));
+        // A band takes many times the memory of its logs.
+        drop((data, residual));
+        for band in by_band(body, logs, joint_bands, options) {
+            let (members, data) = band?;
             let own = noise_floor(&data);
             members.into_iter().for_each(|j| floor[j] = own[j]);
         }
         Ok(Along {
-            joints: (0..data.dof()).map(|j| JointAlong::new(&data, model, j, &residual[j])).collect(),
-            curves: curves(&data, &residual, &residual),
+            joints,
+            curves,
             logs: logs.iter().map(LogFacts::of).collect(),
             noise_floor: floor,
             mounting,
-            motion: motion(&data),
+            motion,
         })
     }
 }

@@ -9,6 +9,7 @@ use crate::known::KnownModel;
 use crate::mounting::Mounting;
 use crate::source::{Input, Source, read_summary};
 use crate::transmission::{JointTransmission, transmission};
+use crate::usable;
 use dyngen::Arm;
 use powerball_controller::JointNumber;
 use powerball_logs::Progress;
@@ -23,10 +24,12 @@ pub(crate) struct Mounted {
     pub mounting: Mounting,
     pub body: RigidArm,
     pub bands: Bands,
-    /// The first logs as they were read, for figures; all where they were asked for.
+    /// The first samples of the logs as they were read, for figures; all where they were asked for.
     pub logs: Vec<Log>,
     /// The logs by which the fit is judged.
     pub held_out: Vec<Log>,
+    /// What its logs say themselves against being used.
+    pub doubts: Vec<String>,
 }
 
 impl Mounted {
@@ -42,7 +45,7 @@ impl Mounted {
     /// The same for a body that is there already.
     pub(crate) fn of(body: RigidArm, mounting: Mounting, options: &DataOptions) -> Mounted {
         let bands = Bands::new(&body, options);
-        Mounted { mounting, body, bands, logs: Vec::new(), held_out: Vec::new() }
+        Mounted { mounting, body, bands, logs: Vec::new(), held_out: Vec::new(), doubts: Vec::new() }
     }
 
     /// Whether the base stands so.
@@ -286,7 +289,13 @@ impl<'a> Gathering<'a> {
 
     fn take_log(&mut self, name: &str, log: Log, said: Option<Mounting>) -> Result<(), IdentifyError> {
         let place = self.place(said.unwrap_or_default())?;
-        let Mounted { body, bands, logs, .. } = &mut self.mounted[place];
+        let Mounted { body, bands, logs, doubts, .. } = &mut self.mounted[place];
+        doubts.extend(
+            usable::doubts(&body.filed(), [&log])
+                .into_iter()
+                .filter(|doubt| !doubts.contains(doubt))
+                .collect::<Vec<_>>(),
+        );
         // A log and its summary must come to the same.
         match reduce_in_bands(body, &log, self.options) {
             Ok((one, notes)) => {
@@ -297,7 +306,15 @@ impl<'a> Gathering<'a> {
             }
             Err(error) => self.refused.push(format!("{name}: {error}")),
         }
-        if self.needs_samples || self.samples_kept < SHOWN {
+        let room = if self.needs_samples { usize::MAX } else { SHOWN.saturating_sub(self.samples_kept) };
+        if room > 0 {
+            if log.t.len() > room {
+                self.warnings.push(format!(
+                    "{name}: figures, and what its columns are, are of its first {room} samples of {}; the fit is of all",
+                    log.t.len()
+                ));
+            }
+            let log = log.cut(room);
             self.samples_kept += log.t.len();
             logs.push(log);
         }

@@ -43,7 +43,8 @@ fn of_mounting(
     let body = &mounted.body;
     let model = model.clone().in_set_of(body);
     let mut judged: Option<(ResidualStats, Vec<usize>)> = None;
-    for (members, data) in by_band(body, &mounted.held_out, joint_bands, options)? {
+    for band in by_band(body, &mounted.held_out, joint_bands, options) {
+        let (members, data) = band?;
         let own = residual_stats(&data, &model.residual(body, &data));
         let (all, rows) = judged.get_or_insert_with(|| (own.clone(), vec![0; body.dof()]));
         for j in members {
@@ -226,6 +227,8 @@ pub(super) fn unusable(
     let values = identified.parameters.iter().map(|p| p.value).chain(judged.rms.iter().copied());
     let findings = Findings {
         columns,
+        // With the columns they are asked there; of summaries nothing is known.
+        doubts: Vec::new(),
         resting: (0..joints.len()).filter(rests).map(JointNumber::from_index).collect(),
         useless: judged.useless_joints(),
         not_finite: values.into_iter().any(|x| !x.is_finite()),
@@ -236,20 +239,21 @@ pub(super) fn unusable(
 
 // Logs prepared in the band of each joint.
 
-/// Logs prepared in every band that a joint has, widest first, with the joints of that band, from 0.
+/// Logs prepared in every band that a joint has, widest first, with the joints of that band, from 0: one band at a time, as each
+/// takes many times the memory of its logs.
 pub(crate) fn by_band<'a>(
     body: &'a RigidArm,
-    logs: &[Log],
-    joint_bands: &[f64],
-    options: &DataOptions,
-) -> Result<Vec<(Vec<usize>, Data<'a>)>, IdentifyError> {
-    let members =
-        |band: f64| -> Vec<usize> { (0..joint_bands.len()).filter(|j| joint_bands[*j] == band).collect() };
-    let with = |band: f64| DataOptions { cutoff: band, ..options.clone() };
+    logs: &'a [Log],
+    joint_bands: &'a [f64],
+    options: &'a DataOptions,
+) -> impl Iterator<Item = Result<(Vec<usize>, Data<'a>), IdentifyError>> + 'a {
+    let members = move |band: f64| -> Vec<usize> {
+        (0..joint_bands.len()).filter(|j| joint_bands[*j] == band).collect()
+    };
+    let with = move |band: f64| DataOptions { cutoff: band, ..options.clone() };
     BANDS
         .iter()
-        .map(|band| (members(*band), *band))
+        .map(move |band| (members(*band), *band))
         .filter(|(members, _)| !members.is_empty())
-        .map(|(members, band)| Ok((members, Data::new(body, logs, &with(band))?)))
-        .collect()
+        .map(move |(members, band)| Ok((members, Data::new(body, logs, &with(band))?)))
 }

@@ -77,6 +77,22 @@ impl Log {
         self.pieces.iter().cloned().flatten().map(sample)
     }
 
+    /// Its first samples.
+    #[must_use]
+    pub fn cut(mut self, samples: usize) -> Log {
+        let samples = samples.min(self.t.len());
+        let cut = |values: &mut Vec<f64>| {
+            values.truncate(samples);
+            values.shrink_to_fit();
+        };
+        cut(&mut self.t);
+        let optional = self.temperature.iter_mut().chain(&mut self.motor).flatten();
+        self.q.iter_mut().chain(&mut self.torque).chain(optional).for_each(cut);
+        self.pieces.retain(|piece| piece.start < samples);
+        self.pieces.iter_mut().for_each(|piece| piece.end = piece.end.min(samples));
+        self
+    }
+
     fn part(&self, own: std::ops::Range<usize>, name: &str) -> Log {
         let cut = |all: &Vec<Vec<f64>>| all.iter().map(|x| x[own.clone()].to_vec()).collect();
         let clip = |piece: &std::ops::Range<usize>| {

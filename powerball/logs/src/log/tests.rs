@@ -623,3 +623,25 @@ fn one_factor_between_all_velocities_and_slopes_is_a_wrong_time() {
         assert_eq!(with(factors), [], "{factors:?}");
     }
 }
+
+#[test]
+fn a_log_that_is_cut_keeps_its_first_samples_and_pieces() {
+    let signals = |width: usize| vec![vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]; width];
+    let log = Log {
+        file: "made".into(),
+        t: vec![0.0, 0.1, 0.2, 5.0, 5.1, 5.2],
+        q: signals(2),
+        torque: signals(2),
+        temperature: Some(signals(2)),
+        motor: None,
+        pieces: vec![0..3, 3..6],
+        doubts: Vec::new(),
+        clock: 0.0,
+    };
+    let cut = log.clone().cut(4);
+    assert_eq!((cut.t.as_slice(), cut.pieces), (&log.t[..4], vec![0..3, 3..4]));
+    let temperature = cut.temperature.unwrap();
+    assert!(cut.q.iter().chain(&cut.torque).chain(&temperature).all(|x| x == &[1.0, 2.0, 3.0, 4.0]));
+    assert_eq!(log.clone().cut(3).pieces, vec![0..3]);
+    assert_eq!(log.clone().cut(100).pieces, log.pieces);
+}

@@ -522,20 +522,28 @@ fn joint_rows(
         .collect();
     let Some(narrowest) = bands.last() else { return all };
     for (r, recording) in recordings.iter().enumerate() {
-        let y = body.regressor(&recording.q, &recording.v, &recording.a);
         // By joint, column and band.
-        let per_joint: Vec<Vec<Vec<Vec<f64>>>> = parallel::map(&(0..n).collect::<Vec<_>>(), |&j| {
-            let pass = |signal: Vec<f64>| {
-                let passed = narrowest.pass_bands(&signal, bands.len());
-                let rows = |(passed, joints): (Vec<f64>, &Vec<JointRows>)| {
-                    joints[j].kept[r].iter().map(|k| passed[*k]).collect()
+        let mut per_joint: Vec<Vec<Vec<Vec<f64>>>> = Vec::new();
+        let groups = (n * p * recording.len()).div_ceil(MOST_NUMBERS).max(1);
+        let joints: Vec<usize> = (0..n).collect();
+        for group in joints.chunks(n.div_ceil(groups).max(1)) {
+            let own = regressor_of(body, recording, group, groups);
+            let (first, width) = (group[0], group.len());
+            per_joint.extend(parallel::map(group, |&j| {
+                let pass = |signal: Vec<f64>| {
+                    let passed = narrowest.pass_bands(&signal, bands.len());
+                    let rows = |(passed, joints): (Vec<f64>, &Vec<JointRows>)| {
+                        joints[j].kept[r].iter().map(|k| passed[*k]).collect()
+                    };
+                    passed.into_iter().zip(&all).map(rows).collect()
                 };
-                passed.into_iter().zip(&all).map(rows).collect()
-            };
-            let mut columns = vec![pass(recording.smooth_torque(j))];
-            columns.extend((0..p).map(|c| pass(y.iter().skip(j * p + c).step_by(n * p).copied().collect())));
-            columns
-        });
+                let column =
+                    |c: usize| own.iter().skip((j - first) * p + c).step_by(width * p).copied().collect();
+                let mut columns = vec![pass(recording.smooth_torque(j))];
+                columns.extend((0..p).map(|c| pass(column(c))));
+                columns
+            }));
+        }
         for (j, columns) in per_joint.into_iter().enumerate() {
             for (c, bands) in columns.into_iter().enumerate() {
                 for (joints, from) in all.iter_mut().zip(bands) {
@@ -549,6 +557,28 @@ fn joint_rows(
         }
     }
     all
+}
+
+/// Numbers of a regressor that are held at a time: a long recording's is computed anew for each few joints.
+const MOST_NUMBERS: usize = 12 << 20;
+/// Samples of a regressor of which some joints are kept.
+const AT_ONCE: usize = 8192;
+
+/// The rows of some joints in the regressor along a recording, samples × joints × p; `groups`: of how many such it is made.
+fn regressor_of(body: &RigidArm, recording: &Recording, joints: &[usize], groups: usize) -> Vec<f64> {
+    if groups == 1 {
+        return body.regressor(&recording.q, &recording.v, &recording.a);
+    }
+    let (n, p) = (body.dof(), body.names().len());
+    let mut own = Vec::with_capacity(recording.len() * joints.len() * p);
+    for from in (0..recording.len()).step_by(AT_ONCE) {
+        let at = from * n..recording.len().min(from + AT_ONCE) * n;
+        let [q, v, a] = [&recording.q, &recording.v, &recording.a].map(|x| &x[at.clone()]);
+        for sample in body.regressor(q, v, a).chunks_exact(n * p) {
+            joints.iter().for_each(|j| own.extend_from_slice(&sample[j * p..(j + 1) * p]));
+        }
+    }
+    own
 }
 
 fn blocks_of(recordings: &[Recording], joints: &[JointRows], band: &Band, length: f64) -> Vec<Block> {
@@ -575,4 +605,42 @@ fn blocks_of(recordings: &[Recording], joints: &[JointRows], band: &Band, length
         }
     }
     blocks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn joint_by_joint_a_long_recording_has_the_same_regressor() {
+        let joint = "[[joint]]\nkind = \"revolute\"\na = 0.3\nalpha = \"pi/2\"\nd = 0.1\ntheta = 0\n";
+        let head = "name = \"three\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\n";
+        let body =
+            RigidArm::new(&dyngen::Arm::parse(&format!("{head}{}", joint.repeat(3)), "three.toml").unwrap())
+                .unwrap();
+        let count = 2 * AT_ONCE + 77;
+        let wave = |by: f64| (0..3 * count).map(|k| (by * k as f64).sin()).collect::<Vec<f64>>();
+        let recording = Recording {
+            log: 0,
+            start: 0.0,
+            clock: 0.0,
+            rate: 200.0,
+            q: wave(0.01),
+            v: wave(0.02),
+            a: wave(0.03),
+            torque: Vec::new(),
+            temperature: None,
+            smoothing: 20.0,
+            dof: 3,
+        };
+        let (whole, p) = (regressor_of(&body, &recording, &[0, 1, 2], 1), body.names().len());
+        for joints in [&[0, 1][..], &[2]] {
+            let own = regressor_of(&body, &recording, joints, 2);
+            let expected: Vec<f64> = whole
+                .chunks_exact(3 * p)
+                .flat_map(|sample| joints.iter().flat_map(|j| sample[j * p..(j + 1) * p].to_vec()))
+                .collect();
+            assert!(own == expected, "{joints:?}");
+        }
+    }
 }

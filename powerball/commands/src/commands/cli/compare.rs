@@ -43,6 +43,8 @@ pub(crate) struct Compare {
     /// Print the result as one JSON object on standard output.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    accept: output::Accept,
 }
 
 impl From<CompareError> for Failure {
@@ -65,21 +67,15 @@ impl Compare {
         output::write_all(&files, &self.out)?;
         if self.json {
             output::print(&files.first());
-            return Ok(());
+            return self.accept.judge(&compared.unusable);
         }
+        output::first_lines(&compared.unusable, None, false).iter().for_each(|line| output::print(line));
         compared.warnings.iter().for_each(|warning| output::print(&format!("note: {warning}")));
         output::print(&compared.sentence);
         for t in &compared.torque_difference {
-            output::print(&format!(
-                "joint {}: {:.4} N·m along the logs of A, {:.1} % of the torque; the errors of both alone \
-                    make {:.4} N·m",
-                t.joint,
-                t.rms,
-                100.0 * t.relative,
-                t.expected
-            ));
+            output::print(&t.in_words());
         }
-        Ok(())
+        self.accept.judge(&compared.unusable)
     }
 
     /// A result as it is, or the fit of a log or a summary.

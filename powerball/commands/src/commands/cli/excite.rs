@@ -72,7 +72,7 @@ pub(super) fn floor(text: &str) -> Result<FloorAt, String> {
 )]
 pub(crate) struct Excite {
     /// The arm file; every joint needs `position`, `velocity` and `acceleration` in it, or `torque` in place of
-    /// `acceleration` where --values gives the masses.
+    /// `acceleration` where the masses are known (--values).
     #[arg(long)]
     arm: PathBuf,
     /// The parameter set whose regressor is to be well conditioned.
@@ -123,7 +123,8 @@ pub(crate) struct Excite {
     #[arg(long)]
     no_collision: bool,
     /// The arm's masses for the torque limits: an identified.json, or a values file `{"parameter": number,
-    /// …}`. Without it they are guessed from the capsules.
+    /// …}`. Without it they are those of ARM.values.json, which `dyngen import` writes next to the arm file; else they
+    /// are guessed from the capsules.
     #[arg(long, value_name = "FILE.json", conflicts_with = "no_torque")]
     values: Option<PathBuf>,
     /// Does not look at torque limits.
@@ -201,8 +202,16 @@ impl Excite {
         }
     }
 
+    /// As said, else those that an import has written next to the arm file.
     fn masses(&self) -> Result<MassSource, Failure> {
-        let Some(path) = &self.values else { return Ok(MassSource::Guess) };
+        let beside = self.arm.with_extension("values.json");
+        let imported =
+            || beside.is_file().then(|| tracing::warn!("{}: the masses are taken from it", beside.display()));
+        let path = match &self.values {
+            Some(path) => path,
+            None if imported().is_some() => &beside,
+            None => return Ok(MassSource::Guess),
+        };
         let file = path.display().to_string();
         let text = dyngen::file::text(path)
             .map_err(|e| Failure::Unusable(format!("{file}: cannot be read: {e}")))?;

@@ -277,7 +277,9 @@ pub(super) fn everything(explained: &Explained, arm: &Path, out: &Path) -> Strin
         "{accepted} of {surrogates} effects that cannot be there were accepted (shifted in time)"
     ));
     if *without > 0 {
-        text.push_str(&format!("; {without} more were constant torques, which no shift changes"));
+        text.push_str(&format!(
+            "; constant torques are left out: {without}, as they are the same at every time"
+        ));
     }
     text.push_str(&format!("\nreport: {}\n", out.join("report.html").display()));
     text.push_str(&format!("next: {}", next(explained, arm, out)));

@@ -43,6 +43,8 @@ pub(crate) struct Summarize {
     /// Print what was written as one JSON object on standard output.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    accept: output::Accept,
 }
 
 /// What was written.
@@ -58,6 +60,9 @@ struct Written {
     /// By joint.
     rows: Vec<u64>,
     bytes: usize,
+    /// Why it should not be used.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    unusable: Vec<String>,
     /// Their ends, Hz.
     bands: [f64; BANDS.len()],
     warnings: Vec<String>,
@@ -73,7 +78,7 @@ impl Summarize {
             let source = Source { mounting: self.mounting, ..Source::file(file) };
             source.mapped(Arc::clone(&map))
         };
-        let Summarized { mounting, bands, warnings } =
+        let Summarized { mounting, bands, unusable, warnings } =
             summarize(&arm, self.log.iter().map(source), &DataOptions::default(), Progress::to(&say))?;
         let bytes = bands.to_bytes();
         let summary = bands.widest();
@@ -87,12 +92,14 @@ impl Summarize {
             rows: summary.joints.iter().map(|j| j.rows()).collect(),
             bytes: bytes.len(),
             bands: BANDS,
+            unusable,
             warnings,
         };
         if self.json {
             output::print(&output::json(&written)?);
-            return Ok(());
+            return self.accept.judge(&written.unusable);
         }
+        output::first_lines(&written.unusable, None, false).iter().for_each(|line| output::print(line));
         for warning in &written.warnings {
             output::print(&format!("note: {warning}"));
         }
@@ -104,6 +111,6 @@ impl Summarize {
             written.rows.iter().max().unwrap_or(&0),
             written.bytes / 1000
         ));
-        Ok(())
+        self.accept.judge(&written.unusable)
     }
 }

@@ -15,7 +15,8 @@ use std::sync::Arc;
 /// Judge an identified model on logs that it has not seen (Fig. 8): errors with intervals, against the noise
 /// floor.
 ///
-/// Writes verified.json and report.html. Exit code 1 where a joint's error is beyond the tolerance.
+/// Writes verified.json and report.html. Exit code 1 where a joint's error is beyond the tolerance, 3 where the logs should not
+/// be used.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Example:\n  powerball verify --arm arm.toml --model result/identified.json --log other.csv \
@@ -35,6 +36,8 @@ pub(crate) struct Verify {
     /// Largest error of a joint, as a share of the rms of its torque.
     #[arg(long, default_value_t = 0.1)]
     tolerance: f64,
+    #[command(flatten)]
+    accept: output::Accept,
 }
 
 impl Verify {
@@ -58,6 +61,7 @@ impl Verify {
         if self.inputs.json {
             output::print(&files.first());
         } else {
+            output::first_lines(&verified.unusable, None, false).iter().for_each(|line| output::print(line));
             for (j, band) in verified.joints.iter().zip(&verified.joint_bands) {
                 output::print(&format!(
                     "joint {}: {:.4} N·m ({:.4} to {:.4}), {:.1} % of the torque, noise alone {:.4} N·m, {band} Hz",
@@ -71,6 +75,7 @@ impl Verify {
                 ));
             }
         }
+        self.accept.judge(&verified.unusable)?;
         let beyond: Vec<String> =
             verified.joints.iter().filter(|j| j.within == Some(false)).map(|j| j.joint.to_string()).collect();
         if beyond.is_empty() {

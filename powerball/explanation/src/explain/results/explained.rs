@@ -100,7 +100,8 @@ impl Explained {
         let rms = &self.after.validate.rms;
         let not_finite = rms.iter().any(|x| !x.is_finite());
         let resting = self.resting.clone();
-        let findings = Findings { columns: Some(&columns), resting, useless, not_finite, indefinite: 0.0 };
+        let findings =
+            Findings { columns: Some(&columns), resting, useless, not_finite, ..Findings::default() };
         self.unusable = findings.reasons();
         self.conventions = Some(columns);
         self

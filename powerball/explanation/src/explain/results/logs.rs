@@ -10,7 +10,6 @@ use super::super::study::Study;
 use crate::effects::{Settings, Window, contact_wrench};
 use crate::rule::Rule;
 use powerball_controller::JointNumber;
-use powerball_identification::estimate::distribution::f_tail;
 use powerball_logs::regression::{Data, Signals};
 use serde::Serialize;
 
@@ -163,12 +162,6 @@ impl Judged<'_> {
         (!joints.is_empty()).then(|| joints.iter().sum::<f64>() / joints.len() as f64)
     }
 
-    /// Whether so many times the error of any other log is more than chance gives, for as many blocks as the log has.
-    fn is_odd(&self, ratio: f64, rule: &Rule) -> bool {
-        let blocks = self.data.blocks.iter().filter(|block| block.log == self.log).count() as f64;
-        ratio > rule.odd_log && f_tail(ratio, blocks, blocks) < rule.family_wise
-    }
-
     /// When the log begins and ends, in its own t, s.
     fn span(&self) -> [f64; 2] {
         let own = || self.data.recordings.iter().filter(|r| r.log == self.log);
@@ -202,8 +195,7 @@ impl Judged<'_> {
         }
         differs.sort_by(|a, b| a.start_time.total_cmp(&b.start_time));
         let error_ratio = usual.filter(|usual| *usual > 0.0).map(|usual| after / usual);
-        let like_the_others =
-            differs.is_empty() && !error_ratio.is_some_and(|ratio| self.is_odd(ratio, rule));
+        let like_the_others = differs.is_empty() && error_ratio.is_none_or(|ratio| ratio <= rule.odd_log);
         LogResult { log, like_the_others, error_ratio, differs }
     }
 }

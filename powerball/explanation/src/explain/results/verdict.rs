@@ -168,7 +168,8 @@ fn kind(signals: &[(String, f64)], j: usize) -> String {
 /// * No name is given and refused on one joint.
 /// * A joint at the noise floor is not among those where something is left without a name; the error of one that is
 ///   improved falls, that of one that is not predicted does not.
-/// * An experiment is of names that are open: of at most one that was given on these joints.
+/// * An experiment is of names that are open: of at most one that was given on these joints. Each stands in the answer,
+///   given, as a rival or as one that was considered.
 /// * No interval of a change lies on the wrong side of it.
 #[must_use]
 pub fn contradictions(explained: &Explained) -> Vec<String> {
@@ -211,6 +212,14 @@ pub fn contradictions(explained: &Explained) -> Vec<String> {
         let given = open.hypotheses.iter().filter(|h| is_named(explained, h.name, &h.joints)).count();
         if given > 1 {
             all.push(format!("an experiment of {:?}, which are given", next.to_tell_apart));
+        }
+    }
+    for name in explained.next_experiment.iter().flat_map(|next| &next.to_tell_apart) {
+        let rivals = explained.effects.iter().flat_map(|effect| &effect.rivals);
+        let others = rivals.chain(rest.iter().flat_map(|rest| &rest.considered));
+        let given = explained.effects.iter().any(|effect| effect.effect == *name);
+        if !given && !others.into_iter().any(|other| other.effect == *name) {
+            all.push(format!("an experiment of {name}, of which nothing is said"));
         }
     }
     for change in &explained.held_out_change {
