@@ -94,7 +94,7 @@ impl<'s, S: RowSink> Rows<'s, S> {
         let rows = u64::try_from(builder.metadata().file_metadata().num_rows()).unwrap_or(0);
         self.claimed = usize::try_from(rows).unwrap_or(usize::MAX);
         self.expected = usize::try_from(rows.min(length.saturating_mul(ROWS_A_BYTE))).unwrap_or(0);
-        let texts = builder.parquet_schema().columns().iter().any(|column| has_texts(column));
+        let texts = builder.parquet_schema().columns().iter().any(has_texts);
         let batch = if texts { ROWS_OF_TEXTS } else { ROWS };
         let mut reader =
             guarded(|| builder.with_batch_size(batch).build()).map_err(|e| unreadable(None, &e))?;

@@ -103,7 +103,7 @@ fn array(name: &str, set: &Dataset, memory: &mut Memory) -> Result<Array, String
         return Err(format!("its shape is {shape:?}"));
     }
     // As they are stored, and as numbers.
-    let stored = set.element_size().map_or(8, |size| size as u64);
+    let stored = set.element_size().unwrap_or(8);
     memory.claim(count.saturating_mul(stored.saturating_add(8)))?;
     let mut shape = if long.is_empty() { vec![1] } else { long };
     // MATLAB writes its arrays column by column, and so their dimensions the other way round.
