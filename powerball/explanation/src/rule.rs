@@ -96,8 +96,8 @@ pub struct Rule {
     /// [`family_wise`](Self::family_wise) over eight octaves.
     pub missing_errors: f64,
 
-    /// A name is taken back where without its effect the squared error on the validation set is smaller by this
-    /// share, on its joints. What is in validation logs only must not raise that of any joint by this share.
+    /// A name is taken back where without its effect the squared error on the validation set is smaller on its joints, or by
+    /// this share on all together. What is in validation logs only must not raise that of any joint by this share.
     pub max_validation_loss: f64,
 
     /// A setting is refined for more than chance gains by one more coefficient, in units of χ².

@@ -132,15 +132,15 @@ fn is_the_same(a: &Candidate, b: &Candidate) -> bool {
     a.joints == b.joints && (x - y).abs() < APART
 }
 
-/// Whether the error on the validation set rises in the band so much that a name is taken back for it: a ripple that is
-/// there changes little.
+/// Whether the error on the validation set rises in the band: a ripple that is there passes it slowly where the joint turns
+/// back.
 fn raises_error(study: &Study<'_>, model: &Model, ripple: &Ripple) -> bool {
     let joint = ripple.candidate.joints[0].index();
     let columns = study.on_validation(&model.fit, &[]).columns(&ripple.candidate);
     let mut residual = model.residual_on_validation(study);
     let before = residual.squares()[joint];
     residual.subtract(&columns, &ripple.coefficients);
-    residual.squares()[joint] > study.rule().max_validation_loss.exp() * before
+    residual.squares()[joint] > before
 }
 
 // What a model leaves of a joint's torque above the band of the fit: along each recording, by order of the joint's

@@ -16,8 +16,6 @@ fn every_law() -> Vec<Law<f64>> {
         Law::Position,
         Law::Cosine { order: 7.0 },
         Law::Sine { order: 161.25 },
-        Law::DirectionCosine { order: 1.0, steepness: 50.0 },
-        Law::DirectionSine { order: 2.0, steepness: 50.0 },
         Law::CoolFriction { time_constant: 60.0 },
         Law::CoolVelocity { time_constant: 60.0 },
         Law::HotFriction { reference: 21.5 },
@@ -40,6 +38,8 @@ fn every_law() -> Vec<Law<f64>> {
         Law::Gap { gap: 0.002 },
         Law::Flight { reach: 0.002 },
         Law::Compliance,
+        Law::DirectionCosine { order: 1.0, steepness: 50.0 },
+        Law::DirectionSine { order: 2.0, steepness: 50.0 },
         Law::HangingBack { scale: 30.0 },
     ]
 }

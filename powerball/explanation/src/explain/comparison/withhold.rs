@@ -84,8 +84,8 @@ fn impossible(study: &Study<'_>, model: &Model) -> Option<usize> {
     found.position(|(a, coefficients)| !a.effect().possible(&context, &a.candidate, &coefficients))
 }
 
-/// The accepted effect without which the logs to judge on are predicted clearly better, on its joints or on all: what one
-/// joint gains others may lose, since they share their parameters.
+/// The accepted effect without which the logs to judge on are predicted better on its joints, or clearly better on all: what
+/// one joint gains others may lose, since they share their parameters.
 fn harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
     *model.harmful.get_or_init(|| find_harmful(study, model))
 }
@@ -102,9 +102,9 @@ fn find_harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
     found.into_iter().find(|k| {
         let joints = &model.accepted[*k].candidate.joints;
         let without = model.without(study, *k).residual_on_validation(study);
-        [joints, &all]
+        [(joints, 0.0), (&all, study.rule().max_validation_loss)]
             .iter()
-            .any(|on| error(&without, on) < error(&with, on) - study.rule().max_validation_loss)
+            .any(|(on, loss)| error(&without, on) < error(&with, on) - loss)
     })
 }
 
