@@ -9,9 +9,11 @@ use powerball_logs::log::{LiveSample, logs_of_motors};
 use powerball_logs::regression::{DataOptions, Recording};
 
 /// Rows are made so often, s.
-const HOP: f64 = 0.1;
-/// So many seconds before new rows are needed: filters and presliding have memories.
-const BEFORE: f64 = 2.5;
+const HOP: f64 = 0.2;
+/// So many seconds before new rows are needed: the filters of positions and torques have forgotten what was before …
+const BEFORE: f64 = 1.0;
+/// … and where a law of the model remembers as well, this many.
+const REMEMBERED: f64 = 2.5;
 /// What a row needs of the residual before it, s: beyond that its band's filter has forgotten all.
 const BAND_BEFORE: f64 = 0.6;
 /// What is learnt again, of a model with a change whose size is known roughly, has so many times the margin.
@@ -130,7 +132,9 @@ impl<'a> Stream<'a> {
     /// The rows since the last time.
     fn rows(&self) -> Option<Rows> {
         let Setting { body, model, file, .. } = self.setting;
-        let log = [self.buffer.log(self.last - BEFORE, file)?];
+        let remembers = model.terms().iter().any(|term| term.law.remembers());
+        let before = if remembers { REMEMBERED } else { BEFORE };
+        let log = [self.buffer.log(self.last - before, file)?];
         let motors = logs_of_motors(body.arm(), &log);
         let log = motors.first()?;
         let all = log.pieces.first()?.clone();

@@ -31,6 +31,7 @@ pub(crate) struct Memory {
     allowed: u64,
     claimed: u64,
     /// Why the log is refused, where it is.
+    #[cfg(any(feature = "topics", feature = "npz", feature = "mat", feature = "hdf5"))]
     refused: Option<String>,
 }
 
@@ -39,7 +40,12 @@ impl Memory {
     pub(crate) fn of_a_log() -> Memory {
         let said = Some(ALLOWED.load(Ordering::Relaxed)).filter(|bytes| *bytes > 0);
         let allowed = said.or_else(|| Some(free()? / 2)).unwrap_or(ELSEWHERE);
-        Memory { allowed, claimed: 0, refused: None }
+        Memory {
+            allowed,
+            claimed: 0,
+            #[cfg(any(feature = "topics", feature = "npz", feature = "mat", feature = "hdf5"))]
+            refused: None,
+        }
     }
 
     /// Whether so many bytes fit beside what was claimed before.
@@ -65,7 +71,11 @@ impl Memory {
     pub(crate) fn holds_rows(&self, rows: usize, numbers: usize) -> Result<(), String> {
         self.holds((rows as u64).saturating_mul(numbers as u64).saturating_mul(NUMBER))
     }
+}
 
+/// What takes its room piece by piece, and says at the end whether all of it was there.
+#[cfg(any(feature = "topics", feature = "npz", feature = "mat", feature = "hdf5"))]
+impl Memory {
     /// Takes so many bytes of it; where they are not there, the log is refused.
     ///
     /// # Errors
@@ -129,7 +139,7 @@ fn size(bytes: u64) -> String {
     unit.map_or(format!("{bytes} B"), |(unit, name)| format!("{:.1} {name}", bytes / unit))
 }
 
-#[cfg(test)]
+#[cfg(all(test, any(feature = "topics", feature = "npz", feature = "mat", feature = "hdf5")))]
 mod tests {
     use super::*;
 
