@@ -66,6 +66,7 @@ impl Bench {
             parameters: found.parameters,
             friction: found.friction,
             uncertainty: Some(Uncertainty::of(self.body.names(), &solution, &errors)),
+            strokes: Vec::new(),
             unusable: Vec::new(),
         })
     }

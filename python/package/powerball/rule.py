@@ -97,9 +97,9 @@ class Rule:
     #: See ``least_missing``: standard errors that chance exceeds once in 800, ``family_wise`` over eight
     #: octaves.
     missing_errors: float = 3.2
-    #: A name is taken back where without its effect the squared error on the validation set is smaller by
-    #: this share, on its joints. What is in validation logs only must not raise that of any joint by this
-    #: share.
+    #: A name is taken back where without its effect the squared error on the validation set is smaller on
+    #: its joints, or by this share on all together. What is in validation logs only must not raise that of
+    #: any joint by this share.
     max_validation_loss: float = 0.1
     #: A setting is refined for more than chance gains by one more coefficient, in units of χ².
     refinement_gain: float = 1.0

@@ -132,7 +132,7 @@ impl<'a> Stream<'a> {
     /// The rows since the last time.
     fn rows(&self) -> Option<Rows> {
         let Setting { body, model, file, .. } = self.setting;
-        let remembers = model.terms().iter().any(|term| term.law.remembers());
+        let remembers = model.terms().iter().any(|named| named.term.law.remembers());
         let before = if remembers { REMEMBERED } else { BEFORE };
         let log = [self.buffer.log(self.last - before, file)?];
         let motors = logs_of_motors(body.arm(), &log);

@@ -8,6 +8,7 @@ use super::result::{
     TorqueDifference,
 };
 use super::side::Side;
+use super::strokes::changes;
 use crate::estimate::distribution::{f_tail, t_critical};
 use crate::estimate::{Solver, Uncertainty, friction_row};
 use faer::Mat;
@@ -130,9 +131,18 @@ impl Differences {
         let shows = |f: &FrictionDifference| {
             torque.iter().find(|t| t.joint == f.joint).is_none_or(|t| t.rms > t.expected)
         };
-        let friction = friction.iter().map(|curves| curves.difference(p, share));
-        let friction =
-            friction.map(|f| FrictionDifference { differs: f.differs && shows(&f), ..f }).collect();
+        let on_one_path = changes(&a.strokes, &b.strokes);
+        let friction = friction.iter().map(|curves| {
+            let f = curves.difference(p, share);
+            match on_one_path.get(f.joint - 1).copied().flatten() {
+                Some(change) => {
+                    let (p_value, change) = (change.p_value(), change.interval(share));
+                    FrictionDifference { p_value, change, differs: p_value < share, ..f }
+                }
+                None => FrictionDifference { differs: f.differs && shows(&f), ..f },
+            }
+        });
+        let friction = friction.collect();
         Ok(Differences {
             level,
             comparisons,

@@ -12,12 +12,14 @@ mod cause;
 mod differences;
 mod result;
 mod side;
+mod strokes;
 
 pub use result::{
     Cause, CompareError, CompareOptions, Comparison, ConstantDifference, FrictionDifference,
     ParameterDifference, TorqueDifference,
 };
 pub use side::Side;
+pub use strokes::Stroke;
 
 use differences::Differences;
 

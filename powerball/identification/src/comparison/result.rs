@@ -84,8 +84,8 @@ pub struct FrictionDifference {
     pub difference: Vec<f64>,
     /// Where the differences lie.
     pub interval: Vec<[f64; 2]>,
-    /// Where (b − a)/a lies, at the velocity at which the difference is surest; at the fastest one where only
-    /// the slope tells a difference.
+    /// Where (b − a)/a lies: of two logs of one path the mean along it, else at the velocity at which the difference is
+    /// surest, at the fastest one where only the slope tells a difference.
     pub change: [f64; 2],
     /// How often equal arms would differ so in the curve.
     pub p_value: f64,

@@ -1,11 +1,13 @@
 //! One of two fits: its values and how well they are known.
 
 use super::result::CompareError;
+use super::strokes::{Stroke, strokes};
 use crate::Identified;
 use crate::estimate::{
     JointFriction, ParameterEstimate, Uncertainty, distribution::freedom_of, friction_row,
 };
 use powerball_controller::friction::TanhFriction;
+use powerball_logs::log::Log;
 use serde::Deserialize;
 use std::path::Path;
 
@@ -22,6 +24,8 @@ pub struct Side {
     pub friction: Vec<JointFriction>,
     /// How well all of it is known together; without it the standard errors count one by one.
     pub uncertainty: Option<Uncertainty>,
+    /// The strokes of its log by joint; nothing where it is no fit of one log.
+    pub strokes: Vec<Vec<Stroke>>,
     /// Why it should not be used, each a sentence without its full stop; empty where it may be.
     pub unusable: Vec<String>,
 }
@@ -49,8 +53,16 @@ impl Side {
             parameters: identified.parameters.clone(),
             friction: identified.friction.clone(),
             uncertainty: Some(identified.uncertainty.clone()),
+            strokes: Vec::new(),
             unusable: identified.unusable.clone(),
         }
+    }
+
+    /// The same with the log that was fitted, so that friction can be compared along it where the other one runs its path.
+    #[must_use]
+    pub fn along(mut self, log: &Log) -> Side {
+        self.strokes = strokes(log);
+        self
     }
 
     /// Reads the result of `powerball identify`: its folder, or `identified.json` in it, or another model of
@@ -81,7 +93,7 @@ impl Side {
             _ => None,
         };
         let File { arm, parameters, friction, unusable } = model;
-        Ok(Side { name, arm, parameters, friction, uncertainty, unusable })
+        Ok(Side { name, arm, parameters, friction, uncertainty, strokes: Vec::new(), unusable })
     }
 
     /// The covariance of two parameters of the minimal set.

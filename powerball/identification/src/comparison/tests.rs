@@ -1,5 +1,6 @@
 //! Simulated pairs: the virtual arm with its own dynamics, sensors and noise, recorded twice.
 
+use super::strokes::{changes, strokes};
 use super::{Cause, CompareOptions, Comparison, Side, compare};
 use crate::estimate::{
     FrictionKind, Uncertainty, estimates, reduce_in_bands, solve_in_band, standard_errors,
@@ -40,6 +41,7 @@ fn fitted(body: &RigidArm, links: Vec<Body>, friction: Vec<TanhFriction<f64>>, s
         parameters,
         friction,
         uncertainty,
+        strokes: Vec::new(),
         unusable: Vec::new(),
     }
 }
@@ -88,7 +90,7 @@ fn equal_arms_are_equal_and_five_per_cent_of_viscous_friction_is_seen() {
         };
         // Viscous friction is a part of it all.
         assert!(low > 0.0 && high < 0.1, "{low} {high}");
-        assert!(other.sentence.starts_with("Friction changed on joint 3 by"), "{}", other.sentence);
+        assert!(other.sentence.starts_with("Friction of joint 3 is higher by"), "{}", other.sentence);
         // The other way round it is the other way round.
         let back = compared(&changed, a);
         assert!(back.differ && back.friction[2].change[1] < 0.0);
@@ -145,4 +147,50 @@ fn what_cannot_be_compared_is_told() {
         let width = |[low, high]: [f64; 2]| high - low;
         assert!(width(without.interval[0]) >= 0.9 * width(with.interval[0]));
     }
+}
+
+/// A tenth of a joint's friction is seen between two logs of one path, with its sign, also where the other arm holds a body;
+/// the same arm on the same path again is the same.
+#[test]
+fn a_tenth_of_friction_is_seen_along_one_path() {
+    let chain = Chain::new(&lwa4p::arm().unwrap());
+    let sensors = lwa4p::plant().unwrap().sensors().clone();
+    let harmonics = |j: usize| {
+        let swing = if j == 1 || j == 2 { 0.6 } else { 0.0 };
+        Harmonics { middle: 0.2, a: vec![0.0, swing, 0.3 * swing], b: vec![0.2 * swing, 0.0, 0.0] }
+    };
+    let joints = (0..6).map(harmonics).collect();
+    let path = Fourier { fundamental: std::f64::consts::TAU / 6.0, periods: 6, ramp: 1.0, joints };
+    let strokes_of = |factor: f64, links: Vec<Body>, seed: u64| {
+        let mut friction = table();
+        let f = friction[2];
+        friction[2] =
+            TanhFriction::new([factor * f.gamma1, f.gamma2, factor * f.gamma3, f.gamma4, factor * f.gamma5]);
+        let plant = Plant::new(Dynamics::new(chain.clone(), links).unwrap(), friction, sensors.clone());
+        strokes(&plant.record(&path.sample(plant.sensors().rate), 0.0, seed).log("virtual"))
+    };
+    let mut loaded = lwa4p::links();
+    let (last, load) = (loaded.last_mut().unwrap(), Body::even_box(0.5, [0.0, 0.0, 0.1], [0.05; 3], 0.0));
+    (last.mass, last.moment, last.inertia) =
+        (last.mass + load.mass, last.moment + load.moment, last.inertia + load.inertia);
+    let usual = strokes_of(1.0, lwa4p::links(), 1);
+    for (factor, links, seed) in [
+        (1.1, lwa4p::links(), 2),
+        (0.9, lwa4p::links(), 3),
+        (1.1, loaded.clone(), 4),
+        (1.0, lwa4p::links(), 5),
+        (1.0, loaded, 6),
+    ] {
+        let changes = changes(&usual, &strokes_of(factor, links, seed));
+        assert!([0, 3, 4, 5].iter().all(|j: &usize| changes[*j].is_none()), "{changes:?}");
+        let [other, own] = [1, 2].map(|j: usize| changes[j].unwrap());
+        assert!(other.p_value() > 0.01 && (own.p_value() < 1e-3) == (factor != 1.0), "{factor} {changes:?}");
+        let [low, high] = own.interval(0.01);
+        assert!(low < factor - 1.0 + 0.01 && high > factor - 1.0 - 0.01 && high - low < 0.08, "{low} {high}");
+    }
+    // On another path nothing is said.
+    let other = Fourier { fundamental: std::f64::consts::TAU / 5.0, ..path.clone() };
+    let plant = lwa4p::plant().unwrap();
+    let elsewhere = strokes(&plant.record(&other.sample(plant.sensors().rate), 0.0, 7).log("virtual"));
+    assert!(changes(&usual, &elsewhere).iter().all(Option::is_none));
 }

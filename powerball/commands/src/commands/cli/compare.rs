@@ -98,6 +98,7 @@ impl Compare {
         let side = Side::of(&shown, &fit(Source::file(path).mapped(Arc::new(map.clone())))?);
         // A summary has no parts.
         let Ok(log) = read_log_as(path, arm, &map, &mut Vec::new()) else { return Ok(side) };
+        let side = side.along(&log);
         let halves: Vec<Side> = (log.halves().into_iter())
             .filter_map(|half| Some(Side::of(&half.file.clone(), &fit(Source::from(half)).ok()?)))
             .collect();
