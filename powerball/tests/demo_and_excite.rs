@@ -249,6 +249,7 @@ fn an_imported_arm_is_excited_as_it_is() {
             path.to_str().unwrap(),
             "--evaluations",
             "40",
+            "--no-collision",
         ])
     };
     let done = run(&file);

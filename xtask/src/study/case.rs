@@ -164,7 +164,7 @@ impl Case {
                 Table::Pairs | Table::Drawn => {
                     let sizes = vec![size(), size()];
                     let two: Vec<String> =
-                        Effect::NAMES.sample(&mut rng, 2).map(|n| (*n).to_string()).collect();
+                        Effect::chosen_by_seed().sample(&mut rng, 2).map(|n| (*n).to_string()).collect();
                     add(two, sizes);
                 }
                 _ => {

@@ -334,12 +334,6 @@ impl<T: RealField + Copy> Law<T> {
         matches!(self, Law::Compliance | Law::HangingBack { .. })
     }
 
-    /// Whether its torque depends on what was before: it needs some of the past before it is right.
-    #[must_use]
-    pub fn remembers(&self) -> bool {
-        matches!(self, Law::Presliding { .. } | Law::Gap { .. } | Law::Flight { .. }) || self.moves_link()
-    }
-
     /// How far the link of a joint under `load` N·m is from where its motor is, rad for a coefficient of 1.
     #[must_use]
     pub fn shift(&self, load: T) -> T {

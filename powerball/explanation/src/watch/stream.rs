@@ -9,13 +9,9 @@ use powerball_logs::log::{LiveSample, logs_of_motors};
 use powerball_logs::regression::{DataOptions, Recording};
 
 /// Rows are made so often, s.
-const HOP: f64 = 0.2;
-/// So many seconds before new rows are needed: the filters of positions and torques have forgotten what was before …
-const BEFORE: f64 = 1.0;
-/// … and where a law of the model remembers as well, this many.
-const REMEMBERED: f64 = 2.5;
-/// What a row needs of the residual before it, s: beyond that its band's filter has forgotten all.
-const BAND_BEFORE: f64 = 0.6;
+const HOP: f64 = 0.05;
+/// So many seconds before new rows are needed: filters and presliding have memories.
+const BEFORE: f64 = 2.5;
 /// What is learnt again, of a model with a change whose size is known roughly, has so many times the margin.
 const AGAIN: f64 = 1.5;
 
@@ -132,29 +128,18 @@ impl<'a> Stream<'a> {
     /// The rows since the last time.
     fn rows(&self) -> Option<Rows> {
         let Setting { body, model, file, .. } = self.setting;
-        let remembers = model.terms().iter().any(|named| named.term.law.remembers());
-        let before = if remembers { REMEMBERED } else { BEFORE };
-        let log = [self.buffer.log(self.last - before, file)?];
+        let log = [self.buffer.log(self.last - BEFORE, file)?];
         let motors = logs_of_motors(body.arm(), &log);
         let log = motors.first()?;
         let all = log.pieces.first()?.clone();
         let recording = Recording::new(log, 0, all, 1.0 / self.rate, DataOptions::default().smoothing)?;
         let predicted = changes::torque(body, model, &self.changes, &recording);
-        let from = self.first_needed(&recording);
-        let n = recording.dof;
-        let rows = Rows::new(model, body, &recording.from_sample(from), &predicted[from * n..]);
+        let rows = Rows::new(model, body, &recording, &predicted);
         let new = rows.t.partition_point(|t| *t < self.last + 0.5 * self.row_step());
         Some(Rows {
             t: rows.t[new..].to_vec(),
             joints: rows.joints.into_iter().map(|joint| joint[new..].to_vec()).collect(),
         })
-    }
-
-    /// The sample of a recording from which the band's filter needs it for the next row, on the grid of the rows.
-    fn first_needed(&self, recording: &Recording) -> usize {
-        let stride = (recording.rate * self.row_step()).round().max(1.0);
-        let known = (self.last - BAND_BEFORE - recording.start) / self.row_step();
-        (known.floor().max(0.0) * stride) as usize
     }
 
     fn hop(&mut self, ends: bool) -> Vec<Event> {

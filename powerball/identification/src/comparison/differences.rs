@@ -127,9 +127,10 @@ impl Differences {
         });
         let torque = torque(a, b, &place);
         // A curve that is another one, where all torques together are the same, is what another parameter of the fit made
-        // up for.
+        // up for; one of less than no friction is no friction.
         let shows = |f: &FrictionDifference| {
-            torque.iter().find(|t| t.joint == f.joint).is_none_or(|t| t.rms > t.expected)
+            f.change[1] > -1.0
+                && torque.iter().find(|t| t.joint == f.joint).is_none_or(|t| t.rms > t.expected)
         };
         let on_one_path = changes(&a.strokes, &b.strokes);
         let friction = friction.iter().map(|curves| {

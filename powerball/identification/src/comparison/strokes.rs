@@ -46,7 +46,7 @@ const ALIKE: f64 = 0.05;
 /// Strokes of one log that may have none in the other, in a row.
 const SKIPPED: usize = 4;
 /// Strokes in either direction without which nothing is said.
-const FEWEST: usize = 3;
+const FEWEST: usize = 2;
 /// Friction of an arm at work wanders by as much with its warmth: what differs by less is no difference.
 const WANDERS: f64 = 0.05;
 

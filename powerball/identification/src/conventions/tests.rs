@@ -163,7 +163,7 @@ fn logs_that_are_too_short_tell_nothing() {
     short.pieces = std::iter::once(0..40).collect();
     let result = conventions(body, &[short], &[]);
     assert_eq!(result.torque, super::TorqueColumns::default());
-    assert!(!result.differ() && result.evidence.contains("not told"));
+    assert!(!result.differ() && result.evidence.contains("not shown"));
 }
 
 /// What is told where the logs are those of the sound arm and the file is not.

@@ -93,25 +93,6 @@ impl Recording {
         smoother(self.smoothing, self.rate).map_or_else(|| torque.clone(), |filter| filter.zero_phase(torque))
     }
 
-    /// What is left of it from a sample on.
-    #[must_use]
-    pub fn from_sample(&self, from: usize) -> Recording {
-        let from = from.min(self.len());
-        let motion = |x: &[f64]| x[from * self.dof..].to_vec();
-        let signals = |x: &[Vec<f64>]| x.iter().map(|signal| signal[from..].to_vec()).collect();
-        let by = from as f64 / self.rate;
-        Recording {
-            start: self.start + by,
-            clock: self.clock + by,
-            q: motion(&self.q),
-            v: motion(&self.v),
-            a: motion(&self.a),
-            torque: signals(&self.torque),
-            temperature: self.temperature.as_deref().map(signals),
-            ..*self
-        }
-    }
-
     /// Samples.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -211,6 +211,12 @@ impl PlantEffect {
         "friction_by_position",
     ];
 
+    /// Those among which a seed chooses: a name that came later is not one of them, so that a seed goes on to choose as it
+    /// did.
+    pub fn chosen_by_seed() -> &'static [&'static str] {
+        &Self::NAMES[..18]
+    }
+
     /// Draws an effect of that name: its joint and its figures. `session` is the time in s within which the logs
     /// are recorded, and what starts at some time starts within `begins`.
     ///

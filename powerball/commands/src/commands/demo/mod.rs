@@ -84,7 +84,8 @@ impl From<ExplainError> for DemoError {
 /// The names that a demo draws from: effects that the plant has and the residual loop knows.
 pub fn names<'a>() -> Vec<&'a str> {
     let known = effects::all();
-    Effect::NAMES.into_iter().filter(|name| known.iter().any(|effect| effect.name() == *name)).collect()
+    let chosen = Effect::chosen_by_seed().iter().copied();
+    chosen.filter(|name| known.iter().any(|effect| effect.name() == *name)).collect()
 }
 
 /// Records a session with an effect drawn by `seed`, or with the one of the given name, into `folder`, and
