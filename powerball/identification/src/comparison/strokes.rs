@@ -45,7 +45,7 @@ const OTHERS: f64 = 0.2;
 const ALIKE: f64 = 0.05;
 /// Strokes of one log that may have none in the other, in a row.
 const SKIPPED: usize = 4;
-/// Strokes in either direction without which nothing is said.
+/// Strokes in either direction that a comparison needs.
 const FEWEST: usize = 2;
 /// Friction of an arm at work wanders by as much with its warmth: what differs by less is no difference.
 const WANDERS: f64 = 0.05;

@@ -188,7 +188,7 @@ fn a_tenth_of_friction_is_seen_along_one_path() {
         let [low, high] = own.interval(0.01);
         assert!(low < factor - 1.0 + 0.01 && high > factor - 1.0 - 0.01 && high - low < 0.08, "{low} {high}");
     }
-    // On another path nothing is said.
+    // Logs of another path are not compared so.
     let other = Fourier { fundamental: std::f64::consts::TAU / 5.0, ..path.clone() };
     let plant = lwa4p::plant().unwrap();
     let elsewhere = strokes(&plant.record(&other.sample(plant.sensors().rate), 0.0, 7).log("virtual"));

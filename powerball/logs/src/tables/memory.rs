@@ -12,8 +12,8 @@ const MOST_COLUMNS: usize = 10_000;
 /// Bytes of a number.
 const NUMBER: u64 = 8;
 
-/// Says how many bytes of memory one log may take from now on in this process. Where nothing is said it is half of what is free
-/// when a log is read.
+/// Sets how many bytes of memory one log may take from now on in this process. Without it the limit is half of what is free when
+/// a log is read.
 pub fn allow_memory(bytes: u64) {
     ALLOWED.store(bytes, Ordering::Relaxed);
 }
@@ -48,7 +48,7 @@ impl Memory {
         }
     }
 
-    /// Whether so many bytes fit beside what was claimed before.
+    /// Whether that number of bytes fits next to what was claimed before.
     ///
     /// # Errors
     /// How much is needed, how much there is and what to do.
@@ -64,7 +64,7 @@ impl Memory {
         }
     }
 
-    /// Whether so many rows of so many numbers fit.
+    /// Whether that number of rows of that many numbers fits.
     ///
     /// # Errors
     /// As [`Memory::holds`].
@@ -76,7 +76,7 @@ impl Memory {
 /// What takes its room piece by piece, and says at the end whether all of it was there.
 #[cfg(any(feature = "topics", feature = "npz", feature = "mat", feature = "hdf5"))]
 impl Memory {
-    /// Takes so many bytes of it; where they are not there, the log is refused.
+    /// Takes a number of bytes of it; where they are not there, the log is refused.
     ///
     /// # Errors
     /// As [`Memory::holds`].
@@ -89,7 +89,7 @@ impl Memory {
         held
     }
 
-    /// Takes the bytes of so many numbers.
+    /// Takes the bytes of a number of values.
     ///
     /// # Errors
     /// As [`Memory::holds`].

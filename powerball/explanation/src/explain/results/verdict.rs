@@ -219,7 +219,7 @@ pub fn contradictions(explained: &Explained) -> Vec<String> {
         let others = rivals.chain(rest.iter().flat_map(|rest| &rest.considered));
         let given = explained.effects.iter().any(|effect| effect.effect == *name);
         if !given && !others.into_iter().any(|other| other.effect == *name) {
-            all.push(format!("an experiment of {name}, of which nothing is said"));
+            all.push(format!("an experiment of {name}, which stands nowhere in the answer"));
         }
     }
     for change in &explained.held_out_change {
