@@ -53,7 +53,9 @@ fn said(output: &Output) -> String {
 #[test]
 fn an_arm_file_in_another_unit_makes_a_result_useless() {
     let folder = folder("units");
-    std::fs::write(folder.join("a.csv"), log("t,q1,tau1", 0.0)).unwrap();
+    for (name, phase) in [("a.csv", 0.0), ("b.csv", 0.4)] {
+        std::fs::write(folder.join(name), log("t,q1,tau1", phase)).unwrap();
+    }
     for (name, text, reason) in [
         ("sound", arm("0.5", "9.81"), None),
         ("gravity", arm("0.5", "9810"), Some("give it in m/s²")),
@@ -62,6 +64,24 @@ fn an_arm_file_in_another_unit_makes_a_result_useless() {
         std::fs::write(folder.join("arm.toml"), text).unwrap();
         let done = powerball(&folder, &format!("identify --arm arm.toml --log a.csv --out {name}"));
         let first = String::from_utf8_lossy(&done.stdout).lines().next().unwrap_or_default().to_string();
+        // The other commands that look at logs say so as well.
+        let others = [
+            format!("verify --arm arm.toml --model {name}/identified.json --log b.csv --out {name}_verified"),
+            format!("summarize --arm arm.toml --log a.csv --out {name}.summary"),
+            format!("compare a.csv b.csv --arm arm.toml --out {name}_compared"),
+        ];
+        for command in others {
+            let done = powerball(&folder, &command);
+            let first = String::from_utf8_lossy(&done.stdout).lines().next().unwrap_or_default().to_string();
+            assert_eq!(code(&done) == 3, reason.is_some(), "{command}: {first} {}", said(&done));
+            // A comparison says of which side, and `identify` of that side says how.
+            let sentence = match command.starts_with("compare") {
+                true => reason.map(|_| "a.csv: the columns or the arm file are not what they are said to be"),
+                false => reason,
+            };
+            assert!(sentence.is_none_or(|sentence| first.contains(sentence)), "{command}: {first}");
+            assert_ne!(code(&powerball(&folder, &format!("{command} --accept"))), 3, "{command}");
+        }
         let Some(reason) = reason else {
             assert_eq!(code(&done), 0, "{first} {}", said(&done));
             continue;

@@ -204,12 +204,13 @@ impl Excite {
 
     /// As said, else those that an import has written next to the arm file.
     fn masses(&self) -> Result<MassSource, Failure> {
-        let beside = self.arm.with_extension("values.json");
-        let imported =
-            || beside.is_file().then(|| tracing::warn!("{}: the masses are taken from it", beside.display()));
+        let imported = self.arm.with_extension("values.json");
         let path = match &self.values {
             Some(path) => path,
-            None if imported().is_some() => &beside,
+            None if imported.is_file() => {
+                tracing::warn!("{}: the masses are taken from it", imported.display());
+                &imported
+            }
             None => return Ok(MassSource::Guess),
         };
         let file = path.display().to_string();
