@@ -57,7 +57,7 @@ pub(crate) fn is_unseen(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// What is said of such a letter, or of a control character, that stands in something.
+/// The message about such a letter, or a control character, that stands in something.
 pub(crate) fn unseen(c: char) -> String {
     let what = if is_unseen(c) { "which turns or breaks the text around it" } else { "a control character" };
     format!("U+{:04X}, {what}: remove it", u32::from(c))

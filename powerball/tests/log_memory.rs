@@ -72,7 +72,7 @@ fn one() {
     println!("\nfigures {} {arrays:.1} {:.1} {seconds:.2}", log.t.len(), held()[1] - before);
 }
 
-/// `powerball log` within so many kB of address space: its exit code and what it said.
+/// `powerball log` within that many kB of address space: its exit code and what it printed.
 fn looked_at(file: &Path, more: &[&str], kilobytes: usize) -> (Option<i32>, String) {
     let command = format!("ulimit -v {kilobytes}; exec \"$@\"");
     let mut shell = Command::new("bash");

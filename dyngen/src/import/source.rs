@@ -20,7 +20,7 @@ pub struct Source {
     letters: Letters,
     /// The files that are included, by their names.
     included: Vec<String>,
-    /// What is said of those that lie outside of the model's folder.
+    /// Notes on those that lie outside of the model's folder.
     outside: Vec<String>,
     /// For each line of the text the file that it is from, 0 the description itself, and its line there.
     lines: Vec<(usize, u32)>,
@@ -139,7 +139,7 @@ impl Source {
         &self.included
     }
 
-    /// What is said of included files that lie outside of the model's folder.
+    /// Notes on included files that lie outside of the model's folder.
     pub(super) fn outside(&self) -> &[String] {
         &self.outside
     }
@@ -173,7 +173,7 @@ struct Whole {
     seen: BTreeSet<PathBuf>,
     /// Of the model.
     folder: PathBuf,
-    /// What is said of included files that lie elsewhere.
+    /// Notes on included files that lie elsewhere.
     outside: Vec<String>,
 }
 

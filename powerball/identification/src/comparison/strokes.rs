@@ -119,7 +119,7 @@ fn matched(a: &[Stroke], b: &[Stroke]) -> Option<Vec<(Stroke, Stroke)>> {
     let mut pairs: Vec<(Stroke, Stroke)> = Vec::new();
     let mut next = 0;
     for stroke in a {
-        // One of them may have begun later, and noise cuts a slow stroke in two.
+        // One of them may start later, and noise cuts a slow stroke in two.
         let reach = if pairs.is_empty() { b.len() } else { (next + SKIPPED).min(b.len()) };
         if let Some(k) = (next..reach).find(|k| alike(stroke, &b[*k])) {
             pairs.push((*stroke, b[k]));

@@ -18,9 +18,9 @@ use std::path::Path;
 /// A chunk that claims to be larger than this, bytes, is damaged.
 const LARGEST_CHUNK: usize = 1 << 30;
 
-/// A chunk is unpacked in steps of so many bytes.
+/// A chunk is unpacked in steps of this many bytes.
 const STEP: u64 = 64 << 20;
-/// No byte that LZ4 compressed is more than so many.
+/// No byte that LZ4 compressed becomes more than this many.
 const LZ4_MOST: u64 = 256;
 
 /// Bytes of a message that Zstandard compressed very well.

@@ -165,11 +165,11 @@ impl Topics {
             Reader::Other => Ok(None),
         };
         row.end(done);
-        // What is not there is told when the tables are asked for.
+        // What is not there is reported when the tables are asked for.
         let _ = self.memory.claim_numbers(topic.table.numbers().saturating_sub(before));
     }
 
-    /// Room for the bytes of a chunk beside the tables.
+    /// Room for the bytes of a chunk next to the tables.
     ///
     /// # Errors
     /// Why there is none.
