@@ -128,7 +128,7 @@ fn a_killed_warm_up_goes_on_with_what_it_saw() {
     assert!(told["seconds"].as_f64().unwrap() < 30.0);
 }
 
-/// Ctrl-C, twice: the arm is stopped, the log is closed and whole, and the reason is told.
+/// Ctrl-C, twice: the arm is stopped, the log is closed and whole, and the reason is printed.
 #[cfg(all(unix, feature = "parquet"))]
 #[test]
 fn a_signal_stops_the_arm_and_closes_the_log() {
@@ -150,15 +150,15 @@ fn a_signal_stops_the_arm_and_closes_the_log() {
             assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
         }
         let ended = child.wait_with_output().unwrap();
-        let told = String::from_utf8_lossy(&ended.stderr).into_owned();
-        assert_eq!(ended.status.code(), Some(1), "{told}");
-        assert!(told.contains("asked to end"), "{told}");
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(1), "{said}");
+        assert!(said.contains("asked to end"), "{said}");
         assert!(!lines.exists(), "the log was not closed");
         assert!(read(Path::new(&log)).t.len() > 50);
     }
 }
 
-/// A disk that is full, or a limit of file sizes: the arm is stopped, and the reason is told.
+/// A disk that is full, or a limit of file sizes: the arm is stopped, and the reason is printed.
 #[cfg(unix)]
 #[test]
 fn a_log_that_cannot_grow_stops_the_arm() {
@@ -172,9 +172,9 @@ fn a_log_that_cannot_grow_stops_the_arm() {
         folder.join("log.csv").display()
     );
     let ended = Command::new("bash").args(["-c", &script]).output().unwrap();
-    let told = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert_eq!(ended.status.code(), Some(1), "{told}");
-    assert!(told.contains("cannot be written"), "{told}");
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(1), "{said}");
+    assert!(said.contains("cannot be written"), "{said}");
     let log = std::fs::read_to_string(folder.join("log.csv")).unwrap();
     assert!(log.lines().count() > 100 && log.ends_with('\n'), "{} bytes", log.len());
 
@@ -187,9 +187,9 @@ fn a_log_that_cannot_grow_stops_the_arm() {
         folder.join("log.mcap").display()
     );
     let ended = Command::new("bash").args(["-c", &script]).output().unwrap();
-    let told = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert_eq!(ended.status.code(), Some(2), "{told}");
-    assert!(told.contains("log.mcap: cannot be written"), "{told}");
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(2), "{said}");
+    assert!(said.contains("log.mcap: cannot be written"), "{said}");
     let names =
         std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
     let names: Vec<String> = names.filter(|name| name.contains("part") || name.contains("mcap")).collect();

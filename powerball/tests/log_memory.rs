@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use powerball::Log;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
@@ -46,6 +46,25 @@ fn log() -> Log {
     }
 }
 
+/// An empty folder.
+fn scratch(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// The log in each format, in a folder of that name.
+fn written(folder: &str) -> [(&'static str, PathBuf); 3] {
+    let (folder, made) = (scratch(folder), log());
+    let names: Vec<String> = (1..=JOINTS).map(|j| format!("arm_joint_{j}")).collect();
+    ["log.csv", "log.parquet", "log.mcap"].map(|name| {
+        let file = folder.join(name);
+        made.write_for(&file, &names).unwrap();
+        (name, file)
+    })
+}
+
 /// MB that the program holds now, and that it held at most.
 fn held() -> [f64; 2] {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
@@ -65,9 +84,9 @@ fn one() {
         Ok(arm) => dyngen::Arm::read(Path::new(&arm)).unwrap(),
         Err(_) => arm(),
     };
-    let (before, begun) = (held()[0], Instant::now());
+    let (before, start) = (held()[0], Instant::now());
     let (log, _) = Log::read(&file, &arm).unwrap();
-    let seconds = begun.elapsed().as_secs_f64();
+    let seconds = start.elapsed().as_secs_f64();
     let arrays = 8.0 * log.t.len() as f64 * (1 + log.q.len() + log.torque.len()) as f64 / f64::from(1 << 20);
     println!("\nfigures {} {arrays:.1} {:.1} {seconds:.2}", log.t.len(), held()[1] - before);
 }
@@ -77,10 +96,10 @@ fn looked_at(file: &Path, more: &[&str], kilobytes: usize) -> (Option<i32>, Stri
     let command = format!("ulimit -v {kilobytes}; exec \"$@\"");
     let mut shell = Command::new("bash");
     shell.args(["-c", &command, "bash", env!("CARGO_BIN_EXE_powerball"), "log"]).arg(file).args(more);
-    let begun = Instant::now();
+    let start = Instant::now();
     let done = shell.output().unwrap();
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
-    assert!(begun.elapsed().as_secs_f64() < 5.0, "{}: {:?}", file.display(), begun.elapsed());
+    assert!(start.elapsed().as_secs_f64() < 5.0, "{}: {:?}", file.display(), start.elapsed());
     (done.status.code(), said)
 }
 
@@ -88,19 +107,14 @@ fn looked_at(file: &Path, more: &[&str], kilobytes: usize) -> (Option<i32>, Stri
 #[test]
 fn what_needs_more_memory_than_is_allowed_is_refused_before_it_is_read() {
     const ADDRESSES: usize = 600_000;
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("log_refused");
-    std::fs::create_dir_all(&folder).unwrap();
-    let made = log();
-    let names: Vec<String> = (1..=JOINTS).map(|j| format!("arm_joint_{j}")).collect();
-    for name in ["log.csv", "log.parquet", "log.mcap"] {
-        let file = folder.join(name);
-        made.write_for(&file, &names).unwrap();
+    for (name, file) in written("log_refused") {
         let (code, said) = looked_at(&file, &["--memory", "10MB"], ADDRESSES);
         assert_eq!(code, Some(2), "{name}: {said}");
         for words in [name, "of memory, and a log may take 10.0 MB", "--memory"] {
             assert!(said.contains(words), "{name}: {said}");
         }
     }
+    let folder = scratch("log_too_large");
     // 8 TB of zeros, none of them on the disk, and rows of nothing.
     let array = |name: &str, shape: &str, bytes: u64| {
         let head = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
@@ -134,9 +148,7 @@ fn what_needs_more_memory_than_is_allowed_is_refused_before_it_is_read() {
 /// What need not end is refused before it is opened.
 #[test]
 fn pipes_and_devices_are_no_logs_and_no_maps() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("log_pipes");
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).unwrap();
+    let folder = scratch("log_pipes");
     let (pipe, csv) = (folder.join("pipe"), folder.join("log.csv"));
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     std::fs::write(&csv, "t,q1\n0,0\n").unwrap();
@@ -154,13 +166,7 @@ fn pipes_and_devices_are_no_logs_and_no_maps() {
 
 #[test]
 fn a_log_is_read_in_little_more_memory_than_its_arrays_take() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("log_memory");
-    std::fs::create_dir_all(&folder).unwrap();
-    let made = log();
-    let names: Vec<String> = (1..=JOINTS).map(|j| format!("arm_joint_{j}")).collect();
-    for name in ["log.csv", "log.parquet", "log.mcap"] {
-        let file = folder.join(name);
-        made.write_for(&file, &names).unwrap();
+    for (name, file) in written("log_memory") {
         let mut command = Command::new(std::env::current_exe().unwrap());
         command
             .args(["--exact", "one", "--ignored", "--nocapture"])

@@ -86,11 +86,11 @@ impl Source {
     /// Where a file cannot be read, or an `<include>` cannot be followed: its name, and the line that names it.
     pub fn read(path: &Path) -> Result<Source, ImportError> {
         let file = path.display().to_string();
-        let told = |e: String| ImportError::Unreadable(format!("{file}: {e}"));
-        let bytes = crate::file::read(path).map_err(|e| told(format!("cannot be read: {e}")))?;
+        let unreadable = |e: String| ImportError::Unreadable(format!("{file}: {e}"));
+        let bytes = crate::file::read(path).map_err(|e| unreadable(format!("cannot be read: {e}")))?;
         let letters = Letters::of(&bytes);
-        let text = letters.text(&bytes).map_err(told)?;
-        // What is wrong with a text that is no XML is told by who reads it.
+        let text = letters.text(&bytes).map_err(unreadable)?;
+        // What is wrong with a text that is no XML is reported by who reads it.
         let followed = nested(&text).is_ok() && is_mjcf(&text) && text.contains("<include");
         let document = if followed { Document::parse(&text).ok() } else { None };
         let Some(document) = document else {
