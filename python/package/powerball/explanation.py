@@ -190,6 +190,11 @@ class Explained(OfLogs):
         return numbers(self._told["noise_floor"])
 
     @property
+    def explainable(self) -> Array:
+        """The share of the squared error left on the validation set that some smooth law would take away, (n,)."""
+        return numbers(self._told["explainable"])
+
+    @property
     def unattributed(self) -> Optional[Dict[str, Any]]:
         """What stays without a name, and the signals that it depends on."""
         told: Optional[Dict[str, Any]] = self._told["unattributed"]

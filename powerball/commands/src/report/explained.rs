@@ -192,6 +192,14 @@ fn errors(page: &mut Page, explained: &Explained) {
         &error_bars(explained),
         "The dashed lines are what white measurement noise alone would leave in the band.",
     );
+    let share = |(joint, share): (usize, &f64)| format!("joint {} {}", joint + 1, percent(*share));
+    let shares: Vec<String> = explained.explainable.iter().enumerate().map(share).collect();
+    page.paragraph(&format!(
+        "Of the squared error that is left, some smooth law of positions, velocities and directions would take away \
+         here: {}. Where that is much, a law is missing. Where it is little, the rest is noise, or depends on something \
+         else than the joints' states.",
+        shares.join(", ")
+    ));
 }
 
 /// Held-out errors by joint, before and after.

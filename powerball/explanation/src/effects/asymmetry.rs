@@ -76,6 +76,11 @@ impl Effect for Asymmetry {
         Class::Friction
     }
 
+    /// A zero of torques is none.
+    fn is_friction(&self) -> bool {
+        false
+    }
+
     fn shown_by(&self, candidate: &Candidate) -> Axis {
         Axis::Velocity(candidate.joints[0])
     }

@@ -61,6 +61,11 @@ impl Effect for Backlash {
         Class::Friction
     }
 
+    /// Play is none.
+    fn is_friction(&self) -> bool {
+        false
+    }
+
     /// When the motor arrives at the other side of the gap depends on the load on the way.
     fn abrupt(&self) -> bool {
         true

@@ -11,8 +11,8 @@ use std::f64::consts::PI;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A force in the base frame at the tool, during a window of one log: constant, or rising and falling
-/// as that of a hand does.
+/// A force in the base frame at the tool, during a window of one log: constant, rising and falling as that of a hand
+/// does, or of any shape and direction over time.
 pub(super) struct ContactWrench;
 
 /// How its force goes through its windows.
@@ -22,6 +22,8 @@ pub enum Settings {
     Constant,
     /// Half a wave: largest in the middle of the window.
     Push,
+    /// Of any shape: linear between [`KNOTS`] instants, the first and the last of which are the window's ends.
+    Knots,
 }
 
 /// What it is, one entry a window.
@@ -29,7 +31,7 @@ pub enum Settings {
 pub struct Figures {
     /// When it ended, in the log's own t, s.
     pub end_time: Vec<f64>,
-    /// The force in the base frame, N; of a push that rises and falls the largest.
+    /// The force in the base frame, N; of one that changes the largest.
     pub force: Vec<Vec<f64>>,
     /// Where it is taken to act: on the tool. At another point of the link it has another size.
     pub point: Vec<Point>,
@@ -52,6 +54,11 @@ impl Point {
     pub(crate) fn tool(body: &RigidArm) -> Point {
         let last = body.dof() - 1;
         Point { link: JointNumber::from_index(last), xyz: body.in_link_frame(last, body.force_point()) }
+    }
+
+    /// The origin of a link's frame in the table.
+    pub(crate) fn origin(body: &RigidArm, link: usize) -> Point {
+        Point { link: JointNumber::from_index(link), xyz: body.in_link_frame(link, [0.0; 3]) }
     }
 }
 
@@ -96,6 +103,8 @@ const MOST: f64 = 2000.0;
 const LONGER: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
 /// … and by which share of that its middle is later.
 const LATE: [f64; 3] = [-0.25, 0.0, 0.25];
+/// Instants between which a force of any shape is linear.
+const KNOTS: usize = 5;
 /// What is longer leans on the arm, and does not push it, s.
 pub(crate) const LONGEST_PUSH: f64 = 4.0;
 /// Grid of the same push in other logs, s: its force is known there, so that a row more or less can be told.
@@ -129,8 +138,10 @@ impl Effect for ContactWrench {
 
     fn columns(&self, context: &Context<'_>, candidate: &Candidate) -> Vec<Column> {
         let constant = cut(context, context.data.force_columns(), &candidate.windows);
+        let shaped = |shape: &dyn Fn(f64) -> f64| shaped(context, &constant, &candidate.windows, shape);
         match Settings::of(candidate) {
-            Some(Settings::Push) => rising_and_falling(context, constant, &candidate.windows),
+            Some(Settings::Push) => shaped(&|x| (PI * x).sin()),
+            Some(Settings::Knots) => (0..KNOTS).flat_map(|k| shaped(&|x| near_knot(k, x))).collect(),
             _ => constant,
         }
     }
@@ -151,9 +162,8 @@ impl Effect for ContactWrench {
         seen.windows.retain(|w| !data.logs.contains(&w.log));
         let lasted = seen.windows.iter().map(|w| w.to - w.from).fold(f64::INFINITY, f64::min);
         let steps = data.blocks_of(FINE);
-        // Of a push the mean of its half wave: it explains over its time what its own form would explain there.
-        let mean = if Settings::of(candidate) == Some(&Settings::Push) { 2.0 / PI } else { 1.0 };
-        let force: Vec<f64> = c.iter().map(|c| mean * c).collect();
+        // The mean over its time explains there what its own shape would.
+        let force = mean(candidate, c);
         let explains = explained(context, data.force_columns(), &force, &steps);
         for log in by_log(&steps) {
             let chance = 4.0 * (log.len().max(1) as f64).ln();
@@ -175,7 +185,7 @@ impl Effect for ContactWrench {
 
     fn figures(&self, context: &Context<'_>, found: &[Found<'_>]) -> super::Figures {
         let windows = || found.iter().flat_map(|f| &f.candidate.windows);
-        let force = |f: &Found<'_>| vec![f.coefficients.to_vec(); f.candidate.windows.len()];
+        let force = |f: &Found<'_>| vec![largest(f.coefficients); f.candidate.windows.len()];
         Figures {
             end_time: windows().map(|w| w.to).collect(),
             force: found.iter().flat_map(force).collect(),
@@ -285,32 +295,66 @@ fn pushes(context: &Context<'_>, constant: &Candidate, rests: &[Window]) -> Vec<
     let recordings = || context.data.recordings.iter().filter(|r| context.data.logs[r.log] == window.log);
     let starts = recordings().map(|r| r.start).fold(f64::INFINITY, f64::min);
     let ends = recordings().map(|r| r.start + r.len() as f64 / r.rate).fold(f64::NEG_INFINITY, f64::max);
-    let push = |(longer, late): (f64, f64)| {
+    let push = |longer: f64, late: f64, settings: Settings| {
         let (middle, half) = (middle + late * length, 0.5 * longer * length);
         let window = Window { from: middle - half, to: middle + half, ..window.clone() };
         let inside = window.from > starts && window.to < ends && half < 0.5 * LONGEST_PUSH;
         (inside && !sets_off(rests, &window.log, window.from)).then(|| Candidate {
             windows: vec![window],
-            settings: Settings::Push.into(),
+            settings: settings.into(),
             ..constant.clone()
         })
     };
-    LONGER.iter().flat_map(|longer| LATE.map(|late| (*longer, late))).filter_map(push).collect()
+    let of = |longer: f64| {
+        // One of any shape has its middle where that is.
+        let waves = LATE.map(|late| push(longer, late, Settings::Push));
+        waves.into_iter().chain([push(longer, 0.0, Settings::Knots)])
+    };
+    LONGER.into_iter().flat_map(of).flatten().collect()
 }
 
-/// Columns of a force that is the largest in the middle of its window and nothing at its ends.
-fn rising_and_falling(context: &Context<'_>, constant: Vec<Column>, windows: &[Window]) -> Vec<Column> {
+/// Columns of a force of another size over its windows; `shape` says of 0 … 1, from a window's beginning to its end, how
+/// large it is.
+fn shaped(
+    context: &Context<'_>,
+    constant: &[Column],
+    windows: &[Window],
+    shape: &dyn Fn(f64) -> f64,
+) -> Vec<Column> {
     let height = |(log, t): &(usize, f64)| {
         let own = windows.iter().find(|w| w.log == context.data.logs[*log] && *t >= w.from && *t <= w.to);
-        own.map_or(0.0, |w| (PI * (t - w.from) / (w.to - w.from)).sin())
+        own.map_or(0.0, |w| shape((t - w.from) / (w.to - w.from)))
     };
     let heights: Vec<Vec<f64>> =
         (0..context.data.dof()).map(|j| context.row_times(j).iter().map(height).collect()).collect();
-    let part = |(j, values): (usize, Arc<Vec<f64>>)| {
-        (j, values.iter().zip(&heights[j]).map(|(v, h)| v * h).collect::<Vec<f64>>().into())
+    let part = |(j, values): &(usize, Arc<Vec<f64>>)| {
+        (*j, values.iter().zip(&heights[*j]).map(|(v, h)| v * h).collect::<Vec<f64>>().into())
     };
-    let of = |column: Column| Column { parts: column.parts.into_iter().map(part).collect() };
-    constant.into_iter().map(of).collect()
+    constant.iter().map(|column| Column { parts: column.parts.iter().map(part).collect() }).collect()
+}
+
+/// 1 at a knot, 0 from its neighbours on, linear between them.
+fn near_knot(knot: usize, x: f64) -> f64 {
+    (1.0 - (x * (KNOTS - 1) as f64 - knot as f64).abs()).max(0.0)
+}
+
+/// The largest of a force's knots.
+fn largest(c: &[f64]) -> Vec<f64> {
+    let square = |force: &[f64]| force.iter().map(|f| f * f).sum::<f64>();
+    let largest = c.chunks(3).max_by(|a, b| square(a).total_cmp(&square(b)));
+    largest.unwrap_or_default().to_vec()
+}
+
+/// The mean of a force over its time.
+fn mean(candidate: &Candidate, c: &[f64]) -> Vec<f64> {
+    let knots = c.len() / 3;
+    // Trapezia; of half a wave 2/π of its height.
+    let share = |k: usize| match Settings::of(candidate) {
+        Some(Settings::Push) => 2.0 / PI,
+        Some(Settings::Knots) => (if k == 0 || k + 1 == knots { 0.5 } else { 1.0 }) / (knots - 1) as f64,
+        _ => 1.0,
+    };
+    (0..3).map(|axis| (0..knots).map(|k| share(k) * c[3 * k + axis]).sum()).collect()
 }
 
 /// Where a log's longer windows lie.

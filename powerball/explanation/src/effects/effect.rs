@@ -83,6 +83,11 @@ pub trait Effect: Sync {
         self.class() == Class::Event
     }
 
+    /// Whether it is a part of its joint's friction: what makes all of that larger makes it larger too.
+    fn is_friction(&self) -> bool {
+        self.class() == Class::Friction
+    }
+
     /// Whether it is a property of the multibody model that all joints share.
     fn of_the_body(&self) -> bool {
         false

@@ -116,18 +116,26 @@ fn tried(study: &Study<'_>, model: &Model) -> Vec<Tried> {
     let warmth = Settings::from(temperature::Settings { of: temperature::Friction::Whole, with });
     let warmth = warmth.effect().name();
     for j in on_fitted.moving_joints() {
-        let columns = [&on_fitted, &on_validation].map(|context| friction(context, j));
+        let columns = [&on_fitted, &on_validation].map(|context| friction(context, model, j));
         tried.push(Tried { effect: warmth, joints: vec![j], unit: 1.0, possible: -1.0..10.0, columns });
     }
     tried.retain(|t| t.columns.iter().all(|c| !c.parts.is_empty() && c.is_finite()));
     tried
 }
 
-/// The friction torque of a joint as the model has it.
-fn friction(context: &Context<'_>, joint: JointNumber) -> Column {
+/// The friction torque of a joint as the model has it: Eq. 16 and what was found of friction beyond that.
+fn friction(context: &Context<'_>, model: &Model, joint: JointNumber) -> Column {
     let (n, j) = (context.data.dof(), joint.index());
-    let friction = context.friction();
-    context.data.column_on(j, |r, _| friction[r].iter().skip(j).step_by(n).copied().collect())
+    let base = context.friction();
+    let own = context.data.column_on(j, |r, _| base[r].iter().skip(j).step_by(n).copied().collect());
+    let mut friction = Signals::zeros(context.data);
+    own.add_to(&mut friction, 1.0);
+    for (a, coefficients) in model.accepted.iter().zip(model.coefficients()) {
+        if a.effect().is_friction() && a.candidate.joints == [joint] {
+            friction.add(&context.columns(&a.candidate), &coefficients);
+        }
+    }
+    Column::on(j, std::mem::take(&mut friction[j]))
 }
 
 /// The share of what the squared error of some joints is larger in a log than in any other one that goes with a column;

@@ -4,7 +4,7 @@ use super::comparison::History;
 use super::model::Model;
 use super::named::FalsePositives;
 use super::prepare::InitialFit;
-use super::special::{RestPush, predicts_better};
+use super::special::predicts_better;
 use super::study::Study;
 use powerball_identification::estimate::residual_stats;
 use std::collections::BTreeSet;
@@ -18,8 +18,6 @@ pub(super) struct Findings<'a> {
     pub(super) model: Model,
     /// What its steps decided.
     pub(super) history: History,
-    /// What pushed the arm while it stood still.
-    pub(super) at_rest: Vec<RestPush>,
     /// How often it is wrong on these data.
     pub(super) false_positives: FalsePositives,
 }

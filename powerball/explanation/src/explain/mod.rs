@@ -45,7 +45,6 @@ pub use results::{
     Shown, State, TorqueCurve, Trajectory, Unattributed, UnnamedLaw, Verdict, contradictions, curves,
 };
 use search::CandidateKind;
-use special::pushes_at_rest;
 use step::{Outcome, Proposed, accept, drop_words, judge_baseline, propose};
 
 /// Explains what the base model of an arm that is derived already lacks on `logs`, judged on `validate`. The
@@ -122,8 +121,7 @@ fn find(Prepared { study, base, initial_fit }: Prepared<'_>) -> Findings<'_> {
     history.steps.extend(ripple_above_band(&study, &mut model, 2 * study.rule().most_steps));
     study.say("asking time-shift surrogates");
     let false_positives = search::false_positives(&study, &model);
-    let at_rest = pushes_at_rest(&study, &model);
-    Findings { study, initial_fit, model, history, at_rest, false_positives }
+    Findings { study, initial_fit, model, history, false_positives }
 }
 
 #[cfg(test)]

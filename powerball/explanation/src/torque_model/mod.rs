@@ -207,11 +207,21 @@ impl TorqueModel {
         let recordings: Vec<usize> = (0..data.recordings.len()).collect();
         let torque = parallel::map(&recordings, |r| {
             let recording = &data.recordings[*r];
-            let log = &data.logs[recording.log];
-            let here: Vec<&Window> = held.iter().filter(|w| w.log == *log).collect();
-            self.torque(body, recording, &|t| here.iter().any(|w| t >= w.from && t <= w.to))
+            self.torque_in(body, &data.logs[recording.log], recording, held)
         });
         data.residual(&torque)
+    }
+
+    /// The torque along a recording of the log `log`, which has the model's latest payload during the windows `held`.
+    pub(crate) fn torque_in(
+        &self,
+        body: &RigidArm,
+        log: &str,
+        recording: &Recording,
+        held: &[Window],
+    ) -> Vec<f64> {
+        let here: Vec<&Window> = held.iter().filter(|w| w.log == log).collect();
+        self.torque(body, recording, &|t| here.iter().any(|w| t >= w.from && t <= w.to))
     }
 
     /// The torque along one recording, n a sample, N·m as logged; `held` says by the log's time whether the

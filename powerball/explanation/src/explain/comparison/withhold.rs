@@ -81,7 +81,10 @@ fn take_back(
 fn impossible(study: &Study<'_>, model: &Model) -> Option<usize> {
     let context = model.context(study);
     let mut found = model.accepted.iter().zip(model.coefficients());
-    found.position(|(a, coefficients)| !a.effect().possible(&context, &a.candidate, &coefficients))
+    found.position(|(a, coefficients)| {
+        let (effect, candidate) = (a.effect(), &a.candidate);
+        !(effect.admissible(candidate, &coefficients) && effect.possible(&context, candidate, &coefficients))
+    })
 }
 
 /// The accepted effect without which the logs to judge on are predicted better on its joints, or clearly better on all: what

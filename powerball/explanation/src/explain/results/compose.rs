@@ -16,6 +16,10 @@ use powerball_logs::regression::{Data, RigidArm, Signals};
 /// A model and what it leaves, by joint and row, N·m.
 pub(crate) struct Composed {
     pub(crate) model: TorqueModel,
+    /// The arm, where the model changes it.
+    pub(crate) arm: Option<RigidArm>,
+    /// When the fitted logs have the payload, and when the validation set.
+    pub(crate) held: [Vec<Window>; 2],
     /// On the fitted logs.
     pub(crate) fitted: Signals,
     /// On the validation set.
@@ -73,7 +77,7 @@ pub(crate) fn compose(
         residual
     };
     let (fitted, held_out) = (residual(&study.data, &held[0]), residual(&study.validation, &held[1]));
-    Ok(Composed { model, fitted, held_out })
+    Ok(Composed { model, arm: changed, held, fitted, held_out })
 }
 
 /// What the per-joint fit leaves, and a model of one body with the effects that were found by it.
@@ -83,9 +87,9 @@ pub(crate) fn compose_per_joint(study: &Study<'_>, found: &Model) -> Result<Comp
     let mut shared = Model { accepted: found.accepted.clone(), ..Model::new(base) };
     shared.refit(&of_body);
     Ok(Composed {
-        model: compose(&of_body, &shared, &[])?.model,
         fitted: found.fit.residual.clone(),
         held_out: found.residual_on_validation(study),
+        ..compose(&of_body, &shared, &[])?
     })
 }
 

@@ -6,8 +6,10 @@ use super::super::comparison::{Comparison, Step, leftover, open};
 use super::super::findings::Findings;
 use super::super::model::{Accepted, Model, Own};
 use super::super::named::{FitErrors, NamedEffect, Rival};
+use super::super::special::{RestPush, pushes_at_rest};
 use super::super::study::Study;
 use super::compose::{Composed, compose, compose_per_joint};
+use super::explainable::explainable;
 use super::explained::{Change, Explained, NextExperiment, curves, shown};
 use super::logs::logs;
 use super::unattributed::{effective_samples, unattributed};
@@ -26,10 +28,13 @@ use std::sync::Arc;
 /// Makes the result.
 pub(crate) fn conclude(findings: Findings<'_>) -> Result<Explained, ExplainError> {
     let validation_only = &findings.initial_fit.validation_only;
-    let Composed { model: torque_model, fitted, held_out } = match findings.study.data.per_joint {
+    let composed = match findings.study.data.per_joint {
         true => compose_per_joint(&findings.study, &findings.model)?,
         false => compose(&findings.study, &findings.model, validation_only)?,
     };
+    let Composed { model: torque_model, arm, held, fitted, held_out } = composed;
+    let arm = arm.as_ref().unwrap_or(findings.study.data.body);
+    let at_rest = pushes_at_rest(&findings.study, (&torque_model, arm), &held);
     let (study, model, history) = (&findings.study, &findings.model, &findings.history);
     let before = &findings.initial_fit;
     let after = FitErrors {
@@ -40,7 +45,7 @@ pub(crate) fn conclude(findings: Findings<'_>) -> Result<Explained, ExplainError
     let left = |joints: &[JointNumber]| leftover(&before.errors.fit.rms, &after.fit.rms, &floor, joints);
     let mut named: Vec<NamedEffect> = validation_only.iter().map(|effect| effect.named.clone()).collect();
     named.extend(named_effects(study, model, &history.steps, &left));
-    add_pushes_at_rest(&mut named, &findings, &after);
+    add_pushes_at_rest(&mut named, &at_rest, &findings, &after);
     not_named_elsewhere(&mut named);
     let (unattributed, unexplained, dependencies) =
         unattributed(study, model, history, &floor, &after, &named);
@@ -55,7 +60,7 @@ pub(crate) fn conclude(findings: Findings<'_>) -> Result<Explained, ExplainError
         unusable: Vec::new(),
         resting: resting.map(JointNumber::from_index).collect(),
         verdict: verdict(study, &held_out_change, &after.validate, &floor, &dependencies),
-        logs: logs(&findings),
+        logs: logs(&findings, &at_rest),
         arm: study.data.body.arm().name.clone(),
         sliding: study.data.body.arm().joints.iter().map(|j| j.kind == JointKind::Prismatic).collect(),
         conventions: None,
@@ -63,6 +68,7 @@ pub(crate) fn conclude(findings: Findings<'_>) -> Result<Explained, ExplainError
         held_out_change,
         before: before.errors.clone(),
         noise_floor: floor,
+        explainable: explainable(study, &fitted, &held_out),
         effects: named,
         laws: laws(study, model, &history.steps),
         band: [0.0, study.data.band.cutoff],
@@ -160,15 +166,19 @@ fn not_named_elsewhere(named: &mut [NamedEffect]) {
 
 /// Pushes while the arm stood still are one effect with those on the way. No error of a row falls by them, since rows
 /// at rest are in no error.
-fn add_pushes_at_rest(named: &mut Vec<NamedEffect>, findings: &Findings<'_>, after: &FitErrors) {
-    let pushes = &findings.at_rest;
+fn add_pushes_at_rest(
+    named: &mut Vec<NamedEffect>,
+    pushes: &[RestPush],
+    findings: &Findings<'_>,
+    after: &FitErrors,
+) {
     if pushes.is_empty() {
         return;
     }
     let own = contact_wrench::Figures {
         end_time: pushes.iter().map(|p| p.to).collect(),
         force: pushes.iter().map(|p| p.force.to_vec()).collect(),
-        point: vec![contact_wrench::Point::tool(findings.study.data.body); pushes.len()],
+        point: pushes.iter().map(|p| p.point.clone()).collect(),
         start_time: pushes.iter().map(|p| p.from).collect(),
     };
     let mut logs: Vec<String> = pushes.iter().map(|p| p.log.clone()).collect();

@@ -51,6 +51,9 @@ pub struct Explained {
     pub held_out_change: Vec<Change>,
     /// What white measurement noise alone would leave in the band, by joint, N·m.
     pub noise_floor: Vec<f64>,
+    /// By joint, the share of the squared error left on the validation set that a smooth function of the joints' states
+    /// would take away there: much where a law is missing, little where the rest is noise.
+    pub explainable: Vec<f64>,
     /// Accepted effects in the order in which they were added.
     pub effects: Vec<NamedEffect>,
     /// What is there without a name, as formulas.

@@ -6,6 +6,7 @@
 use super::super::by_log::{Changed, Together, changes};
 use super::super::findings::Findings;
 use super::super::model::{Accepted, Model};
+use super::super::special::RestPush;
 use super::super::study::Study;
 use crate::effects::{Settings, Window, contact_wrench};
 use crate::rule::Rule;
@@ -66,7 +67,7 @@ struct Judged<'a> {
 }
 
 /// One entry a log, those that were fitted first.
-pub(super) fn logs(findings: &Findings<'_>) -> Vec<LogResult> {
+pub(super) fn logs(findings: &Findings<'_>, at_rest: &[RestPush]) -> Vec<LogResult> {
     let (study, model) = (&findings.study, &findings.model);
     let mut local: Vec<Local> =
         model.accepted.iter().enumerate().filter_map(|(k, a)| of_accepted(study, model, k, a)).collect();
@@ -105,7 +106,7 @@ pub(super) fn logs(findings: &Findings<'_>) -> Vec<LogResult> {
             value: Some(value),
         });
     }
-    for push in &findings.at_rest {
+    for push in at_rest {
         for result in results.iter_mut().filter(|result| result.log == push.log) {
             result.like_the_others = false;
             result.differs.push(Difference {

@@ -1,15 +1,19 @@
-//! A hand that pushes an arm which stands still.
+//! A touch of an arm that stands still, or that the touch has stopped.
 //!
-//! Rows at rest take no part in any fit: friction there is anything between its levels of either direction. But what
-//! holds an arm in its place holds it against a push too, and a torque that leaves by more than friction can hide, and
-//! comes back while no joint has moved, is that of something outside.
+//! Rows at rest take no part in any fit: friction there is anything between its levels of either direction. But how far
+//! the torque at rest may be from the model's is seen in the rests of other logs. A torque beyond that, and beyond
+//! friction, is of something outside, however long it stays.
 
-use super::super::model::Model;
 use super::super::study::Study;
+use crate::effects::Window;
+use crate::effects::contact_wrench::Point;
+use crate::torque_model::TorqueModel;
+use dyngen::arm::ParameterKind;
 use faer::Mat;
 use powerball_controller::JointNumber;
 use powerball_identification::estimate::Solver;
-use powerball_logs::regression::{Data, Recording};
+use powerball_logs::parallel;
+use powerball_logs::regression::{Data, Recording, RigidArm};
 use powerball_logs::signal::motion;
 use powerball_logs::vector::{NORMAL, median};
 use std::ops::Range;
@@ -22,162 +26,302 @@ pub(crate) struct RestPush {
     /// When, in the log's own t, s.
     pub(crate) from: f64,
     pub(crate) to: f64,
-    /// The largest force on the tool in the base frame, N.
+    /// The largest force in the base frame, N …
     pub(crate) force: [f64; 3],
-    /// The joints of which torque left by more than friction hides.
+    /// … and the point on which it is taken to act.
+    pub(crate) point: Point,
+    /// The joints whose torque left by more than their limits.
     pub(crate) joints: Vec<JointNumber>,
-    /// The share of the squared deviation that this force explains.
+    /// The share of the squared residual that this force explains.
     pub(crate) share: f64,
-    /// The largest deviation over what friction and noise hide, over joints.
+    /// The largest residual over its limit, over joints.
     pub(crate) size: f64,
-    /// The largest of what friction cannot hide, in standard deviations of the torque at rest.
+    /// The largest of what is beyond the limit, in standard deviations of the torque at rest.
     pub(crate) beyond: f64,
 }
 
-/// A stretch of rest is asked where it lasts so long, s: what is usual in it is its median …
-const SHORTEST_REST: f64 = 2.0;
-/// … and what is so near to a motion is left out, s: it stops, and its controller comes to rest.
-const GUARD: f64 = 1.0;
-/// A push lasts at least so long, s …
+/// A rest begins so long after the arm has stopped, s: its controller comes to rest.
+const GUARD: f64 = 0.25;
+/// A push lasts at least so long, s; what is interrupted for less is one push.
 const SHORTEST: f64 = 0.2;
-/// … and less than this share of the stretch, of which the rest tells what is usual.
-const LONGEST: f64 = 0.4;
-/// A push begins and ends where a joint's torque is this share of its largest deviation.
-const FOOT: f64 = 0.25;
-/// Deviations beyond what friction hides, in standard deviations of the torque at rest.
+/// What a residual at rest may be is taken from the rests of other logs where they last so long together, s …
+const ENOUGH_REST: f64 = 5.0;
+/// … as the value that this share of them does not exceed …
+const USUAL: f64 = 0.995;
+/// … with this margin …
+const MARGIN: f64 = 1.25;
+/// … and is else so many times Coulomb friction, beyond which undisturbed joints stick in no measured log.
+const STICKS: f64 = 3.0;
+/// Beyond that, in standard deviations of the torque at rest.
 const DEVIATIONS: f64 = 6.0;
 /// N·m: what divides by noise has some.
 const LEAST_NOISE: f64 = 1e-9;
-/// One force on the last frame explains at least so much of a push.
+/// A push begins and ends where the residual is this share of its largest one.
+const FOOT: f64 = 0.25;
+/// Motors whose torques are all below this share of the limits hold no arm that has weight: its brakes do.
+const BRAKED: f64 = 0.5;
+/// One force explains at least so much of a push. It acts on another link than the last one where that link's origin
+/// explains so much more than the tool.
 const EXPLAINED: f64 = 0.5;
+const OTHER_LINK: f64 = 0.2;
+/// What is there for this share of the rests of a log, of which there are several, is carried, and no push.
+const CARRIED: f64 = 0.9;
+/// Rounds in which what pushes is taken out of what is usual.
+const ROUNDS: usize = 2;
 
 /// The pushes in all logs, those that were fitted first.
-pub(crate) fn pushes_at_rest(study: &Study<'_>, model: &Model) -> Vec<RestPush> {
-    let friction: Vec<f64> = (0..study.data.dof())
-        .map(|j| {
-            let gamma = model.fit.friction(j);
-            gamma[0].abs() + gamma[2].abs()
-        })
-        .collect();
-    [&study.data, &study.validation].into_iter().flat_map(|data| in_data(data, &friction)).collect()
+///
+/// `arm` is the arm with the changes of `model`, and the last link holds the model's payload during the windows `held`
+/// of the fitted logs and of the validation set.
+pub(crate) fn pushes_at_rest(
+    study: &Study<'_>,
+    (model, arm): (&TorqueModel, &RigidArm),
+    held: &[Vec<Window>; 2],
+) -> Vec<RestPush> {
+    let sets = [&study.data, &study.validation];
+    let friction: Vec<f64> = model.gammas().iter().map(|g| g[0].abs() + g[2].abs()).collect();
+    let [mut fitted, judged] = [0, 1].map(|k| rests(sets[k], (model, arm), &held[k]));
+    // A push in one log hides those of others until it is known.
+    for _ in 0..ROUNDS {
+        let found = pushed(&fitted, None, &friction);
+        let runs: Vec<Vec<Range<usize>>> = found.into_iter().flat_map(|(_, runs)| runs).collect();
+        for (rest, runs) in fitted.iter_mut().zip(runs) {
+            rest.calm = (0..rest.samples.len()).map(|k| !runs.iter().any(|run| run.contains(&k))).collect();
+        }
+    }
+    let pushes = |k: usize, own: &[Rest<'_>], found: Vec<(Limits, Vec<Vec<Range<usize>>>)>| {
+        let each = found.iter().flat_map(|(limits, runs)| runs.iter().map(move |runs| (limits, runs)));
+        let of = |(rest, (limits, runs)): (&Rest<'_>, (&Limits, &Vec<Range<usize>>))| {
+            runs.iter().filter_map(|run| rest.push(sets[k], limits, run)).collect::<Vec<_>>()
+        };
+        own.iter().zip(each).flat_map(of).collect::<Vec<_>>()
+    };
+    let in_fitted = pushes(0, &fitted, pushed(&fitted, None, &friction));
+    let in_judged = pushes(1, &judged, pushed(&judged, Some(&fitted), &friction));
+    in_fitted.into_iter().chain(in_judged).collect()
 }
 
-fn in_data(data: &Data<'_>, friction: &[f64]) -> Vec<RestPush> {
-    let stretches: Vec<Stretch<'_>> =
-        data.recordings.iter().flat_map(|recording| Stretch::all(data, recording)).collect();
-    // Noise of the torque at rest by joint: a median over stretches, most of which nobody touches.
-    let noise: Vec<f64> = (0..data.dof())
-        .map(|j| median(&mut stretches.iter().map(|s| s.noise(j)).collect::<Vec<_>>()))
-        .collect();
-    let limit: Vec<f64> = friction.iter().zip(&noise).map(|(f, n)| 2.0 * f + DEVIATIONS * n).collect();
-    stretches.iter().flat_map(|stretch| stretch.pushes(data, &limit, &noise)).collect()
+/// When something pushes, by log and rest, with what may be left there. The rests of `fitted` tell that of other logs; where
+/// there are none, the other logs of the rests themselves.
+fn pushed(
+    rests: &[Rest<'_>],
+    fitted: Option<&[Rest<'_>]>,
+    friction: &[f64],
+) -> Vec<(Limits, Vec<Vec<Range<usize>>>)> {
+    let of = |own: &[Rest<'_>]| {
+        let log = own[0].recording.log;
+        let others: Vec<&Rest<'_>> = match fitted {
+            Some(fitted) => fitted.iter().collect(),
+            None => rests.iter().filter(|rest| rest.recording.log != log).collect(),
+        };
+        let limits = Limits::new(friction, &others, own);
+        let mut runs: Vec<Vec<Range<usize>>> = own.iter().map(|rest| rest.pushed(&limits)).collect();
+        let pushed: usize = runs.iter().flatten().map(Range::len).sum();
+        let all: usize = own.iter().map(|rest| rest.samples.len()).sum();
+        if own.len() > 1 && pushed as f64 >= CARRIED * all as f64 {
+            runs.iter_mut().for_each(Vec::clear);
+        }
+        (limits, runs)
+    };
+    rests.chunk_by(|a, b| a.recording.log == b.recording.log).map(of).collect()
+}
+
+/// How far the torque of each joint at rest may be from the model's, N·m.
+struct Limits {
+    limit: Vec<f64>,
+    /// Standard deviation of the torque at rest.
+    noise: Vec<f64>,
+}
+
+impl Limits {
+    fn new(friction: &[f64], others: &[&Rest<'_>], own: &[Rest<'_>]) -> Limits {
+        let seconds: f64 = others.iter().map(|rest| rest.calm_seconds()).sum();
+        // A median over rests, most of which nobody touches.
+        let noise = |j: usize| {
+            let mut all: Vec<f64> = others.iter().copied().chain(own).map(|rest| rest.noise(j)).collect();
+            median(&mut all)
+        };
+        let noise: Vec<f64> = (0..friction.len()).map(noise).collect();
+        let limit = |j: usize| {
+            let usual = match seconds >= ENOUGH_REST {
+                true => {
+                    let mut sizes: Vec<f64> = others.iter().flat_map(|rest| rest.calm_sizes(j)).collect();
+                    let k = ((sizes.len() - 1) as f64 * USUAL) as usize;
+                    let (_, usual, _) = sizes.select_nth_unstable_by(k, f64::total_cmp);
+                    MARGIN * usual.max(friction[j])
+                }
+                false => STICKS * friction[j],
+            };
+            usual + DEVIATIONS * noise[j]
+        };
+        Limits { limit: (0..friction.len()).map(limit).collect(), noise }
+    }
 }
 
 /// A time in which no joint moves.
-struct Stretch<'r> {
+struct Rest<'r> {
     recording: &'r Recording,
     samples: Range<usize>,
-    /// Torque less its median, in the band, by joint, N·m.
+    /// Measured less predicted torque in the band by joint, N·m.
+    left: Vec<Vec<f64>>,
+    /// Measured torque in the band by joint, N·m.
     torque: Vec<Vec<f64>>,
+    /// Where nothing pushes, as far as that is known.
+    calm: Vec<bool>,
 }
 
-impl<'r> Stretch<'r> {
-    fn all(data: &Data<'_>, recording: &'r Recording) -> Vec<Stretch<'r>> {
+/// The rests of some logs, in order.
+fn rests<'r>(data: &'r Data<'_>, (model, arm): (&TorqueModel, &RigidArm), held: &[Window]) -> Vec<Rest<'r>> {
+    let of = |recording: &'r Recording| {
         let mut moves = vec![false; recording.len()];
         for j in 0..data.dof() {
             let v: Vec<f64> = recording.velocity(j).collect();
             let moving = motion::moving(&v, recording.rate, data.rest_velocity[j]);
             moves.iter_mut().zip(moving).for_each(|(all, moving)| *all |= moving);
         }
-        let runs = runs(&moves, |moves| !moves);
-        let shortest = (SHORTEST_REST * recording.rate).ceil() as usize;
-        let guard = (GUARD * recording.rate).ceil() as usize;
-        let inside = |run: Range<usize>| run.start + guard..run.end.saturating_sub(guard);
+        let (guard, shortest) = ((GUARD * recording.rate).ceil() as usize, SHORTEST * recording.rate);
+        // Before an arm sets off it stands; after it has stopped it comes to rest.
+        let settled = |run: Range<usize>| if run.start == 0 { run } else { run.start + guard..run.end };
+        let long = runs(&moves, |moves| !moves).into_iter().map(settled);
         let long: Vec<Range<usize>> =
-            runs.into_iter().map(inside).filter(|run| run.start < run.end && run.len() >= shortest).collect();
+            long.filter(|run| run.start < run.end && run.len() as f64 >= shortest).collect();
         if long.is_empty() {
             return Vec::new();
         }
-        let torque: Vec<Vec<f64>> =
-            (0..data.dof()).map(|j| data.band.filtered(&recording.smooth_torque(j))).collect();
-        let of = |samples: Range<usize>| {
-            let less_median = |torque: &Vec<f64>| {
-                let own = &torque[samples.clone()];
-                let usual = median(&mut own.to_vec());
-                own.iter().map(|t| t - usual).collect()
-            };
-            Stretch { recording, torque: torque.iter().map(less_median).collect(), samples }
-        };
-        long.into_iter().map(of).collect()
-    }
-
-    /// The standard deviation of a joint's torque, by the median of its size; not 0, where a log holds a torque that
-    /// never changes.
-    fn noise(&self, joint: usize) -> f64 {
-        f64::max(
-            LEAST_NOISE,
-            NORMAL * median(&mut self.torque[joint].iter().map(|t| t.abs()).collect::<Vec<_>>()),
-        )
-    }
-
-    fn pushes(&self, data: &Data<'_>, limit: &[f64], noise: &[f64]) -> Vec<RestPush> {
-        let n = self.samples.len();
-        let over =
-            |k: usize, share: f64| (0..limit.len()).any(|j| self.torque[j][k].abs() > share * limit[j]);
-        let above: Vec<bool> = (0..n).map(|k| over(k, 1.0)).collect();
-        let mut found: Vec<Range<usize>> = Vec::new();
-        for peak in runs(&above, |above| above) {
-            // From where the joint that stands out leaves what is usual to where it is back.
-            let size =
-                |k: usize| (0..limit.len()).map(|j| self.torque[j][k].abs() / limit[j]).fold(0.0, f64::max);
-            let highest = peak.clone().map(size).fold(0.0, f64::max);
-            let foot = |k: &usize| size(*k) < FOOT * highest;
-            let from = (0..peak.start).rev().find(foot);
-            let to = (peak.end..n).find(foot);
-            // What does not come back is no push: a brake that falls in, a load that is put down.
-            let (Some(from), Some(to)) = (from, to) else { continue };
-            if found.last().is_none_or(|last| last.end <= from) {
-                found.push(from..to);
+        // A joint that rests has no velocity, whatever its encoder's steps are.
+        let mut still = recording.clone();
+        for (v, moves) in still.v.chunks_exact_mut(data.dof()).zip(&moves) {
+            if !moves {
+                v.fill(0.0);
             }
         }
-        let long = |run: &Range<usize>| {
-            let seconds = run.len() as f64 / self.recording.rate;
-            seconds >= SHORTEST && (run.len() as f64) < LONGEST * n as f64
+        let predicted = model.torque_in(arm, &data.logs[recording.log], &still, held);
+        let torque: Vec<Vec<f64>> =
+            (0..data.dof()).map(|j| data.band.filtered(&recording.smooth_torque(j))).collect();
+        let left = |j: usize| -> Vec<f64> {
+            let own: Vec<f64> = predicted.iter().skip(j).step_by(data.dof()).copied().collect();
+            torque[j].iter().zip(data.band.filtered(&own)).map(|(measured, own)| measured - own).collect()
         };
-        found.into_iter().filter(long).filter_map(|run| self.push(data, limit, noise, run)).collect()
+        let left: Vec<Vec<f64>> = (0..data.dof()).map(left).collect();
+        let cut = |all: &[Vec<f64>], samples: &Range<usize>| {
+            all.iter().map(|of| of[samples.clone()].to_vec()).collect::<Vec<_>>()
+        };
+        let rest = |samples: Range<usize>| Rest {
+            recording,
+            left: cut(&left, &samples),
+            torque: cut(&torque, &samples),
+            calm: vec![true; samples.len()],
+            samples,
+        };
+        long.into_iter().map(rest).collect()
+    };
+    let recordings: Vec<&Recording> = data.recordings.iter().collect();
+    parallel::map(&recordings, |recording| of(recording)).into_iter().flatten().collect()
+}
+
+impl Rest<'_> {
+    /// For how long nothing pushes, s.
+    fn calm_seconds(&self) -> f64 {
+        self.calm.iter().filter(|calm| **calm).count() as f64 / self.recording.rate
     }
 
-    fn push(&self, data: &Data<'_>, limit: &[f64], noise: &[f64], run: Range<usize>) -> Option<RestPush> {
-        let dof = self.torque.len();
-        let size = |k: usize| (0..dof).map(|j| (self.torque[j][k] / limit[j]).powi(2)).sum::<f64>();
-        let top = run.clone().max_by(|a, b| size(*a).total_cmp(&size(*b)))?;
-        let deviation: Vec<f64> = (0..dof).map(|j| self.torque[j][top]).collect();
+    /// The size of a joint's residual where nothing pushes, N·m.
+    fn calm_sizes(&self, joint: usize) -> impl Iterator<Item = f64> + '_ {
+        self.left[joint].iter().zip(&self.calm).filter(|(_, calm)| **calm).map(|(left, _)| left.abs())
+    }
+
+    /// The standard deviation of a joint's torque, by the median of its distance from its median; not 0, where a log
+    /// holds a torque that never changes.
+    fn noise(&self, joint: usize) -> f64 {
+        let usual = median(&mut self.left[joint].clone());
+        let mut sizes: Vec<f64> = self.left[joint].iter().map(|r| (r - usual).abs()).collect();
+        f64::max(LEAST_NOISE, NORMAL * median(&mut sizes))
+    }
+
+    /// The largest residual over its limit at a sample, over joints.
+    fn size(&self, limits: &Limits, k: usize) -> f64 {
+        largest(&self.left, &limits.limit, k)
+    }
+
+    /// When something pushes: samples of the rest.
+    fn pushed(&self, limits: &Limits) -> Vec<Range<usize>> {
+        let n = self.samples.len();
+        // Brakes hold the arm, and motors do not.
+        let braked = |k: usize| largest(&self.torque, &limits.limit, k) < BRAKED;
+        let above: Vec<bool> = (0..n).map(|k| self.size(limits, k) > 1.0 && !braked(k)).collect();
+        let shortest = SHORTEST * self.recording.rate;
+        let mut found: Vec<Range<usize>> = Vec::new();
+        for peak in runs(&above, |above| above) {
+            let highest = peak.clone().map(|k| self.size(limits, k)).fold(0.0, f64::max);
+            let foot = |k: &usize| self.size(limits, *k) < FOOT * highest || braked(*k);
+            let from = (0..peak.start).rev().find(foot).map_or(0, |k| k + 1);
+            let to = (peak.end..n).find(foot).unwrap_or(n);
+            match found.last_mut().filter(|last| (from as f64) < last.end as f64 + shortest) {
+                Some(last) => last.end = last.end.max(to),
+                None => found.push(from..to),
+            }
+        }
+        found.into_iter().filter(|run| run.len() as f64 >= shortest).collect()
+    }
+
+    /// The force of a push.
+    fn push(&self, data: &Data<'_>, limits: &Limits, run: &Range<usize>) -> Option<RestPush> {
+        let dof = self.left.len();
+        let top = run.clone().max_by(|a, b| self.size(limits, *a).total_cmp(&self.size(limits, *b)))?;
+        let left: Vec<f64> = (0..dof).map(|j| self.left[j][top]).collect();
         let q = &self.recording.q[(self.samples.start + top) * dof..][..dof];
-        let lever = data.body.force_columns(q)?;
-        // Each joint counts as surely as its friction lets it.
-        let weight: Vec<f64> = limit.iter().zip(noise).map(|(l, n)| 1.0 / (l * l + n * n)).collect();
-        let sum = |x: &[f64], y: &[f64]| (0..dof).map(|j| weight[j] * x[j] * y[j]).sum::<f64>();
-        let gram = Mat::from_fn(3, 3, |a, b| sum(&lever[a], &lever[b]));
-        let right: Vec<f64> = lever.iter().map(|l| sum(l, &deviation)).collect();
-        let force = Solver::new(&gram, |_| true).solve(&right);
-        let explained: f64 = force.iter().zip(&right).map(|(f, r)| f * r).sum();
-        let share = explained / sum(&deviation, &deviation);
+        let fit = |lever: [Vec<f64>; 3]| force(limits, &left, &lever);
+        let (mut force, mut share) = fit(data.body.force_columns(q)?)?;
+        let mut point = Point::tool(data.body);
+        for link in (0..dof - 1).rev() {
+            let Some(other) = at_link(data.body, link, q).and_then(fit) else { continue };
+            if other.1 > share + OTHER_LINK {
+                (force, share) = other;
+                point = Point::origin(data.body, link);
+            }
+        }
         let at = |k: usize| self.recording.start + (self.samples.start + k) as f64 / self.recording.rate;
         let joints = (0..dof)
-            .filter(|j| run.clone().any(|k| self.torque[*j][k].abs() > limit[*j]))
+            .filter(|j| run.clone().any(|k| self.left[*j][k].abs() > limits.limit[*j]))
             .map(JointNumber::from_index);
-        let largest = |of: &dyn Fn(usize) -> f64| (0..dof).map(of).fold(0.0, f64::max);
+        let beyond = |j: usize| (left[j].abs() - limits.limit[j]) / limits.noise[j] + DEVIATIONS;
         (share >= EXPLAINED).then(|| RestPush {
-            size: largest(&|j| deviation[j].abs() / limit[j]),
-            beyond: largest(&|j| (deviation[j].abs() - limit[j]) / noise[j] + DEVIATIONS),
+            size: self.size(limits, top),
+            beyond: (0..dof).map(beyond).fold(0.0, f64::max),
             log: data.logs[self.recording.log].clone(),
             from: at(run.start),
             to: at(run.end),
-            force: [force[0], force[1], force[2]],
+            force,
+            point,
             joints: joints.collect(),
             share,
         })
     }
+}
+
+/// The force that explains most of what is left at one sample, N, and the share of it; each joint counts as surely as
+/// its limit lets it.
+fn force(limits: &Limits, left: &[f64], lever: &[Vec<f64>; 3]) -> Option<([f64; 3], f64)> {
+    let weight = |j: usize| 1.0 / (limits.limit[j].powi(2) + limits.noise[j].powi(2));
+    let sum = |x: &[f64], y: &[f64]| (0..left.len()).map(|j| weight(j) * x[j] * y[j]).sum::<f64>();
+    let gram = Mat::from_fn(3, 3, |a, b| sum(&lever[a], &lever[b]));
+    let right: Vec<f64> = lever.iter().map(|l| sum(l, left)).collect();
+    let force = Solver::new(&gram, |_| true).solve(&right);
+    let explained: f64 = force.iter().zip(&right).map(|(f, r)| f * r).sum();
+    let share = explained / sum(left, left);
+    share.is_finite().then(|| ([force[0], force[1], force[2]], share))
+}
+
+/// The torques of a unit force along each base axis at a link's origin.
+fn at_link(body: &RigidArm, link: usize, q: &[f64]) -> Option<[Vec<f64>; 3]> {
+    let mass = link * ParameterKind::ALL.len() + ParameterKind::M as usize;
+    let along = |axis: usize| body.gravity_columns(axis, &[mass], q);
+    Some([along(0)?, along(1)?, along(2)?])
+}
+
+/// The largest value over its limit at a sample, over joints.
+fn largest(values: &[Vec<f64>], limits: &[f64], k: usize) -> f64 {
+    values.iter().zip(limits).map(|(own, limit)| own[k].abs() / limit).fold(0.0, f64::max)
 }
 
 /// The runs of what is wanted.
